@@ -1,0 +1,362 @@
+"""Case: what the specimen is. Validated once, at birth; lengths and pressures carry their unit in the key.
+
+A case holds no paths and no binary. `read_case` reads TOML, `Case.toml()` writes it back with every default.
+"""
+
+import difflib
+import hashlib
+import json
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tomli_w
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+
+from fdnet.errors import CaseError
+
+MAX_CONCENTRATION = 0.30
+"""Random sequential addition of spheres saturates near 0.38 (Torquato, Uche & Stillinger 2006)."""
+
+CONTACT_STEP_LIMIT = 0.2
+"""Largest time step over sqrt(m/k): at 0.3 energy still holds, at 0.5 it grows (measured, docs/physics.md)."""
+
+
+def _as_tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Fraction = Annotated[float, Field(gt=0, lt=1)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Pair = Annotated[tuple[Positive, Positive], BeforeValidator(_as_tuple)]
+Triple = Annotated[tuple[Positive, Positive, Positive], BeforeValidator(_as_tuple)]
+Vector = Annotated[tuple[Finite, Finite, Finite], BeforeValidator(_as_tuple)]
+Radius = Annotated[Positive | Pair, Field(union_mode="smart")]
+
+
+class Part(BaseModel):
+    """A table of the case file: frozen, no unknown keys, no silent conversion of text to numbers."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+class Spheres(Part):
+    """What grains and fines share: sizes, density and linear (Hooke) contact parameters."""
+
+    radius_mm: Radius
+    density_kg_m3: Positive
+    normal_stiffness_N_m: Positive
+    shear_stiffness_N_m: Positive
+    friction: NonNegative = 0.55
+    damping_ratio: Annotated[float, Field(ge=0, lt=1)] = 0.2
+
+    @property
+    def radius_range_m(self) -> tuple[float, float]:
+        """Smallest and largest radius, m; radii are uniform by number between them."""
+        pair = self.radius_mm if isinstance(self.radius_mm, tuple) else (self.radius_mm, self.radius_mm)
+        return pair[0] * 1e-3, pair[1] * 1e-3
+
+    @property
+    def mean_radius_m(self) -> float:
+        """Number mean of the radius, m."""
+        low, high = self.radius_range_m
+        return 0.5 * (low + high)
+
+    @property
+    def mean_volume_m3(self) -> float:
+        """Mean sphere volume of a radius uniform in [a, b]: pi/3 (a + b)(a^2 + b^2)."""
+        low, high = self.radius_range_m
+        return 3.141592653589793 / 3 * (low + high) * (low**2 + high**2)
+
+    @property
+    def sauter_diameter_m(self) -> float:
+        """Diameter of equal volume to surface ratio, 6 V/S = 2 <r^3>/<r^2>, radius uniform in [a, b]."""
+        low, high = self.radius_range_m
+        return 2 * (0.25 * (low + high) * (low**2 + high**2)) / ((low**2 + low * high + high**2) / 3)
+
+
+class Box(Part):
+    """The specimen: flow and depth along the first side; `sides` is what bounds the other two."""
+
+    size_mm: Triple
+    sides: Literal["walls", "periodic"] = "walls"
+    wall_friction: NonNegative = 0.0
+
+
+class Grains(Spheres):
+    """The skeleton. `porosity` counts overlap once; `count` overrides it."""
+
+    porosity: Fraction | None = None
+    count: Annotated[int, Field(ge=1)] | None = None
+    density_kg_m3: Positive = 2650.0
+    normal_stiffness_N_m: Positive = 94.3e9
+    shear_stiffness_N_m: Positive = 34.0e9
+    motion: Literal["fixed", "mobile"] = "fixed"
+    max_overlap: Fraction = 0.15
+
+
+class Fines(Spheres):
+    """The invading particles: a slab upstream, given by its length or by the number of fines."""
+
+    density_kg_m3: Positive = 2146.0
+    normal_stiffness_N_m: Positive = 63.0e9
+    shear_stiffness_N_m: Positive = 26.0e9
+    concentration: Annotated[float, Field(gt=0, le=MAX_CONCENTRATION)] = 0.10
+    count: Annotated[int, Field(ge=1)] | None = None
+    slab_mm: Positive | None = None
+
+
+class Fluid(Part):
+    """The mud's liquid. Its velocity is given, or follows from Darcy's law and Carman-Kozeny."""
+
+    viscosity_cP: Positive = 50.0
+    density_kg_m3: Positive = 1095.0
+    overbalance_MPa: Positive = 3.5
+    velocity_m_s: Positive | None = None
+    darcy_length_mm: Positive | None = None
+
+
+class Drag(Part):
+    """Stokes drag on every fine: evaluated every step, or held for `refresh_steps` steps."""
+
+    field: Literal["uniform", "network"] = "uniform"
+    multiplier: Positive = 1.0
+    scheme: Literal["every_step", "held"] = "held"
+    refresh_steps: Annotated[int, Field(ge=1)] | None = None
+    upstream: Literal["interstitial", "darcy"] = "interstitial"
+
+
+class Gravity(Part):
+    """`auto` leaves gravity out of the deck where gravity over drag is below `negligible_below`."""
+
+    mode: Literal["auto", "on", "off"] = "auto"
+    acceleration_m_s2: Vector = (0.0, 0.0, -9.81)
+    buoyancy: bool = True
+    negligible_below: NonNegative = 1e-3
+
+
+class Run(Part):
+    """Run control. Times left out are derived from the case (see `fdnet render`)."""
+
+    stiffness_N_m: Positive | None = 1.0e4
+    time_step_factor: Annotated[float, Field(gt=0, le=CONTACT_STEP_LIMIT)] = 0.1
+    time_step_s: Positive | None = None
+    duration_ms: Positive | None = None
+    plug_time_ms: Positive | None = None
+    cap_ms: Positive | None = None
+    checkpoint_ms: Positive | None = None
+
+
+class AnalysisChoices(Part):
+    """How permeability is computed; the default laws are fdnet's most accurate pair."""
+
+    sections: Annotated[int, Field(ge=1)] = 8
+    law: Literal["thesis", "effective", "hydraulic", "series"] = "series"
+    damage_law: Literal["thesis", "thesis-code", "kozeny"] = "kozeny"
+    clogging_threshold: Fraction | None = None
+    middle_band: Literal["threshold", "position"] = "threshold"
+    throat_overlap: Literal["exact", "two-plane"] = "exact"
+    profile_bin_mm: Positive = 0.25
+
+
+class Case(Part):
+    """One specimen. Without `fines` the pack stays intact and no invasion is run."""
+
+    name: Annotated[str, Field(min_length=1, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")]
+    seed: Annotated[int, Field(ge=0, lt=2**31)] = 1
+    box: Box
+    grains: Grains
+    fines: Fines | None = None
+    fluid: Fluid = Fluid()
+    drag: Drag = Drag()
+    gravity: Gravity = Gravity()
+    run: Run = Run()
+    analysis: AnalysisChoices = AnalysisChoices()
+
+    @model_validator(mode="after")
+    def _parts_fit(self) -> "Case":
+        found = list(cross_problems({name: getattr(self, name) for name in type(self).model_fields}))
+        if found:
+            raise ValueError("; ".join(found))
+        return self
+
+    @property
+    def size_m(self) -> tuple[float, float, float]:
+        """Box sides, m."""
+        x, y, z = self.box.size_mm
+        return x * 1e-3, y * 1e-3, z * 1e-3
+
+    @property
+    def periodic(self) -> tuple[bool, bool, bool]:
+        """Which directions are periodic; the flow direction never is."""
+        sideways = self.box.sides == "periodic"
+        return False, sideways, sideways
+
+    def data(self) -> dict[str, Any]:
+        """All keys with a value, defaults written out (TOML has no null: keys without a value are left out)."""
+        return _without_none(self.model_dump(mode="json"))
+
+    def toml(self) -> str:
+        """The full resolved case as TOML."""
+        return tomli_w.dumps(self.data())
+
+    def digest(self, stage: str = "analyse") -> str:
+        """Hash of what `stage` depends on: "pack" ignores fines, fluid and analysis, "invade" the analysis."""
+        data = self.data()
+        if stage in ("pack", "invade"):
+            data.pop("analysis")
+            data.pop("name")
+        if stage == "pack":
+            data["grains"].pop("motion")
+            data = {key: data[key] for key in ("seed", "box", "grains")} | {"stiffness": self.run.stiffness_N_m}
+        return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def _without_none(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_none(item) for key, item in value.items() if item is not None}
+    return value
+
+
+def cross_problems(parts: Mapping[str, Any]) -> Iterator[str]:
+    """What is wrong between the parts of a case; parts that did not validate are absent or None."""
+    box, grains, fines = parts.get("box"), parts.get("grains"), parts.get("fines")
+    for name, spheres in (("grains", grains), ("fines", fines)):
+        pair = spheres.radius_mm if spheres else None
+        if isinstance(pair, tuple) and pair[0] >= pair[1]:
+            yield f"{name}.radius_mm: {list(pair)} must rise, [smallest, largest]"
+    if grains and grains.porosity is None and grains.count is None:
+        yield "grains.porosity: missing, give it (0 to 1) or grains.count"
+    if fines and (fines.count is None) == (fines.slab_mm is None):
+        yield f"fines.count: {fines.count} with fines.slab_mm: {fines.slab_mm}, give exactly one of the two"
+    if box and grains:
+        yield from _box_problems(box, grains)
+    if grains and fines and fines.radius_range_m[1] >= grains.radius_range_m[0]:
+        yield (f"fines.radius_mm: {fines.radius_mm} is not below grains.radius_mm {grains.radius_mm} "
+               "(the network needs a clear gap)")
+    drag = parts.get("drag")
+    if drag and drag.field == "network":
+        yield "drag.field: 'network' is not available yet; expected 'uniform'"
+    if drag and drag.scheme == "every_step" and drag.refresh_steps not in (None, 1):
+        yield f"drag.refresh_steps: {drag.refresh_steps} belongs to drag.scheme 'held', not 'every_step'"
+
+
+def _box_problems(box: Box, grains: Grains) -> Iterator[str]:
+    diameter_mm = 2e3 * grains.radius_range_m[1]
+    need = 2.0 if box.sides == "periodic" else 1.0
+    for axis, side in zip("xyz", box.size_mm, strict=True):
+        least = diameter_mm * (need if axis != "x" else 1.0)
+        if side < least:
+            why = "a grain would meet its own image" if need == 2.0 and axis != "x" else "a grain does not fit"
+            yield f"box.size_mm: side {axis} is {side:g} mm, expected at least {least:g} mm ({why})"
+
+
+def known_keys(model: type[BaseModel] = Case, prefix: str = "") -> Iterator[str]:
+    """Every dotted key a case file may hold."""
+    for name, field in model.model_fields.items():
+        yield prefix + name
+        part = _part_of(field.annotation)
+        if part is not None:
+            yield from known_keys(part, f"{prefix}{name}.")
+
+
+def case_from(data: Mapping[str, Any], *, source: str = "case") -> Case:
+    """A Case from nested tables.
+
+    Raises CaseError that lists every problem: dotted path, value given, what is allowed, nearest known key.
+    """
+    problems = _schema_problems(Case, data)
+    parts = {name: _usable_part(field.annotation, data[name]) for name, field in Case.model_fields.items()
+             if name in data}
+    problems += [p for p in cross_problems(parts) if not any(p in q for q in problems)]
+    if problems:
+        raise CaseError(f"{source}: {len(problems)} problem{'s' * (len(problems) > 1)}: " + " | ".join(problems))
+    return Case.model_validate(data)
+
+
+def _usable_part(annotation: Any, data: Any) -> Part | None:
+    """The part without its bad keys, so that checks between parts still see its good ones; None if hopeless."""
+    model = _part_of(annotation)
+    if model is None or not isinstance(data, dict):
+        return None
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        bad = {item["loc"][0] for item in error.errors() if item["loc"]}
+    rest = {key: value for key, value in data.items() if key not in bad}
+    return model.model_validate(rest) if not _schema_problems(model, rest) else None
+
+
+def _part_of(annotation: Any) -> type[Part] | None:
+    candidates = (annotation, *getattr(annotation, "__args__", ()))
+    return next((t for t in candidates if isinstance(t, type) and issubclass(t, Part)), None)
+
+
+def _schema_problems(model: type[BaseModel], data: Any) -> list[str]:
+    try:
+        model.model_validate(data)
+    except ValidationError as error:
+        lines = [_problem(dict(item)) for item in error.errors()]
+        return list(dict.fromkeys(lines))
+    return []
+
+
+def _problem(item: dict[str, Any]) -> str:
+    path = ".".join(str(part) for part in item["loc"] if not _is_union_tag(part))
+    given = item["input"]
+    if item["type"] == "extra_forbidden":
+        near = difflib.get_close_matches(path, list(known_keys()), n=1, cutoff=0.5)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        return f"{path}: unknown key (given {given!r}){hint}"
+    if item["type"] == "missing":
+        return f"{path}: missing, a value is needed"
+    message = item["msg"].removeprefix("Value error, ")
+    if item["type"] == "value_error":
+        return f"{path}: {message}" if path else message
+    message = message.replace("Input should be", "should be").replace("a valid tuple", "a list")
+    return f"{path}: {given!r} {message}"
+
+
+def _is_union_tag(part: Any) -> bool:
+    return isinstance(part, str) and ("[" in part or part in ("float", "int", "constrained-float"))
+
+
+def set_keys(data: dict[str, Any], assignments: list[str]) -> dict[str, Any]:
+    """`data` with dotted `key=value` assignments put in; values are read as TOML, bare words as text.
+
+    Raises CaseError for a malformed assignment.
+    """
+    result = json.loads(json.dumps(data))
+    for assignment in assignments:
+        key, equals, text = assignment.partition("=")
+        names = key.strip().split(".")
+        if not equals or not all(names):
+            raise CaseError(f"--set {assignment}: expected key=value with a dotted key, e.g. fines.radius_mm=0.05")
+        table = result
+        for name in names[:-1]:
+            table = table.setdefault(name, {})
+            if not isinstance(table, dict):
+                raise CaseError(f"--set {assignment}: {name} is a value, not a table")
+        table[names[-1]] = _toml_value(text.strip())
+    return result
+
+
+def _toml_value(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def read_case(path: Path, *, assignments: list[str] | None = None) -> Case:
+    """The case in the TOML file at `path`. Raises CaseError: unreadable file, bad TOML, any invalid parameter."""
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise CaseError(f"{path}: cannot be read as a case file: {error}; give the path of a TOML file") from error
+    except tomllib.TOMLDecodeError as error:
+        raise CaseError(f"{path}: not valid TOML: {error}") from error
+    return case_from(set_keys(data, assignments or []), source=str(path))

@@ -1,0 +1,186 @@
+"""The `fdnet` command: run, render, permeability. Thin: it reads arguments, calls the package, prints.
+
+Exit codes: 0 done, 2 bad input (nothing written), 3 LIGGGHTS missing or failed, 4 degenerate geometry or an unconverged
+solve, 130 stopped by the user.
+"""
+
+import argparse
+import json
+import shlex
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+from fdnet.errors import FdnetError
+
+_STOPPED = 130
+
+
+class _Parser(argparse.ArgumentParser):
+    """One line on stderr for a bad command line too."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    options = _parser().parse_args(given)
+    options.command_line = shlex.join(["fdnet", *given])
+    if hasattr(signal, "SIGTERM"):
+        signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        return options.action(options)
+    except FdnetError as error:
+        if options.debug:
+            raise
+        print(f"fdnet: {_one_line(error)}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print("fdnet: stopped; what was written is kept, continue with --resume", file=sys.stderr)
+        return _STOPPED
+    except OSError as error:
+        if options.debug:
+            raise
+        print(f"fdnet: {error.filename or 'system'}: {error.strerror or error}; free space or mend permissions, then continue "
+              "with --resume", file=sys.stderr)
+        return 2
+
+
+def _interrupt(*_: Any) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())
+
+
+def _parser() -> argparse.ArgumentParser:
+    common = _Parser(add_help=False)
+    common.add_argument("--debug", action="store_true", help="show a traceback on errors")
+    parser = _Parser(prog="fdnet", description=str(__doc__).splitlines()[0])
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
+    commands = parser.add_subparsers(required=True, metavar="command")
+    _add_run(commands, common)
+    _add_render(commands, common)
+    _add_permeability(commands, common)
+    return parser
+
+
+class _Version(argparse.Action):
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from importlib import metadata
+
+        print(f"fdnet {metadata.version('fdnet')}")
+        parser.exit(0)
+
+
+def _add_case(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("case", type=Path, metavar="CASE.toml", help="the case file")
+    parser.add_argument("--seed", type=int, help="overrides the seed of the case")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="overrides a key, e.g. fines.count=500")
+    parser.add_argument("--np", type=_ranks, default=1, metavar="N", help="MPI ranks for LIGGGHTS (default 1)")
+
+
+def _ranks(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{value} ranks, expected 1 or more")
+    return value
+
+
+def _add_run(commands: Any, common: argparse.ArgumentParser) -> None:
+    run = commands.add_parser("run", parents=[common], help="pack, invade, analyse and report one case")
+    _add_case(run)
+    run.add_argument("--out", type=Path, help="run folder (default runs/NAME)")
+    run.add_argument("--resume", action="store_true", help="continue an unfinished run")
+    run.add_argument("--force", action="store_true", help="replace what is there")
+    run.add_argument("--stages", default="pack,invade,analyse,report", help="comma-separated (default: all four)")
+    run.add_argument("--json", action="store_true", help="print summary.json on standard output")
+    run.add_argument("--liggghts", metavar="PATH", help="the LIGGGHTS binary")
+    run.add_argument("--timeout", type=float, metavar="SECONDS", help="stop LIGGGHTS after this time (continue with --resume)")
+    run.add_argument("--quiet", action="store_true", help="no progress")
+    run.set_defaults(action=_run)
+
+
+def _add_render(commands: Any, common: argparse.ArgumentParser) -> None:
+    render = commands.add_parser("render", parents=[common], help="write the decks without LIGGGHTS and print the scales")
+    _add_case(render)
+    render.add_argument("--out", type=Path, required=True, help="folder for the decks")
+    render.set_defaults(action=_render)
+
+
+def _add_permeability(commands: Any, common: argparse.ArgumentParser) -> None:
+    from fdnet.permeability_command import add_arguments, run
+
+    command = commands.add_parser("permeability", parents=[common], help="permeability of a CSV of spheres, without LIGGGHTS")
+    add_arguments(command)
+    command.set_defaults(action=run)
+
+
+def _case_of(options: argparse.Namespace) -> Any:
+    from fdnet.case import read_case
+
+    seed = [] if options.seed is None else [f"seed={options.seed}"]
+    return read_case(options.case, assignments=[*options.set, *seed])
+
+
+def _stages(text: str) -> tuple[str, ...]:
+    from fdnet.errors import CaseError
+    from fdnet.run_folder import STAGES
+
+    asked = [part.strip() for part in text.split(",") if part.strip()]
+    unknown = [part for part in asked if part not in STAGES]
+    if unknown or not asked:
+        raise CaseError(f"--stages: {text!r} has {unknown or 'nothing'}, expected some of {','.join(STAGES)}")
+    return tuple(stage for stage in STAGES if stage in asked)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from fdnet.pipeline import RunOptions, run_case
+
+    case = _case_of(options)
+    out = options.out or Path("runs") / case.name
+    chosen = RunOptions(out=out, ranks=options.np, resume=options.resume, force=options.force, stages=_stages(options.stages),
+                        liggghts=options.liggghts, timeout=options.timeout, show_progress=not options.quiet,
+                        command=options.command_line)
+    summary = run_case(case, chosen)
+    if options.json:
+        print(json.dumps(summary, indent=2))
+    else:
+        _print_summary(summary, out)
+    return 0
+
+
+def _print_summary(summary: dict[str, Any], out: Path) -> None:
+    from fdnet.summary_text import summary_lines
+
+    for line in summary_lines(summary) if summary else ["done (no analysis was asked for)"]:
+        print(line)
+    print(f"run folder: {out}")
+
+
+def _render(options: argparse.Namespace) -> int:
+    from fdnet.pipeline import render_decks
+    from fdnet.scale_table import scale_rows
+    from fdnet.scales import scales_of
+
+    case = _case_of(options)
+    scales = scales_of(case)
+    decks = render_decks(case, options.out, ranks=options.np)
+    for row in scale_rows(case, scales):
+        print(f"{row.name:<36} {row.symbol:<11} {row.value:>12.4g} {row.unit:<5} {row.formula:<40} {row.source}")
+    for warning in scales.warnings:
+        print(f"warning: {warning}")
+    for deck in decks:
+        print(f"deck: {deck}")
+    return 0
+
+
+Action = Callable[[argparse.Namespace], int]
+
+if __name__ == "__main__":
+    sys.exit(main())

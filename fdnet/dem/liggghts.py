@@ -1,0 +1,175 @@
+"""The LIGGGHTS binary: found, started, followed, stopped, and judged. Exit code 0 alone proves nothing (docs/physics.md)."""
+
+import contextlib
+import ctypes
+import os
+import re
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from fdnet.errors import LiggghtsError
+
+END_MARK = "DECK_DONE"
+SCREEN, LOG = "screen.txt", "log.liggghts"
+KNOWN_VERSION = "3.8.0"
+_PROJECT = Path(__file__).resolve().parents[2]
+_BAD_LINE = re.compile(r"^(ERROR|Lost atoms)|Signal: |Segmentation fault|Forced restart written|No space left")
+_NAN = re.compile(r"(?i)(?:^|\s)[-+]?(?:nan|inf)(?:\s|$)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Binary:
+    """A LIGGGHTS that answers: its path and version, and the MPI launcher that belongs to it (None: serial only)."""
+
+    path: Path
+    version: str
+    launcher: Path | None
+
+    def command(self, deck: str, ranks: int) -> list[str]:
+        """The command line for a deck in the current folder.
+
+        Raises LiggghtsError when several ranks are asked for and there is no launcher.
+        """
+        base = [str(self.path), "-in", deck, "-log", LOG]
+        stdbuf = shutil.which("stdbuf")
+        if ranks == 1:
+            return ([stdbuf, "-oL"] if stdbuf else []) + base
+        if self.launcher is None:
+            raise LiggghtsError(f"--np {ranks}: no mpirun beside {self.path} or on PATH; install openmpi-bin or use --np 1")
+        return [str(self.launcher), "--allow-run-as-root", "--oversubscribe", "-np", str(ranks), *base]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """One finished, verified execution. Exists only if complete."""
+
+    directory: Path
+    command: tuple[str, ...]
+    version: str
+    seconds: float
+    ranks: int
+
+
+def find_binary(option: str | None = None) -> Binary:
+    """LIGGGHTS from `option`, $FDNET_LIGGGHTS, PATH or the project's .prefix, in that order.
+
+    Raises LiggghtsError when there is none, or when it does not answer like LIGGGHTS.
+    """
+    asked = option or os.environ.get("FDNET_LIGGGHTS")
+    places = [asked] if asked else ["liggghts", str(_PROJECT / ".prefix" / "bin" / "liggghts")]
+    found = next((hit for hit in map(shutil.which, places) if hit), None)
+    if found is None:
+        raise LiggghtsError(f"LIGGGHTS not found (looked for {', '.join(places)}); run scripts/setup.sh, install the "
+                            "Debian package liggghts, or give its path with --liggghts")
+    path = Path(found).absolute()
+    beside = path.parent / "mpirun"
+    launcher = str(beside) if beside.exists() else (shutil.which("mpirun") or shutil.which("orterun"))
+    return Binary(path=path, version=_version(path), launcher=Path(launcher) if launcher else None)
+
+
+def _version(path: Path) -> str:
+    try:
+        answer = subprocess.run([str(path), "-h", "-log", "none"], capture_output=True, timeout=60, check=False,
+                                stdin=subprocess.DEVNULL, cwd="/tmp")
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise LiggghtsError(f"{path}: cannot be started: {error}; check the file or run scripts/setup.sh") from error
+    text = (answer.stdout + answer.stderr).decode("utf-8", "replace")
+    match = re.search(r"Version LIGGGHTS[-A-Z]*\s+([0-9.]+)", text)
+    if not match:
+        first = text.strip().splitlines()[:1]
+        raise LiggghtsError(f"{path}: does not answer like LIGGGHTS (exit {answer.returncode}, {first}); expected "
+                            f"version {KNOWN_VERSION}, run scripts/setup.sh")
+    return match.group(1)
+
+
+def run_deck(folder: Path, deck: str, *, binary: Binary, ranks: int = 1,
+             follow: Callable[[str], None] | None = None, timeout: float | None = None) -> Run:
+    """Run `folder/deck` to its end mark; `follow` gets each new line of the screen as it appears.
+
+    Raises LiggghtsError with the evidence when the run did not really finish. On KeyboardInterrupt the run is
+    stopped and what it wrote is kept.
+    """
+    if not (folder / deck).is_file():
+        raise LiggghtsError(f"{folder / deck}: deck not found; render it first")
+    command, start = binary.command(deck, ranks), time.monotonic()
+    with (folder / SCREEN).open("wb") as screen:
+        try:
+            process = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=screen,
+                                       stderr=subprocess.STDOUT, env=_environment(), start_new_session=True,
+                                       preexec_fn=_die_with_parent(ranks))
+        except OSError as error:
+            raise LiggghtsError(f"{command[0]}: cannot be started: {error}") from error
+        try:
+            _wait(process, folder / SCREEN, follow, None if timeout is None else start + timeout)
+        except BaseException:
+            _stop(process)
+            raise
+    _verify(folder, deck, process.returncode)
+    return Run(directory=folder, command=tuple(command), version=binary.version, seconds=time.monotonic() - start,
+               ranks=ranks)
+
+
+def _environment() -> dict[str, str]:
+    return os.environ | {"OMP_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+
+
+def _die_with_parent(ranks: int) -> Callable[[], None]:
+    """The child is ended by the kernel when fdnet dies, so that no orphan writes into a resumed run."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    last = signal.SIGKILL if ranks == 1 else signal.SIGTERM
+
+    def ask() -> None:
+        libc.prctl(1, last, 0, 0, 0)
+
+    return ask
+
+
+def _wait(process: subprocess.Popen, screen: Path, follow: Callable[[str], None] | None, deadline: float | None) -> None:
+    with screen.open("r", encoding="utf-8", errors="replace") as lines:
+        while True:
+            code, partial = process.poll(), lines.tell()
+            for line in iter(lines.readline, ""):
+                if not line.endswith("\n") and code is None:
+                    lines.seek(partial)
+                    break
+                partial = lines.tell()
+                if follow:
+                    follow(line.rstrip("\n"))
+            if code is not None:
+                return
+            if deadline is not None and time.monotonic() > deadline:
+                raise LiggghtsError(f"{screen.parent}: LIGGGHTS did not end within its time limit and was stopped; "
+                                    "raise --timeout and continue with --resume")
+            time.sleep(0.05)
+
+
+def _stop(process: subprocess.Popen) -> None:
+    for end, patience in ((signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0)):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, end)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(patience)
+            return
+
+
+def _verify(folder: Path, deck: str, code: int) -> None:
+    text = (folder / SCREEN).read_text(encoding="utf-8", errors="replace")
+    lines = text.splitlines()
+    bad = [line.strip() for line in lines if _BAD_LINE.search(line)]
+    where = f"{folder / deck}"
+    if code == 0 and not bad and any(line.strip() == END_MARK for line in lines):
+        numbers = [line for line in lines if _NAN.search(line) and not line.lstrip().startswith(("#", "print", "fix"))]
+        if numbers:
+            raise LiggghtsError(f"{where}: not-a-number in the output ({numbers[0].strip()[:80]!r}); "
+                                "lower run.time_step_factor")
+        return
+    evidence = bad[0] if bad else (lines[-1].strip() if lines else "no output")
+    state = f"ended by signal {-code}" if code < 0 else f"exit {code}"
+    finished = "" if bad else f", no {END_MARK} line"
+    raise LiggghtsError(f"{where}: LIGGGHTS failed ({state}{finished}): {evidence[:200]}; see {folder / SCREEN}, "
+                        "mend the cause and continue with --resume")

@@ -1,0 +1,187 @@
+"""The dense grain pack: small spheres at random, grown in stages, relaxed to rest (thesis, appendix A)."""
+
+import json
+import math
+import os
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fdnet.case import Case
+from fdnet.contacts import max_overlap
+from fdnet.dem.deck import Deck, LeftOut, number, render_text
+from fdnet.dem.dump import COLUMNS, FORMAT, Frame, read_frame
+from fdnet.dem.liggghts import Binary, Run, run_deck
+from fdnet.dem.scene import contact_variables, header_variables, wall_variables, write_data
+from fdnet.errors import CaseError, LiggghtsError
+from fdnet.network.porosity import measure_porosity
+from fdnet.scales import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES, PACK_START, Scales, grain_count, sphere_mass
+from fdnet.snapshot import Array, Kind, Snapshot
+
+POROSITY_TOLERANCE = 0.003
+ATTEMPTS = 8
+RELAX_RUN_STEPS = 2500
+REST_RUNS = 4 * PACK_RELAX_STEPS // RELAX_RUN_STEPS
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pack:
+    """A pack at rest: its grains, its porosity with standard error, and how it was reached."""
+
+    grains: Snapshot
+    porosity: float
+    porosity_error: float
+    porosity_sum: float
+    max_overlap: float
+    steps: int
+    step_s: float
+    attempts: tuple[dict[str, Any], ...]
+    run: Run
+
+
+def make_pack(case: Case, scales: Scales, folder: Path, *, binary: Binary, ranks: int = 1,
+              follow: Callable[[str], None] | None = None) -> Pack:
+    """Pack until the porosity (overlap counted once) is within 0.003 of the target, by adjusting the count.
+
+    Raises CaseError when the porosity cannot be reached, LiggghtsError when a run fails or does not come to rest.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    counts, tried = [grain_count(case)], []
+    while True:
+        attempt = folder / f"attempt_{len(counts)}"
+        pack = _attempt(case, scales, attempt, counts[-1], binary=binary, ranks=ranks, follow=follow)
+        tried.append({"grains": len(pack.grains), "porosity": pack.porosity, "porosity_error": pack.porosity_error,
+                      "max_overlap": pack.max_overlap})
+        if case.grains.count is not None or _met(case, pack):
+            return _accept(folder, attempt, pack, tried)
+        counts.append(_next_count(case, tried))
+        shutil.rmtree(attempt)
+
+
+def _met(case: Case, pack: Pack) -> bool:
+    assert case.grains.porosity is not None
+    if pack.max_overlap > case.grains.max_overlap:
+        raise CaseError(f"grains.porosity: {case.grains.porosity} needs grains that overlap by {100 * pack.max_overlap:.1f} % of "
+                        f"a diameter (limit grains.max_overlap {case.grains.max_overlap:g}); raise the porosity or the limit")
+    return abs(pack.porosity - case.grains.porosity) + pack.porosity_error <= POROSITY_TOLERANCE
+
+
+def _next_count(case: Case, tried: list[dict[str, Any]]) -> int:
+    """Newton on the plain sum first, then the secant through the two nearest attempts."""
+    target = case.grains.porosity
+    assert target is not None
+    grain = case.grains.mean_volume_m3 / math.prod(case.size_m)
+    nearest = sorted(tried, key=lambda row: abs(row["porosity"] - target))
+    slope = -grain
+    if len(nearest) > 1 and nearest[0]["grains"] != nearest[1]["grains"]:
+        secant = (nearest[0]["porosity"] - nearest[1]["porosity"]) / (nearest[0]["grains"] - nearest[1]["grains"])
+        slope = min(max(secant, -1.5 * grain), -0.4 * grain)
+    guess = round(nearest[0]["grains"] + (target - nearest[0]["porosity"]) / slope)
+    done = {row["grains"] for row in tried}
+    around = [count for count in (guess, guess + 1, guess - 1, guess + 2, guess - 2) if count > 0 and count not in done]
+    if not around or len(tried) >= ATTEMPTS:
+        raise CaseError(f"grains.porosity: {target} not met within {POROSITY_TOLERANCE} after {len(tried)} packs, nearest "
+                        f"{nearest[0]['porosity']:.4f} with {nearest[0]['grains']} grains (one grain is {grain:.4f}); use a "
+                        "larger box, another seed, or give grains.count")
+    return around[0]
+
+
+def _accept(folder: Path, attempt: Path, pack: Pack, tried: list[dict[str, Any]]) -> Pack:
+    for path in attempt.iterdir():
+        target = folder / path.name
+        if target.is_dir():
+            shutil.rmtree(target)
+        os.replace(path, target)
+    attempt.rmdir()
+    (folder / "attempts.json").write_text(json.dumps(tried, indent=1) + "\n")
+    return Pack(grains=pack.grains, porosity=pack.porosity, porosity_error=pack.porosity_error,
+                porosity_sum=pack.porosity_sum, max_overlap=pack.max_overlap, steps=pack.steps, step_s=pack.step_s,
+                attempts=tuple(tried), run=pack.run)
+
+
+def _attempt(case: Case, scales: Scales, folder: Path, count: int, *, binary: Binary, ranks: int,
+             follow: Callable[[str], None] | None) -> Pack:
+    if folder.exists():
+        shutil.rmtree(folder)
+    (folder / "post").mkdir(parents=True)
+    write_pack_inputs(case, scales, folder, count=count, ranks=ranks)
+    run = run_deck(folder, "in.pack", binary=binary, ranks=ranks, follow=follow)
+    frame = read_frame(folder / "post" / "pack.dump")
+    screen = (folder / "screen.txt").read_text(encoding="utf-8", errors="replace")
+    if "FDNET restless" in screen:
+        raise LiggghtsError(f"{folder}: the pack did not come to rest in {REST_RUNS * RELAX_RUN_STEPS} steps; "
+                            "lower grains.max_overlap demands or raise grains.porosity")
+    grains = snapshot_of(frame, case, time_s=0.0)
+    if len(grains) != count:
+        raise LiggghtsError(f"{folder}/post/pack.dump: {len(grains)} grains, expected {count}: some were lost")
+    porosity = measure_porosity(grains, periodic=case.periodic)
+    return Pack(grains=grains, porosity=porosity.mean, porosity_error=porosity.standard_error, porosity_sum=porosity.sum,
+                max_overlap=max_overlap(grains, case.periodic), steps=frame.step, step_s=scales.pack_step, attempts=(),
+                run=run)
+
+
+def write_pack_inputs(case: Case, scales: Scales, folder: Path, *, count: int, ranks: int = 1) -> Deck:
+    """Write in.pack and pack.data (random small spheres) into `folder`."""
+    deck = render_pack(case, scales, count=count, ranks=ranks)
+    (folder / "in.pack").write_text(deck.text)
+    radii = draw_radii(case, count)
+    rng = np.random.default_rng([case.seed, count])
+    small, size = PACK_START * radii, np.array(case.size_m)
+    margin = small[:, None] * np.array([1.0, *([0.0, 0.0] if case.box.sides == "periodic" else [1.0, 1.0])])
+    seeds = Snapshot(step=0, time_s=0.0, box=_box(case), id=np.arange(1, count + 1), kind=np.full(count, Kind.GRAIN),
+                     position=margin + rng.random((count, 3)) * (size - 2 * margin), radius=small,
+                     velocity=np.zeros((count, 3)))
+    write_data(folder / "pack.data", seeds, bounds=_box(case), density=np.full(count, case.grains.density_kg_m3), types=2)
+    return deck
+
+
+def draw_radii(case: Case, count: int) -> Array:
+    """`count` radii (N,) m, uniform by number; the last grain closes the plain sum of the target as far as its range allows."""
+    low, high = case.grains.radius_range_m
+    radii = np.random.default_rng([case.seed, 7]).uniform(low, high, count)
+    if low < high and count > 1:
+        wanted = count * case.grains.mean_volume_m3 - 4 / 3 * math.pi * np.sum(radii[:-1] ** 3)
+        radii[-1] = np.clip(np.cbrt(max(wanted, 0.0) * 3 / (4 * math.pi)), low, high)
+    return radii
+
+
+def render_pack(case: Case, scales: Scales, *, count: int, ranks: int = 1) -> Deck:
+    """The packing deck: soft frictionless springs, viscous damping, growth in separate runs, rest test."""
+    stiffness = scales.contacts["grain-grain"].normal_stiffness
+    low, high = case.grains.radius_range_m
+    mass = sphere_mass(low, case.grains.density_kg_m3)
+    left_out = [LeftOut(what="friction and tangential history", why="grains are packed frictionless"),
+                LeftOut(what="gravity", why="only the geometry of the pack is wanted"),
+                LeftOut(what="fines and fluid", why="the pack is made before the invasion")]
+    if ranks == 1:
+        left_out.append(LeftOut(what="MPI processor grid", why="one rank"))
+    contacts = contact_variables(case, scales, "pack", friction=False)
+    contacts["damping"] = " ".join([number(0.8 * math.sqrt(stiffness / mass))] * contacts["size"] ** 2)
+    text = render_text("pack.in.j2", header_variables(case, "pack", left_out, ranks) | {
+        "skin": number(0.4 * low), "contacts": contacts, "walls": wall_variables(case, "pack", friction=False),
+        "time_step": number(scales.pack_step), "viscous": number(0.03 * math.sqrt(stiffness * mass)),
+        "thermo_steps": RELAX_RUN_STEPS, "density": number(case.grains.density_kg_m3),
+        "stages": [number((PACK_START + (1 - PACK_START) * s / PACK_STAGES) / PACK_START) for s in range(1, PACK_STAGES + 1)],
+        "stage_steps": PACK_STAGE_STEPS, "relax_runs": REST_RUNS, "relax_steps": RELAX_RUN_STEPS,
+        "rest_energy": number(count * 1e-10 * 0.5 * stiffness * (0.02 * high) ** 2),
+        "dump_columns": COLUMNS, "dump_format": FORMAT})
+    return Deck(text=text, stage="pack", digest=case.digest("pack"), left_out=tuple(left_out))
+
+
+def _box(case: Case) -> Array:
+    return np.column_stack([np.zeros(3), case.size_m])
+
+
+def snapshot_of(frame: Frame, case: Case, *, time_s: float) -> Snapshot:
+    """A dump frame as a Snapshot in the specimen's box; positions across a periodic side are wrapped into it."""
+    position = np.column_stack([frame.column(c) for c in "xyz"])
+    for axis, periodic in enumerate(case.periodic):
+        if periodic:
+            position[:, axis] = np.mod(position[:, axis], case.size_m[axis])
+    return Snapshot(step=frame.step, time_s=time_s, box=_box(case), id=frame.column("id"), kind=frame.column("type"),
+                    position=position, radius=frame.column("radius"),
+                    velocity=np.column_stack([frame.column(f"v{c}") for c in "xyz"]))

@@ -1,0 +1,79 @@
+"""What both scenes share in a deck: header, contacts, walls, and the data file of spheres."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fdnet.case import Case
+from fdnet.dem.deck import LeftOut, number
+from fdnet.scales import Contact, Scales
+from fdnet.snapshot import Array, Snapshot
+
+_MATERIALS = {"pack": ("grain", "wall"), "invade": ("grain", "fine", "wall")}
+
+
+def header_variables(case: Case, stage: str, left_out: list[LeftOut], ranks: int) -> dict[str, Any]:
+    """Variables of `_header.in.j2`; several ranks never cut the flow direction (fines crowd at the face)."""
+    sideways = "p p" if case.box.sides == "periodic" else "f f"
+    return {"stage": stage, "case_name": case.name, "digest": case.digest(stage), "left_out": left_out,
+            "boundary": f"f {sideways}", "processors": "1 * *" if ranks > 1 else ""}
+
+
+def contact_variables(case: Case, scales: Scales, stage: str, *, friction: bool) -> dict[str, Any]:
+    """The symmetric property matrices of a scene, row by row, and its contact model."""
+    materials = _MATERIALS[stage]
+
+    def matrix(value: str) -> str:
+        return " ".join(number(getattr(_contact(scales, a, b), value)) for a in materials for b in materials)
+
+    size = len(materials)
+    tangential = " tangential history" if friction else ""
+    return {"materials": " ".join(materials), "size": size, "normal": matrix("normal_stiffness"),
+            "damping": matrix("damping_rate"), "shear": matrix("shear_stiffness"),
+            "no_damping": " ".join(["0"] * size**2), "friction": matrix("friction") if friction else "",
+            "pair_model": f"hooke/stiffness{tangential}{_settings(friction)}"}
+
+
+def _settings(friction: bool) -> str:
+    return " tangential_damping off limitForce on" if friction else " limitForce on"
+
+
+def _contact(scales: Scales, first: str, second: str) -> Contact:
+    """The pair's contact in either order; walls do not touch each other, so any value serves."""
+    for pair in (f"{first}-{second}", f"{second}-{first}"):
+        if pair in scales.contacts:
+            return scales.contacts[pair]
+    return scales.contacts["grain-wall"]
+
+
+def wall_variables(case: Case, stage: str, *, friction: bool) -> list[dict[str, Any]]:
+    """Planes at the sides; at both ends too for grains that move (fines pass freely)."""
+    size, material = case.size_m, len(_MATERIALS[stage])
+    ends_hold = "all" if stage == "pack" else ("grains" if case.grains.motion == "mobile" else "")
+    sides_hold = "" if case.box.sides == "periodic" else ("all" if stage == "pack" or ends_hold else "fines")
+    walls = []
+    for axis, held in ((0, ends_hold), (1, sides_hold), (2, sides_hold)):
+        for end, position in enumerate((0.0, size[axis])):
+            if held:
+                walls.append(_wall(f"w{'xyz'[axis]}{end}", held, material, position, friction))
+    return walls
+
+
+def _wall(name: str, group: str, material: int, position: float, friction: bool) -> dict[str, Any]:
+    model = "hooke/stiffness" + (" tangential history" if friction else "")
+    return {"id": name, "group": group, "model": model, "material": material, "plane": f"{name[1]}plane",
+            "position": number(position), "settings": _settings(friction)}
+
+
+def write_data(path: Path, spheres: Snapshot, *, bounds: Array, density: Array, types: int) -> None:
+    """The spheres (N) as a LIGGGHTS data file; `bounds` (3, 2) m of the simulation box, `density` (N,) kg/m3."""
+    lines = ["spheres", "", f"{len(spheres)} atoms", f"{types} atom types", ""]
+    lines += [f"{number(low)} {number(high)} {axis}lo {axis}hi" for (low, high), axis in zip(bounds, "xyz", strict=True)]
+    lines += ["", "Atoms", ""]
+    table = np.column_stack([spheres.id, spheres.kind, 2 * spheres.radius, density, spheres.position])
+    lines += ["%d %d %.17g %.17g %.17g %.17g %.17g" % tuple(row) for row in table]
+    partial = path.with_suffix(path.suffix + ".part")
+    partial.write_text("\n".join(lines) + "\n")
+    os.replace(partial, path)

@@ -1,0 +1,218 @@
+"""Steady flow through a network: pressures from the mass balance of each pore. Viscosity is factored out (g in m3).
+
+Pressure is held on planes across x: 1 on the inlet plane, 0 on the outlet plane. Pores on or beyond a plane are at
+its pressure; a throat that crosses a plane is split there: its part inside has conductance g / f, f the share of its
+length (in x) inside. Where x is periodic and no slab is asked for, the pressure drops by 1 per period instead.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from fdnet.errors import FlowError
+from fdnet.network.solver import METHOD, solve_balances
+from fdnet.network.tessellation import Network
+from fdnet.snapshot import Array, frozen
+
+TOLERANCE = 1e-6
+INLET, OUTLET, BETWEEN = -1, -2, 0
+PLANE_HAIR = 1e-9
+SHORTEST_SHARE = 1e-3
+NO_FLOW = 1e-24
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Flow:
+    """Pressures and fluxes of one solve.
+
+    `pore_pressure` (P,) 1 at the inlet plane, 0 at the outlet plane, NaN where cut off; `throat_flux` (T,) m3 from
+    the first to the second pore; `inflow` m3 = Q mu / dp; `residual` largest imbalance of a pore over the inflow;
+    `mass_balance` |in - out| / in, None without flow (x periodic: the flux across the period against the
+    energy spent, which is flux times the drop of 1);
+    `isolated_pores` not tied to both planes; `reason` why the inflow is 0, else empty.
+    """
+
+    pore_pressure: Array
+    throat_flux: Array
+    method: str
+    residual: float
+    mass_balance: float | None
+    inflow: float
+    isolated_pores: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Links:
+    """Links (K): `ends` (K, 2) pores or INLET, OUTLET; `throat` (K,) the throat it is (part of)."""
+
+    ends: Array
+    conductance: Array
+    throat: Array
+
+
+def solve_flow(network: Network, conductance: Array, *, span: tuple[float, float] | None = None) -> Flow:
+    """Flow for throat `conductance` (T,) m3, through the whole box or the cut-out slab `span` = (low, high) m.
+
+    No open path is not an error: inflow 0 with its reason. Raises FlowError on a conductance that is negative or not
+    finite, and when residual, mass balance or pressure bounds are off by more than 1e-6.
+    """
+    _check(conductance, len(network.throat_pores))
+    if span is None and network.periodic[0]:
+        return _solve_period(network, conductance)
+    low, high = (float(network.box[0, 0]), float(network.box[0, 1])) if span is None else span
+    x = network.pore_position[:, 0]
+    state = _beside_planes(network, x, low, high)
+    links = _cut_links(network, conductance, low, high)
+    free = _tied_to_both(links, state)
+    pressure = np.where(state == INLET, 1.0, np.where(state == OUTLET, 0.0, np.nan))
+    pressure[free] = _solve(links, free)
+    flux = _link_flux(links, pressure)
+    isolated = int(np.sum((state == BETWEEN) & ~free))
+    if not np.any(flux):
+        return Flow(pore_pressure=frozen(pressure), throat_flux=frozen(np.zeros(len(conductance))), method=METHOD,
+                    residual=0.0, mass_balance=None, inflow=0.0, isolated_pores=isolated,
+                    reason=f"no open path from x = {low:g} m to x = {high:g} m")
+    inflow, outflow = _through(links, flux, INLET), -_through(links, flux, OUTLET)
+    per_throat = np.zeros(len(conductance))
+    per_throat[links.throat] = flux
+    return _checked(Flow(
+        pore_pressure=frozen(pressure), throat_flux=frozen(per_throat), method=METHOD, inflow=inflow,
+        residual=_imbalance(links, flux, free) / inflow, mass_balance=abs(inflow - outflow) / inflow,
+        isolated_pores=isolated, reason=""), bounds=(0.0, 1.0))
+
+
+def _check(conductance: Array, count: int) -> None:
+    if conductance.shape != (count,):
+        raise FlowError(f"conductance has shape {conductance.shape}, expected ({count},), one per throat")
+    bad = np.flatnonzero(~np.isfinite(conductance) | (conductance < 0))
+    if len(bad):
+        raise FlowError(f"throat {bad[0]}: conductance {conductance[bad[0]]} m3 is not finite or negative "
+                        f"({len(bad)} such throats); check the law and the fines")
+
+
+def _beside_planes(network: Network, x: Array, low: float, high: float) -> Array:
+    """INLET or OUTLET where `x` is on or beyond that plane, else BETWEEN."""
+    hair = PLANE_HAIR * float(network.box[0, 1] - network.box[0, 0])
+    return np.where(x <= low + hair, INLET, np.where(x >= high - hair, OUTLET, BETWEEN))
+
+
+def _cut_links(network: Network, conductance: Array, low: float, high: float) -> _Links:
+    """Throats with a part between the planes; those crossing a plane are shortened to it."""
+    turned = np.flatnonzero(network.throat_shift[:, 0] != 0)
+    throat = np.concatenate([np.arange(len(conductance)), turned])
+    x = network.throat_ends[throat, :, 0]
+    # a throat across a periodic x face appears at both ends of the box
+    x[len(conductance):] -= (network.throat_shift[turned, 0] * (network.box[0, 1] - network.box[0, 0]))[:, None]
+    side = _beside_planes(network, x, low, high)
+    use = ((side[:, 0] == BETWEEN) | (side[:, 0] != side[:, 1])) & (conductance[throat] > 0)
+    throat, x, side = throat[use], x[use], side[use]
+    inside, whole = np.diff(np.clip(x, low, high), axis=1)[:, 0], np.diff(x, axis=1)[:, 0]
+    cut = np.any(side != BETWEEN, axis=1)
+    share = np.divide(inside, whole, out=np.ones(len(x)), where=cut)
+    return _Links(ends=np.where(side == BETWEEN, network.throat_pores[throat], side), throat=throat,
+                  conductance=conductance[throat] / np.maximum(share, SHORTEST_SHARE))
+
+
+def _tied_to_both(links: _Links, state: Array) -> Array:
+    """True (P,) for pores between the planes whose group of open links touches both planes."""
+    inner = links.ends[np.all(links.ends >= 0, axis=1)]
+    count = len(state)
+    graph = sparse.coo_matrix((np.ones(len(inner)), (inner[:, 0], inner[:, 1])), shape=(count, count))
+    _, group = connected_components(graph, directed=False)
+    free = state == BETWEEN
+    for plane in (INLET, OUTLET):
+        beside = links.ends[np.any(links.ends == plane, axis=1)].max(axis=1, initial=-1)
+        free &= np.isin(group, group[beside[beside >= 0]])
+    return free
+
+
+def _solve(links: _Links, free: Array) -> Array:
+    """Pressures of the `free` pores."""
+    index = np.cumsum(free) - 1
+    count = int(free.sum())
+    tied, fed = np.zeros(count), np.zeros(count)
+    for own, other in (links.ends.T, links.ends.T[::-1]):
+        held = (own >= 0) & (other < 0)
+        held[held] = free[own[held]]
+        tied += np.bincount(index[own[held]], weights=links.conductance[held], minlength=count)
+        held &= other == INLET
+        fed += np.bincount(index[own[held]], weights=links.conductance[held], minlength=count)
+    inner = np.all(links.ends >= 0, axis=1)
+    inner[inner] = np.all(free[links.ends[inner]], axis=1)
+    return solve_balances(index[links.ends[inner]], links.conductance[inner], tied, fed)
+
+
+def _link_flux(links: _Links, pressure: Array) -> Array:
+    at = np.where(links.ends >= 0, pressure[np.maximum(links.ends, 0)], np.where(links.ends == INLET, 1.0, 0.0))
+    return np.nan_to_num(links.conductance * (at[:, 0] - at[:, 1]), nan=0.0)
+
+
+def _through(links: _Links, flux: Array, plane: int) -> float:
+    """Flux out of the plane into the pores."""
+    return float(np.sum(flux[links.ends[:, 0] == plane]) - np.sum(flux[links.ends[:, 1] == plane]))
+
+
+def _imbalance(links: _Links, flux: Array, free: Array) -> float:
+    net = np.zeros(len(free))
+    for own, sign in ((links.ends[:, 0], 1.0), (links.ends[:, 1], -1.0)):
+        net += np.bincount(own[own >= 0], weights=sign * flux[own >= 0], minlength=len(free))
+    return float(np.abs(net[free]).max(initial=0.0))
+
+
+def _checked(flow: Flow, *, bounds: tuple[float, float]) -> Flow:
+    pressure = flow.pore_pressure[np.isfinite(flow.pore_pressure)]
+    low, high = float(pressure.min(initial=np.inf)), float(pressure.max(initial=-np.inf))
+    within = not len(pressure) or (low >= bounds[0] - TOLERANCE and high <= bounds[1] + TOLERANCE)
+    balance = flow.mass_balance or 0.0
+    if not (np.isfinite(flow.inflow) and flow.residual <= TOLERANCE and balance <= TOLERANCE and within):
+        raise FlowError(f"solve of {len(pressure)} pores: residual {flow.residual:.2g}, in/out balance {balance:.2g}, "
+                        f"pressures {low:.6g} to {high:.6g}; expected <= {TOLERANCE:g} and pressures within {bounds}")
+    return flow
+
+
+def _solve_period(network: Network, conductance: Array) -> Flow:
+    """A pressure drop of 1 per period along x; one pore of each connected group is the reference."""
+    count = len(network.pore_position)
+    open_throat = np.flatnonzero(conductance > 0)
+    pair, jump = network.throat_pores[open_throat], network.throat_shift[open_throat, 0].astype(float)
+    g = conductance[open_throat]
+    graph = sparse.coo_matrix((np.ones(len(pair)), (pair[:, 0], pair[:, 1])), shape=(count, count))
+    _, group = connected_components(graph, directed=False)
+    free = np.ones(count, bool)
+    free[np.unique(group, return_index=True)[1]] = False
+    pressure = np.zeros(count)
+    pressure[free] = _solve_jumps(pair, g, jump, free)
+    flux = g * (pressure[pair[:, 0]] - pressure[pair[:, 1]] + jump)
+    spent = flux**2 / g
+    inflow, driven = float(spent.sum()), float(np.sum(g * jump**2))
+    per_group = np.bincount(group[pair[:, 0]], weights=spent, minlength=count)
+    live = per_group[group] > NO_FLOW * max(driven, 1e-300)
+    per_throat = np.zeros(len(conductance))
+    links = _Links(ends=pair, conductance=g, throat=open_throat)
+    if not live.any():
+        return Flow(pore_pressure=frozen(np.full(count, np.nan)), throat_flux=frozen(per_throat), method=METHOD,
+                    residual=0.0, mass_balance=None, inflow=0.0, isolated_pores=count,
+                    reason="no open path around the period along x")
+    per_throat[open_throat] = np.where(live[pair[:, 0]], flux, 0.0)
+    return _checked(Flow(
+        pore_pressure=frozen(np.where(live, pressure, np.nan)), throat_flux=frozen(per_throat), method=METHOD,
+        residual=_imbalance(links, flux, np.ones(count, bool)) / inflow, inflow=inflow,
+        mass_balance=abs(float(np.sum(flux * jump)) - inflow) / inflow, isolated_pores=int(np.sum(~live)), reason=""),
+        bounds=(-np.inf, np.inf))
+
+
+def _solve_jumps(pair: Array, g: Array, jump: Array, free: Array) -> Array:
+    index = np.cumsum(free) - 1
+    count = int(free.sum())
+    tied, source = np.zeros(count), np.zeros(count)
+    for side, sign in ((0, -1.0), (1, 1.0)):
+        own, other = pair[:, side], pair[:, 1 - side]
+        mine = free[own]
+        source += np.bincount(index[own[mine]], weights=sign * (g * jump)[mine], minlength=count)
+        held = mine & ~free[other]
+        tied += np.bincount(index[own[held]], weights=g[held], minlength=count)
+    inner = np.all(free[pair], axis=1)
+    return solve_balances(index[pair[inner]], g[inner], tied, source)

@@ -1,0 +1,166 @@
+"""Tetrahedra, triangles and the spheres on their corners. Arrays carry any leading shape; lengths in m.
+
+Sources: solid angle, van Oosterom and Strackee 1983 (IEEE Trans. Biomed. Eng. 30, 125, eq. 8); circle and sphere
+touching given ones, Apollonius' problem solved by subtracting the sphere equations; lens of two spheres, the sum of
+two caps pi h^2 (3 r - h) / 3.
+"""
+
+import numpy as np
+
+from fdnet.snapshot import Array
+
+EDGES = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
+FACETS = np.array([(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)])
+SIDES = np.array([(0, 1), (1, 2), (2, 0)])
+
+
+def signed_volume(corner: Array) -> Array:
+    """Volume of tetrahedra (..., 4, 3), m3, positive when corner 3 sees corners 0, 1, 2 turn clockwise."""
+    side = corner[..., 1:, :] - corner[..., :1, :]
+    return np.einsum("...i,...i->...", side[..., 0, :], np.cross(side[..., 1, :], side[..., 2, :])) / 6.0
+
+
+def solid_angles(corner: Array) -> Array:
+    """Signed solid angle (..., 4), sr, at each corner of tetrahedra (..., 4, 3); sign of the volume."""
+    return np.stack([_solid_angle(np.roll(corner, -k, axis=-2)) * (-1.0) ** k for k in range(4)], axis=-1)
+
+
+def _solid_angle(corner: Array) -> Array:
+    a, b, c = (corner[..., k, :] - corner[..., 0, :] for k in (1, 2, 3))
+    la, lb, lc = (np.linalg.norm(v, axis=-1) for v in (a, b, c))
+    dot = [np.einsum("...i,...i->...", u, v) for u, v in ((a, b), (a, c), (b, c))]
+    triple = np.einsum("...i,...i->...", a, np.cross(b, c))
+    return 2.0 * np.arctan2(triple, la * lb * lc + dot[0] * lc + dot[1] * lb + dot[2] * la)
+
+
+def dihedral_angles(corner: Array) -> Array:
+    """Angle (..., 6), rad, between the two faces at each of EDGES of tetrahedra (..., 4, 3)."""
+    found = []
+    for first, second in EDGES:
+        other = [k for k in range(4) if k not in (first, second)]
+        axis = corner[..., second, :] - corner[..., first, :]
+        left, right = (np.cross(axis, corner[..., k, :] - corner[..., first, :]) for k in other)
+        along = np.linalg.norm(np.cross(left, right), axis=-1)
+        found.append(np.arctan2(along, np.einsum("...i,...i->...", left, right)))
+    return np.stack(found, axis=-1)
+
+
+def touching_sphere(corner: Array, radius: Array) -> tuple[Array, Array]:
+    """Centre (..., 3) and radius (...) of the sphere touching four spheres from outside; NaN where there is none.
+
+    Subtracting |x - p_i|^2 = (s + r_i)^2 pairwise leaves x = A + B s, then one quadratic for s.
+    """
+    return _touching(corner, radius)
+
+
+def touching_circle(triangle: Array, radius: Array) -> Array:
+    """Radius (...) of the circle touching three discs from outside in the plane of `triangle` (..., 3, 3); NaN if none.
+    """
+    return _touching(flat(triangle), radius)[1]
+
+
+def _touching(corner: Array, radius: Array) -> tuple[Array, Array]:
+    side = corner[..., 1:, :] - corner[..., :1, :]
+    first = radius[..., 0]
+    apart = radius[..., 1:] - first[..., None]
+    constant = 0.5 * (np.sum(side**2, axis=-1) + first[..., None] ** 2 - radius[..., 1:] ** 2)
+    solved = _solve(side, np.stack([constant, -apart], axis=-1))
+    a, b = solved[..., 0], solved[..., 1]
+    square = np.sum(b**2, axis=-1) - 1.0
+    half = first - np.sum(a * b, axis=-1)
+    rest = np.sum(a**2, axis=-1) - first**2
+    with np.errstate(invalid="ignore", divide="ignore"):
+        # root of square s^2 - 2 half s + rest = 0 in the form that stays finite where square vanishes
+        found = rest / (half + np.sqrt(half**2 - square * rest))
+        found = np.where(found > -np.min(radius, axis=-1), found, np.nan)
+    return corner[..., 0, :] + a + b * found[..., None], found
+
+
+def _solve(matrix: Array, right: Array) -> Array:
+    """Solve (..., n, n) systems; NaN where singular."""
+    flat_system = np.linalg.det(matrix) == 0.0
+    safe = np.where(flat_system[..., None, None], np.eye(matrix.shape[-1]), matrix)
+    return np.where(flat_system[..., None, None], np.nan, np.linalg.solve(safe, right))
+
+
+def circumcentre(corner: Array) -> tuple[Array, Array]:
+    """Centre (..., 3) and radius (...) of the sphere through four points (..., 4, 3); NaN where they are coplanar."""
+    side = corner[..., 1:, :] - corner[..., :1, :]
+    offset = _solve(side, 0.5 * np.sum(side**2, axis=-1)[..., None])[..., 0]
+    return corner[..., 0, :] + offset, np.linalg.norm(offset, axis=-1)
+
+
+def contains(corner: Array, point: Array, *, hair: float = 1e-9) -> Array:
+    """True (...) where `point` (..., 3) lies in the tetrahedron (..., 4, 3), its faces included within `hair`."""
+    side = np.swapaxes(corner[..., 1:, :] - corner[..., :1, :], -1, -2)
+    share = _solve(side, (point - corner[..., 0, :])[..., None])[..., 0]
+    with np.errstate(invalid="ignore"):
+        return np.all(share >= -hair, axis=-1) & (share.sum(axis=-1) <= 1.0 + hair)
+
+
+def flat(triangle: Array) -> Array:
+    """Corners (..., 3, 2) of triangles (..., 3, 3) in their own plane, the first at the origin."""
+    ab, ac = triangle[..., 1, :] - triangle[..., 0, :], triangle[..., 2, :] - triangle[..., 0, :]
+    base = np.linalg.norm(ab, axis=-1)
+    placed = np.zeros((*triangle.shape[:-1], 2))
+    placed[..., 1, 0] = base
+    placed[..., 2, 0] = np.einsum("...i,...i->...", ab, ac) / base
+    placed[..., 2, 1] = np.linalg.norm(np.cross(ab, ac), axis=-1) / base
+    return placed
+
+
+def triangle_area(triangle: Array) -> Array:
+    """Area (...) of triangles (..., 3, 3), m2."""
+    ab, ac = triangle[..., 1, :] - triangle[..., 0, :], triangle[..., 2, :] - triangle[..., 0, :]
+    return 0.5 * np.linalg.norm(np.cross(ab, ac), axis=-1)
+
+
+def triangle_angles(triangle: Array) -> Array:
+    """Angle (..., 3), rad, at each corner of triangles (..., 3, 3)."""
+    found = []
+    for k in range(3):
+        left = triangle[..., (k + 1) % 3, :] - triangle[..., k, :]
+        right = triangle[..., (k + 2) % 3, :] - triangle[..., k, :]
+        across = np.linalg.norm(np.cross(left, right), axis=-1)
+        found.append(np.arctan2(across, np.einsum("...i,...i->...", left, right)))
+    return np.stack(found, axis=-1)
+
+
+def open_area(triangle: Array, radius: Array) -> Array:
+    """Area (...) of triangles (..., 3, 3) outside the discs of `radius` (..., 3) on their corners; may be negative.
+
+    Triangle - sectors + half the lens of each overlapping pair (counted once). Shi 2011, section 3.1.2.
+    """
+    sectors = 0.5 * np.sum(triangle_angles(triangle) * radius**2, axis=-1)
+    ends = triangle[..., SIDES, :]
+    apart = np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1)
+    lens = disc_lens_area(radius[..., SIDES[:, 0]], radius[..., SIDES[:, 1]], apart)
+    return triangle_area(triangle) - sectors + 0.5 * lens.sum(axis=-1)
+
+
+def disc_lens_area(first: Array, second: Array, apart: Array) -> Array:
+    """Area common to two discs whose centres are `apart`, m2."""
+    first, second, apart = np.broadcast_arrays(first, second, apart)
+    small = np.pi * np.minimum(first, second) ** 2
+    found = np.where(apart <= np.abs(first - second), small, 0.0)
+    cross = (apart > np.abs(first - second)) & (apart < first + second)
+    a, b, d = first[cross], second[cross], apart[cross]
+    to_chord = (d**2 + a**2 - b**2) / (2.0 * d)
+    chord = np.sqrt(np.maximum(a**2 - to_chord**2, 0.0))
+    found[cross] = (a**2 * np.arctan2(chord, to_chord) - to_chord * chord
+                    + b**2 * np.arctan2(chord, d - to_chord) - (d - to_chord) * chord)
+    return found
+
+
+def cap_heights(first: Array, second: Array, apart: Array) -> tuple[Array, Array]:
+    """Heights (...) of the two caps that make up the lens of two spheres; zero where they do not overlap."""
+    to_plane = (apart**2 + first**2 - second**2) / (2.0 * apart)
+    overlap = apart < first + second
+    return (np.where(overlap, np.clip(first - to_plane, 0.0, 2.0 * first), 0.0),
+            np.where(overlap, np.clip(second - apart + to_plane, 0.0, 2.0 * second), 0.0))
+
+
+def cap_volume(radius: Array, height: Array) -> Array:
+    """Volume of a spherical cap, m3; `height` outside [0, 2 radius] is taken as its nearer end."""
+    height = np.clip(height, 0.0, 2.0 * radius)
+    return np.pi * height**2 * (3.0 * radius - height) / 3.0

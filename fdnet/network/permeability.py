@@ -1,0 +1,258 @@
+"""Permeability of a pack before and after fines: the whole network analysis of one specimen."""
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from fdnet.errors import CaseError, NetworkError
+from fdnet.network.conductance import DEFAULT_LAW, LAWS
+from fdnet.network.damage import CLEAN, DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, Damage
+from fdnet.network.flow import Flow, solve_flow
+from fdnet.network.invaded import measure_invaded
+from fdnet.network.occupancy import Occupancy, measure_occupancy
+from fdnet.network.porosity import Porosity, measure_porosity
+from fdnet.network.sections import (
+    Profile,
+    Section,
+    SlabK,
+    make_profile,
+    make_sections,
+    profile_edges,
+    reduction,
+    section_edges,
+)
+from fdnet.network.slabs import inplace_permeability, slab_permeability
+from fdnet.network.tessellation import Network, build_network
+from fdnet.snapshot import Array, Snapshot, frozen
+
+__all__ = ["Analysis", "AnalysisOptions", "Profile", "Section", "analyse"]
+
+MOVED = 1e-9
+STAGES = ("tessellate", "occupancy", "conductance", "solve", "porosity")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnalysisOptions:
+    """Choices of an analysis: `sections` count or edges (m), laws by name, `threshold` of the thesis law (None: the
+    law's own), `middle_band` "threshold" or "position", `overlap` "exact" or "two-plane", `profile_bin` m."""
+
+    sections: int | Sequence[float] = 1
+    law: str = DEFAULT_LAW
+    damage_law: str = DEFAULT_DAMAGE_LAW
+    threshold: float | None = None
+    middle_band: str = "threshold"
+    overlap: str = "exact"
+    profile_bin: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Analysis:
+    """Everything the report writes; SI units.
+
+    `network` and all that goes by pore or throat (occupancy, conductances, flows) are of the final grain positions;
+    when the grains moved, `k_initial` and the sections' initial values are of the first positions, `k_moved` is
+    `network` without fines and `flow_initial` its flow. `solver` holds the worst of all solves.
+    """
+
+    network: Network
+    occupancy: Occupancy | None
+    law: str
+    damage_law: str
+    conductance_initial: Array
+    conductance_damaged: Array
+    law_used: Array
+    flow_initial: Flow
+    flow_damaged: Flow
+    k_initial: float
+    k_damaged: float
+    k_moved: float | None
+    k_reduction: float | None
+    porosity_initial: float
+    porosity_initial_error: float
+    porosity_initial_sum: float
+    porosity_damaged: float
+    sections: tuple[Section, ...]
+    profile: Profile
+    invaded_count: int
+    invaded_volume: float
+    invasion_depth: float
+    invasion_depth_p95: float
+    cake_thickness: float
+    solver: Mapping[str, str | float | None]
+    counts: Mapping[str, int]
+    warnings: tuple[str, ...]
+    seconds: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _State:
+    """A network with its conductance, its flow through the whole box and its k."""
+
+    network: Network
+    conductance: Array
+    flow: Flow
+    k: float
+
+
+@dataclass(slots=True)
+class _Log:
+    """Seconds per stage, all flows solved, and what to tell the user."""
+
+    seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
+    flows: list[Flow] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    @contextmanager
+    def timed(self, stage: str) -> Iterator[None]:
+        start = time.perf_counter()
+        yield
+        self.seconds[stage] += time.perf_counter() - start
+
+
+def analyse(
+    initial: Snapshot, damaged: Snapshot | None, *, periodic: tuple[bool, bool, bool], options: AnalysisOptions
+) -> Analysis:
+    """Permeability of the grains of `initial`, and with the fines of `damaged` (grains, moved or not, and all fines).
+
+    `damaged` None: an intact pack. Raises CaseError on unknown laws or wrong section edges, NetworkError on grains that
+    differ between the two and on degenerate geometry, FlowError on a solve that fails its checks; no open path is k = 0
+    with the reason in `warnings`.
+    """
+    _check_names(options)
+    log = _Log()
+    before = initial.grains()
+    after = before if damaged is None else _same_grains(before, damaged.grains())
+    clean = _clean_state(before, periodic, options, log)
+    moved = damaged is not None and _displaced(before, after, periodic)
+    base = _clean_state(after, periodic, options, log) if moved else clean
+    occupancy, damage = _damage(base, damaged, options, log)
+    final = base if damage is None else _state(base.network, damage.conductance, log)
+    spheres = before if damaged is None else after.joined(damaged.fines())
+    invaded = measure_invaded(spheres, periodic=periodic)
+    sections, profile, porosity = _by_depth(clean, final, (before, spheres), options, log)
+    _warn(log, (clean, final), sections)
+    law_used = np.full(len(final.conductance), CLEAN) if damage is None else damage.law_used
+    return Analysis(
+        network=base.network, occupancy=occupancy, law=options.law, damage_law=options.damage_law,
+        conductance_initial=base.conductance, conductance_damaged=final.conductance, law_used=frozen(law_used),
+        flow_initial=base.flow, flow_damaged=final.flow, k_initial=clean.k, k_damaged=final.k,
+        k_moved=base.k if moved else None, k_reduction=reduction(clean.k, final.k),
+        porosity_initial=porosity[0].mean, porosity_initial_error=porosity[0].standard_error,
+        porosity_initial_sum=porosity[0].sum, porosity_damaged=porosity[1].mean, sections=sections, profile=profile,
+        invaded_count=invaded.count, invaded_volume=invaded.volume, invasion_depth=invaded.depth,
+        invasion_depth_p95=invaded.depth_p95, cake_thickness=invaded.cake_thickness, solver=_worst(log.flows),
+        counts=_counts(base.network, occupancy, damage, final.flow), warnings=tuple(log.warnings),
+        seconds=log.seconds)
+
+
+def _check_names(options: AnalysisOptions) -> None:
+    for key, value, known in (("law", options.law, LAWS), ("damage_law", options.damage_law, DAMAGE_LAWS)):
+        if value not in known:
+            raise CaseError(f"analysis.{key}: {value!r} is not known; choose one of {sorted(known)}")
+
+
+def _same_grains(before: Snapshot, after: Snapshot) -> Snapshot:
+    """`after` in the order of `before`, matched by id."""
+    order, wanted = np.argsort(after.id), np.argsort(before.id)
+    if len(before) != len(after) or np.any(after.id[order] != before.id[wanted]):
+        lost = np.setxor1d(before.id, after.id)
+        raise NetworkError(f"grains differ before ({len(before)}) and after ({len(after)}) the invasion, for "
+                           f"example id {lost[:3].tolist()}; give the same pack twice")
+    index = np.empty(len(before), int)
+    index[wanted] = order
+    return after.where(index)
+
+
+def _displaced(before: Snapshot, after: Snapshot, periodic: tuple[bool, bool, bool]) -> bool:
+    size = before.box[:, 1] - before.box[:, 0]
+    shift = after.position - before.position
+    shift = shift - np.where(periodic, np.round(shift / size) * size, 0.0)
+    return bool(np.max(np.linalg.norm(shift, axis=1), initial=0.0) > MOVED)
+
+
+def _clean_state(
+    grains: Snapshot, periodic: tuple[bool, bool, bool], options: AnalysisOptions, log: _Log
+) -> _State:
+    with log.timed("tessellate"):
+        network = build_network(grains, periodic=periodic)
+    with log.timed("conductance"):
+        conductance = LAWS[options.law](network)
+    return _state(network, frozen(conductance), log)
+
+
+def _state(network: Network, conductance: Array, log: _Log) -> _State:
+    with log.timed("solve"):
+        flow = solve_flow(network, conductance)
+    log.flows.append(flow)
+    length = float(network.box[0, 1] - network.box[0, 0])
+    return _State(network=network, conductance=conductance, flow=flow, k=flow.inflow * length / network.area)
+
+
+def _damage(
+    base: _State, damaged: Snapshot | None, options: AnalysisOptions, log: _Log
+) -> tuple[Occupancy | None, Damage | None]:
+    if damaged is None:
+        return None, None
+    with log.timed("occupancy"):
+        occupancy = measure_occupancy(base.network, damaged.fines(), overlap=options.overlap)
+    with log.timed("conductance"):
+        damage = DAMAGE_LAWS[options.damage_law](base.network, occupancy, base.conductance,
+                                                 threshold=options.threshold, middle_band=options.middle_band)
+    return occupancy, damage
+
+
+def _by_depth(
+    clean: _State, final: _State, spheres: tuple[Snapshot, Snapshot], options: AnalysisOptions, log: _Log
+) -> tuple[tuple[Section, ...], Profile, tuple[Porosity, Porosity]]:
+    box, periodic = clean.network.box, clean.network.periodic
+    edges = section_edges(options.sections, box)
+    bins = profile_edges(clean.network.grain_radius if options.profile_bin is None else options.profile_bin, box)
+    cuts = np.unique(np.concatenate([edges, bins]))
+    with log.timed("porosity"):
+        before = measure_porosity(spheres[0], periodic=periodic, edges=cuts)
+        after = before if spheres[1] is spheres[0] else measure_porosity(spheres[1], periodic=periodic, edges=cuts)
+    with log.timed("solve"):
+        k_before = _slab_k(clean, edges, log)
+        k_after = k_before if final is clean else _slab_k(final, edges, log)
+    x = spheres[1].fines().position[:, 0]
+    depth = x[(x >= box[0, 0]) & (x < box[0, 1])]
+    sections = make_sections(edges, (before, after), (k_before, k_after), depth)
+    return sections, make_profile(bins, (before, after), depth), (before, after)
+
+
+def _slab_k(state: _State, edges: Array, log: _Log) -> SlabK:
+    solved = [slab_permeability(state.network, state.conductance, (float(low), float(high)))
+              for low, high in pairwise(edges)]
+    log.flows.extend(flow for _, flow in solved)
+    return SlabK(cut_out=frozen([k for k, _ in solved]),
+                 inplace=frozen(inplace_permeability(state.network, state.flow, edges)))
+
+
+def _warn(log: _Log, states: tuple[_State, _State], sections: tuple[Section, ...]) -> None:
+    for name, state in zip(("k_initial", "k_damaged"), states, strict=True):
+        if state.flow.reason:
+            log.warnings.append(f"{name} = 0: {state.flow.reason}")
+    network = states[0].network
+    thin = [one.section for one in sections if one.x_hi - one.x_lo < 2.0 * network.grain_radius]
+    if thin:
+        log.warnings.append(f"sections {thin} are thinner than a grain diameter ({2 * network.grain_radius:.3g} m): "
+                            "their k is of single throats")
+    if network.counts["grains_outside_box"]:
+        log.warnings.append(f"{network.counts['grains_outside_box']} grains lie outside the box and play no part")
+
+
+def _worst(flows: list[Flow]) -> dict[str, str | float | None]:
+    balances = [flow.mass_balance for flow in flows if flow.mass_balance is not None]
+    return {"method": flows[0].method, "residual": max(flow.residual for flow in flows),
+            "mass_balance": max(balances) if balances else None}
+
+
+def _counts(network: Network, occupancy: Occupancy | None, damage: Damage | None, flow: Flow) -> dict[str, int]:
+    found = dict(network.counts)
+    if occupancy is not None and damage is not None:
+        found |= {**occupancy.counts, **damage.counts, "throats_blocked": int(occupancy.blocked.sum())}
+    return found | {"isolated_pores": flow.isolated_pores}

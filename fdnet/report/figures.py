@@ -1,0 +1,194 @@
+"""PNG figures of one specimen; depth is x, from the formation face. Colours after Okabe and Ito (2008)."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fdnet.report.atomic import replacing
+from fdnet.report.side_view import fill_side_view
+from fdnet.snapshot import Array, Snapshot
+
+if TYPE_CHECKING:
+    from fdnet.network.permeability import Analysis
+
+BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#7F7F7F"
+MM, MICRON = 1e3, 1e6
+DEPTH_LABEL = "depth from the formation face (mm)"
+STYLE: Any = {"font.size": 11, "axes.grid": True, "grid.color": "#DDDDDD", "axes.axisbelow": True,
+         "axes.spines.top": False, "axes.spines.right": False, "legend.edgecolor": "white",
+         "legend.framealpha": 0.9, "lines.linewidth": 2}
+
+CAPTIONS = {
+    "spheres_3d": "The specimen from the front and upstream: the grains of the far half (grey) and the fines, coloured "
+                  "by radius, or by depth where they are of one size. The fluid enters at x = 0.",
+    "side_view": "Section x-z through the middle of the specimen: every circle is the true cut through a sphere.",
+    "porosity_reduction": "Porosity lost to the fines against depth: difference of the intact and the damaged "
+                          "porosity, in fine bins and per section.",
+    "invaded_fraction": "Share of the invaded fines, by number, against depth.",
+    "permeability_ratio": "Damaged over intact permeability of each section, cut out with its own network and in "
+                          "place from the pressures of the whole specimen.",
+    "porosity_profile": "Porosity before and after the invasion against depth, overlap counted once.",
+    "size_distributions": "Inscribed radii of throats and pores between the grains alone, by number; the band is the "
+                          "range of the fines' radii.",
+    "invasion_history": "Fines inside the specimen, passed through it and still upstream, against time.",
+}
+
+
+def draw_all(folder: str | Path, analysis: "Analysis", snapshot: Snapshot | None = None,
+             history: Sequence[Mapping[str, float]] | None = None) -> list[Path]:
+    """Draw every figure that has data into `folder` (made if missing); returns the paths in report order.
+
+    `snapshot` is what the side view shows: the damaged specimen, or the grains alone; without one there is no side
+    view. Figures of damage are left out for an intact pack. `history` rows hold time_s, invaded, passed,
+    upstream. `CAPTIONS` says under each file's stem what it shows.
+    """
+    target = Path(folder)
+    target.mkdir(parents=True, exist_ok=True)
+    fines = None if snapshot is None else snapshot.fines()
+    draws: dict[str, Callable[[Any], None]] = {}
+    if snapshot is not None:
+        draws["side_view"] = partial(fill_side_view, snapshot=snapshot)
+    if analysis.occupancy is not None:
+        draws["porosity_reduction"] = partial(_porosity_reduction, analysis=analysis)
+        draws["invaded_fraction"] = partial(_invaded_fraction, analysis=analysis)
+        draws["permeability_ratio"] = partial(_permeability_ratio, analysis=analysis)
+    draws["porosity_profile"] = partial(_porosity_profile, analysis=analysis)
+    draws["size_distributions"] = partial(_size_distributions, analysis=analysis, fines=fines)
+    if history:
+        draws["invasion_history"] = partial(_invasion_history, history=history)
+    return [_draw(target / f"{name}.png", fill) for name, fill in draws.items()]
+
+
+def _draw(path: Path, fill: Callable[[Any], None]) -> Path:
+    with _figure(path) as figure:
+        fill(figure)
+    return path
+
+
+@contextmanager
+def _figure(path: Path) -> Iterator[Any]:
+    """A figure without pyplot's global state, saved to `path` when filled."""
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with rc_context(STYLE):
+        figure = Figure(figsize=(7.2, 4.4), dpi=130, layout="constrained")
+        FigureCanvasAgg(figure)
+        yield figure
+        with replacing(path) as part:
+            figure.savefig(part)
+
+
+def _stairs(axes: Any, edges: Array, values: Any, **style: Any) -> None:
+    axes.stairs(np.asarray(values, float), np.asarray(edges, float) * MM, baseline=None, linewidth=2, **style)
+
+
+def _section_edges(analysis: "Analysis") -> Array:
+    return np.array([s.x_lo for s in analysis.sections] + [analysis.sections[-1].x_hi])
+
+
+def _depth_axes(figure: Any, analysis: "Analysis", label: str) -> Any:
+    axes = figure.add_subplot()
+    axes.set(xlabel=DEPTH_LABEL, ylabel=label, xlim=np.asarray(analysis.network.box[0]) * MM)
+    return axes
+
+
+def _legend(axes: Any, **style: Any) -> None:
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(**style)
+
+
+def _porosity_reduction(figure: Any, *, analysis: "Analysis") -> None:
+    axes = _depth_axes(figure, analysis, "porosity reduction, intact − damaged (–)")
+    profile, edges = analysis.profile, _section_edges(analysis)
+    lost = np.subtract(profile.porosity_initial, profile.porosity_damaged)
+    axes.stairs(lost, np.asarray(profile.edges) * MM, fill=True, color=BLUE, alpha=0.3, label="bins")
+    _stairs(axes, edges, [s.porosity_initial - s.porosity_damaged for s in analysis.sections], color=BLUE,
+            label="sections")
+    axes.axhline(0, color=GREY, linewidth=0.8)
+    _legend(axes)
+
+
+def _invaded_fraction(figure: Any, *, analysis: "Analysis") -> None:
+    edges = np.asarray(analysis.profile.edges)
+    width = np.diff(edges).mean() * MM
+    axes = _depth_axes(figure, analysis, f"share of invaded fines per {width:.3g} mm (–)")
+    axes.stairs(analysis.profile.fines_fraction, edges * MM, fill=True, color=ORANGE, alpha=0.6,
+                label=f"{analysis.invaded_count} invaded fines")
+    if analysis.invaded_count:
+        axes.axvline(analysis.invasion_depth_p95 * MM, color="black", linestyle="--", linewidth=1.3,
+                     label=f"95 % shallower than {analysis.invasion_depth_p95 * MM:.2f} mm")
+        axes.axvline(analysis.invasion_depth * MM, color="black", linestyle=":", linewidth=1.3,
+                     label=f"deepest {analysis.invasion_depth * MM:.2f} mm")
+    axes.set_ylim(bottom=0)
+    _legend(axes)
+
+
+def _ratios(damaged: Sequence[float], initial: Sequence[float]) -> Array:
+    """Damaged over initial, NaN where there is no intact permeability to compare with."""
+    below = np.asarray(initial, float)
+    return np.divide(np.asarray(damaged, float), below, out=np.full(len(below), np.nan), where=below > 0)
+
+
+def _permeability_ratio(figure: Any, *, analysis: "Analysis") -> None:
+    axes = _depth_axes(figure, analysis, "permeability damaged / intact, k/k₀ (–)")
+    edges, sections = _section_edges(analysis), analysis.sections
+    cut_out = _ratios([s.k_damaged for s in sections], [s.k_initial for s in sections])
+    in_place = _ratios([s.k_damaged_inplace for s in sections], [s.k_initial_inplace for s in sections])
+    _stairs(axes, edges, cut_out, color=BLUE, label="section cut out")
+    _stairs(axes, edges, in_place, color=ORANGE, linestyle="--", label="section in place")
+    if analysis.k_initial > 0:
+        whole = analysis.k_damaged / analysis.k_initial
+        axes.axhline(whole, color=GREY, linewidth=1.2, linestyle=":", label=f"whole specimen {whole:.3f}")
+    highest = np.nanmax([1.0, *cut_out, *in_place])
+    axes.set_ylim(0, 1.05 * highest)
+    _legend(axes, loc="lower right")
+
+
+def _porosity_profile(figure: Any, *, analysis: "Analysis") -> None:
+    axes = _depth_axes(figure, analysis, "porosity (–)")
+    profile = analysis.profile
+    _stairs(axes, profile.edges, profile.porosity_initial, color=GREY,
+            label=f"intact, mean {analysis.porosity_initial:.4f}")
+    if analysis.occupancy is not None:
+        _stairs(axes, profile.edges, profile.porosity_damaged, color=BLUE,
+                label=f"damaged, mean {analysis.porosity_damaged:.4f}")
+    axes.set_ylim(bottom=0)
+    _legend(axes)
+
+
+def _size_distributions(figure: Any, *, analysis: "Analysis", fines: Snapshot | None) -> None:
+    network = analysis.network
+    left, right = figure.subplots(1, 2)
+    for axes, radius, name, colour in ((left, network.throat_radius, "throat", BLUE),
+                                       (right, network.pore_radius, "pore", GREEN)):
+        open_ones = np.asarray(radius)[np.asarray(radius) > 0] * MICRON
+        closed = len(radius) - len(open_ones)
+        label = f"{len(radius)} {name}s" + (f",\n{closed} of them closed\n(not drawn)" if closed else "")
+        if len(open_ones):
+            weights = np.full(len(open_ones), 1 / len(radius))
+            axes.hist(open_ones, bins=30, weights=weights, color=colour, alpha=0.7, label=label)
+        if fines is not None and len(fines):
+            low, high = np.quantile(fines.radius, [0, 1]) * MICRON
+            axes.axvspan(low, high, color=ORANGE, alpha=0.2, linewidth=1, label="fines")
+        axes.set(xlabel=f"{name} radius, inscribed (µm)", ylabel=f"share of {name}s per bin (–)")
+        axes.set_xlim(left=0)
+        _legend(axes, fontsize=9)
+
+
+def _invasion_history(figure: Any, *, history: Sequence[Mapping[str, float]]) -> None:
+    axes = figure.add_subplot()
+    time = np.array([row["time_s"] for row in history])
+    scale, unit = (1.0, "s") if time.max() >= 1 else (1e3, "ms")
+    for name, label, colour, line in (("invaded", "inside the specimen", BLUE, "-"),
+                                      ("passed", "passed the outlet", GREEN, "--"),
+                                      ("upstream", "upstream of the face", ORANGE, ":")):
+        axes.plot(time * scale, [row[name] for row in history], line, color=colour, label=label)
+    axes.set(xlabel=f"time since the fines were released ({unit})", ylabel="number of fines (–)")
+    axes.set_ylim(bottom=0)
+    _legend(axes)

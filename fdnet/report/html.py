@@ -1,0 +1,142 @@
+"""report.html: one self-contained page of a run, its pictures inside."""
+
+import base64
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fdnet.errors import CaseError
+from fdnet.report.atomic import write_text
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+DARCY_M2 = 9.869233e-13  # one darcy, API RP 27 (1952)
+DASH = "–"
+STOP_WORDS = {
+    "plugged": "plugged: no fine crossed the face for the set time",
+    "duration": "the set duration was over",
+    "supply_exhausted": "the supply of fines ran out before the specimen plugged",
+    "cap": "the cap on the run was reached before the specimen plugged",
+}
+SECTION_COLUMNS = (  # key, heading, unit, factor to that unit
+    ("section", "section", "", None), ("x_lo_m", "from", "mm", 1e3), ("x_hi_m", "to", "mm", 1e3),
+    ("porosity_initial", "porosity intact", "–", 1), ("porosity_damaged", "porosity damaged", "–", 1),
+    ("k_initial_m2", "k intact", "m²", 1), ("k_damaged_m2", "k damaged", "m²", 1),
+    ("k_reduction", "k lost", "%", 1e2), ("k_initial_inplace_m2", "k intact, in place", "m²", 1),
+    ("k_damaged_inplace_m2", "k damaged, in place", "m²", 1), ("fines_count", "fines", "", None),
+    ("fines_fraction", "share of fines", "%", 1e2),
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ReportParts:
+    """What the page shows beside the summary; everything may be left empty.
+
+    `figures` (path, caption); `case_text` the resolved case as TOML; `scales` rows with name, symbol, value,
+    unit, formula, source (objects or mappings); `versions` by program; `commands` as typed.
+    """
+
+    figures: Sequence[tuple[Path, str]] = ()
+    case_text: str = ""
+    scales: Sequence[Any] = ()
+    versions: Mapping[str, Any] = field(default_factory=dict)
+    commands: Sequence[str] = ()
+
+
+def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportParts) -> Path:
+    """Write the page atomically. `summary` is the mapping of summary.json; keys it lacks show as a dash.
+
+    Raises CaseError for a figure that cannot be read.
+    """
+    template = _environment().from_string(_template_text())
+    figures = [{"data": _data_uri(Path(file)), "caption": caption, "name": Path(file).name}
+               for file, caption in parts.figures]
+    text = template.render(summary=summary, parts=parts, figures=figures, headline=headline(summary),
+                           columns=SECTION_COLUMNS)
+    return write_text(path, text)
+
+
+def headline(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """The numbers on top: label, value, remark."""
+    lost, invaded, supplied = (summary.get(key) for key in ("k_reduction", "invaded_count", "supplied_count"))
+    whole = [("permeability intact", quantity(summary.get("k_initial_m2"), "m²"), _darcy(summary.get("k_initial_m2"))),
+             ("porosity intact", fixed(summary.get("porosity_initial")), "overlap counted once")]
+    if summary.get("stop_reason") is None and not invaded:
+        return whole
+    reason, loss = summary.get("stop_reason"), DASH if lost is None else f"{100 * lost:.1f} % lost"
+    passed, upstream = quantity(summary.get("passed_count")), quantity(summary.get("upstream_count"))
+    return [
+        whole[0],
+        ("permeability damaged", quantity(summary.get("k_damaged_m2"), "m²"),
+         f"{_darcy(summary.get('k_damaged_m2'))}, {loss}"),
+        whole[1],
+        ("porosity damaged", fixed(summary.get("porosity_damaged")), "overlap counted once"),
+        ("fines invaded", quantity(invaded),
+         f"of {quantity(supplied)} supplied; {passed} passed, {upstream} upstream"),
+        ("invasion depth", _millimetres(summary, "invasion_depth_m"),
+         f"95 % shallower than {_millimetres(summary, 'invasion_depth_p95_m')}"),
+        ("cake thickness", _millimetres(summary, "cake_thickness_m"), "deposit upstream of the face"),
+        ("end of the run", quantity(reason), STOP_WORDS.get(str(reason), "")),
+    ]
+
+
+def quantity(value: Any, unit: str = "") -> str:
+    """A number as a reader wants it: 4 digits, powers of ten written out, `unit` behind; a dash for None or NaN."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return DASH
+    if isinstance(value, bool | str):
+        return str(value)
+    return f"{_digits(value)} {unit}".strip()
+
+
+def fixed(value: Any) -> str:
+    """A porosity: four decimals."""
+    return DASH if value is None else f"{value:.4f}"
+
+
+def scaled(value: Any, factor: float | None) -> Any:
+    """`value` times `factor`; None stays None."""
+    return value if value is None or factor is None else value * factor
+
+
+def _digits(value: float) -> str:
+    if isinstance(value, int) or (float(value).is_integer() and abs(value) < 1e6):
+        return f"{int(value):,}".replace(",", "\u2009")
+    if 1e-3 <= abs(value) < 1e6:
+        return f"{value:.4g}" if abs(value) < 1e4 else f"{value:,.0f}".replace(",", "\u2009")
+    if not math.isfinite(value):
+        return "∞" if value > 0 else "−∞"
+    mantissa, power = f"{value:.3e}".split("e")
+    return f"{mantissa}·10{str(int(power)).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
+
+
+def _darcy(value: Any) -> str:
+    return DASH if value is None else quantity(value / DARCY_M2, "darcy")
+
+
+def _millimetres(summary: Mapping[str, Any], key: str) -> str:
+    return quantity(scaled(summary.get(key), 1e3), "mm")
+
+
+def _environment() -> "Environment":
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters.update(quantity=quantity, fixed=fixed, scaled=scaled)
+    return environment
+
+
+def _template_text() -> str:
+    return resources.files("fdnet.report").joinpath("report.html.j2").read_text(encoding="utf-8")
+
+
+def _data_uri(path: Path) -> str:
+    try:
+        return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")
+    except OSError as error:
+        raise CaseError(f"{path}: figure for the report cannot be read ({error.strerror}); draw it again with "
+                        "--stages report") from error

@@ -1,0 +1,177 @@
+"""ParaView files (.vtp, .pvd) of one specimen, and the 3-D picture drawn in a child process."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from fdnet.report.atomic import replacing, write_text
+from fdnet.report.tables import blocked_throats, pore_porosity
+from fdnet.snapshot import Array, Snapshot
+
+if TYPE_CHECKING:
+    from fdnet.network.permeability import Analysis
+
+PNG_START, PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND"
+LAW_CODES = {"clean": 0, "deposition": 1, "clogging": 2, "blocked": 3, "kozeny": 4}
+
+
+def write_network_vtp(path: str | Path, analysis: "Analysis") -> Path:
+    """The pore network: pores as points, throats as lines.
+
+    Points 0 .. P-1 are the pores; further ones (`end` 1) are where a throat leaves the network at a face or goes
+    to a periodic image, so that no line crosses the whole box. Cell data: throat geometry, porosity,
+    conductances (times viscosity, m3), fluxes (times viscosity over the pressure drop, m3), blocked, law_used
+    as in `LAW_CODES`. Point data: pressure over the pressure drop, radius, volume.
+    """
+    import pyvista as pv
+
+    drawing = _drawing(analysis.network)
+    mesh = pv.PolyData(drawing.points, lines=np.insert(drawing.lines, 0, 2, axis=1).ravel())
+    for name, values in _throat_data(analysis).items():
+        mesh.cell_data[name] = values
+    for name, values in _pore_data(analysis, drawing).items():
+        mesh.point_data[name] = values
+    return _save(path, mesh)
+
+
+def write_spheres_vtp(path: str | Path, snapshot: Snapshot) -> Path:
+    """The spheres as points with radius (m), kind (1 grain, 2 fine), id and velocity (m/s).
+
+    In ParaView: Glyph, sphere of radius 1, scaled by `radius`.
+    """
+    import pyvista as pv
+
+    mesh = pv.PolyData(np.array(snapshot.position)) if len(snapshot) else pv.PolyData()
+    for name in ("radius", "kind", "id", "velocity") if len(snapshot) else ():
+        mesh.point_data[name] = np.array(getattr(snapshot, name))
+    return _save(path, mesh)
+
+
+def write_pvd(path: str | Path, entries: Sequence[tuple[float, str | Path]]) -> Path:
+    """A ParaView collection of (time in s, file); files are named relative to the folder of `path`."""
+    folder = Path(path).resolve().parent
+    rows = "".join(
+        f"    <DataSet timestep={quoteattr(repr(float(time)))} part=\"0\" "
+        f"file={quoteattr(Path(os.path.relpath(Path(folder, file), folder)).as_posix())}/>\n"
+        for time, file in entries)
+    return write_text(path, '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
+                            f"{rows}  </Collection>\n</VTKFile>\n")
+
+
+def render_spheres_png(path: str | Path, spheres_vtp: str | Path, box: Array, *, seconds: float = 120.0) -> str:
+    """Draw the 3-D view of `spheres_vtp` into `path` in a child process; returns "" or why there is no picture.
+
+    `box` (3, 2) m. Without usable OpenGL, VTK kills its process with no Python error; here that costs the
+    picture only. Nothing is raised and `path` is replaced only by a complete picture.
+    """
+    try:
+        with replacing(path) as part:
+            done = subprocess.run([*_command(spheres_vtp, box), str(part.absolute())], capture_output=True,
+                                  text=True, errors="replace", timeout=seconds, check=False,
+                                  stdin=subprocess.DEVNULL, env=_child_environment())
+            _refuse_failure(done, part)
+    except subprocess.TimeoutExpired:
+        return f"the 3-D picture was given up after {seconds:g} s"
+    except OSError as error:
+        return f"no 3-D picture: {error}"
+    return ""
+
+
+def _command(spheres_vtp: str | Path, box: Array) -> list[str]:
+    bounds = ",".join(repr(float(value)) for value in np.asarray(box).ravel())
+    return [sys.executable, "-m", "fdnet.report.render", str(Path(spheres_vtp).absolute()), f"--box={bounds}"]
+
+
+def _child_environment() -> dict[str, str]:
+    """The environment with this very package first on the child's path."""
+    here, before = str(Path(__file__).resolve().parents[2]), os.environ.get("PYTHONPATH")
+    return os.environ | {"PYTHONPATH": os.pathsep.join([here, before] if before else [here])}
+
+
+class _NoPictureError(OSError):
+    """Leaves `replacing` without replacing anything."""
+
+
+def _refuse_failure(done: "subprocess.CompletedProcess[str]", part: Path) -> None:
+    """Raise _NoPictureError, with the reason, unless the child ended well and left a whole PNG."""
+    if done.returncode:
+        said = [line.strip() for line in (done.stderr or "").splitlines() if line.strip()]
+        how = f"signal {-done.returncode}" if done.returncode < 0 else f"exit code {done.returncode}"
+        why = said[-1][:200] if said else "no usable OpenGL?"
+        raise _NoPictureError(f"the drawing process ended with {how}; {why}")
+    picture = part.read_bytes() if part.is_file() else b""
+    if not (picture.startswith(PNG_START) and PNG_END in picture[-12:]):
+        raise _NoPictureError("the drawing process left no complete PNG")
+
+
+def _save(path: str | Path, mesh: Any) -> Path:
+    with replacing(path) as part:
+        mesh.save(part)
+    return Path(path)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Drawing:
+    """Points (P+E, 3), pores first; lines (T, 2) into them. For the extra ends (E,): `source` the pore each is an
+    image of (-1, -2: beyond the inlet, outlet face) and `periods` along x it is away from it."""
+
+    points: Array
+    lines: Array
+    source: Array
+    periods: Array
+
+
+def _drawing(network: Any) -> _Drawing:
+    pores, lines = np.asarray(network.pore_position), np.array(network.throat_pores)
+    ends, source = np.asarray(network.throat_ends).reshape(-1, 3), lines.ravel().copy()
+    away = source < 0
+    away[~away] = np.linalg.norm(ends[~away] - pores[source[~away]], axis=1) > 1e-9
+    points, source = ends[away], source[away]
+    lines[away.reshape(lines.shape)] = len(pores) + np.arange(len(points))
+    periods = np.where(source < 0, 0, np.rint((points[:, 0] - pores[source, 0]) / np.ptp(network.box[0])))
+    return _Drawing(points=np.concatenate([pores, points]), lines=lines, source=source, periods=periods)
+
+
+def _throat_data(analysis: "Analysis") -> dict[str, Array]:
+    network, occupancy, count = analysis.network, analysis.occupancy, len(analysis.network.throat_radius)
+    codes = [LAW_CODES.get(str(name), -1) for name in analysis.law_used]
+    return {
+        "throat_radius": network.throat_radius, "throat_length": network.throat_length,
+        "porosity": np.ones(count) if occupancy is None else occupancy.throat_porosity,
+        "fines": np.zeros(count, int) if occupancy is None else occupancy.throat_fines,
+        "blocked": blocked_throats(analysis).astype(np.uint8), "law_used": np.array(codes, np.int8),
+        "conductance_initial": analysis.conductance_initial, "conductance_damaged": analysis.conductance_damaged,
+        "flux_initial": analysis.flow_initial.throat_flux,
+        "flux_damaged": analysis.flow_damaged.throat_flux,
+    }
+
+
+def _pore_data(analysis: "Analysis", drawing: _Drawing) -> dict[str, Array]:
+    """Per point; the extra ends carry their pore's values, or those of their face, and no volume."""
+    network, count = analysis.network, len(analysis.network.pore_radius)
+    source, none = drawing.source, np.zeros(len(drawing.source))
+    porosity = pore_porosity(analysis)
+    pressures = {"pressure_initial": analysis.flow_initial.pore_pressure,
+                 "pressure_damaged": analysis.flow_damaged.pore_pressure}
+    fall = drawing.periods if network.periodic[0] else none      # periodic x: the pressure falls by 1 per period
+    data = {name: np.append(p, _of_ends(p, source, (1.0, 0.0)) - fall) for name, p in pressures.items()}
+    return data | {
+        "radius": np.append(network.pore_radius, _of_ends(network.pore_radius, source, (0.0, 0.0))),
+        "porosity": np.append(porosity, _of_ends(porosity, source, (np.nan, np.nan))),
+        "volume": np.append(network.pore_volume, none), "share": np.append(network.pore_share, none),
+        "end": np.append(np.zeros(count, np.uint8), np.ones(len(source), np.uint8)),
+    }
+
+
+def _of_ends(values: Array, source: Array, faces: tuple[float, float]) -> Array:
+    """For extra ends (E,) the value of the pore they are images of, or the inlet's or outlet's of `faces`."""
+    ends = np.where(source == -1, *faces)
+    ends[source >= 0] = np.asarray(values)[source[source >= 0]]
+    return ends

@@ -1,0 +1,303 @@
+"""What follows from a case in closed form: velocities, times, stable steps, dimensionless numbers.
+
+Every formula and its source is also a row of `scale_rows`, which `fdnet render` prints and the report repeats.
+"""
+
+import math
+from dataclasses import dataclass
+
+from fdnet.case import CONTACT_STEP_LIMIT, Case, Spheres
+from fdnet.errors import CaseError
+
+HOLD_OVER_RELAXATION = 0.05
+"""Share of the drag relaxation time for which the drag is held by default (held 0.1 tau: at the seed scatter)."""
+HOLD_WARNING, HOLD_LIMIT = 0.1, 1.0
+FINE_STEPS_PER_SECOND = {"every_step": 5.0e6, "held": 8.0e6}
+"""Fines times steps per second on one core with fixed grains (measured, +-50 %)."""
+GRAIN_STEPS_PER_SECOND = 5.0e6
+PACK_STAGES, PACK_STAGE_STEPS, PACK_RELAX_STEPS, PACK_START = 30, 300, 20_000, 0.6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantity:
+    """One row of the table of scales."""
+
+    name: str
+    symbol: str
+    value: float
+    unit: str
+    formula: str
+    source: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contact:
+    """Linear contact of one pair of materials. Stiffness N/m, damping_rate 1/s (times m_eff), step_limit s."""
+
+    pair: str
+    nominal_stiffness: float
+    normal_stiffness: float
+    shear_stiffness: float
+    friction: float
+    damping_rate: float
+    contact_time: float
+    step_limit: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scales:
+    """Closed-form consequences of a case, SI. Fields about fines are 0 when the case has none."""
+
+    porosity: float
+    permeability: float
+    darcy_velocity: float
+    interstitial_velocity: float
+    upstream_velocity: float
+    stiffness_factor: float
+    contacts: dict[str, Contact]
+    pack_step: float
+    supplied_count: int
+    slab_length: float
+    relaxation_time: tuple[float, float]
+    time_step: float
+    hold_steps: int
+    plug_time: float
+    cap_time: float
+    checkpoint_steps: int
+    reynolds: float
+    stokes: float
+    gravity_over_drag: float
+    impact_overlap: float
+    warnings: tuple[str, ...]
+
+
+def carman_kozeny(porosity: float, diameter: float) -> float:
+    """k = d^2 phi^3 / (180 (1 - phi)^2), m2 (Carman 1937; 180 = 72 x tortuosity 2.5)."""
+    return diameter**2 * porosity**3 / (180 * (1 - porosity) ** 2)
+
+
+def relaxation_time(radius: float, density: float, viscosity: float, multiplier: float = 1.0) -> float:
+    """tau = m / (6 pi mu r M) = 2 r^2 rho / (9 mu M), s (Stokes 1851)."""
+    return 2 * radius**2 * density / (9 * viscosity * multiplier)
+
+
+def sphere_mass(radius: float, density: float) -> float:
+    """4/3 pi r^3 rho, kg."""
+    return 4 / 3 * math.pi * radius**3 * density
+
+
+def series(first: float, second: float) -> float:
+    """Two springs in series, kA kB / (kA + kB) (PFC's rule for a contact)."""
+    return first * second / (first + second)
+
+
+def scales_of(case: Case) -> Scales:
+    """All scales of a case.
+
+    Raises CaseError when a time step or drag refresh breaks a stability bound (the message gives the bound).
+    """
+    porosity = target_porosity(case)
+    permeability = carman_kozeny(porosity, case.grains.sauter_diameter_m)
+    darcy, interstitial = _velocities(case, porosity, permeability)
+    upstream = interstitial if case.drag.upstream == "interstitial" else darcy
+    contacts = _contacts(case)
+    fine = _fine_scales(case, contacts, interstitial, upstream)
+    return Scales(
+        porosity=porosity, permeability=permeability, darcy_velocity=darcy, interstitial_velocity=interstitial,
+        upstream_velocity=upstream, stiffness_factor=_stiffness_factor(case), contacts=contacts,
+        pack_step=0.15 * math.sqrt(_mass_range(case.grains)[0] / contacts["grain-grain"].normal_stiffness), **fine)
+
+
+def target_porosity(case: Case) -> float:
+    """The porosity asked for; with `grains.count` the plain sum of its spheres."""
+    if case.grains.count is not None:
+        solid = case.grains.count * case.grains.mean_volume_m3 / math.prod(case.size_m)
+        return max(1 - solid, 0.05)
+    assert case.grains.porosity is not None
+    return case.grains.porosity
+
+
+def _velocities(case: Case, porosity: float, permeability: float) -> tuple[float, float]:
+    if case.fluid.velocity_m_s is not None:
+        return case.fluid.velocity_m_s * porosity, case.fluid.velocity_m_s
+    length = case.size_m[0] if case.fluid.darcy_length_mm is None else case.fluid.darcy_length_mm * 1e-3
+    darcy = permeability / (case.fluid.viscosity_cP * 1e-3) * case.fluid.overbalance_MPa * 1e6 / length
+    return darcy, darcy / porosity
+
+
+def _mass_range(spheres: Spheres) -> tuple[float, float]:
+    low, high = spheres.radius_range_m
+    return sphere_mass(low, spheres.density_kg_m3), sphere_mass(high, spheres.density_kg_m3)
+
+
+def _nominal(case: Case) -> dict[str, tuple[float, float, float]]:
+    """Per material: normal and shear stiffness, friction. The walls are of the grains' material."""
+    grains = case.grains
+    table = {"grain": (grains.normal_stiffness_N_m, grains.shear_stiffness_N_m, grains.friction),
+             "wall": (grains.normal_stiffness_N_m, grains.shear_stiffness_N_m, case.box.wall_friction)}
+    if case.fines:
+        table["fine"] = (case.fines.normal_stiffness_N_m, case.fines.shear_stiffness_N_m, case.fines.friction)
+    return table
+
+
+def _pairs(case: Case) -> list[tuple[str, str]]:
+    pairs = [("grain", "grain"), ("grain", "wall")]
+    return [*pairs, ("grain", "fine"), ("fine", "fine"), ("fine", "wall")] if case.fines else pairs
+
+
+def _stiffness_factor(case: Case) -> float:
+    """What all contact stiffnesses are multiplied by: run.stiffness_N_m over the stiffest pair's nominal value."""
+    if case.run.stiffness_N_m is None:
+        return 1.0
+    nominal = _nominal(case)
+    return case.run.stiffness_N_m / max(series(nominal[a][0], nominal[b][0]) for a, b in _pairs(case))
+
+
+def _contacts(case: Case) -> dict[str, Contact]:
+    nominal, factor = _nominal(case), _stiffness_factor(case)
+    return {f"{a}-{b}": _contact(case, (a, b), nominal, factor) for a, b in _pairs(case)}
+
+
+def _contact(case: Case, pair: tuple[str, str], nominal: dict[str, tuple[float, float, float]],
+             factor: float) -> Contact:
+    first, second = pair
+    stiffness = series(nominal[first][0], nominal[second][0])
+    normal = factor * stiffness
+    mass, lightest = _effective_mass(case, pair)
+    spheres = [case.grains if name == "grain" else case.fines for name in pair if name != "wall"]
+    damping = sum(s.damping_ratio for s in spheres if s) / len(spheres)
+    frequency = math.sqrt(normal / mass)
+    return Contact(
+        pair=f"{first}-{second}", nominal_stiffness=stiffness, normal_stiffness=normal,
+        shear_stiffness=factor * series(nominal[first][1], nominal[second][1]),
+        friction=min(nominal[first][2], nominal[second][2]), damping_rate=2 * damping * frequency,
+        contact_time=math.pi / (frequency * math.sqrt(1 - damping**2)), step_limit=math.sqrt(lightest / normal))
+
+
+def _effective_mass(case: Case, pair: tuple[str, str]) -> tuple[float, float]:
+    """Effective mass of a typical contact, and the smallest moving mass in it, kg."""
+    def typical(name: str) -> float:
+        spheres = case.grains if name == "grain" else case.fines
+        if name == "wall" or (name == "grain" and case.grains.motion == "fixed" and "fine" in pair):
+            return math.inf
+        assert spheres is not None
+        return sphere_mass(spheres.mean_radius_m, spheres.density_kg_m3)
+
+    first, second = typical(pair[0]), typical(pair[1])
+    effective = 1 / (1 / first + 1 / second)
+    small = case.fines if "fine" in pair and case.fines else case.grains
+    return effective, _mass_range(small)[0]
+
+
+def _fine_scales(case: Case, contacts: dict[str, Contact], velocity: float, upstream: float) -> dict:
+    if case.fines is None:
+        return {"supplied_count": 0, "slab_length": 0.0, "relaxation_time": (0.0, 0.0), "time_step": 0.0,
+                "hold_steps": 0, "plug_time": 0.0, "cap_time": 0.0, "checkpoint_steps": 0, "reynolds": 0.0,
+                "stokes": 0.0, "gravity_over_drag": 0.0, "impact_overlap": 0.0, "warnings": tuple(_warnings(case))}
+    fines, viscosity = case.fines, case.fluid.viscosity_cP * 1e-3
+    low, high = fines.radius_range_m
+    tau = tuple(relaxation_time(r, fines.density_kg_m3, viscosity, case.drag.multiplier) for r in (low, high))
+    step = _time_step(case, contacts, tau[0])
+    hold = _hold_steps(case, step, tau[0])
+    count, slab = _supply(case)
+    impact = velocity * math.sqrt(_mass_range(fines)[1] / contacts["grain-fine"].normal_stiffness)
+    reynolds = case.fluid.density_kg_m3 * velocity * 2 * high / viscosity
+    times = _times(case, slab, velocity, upstream)
+    weight = math.dist((0, 0, 0), case.gravity.acceleration_m_s2) * abs(
+        fines.density_kg_m3 - case.fluid.density_kg_m3 * case.gravity.buoyancy)
+    result = {
+        "supplied_count": count, "slab_length": slab, "relaxation_time": tau, "time_step": step, "hold_steps": hold,
+        "plug_time": times[0], "cap_time": times[1],
+        "checkpoint_steps": max(1, math.ceil(times[2] / step / hold)) * hold, "reynolds": reynolds,
+        "stokes": tau[1] * velocity / (2 * case.grains.mean_radius_m),
+        "gravity_over_drag": 2 * high**2 * weight / (9 * viscosity * velocity * case.drag.multiplier),
+        "impact_overlap": impact / (2 * high)}
+    return result | {"warnings": tuple(_warnings(case, result))}
+
+
+def _time_step(case: Case, contacts: dict[str, Contact], tau: float) -> float:
+    mobile = case.grains.motion == "mobile"
+    bound = min(c.step_limit for name, c in contacts.items() if "fine" in name or mobile)
+    if case.run.time_step_s is None:
+        return min(case.run.time_step_factor * bound, HOLD_WARNING * tau)
+    if case.run.time_step_s > CONTACT_STEP_LIMIT * bound:
+        raise CaseError(f"run.time_step_s: {case.run.time_step_s:g} s is above the contact bound "
+                        f"{CONTACT_STEP_LIMIT:g} sqrt(m/k) = {CONTACT_STEP_LIMIT * bound:.3g} s; lower it or "
+                        "run.stiffness_N_m")
+    if case.run.time_step_s > HOLD_LIMIT * tau:
+        raise CaseError(f"run.time_step_s: {case.run.time_step_s:g} s is above the drag relaxation time "
+                        f"{tau:.3g} s, explicit drag would overshoot; lower it")
+    return case.run.time_step_s
+
+
+def _hold_steps(case: Case, step: float, tau: float) -> int:
+    if case.drag.scheme == "every_step":
+        return 1
+    if case.drag.refresh_steps is None:
+        return max(1, math.floor(HOLD_OVER_RELAXATION * tau / step))
+    if case.drag.refresh_steps * step > HOLD_LIMIT * tau:
+        raise CaseError(f"drag.refresh_steps: {case.drag.refresh_steps} steps of {step:.3g} s exceed the drag relaxation "
+                        f"time {tau:.3g} s; at most {math.floor(HOLD_LIMIT * tau / step)} steps are stable")
+    return case.drag.refresh_steps
+
+
+def _supply(case: Case) -> tuple[int, float]:
+    """Number of fines and slab length: n v = c A l."""
+    fines = case.fines
+    assert fines is not None
+    area, volume = case.size_m[1] * case.size_m[2], fines.mean_volume_m3
+    if fines.count is not None:
+        return fines.count, max(fines.count * volume / (fines.concentration * area), 2 * fines.radius_range_m[1])
+    assert fines.slab_mm is not None
+    slab = fines.slab_mm * 1e-3
+    return max(1, round(fines.concentration * area * slab / volume)), slab
+
+
+def _times(case: Case, slab: float, velocity: float, upstream: float) -> tuple[float, float, float]:
+    """Plug, cap and checkpoint time, s. One checkpoint lets the fluid pass about one grain diameter."""
+    passage = 2 * case.grains.mean_radius_m / velocity
+    plug = 4 * passage if case.run.plug_time_ms is None else case.run.plug_time_ms * 1e-3
+    feed = slab / upstream
+    cap = 3 * feed + 4 * plug + 2 * case.size_m[0] / velocity
+    if case.run.duration_ms is not None:
+        cap = case.run.duration_ms * 1e-3
+    elif case.run.cap_ms is not None:
+        cap = case.run.cap_ms * 1e-3
+    checkpoint = min(passage, plug / 4) if case.run.checkpoint_ms is None else case.run.checkpoint_ms * 1e-3
+    return plug, cap, min(checkpoint, cap)
+
+
+def _warnings(case: Case, fine: dict | None = None) -> list[str]:
+    found = []
+    thickness = case.box.size_mm[0] / case.analysis.sections
+    if thickness < 2e3 * case.grains.mean_radius_m:
+        found.append(f"analysis.sections: {case.analysis.sections} sections of {thickness:.3g} mm are thinner than a grain")
+    if not fine:
+        return found
+    if fine["reynolds"] > 1:
+        found.append(f"particle Reynolds number {fine['reynolds']:.2g} is outside the range of Stokes drag (below 1)")
+    if fine["impact_overlap"] > 0.03:
+        found.append(f"predicted impact overlap {100 * fine['impact_overlap']:.2g} % of a fine's diameter is above 3 %: "
+                     "raise run.stiffness_N_m")
+    held = fine["hold_steps"] * fine["time_step"] / fine["relaxation_time"][0]
+    if held > HOLD_WARNING:
+        found.append(f"drag is held for {held:.2g} of the relaxation time (above {HOLD_WARNING:g}: invasion is biased upward)")
+    return found
+
+
+def run_seconds(case: Case, scales: Scales) -> float:
+    """Estimated seconds of the invasion on one core, +-factor 2: fines times steps over a measured rate."""
+    if case.fines is None:
+        return 0.0
+    expected = min(scales.cap_time, scales.slab_length / scales.upstream_velocity + scales.plug_time)
+    steps = expected / scales.time_step
+    rate = FINE_STEPS_PER_SECOND["held" if scales.hold_steps > 1 else "every_step"]
+    mobile = grain_count(case) if case.grains.motion == "mobile" else 0
+    return steps * (scales.supplied_count / rate + mobile / GRAIN_STEPS_PER_SECOND)
+
+
+def grain_count(case: Case) -> int:
+    """First guess of the number of grains, (1 - phi) V / v, or the count given."""
+    if case.grains.count is not None:
+        return case.grains.count
+    return max(1, round((1 - target_porosity(case)) * math.prod(case.size_m) / case.grains.mean_volume_m3))

@@ -1,0 +1,135 @@
+"""Decks by meaning: the command is there, the left-out one is not, and variables offered and used agree."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+from builders import tiny
+
+from fdnet.dem.deck import render_text, used_variables
+from fdnet.dem.invasion import render_invade
+from fdnet.dem.packing import draw_radii, render_pack
+from fdnet.errors import CaseError, DeckError
+from fdnet.scales import scales_of
+from fdnet.snapshot import Kind, Snapshot
+
+
+def one_grain(case) -> Snapshot:
+    box = np.column_stack([np.zeros(3), case.size_m])
+    return Snapshot(step=0, time_s=0.0, box=box, id=np.array([1]), kind=np.array([Kind.GRAIN]),
+                    position=np.array([[2e-4, 8e-4, 8e-4]]), radius=np.array([2.5e-4]), velocity=np.zeros((1, 3)))
+
+
+def invade_text(*assignments: str, ranks: int = 1) -> str:
+    case = tiny(*assignments)
+    return render_invade(case, scales_of(case), one_grain(case), ranks=ranks).text
+
+
+def commands(text: str) -> list[str]:
+    return [line for line in text.splitlines() if line and not line.startswith("#")]
+
+
+def has(text: str, pattern: str) -> bool:
+    return any(re.search(pattern, line) for line in commands(text))
+
+
+def test_missing_template_and_variables_are_errors():
+    with pytest.raises(DeckError, match="template not found"):
+        used_variables("nothing.in.j2")
+    with pytest.raises(DeckError, match="offered but never used: spare"):
+        render_text("_walls.in.j2", {"walls": [], "spare": 1})
+    with pytest.raises(DeckError, match="walls"):
+        render_text("_walls.in.j2", {})
+
+
+def test_templates_hold_no_arithmetic():
+    from importlib.resources import files
+
+    for entry in files("liggghts_templates").iterdir():
+        if entry.name.endswith(".j2"):
+            for expression in re.findall(r"\{\{(.*?)\}\}|\{%(.*?)%\}", entry.read_text()):
+                assert not re.search(r"[*/+]|\d\s*-", "".join(expression).replace("-%", "").replace('".', "")), entry.name
+
+
+def test_drag_is_stokes_with_the_multiplier():
+    text = invade_text("drag.multiplier=30")
+    value = float(re.search(r"variable fx atom ([-+.\de]+)\*r\*\(f_uf\[1\]-vx\)", text).group(1))
+    assert value == pytest.approx(6 * math.pi * 0.05 * 30)
+    assert has(text, r"^fix drag fines addforce")
+
+
+def test_held_drag_stores_and_every_step_does_not():
+    assert has(invade_text(), r"^fix st fines store/state \d+ v_fx")
+    assert has(invade_text("drag.scheme=every_step"), r"^fix drag fines addforce v_fx v_fy v_fz$")
+    assert not has(invade_text("drag.scheme=every_step"), "store/state")
+
+
+def test_gravity_is_left_out_when_negligible_and_told():
+    text = invade_text()
+    assert not has(text, "gravity|buoyancy")
+    assert "# left out: gravity and buoyancy (gravity is" in text
+    assert has(invade_text("gravity.mode=on"), r"^fix grav fines gravity 9.81 vector 0.0 0.0 -1.0")
+    assert has(invade_text("gravity.mode=on"), r"^fix buoy fines buoyancy density 1095.0 dim z level")
+    assert not has(invade_text("gravity.mode=on", "gravity.buoyancy=false"), "buoyancy")
+    with pytest.raises(CaseError, match="along one axis"):
+        invade_text("gravity.mode=on", "gravity.acceleration_m_s2=[1.0,0.0,-9.0]")
+
+
+def test_fixed_grains_have_no_mutual_contacts_and_mobile_ones_are_held_by_planes():
+    fixed, mobile = invade_text(), invade_text("grains.motion=mobile")
+    assert has(fixed, r"^neigh_modify exclude group grains grains")
+    assert not has(fixed, "xplane")
+    assert has(fixed, r"^fix integ fines nve/sphere")
+    assert not has(mobile, "exclude")
+    assert has(mobile, r"^fix wx0 grains wall/gran .*xplane 0.0")
+    assert has(mobile, r"^fix integ all nve/sphere")
+
+
+def test_sides_friction_and_ranks_leave_lines_out():
+    assert has(invade_text(), "yplane")
+    assert not has(invade_text("box.sides=periodic"), "yplane")
+    assert has(invade_text("box.sides=periodic"), r"^boundary f p p")
+    assert has(invade_text(), "tangential history")
+    smooth = invade_text("fines.friction=0.0")
+    assert not has(smooth, "tangential history|coefficientFriction")
+    assert not has(invade_text(), "^processors")
+    assert has(invade_text(ranks=2), r"^processors 1 \* \*")
+
+
+def test_lost_atoms_are_errors_and_the_end_is_marked():
+    case = tiny()
+    for text in (invade_text(), render_pack(case, scales_of(case), count=66).text):
+        assert has(text, "thermo_modify lost error")
+        assert commands(text)[-1] == 'print "DECK_DONE"'
+        assert has(text, r"^timestep ")
+        assert not has(text, "multi|screen none")
+
+
+def test_the_set_command_never_meets_its_unset_number():
+    case = tiny()
+    text = render_pack(case, scales_of(case), count=66).text
+    assert has(text, r"^set group all density 2650.0 diameter v_d")
+    assert not has(text, r"^set group all diameter v_")
+
+
+def test_pair_matrices_are_symmetric_series_values():
+    text = invade_text()
+    row = next(line for line in commands(text) if line.startswith("fix kn "))
+    values = np.array(row.split()[7:], float).reshape(3, 3)
+    assert np.array_equal(values, values.T)
+    scales = scales_of(tiny())
+    assert values[0, 1] == scales.contacts["grain-fine"].normal_stiffness
+    assert values[1, 1] == scales.contacts["fine-fine"].normal_stiffness
+
+
+def test_radii_are_uniform_by_number_and_the_last_closes_the_target():
+    case = tiny("grains.radius_mm=[0.15,0.25]")
+    radii = draw_radii(case, 2000)
+    assert radii.min() >= 0.15e-3
+    assert radii.max() <= 0.25e-3
+    counts, _ = np.histogram(radii, bins=4, range=(0.15e-3, 0.25e-3))
+    assert np.all(np.abs(counts - 500) < 100)
+    short = 2000 * case.grains.mean_volume_m3 - 4 / 3 * math.pi * np.sum(radii[:-1] ** 3)
+    expected = np.clip(np.cbrt(max(short, 0) * 3 / (4 * math.pi)), 0.15e-3, 0.25e-3)
+    assert radii[-1] == pytest.approx(expected)

@@ -1,0 +1,85 @@
+"""The dump parser: what it reads exactly, and every way a file can be broken."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fdnet.dem.dump import parse_dump, read_dump, read_frame
+from fdnet.errors import DumpError
+
+HEADER = "ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS ff ff ff\n-1 1\n0 2\n0 3\nITEM: ATOMS id type x \n"
+
+
+def frame(step: int, rows: list[str], count: int | None = None) -> str:
+    return HEADER.format(step=step, count=len(rows) if count is None else count) + "".join(row + "\n" for row in rows)
+
+
+def parse(text: str) -> list:
+    return list(parse_dump(text.encode(), "d.dump"))
+
+
+def test_full_precision_any_order_and_several_frames():
+    first, second = parse(frame(5, ["2 1 0.12345678901234568 ", "1 2 -3e-9 "]) + frame(10, ["1 2 7 "]))
+    assert (first.step, second.step) == (5, 10)
+    assert first.column("id").tolist() == [1, 2]
+    assert first.column("x").tolist() == [-3e-9, 0.12345678901234568]
+    assert first.box.tolist() == [[-1, 1], [0, 2], [0, 3]]
+    assert not first.rows.flags.writeable
+
+
+def test_rows_without_trailing_space():
+    assert parse(frame(0, ["1 1 0.5", "2 1 0.25"]))[0].column("x").tolist() == [0.5, 0.25]
+
+
+def test_empty_frame():
+    assert parse(frame(0, []))[0].rows.shape == (0, 3)
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    (frame(4000, ["1 1 0.5 "], count=3), r"d\.dump:11: step 4000: 1 of 3 rows, then the file ends"),
+    (frame(4000, ["1 1 0.5 ", "2 1 0."])[:-1], "rows, then the file ends"),
+    (frame(0, ["1 1 0.5 "], count=2) + frame(1, ["1 1 0.5 "]), "1 of 2 rows, then the next frame begins"),
+    (frame(0, ["1 1 0.5 ", "2 1 "]), "d.dump:11: step 0: 2 values, expected 3"),
+    (frame(0, ["1 1 0.5 ", "2 1 0.5 7 "]), "4 values, expected 3"),
+    (frame(0, ["1 1 nan "]), "column x holds b'nan', expected a finite number"),
+    (frame(0, ["1 1 0.5 ", "2 1 -inf "]), "d.dump:11: step 0: column x holds b'-inf'"),
+    (frame(0, ["1 1 abc "]), "column x holds b'abc'"),
+    ("ITEM: TIMESTEP\n12\nITEM: NUMBER OF", "the file ends in the middle of a line"),
+    ("ITEM: TIMESTEP\n12\n", "the file ends before ITEM: NUMBER OF ATOMS"),
+    ("ITEM: TIMESTEP\nx\nITEM: NUMBER OF ATOMS\n", "step is b'x'"),
+    ("hello\n", "found b'hello', expected 'ITEM: TIMESTEP'"),
+    (frame(0, ["1 1 1 "]).replace("0 2", "0"), "box bounds b'0', expected two numbers"),
+    (frame(0, ["1 1 1 "]).replace("\n1\nITEM: BOX", "\n-4\nITEM: BOX"), "number of atoms is b'-4'"),
+])
+def test_broken_files_are_named_by_line_and_step(text, said):
+    with pytest.raises(DumpError, match=said):
+        parse(text)
+
+
+def test_missing_file_and_wrong_number_of_frames(tmp_path: Path):
+    with pytest.raises(DumpError, match="cannot be read"):
+        read_dump(tmp_path / "none")
+    (tmp_path / "d").write_text("")
+    with pytest.raises(DumpError, match="0 frames, expected one"):
+        read_frame(tmp_path / "d")
+
+
+def test_missing_column():
+    with pytest.raises(DumpError, match="no column radius, found id type x"):
+        parse(frame(0, ["1 1 1 "]))[0].column("radius")
+
+
+def test_every_cut_of_a_file_is_noticed():
+    text = frame(3, ["1 1 0.5 ", "2 1 0.25 "]).encode()
+    for length in range(1, len(text)):
+        with pytest.raises(DumpError):
+            list(parse_dump(text[:length], "cut"))
+
+
+def test_many_rows_equal_numpy():
+    rng = np.random.default_rng(0)
+    values = rng.normal(size=(500, 3))
+    rows = [f"{i + 1} {v[0]:.17g} {v[1]:.17g} " for i, v in enumerate(values)]
+    read = parse(frame(0, rows))[0].rows
+    assert np.array_equal(read[:, 1:], values[:, :2])

@@ -1,0 +1,78 @@
+"""Packs made in code: lattices with known porosity, random packs without and with fines (lengths in m)."""
+
+import numpy as np
+
+from fdnet.snapshot import Array, Kind, Snapshot
+
+
+def snapshot(position: Array, radius: Array | float, box: Array, kind: Array | int = Kind.GRAIN) -> Snapshot:
+    position = np.asarray(position, dtype=float).reshape(-1, 3)
+    count = len(position)
+    return Snapshot(step=0, time_s=0.0, box=np.asarray(box, dtype=float), id=np.arange(1, count + 1),
+                    kind=np.broadcast_to(kind, count), position=position,
+                    radius=np.broadcast_to(np.asarray(radius, dtype=float), count), velocity=np.zeros((count, 3)))
+
+
+def lattice(cell: list[list[float]], edge: float, repeat: int, radius: float) -> Snapshot:
+    """`repeat` cubic cells each way; `cell` holds positions in units of the cell edge."""
+    steps = np.stack(np.meshgrid(*[np.arange(repeat)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    position = ((steps + np.array(cell) + 0.1).reshape(-1, 3)) * edge
+    return snapshot(position, radius, np.array([[0.0, repeat * edge]] * 3))
+
+
+def simple_cubic(repeat: int = 3, radius: float = 1.0, edge: float | None = None) -> Snapshot:
+    return lattice([[0, 0, 0]], 2.0 * radius if edge is None else edge, repeat, radius)
+
+
+def body_centred(repeat: int = 3, radius: float = 1.0) -> Snapshot:
+    return lattice([[0, 0, 0], [0.5, 0.5, 0.5]], 4.0 * radius / np.sqrt(3.0), repeat, radius)
+
+
+def face_centred(repeat: int = 3, radius: float = 1.0) -> Snapshot:
+    return lattice([[0, 0, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [0.5, 0.5, 0]], 2.0 * radius * np.sqrt(2.0), repeat,
+                   radius)
+
+
+def random_pack(
+    count: int, solid: float = 0.58, *, seed: int = 1, periodic: bool = True, spread: float = 0.0, aspect: float = 1.0
+) -> Snapshot:
+    """Random pack of radius about 1 relaxed from overlap; box aspect x : y : z = aspect : 1 : 1."""
+    rng = np.random.default_rng(seed)
+    radius = 1.0 + spread * (2.0 * rng.random(count) - 1.0)
+    edge = (4.0 / 3.0 * np.pi * np.sum(radius**3) / solid / aspect) ** (1.0 / 3.0)
+    size = edge * np.array([aspect, 1.0, 1.0])
+    position = rng.random((count, 3)) * size
+    for _ in range(600):
+        push = _push(position, radius, size, periodic)
+        position = position + 0.5 * push
+        position = position % size if periodic else np.clip(position, radius[:, None], size - radius[:, None])
+        if np.abs(push).max() < 2e-3:
+            break
+    return snapshot(position, radius, np.stack([np.zeros(3), size], axis=1))
+
+
+def _push(position: Array, radius: Array, size: Array, periodic: bool) -> Array:
+    apart = position[:, None] - position[None]
+    if periodic:
+        apart -= size * np.round(apart / size)
+    distance = np.linalg.norm(apart, axis=2) + np.eye(len(position))
+    overlap = np.maximum(radius[:, None] + radius[None] - distance, 0.0) * (1.0 - np.eye(len(position)))
+    return np.sum((overlap / distance)[:, :, None] * apart, axis=1)
+
+
+def with_fines(grains: Snapshot, count: int, radius: float, *, seed: int = 5) -> Snapshot:
+    """`grains` and `count` fines set on the grain surfaces at random, away from other grains, x inside the box."""
+    rng = np.random.default_rng(seed)
+    size = grains.box[:, 1] - grains.box[:, 0]
+    found: list[Array] = []
+    while len(found) < count:
+        host = rng.integers(len(grains))
+        normal = rng.normal(size=3)
+        place = grains.position[host] + normal / np.linalg.norm(normal) * (grains.radius[host] + radius)
+        place = grains.box[:, 0] + (place - grains.box[:, 0]) % size
+        apart = grains.position - place
+        apart -= size * np.round(apart / size)
+        if np.all(np.linalg.norm(apart, axis=1) >= grains.radius + 0.999 * radius):
+            found.append(place)
+    fines = snapshot(np.array(found), radius, grains.box, Kind.FINE)
+    return grains.joined(fines)

@@ -1,0 +1,56 @@
+"""Figures: drawn for every kind of specimen; the cut circles checked against the closed form."""
+
+import copy
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+from report_demo import demo_analysis, demo_damaged, demo_grains, snapshot_of
+
+from fdnet.report import figures
+from fdnet.report.side_view import cut_circles
+from fdnet.snapshot import Kind
+
+HISTORY = [{"time_s": 1e-4 * i, "invaded": i, "passed": 0, "upstream": 50 - i} for i in range(50)]
+DAMAGE = {"porosity_reduction", "invaded_fraction", "permeability_ratio"}
+
+
+def coloured_share(path):
+    picture = imread(path)[..., :3]
+    return float((picture.min(axis=2) < 0.95).mean())
+
+
+def test_all_figures_of_a_damaged_specimen(tmp_path):
+    paths = figures.draw_all(tmp_path / "figures", demo_analysis(), demo_damaged(), HISTORY)
+    assert {path.stem for path in paths} == set(figures.CAPTIONS) - {"spheres_3d"}
+    assert sorted(paths) == sorted((tmp_path / "figures").iterdir())
+    assert all(imread(path).shape[1] >= 900 and coloured_share(path) > 0.02 for path in paths)
+
+
+def test_an_intact_pack_gets_no_figures_of_damage(tmp_path):
+    intact = SimpleNamespace(**(vars(demo_analysis()) | {"occupancy": None, "invaded_count": 0}))
+    stems = {path.stem for path in figures.draw_all(tmp_path, intact, demo_grains())}
+    assert stems == {"side_view", "porosity_profile", "size_distributions"}
+
+
+def test_sections_without_flow_fines_of_one_size_and_no_invasion_can_be_drawn(tmp_path):
+    dead = [copy.copy(s) for s in demo_analysis().sections]
+    dead[0].k_initial = dead[0].k_initial_inplace = 0.0
+    fines = snapshot_of([[-1e-4, 1e-3, 1e-3]], 5e-5, Kind.FINE, first_id=900)
+    values = {"sections": tuple(dead), "k_initial": 0.0, "invaded_count": 0}
+    analysis = SimpleNamespace(**(vars(demo_analysis()) | values))
+    stems = {path.stem for path in figures.draw_all(tmp_path, analysis, demo_grains().joined(fines))}
+    assert stems >= DAMAGE
+
+
+def test_a_ratio_to_nothing_is_no_number():
+    assert figures._ratios([1.0, 2.0], [2.0, 0.0]) == pytest.approx([0.5, np.nan], nan_ok=True)
+
+
+def test_cut_circles_are_pythagoras():
+    position = np.array([[1.0, 0.0, 2.0], [3.0, 3.0, 4.0], [5.0, 5.0, 6.0], [7.0, -5.1, 8.0]])
+    index, centre, radius = cut_circles(snapshot_of(position, 5.0, Kind.GRAIN), 0.0)
+    assert index.tolist() == [0, 1]                  # touching (d = r) is no cut
+    assert centre.tolist() == [[1, 2], [3, 4]]
+    assert radius == pytest.approx([5.0, 4.0])       # the 3-4-5 triangle

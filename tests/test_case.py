@@ -1,0 +1,114 @@
+"""Cases: what is accepted, and that every problem is named at once."""
+
+import copy
+import tomllib
+from pathlib import Path
+
+import pytest
+from builders import TINY, tiny
+
+from fdnet.case import case_from, known_keys, read_case, set_keys
+from fdnet.errors import CaseError
+
+
+def problems(data: dict) -> str:
+    with pytest.raises(CaseError) as caught:
+        case_from(data)
+    return str(caught.value)
+
+
+def changed(**parts: dict) -> dict:
+    data = copy.deepcopy(TINY)
+    for name, values in parts.items():
+        data.setdefault(name, {}).update(values)
+    return data
+
+
+def test_every_problem_is_listed_at_once():
+    text = problems({"name": "a b", "box": {"size_mm": [8, 4]}, "grains": {"radius_mm": "0.25", "porosity": 1.3, "frction": 2},
+                     "fines": {"radius_mm": 0.08}, "drag": {"multiplier": True}})
+    for part in ("name: 'a b'", "box.size_mm", "grains.radius_mm: '0.25'", "grains.porosity: 1.3", "grains.frction: unknown key",
+                 "did you mean grains.friction?", "fines.count", "drag.multiplier: True"):
+        assert part in text
+    assert "\n" not in text
+
+
+@pytest.mark.parametrize(("part", "values", "expected"), [
+    ("fines", {"radius_mm": 0.3}, "not below grains.radius_mm 0.25"),
+    ("fines", {"slab_mm": 2.0}, "give exactly one of the two"),
+    ("fines", {"concentration": 0.4}, "fines.concentration: 0.4"),
+    ("grains", {"radius_mm": [0.3, 0.2]}, "must rise"),
+    ("grains", {"count": 0}, "grains.count: 0"),
+    ("box", {"size_mm": [3.0, 0.4, 1.6]}, "a grain does not fit"),
+    ("box", {"size_mm": [3.0, 0.9, 1.6], "sides": "periodic"}, "its own image"),
+    ("box", {"size_mm": [3.0, float("inf"), 1.6]}, "finite number"),
+    ("drag", {"field": "network"}, "not available yet"),
+    ("drag", {"scheme": "every_step", "refresh_steps": 5}, "belongs to drag.scheme 'held'"),
+    ("run", {"time_step_factor": 0.3}, "run.time_step_factor: 0.3"),
+    ("analysis", {"law": "darcy"}, "analysis.law: 'darcy'"),
+    ("fluid", {"viscosity_Pas": 0.05}, "unknown key"),
+])
+def test_a_bad_value_is_named_with_its_path(part, values, expected):
+    assert expected in problems(changed(**{part: values}))
+
+
+def test_porosity_or_count_is_needed():
+    data = copy.deepcopy(TINY)
+    del data["grains"]["count"]
+    assert "grains.porosity: missing" in problems(data)
+
+
+def test_toml_comes_back_as_the_same_case():
+    case = tiny("grains.radius_mm=[0.2,0.25]", "analysis.law=thesis")
+    again = case_from(tomllib.loads(case.toml()))
+    assert again == case
+    assert again.digest() == case.digest()
+
+
+def test_stages_depend_only_on_their_own_keys():
+    case = tiny()
+    other_law = tiny("analysis.law=thesis")
+    other_fines = tiny("fines.count=301")
+    assert other_law.digest("invade") == case.digest("invade")
+    assert other_law.digest("analyse") != case.digest("analyse")
+    assert other_fines.digest("pack") == case.digest("pack")
+    assert other_fines.digest("invade") != case.digest("invade")
+    assert tiny("seed=2").digest("pack") != case.digest("pack")
+
+
+def test_set_reads_values_as_toml_and_refuses_nonsense():
+    data = set_keys(TINY, ["fines.radius_mm=[0.03, 0.05]", "box.sides=periodic", "seed=7"])
+    assert data["fines"]["radius_mm"] == [0.03, 0.05]
+    assert data["box"]["sides"] == "periodic"
+    assert data["seed"] == 7
+    assert "seed" in TINY
+    assert TINY["seed"] == 1
+    for bad in ("fines.radius_mm", "=3", "name.x=3"):
+        with pytest.raises(CaseError, match="--set"):
+            set_keys(TINY, [bad])
+
+
+def test_unreadable_and_malformed_files(tmp_path: Path):
+    with pytest.raises(CaseError, match="cannot be read as a case file"):
+        read_case(tmp_path / "none.toml")
+    (tmp_path / "bad.toml").write_text("name = ")
+    with pytest.raises(CaseError, match=r"bad\.toml: not valid TOML"):
+        read_case(tmp_path / "bad.toml")
+    (tmp_path / "bytes.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(CaseError, match="cannot be read"):
+        read_case(tmp_path / "bytes.toml")
+
+
+def test_fixed_keys_of_the_contract_exist():
+    fixed = {"name", "seed", "box.size_mm", "box.sides", "grains.radius_mm", "grains.porosity", "grains.density_kg_m3",
+             "grains.friction", "grains.motion", "fines.radius_mm", "fines.density_kg_m3", "fines.friction", "fines.concentration",
+             "fluid.viscosity_cP", "fluid.density_kg_m3", "fluid.overbalance_MPa", "drag.field", "drag.multiplier",
+             "analysis.sections", "analysis.law", "analysis.damage_law"}
+    assert fixed <= set(known_keys())
+
+
+@pytest.mark.parametrize("name", ["quick", "specimen1", "specimen5"])
+def test_shipped_cases_are_valid_and_short(root: Path, name: str):
+    path = root / "cases" / f"{name}.toml"
+    assert read_case(path).name == name
+    assert len(path.read_text().splitlines()) < 40

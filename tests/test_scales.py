@@ -1,0 +1,105 @@
+"""Scales against the numbers of the thesis and closed forms worked out by hand."""
+
+import math
+
+import pytest
+from builders import tiny
+
+from fdnet.case import read_case
+from fdnet.errors import CaseError
+from fdnet.scale_table import scale_rows
+from fdnet.scales import carman_kozeny, relaxation_time, scales_of, series
+
+
+@pytest.fixture
+def specimen1(root):
+    case = read_case(root / "cases" / "specimen1.toml")
+    return case, scales_of(case)
+
+
+def test_specimen_1_has_the_velocities_of_the_thesis(specimen1):
+    _, scales = specimen1
+    assert scales.permeability == pytest.approx(7.65e-11, rel=1e-3)
+    assert scales.darcy_velocity == pytest.approx(0.670, rel=1e-3)
+    assert scales.interstitial_velocity == pytest.approx(2.23, rel=2e-3)
+    assert scales.reynolds == pytest.approx(8, abs=0.3)
+    assert any("Reynolds" in warning for warning in scales.warnings)
+
+
+def test_specimen_5_is_further_outside_stokes(root):
+    assert scales_of(read_case(root / "cases" / "specimen5.toml")).reynolds == pytest.approx(12, abs=0.3)
+
+
+def test_carman_kozeny_by_hand():
+    assert carman_kozeny(0.5, 1e-3) == pytest.approx(1e-6 * 0.125 / (180 * 0.25), rel=1e-12)
+
+
+@pytest.mark.parametrize(("diameter_mm", "microseconds"), [(0.05, 5.96), (0.10, 23.8), (0.16, 61.0)])
+def test_relaxation_times(diameter_mm, microseconds):
+    assert relaxation_time(0.5e-3 * diameter_mm, 2146, 0.05) == pytest.approx(1e-6 * microseconds, rel=2e-3)
+
+
+def test_springs_in_series_and_smaller_friction(specimen1):
+    _, scales = specimen1
+    nominal = {name: contact.nominal_stiffness for name, contact in scales.contacts.items()}
+    assert nominal["grain-grain"] == pytest.approx(47.15e9)
+    assert nominal["grain-fine"] == pytest.approx(37.77e9, rel=1e-3)
+    assert nominal["fine-fine"] == pytest.approx(31.5e9)
+    assert scales.contacts["fine-wall"].friction == 0.0
+    assert scales_of(tiny("fines.friction=0.2")).contacts["grain-fine"].friction == 0.2
+    assert series(2.0, 2.0) == 1.0
+
+
+def test_scaling_keeps_ratios_of_stiffness(specimen1):
+    _, scales = specimen1
+    used = scales.contacts
+    assert max(c.normal_stiffness for c in used.values()) == pytest.approx(1e4)
+    ratio = used["fine-fine"].normal_stiffness / used["grain-grain"].normal_stiffness
+    assert ratio == pytest.approx(31.5 / 47.15, rel=1e-9)
+    assert scales_of(tiny("run.stiffness_N_m=94.3e9")).contacts["grain-grain"].normal_stiffness == pytest.approx(94.3e9)
+
+
+def test_damping_rate_gives_the_damping_ratio():
+    case = tiny("fines.damping_ratio=0.3", "grains.damping_ratio=0.3")
+    contact = scales_of(case).contacts["fine-fine"]
+    mass = 4 / 3 * math.pi * (0.05e-3) ** 3 * 2146 / 2
+    assert contact.damping_rate == pytest.approx(2 * 0.3 * math.sqrt(contact.normal_stiffness / mass))
+
+
+def test_supply_from_count_and_from_slab():
+    counted = scales_of(tiny())
+    assert counted.slab_length == pytest.approx(300 * 4 / 3 * math.pi * (0.05e-3) ** 3 / (0.1 * 1.6e-3**2))
+    slab = scales_of(tiny("fines={radius_mm=0.05, slab_mm=0.5}"))
+    assert slab.supplied_count == round(0.1 * 0.5e-3 * 1.6e-3**2 / (4 / 3 * math.pi * (0.05e-3) ** 3))
+
+
+def test_given_velocity_replaces_darcy():
+    scales = scales_of(tiny("fluid.velocity_m_s=3.0"))
+    assert scales.interstitial_velocity == 3.0
+    assert scales.darcy_velocity == pytest.approx(3.0 * scales.porosity)
+
+
+@pytest.mark.parametrize(("assignment", "bound"), [
+    ("run.time_step_s=1e-6", "contact bound"), ("drag.refresh_steps=100000", "are stable")])
+def test_a_step_beyond_its_bound_is_refused_with_the_bound(assignment, bound):
+    with pytest.raises(CaseError, match=bound):
+        scales_of(tiny(assignment))
+
+
+def test_a_step_beyond_the_drag_relaxation_time_is_refused():
+    with pytest.raises(CaseError, match="drag relaxation time"):
+        scales_of(tiny("run.time_step_s=1e-8", "drag.multiplier=1e4"))
+
+
+def test_long_hold_and_thin_sections_warn():
+    scales = scales_of(tiny("drag.refresh_steps=300", "analysis.sections=30"))
+    text = " ".join(scales.warnings)
+    assert "held for" in text
+    assert "thinner than a grain" in text
+
+
+def test_every_row_has_formula_source_and_a_finite_value(specimen1):
+    for row in scale_rows(*specimen1):
+        assert row.formula
+        assert row.source
+        assert math.isfinite(row.value)
