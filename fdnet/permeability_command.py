@@ -1,7 +1,6 @@
 """`fdnet permeability`: the network half alone, on a CSV of spheres."""
 
 import argparse
-import json
 import math
 import time
 from pathlib import Path
@@ -126,7 +125,7 @@ def _print(results: list[dict[str, Any]], options: argparse.Namespace) -> None:
     from fdnet.report.tables import plain_json
 
     if options.json:
-        print(plain_json({"laws": results} if options.compare_laws else results[0]))
+        print(plain_json({"laws": results} if options.compare_laws else results[0])[1])
         return
     first = results[0]
     print(f"porosity {first['porosity_initial']:.5f} -> {first['porosity_damaged']:.5f}, {first['pores']} pores, {first['throats']} throats")

@@ -237,7 +237,7 @@ def _draw(story: _Story, analysis: Analysis, grains: Snapshot, damaged: Snapshot
     reason = vtk.render_spheres_png(picture, path / "spheres_damaged.vtp", shown.box)
     captioned = [(file, figures.CAPTIONS.get(file.stem, file.stem)) for file in drawn]
     if not reason:
-        captioned.insert(0, (picture, "Grains (cut away) and fines, coloured by size; the fluid enters at x = 0."))
+        captioned.insert(0, (picture, figures.CAPTIONS[picture.stem]))
     return captioned, [reason] if reason else []
 
 

@@ -45,7 +45,7 @@ class Progress:
     def __call__(self, line: str) -> None:
         """Take one line of the screen."""
         if line.startswith("FDNET checkpoint"):
-            _, _, chunk, step, upstream, invaded, passed = line.split()
+            step, upstream, invaded, passed = line.split()[3:7]
             self.note = f"upstream {upstream}, invaded {invaded}, passed {passed}"
             self._at(int(step))
         elif line.startswith("FDNET"):

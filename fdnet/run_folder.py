@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fdnet.atomic import write_text
 from fdnet.case import Case
 from fdnet.errors import CaseError
 
@@ -110,13 +111,6 @@ def _force(folder: RunFolder, case: Case, stages: tuple[str, ...]) -> None:
     stale = [i for i, stage in enumerate(STAGES[:2])
              if (record := folder.record(stage)) is not None and record["digest"] != case.digest(stage)]
     folder.clear(STAGES[min([first, *stale]):])
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a whole file or none of it."""
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, path)
 
 
 def write_json(path: Path, value: Any) -> None:

@@ -1,7 +1,6 @@
 """The invasion: fines driven into the pack until plugged, with a checkpoint after every chunk of steps."""
 
 import math
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fdnet.atomic import write_text
 from fdnet.case import Case
 from fdnet.contacts import max_overlap, touching_pairs
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
@@ -105,11 +105,20 @@ def quiet_chunks(scales: Scales) -> int:
     return max(1, math.ceil(scales.plug_time / (scales.checkpoint_steps * scales.time_step) - 1e-9))
 
 
+def empty_chunks(case: Case, scales: Scales) -> int:
+    """Chunks without a fine leaving once the slab is empty: twice the fluid's passage, at least the plug time."""
+    passage = 2 * case.size_m[0] / scales.interstitial_velocity
+    return max(quiet_chunks(scales), math.ceil(passage / (scales.checkpoint_steps * scales.time_step)))
+
+
+def _quiet_enough(case: Case, scales: Scales, row: Checkpoint) -> bool:
+    return row.quiet >= (quiet_chunks(scales) if row.upstream > 0 else empty_chunks(case, scales))
+
+
 def _over(case: Case, scales: Scales, last: Checkpoint | None) -> bool:
     if last is None:
         return False
-    plugged = case.run.duration_ms is None and last.quiet >= quiet_chunks(scales)
-    return plugged or last.chunk >= chunks_of(scales)
+    return (case.run.duration_ms is None and _quiet_enough(case, scales, last)) or last.chunk >= chunks_of(scales)
 
 
 def _prepare(case: Case, scales: Scales, grains: Snapshot, folder: Path, last: Checkpoint | None, ranks: int) -> Deck:
@@ -117,22 +126,16 @@ def _prepare(case: Case, scales: Scales, grains: Snapshot, folder: Path, last: C
         for stale in [folder / HISTORY, *(folder / "post").glob("invade_*")]:
             stale.unlink(missing_ok=True)
         deck = write_invade_inputs(case, scales, grains, folder, ranks=ranks)
-        _write(folder / HISTORY, _HISTORY_HEADER + "\n")
+        write_text(folder / HISTORY, _HISTORY_HEADER + "\n")
         return deck
     rows = [row for row in read_history(folder) if row.step <= last.step]
-    _write(folder / HISTORY, "\n".join([_HISTORY_HEADER, *(_csv(row) for row in rows)]) + "\n")
+    write_text(folder / HISTORY, "\n".join([_HISTORY_HEADER, *(_csv(row) for row in rows)]) + "\n")
     for path in (folder / "post").glob("invade_*"):
         if _step_of(path) > last.step:
             path.unlink()
     deck = render_invade(case, scales, grains, ranks=ranks, resume=last)
-    _write(folder / "in.invade.resume", deck.text)
+    write_text(folder / "in.invade.resume", deck.text)
     return deck
-
-
-def _write(path: Path, text: str) -> None:
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(text)
-    os.replace(partial, path)
 
 
 def _csv(row: Checkpoint) -> str:
@@ -149,7 +152,7 @@ def write_invade_inputs(case: Case, scales: Scales, grains: Snapshot, folder: Pa
     density = np.where(spheres.kind == Kind.GRAIN, case.grains.density_kg_m3, case.fines.density_kg_m3)
     write_data(folder / "invade.data", spheres, bounds=_bounds(case, scales, grains), density=density, types=3)
     deck = render_invade(case, scales, grains, ranks=ranks)
-    _write(folder / "in.invade", deck.text)
+    write_text(folder / "in.invade", deck.text)
     return deck
 
 
@@ -187,6 +190,7 @@ def render_invade(case: Case, scales: Scales, grains: Snapshot, *, ranks: int = 
         "start_velocity": number(scales.upstream_velocity), "fluid_velocity": number(scales.interstitial_velocity),
         "drag": _drag(case, scales), "regions": _regions(case, scales, grains),
         "thermo_steps": max(1, scales.checkpoint_steps // 4), "quiet_checkpoints": quiet_chunks(scales),
+        "empty_checkpoints": empty_chunks(case, scales),
         "start": _start(resume), "chunks": chunks_of(scales), "chunk_steps": scales.checkpoint_steps,
         "stop_when_plugged": case.run.duration_ms is None, "dump_columns": COLUMNS, "dump_format": FORMAT})
     return Deck(text=text, stage="invade", digest=case.digest("invade"), left_out=tuple(left_out))
@@ -327,7 +331,7 @@ def _ending(case: Case, scales: Scales, history: tuple[Checkpoint, ...]) -> tupl
     warnings = []
     if case.run.duration_ms is not None:
         reason = "duration"
-    elif last.quiet >= quiet_chunks(scales):
+    elif _quiet_enough(case, scales, last):
         reason = "plugged" if last.upstream > 0 else "supply_exhausted"
     else:
         reason = "cap"

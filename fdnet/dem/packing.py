@@ -109,7 +109,7 @@ def _attempt(case: Case, scales: Scales, folder: Path, count: int, *, binary: Bi
         shutil.rmtree(folder)
     (folder / "post").mkdir(parents=True)
     write_pack_inputs(case, scales, folder, count=count, ranks=ranks)
-    run = run_deck(folder, "in.pack", binary=binary, ranks=ranks, follow=follow)
+    run = _run(case, folder, count, binary=binary, ranks=ranks, follow=follow)
     frame = read_frame(folder / "post" / "pack.dump")
     screen = (folder / "screen.txt").read_text(encoding="utf-8", errors="replace")
     if "FDNET restless" in screen:
@@ -122,6 +122,17 @@ def _attempt(case: Case, scales: Scales, folder: Path, count: int, *, binary: Bi
     return Pack(grains=grains, porosity=porosity.mean, porosity_error=porosity.standard_error, porosity_sum=porosity.sum,
                 max_overlap=max_overlap(grains, case.periodic), steps=frame.step, step_s=scales.pack_step, attempts=(),
                 run=run)
+
+
+def _run(case: Case, folder: Path, count: int, *, binary: Binary, ranks: int, follow: Callable[[str], None] | None) -> Run:
+    try:
+        return run_deck(folder, "in.pack", binary=binary, ranks=ranks, follow=follow)
+    except LiggghtsError as error:
+        if "Lost atoms" not in str(error):
+            raise
+        key = "grains.porosity" if case.grains.count is None else "grains.count"
+        raise CaseError(f"{key}: {count} grains needs more room than the box has, some were pushed out of it while growing; "
+                        "raise the porosity, lower the count or enlarge the box") from error
 
 
 def write_pack_inputs(case: Case, scales: Scales, folder: Path, *, count: int, ranks: int = 1) -> Deck:

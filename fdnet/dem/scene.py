@@ -1,11 +1,11 @@
 """What both scenes share in a deck: header, contacts, walls, and the data file of spheres."""
 
-import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fdnet.atomic import write_text
 from fdnet.case import Case
 from fdnet.dem.deck import LeftOut, number
 from fdnet.scales import Contact, Scales
@@ -73,7 +73,5 @@ def write_data(path: Path, spheres: Snapshot, *, bounds: Array, density: Array, 
     lines += [f"{number(low)} {number(high)} {axis}lo {axis}hi" for (low, high), axis in zip(bounds, "xyz", strict=True)]
     lines += ["", "Atoms", ""]
     table = np.column_stack([spheres.id, spheres.kind, 2 * spheres.radius, density, spheres.position])
-    lines += ["%d %d %.17g %.17g %.17g %.17g %.17g" % tuple(row) for row in table]
-    partial = path.with_suffix(path.suffix + ".part")
-    partial.write_text("\n".join(lines) + "\n")
-    os.replace(partial, path)
+    lines += [f"{atom:.0f} {kind:.0f} " + " ".join(f"{value:.17g}" for value in rest) for atom, kind, *rest in table]
+    write_text(path, "\n".join(lines) + "\n")

@@ -15,12 +15,13 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from fdnet.errors import NetworkError
 from fdnet.network import geometry
-from fdnet.network.images import INSIDE, ON_FACE, Images, label, make_images, packed_shift
+from fdnet.network.images import INSIDE, ON_FACE, Images, label, make_images, packed_shift, wrapped
 from fdnet.snapshot import Array, Snapshot
 
 SHAKE = 1e-7
 SHAKE_SEED = 3_141_592
 ON_FACE_HAIR = 1e-6
+COINCIDENT = 1e-3
 UNMATCHED_SHARE = 1e-3
 
 
@@ -59,7 +60,7 @@ class Facets:
 
 def tessellate(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Tetrahedra:
     """Unique tetrahedra of `grains` in their box. Raises NetworkError on too few or coincident grains."""
-    _check(grains)
+    _check(grains, periodic)
     largest = float(grains.radius.max())
     size = grains.box[:, 1] - grains.box[:, 0]
     margin = np.full(3, 4.0 * largest)
@@ -74,12 +75,16 @@ def tessellate(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Tetrah
                        f"around the box of {size.tolist()} m; give more grains or a smaller box")
 
 
-def _check(grains: Snapshot) -> None:
+def _check(grains: Snapshot, periodic: tuple[bool, ...]) -> None:
     if len(grains) < 4:
         raise NetworkError(f"tessellation: {len(grains)} grains; a tetrahedron needs at least 4, give more grains")
     if np.any(grains.radius <= 0) or np.any(grains.box[:, 1] <= grains.box[:, 0]):
         raise NetworkError("tessellation: a grain radius or a box side is not positive; check the input lengths")
-    close = cKDTree(grains.position).query_pairs(1e-3 * float(grains.radius.min()), output_type="ndarray")
+    low, size = grains.box[:, 0], grains.box[:, 1] - grains.box[:, 0]
+    place = wrapped(grains.position, grains.box, periodic) - low
+    place = np.where(periodic, np.where(place >= size, 0.0, place), place)
+    tree = cKDTree(place, boxsize=np.where(periodic, size, 0.0))
+    close = tree.query_pairs(COINCIDENT * float(grains.radius.min()), output_type="ndarray")
     if len(close):
         first, second = grains.id[close[0]]
         raise NetworkError(f"tessellation: grains {first} and {second} coincide at {grains.position[close[0, 0]]} m "

@@ -25,8 +25,9 @@ def deposit_in_pores(network: Network, fines: Snapshot) -> tuple[Array, Array]:
     if not len(fines):
         return volume, surface
     position, radius = _with_images(network, fines)
-    real = np.flatnonzero(network.pore_tetra_volume > SPECK * network.grain_radius**3)
-    corner = _oriented(network.pore_corner[real])
+    corner = _oriented(network.pore_corner)
+    real = np.flatnonzero(geometry.signed_volume(corner) > SPECK * network.grain_radius**3)
+    corner = corner[real]
     pore, fine = _near(corner, position, radius)
     depth = _facet_depths(corner, pore, position[fine])
     touched = np.all(depth > -radius[fine, None], axis=1)

@@ -100,7 +100,7 @@ def _beside_planes(network: Network, x: Array, low: float, high: float) -> Array
 
 
 def _cut_links(network: Network, conductance: Array, low: float, high: float) -> _Links:
-    """Throats with a part between the planes; those crossing a plane are shortened to it."""
+    """Throats with a part between the planes; those crossing a plane are shortened to it, to 1e-3 at the least."""
     turned = np.flatnonzero(network.throat_shift[:, 0] != 0)
     throat = np.concatenate([np.arange(len(conductance)), turned])
     x = network.throat_ends[throat, :, 0]

@@ -4,6 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from fdnet.errors import NetworkError
 from fdnet.network import geometry
@@ -12,6 +15,7 @@ from fdnet.network.images import MIRROR_LOW
 from fdnet.snapshot import Array, Snapshot, frozen
 
 LENGTH_FLOOR = 1e-3
+SAME_CENTRE = 1e-5
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -24,7 +28,8 @@ class Network:
     1). `pore_grains` (P, 4) index; `pore_corner` (P, 4, 3), images included; `pore_corner_radius` (P, 4);
     `pore_position` (P, 3) centre of the sphere touching the four grains, the centroid where that is outside (Shi
     2011, section 3.1.2); `pore_radius` of that sphere (0 where grains close it); `pore_circumcentre` (P, 3);
-    `pore_tetra_volume`, `pore_volume` (void), `pore_wall_surface` (P,).
+    `pore_tetra_volume`, `pore_volume` (void), `pore_wall_surface` (P,); `pore_group` (P,) equal for pores of one
+    circumcentre, which are parts of one polyhedron (a lattice's cell, a prism cut by a face) split at will.
     `throat_pores` (T, 2); `throat_shift` (T, 3) periods from the second pore's position to its place beside the
     first; `throat_ends` (T, 2, 3) the two places; `throat_grains` (T, 3); `throat_corner` (T, 3, 3);
     `throat_corner_radius` (T, 3); `throat_heights` (T, 2) distances of the circumcentres from the facet, positive on
@@ -45,6 +50,7 @@ class Network:
     pore_tetra_volume: Array
     pore_volume: Array
     pore_wall_surface: Array
+    pore_group: Array
     pore_share: Array
     throat_pores: Array
     throat_shift: Array
@@ -74,7 +80,7 @@ def build_network(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Net
     Periodic sides join. Across the others the grains are mirrored before tessellating; pores cut by a side wall are
     left out, pores cut by an x face stay and lie on it. Grains that do not reach into the box are left out and
     counted. Raises NetworkError on fewer than four grains, coincident grains, grains in one plane, facets without
-    partner, or no throat at all.
+    partner, no throat at all, or an x face without pores.
     """
     periodic = (bool(periodic[0]), bool(periodic[1]), bool(periodic[2]))
     grains, outside = _reaching(grains, periodic)
@@ -84,6 +90,8 @@ def build_network(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Net
         raise NetworkError(f"tessellation: no throat joins two pores of these {len(grains)} grains; the box is too "
                            "narrow for its side walls, give more grains or periodic sides")
     centres = _pore_centres(grains, tetrahedra, periodic)
+    if not periodic[0]:
+        _check_ends(grains.box, centres.position[:, 0])
     pores, pore_counts = _pores(grains, tetrahedra, centres)
     throats, throat_counts = _throats(grains, tetrahedra, facets, centres)
     counts = {"grains_outside_box": outside, "centre_is_centroid": centres.centroids, **pore_counts, **throat_counts,
@@ -91,6 +99,13 @@ def build_network(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Net
     area = float(np.sum(pores["pore_share"] * pores["pore_tetra_volume"]) / (grains.box[0, 1] - grains.box[0, 0]))
     return Network(box=frozen(grains.box), periodic=periodic, grain_radius=float(grains.radius.mean()), area=area,
                    counts=counts, **{name: frozen(value) for name, value in {**pores, **throats}.items()})
+
+
+def _check_ends(box: Array, x: Array) -> None:
+    for name, face in (("inlet", box[0, 0]), ("outlet", box[0, 1])):
+        if not np.any(x == face):
+            raise NetworkError(f"tessellation: no pore lies on the {name} face x = {face:g} m, a whole layer of grains "
+                               "is centred on it; shift the box by part of a radius or make x periodic")
 
 
 def _reaching(grains: Snapshot, periodic: tuple[bool, ...]) -> tuple[Snapshot, int]:
@@ -129,11 +144,19 @@ def _pores(grains: Snapshot, tetrahedra: Tetrahedra, centres: _Centres) -> tuple
     found = {"pore_grains": tetrahedra.grain, "pore_corner": corner, "pore_corner_radius": radius,
              "pore_position": centres.position, "pore_radius": np.maximum(centres.radius, 0.0),
              "pore_circumcentre": tetrahedra.centre - offset, "pore_tetra_volume": volume,
-             "pore_volume": volume - solid, "pore_wall_surface": surface, "pore_share": np.where(cut, 0.5, 1.0)}
+             "pore_volume": volume - solid, "pore_wall_surface": surface,
+             "pore_group": _groups(tetrahedra.centre, grains), "pore_share": np.where(cut, 0.5, 1.0)}
     speck = 1e-9 * float(grains.radius.mean()) ** 3
     counts = {"pores_closed": int(np.sum(centres.radius <= 0)), "pores_at_end_faces": int(np.sum(cut)),
               "void_negative": int(np.sum(found["pore_volume"] < -speck))}
     return found, counts
+
+
+def _groups(centre: Array, grains: Snapshot) -> Array:
+    # centres of one polyhedron differ by the shake, about 1e-7 radii; along x images never meet
+    near = cKDTree(centre).query_pairs(SAME_CENTRE * float(grains.radius.mean()), output_type="ndarray")
+    graph = coo_matrix((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(len(centre), len(centre)))
+    return connected_components(graph, directed=False)[1]
 
 
 def solid_in_tetrahedra(corner: Array, radius: Array) -> tuple[Array, Array]:

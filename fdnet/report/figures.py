@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fdnet.report.atomic import replacing
+from fdnet.atomic import replacing
 from fdnet.report.side_view import fill_side_view
 from fdnet.snapshot import Array, Snapshot
 

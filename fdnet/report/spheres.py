@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from fdnet.atomic import replacing
 from fdnet.errors import CaseError
-from fdnet.report.atomic import replacing
 from fdnet.snapshot import Array, Kind, Snapshot, frozen
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}

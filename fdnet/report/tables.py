@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fdnet.report.atomic import replacing, write_text
+from fdnet.atomic import replacing, write_text
 from fdnet.report.spheres import read_spheres, write_spheres
 from fdnet.snapshot import Array
 
@@ -107,17 +107,23 @@ def write_throats(path: str | Path, analysis: "Analysis") -> Path:
     return _write(path, _frame(columns))
 
 
-def write_summary(path: str | Path, summary: Mapping[str, Any]) -> dict[str, Any]:
-    """Write summary.json and return what was written.
+def plain_json(mapping: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
+    """`mapping` as plain values and as JSON text.
 
     JSON knows no NaN or infinity: each becomes null and a line in `warnings` names it. Raises TypeError
     for values that are no numbers, texts, lists or mappings.
     """
     refused: list[str] = []
-    plain = _plain(summary, "", refused)
+    plain = _plain(mapping, "", refused)
     if refused:
         plain["warnings"] = [*plain.get("warnings", []), *refused]
-    write_text(path, json.dumps(plain, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+    return plain, json.dumps(plain, indent=2, allow_nan=False, ensure_ascii=False)
+
+
+def write_summary(path: str | Path, summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Write summary.json and return what was written; see `plain_json`."""
+    plain, text = plain_json(summary)
+    write_text(path, text + "\n")
     return plain
 
 

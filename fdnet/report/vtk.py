@@ -11,7 +11,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from fdnet.report.atomic import replacing, write_text
+from fdnet.atomic import replacing, write_text
 from fdnet.report.tables import blocked_throats, pore_porosity
 from fdnet.snapshot import Array, Snapshot
 

@@ -1,0 +1,147 @@
+"""Invasions by the real binary: every fine is accounted for, and a cut run goes on as if never cut."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builders import tiny
+
+from fdnet.contacts import touching_pairs
+from fdnet.dem import invasion
+from fdnet.dem.invasion import invade, last_checkpoint, read_history
+from fdnet.dem.packing import make_pack
+from fdnet.dem.supply import CLEARANCE, place_fines
+from fdnet.errors import CaseError, LiggghtsError
+from fdnet.scales import scales_of
+from fdnet.snapshot import Kind
+
+pytestmark = pytest.mark.liggghts
+
+
+@pytest.fixture(scope="module")
+def packed(binary, tmp_path_factory):
+    """Grains of the tiny case, with walls and with periodic sides."""
+    grains = {}
+    for sides in ("walls", "periodic"):
+        case = tiny(f"box.sides={sides}")
+        grains[sides] = make_pack(case, scales_of(case), tmp_path_factory.mktemp(sides), binary=binary).grains
+    return grains
+
+
+@pytest.mark.parametrize("assignments", [[], ["fines.radius_mm=[0.02,0.06]"], ["box.sides=periodic", "fines.concentration=0.3"]])
+def test_fines_start_clear_of_everything(packed, assignments):
+    case = tiny(*assignments)
+    scales = scales_of(case)
+    grains = packed[case.box.sides]
+    fines = place_fines(case, scales, grains)
+    assert len(fines) == scales.supplied_count
+    pairs, _ = touching_pairs(grains.joined(fines), case.periodic, gap=0.5 * (CLEARANCE - 1))
+    assert not np.any(grains.joined(fines).kind[pairs] == Kind.FINE)
+    low = fines.position[:, 0].min()
+    assert np.min(grains.position[:, 0] - grains.radius) > fines.position[:, 0].max()
+    assert fines.position[:, 0].max() - low <= scales.slab_length
+    assert np.all(fines.velocity[:, 0] == scales.upstream_velocity)
+
+
+def test_a_slab_that_cannot_hold_the_fines_is_an_error(packed):
+    case = tiny("fines={radius_mm=0.05, count=300, concentration=0.3}")
+    crowded = case.model_copy(update={"fines": case.fines.model_copy(update={"concentration": 0.6})})
+    with pytest.raises(CaseError, match=r"fines\.concentration: 0\.6 leaves"):
+        place_fines(crowded, scales_of(crowded), packed["walls"])
+
+
+@pytest.mark.parametrize("assignments", [
+    [], ["box.sides=periodic"], ["grains.motion=mobile"], ["drag.scheme=every_step"], ["drag.upstream=darcy"],
+    ["fines.radius_mm=[0.02,0.05]", "fines.friction=0.0", "run.duration_ms=0.25"]])
+def test_supplied_is_invaded_passed_and_upstream_at_every_checkpoint(binary, packed, tmp_path, assignments):
+    case = tiny("run.cap_ms=0.6", *assignments)
+    scales = scales_of(case)
+    result = invade(case, scales, packed[case.box.sides], tmp_path, binary=binary)
+    for row in result.history:
+        assert row.upstream + row.invaded + row.passed == scales.supplied_count
+    x = result.damaged.fines().position[:, 0]
+    assert np.count_nonzero((x >= 0) & (x < case.size_m[0])) == result.history[-1].invaded
+    assert result.max_overlap < 0.1
+    assert result.stop_reason in {"plugged", "duration", "supply_exhausted", "cap"}
+    assert (result.stop_reason == "duration") == (case.run.duration_ms is not None)
+
+
+def test_fixed_grains_do_not_move_and_mobile_ones_do(binary, packed, tmp_path):
+    grains = packed["walls"]
+    for motion in ("fixed", "mobile"):
+        case = tiny(f"grains.motion={motion}", "run.duration_ms=0.2")
+        result = invade(case, scales_of(case), grains, tmp_path / motion, binary=binary)
+        moved = np.max(np.abs(result.damaged.grains().position - grains.position))
+        assert (moved > 0) == (motion == "mobile")
+        assert moved < 0.2 * 0.25e-3
+
+
+def test_passed_fines_are_removed_and_counted(binary, packed, tmp_path):
+    case = tiny("fines.radius_mm=0.02", "fines.friction=0.0", "fines.count=200", "run.cap_ms=3.0")
+    result = invade(case, scales_of(case), packed["walls"], tmp_path, binary=binary)
+    assert result.history[-1].passed > 0
+    assert len(result.damaged.fines()) == 200 - result.history[-1].passed
+    assert result.stop_reason == "supply_exhausted"
+    assert any("empty slab" in warning for warning in result.warnings)
+
+
+def test_every_stop_reason_is_told(binary, packed, tmp_path):
+    capped = tiny("run.cap_ms=0.05")
+    assert invade(capped, scales_of(capped), packed["walls"], tmp_path / "cap", binary=binary).stop_reason == "cap"
+    plugged = tiny("fines={radius_mm=0.12, count=60}")
+    assert invade(plugged, scales_of(plugged), packed["walls"], tmp_path / "plug", binary=binary).stop_reason == "plugged"
+
+
+class StopError(Exception):
+    """Stands for any sudden end."""
+
+
+@pytest.mark.parametrize("assignments", [[], ["drag.scheme=every_step"], ["grains.motion=mobile"]])
+def test_a_cut_run_continues_bit_for_bit(binary, packed, tmp_path, monkeypatch, assignments):
+    case = tiny("run.cap_ms=0.5", *assignments)
+    scales, grains = scales_of(case), packed["walls"]
+    whole = invade(case, scales, grains, tmp_path / "whole", binary=binary)
+
+    def stop(line: str) -> None:
+        if line.startswith("FDNET checkpoint 2 "):
+            raise StopError
+
+    with pytest.raises(StopError):
+        invade(case, scales, grains, tmp_path / "cut", binary=binary, follow=stop)
+    assert read_history(tmp_path / "cut")[-1].chunk < whole.history[-1].chunk
+    again = invade(case, scales, grains, tmp_path / "cut", binary=binary)
+    assert again.history == whole.history
+    assert np.array_equal(again.damaged.position, whole.damaged.position)
+
+
+def test_broken_checkpoints_are_passed_over(binary, packed, tmp_path):
+    case = tiny("run.cap_ms=0.3")
+    scales, grains = scales_of(case), packed["walls"]
+    whole = invade(case, scales, grains, tmp_path, binary=binary)
+    last, before = whole.history[-1], whole.history[-2]
+    dump = tmp_path / "post" / f"invade_{last.step}.dump"
+    dump.write_bytes(dump.read_bytes()[:-40])
+    assert last_checkpoint(tmp_path, case, grains) == before
+    (tmp_path / "post" / f"invade_{before.step}.restart").write_bytes(b"")
+    assert last_checkpoint(tmp_path, case, grains) is None
+    again = invade(case, scales, grains, tmp_path, binary=binary)
+    assert np.array_equal(again.damaged.position, whole.damaged.position)
+
+
+def test_fines_that_vanish_are_an_error(packed, tmp_path):
+    case = tiny()
+    (tmp_path / "post").mkdir()
+    row = invasion.Checkpoint(chunk=1, step=10, upstream=200, invaded=90, passed=5, removed_upstream=0, most_crossed=95, quiet=0)
+    damaged = packed["walls"].joined(place_fines(case, scales_of(case), packed["walls"]))
+    with pytest.raises(LiggghtsError, match="fines inside"):
+        invasion._check_counts(tmp_path, row, damaged, 300)
+    row = invasion.Checkpoint(chunk=1, step=10, upstream=300, invaded=0, passed=0, removed_upstream=0, most_crossed=0, quiet=0)
+    with pytest.raises(LiggghtsError, match="is not the 301 supplied"):
+        invasion._check_counts(tmp_path, row, damaged, 301)
+
+
+def test_history_with_a_half_written_line(tmp_path: Path):
+    (tmp_path / "history.csv").write_text("chunk,step\n1,10,5,5,0,0,5,0\n2,20,4,")
+    assert [row.chunk for row in read_history(tmp_path)] == [1]
+    with pytest.raises(LiggghtsError, match="no checkpoint recorded"):
+        read_history(tmp_path / "none")

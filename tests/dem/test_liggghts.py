@@ -1,0 +1,138 @@
+"""Every way a LIGGGHTS run can fail, played by a ten-line fake; exit code 0 alone proves nothing."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import pytest
+
+from fdnet.dem.liggghts import Binary, find_binary, run_deck
+from fdnet.errors import LiggghtsError
+
+FAKE = """#!/bin/sh
+case "$1" in -h) echo "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0, compiled)"; exit 0;; esac
+mode=$(cat mode)
+echo "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0)"
+case "$mode" in
+ok) echo "   100   20   1.5   0.2"; echo DECK_DONE;;
+exit1) echo "ERROR: Unknown command: nonsense (input.cpp:271)"; exit 1;;
+error0) echo "ERROR on proc 0: Cannot open file"; echo DECK_DONE;;
+short) echo "half way";;
+silent) exit 1;;
+lost) echo "ERROR: Lost atoms: original 20 current 19"; exit 1;;
+nan) echo "   100   20   nan   0.2"; echo DECK_DONE;;
+forced) echo "Forced restart written"; echo DECK_DONE;;
+segv) kill -SEGV $$;;
+junk) printf '\\377\\376 junk\\n'; echo DECK_DONE;;
+hang) echo started; sleep 60;;
+esac
+"""
+
+
+@pytest.fixture
+def fake(tmp_path: Path) -> Binary:
+    path = tmp_path / "bin" / "liggghts"
+    path.parent.mkdir()
+    path.write_text(FAKE)
+    path.chmod(0o755)
+    (tmp_path / "in.deck").write_text("units si\n")
+    return find_binary(str(path))
+
+
+def run(fake: Binary, folder: Path, mode: str, **options):
+    (folder / "mode").write_text(mode)
+    return run_deck(folder, "in.deck", binary=fake, **options)
+
+
+def test_a_whole_run_is_a_run(fake, tmp_path):
+    lines: list[str] = []
+    result = run(fake, tmp_path, "ok", follow=lines.append)
+    assert result.version == "3.8.0"
+    assert lines[-1] == "DECK_DONE"
+    assert run(fake, tmp_path, "junk").ranks == 1
+
+
+@pytest.mark.parametrize(("mode", "said"), [
+    ("exit1", r"exit 1\): ERROR: Unknown command: nonsense"),
+    ("error0", r"exit 0\): ERROR on proc 0: Cannot open file"),
+    ("short", r"exit 0, no DECK_DONE line\): half way"),
+    ("silent", r"exit 1, no DECK_DONE line"),
+    ("lost", "Lost atoms"),
+    ("nan", "not-a-number in the output"),
+    ("forced", "Forced restart written"),
+    ("segv", "signal 11"),
+])
+def test_failures_are_told_with_their_evidence(fake, tmp_path, mode, said):
+    with pytest.raises(LiggghtsError, match=said):
+        run(fake, tmp_path, mode)
+
+
+def test_a_hanging_run_is_stopped_at_its_time_limit(fake, tmp_path):
+    start = time.monotonic()
+    with pytest.raises(LiggghtsError, match="time limit"):
+        run(fake, tmp_path, "hang", timeout=0.5)
+    assert time.monotonic() - start < 20
+
+
+def test_the_run_dies_with_its_parent(fake, tmp_path):
+    """kill -9 of Python must not leave an orphan that writes into a resumed run."""
+    (tmp_path / "mode").write_text("hang")
+    code = textwrap.dedent(f"""
+        from pathlib import Path
+        from fdnet.dem.liggghts import find_binary, run_deck
+        run_deck(Path({str(tmp_path)!r}), "in.deck", binary=find_binary({str(fake.path)!r}))
+    """)
+    parent = subprocess.Popen([sys.executable, "-c", code], start_new_session=True)
+    screen = tmp_path / "screen.txt"
+    deadline = time.monotonic() + 30
+    while time.monotonic() < deadline and not (screen.exists() and "started" in screen.read_text()):
+        time.sleep(0.05)
+    children = Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text().split()
+    assert children
+    parent.send_signal(signal.SIGKILL)
+    parent.wait()
+    while time.monotonic() < deadline and any(_alive(int(child)) for child in children):
+        time.sleep(0.05)
+    assert not any(_alive(int(child)) for child in children)
+
+
+def _alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().split(")")[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def test_missing_binary_deck_and_strangers(fake, tmp_path, monkeypatch):
+    with pytest.raises(LiggghtsError, match="LIGGGHTS not found"):
+        find_binary(str(tmp_path / "nowhere"))
+    with pytest.raises(LiggghtsError, match="does not answer like LIGGGHTS"):
+        find_binary("/bin/true")
+    with pytest.raises(LiggghtsError, match="deck not found"):
+        run_deck(tmp_path, "in.other", binary=fake)
+    monkeypatch.setenv("FDNET_LIGGGHTS", str(fake.path))
+    assert find_binary().path == fake.path
+    with pytest.raises(LiggghtsError, match="no mpirun"):
+        Binary(path=fake.path, version="3.8.0", launcher=None).command("in.deck", 2)
+
+
+@pytest.mark.liggghts
+def test_the_real_binary_fails_as_the_fake_does(binary, tmp_path):
+    for text, said in (("nonsense\n", "Unknown command"), ("units si\nread_data none.data\n", "Cannot open file"),
+                       ("units si\n", "no DECK_DONE"), ('print "${undefined}"\n', "exit 1"), ("quit\n", "exit 1")):
+        (tmp_path / "in.bad").write_text(text)
+        with pytest.raises(LiggghtsError, match=said):
+            run_deck(tmp_path, "in.bad", binary=binary)
+
+
+@pytest.mark.liggghts
+@pytest.mark.skipif(os.cpu_count() == 1, reason="needs two cores")
+def test_two_ranks_run(binary, tmp_path):
+    (tmp_path / "in.two").write_text('units si\nprint "DECK_DONE"\n')
+    if binary.launcher is None:
+        pytest.skip("no mpirun on this machine")
+    assert run_deck(tmp_path, "in.two", binary=binary, ranks=2).ranks == 2

@@ -1,0 +1,46 @@
+"""Small networks made by hand: what flow and damage need, the rest zero."""
+
+import numpy as np
+
+from fdnet.network.tessellation import Network
+from fdnet.snapshot import Array, frozen
+
+
+def network_of(position: Array, pairs: Array, box: Array, *, radius: float = 0.1, **given: object) -> Network:
+    """Pores at `position` (P, 3) joined by throats `pairs` (T, 2), not periodic; `given` fields replace the zeros."""
+    position, pairs = np.asarray(position, float), np.asarray(pairs, int)
+    pores, throats = len(position), len(pairs)
+    ends = position[pairs]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    box = np.asarray(box, float)
+    fields: dict[str, object] = {
+        "box": box, "periodic": (False, False, False), "grain_radius": 1.0,
+        "area": float(np.prod(np.ptp(box[1:], axis=1))),
+        "pore_grains": np.zeros((pores, 4), int), "pore_corner": np.zeros((pores, 4, 3)),
+        "pore_corner_radius": np.ones((pores, 4)), "pore_position": position, "pore_radius": np.full(pores, radius),
+        "pore_circumcentre": position, "pore_tetra_volume": np.ones(pores), "pore_volume": np.ones(pores),
+        "pore_wall_surface": np.ones(pores), "pore_share": np.ones(pores), "throat_pores": pairs,
+        "throat_shift": np.zeros((throats, 3), int), "throat_ends": ends, "throat_grains": np.zeros((throats, 3), int),
+        "throat_corner": np.zeros((throats, 3, 3)), "throat_corner_radius": np.ones((throats, 3)),
+        "throat_heights": np.zeros((throats, 2)), "throat_radius": np.full(throats, radius),
+        "throat_radius_effective": np.full(throats, radius), "throat_area": np.full(throats, np.pi * radius**2),
+        "throat_length": length, "counts": {"grains_outside_box": 0},
+    } | given
+    return Network(**{name: frozen(value) if isinstance(value, np.ndarray) else value
+                      for name, value in fields.items()})
+
+
+def chain(count: int, *, step: float = 1.0) -> Network:
+    """`count` throats in a row along x, the first and last pore on the faces."""
+    position = np.stack([np.arange(count + 1) * step, np.full(count + 1, 0.5), np.full(count + 1, 0.5)], axis=1)
+    pairs = np.stack([np.arange(count), np.arange(1, count + 1)], axis=1)
+    return network_of(position, pairs, [[0, count * step], [0, 1], [0, 1]])
+
+
+def random_network(count: int = 30, *, seed: int = 3) -> tuple[Network, Array]:
+    """Random pores with three links each and log-uniform conductances over six decades; some pores on the faces."""
+    rng = np.random.default_rng(seed)
+    position = rng.random((count, 3))
+    position[:4, 0], position[4:8, 0] = 0.0, 1.0
+    pairs = np.array([(i, j) for i in range(count) for j in rng.choice(count, 3, replace=False) if i < j])
+    return network_of(position, pairs, [[0, 1]] * 3), 10.0 ** rng.uniform(-6, 0, len(pairs))

@@ -1,0 +1,91 @@
+"""Damage laws on single throats, in closed form."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fdnet.errors import CaseError
+from fdnet.network.damage import DAMAGE_LAWS
+from tests.network.networks import chain
+
+R, L = 0.1, 1.0
+CLEAN = np.pi * R**4 / (8 * L)
+
+
+def occupancy(porosity, *, fine=0.02, distance=0.9, blocked=None, solid=0.0, surface=0.0):
+    porosity = np.asarray(porosity, float)
+    count = len(porosity)
+    return SimpleNamespace(
+        throat_porosity=porosity, throat_fines=(porosity < 1).astype(int), throat_fine_radius=np.full(count, fine),
+        blocked=np.zeros(count, bool) if blocked is None else np.asarray(blocked), pair_throat=np.arange(count),
+        pair_distance=np.full(count, distance), pore_solid_volume=np.broadcast_to(solid, count + 1).astype(float),
+        pore_solid_surface=np.broadcast_to(surface, count + 1).astype(float))
+
+
+def damaged(law, state, **options):
+    count = len(state.throat_porosity)
+    return DAMAGE_LAWS[law](chain(count), state, np.full(count, CLEAN), **options)
+
+
+def carman_kozeny(porosity, fine):
+    k = porosity**3 * (2 * fine) ** 2 / (72 * 2.5 * (1 - porosity) ** 2)
+    return k * np.pi * R**2 / L
+
+
+def test_thesis_law_by_throat_porosity():
+    found = damaged("thesis", occupancy([1.0, 0.8, 0.4, 0.39, 0.2, -0.1]))
+    expected = [CLEAN, CLEAN * 0.64, CLEAN * 0.16, carman_kozeny(0.39, 0.02), carman_kozeny(0.2, 0.02), 0.0]
+    assert found.conductance == pytest.approx(expected, rel=1e-12, abs=1e-18)
+    assert found.law_used.tolist() == ["clean", "deposition", "deposition", "clogging", "clogging", "clogging"]
+    assert found.counts["throats_filled"] == 1
+
+
+def test_thresholds_of_text_and_code_and_by_choice():
+    state = occupancy([0.38])
+    assert damaged("thesis", state).law_used[0] == "clogging"
+    assert damaged("thesis-code", state).law_used[0] == "deposition"
+    assert damaged("thesis", state, threshold=0.3).law_used[0] == "deposition"
+    assert damaged("thesis-code", state, threshold=0.5).law_used[0] == "clogging"
+
+
+def test_middle_band_is_decided_by_where_the_fines_lie():
+    porosity = [0.35, 0.37, 0.79, 0.81]
+    wall = damaged("thesis", occupancy(porosity, distance=0.9), middle_band="position")
+    middle = damaged("thesis", occupancy(porosity, distance=0.3), middle_band="position")
+    assert wall.law_used.tolist() == ["clogging", "deposition", "deposition", "deposition"]
+    assert middle.law_used.tolist() == ["clogging", "clogging", "clogging", "deposition"]
+
+
+def test_blocked_throat_is_closed_whatever_its_porosity():
+    found = damaged("thesis", occupancy([0.9, 0.9], blocked=[True, False]))
+    assert found.conductance == pytest.approx([0.0, CLEAN * 0.81])
+    assert found.law_used[0] == "blocked"
+
+
+def test_clogging_never_exceeds_the_clean_throat():
+    found = damaged("thesis", occupancy([0.39], fine=1.0))
+    assert carman_kozeny(0.39, 1.0) > CLEAN
+    assert found.conductance[0] == CLEAN
+    assert found.counts["capped"] == 1
+
+
+def test_kozeny_is_the_harmonic_mean_of_two_pores():
+    state = occupancy([1.0], solid=np.array([0.2, 0.0]), surface=np.array([0.5, 0.0]))
+    factor = 0.8**3 / 1.5**2
+    found = damaged("kozeny", state)
+    assert found.conductance[0] == pytest.approx(CLEAN * 2 * factor / (1 + factor))
+    assert found.law_used[0] == "kozeny"
+
+
+def test_kozeny_closes_a_filled_pore_and_counts_it():
+    found = damaged("kozeny", occupancy([1.0, 1.0], solid=np.array([1.0, 0.0, 0.0]), surface=0.1))
+    assert found.conductance == pytest.approx([0.0, CLEAN])
+    assert found.counts["pores_filled"] == 1
+    assert found.law_used.tolist() == ["blocked", "clean"]
+
+
+@pytest.mark.parametrize("options", [{"threshold": 1.2}, {"middle_band": "guess"}])
+def test_options_out_of_range_are_refused(options):
+    with pytest.raises(CaseError, match=next(iter(options))):
+        damaged("thesis", occupancy([0.5]), **options)

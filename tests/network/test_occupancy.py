@@ -1,0 +1,133 @@
+"""Fines in throats and pores: volumes against Monte Carlo, closed forms and sums."""
+
+import numpy as np
+import pytest
+
+from fdnet.errors import CaseError
+from fdnet.network.cylinder import Pairs, covers_section, exact_volume, two_plane_volume
+from fdnet.network.occupancy import measure_occupancy
+from fdnet.network.tessellation import build_network
+from fdnet.snapshot import Kind
+from tests.network.networks import chain
+from tests.network.packs import random_pack, snapshot, with_fines
+
+ALL, NONE = (True,) * 3, (False,) * 3
+CASES = np.array([  # sphere, offset, depth, tube, length
+    [0.5, 0.75, 1.0, 1.0, 3.0], [0.5, 1.2, 0.1, 1.0, 3.0], [2.0, 0.5, 1.0, 1.0, 3.0], [1.0, 0.0, -0.3, 1.0, 3.0],
+    [0.3, 0.2, 1.0, 1.0, 3.0], [0.8, 0.6, 2.9, 1.0, 3.0], [1.5, 2.2, 0.5, 1.0, 1.0], [0.4, 0.1, 0.2, 1.0, 0.3]])
+
+
+def pairs_of(rows):
+    return Pairs(**dict(zip(("sphere", "offset", "depth", "tube", "length"), np.atleast_2d(rows).T, strict=True)))
+
+
+@pytest.mark.parametrize("row", CASES)
+def test_sphere_in_cylinder_against_random_points(row):
+    sphere, offset, depth, tube, length = row
+    point = np.random.default_rng(11).uniform(-sphere, sphere, (1_000_000, 3))
+    point = point[np.sum(point**2, axis=1) < sphere**2]
+    inside = (point[:, 2] + depth > 0) & (point[:, 2] + depth < length)
+    inside &= (point[:, 0] + offset) ** 2 + point[:, 1] ** 2 < tube**2
+    ball = 4 / 3 * np.pi * sphere**3
+    assert exact_volume(pairs_of(row))[0] / ball == pytest.approx(inside.mean(), abs=4 * 0.5 / np.sqrt(len(point)))
+
+
+def test_centred_sphere_wider_than_the_tube_is_the_napkin_ring():
+    """Tube through the centre: 4/3 pi (a^3 - (a^2 - r^2)^1.5)."""
+    found = exact_volume(pairs_of([2.0, 0.0, 5.0, 1.0, 10.0]))[0]
+    assert found == pytest.approx(4 / 3 * np.pi * (8 - 3**1.5), rel=1e-4)
+
+
+@pytest.mark.parametrize(("sphere", "offset", "ratio"), [   # measured apart by quadrature of the same reading
+    (0.1, 1.0, 0.981), (0.2, 0.9, 0.984), (0.5, 0.75, 0.942), (0.5, 1.25, 0.886), (0.8, 0.5, 0.877), (1.0, 0.5, 0.770),
+    (1.0, 1.5, 0.850), (2.0, 0.5, 1.016), (2.0, 1.25, 0.859)])
+def test_two_plane_estimate_over_exact(sphere, offset, ratio):
+    pair = pairs_of([sphere, offset, 50.0, 1.0, 100.0])
+    assert two_plane_volume(pair)[0] / exact_volume(pair)[0] == pytest.approx(ratio, abs=1.5e-3)
+
+
+def test_estimates_agree_where_no_plane_is_needed():
+    whole, outside = pairs_of([0.3, 0.6, 1.0, 1.0, 3.0]), pairs_of([0.3, 1.4, 1.0, 1.0, 3.0])
+    assert two_plane_volume(whole) == pytest.approx(4 / 3 * np.pi * 0.027)
+    assert exact_volume(whole) == pytest.approx(4 / 3 * np.pi * 0.027)
+    assert two_plane_volume(outside)[0] == exact_volume(outside)[0] == 0
+    half = pairs_of([0.3, 0.2, 0.0, 1.0, 3.0])
+    assert two_plane_volume(half) == pytest.approx(2 / 3 * np.pi * 0.027)
+
+
+@pytest.mark.parametrize(("row", "covers"), [
+    ([1.01, 0.0, 1.0, 1.0, 3.0], True), ([0.99, 0.0, 1.0, 1.0, 3.0], False), ([1.5, 0.49, 1.0, 1.0, 3.0], True),
+    ([1.5, 0.51, 1.0, 1.0, 3.0], False), ([1.25, 0.0, -0.74, 1.0, 3.0], True), ([1.25, 0.0, -0.76, 1.0, 3.0], False),
+    ([1.25, 0.0, 3.74, 1.0, 3.0], True), ([1.0, 0.0, 1.0, 0.0, 3.0], False)])
+def test_blocking_needs_a_whole_section_covered(row, covers):
+    assert covers_section(pairs_of(row))[0] == covers
+
+
+def test_throat_porosity_of_one_fine_in_a_tube():
+    network = chain(3)
+    fine = snapshot([[1.5, 0.5, 0.5]], 0.05, network.box, Kind.FINE)
+    found = measure_occupancy(network, fine)
+    assert found.throat_porosity == pytest.approx([1, 1 - 4 / 3 * 0.05**3 / 0.1**2, 1])
+    assert found.throat_fines.tolist() == [0, 1, 0]
+    assert found.throat_fine_radius == pytest.approx([0, 0.05, 0])
+    assert found.pair_distance == pytest.approx([0])
+    assert not found.blocked.any()
+
+
+def test_fine_before_the_face_blocks_the_throat_it_reaches_into():
+    network = chain(3)
+    fine = snapshot([[-0.05, 0.5, 0.5]], 0.12, network.box, Kind.FINE)
+    assert measure_occupancy(network, fine).blocked.tolist() == [True, False, False]
+
+
+def test_fines_fill_the_pores_with_their_whole_volume_and_surface():
+    pack = with_fines(random_pack(60), 300, 0.2)
+    network = build_network(pack.grains(), periodic=ALL)
+    found = measure_occupancy(network, pack.fines())
+    assert found.pore_solid_volume.sum() == pytest.approx(300 * 4 / 3 * np.pi * 0.2**3, rel=1e-9)
+    assert found.pore_solid_surface.sum() == pytest.approx(300 * 4 * np.pi * 0.2**2, rel=1e-7)
+
+
+def test_fine_in_one_pore_against_random_points():
+    pack = random_pack(40)
+    network = build_network(pack, periodic=ALL)
+    pore = int(np.argmax(network.pore_volume))
+    corner = network.pore_corner[pore]
+    place = corner.mean(axis=0) + np.array([0.3, 0.1, 0.0])
+    found = measure_occupancy(network, snapshot([place], 0.7, pack.box, Kind.FINE)).pore_solid_volume[pore]
+    share = np.random.default_rng(1).dirichlet(np.ones(4), 500_000)
+    inside = np.linalg.norm(share @ corner - place, axis=1) < 0.7
+    expected = inside.mean() * network.pore_tetra_volume[pore]
+    assert found == pytest.approx(expected, rel=4 / np.sqrt(inside.sum()))
+
+
+def test_fines_of_a_walled_pack_count_once_with_their_mirror_images():
+    pack = with_fines(random_pack(60), 200, 0.2)
+    network = build_network(pack.grains(), periodic=(False, True, True))
+    found = measure_occupancy(network, pack.fines())
+    assert np.sum(network.pore_share * found.pore_solid_volume) == pytest.approx(200 * 4 / 3 * np.pi * 0.2**3, rel=1e-9)
+
+
+def test_throat_volumes_are_those_of_every_pair_taken_alone():
+    """All fines against all throats one by one, images across the period included."""
+    pack = with_fines(random_pack(30), 40, 0.25)
+    network = build_network(pack.grains(), periodic=ALL)
+    fines, size = pack.fines(), pack.box[:, 1]
+    expected = np.zeros(len(network.throat_radius))
+    steps = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    for throat, (start, end) in enumerate(network.throat_ends):
+        axis = (end - start) / np.linalg.norm(end - start)
+        image = (fines.position[:, None] + steps * size).reshape(-1, 3) - start
+        depth = image @ axis
+        offset = np.linalg.norm(image - depth[:, None] * axis, axis=1)
+        rows = np.stack([np.full(len(depth), 0.25), offset, depth, np.full(len(depth), network.throat_radius[throat]),
+                         np.full(len(depth), network.throat_length[throat])], axis=1)
+        expected[throat] = exact_volume(pairs_of(rows)).sum()
+    found = measure_occupancy(network, fines).throat_solid_volume
+    assert found == pytest.approx(expected, rel=1e-9, abs=1e-12)
+    assert (found > 0).sum() > 20
+
+
+def test_unknown_overlap_is_refused():
+    with pytest.raises(CaseError, match="two-plane"):
+        measure_occupancy(chain(2), snapshot(np.zeros((0, 3)), 1.0, [[0, 2], [0, 1], [0, 1]]), overlap="rough")

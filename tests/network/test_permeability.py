@@ -1,0 +1,179 @@
+"""The whole analysis: invariances, sections, fines, moved grains."""
+
+import numpy as np
+import pytest
+
+from fdnet.errors import CaseError, NetworkError
+from fdnet.network.conductance import LAWS
+from fdnet.network.damage import DAMAGE_LAWS
+from fdnet.network.permeability import AnalysisOptions, analyse
+from fdnet.snapshot import Kind, Snapshot
+from tests.network.packs import random_pack, simple_cubic, snapshot, with_fines
+
+ALL, FLOW_X, WALLED = (True,) * 3, (False, True, True), (False,) * 3
+PAIRS = [("thesis", "thesis"), ("series", "kozeny")]
+
+
+def options(pair=PAIRS[1], **more):
+    return AnalysisOptions(law=pair[0], damage_law=pair[1], **more)
+
+
+def rebuilt(pack, position=None, *, scale=1.0, order=None, box=None):
+    position = (pack.position if position is None else position) * scale
+    order = np.arange(len(pack)) if order is None else order
+    return Snapshot(step=0, time_s=0, box=(pack.box if box is None else box) * scale, id=pack.id[order],
+                    kind=pack.kind[order], position=position[order], radius=pack.radius[order] * scale,
+                    velocity=pack.velocity)
+
+
+@pytest.fixture(scope="module")
+def pack():
+    return with_fines(random_pack(120, aspect=2.0), 400, 0.15)
+
+
+@pytest.fixture(scope="module")
+def walled():
+    return with_fines(random_pack(150, 0.52, periodic=False, aspect=2.0), 200, 0.15)
+
+
+def both(pack, periodic, pair):
+    found = analyse(pack.grains(), pack, periodic=periodic, options=options(pair))
+    return np.array([found.k_initial, found.k_damaged])
+
+
+@pytest.mark.parametrize("periodic", [ALL, FLOW_X, WALLED])
+@pytest.mark.parametrize("pair", PAIRS)
+def test_renumbering_quarter_turn_mirror_and_scale_leave_k(pack, walled, periodic, pair):
+    spheres = walled if periodic == WALLED else pack
+    k = both(spheres, periodic, pair)
+    rng = np.random.default_rng(8)
+    assert both(rebuilt(spheres, order=rng.permutation(len(spheres))), periodic, pair) == pytest.approx(k, rel=1e-5)
+    high = spheres.box[:, 1]
+    turned = np.stack([spheres.position[:, 0], high[2] - spheres.position[:, 2], spheres.position[:, 1]], axis=1)
+    assert both(rebuilt(spheres, turned), periodic, pair) == pytest.approx(k, rel=1e-5)
+    for axis in range(3):
+        mirrored = spheres.position.copy()
+        mirrored[:, axis] = high[axis] - mirrored[:, axis]
+        assert both(rebuilt(spheres, mirrored), periodic, pair) == pytest.approx(k, rel=1e-5)
+    assert both(rebuilt(spheres, scale=2.5e-4), periodic, pair) == pytest.approx(k * 6.25e-8, rel=1e-5)
+
+
+def test_shifting_a_periodic_pack_leaves_k(pack):
+    k = both(pack, ALL, PAIRS[1])
+    moved = (pack.position + [3.3, 1.7, 5.1]) % pack.box[:, 1]
+    assert both(rebuilt(pack, moved), ALL, PAIRS[1]) == pytest.approx(k, rel=1e-5)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("damage_law", ["thesis", "thesis-code", "kozeny"])
+def test_fines_never_raise_k(pack, law, damage_law):
+    found = analyse(pack.grains(), pack, periodic=FLOW_X, options=options((law, damage_law)))
+    assert 0 < found.k_damaged < found.k_initial
+    assert np.all(found.conductance_damaged <= found.conductance_initial)
+    assert found.k_reduction == pytest.approx(1 - found.k_damaged / found.k_initial)
+    assert found.porosity_damaged < found.porosity_initial
+
+
+def test_more_fines_lower_k_with_the_default_law(pack):
+    grains, fines = pack.grains(), pack.fines()
+    k = [analyse(grains, grains.joined(fines.where(np.arange(len(fines)) < count)), periodic=FLOW_X,
+                 options=options()).k_damaged for count in (0, 100, 200, 400)]
+    assert np.all(np.diff(k) < 0)
+    assert k[0] == pytest.approx(analyse(grains, None, periodic=FLOW_X, options=options()).k_initial)
+
+
+@pytest.mark.parametrize("periodic", [ALL, FLOW_X, WALLED])
+@pytest.mark.parametrize("sections", [5, "uneven"])
+def test_inplace_sections_recombine_in_series(pack, periodic, sections):
+    length = pack.box[0, 1]
+    wanted = sections if sections == 5 else [0.0, 0.13 * length, 0.2 * length, 0.71 * length, length]
+    found = analyse(pack.grains(), pack, periodic=periodic, options=options(sections=wanted))
+    for k, name in ((found.k_initial, "k_initial_inplace"), (found.k_damaged, "k_damaged_inplace")):
+        resistance = [(one.x_hi - one.x_lo) / getattr(one, name) for one in found.sections]
+        assert length / sum(resistance) == pytest.approx(k, rel=1e-9)
+        assert min(resistance) > 0
+
+
+def test_one_section_is_the_whole_specimen(pack):
+    found = analyse(pack.grains(), pack, periodic=FLOW_X, options=options())
+    section, = found.sections
+    assert section.k_initial == pytest.approx(found.k_initial)
+    assert section.k_damaged_inplace == pytest.approx(found.k_damaged)
+    assert section.porosity_initial == pytest.approx(found.porosity_initial)
+    assert section.fines_count == found.invaded_count == 400
+
+
+def test_damage_shows_in_the_section_that_holds_the_fines(pack):
+    grains, fines, length = pack.grains(), pack.fines(), pack.box[0, 1]
+    near = fines.where(fines.position[:, 0] < 0.2 * length)
+    found = analyse(grains, grains.joined(near), periodic=FLOW_X, options=options(sections=4))
+    reduction = [one.k_reduction for one in found.sections]
+    assert reduction[0] > 0.1
+    assert reduction[2] == reduction[3] == 0.0
+    assert [one.fines_fraction for one in found.sections] == [1.0, 0, 0, 0]
+    assert found.profile.fines_fraction.sum() == pytest.approx(1.0)
+    assert found.invasion_depth == near.position[:, 0].max()
+    assert found.invasion_depth_p95 == pytest.approx(np.quantile(near.position[:, 0], 0.95))
+    assert found.invaded_volume == pytest.approx(len(near) * 4 / 3 * np.pi * 0.15**3)
+
+
+def test_face_sealed_by_fines_is_zero_with_a_warning():
+    """One fine in each throat of a lattice's first layer, wide enough to cover it (thesis rule)."""
+    grains = simple_cubic(4)
+    network = analyse(grains, None, periodic=FLOW_X, options=options(("thesis", "thesis"))).network
+    first = network.throat_ends.mean(axis=1)
+    cork = first[(np.abs(np.diff(network.throat_ends[:, :, 0], axis=1)[:, 0]) > 1e-6) & (first[:, 0] < 3)]
+    spheres = grains.joined(snapshot(cork, 0.9, grains.box, Kind.FINE))
+    spheres = rebuilt(spheres)
+    found = analyse(grains, spheres, periodic=FLOW_X, options=options(("thesis", "thesis"), sections=2))
+    assert found.k_damaged == 0.0
+    assert found.k_reduction == 1.0
+    assert any("no open path" in one for one in found.warnings)
+    assert found.sections[0].k_damaged_inplace == 0.0
+    assert found.sections[0].k_damaged == 0.0
+
+
+def test_moved_grains_make_a_second_network(pack):
+    grains = pack.grains()
+    rng = np.random.default_rng(1)
+    shifted = rebuilt(pack, pack.position + 0.02 * rng.normal(size=pack.position.shape)
+                      * (pack.kind == Kind.GRAIN)[:, None])
+    found = analyse(grains, shifted, periodic=ALL, options=options())
+    assert found.k_moved == pytest.approx(
+        analyse(shifted.grains(), None, periodic=ALL, options=options()).k_initial, rel=1e-9)
+    assert found.k_initial == pytest.approx(analyse(grains, None, periodic=ALL, options=options()).k_initial, rel=1e-9)
+    assert found.k_damaged < found.k_moved != found.k_initial
+    assert len(found.conductance_initial) == len(found.network.throat_radius) == len(found.flow_initial.throat_flux)
+
+
+def test_grains_in_another_order_or_wrapped_have_not_moved(pack):
+    grains = pack.grains()
+    order = np.random.default_rng(2).permutation(len(pack))
+    assert analyse(grains, rebuilt(pack, order=order), periodic=ALL, options=options()).k_moved is None
+    across = pack.position + pack.box[:, 1] * (np.arange(len(pack)) % 2)[:, None]
+    assert analyse(grains, rebuilt(pack, across), periodic=ALL, options=options()).k_moved is None
+
+
+def test_solver_reports_the_worst_of_all_solves(pack):
+    found = analyse(pack.grains(), pack, periodic=WALLED, options=options(sections=3))
+    assert 0 < found.solver["mass_balance"] < 1e-6
+    assert found.solver["mass_balance"] >= found.flow_initial.mass_balance
+    assert set(found.seconds) == {"tessellate", "occupancy", "conductance", "solve", "porosity"}
+
+
+@pytest.mark.parametrize("wrong", [{"law": "magic"}, {"damage_law": "magic"}, {"sections": [0.0, 1.0]},
+                                   {"sections": 0}, {"profile_bin": 0.0}])
+def test_wrong_choices_are_refused(pack, wrong):
+    with pytest.raises(CaseError, match=next(iter(wrong))):
+        analyse(pack.grains(), None, periodic=ALL, options=AnalysisOptions(**wrong))
+
+
+def test_another_pack_after_the_invasion_is_refused(pack):
+    fewer = pack.where(np.arange(len(pack)) > 0)
+    with pytest.raises(NetworkError, match="differ"):
+        analyse(pack.grains(), fewer, periodic=ALL, options=options())
+
+
+def test_laws_named_by_the_contract_exist():
+    assert set(LAWS) == {"thesis", "effective", "hydraulic", "series"}
+    assert set(DAMAGE_LAWS) == {"thesis", "thesis-code", "kozeny"}

@@ -1,0 +1,116 @@
+"""The network of a pack: exact porosities, unique pores, matching facets, errors."""
+
+import numpy as np
+import pytest
+
+from fdnet.errors import NetworkError
+from fdnet.network.tessellation import build_network
+from fdnet.snapshot import Snapshot
+from tests.network.packs import body_centred, face_centred, random_pack, simple_cubic, snapshot
+
+ALL, NONE, SIDES = (True,) * 3, (False,) * 3, (False, True, True)
+
+
+@pytest.mark.parametrize(("pack", "expected"), [
+    (simple_cubic(), 1 - np.pi / 6), (face_centred(), 0.259520), (body_centred(), 1 - np.pi * np.sqrt(3) / 8)])
+@pytest.mark.parametrize("periodic", [ALL, SIDES])
+def test_void_of_the_pores_is_the_known_porosity(pack, expected, periodic):
+    network = build_network(pack, periodic=periodic)
+    void = np.sum(network.pore_share * network.pore_volume) / np.prod(pack.box[:, 1])
+    if periodic == ALL:
+        assert void == pytest.approx(expected, abs=1e-6)
+    assert network.area == pytest.approx(pack.box[1, 1] ** 2)
+
+
+def test_pores_of_overlapping_grains_hold_the_same_void_as_chords():
+    from fdnet.network.porosity import measure_porosity
+    pack = random_pack(80, 0.66, spread=0.2)
+    network = build_network(pack, periodic=ALL)
+    porosity = measure_porosity(pack, periodic=ALL, lines=20_000)
+    assert porosity.mean > porosity.sum + 1e-4                      # they do overlap
+    void = np.sum(network.pore_volume) / np.prod(pack.box[:, 1])
+    assert void == pytest.approx(porosity.mean, abs=5 * porosity.standard_error + 1e-5)
+
+
+def test_wall_surface_of_touching_grains_is_their_whole_surface():
+    pack = face_centred()
+    network = build_network(pack, periodic=ALL)
+    assert np.sum(network.pore_wall_surface) == pytest.approx(4 * np.pi * len(pack))
+
+
+@pytest.mark.parametrize("periodic", [ALL, SIDES, (True, False, True), NONE])
+def test_tetrahedra_tile_and_facets_pair(periodic):
+    pack = random_pack(120, 0.5, periodic=False)
+    network = build_network(pack, periodic=periodic)
+    assert network.counts["throats_unmatched"] == 0
+    assert np.all(network.throat_heights.sum(axis=1) > 0)           # Delaunay: centres in order along the normal
+    assert len(np.unique(network.pore_position, axis=0)) > 0.8 * len(network.pore_position)
+    filled = np.sum(network.pore_share * network.pore_tetra_volume)
+    assert filled == pytest.approx(network.area * pack.box[0, 1])
+    if periodic[1] and periodic[2]:
+        assert filled == pytest.approx(np.prod(pack.box[:, 1]))
+    if periodic == ALL:
+        assert len(network.throat_pores) == 2 * len(network.pore_position)
+
+
+def test_throat_ends_are_its_pores_up_to_whole_periods():
+    pack = random_pack(60)
+    network = build_network(pack, periodic=ALL)
+    size = pack.box[:, 1]
+    place = network.pore_position[network.throat_pores] + np.stack(
+        [0 * network.throat_shift, network.throat_shift], axis=1) * size
+    assert network.throat_ends == pytest.approx(place, abs=1e-9)
+    assert np.all(network.pore_position >= 0)
+    assert np.all(network.pore_position < size)
+    # both pores hold the throat's three grains
+    for side in (0, 1):
+        grains = network.pore_grains[network.throat_pores[:, side]]
+        assert np.all(np.any(grains[:, :, None] == network.throat_grains[:, None], axis=1))
+
+
+def test_pores_on_the_x_faces_lie_on_them():
+    pack = random_pack(100, 0.5, periodic=False)
+    network = build_network(pack, periodic=SIDES)
+    on_face = network.pore_share < 1
+    assert set(network.pore_position[on_face, 0]) == {0.0, pack.box[0, 1]}
+    inner = network.pore_position[~on_face, 0]
+    assert inner.min() > 0
+    assert inner.max() < pack.box[0, 1]
+
+
+def test_two_grains_at_one_place_are_refused():
+    pack = random_pack(30)
+    double = np.vstack([pack.position, pack.position[7] + [0, pack.box[1, 1], 0]])     # the image across the period
+    with pytest.raises(NetworkError, match=r"grains 8 and 31 coincide"):
+        build_network(snapshot(double, 1.0, pack.box), periodic=ALL)
+
+
+@pytest.mark.parametrize(("position", "what"), [
+    (np.zeros((3, 3)), "at least 4"), (np.random.default_rng(0).random((9, 3)) * [8, 8, 0] + 1, "no throat")])
+def test_degenerate_packs_are_refused(position, what):
+    with pytest.raises(NetworkError, match=what):
+        build_network(snapshot(position, 0.1, [[0, 10]] * 3), periodic=NONE)
+
+
+def test_layer_centred_on_the_inlet_is_refused():
+    pack = simple_cubic(4)
+    shifted = snapshot(pack.position - 0.2, 1.0, [[0, 6.0], [0, 6], [0, 6]])
+    with pytest.raises(NetworkError, match="inlet face"):
+        build_network(shifted, periodic=NONE)
+
+
+def test_grains_out_of_reach_are_left_out_and_counted():
+    pack = random_pack(60, 0.5, periodic=False)
+    position = np.vstack([pack.position, [[-3.0, 1, 1]]])
+    network = build_network(snapshot(position, np.append(pack.radius, 1.0), pack.box), periodic=NONE)
+    assert network.counts["grains_outside_box"] == 1
+    assert len(network.pore_position) == len(build_network(pack, periodic=NONE).pore_position)
+
+
+def test_heavily_overlapping_grains_close_throats():
+    pack = random_pack(60)
+    fat = Snapshot(step=0, time_s=0, box=pack.box, id=pack.id, kind=pack.kind, position=pack.position,
+                   radius=pack.radius * 1.25, velocity=pack.velocity)
+    network = build_network(fat, periodic=ALL)
+    assert network.counts["throats_closed"] == np.sum(network.throat_radius == 0) > 0
+    assert np.all(network.throat_radius >= 0)
