@@ -122,7 +122,7 @@ def _add_permeability(commands: Any, common: argparse.ArgumentParser) -> None:
 
 
 def _case_of(options: argparse.Namespace) -> Any:
-    from fdnet.case import read_case
+    from fdnet.case_file import read_case
 
     seed = [] if options.seed is None else [f"seed={options.seed}"]
     return read_case(options.case, assignments=[*options.set, *seed])
@@ -164,7 +164,7 @@ def _print_summary(summary: dict[str, Any], out: Path) -> None:
 
 
 def _render(options: argparse.Namespace) -> int:
-    from fdnet.pipeline import render_decks
+    from fdnet.dem.render import render_decks
     from fdnet.scale_table import scale_rows
     from fdnet.scales import scales_of
 

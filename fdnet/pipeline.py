@@ -13,16 +13,19 @@ from pathlib import Path
 from typing import Any
 
 from fdnet.case import Case
+from fdnet.dem.checkpoint import Checkpoint, read_history, state_at
 from fdnet.dem.dump import read_frame
-from fdnet.dem.invasion import Checkpoint, invade, read_history, render_invade, state_at
+from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Binary, Run, find_binary
-from fdnet.dem.packing import Pack, make_pack, render_pack, snapshot_of, write_pack_inputs
+from fdnet.dem.packing import Pack, make_pack, render_pack
+from fdnet.dem.scene import snapshot_of
 from fdnet.errors import CaseError
-from fdnet.network.permeability import Analysis, AnalysisOptions, analyse
+from fdnet.network.permeability import AnalysisOptions, analyse
+from fdnet.outputs import Results, draw_figures, write_paraview, write_tables
 from fdnet.progress import Progress
 from fdnet.run_folder import STAGES, RunFolder, open_folder, write_json
 from fdnet.scale_table import scale_rows
-from fdnet.scales import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES, Scales, grain_count, scales_of
+from fdnet.scales import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES, Scales, scales_of
 from fdnet.snapshot import Snapshot
 from fdnet.summary import summarise
 
@@ -182,14 +185,24 @@ def _analyse_and_report(story: _Story) -> dict[str, Any]:
     history = _history(story)
     damaged = state_at(path / "invade", history[-1], case, story.scales, grains) if history else None
     with story.timed("analyse"):
-        analysis = analyse(grains, damaged, periodic=case.periodic, options=analysis_options(case))
-        _write_tables(path, analysis, grains, damaged)
+        analysis = analyse(grains, damaged, periodic=case.periodic, options=_analysis_options(case))
+        results = Results(path=path, case=case, scales=story.scales, grains=grains, damaged=damaged, history=history,
+                          analysis=analysis)
+        write_tables(results)
+    figures: list[tuple[Path, str]] = []
+    notes: list[str] = []
     if "report" in story.options.stages:
         with story.timed("report"):
-            figures, notes = _draw(story, analysis, grains, damaged, history)
-    else:
-        figures, notes = [], []
-    return _write_summary(story, analysis, history, figures, notes)
+            write_paraview(results)
+            figures, notes = draw_figures(results)
+    return _write_summary(story, results, figures, notes)
+
+
+def _analysis_options(case: Case) -> AnalysisOptions:
+    chosen = case.analysis
+    return AnalysisOptions(sections=chosen.sections, law=chosen.law, damage_law=chosen.damage_law,
+                           threshold=chosen.clogging_threshold, middle_band=chosen.middle_band, overlap=chosen.throat_overlap,
+                           profile_bin=chosen.profile_bin_mm * 1e-3)
 
 
 def _history(story: _Story) -> tuple[Checkpoint, ...]:
@@ -200,72 +213,15 @@ def _history(story: _Story) -> tuple[Checkpoint, ...]:
     return read_history(story.path / "invade")
 
 
-def analysis_options(case: Case) -> AnalysisOptions:
-    """The analysis choices of a case in SI."""
-    chosen = case.analysis
-    return AnalysisOptions(sections=chosen.sections, law=chosen.law, damage_law=chosen.damage_law,
-                           threshold=chosen.clogging_threshold, middle_band=chosen.middle_band, overlap=chosen.throat_overlap,
-                           profile_bin=chosen.profile_bin_mm * 1e-3)
-
-
-def _write_tables(path: Path, analysis: Analysis, grains: Snapshot, damaged: Snapshot | None) -> None:
-    from fdnet.report import spheres, tables
-
-    spheres.write_spheres(path / "spheres_initial.csv", grains)
-    spheres.write_spheres(path / "spheres_damaged.csv", grains if damaged is None else damaged)
-    tables.write_sections(path / "sections.csv", analysis)
-    tables.write_profile(path / "profile.csv", analysis)
-    tables.write_pores(path / "pores.csv", analysis)
-    tables.write_throats(path / "throats.csv", analysis)
-
-
-def _draw(story: _Story, analysis: Analysis, grains: Snapshot, damaged: Snapshot | None,
-          history: tuple[Checkpoint, ...]) -> tuple[list[tuple[Path, str]], list[str]]:
-    from fdnet.report import figures, vtk
-
-    path, shown = story.path, grains if damaged is None else damaged
-    rows = [{"time_s": row.step * story.scales.time_step, "upstream": row.upstream, "invaded": row.invaded,
-             "passed": row.passed} for row in history]
-    drawn = figures.draw_all(path / "figures", analysis, shown, rows or None)
-    vtk.write_network_vtp(path / "network.vtp", analysis)
-    vtk.write_spheres_vtp(path / "spheres_initial.vtp", grains)
-    vtk.write_spheres_vtp(path / "spheres_damaged.vtp", shown)
-    vtk.write_pvd(path / "spheres.pvd", [(0.0, "spheres_initial.vtp"), (shown.time_s, "spheres_damaged.vtp")])
-    if history:
-        _write_frames(story, history, grains)
-    picture = path / "figures" / "spheres_3d.png"
-    reason = vtk.render_spheres_png(picture, path / "spheres_damaged.vtp", shown.box)
-    captioned = [(file, figures.CAPTIONS.get(file.stem, file.stem)) for file in drawn]
-    if not reason:
-        captioned.insert(0, (picture, figures.CAPTIONS[picture.stem]))
-    return captioned, [reason] if reason else []
-
-
-def _write_frames(story: _Story, history: tuple[Checkpoint, ...], grains: Snapshot, most: int = 24) -> None:
-    """At most `most` evenly spaced states of the invasion for ParaView's time slider."""
-    from fdnet.report import vtk
-
-    stride = max(1, -(-len(history) // most))
-    chosen = list(history)[::-1][::stride][::-1]
-    (story.path / "frames").mkdir(exist_ok=True)
-    entries = []
-    for row in chosen:
-        state = state_at(story.path / "invade", row, story.case, story.scales, grains)
-        name = f"frames/spheres_{row.step}.vtp"
-        vtk.write_spheres_vtp(story.path / name, state if story.case.grains.motion == "mobile" else state.fines())
-        entries.append((state.time_s, name))
-    vtk.write_pvd(story.path / "invasion.pvd", entries)
-
-
-def _write_summary(story: _Story, analysis: Analysis, history: tuple[Checkpoint, ...], figures: list[tuple[Path, str]],
-                   notes: list[str]) -> dict[str, Any]:
+def _write_summary(story: _Story, results: Results, figures: list[tuple[Path, str]], notes: list[str]) -> dict[str, Any]:
     from fdnet.report import html, tables
 
+    history = results.history
     pack, invasion = story.folder.record("pack"), story.folder.record("invade") if history else None
     assert pack is not None
     seconds = _seconds(story, pack, invasion)
     warnings = [*story.scales.warnings, *(invasion["warnings"] if invasion else []), *_overlap_warnings(invasion), *notes]
-    summary = summarise(story.case, analysis, pack=pack, invasion=invasion, last=history[-1] if history else None,
+    summary = summarise(story.case, results.analysis, pack=pack, invasion=invasion, last=history[-1] if history else None,
                         seconds=seconds, warnings=warnings)
     summary = tables.write_summary(story.path / "summary.json", summary)
     if "report" in story.options.stages:
@@ -306,35 +262,4 @@ def _manifest(story: _Story, stages: list[str]) -> dict[str, Any]:
             "seed": story.case.seed, "stages": stages, "command": story.options.command, "seconds": story.seconds,
             "versions": _versions(pack) if pack else {}, "pack": pack, "invade": invasion}
 
-
-def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
-    """Write the decks of a case without LIGGGHTS: the pack with its data file, and the invasion.
-
-    The invasion's own data file needs a finished pack; where `out` holds one it is written too.
-    Raises CaseError when a deck is there already.
-    """
-    scales = scales_of(case)
-    decks = [out / "pack" / "in.pack"] + ([out / "invade" / "in.invade"] if case.fines else [])
-    there = [deck for deck in decks if deck.exists()]
-    if there:
-        raise CaseError(f"{there[0]}: is there already; give another --out (nothing was changed)")
-    for deck in decks:
-        deck.parent.mkdir(parents=True, exist_ok=True)
-    write_pack_inputs(case, scales, decks[0].parent, count=grain_count(case), ranks=ranks)
-    if case.fines:
-        grains = _expected_grains(case)
-        decks[1].write_text(render_invade(case, scales, grains, ranks=ranks).text)
-    return decks
-
-
-def _expected_grains(case: Case) -> Snapshot:
-    """One grain that stands beyond the face as far as grains of a dense pack do: only its reach matters for the deck."""
-    import numpy as np
-
-    from fdnet.snapshot import Kind
-
-    radius = case.grains.radius_range_m[1]
-    box = np.column_stack([np.zeros(3), case.size_m])
-    return Snapshot(step=0, time_s=0.0, box=box, id=np.array([1]), kind=np.array([Kind.GRAIN]),
-                    position=np.array([[0.7 * radius, *(box[1:, 1] / 2)]]), radius=np.array([radius]), velocity=np.zeros((1, 3)))
 

@@ -3,7 +3,7 @@
 from typing import Any
 
 from fdnet.case import Case
-from fdnet.dem.invasion import Checkpoint
+from fdnet.dem.checkpoint import Checkpoint
 from fdnet.network.permeability import Analysis
 from fdnet.report.tables import section_rows
 

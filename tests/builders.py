@@ -2,7 +2,8 @@
 
 from typing import Any
 
-from fdnet.case import Case, case_from, set_keys
+from fdnet.case import Case
+from fdnet.case_file import case_from, set_keys
 
 TINY: dict[str, Any] = {
     "name": "tiny", "seed": 1,

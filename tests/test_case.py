@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from builders import TINY, tiny
 
-from fdnet.case import case_from, known_keys, read_case, set_keys
+from fdnet.case_file import case_from, known_keys, read_case, set_keys
 from fdnet.errors import CaseError
 
 

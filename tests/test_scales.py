@@ -5,10 +5,11 @@ import math
 import pytest
 from builders import tiny
 
-from fdnet.case import read_case
+from fdnet.case_file import read_case
+from fdnet.contact_law import series
 from fdnet.errors import CaseError
 from fdnet.scale_table import scale_rows
-from fdnet.scales import carman_kozeny, relaxation_time, scales_of, series
+from fdnet.scales import carman_kozeny, relaxation_time, scales_of
 
 
 @pytest.fixture

@@ -12,14 +12,15 @@ from typing import Any
 import numpy as np
 
 from fdnet.case import Case
+from fdnet.contact_law import sphere_mass
 from fdnet.contacts import max_overlap
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
-from fdnet.dem.dump import COLUMNS, FORMAT, Frame, read_frame
+from fdnet.dem.dump import COLUMNS, FORMAT, read_frame
 from fdnet.dem.liggghts import Binary, Run, run_deck
-from fdnet.dem.scene import contact_variables, header_variables, wall_variables, write_data
+from fdnet.dem.scene import box_of, contact_variables, header_variables, snapshot_of, wall_variables, write_data
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.network.porosity import measure_porosity
-from fdnet.scales import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES, PACK_START, Scales, grain_count, sphere_mass
+from fdnet.scales import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES, PACK_START, Scales, grain_count
 from fdnet.snapshot import Array, Kind, Snapshot
 
 POROSITY_TOLERANCE = 0.003
@@ -143,10 +144,10 @@ def write_pack_inputs(case: Case, scales: Scales, folder: Path, *, count: int, r
     rng = np.random.default_rng([case.seed, count])
     small, size = PACK_START * radii, np.array(case.size_m)
     margin = small[:, None] * np.array([1.0, *([0.0, 0.0] if case.box.sides == "periodic" else [1.0, 1.0])])
-    seeds = Snapshot(step=0, time_s=0.0, box=_box(case), id=np.arange(1, count + 1), kind=np.full(count, Kind.GRAIN),
+    seeds = Snapshot(step=0, time_s=0.0, box=box_of(case), id=np.arange(1, count + 1), kind=np.full(count, Kind.GRAIN),
                      position=margin + rng.random((count, 3)) * (size - 2 * margin), radius=small,
                      velocity=np.zeros((count, 3)))
-    write_data(folder / "pack.data", seeds, bounds=_box(case), density=np.full(count, case.grains.density_kg_m3), types=2)
+    write_data(folder / "pack.data", seeds, bounds=box_of(case), density=np.full(count, case.grains.density_kg_m3), types=2)
     return deck
 
 
@@ -183,16 +184,3 @@ def render_pack(case: Case, scales: Scales, *, count: int, ranks: int = 1) -> De
     return Deck(text=text, stage="pack", digest=case.digest("pack"), left_out=tuple(left_out))
 
 
-def _box(case: Case) -> Array:
-    return np.column_stack([np.zeros(3), case.size_m])
-
-
-def snapshot_of(frame: Frame, case: Case, *, time_s: float) -> Snapshot:
-    """A dump frame as a Snapshot in the specimen's box; positions across a periodic side are wrapped into it."""
-    position = np.column_stack([frame.column(c) for c in "xyz"])
-    for axis, periodic in enumerate(case.periodic):
-        if periodic:
-            position[:, axis] = np.mod(position[:, axis], case.size_m[axis])
-    return Snapshot(step=frame.step, time_s=time_s, box=_box(case), id=frame.column("id"), kind=frame.column("type"),
-                    position=position, radius=frame.column("radius"),
-                    velocity=np.column_stack([frame.column(f"v{c}") for c in "xyz"]))

@@ -8,6 +8,7 @@ import numpy as np
 from fdnet.atomic import write_text
 from fdnet.case import Case
 from fdnet.dem.deck import LeftOut, number
+from fdnet.dem.dump import Frame
 from fdnet.scales import Contact, Scales
 from fdnet.snapshot import Array, Snapshot
 
@@ -75,3 +76,18 @@ def write_data(path: Path, spheres: Snapshot, *, bounds: Array, density: Array, 
     table = np.column_stack([spheres.id, spheres.kind, 2 * spheres.radius, density, spheres.position])
     lines += [f"{atom:.0f} {kind:.0f} " + " ".join(f"{value:.17g}" for value in rest) for atom, kind, *rest in table]
     write_text(path, "\n".join(lines) + "\n")
+
+
+def box_of(case: Case) -> Array:
+    return np.column_stack([np.zeros(3), case.size_m])
+
+
+def snapshot_of(frame: Frame, case: Case, *, time_s: float) -> Snapshot:
+    """A dump frame as a Snapshot in the specimen's box; positions across a periodic side are wrapped into it."""
+    position = np.column_stack([frame.column(c) for c in "xyz"])
+    for axis, periodic in enumerate(case.periodic):
+        if periodic:
+            position[:, axis] = np.mod(position[:, axis], case.size_m[axis])
+    return Snapshot(step=frame.step, time_s=time_s, box=box_of(case), id=frame.column("id"), kind=frame.column("type"),
+                    position=position, radius=frame.column("radius"),
+                    velocity=np.column_stack([frame.column(f"v{c}") for c in "xyz"]))

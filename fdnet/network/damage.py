@@ -94,22 +94,31 @@ def kozeny_damage(
     """Local Kozeny factor per pore, (1 - v)^3 / (1 + a)^2, harmonic mean of a throat's two pores on its conductance.
 
     v = volume of fines / void, a = surface of fines / wall, in the tetrahedron (k ~ porosity^3 / surface^2, Kozeny
-    1927, Carman 1937). A pore whose fines fill it (v >= 1) is closed and counted. `threshold` and `middle_band` play
-    no part here.
+    1927, Carman 1937); pores of one `pore_group` are taken together. A pore whose fines fill it (v >= 1) is closed and
+    counted. `threshold` and `middle_band` play no part here.
     """
     del threshold, middle_band
-    taken = occupancy.pore_solid_volume > 0
-    void, wall = network.pore_volume, network.pore_wall_surface
-    filled = taken & ((void <= 0) | (wall <= 0) | (occupancy.pore_solid_volume >= void))
-    safe = taken & ~filled
-    v = np.divide(occupancy.pore_solid_volume, void, out=np.zeros(len(void)), where=safe)
-    a = np.divide(occupancy.pore_solid_surface, wall, out=np.zeros(len(void)), where=safe)
-    factor = np.where(filled, 0.0, (1.0 - v) ** 3 / (1.0 + a) ** 2)
+    factor, taken, filled = _pore_factors(network, occupancy)
     first, second = factor[network.throat_pores].T
     both = np.divide(2.0 * first * second, first + second, out=np.zeros(len(first)), where=first + second > 0)
     law = np.where(taken[network.throat_pores].any(axis=1), KOZENY, CLEAN).astype("<U10")
     law[(both == 0) & (law == KOZENY)] = BLOCKED
     return Damage(conductance=frozen(clean * both), law_used=frozen(law), counts={"pores_filled": int(filled.sum())})
+
+
+def _pore_factors(network: Network, occupancy: Occupancy) -> tuple[Array, Array, Array]:
+    """Factor (P,) on a pore's conductance, whether it holds fines, whether they fill it."""
+    group = network.pore_group
+    solid, surface, void, wall = (
+        np.bincount(group, weights=weights)[group]
+        for weights in (occupancy.pore_solid_volume, occupancy.pore_solid_surface, network.pore_volume,
+                        network.pore_wall_surface))
+    taken = solid > 0
+    filled = taken & ((void <= 0) | (wall <= 0) | (solid >= void))
+    safe = taken & ~filled
+    v = np.divide(solid, void, out=np.zeros(len(void)), where=safe)
+    a = np.divide(surface, wall, out=np.zeros(len(void)), where=safe)
+    return np.where(filled, 0.0, (1.0 - v) ** 3 / (1.0 + a) ** 2), taken, filled
 
 
 DAMAGE_LAWS: dict[str, DamageLaw] = {"thesis": thesis_damage, "kozeny": kozeny_damage,

@@ -11,11 +11,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
 import numpy as np
-from scipy.spatial import Delaunay, QhullError, cKDTree
+from scipy.spatial import Delaunay, QhullError
 
 from fdnet.errors import NetworkError
 from fdnet.network import geometry
-from fdnet.network.images import INSIDE, ON_FACE, Images, label, make_images, packed_shift, wrapped
+from fdnet.network.images import INSIDE, ON_FACE, Images, label, make_images, neighbour_tree, packed_shift
 from fdnet.snapshot import Array, Snapshot
 
 SHAKE = 1e-7
@@ -80,10 +80,7 @@ def _check(grains: Snapshot, periodic: tuple[bool, ...]) -> None:
         raise NetworkError(f"tessellation: {len(grains)} grains; a tetrahedron needs at least 4, give more grains")
     if np.any(grains.radius <= 0) or np.any(grains.box[:, 1] <= grains.box[:, 0]):
         raise NetworkError("tessellation: a grain radius or a box side is not positive; check the input lengths")
-    low, size = grains.box[:, 0], grains.box[:, 1] - grains.box[:, 0]
-    place = wrapped(grains.position, grains.box, periodic) - low
-    place = np.where(periodic, np.where(place >= size, 0.0, place), place)
-    tree = cKDTree(place, boxsize=np.where(periodic, size, 0.0))
+    tree = neighbour_tree(grains.position, grains.box, periodic=periodic)
     close = tree.query_pairs(COINCIDENT * float(grains.radius.min()), output_type="ndarray")
     if len(close):
         first, second = grains.id[close[0]]

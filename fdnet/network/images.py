@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from fdnet.snapshot import Array
 
@@ -27,6 +28,14 @@ def wrapped(position: Array, box: Array, periodic: tuple[bool, ...]) -> Array:
     """Positions (N, 3) brought into [low, high) along the periodic axes."""
     low, size = box[:, 0], box[:, 1] - box[:, 0]
     return np.where(periodic, low + (position - low) % size, position)
+
+
+def neighbour_tree(position: Array, box: Array, *, periodic: tuple[bool, ...]) -> cKDTree:
+    """Search tree of `position` (N, 3) that sees across the periodic sides."""
+    low, size = box[:, 0], box[:, 1] - box[:, 0]
+    place = wrapped(position, box, periodic) - low
+    # rounding may leave a wrapped place at the size itself
+    return cKDTree(np.where(periodic & (place >= size), 0.0, place), boxsize=np.where(periodic, size, 0.0))
 
 
 def make_images(position: Array, box: Array, *, periodic: tuple[bool, ...], margin: Array, hair: float) -> Images:

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from fdnet.errors import NetworkError
 from fdnet.network import geometry
 from fdnet.network.delaunay import Facets, Tetrahedra, cut_axes, share_facets, tessellate, without_side_walls
-from fdnet.network.images import MIRROR_LOW
+from fdnet.network.images import MIRROR_LOW, neighbour_tree
 from fdnet.snapshot import Array, Snapshot, frozen
 
 LENGTH_FLOOR = 1e-3
@@ -83,7 +82,8 @@ def build_network(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Net
     partner, no throat at all, or an x face without pores.
     """
     periodic = (bool(periodic[0]), bool(periodic[1]), bool(periodic[2]))
-    grains, outside = _reaching(grains, periodic)
+    kept = _reaching(grains, periodic)
+    outside, grains = len(grains) - len(kept), grains.where(kept)
     tetrahedra = tessellate(grains, periodic=periodic)
     tetrahedra, facets = without_side_walls(tetrahedra, share_facets(tetrahedra, periodic=periodic), periodic=periodic)
     if not len(facets.pore):
@@ -92,10 +92,12 @@ def build_network(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Net
     centres = _pore_centres(grains, tetrahedra, periodic)
     if not periodic[0]:
         _check_ends(grains.box, centres.position[:, 0])
-    pores, pore_counts = _pores(grains, tetrahedra, centres)
+    pores, pore_counts = _pores(grains, tetrahedra, centres, periodic)
     throats, throat_counts = _throats(grains, tetrahedra, facets, centres)
     counts = {"grains_outside_box": outside, "centre_is_centroid": centres.centroids, **pore_counts, **throat_counts,
               **facets.counts}
+    # indices count all grains given
+    pores["pore_grains"], throats["throat_grains"] = kept[pores["pore_grains"]], kept[throats["throat_grains"]]
     area = float(np.sum(pores["pore_share"] * pores["pore_tetra_volume"]) / (grains.box[0, 1] - grains.box[0, 0]))
     return Network(box=frozen(grains.box), periodic=periodic, grain_radius=float(grains.radius.mean()), area=area,
                    counts=counts, **{name: frozen(value) for name, value in {**pores, **throats}.items()})
@@ -108,10 +110,10 @@ def _check_ends(box: Array, x: Array) -> None:
                                "is centred on it; shift the box by part of a radius or make x periodic")
 
 
-def _reaching(grains: Snapshot, periodic: tuple[bool, ...]) -> tuple[Snapshot, int]:
+def _reaching(grains: Snapshot, periodic: tuple[bool, ...]) -> Array:
+    """Indices of the grains whose sphere reaches into the box."""
     beyond = np.maximum(grains.box[:, 0] - grains.position, grains.position - grains.box[:, 1])
-    keep = np.all((beyond < grains.radius[:, None]) | np.array(periodic), axis=1)
-    return grains.where(keep), int(np.sum(~keep))
+    return np.flatnonzero(np.all((beyond < grains.radius[:, None]) | np.array(periodic), axis=1))
 
 
 def _pore_centres(grains: Snapshot, tetrahedra: Tetrahedra, periodic: tuple[bool, ...]) -> _Centres:
@@ -134,7 +136,9 @@ def _pore_centres(grains: Snapshot, tetrahedra: Tetrahedra, periodic: tuple[bool
                     centroids=int(np.sum(~centred)))
 
 
-def _pores(grains: Snapshot, tetrahedra: Tetrahedra, centres: _Centres) -> tuple[dict[str, Array], dict[str, int]]:
+def _pores(
+    grains: Snapshot, tetrahedra: Tetrahedra, centres: _Centres, periodic: tuple[bool, ...]
+) -> tuple[dict[str, Array], dict[str, int]]:
     offset = centres.wrap * (grains.box[:, 1] - grains.box[:, 0])
     corner = tetrahedra.corner - offset[:, None]
     radius = grains.radius[tetrahedra.grain]
@@ -145,16 +149,17 @@ def _pores(grains: Snapshot, tetrahedra: Tetrahedra, centres: _Centres) -> tuple
              "pore_position": centres.position, "pore_radius": np.maximum(centres.radius, 0.0),
              "pore_circumcentre": tetrahedra.centre - offset, "pore_tetra_volume": volume,
              "pore_volume": volume - solid, "pore_wall_surface": surface,
-             "pore_group": _groups(tetrahedra.centre, grains), "pore_share": np.where(cut, 0.5, 1.0)}
+             "pore_group": _groups(tetrahedra.centre, grains, periodic), "pore_share": np.where(cut, 0.5, 1.0)}
     speck = 1e-9 * float(grains.radius.mean()) ** 3
     counts = {"pores_closed": int(np.sum(centres.radius <= 0)), "pores_at_end_faces": int(np.sum(cut)),
               "void_negative": int(np.sum(found["pore_volume"] < -speck))}
     return found, counts
 
 
-def _groups(centre: Array, grains: Snapshot) -> Array:
-    # centres of one polyhedron differ by the shake, about 1e-7 radii; along x images never meet
-    near = cKDTree(centre).query_pairs(SAME_CENTRE * float(grains.radius.mean()), output_type="ndarray")
+def _groups(centre: Array, grains: Snapshot, periodic: tuple[bool, ...]) -> Array:
+    # the centres of the parts of one polyhedron differ by the shake, some 1e-7 radii
+    tree = neighbour_tree(centre, grains.box, periodic=periodic)
+    near = tree.query_pairs(SAME_CENTRE * float(grains.radius.mean()), output_type="ndarray")
     graph = coo_matrix((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(len(centre), len(centre)))
     return connected_components(graph, directed=False)[1]
 

@@ -8,7 +8,7 @@ import pytest
 from builders import tiny
 
 from fdnet.dem.deck import render_text, used_variables
-from fdnet.dem.invasion import render_invade
+from fdnet.dem.invade_deck import render_invade
 from fdnet.dem.packing import draw_radii, render_pack
 from fdnet.errors import CaseError, DeckError
 from fdnet.scales import scales_of

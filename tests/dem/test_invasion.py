@@ -7,8 +7,9 @@ import pytest
 from builders import tiny
 
 from fdnet.contacts import touching_pairs
-from fdnet.dem import invasion
-from fdnet.dem.invasion import invade, last_checkpoint, read_history
+from fdnet.dem import checkpoint
+from fdnet.dem.checkpoint import last_checkpoint, read_history
+from fdnet.dem.invasion import invade
 from fdnet.dem.packing import make_pack
 from fdnet.dem.supply import CLEARANCE, place_fines
 from fdnet.errors import CaseError, LiggghtsError
@@ -131,13 +132,13 @@ def test_broken_checkpoints_are_passed_over(binary, packed, tmp_path):
 def test_fines_that_vanish_are_an_error(packed, tmp_path):
     case = tiny()
     (tmp_path / "post").mkdir()
-    row = invasion.Checkpoint(chunk=1, step=10, upstream=200, invaded=90, passed=5, removed_upstream=0, most_crossed=95, quiet=0)
+    row = checkpoint.Checkpoint(chunk=1, step=10, upstream=200, invaded=90, passed=5, removed_upstream=0, most_crossed=95, quiet=0)
     damaged = packed["walls"].joined(place_fines(case, scales_of(case), packed["walls"]))
     with pytest.raises(LiggghtsError, match="fines inside"):
-        invasion._check_counts(tmp_path, row, damaged, 300)
-    row = invasion.Checkpoint(chunk=1, step=10, upstream=300, invaded=0, passed=0, removed_upstream=0, most_crossed=0, quiet=0)
+        checkpoint.check_counts(tmp_path, row, damaged, 300)
+    row = checkpoint.Checkpoint(chunk=1, step=10, upstream=300, invaded=0, passed=0, removed_upstream=0, most_crossed=0, quiet=0)
     with pytest.raises(LiggghtsError, match="is not the 301 supplied"):
-        invasion._check_counts(tmp_path, row, damaged, 301)
+        checkpoint.check_counts(tmp_path, row, damaged, 301)
 
 
 def test_history_with_a_half_written_line(tmp_path: Path):

@@ -1,5 +1,7 @@
 """Packs made in code: lattices with known porosity, random packs without and with fines (lengths in m)."""
 
+from functools import cache
+
 import numpy as np
 
 from fdnet.snapshot import Array, Kind, Snapshot
@@ -33,6 +35,7 @@ def face_centred(repeat: int = 3, radius: float = 1.0) -> Snapshot:
                    radius)
 
 
+@cache
 def random_pack(
     count: int, solid: float = 0.58, *, seed: int = 1, periodic: bool = True, spread: float = 0.0, aspect: float = 1.0
 ) -> Snapshot:

@@ -29,7 +29,8 @@ def test_touching_simple_cubic_against_stokes(law, ratio):
     assert found == pytest.approx(ratio, abs=0.015)          # ratios measured apart, by another code of these rules
 
 
-@pytest.mark.parametrize(("law", "ratio"), [("series", 1.00), ("hydraulic", 1.02), ("thesis", 0.27), ("effective", 1.04)])
+@pytest.mark.parametrize(("law", "ratio"), [
+    ("series", 1.00), ("hydraulic", 1.02), ("thesis", 0.27), ("effective", 1.04)])
 def test_touching_body_centred_against_stokes(law, ratio):
     found = permeability(body_centred(), law) / zick_homsy(np.pi * np.sqrt(3) / 8, 162.9)
     assert found == pytest.approx(ratio, abs=0.015)
@@ -85,5 +86,5 @@ def test_closed_throats_conduct_nothing_in_any_law(law):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_walled_sides_agree_with_periodic_sides_within_20_percent(law):
-    pack = random_pack(300, 0.6, seed=2)
+    pack = random_pack(220, 0.6, seed=2)
     assert permeability(pack, law, (True, False, False)) == pytest.approx(permeability(pack, law), rel=0.20)

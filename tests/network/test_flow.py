@@ -6,9 +6,10 @@ import pytest
 from fdnet.errors import FlowError
 from fdnet.network.conductance import LAWS
 from fdnet.network.flow import solve_flow
+from fdnet.network.slabs import plane_pressures
 from fdnet.network.tessellation import build_network
 from tests.network.networks import chain, network_of, random_network
-from tests.network.packs import random_pack
+from tests.network.packs import random_pack, snapshot
 
 
 @pytest.mark.parametrize("count", [1, 2, 7])
@@ -93,16 +94,31 @@ def test_twelve_decades_with_blocked_throats_still_balance():
         assert out == pytest.approx(flow.throat_flux[network.throat_pores[:, 1] == pore].sum(), abs=1e-9 * flow.inflow)
 
 
-def test_period_of_a_pack_is_the_limit_of_many_periods_between_planes():
-    """Three copies in a row between pressure planes: the middle one takes what the period takes."""
-    from fdnet.network.slabs import plane_pressures
-    from tests.network.packs import snapshot
-    pack = random_pack(50)
+def three_in_a_row(pack):
     edge = pack.box[0, 1]
     place = np.vstack([pack.position + np.array([n * edge, 0, 0]) for n in range(3)])
-    row = snapshot(place, 1.0, pack.box * [[3], [1], [1]])
+    return snapshot(place, 1.0, pack.box * [[3], [1], [1]])
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("span", [(0.0, 1.0), (0.2, 0.7), (0.0, 0.3)])
+def test_slab_of_a_period_is_the_slab_of_the_middle_copy(law, span):
+    """Throats across the periodic x face belong to both ends of the box."""
+    pack = random_pack(50)
+    edge = pack.box[0, 1]
     one = build_network(pack, periodic=(True,) * 3)
-    three = build_network(row, periodic=(False, True, True))
+    three = build_network(three_in_a_row(pack), periodic=(False, True, True))
+    low, high = np.array(span) * edge
+    found = solve_flow(one, LAWS[law](one), span=(low, high)).inflow
+    assert found == pytest.approx(solve_flow(three, LAWS[law](three), span=(low + edge, high + edge)).inflow, rel=1e-5)
+
+
+def test_period_of_a_pack_is_the_limit_of_many_periods_between_planes():
+    """Three copies in a row between pressure planes: the middle one takes what the period takes."""
+    pack = random_pack(50)
+    edge = pack.box[0, 1]
+    one = build_network(pack, periodic=(True,) * 3)
+    three = build_network(three_in_a_row(pack), periodic=(False, True, True))
     for law in LAWS.values():
         flow = solve_flow(three, law(three))
         pressure = plane_pressures(three, flow, np.array([edge, 2 * edge]))

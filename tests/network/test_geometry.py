@@ -66,3 +66,13 @@ def test_overlapping_pair_is_counted_once_in_the_tetrahedron():
     solid = np.any(np.linalg.norm(point[:, None] - TOUCHING, axis=2) < radius, axis=1).mean()
     found = solid_in_tetrahedra(TOUCHING[None], radius[None])[0][0] / abs(geometry.signed_volume(TOUCHING))
     assert found == pytest.approx(solid, abs=4 * np.sqrt(0.25 / 400_000))
+
+
+def test_open_area_between_overlapping_discs_against_a_fine_grid():
+    triangle = np.array([[0, 0, 0], [1.8, 0, 0], [0.8, 1.9, 0.0]])
+    radius = np.array([1.0, 0.9, 0.7])
+    x, y = np.meshgrid(np.arange(0.0005, 1.8, 0.001), np.arange(0.0005, 1.9, 0.001))
+    inside = (y * 0.8 < x * 1.9) & (y * (0.8 - 1.8) > (x - 1.8) * 1.9)
+    for corner, size in zip(triangle, radius, strict=True):
+        inside &= (x - corner[0]) ** 2 + (y - corner[1]) ** 2 > size**2
+    assert geometry.open_area(triangle[None], radius[None])[0] == pytest.approx(inside.sum() * 1e-6, abs=2e-3)

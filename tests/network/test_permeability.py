@@ -60,7 +60,7 @@ def test_renumbering_quarter_turn_mirror_and_scale_leave_k(pack, walled, periodi
 
 def test_shifting_a_periodic_pack_leaves_k(pack):
     k = both(pack, ALL, PAIRS[1])
-    moved = (pack.position + [3.3, 1.7, 5.1]) % pack.box[:, 1]
+    moved = (pack.position + np.array([3.3, 1.7, 5.1])) % pack.box[:, 1]
     assert both(rebuilt(pack, moved), ALL, PAIRS[1]) == pytest.approx(k, rel=1e-5)
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fdnet.errors import NetworkError
+from fdnet.network.porosity import measure_porosity
 from fdnet.network.tessellation import build_network
 from fdnet.snapshot import Snapshot
 from tests.network.packs import body_centred, face_centred, random_pack, simple_cubic, snapshot
@@ -23,7 +24,6 @@ def test_void_of_the_pores_is_the_known_porosity(pack, expected, periodic):
 
 
 def test_pores_of_overlapping_grains_hold_the_same_void_as_chords():
-    from fdnet.network.porosity import measure_porosity
     pack = random_pack(80, 0.66, spread=0.2)
     network = build_network(pack, periodic=ALL)
     porosity = measure_porosity(pack, periodic=ALL, lines=20_000)
@@ -36,6 +36,16 @@ def test_wall_surface_of_touching_grains_is_their_whole_surface():
     pack = face_centred()
     network = build_network(pack, periodic=ALL)
     assert np.sum(network.pore_wall_surface) == pytest.approx(4 * np.pi * len(pack))
+
+
+def test_wall_surface_hides_the_caps_of_overlapping_pairs():
+    pack = random_pack(80, 0.66)
+    apart = pack.position[:, None] - pack.position[None]
+    apart -= pack.box[:, 1] * np.round(apart / pack.box[:, 1])
+    height = np.maximum(1 - 0.5 * np.linalg.norm(apart, axis=2), 0)[~np.eye(80, dtype=bool)]
+    assert height.sum() > 0.5
+    surface = np.sum(build_network(pack, periodic=ALL).pore_wall_surface)
+    assert surface == pytest.approx(4 * np.pi * 80 - 2 * np.pi * height.sum(), rel=1e-9)
 
 
 @pytest.mark.parametrize("periodic", [ALL, SIDES, (True, False, True), NONE])
@@ -62,6 +72,9 @@ def test_throat_ends_are_its_pores_up_to_whole_periods():
     assert network.throat_ends == pytest.approx(place, abs=1e-9)
     assert np.all(network.pore_position >= 0)
     assert np.all(network.pore_position < size)
+    # the two places are those beside the facet, not an image of them elsewhere
+    away = np.linalg.norm(network.throat_ends - network.throat_corner.mean(axis=1)[:, None], axis=2)
+    assert away.max() < 2.5
     # both pores hold the throat's three grains
     for side in (0, 1):
         grains = network.pore_grains[network.throat_pores[:, side]]
@@ -101,10 +114,12 @@ def test_layer_centred_on_the_inlet_is_refused():
 
 def test_grains_out_of_reach_are_left_out_and_counted():
     pack = random_pack(60, 0.5, periodic=False)
-    position = np.vstack([pack.position, [[-3.0, 1, 1]]])
-    network = build_network(snapshot(position, np.append(pack.radius, 1.0), pack.box), periodic=NONE)
+    position = np.vstack([[[-3.0, 1, 1]], pack.position])
+    network = build_network(snapshot(position, np.append(1.0, pack.radius), pack.box), periodic=NONE)
+    alone = build_network(pack, periodic=NONE)
     assert network.counts["grains_outside_box"] == 1
-    assert len(network.pore_position) == len(build_network(pack, periodic=NONE).pore_position)
+    assert np.array_equal(network.pore_grains, alone.pore_grains + 1)
+    assert np.array_equal(network.throat_grains, alone.throat_grains + 1)
 
 
 def test_heavily_overlapping_grains_close_throats():

@@ -1,0 +1,125 @@
+"""Checkpoints of an invasion: the counts after each chunk of steps, and the state on disk behind them."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fdnet.case import Case
+from fdnet.dem.dump import read_frame
+from fdnet.dem.scene import snapshot_of
+from fdnet.errors import DumpError, LiggghtsError
+from fdnet.scales import Scales
+from fdnet.snapshot import Kind, Snapshot
+
+HISTORY = "history.csv"
+HISTORY_HEADER = "chunk,step,upstream,invaded,passed,removed_upstream,most_crossed,quiet"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Checkpoint:
+    """Counts after one chunk. `upstream` includes `removed_upstream`; `most_crossed` the most crossings so far."""
+
+    chunk: int
+    step: int
+    upstream: int
+    invaded: int
+    passed: int
+    removed_upstream: int
+    most_crossed: int
+    quiet: int
+
+
+def chunks_of(scales: Scales) -> int:
+    """Number of chunks until the cap."""
+    return max(1, math.ceil(scales.cap_time / (scales.checkpoint_steps * scales.time_step) - 1e-9))
+
+
+def quiet_chunks(scales: Scales) -> int:
+    """Chunks without a crossing that make the plug time."""
+    return max(1, math.ceil(scales.plug_time / (scales.checkpoint_steps * scales.time_step) - 1e-9))
+
+
+def empty_chunks(case: Case, scales: Scales) -> int:
+    """Chunks without a fine leaving once the slab is empty: twice the fluid's passage, at least the plug time."""
+    passage = 2 * case.size_m[0] / scales.interstitial_velocity
+    return max(quiet_chunks(scales), math.ceil(passage / (scales.checkpoint_steps * scales.time_step)))
+
+
+def quiet_enough(case: Case, scales: Scales, row: Checkpoint) -> bool:
+    return row.quiet >= (quiet_chunks(scales) if row.upstream > 0 else empty_chunks(case, scales))
+
+
+def csv_row(row: Checkpoint) -> str:
+    return ",".join(str(getattr(row, name)) for name in HISTORY_HEADER.split(","))
+
+
+def read_history(folder: Path) -> tuple[Checkpoint, ...]:
+    """All checkpoints recorded in history.csv; an unfinished last line is left out. Raises LiggghtsError if there are none."""
+    try:
+        text = (folder / HISTORY).read_text(errors="replace")
+    except OSError:
+        text = ""
+    rows = []
+    for line in text[: text.rfind("\n") + 1].splitlines()[1:]:
+        parts = line.split(",")
+        if len(parts) == len(HISTORY_HEADER.split(",")) and all(_is_count(p) for p in parts):
+            rows.append(Checkpoint(**{n: int(float(p)) for n, p in zip(HISTORY_HEADER.split(","), parts, strict=True)}))
+    if not rows:
+        raise LiggghtsError(f"{folder / HISTORY}: no checkpoint recorded; see {folder}/screen.txt, run again")
+    return tuple(rows)
+
+
+def _is_count(text: str) -> bool:
+    try:
+        return float(text) == int(float(text))
+    except (ValueError, OverflowError):
+        return False
+
+
+def last_checkpoint(folder: Path, case: Case, grains: Snapshot) -> Checkpoint | None:
+    """The newest checkpoint whose dump and restart are whole; None when there is none."""
+    try:
+        rows = read_history(folder)
+    except LiggghtsError:
+        return None
+    for row in reversed(rows):
+        if _whole(folder, row, len(grains)):
+            return row
+    return None
+
+
+def _whole(folder: Path, row: Checkpoint, grain_number: int) -> bool:
+    restart = folder / "post" / f"invade_{row.step}.restart"
+    try:
+        frame = read_frame(folder / "post" / f"invade_{row.step}.dump")
+        size = restart.stat().st_size
+    except (DumpError, OSError):
+        return False
+    fines = int(np.count_nonzero(frame.column("type") == Kind.FINE))
+    remaining = row.upstream - row.removed_upstream + row.invaded
+    return fines == remaining and size > 100 * (fines + grain_number)
+
+
+def state_at(folder: Path, row: Checkpoint, case: Case, scales: Scales, grains: Snapshot) -> Snapshot:
+    """Grains and remaining fines at a checkpoint. Raises DumpError when its dump is missing or cut."""
+    frame = read_frame(folder / "post" / f"invade_{row.step}.dump")
+    moved = snapshot_of(frame, case, time_s=row.step * scales.time_step)
+    return moved if case.grains.motion == "mobile" else grains.joined(moved)
+
+
+def check_counts(folder: Path, row: Checkpoint, damaged: Snapshot, supplied: int) -> None:
+    fines, length = damaged.fines(), damaged.box[0, 1]
+    inside = int(np.count_nonzero((fines.position[:, 0] >= 0) & (fines.position[:, 0] < length)))
+    upstream = int(np.count_nonzero(fines.position[:, 0] < 0))
+    if inside != row.invaded or upstream != row.upstream - row.removed_upstream:
+        raise LiggghtsError(f"{folder}/post/invade_{row.step}.dump: {inside} fines inside and {upstream} upstream, expected "
+                            f"{row.invaded} and {row.upstream - row.removed_upstream} as in {HISTORY}")
+    if row.upstream + row.invaded + row.passed != supplied:
+        raise LiggghtsError(f"{folder / HISTORY}: step {row.step}: upstream {row.upstream} + invaded {row.invaded} + passed "
+                            f"{row.passed} is not the {supplied} supplied: fines were lost; lower run.time_step_factor")
+
+
+def step_of(path: Path) -> int:
+    return int(path.stem.rsplit("_", 1)[1])

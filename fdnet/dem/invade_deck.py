@@ -1,0 +1,136 @@
+"""The invasion deck and its data file."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fdnet.atomic import write_text
+from fdnet.case import Case
+from fdnet.contacts import touching_pairs
+from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, quiet_chunks
+from fdnet.dem.deck import Deck, LeftOut, number, render_text
+from fdnet.dem.dump import COLUMNS, FORMAT
+from fdnet.dem.scene import contact_variables, header_variables, wall_variables, write_data
+from fdnet.dem.supply import front_of, place_fines
+from fdnet.errors import CaseError
+from fdnet.scales import Scales
+from fdnet.snapshot import Array, Kind, Snapshot
+
+
+def write_invade_inputs(case: Case, scales: Scales, grains: Snapshot, folder: Path, *, ranks: int = 1) -> Deck:
+    """Write in.invade and invade.data (grains and the slab of fines) into `folder`."""
+    assert case.fines is not None
+    spheres = grains.joined(place_fines(case, scales, grains))
+    pairs, _ = touching_pairs(spheres, case.periodic)
+    if np.any(spheres.kind[pairs] == Kind.FINE):
+        raise CaseError("fines: a fine would start in contact; this is an fdnet fault, please report the case and seed")
+    density = np.where(spheres.kind == Kind.GRAIN, case.grains.density_kg_m3, case.fines.density_kg_m3)
+    write_data(folder / "invade.data", spheres, bounds=_bounds(case, scales, grains), density=density, types=3)
+    deck = render_invade(case, scales, grains, ranks=ranks)
+    write_text(folder / "in.invade", deck.text)
+    return deck
+
+
+def _margin(case: Case, scales: Scales) -> float:
+    """How far a fine could go in one chunk at twice the fluid's velocity, plus two diameters."""
+    assert case.fines is not None
+    travel = 2 * scales.interstitial_velocity * scales.checkpoint_steps * scales.time_step
+    return travel + 4 * case.fines.radius_range_m[1]
+
+
+def _bounds(case: Case, scales: Scales, grains: Snapshot) -> Array:
+    """The simulation box (3, 2): it extends past the outlet and upstream of the slab, where fines are removed."""
+    assert case.fines is not None
+    start = front_of(grains) - 2 * case.fines.radius_range_m[1] - scales.slab_length
+    margin = _margin(case, scales)
+    size = case.size_m
+    return np.array([[start - 2 * margin, size[0] + 2 * margin], [0.0, size[1]], [0.0, size[2]]])
+
+
+def render_invade(case: Case, scales: Scales, grains: Snapshot, *, ranks: int = 1, resume: Checkpoint | None = None) -> Deck:
+    """The invasion deck, fresh or continued from a checkpoint's restart."""
+    assert case.fines is not None
+    mobile = case.grains.motion == "mobile"
+    frictional = [c for name, c in scales.contacts.items() if "fine" in name or mobile]
+    friction = any(c.friction > 0 for c in frictional)
+    wall_friction = any(c.friction > 0 for c in frictional if "wall" in c.pair)
+    gravity, left_out = _gravity(case, scales)
+    left_out += _left_out(case, friction=friction, ranks=ranks)
+    text = render_text("invade.in.j2", header_variables(case, "invade", left_out, ranks) | {
+        "resume": {"restart": f"post/invade_{resume.step}.restart"} if resume else None,
+        "skin": number(case.fines.radius_range_m[0]),
+        "contacts": contact_variables(case, scales, "invade", friction=friction), "time_step": number(scales.time_step),
+        "walls": wall_variables(case, "invade", friction=wall_friction), "fixed_grains": not mobile,
+        "moving": "all" if mobile else "fines", "gravity": gravity, "dump_group": "all" if mobile else "fines",
+        "start_velocity": number(scales.upstream_velocity), "fluid_velocity": number(scales.interstitial_velocity),
+        "drag": _drag(case, scales), "regions": _regions(case, scales, grains),
+        "thermo_steps": max(1, scales.checkpoint_steps // 4), "quiet_checkpoints": quiet_chunks(scales),
+        "empty_checkpoints": empty_chunks(case, scales),
+        "start": _start(resume), "chunks": chunks_of(scales), "chunk_steps": scales.checkpoint_steps,
+        "stop_when_plugged": case.run.duration_ms is None, "dump_columns": COLUMNS, "dump_format": FORMAT})
+    return Deck(text=text, stage="invade", digest=case.digest("invade"), left_out=tuple(left_out))
+
+
+def _start(resume: Checkpoint | None) -> dict[str, int]:
+    if resume is None:
+        return {"chunk": 1, "passed": 0, "behind": 0, "most": 0, "quiet": 0}
+    return {"chunk": resume.chunk + 1, "passed": resume.passed, "behind": resume.removed_upstream,
+            "most": resume.most_crossed, "quiet": resume.quiet}
+
+
+def _drag(case: Case, scales: Scales) -> dict[str, Any]:
+    coefficient = 6 * math.pi * case.fluid.viscosity_cP * 1e-3 * case.drag.multiplier
+    slower = scales.interstitial_velocity - scales.upstream_velocity
+    fluid = f"(f_uf[1]-(x<0.0)*{number(slower)})" if slower else "f_uf[1]"
+    return {"coefficient": number(coefficient), "fluid_x": fluid, "hold_steps": scales.hold_steps if scales.hold_steps > 1 else 0}
+
+
+def _regions(case: Case, scales: Scales, grains: Snapshot) -> dict[str, str]:
+    bounds, length, margin = _bounds(case, scales, grains), case.size_m[0], _margin(case, scales)
+    behind = bounds[0, 0] + margin
+    sides = "INF INF INF INF"
+    return {"specimen": f"0.0 {number(np.nextafter(length, 0))} {sides}",
+            "upstream": f"{number(np.nextafter(behind, 0))} {number(-5e-324)} {sides}",
+            "beyond": f"{number(length)} INF {sides}", "behind": f"INF {number(behind)} {sides}"}
+
+
+def _gravity(case: Case, scales: Scales) -> tuple[dict[str, Any] | None, list[LeftOut]]:
+    mode, vector = case.gravity.mode, case.gravity.acceleration_m_s2
+    magnitude = math.hypot(*vector)
+    if mode == "off" or magnitude == 0:
+        return None, [LeftOut(what="gravity and buoyancy", why="switched off")]
+    if mode == "auto" and scales.gravity_over_drag < case.gravity.negligible_below:
+        return None, [LeftOut(what="gravity and buoyancy",
+                              why=f"gravity is {scales.gravity_over_drag:.1e} of the drag, below {case.gravity.negligible_below:g}")]
+    if not case.gravity.buoyancy:
+        return _pull(vector, 1.0), [LeftOut(what="buoyancy", why="switched off")]
+    along = [axis for axis in range(3) if vector[axis] != 0]
+    if len(along) > 1:
+        raise CaseError(f"gravity.acceleration_m_s2: {list(vector)}: LIGGGHTS's buoyancy needs gravity along one axis; "
+                        "turn the vector, or set gravity.buoyancy = false")
+    if vector[along[0]] > 0:
+        raise CaseError(f"gravity.acceleration_m_s2: {list(vector)}: LIGGGHTS's buoyancy needs gravity pointing down its "
+                        "axis (negative); turn the vector, or set gravity.buoyancy = false")
+    buoyancy = {"density": number(case.fluid.density_kg_m3), "axis": "xyz"[along[0]], "level": "1.0"}
+    return _pull(vector, 1.0) | {"buoyancy": buoyancy}, []
+
+
+def _pull(vector: tuple[float, float, float], factor: float) -> dict[str, Any]:
+    magnitude = math.hypot(*vector)
+    return {"magnitude": number(factor * magnitude), "direction": " ".join(number(c / magnitude) for c in vector),
+            "buoyancy": None}
+
+
+def _left_out(case: Case, *, friction: bool, ranks: int) -> list[LeftOut]:
+    found = []
+    if case.grains.motion == "fixed":
+        found.append(LeftOut(what="contacts between grains, end planes", why="grains are fixed"))
+    if not friction:
+        found.append(LeftOut(what="tangential history", why="no pair has friction"))
+    if case.box.sides == "periodic":
+        found.append(LeftOut(what="side walls", why="sides are periodic"))
+    if ranks == 1:
+        found.append(LeftOut(what="MPI processor grid", why="one rank"))
+    return found

@@ -1,0 +1,41 @@
+"""Decks without LIGGGHTS."""
+
+from pathlib import Path
+
+import numpy as np
+
+from fdnet.case import Case
+from fdnet.dem.invade_deck import render_invade
+from fdnet.dem.packing import write_pack_inputs
+from fdnet.dem.scene import box_of
+from fdnet.errors import CaseError
+from fdnet.scales import grain_count, scales_of
+from fdnet.snapshot import Kind, Snapshot
+
+
+def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
+    """Write the decks of a case without LIGGGHTS: the pack with its data file, and the invasion.
+
+    The invasion's own data file needs a finished pack; where `out` holds one it is written too.
+    Raises CaseError when a deck is there already.
+    """
+    scales = scales_of(case)
+    decks = [out / "pack" / "in.pack"] + ([out / "invade" / "in.invade"] if case.fines else [])
+    there = [deck for deck in decks if deck.exists()]
+    if there:
+        raise CaseError(f"{there[0]}: is there already; give another --out (nothing was changed)")
+    for deck in decks:
+        deck.parent.mkdir(parents=True, exist_ok=True)
+    write_pack_inputs(case, scales, decks[0].parent, count=grain_count(case), ranks=ranks)
+    if case.fines:
+        grains = _expected_grains(case)
+        decks[1].write_text(render_invade(case, scales, grains, ranks=ranks).text)
+    return decks
+
+
+def _expected_grains(case: Case) -> Snapshot:
+    """One grain that stands beyond the face as far as grains of a dense pack do: only its reach matters for the deck."""
+    radius = case.grains.radius_range_m[1]
+    box = box_of(case)
+    return Snapshot(step=0, time_s=0.0, box=box, id=np.array([1]), kind=np.array([Kind.GRAIN]),
+                    position=np.array([[0.7 * radius, *(box[1:, 1] / 2)]]), radius=np.array([radius]), velocity=np.zeros((1, 3)))

@@ -1,0 +1,266 @@
+"""Whole runs through the command line and the real binary: the output contract, killing and resuming, refusals."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builders import tiny
+
+pytestmark = pytest.mark.liggghts
+SHORT = ("run.cap_ms=0.35",)
+
+
+def fdnet(*arguments: str | Path, **options) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-m", "fdnet.cli", *map(str, arguments)], capture_output=True, text=True, check=False,
+                          **options)
+
+
+def write_case(folder: Path, *assignments: str) -> Path:
+    path = folder / "case.toml"
+    path.write_text(tiny(*SHORT, *assignments).toml())
+    return path
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A finished run of the tiny case: its folder and the case file."""
+    folder = tmp_path_factory.mktemp("finished")
+    case = write_case(folder)
+    done = fdnet("run", case, "--out", folder / "run", "--json")
+    assert done.returncode == 0, done.stderr
+    return folder / "run", case, json.loads(done.stdout)
+
+
+def test_the_folder_keeps_the_output_contract(finished, root):
+    run, _, summary = finished
+    checker = root.parent / "shared" / "checks" / "contract.py"
+    if checker.exists():
+        checked = subprocess.run([sys.executable, str(checker), str(run)], capture_output=True, text=True, check=False)
+        assert checked.stdout.strip() == "contract holds"
+    assert summary["supplied_count"] == 300
+    assert summary["invaded_count"] > 0
+    assert 0 < summary["k_damaged_m2"] < summary["k_initial_m2"]
+    assert {"pack", "invade", "analyse", "report"} <= set(summary["seconds"])
+    for name in ("pack/in.pack", "pack/log.liggghts", "invade/in.invade", "invade/log.liggghts", "report.html", "network.vtp"):
+        assert (run / name).stat().st_size > 0
+
+
+def test_a_finished_run_is_not_repeated(finished):
+    run, case, summary = finished
+    before = (run / "manifest.json").stat().st_mtime_ns
+    for extra in ([], ["--resume"]):
+        again = fdnet("run", case, "--out", run, "--json", *extra)
+        assert again.returncode == 0
+        assert json.loads(again.stdout) == summary
+    assert (run / "manifest.json").stat().st_mtime_ns == before
+
+
+def test_its_spheres_feed_the_permeability_command(finished):
+    run, _, summary = finished
+    answer = fdnet("permeability", run / "spheres_damaged.csv", "--axis", "x", "--box", "0,0.003,0,0.0016,0,0.0016", "--sections", "3",
+                   "--json")
+    assert answer.returncode == 0, answer.stderr
+    result = json.loads(answer.stdout)
+    assert result["k_initial_m2"] == pytest.approx(summary["k_initial_m2"], rel=1e-9)
+    assert result["k_damaged_m2"] == pytest.approx(summary["k_damaged_m2"], rel=1e-9)
+    assert result["porosity_damaged"] == pytest.approx(summary["porosity_damaged"], abs=1e-9)
+
+
+def test_another_case_and_foreign_folders_are_refused(finished, tmp_path):
+    run, _, _ = finished
+    other = write_case(tmp_path, "fines.count=200")
+    refused = fdnet("run", other, "--out", run)
+    assert refused.returncode == 2
+    assert "holds a run of another case" in refused.stderr
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.doc").write_text("precious")
+    for extra in ([], ["--force"]):
+        refused = fdnet("run", other, "--out", tmp_path / "mine", *extra)
+        assert refused.returncode == 2
+        assert "holds no fdnet run" in refused.stderr
+    assert [p.name for p in (tmp_path / "mine").iterdir()] == ["thesis.doc"]
+
+
+def test_force_with_another_law_keeps_pack_and_invasion(finished, tmp_path):
+    run, case, summary = finished
+    copy = tmp_path / "run"
+    shutil.copytree(run, copy)
+    again = fdnet("run", case, "--out", copy, "--set", "analysis.law=thesis", "--stages", "analyse,report", "--force", "--json")
+    assert again.returncode == 0, again.stderr
+    result = json.loads(again.stdout)
+    assert result["law"] == "thesis"
+    assert result["invaded_count"] == summary["invaded_count"]
+    assert result["k_initial_m2"] < summary["k_initial_m2"]
+    assert (copy / "invade" / "stage.json").stat().st_mtime_ns == (run / "invade" / "stage.json").stat().st_mtime_ns
+
+
+def test_stages_one_after_the_other_equal_all_at_once(finished, tmp_path):
+    run, case, summary = finished
+    for stage in ("pack", "invade", "analyse,report"):
+        done = fdnet("run", case, "--out", tmp_path / "run", "--stages", stage)
+        assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert result["k_damaged_m2"] == summary["k_damaged_m2"]
+    assert np.array_equal(*(Path(p, "spheres_damaged.csv").read_text() for p in (run, tmp_path / "run")))
+
+
+def test_a_stage_without_its_forerunner_is_refused(tmp_path):
+    case = write_case(tmp_path)
+    for stage, said in (("invade", "no finished pack"), ("analyse", "no finished pack")):
+        refused = fdnet("run", case, "--out", tmp_path / stage, "--stages", stage)
+        assert refused.returncode == 2
+        assert said in refused.stderr
+    refused = fdnet("run", case, "--out", tmp_path / "x", "--stages", "bake")
+    assert refused.returncode == 2
+    assert not (tmp_path / "x").exists()
+
+
+def kill_when(command: list[str], ready, sign: int) -> int:
+    """Start a run, send `sign` as soon as `ready()` is true; returns the exit code."""
+    process = subprocess.Popen([sys.executable, "-m", "fdnet.cli", *command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 60
+    while process.poll() is None and not ready() and time.monotonic() < deadline:
+        time.sleep(0.005)
+    process.send_signal(sign)
+    return process.wait(30)
+
+
+@pytest.mark.parametrize("sign", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("moment", ["pack/attempt_1/in.pack", "pack/attempt_1/screen.txt", "pack/stage.json", "invade/in.invade",
+                                    "invade/history.csv rows", "invade/stage.json", "sections.csv", "figures"])
+def test_a_run_killed_at_any_moment_is_completed_by_resume(finished, tmp_path, moment, sign):
+    if sign != signal.SIGKILL and moment not in ("pack/attempt_1/screen.txt", "invade/history.csv rows"):
+        pytest.skip("polite signals are tried while LIGGGHTS runs")
+    run, case, summary = finished
+    out = tmp_path / "run"
+    name, _, rows = moment.partition(" ")
+
+    def ready() -> bool:
+        path = out / name
+        return path.exists() and (not rows or path.read_text().count("\n") > 2)
+
+    code = kill_when(["run", str(case), "--out", str(out)], ready, sign)
+    assert code == (-signal.SIGKILL if sign == signal.SIGKILL else 130)
+    assert not (out / "manifest.json").exists()
+    unfinished = fdnet("run", case, "--out", out)
+    assert unfinished.returncode == 2
+    assert "--resume" in unfinished.stderr
+    resumed = fdnet("run", case, "--out", out, "--resume", "--json")
+    assert resumed.returncode == 0, resumed.stderr
+    result = json.loads(resumed.stdout)
+    assert result["invaded_count"] == summary["invaded_count"]
+    assert result["k_damaged_m2"] == summary["k_damaged_m2"]
+    assert (out / "spheres_damaged.csv").read_text() == (run / "spheres_damaged.csv").read_text()
+    assert (out / "report.html").exists()
+
+
+def test_two_runs_cannot_write_the_same_folder(tmp_path):
+    import fcntl
+
+    case = write_case(tmp_path)
+    out = tmp_path / "run"
+    out.mkdir()
+    lock = os.open(out / ".lock", os.O_RDWR | os.O_CREAT)
+    fcntl.flock(lock, fcntl.LOCK_EX)
+    refused = fdnet("run", case, "--out", out)
+    os.close(lock)
+    assert refused.returncode == 2
+    assert "another fdnet run is writing here" in refused.stderr
+
+
+def test_bad_input_writes_nothing_and_ends_with_2(tmp_path):
+    case = write_case(tmp_path)
+    out = tmp_path / "run"
+    for arguments in ([tmp_path / "none.toml"], [case, "--set", "fines.radius_mm=0.4"], [case, "--np", "0"], [case, "--set", "x"],
+                      [case, "--nonsense"], [case, "--set", "run.time_step_s=1e-6"]):
+        refused = fdnet("run", *arguments, "--out", out)
+        assert refused.returncode == 2, arguments
+        assert len(refused.stderr.strip().splitlines()) == 1, refused.stderr
+        assert not out.exists()
+
+
+def test_a_missing_binary_ends_with_3_before_anything_is_written(tmp_path):
+    refused = fdnet("run", write_case(tmp_path), "--out", tmp_path / "run", "--liggghts", "/nowhere/liggghts")
+    assert refused.returncode == 3
+    assert "LIGGGHTS not found" in refused.stderr
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_failing_binary_ends_with_3_and_keeps_what_was_written(finished, tmp_path):
+    _, case, _ = finished
+    fake = tmp_path / "liggghts"
+    fake.write_text('#!/bin/sh\necho "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0)"\necho "ERROR: played"\nexit 1\n')
+    fake.chmod(0o755)
+    failed = fdnet("run", case, "--out", tmp_path / "run", "--liggghts", fake)
+    assert failed.returncode == 3
+    assert "ERROR: played" in failed.stderr
+    assert "Traceback" not in failed.stderr
+    mended = fdnet("run", case, "--out", tmp_path / "run", "--resume")
+    assert mended.returncode == 0, mended.stderr
+
+
+def test_a_cut_dump_of_a_finished_stage_is_named(finished, tmp_path):
+    run, case, _ = finished
+    copy = tmp_path / "run"
+    shutil.copytree(run, copy)
+    (copy / "manifest.json").unlink()
+    dump = copy / "pack" / "post" / "pack.dump"
+    dump.write_bytes(dump.read_bytes()[:-50])
+    failed = fdnet("run", case, "--out", copy, "--resume")
+    assert failed.returncode == 3
+    assert "pack.dump" in failed.stderr
+    assert "rows, then the file ends" in failed.stderr
+
+
+def test_an_intact_pack_needs_no_fines(tmp_path):
+    case = tmp_path / "case.toml"
+    text = tiny("grains.count=70").toml()
+    start = text.index("[fines]")
+    case.write_text(text[:start] + text[text.index("[fluid]"):])
+    done = fdnet("run", case, "--out", tmp_path / "run", "--json")
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["stop_reason"] is None
+    assert summary["supplied_count"] == 0
+    assert summary["k_damaged_m2"] == summary["k_initial_m2"]
+    assert any("no fines" in item for item in summary["left_out"])
+
+
+def test_mobile_grains_give_a_moved_permeability(tmp_path):
+    done = fdnet("run", write_case(tmp_path, "grains.motion=mobile"), "--out", tmp_path / "run", "--json")
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["k_damaged_m2"] <= summary["k_moved_m2"]
+
+
+def test_render_writes_decks_and_scales_without_a_binary(tmp_path, monkeypatch):
+    monkeypatch.setenv("FDNET_LIGGGHTS", "/nowhere")
+    case = write_case(tmp_path)
+    done = fdnet("render", case, "--out", tmp_path / "decks")
+    assert done.returncode == 0, done.stderr
+    assert "Carman-Kozeny permeability" in done.stdout
+    assert (tmp_path / "decks" / "pack" / "pack.data").exists()
+    again = fdnet("render", case, "--out", tmp_path / "decks")
+    assert again.returncode == 2
+    assert "is there already" in again.stderr
+
+
+def test_run_case_script_equals_fdnet_run(finished, root):
+    run, case, summary = finished
+    done = subprocess.run([sys.executable, root / "scripts" / "run_case.py", case, "--out", run, "--json"], capture_output=True, text=True,
+                          check=False)
+    assert json.loads(done.stdout) == summary
+
+
+def test_help_is_quick_to_import():
+    """The heavy libraries are imported only by the commands that need them."""
+    code = "import sys, fdnet.cli; fdnet.cli._parser(); print([m for m in ('numpy', 'pandas', 'pyvista', 'scipy') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "[]"
