@@ -1,9 +1,17 @@
 """Files that are either the old one or the complete new one, never half of it."""
 
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+_FULL_BYTES = 1 << 16
+
+
+def disk_is_full(folder: str | Path) -> bool:
+    """Less than 64 kB are free where `folder` is."""
+    return shutil.disk_usage(folder).free < _FULL_BYTES
 
 
 @contextmanager

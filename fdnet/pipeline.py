@@ -16,7 +16,7 @@ from fdnet.case import Case
 from fdnet.dem.checkpoint import Checkpoint, read_history, state_at
 from fdnet.dem.dump import read_frame
 from fdnet.dem.invasion import invade
-from fdnet.dem.liggghts import Binary, Run, find_binary
+from fdnet.dem.liggghts import KNOWN_VERSION, Binary, Run, find_binary
 from fdnet.dem.packing import Pack, make_pack, render_pack
 from fdnet.dem.scene import snapshot_of
 from fdnet.errors import CaseError
@@ -220,7 +220,7 @@ def _write_summary(story: _Story, results: Results, figures: list[tuple[Path, st
     pack, invasion = story.folder.record("pack"), story.folder.record("invade") if history else None
     assert pack is not None
     seconds = _seconds(story, pack, invasion)
-    warnings = [*story.scales.warnings, *(invasion["warnings"] if invasion else []), *_overlap_warnings(invasion), *notes]
+    warnings = [*story.scales.warnings, *_version_warnings(pack), *(invasion["warnings"] if invasion else []), *_overlap_warnings(invasion), *notes]
     summary = summarise(story.case, results.analysis, pack=pack, invasion=invasion, last=history[-1] if history else None,
                         seconds=seconds, warnings=warnings)
     summary = tables.write_summary(story.path / "summary.json", summary)
@@ -229,6 +229,11 @@ def _write_summary(story: _Story, results: Results, figures: list[tuple[Path, st
                                  versions=_versions(pack), commands=[story.options.command] if story.options.command else [])
         html.write_report(story.path / "report.html", summary, parts=parts)
     return summary
+
+
+def _version_warnings(pack: dict[str, Any]) -> list[str]:
+    version = pack["run"]["version"]
+    return [] if version == KNOWN_VERSION else [f"LIGGGHTS {version}: fdnet was measured and tested with {KNOWN_VERSION}"]
 
 
 def _overlap_warnings(invasion: dict[str, Any] | None) -> list[str]:

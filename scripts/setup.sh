@@ -104,7 +104,7 @@ quietly() {
     local log status=0
     log="$(mktemp)"
     "$@" >"$log" 2>&1 </dev/null || status=$?
-    [ "$status" -eq 0 ] || tail -n 15 "$log" >&2
+    [ "$status" -eq 0 ] || tail -n 5 "$log" >&2
     rm -f "$log"
     return "$status"
 }

@@ -132,33 +132,34 @@ def kill_when(command: list[str], ready, sign: int) -> int:
     return process.wait(30)
 
 
-@pytest.mark.parametrize("sign", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("moment", ["pack/attempt_1/in.pack", "pack/attempt_1/screen.txt", "pack/stage.json", "invade/in.invade",
-                                    "invade/history.csv rows", "invade/stage.json", "sections.csv", "figures"])
+@pytest.mark.parametrize(("moment", "sign"), [
+    ("pack/attempt_1/in.pack", signal.SIGKILL), ("pack/attempt_1/screen.txt", signal.SIGKILL), ("pack/stage.json", signal.SIGKILL),
+    ("invade/in.invade", signal.SIGKILL), ("invade/history.csv rows", signal.SIGKILL), ("invade/stage.json", signal.SIGKILL),
+    ("sections.csv", signal.SIGKILL), ("figures", signal.SIGKILL), ("pack/attempt_1/screen.txt", signal.SIGTERM),
+    ("invade/history.csv rows", signal.SIGINT)])
 def test_a_run_killed_at_any_moment_is_completed_by_resume(finished, tmp_path, moment, sign):
-    if sign != signal.SIGKILL and moment not in ("pack/attempt_1/screen.txt", "invade/history.csv rows"):
-        pytest.skip("polite signals are tried while LIGGGHTS runs")
     run, case, summary = finished
     out = tmp_path / "run"
+    stages = ["--stages", "pack,invade,analyse" + ",report" * (moment == "figures")]
     name, _, rows = moment.partition(" ")
 
     def ready() -> bool:
         path = out / name
         return path.exists() and (not rows or path.read_text().count("\n") > 2)
 
-    code = kill_when(["run", str(case), "--out", str(out)], ready, sign)
+    code = kill_when(["run", str(case), "--out", str(out), *stages], ready, sign)
     assert code == (-signal.SIGKILL if sign == signal.SIGKILL else 130)
     assert not (out / "manifest.json").exists()
-    unfinished = fdnet("run", case, "--out", out)
+    unfinished = fdnet("run", case, "--out", out, *stages)
     assert unfinished.returncode == 2
     assert "--resume" in unfinished.stderr
-    resumed = fdnet("run", case, "--out", out, "--resume", "--json")
+    resumed = fdnet("run", case, "--out", out, "--resume", "--json", *stages)
     assert resumed.returncode == 0, resumed.stderr
     result = json.loads(resumed.stdout)
     assert result["invaded_count"] == summary["invaded_count"]
     assert result["k_damaged_m2"] == summary["k_damaged_m2"]
     assert (out / "spheres_damaged.csv").read_text() == (run / "spheres_damaged.csv").read_text()
-    assert (out / "report.html").exists()
+    assert (out / "report.html").exists() == (moment == "figures")
 
 
 def test_two_runs_cannot_write_the_same_folder(tmp_path):
@@ -204,6 +205,40 @@ def test_a_failing_binary_ends_with_3_and_keeps_what_was_written(finished, tmp_p
     assert "Traceback" not in failed.stderr
     mended = fdnet("run", case, "--out", tmp_path / "run", "--resume")
     assert mended.returncode == 0, mended.stderr
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of 300 kB."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", str(place)], capture_output=True, check=False).returncode:
+        pytest.skip("mounting a small file system needs root")
+    yield place
+    subprocess.run(["umount", str(place)], check=True)
+
+
+def test_a_full_disk_is_named_and_room_completes_the_run(finished, small_disk):
+    _, case, summary = finished
+    command = ["run", case, "--out", small_disk / "run", "--stages", "pack,invade,analyse", "--json"]
+    full = fdnet(*command)
+    assert full.returncode == 3
+    assert "the disk is full" in full.stderr
+    subprocess.run(["mount", "-o", "remount,size=50m", str(small_disk)], check=True)
+    resumed = fdnet(*command, "--resume")
+    assert resumed.returncode == 0, resumed.stderr
+    assert json.loads(resumed.stdout)["k_damaged_m2"] == summary["k_damaged_m2"]
+
+
+def test_two_ranks_complete_a_run(finished, tmp_path, binary):
+    if binary.launcher is None:
+        pytest.skip("no mpirun on this machine")
+    _, case, summary = finished
+    done = fdnet("run", case, "--out", tmp_path / "run", "--np", "2", "--stages", "pack,invade,analyse", "--json")
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert abs(result["invaded_count"] - summary["invaded_count"]) < 0.2 * summary["invaded_count"]
+    assert "processors 1 * *" in (tmp_path / "run" / "invade" / "in.invade").read_text()
 
 
 def test_a_cut_dump_of_a_finished_stage_is_named(finished, tmp_path):

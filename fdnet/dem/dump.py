@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from fdnet.atomic import disk_is_full
 from fdnet.errors import DumpError
 from fdnet.snapshot import Array, frozen
 
@@ -46,9 +47,14 @@ def read_dump(path: Path) -> list[Frame]:
 
 def read_frame(path: Path) -> Frame:
     """The only frame of a dump file. Raises DumpError, also when there are none or several."""
-    frames = read_dump(path)
-    if len(frames) != 1:
-        raise DumpError(f"{path}: {len(frames)} frames, expected one")
+    try:
+        frames = read_dump(path)
+        if len(frames) != 1:
+            raise DumpError(f"{path}: {len(frames)} frames, expected one. The run was cut; continue it with --resume.")
+    except DumpError as error:
+        if path.parent.exists() and disk_is_full(path.parent):
+            raise DumpError(f"{error} Make room first: the disk is full.") from error
+        raise
     return frames[0]
 
 

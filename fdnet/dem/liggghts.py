@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from fdnet.atomic import disk_is_full
 from fdnet.errors import LiggghtsError
 
 END_MARK = "DECK_DONE"
@@ -168,7 +169,9 @@ def _verify(folder: Path, deck: str, code: int) -> None:
             raise LiggghtsError(f"{where}: not-a-number in the output ({numbers[0].strip()[:80]!r}); "
                                 "lower run.time_step_factor")
         return
-    evidence = bad[0] if bad else (lines[-1].strip() if lines else "no output")
+    evidence = bad[0] if bad else (f"the last line is {lines[-1].strip()!r}" if lines else "no output")
+    if disk_is_full(folder):
+        evidence = f"the disk is full ({evidence})"
     state = f"ended by signal {-code}" if code < 0 else f"exit {code}"
     finished = "" if bad else f", no {END_MARK} line"
     raise LiggghtsError(f"{where}: LIGGGHTS failed ({state}{finished}): {evidence[:200]}; see {folder / SCREEN}, "

@@ -56,7 +56,7 @@ def make_pack(case: Case, scales: Scales, folder: Path, *, binary: Binary, ranks
         attempt = folder / f"attempt_{len(counts)}"
         pack = _attempt(case, scales, attempt, counts[-1], binary=binary, ranks=ranks, follow=follow)
         tried.append({"grains": len(pack.grains), "porosity": pack.porosity, "porosity_error": pack.porosity_error,
-                      "max_overlap": pack.max_overlap})
+                      "max_overlap": pack.max_overlap, "liggghts_s": pack.run.seconds})
         if case.grains.count is not None or _met(case, pack):
             return _accept(folder, attempt, pack, tried)
         counts.append(_next_count(case, tried))

@@ -58,6 +58,19 @@ def test_renumbering_quarter_turn_mirror_and_scale_leave_k(pack, walled, periodi
     assert both(rebuilt(spheres, scale=2.5e-4), periodic, pair) == pytest.approx(k * 6.25e-8, rel=1e-5)
 
 
+@pytest.mark.parametrize("periodic", [ALL, FLOW_X, WALLED])
+def test_box_may_start_anywhere(walled, periodic):
+    offset = np.array([5.0, -3.0, 2.0])
+    moved = rebuilt(walled, walled.position + offset, box=walled.box + offset[:, None])
+    here, there = (analyse(one.grains(), one, periodic=periodic, options=options(sections=3))
+                   for one in (walled, moved))
+    assert there.k_damaged == pytest.approx(here.k_damaged, rel=1e-5)
+    assert there.porosity_damaged == pytest.approx(here.porosity_damaged, abs=1e-9)
+    assert there.invasion_depth == pytest.approx(here.invasion_depth)
+    assert [one.k_damaged_inplace for one in there.sections] == pytest.approx(
+        [one.k_damaged_inplace for one in here.sections], rel=1e-5)
+
+
 def test_shifting_a_periodic_pack_leaves_k(pack):
     k = both(pack, ALL, PAIRS[1])
     moved = (pack.position + np.array([3.3, 1.7, 5.1])) % pack.box[:, 1]
@@ -92,6 +105,18 @@ def test_inplace_sections_recombine_in_series(pack, periodic, sections):
         resistance = [(one.x_hi - one.x_lo) / getattr(one, name) for one in found.sections]
         assert length / sum(resistance) == pytest.approx(k, rel=1e-9)
         assert min(resistance) > 0
+
+
+def test_inplace_sections_of_a_period_move_with_the_pack(pack):
+    """Shifted by half a period the two halves change places; all in-place values stay."""
+    moved = pack.position.copy()
+    moved[:, 0] = (moved[:, 0] + 0.5 * pack.box[0, 1]) % pack.box[0, 1]
+    here, there = (analyse(one.grains(), one, periodic=ALL, options=options(sections=2)).sections
+                   for one in (pack, rebuilt(pack, moved)))
+    assert abs(here[0].k_damaged_inplace / here[1].k_damaged_inplace - 1) > 0.01
+    for name in ("k_initial_inplace", "k_damaged_inplace"):
+        first, second = ([getattr(one, name) for one in sections] for sections in (here, there[::-1]))
+        assert first == pytest.approx(second, rel=1e-5)
 
 
 def test_one_section_is_the_whole_specimen(pack):
@@ -161,8 +186,9 @@ def test_solver_reports_the_worst_of_all_solves(pack):
     assert set(found.seconds) == {"tessellate", "occupancy", "conductance", "solve", "porosity"}
 
 
-@pytest.mark.parametrize("wrong", [{"law": "magic"}, {"damage_law": "magic"}, {"sections": [0.0, 1.0]},
-                                   {"sections": 0}, {"profile_bin": 0.0}])
+@pytest.mark.parametrize("wrong", [
+    {"law": "magic"}, {"damage_law": "magic"}, {"sections": [0.0, 1.0]}, {"sections": []}, {"sections": 0},
+    {"profile_bin": 0.0}])
 def test_wrong_choices_are_refused(pack, wrong):
     with pytest.raises(CaseError, match=next(iter(wrong))):
         analyse(pack.grains(), None, periodic=ALL, options=AnalysisOptions(**wrong))

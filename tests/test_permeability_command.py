@@ -1,0 +1,103 @@
+"""`fdnet permeability` on files made here."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fdnet.cli import main
+
+
+def cubic(path: Path, cells: int = 4, *, radius: float = 0.5, extra: str = "") -> str:
+    """Spheres on a simple cubic lattice of spacing 1; returns the box."""
+    points = np.indices((cells,) * 3).reshape(3, -1).T + 0.5
+    rows = "".join(f"{x},{y},{z},{radius}\n" for x, y, z in points)
+    path.write_text("# a comment\nx,y,z,radius\n" + rows + extra)
+    return ",".join(["0", str(cells)] * 3)
+
+
+def answer(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    code = 0
+    try:
+        code = main(["permeability", *map(str, arguments)])
+    except SystemExit as stop:
+        code = int(stop.code or 0)
+    said = capsys.readouterr()
+    return code, said.out, said.err
+
+
+def test_units_axes_and_fully_periodic_lattice(tmp_path, capsys):
+    """SC touching: k = 0.00252 d^2 (Zick & Homsy 1982, K = 42.1); the series law is within 10 %."""
+    box = cubic(tmp_path / "sc.csv")
+    values = {}
+    for units, axis in (("mm", "x"), ("mm", "z"), ("um", "y")):
+        code, out, err = answer(capsys, tmp_path / "sc.csv", "--units", units, "--box", box, "--periodic", "xyz", "--axis", axis, "--json")
+        assert code == 0, err
+        values[units, axis] = json.loads(out)
+    result = values["mm", "x"]
+    assert result["porosity_initial"] == pytest.approx(0.476401, abs=2e-3)
+    assert result["k_initial_m2"] == pytest.approx(0.00252e-6, rel=0.10)
+    assert result["k_damaged_m2"] == result["k_initial_m2"]
+    assert values["mm", "z"]["k_initial_m2"] == pytest.approx(result["k_initial_m2"], rel=1e-3)
+    assert values["um", "y"]["k_initial_m2"] == pytest.approx(1e-6 * result["k_initial_m2"], rel=1e-3)
+    assert {"pores", "throats", "solver", "law", "damage_law", "seconds", "warnings", "porosity_damaged"} <= set(result)
+
+
+def test_all_laws_as_a_table(tmp_path, capsys):
+    box = cubic(tmp_path / "sc.csv")
+    code, out, _ = answer(capsys, tmp_path / "sc.csv", "--units", "mm", "--box", box, "--periodic", "yz", "--compare-laws")
+    assert code == 0
+    for law in ("thesis", "effective", "hydraulic", "series", "thesis-code", "kozeny"):
+        assert law in out
+
+
+@pytest.mark.parametrize(("arguments", "said"), [
+    (["--units", "mm", "--box", "0,1,0"], "--box: '0,1,0', expected six numbers"),
+    (["--units", "mm", "--box", "0,4,4,0,0,4"], "each lower bound below the upper"),
+    (["--units", "mm", "--periodic", "xy"], "--box: missing"),
+    (["--units", "mm", "--periodic", "xq"], "--periodic: 'xq'"),
+    (["--units", "furlong"], "invalid choice"),
+    (["--units", "mm", "--sections", "0"], "expected 1 or more"),
+    (["--units", "mm", "--law", "darcy"], "invalid choice"),
+    ([], "units"),
+])
+def test_bad_options_end_with_2_and_one_line(tmp_path, capsys, arguments, said):
+    cubic(tmp_path / "sc.csv")
+    code, out, err = answer(capsys, tmp_path / "sc.csv", *arguments)
+    assert code == 2
+    assert said in err
+    assert len(err.strip().splitlines()) == 1
+    assert not out
+
+
+def test_metre_columns_refuse_units(tmp_path, capsys):
+    (tmp_path / "m.csv").write_text("x_m,y_m,z_m,radius_m\n0,0,0,1\n")
+    code, _, err = answer(capsys, tmp_path / "m.csv", "--units", "mm")
+    assert code == 2
+    assert "units" in err
+
+
+def test_degenerate_spheres_end_with_4(tmp_path, capsys):
+    box = cubic(tmp_path / "sc.csv", extra="0.5,0.5,0.5,0.5\n")
+    code, _, err = answer(capsys, tmp_path / "sc.csv", "--units", "mm", "--box", box)
+    assert code == 4
+    assert len(err.strip().splitlines()) == 1
+
+
+def test_too_few_grains_and_missing_file(tmp_path, capsys):
+    (tmp_path / "few.csv").write_text("x,y,z,radius,kind\n0,0,0,1,grain\n2,0,0,0.1,fine\n")
+    assert answer(capsys, tmp_path / "few.csv", "--units", "mm")[0] == 2
+    assert answer(capsys, tmp_path / "none.csv", "--units", "mm")[0] == 2
+
+
+def test_a_pack_without_an_open_path_is_an_answer(tmp_path, capsys):
+    """Spheres of 0.72 spacings close every triangle of the lattice (circumradius 0.707) but leave voids: k = 0 with its reason."""
+    box = cubic(tmp_path / "sc.csv", radius=0.72)
+    code, out, err = answer(capsys, tmp_path / "sc.csv", "--units", "mm", "--box", box, "--periodic", "xyz", "--json")
+    assert code == 0, err
+    result = json.loads(out)
+    assert result["k_initial_m2"] == 0
+    assert result["k_reduction"] is None
+    assert 0 < result["porosity_initial"] < 0.05
+    assert any("path" in warning for warning in result["warnings"])
