@@ -13,6 +13,7 @@ from fdnet.snapshot import Array, Kind
 MM, MICRON = 1e3, 1e6
 WINDOW = [1500, 950]
 UPSTREAM_SHOWN = 0.12
+FACETS = 6e5  # about half the triangles all fines together may have: memory and time of the picture
 FACE_COLOUR = "#0072B2"
 
 
@@ -65,7 +66,7 @@ def _add_fines(plotter: Any, spheres: Any, bounds: Array) -> None:
     if np.ptp(radius) < 0.02 * radius.max():
         deepest = min(spheres.points[mask, 0].max() * MM, bounds[0, 1])
         name, title, limits = "depth_mm", "fines, depth (mm)", [bounds[0, 0], max(deepest, 0.1 * bounds[0, 1])]
-    balls = _balls(spheres, mask, 16 if mask.sum() < 5000 else 10)
+    balls = _balls(spheres, mask, int(np.clip(np.sqrt(FACETS / mask.sum()), 5, 16)))
     bar = {"title": title, "color": "black", "title_font_size": 22, "label_font_size": 22, "fmt": "%.3g",
            "n_labels": 5, "vertical": True, "position_x": 0.88, "position_y": 0.15, "width": 0.07, "height": 0.65}
     plotter.add_mesh(balls, scalars=name, clim=limits, cmap="plasma", smooth_shading=True, scalar_bar_args=bar)
