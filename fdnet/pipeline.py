@@ -1,14 +1,10 @@
 """The story of a run: pack, invade, analyse, report; each stage is kept when done and continued when cut."""
 
-import hashlib
 import json
-import platform
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -16,20 +12,19 @@ from fdnet.case import Case
 from fdnet.dem.checkpoint import Checkpoint, read_history, state_at
 from fdnet.dem.dump import read_frame
 from fdnet.dem.invasion import invade
-from fdnet.dem.liggghts import KNOWN_VERSION, Binary, Run, find_binary
-from fdnet.dem.packing import Pack, make_pack, render_pack
+from fdnet.dem.liggghts import Binary, find_binary
+from fdnet.dem.packing import make_pack
 from fdnet.dem.scene import snapshot_of
 from fdnet.errors import CaseError
 from fdnet.network.permeability import AnalysisOptions, analyse
 from fdnet.outputs import Results, draw_figures, write_paraview, write_tables
 from fdnet.progress import Progress
+from fdnet.records import invade_record, pack_record, record_warnings, stage_seconds, versions
 from fdnet.run_folder import STAGES, RunFolder, open_folder, write_json
 from fdnet.scale_table import scale_rows
 from fdnet.scales import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES, Scales, scales_of
 from fdnet.snapshot import Snapshot
 from fdnet.summary import summarise
-
-OVERLAP_WARNING = 0.03
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,8 +77,7 @@ def run_case(case: Case, options: RunOptions) -> dict[str, Any]:
     written stays and `resume` continues from it.
     """
     scales = scales_of(case)
-    if any(stage in options.stages for stage in ("pack", "invade")) and not _finished_before(options.out):
-        find_binary(options.liggghts)
+    _refuse_without_binary(case, options)
     folder = open_folder(options.out, case, stages=options.stages, resume=options.resume, force=options.force)
     try:
         story = _Story(case=case, scales=scales, folder=folder, options=options)
@@ -95,8 +89,11 @@ def run_case(case: Case, options: RunOptions) -> dict[str, Any]:
         folder.close()
 
 
-def _finished_before(out: Path) -> bool:
-    return (out / "manifest.json").exists()
+def _refuse_without_binary(case: Case, options: RunOptions) -> None:
+    """A run that will need LIGGGHTS is refused before anything is written."""
+    needed = [stage for stage in ("pack", "invade") if stage in options.stages and (stage == "pack" or case.fines)]
+    if options.force or not all((options.out / stage / "stage.json").exists() for stage in needed):
+        find_binary(options.liggghts)
 
 
 def _read_summary(folder: RunFolder) -> dict[str, Any]:
@@ -121,13 +118,20 @@ def _run_stages(story: _Story, manifest: dict[str, Any] | None) -> dict[str, Any
     return summary
 
 
+def _manifest(story: _Story, stages: list[str]) -> dict[str, Any]:
+    pack = story.folder.record("pack")
+    return {"case": story.case.name, "digests": {stage: story.case.digest(stage) for stage in STAGES[:3]},
+            "seed": story.case.seed, "stages": stages, "command": story.options.command, "seconds": story.seconds,
+            "versions": versions(pack), "pack": pack, "invade": story.folder.record("invade")}
+
+
 def _pack_stage(story: _Story) -> None:
     if _done(story, "pack"):
         return
     case, scales = story.case, story.scales
     with story.timed("pack"), Progress("pack", _pack_steps(), show=story.options.show_progress) as progress:
         pack = make_pack(case, scales, story.path / "pack", binary=story.binary(), ranks=story.options.ranks, follow=progress)
-    story.folder.finish("pack", _pack_record(case, pack, story.seconds["pack"]))
+    story.folder.finish("pack", pack_record(case, pack, story.seconds["pack"]))
 
 
 def _pack_steps() -> int:
@@ -141,18 +145,6 @@ def _done(story: _Story, stage: str) -> bool:
     if record["digest"] != story.case.digest(stage):
         raise CaseError(f"{story.path / stage}: belongs to another case; give another --out, or --force to replace it")
     return True
-
-
-def _pack_record(case: Case, pack: Pack, seconds: float) -> dict[str, Any]:
-    return {"digest": case.digest("pack"), "seconds": seconds, "porosity": pack.porosity, "porosity_error": pack.porosity_error,
-            "porosity_sum": pack.porosity_sum, "max_overlap": pack.max_overlap, "steps": pack.steps, "dt_s": pack.step_s,
-            "attempts": list(pack.attempts), "run": _run_record(pack.run),
-            "left_out": [str(item) for item in render_pack(case, scales_of(case), count=len(pack.grains)).left_out]}
-
-
-def _run_record(run: Run) -> dict[str, Any]:
-    return {"command": " ".join(run.command), "version": run.version, "seconds": run.seconds, "ranks": run.ranks,
-            "deck_sha256": {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in sorted(run.directory.glob("in.*"))}}
 
 
 def packed_grains(story_path: Path, case: Case) -> Snapshot:
@@ -172,11 +164,7 @@ def _invade_stage(story: _Story) -> None:
     with story.timed("invade"), Progress("invade", expected, show=story.options.show_progress) as progress:
         result = invade(case, scales, grains, folder, binary=story.binary(), ranks=story.options.ranks, follow=progress,
                         timeout=story.options.timeout)
-    story.folder.finish("invade", {
-        "digest": case.digest("invade"), "seconds": story.seconds["invade"], "stop_reason": result.stop_reason,
-        "max_overlap": result.max_overlap, "steps": result.history[-1].step, "dt_s": result.step_s,
-        "supplied": scales.supplied_count, "warnings": list(result.warnings), "left_out": [str(item) for item in result.left_out],
-        "runs": [_run_record(run) for run in result.runs]})
+    story.folder.finish("invade", invade_record(case, result, scales.supplied_count, story.seconds["invade"]))
 
 
 def _analyse_and_report(story: _Story) -> dict[str, Any]:
@@ -219,52 +207,14 @@ def _write_summary(story: _Story, results: Results, figures: list[tuple[Path, st
     history = results.history
     pack, invasion = story.folder.record("pack"), story.folder.record("invade") if history else None
     assert pack is not None
-    seconds = _seconds(story, pack, invasion)
-    warnings = [*story.scales.warnings, *_version_warnings(pack), *(invasion["warnings"] if invasion else []), *_overlap_warnings(invasion), *notes]
     summary = summarise(story.case, results.analysis, pack=pack, invasion=invasion, last=history[-1] if history else None,
-                        seconds=seconds, warnings=warnings)
+                        seconds=stage_seconds(pack, invasion, story.seconds),
+                        warnings=[*story.scales.warnings, *record_warnings(pack, invasion), *notes])
     summary = tables.write_summary(story.path / "summary.json", summary)
     if "report" in story.options.stages:
         parts = html.ReportParts(figures=figures, case_text=story.case.toml(), scales=scale_rows(story.case, story.scales),
-                                 versions=_versions(pack), commands=[story.options.command] if story.options.command else [])
+                                 versions=versions(pack), commands=[story.options.command] if story.options.command else [])
         html.write_report(story.path / "report.html", summary, parts=parts)
     return summary
-
-
-def _version_warnings(pack: dict[str, Any]) -> list[str]:
-    version = pack["run"]["version"]
-    return [] if version == KNOWN_VERSION else [f"LIGGGHTS {version}: fdnet was measured and tested with {KNOWN_VERSION}"]
-
-
-def _overlap_warnings(invasion: dict[str, Any] | None) -> list[str]:
-    if invasion and invasion["max_overlap"] > OVERLAP_WARNING:
-        return [f"largest overlap of a fine at a checkpoint is {100 * invasion['max_overlap']:.1f} % of a diameter (above "
-                f"{100 * OVERLAP_WARNING:.0f} %): raise run.stiffness_N_m"]
-    return []
-
-
-def _seconds(story: _Story, pack: dict[str, Any], invasion: dict[str, Any] | None) -> dict[str, float]:
-    inside = pack["run"]["seconds"] + sum(run["seconds"] for run in (invasion["runs"] if invasion else []))
-    return {"pack": pack["seconds"], "invade": invasion["seconds"] if invasion else 0.0,
-            "analyse": story.seconds.get("analyse", 0.0), "report": story.seconds.get("report", 0.0), "liggghts": inside}
-
-
-def _versions(pack: dict[str, Any]) -> dict[str, str]:
-    names = ("fdnet", "numpy", "scipy", "pandas", "jinja2", "pyvista", "matplotlib", "pydantic", "overlap", "pymetis")
-    found = {}
-    for name in names:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = "not installed as a package"
-    return {**found, "python": sys.version.split()[0], "liggghts": pack["run"]["version"], "system": platform.platform()}
-
-
-def _manifest(story: _Story, stages: list[str]) -> dict[str, Any]:
-    pack = story.folder.record("pack")
-    invasion = story.folder.record("invade")
-    return {"case": story.case.name, "digests": {s: story.case.digest(s) for s in ("pack", "invade", "analyse")},
-            "seed": story.case.seed, "stages": stages, "command": story.options.command, "seconds": story.seconds,
-            "versions": _versions(pack) if pack else {}, "pack": pack, "invade": invasion}
 
 

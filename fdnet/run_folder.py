@@ -17,7 +17,7 @@ _OUTPUTS = {
     "pack": ("pack",),
     "invade": ("invade",),
     "analyse": ("spheres_initial.csv", "spheres_damaged.csv", "sections.csv", "profile.csv", "pores.csv", "throats.csv",
-                "summary.json", "analyse.json"),
+                "summary.json"),
     "report": ("figures", "frames", "network.vtp", "spheres_initial.vtp", "spheres_damaged.vtp", "spheres.pvd",
                "invasion.pvd", "report.html"),
 }

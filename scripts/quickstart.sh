@@ -5,12 +5,7 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 bash scripts/setup.sh
-run=(.venv/bin/fdnet run cases/quick.toml --out runs/quick --resume)
-# Without root, the libraries for 3-D pictures lie in the local prefix.
-if [ -x .prefix/bin/with-libraries ]; then
-    run=(.prefix/bin/with-libraries "${run[@]}")
-fi
-"${run[@]}" "$@"
+.venv/bin/fdnet run cases/quick.toml --out runs/quick --resume "$@"
 echo
 echo "report:   runs/quick/report.html"
 echo "pictures: runs/quick/figures/"

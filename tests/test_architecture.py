@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 LAYERS = [["errors"], ["atomic", "snapshot"], ["case", "contacts"], ["case_file", "contact_law"], ["scales"], ["scale_table", "network"], ["dem", "report"],
-          ["progress", "run_folder", "summary_text"], ["summary", "outputs"], ["pipeline"], ["permeability_command"], ["studies"], ["cli"]]
+          ["progress", "run_folder", "summary_text"], ["summary", "outputs", "records"], ["pipeline"], ["permeability_command"], ["studies"], ["cli"]]
 SIDEWAYS = {("network", "network"), ("dem", "dem"), ("report", "report"), ("snapshot", "atomic")}
 DOORS = {
     "jinja2": {"dem/deck", "report/html", "studies"},

@@ -23,7 +23,8 @@ from fdnet.dem.checkpoint import (
 )
 from fdnet.dem.deck import Deck, LeftOut
 from fdnet.dem.invade_deck import render_invade, write_invade_inputs
-from fdnet.dem.liggghts import Binary, Run, run_deck
+from fdnet.dem.liggghts import SCREEN, Binary, Run, run_deck
+from fdnet.errors import LiggghtsError
 from fdnet.scales import Scales
 from fdnet.snapshot import Snapshot
 
@@ -49,20 +50,36 @@ def invade(case: Case, scales: Scales, grains: Snapshot, folder: Path, *, binary
     Raises LiggghtsError when a run fails or fines are lost, CaseError when the fines cannot be placed.
     """
     (folder / "post").mkdir(parents=True, exist_ok=True)
-    last = last_checkpoint(folder, case, grains)
-    deck = _prepare(case, scales, grains, folder, last, ranks)
-    runs = []
-    if not _over(case, scales, last):
+    run, deck = None, None
+    while deck is None or run is None:
+        last = last_checkpoint(folder, case, grains)
+        deck = _prepare(case, scales, grains, folder, last, ranks)
+        if _over(case, scales, last):
+            break
         name = "in.invade" if last is None else "in.invade.resume"
-        keeper = _Keeper(folder, follow)
-        runs.append(run_deck(folder, name, binary=binary, ranks=ranks, follow=keeper, timeout=timeout))
+        run = _run(folder, name, last, binary=binary, ranks=ranks, follow=_Keeper(folder, follow), timeout=timeout)
     history = read_history(folder)
     damaged = state_at(folder, history[-1], case, scales, grains)
     check_counts(folder, history[-1], damaged, scales.supplied_count)
     overlaps = [max_overlap(state_at(folder, row, case, scales, grains), case.periodic, only_fines=True) for row in history]
     reason, warnings = _ending(case, scales, history)
     return Invasion(damaged=damaged, history=history, stop_reason=reason, max_overlap=max(overlaps),
-                    step_s=scales.time_step, left_out=deck.left_out, warnings=warnings, runs=tuple(runs))
+                    step_s=scales.time_step, left_out=deck.left_out, warnings=warnings, runs=(run,) if run else ())
+
+
+def _run(folder: Path, deck: str, last: Checkpoint | None, *, binary: Binary, ranks: int, follow: Callable[[str], None],
+         timeout: float | None) -> Run | None:
+    """The run, or None when LIGGGHTS could not read the restart (a full disk cuts it silently): it is set aside, so that
+    the checkpoint before it is tried next."""
+    try:
+        return run_deck(folder, deck, binary=binary, ranks=ranks, follow=follow, timeout=timeout)
+    except LiggghtsError:
+        said = (folder / SCREEN).read_text(encoding="utf-8", errors="replace")
+        if last is None or "FDNET restoring" not in said or "FDNET restored" in said:
+            raise
+        restart = folder / "post" / f"invade_{last.step}.restart"
+        restart.rename(restart.with_suffix(".unreadable"))
+        return None
 
 
 class _Keeper:

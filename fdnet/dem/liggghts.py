@@ -18,6 +18,7 @@ from fdnet.errors import LiggghtsError
 END_MARK = "DECK_DONE"
 SCREEN, LOG = "screen.txt", "log.liggghts"
 KNOWN_VERSION = "3.8.0"
+_STOP_SIGNALS = {signal.SIGINT, signal.SIGTERM}
 _PROJECT = Path(__file__).resolve().parents[2]
 _BAD_LINE = re.compile(r"^(ERROR|Lost atoms)|Signal: |Segmentation fault|Forced restart written|No space left")
 _NAN = re.compile(r"(?i)(?:^|\s)[-+]?(?:nan|inf)(?:\s|$)")
@@ -99,13 +100,16 @@ def run_deck(folder: Path, deck: str, *, binary: Binary, ranks: int = 1,
         raise LiggghtsError(f"{folder / deck}: deck not found; render it first")
     command, start = binary.command(deck, ranks), time.monotonic()
     with (folder / SCREEN).open("wb") as screen:
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOP_SIGNALS)
         try:
             process = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=screen,
                                        stderr=subprocess.STDOUT, env=_environment(), start_new_session=True,
-                                       preexec_fn=_die_with_parent(ranks))
+                                       preexec_fn=_prepare_child(ranks, before))
         except OSError as error:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
             raise LiggghtsError(f"{command[0]}: cannot be started: {error}") from error
         try:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
             _wait(process, folder / SCREEN, follow, None if timeout is None else start + timeout)
         except BaseException:
             _stop(process)
@@ -119,13 +123,18 @@ def _environment() -> dict[str, str]:
     return os.environ | {"OMP_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 
 
-def _die_with_parent(ranks: int) -> Callable[[], None]:
-    """The child is ended by the kernel when fdnet dies, so that no orphan writes into a resumed run."""
+def _prepare_child(ranks: int, mask: set[int]) -> Callable[[], None]:
+    """The child is ended by the kernel when fdnet dies, so that no orphan writes into a resumed run.
+
+    `mask` are the signals blocked before the start: while it lasts, SIGINT and SIGTERM wait, for an exception raised
+    inside the fork is swallowed by Python and the run would go on.
+    """
     libc = ctypes.CDLL(None, use_errno=True)
     last = signal.SIGKILL if ranks == 1 else signal.SIGTERM
 
     def ask() -> None:
         libc.prctl(1, last, 0, 0, 0)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
     return ask
 

@@ -5,7 +5,7 @@ import math
 import os
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +41,7 @@ class Pack:
     steps: int
     step_s: float
     attempts: tuple[dict[str, Any], ...]
+    left_out: tuple[LeftOut, ...]
     run: Run
 
 
@@ -99,9 +100,7 @@ def _accept(folder: Path, attempt: Path, pack: Pack, tried: list[dict[str, Any]]
         os.replace(path, target)
     attempt.rmdir()
     (folder / "attempts.json").write_text(json.dumps(tried, indent=1) + "\n")
-    return Pack(grains=pack.grains, porosity=pack.porosity, porosity_error=pack.porosity_error,
-                porosity_sum=pack.porosity_sum, max_overlap=pack.max_overlap, steps=pack.steps, step_s=pack.step_s,
-                attempts=tuple(tried), run=pack.run)
+    return replace(pack, attempts=tuple(tried))
 
 
 def _attempt(case: Case, scales: Scales, folder: Path, count: int, *, binary: Binary, ranks: int,
@@ -109,7 +108,7 @@ def _attempt(case: Case, scales: Scales, folder: Path, count: int, *, binary: Bi
     if folder.exists():
         shutil.rmtree(folder)
     (folder / "post").mkdir(parents=True)
-    write_pack_inputs(case, scales, folder, count=count, ranks=ranks)
+    deck = write_pack_inputs(case, scales, folder, count=count, ranks=ranks)
     run = _run(case, folder, count, binary=binary, ranks=ranks, follow=follow)
     frame = read_frame(folder / "post" / "pack.dump")
     screen = (folder / "screen.txt").read_text(encoding="utf-8", errors="replace")
@@ -121,7 +120,7 @@ def _attempt(case: Case, scales: Scales, folder: Path, count: int, *, binary: Bi
         raise LiggghtsError(f"{folder}/post/pack.dump: {len(grains)} grains, expected {count}: some were lost")
     porosity = measure_porosity(grains, periodic=case.periodic)
     return Pack(grains=grains, porosity=porosity.mean, porosity_error=porosity.standard_error, porosity_sum=porosity.sum,
-                max_overlap=max_overlap(grains, case.periodic), steps=frame.step, step_s=scales.pack_step, attempts=(),
+                max_overlap=max_overlap(grains, case.periodic), steps=frame.step, step_s=scales.pack_step, attempts=(), left_out=deck.left_out,
                 run=run)
 
 

@@ -85,8 +85,11 @@ def render_spheres_png(path: str | Path, spheres_vtp: str | Path, box: Array, *,
 
 
 def _command(spheres_vtp: str | Path, box: Array) -> list[str]:
+    """The child's command line, with the software OpenGL of the local prefix where the set-up made one."""
     bounds = ",".join(repr(float(value)) for value in np.asarray(box).ravel())
-    return [sys.executable, "-m", "fdnet.report.render", str(Path(spheres_vtp).absolute()), f"--box={bounds}"]
+    libraries = Path(__file__).resolve().parents[2] / ".prefix" / "bin" / "with-libraries"
+    wrapper = [str(libraries)] if os.access(libraries, os.X_OK) else []
+    return [*wrapper, sys.executable, "-m", "fdnet.report.render", str(Path(spheres_vtp).absolute()), f"--box={bounds}"]
 
 
 def _child_environment() -> dict[str, str]:

@@ -129,6 +129,21 @@ def test_broken_checkpoints_are_passed_over(binary, packed, tmp_path):
     assert np.array_equal(again.damaged.position, whole.damaged.position)
 
 
+def test_a_restart_cut_by_a_full_disk_is_set_aside(binary, packed, tmp_path):
+    case = tiny("run.cap_ms=0.3")
+    scales, grains = scales_of(case), packed["walls"]
+    whole = invade(case, scales, grains, tmp_path, binary=binary)
+    rows = (tmp_path / "history.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "history.csv").write_text("".join(rows[:-1]))
+    kept = whole.history[-2]
+    restart = tmp_path / "post" / f"invade_{kept.step}.restart"
+    restart.write_bytes(restart.read_bytes()[: int(0.9 * restart.stat().st_size)])
+    assert last_checkpoint(tmp_path, case, grains) == kept
+    again = invade(case, scales, grains, tmp_path, binary=binary)
+    assert again.history == whole.history
+    assert np.array_equal(again.damaged.position, whole.damaged.position)
+
+
 def test_fines_that_vanish_are_an_error(packed, tmp_path):
     case = tiny()
     (tmp_path / "post").mkdir()

@@ -59,7 +59,7 @@ def test_a_whole_run_is_a_run(fake, tmp_path):
 @pytest.mark.parametrize(("mode", "said"), [
     ("exit1", r"exit 1\): ERROR: Unknown command: nonsense"),
     ("error0", r"exit 0\): ERROR on proc 0: Cannot open file"),
-    ("short", r"exit 0, no DECK_DONE line\): half way"),
+    ("short", r"exit 0, no DECK_DONE line\): the last line is 'half way'"),
     ("silent", r"exit 1, no DECK_DONE line"),
     ("lost", "Lost atoms"),
     ("nan", "not-a-number in the output"),

@@ -1,0 +1,72 @@
+"""What stages leave behind for later ones, for resuming and for the manifest."""
+
+import hashlib
+import platform
+import sys
+from importlib import metadata
+from typing import Any
+
+from fdnet.case import Case
+from fdnet.dem.invasion import Invasion
+from fdnet.dem.liggghts import KNOWN_VERSION, Run
+from fdnet.dem.packing import Pack
+
+OVERLAP_WARNING = 0.03
+_PACKAGES = ("fdnet", "numpy", "scipy", "pandas", "jinja2", "pyvista", "matplotlib", "pydantic", "overlap", "pymetis")
+
+
+def pack_record(case: Case, pack: Pack, seconds: float) -> dict[str, Any]:
+    """pack/stage.json: how the pack was reached."""
+    return {
+        "digest": case.digest("pack"), "seconds": seconds, "porosity": pack.porosity, "porosity_error": pack.porosity_error,
+        "porosity_sum": pack.porosity_sum, "max_overlap": pack.max_overlap, "steps": pack.steps, "dt_s": pack.step_s,
+        "attempts": list(pack.attempts), "runs": [run_record(pack.run)],
+        "left_out": [str(item) for item in pack.left_out]}
+
+
+def invade_record(case: Case, result: Invasion, supplied: int, seconds: float) -> dict[str, Any]:
+    """invade/stage.json: how the invasion ended."""
+    return {
+        "digest": case.digest("invade"), "seconds": seconds, "stop_reason": result.stop_reason,
+        "max_overlap": result.max_overlap, "steps": result.history[-1].step, "dt_s": result.step_s, "supplied": supplied,
+        "warnings": list(result.warnings), "runs": [run_record(run) for run in result.runs],
+        "left_out": [str(item) for item in result.left_out]}
+
+
+def run_record(run: Run) -> dict[str, Any]:
+    """One LIGGGHTS execution, with the digests of its decks."""
+    decks = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(run.directory.glob("in.*"))}
+    return {"command": " ".join(run.command), "version": run.version, "seconds": run.seconds, "ranks": run.ranks,
+            "deck_sha256": decks}
+
+
+def record_warnings(pack: dict[str, Any], invasion: dict[str, Any] | None) -> list[str]:
+    """Doubts about the DEM runs: another LIGGGHTS than the one fdnet was measured with, large overlaps, how it ended."""
+    version = pack["runs"][0]["version"]
+    found = [] if version == KNOWN_VERSION else [f"LIGGGHTS {version}: fdnet was measured and tested with {KNOWN_VERSION}"]
+    if invasion is None:
+        return found
+    if invasion["max_overlap"] > OVERLAP_WARNING:
+        found.append(f"largest overlap of a fine at a checkpoint is {100 * invasion['max_overlap']:.1f} % of a diameter (above "
+                     f"{100 * OVERLAP_WARNING:.0f} %): raise run.stiffness_N_m")
+    return [*invasion["warnings"], *found]
+
+
+def stage_seconds(pack: dict[str, Any], invasion: dict[str, Any] | None, own: dict[str, float]) -> dict[str, float]:
+    """Seconds per stage, and how many of them LIGGGHTS took (of the session that finished each stage)."""
+    runs = pack["runs"] + (invasion["runs"] if invasion else [])
+    return {"pack": pack["seconds"], "invade": invasion["seconds"] if invasion else 0.0,
+            "analyse": own.get("analyse", 0.0), "report": own.get("report", 0.0),
+            "liggghts": sum(run["seconds"] for run in runs)}
+
+
+def versions(pack: dict[str, Any] | None) -> dict[str, str]:
+    """Versions of everything that shaped the run."""
+    found = {}
+    for name in _PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = "not installed as a package"
+    liggghts = {"liggghts": pack["runs"][0]["version"]} if pack else {}
+    return {**found, "python": sys.version.split()[0], **liggghts, "system": platform.platform()}
