@@ -6,6 +6,7 @@ every default.
 
 import hashlib
 import json
+import math
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal
 
@@ -15,6 +16,9 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 MAX_CONCENTRATION = 0.30
 """Random sequential addition of spheres saturates near 0.38 (Torquato, Uche & Stillinger 2006)."""
 
+MOST_FINES, MOST_SLAB, MOST_BINS, MOST_SECTIONS = 10_000_000, 1000, 10_000, 1000
+"""Bounds on what a case may ask for: number of fines, slab over box length, profile bins, sections."""
+
 CONTACT_STEP_LIMIT = 0.2
 """Largest time step over sqrt(m/k): at 0.3 energy still holds, at 0.5 it grows (measured, docs/physics.md)."""
 
@@ -23,7 +27,7 @@ def _as_tuple(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Positive = Annotated[float, Field(ge=1e-18, le=1e15, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(gt=0, lt=1)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -65,7 +69,7 @@ class Spheres(Part):
     def mean_volume_m3(self) -> float:
         """Mean sphere volume of a radius uniform in [a, b]: pi/3 (a + b)(a^2 + b^2)."""
         low, high = self.radius_range_m
-        return 3.141592653589793 / 3 * (low + high) * (low**2 + high**2)
+        return math.pi / 3 * (low + high) * (low**2 + high**2)
 
     @property
     def sauter_diameter_m(self) -> float:
@@ -149,7 +153,7 @@ class Run(Part):
 class AnalysisChoices(Part):
     """How permeability is computed; the default laws are fdnet's most accurate pair."""
 
-    sections: Annotated[int, Field(ge=1)] = 8
+    sections: Annotated[int, Field(ge=1, le=MOST_SECTIONS)] = 8
     law: Literal["thesis", "effective", "hydraulic", "series"] = "series"
     damage_law: Literal["thesis", "thesis-code", "kozeny"] = "kozeny"
     clogging_threshold: Fraction | None = None
@@ -207,7 +211,9 @@ class Case(Part):
             data.pop("name")
         if stage == "pack":
             data["grains"].pop("motion")
-            data = {key: data[key] for key in ("seed", "box", "grains")} | {"stiffness": self.run.stiffness_N_m}
+            fines = self.fines.normal_stiffness_N_m if self.fines else None
+            scaling = {"stiffness": self.run.stiffness_N_m, "fines_stiffness": fines}
+            data = {key: data[key] for key in ("seed", "box", "grains")} | scaling
         return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
 
 
@@ -230,17 +236,49 @@ def cross_problems(parts: Mapping[str, Any]) -> Iterator[str]:
         yield f"fines.count: {fines.count} with fines.slab_mm: {fines.slab_mm}, give exactly one of the two"
     if box and grains:
         yield from _box_problems(box, grains)
+    if box and fines:
+        yield from _supply_problems(box, fines)
     if grains and fines and fines.radius_range_m[1] >= grains.radius_range_m[0]:
         yield (f"fines.radius_mm: {fines.radius_mm} is not below grains.radius_mm {grains.radius_mm} "
                "(the network needs a clear gap)")
-    drag = parts.get("drag")
+    yield from _choice_problems(parts)
+
+
+def _choice_problems(parts: Mapping[str, Any]) -> Iterator[str]:
+    drag, gravity, run, box, analysis = (parts.get(name) for name in ("drag", "gravity", "run", "box", "analysis"))
     if drag and drag.field == "network":
         yield "drag.field: 'network' is not available yet; expected 'uniform'"
     if drag and drag.scheme == "every_step" and drag.refresh_steps not in (None, 1):
         yield f"drag.refresh_steps: {drag.refresh_steps} belongs to drag.scheme 'held', not 'every_step'"
+    if gravity and gravity.mode != "off" and gravity.buoyancy:
+        pulled = [component for component in gravity.acceleration_m_s2 if component]
+        if len(pulled) > 1 or any(component > 0 for component in pulled):
+            yield (f"gravity.acceleration_m_s2: {list(gravity.acceleration_m_s2)}: LIGGGHTS's buoyancy needs gravity down one axis, "
+                   "e.g. [0.0, 0.0, -9.81]; turn it, or set gravity.buoyancy = false")
+    if run and run.duration_ms is not None and run.cap_ms is not None:
+        yield f"run.cap_ms: {run.cap_ms} beside run.duration_ms {run.duration_ms}: a duration needs no cap, give one of the two"
+    if box and analysis and box.size_mm[0] / analysis.profile_bin_mm > MOST_BINS:
+        yield (f"analysis.profile_bin_mm: {analysis.profile_bin_mm:g} cuts {box.size_mm[0]:g} mm into more than {MOST_BINS} bins; "
+               f"expected at least {box.size_mm[0] / MOST_BINS:.3g}")
+
+
+def _supply_problems(box: Box, fines: Fines) -> Iterator[str]:
+    """The slab must hold its fines and stay a slab; their number is bounded by memory."""
+    area = box.size_mm[1] * box.size_mm[2]
+    volume = fines.mean_volume_m3 * 1e9
+    count = fines.count or fines.concentration * area * (fines.slab_mm or 0.0) / volume
+    length = fines.slab_mm or count * volume / (fines.concentration * area)
+    if count > MOST_FINES:
+        yield f"fines.count: {count:.3g} fines supplied, expected at most {MOST_FINES:.0e}; shorten the slab or take larger fines"
+    if length > MOST_SLAB * box.size_mm[0]:
+        yield (f"fines.concentration: {fines.concentration:g} makes a slab of {length:.3g} mm, expected at most {MOST_SLAB} box lengths; "
+               "raise it or supply fewer fines")
 
 
 def _box_problems(box: Box, grains: Grains) -> Iterator[str]:
+    if grains.count is not None and grains.count * grains.mean_volume_m3 * 1e9 >= math.prod(box.size_mm):
+        room = int(math.prod(box.size_mm) / (grains.mean_volume_m3 * 1e9))
+        yield f"grains.count: {grains.count} spheres sum to more than the box; expected at most {room}"
     diameter_mm = 2e3 * grains.radius_range_m[1]
     need = 2.0 if box.sides == "periodic" else 1.0
     for axis, side in zip("xyz", box.size_mm, strict=True):

@@ -1,7 +1,7 @@
 """Case files: TOML in, a Case out, and every problem named at once."""
 
+import copy
 import difflib
-import json
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -30,7 +30,8 @@ def case_from(data: Mapping[str, Any], *, source: str = "case") -> Case:
     problems = _schema_problems(Case, data)
     parts = {name: _usable_part(field.annotation, data[name]) for name, field in Case.model_fields.items()
              if name in data}
-    problems += [p for p in cross_problems(parts) if not any(p in q for q in problems)]
+    named = [problem.split(":")[0] for problem in problems]
+    problems += [p for p in cross_problems(parts) if not any(p in q for q in problems) and not any(key in p for key in named)]
     if problems:
         raise CaseError(f"{source}: {len(problems)} problem{'s' * (len(problems) > 1)}: " + " | ".join(problems))
     return Case.model_validate(data)
@@ -88,7 +89,7 @@ def set_keys(data: dict[str, Any], assignments: list[str]) -> dict[str, Any]:
 
     Raises CaseError for a malformed assignment.
     """
-    result = json.loads(json.dumps(data))
+    result = copy.deepcopy(data)
     for assignment in assignments:
         key, equals, text = assignment.partition("=")
         names = key.strip().split(".")

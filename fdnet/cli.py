@@ -42,11 +42,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("fdnet: stopped; what was written is kept, continue with --resume", file=sys.stderr)
         return _STOPPED
+    except MemoryError as error:
+        print(f"fdnet: not enough memory ({error}); supply fewer fines, or take a machine with more", file=sys.stderr)
+        return 2
     except OSError as error:
         if options.debug:
             raise
-        print(f"fdnet: {error.filename or 'system'}: {error.strerror or error}; free space or mend permissions, then continue "
-              "with --resume", file=sys.stderr)
+        print(f"fdnet: {error.filename or 'system'}: {error.strerror or error}; free space or mend permissions, then repeat the "
+              "command (a run: with --resume)", file=sys.stderr)
         return 2
 
 
@@ -86,10 +89,9 @@ def _add_case(parser: argparse.ArgumentParser) -> None:
 
 
 def _ranks(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"{value} ranks, expected 1 or more")
-    return value
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r}, expected a number of ranks, 1 or more")
+    return int(text)
 
 
 def _add_run(commands: Any, common: argparse.ArgumentParser) -> None:

@@ -8,10 +8,9 @@ from fdnet.case import Case, Spheres
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contact:
-    """Linear contact of one pair of materials. Stiffness N/m, damping_rate 1/s (times m_eff), step_limit s."""
+    """Linear contact of one pair of materials, as used. Stiffness N/m, damping_rate 1/s, contact_time and step_limit s."""
 
     pair: str
-    nominal_stiffness: float
     normal_stiffness: float
     shear_stiffness: float
     friction: float
@@ -63,32 +62,37 @@ def contacts_of(case: Case) -> dict[str, Contact]:
     return {f"{a}-{b}": _contact(case, (a, b), nominal, factor) for a, b in _pairs(case)}
 
 
-def _contact(case: Case, pair: tuple[str, str], nominal: dict[str, tuple[float, float, float]],
-             factor: float) -> Contact:
+def _contact(case: Case, pair: tuple[str, str], nominal: dict[str, tuple[float, float, float]], factor: float) -> Contact:
     first, second = pair
-    stiffness = series(nominal[first][0], nominal[second][0])
-    normal = factor * stiffness
-    mass, lightest = _effective_mass(case, pair)
+    normal = factor * series(nominal[first][0], nominal[second][0])
     spheres = [case.grains if name == "grain" else case.fines for name in pair if name != "wall"]
     damping = sum(s.damping_ratio for s in spheres if s) / len(spheres)
-    frequency = math.sqrt(normal / mass)
-    return Contact(
-        pair=f"{first}-{second}", nominal_stiffness=stiffness, normal_stiffness=normal,
-        shear_stiffness=factor * series(nominal[first][1], nominal[second][1]),
-        friction=min(nominal[first][2], nominal[second][2]), damping_rate=2 * damping * frequency,
-        contact_time=math.pi / (frequency * math.sqrt(1 - damping**2)), step_limit=math.sqrt(lightest / normal))
-
-
-def _effective_mass(case: Case, pair: tuple[str, str]) -> tuple[float, float]:
-    """Effective mass of a typical contact, and the smallest moving mass in it, kg."""
-    def typical(name: str) -> float:
-        spheres = case.grains if name == "grain" else case.fines
-        if name == "wall" or (name == "grain" and case.grains.motion == "fixed" and "fine" in pair):
-            return math.inf
-        assert spheres is not None
-        return sphere_mass(spheres.mean_radius_m, spheres.density_kg_m3)
-
-    first, second = typical(pair[0]), typical(pair[1])
-    effective = 1 / (1 / first + 1 / second)
+    frequency = math.sqrt(normal / _effective_mass(case, pair, grains_fixed="fine" in pair and case.grains.motion == "fixed"))
+    by_liggghts = _effective_mass(case, pair, grains_fixed=False)
     small = case.fines if "fine" in pair and case.fines else case.grains
-    return effective, mass_range(small)[0]
+    return Contact(
+        pair=f"{first}-{second}",
+        normal_stiffness=normal,
+        shear_stiffness=factor * series(nominal[first][1], nominal[second][1]),
+        friction=min(nominal[first][2], nominal[second][2]),
+        damping_rate=2 * damping * normal / (frequency * by_liggghts),
+        contact_time=math.pi / (frequency * math.sqrt(1 - damping**2)),
+        step_limit=math.sqrt(mass_range(small)[0] / normal),
+    )
+
+
+def _effective_mass(case: Case, pair: tuple[str, str], *, grains_fixed: bool) -> float:
+    """m1 m2 / (m1 + m2) of a typical contact, kg; walls and fixed grains have infinite mass.
+
+    LIGGGHTS multiplies the damping rate by the effective mass of both spheres' own masses, also where the grain is
+    not integrated; the motion has the fine's mass alone. The rate makes up for the difference.
+    """
+
+    def inverse(name: str) -> float:
+        spheres = case.grains if name == "grain" else case.fines
+        if name == "wall" or (name == "grain" and grains_fixed):
+            return 0.0
+        assert spheres is not None
+        return 1 / sphere_mass(spheres.mean_radius_m, spheres.density_kg_m3)
+
+    return 1 / (inverse(pair[0]) + inverse(pair[1]))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fdnet.case import Case
-from fdnet.dem.checkpoint import Checkpoint, state_at
+from fdnet.dem.checkpoint import Checkpoint, readable_states
 from fdnet.network.permeability import Analysis
 from fdnet.scales import Scales
 from fdnet.snapshot import Snapshot
@@ -63,8 +63,8 @@ def _write_frames(results: Results) -> None:
     stride = -(-len(results.history) // MOST_FRAMES)
     (results.path / "frames").mkdir(exist_ok=True)
     entries = []
-    for row in results.history[::-1][::stride][::-1]:
-        state = state_at(results.path / "invade", row, results.case, results.scales, results.grains)
+    chosen = results.history[::-1][::stride][::-1]
+    for row, state in readable_states(results.path / "invade", chosen, results.case, results.scales, results.grains):
         name = f"frames/spheres_{row.step}.vtp"
         vtk.write_spheres_vtp(results.path / name, state if results.case.grains.motion == "mobile" else state.fines())
         entries.append((state.time_s, name))

@@ -9,6 +9,7 @@ from typing import Any
 from fdnet.errors import CaseError
 
 LAW_NAMES = ("thesis", "effective", "hydraulic", "series")
+MOST_SECTIONS = 1000
 DAMAGE_LAW_NAMES = ("thesis", "thesis-code", "kozeny")
 _METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 
@@ -28,10 +29,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _count(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"{value}, expected 1 or more")
-    return value
+    if not text.isdecimal() or not 1 <= int(text) <= MOST_SECTIONS:
+        raise argparse.ArgumentTypeError(f"{text!r}, expected 1 to {MOST_SECTIONS}")
+    return int(text)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fdnet.case import Case
-from fdnet.dem.checkpoint import Checkpoint, read_history, state_at
+from fdnet.dem.checkpoint import read_history, state_at
 from fdnet.dem.dump import read_frame
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Binary, find_binary
@@ -20,7 +20,7 @@ from fdnet.network.permeability import AnalysisOptions, analyse
 from fdnet.outputs import Results, draw_figures, write_paraview, write_tables
 from fdnet.progress import Progress
 from fdnet.records import invade_record, pack_record, record_warnings, stage_seconds, versions
-from fdnet.run_folder import STAGES, RunFolder, open_folder, write_json
+from fdnet.run_folder import STAGES, RunFolder, open_folder
 from fdnet.scale_table import scale_rows
 from fdnet.scales import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES, Scales, scales_of
 from fdnet.snapshot import Snapshot
@@ -71,7 +71,7 @@ class _Story:
 
 
 def run_case(case: Case, options: RunOptions) -> dict[str, Any]:
-    """Run the stages asked for; returns the summary ({} when the analysis was not asked for).
+    """Run the stages asked for; returns the summary ({} when neither analysis nor report was asked for).
 
     A finished run is not repeated: its summary is returned. Raises the FdnetError of the stage that fails; what was
     written stays and `resume` continues from it.
@@ -84,7 +84,7 @@ def run_case(case: Case, options: RunOptions) -> dict[str, Any]:
         manifest = folder.manifest()
         if manifest is not None and set(options.stages) <= set(manifest["stages"]):
             return _read_summary(folder)
-        return _run_stages(story, manifest)
+        return _run_stages(story)
     finally:
         folder.close()
 
@@ -101,28 +101,29 @@ def _read_summary(folder: RunFolder) -> dict[str, Any]:
     return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
 
 
-def _run_stages(story: _Story, manifest: dict[str, Any] | None) -> dict[str, Any]:
+def _run_stages(story: _Story) -> dict[str, Any]:
     stages = story.options.stages
-    if manifest:
-        story.folder.clear(tuple(s for s in ("analyse", "report") if s in stages))
-    done = [stage for stage in STAGES if stage in stages or (manifest and stage in manifest["stages"])]
-    summary: dict[str, Any] = {}
+    if story.folder.manifest() is not None:
+        story.folder.clear(tuple(stage for stage in ("analyse", "report") if stage in stages))
     if "pack" in stages:
         _pack_stage(story)
     if "invade" in stages and story.case.fines:
         _invade_stage(story)
-    if "analyse" in stages or "report" in stages:
-        summary = _analyse_and_report(story)
-        done = [stage for stage in STAGES if stage in {*done, "analyse"}]
-    write_json(story.path / "manifest.json", _manifest(story, done))
+    if not {"analyse", "report"} & set(stages):
+        story.folder.complete(None)
+        return {}
+    summary = _analyse_and_report(story)
+    story.folder.complete(_manifest(story))
     return summary
 
 
-def _manifest(story: _Story, stages: list[str]) -> dict[str, Any]:
-    pack = story.folder.record("pack")
+def _manifest(story: _Story) -> dict[str, Any]:
+    pack, invasion = story.folder.record("pack"), story.folder.record("invade")
+    assert pack is not None
     return {"case": story.case.name, "digests": {stage: story.case.digest(stage) for stage in STAGES[:3]},
-            "seed": story.case.seed, "stages": stages, "command": story.options.command, "seconds": story.seconds,
-            "versions": versions(pack), "pack": pack, "invade": story.folder.record("invade")}
+            "seed": story.case.seed, "stages": [stage for stage in STAGES if stage != "report" or stage in story.options.stages],
+            "command": story.options.command, "seconds": stage_seconds(pack, invasion, story.seconds),
+            "versions": versions(pack), "pack": pack, "invade": invasion}
 
 
 def _pack_stage(story: _Story) -> None:
@@ -130,8 +131,9 @@ def _pack_stage(story: _Story) -> None:
         return
     case, scales = story.case, story.scales
     with story.timed("pack"), Progress("pack", _pack_steps(), show=story.options.show_progress) as progress:
-        pack = make_pack(case, scales, story.path / "pack", binary=story.binary(), ranks=story.options.ranks, follow=progress)
-    story.folder.finish("pack", pack_record(case, pack, story.seconds["pack"]))
+        pack = make_pack(case, scales, story.path / "pack", binary=story.binary(), ranks=story.options.ranks, follow=progress,
+                         timeout=story.options.timeout)
+    story.folder.finish("pack", pack_record(case, pack, scales.porosity, story.seconds["pack"]))
 
 
 def _pack_steps() -> int:
@@ -147,19 +149,15 @@ def _done(story: _Story, stage: str) -> bool:
     return True
 
 
-def packed_grains(story_path: Path, case: Case) -> Snapshot:
-    """The grains of a finished pack stage. Raises CaseError when there is none, DumpError when its dump is cut."""
-    dump = story_path / "pack" / "post" / "pack.dump"
-    if not (story_path / "pack" / "stage.json").exists():
-        raise CaseError(f"{story_path}: no finished pack here; run the stage pack first (--stages pack,...)")
-    return snapshot_of(read_frame(dump), case, time_s=0.0)
+def _packed_grains(story: _Story) -> Snapshot:
+    return snapshot_of(read_frame(story.path / "pack" / "post" / "pack.dump"), story.case, time_s=0.0)
 
 
 def _invade_stage(story: _Story) -> None:
     if _done(story, "invade"):
         return
     case, scales, folder = story.case, story.scales, story.path / "invade"
-    grains = packed_grains(story.path, case)
+    grains = _packed_grains(story)
     expected = round(min(scales.cap_time, scales.slab_length / scales.upstream_velocity + 2 * scales.plug_time) / scales.time_step)
     with story.timed("invade"), Progress("invade", expected, show=story.options.show_progress) as progress:
         result = invade(case, scales, grains, folder, binary=story.binary(), ranks=story.options.ranks, follow=progress,
@@ -169,8 +167,8 @@ def _invade_stage(story: _Story) -> None:
 
 def _analyse_and_report(story: _Story) -> dict[str, Any]:
     case, path = story.case, story.path
-    grains = packed_grains(path, case)
-    history = _history(story)
+    grains = _packed_grains(story)
+    history = read_history(path / "invade") if case.fines else ()
     damaged = state_at(path / "invade", history[-1], case, story.scales, grains) if history else None
     with story.timed("analyse"):
         analysis = analyse(grains, damaged, periodic=case.periodic, options=_analysis_options(case))
@@ -191,14 +189,6 @@ def _analysis_options(case: Case) -> AnalysisOptions:
     return AnalysisOptions(sections=chosen.sections, law=chosen.law, damage_law=chosen.damage_law,
                            threshold=chosen.clogging_threshold, middle_band=chosen.middle_band, overlap=chosen.throat_overlap,
                            profile_bin=chosen.profile_bin_mm * 1e-3)
-
-
-def _history(story: _Story) -> tuple[Checkpoint, ...]:
-    if story.case.fines is None:
-        return ()
-    if story.folder.record("invade") is None:
-        raise CaseError(f"{story.path}: no finished invasion here; run the stage invade first (--stages invade,...)")
-    return read_history(story.path / "invade")
 
 
 def _write_summary(story: _Story, results: Results, figures: list[tuple[Path, str]], notes: list[str]) -> dict[str, Any]:

@@ -10,15 +10,16 @@ from fdnet.case import Case
 from fdnet.dem.invasion import Invasion
 from fdnet.dem.liggghts import KNOWN_VERSION, Run
 from fdnet.dem.packing import Pack
+from fdnet.run_folder import RECORD_FORMAT
 
-OVERLAP_WARNING = 0.03
+OVERLAP_WARNING, POROSITY_WARNING = 0.03, 0.02
 _PACKAGES = ("fdnet", "numpy", "scipy", "pandas", "jinja2", "pyvista", "matplotlib", "pydantic", "overlap", "pymetis")
 
 
-def pack_record(case: Case, pack: Pack, seconds: float) -> dict[str, Any]:
+def pack_record(case: Case, pack: Pack, assumed: float, seconds: float) -> dict[str, Any]:
     """pack/stage.json: how the pack was reached."""
     return {
-        "digest": case.digest("pack"), "seconds": seconds, "porosity": pack.porosity, "porosity_error": pack.porosity_error,
+        "format": RECORD_FORMAT, "digest": case.digest("pack"), "seconds": seconds, "porosity_assumed": assumed, "porosity": pack.porosity, "porosity_error": pack.porosity_error,
         "porosity_sum": pack.porosity_sum, "max_overlap": pack.max_overlap, "steps": pack.steps, "dt_s": pack.step_s,
         "attempts": list(pack.attempts), "runs": [run_record(pack.run)],
         "left_out": [str(item) for item in pack.left_out]}
@@ -27,7 +28,7 @@ def pack_record(case: Case, pack: Pack, seconds: float) -> dict[str, Any]:
 def invade_record(case: Case, result: Invasion, supplied: int, seconds: float) -> dict[str, Any]:
     """invade/stage.json: how the invasion ended."""
     return {
-        "digest": case.digest("invade"), "seconds": seconds, "stop_reason": result.stop_reason,
+        "format": RECORD_FORMAT, "digest": case.digest("invade"), "seconds": seconds, "stop_reason": result.stop_reason,
         "max_overlap": result.max_overlap, "steps": result.history[-1].step, "dt_s": result.step_s, "supplied": supplied,
         "warnings": list(result.warnings), "runs": [run_record(run) for run in result.runs],
         "left_out": [str(item) for item in result.left_out]}
@@ -44,6 +45,11 @@ def record_warnings(pack: dict[str, Any], invasion: dict[str, Any] | None) -> li
     """Doubts about the DEM runs: another LIGGGHTS than the one fdnet was measured with, large overlaps, how it ended."""
     version = pack["runs"][0]["version"]
     found = [] if version == KNOWN_VERSION else [f"LIGGGHTS {version}: fdnet was measured and tested with {KNOWN_VERSION}"]
+    if pack["max_overlap"] > OVERLAP_WARNING:
+        found.append(f"grains overlap by up to {100 * pack['max_overlap']:.1f} % of a diameter: the pack is denser than rigid spheres get")
+    if abs(pack["porosity"] - pack["porosity_assumed"]) > POROSITY_WARNING:
+        found.append(f"the fluid's velocity follows from a porosity of {pack['porosity_assumed']:.3f} (plain sum of grains.count), the pack "
+                     f"has {pack['porosity']:.3f}: give fluid.velocity_m_s")
     if invasion is None:
         return found
     if invasion["max_overlap"] > OVERLAP_WARNING:
@@ -57,7 +63,7 @@ def stage_seconds(pack: dict[str, Any], invasion: dict[str, Any] | None, own: di
     runs = pack["runs"] + (invasion["runs"] if invasion else [])
     return {"pack": pack["seconds"], "invade": invasion["seconds"] if invasion else 0.0,
             "analyse": own.get("analyse", 0.0), "report": own.get("report", 0.0),
-            "liggghts": sum(run["seconds"] for run in runs)}
+            "liggghts": sum(run["seconds"] for run in runs) + sum(row["liggghts_s"] for row in pack["attempts"][:-1])}
 
 
 def versions(pack: dict[str, Any] | None) -> dict[str, str]:

@@ -13,6 +13,9 @@ from fdnet.case import Case
 from fdnet.errors import CaseError
 
 STAGES = ("pack", "invade", "analyse", "report")
+RECORD_FORMAT = 1
+MANIFEST, CASE, LOCK, UNFINISHED = "manifest.json", "case.toml", ".lock", ".unfinished"
+_RECORDS = {"pack": "pack/stage.json", "invade": "invade/stage.json"}
 _OUTPUTS = {
     "pack": ("pack",),
     "invade": ("invade",),
@@ -21,7 +24,6 @@ _OUTPUTS = {
     "report": ("figures", "frames", "network.vtp", "spheres_initial.vtp", "spheres_damaged.vtp", "spheres.pvd",
                "invasion.pvd", "report.html"),
 }
-MANIFEST, CASE = "manifest.json", "case.toml"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,19 +34,27 @@ class RunFolder:
     lock: int
 
     def record(self, stage: str) -> dict[str, Any] | None:
-        """What a finished stage left behind, or None."""
-        return _read_json(self._record_path(stage))
+        """What a finished stage (pack, invade) left behind, or None. Raises CaseError when it cannot be understood."""
+        return _read_record(self.path / _RECORDS[stage])
 
     def finish(self, stage: str, record: dict[str, Any]) -> None:
-        """Mark a stage as done; its presence means whole."""
-        write_json(self._record_path(stage), record)
-
-    def _record_path(self, stage: str) -> Path:
-        return self.path / stage / "stage.json" if stage in ("pack", "invade") else self.path / f"{stage}.json"
+        """Mark a stage as done; the record's presence means whole."""
+        write_json(self.path / _RECORDS[stage], record)
 
     def manifest(self) -> dict[str, Any] | None:
-        """The manifest of a complete run, or None."""
-        return _read_json(self.path / MANIFEST)
+        """The manifest of an analysed run, or None. Raises CaseError when it or what it lists is damaged."""
+        manifest = _read_record(self.path / MANIFEST)
+        missing = [] if manifest is None else [name for stage in ("pack", "invade", "analyse") for name in _expected(manifest, stage)
+                                               if not (self.path / name).exists()]
+        if missing:
+            raise CaseError(f"{self.path}: {MANIFEST} says complete, but {missing[0]} is missing; start over with --force")
+        return manifest
+
+    def complete(self, manifest: dict[str, Any] | None) -> None:
+        """End this session well; a manifest (None: not analysed yet) makes the run complete."""
+        if manifest is not None:
+            write_json(self.path / MANIFEST, {"format": RECORD_FORMAT} | manifest)
+        (self.path / UNFINISHED).unlink(missing_ok=True)
 
     def clear(self, stages: tuple[str, ...]) -> None:
         """Remove the outputs of these stages; the manifest goes first, so a half-cleared run is never complete."""
@@ -61,56 +71,86 @@ class RunFolder:
         os.close(self.lock)
 
 
+def _expected(manifest: dict[str, Any], stage: str) -> tuple[str, ...]:
+    """Files that must exist when `stage` is listed as done."""
+    if stage not in manifest["stages"] or (stage == "invade" and manifest["invade"] is None):
+        return ()
+    return (_RECORDS[stage],) if stage in _RECORDS else _OUTPUTS[stage]
+
+
 def open_folder(path: Path, case: Case, *, stages: tuple[str, ...], resume: bool, force: bool) -> RunFolder:
     """Lock the folder for this case, making it if need be, and write case.toml.
 
-    Raises CaseError when another run is writing there, when it holds another case or an unfinished run and neither
-    resume nor force was asked for, or when it holds something that is not a run.
+    Raises CaseError, with nothing changed, when a stage asked for lacks its forerunner, when another run is writing there,
+    when the folder holds another case or an unfinished run and neither resume nor force was asked for, or when it holds
+    something that is not a run.
     """
     _refuse_foreign(path)
+    _refuse_gap(path, case, stages)
     try:
         path.mkdir(parents=True, exist_ok=True)
-        lock = os.open(path / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
+        lock = os.open(path / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
     except OSError as error:
         raise CaseError(f"{path}: cannot be made or written: {error.strerror}; give another --out") from error
+    folder = RunFolder(path=path, lock=lock)
     try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        folder = RunFolder(path=path, lock=lock)
+        _take_lock(folder)
         _admit(folder, case, stages, resume, force)
-    except OSError as error:
-        os.close(lock)
-        raise CaseError(f"{path}: another fdnet run is writing here; wait for it or give another --out") from error
     except BaseException:
-        os.close(lock)
+        folder.close()
         raise
     return folder
 
 
+def _take_lock(folder: RunFolder) -> None:
+    try:
+        fcntl.flock(folder.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        raise CaseError(f"{folder.path}: another fdnet run is writing here; wait for it or give another --out") from error
+
+
 def _refuse_foreign(path: Path) -> None:
+    """A case.toml alone does not make a folder ours: it may be the user's."""
     if path.exists() and not path.is_dir():
         raise CaseError(f"{path}: is a file, expected a folder for --out")
-    if path.is_dir() and not (path / CASE).exists() and any(p.name != ".lock" for p in path.iterdir()):
+    ours = any((path / name).exists() for name in (LOCK, MANIFEST, *_RECORDS.values()))
+    if path.is_dir() and not ours and any(path.iterdir()):
         raise CaseError(f"{path}: is not empty and holds no fdnet run; give another --out (nothing was changed)")
+
+
+def _refuse_gap(path: Path, case: Case, stages: tuple[str, ...]) -> None:
+    needed = ["pack"] * (stages != ("pack",)) + ["invade"] * (bool(case.fines) and bool({"analyse", "report"} & set(stages)))
+    for stage in needed:
+        if stage not in stages and not (path / _RECORDS[stage]).exists():
+            what = "pack" if stage == "pack" else "invasion"
+            raise CaseError(f"{path}: no finished {what} here; run the stage {stage} first (--stages {stage},...)")
 
 
 def _admit(folder: RunFolder, case: Case, stages: tuple[str, ...], resume: bool, force: bool) -> None:
     written = folder.path / CASE
-    if force and written.exists():
+    if force:
         _force(folder, case, stages)
-    elif written.exists() and written.read_text(encoding="utf-8") != case.toml():
+    elif written.exists() and written.read_bytes() != case.toml().encode():
         raise CaseError(f"{folder.path}: holds a run of another case (see {written}); give another --out, or --force to "
                         "replace it")
-    elif written.exists() and folder.manifest() is None and not resume:
+    elif (folder.path / UNFINISHED).exists() and not resume:
         raise CaseError(f"{folder.path}: holds an unfinished run; continue it with --resume or start over with --force")
+    if force or folder.manifest() is None:
+        write_text(folder.path / UNFINISHED, " ".join(stages) + "\n")
     write_text(written, case.toml())
 
 
 def _force(folder: RunFolder, case: Case, stages: tuple[str, ...]) -> None:
-    """Clear the stages asked for, every later one, and every earlier one that belongs to another case."""
+    """Clear the stages asked for and every later one. Refused when an earlier one that is kept belongs to another case."""
     first = min(STAGES.index(stage) for stage in stages)
-    stale = [i for i, stage in enumerate(STAGES[:2])
-             if (record := folder.record(stage)) is not None and record["digest"] != case.digest(stage)]
-    folder.clear(STAGES[min([first, *stale]):])
+    for stage in _RECORDS:
+        if STAGES.index(stage) >= first:
+            continue
+        record = folder.record(stage)
+        if record is not None and record["digest"] != case.digest(stage):
+            raise CaseError(f"{folder.path / stage}: belongs to another case; add {stage} to --stages, or give another --out "
+                            "(nothing was changed)")
+    folder.clear(STAGES[first:])
 
 
 def write_json(path: Path, value: Any) -> None:
@@ -118,10 +158,13 @@ def write_json(path: Path, value: Any) -> None:
     write_text(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
 
 
-def _read_json(path: Path) -> dict[str, Any] | None:
+def _read_record(path: Path) -> dict[str, Any] | None:
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        record = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return None
     except (OSError, ValueError) as error:
         raise CaseError(f"{path}: cannot be read ({error}); start over with --force") from error
+    if not isinstance(record, dict) or record.get("format") != RECORD_FORMAT:
+        raise CaseError(f"{path}: is no record of this fdnet (format {RECORD_FORMAT} expected); start over with --force")
+    return record

@@ -51,10 +51,11 @@ def _fine_rows(scales: Scales) -> list[Quantity]:
         _row("Stokes number", "St", scales.stokes, "-", "tau u / d_grain", "inertia over drag at a grain"),
         _row("gravity over drag", "G", scales.gravity_over_drag, "-", "2 r^2 (rho - rho_f) g / (9 mu u M)", "force ratio"),
         _row("impact overlap over diameter", "delta/d", scales.impact_overlap, "-", "u sqrt(m/k) / 2r", "linear spring"),
+        _row("drag overlap over diameter", "delta/d", scales.drag_overlap, "-", "6 pi mu M u / 2k", "linear spring"),
         _row("fines supplied", "n", scales.supplied_count, "-", "c A l / v", "slab of suspension"),
         _row("slab length", "l", scales.slab_length, "m", "n v / (c A)", "slab of suspension"),
         _row("time to feed the slab", "t_f", scales.slab_length / scales.upstream_velocity, "s", "l / u", "kinematics"),
-        _row("plug time", "t_p", scales.plug_time, "s", "4 d_grain / u unless given", "stop rule"),
+        _row("plug time", "t_p", scales.plug_time, "s", "4 d_grain / u or 10 arrivals unless given", "stop rule"),
         _row("cap or duration", "t_c", scales.cap_time, "s", "3 t_f + 4 t_p + 2 L / u unless given", "stop rule"),
         _row("time step", "dt", scales.time_step, "s", "factor sqrt(m/k), at most 0.1 tau", "measured, docs/physics.md"),
     ]

@@ -5,6 +5,7 @@ Every formula and its source is also a row of `scale_rows`, which `fdnet render`
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from fdnet.case import CONTACT_STEP_LIMIT, Case
 from fdnet.contact_law import Contact, contacts_of, mass_range, stiffness_factor
@@ -13,6 +14,14 @@ from fdnet.errors import CaseError
 HOLD_OVER_RELAXATION = 0.05
 """Share of the drag relaxation time for which the drag is held by default (held 0.1 tau: at the seed scatter)."""
 HOLD_WARNING, HOLD_LIMIT = 0.1, 1.0
+OVERLAP_WARNING, MOST_DRAG_OVERLAP = 0.03, 0.5
+ARRIVALS = 10
+"""The default plug time lets at least this many fines of the undisturbed suspension arrive."""
+MOST_STEPS = 2**31 - 1
+_NO_FINES: dict[str, Any] = {
+    "supplied_count": 0, "slab_length": 0.0, "relaxation_time": (0.0, 0.0), "time_step": 0.0, "hold_steps": 0, "plug_time": 0.0,
+    "cap_time": 0.0, "checkpoint_steps": 0, "reynolds": 0.0, "stokes": 0.0, "gravity_over_drag": 0.0, "impact_overlap": 0.0,
+    "drag_overlap": 0.0, "warnings": ()}
 FINE_STEPS_PER_SECOND = {"every_step": 5.0e6, "held": 8.0e6}
 """Fines times steps per second on one core with fixed grains (measured, +-50 %)."""
 GRAIN_STEPS_PER_SECOND = 5.0e6
@@ -55,6 +64,7 @@ class Scales:
     stokes: float
     gravity_over_drag: float
     impact_overlap: float
+    drag_overlap: float
     warnings: tuple[str, ...]
 
 
@@ -71,25 +81,33 @@ def relaxation_time(radius: float, density: float, viscosity: float, multiplier:
 def scales_of(case: Case) -> Scales:
     """All scales of a case.
 
-    Raises CaseError when a time step or drag refresh breaks a stability bound (the message gives the bound).
+    Raises CaseError when a time step or drag refresh breaks a stability bound (the message gives the bound), when drag
+    would press contacts shut, or when numbers are so extreme that a formula overflows.
     """
+    try:
+        return _scales(case)
+    except (OverflowError, ZeroDivisionError) as error:
+        raise CaseError(f"case {case.name}: a formula leaves the range of numbers ({error}); check units and magnitudes of "
+                        "fluid, fines and run") from error
+
+
+def _scales(case: Case) -> Scales:
     porosity = target_porosity(case)
     permeability = carman_kozeny(porosity, case.grains.sauter_diameter_m)
     darcy, interstitial = _velocities(case, porosity, permeability)
     upstream = interstitial if case.drag.upstream == "interstitial" else darcy
     contacts = contacts_of(case)
+    pack_step = 0.15 * math.sqrt(mass_range(case.grains)[0] / contacts["grain-grain"].normal_stiffness)
     fine = _fine_scales(case, contacts, interstitial, upstream)
-    return Scales(
-        porosity=porosity, permeability=permeability, darcy_velocity=darcy, interstitial_velocity=interstitial,
-        upstream_velocity=upstream, stiffness_factor=stiffness_factor(case), contacts=contacts,
-        pack_step=0.15 * math.sqrt(mass_range(case.grains)[0] / contacts["grain-grain"].normal_stiffness), **fine)
+    return Scales(porosity=porosity, permeability=permeability, darcy_velocity=darcy, interstitial_velocity=interstitial,
+                  upstream_velocity=upstream, stiffness_factor=stiffness_factor(case), contacts=contacts, pack_step=pack_step,
+                  **fine)
 
 
 def target_porosity(case: Case) -> float:
-    """The porosity asked for; with `grains.count` the plain sum of its spheres."""
+    """The porosity asked for; with `grains.count` the plain sum of its spheres (a Case makes sure that it is above 0)."""
     if case.grains.count is not None:
-        solid = case.grains.count * case.grains.mean_volume_m3 / math.prod(case.size_m)
-        return max(1 - solid, 0.05)
+        return 1 - case.grains.count * case.grains.mean_volume_m3 / math.prod(case.size_m)
     assert case.grains.porosity is not None
     return case.grains.porosity
 
@@ -102,30 +120,44 @@ def _velocities(case: Case, porosity: float, permeability: float) -> tuple[float
     return darcy, darcy / porosity
 
 
-def _fine_scales(case: Case, contacts: dict[str, Contact], velocity: float, upstream: float) -> dict:
+def _fine_scales(case: Case, contacts: dict[str, Contact], velocity: float, upstream: float) -> dict[str, Any]:
     if case.fines is None:
-        return {"supplied_count": 0, "slab_length": 0.0, "relaxation_time": (0.0, 0.0), "time_step": 0.0,
-                "hold_steps": 0, "plug_time": 0.0, "cap_time": 0.0, "checkpoint_steps": 0, "reynolds": 0.0,
-                "stokes": 0.0, "gravity_over_drag": 0.0, "impact_overlap": 0.0, "warnings": tuple(_warnings(case))}
+        return dict(_NO_FINES)
     fines, viscosity = case.fines, case.fluid.viscosity_cP * 1e-3
     low, high = fines.radius_range_m
     tau = tuple(relaxation_time(r, fines.density_kg_m3, viscosity, case.drag.multiplier) for r in (low, high))
     step = _time_step(case, contacts, tau[0])
     hold = _hold_steps(case, step, tau[0])
     count, slab = _supply(case)
-    impact = velocity * math.sqrt(mass_range(fines)[1] / contacts["grain-fine"].normal_stiffness)
-    reynolds = case.fluid.density_kg_m3 * velocity * 2 * high / viscosity
-    times = _times(case, slab, velocity, upstream)
-    weight = math.dist((0, 0, 0), case.gravity.acceleration_m_s2) * abs(
-        fines.density_kg_m3 - case.fluid.density_kg_m3 * case.gravity.buoyancy)
-    result = {
+    plug, cap, chunk = _times(case, slab, velocity, upstream, step * hold)
+    stiffness = contacts["grain-fine"].normal_stiffness
+    result: dict[str, Any] = {
         "supplied_count": count, "slab_length": slab, "relaxation_time": tau, "time_step": step, "hold_steps": hold,
-        "plug_time": times[0], "cap_time": times[1],
-        "checkpoint_steps": max(1, math.ceil(times[2] / step / hold)) * hold, "reynolds": reynolds,
+        "plug_time": plug, "cap_time": cap, "checkpoint_steps": chunk * hold,
+        "reynolds": case.fluid.density_kg_m3 * velocity * 2 * high / viscosity,
         "stokes": tau[1] * velocity / (2 * case.grains.mean_radius_m),
-        "gravity_over_drag": 2 * high**2 * weight / (9 * viscosity * velocity * case.drag.multiplier),
-        "impact_overlap": impact / (2 * high)}
-    return result | {"warnings": tuple(_warnings(case, result))}
+        "gravity_over_drag": _gravity_over_drag(case, velocity),
+        "impact_overlap": velocity * math.sqrt(mass_range(fines)[1] / stiffness) / (2 * high),
+        "drag_overlap": 6 * math.pi * viscosity * case.drag.multiplier * velocity / (2 * stiffness)}
+    if result["drag_overlap"] > MOST_DRAG_OVERLAP:
+        raise CaseError(f"run.stiffness_N_m: drag alone would press a fine {100 * result['drag_overlap']:.3g} % of its diameter into "
+                        f"a grain (limit {100 * MOST_DRAG_OVERLAP:.0f} %); raise it, or lower drag.multiplier, viscosity or velocity")
+    if result["checkpoint_steps"] > MOST_STEPS:
+        raise CaseError(f"run.time_step_s: {step:.3g} s needs {result['checkpoint_steps']:.3g} steps between checkpoints (limit "
+                        f"{MOST_STEPS:.3g}); raise the step or shorten run.checkpoint_ms")
+    warnings = _warnings(case, result)
+    if plug < ARRIVALS * arrival_time(case, upstream):
+        warnings.append(f"run.plug_time_ms: in {1e3 * plug:.3g} ms fewer than {ARRIVALS} fines of the suspension arrive at the face: "
+                        "the invasion may be called plugged too early")
+    return result | {"warnings": tuple(warnings)}
+
+
+def _gravity_over_drag(case: Case, velocity: float) -> float:
+    assert case.fines is not None
+    excess = abs(case.fines.density_kg_m3 - case.fluid.density_kg_m3 * case.gravity.buoyancy)
+    weight = math.hypot(*case.gravity.acceleration_m_s2) * excess
+    viscosity = case.fluid.viscosity_cP * 1e-3
+    return 2 * case.fines.radius_range_m[1] ** 2 * weight / (9 * viscosity * velocity * case.drag.multiplier)
 
 
 def _time_step(case: Case, contacts: dict[str, Contact], tau: float) -> float:
@@ -155,43 +187,55 @@ def _hold_steps(case: Case, step: float, tau: float) -> int:
 
 
 def _supply(case: Case) -> tuple[int, float]:
-    """Number of fines and slab length: n v = c A l."""
+    """Number of fines and slab length: n v = c A l; a slab is never shorter than a fine (`_warnings` tells)."""
     fines = case.fines
     assert fines is not None
     area, volume = case.size_m[1] * case.size_m[2], fines.mean_volume_m3
+    least = 2 * fines.radius_range_m[1]
     if fines.count is not None:
-        return fines.count, max(fines.count * volume / (fines.concentration * area), 2 * fines.radius_range_m[1])
+        return fines.count, max(fines.count * volume / (fines.concentration * area), least)
     assert fines.slab_mm is not None
-    slab = fines.slab_mm * 1e-3
+    slab = max(fines.slab_mm * 1e-3, least)
     return max(1, round(fines.concentration * area * slab / volume)), slab
 
 
-def _times(case: Case, slab: float, velocity: float, upstream: float) -> tuple[float, float, float]:
-    """Plug, cap and checkpoint time, s. One checkpoint lets the fluid pass about one grain diameter."""
+def arrival_time(case: Case, upstream: float) -> float:
+    """Mean time between two fines arriving at the face, v / (c A u), s."""
+    assert case.fines is not None
+    return case.fines.mean_volume_m3 / (case.fines.concentration * case.size_m[1] * case.size_m[2] * upstream)
+
+
+def _times(case: Case, slab: float, velocity: float, upstream: float, refresh: float) -> tuple[float, float, int]:
+    """Plug time and cap, s, and the drag refreshes of a chunk: the fluid passes about one grain diameter in it.
+
+    A given duration is cut into equal chunks, so that it is met within one refresh a chunk.
+    """
     passage = 2 * case.grains.mean_radius_m / velocity
-    plug = 4 * passage if case.run.plug_time_ms is None else case.run.plug_time_ms * 1e-3
-    feed = slab / upstream
-    cap = 3 * feed + 4 * plug + 2 * case.size_m[0] / velocity
+    plug = max(4 * passage, ARRIVALS * arrival_time(case, upstream))
+    if case.run.plug_time_ms is not None:
+        plug = case.run.plug_time_ms * 1e-3
+    cap = 3 * slab / upstream + 4 * plug + 2 * case.size_m[0] / velocity
+    given = case.run.duration_ms or case.run.cap_ms
+    cap = cap if given is None else given * 1e-3
+    chunk = min(min(passage, plug / 4) if case.run.checkpoint_ms is None else case.run.checkpoint_ms * 1e-3, cap)
     if case.run.duration_ms is not None:
-        cap = case.run.duration_ms * 1e-3
-    elif case.run.cap_ms is not None:
-        cap = case.run.cap_ms * 1e-3
-    checkpoint = min(passage, plug / 4) if case.run.checkpoint_ms is None else case.run.checkpoint_ms * 1e-3
-    return plug, cap, min(checkpoint, cap)
+        chunk = cap / math.ceil(cap / chunk)
+        return plug, cap, max(1, round(chunk / refresh))
+    return plug, cap, max(1, math.ceil(chunk / refresh))
 
 
-def _warnings(case: Case, fine: dict | None = None) -> list[str]:
+def _warnings(case: Case, fine: dict[str, Any]) -> list[str]:
     found = []
-    thickness = case.box.size_mm[0] / case.analysis.sections
-    if thickness < 2e3 * case.grains.mean_radius_m:
-        found.append(f"analysis.sections: {case.analysis.sections} sections of {thickness:.3g} mm are thinner than a grain")
-    if not fine:
-        return found
     if fine["reynolds"] > 1:
         found.append(f"particle Reynolds number {fine['reynolds']:.2g} is outside the range of Stokes drag (below 1)")
-    if fine["impact_overlap"] > 0.03:
-        found.append(f"predicted impact overlap {100 * fine['impact_overlap']:.2g} % of a fine's diameter is above 3 %: "
-                     "raise run.stiffness_N_m")
+    for name in ("impact", "drag"):
+        if fine[f"{name}_overlap"] > OVERLAP_WARNING:
+            found.append(f"predicted overlap under {name} is {100 * fine[f'{name}_overlap']:.2g} % of a fine's diameter (above "
+                         f"{100 * OVERLAP_WARNING:.0f} %): raise run.stiffness_N_m")
+    assert case.fines is not None
+    diameter = 2 * case.fines.radius_range_m[1]
+    if fine["slab_length"] <= diameter:
+        found.append(f"the slab is lengthened to one fine's diameter, {1e3 * diameter:.3g} mm, so it is thinner than fines.concentration")
     held = fine["hold_steps"] * fine["time_step"] / fine["relaxation_time"][0]
     if held > HOLD_WARNING:
         found.append(f"drag is held for {held:.2g} of the relaxation time (above {HOLD_WARNING:g}: invasion is biased upward)")

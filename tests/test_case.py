@@ -1,6 +1,7 @@
 """Cases: what is accepted, and that every problem is named at once."""
 
 import copy
+import datetime
 import tomllib
 from pathlib import Path
 
@@ -42,6 +43,15 @@ def test_every_problem_is_listed_at_once():
     ("box", {"size_mm": [3.0, 0.4, 1.6]}, "a grain does not fit"),
     ("box", {"size_mm": [3.0, 0.9, 1.6], "sides": "periodic"}, "its own image"),
     ("box", {"size_mm": [3.0, float("inf"), 1.6]}, "finite number"),
+    ("box", {"size_mm": [3.0, 1e16, 1.6]}, "less than or equal to"),
+    ("gravity", {"acceleration_m_s2": [1.0, 0.0, -9.0]}, "gravity down one axis"),
+    ("gravity", {"acceleration_m_s2": [9.81, 0.0, 0.0]}, "gravity down one axis"),
+    ("run", {"duration_ms": 1.0, "cap_ms": 2.0}, "give one of the two"),
+    ("analysis", {"profile_bin_mm": 1e-9}, "more than 10000 bins"),
+    ("analysis", {"sections": 10**6}, "less than or equal to"),
+    ("fines", {"count": 10**9}, "expected at most 1e+07"),
+    ("fines", {"concentration": 1e-8}, "box lengths"),
+    ("grains", {"count": 200}, "sum to more than the box; expected at most 117"),
     ("drag", {"field": "network"}, "not available yet"),
     ("drag", {"scheme": "every_step", "refresh_steps": 5}, "belongs to drag.scheme 'held'"),
     ("run", {"time_step_factor": 0.3}, "run.time_step_factor: 0.3"),
@@ -50,6 +60,17 @@ def test_every_problem_is_listed_at_once():
 ])
 def test_a_bad_value_is_named_with_its_path(part, values, expected):
     assert expected in problems(changed(**{part: values}))
+
+
+@pytest.mark.parametrize(("part", "values"), [("fines", {"count": True}), ("grains", {"count": 66.0})])
+def test_a_bad_key_brings_no_false_problem_with_it(part, values):
+    text = problems(changed(**{part: values}))
+    assert "1 problem:" in text
+
+
+def test_a_date_is_refused_like_any_other_value():
+    with pytest.raises(CaseError, match="name"):
+        case_from(set_keys({**TINY, "name": datetime.date(2020, 1, 1)}, []))
 
 
 def test_porosity_or_count_is_needed():

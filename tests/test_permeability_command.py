@@ -58,7 +58,7 @@ def test_all_laws_as_a_table(tmp_path, capsys):
     (["--units", "mm", "--periodic", "xy"], "--box: missing"),
     (["--units", "mm", "--periodic", "xq"], "--periodic: 'xq'"),
     (["--units", "furlong"], "invalid choice"),
-    (["--units", "mm", "--sections", "0"], "expected 1 or more"),
+    (["--units", "mm", "--sections", "0"], "expected 1 to 1000"),
     (["--units", "mm", "--law", "darcy"], "invalid choice"),
     ([], "units"),
 ])

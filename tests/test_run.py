@@ -81,11 +81,12 @@ def test_another_case_and_foreign_folders_are_refused(finished, tmp_path):
     assert "holds a run of another case" in refused.stderr
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.doc").write_text("precious")
-    for extra in ([], ["--force"]):
+    shutil.copy(other, tmp_path / "mine" / "case.toml")
+    for extra in ([], ["--force"], ["--resume"]):
         refused = fdnet("run", other, "--out", tmp_path / "mine", *extra)
         assert refused.returncode == 2
         assert "holds no fdnet run" in refused.stderr
-    assert [p.name for p in (tmp_path / "mine").iterdir()] == ["thesis.doc"]
+    assert sorted(p.name for p in (tmp_path / "mine").iterdir()) == ["case.toml", "thesis.doc"]
 
 
 def test_force_with_another_law_keeps_pack_and_invasion(finished, tmp_path):
@@ -99,6 +100,89 @@ def test_force_with_another_law_keeps_pack_and_invasion(finished, tmp_path):
     assert result["invaded_count"] == summary["invaded_count"]
     assert result["k_initial_m2"] < summary["k_initial_m2"]
     assert (copy / "invade" / "stage.json").stat().st_mtime_ns == (run / "invade" / "stage.json").stat().st_mtime_ns
+
+
+def test_force_that_would_need_an_unasked_stage_changes_nothing(finished, tmp_path):
+    run, case, _ = finished
+    copy = tmp_path / "run"
+    shutil.copytree(run, copy)
+    refused = fdnet("run", case, "--out", copy, "--set", "fines.friction=0.3", "--stages", "analyse,report", "--force")
+    assert refused.returncode == 2
+    assert "add invade to --stages" in refused.stderr
+    refused = fdnet("run", case, "--out", copy, "--force", "--liggghts", "/nowhere")
+    assert refused.returncode == 3
+    assert sorted(p.name for p in copy.iterdir()) == sorted(p.name for p in run.iterdir())
+    assert fdnet("run", case, "--out", copy).returncode == 0
+
+
+@pytest.mark.parametrize("name", ["pack/stage.json", "manifest.json", "case.toml"])
+@pytest.mark.parametrize("content", [b"{", b"{}", b"\xff\xfe", b"[]"])
+def test_damaged_records_are_named_and_force_mends_them(finished, tmp_path, name, content):
+    run, case, _ = finished
+    copy = tmp_path / "run"
+    shutil.copytree(run, copy)
+    (copy / name).write_bytes(content)
+    if name != "manifest.json":
+        (copy / "manifest.json").unlink()
+    refused = fdnet("run", case, "--out", copy, "--resume", "--stages", "pack,invade,analyse")
+    assert refused.returncode == 2, refused.stderr
+    assert "--force" in refused.stderr
+    assert len(refused.stderr.strip().splitlines()) == 1
+    mended = fdnet("run", case, "--out", copy, "--force", "--stages", "pack")
+    assert mended.returncode == 0, mended.stderr
+
+
+def test_a_complete_folder_that_lost_a_table_is_refused(finished, tmp_path):
+    run, case, _ = finished
+    copy = tmp_path / "run"
+    shutil.copytree(run, copy)
+    (copy / "sections.csv").unlink()
+    refused = fdnet("run", case, "--out", copy)
+    assert refused.returncode == 2
+    assert "sections.csv is missing" in refused.stderr
+
+
+def test_a_broken_dump_in_mid_history_is_counted_not_fatal(finished, tmp_path):
+    run, case, summary = finished
+    copy = tmp_path / "run"
+    shutil.copytree(run, copy)
+    (copy / "manifest.json").unlink()
+    (copy / "invade" / "stage.json").unlink()
+    steps = [line.split(",")[1] for line in (copy / "invade" / "history.csv").read_text().splitlines()[1:]]
+    (copy / "invade" / "post" / f"invade_{steps[0]}.dump").write_bytes(b"")
+    done = fdnet("run", case, "--out", copy, "--resume", "--json")
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert result["k_damaged_m2"] == summary["k_damaged_m2"]
+    assert any("1 of" in warning and "cannot be read" in warning for warning in result["warnings"])
+
+
+def test_counts_are_checked_at_every_checkpoint(finished, tmp_path):
+    run, case, _ = finished
+    copy = tmp_path / "run"
+    shutil.copytree(run, copy)
+    (copy / "manifest.json").unlink()
+    (copy / "invade" / "stage.json").unlink()
+    history = copy / "invade" / "history.csv"
+    rows = history.read_text().splitlines()
+    parts = rows[2].split(",")
+    rows[2] = ",".join([*parts[:2], "25", "9999", *parts[4:]])
+    history.write_text("\n".join(rows) + "\n")
+    refused = fdnet("run", case, "--out", copy, "--resume")
+    assert refused.returncode == 3
+    assert "9999" in refused.stderr
+
+
+def test_the_time_limit_holds_for_packing_too(finished, tmp_path):
+    _, case, _ = finished
+    fake = tmp_path / "liggghts"
+    fake.write_text('#!/bin/sh\necho "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0)"\n[ "$1" = -h ] || sleep 100\n')
+    fake.chmod(0o755)
+    start = time.monotonic()
+    stopped = fdnet("run", case, "--out", tmp_path / "run", "--liggghts", fake, "--timeout", "1")
+    assert stopped.returncode == 3
+    assert "time limit" in stopped.stderr
+    assert time.monotonic() - start < 30
 
 
 def test_stages_one_after_the_other_equal_all_at_once(finished, tmp_path):
@@ -207,12 +291,13 @@ def test_a_failing_binary_ends_with_3_and_keeps_what_was_written(finished, tmp_p
     assert mended.returncode == 0, mended.stderr
 
 
-@pytest.fixture
-def small_disk(tmp_path):
-    """A file system of 300 kB."""
+@pytest.fixture(params=[300, 420, 600])
+def small_disk(tmp_path, request):
+    """A file system of some hundred kB: it fills up early, or when restarts are there already."""
     place = tmp_path / "disk"
     place.mkdir()
-    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", str(place)], capture_output=True, check=False).returncode:
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={request.param}k", "tmpfs", str(place)]
+    if subprocess.run(mount, capture_output=True, check=False).returncode:
         pytest.skip("mounting a small file system needs root")
     yield place
     subprocess.run(["umount", str(place)], check=True)

@@ -42,7 +42,7 @@ def test_relaxation_times(diameter_mm, microseconds):
 
 def test_springs_in_series_and_smaller_friction(specimen1):
     _, scales = specimen1
-    nominal = {name: contact.nominal_stiffness for name, contact in scales.contacts.items()}
+    nominal = {name: contact.normal_stiffness / scales.stiffness_factor for name, contact in scales.contacts.items()}
     assert nominal["grain-grain"] == pytest.approx(47.15e9)
     assert nominal["grain-fine"] == pytest.approx(37.77e9, rel=1e-3)
     assert nominal["fine-fine"] == pytest.approx(31.5e9)
@@ -92,11 +92,47 @@ def test_a_step_beyond_the_drag_relaxation_time_is_refused():
         scales_of(tiny("run.time_step_s=1e-8", "drag.multiplier=1e4"))
 
 
-def test_long_hold_and_thin_sections_warn():
-    scales = scales_of(tiny("drag.refresh_steps=300", "analysis.sections=30"))
-    text = " ".join(scales.warnings)
+def test_doubtful_input_warns():
+    text = " ".join(scales_of(tiny("drag.refresh_steps=300")).warnings)
     assert "held for" in text
-    assert "thinner than a grain" in text
+    assert "overlap under impact" in text
+    assert "fewer than 10 fines" in " ".join(scales_of(tiny("run.plug_time_ms=0.0001")).warnings)
+    assert "lengthened to one fine's diameter" in " ".join(scales_of(tiny("fines.count=1")).warnings)
+    assert "overlap under drag" in " ".join(scales_of(tiny("drag.multiplier=40")).warnings)
+
+
+def test_drag_that_presses_contacts_shut_is_refused():
+    """6 pi mu M r u / k over 2 r: at M = 1000 a fine would be pressed through a grain."""
+    with pytest.raises(CaseError, match="drag alone would press"):
+        scales_of(tiny("drag.multiplier=1000"))
+
+
+@pytest.mark.parametrize("assignment", ["fluid.overbalance_MPa=1e-17", "fluid.viscosity_cP=1e15", "run.time_step_s=1e-18"])
+def test_extreme_numbers_are_refused_not_crashed_on(assignment):
+    with pytest.raises(CaseError):
+        scales_of(tiny(assignment))
+
+
+def test_the_plug_time_waits_for_fines_to_arrive():
+    """A dilute suspension: 10 v / (c A u) is longer than 4 grain diameters of passage."""
+    case = tiny("fines={radius_mm=0.1, count=60, concentration=0.001}")
+    scales = scales_of(case)
+    arrival = 4 / 3 * math.pi * 1e-4**3 / (0.001 * 1.6e-3**2 * scales.upstream_velocity)
+    assert scales.plug_time == pytest.approx(10 * arrival)
+    assert scales_of(tiny()).plug_time == pytest.approx(4 * 0.5e-3 / scales_of(tiny()).interstitial_velocity)
+
+
+def test_a_duration_is_met_by_whole_chunks():
+    scales = scales_of(tiny("run.duration_ms=0.08"))
+    chunk = scales.checkpoint_steps * scales.time_step
+    assert round(0.08e-3 / chunk) * chunk == pytest.approx(0.08e-3, rel=0.02)
+
+
+def test_damping_against_a_fixed_grain_makes_up_for_the_mass_liggghts_takes():
+    """LIGGGHTS damps with rate x m1 m2/(m1+m2), the fine moves alone: rate = 2 zeta sqrt(k m_fine) / (m1 m2/(m1+m2))."""
+    contact = scales_of(tiny("fines.radius_mm=0.2", "fines.count=60")).contacts["grain-fine"]
+    fine, grain = (4 / 3 * math.pi * r**3 * rho for r, rho in ((0.2e-3, 2146), (0.25e-3, 2650)))
+    assert contact.damping_rate == pytest.approx(2 * 0.2 * math.sqrt(contact.normal_stiffness * fine) * (1 / fine + 1 / grain))
 
 
 def test_every_row_has_formula_source_and_a_finite_value(specimen1):

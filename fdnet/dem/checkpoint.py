@@ -1,6 +1,7 @@
 """Checkpoints of an invasion: the counts after each chunk of steps, and the state on disk behind them."""
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -48,7 +49,8 @@ def empty_chunks(case: Case, scales: Scales) -> int:
 
 
 def quiet_enough(case: Case, scales: Scales, row: Checkpoint) -> bool:
-    return row.quiet >= (quiet_chunks(scales) if row.upstream > 0 else empty_chunks(case, scales))
+    waiting = row.upstream - row.removed_upstream
+    return row.quiet >= (quiet_chunks(scales) if waiting > 0 else empty_chunks(case, scales))
 
 
 def csv_row(row: Checkpoint) -> str:
@@ -123,3 +125,20 @@ def check_counts(folder: Path, row: Checkpoint, damaged: Snapshot, supplied: int
 
 def step_of(path: Path) -> int:
     return int(path.stem.rsplit("_", 1)[1])
+
+
+def readable_states(folder: Path, history: Sequence[Checkpoint], case: Case, scales: Scales,
+                    grains: Snapshot) -> Iterator[tuple[Checkpoint, Snapshot]]:
+    """The states behind `history`, each checked against its counts; earlier dumps that are missing or cut are passed over.
+
+    Raises DumpError when the last one is, LiggghtsError when counts disagree.
+    """
+    for row in history:
+        try:
+            state = state_at(folder, row, case, scales, grains)
+        except DumpError:
+            if row == history[-1]:
+                raise
+            continue
+        check_counts(folder, row, state, scales.supplied_count)
+        yield row, state

@@ -104,23 +104,11 @@ def _gravity(case: Case, scales: Scales) -> tuple[dict[str, Any] | None, list[Le
     if mode == "auto" and scales.gravity_over_drag < case.gravity.negligible_below:
         return None, [LeftOut(what="gravity and buoyancy",
                               why=f"gravity is {scales.gravity_over_drag:.1e} of the drag, below {case.gravity.negligible_below:g}")]
+    pull = {"magnitude": number(magnitude), "direction": " ".join(number(c / magnitude) for c in vector), "buoyancy": None}
     if not case.gravity.buoyancy:
-        return _pull(vector, 1.0), [LeftOut(what="buoyancy", why="switched off")]
-    along = [axis for axis in range(3) if vector[axis] != 0]
-    if len(along) > 1:
-        raise CaseError(f"gravity.acceleration_m_s2: {list(vector)}: LIGGGHTS's buoyancy needs gravity along one axis; "
-                        "turn the vector, or set gravity.buoyancy = false")
-    if vector[along[0]] > 0:
-        raise CaseError(f"gravity.acceleration_m_s2: {list(vector)}: LIGGGHTS's buoyancy needs gravity pointing down its "
-                        "axis (negative); turn the vector, or set gravity.buoyancy = false")
-    buoyancy = {"density": number(case.fluid.density_kg_m3), "axis": "xyz"[along[0]], "level": "1.0"}
-    return _pull(vector, 1.0) | {"buoyancy": buoyancy}, []
-
-
-def _pull(vector: tuple[float, float, float], factor: float) -> dict[str, Any]:
-    magnitude = math.hypot(*vector)
-    return {"magnitude": number(factor * magnitude), "direction": " ".join(number(c / magnitude) for c in vector),
-            "buoyancy": None}
+        return pull, [LeftOut(what="buoyancy", why="switched off")]
+    axis = next(name for name, component in zip("xyz", vector, strict=True) if component)
+    return pull | {"buoyancy": {"density": number(case.fluid.density_kg_m3), "axis": axis, "level": "1.0"}}, []
 
 
 def _left_out(case: Case, *, friction: bool, ranks: int) -> list[LeftOut]:

@@ -4,21 +4,20 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from fdnet.atomic import write_text
+from fdnet.atomic import disk_is_full, write_text
 from fdnet.case import Case
 from fdnet.contacts import max_overlap
 from fdnet.dem.checkpoint import (
     HISTORY,
     HISTORY_HEADER,
     Checkpoint,
-    check_counts,
     chunks_of,
     csv_row,
     last_checkpoint,
     quiet_chunks,
     quiet_enough,
     read_history,
-    state_at,
+    readable_states,
     step_of,
 )
 from fdnet.dem.deck import Deck, LeftOut
@@ -50,21 +49,26 @@ def invade(case: Case, scales: Scales, grains: Snapshot, folder: Path, *, binary
     Raises LiggghtsError when a run fails or fines are lost, CaseError when the fines cannot be placed.
     """
     (folder / "post").mkdir(parents=True, exist_ok=True)
-    run, deck = None, None
+    run, deck, anew = None, None, []
     while deck is None or run is None:
         last = last_checkpoint(folder, case, grains)
+        if last is None and (folder / HISTORY).exists() and len((folder / HISTORY).read_text(errors="replace").splitlines()) > 1:
+            anew = ["no checkpoint of the cut invasion could be used, it was begun anew"]
         deck = _prepare(case, scales, grains, folder, last, ranks)
         if _over(case, scales, last):
             break
         name = "in.invade" if last is None else "in.invade.resume"
         run = _run(folder, name, last, binary=binary, ranks=ranks, follow=_Keeper(folder, follow), timeout=timeout)
     history = read_history(folder)
-    damaged = state_at(folder, history[-1], case, scales, grains)
-    check_counts(folder, history[-1], damaged, scales.supplied_count)
-    overlaps = [max_overlap(state_at(folder, row, case, scales, grains), case.periodic, only_fines=True) for row in history]
+    overlaps, damaged = [], grains
+    for _, damaged in readable_states(folder, history, case, scales, grains):
+        overlaps.append(max_overlap(damaged, case.periodic, only_fines=True))
     reason, warnings = _ending(case, scales, history)
-    return Invasion(damaged=damaged, history=history, stop_reason=reason, max_overlap=max(overlaps),
-                    step_s=scales.time_step, left_out=deck.left_out, warnings=warnings, runs=(run,) if run else ())
+    if len(overlaps) < len(history):
+        warnings.append(f"{len(history) - len(overlaps)} of {len(history)} checkpoint dumps cannot be read: they are missing from the "
+                        "largest overlap and from invasion.pvd")
+    return Invasion(damaged=damaged, history=history, stop_reason=reason, max_overlap=max(overlaps), step_s=scales.time_step,
+                    left_out=deck.left_out, warnings=(*anew, *warnings), runs=(run,) if run else ())
 
 
 def _run(folder: Path, deck: str, last: Checkpoint | None, *, binary: Binary, ranks: int, follow: Callable[[str], None],
@@ -83,13 +87,18 @@ def _run(folder: Path, deck: str, last: Checkpoint | None, *, binary: Binary, ra
 
 
 class _Keeper:
-    """Follows the screen: keeps only the two newest restarts, passes every line on."""
+    """Follows the screen: keeps the two newest restarts, stops a run that writes to a full disk, passes every line on.
+
+    LIGGGHTS goes on after a failed write and ends with 0; older restarts are removed only while there is room.
+    """
 
     def __init__(self, folder: Path, follow: Callable[[str], None] | None) -> None:
         self.folder, self.follow = folder, follow
 
     def __call__(self, line: str) -> None:
         if line.startswith("FDNET checkpoint"):
+            if disk_is_full(self.folder):
+                raise LiggghtsError(f"{self.folder}: the disk is full, LIGGGHTS was stopped; make room and continue with --resume")
             files = sorted((self.folder / "post").glob("invade_*.restart"), key=step_of)
             for old in files[:-2]:
                 old.unlink(missing_ok=True)
@@ -120,20 +129,20 @@ def _prepare(case: Case, scales: Scales, grains: Snapshot, folder: Path, last: C
     return deck
 
 
-def _ending(case: Case, scales: Scales, history: tuple[Checkpoint, ...]) -> tuple[str, tuple[str, ...]]:
+def _ending(case: Case, scales: Scales, history: tuple[Checkpoint, ...]) -> tuple[str, list[str]]:
     """stop_reason and warnings. An empty slab decides nothing about plugging, so it is its own reason."""
     last = history[-1]
+    waiting = last.upstream - last.removed_upstream
     warnings = []
     if case.run.duration_ms is not None:
         reason = "duration"
     elif quiet_enough(case, scales, last):
-        reason = "plugged" if last.upstream > 0 else "supply_exhausted"
+        reason = "plugged" if waiting > 0 else "supply_exhausted"
     else:
         reason = "cap"
-        warnings.append(f"invasion stopped at its cap of {1e3 * scales.cap_time:.3g} ms, fines still crossed the face: raise "
-                        "run.cap_ms")
-    if last.upstream == 0:
-        warnings.append("all fines supplied entered the specimen: the end was decided by an empty slab, raise fines.count or "
+        warnings.append(f"invasion stopped at its cap of {1e3 * scales.cap_time:.3g} ms before the stop rule held: raise run.cap_ms")
+    if waiting == 0:
+        warnings.append("no fine is left upstream: the end was decided by an empty slab, raise fines.count or "
                         "fines.slab_mm")
     before = history[-min(len(history), quiet_chunks(scales) + 1)]
     if reason == "plugged" and last.passed > before.passed:
@@ -141,4 +150,4 @@ def _ending(case: Case, scales: Scales, history: tuple[Checkpoint, ...]) -> tupl
                         "raise run.plug_time_ms to follow them")
     if last.removed_upstream:
         warnings.append(f"{last.removed_upstream} fines bounced out upstream and were removed")
-    return reason, tuple(warnings)
+    return reason, warnings

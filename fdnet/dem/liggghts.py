@@ -2,13 +2,14 @@
 
 import contextlib
 import ctypes
+import fcntl
 import os
 import re
 import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -99,11 +100,11 @@ def run_deck(folder: Path, deck: str, *, binary: Binary, ranks: int = 1,
     if not (folder / deck).is_file():
         raise LiggghtsError(f"{folder / deck}: deck not found; render it first")
     command, start = binary.command(deck, ranks), time.monotonic()
-    with (folder / SCREEN).open("wb") as screen:
+    with _only_writer(folder) as lock, (folder / SCREEN).open("wb") as screen:
         before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOP_SIGNALS)
         try:
             process = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=screen,
-                                       stderr=subprocess.STDOUT, env=_environment(), start_new_session=True,
+                                       stderr=subprocess.STDOUT, env=_environment(), start_new_session=True, pass_fds=(lock,),
                                        preexec_fn=_prepare_child(ranks, before))
         except OSError as error:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
@@ -117,6 +118,20 @@ def run_deck(folder: Path, deck: str, *, binary: Binary, ranks: int = 1,
     _verify(folder, deck, process.returncode)
     return Run(directory=folder, command=tuple(command), version=binary.version, seconds=time.monotonic() - start,
                ranks=ranks)
+
+
+@contextlib.contextmanager
+def _only_writer(folder: Path) -> Iterator[int]:
+    """A lock on the stage's folder that LIGGGHTS inherits: it holds until the last process that writes there has ended."""
+    lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise LiggghtsError(f"{folder}: a LIGGGHTS of an earlier run is still writing here; wait until it ends") from error
+        yield lock
+    finally:
+        os.close(lock)
 
 
 def _environment() -> dict[str, str]:
@@ -176,12 +191,21 @@ def _verify(folder: Path, deck: str, code: int) -> None:
         numbers = [line for line in lines if _NAN.search(line) and not line.lstrip().startswith(("#", "print", "fix"))]
         if numbers:
             raise LiggghtsError(f"{where}: not-a-number in the output ({numbers[0].strip()[:80]!r}); "
-                                "lower run.time_step_factor")
+                                "lower run.time_step_factor and start over with --force or another --out")
         return
     evidence = bad[0] if bad else (f"the last line is {lines[-1].strip()!r}" if lines else "no output")
     if disk_is_full(folder):
         evidence = f"the disk is full ({evidence})"
     state = f"ended by signal {-code}" if code < 0 else f"exit {code}"
     finished = "" if bad else f", no {END_MARK} line"
-    raise LiggghtsError(f"{where}: LIGGGHTS failed ({state}{finished}): {evidence[:200]}; see {folder / SCREEN}, "
-                        "mend the cause and continue with --resume")
+    raise LiggghtsError(f"{where}: LIGGGHTS failed ({state}{finished}): {evidence[:200]}; see {folder / SCREEN}; {_advice(bad)}")
+
+
+def _advice(bad: list[str]) -> str:
+    """What helps: another case for what would happen again, --resume for what came from outside."""
+    if any("Lost atoms" in line for line in bad):
+        return ("spheres were thrown out: lower run.time_step_factor or drag.multiplier, or raise run.stiffness_N_m, and start over "
+                "with --force or another --out")
+    if any(line.startswith("ERROR") and "No space" not in line for line in bad):
+        return "the same deck would fail again: mend the case and start over with --force or another --out"
+    return "mend the cause and continue with --resume"

@@ -46,7 +46,7 @@ class Pack:
 
 
 def make_pack(case: Case, scales: Scales, folder: Path, *, binary: Binary, ranks: int = 1,
-              follow: Callable[[str], None] | None = None) -> Pack:
+              follow: Callable[[str], None] | None = None, timeout: float | None = None) -> Pack:
     """Pack until the porosity (overlap counted once) is within 0.003 of the target, by adjusting the count.
 
     Raises CaseError when the porosity cannot be reached, LiggghtsError when a run fails or does not come to rest.
@@ -55,20 +55,25 @@ def make_pack(case: Case, scales: Scales, folder: Path, *, binary: Binary, ranks
     counts, tried = [grain_count(case)], []
     while True:
         attempt = folder / f"attempt_{len(counts)}"
-        pack = _attempt(case, scales, attempt, counts[-1], binary=binary, ranks=ranks, follow=follow)
+        pack = _attempt(case, scales, attempt, counts[-1], binary=binary, ranks=ranks, follow=follow, timeout=timeout)
         tried.append({"grains": len(pack.grains), "porosity": pack.porosity, "porosity_error": pack.porosity_error,
                       "max_overlap": pack.max_overlap, "liggghts_s": pack.run.seconds})
+        _refuse_overlap(case, pack)
         if case.grains.count is not None or _met(case, pack):
             return _accept(folder, attempt, pack, tried)
         counts.append(_next_count(case, tried))
         shutil.rmtree(attempt)
 
 
+def _refuse_overlap(case: Case, pack: Pack) -> None:
+    if pack.max_overlap > case.grains.max_overlap:
+        asked = f"grains.porosity: {case.grains.porosity}" if case.grains.count is None else f"grains.count: {case.grains.count}"
+        raise CaseError(f"{asked} needs grains that overlap by {100 * pack.max_overlap:.1f} % of a diameter (limit "
+                        f"grains.max_overlap {case.grains.max_overlap:g}); take a looser pack or raise the limit")
+
+
 def _met(case: Case, pack: Pack) -> bool:
     assert case.grains.porosity is not None
-    if pack.max_overlap > case.grains.max_overlap:
-        raise CaseError(f"grains.porosity: {case.grains.porosity} needs grains that overlap by {100 * pack.max_overlap:.1f} % of "
-                        f"a diameter (limit grains.max_overlap {case.grains.max_overlap:g}); raise the porosity or the limit")
     return abs(pack.porosity - case.grains.porosity) + pack.porosity_error <= POROSITY_TOLERANCE
 
 
@@ -104,12 +109,12 @@ def _accept(folder: Path, attempt: Path, pack: Pack, tried: list[dict[str, Any]]
 
 
 def _attempt(case: Case, scales: Scales, folder: Path, count: int, *, binary: Binary, ranks: int,
-             follow: Callable[[str], None] | None) -> Pack:
+             follow: Callable[[str], None] | None, timeout: float | None) -> Pack:
     if folder.exists():
         shutil.rmtree(folder)
     (folder / "post").mkdir(parents=True)
     deck = write_pack_inputs(case, scales, folder, count=count, ranks=ranks)
-    run = _run(case, folder, count, binary=binary, ranks=ranks, follow=follow)
+    run = _run(case, folder, count, binary=binary, ranks=ranks, follow=follow, timeout=timeout)
     frame = read_frame(folder / "post" / "pack.dump")
     screen = (folder / "screen.txt").read_text(encoding="utf-8", errors="replace")
     if "FDNET restless" in screen:
@@ -124,9 +129,10 @@ def _attempt(case: Case, scales: Scales, folder: Path, count: int, *, binary: Bi
                 run=run)
 
 
-def _run(case: Case, folder: Path, count: int, *, binary: Binary, ranks: int, follow: Callable[[str], None] | None) -> Run:
+def _run(case: Case, folder: Path, count: int, *, binary: Binary, ranks: int, follow: Callable[[str], None] | None,
+         timeout: float | None) -> Run:
     try:
-        return run_deck(folder, "in.pack", binary=binary, ranks=ranks, follow=follow)
+        return run_deck(folder, "in.pack", binary=binary, ranks=ranks, follow=follow, timeout=timeout)
     except LiggghtsError as error:
         if "Lost atoms" not in str(error):
             raise

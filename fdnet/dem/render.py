@@ -16,8 +16,8 @@ from fdnet.snapshot import Kind, Snapshot
 def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
     """Write the decks of a case without LIGGGHTS: the pack with its data file, and the invasion.
 
-    The invasion's own data file needs a finished pack; where `out` holds one it is written too.
-    Raises CaseError when a deck is there already.
+    The invasion's data file needs a finished pack, so `fdnet run` writes it; the deck is shown for grains that stand
+    beyond the face as those of a dense pack do. Raises CaseError when a deck is there already.
     """
     scales = scales_of(case)
     decks = [out / "pack" / "in.pack"] + ([out / "invade" / "in.invade"] if case.fines else [])

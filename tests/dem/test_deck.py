@@ -44,12 +44,18 @@ def test_missing_template_and_variables_are_errors():
 
 
 def test_templates_hold_no_arithmetic():
+    """No operators and no filters: every number is computed in Python."""
     from importlib.resources import files
 
+    import jinja2
+    from jinja2 import nodes
+
+    forbidden = (nodes.Add, nodes.Sub, nodes.Mul, nodes.Div, nodes.FloorDiv, nodes.Mod, nodes.Pow, nodes.Neg, nodes.Concat, nodes.Filter,
+                 nodes.Assign)
     for entry in files("liggghts_templates").iterdir():
         if entry.name.endswith(".j2"):
-            for expression in re.findall(r"\{\{(.*?)\}\}|\{%(.*?)%\}", entry.read_text()):
-                assert not re.search(r"[*/+]|\d\s*-", "".join(expression).replace("-%", "").replace('".', "")), entry.name
+            tree = jinja2.Environment().parse(entry.read_text())
+            assert not list(tree.find_all(forbidden)), entry.name
 
 
 def test_drag_is_stokes_with_the_multiplier():
@@ -72,8 +78,6 @@ def test_gravity_is_left_out_when_negligible_and_told():
     assert has(invade_text("gravity.mode=on"), r"^fix grav fines gravity 9.81 vector 0.0 0.0 -1.0")
     assert has(invade_text("gravity.mode=on"), r"^fix buoy fines buoyancy density 1095.0 dim z level")
     assert not has(invade_text("gravity.mode=on", "gravity.buoyancy=false"), "buoyancy")
-    with pytest.raises(CaseError, match="along one axis"):
-        invade_text("gravity.mode=on", "gravity.acceleration_m_s2=[1.0,0.0,-9.0]")
 
 
 def test_fixed_grains_have_no_mutual_contacts_and_mobile_ones_are_held_by_planes():

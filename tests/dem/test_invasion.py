@@ -53,7 +53,7 @@ def test_a_slab_that_cannot_hold_the_fines_is_an_error(packed):
 
 @pytest.mark.parametrize("assignments", [
     [], ["box.sides=periodic"], ["grains.motion=mobile"], ["drag.scheme=every_step"], ["drag.upstream=darcy"],
-    ["fines.radius_mm=[0.02,0.05]", "fines.friction=0.0", "run.duration_ms=0.25"]])
+    ["fines.radius_mm=[0.02,0.05]", "fines.friction=0.0", "run={duration_ms=0.25}"]])
 def test_supplied_is_invaded_passed_and_upstream_at_every_checkpoint(binary, packed, tmp_path, assignments):
     case = tiny("run.cap_ms=0.6", *assignments)
     scales = scales_of(case)

@@ -100,6 +100,19 @@ def test_the_run_dies_with_its_parent(fake, tmp_path):
     assert not any(_alive(int(child)) for child in children)
 
 
+def test_a_folder_where_liggghts_still_writes_is_refused(fake, tmp_path):
+    """The lock is LIGGGHTS's own: it outlives a killed parent, also under MPI, where ranks take a moment to end."""
+    (tmp_path / "mode").write_text("hang")
+    command = ["sh", "-c", f"exec 9>{tmp_path}/.lock; flock 9; sleep 30 9>&9"]
+    orphan = subprocess.Popen(command, start_new_session=True)
+    time.sleep(0.5)
+    with pytest.raises(LiggghtsError, match="still writing here"):
+        run(fake, tmp_path, "ok")
+    os.killpg(orphan.pid, signal.SIGKILL)
+    orphan.wait()
+    assert run(fake, tmp_path, "ok").ranks == 1
+
+
 def _alive(pid: int) -> bool:
     try:
         return Path(f"/proc/{pid}/stat").read_text().split(")")[1].split()[0] != "Z"

@@ -53,3 +53,9 @@ def test_a_grain_too_coarse_for_the_tolerance_is_an_error(binary, tmp_path):
     case = tiny("box.size_mm=[1.2,1.2,1.2]", "grains={radius_mm=0.25, porosity=0.47}")
     with pytest.raises(CaseError, match="one grain is"):
         make_pack(case, scales_of(case), tmp_path, binary=binary)
+
+
+def test_the_overlap_limit_holds_for_a_count_too(binary, tmp_path):
+    case = tiny("grains={radius_mm=0.25, count=98}")
+    with pytest.raises(CaseError, match=r"grains\.count: 98 needs (grains that overlap|more room)|98 grains needs more room"):
+        make_pack(case, scales_of(case), tmp_path, binary=binary)
