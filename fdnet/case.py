@@ -239,8 +239,10 @@ def cross_problems(parts: Mapping[str, Any]) -> Iterator[str]:
     if box and fines:
         yield from _supply_problems(box, fines)
     if grains and fines and fines.radius_range_m[1] >= grains.radius_range_m[0]:
-        yield (f"fines.radius_mm: {fines.radius_mm} is not below grains.radius_mm {grains.radius_mm} "
-               "(the network needs a clear gap)")
+        yield (
+            f"fines.radius_mm: {fines.radius_mm} is not below grains.radius_mm {grains.radius_mm} "
+            "(the network needs a clear gap)"
+        )
     yield from _choice_problems(parts)
 
 
@@ -253,13 +255,19 @@ def _choice_problems(parts: Mapping[str, Any]) -> Iterator[str]:
     if gravity and gravity.mode != "off" and gravity.buoyancy:
         pulled = [component for component in gravity.acceleration_m_s2 if component]
         if len(pulled) > 1 or any(component > 0 for component in pulled):
-            yield (f"gravity.acceleration_m_s2: {list(gravity.acceleration_m_s2)}: LIGGGHTS's buoyancy needs gravity down one axis, "
-                   "e.g. [0.0, 0.0, -9.81]; turn it, or set gravity.buoyancy = false")
+            yield (
+                f"gravity.acceleration_m_s2: {list(gravity.acceleration_m_s2)}: LIGGGHTS's buoyancy needs "
+                "gravity down one axis, "
+                "e.g. [0.0, 0.0, -9.81]; turn it, or set gravity.buoyancy = false"
+            )
     if run and run.duration_ms is not None and run.cap_ms is not None:
-        yield f"run.cap_ms: {run.cap_ms} beside run.duration_ms {run.duration_ms}: a duration needs no cap, give one of the two"
+        yield f"run.cap_ms: {run.cap_ms} beside run.duration_ms {run.duration_ms}: give one of the two"
     if box and analysis and box.size_mm[0] / analysis.profile_bin_mm > MOST_BINS:
-        yield (f"analysis.profile_bin_mm: {analysis.profile_bin_mm:g} cuts {box.size_mm[0]:g} mm into more than {MOST_BINS} bins; "
-               f"expected at least {box.size_mm[0] / MOST_BINS:.3g}")
+        yield (
+            f"analysis.profile_bin_mm: {analysis.profile_bin_mm:g} cuts {box.size_mm[0]:g} mm into more than "
+            f"{MOST_BINS} bins; "
+            f"expected at least {box.size_mm[0] / MOST_BINS:.3g}"
+        )
 
 
 def _supply_problems(box: Box, fines: Fines) -> Iterator[str]:
@@ -269,10 +277,13 @@ def _supply_problems(box: Box, fines: Fines) -> Iterator[str]:
     count = fines.count or fines.concentration * area * (fines.slab_mm or 0.0) / volume
     length = fines.slab_mm or count * volume / (fines.concentration * area)
     if count > MOST_FINES:
-        yield f"fines.count: {count:.3g} fines supplied, expected at most {MOST_FINES:.0e}; shorten the slab or take larger fines"
+        yield f"fines.count: {count:.3g} fines, expected at most {MOST_FINES:.0e}; shorten the slab"
     if length > MOST_SLAB * box.size_mm[0]:
-        yield (f"fines.concentration: {fines.concentration:g} makes a slab of {length:.3g} mm, expected at most {MOST_SLAB} box lengths; "
-               "raise it or supply fewer fines")
+        yield (
+            f"fines.concentration: {fines.concentration:g} makes a slab of {length:.3g} mm, expected at most "
+            f"{MOST_SLAB} box lengths; "
+            "raise it or supply fewer fines"
+        )
 
 
 def _box_problems(box: Box, grains: Grains) -> Iterator[str]:
@@ -286,5 +297,3 @@ def _box_problems(box: Box, grains: Grains) -> Iterator[str]:
         if side < least:
             why = "a grain would meet its own image" if need == 2.0 and axis != "x" else "a grain does not fit"
             yield f"box.size_mm: side {axis} is {side:g} mm, expected at least {least:g} mm ({why})"
-
-

@@ -28,10 +28,13 @@ def case_from(data: Mapping[str, Any], *, source: str = "case") -> Case:
     Raises CaseError that lists every problem: dotted path, value given, what is allowed, nearest known key.
     """
     problems = _schema_problems(Case, data)
-    parts = {name: _usable_part(field.annotation, data[name]) for name, field in Case.model_fields.items()
-             if name in data}
+    parts = {
+        name: _usable_part(field.annotation, data[name]) for name, field in Case.model_fields.items() if name in data
+    }
     named = [problem.split(":")[0] for problem in problems]
-    problems += [p for p in cross_problems(parts) if not any(p in q for q in problems) and not any(key in p for key in named)]
+    problems += [
+        p for p in cross_problems(parts) if not any(p in q for q in problems) and not any(key in p for key in named)
+    ]
     if problems:
         raise CaseError(f"{source}: {len(problems)} problem{'s' * (len(problems) > 1)}: " + " | ".join(problems))
     return Case.model_validate(data)

@@ -48,8 +48,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         if options.debug:
             raise
-        print(f"fdnet: {error.filename or 'system'}: {error.strerror or error}; free space or mend permissions, then repeat the "
-              "command (a run: with --resume)", file=sys.stderr)
+        print(
+            f"fdnet: {error.filename or 'system'}: {error.strerror or error}; free space or mend permissions, "
+            "then repeat the "
+            "command (a run: with --resume)",
+            file=sys.stderr,
+        )
         return 2
 
 
@@ -84,7 +88,9 @@ class _Version(argparse.Action):
 def _add_case(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("case", type=Path, metavar="CASE.toml", help="the case file")
     parser.add_argument("--seed", type=int, help="overrides the seed of the case")
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="overrides a key, e.g. fines.count=500")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="overrides a key, e.g. fines.count=500"
+    )
     parser.add_argument("--np", type=_ranks, default=1, metavar="N", help="MPI ranks for LIGGGHTS (default 1)")
 
 
@@ -103,13 +109,17 @@ def _add_run(commands: Any, common: argparse.ArgumentParser) -> None:
     run.add_argument("--stages", default="pack,invade,analyse,report", help="comma-separated (default: all four)")
     run.add_argument("--json", action="store_true", help="print summary.json on standard output")
     run.add_argument("--liggghts", metavar="PATH", help="the LIGGGHTS binary")
-    run.add_argument("--timeout", type=float, metavar="SECONDS", help="stop LIGGGHTS after this time (continue with --resume)")
+    run.add_argument(
+        "--timeout", type=float, metavar="SECONDS", help="stop LIGGGHTS after this time (continue with --resume)"
+    )
     run.add_argument("--quiet", action="store_true", help="no progress")
     run.set_defaults(action=_run)
 
 
 def _add_render(commands: Any, common: argparse.ArgumentParser) -> None:
-    render = commands.add_parser("render", parents=[common], help="write the decks without LIGGGHTS and print the scales")
+    render = commands.add_parser(
+        "render", parents=[common], help="write the decks without LIGGGHTS and print the scales"
+    )
     _add_case(render)
     render.add_argument("--out", type=Path, required=True, help="folder for the decks")
     render.set_defaults(action=_render)
@@ -118,7 +128,9 @@ def _add_render(commands: Any, common: argparse.ArgumentParser) -> None:
 def _add_permeability(commands: Any, common: argparse.ArgumentParser) -> None:
     from fdnet.permeability_command import add_arguments, run
 
-    command = commands.add_parser("permeability", parents=[common], help="permeability of a CSV of spheres, without LIGGGHTS")
+    command = commands.add_parser(
+        "permeability", parents=[common], help="permeability of a CSV of spheres, without LIGGGHTS"
+    )
     add_arguments(command)
     command.set_defaults(action=run)
 
@@ -146,9 +158,17 @@ def _run(options: argparse.Namespace) -> int:
 
     case = _case_of(options)
     out = options.out or Path("runs") / case.name
-    chosen = RunOptions(out=out, ranks=options.np, resume=options.resume, force=options.force, stages=_stages(options.stages),
-                        liggghts=options.liggghts, timeout=options.timeout, show_progress=not options.quiet,
-                        command=options.command_line)
+    chosen = RunOptions(
+        out=out,
+        ranks=options.np,
+        resume=options.resume,
+        force=options.force,
+        stages=_stages(options.stages),
+        liggghts=options.liggghts,
+        timeout=options.timeout,
+        show_progress=not options.quiet,
+        command=options.command_line,
+    )
     summary = run_case(case, chosen)
     if options.json:
         print(json.dumps(summary, indent=2))

@@ -8,7 +8,7 @@ from fdnet.case import Case, Spheres
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contact:
-    """Linear contact of one pair of materials, as used. Stiffness N/m, damping_rate 1/s, contact_time and step_limit s."""
+    """Linear contact of one pair of materials, as used: stiffness N/m, damping_rate 1/s, times s."""
 
     pair: str
     normal_stiffness: float
@@ -37,8 +37,10 @@ def mass_range(spheres: Spheres) -> tuple[float, float]:
 def _nominal(case: Case) -> dict[str, tuple[float, float, float]]:
     """Per material: normal and shear stiffness, friction. The walls are of the grains' material."""
     grains = case.grains
-    table = {"grain": (grains.normal_stiffness_N_m, grains.shear_stiffness_N_m, grains.friction),
-             "wall": (grains.normal_stiffness_N_m, grains.shear_stiffness_N_m, case.box.wall_friction)}
+    table = {
+        "grain": (grains.normal_stiffness_N_m, grains.shear_stiffness_N_m, grains.friction),
+        "wall": (grains.normal_stiffness_N_m, grains.shear_stiffness_N_m, case.box.wall_friction),
+    }
     if case.fines:
         table["fine"] = (case.fines.normal_stiffness_N_m, case.fines.shear_stiffness_N_m, case.fines.friction)
     return table
@@ -62,12 +64,16 @@ def contacts_of(case: Case) -> dict[str, Contact]:
     return {f"{a}-{b}": _contact(case, (a, b), nominal, factor) for a, b in _pairs(case)}
 
 
-def _contact(case: Case, pair: tuple[str, str], nominal: dict[str, tuple[float, float, float]], factor: float) -> Contact:
+def _contact(
+    case: Case, pair: tuple[str, str], nominal: dict[str, tuple[float, float, float]], factor: float
+) -> Contact:
     first, second = pair
     normal = factor * series(nominal[first][0], nominal[second][0])
     spheres = [case.grains if name == "grain" else case.fines for name in pair if name != "wall"]
     damping = sum(s.damping_ratio for s in spheres if s) / len(spheres)
-    frequency = math.sqrt(normal / _effective_mass(case, pair, grains_fixed="fine" in pair and case.grains.motion == "fixed"))
+    frequency = math.sqrt(
+        normal / _effective_mass(case, pair, grains_fixed="fine" in pair and case.grains.motion == "fixed")
+    )
     by_liggghts = _effective_mass(case, pair, grains_fixed=False)
     small = case.fines if "fine" in pair and case.fines else case.grains
     return Contact(

@@ -7,7 +7,7 @@ from fdnet.snapshot import Array, Kind, Snapshot
 
 
 def touching_pairs(spheres: Snapshot, periodic: tuple[bool, bool, bool], *, gap: float = 0.0) -> tuple[Array, Array]:
-    """Pairs (K, 2) of spheres nearer than `gap` times the smaller diameter, and their overlaps (K,) m (negative: a gap).
+    """Pairs (K, 2) of spheres nearer than `gap` smaller diameters, and their overlaps (K,) m (negative: a gap).
 
     Spheres are searched in two classes of size, so that a few large ones do not widen the search of all.
     """
@@ -20,12 +20,17 @@ def touching_pairs(spheres: Snapshot, periodic: tuple[bool, bool, bool], *, gap:
     small = radius <= 0.5 * radius.max()
     groups = [group for group in (np.flatnonzero(small), np.flatnonzero(~small)) if len(group)]
     trees = [cKDTree(position[group], boxsize=period) for group in groups]
-    found = [_pairs((trees[i], trees[j]), (groups[i], groups[j]), radius, gap)
-             for i in range(len(groups)) for j in range(i, len(groups))]
+    found = [
+        _pairs((trees[i], trees[j]), (groups[i], groups[j]), radius, gap)
+        for i in range(len(groups))
+        for j in range(i, len(groups))
+    ]
     return np.concatenate([pairs for pairs, _ in found]), np.concatenate([overlap for _, overlap in found])
 
 
-def _pairs(trees: tuple[cKDTree, cKDTree], groups: tuple[Array, Array], radius: Array, gap: float) -> tuple[Array, Array]:
+def _pairs(
+    trees: tuple[cKDTree, cKDTree], groups: tuple[Array, Array], radius: Array, gap: float
+) -> tuple[Array, Array]:
     first, second = groups
     reach = radius[first].max() + radius[second].max()
     reach += 2 * gap * min(radius[first].max(), radius[second].max())

@@ -75,8 +75,15 @@ def draw_figures(results: Results) -> tuple[list[tuple[Path, str]], list[str]]:
     """All figures with their captions, and why the 3-D picture is missing if it is."""
     from fdnet.report import figures, vtk
 
-    rows = [{"time_s": row.step * results.scales.time_step, "upstream": row.upstream, "invaded": row.invaded,
-             "passed": row.passed} for row in results.history]
+    rows = [
+        {
+            "time_s": row.step * results.scales.time_step,
+            "upstream": row.upstream,
+            "invaded": row.invaded,
+            "passed": row.passed,
+        }
+        for row in results.history
+    ]
     drawn = figures.draw_all(results.path / "figures", results.analysis, results.shown, rows or None)
     picture = results.path / "figures" / "spheres_3d.png"
     reason = vtk.render_spheres_png(picture, results.path / "spheres_damaged.vtp", results.shown.box)

@@ -16,11 +16,17 @@ _METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of the command."""
-    parser.add_argument("spheres", type=Path, metavar="SPHERES.csv", help="columns x,y,z,radius[,kind] or x_m,...,radius_m[,kind]")
-    parser.add_argument("--units", choices=tuple(_METRES), help="unit of the columns and of --box (not with x_m columns)")
+    parser.add_argument(
+        "spheres", type=Path, metavar="SPHERES.csv", help="columns x,y,z,radius[,kind] or x_m,...,radius_m[,kind]"
+    )
+    parser.add_argument(
+        "--units", choices=tuple(_METRES), help="unit of the columns and of --box (not with x_m columns)"
+    )
     parser.add_argument("--axis", choices=("x", "y", "z"), default="x", help="flow direction (default x)")
     parser.add_argument("--box", metavar="x0,x1,y0,y1,z0,z1", help="the specimen, in the unit of the columns")
-    parser.add_argument("--periodic", default="", metavar="DIRS", help="periodic directions, any of x, y, z together; others are walls")
+    parser.add_argument(
+        "--periodic", default="", metavar="DIRS", help="periodic directions, any of x, y, z together; others are walls"
+    )
     parser.add_argument("--sections", type=_count, default=1, metavar="N", help="slabs along the flow (default 1)")
     parser.add_argument("--law", choices=LAW_NAMES, help="conductance law (default: fdnet's own)")
     parser.add_argument("--damage-law", choices=DAMAGE_LAW_NAMES, help="damage law (default: fdnet's own)")
@@ -70,12 +76,22 @@ def read_snapshot(options: argparse.Namespace, periodic: tuple[bool, bool, bool]
     if np.count_nonzero(grains) < 4:
         raise CaseError(f"{options.spheres}: {np.count_nonzero(grains)} grains, expected at least 4 for a tetrahedron")
     box, notes = _box(options, position[grains], radius[grains], periodic)
-    snapshot = Snapshot(step=0, time_s=0.0, box=box, id=np.arange(1, len(radius) + 1), kind=kind, position=position, radius=radius,
-                        velocity=np.zeros_like(position))
+    snapshot = Snapshot(
+        step=0,
+        time_s=0.0,
+        box=box,
+        id=np.arange(1, len(radius) + 1),
+        kind=kind,
+        position=position,
+        radius=radius,
+        velocity=np.zeros_like(position),
+    )
     return snapshot, notes
 
 
-def _box(options: argparse.Namespace, position: Any, radius: Any, periodic: tuple[bool, bool, bool]) -> tuple[Any, list[str]]:
+def _box(
+    options: argparse.Namespace, position: Any, radius: Any, periodic: tuple[bool, bool, bool]
+) -> tuple[Any, list[str]]:
     import numpy as np
 
     if options.box is None:
@@ -88,7 +104,9 @@ def _box(options: argparse.Namespace, position: Any, radius: Any, periodic: tupl
     except ValueError:
         values = []
     if len(values) != 6 or not all(map(math.isfinite, values)) or any(values[i] >= values[i + 1] for i in (0, 2, 4)):
-        raise CaseError(f"--box: {options.box!r}, expected six numbers x0,x1,y0,y1,z0,z1 with each lower bound below the upper")
+        raise CaseError(
+            f"--box: {options.box!r}, expected six numbers x0,x1,y0,y1,z0,z1 with each lower bound below the upper"
+        )
     return np.array(values).reshape(3, 2) * _METRES[options.units or "m"], []
 
 
@@ -99,26 +117,53 @@ def turned(spheres: Any, turn: list[int]) -> Any:
     from fdnet.snapshot import Snapshot
 
     start = np.array([spheres.box[turn[0], 0], 0.0, 0.0])
-    return Snapshot(step=spheres.step, time_s=spheres.time_s, box=spheres.box[turn] - start[:, None], id=spheres.id,
-                    kind=spheres.kind, position=spheres.position[:, turn] - start, radius=spheres.radius,
-                    velocity=spheres.velocity[:, turn])
+    return Snapshot(
+        step=spheres.step,
+        time_s=spheres.time_s,
+        box=spheres.box[turn] - start[:, None],
+        id=spheres.id,
+        kind=spheres.kind,
+        position=spheres.position[:, turn] - start,
+        radius=spheres.radius,
+        velocity=spheres.velocity[:, turn],
+    )
 
 
-def _measure(spheres: Any, periodic: tuple[bool, bool, bool], sections: int, laws: tuple[str, str], notes: list[str]) -> dict[str, Any]:
+def _measure(
+    spheres: Any, periodic: tuple[bool, bool, bool], sections: int, laws: tuple[str, str], notes: list[str]
+) -> dict[str, Any]:
     from fdnet.network.permeability import AnalysisOptions, analyse
     from fdnet.report.tables import section_rows
 
     start = time.perf_counter()
     damaged = spheres if len(spheres.fines()) else None
     length = spheres.box[0, 1] - spheres.box[0, 0]
-    options = AnalysisOptions(sections=sections, law=laws[0], damage_law=laws[1], threshold=None, middle_band="threshold",
-                              overlap="exact", profile_bin=length / 32)
+    options = AnalysisOptions(
+        sections=sections,
+        law=laws[0],
+        damage_law=laws[1],
+        threshold=None,
+        middle_band="threshold",
+        overlap="exact",
+        profile_bin=length / 32,
+    )
     result = analyse(spheres.grains(), damaged, periodic=periodic, options=options)
-    return {"k_initial_m2": result.k_initial, "k_damaged_m2": result.k_damaged, "k_reduction": result.k_reduction,
-            "porosity_initial": result.porosity_initial, "porosity_damaged": result.porosity_damaged,
-            "pores": len(result.network.pore_radius), "throats": len(result.network.throat_radius),
-            "solver": result.solver, "law": result.law, "damage_law": result.damage_law, "sections": section_rows(result),
-            "network_counts": result.counts, "seconds": time.perf_counter() - start, "warnings": [*notes, *result.warnings]}
+    return {
+        "k_initial_m2": result.k_initial,
+        "k_damaged_m2": result.k_damaged,
+        "k_reduction": result.k_reduction,
+        "porosity_initial": result.porosity_initial,
+        "porosity_damaged": result.porosity_damaged,
+        "pores": len(result.network.pore_radius),
+        "throats": len(result.network.throat_radius),
+        "solver": result.solver,
+        "law": result.law,
+        "damage_law": result.damage_law,
+        "sections": section_rows(result),
+        "network_counts": result.counts,
+        "seconds": time.perf_counter() - start,
+        "warnings": [*notes, *result.warnings],
+    }
 
 
 def _print(results: list[dict[str, Any]], options: argparse.Namespace) -> None:
@@ -128,10 +173,16 @@ def _print(results: list[dict[str, Any]], options: argparse.Namespace) -> None:
         print(plain_json({"laws": results} if options.compare_laws else results[0])[1])
         return
     first = results[0]
-    print(f"porosity {first['porosity_initial']:.5f} -> {first['porosity_damaged']:.5f}, {first['pores']} pores, {first['throats']} throats")
+    print(
+        f"porosity {first['porosity_initial']:.5f} -> {first['porosity_damaged']:.5f}, {first['pores']} pores, "
+        f"{first['throats']} throats"
+    )
     print(f"{'law':<10} {'damage law':<12} {'k m2':>12} {'k damaged m2':>13} {'k/k0':>8}")
     for row in results:
         ratio = "-" if row["k_reduction"] is None else f"{1 - row['k_reduction']:.4f}"
-        print(f"{row['law']:<10} {row['damage_law']:<12} {row['k_initial_m2']:>12.5g} {row['k_damaged_m2']:>13.5g} {ratio:>8}")
+        print(
+            f"{row['law']:<10} {row['damage_law']:<12} {row['k_initial_m2']:>12.5g} "
+            f"{row['k_damaged_m2']:>13.5g} {ratio:>8}"
+        )
     for warning in first["warnings"]:
         print(f"warning: {warning}")

@@ -12,7 +12,7 @@ from fdnet.case import Case
 from fdnet.dem.checkpoint import read_history, state_at
 from fdnet.dem.dump import read_frame
 from fdnet.dem.invasion import invade
-from fdnet.dem.liggghts import Binary, find_binary
+from fdnet.dem.liggghts import Binary, Launch, find_binary
 from fdnet.dem.packing import make_pack
 from fdnet.dem.scene import snapshot_of
 from fdnet.errors import CaseError
@@ -53,11 +53,11 @@ class _Story:
     seconds: dict[str, float] = field(default_factory=dict)
     _binary: Binary | None = None
 
-    def binary(self) -> Binary:
-        """The binary, looked up only when a stage needs it."""
+    def launch(self, progress: Progress) -> Launch:
+        """How this run starts LIGGGHTS; the binary is looked up only when a stage needs it."""
         if self._binary is None:
             self._binary = find_binary(self.options.liggghts)
-        return self._binary
+        return Launch(binary=self._binary, ranks=self.options.ranks, timeout=self.options.timeout, follow=progress)
 
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
@@ -120,10 +120,17 @@ def _run_stages(story: _Story) -> dict[str, Any]:
 def _manifest(story: _Story) -> dict[str, Any]:
     pack, invasion = story.folder.record("pack"), story.folder.record("invade")
     assert pack is not None
-    return {"case": story.case.name, "digests": {stage: story.case.digest(stage) for stage in STAGES[:3]},
-            "seed": story.case.seed, "stages": [stage for stage in STAGES if stage != "report" or stage in story.options.stages],
-            "command": story.options.command, "seconds": stage_seconds(pack, invasion, story.seconds),
-            "versions": versions(pack), "pack": pack, "invade": invasion}
+    return {
+        "case": story.case.name,
+        "digests": {stage: story.case.digest(stage) for stage in STAGES[:3]},
+        "seed": story.case.seed,
+        "stages": [stage for stage in STAGES if stage != "report" or stage in story.options.stages],
+        "command": story.options.command,
+        "seconds": stage_seconds(pack, invasion, story.seconds),
+        "versions": versions(pack),
+        "pack": pack,
+        "invade": invasion,
+    }
 
 
 def _pack_stage(story: _Story) -> None:
@@ -131,8 +138,7 @@ def _pack_stage(story: _Story) -> None:
         return
     case, scales = story.case, story.scales
     with story.timed("pack"), Progress("pack", _pack_steps(), show=story.options.show_progress) as progress:
-        pack = make_pack(case, scales, story.path / "pack", binary=story.binary(), ranks=story.options.ranks, follow=progress,
-                         timeout=story.options.timeout)
+        pack = make_pack(case, scales, story.path / "pack", story.launch(progress))
     story.folder.finish("pack", pack_record(case, pack, scales.porosity, story.seconds["pack"]))
 
 
@@ -158,10 +164,11 @@ def _invade_stage(story: _Story) -> None:
         return
     case, scales, folder = story.case, story.scales, story.path / "invade"
     grains = _packed_grains(story)
-    expected = round(min(scales.cap_time, scales.slab_length / scales.upstream_velocity + 2 * scales.plug_time) / scales.time_step)
+    expected = round(
+        min(scales.cap_time, scales.slab_length / scales.upstream_velocity + 2 * scales.plug_time) / scales.time_step
+    )
     with story.timed("invade"), Progress("invade", expected, show=story.options.show_progress) as progress:
-        result = invade(case, scales, grains, folder, binary=story.binary(), ranks=story.options.ranks, follow=progress,
-                        timeout=story.options.timeout)
+        result = invade(case, scales, grains, folder, story.launch(progress))
     story.folder.finish("invade", invade_record(case, result, scales.supplied_count, story.seconds["invade"]))
 
 
@@ -172,8 +179,15 @@ def _analyse_and_report(story: _Story) -> dict[str, Any]:
     damaged = state_at(path / "invade", history[-1], case, story.scales, grains) if history else None
     with story.timed("analyse"):
         analysis = analyse(grains, damaged, periodic=case.periodic, options=_analysis_options(case))
-        results = Results(path=path, case=case, scales=story.scales, grains=grains, damaged=damaged, history=history,
-                          analysis=analysis)
+        results = Results(
+            path=path,
+            case=case,
+            scales=story.scales,
+            grains=grains,
+            damaged=damaged,
+            history=history,
+            analysis=analysis,
+        )
         write_tables(results)
     figures: list[tuple[Path, str]] = []
     notes: list[str] = []
@@ -186,25 +200,42 @@ def _analyse_and_report(story: _Story) -> dict[str, Any]:
 
 def _analysis_options(case: Case) -> AnalysisOptions:
     chosen = case.analysis
-    return AnalysisOptions(sections=chosen.sections, law=chosen.law, damage_law=chosen.damage_law,
-                           threshold=chosen.clogging_threshold, middle_band=chosen.middle_band, overlap=chosen.throat_overlap,
-                           profile_bin=chosen.profile_bin_mm * 1e-3)
+    return AnalysisOptions(
+        sections=chosen.sections,
+        law=chosen.law,
+        damage_law=chosen.damage_law,
+        threshold=chosen.clogging_threshold,
+        middle_band=chosen.middle_band,
+        overlap=chosen.throat_overlap,
+        profile_bin=chosen.profile_bin_mm * 1e-3,
+    )
 
 
-def _write_summary(story: _Story, results: Results, figures: list[tuple[Path, str]], notes: list[str]) -> dict[str, Any]:
+def _write_summary(
+    story: _Story, results: Results, figures: list[tuple[Path, str]], notes: list[str]
+) -> dict[str, Any]:
     from fdnet.report import html, tables
 
     history = results.history
     pack, invasion = story.folder.record("pack"), story.folder.record("invade") if history else None
     assert pack is not None
-    summary = summarise(story.case, results.analysis, pack=pack, invasion=invasion, last=history[-1] if history else None,
-                        seconds=stage_seconds(pack, invasion, story.seconds),
-                        warnings=[*story.scales.warnings, *record_warnings(pack, invasion), *notes])
+    summary = summarise(
+        story.case,
+        results.analysis,
+        pack=pack,
+        invasion=invasion,
+        last=history[-1] if history else None,
+        seconds=stage_seconds(pack, invasion, story.seconds),
+        warnings=[*story.scales.warnings, *record_warnings(pack, invasion), *notes],
+    )
     summary = tables.write_summary(story.path / "summary.json", summary)
     if "report" in story.options.stages:
-        parts = html.ReportParts(figures=figures, case_text=story.case.toml(), scales=scale_rows(story.case, story.scales),
-                                 versions=versions(pack), commands=[story.options.command] if story.options.command else [])
+        parts = html.ReportParts(
+            figures=figures,
+            case_text=story.case.toml(),
+            scales=scale_rows(story.case, story.scales),
+            versions=versions(pack),
+            commands=[story.options.command] if story.options.command else [],
+        )
         html.write_report(story.path / "report.html", summary, parts=parts)
     return summary
-
-

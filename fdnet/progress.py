@@ -27,7 +27,9 @@ class Progress:
             self._open_bar()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self._stop()
 
     def _open_bar(self) -> None:
@@ -35,8 +37,14 @@ class Progress:
         from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
         from rich.progress import Progress as Bar
 
-        bar = Bar(TextColumn("{task.description:>8}"), BarColumn(), TextColumn("{task.fields[note]}"), TimeElapsedColumn(),
-                  console=Console(stderr=True), transient=True)
+        bar = Bar(
+            TextColumn("{task.description:>8}"),
+            BarColumn(),
+            TextColumn("{task.fields[note]}"),
+            TimeElapsedColumn(),
+            console=Console(stderr=True),
+            transient=True,
+        )
         bar.start()
         task = bar.add_task(self.stage, total=self.expected, note="")
         self._draw = lambda: bar.update(task, completed=min(self.step, self.expected), note=self._text())
@@ -76,4 +84,8 @@ class Progress:
 
 def _clock(seconds: float) -> str:
     minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes // 60} h {minutes % 60} min" if minutes >= 60 else (f"{minutes} min {rest} s" if minutes else f"{rest} s")
+    return (
+        f"{minutes // 60} h {minutes % 60} min"
+        if minutes >= 60
+        else (f"{minutes} min {rest} s" if minutes else f"{rest} s")
+    )

@@ -19,10 +19,25 @@ _RECORDS = {"pack": "pack/stage.json", "invade": "invade/stage.json"}
 _OUTPUTS = {
     "pack": ("pack",),
     "invade": ("invade",),
-    "analyse": ("spheres_initial.csv", "spheres_damaged.csv", "sections.csv", "profile.csv", "pores.csv", "throats.csv",
-                "summary.json"),
-    "report": ("figures", "frames", "network.vtp", "spheres_initial.vtp", "spheres_damaged.vtp", "spheres.pvd",
-               "invasion.pvd", "report.html"),
+    "analyse": (
+        "spheres_initial.csv",
+        "spheres_damaged.csv",
+        "sections.csv",
+        "profile.csv",
+        "pores.csv",
+        "throats.csv",
+        "summary.json",
+    ),
+    "report": (
+        "figures",
+        "frames",
+        "network.vtp",
+        "spheres_initial.vtp",
+        "spheres_damaged.vtp",
+        "spheres.pvd",
+        "invasion.pvd",
+        "report.html",
+    ),
 }
 
 
@@ -44,10 +59,20 @@ class RunFolder:
     def manifest(self) -> dict[str, Any] | None:
         """The manifest of an analysed run, or None. Raises CaseError when it or what it lists is damaged."""
         manifest = _read_record(self.path / MANIFEST)
-        missing = [] if manifest is None else [name for stage in ("pack", "invade", "analyse") for name in _expected(manifest, stage)
-                                               if not (self.path / name).exists()]
+        missing = (
+            []
+            if manifest is None
+            else [
+                name
+                for stage in ("pack", "invade", "analyse")
+                for name in _expected(manifest, stage)
+                if not (self.path / name).exists()
+            ]
+        )
         if missing:
-            raise CaseError(f"{self.path}: {MANIFEST} says complete, but {missing[0]} is missing; start over with --force")
+            raise CaseError(
+                f"{self.path}: {MANIFEST} says complete, but {missing[0]} is missing; start over with --force"
+            )
         return manifest
 
     def complete(self, manifest: dict[str, Any] | None) -> None:
@@ -81,9 +106,9 @@ def _expected(manifest: dict[str, Any], stage: str) -> tuple[str, ...]:
 def open_folder(path: Path, case: Case, *, stages: tuple[str, ...], resume: bool, force: bool) -> RunFolder:
     """Lock the folder for this case, making it if need be, and write case.toml.
 
-    Raises CaseError, with nothing changed, when a stage asked for lacks its forerunner, when another run is writing there,
-    when the folder holds another case or an unfinished run and neither resume nor force was asked for, or when it holds
-    something that is not a run.
+    Raises CaseError, with nothing changed, when a stage asked for lacks its forerunner, when another run is writing
+    there, when the folder holds another case or an unfinished run and neither resume nor force was asked for, or when
+    it holds something that is not a run.
     """
     _refuse_foreign(path)
     _refuse_gap(path, case, stages)
@@ -106,7 +131,9 @@ def _take_lock(folder: RunFolder) -> None:
     try:
         fcntl.flock(folder.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
-        raise CaseError(f"{folder.path}: another fdnet run is writing here; wait for it or give another --out") from error
+        raise CaseError(
+            f"{folder.path}: another fdnet run is writing here; wait for it or give another --out"
+        ) from error
 
 
 def _refuse_foreign(path: Path) -> None:
@@ -119,7 +146,9 @@ def _refuse_foreign(path: Path) -> None:
 
 
 def _refuse_gap(path: Path, case: Case, stages: tuple[str, ...]) -> None:
-    needed = ["pack"] * (stages != ("pack",)) + ["invade"] * (bool(case.fines) and bool({"analyse", "report"} & set(stages)))
+    needed = ["pack"] * (stages != ("pack",)) + ["invade"] * (
+        bool(case.fines) and bool({"analyse", "report"} & set(stages))
+    )
     for stage in needed:
         if stage not in stages and not (path / _RECORDS[stage]).exists():
             what = "pack" if stage == "pack" else "invasion"
@@ -131,8 +160,9 @@ def _admit(folder: RunFolder, case: Case, stages: tuple[str, ...], resume: bool,
     if force:
         _force(folder, case, stages)
     elif written.exists() and written.read_bytes() != case.toml().encode():
-        raise CaseError(f"{folder.path}: holds a run of another case (see {written}); give another --out, or --force to "
-                        "replace it")
+        raise CaseError(
+            f"{folder.path}: holds a run of another case (see {written}); give another --out, or --force to replace it"
+        )
     elif (folder.path / UNFINISHED).exists() and not resume:
         raise CaseError(f"{folder.path}: holds an unfinished run; continue it with --resume or start over with --force")
     if force or folder.manifest() is None:
@@ -141,15 +171,17 @@ def _admit(folder: RunFolder, case: Case, stages: tuple[str, ...], resume: bool,
 
 
 def _force(folder: RunFolder, case: Case, stages: tuple[str, ...]) -> None:
-    """Clear the stages asked for and every later one. Refused when an earlier one that is kept belongs to another case."""
+    """Clear the stages asked for and every later one. Refused when a kept earlier one belongs to another case."""
     first = min(STAGES.index(stage) for stage in stages)
     for stage in _RECORDS:
         if STAGES.index(stage) >= first:
             continue
         record = folder.record(stage)
         if record is not None and record["digest"] != case.digest(stage):
-            raise CaseError(f"{folder.path / stage}: belongs to another case; add {stage} to --stages, or give another --out "
-                            "(nothing was changed)")
+            raise CaseError(
+                f"{folder.path / stage}: belongs to another case; add {stage} to --stages, or give another --out "
+                "(nothing was changed)"
+            )
     folder.clear(STAGES[first:])
 
 
@@ -166,5 +198,7 @@ def _read_record(path: Path) -> dict[str, Any] | None:
     except (OSError, ValueError) as error:
         raise CaseError(f"{path}: cannot be read ({error}); start over with --force") from error
     if not isinstance(record, dict) or record.get("format") != RECORD_FORMAT:
-        raise CaseError(f"{path}: is no record of this fdnet (format {RECORD_FORMAT} expected); start over with --force")
+        raise CaseError(
+            f"{path}: is no record of this fdnet (format {RECORD_FORMAT} expected); start over with --force"
+        )
     return record

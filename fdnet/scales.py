@@ -19,12 +19,21 @@ ARRIVALS = 10
 """The default plug time lets at least this many fines of the undisturbed suspension arrive."""
 MOST_STEPS = 2**31 - 1
 _NO_FINES: dict[str, Any] = {
-    "supplied_count": 0, "slab_length": 0.0, "relaxation_time": (0.0, 0.0), "time_step": 0.0, "hold_steps": 0, "plug_time": 0.0,
-    "cap_time": 0.0, "checkpoint_steps": 0, "reynolds": 0.0, "stokes": 0.0, "gravity_over_drag": 0.0, "impact_overlap": 0.0,
-    "drag_overlap": 0.0, "warnings": ()}
-FINE_STEPS_PER_SECOND = {"every_step": 5.0e6, "held": 8.0e6}
-"""Fines times steps per second on one core with fixed grains (measured, +-50 %)."""
-GRAIN_STEPS_PER_SECOND = 5.0e6
+    "supplied_count": 0,
+    "slab_length": 0.0,
+    "relaxation_time": (0.0, 0.0),
+    "time_step": 0.0,
+    "hold_steps": 0,
+    "plug_time": 0.0,
+    "cap_time": 0.0,
+    "checkpoint_steps": 0,
+    "reynolds": 0.0,
+    "stokes": 0.0,
+    "gravity_over_drag": 0.0,
+    "impact_overlap": 0.0,
+    "drag_overlap": 0.0,
+    "warnings": (),
+}
 PACK_STAGES, PACK_STAGE_STEPS, PACK_RELAX_STEPS, PACK_START = 30, 300, 20_000, 0.6
 
 
@@ -87,8 +96,10 @@ def scales_of(case: Case) -> Scales:
     try:
         return _scales(case)
     except (OverflowError, ZeroDivisionError) as error:
-        raise CaseError(f"case {case.name}: a formula leaves the range of numbers ({error}); check units and magnitudes of "
-                        "fluid, fines and run") from error
+        raise CaseError(
+            f"case {case.name}: a formula leaves the range of numbers ({error}); check units and magnitudes of "
+            "fluid, fines and run"
+        ) from error
 
 
 def _scales(case: Case) -> Scales:
@@ -99,13 +110,21 @@ def _scales(case: Case) -> Scales:
     contacts = contacts_of(case)
     pack_step = 0.15 * math.sqrt(mass_range(case.grains)[0] / contacts["grain-grain"].normal_stiffness)
     fine = _fine_scales(case, contacts, interstitial, upstream)
-    return Scales(porosity=porosity, permeability=permeability, darcy_velocity=darcy, interstitial_velocity=interstitial,
-                  upstream_velocity=upstream, stiffness_factor=stiffness_factor(case), contacts=contacts, pack_step=pack_step,
-                  **fine)
+    return Scales(
+        porosity=porosity,
+        permeability=permeability,
+        darcy_velocity=darcy,
+        interstitial_velocity=interstitial,
+        upstream_velocity=upstream,
+        stiffness_factor=stiffness_factor(case),
+        contacts=contacts,
+        pack_step=pack_step,
+        **fine,
+    )
 
 
 def target_porosity(case: Case) -> float:
-    """The porosity asked for; with `grains.count` the plain sum of its spheres (a Case makes sure that it is above 0)."""
+    """The porosity asked for; with `grains.count` the plain sum of its spheres (above 0 in any Case)."""
     if case.grains.count is not None:
         return 1 - case.grains.count * case.grains.mean_volume_m3 / math.prod(case.size_m)
     assert case.grains.porosity is not None
@@ -132,23 +151,39 @@ def _fine_scales(case: Case, contacts: dict[str, Contact], velocity: float, upst
     plug, cap, chunk = _times(case, slab, velocity, upstream, step * hold)
     stiffness = contacts["grain-fine"].normal_stiffness
     result: dict[str, Any] = {
-        "supplied_count": count, "slab_length": slab, "relaxation_time": tau, "time_step": step, "hold_steps": hold,
-        "plug_time": plug, "cap_time": cap, "checkpoint_steps": chunk * hold,
+        "supplied_count": count,
+        "slab_length": slab,
+        "relaxation_time": tau,
+        "time_step": step,
+        "hold_steps": hold,
+        "plug_time": plug,
+        "cap_time": cap,
+        "checkpoint_steps": chunk * hold,
         "reynolds": case.fluid.density_kg_m3 * velocity * 2 * high / viscosity,
         "stokes": tau[1] * velocity / (2 * case.grains.mean_radius_m),
         "gravity_over_drag": _gravity_over_drag(case, velocity),
         "impact_overlap": velocity * math.sqrt(mass_range(fines)[1] / stiffness) / (2 * high),
-        "drag_overlap": 6 * math.pi * viscosity * case.drag.multiplier * velocity / (2 * stiffness)}
+        "drag_overlap": 6 * math.pi * viscosity * case.drag.multiplier * velocity / (2 * stiffness),
+    }
     if result["drag_overlap"] > MOST_DRAG_OVERLAP:
-        raise CaseError(f"run.stiffness_N_m: drag alone would press a fine {100 * result['drag_overlap']:.3g} % of its diameter into "
-                        f"a grain (limit {100 * MOST_DRAG_OVERLAP:.0f} %); raise it, or lower drag.multiplier, viscosity or velocity")
+        raise CaseError(
+            f"run.stiffness_N_m: drag alone would press a fine {100 * result['drag_overlap']:.3g} % of its "
+            "diameter into "
+            f"a grain (limit {100 * MOST_DRAG_OVERLAP:.0f} %); raise it, or lower drag.multiplier, viscosity "
+            "or velocity"
+        )
     if result["checkpoint_steps"] > MOST_STEPS:
-        raise CaseError(f"run.time_step_s: {step:.3g} s needs {result['checkpoint_steps']:.3g} steps between checkpoints (limit "
-                        f"{MOST_STEPS:.3g}); raise the step or shorten run.checkpoint_ms")
+        raise CaseError(
+            f"run.time_step_s: {step:.3g} s needs {result['checkpoint_steps']:.3g} steps between checkpoints (limit "
+            f"{MOST_STEPS:.3g}); raise the step or shorten run.checkpoint_ms"
+        )
     warnings = _warnings(case, result)
     if plug < ARRIVALS * arrival_time(case, upstream):
-        warnings.append(f"run.plug_time_ms: in {1e3 * plug:.3g} ms fewer than {ARRIVALS} fines of the suspension arrive at the face: "
-                        "the invasion may be called plugged too early")
+        warnings.append(
+            f"run.plug_time_ms: in {1e3 * plug:.3g} ms fewer than {ARRIVALS} fines of the suspension arrive at "
+            "the face: "
+            "the invasion may be called plugged too early"
+        )
     return result | {"warnings": tuple(warnings)}
 
 
@@ -166,12 +201,16 @@ def _time_step(case: Case, contacts: dict[str, Contact], tau: float) -> float:
     if case.run.time_step_s is None:
         return min(case.run.time_step_factor * bound, HOLD_WARNING * tau)
     if case.run.time_step_s > CONTACT_STEP_LIMIT * bound:
-        raise CaseError(f"run.time_step_s: {case.run.time_step_s:g} s is above the contact bound "
-                        f"{CONTACT_STEP_LIMIT:g} sqrt(m/k) = {CONTACT_STEP_LIMIT * bound:.3g} s; lower it or "
-                        "run.stiffness_N_m")
+        raise CaseError(
+            f"run.time_step_s: {case.run.time_step_s:g} s is above the contact bound "
+            f"{CONTACT_STEP_LIMIT:g} sqrt(m/k) = {CONTACT_STEP_LIMIT * bound:.3g} s; lower it or "
+            "run.stiffness_N_m"
+        )
     if case.run.time_step_s > HOLD_LIMIT * tau:
-        raise CaseError(f"run.time_step_s: {case.run.time_step_s:g} s is above the drag relaxation time "
-                        f"{tau:.3g} s, explicit drag would overshoot; lower it")
+        raise CaseError(
+            f"run.time_step_s: {case.run.time_step_s:g} s is above the drag relaxation time "
+            f"{tau:.3g} s, explicit drag would overshoot; lower it"
+        )
     return case.run.time_step_s
 
 
@@ -181,8 +220,10 @@ def _hold_steps(case: Case, step: float, tau: float) -> int:
     if case.drag.refresh_steps is None:
         return max(1, math.floor(HOLD_OVER_RELAXATION * tau / step))
     if case.drag.refresh_steps * step > HOLD_LIMIT * tau:
-        raise CaseError(f"drag.refresh_steps: {case.drag.refresh_steps} steps of {step:.3g} s exceed the drag relaxation "
-                        f"time {tau:.3g} s; at most {math.floor(HOLD_LIMIT * tau / step)} steps are stable")
+        raise CaseError(
+            f"drag.refresh_steps: {case.drag.refresh_steps} steps of {step:.3g} s exceed the drag relaxation "
+            f"time {tau:.3g} s; at most {math.floor(HOLD_LIMIT * tau / step)} steps are stable"
+        )
     return case.drag.refresh_steps
 
 
@@ -230,27 +271,23 @@ def _warnings(case: Case, fine: dict[str, Any]) -> list[str]:
         found.append(f"particle Reynolds number {fine['reynolds']:.2g} is outside the range of Stokes drag (below 1)")
     for name in ("impact", "drag"):
         if fine[f"{name}_overlap"] > OVERLAP_WARNING:
-            found.append(f"predicted overlap under {name} is {100 * fine[f'{name}_overlap']:.2g} % of a fine's diameter (above "
-                         f"{100 * OVERLAP_WARNING:.0f} %): raise run.stiffness_N_m")
+            found.append(
+                f"predicted overlap under {name} is {100 * fine[f'{name}_overlap']:.2g} % of a fine's diameter (above "
+                f"{100 * OVERLAP_WARNING:.0f} %): raise run.stiffness_N_m"
+            )
     assert case.fines is not None
     diameter = 2 * case.fines.radius_range_m[1]
     if fine["slab_length"] <= diameter:
-        found.append(f"the slab is lengthened to one fine's diameter, {1e3 * diameter:.3g} mm, so it is thinner than fines.concentration")
+        found.append(
+            f"the slab is lengthened to one fine's diameter, {1e3 * diameter:.3g} mm, so it is thinner than "
+            "fines.concentration"
+        )
     held = fine["hold_steps"] * fine["time_step"] / fine["relaxation_time"][0]
     if held > HOLD_WARNING:
-        found.append(f"drag is held for {held:.2g} of the relaxation time (above {HOLD_WARNING:g}: invasion is biased upward)")
+        found.append(
+            f"drag is held for {held:.2g} of the relaxation time (above {HOLD_WARNING:g}: invasion is biased upward)"
+        )
     return found
-
-
-def run_seconds(case: Case, scales: Scales) -> float:
-    """Estimated seconds of the invasion on one core, +-factor 2: fines times steps over a measured rate."""
-    if case.fines is None:
-        return 0.0
-    expected = min(scales.cap_time, scales.slab_length / scales.upstream_velocity + scales.plug_time)
-    steps = expected / scales.time_step
-    rate = FINE_STEPS_PER_SECOND["held" if scales.hold_steps > 1 else "every_step"]
-    mobile = grain_count(case) if case.grains.motion == "mobile" else 0
-    return steps * (scales.supplied_count / rate + mobile / GRAIN_STEPS_PER_SECOND)
 
 
 def grain_count(case: Case) -> int:

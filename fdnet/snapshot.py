@@ -45,8 +45,14 @@ class Snapshot:
 
     def __post_init__(self) -> None:
         count = len(self.id)
-        shapes = {"box": (3, 2), "id": (count,), "kind": (count,), "position": (count, 3),
-                  "radius": (count,), "velocity": (count, 3)}
+        shapes = {
+            "box": (3, 2),
+            "id": (count,),
+            "kind": (count,),
+            "position": (count, 3),
+            "radius": (count,),
+            "velocity": (count, 3),
+        }
         for name, shape in shapes.items():
             value = frozen(getattr(self, name), np.int64 if name in ("id", "kind") else np.float64)
             if value.shape != shape:
@@ -60,8 +66,16 @@ class Snapshot:
 
     def where(self, mask: Array) -> "Snapshot":
         """The spheres for which `mask` (N,) is true."""
-        return Snapshot(step=self.step, time_s=self.time_s, box=self.box, id=self.id[mask], kind=self.kind[mask],
-                        position=self.position[mask], radius=self.radius[mask], velocity=self.velocity[mask])
+        return Snapshot(
+            step=self.step,
+            time_s=self.time_s,
+            box=self.box,
+            id=self.id[mask],
+            kind=self.kind[mask],
+            position=self.position[mask],
+            radius=self.radius[mask],
+            velocity=self.velocity[mask],
+        )
 
     def grains(self) -> "Snapshot":
         """The big spheres, by kind."""
@@ -73,8 +87,13 @@ class Snapshot:
 
     def joined(self, other: "Snapshot") -> "Snapshot":
         """This snapshot's spheres followed by those of `other`, at the step and time of `other`."""
-        return Snapshot(step=other.step, time_s=other.time_s, box=self.box,
-                        id=np.concatenate([self.id, other.id]), kind=np.concatenate([self.kind, other.kind]),
-                        position=np.concatenate([self.position, other.position]),
-                        radius=np.concatenate([self.radius, other.radius]),
-                        velocity=np.concatenate([self.velocity, other.velocity]))
+        return Snapshot(
+            step=other.step,
+            time_s=other.time_s,
+            box=self.box,
+            id=np.concatenate([self.id, other.id]),
+            kind=np.concatenate([self.kind, other.kind]),
+            position=np.concatenate([self.position, other.position]),
+            radius=np.concatenate([self.radius, other.radius]),
+            velocity=np.concatenate([self.velocity, other.velocity]),
+        )

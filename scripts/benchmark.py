@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Seconds inside and outside LIGGGHTS for whole runs.
 
-    .venv/bin/python scripts/benchmark.py cases/specimen1.toml cases/specimen5.toml --out runs/benchmark --csv docs/benchmark.csv
+    .venv/bin/python scripts/benchmark.py cases/specimen1.toml cases/specimen5.toml --csv docs/benchmark.csv
 
-Every case is run anew in its own folder below --out. "outside" is the wall time of the whole command less the time of all
-LIGGGHTS processes; how much of that went into rejected packs is listed too.
+Every case is run anew in its own folder below --out. "outside" is the wall time of the whole command less the time of
+all LIGGGHTS processes; how much of that went into rejected packs is listed too.
 """
 
 import argparse
@@ -18,8 +18,20 @@ import time
 from pathlib import Path
 from typing import Any
 
-COLUMNS = ("case", "grains", "fines", "wall_s", "liggghts_s", "rejected_packs_s", "outside_s", "outside_share", "network_and_laws_s", "analyse_s",
-           "report_s", "peak_memory_MB")
+COLUMNS = (
+    "case",
+    "grains",
+    "fines",
+    "wall_s",
+    "liggghts_s",
+    "rejected_packs_s",
+    "outside_s",
+    "outside_share",
+    "network_and_laws_s",
+    "analyse_s",
+    "report_s",
+    "peak_memory_MB",
+)
 
 
 def measure(case: Path, out: Path) -> dict[str, Any]:
@@ -30,8 +42,12 @@ def measure(case: Path, out: Path) -> dict[str, Any]:
             sys.exit(f"benchmark: {folder} is not an fdnet run; give another --out")
         shutil.rmtree(folder)
     start = time.monotonic()
-    done = subprocess.run([sys.executable, "-m", "fdnet.cli", "run", str(case), "--out", str(folder), "--json"], check=False, text=True,
-                          stdout=subprocess.PIPE)
+    done = subprocess.run(
+        [sys.executable, "-m", "fdnet.cli", "run", str(case), "--out", str(folder), "--json"],
+        check=False,
+        text=True,
+        stdout=subprocess.PIPE,
+    )
     wall = time.monotonic() - start
     if done.returncode:
         sys.exit(f"benchmark: {case} ended with {done.returncode}")
@@ -46,8 +62,20 @@ def row_of(summary: dict[str, Any], manifest: dict[str, Any], wall: float) -> di
     outside = wall - seconds["liggghts"]
     network = sum(seconds[f"analyse_{part}"] for part in ("tessellate", "occupancy", "conductance", "solve"))
     peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
-    values = (summary["case"], attempts[-1]["grains"], summary["supplied_count"], wall, seconds["liggghts"], rejected, outside, outside / wall,
-              network, seconds["analyse"], seconds["report"], peak)
+    values = (
+        summary["case"],
+        attempts[-1]["grains"],
+        summary["supplied_count"],
+        wall,
+        seconds["liggghts"],
+        rejected,
+        outside,
+        outside / wall,
+        network,
+        seconds["analyse"],
+        seconds["report"],
+        peak,
+    )
     return dict(zip(COLUMNS, values, strict=True))
 
 

@@ -26,38 +26,56 @@ def changed(**parts: dict) -> dict:
 
 
 def test_every_problem_is_listed_at_once():
-    text = problems({"name": "a b", "box": {"size_mm": [8, 4]}, "grains": {"radius_mm": "0.25", "porosity": 1.3, "frction": 2},
-                     "fines": {"radius_mm": 0.08}, "drag": {"multiplier": True}})
-    for part in ("name: 'a b'", "box.size_mm", "grains.radius_mm: '0.25'", "grains.porosity: 1.3", "grains.frction: unknown key",
-                 "did you mean grains.friction?", "fines.count", "drag.multiplier: True"):
+    text = problems(
+        {
+            "name": "a b",
+            "box": {"size_mm": [8, 4]},
+            "grains": {"radius_mm": "0.25", "porosity": 1.3, "frction": 2},
+            "fines": {"radius_mm": 0.08},
+            "drag": {"multiplier": True},
+        }
+    )
+    for part in (
+        "name: 'a b'",
+        "box.size_mm",
+        "grains.radius_mm: '0.25'",
+        "grains.porosity: 1.3",
+        "grains.frction: unknown key",
+        "did you mean grains.friction?",
+        "fines.count",
+        "drag.multiplier: True",
+    ):
         assert part in text
     assert "\n" not in text
 
 
-@pytest.mark.parametrize(("part", "values", "expected"), [
-    ("fines", {"radius_mm": 0.3}, "not below grains.radius_mm 0.25"),
-    ("fines", {"slab_mm": 2.0}, "give exactly one of the two"),
-    ("fines", {"concentration": 0.4}, "fines.concentration: 0.4"),
-    ("grains", {"radius_mm": [0.3, 0.2]}, "must rise"),
-    ("grains", {"count": 0}, "grains.count: 0"),
-    ("box", {"size_mm": [3.0, 0.4, 1.6]}, "a grain does not fit"),
-    ("box", {"size_mm": [3.0, 0.9, 1.6], "sides": "periodic"}, "its own image"),
-    ("box", {"size_mm": [3.0, float("inf"), 1.6]}, "finite number"),
-    ("box", {"size_mm": [3.0, 1e16, 1.6]}, "less than or equal to"),
-    ("gravity", {"acceleration_m_s2": [1.0, 0.0, -9.0]}, "gravity down one axis"),
-    ("gravity", {"acceleration_m_s2": [9.81, 0.0, 0.0]}, "gravity down one axis"),
-    ("run", {"duration_ms": 1.0, "cap_ms": 2.0}, "give one of the two"),
-    ("analysis", {"profile_bin_mm": 1e-9}, "more than 10000 bins"),
-    ("analysis", {"sections": 10**6}, "less than or equal to"),
-    ("fines", {"count": 10**9}, "expected at most 1e+07"),
-    ("fines", {"concentration": 1e-8}, "box lengths"),
-    ("grains", {"count": 200}, "sum to more than the box; expected at most 117"),
-    ("drag", {"field": "network"}, "not available yet"),
-    ("drag", {"scheme": "every_step", "refresh_steps": 5}, "belongs to drag.scheme 'held'"),
-    ("run", {"time_step_factor": 0.3}, "run.time_step_factor: 0.3"),
-    ("analysis", {"law": "darcy"}, "analysis.law: 'darcy'"),
-    ("fluid", {"viscosity_Pas": 0.05}, "unknown key"),
-])
+@pytest.mark.parametrize(
+    ("part", "values", "expected"),
+    [
+        ("fines", {"radius_mm": 0.3}, "not below grains.radius_mm 0.25"),
+        ("fines", {"slab_mm": 2.0}, "give exactly one of the two"),
+        ("fines", {"concentration": 0.4}, "fines.concentration: 0.4"),
+        ("grains", {"radius_mm": [0.3, 0.2]}, "must rise"),
+        ("grains", {"count": 0}, "grains.count: 0"),
+        ("box", {"size_mm": [3.0, 0.4, 1.6]}, "a grain does not fit"),
+        ("box", {"size_mm": [3.0, 0.9, 1.6], "sides": "periodic"}, "its own image"),
+        ("box", {"size_mm": [3.0, float("inf"), 1.6]}, "finite number"),
+        ("box", {"size_mm": [3.0, 1e16, 1.6]}, "less than or equal to"),
+        ("gravity", {"acceleration_m_s2": [1.0, 0.0, -9.0]}, "gravity down one axis"),
+        ("gravity", {"acceleration_m_s2": [9.81, 0.0, 0.0]}, "gravity down one axis"),
+        ("run", {"duration_ms": 1.0, "cap_ms": 2.0}, "give one of the two"),
+        ("analysis", {"profile_bin_mm": 1e-9}, "more than 10000 bins"),
+        ("analysis", {"sections": 10**6}, "less than or equal to"),
+        ("fines", {"count": 10**9}, "expected at most 1e+07"),
+        ("fines", {"concentration": 1e-8}, "box lengths"),
+        ("grains", {"count": 200}, "sum to more than the box; expected at most 117"),
+        ("drag", {"field": "network"}, "not available yet"),
+        ("drag", {"scheme": "every_step", "refresh_steps": 5}, "belongs to drag.scheme 'held'"),
+        ("run", {"time_step_factor": 0.3}, "run.time_step_factor: 0.3"),
+        ("analysis", {"law": "darcy"}, "analysis.law: 'darcy'"),
+        ("fluid", {"viscosity_Pas": 0.05}, "unknown key"),
+    ],
+)
 def test_a_bad_value_is_named_with_its_path(part, values, expected):
     assert expected in problems(changed(**{part: values}))
 
@@ -121,10 +139,29 @@ def test_unreadable_and_malformed_files(tmp_path: Path):
 
 
 def test_fixed_keys_of_the_contract_exist():
-    fixed = {"name", "seed", "box.size_mm", "box.sides", "grains.radius_mm", "grains.porosity", "grains.density_kg_m3",
-             "grains.friction", "grains.motion", "fines.radius_mm", "fines.density_kg_m3", "fines.friction", "fines.concentration",
-             "fluid.viscosity_cP", "fluid.density_kg_m3", "fluid.overbalance_MPa", "drag.field", "drag.multiplier",
-             "analysis.sections", "analysis.law", "analysis.damage_law"}
+    fixed = {
+        "name",
+        "seed",
+        "box.size_mm",
+        "box.sides",
+        "grains.radius_mm",
+        "grains.porosity",
+        "grains.density_kg_m3",
+        "grains.friction",
+        "grains.motion",
+        "fines.radius_mm",
+        "fines.density_kg_m3",
+        "fines.friction",
+        "fines.concentration",
+        "fluid.viscosity_cP",
+        "fluid.density_kg_m3",
+        "fluid.overbalance_MPa",
+        "drag.field",
+        "drag.multiplier",
+        "analysis.sections",
+        "analysis.law",
+        "analysis.damage_law",
+    }
     assert fixed <= set(known_keys())
 
 

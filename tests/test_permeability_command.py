@@ -32,7 +32,9 @@ def test_units_axes_and_fully_periodic_lattice(tmp_path, capsys):
     box = cubic(tmp_path / "sc.csv")
     values = {}
     for units, axis in (("mm", "x"), ("mm", "z"), ("um", "y")):
-        code, out, err = answer(capsys, tmp_path / "sc.csv", "--units", units, "--box", box, "--periodic", "xyz", "--axis", axis, "--json")
+        code, out, err = answer(
+            capsys, tmp_path / "sc.csv", "--units", units, "--box", box, "--periodic", "xyz", "--axis", axis, "--json"
+        )
         assert code == 0, err
         values[units, axis] = json.loads(out)
     result = values["mm", "x"]
@@ -46,22 +48,27 @@ def test_units_axes_and_fully_periodic_lattice(tmp_path, capsys):
 
 def test_all_laws_as_a_table(tmp_path, capsys):
     box = cubic(tmp_path / "sc.csv")
-    code, out, _ = answer(capsys, tmp_path / "sc.csv", "--units", "mm", "--box", box, "--periodic", "yz", "--compare-laws")
+    code, out, _ = answer(
+        capsys, tmp_path / "sc.csv", "--units", "mm", "--box", box, "--periodic", "yz", "--compare-laws"
+    )
     assert code == 0
     for law in ("thesis", "effective", "hydraulic", "series", "thesis-code", "kozeny"):
         assert law in out
 
 
-@pytest.mark.parametrize(("arguments", "said"), [
-    (["--units", "mm", "--box", "0,1,0"], "--box: '0,1,0', expected six numbers"),
-    (["--units", "mm", "--box", "0,4,4,0,0,4"], "each lower bound below the upper"),
-    (["--units", "mm", "--periodic", "xy"], "--box: missing"),
-    (["--units", "mm", "--periodic", "xq"], "--periodic: 'xq'"),
-    (["--units", "furlong"], "invalid choice"),
-    (["--units", "mm", "--sections", "0"], "expected 1 to 1000"),
-    (["--units", "mm", "--law", "darcy"], "invalid choice"),
-    ([], "units"),
-])
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--units", "mm", "--box", "0,1,0"], "--box: '0,1,0', expected six numbers"),
+        (["--units", "mm", "--box", "0,4,4,0,0,4"], "each lower bound below the upper"),
+        (["--units", "mm", "--periodic", "xy"], "--box: missing"),
+        (["--units", "mm", "--periodic", "xq"], "--periodic: 'xq'"),
+        (["--units", "furlong"], "invalid choice"),
+        (["--units", "mm", "--sections", "0"], "expected 1 to 1000"),
+        (["--units", "mm", "--law", "darcy"], "invalid choice"),
+        ([], "units"),
+    ],
+)
 def test_bad_options_end_with_2_and_one_line(tmp_path, capsys, arguments, said):
     cubic(tmp_path / "sc.csv")
     code, out, err = answer(capsys, tmp_path / "sc.csv", *arguments)
@@ -92,7 +99,7 @@ def test_too_few_grains_and_missing_file(tmp_path, capsys):
 
 
 def test_a_pack_without_an_open_path_is_an_answer(tmp_path, capsys):
-    """Spheres of 0.72 spacings close every triangle of the lattice (circumradius 0.707) but leave voids: k = 0 with its reason."""
+    """Spheres of 0.72 spacings close every triangle of the lattice (circumradius 0.707) but leave voids: k = 0."""
     box = cubic(tmp_path / "sc.csv", radius=0.72)
     code, out, err = answer(capsys, tmp_path / "sc.csv", "--units", "mm", "--box", box, "--periodic", "xyz", "--json")
     assert code == 0, err

@@ -18,8 +18,13 @@ SHORT = ("run.cap_ms=0.35",)
 
 
 def fdnet(*arguments: str | Path, **options) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-m", "fdnet.cli", *map(str, arguments)], capture_output=True, text=True, check=False,
-                          **options)
+    return subprocess.run(
+        [sys.executable, "-m", "fdnet.cli", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        **options,
+    )
 
 
 def write_case(folder: Path, *assignments: str) -> Path:
@@ -48,7 +53,14 @@ def test_the_folder_keeps_the_output_contract(finished, root):
     assert summary["invaded_count"] > 0
     assert 0 < summary["k_damaged_m2"] < summary["k_initial_m2"]
     assert {"pack", "invade", "analyse", "report"} <= set(summary["seconds"])
-    for name in ("pack/in.pack", "pack/log.liggghts", "invade/in.invade", "invade/log.liggghts", "report.html", "network.vtp"):
+    for name in (
+        "pack/in.pack",
+        "pack/log.liggghts",
+        "invade/in.invade",
+        "invade/log.liggghts",
+        "report.html",
+        "network.vtp",
+    ):
         assert (run / name).stat().st_size > 0
 
 
@@ -64,8 +76,17 @@ def test_a_finished_run_is_not_repeated(finished):
 
 def test_its_spheres_feed_the_permeability_command(finished):
     run, _, summary = finished
-    answer = fdnet("permeability", run / "spheres_damaged.csv", "--axis", "x", "--box", "0,0.003,0,0.0016,0,0.0016", "--sections", "3",
-                   "--json")
+    answer = fdnet(
+        "permeability",
+        run / "spheres_damaged.csv",
+        "--axis",
+        "x",
+        "--box",
+        "0,0.003,0,0.0016,0,0.0016",
+        "--sections",
+        "3",
+        "--json",
+    )
     assert answer.returncode == 0, answer.stderr
     result = json.loads(answer.stdout)
     assert result["k_initial_m2"] == pytest.approx(summary["k_initial_m2"], rel=1e-9)
@@ -93,7 +114,9 @@ def test_force_with_another_law_keeps_pack_and_invasion(finished, tmp_path):
     run, case, summary = finished
     copy = tmp_path / "run"
     shutil.copytree(run, copy)
-    again = fdnet("run", case, "--out", copy, "--set", "analysis.law=thesis", "--stages", "analyse,report", "--force", "--json")
+    again = fdnet(
+        "run", case, "--out", copy, "--set", "analysis.law=thesis", "--stages", "analyse,report", "--force", "--json"
+    )
     assert again.returncode == 0, again.stderr
     result = json.loads(again.stdout)
     assert result["law"] == "thesis"
@@ -208,7 +231,9 @@ def test_a_stage_without_its_forerunner_is_refused(tmp_path):
 
 def kill_when(command: list[str], ready, sign: int) -> int:
     """Start a run, send `sign` as soon as `ready()` is true; returns the exit code."""
-    process = subprocess.Popen([sys.executable, "-m", "fdnet.cli", *command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "fdnet.cli", *command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
     deadline = time.monotonic() + 60
     while process.poll() is None and not ready() and time.monotonic() < deadline:
         time.sleep(0.005)
@@ -216,11 +241,21 @@ def kill_when(command: list[str], ready, sign: int) -> int:
     return process.wait(30)
 
 
-@pytest.mark.parametrize(("moment", "sign"), [
-    ("pack/attempt_1/in.pack", signal.SIGKILL), ("pack/attempt_1/screen.txt", signal.SIGKILL), ("pack/stage.json", signal.SIGKILL),
-    ("invade/in.invade", signal.SIGKILL), ("invade/history.csv rows", signal.SIGKILL), ("invade/stage.json", signal.SIGKILL),
-    ("sections.csv", signal.SIGKILL), ("figures", signal.SIGKILL), ("pack/attempt_1/screen.txt", signal.SIGTERM),
-    ("invade/history.csv rows", signal.SIGINT)])
+@pytest.mark.parametrize(
+    ("moment", "sign"),
+    [
+        ("pack/attempt_1/in.pack", signal.SIGKILL),
+        ("pack/attempt_1/screen.txt", signal.SIGKILL),
+        ("pack/stage.json", signal.SIGKILL),
+        ("invade/in.invade", signal.SIGKILL),
+        ("invade/history.csv rows", signal.SIGKILL),
+        ("invade/stage.json", signal.SIGKILL),
+        ("sections.csv", signal.SIGKILL),
+        ("figures", signal.SIGKILL),
+        ("pack/attempt_1/screen.txt", signal.SIGTERM),
+        ("invade/history.csv rows", signal.SIGINT),
+    ],
+)
 def test_a_run_killed_at_any_moment_is_completed_by_resume(finished, tmp_path, moment, sign):
     run, case, summary = finished
     out = tmp_path / "run"
@@ -263,8 +298,14 @@ def test_two_runs_cannot_write_the_same_folder(tmp_path):
 def test_bad_input_writes_nothing_and_ends_with_2(tmp_path):
     case = write_case(tmp_path)
     out = tmp_path / "run"
-    for arguments in ([tmp_path / "none.toml"], [case, "--set", "fines.radius_mm=0.4"], [case, "--np", "0"], [case, "--set", "x"],
-                      [case, "--nonsense"], [case, "--set", "run.time_step_s=1e-6"]):
+    for arguments in (
+        [tmp_path / "none.toml"],
+        [case, "--set", "fines.radius_mm=0.4"],
+        [case, "--np", "0"],
+        [case, "--set", "x"],
+        [case, "--nonsense"],
+        [case, "--set", "run.time_step_s=1e-6"],
+    ):
         refused = fdnet("run", *arguments, "--out", out)
         assert refused.returncode == 2, arguments
         assert len(refused.stderr.strip().splitlines()) == 1, refused.stderr
@@ -343,7 +384,7 @@ def test_an_intact_pack_needs_no_fines(tmp_path):
     case = tmp_path / "case.toml"
     text = tiny("grains.count=70").toml()
     start = text.index("[fines]")
-    case.write_text(text[:start] + text[text.index("[fluid]"):])
+    case.write_text(text[:start] + text[text.index("[fluid]") :])
     done = fdnet("run", case, "--out", tmp_path / "run", "--json")
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout)
@@ -374,13 +415,18 @@ def test_render_writes_decks_and_scales_without_a_binary(tmp_path, monkeypatch):
 
 def test_run_case_script_equals_fdnet_run(finished, root):
     run, case, summary = finished
-    done = subprocess.run([sys.executable, root / "scripts" / "run_case.py", case, "--out", run, "--json"], capture_output=True, text=True,
-                          check=False)
+    done = subprocess.run(
+        [sys.executable, root / "scripts" / "run_case.py", case, "--out", run, "--json"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert json.loads(done.stdout) == summary
 
 
 def test_help_is_quick_to_import():
     """The heavy libraries are imported only by the commands that need them."""
-    code = "import sys, fdnet.cli; fdnet.cli._parser(); print([m for m in ('numpy', 'pandas', 'pyvista', 'scipy') if m in sys.modules])"
+    heavy = ("numpy", "pandas", "pyvista", "scipy")
+    code = f"import sys, fdnet.cli; fdnet.cli._parser(); print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.stdout.strip() == "[]"

@@ -80,8 +80,9 @@ def test_given_velocity_replaces_darcy():
     assert scales.darcy_velocity == pytest.approx(3.0 * scales.porosity)
 
 
-@pytest.mark.parametrize(("assignment", "bound"), [
-    ("run.time_step_s=1e-6", "contact bound"), ("drag.refresh_steps=100000", "are stable")])
+@pytest.mark.parametrize(
+    ("assignment", "bound"), [("run.time_step_s=1e-6", "contact bound"), ("drag.refresh_steps=100000", "are stable")]
+)
 def test_a_step_beyond_its_bound_is_refused_with_the_bound(assignment, bound):
     with pytest.raises(CaseError, match=bound):
         scales_of(tiny(assignment))
@@ -107,7 +108,9 @@ def test_drag_that_presses_contacts_shut_is_refused():
         scales_of(tiny("drag.multiplier=1000"))
 
 
-@pytest.mark.parametrize("assignment", ["fluid.overbalance_MPa=1e-17", "fluid.viscosity_cP=1e15", "run.time_step_s=1e-18"])
+@pytest.mark.parametrize(
+    "assignment", ["fluid.overbalance_MPa=1e-17", "fluid.viscosity_cP=1e15", "run.time_step_s=1e-18"]
+)
 def test_extreme_numbers_are_refused_not_crashed_on(assignment):
     with pytest.raises(CaseError):
         scales_of(tiny(assignment))
@@ -129,10 +132,12 @@ def test_a_duration_is_met_by_whole_chunks():
 
 
 def test_damping_against_a_fixed_grain_makes_up_for_the_mass_liggghts_takes():
-    """LIGGGHTS damps with rate x m1 m2/(m1+m2), the fine moves alone: rate = 2 zeta sqrt(k m_fine) / (m1 m2/(m1+m2))."""
+    """LIGGGHTS damps with rate x m1 m2/(m1+m2), the fine moves alone: rate = 2 zeta sqrt(k m_fine) (1/m1 + 1/m2)."""
     contact = scales_of(tiny("fines.radius_mm=0.2", "fines.count=60")).contacts["grain-fine"]
     fine, grain = (4 / 3 * math.pi * r**3 * rho for r, rho in ((0.2e-3, 2146), (0.25e-3, 2650)))
-    assert contact.damping_rate == pytest.approx(2 * 0.2 * math.sqrt(contact.normal_stiffness * fine) * (1 / fine + 1 / grain))
+    assert contact.damping_rate == pytest.approx(
+        2 * 0.2 * math.sqrt(contact.normal_stiffness * fine) * (1 / fine + 1 / grain)
+    )
 
 
 def test_every_row_has_formula_source_and_a_finite_value(specimen1):

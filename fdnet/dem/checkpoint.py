@@ -58,7 +58,7 @@ def csv_row(row: Checkpoint) -> str:
 
 
 def read_history(folder: Path) -> tuple[Checkpoint, ...]:
-    """All checkpoints recorded in history.csv; an unfinished last line is left out. Raises LiggghtsError if there are none."""
+    """All checkpoints of history.csv but an unfinished last line. Raises LiggghtsError if there are none."""
     try:
         text = (folder / HISTORY).read_text(errors="replace")
     except OSError:
@@ -116,20 +116,25 @@ def check_counts(folder: Path, row: Checkpoint, damaged: Snapshot, supplied: int
     inside = int(np.count_nonzero((fines.position[:, 0] >= 0) & (fines.position[:, 0] < length)))
     upstream = int(np.count_nonzero(fines.position[:, 0] < 0))
     if inside != row.invaded or upstream != row.upstream - row.removed_upstream:
-        raise LiggghtsError(f"{folder}/post/invade_{row.step}.dump: {inside} fines inside and {upstream} upstream, expected "
-                            f"{row.invaded} and {row.upstream - row.removed_upstream} as in {HISTORY}")
+        raise LiggghtsError(
+            f"{folder}/post/invade_{row.step}.dump: {inside} fines inside and {upstream} upstream, expected "
+            f"{row.invaded} and {row.upstream - row.removed_upstream} as in {HISTORY}"
+        )
     if row.upstream + row.invaded + row.passed != supplied:
-        raise LiggghtsError(f"{folder / HISTORY}: step {row.step}: upstream {row.upstream} + invaded {row.invaded} + passed "
-                            f"{row.passed} is not the {supplied} supplied: fines were lost; lower run.time_step_factor")
+        raise LiggghtsError(
+            f"{folder / HISTORY}: step {row.step}: upstream {row.upstream} + invaded {row.invaded} + passed "
+            f"{row.passed} is not the {supplied} supplied: fines were lost; lower run.time_step_factor"
+        )
 
 
 def step_of(path: Path) -> int:
     return int(path.stem.rsplit("_", 1)[1])
 
 
-def readable_states(folder: Path, history: Sequence[Checkpoint], case: Case, scales: Scales,
-                    grains: Snapshot) -> Iterator[tuple[Checkpoint, Snapshot]]:
-    """The states behind `history`, each checked against its counts; earlier dumps that are missing or cut are passed over.
+def readable_states(
+    folder: Path, history: Sequence[Checkpoint], case: Case, scales: Scales, grains: Snapshot
+) -> Iterator[tuple[Checkpoint, Snapshot]]:
+    """The states behind `history`, checked against its counts; earlier dumps that are missing or cut are passed over.
 
     Raises DumpError when the last one is, LiggghtsError when counts disagree.
     """

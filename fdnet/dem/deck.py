@@ -37,8 +37,14 @@ class Deck:
 def _environment() -> jinja2.Environment:
     folder = files("liggghts_templates")
     loader = jinja2.FunctionLoader(lambda name: _source(folder, name))
-    return jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined, trim_blocks=True,
-                              lstrip_blocks=True, keep_trailing_newline=True, autoescape=False)
+    return jinja2.Environment(
+        loader=loader,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
 
 
 def _source(folder: Any, name: str) -> str | None:

@@ -80,7 +80,7 @@ class _Reader:
         end = self.data.find(b"\n", self.position)
         if end < 0:
             raise self.fail("the file ends in the middle of a line. The run was cut; continue it with --resume.")
-        text = self.data[self.position:end]
+        text = self.data[self.position : end]
         self.position, self.line = end + 1, self.line + 1
         return text
 
@@ -91,7 +91,7 @@ class _Reader:
         text = self.take()
         if not text.startswith(expected):
             raise self.fail(f"found {text[:60]!r}, expected {expected.decode()!r}", line)
-        return text[len(expected):]
+        return text[len(expected) :]
 
     def whole(self, what: str) -> int:
         line, text = self.line, self.take()
@@ -127,11 +127,13 @@ class _Reader:
     def rows(self, count: int, columns: tuple[str, ...]) -> Array:
         end = self.data.find(_ITEMS[0], self.position)
         end = len(self.data) if end < 0 else end
-        body, first = self.data[self.position:end], self.line
+        body, first = self.data[self.position : end], self.line
         found = body.count(b"\n")
         if found != count or (body and not body.endswith(b"\n")):
             what = "then the file ends" if end == len(self.data) else "then the next frame begins"
-            raise self.fail(f"{found} of {count} rows, {what}. The run was cut; continue it with --resume.", first + found)
+            raise self.fail(
+                f"{found} of {count} rows, {what}. The run was cut; continue it with --resume.", first + found
+            )
         self.position, self.line = end, first + found
         table = _table(body, columns) if count else np.empty((0, len(columns)))
         if table is None:
@@ -143,9 +145,20 @@ def _table(body: bytes, columns: tuple[str, ...]) -> Array | None:
     """The rows as numbers (N, C), or None when one is short, long, not a number or not finite."""
     trailing = ["trailing space"] if body[: body.index(b"\n")].endswith(b" ") else []
     try:
-        table = pd.read_csv(io.BytesIO(body), sep=" ", header=None, names=[*columns, *trailing], usecols=list(columns),
-                            dtype=np.float64, engine="c", na_filter=False, index_col=False, on_bad_lines="error",
-                            skip_blank_lines=False, **_EXACT)
+        table = pd.read_csv(
+            io.BytesIO(body),
+            sep=" ",
+            header=None,
+            names=[*columns, *trailing],
+            usecols=list(columns),
+            dtype=np.float64,
+            engine="c",
+            na_filter=False,
+            index_col=False,
+            on_bad_lines="error",
+            skip_blank_lines=False,
+            **_EXACT,
+        )
     except (ValueError, pd.errors.ParserError):
         return None
     values = table.to_numpy()

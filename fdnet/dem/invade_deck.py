@@ -49,7 +49,9 @@ def _bounds(case: Case, scales: Scales, grains: Snapshot) -> Array:
     return np.array([[start - 2 * margin, size[0] + 2 * margin], [0.0, size[1]], [0.0, size[2]]])
 
 
-def render_invade(case: Case, scales: Scales, grains: Snapshot, *, ranks: int = 1, resume: Checkpoint | None = None) -> Deck:
+def render_invade(
+    case: Case, scales: Scales, grains: Snapshot, *, ranks: int = 1, resume: Checkpoint | None = None
+) -> Deck:
     """The invasion deck, fresh or continued from a checkpoint's restart."""
     assert case.fines is not None
     mobile = case.grains.motion == "mobile"
@@ -58,42 +60,70 @@ def render_invade(case: Case, scales: Scales, grains: Snapshot, *, ranks: int = 
     wall_friction = any(c.friction > 0 for c in frictional if "wall" in c.pair)
     gravity, left_out = _gravity(case, scales)
     left_out += _left_out(case, friction=friction, ranks=ranks)
-    text = render_text("invade.in.j2", header_variables(case, "invade", left_out, ranks) | {
-        "resume": {"restart": f"post/invade_{resume.step}.restart"} if resume else None,
-        "skin": number(case.fines.radius_range_m[0]),
-        "contacts": contact_variables(case, scales, "invade", friction=friction), "time_step": number(scales.time_step),
-        "walls": wall_variables(case, "invade", friction=wall_friction), "fixed_grains": not mobile,
-        "moving": "all" if mobile else "fines", "gravity": gravity, "dump_group": "all" if mobile else "fines",
-        "start_velocity": number(scales.upstream_velocity), "fluid_velocity": number(scales.interstitial_velocity),
-        "drag": _drag(case, scales), "regions": _regions(case, scales, grains),
-        "thermo_steps": max(1, scales.checkpoint_steps // 4), "quiet_checkpoints": quiet_chunks(scales),
-        "empty_checkpoints": empty_chunks(case, scales),
-        "start": _start(resume), "chunks": chunks_of(scales), "chunk_steps": scales.checkpoint_steps,
-        "stop_when_plugged": case.run.duration_ms is None, "dump_columns": COLUMNS, "dump_format": FORMAT})
+    text = render_text(
+        "invade.in.j2",
+        header_variables(case, "invade", left_out, ranks)
+        | {
+            "resume": {"restart": f"post/invade_{resume.step}.restart"} if resume else None,
+            "skin": number(case.fines.radius_range_m[0]),
+            "contacts": contact_variables(case, scales, "invade", friction=friction),
+            "time_step": number(scales.time_step),
+            "walls": wall_variables(case, "invade", friction=wall_friction),
+            "fixed_grains": not mobile,
+            "moving": "all" if mobile else "fines",
+            "gravity": gravity,
+            "dump_group": "all" if mobile else "fines",
+            "start_velocity": number(scales.upstream_velocity),
+            "fluid_velocity": number(scales.interstitial_velocity),
+            "drag": _drag(case, scales),
+            "regions": _regions(case, scales, grains),
+            "thermo_steps": max(1, scales.checkpoint_steps // 4),
+            "quiet_checkpoints": quiet_chunks(scales),
+            "empty_checkpoints": empty_chunks(case, scales),
+            "start": _start(resume),
+            "chunks": chunks_of(scales),
+            "chunk_steps": scales.checkpoint_steps,
+            "stop_when_plugged": case.run.duration_ms is None,
+            "dump_columns": COLUMNS,
+            "dump_format": FORMAT,
+        },
+    )
     return Deck(text=text, stage="invade", digest=case.digest("invade"), left_out=tuple(left_out))
 
 
 def _start(resume: Checkpoint | None) -> dict[str, int]:
     if resume is None:
         return {"chunk": 1, "passed": 0, "behind": 0, "most": 0, "quiet": 0}
-    return {"chunk": resume.chunk + 1, "passed": resume.passed, "behind": resume.removed_upstream,
-            "most": resume.most_crossed, "quiet": resume.quiet}
+    return {
+        "chunk": resume.chunk + 1,
+        "passed": resume.passed,
+        "behind": resume.removed_upstream,
+        "most": resume.most_crossed,
+        "quiet": resume.quiet,
+    }
 
 
 def _drag(case: Case, scales: Scales) -> dict[str, Any]:
     coefficient = 6 * math.pi * case.fluid.viscosity_cP * 1e-3 * case.drag.multiplier
     slower = scales.interstitial_velocity - scales.upstream_velocity
     fluid = f"(f_uf[1]-(x<0.0)*{number(slower)})" if slower else "f_uf[1]"
-    return {"coefficient": number(coefficient), "fluid_x": fluid, "hold_steps": scales.hold_steps if scales.hold_steps > 1 else 0}
+    return {
+        "coefficient": number(coefficient),
+        "fluid_x": fluid,
+        "hold_steps": scales.hold_steps if scales.hold_steps > 1 else 0,
+    }
 
 
 def _regions(case: Case, scales: Scales, grains: Snapshot) -> dict[str, str]:
     bounds, length, margin = _bounds(case, scales, grains), case.size_m[0], _margin(case, scales)
     behind = bounds[0, 0] + margin
     sides = "INF INF INF INF"
-    return {"specimen": f"0.0 {number(np.nextafter(length, 0))} {sides}",
-            "upstream": f"{number(np.nextafter(behind, 0))} {number(-5e-324)} {sides}",
-            "beyond": f"{number(length)} INF {sides}", "behind": f"INF {number(behind)} {sides}"}
+    return {
+        "specimen": f"0.0 {number(np.nextafter(length, 0))} {sides}",
+        "upstream": f"{number(np.nextafter(behind, 0))} {number(-5e-324)} {sides}",
+        "beyond": f"{number(length)} INF {sides}",
+        "behind": f"INF {number(behind)} {sides}",
+    }
 
 
 def _gravity(case: Case, scales: Scales) -> tuple[dict[str, Any] | None, list[LeftOut]]:
@@ -102,9 +132,17 @@ def _gravity(case: Case, scales: Scales) -> tuple[dict[str, Any] | None, list[Le
     if mode == "off" or magnitude == 0:
         return None, [LeftOut(what="gravity and buoyancy", why="switched off")]
     if mode == "auto" and scales.gravity_over_drag < case.gravity.negligible_below:
-        return None, [LeftOut(what="gravity and buoyancy",
-                              why=f"gravity is {scales.gravity_over_drag:.1e} of the drag, below {case.gravity.negligible_below:g}")]
-    pull = {"magnitude": number(magnitude), "direction": " ".join(number(c / magnitude) for c in vector), "buoyancy": None}
+        return None, [
+            LeftOut(
+                what="gravity and buoyancy",
+                why=f"gravity is {scales.gravity_over_drag:.1e} of the drag, below {case.gravity.negligible_below:g}",
+            )
+        ]
+    pull = {
+        "magnitude": number(magnitude),
+        "direction": " ".join(number(c / magnitude) for c in vector),
+        "buoyancy": None,
+    }
     if not case.gravity.buoyancy:
         return pull, [LeftOut(what="buoyancy", why="switched off")]
     axis = next(name for name, component in zip("xyz", vector, strict=True) if component)

@@ -1,7 +1,7 @@
 """The invasion: fines driven into the pack until plugged, with a checkpoint after every chunk of steps."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fdnet.atomic import disk_is_full, write_text
@@ -22,7 +22,7 @@ from fdnet.dem.checkpoint import (
 )
 from fdnet.dem.deck import Deck, LeftOut
 from fdnet.dem.invade_deck import render_invade, write_invade_inputs
-from fdnet.dem.liggghts import SCREEN, Binary, Run, run_deck
+from fdnet.dem.liggghts import SCREEN, Launch, Run, run_deck
 from fdnet.errors import LiggghtsError
 from fdnet.scales import Scales
 from fdnet.snapshot import Snapshot
@@ -42,41 +42,63 @@ class Invasion:
     runs: tuple[Run, ...]
 
 
-def invade(case: Case, scales: Scales, grains: Snapshot, folder: Path, *, binary: Binary, ranks: int = 1,
-           follow: Callable[[str], None] | None = None, timeout: float | None = None) -> Invasion:
+def invade(case: Case, scales: Scales, grains: Snapshot, folder: Path, launch: Launch) -> Invasion:
     """Drive the fines in; continues from the last whole checkpoint when `folder` holds one.
 
     Raises LiggghtsError when a run fails or fines are lost, CaseError when the fines cannot be placed.
     """
     (folder / "post").mkdir(parents=True, exist_ok=True)
-    run, deck, anew = None, None, []
-    while deck is None or run is None:
-        last = last_checkpoint(folder, case, grains)
-        if last is None and (folder / HISTORY).exists() and len((folder / HISTORY).read_text(errors="replace").splitlines()) > 1:
-            anew = ["no checkpoint of the cut invasion could be used, it was begun anew"]
-        deck = _prepare(case, scales, grains, folder, last, ranks)
-        if _over(case, scales, last):
-            break
-        name = "in.invade" if last is None else "in.invade.resume"
-        run = _run(folder, name, last, binary=binary, ranks=ranks, follow=_Keeper(folder, follow), timeout=timeout)
+    anew = _has_history(folder) and last_checkpoint(folder, case, grains) is None
+    deck, run = _drive(case, scales, grains, folder, launch)
     history = read_history(folder)
     overlaps, damaged = [], grains
     for _, damaged in readable_states(folder, history, case, scales, grains):
         overlaps.append(max_overlap(damaged, case.periodic, only_fines=True))
     reason, warnings = _ending(case, scales, history)
+    if anew:
+        warnings.append("no checkpoint of the cut invasion could be used, it was begun anew")
     if len(overlaps) < len(history):
-        warnings.append(f"{len(history) - len(overlaps)} of {len(history)} checkpoint dumps cannot be read: they are missing from the "
-                        "largest overlap and from invasion.pvd")
-    return Invasion(damaged=damaged, history=history, stop_reason=reason, max_overlap=max(overlaps), step_s=scales.time_step,
-                    left_out=deck.left_out, warnings=(*anew, *warnings), runs=(run,) if run else ())
+        lost = len(history) - len(overlaps)
+        warnings.append(
+            f"{lost} of {len(history)} checkpoint dumps cannot be read: they are missing from the largest overlap "
+            "and from invasion.pvd"
+        )
+    return Invasion(
+        damaged=damaged,
+        history=history,
+        stop_reason=reason,
+        max_overlap=max(overlaps),
+        step_s=scales.time_step,
+        left_out=deck.left_out,
+        warnings=tuple(warnings),
+        runs=(run,) if run else (),
+    )
 
 
-def _run(folder: Path, deck: str, last: Checkpoint | None, *, binary: Binary, ranks: int, follow: Callable[[str], None],
-         timeout: float | None) -> Run | None:
-    """The run, or None when LIGGGHTS could not read the restart (a full disk cuts it silently): it is set aside, so that
-    the checkpoint before it is tried next."""
+def _has_history(folder: Path) -> bool:
+    path = folder / HISTORY
+    return path.exists() and path.read_text(errors="replace").count("\n") > 1
+
+
+def _drive(case: Case, scales: Scales, grains: Snapshot, folder: Path, launch: Launch) -> tuple[Deck, Run | None]:
+    """Run to the end of the invasion; no run when the last checkpoint was the end already."""
+    while True:
+        last = last_checkpoint(folder, case, grains)
+        deck = _prepare(case, scales, grains, folder, ranks=launch.ranks, last=last)
+        if _over(case, scales, last):
+            return deck, None
+        run = _run(folder, last, replace(launch, follow=_Keeper(folder, launch.follow)))
+        if run is not None:
+            return deck, run
+
+
+def _run(folder: Path, last: Checkpoint | None, launch: Launch) -> Run | None:
+    """The run, or None when LIGGGHTS could not read the restart (a full disk cuts it silently).
+
+    The restart is then set aside, so that the checkpoint before it is tried next.
+    """
     try:
-        return run_deck(folder, deck, binary=binary, ranks=ranks, follow=follow, timeout=timeout)
+        return run_deck(folder, "in.invade" if last is None else "in.invade.resume", launch)
     except LiggghtsError:
         said = (folder / SCREEN).read_text(encoding="utf-8", errors="replace")
         if last is None or "FDNET restoring" not in said or "FDNET restored" in said:
@@ -98,7 +120,9 @@ class _Keeper:
     def __call__(self, line: str) -> None:
         if line.startswith("FDNET checkpoint"):
             if disk_is_full(self.folder):
-                raise LiggghtsError(f"{self.folder}: the disk is full, LIGGGHTS was stopped; make room and continue with --resume")
+                raise LiggghtsError(
+                    f"{self.folder}: the disk is full, LIGGGHTS was stopped; make room and continue with --resume"
+                )
             files = sorted((self.folder / "post").glob("invade_*.restart"), key=step_of)
             for old in files[:-2]:
                 old.unlink(missing_ok=True)
@@ -112,7 +136,9 @@ def _over(case: Case, scales: Scales, last: Checkpoint | None) -> bool:
     return (case.run.duration_ms is None and quiet_enough(case, scales, last)) or last.chunk >= chunks_of(scales)
 
 
-def _prepare(case: Case, scales: Scales, grains: Snapshot, folder: Path, last: Checkpoint | None, ranks: int) -> Deck:
+def _prepare(
+    case: Case, scales: Scales, grains: Snapshot, folder: Path, *, ranks: int, last: Checkpoint | None
+) -> Deck:
     if last is None:
         for stale in [folder / HISTORY, *(folder / "post").glob("invade_*")]:
             stale.unlink(missing_ok=True)
@@ -140,14 +166,19 @@ def _ending(case: Case, scales: Scales, history: tuple[Checkpoint, ...]) -> tupl
         reason = "plugged" if waiting > 0 else "supply_exhausted"
     else:
         reason = "cap"
-        warnings.append(f"invasion stopped at its cap of {1e3 * scales.cap_time:.3g} ms before the stop rule held: raise run.cap_ms")
+        warnings.append(
+            f"invasion stopped at its cap of {1e3 * scales.cap_time:.3g} ms before the stop rule held: raise run.cap_ms"
+        )
     if waiting == 0:
-        warnings.append("no fine is left upstream: the end was decided by an empty slab, raise fines.count or "
-                        "fines.slab_mm")
+        warnings.append(
+            "no fine is left upstream: the end was decided by an empty slab, raise fines.count or fines.slab_mm"
+        )
     before = history[-min(len(history), quiet_chunks(scales) + 1)]
     if reason == "plugged" and last.passed > before.passed:
-        warnings.append(f"the face was plugged, but {last.passed - before.passed} fines still left through the outlet meanwhile: "
-                        "raise run.plug_time_ms to follow them")
+        warnings.append(
+            f"the face was plugged, but {last.passed - before.passed} fines still left through the outlet meanwhile: "
+            "raise run.plug_time_ms to follow them"
+        )
     if last.removed_upstream:
         warnings.append(f"{last.removed_upstream} fines bounced out upstream and were removed")
     return reason, warnings

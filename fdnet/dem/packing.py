@@ -4,7 +4,6 @@ import json
 import math
 import os
 import shutil
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from fdnet.contact_law import sphere_mass
 from fdnet.contacts import max_overlap
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
 from fdnet.dem.dump import COLUMNS, FORMAT, read_frame
-from fdnet.dem.liggghts import Binary, Run, run_deck
+from fdnet.dem.liggghts import Launch, Run, run_deck
 from fdnet.dem.scene import box_of, contact_variables, header_variables, snapshot_of, wall_variables, write_data
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.network.porosity import measure_porosity
@@ -45,8 +44,7 @@ class Pack:
     run: Run
 
 
-def make_pack(case: Case, scales: Scales, folder: Path, *, binary: Binary, ranks: int = 1,
-              follow: Callable[[str], None] | None = None, timeout: float | None = None) -> Pack:
+def make_pack(case: Case, scales: Scales, folder: Path, launch: Launch) -> Pack:
     """Pack until the porosity (overlap counted once) is within 0.003 of the target, by adjusting the count.
 
     Raises CaseError when the porosity cannot be reached, LiggghtsError when a run fails or does not come to rest.
@@ -55,9 +53,16 @@ def make_pack(case: Case, scales: Scales, folder: Path, *, binary: Binary, ranks
     counts, tried = [grain_count(case)], []
     while True:
         attempt = folder / f"attempt_{len(counts)}"
-        pack = _attempt(case, scales, attempt, counts[-1], binary=binary, ranks=ranks, follow=follow, timeout=timeout)
-        tried.append({"grains": len(pack.grains), "porosity": pack.porosity, "porosity_error": pack.porosity_error,
-                      "max_overlap": pack.max_overlap, "liggghts_s": pack.run.seconds})
+        pack = _attempt(case, scales, attempt, launch, count=counts[-1])
+        tried.append(
+            {
+                "grains": len(pack.grains),
+                "porosity": pack.porosity,
+                "porosity_error": pack.porosity_error,
+                "max_overlap": pack.max_overlap,
+                "liggghts_s": pack.run.seconds,
+            }
+        )
         _refuse_overlap(case, pack)
         if case.grains.count is not None or _met(case, pack):
             return _accept(folder, attempt, pack, tried)
@@ -67,9 +72,15 @@ def make_pack(case: Case, scales: Scales, folder: Path, *, binary: Binary, ranks
 
 def _refuse_overlap(case: Case, pack: Pack) -> None:
     if pack.max_overlap > case.grains.max_overlap:
-        asked = f"grains.porosity: {case.grains.porosity}" if case.grains.count is None else f"grains.count: {case.grains.count}"
-        raise CaseError(f"{asked} needs grains that overlap by {100 * pack.max_overlap:.1f} % of a diameter (limit "
-                        f"grains.max_overlap {case.grains.max_overlap:g}); take a looser pack or raise the limit")
+        asked = (
+            f"grains.porosity: {case.grains.porosity}"
+            if case.grains.count is None
+            else f"grains.count: {case.grains.count}"
+        )
+        raise CaseError(
+            f"{asked} needs grains that overlap by {100 * pack.max_overlap:.1f} % of a diameter (limit "
+            f"grains.max_overlap {case.grains.max_overlap:g}); take a looser pack or raise the limit"
+        )
 
 
 def _met(case: Case, pack: Pack) -> bool:
@@ -91,9 +102,11 @@ def _next_count(case: Case, tried: list[dict[str, Any]]) -> int:
     done = {row["grains"] for row in tried}
     around = [count for count in (guess, guess + 1, guess - 1, guess + 2, guess - 2) if count > 0 and count not in done]
     if not around or len(tried) >= ATTEMPTS:
-        raise CaseError(f"grains.porosity: {target} not met within {POROSITY_TOLERANCE} after {len(tried)} packs, nearest "
-                        f"{nearest[0]['porosity']:.4f} with {nearest[0]['grains']} grains (one grain is {grain:.4f}); use a "
-                        "larger box, another seed, or give grains.count")
+        raise CaseError(
+            f"grains.porosity: {target} not met within {POROSITY_TOLERANCE} after {len(tried)} packs, nearest "
+            f"{nearest[0]['porosity']:.4f} with {nearest[0]['grains']} grains (one grain is {grain:.4f}); use a "
+            "larger box, another seed, or give grains.count"
+        )
     return around[0]
 
 
@@ -108,37 +121,48 @@ def _accept(folder: Path, attempt: Path, pack: Pack, tried: list[dict[str, Any]]
     return replace(pack, attempts=tuple(tried))
 
 
-def _attempt(case: Case, scales: Scales, folder: Path, count: int, *, binary: Binary, ranks: int,
-             follow: Callable[[str], None] | None, timeout: float | None) -> Pack:
+def _attempt(case: Case, scales: Scales, folder: Path, launch: Launch, *, count: int) -> Pack:
     if folder.exists():
         shutil.rmtree(folder)
     (folder / "post").mkdir(parents=True)
-    deck = write_pack_inputs(case, scales, folder, count=count, ranks=ranks)
-    run = _run(case, folder, count, binary=binary, ranks=ranks, follow=follow, timeout=timeout)
+    deck = write_pack_inputs(case, scales, folder, count=count, ranks=launch.ranks)
+    run = _run(case, folder, count, launch)
     frame = read_frame(folder / "post" / "pack.dump")
     screen = (folder / "screen.txt").read_text(encoding="utf-8", errors="replace")
     if "FDNET restless" in screen:
-        raise LiggghtsError(f"{folder}: the pack did not come to rest in {REST_RUNS * RELAX_RUN_STEPS} steps; "
-                            "lower grains.max_overlap demands or raise grains.porosity")
+        raise LiggghtsError(
+            f"{folder}: the pack did not come to rest in {REST_RUNS * RELAX_RUN_STEPS} steps; "
+            "lower grains.max_overlap demands or raise grains.porosity"
+        )
     grains = snapshot_of(frame, case, time_s=0.0)
     if len(grains) != count:
         raise LiggghtsError(f"{folder}/post/pack.dump: {len(grains)} grains, expected {count}: some were lost")
     porosity = measure_porosity(grains, periodic=case.periodic)
-    return Pack(grains=grains, porosity=porosity.mean, porosity_error=porosity.standard_error, porosity_sum=porosity.sum,
-                max_overlap=max_overlap(grains, case.periodic), steps=frame.step, step_s=scales.pack_step, attempts=(), left_out=deck.left_out,
-                run=run)
+    return Pack(
+        grains=grains,
+        porosity=porosity.mean,
+        porosity_error=porosity.standard_error,
+        porosity_sum=porosity.sum,
+        max_overlap=max_overlap(grains, case.periodic),
+        steps=frame.step,
+        step_s=scales.pack_step,
+        attempts=(),
+        left_out=deck.left_out,
+        run=run,
+    )
 
 
-def _run(case: Case, folder: Path, count: int, *, binary: Binary, ranks: int, follow: Callable[[str], None] | None,
-         timeout: float | None) -> Run:
+def _run(case: Case, folder: Path, count: int, launch: Launch) -> Run:
     try:
-        return run_deck(folder, "in.pack", binary=binary, ranks=ranks, follow=follow, timeout=timeout)
+        return run_deck(folder, "in.pack", launch)
     except LiggghtsError as error:
         if "Lost atoms" not in str(error):
             raise
         key = "grains.porosity" if case.grains.count is None else "grains.count"
-        raise CaseError(f"{key}: {count} grains needs more room than the box has, some were pushed out of it while growing; "
-                        "raise the porosity, lower the count or enlarge the box") from error
+        raise CaseError(
+            f"{key}: {count} grains needs more room than the box has, some were pushed out of it while growing; "
+            "raise the porosity, lower the count or enlarge the box"
+        ) from error
 
 
 def write_pack_inputs(case: Case, scales: Scales, folder: Path, *, count: int, ranks: int = 1) -> Deck:
@@ -149,15 +173,24 @@ def write_pack_inputs(case: Case, scales: Scales, folder: Path, *, count: int, r
     rng = np.random.default_rng([case.seed, count])
     small, size = PACK_START * radii, np.array(case.size_m)
     margin = small[:, None] * np.array([1.0, *([0.0, 0.0] if case.box.sides == "periodic" else [1.0, 1.0])])
-    seeds = Snapshot(step=0, time_s=0.0, box=box_of(case), id=np.arange(1, count + 1), kind=np.full(count, Kind.GRAIN),
-                     position=margin + rng.random((count, 3)) * (size - 2 * margin), radius=small,
-                     velocity=np.zeros((count, 3)))
-    write_data(folder / "pack.data", seeds, bounds=box_of(case), density=np.full(count, case.grains.density_kg_m3), types=2)
+    seeds = Snapshot(
+        step=0,
+        time_s=0.0,
+        box=box_of(case),
+        id=np.arange(1, count + 1),
+        kind=np.full(count, Kind.GRAIN),
+        position=margin + rng.random((count, 3)) * (size - 2 * margin),
+        radius=small,
+        velocity=np.zeros((count, 3)),
+    )
+    write_data(
+        folder / "pack.data", seeds, bounds=box_of(case), density=np.full(count, case.grains.density_kg_m3), types=2
+    )
     return deck
 
 
 def draw_radii(case: Case, count: int) -> Array:
-    """`count` radii (N,) m, uniform by number; the last grain closes the plain sum of the target as far as its range allows."""
+    """`count` radii (N,) m, uniform by number; the last closes the target's plain sum as far as it can."""
     low, high = case.grains.radius_range_m
     radii = np.random.default_rng([case.seed, 7]).uniform(low, high, count)
     if low < high and count > 1:
@@ -171,21 +204,36 @@ def render_pack(case: Case, scales: Scales, *, count: int, ranks: int = 1) -> De
     stiffness = scales.contacts["grain-grain"].normal_stiffness
     low, high = case.grains.radius_range_m
     mass = sphere_mass(low, case.grains.density_kg_m3)
-    left_out = [LeftOut(what="friction and tangential history", why="grains are packed frictionless"),
-                LeftOut(what="gravity", why="only the geometry of the pack is wanted"),
-                LeftOut(what="fines and fluid", why="the pack is made before the invasion")]
+    left_out = [
+        LeftOut(what="friction and tangential history", why="grains are packed frictionless"),
+        LeftOut(what="gravity", why="only the geometry of the pack is wanted"),
+        LeftOut(what="fines and fluid", why="the pack is made before the invasion"),
+    ]
     if ranks == 1:
         left_out.append(LeftOut(what="MPI processor grid", why="one rank"))
     contacts = contact_variables(case, scales, "pack", friction=False)
     contacts["damping"] = " ".join([number(0.8 * math.sqrt(stiffness / mass))] * contacts["size"] ** 2)
-    text = render_text("pack.in.j2", header_variables(case, "pack", left_out, ranks) | {
-        "skin": number(0.4 * low), "contacts": contacts, "walls": wall_variables(case, "pack", friction=False),
-        "time_step": number(scales.pack_step), "viscous": number(0.03 * math.sqrt(stiffness * mass)),
-        "thermo_steps": RELAX_RUN_STEPS, "density": number(case.grains.density_kg_m3),
-        "stages": [number((PACK_START + (1 - PACK_START) * s / PACK_STAGES) / PACK_START) for s in range(1, PACK_STAGES + 1)],
-        "stage_steps": PACK_STAGE_STEPS, "relax_runs": REST_RUNS, "relax_steps": RELAX_RUN_STEPS,
-        "rest_energy": number(count * 1e-10 * 0.5 * stiffness * (0.02 * high) ** 2),
-        "dump_columns": COLUMNS, "dump_format": FORMAT})
+    text = render_text(
+        "pack.in.j2",
+        header_variables(case, "pack", left_out, ranks)
+        | {
+            "skin": number(0.4 * low),
+            "contacts": contacts,
+            "walls": wall_variables(case, "pack", friction=False),
+            "time_step": number(scales.pack_step),
+            "viscous": number(0.03 * math.sqrt(stiffness * mass)),
+            "thermo_steps": RELAX_RUN_STEPS,
+            "density": number(case.grains.density_kg_m3),
+            "stages": [
+                number((PACK_START + (1 - PACK_START) * s / PACK_STAGES) / PACK_START)
+                for s in range(1, PACK_STAGES + 1)
+            ],
+            "stage_steps": PACK_STAGE_STEPS,
+            "relax_runs": REST_RUNS,
+            "relax_steps": RELAX_RUN_STEPS,
+            "rest_energy": number(count * 1e-10 * 0.5 * stiffness * (0.02 * high) ** 2),
+            "dump_columns": COLUMNS,
+            "dump_format": FORMAT,
+        },
+    )
     return Deck(text=text, stage="pack", digest=case.digest("pack"), left_out=tuple(left_out))
-
-

@@ -18,8 +18,14 @@ _MATERIALS = {"pack": ("grain", "wall"), "invade": ("grain", "fine", "wall")}
 def header_variables(case: Case, stage: str, left_out: list[LeftOut], ranks: int) -> dict[str, Any]:
     """Variables of `_header.in.j2`; several ranks never cut the flow direction (fines crowd at the face)."""
     sideways = "p p" if case.box.sides == "periodic" else "f f"
-    return {"stage": stage, "case_name": case.name, "digest": case.digest(stage), "left_out": left_out,
-            "boundary": f"f {sideways}", "processors": "1 * *" if ranks > 1 else ""}
+    return {
+        "stage": stage,
+        "case_name": case.name,
+        "digest": case.digest(stage),
+        "left_out": left_out,
+        "boundary": f"f {sideways}",
+        "processors": "1 * *" if ranks > 1 else "",
+    }
 
 
 def contact_variables(case: Case, scales: Scales, stage: str, *, friction: bool) -> dict[str, Any]:
@@ -31,10 +37,16 @@ def contact_variables(case: Case, scales: Scales, stage: str, *, friction: bool)
 
     size = len(materials)
     tangential = " tangential history" if friction else ""
-    return {"materials": " ".join(materials), "size": size, "normal": matrix("normal_stiffness"),
-            "damping": matrix("damping_rate"), "shear": matrix("shear_stiffness"),
-            "no_damping": " ".join(["0"] * size**2), "friction": matrix("friction") if friction else "",
-            "pair_model": f"hooke/stiffness{tangential}{_settings(friction)}"}
+    return {
+        "materials": " ".join(materials),
+        "size": size,
+        "normal": matrix("normal_stiffness"),
+        "damping": matrix("damping_rate"),
+        "shear": matrix("shear_stiffness"),
+        "no_damping": " ".join(["0"] * size**2),
+        "friction": matrix("friction") if friction else "",
+        "pair_model": f"hooke/stiffness{tangential}{_settings(friction)}",
+    }
 
 
 def _settings(friction: bool) -> str:
@@ -64,14 +76,23 @@ def wall_variables(case: Case, stage: str, *, friction: bool) -> list[dict[str, 
 
 def _wall(name: str, group: str, material: int, position: float, friction: bool) -> dict[str, Any]:
     model = "hooke/stiffness" + (" tangential history" if friction else "")
-    return {"id": name, "group": group, "model": model, "material": material, "plane": f"{name[1]}plane",
-            "position": number(position), "settings": _settings(friction)}
+    return {
+        "id": name,
+        "group": group,
+        "model": model,
+        "material": material,
+        "plane": f"{name[1]}plane",
+        "position": number(position),
+        "settings": _settings(friction),
+    }
 
 
 def write_data(path: Path, spheres: Snapshot, *, bounds: Array, density: Array, types: int) -> None:
     """The spheres (N) as a LIGGGHTS data file; `bounds` (3, 2) m of the simulation box, `density` (N,) kg/m3."""
     lines = ["spheres", "", f"{len(spheres)} atoms", f"{types} atom types", ""]
-    lines += [f"{number(low)} {number(high)} {axis}lo {axis}hi" for (low, high), axis in zip(bounds, "xyz", strict=True)]
+    lines += [
+        f"{number(low)} {number(high)} {axis}lo {axis}hi" for (low, high), axis in zip(bounds, "xyz", strict=True)
+    ]
     lines += ["", "Atoms", ""]
     table = np.column_stack([spheres.id, spheres.kind, 2 * spheres.radius, density, spheres.position])
     lines += [f"{atom:.0f} {kind:.0f} " + " ".join(f"{value:.17g}" for value in rest) for atom, kind, *rest in table]
@@ -88,6 +109,13 @@ def snapshot_of(frame: Frame, case: Case, *, time_s: float) -> Snapshot:
     for axis, periodic in enumerate(case.periodic):
         if periodic:
             position[:, axis] = np.mod(position[:, axis], case.size_m[axis])
-    return Snapshot(step=frame.step, time_s=time_s, box=box_of(case), id=frame.column("id"), kind=frame.column("type"),
-                    position=position, radius=frame.column("radius"),
-                    velocity=np.column_stack([frame.column(f"v{c}") for c in "xyz"]))
+    return Snapshot(
+        step=frame.step,
+        time_s=time_s,
+        box=box_of(case),
+        id=frame.column("id"),
+        kind=frame.column("type"),
+        position=position,
+        radius=frame.column("radius"),
+        velocity=np.column_stack([frame.column(f"v{c}") for c in "xyz"]),
+    )

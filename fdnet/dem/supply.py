@@ -32,8 +32,16 @@ def place_fines(case: Case, scales: Scales, grains: Snapshot) -> Snapshot:
     velocity = np.zeros((len(radius), 3))
     velocity[:, 0] = scales.upstream_velocity
     first = int(grains.id.max()) + 1
-    return Snapshot(step=0, time_s=0.0, box=grains.box, id=np.arange(first, first + len(radius)),
-                    kind=np.full(len(radius), Kind.FINE), position=position, radius=radius, velocity=velocity)
+    return Snapshot(
+        step=0,
+        time_s=0.0,
+        box=grains.box,
+        id=np.arange(first, first + len(radius)),
+        kind=np.full(len(radius), Kind.FINE),
+        position=position,
+        radius=radius,
+        velocity=velocity,
+    )
 
 
 def _add_sequentially(case: Case, radius: Array, slab: tuple[float, float], rng: np.random.Generator) -> Array:
@@ -54,8 +62,11 @@ def _add_sequentially(case: Case, radius: Array, slab: tuple[float, float], rng:
         position[waiting[free]] = drawn[free]
         done, placed = np.concatenate([done, waiting[free]]), np.concatenate([placed, drawn[free]])
         waiting = waiting[~free]
-    raise CaseError(f"fines.concentration: {case.fines.concentration if case.fines else 0:g} leaves {len(waiting)} of {len(radius)} fines "
-                    f"without a place in a slab of {1e3 * size[0]:.3g} mm; lower it or lengthen fines.slab_mm")
+    raise CaseError(
+        f"fines.concentration: {case.fines.concentration if case.fines else 0:g} leaves {len(waiting)} of "
+        f"{len(radius)} fines "
+        f"without a place in a slab of {1e3 * size[0]:.3g} mm; lower it or lengthen fines.slab_mm"
+    )
 
 
 def _free(points: Array, radius: Array, placed: int, period: Array) -> Array:

@@ -80,8 +80,7 @@ def _height(network: Network) -> Array:
 
 
 def _apex_angles(network: Network, height: Array) -> Array:
-    """Signed solid angle (T, 3) at the facet's corners of the pyramid to the point at `height` above its circumcentre.
-    """
+    """Signed solid angle (T, 3) at the facet's corners of the pyramid to the point `height` above its circumcentre."""
     base = geometry.flat(network.throat_corner)
     middle = _circumcentre_2d(base)
     apex = np.concatenate([middle, height[:, None]], axis=1)[:, None]
@@ -112,6 +111,10 @@ def _hidden_by_pairs(network: Network) -> tuple[Array, Array]:
     return volume, surface
 
 
-LAWS: dict[str, Law] = {"thesis": thesis_law, "effective": effective_law, "hydraulic": hydraulic_law,
-                        "series": series_law}
+LAWS: dict[str, Law] = {
+    "thesis": thesis_law,
+    "effective": effective_law,
+    "hydraulic": hydraulic_law,
+    "series": series_law,
+}
 DEFAULT_LAW = "series"

@@ -28,8 +28,13 @@ class Pairs:
 
     def where(self, mask: Array) -> "Pairs":
         """The pairs for which `mask` (K,) is true."""
-        return Pairs(sphere=self.sphere[mask], offset=self.offset[mask], depth=self.depth[mask], tube=self.tube[mask],
-                     length=self.length[mask])
+        return Pairs(
+            sphere=self.sphere[mask],
+            offset=self.offset[mask],
+            depth=self.depth[mask],
+            tube=self.tube[mask],
+            length=self.length[mask],
+        )
 
 
 def exact_volume(pairs: Pairs) -> Array:

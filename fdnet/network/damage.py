@@ -34,14 +34,24 @@ class DamageLaw(Protocol):
     """A damage law: clean conductance (T,) in, Damage out."""
 
     def __call__(
-        self, network: Network, occupancy: Occupancy, clean: Array, *, threshold: float | None = None,
+        self,
+        network: Network,
+        occupancy: Occupancy,
+        clean: Array,
+        *,
+        threshold: float | None = None,
         middle_band: str = "threshold",
     ) -> Damage: ...
 
 
 def thesis_damage(
-    network: Network, occupancy: Occupancy, clean: Array, *, threshold: float | None = None,
-    middle_band: str = "threshold", default_threshold: float = TEXT_THRESHOLD,
+    network: Network,
+    occupancy: Occupancy,
+    clean: Array,
+    *,
+    threshold: float | None = None,
+    middle_band: str = "threshold",
+    default_threshold: float = TEXT_THRESHOLD,
 ) -> Damage:
     """Two-scale rule of Shi 2011, section 3.2.4, on the throat porosity phi in the inscribed cylinder.
 
@@ -88,7 +98,11 @@ def _lines_the_wall(occupancy: Occupancy) -> Array:
 
 
 def kozeny_damage(
-    network: Network, occupancy: Occupancy, clean: Array, *, threshold: float | None = None,
+    network: Network,
+    occupancy: Occupancy,
+    clean: Array,
+    *,
+    threshold: float | None = None,
     middle_band: str = "threshold",
 ) -> Damage:
     """Local Kozeny factor per pore, (1 - v)^3 / (1 + a)^2, harmonic mean of a throat's two pores on its conductance.
@@ -111,8 +125,13 @@ def _pore_factors(network: Network, occupancy: Occupancy) -> tuple[Array, Array,
     group = network.pore_group
     solid, surface, void, wall = (
         np.bincount(group, weights=weights)[group]
-        for weights in (occupancy.pore_solid_volume, occupancy.pore_solid_surface, network.pore_volume,
-                        network.pore_wall_surface))
+        for weights in (
+            occupancy.pore_solid_volume,
+            occupancy.pore_solid_surface,
+            network.pore_volume,
+            network.pore_wall_surface,
+        )
+    )
     taken = solid > 0
     filled = taken & ((void <= 0) | (wall <= 0) | (solid >= void))
     safe = taken & ~filled
@@ -121,6 +140,9 @@ def _pore_factors(network: Network, occupancy: Occupancy) -> tuple[Array, Array,
     return np.where(filled, 0.0, (1.0 - v) ** 3 / (1.0 + a) ** 2), taken, filled
 
 
-DAMAGE_LAWS: dict[str, DamageLaw] = {"thesis": thesis_damage, "kozeny": kozeny_damage,
-                                     "thesis-code": partial(thesis_damage, default_threshold=CODE_THRESHOLD)}
+DAMAGE_LAWS: dict[str, DamageLaw] = {
+    "thesis": thesis_damage,
+    "kozeny": kozeny_damage,
+    "thesis-code": partial(thesis_damage, default_threshold=CODE_THRESHOLD),
+}
 DEFAULT_DAMAGE_LAW = "kozeny"

@@ -71,8 +71,10 @@ def tessellate(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Tetrah
         if len(found.grain) and np.all((margin >= needed) | (~np.array(periodic) & (margin >= size))):
             return found
         margin = np.maximum(margin * 1.25, min(needed, 4.0 * float(margin.max())))
-    raise NetworkError(f"tessellation of {len(grains)} grains: voids reach {needed:.3g} m, wider than the images "
-                       f"around the box of {size.tolist()} m; give more grains or a smaller box")
+    raise NetworkError(
+        f"tessellation of {len(grains)} grains: voids reach {needed:.3g} m, wider than the images "
+        f"around the box of {size.tolist()} m; give more grains or a smaller box"
+    )
 
 
 def _check(grains: Snapshot, periodic: tuple[bool, ...]) -> None:
@@ -84,8 +86,10 @@ def _check(grains: Snapshot, periodic: tuple[bool, ...]) -> None:
     close = tree.query_pairs(COINCIDENT * float(grains.radius.min()), output_type="ndarray")
     if len(close):
         first, second = grains.id[close[0]]
-        raise NetworkError(f"tessellation: grains {first} and {second} coincide at {grains.position[close[0, 0]]} m "
-                           f"({len(close)} such pairs); remove the doubles")
+        raise NetworkError(
+            f"tessellation: grains {first} and {second} coincide at {grains.position[close[0, 0]]} m "
+            f"({len(close)} such pairs); remove the doubles"
+        )
 
 
 def _shake(grains: Snapshot, images: Images) -> Array:
@@ -105,17 +109,27 @@ def _tessellate_once(grains: Snapshot, periodic: tuple[bool, ...], margin: Array
     try:
         found = Delaunay(points)
     except QhullError as error:
-        raise NetworkError(f"tessellation of {len(grains)} grains failed, they lie in one plane or line: "
-                           f"{str(error).splitlines()[0]}") from error
+        raise NetworkError(
+            f"tessellation of {len(grains)} grains failed, they lie in one plane or line: {str(error).splitlines()[0]}"
+        ) from error
     if len(found.coplanar):
-        raise NetworkError(f"tessellation: {len(found.coplanar)} grains coincide with another grain's image "
-                           "across a side; check the box against the grain positions")
+        raise NetworkError(
+            f"tessellation: {len(found.coplanar)} grains coincide with another grain's image "
+            "across a side; check the box against the grain positions"
+        )
     corner = _unique(images, found.simplices, periodic)
     shaken = points[corner]
     centre, reach = geometry.circumcentre(shaken)
-    return Tetrahedra(grain=images.owner[corner], corner=images.position[corner], shift=images.shift[corner],
-                      mirror=images.mirror[corner], label=label(images)[corner], reach=reach * scale,
-                      shaken=shaken * scale + grains.box[:, 0], centre=centre * scale + grains.box[:, 0])
+    return Tetrahedra(
+        grain=images.owner[corner],
+        corner=images.position[corner],
+        shift=images.shift[corner],
+        mirror=images.mirror[corner],
+        label=label(images)[corner],
+        reach=reach * scale,
+        shaken=shaken * scale + grains.box[:, 0],
+        centre=centre * scale + grains.box[:, 0],
+    )
 
 
 def _unique(images: Images, corner: Array, periodic: tuple[bool, ...]) -> Array:
@@ -145,11 +159,17 @@ def share_facets(tetrahedra: Tetrahedra, *, periodic: tuple[bool, bool, bool]) -
     single = np.setdiff1d(np.arange(4 * count), np.concatenate([first, second]))
     unmatched = int(np.sum(~_beyond(tetrahedra, single, periodic)))
     if unmatched > max(4, UNMATCHED_SHARE * len(first)):
-        raise NetworkError(f"tessellation: {unmatched} of {len(first)} facets have no partner; the grains do not tile "
-                           "the box, check the box and the periodic sides")
+        raise NetworkError(
+            f"tessellation: {unmatched} of {len(first)} facets have no partner; the grains do not tile "
+            "the box, check the box and the periodic sides"
+        )
     base = shifts[:, 0]
-    return Facets(pore=np.stack([first // 4, second // 4], axis=1), opposite=np.stack([first % 4, second % 4], axis=1),
-                  shift=base[first] - base[second], counts={"throats_unmatched": unmatched})
+    return Facets(
+        pore=np.stack([first // 4, second // 4], axis=1),
+        opposite=np.stack([first % 4, second % 4], axis=1),
+        shift=base[first] - base[second],
+        counts={"throats_unmatched": unmatched},
+    )
 
 
 def without_side_walls(
@@ -166,12 +186,16 @@ def without_side_walls(
     mirror = np.take_along_axis(tetrahedra.mirror[facets.pore[:, 0]], corners[..., None], axis=1)
     in_face = cut_axes(mirror)[:, 0]
     use = (kept_ends == 2) & ~in_face
-    counts = {**facets.counts, "throats_at_side_walls_dropped": int(np.sum(kept_ends == 1)),
-              "throats_in_end_faces_dropped": int(np.sum((kept_ends == 2) & in_face))}
+    counts = {
+        **facets.counts,
+        "throats_at_side_walls_dropped": int(np.sum(kept_ends == 1)),
+        "throats_in_end_faces_dropped": int(np.sum((kept_ends == 2) & in_face)),
+    }
     index = np.cumsum(keep) - 1
     thinned = {field.name: getattr(tetrahedra, field.name)[keep] for field in fields(tetrahedra)}
-    return Tetrahedra(**thinned), Facets(pore=index[facets.pore[use]], opposite=facets.opposite[use],
-                                         shift=facets.shift[use], counts=counts)
+    return Tetrahedra(**thinned), Facets(
+        pore=index[facets.pore[use]], opposite=facets.opposite[use], shift=facets.shift[use], counts=counts
+    )
 
 
 def _beyond(tetrahedra: Tetrahedra, facet: Array, periodic: tuple[bool, ...]) -> Array:

@@ -45,8 +45,10 @@ def _oriented(corner: Array) -> Array:
 
 
 def _with_images(network: Network, fines: Snapshot) -> tuple[Array, Array]:
-    reach = np.maximum(network.box[:, 0] - network.pore_corner.min(axis=(0, 1)),
-                       network.pore_corner.max(axis=(0, 1)) - network.box[:, 1])
+    reach = np.maximum(
+        network.box[:, 0] - network.pore_corner.min(axis=(0, 1)),
+        network.pore_corner.max(axis=(0, 1)) - network.box[:, 1],
+    )
     margin = np.maximum(reach, 0.0) + float(fines.radius.max())
     margin[1:] = np.where(network.periodic[1:], margin[1:], np.nan)
     images = make_images(fines.position, network.box, periodic=network.periodic, margin=margin, hair=0.0)

@@ -72,16 +72,32 @@ def solve_flow(network: Network, conductance: Array, *, span: tuple[float, float
     flux = _link_flux(links, pressure)
     isolated = int(np.sum((state == BETWEEN) & ~free))
     if not np.any(flux):
-        return Flow(pore_pressure=frozen(pressure), throat_flux=frozen(np.zeros(len(conductance))), method=METHOD,
-                    residual=0.0, mass_balance=None, inflow=0.0, isolated_pores=isolated,
-                    reason=f"no open path from x = {low:g} m to x = {high:g} m")
+        return Flow(
+            pore_pressure=frozen(pressure),
+            throat_flux=frozen(np.zeros(len(conductance))),
+            method=METHOD,
+            residual=0.0,
+            mass_balance=None,
+            inflow=0.0,
+            isolated_pores=isolated,
+            reason=f"no open path from x = {low:g} m to x = {high:g} m",
+        )
     inflow, outflow = _through(links, flux, INLET), -_through(links, flux, OUTLET)
     per_throat = np.zeros(len(conductance))
     per_throat[links.throat] = flux
-    return _checked(Flow(
-        pore_pressure=frozen(pressure), throat_flux=frozen(per_throat), method=METHOD, inflow=inflow,
-        residual=_imbalance(links, flux, free) / inflow, mass_balance=abs(inflow - outflow) / inflow,
-        isolated_pores=isolated, reason=""), bounds=(0.0, 1.0))
+    return _checked(
+        Flow(
+            pore_pressure=frozen(pressure),
+            throat_flux=frozen(per_throat),
+            method=METHOD,
+            inflow=inflow,
+            residual=_imbalance(links, flux, free) / inflow,
+            mass_balance=abs(inflow - outflow) / inflow,
+            isolated_pores=isolated,
+            reason="",
+        ),
+        bounds=(0.0, 1.0),
+    )
 
 
 def _check(conductance: Array, count: int) -> None:
@@ -89,8 +105,10 @@ def _check(conductance: Array, count: int) -> None:
         raise FlowError(f"conductance has shape {conductance.shape}, expected ({count},), one per throat")
     bad = np.flatnonzero(~np.isfinite(conductance) | (conductance < 0))
     if len(bad):
-        raise FlowError(f"throat {bad[0]}: conductance {conductance[bad[0]]} m3 is not finite or negative "
-                        f"({len(bad)} such throats); check the law and the fines")
+        raise FlowError(
+            f"throat {bad[0]}: conductance {conductance[bad[0]]} m3 is not finite or negative "
+            f"({len(bad)} such throats); check the law and the fines"
+        )
 
 
 def _beside_planes(network: Network, x: Array, low: float, high: float) -> Array:
@@ -105,15 +123,18 @@ def _cut_links(network: Network, conductance: Array, low: float, high: float) ->
     throat = np.concatenate([np.arange(len(conductance)), turned])
     x = network.throat_ends[throat, :, 0]
     # a throat across a periodic x face appears at both ends of the box
-    x[len(conductance):] -= (network.throat_shift[turned, 0] * (network.box[0, 1] - network.box[0, 0]))[:, None]
+    x[len(conductance) :] -= (network.throat_shift[turned, 0] * (network.box[0, 1] - network.box[0, 0]))[:, None]
     side = _beside_planes(network, x, low, high)
     use = ((side[:, 0] == BETWEEN) | (side[:, 0] != side[:, 1])) & (conductance[throat] > 0)
     throat, x, side = throat[use], x[use], side[use]
     inside, whole = np.diff(np.clip(x, low, high), axis=1)[:, 0], np.diff(x, axis=1)[:, 0]
     cut = np.any(side != BETWEEN, axis=1)
     share = np.divide(inside, whole, out=np.ones(len(x)), where=cut)
-    return _Links(ends=np.where(side == BETWEEN, network.throat_pores[throat], side), throat=throat,
-                  conductance=conductance[throat] / np.maximum(share, SHORTEST_SHARE))
+    return _Links(
+        ends=np.where(side == BETWEEN, network.throat_pores[throat], side),
+        throat=throat,
+        conductance=conductance[throat] / np.maximum(share, SHORTEST_SHARE),
+    )
 
 
 def _tied_to_both(links: _Links, state: Array) -> Array:
@@ -168,8 +189,10 @@ def _checked(flow: Flow, *, bounds: tuple[float, float]) -> Flow:
     within = not len(pressure) or (low >= bounds[0] - TOLERANCE and high <= bounds[1] + TOLERANCE)
     balance = flow.mass_balance or 0.0
     if not (np.isfinite(flow.inflow) and flow.residual <= TOLERANCE and balance <= TOLERANCE and within):
-        raise FlowError(f"solve of {len(pressure)} pores: residual {flow.residual:.2g}, in/out balance {balance:.2g}, "
-                        f"pressures {low:.6g} to {high:.6g}; expected <= {TOLERANCE:g} and pressures within {bounds}")
+        raise FlowError(
+            f"solve of {len(pressure)} pores: residual {flow.residual:.2g}, in/out balance {balance:.2g}, "
+            f"pressures {low:.6g} to {high:.6g}; expected <= {TOLERANCE:g} and pressures within {bounds}"
+        )
     return flow
 
 
@@ -193,15 +216,30 @@ def _solve_period(network: Network, conductance: Array) -> Flow:
     per_throat = np.zeros(len(conductance))
     links = _Links(ends=pair, conductance=g, throat=open_throat)
     if not live.any():
-        return Flow(pore_pressure=frozen(np.full(count, np.nan)), throat_flux=frozen(per_throat), method=METHOD,
-                    residual=0.0, mass_balance=None, inflow=0.0, isolated_pores=count,
-                    reason="no open path around the period along x")
+        return Flow(
+            pore_pressure=frozen(np.full(count, np.nan)),
+            throat_flux=frozen(per_throat),
+            method=METHOD,
+            residual=0.0,
+            mass_balance=None,
+            inflow=0.0,
+            isolated_pores=count,
+            reason="no open path around the period along x",
+        )
     per_throat[open_throat] = np.where(live[pair[:, 0]], flux, 0.0)
-    return _checked(Flow(
-        pore_pressure=frozen(np.where(live, pressure, np.nan)), throat_flux=frozen(per_throat), method=METHOD,
-        residual=_imbalance(links, flux, np.ones(count, bool)) / inflow, inflow=inflow,
-        mass_balance=abs(float(np.sum(flux * jump)) - inflow) / inflow, isolated_pores=int(np.sum(~live)), reason=""),
-        bounds=(-np.inf, np.inf))
+    return _checked(
+        Flow(
+            pore_pressure=frozen(np.where(live, pressure, np.nan)),
+            throat_flux=frozen(per_throat),
+            method=METHOD,
+            residual=_imbalance(links, flux, np.ones(count, bool)) / inflow,
+            inflow=inflow,
+            mass_balance=abs(float(np.sum(flux * jump)) - inflow) / inflow,
+            isolated_pores=int(np.sum(~live)),
+            reason="",
+        ),
+        bounds=(-np.inf, np.inf),
+    )
 
 
 def _solve_jumps(pair: Array, g: Array, jump: Array, free: Array) -> Array:

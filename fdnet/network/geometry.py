@@ -54,8 +54,7 @@ def touching_sphere(corner: Array, radius: Array) -> tuple[Array, Array]:
 
 
 def touching_circle(triangle: Array, radius: Array) -> Array:
-    """Radius (...) of the circle touching three discs from outside in the plane of `triangle` (..., 3, 3); NaN if none.
-    """
+    """Radius (...) of the circle touching three discs from outside in the plane of `triangle` (..., 3, 3), or NaN."""
     return _touching(flat(triangle), radius)[1]
 
 
@@ -147,8 +146,12 @@ def disc_lens_area(first: Array, second: Array, apart: Array) -> Array:
     a, b, d = first[cross], second[cross], apart[cross]
     to_chord = (d**2 + a**2 - b**2) / (2.0 * d)
     chord = np.sqrt(np.maximum(a**2 - to_chord**2, 0.0))
-    found[cross] = (a**2 * np.arctan2(chord, to_chord) - to_chord * chord
-                    + b**2 * np.arctan2(chord, d - to_chord) - (d - to_chord) * chord)
+    found[cross] = (
+        a**2 * np.arctan2(chord, to_chord)
+        - to_chord * chord
+        + b**2 * np.arctan2(chord, d - to_chord)
+        - (d - to_chord) * chord
+    )
     return found
 
 
@@ -156,8 +159,10 @@ def cap_heights(first: Array, second: Array, apart: Array) -> tuple[Array, Array
     """Heights (...) of the two caps that make up the lens of two spheres; zero where they do not overlap."""
     to_plane = (apart**2 + first**2 - second**2) / (2.0 * apart)
     overlap = apart < first + second
-    return (np.where(overlap, np.clip(first - to_plane, 0.0, 2.0 * first), 0.0),
-            np.where(overlap, np.clip(second - apart + to_plane, 0.0, 2.0 * second), 0.0))
+    return (
+        np.where(overlap, np.clip(first - to_plane, 0.0, 2.0 * first), 0.0),
+        np.where(overlap, np.clip(second - apart + to_plane, 0.0, 2.0 * second), 0.0),
+    )
 
 
 def cap_volume(radius: Array, height: Array) -> Array:

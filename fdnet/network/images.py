@@ -86,4 +86,3 @@ def label(images: Images) -> Array:
 def packed_shift(shift: Array) -> Array:
     """One integer per whole-period shift (..., 3), |shift| < 512; order is that of the rows."""
     return ((shift[..., 0] + 512) * 1024 + shift[..., 1] + 512) * 1024 + shift[..., 2] + 512
-

@@ -32,10 +32,13 @@ def measure_invaded(spheres: Snapshot, *, periodic: Sequence[bool]) -> Invaded:
     low, high = spheres.box[0]
     within = (fines.position[:, 0] >= low) & (fines.position[:, 0] < high)
     depth = fines.position[within, 0] - low
-    return Invaded(count=int(within.sum()), volume=float(4.0 / 3.0 * np.pi * np.sum(fines.radius[within] ** 3)),
-                   depth=float(depth.max(initial=0.0)),
-                   depth_p95=float(np.quantile(depth, 0.95)) if len(depth) else 0.0,
-                   cake_thickness=_cake_thickness(spheres, fines, periodic))
+    return Invaded(
+        count=int(within.sum()),
+        volume=float(4.0 / 3.0 * np.pi * np.sum(fines.radius[within] ** 3)),
+        depth=float(depth.max(initial=0.0)),
+        depth_p95=float(np.quantile(depth, 0.95)) if len(depth) else 0.0,
+        cake_thickness=_cake_thickness(spheres, fines, periodic),
+    )
 
 
 def _cake_thickness(spheres: Snapshot, fines: Snapshot, periodic: Sequence[bool]) -> float:

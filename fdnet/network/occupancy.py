@@ -58,11 +58,21 @@ def measure_occupancy(network: Network, fines: Snapshot, *, overlap: str = "exac
     solid, surface = deposit_in_pores(network, fines)
     throats = _throat_sums(network, throat, pairs, inside)
     pore_porosity = _ratio(network.pore_volume - solid, network.pore_tetra_volume)
-    counts = {"throat_porosity_negative": int(np.sum(throats["throat_porosity"] < 0)),
-              "pore_porosity_negative": int(np.sum((solid > 0) & (solid > network.pore_volume)))}
-    found = {**throats, "blocked": blocked, "pore_solid_volume": solid, "pore_solid_surface": surface,
-             "pore_porosity": pore_porosity, "pair_throat": throat, "pair_fine": fine, "pair_radius": pairs.sphere,
-             "pair_distance": pairs.offset / pairs.tube}
+    counts = {
+        "throat_porosity_negative": int(np.sum(throats["throat_porosity"] < 0)),
+        "pore_porosity_negative": int(np.sum((solid > 0) & (solid > network.pore_volume))),
+    }
+    found = {
+        **throats,
+        "blocked": blocked,
+        "pore_solid_volume": solid,
+        "pore_solid_surface": surface,
+        "pore_porosity": pore_porosity,
+        "pair_throat": throat,
+        "pair_fine": fine,
+        "pair_radius": pairs.sphere,
+        "pair_distance": pairs.offset / pairs.tube,
+    }
     return Occupancy(counts=counts, **{name: frozen(value) for name, value in found.items()})
 
 
@@ -71,8 +81,12 @@ def _throat_sums(network: Network, throat: Array, pairs: Pairs, inside: Array) -
     solid = np.bincount(throat, weights=inside, minlength=count)
     number = np.bincount(throat, minlength=count)
     tube = np.pi * network.throat_radius**2 * network.throat_length
-    return {"throat_solid_volume": solid, "throat_porosity": 1.0 - _ratio(solid, tube), "throat_fines": number,
-            "throat_fine_radius": _ratio(np.bincount(throat, weights=pairs.sphere, minlength=count), number)}
+    return {
+        "throat_solid_volume": solid,
+        "throat_porosity": 1.0 - _ratio(solid, tube),
+        "throat_fines": number,
+        "throat_fine_radius": _ratio(np.bincount(throat, weights=pairs.sphere, minlength=count), number),
+    }
 
 
 def _ratio(top: Array, bottom: Array) -> Array:
@@ -89,8 +103,11 @@ def _pairs(network: Network, fines: Snapshot) -> tuple[Array, Array, Pairs]:
     open_throat = np.flatnonzero(network.throat_radius > 0)
     if not len(index) or not len(open_throat):
         empty = np.zeros(0)
-        return empty.astype(int), empty.astype(int), Pairs(sphere=empty, offset=empty, depth=empty, tube=empty,
-                                                           length=empty)
+        return (
+            empty.astype(int),
+            empty.astype(int),
+            Pairs(sphere=empty, offset=empty, depth=empty, tube=empty, length=empty),
+        )
     ends = network.throat_ends[open_throat]
     position, owner = _images(network, fines.where(index), ends)
     half = 0.5 * network.throat_length[open_throat]
@@ -117,8 +134,13 @@ def _relative(network: Network, throat: Array, position: Array, radius: Array) -
     from_start = position - start
     depth = np.sum(from_start * axis, axis=1)
     offset = np.linalg.norm(from_start - depth[:, None] * axis, axis=1)
-    return Pairs(sphere=radius, offset=offset, depth=depth, tube=network.throat_radius[throat],
-                 length=network.throat_length[throat])
+    return Pairs(
+        sphere=radius,
+        offset=offset,
+        depth=depth,
+        tube=network.throat_radius[throat],
+        length=network.throat_length[throat],
+    )
 
 
 def _touching(throat: Array, fine: Array, pairs: Pairs) -> tuple[Array, Array, Pairs]:

@@ -137,16 +137,35 @@ def analyse(
     _warn(log, (clean, final), sections)
     law_used = np.full(len(final.conductance), CLEAN) if damage is None else damage.law_used
     return Analysis(
-        network=base.network, occupancy=occupancy, law=options.law, damage_law=options.damage_law,
-        conductance_initial=base.conductance, conductance_damaged=final.conductance, law_used=frozen(law_used),
-        flow_initial=base.flow, flow_damaged=final.flow, k_initial=clean.k, k_damaged=final.k,
-        k_moved=base.k if moved else None, k_reduction=reduction(clean.k, final.k),
-        porosity_initial=porosity[0].mean, porosity_initial_error=porosity[0].standard_error,
-        porosity_initial_sum=porosity[0].sum, porosity_damaged=porosity[1].mean, sections=sections, profile=profile,
-        invaded_count=invaded.count, invaded_volume=invaded.volume, invasion_depth=invaded.depth,
-        invasion_depth_p95=invaded.depth_p95, cake_thickness=invaded.cake_thickness, solver=_worst(log.flows),
-        counts=_counts(base.network, occupancy, damage, final.flow), warnings=tuple(log.warnings),
-        seconds=log.seconds)
+        network=base.network,
+        occupancy=occupancy,
+        law=options.law,
+        damage_law=options.damage_law,
+        conductance_initial=base.conductance,
+        conductance_damaged=final.conductance,
+        law_used=frozen(law_used),
+        flow_initial=base.flow,
+        flow_damaged=final.flow,
+        k_initial=clean.k,
+        k_damaged=final.k,
+        k_moved=base.k if moved else None,
+        k_reduction=reduction(clean.k, final.k),
+        porosity_initial=porosity[0].mean,
+        porosity_initial_error=porosity[0].standard_error,
+        porosity_initial_sum=porosity[0].sum,
+        porosity_damaged=porosity[1].mean,
+        sections=sections,
+        profile=profile,
+        invaded_count=invaded.count,
+        invaded_volume=invaded.volume,
+        invasion_depth=invaded.depth,
+        invasion_depth_p95=invaded.depth_p95,
+        cake_thickness=invaded.cake_thickness,
+        solver=_worst(log.flows),
+        counts=_counts(base.network, occupancy, damage, final.flow),
+        warnings=tuple(log.warnings),
+        seconds=log.seconds,
+    )
 
 
 def _check_names(options: AnalysisOptions) -> None:
@@ -160,8 +179,10 @@ def _same_grains(before: Snapshot, after: Snapshot) -> Snapshot:
     order, wanted = np.argsort(after.id), np.argsort(before.id)
     if len(before) != len(after) or np.any(after.id[order] != before.id[wanted]):
         lost = np.setxor1d(before.id, after.id)
-        raise NetworkError(f"grains differ before ({len(before)}) and after ({len(after)}) the invasion, for "
-                           f"example id {lost[:3].tolist()}; give the same pack twice")
+        raise NetworkError(
+            f"grains differ before ({len(before)}) and after ({len(after)}) the invasion, for "
+            f"example id {lost[:3].tolist()}; give the same pack twice"
+        )
     index = np.empty(len(before), int)
     index[wanted] = order
     return after.where(index)
@@ -174,9 +195,7 @@ def _displaced(before: Snapshot, after: Snapshot, periodic: tuple[bool, bool, bo
     return bool(np.max(np.linalg.norm(shift, axis=1), initial=0.0) > MOVED)
 
 
-def _clean_state(
-    grains: Snapshot, periodic: tuple[bool, bool, bool], options: AnalysisOptions, log: _Log
-) -> _State:
+def _clean_state(grains: Snapshot, periodic: tuple[bool, bool, bool], options: AnalysisOptions, log: _Log) -> _State:
     with log.timed("tessellate"):
         network = build_network(grains, periodic=periodic)
     with log.timed("conductance"):
@@ -200,8 +219,9 @@ def _damage(
     with log.timed("occupancy"):
         occupancy = measure_occupancy(base.network, damaged.fines(), overlap=options.overlap)
     with log.timed("conductance"):
-        damage = DAMAGE_LAWS[options.damage_law](base.network, occupancy, base.conductance,
-                                                 threshold=options.threshold, middle_band=options.middle_band)
+        damage = DAMAGE_LAWS[options.damage_law](
+            base.network, occupancy, base.conductance, threshold=options.threshold, middle_band=options.middle_band
+        )
     return occupancy, damage
 
 
@@ -225,11 +245,13 @@ def _by_depth(
 
 
 def _slab_k(state: _State, edges: Array, log: _Log) -> SlabK:
-    solved = [slab_permeability(state.network, state.conductance, (float(low), float(high)))
-              for low, high in pairwise(edges)]
+    solved = [
+        slab_permeability(state.network, state.conductance, (float(low), float(high))) for low, high in pairwise(edges)
+    ]
     log.flows.extend(flow for _, flow in solved)
-    return SlabK(cut_out=frozen([k for k, _ in solved]),
-                 inplace=frozen(inplace_permeability(state.network, state.flow, edges)))
+    return SlabK(
+        cut_out=frozen([k for k, _ in solved]), inplace=frozen(inplace_permeability(state.network, state.flow, edges))
+    )
 
 
 def _warn(log: _Log, states: tuple[_State, _State], sections: tuple[Section, ...]) -> None:
@@ -239,16 +261,21 @@ def _warn(log: _Log, states: tuple[_State, _State], sections: tuple[Section, ...
     network = states[0].network
     thin = [one.section for one in sections if one.x_hi - one.x_lo < 2.0 * network.grain_radius]
     if thin:
-        log.warnings.append(f"sections {thin} are thinner than a grain diameter ({2 * network.grain_radius:.3g} m): "
-                            "their k is of single throats")
+        log.warnings.append(
+            f"sections {thin} are thinner than a grain diameter ({2 * network.grain_radius:.3g} m): "
+            "their k is of single throats"
+        )
     if network.counts["grains_outside_box"]:
         log.warnings.append(f"{network.counts['grains_outside_box']} grains lie outside the box and play no part")
 
 
 def _worst(flows: list[Flow]) -> dict[str, str | float | None]:
     balances = [flow.mass_balance for flow in flows if flow.mass_balance is not None]
-    return {"method": flows[0].method, "residual": max(flow.residual for flow in flows),
-            "mass_balance": max(balances) if balances else None}
+    return {
+        "method": flows[0].method,
+        "residual": max(flow.residual for flow in flows),
+        "mass_balance": max(balances) if balances else None,
+    }
 
 
 def _counts(network: Network, occupancy: Occupancy | None, damage: Damage | None, flow: Flow) -> dict[str, int]:

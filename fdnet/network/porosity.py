@@ -62,8 +62,10 @@ def _checked_edges(edges: Array | None, low: float, high: float) -> Array:
     bins = np.array([low, high]) if edges is None else np.asarray(edges, dtype=float)
     hair = 1e-9 * (high - low)
     if len(bins) < 2 or np.any(np.diff(bins) <= 0) or bins[0] < low - hair or bins[-1] > high + hair:
-        raise CaseError(f"porosity bins: edges {bins.tolist()} do not ascend within the box [{low:g}, {high:g}] m; "
-                        "give ascending depths inside the box")
+        raise CaseError(
+            f"porosity bins: edges {bins.tolist()} do not ascend within the box [{low:g}, {high:g}] m; "
+            "give ascending depths inside the box"
+        )
     return np.clip(bins, low, high)
 
 
@@ -91,9 +93,7 @@ def _filled_below(spheres: Snapshot, cuts: Array, shift: Array, lines: int, peri
     return (_total_below(start, cuts) - _total_below(end, cuts)) / count.prod()
 
 
-def _crossings(
-    spheres: Snapshot, count: Array, shift: Array, periodic: tuple[bool, ...]
-) -> tuple[Array, Array, Array]:
+def _crossings(spheres: Snapshot, count: Array, shift: Array, periodic: tuple[bool, ...]) -> tuple[Array, Array, Array]:
     """Sphere index, line index and half chord length of every line through a sphere."""
     step = (spheres.box[1:, 1] - spheres.box[1:, 0]) / count
     centre = (spheres.position[:, 1:] - spheres.box[1:, 0]) / step - shift

@@ -83,12 +83,22 @@ def make_sections(
     share = count / max(len(depth), 1)
     before, after = (pooled(one, edges) for one in porosity)
     return tuple(
-        Section(section=s + 1, x_lo=float(edges[s]), x_hi=float(edges[s + 1]), porosity_initial=float(before[s]),
-                porosity_damaged=float(after[s]), k_initial=float(k[0].cut_out[s]), k_damaged=float(k[1].cut_out[s]),
-                k_reduction=reduction(float(k[0].cut_out[s]), float(k[1].cut_out[s])),
-                k_initial_inplace=float(k[0].inplace[s]), k_damaged_inplace=float(k[1].inplace[s]),
-                fines_count=int(count[s]), fines_fraction=float(share[s]))
-        for s in range(len(edges) - 1))
+        Section(
+            section=s + 1,
+            x_lo=float(edges[s]),
+            x_hi=float(edges[s + 1]),
+            porosity_initial=float(before[s]),
+            porosity_damaged=float(after[s]),
+            k_initial=float(k[0].cut_out[s]),
+            k_damaged=float(k[1].cut_out[s]),
+            k_reduction=reduction(float(k[0].cut_out[s]), float(k[1].cut_out[s])),
+            k_initial_inplace=float(k[0].inplace[s]),
+            k_damaged_inplace=float(k[1].inplace[s]),
+            fines_count=int(count[s]),
+            fines_fraction=float(share[s]),
+        )
+        for s in range(len(edges) - 1)
+    )
 
 
 def make_profile(edges: Array, porosity: tuple[Porosity, Porosity], depth: Array) -> Profile:

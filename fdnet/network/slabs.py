@@ -30,8 +30,12 @@ def plane_pressures(network: Network, flow: Flow, planes: Array) -> Array:
     if not network.periodic[0]:
         inner = [_crossing_sums(network, flow, plane) for plane in planes]
         low, high = network.box[0]
-        return np.array([1.0 if plane <= low else 0.0 if plane >= high else total / net
-                         for plane, (total, net) in zip(planes, inner, strict=True)])
+        return np.array(
+            [
+                1.0 if plane <= low else 0.0 if plane >= high else total / net
+                for plane, (total, net) in zip(planes, inner, strict=True)
+            ]
+        )
     length = float(network.box[0, 1] - network.box[0, 0])
     found = []
     for plane in (float(network.box[0, 0]), *planes):

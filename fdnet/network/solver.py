@@ -34,8 +34,12 @@ def solve_balances(pair: Array, conductance: Array, tied: Array, source: Array) 
     matrix = (beside + sparse.diags(own / diagonal)).tocsr()
     order = _order(beside)
     try:
-        factor = splu(matrix[order][:, order].tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0,
-                      options={"SymmetricMode": True})
+        factor = splu(
+            matrix[order][:, order].tocsc(),
+            permc_spec="NATURAL",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
     except RuntimeError as error:
         raise FlowError(f"solve of {count} pores failed: {error}; a group of pores has no way out") from error
     wanted = source * scale

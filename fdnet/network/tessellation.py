@@ -87,27 +87,42 @@ def build_network(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Net
     tetrahedra = tessellate(grains, periodic=periodic)
     tetrahedra, facets = without_side_walls(tetrahedra, share_facets(tetrahedra, periodic=periodic), periodic=periodic)
     if not len(facets.pore):
-        raise NetworkError(f"tessellation: no throat joins two pores of these {len(grains)} grains; the box is too "
-                           "narrow for its side walls, give more grains or periodic sides")
+        raise NetworkError(
+            f"tessellation: no throat joins two pores of these {len(grains)} grains; the box is too "
+            "narrow for its side walls, give more grains or periodic sides"
+        )
     centres = _pore_centres(grains, tetrahedra, periodic)
     if not periodic[0]:
         _check_ends(grains.box, centres.position[:, 0])
     pores, pore_counts = _pores(grains, tetrahedra, centres, periodic)
     throats, throat_counts = _throats(grains, tetrahedra, facets, centres)
-    counts = {"grains_outside_box": outside, "centre_is_centroid": centres.centroids, **pore_counts, **throat_counts,
-              **facets.counts}
+    counts = {
+        "grains_outside_box": outside,
+        "centre_is_centroid": centres.centroids,
+        **pore_counts,
+        **throat_counts,
+        **facets.counts,
+    }
     # indices count all grains given
     pores["pore_grains"], throats["throat_grains"] = kept[pores["pore_grains"]], kept[throats["throat_grains"]]
     area = float(np.sum(pores["pore_share"] * pores["pore_tetra_volume"]) / (grains.box[0, 1] - grains.box[0, 0]))
-    return Network(box=frozen(grains.box), periodic=periodic, grain_radius=float(grains.radius.mean()), area=area,
-                   counts=counts, **{name: frozen(value) for name, value in {**pores, **throats}.items()})
+    return Network(
+        box=frozen(grains.box),
+        periodic=periodic,
+        grain_radius=float(grains.radius.mean()),
+        area=area,
+        counts=counts,
+        **{name: frozen(value) for name, value in {**pores, **throats}.items()},
+    )
 
 
 def _check_ends(box: Array, x: Array) -> None:
     for name, face in (("inlet", box[0, 0]), ("outlet", box[0, 1])):
         if not np.any(x == face):
-            raise NetworkError(f"tessellation: no pore lies on the {name} face x = {face:g} m, a whole layer of grains "
-                               "is centred on it; shift the box by part of a radius or make x periodic")
+            raise NetworkError(
+                f"tessellation: no pore lies on the {name} face x = {face:g} m, a whole layer of grains "
+                "is centred on it; shift the box by part of a radius or make x periodic"
+            )
 
 
 def _reaching(grains: Snapshot, periodic: tuple[bool, ...]) -> Array:
@@ -132,8 +147,9 @@ def _pore_centres(grains: Snapshot, tetrahedra: Tetrahedra, periodic: tuple[bool
     size = high - low
     wrap = np.where(periodic, np.floor((position - low) / size + 1e-9), 0).astype(int)
     position = position - wrap * size
-    return _Centres(position=position, wrap=wrap, radius=np.nan_to_num(radius, nan=0.0),
-                    centroids=int(np.sum(~centred)))
+    return _Centres(
+        position=position, wrap=wrap, radius=np.nan_to_num(radius, nan=0.0), centroids=int(np.sum(~centred))
+    )
 
 
 def _pores(
@@ -145,14 +161,25 @@ def _pores(
     volume = np.abs(geometry.signed_volume(corner))
     solid, surface = solid_in_tetrahedra(corner, radius)
     cut = cut_axes(tetrahedra.mirror)[:, 0]
-    found = {"pore_grains": tetrahedra.grain, "pore_corner": corner, "pore_corner_radius": radius,
-             "pore_position": centres.position, "pore_radius": np.maximum(centres.radius, 0.0),
-             "pore_circumcentre": tetrahedra.centre - offset, "pore_tetra_volume": volume,
-             "pore_volume": volume - solid, "pore_wall_surface": surface,
-             "pore_group": _groups(tetrahedra.centre, grains, periodic), "pore_share": np.where(cut, 0.5, 1.0)}
+    found = {
+        "pore_grains": tetrahedra.grain,
+        "pore_corner": corner,
+        "pore_corner_radius": radius,
+        "pore_position": centres.position,
+        "pore_radius": np.maximum(centres.radius, 0.0),
+        "pore_circumcentre": tetrahedra.centre - offset,
+        "pore_tetra_volume": volume,
+        "pore_volume": volume - solid,
+        "pore_wall_surface": surface,
+        "pore_group": _groups(tetrahedra.centre, grains, periodic),
+        "pore_share": np.where(cut, 0.5, 1.0),
+    }
     speck = 1e-9 * float(grains.radius.mean()) ** 3
-    counts = {"pores_closed": int(np.sum(centres.radius <= 0)), "pores_at_end_faces": int(np.sum(cut)),
-              "void_negative": int(np.sum(found["pore_volume"] < -speck))}
+    counts = {
+        "pores_closed": int(np.sum(centres.radius <= 0)),
+        "pores_at_end_faces": int(np.sum(cut)),
+        "void_negative": int(np.sum(found["pore_volume"] < -speck)),
+    }
     return found, counts
 
 
@@ -196,13 +223,24 @@ def _throats(
     floor = LENGTH_FLOOR * float(grains.radius.mean())
     inscribed = np.nan_to_num(geometry.touching_circle(corner, radius), nan=0.0)
     area = np.where(inscribed > 0, geometry.open_area(corner, radius), 0.0)
-    found = {"throat_pores": facets.pore, "throat_shift": shift, "throat_ends": ends, "throat_grains": grain,
-             "throat_corner": corner - (centres.wrap[one] * size)[:, None], "throat_corner_radius": radius,
-             "throat_heights": _heights(tetrahedra, facets, size), "throat_radius": np.maximum(inscribed, 0.0),
-             "throat_area": np.maximum(area, 0.0), "throat_radius_effective": np.sqrt(np.maximum(area, 0.0) / np.pi),
-             "throat_length": np.maximum(length, floor)}
-    counts = {"throats_closed": int(np.sum(inscribed <= 0)), "throats_short": int(np.sum(length < floor)),
-              "throat_area_negative": int(np.sum(area < 0))}
+    found = {
+        "throat_pores": facets.pore,
+        "throat_shift": shift,
+        "throat_ends": ends,
+        "throat_grains": grain,
+        "throat_corner": corner - (centres.wrap[one] * size)[:, None],
+        "throat_corner_radius": radius,
+        "throat_heights": _heights(tetrahedra, facets, size),
+        "throat_radius": np.maximum(inscribed, 0.0),
+        "throat_area": np.maximum(area, 0.0),
+        "throat_radius_effective": np.sqrt(np.maximum(area, 0.0) / np.pi),
+        "throat_length": np.maximum(length, floor),
+    }
+    counts = {
+        "throats_closed": int(np.sum(inscribed <= 0)),
+        "throats_short": int(np.sum(length < floor)),
+        "throat_area_negative": int(np.sum(area < 0)),
+    }
     return found, counts
 
 
@@ -216,5 +254,10 @@ def _heights(tetrahedra: Tetrahedra, facets: Facets, size: Array) -> Array:
     apex = np.take_along_axis(tetrahedra.shaken[one], facets.opposite[:, 0, None, None], axis=1)[:, 0]
     normal *= np.where(np.sum((apex - facet[:, 0]) * normal, axis=1) > 0, -1.0, 1.0)[:, None]
     other = tetrahedra.centre[two] + facets.shift * size
-    return np.stack([np.sum((facet[:, 0] - tetrahedra.centre[one]) * normal, axis=1),
-                     np.sum((other - facet[:, 0]) * normal, axis=1)], axis=1)
+    return np.stack(
+        [
+            np.sum((facet[:, 0] - tetrahedra.centre[one]) * normal, axis=1),
+            np.sum((other - facet[:, 0]) * normal, axis=1),
+        ],
+        axis=1,
+    )

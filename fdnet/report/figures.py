@@ -18,28 +18,40 @@ if TYPE_CHECKING:
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#7F7F7F"
 MM, MICRON = 1e3, 1e6
 DEPTH_LABEL = "depth from the formation face (mm)"
-STYLE: Any = {"font.size": 11, "axes.grid": True, "grid.color": "#DDDDDD", "axes.axisbelow": True,
-         "axes.spines.top": False, "axes.spines.right": False, "legend.edgecolor": "white",
-         "legend.framealpha": 0.9, "lines.linewidth": 2}
+STYLE: Any = {
+    "font.size": 11,
+    "axes.grid": True,
+    "grid.color": "#DDDDDD",
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.edgecolor": "white",
+    "legend.framealpha": 0.9,
+    "lines.linewidth": 2,
+}
 
 CAPTIONS = {
     "spheres_3d": "The specimen from the front and upstream: the grains of the far half (grey) and the fines, coloured "
-                  "by radius, or by depth where they are of one size. The fluid enters at x = 0.",
+    "by radius, or by depth where they are of one size. The fluid enters at x = 0.",
     "side_view": "Section x-z through the middle of the specimen: every circle is the true cut through a sphere.",
     "porosity_reduction": "Porosity lost to the fines against depth: difference of the intact and the damaged "
-                          "porosity, in fine bins and per section.",
+    "porosity, in fine bins and per section.",
     "invaded_fraction": "Share of the invaded fines, by number, against depth.",
     "permeability_ratio": "Damaged over intact permeability of each section, cut out with its own network and in "
-                          "place from the pressures of the whole specimen.",
+    "place from the pressures of the whole specimen.",
     "porosity_profile": "Porosity before and after the invasion against depth, overlap counted once.",
     "size_distributions": "Inscribed radii of throats and pores between the grains alone, by number; the band is the "
-                          "range of the fines' radii.",
+    "range of the fines' radii.",
     "invasion_history": "Fines inside the specimen, passed through it and still upstream, against time.",
 }
 
 
-def draw_all(folder: str | Path, analysis: "Analysis", snapshot: Snapshot | None = None,
-             history: Sequence[Mapping[str, float]] | None = None) -> list[Path]:
+def draw_all(
+    folder: str | Path,
+    analysis: "Analysis",
+    snapshot: Snapshot | None = None,
+    history: Sequence[Mapping[str, float]] | None = None,
+) -> list[Path]:
     """Draw every figure that has data into `folder` (made if missing); returns the paths in report order.
 
     `snapshot` is what the side view shows: the damaged specimen, or the grains alone; without one there is no side
@@ -108,8 +120,9 @@ def _porosity_reduction(figure: Any, *, analysis: "Analysis") -> None:
     profile, edges = analysis.profile, _section_edges(analysis)
     lost = np.subtract(profile.porosity_initial, profile.porosity_damaged)
     axes.stairs(lost, np.asarray(profile.edges) * MM, fill=True, color=BLUE, alpha=0.3, label="bins")
-    _stairs(axes, edges, [s.porosity_initial - s.porosity_damaged for s in analysis.sections], color=BLUE,
-            label="sections")
+    _stairs(
+        axes, edges, [s.porosity_initial - s.porosity_damaged for s in analysis.sections], color=BLUE, label="sections"
+    )
     axes.axhline(0, color=GREY, linewidth=0.8)
     _legend(axes)
 
@@ -118,13 +131,29 @@ def _invaded_fraction(figure: Any, *, analysis: "Analysis") -> None:
     edges = np.asarray(analysis.profile.edges)
     width = np.diff(edges).mean() * MM
     axes = _depth_axes(figure, analysis, f"share of invaded fines per {width:.3g} mm (–)")
-    axes.stairs(analysis.profile.fines_fraction, edges * MM, fill=True, color=ORANGE, alpha=0.6,
-                label=f"{analysis.invaded_count} invaded fines")
+    axes.stairs(
+        analysis.profile.fines_fraction,
+        edges * MM,
+        fill=True,
+        color=ORANGE,
+        alpha=0.6,
+        label=f"{analysis.invaded_count} invaded fines",
+    )
     if analysis.invaded_count:
-        axes.axvline(analysis.invasion_depth_p95 * MM, color="black", linestyle="--", linewidth=1.3,
-                     label=f"95 % shallower than {analysis.invasion_depth_p95 * MM:.2f} mm")
-        axes.axvline(analysis.invasion_depth * MM, color="black", linestyle=":", linewidth=1.3,
-                     label=f"deepest {analysis.invasion_depth * MM:.2f} mm")
+        axes.axvline(
+            analysis.invasion_depth_p95 * MM,
+            color="black",
+            linestyle="--",
+            linewidth=1.3,
+            label=f"95 % shallower than {analysis.invasion_depth_p95 * MM:.2f} mm",
+        )
+        axes.axvline(
+            analysis.invasion_depth * MM,
+            color="black",
+            linestyle=":",
+            linewidth=1.3,
+            label=f"deepest {analysis.invasion_depth * MM:.2f} mm",
+        )
     axes.set_ylim(bottom=0)
     _legend(axes)
 
@@ -153,11 +182,17 @@ def _permeability_ratio(figure: Any, *, analysis: "Analysis") -> None:
 def _porosity_profile(figure: Any, *, analysis: "Analysis") -> None:
     axes = _depth_axes(figure, analysis, "porosity (–)")
     profile = analysis.profile
-    _stairs(axes, profile.edges, profile.porosity_initial, color=GREY,
-            label=f"intact, mean {analysis.porosity_initial:.4f}")
+    _stairs(
+        axes, profile.edges, profile.porosity_initial, color=GREY, label=f"intact, mean {analysis.porosity_initial:.4f}"
+    )
     if analysis.occupancy is not None:
-        _stairs(axes, profile.edges, profile.porosity_damaged, color=BLUE,
-                label=f"damaged, mean {analysis.porosity_damaged:.4f}")
+        _stairs(
+            axes,
+            profile.edges,
+            profile.porosity_damaged,
+            color=BLUE,
+            label=f"damaged, mean {analysis.porosity_damaged:.4f}",
+        )
     axes.set_ylim(bottom=0)
     _legend(axes)
 
@@ -165,8 +200,10 @@ def _porosity_profile(figure: Any, *, analysis: "Analysis") -> None:
 def _size_distributions(figure: Any, *, analysis: "Analysis", fines: Snapshot | None) -> None:
     network = analysis.network
     left, right = figure.subplots(1, 2)
-    for axes, radius, name, colour in ((left, network.throat_radius, "throat", BLUE),
-                                       (right, network.pore_radius, "pore", GREEN)):
+    for axes, radius, name, colour in (
+        (left, network.throat_radius, "throat", BLUE),
+        (right, network.pore_radius, "pore", GREEN),
+    ):
         open_ones = np.asarray(radius)[np.asarray(radius) > 0] * MICRON
         closed = len(radius) - len(open_ones)
         label = f"{len(radius)} {name}s" + (f",\n{closed} of them closed\n(not drawn)" if closed else "")
@@ -185,9 +222,11 @@ def _invasion_history(figure: Any, *, history: Sequence[Mapping[str, float]]) ->
     axes = figure.add_subplot()
     time = np.array([row["time_s"] for row in history])
     scale, unit = (1.0, "s") if time.max() >= 1 else (1e3, "ms")
-    for name, label, colour, line in (("invaded", "inside the specimen", BLUE, "-"),
-                                      ("passed", "passed the outlet", GREEN, "--"),
-                                      ("upstream", "upstream of the face", ORANGE, ":")):
+    for name, label, colour, line in (
+        ("invaded", "inside the specimen", BLUE, "-"),
+        ("passed", "passed the outlet", GREEN, "--"),
+        ("upstream", "upstream of the face", ORANGE, ":"),
+    ):
         axes.plot(time * scale, [row[name] for row in history], line, color=colour, label=label)
     axes.set(xlabel=f"time since the fines were released ({unit})", ylabel="number of fines (–)")
     axes.set_ylim(bottom=0)

@@ -23,11 +23,17 @@ STOP_WORDS = {
     "cap": "the cap on the run was reached before the specimen plugged",
 }
 SECTION_COLUMNS = (  # key, heading, unit, factor to that unit
-    ("section", "section", "", None), ("x_lo_m", "from", "mm", 1e3), ("x_hi_m", "to", "mm", 1e3),
-    ("porosity_initial", "porosity intact", "–", 1), ("porosity_damaged", "porosity damaged", "–", 1),
-    ("k_initial_m2", "k intact", "m²", 1), ("k_damaged_m2", "k damaged", "m²", 1),
-    ("k_reduction", "k lost", "%", 1e2), ("k_initial_inplace_m2", "k intact, in place", "m²", 1),
-    ("k_damaged_inplace_m2", "k damaged, in place", "m²", 1), ("fines_count", "fines", "", None),
+    ("section", "section", "", None),
+    ("x_lo_m", "from", "mm", 1e3),
+    ("x_hi_m", "to", "mm", 1e3),
+    ("porosity_initial", "porosity intact", "–", 1),
+    ("porosity_damaged", "porosity damaged", "–", 1),
+    ("k_initial_m2", "k intact", "m²", 1),
+    ("k_damaged_m2", "k damaged", "m²", 1),
+    ("k_reduction", "k lost", "%", 1e2),
+    ("k_initial_inplace_m2", "k intact, in place", "m²", 1),
+    ("k_damaged_inplace_m2", "k damaged, in place", "m²", 1),
+    ("fines_count", "fines", "", None),
     ("fines_fraction", "share of fines", "%", 1e2),
 )
 
@@ -53,32 +59,41 @@ def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportP
     Raises CaseError for a figure that cannot be read.
     """
     template = _environment().from_string(_template_text())
-    figures = [{"data": _data_uri(Path(file)), "caption": caption, "name": Path(file).name}
-               for file, caption in parts.figures]
-    text = template.render(summary=summary, parts=parts, figures=figures, headline=headline(summary),
-                           columns=SECTION_COLUMNS)
+    figures = [
+        {"data": _data_uri(Path(file)), "caption": caption, "name": Path(file).name} for file, caption in parts.figures
+    ]
+    text = template.render(
+        summary=summary, parts=parts, figures=figures, headline=headline(summary), columns=SECTION_COLUMNS
+    )
     return write_text(path, text)
 
 
 def headline(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """The numbers on top: label, value, remark."""
     lost, invaded, supplied = (summary.get(key) for key in ("k_reduction", "invaded_count", "supplied_count"))
-    whole = [("permeability intact", quantity(summary.get("k_initial_m2"), "m²"), _darcy(summary.get("k_initial_m2"))),
-             ("porosity intact", fixed(summary.get("porosity_initial")), "overlap counted once")]
+    whole = [
+        ("permeability intact", quantity(summary.get("k_initial_m2"), "m²"), _darcy(summary.get("k_initial_m2"))),
+        ("porosity intact", fixed(summary.get("porosity_initial")), "overlap counted once"),
+    ]
     if summary.get("stop_reason") is None and not invaded:
         return whole
     reason, loss = summary.get("stop_reason"), DASH if lost is None else f"{100 * lost:.1f} % lost"
     passed, upstream = quantity(summary.get("passed_count")), quantity(summary.get("upstream_count"))
     return [
         whole[0],
-        ("permeability damaged", quantity(summary.get("k_damaged_m2"), "m²"),
-         f"{_darcy(summary.get('k_damaged_m2'))}, {loss}"),
+        (
+            "permeability damaged",
+            quantity(summary.get("k_damaged_m2"), "m²"),
+            f"{_darcy(summary.get('k_damaged_m2'))}, {loss}",
+        ),
         whole[1],
         ("porosity damaged", fixed(summary.get("porosity_damaged")), "overlap counted once"),
-        ("fines invaded", quantity(invaded),
-         f"of {quantity(supplied)} supplied; {passed} passed, {upstream} upstream"),
-        ("invasion depth", _millimetres(summary, "invasion_depth_m"),
-         f"95 % shallower than {_millimetres(summary, 'invasion_depth_p95_m')}"),
+        ("fines invaded", quantity(invaded), f"of {quantity(supplied)} supplied; {passed} passed, {upstream} upstream"),
+        (
+            "invasion depth",
+            _millimetres(summary, "invasion_depth_m"),
+            f"95 % shallower than {_millimetres(summary, 'invasion_depth_p95_m')}",
+        ),
         ("cake thickness", _millimetres(summary, "cake_thickness_m"), "deposit upstream of the face"),
         ("end of the run", quantity(reason), STOP_WORDS.get(str(reason), "")),
     ]
@@ -138,5 +153,6 @@ def _data_uri(path: Path) -> str:
     try:
         return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")
     except OSError as error:
-        raise CaseError(f"{path}: figure for the report cannot be read ({error.strerror}); draw it again with "
-                        "--stages report") from error
+        raise CaseError(
+            f"{path}: figure for the report cannot be read ({error.strerror}); draw it again with --stages report"
+        ) from error

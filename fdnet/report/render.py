@@ -67,8 +67,19 @@ def _add_fines(plotter: Any, spheres: Any, bounds: Array) -> None:
         deepest = min(spheres.points[mask, 0].max() * MM, bounds[0, 1])
         name, title, limits = "depth_mm", "fines, depth (mm)", [bounds[0, 0], max(deepest, 0.1 * bounds[0, 1])]
     balls = _balls(spheres, mask, int(np.clip(np.sqrt(FACETS / mask.sum()), 5, 16)))
-    bar = {"title": title, "color": "black", "title_font_size": 22, "label_font_size": 22, "fmt": "%.3g",
-           "n_labels": 5, "vertical": True, "position_x": 0.88, "position_y": 0.15, "width": 0.07, "height": 0.65}
+    bar = {
+        "title": title,
+        "color": "black",
+        "title_font_size": 22,
+        "label_font_size": 22,
+        "fmt": "%.3g",
+        "n_labels": 5,
+        "vertical": True,
+        "position_x": 0.88,
+        "position_y": 0.15,
+        "width": 0.07,
+        "height": 0.65,
+    }
     plotter.add_mesh(balls, scalars=name, clim=limits, cmap="plasma", smooth_shading=True, scalar_bar_args=bar)
 
 
@@ -77,14 +88,38 @@ def _add_frame(plotter: Any, bounds: Array) -> None:
 
     (x0, x1), (y0, y1), (z0, z1) = bounds
     plotter.add_mesh(pv.Box((x0, x1, y0, y1, z0, z1)), style="wireframe", color="black", line_width=2)
-    face = pv.Plane(center=(x0, (y0 + y1) / 2, (z0 + z1) / 2), direction=(1, 0, 0), i_size=z1 - z0, j_size=y1 - y0,
-                    i_resolution=1, j_resolution=1)
+    face = pv.Plane(
+        center=(x0, (y0 + y1) / 2, (z0 + z1) / 2),
+        direction=(1, 0, 0),
+        i_size=z1 - z0,
+        j_size=y1 - y0,
+        i_resolution=1,
+        j_resolution=1,
+    )
     plotter.add_mesh(face, color=FACE_COLOUR, opacity=0.18, show_edges=True, edge_color=FACE_COLOUR, line_width=3)
-    plotter.add_point_labels([(x0, y1, z1 + 0.12 * (z1 - z0))], ["formation face x = 0"], font_size=22,
-                             text_color=FACE_COLOUR, shape=None, show_points=False, always_visible=True)
-    plotter.show_bounds(bounds=(x0, x1, y0, y1, z0, z1), xtitle="x (mm)", ytitle="y (mm)", ztitle="z (mm)",
-                        color="black", font_size=18, location="outer", grid=False, fmt="%.1f", n_xlabels=5,
-                        n_ylabels=3, n_zlabels=3)
+    plotter.add_point_labels(
+        [(x0, y1, z1 + 0.12 * (z1 - z0))],
+        ["formation face x = 0"],
+        font_size=22,
+        text_color=FACE_COLOUR,
+        shape=None,
+        show_points=False,
+        always_visible=True,
+    )
+    plotter.show_bounds(
+        bounds=(x0, x1, y0, y1, z0, z1),
+        xtitle="x (mm)",
+        ytitle="y (mm)",
+        ztitle="z (mm)",
+        color="black",
+        font_size=18,
+        location="outer",
+        grid=False,
+        fmt="%.1f",
+        n_xlabels=5,
+        n_ylabels=3,
+        n_zlabels=3,
+    )
 
 
 def _look(plotter: Any, bounds: Array) -> None:
@@ -95,9 +130,9 @@ def _look(plotter: Any, bounds: Array) -> None:
     up = np.cross(toward, right)
     corners = np.stack(np.meshgrid(*bounds), axis=-1).reshape(-1, 3) - bounds.mean(axis=1)
     width, height = np.ptp(corners @ right), np.ptp(corners @ up)
-    scale = max(0.62 * height, 0.7 * width * WINDOW[1] / WINDOW[0])      # half the height of the window, mm
+    scale = max(0.62 * height, 0.7 * width * WINDOW[1] / WINDOW[0])  # half the height of the window, mm
     focus = bounds.mean(axis=1) + 0.08 * scale * WINDOW[0] / WINDOW[1] * right - 0.05 * scale * up
-    distance = 4.6 * scale      # the axis labels grow with it
+    distance = 4.6 * scale  # the axis labels grow with it
     plotter.camera_position = [tuple(focus + distance * toward), tuple(focus), (0, 0, 1)]
     plotter.enable_parallel_projection()
     plotter.camera.parallel_scale = scale

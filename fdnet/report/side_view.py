@@ -36,8 +36,15 @@ def _circles(axes: Any, spheres: Snapshot, plane: float, **style: Any) -> Any:
 
     index, centre, radius = cut_circles(spheres, plane)
     values = style.pop("values", None)
-    circles = EllipseCollection(2 * radius * MM, 2 * radius * MM, np.zeros(len(index)), units="xy",
-                                offsets=centre * MM, offset_transform=axes.transData, **style)
+    circles = EllipseCollection(
+        2 * radius * MM,
+        2 * radius * MM,
+        np.zeros(len(index)),
+        units="xy",
+        offsets=centre * MM,
+        offset_transform=axes.transData,
+        **style,
+    )
     if values is not None:
         circles.set_array(values[index])
     axes.add_collection(circles)
@@ -54,8 +61,9 @@ def _fines(figure: Any, axes: Any, fines: Snapshot, plane: float) -> None:
         axes.plot([], [], "o", color=FINE_FACE, label=f"fines, radius {high:.3g} µm")
         axes.legend(loc="lower right", bbox_to_anchor=(1, 1), fontsize=9)
         return
-    circles = _circles(axes, fines, plane, values=fines.radius * MICRON, cmap="plasma", edgecolor="black",
-                       linewidth=0.3)
+    circles = _circles(
+        axes, fines, plane, values=fines.radius * MICRON, cmap="plasma", edgecolor="black", linewidth=0.3
+    )
     circles.set_clim(low, high)
     figure.colorbar(circles, ax=axes, label="radius of the fine (µm)", shrink=0.8)
 
@@ -70,8 +78,13 @@ def _frame(figure: Any, axes: Any, snapshot: Snapshot) -> None:
     axes.plot([x_lo, x_hi, x_hi, x_lo], [z_lo, z_lo, z_hi, z_hi], color="black", linewidth=1)
     axes.axvline(x_lo, color="#0072B2", linestyle="--", linewidth=1.6)
     axes.annotate("formation face", (x_lo, z_hi), (3, 3), textcoords="offset points", color="#0072B2", fontsize=9)
-    axes.set(xlim=(start, x_hi + overhang), ylim=(z_lo - overhang, z_hi + overhang), aspect="equal",
-             xlabel="x, depth from the formation face (mm)", ylabel="z (mm)")
+    axes.set(
+        xlim=(start, x_hi + overhang),
+        ylim=(z_lo - overhang, z_hi + overhang),
+        aspect="equal",
+        xlabel="x, depth from the formation face (mm)",
+        ylabel="z (mm)",
+    )
     axes.grid(False)
     width, height = np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())
     figure.set_size_inches(9.0, min(9.0, max(3.0, 7.2 * height / width + 1.6)))

@@ -99,13 +99,22 @@ def _header(fields: list[str] | None, where: str, units: str | None) -> _Header:
     wanted = METRES if any(name in METRES for name in names) else PLAIN
     _refuse_columns(names, wanted, where)
     if wanted is METRES and units is not None:
-        raise CaseError(f"{where}: the columns {','.join(METRES)} are in metres already, "
-                        f"but units {units!r} were given; leave out --units")
+        raise CaseError(
+            f"{where}: the columns {','.join(METRES)} are in metres already, "
+            f"but units {units!r} were given; leave out --units"
+        )
     if wanted is PLAIN and units is None:
-        raise CaseError(f"{where}: the columns {','.join(PLAIN)} have no unit; give --units "
-                        f"({', '.join(UNITS)}) or name them {','.join(METRES)}")
-    return _Header(width=len(names), names=wanted, numbers=tuple(names.index(name) for name in wanted),
-                   kind=names.index("kind") if "kind" in names else None, scale=UNITS[units or "m"])
+        raise CaseError(
+            f"{where}: the columns {','.join(PLAIN)} have no unit; give --units "
+            f"({', '.join(UNITS)}) or name them {','.join(METRES)}"
+        )
+    return _Header(
+        width=len(names),
+        names=wanted,
+        numbers=tuple(names.index(name) for name in wanted),
+        kind=names.index("kind") if "kind" in names else None,
+        scale=UNITS[units or "m"],
+    )
 
 
 def _refuse_columns(names: tuple[str, ...], wanted: tuple[str, ...], where: str) -> None:
@@ -125,8 +134,9 @@ def _refuse_columns(names: tuple[str, ...], wanted: tuple[str, ...], where: str)
 def _row(fields: list[str], header: _Header, where: str) -> tuple[float, float, float, float, int]:
     if len(fields) != header.width:
         raise CaseError(f"{where}: {len(fields)} values, expected {header.width} as in the header")
-    x, y, z, radius = (_number(fields[i], name, where) * header.scale
-                       for i, name in zip(header.numbers, header.names, strict=True))
+    x, y, z, radius = (
+        _number(fields[i], name, where) * header.scale for i, name in zip(header.numbers, header.names, strict=True)
+    )
     if radius <= 0:
         given = fields[header.numbers[3]].strip()
         raise CaseError(f"{where}: {header.names[3]} is {given}, expected a number above 0")

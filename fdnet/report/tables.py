@@ -18,21 +18,39 @@ if TYPE_CHECKING:
 
     from fdnet.network.permeability import Analysis
 
-__all__ = ["read_spheres", "section_rows", "write_pores", "write_profile", "write_sections", "write_spheres",
-           "write_summary", "write_throats"]
+__all__ = [
+    "read_spheres",
+    "section_rows",
+    "write_pores",
+    "write_profile",
+    "write_sections",
+    "write_spheres",
+    "write_summary",
+    "write_throats",
+]
 
 FLOAT_FORMAT = "%.9g"
 
 
 def section_rows(analysis: "Analysis") -> list[dict[str, Any]]:
     """The sections as `sections.csv` and `summary.json` name their values."""
-    return [{
-        "section": s.section, "x_lo_m": s.x_lo, "x_hi_m": s.x_hi,
-        "porosity_initial": s.porosity_initial, "porosity_damaged": s.porosity_damaged,
-        "k_initial_m2": s.k_initial, "k_damaged_m2": s.k_damaged, "k_reduction": s.k_reduction,
-        "k_initial_inplace_m2": s.k_initial_inplace, "k_damaged_inplace_m2": s.k_damaged_inplace,
-        "fines_count": s.fines_count, "fines_fraction": s.fines_fraction,
-    } for s in analysis.sections]
+    return [
+        {
+            "section": s.section,
+            "x_lo_m": s.x_lo,
+            "x_hi_m": s.x_hi,
+            "porosity_initial": s.porosity_initial,
+            "porosity_damaged": s.porosity_damaged,
+            "k_initial_m2": s.k_initial,
+            "k_damaged_m2": s.k_damaged,
+            "k_reduction": s.k_reduction,
+            "k_initial_inplace_m2": s.k_initial_inplace,
+            "k_damaged_inplace_m2": s.k_damaged_inplace,
+            "fines_count": s.fines_count,
+            "fines_fraction": s.fines_fraction,
+        }
+        for s in analysis.sections
+    ]
 
 
 def write_sections(path: str | Path, analysis: "Analysis") -> Path:
@@ -45,12 +63,19 @@ def write_profile(path: str | Path, analysis: "Analysis") -> Path:
     """One row per depth bin; porosity_reduction is the difference initial - damaged (Shi 2011, Figure 16)."""
     profile = analysis.profile
     edges = [repr(float(x)) for x in profile.edges]
-    return _write(path, _frame({
-        "x_lo_m": edges[:-1], "x_hi_m": edges[1:],
-        "porosity_initial": profile.porosity_initial, "porosity_damaged": profile.porosity_damaged,
-        "porosity_reduction": np.subtract(profile.porosity_initial, profile.porosity_damaged),
-        "fines_fraction": profile.fines_fraction,
-    }))
+    return _write(
+        path,
+        _frame(
+            {
+                "x_lo_m": edges[:-1],
+                "x_hi_m": edges[1:],
+                "porosity_initial": profile.porosity_initial,
+                "porosity_damaged": profile.porosity_damaged,
+                "porosity_reduction": np.subtract(profile.porosity_initial, profile.porosity_damaged),
+                "fines_fraction": profile.fines_fraction,
+            }
+        ),
+    )
 
 
 def write_pores(path: str | Path, analysis: "Analysis") -> Path:
@@ -66,8 +91,10 @@ def write_pores(path: str | Path, analysis: "Analysis") -> Path:
     columns |= _split("pore_coords", network.pore_position, "_m")
     columns |= _split("grain", network.pore_grains)
     columns |= {
-        "pore_radius_m": network.pore_radius, "pore_volume_m3": network.pore_volume,
-        "pore_wall_surface_m2": network.pore_wall_surface, "pore_share": network.pore_share,
+        "pore_radius_m": network.pore_radius,
+        "pore_volume_m3": network.pore_volume,
+        "pore_wall_surface_m2": network.pore_wall_surface,
+        "pore_share": network.pore_share,
         "fines_volume_m3": np.zeros(count) if occupancy is None else occupancy.pore_solid_volume,
         "fines_surface_m2": np.zeros(count) if occupancy is None else occupancy.pore_solid_surface,
         "porosity": pore_porosity(analysis),
@@ -93,12 +120,14 @@ def write_throats(path: str | Path, analysis: "Analysis") -> Path:
     columns |= {
         "throat_radius_m": network.throat_radius,
         "throat_radius_effective_m": network.throat_radius_effective,
-        "throat_area_m2": network.throat_area, "throat_length_m": network.throat_length,
+        "throat_area_m2": network.throat_area,
+        "throat_length_m": network.throat_length,
         "fines_count": np.zeros(count, int) if occupancy is None else occupancy.throat_fines,
         "fines_volume_m3": np.zeros(count) if occupancy is None else occupancy.throat_solid_volume,
         "fines_radius_mean_m": np.zeros(count) if occupancy is None else occupancy.throat_fine_radius,
         "porosity": np.ones(count) if occupancy is None else occupancy.throat_porosity,
-        "blocked": blocked_throats(analysis).astype(int), "law_used": analysis.law_used,
+        "blocked": blocked_throats(analysis).astype(int),
+        "law_used": analysis.law_used,
         "conductance_initial_m3": analysis.conductance_initial,
         "conductance_damaged_m3": analysis.conductance_damaged,
         "flux_initial_m3": analysis.flow_initial.throat_flux,

@@ -58,11 +58,15 @@ def write_pvd(path: str | Path, entries: Sequence[tuple[float, str | Path]]) -> 
     """A ParaView collection of (time in s, file); files are named relative to the folder of `path`."""
     folder = Path(path).resolve().parent
     rows = "".join(
-        f"    <DataSet timestep={quoteattr(repr(float(time)))} part=\"0\" "
+        f'    <DataSet timestep={quoteattr(repr(float(time)))} part="0" '
         f"file={quoteattr(Path(os.path.relpath(Path(folder, file), folder)).as_posix())}/>\n"
-        for time, file in entries)
-    return write_text(path, '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
-                            f"{rows}  </Collection>\n</VTKFile>\n")
+        for time, file in entries
+    )
+    return write_text(
+        path,
+        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
+        f"{rows}  </Collection>\n</VTKFile>\n",
+    )
 
 
 def render_spheres_png(path: str | Path, spheres_vtp: str | Path, box: Array, *, seconds: float = 120.0) -> str:
@@ -73,9 +77,16 @@ def render_spheres_png(path: str | Path, spheres_vtp: str | Path, box: Array, *,
     """
     try:
         with replacing(path) as part:
-            done = subprocess.run([*_command(spheres_vtp, box), str(part.absolute())], capture_output=True,
-                                  text=True, errors="replace", timeout=seconds, check=False,
-                                  stdin=subprocess.DEVNULL, env=_child_environment())
+            done = subprocess.run(
+                [*_command(spheres_vtp, box), str(part.absolute())],
+                capture_output=True,
+                text=True,
+                errors="replace",
+                timeout=seconds,
+                check=False,
+                stdin=subprocess.DEVNULL,
+                env=_child_environment(),
+            )
             _refuse_failure(done, part)
     except subprocess.TimeoutExpired:
         return f"the 3-D picture was given up after {seconds:g} s"
@@ -146,11 +157,14 @@ def _throat_data(analysis: "Analysis") -> dict[str, Array]:
     network, occupancy, count = analysis.network, analysis.occupancy, len(analysis.network.throat_radius)
     codes = [LAW_CODES.get(str(name), -1) for name in analysis.law_used]
     return {
-        "throat_radius": network.throat_radius, "throat_length": network.throat_length,
+        "throat_radius": network.throat_radius,
+        "throat_length": network.throat_length,
         "porosity": np.ones(count) if occupancy is None else occupancy.throat_porosity,
         "fines": np.zeros(count, int) if occupancy is None else occupancy.throat_fines,
-        "blocked": blocked_throats(analysis).astype(np.uint8), "law_used": np.array(codes, np.int8),
-        "conductance_initial": analysis.conductance_initial, "conductance_damaged": analysis.conductance_damaged,
+        "blocked": blocked_throats(analysis).astype(np.uint8),
+        "law_used": np.array(codes, np.int8),
+        "conductance_initial": analysis.conductance_initial,
+        "conductance_damaged": analysis.conductance_damaged,
         "flux_initial": analysis.flow_initial.throat_flux,
         "flux_damaged": analysis.flow_damaged.throat_flux,
     }
@@ -161,14 +175,17 @@ def _pore_data(analysis: "Analysis", drawing: _Drawing) -> dict[str, Array]:
     network, count = analysis.network, len(analysis.network.pore_radius)
     source, none = drawing.source, np.zeros(len(drawing.source))
     porosity = pore_porosity(analysis)
-    pressures = {"pressure_initial": analysis.flow_initial.pore_pressure,
-                 "pressure_damaged": analysis.flow_damaged.pore_pressure}
-    fall = drawing.periods if network.periodic[0] else none      # periodic x: the pressure falls by 1 per period
+    pressures = {
+        "pressure_initial": analysis.flow_initial.pore_pressure,
+        "pressure_damaged": analysis.flow_damaged.pore_pressure,
+    }
+    fall = drawing.periods if network.periodic[0] else none  # periodic x: the pressure falls by 1 per period
     data = {name: np.append(p, _of_ends(p, source, (1.0, 0.0)) - fall) for name, p in pressures.items()}
     return data | {
         "radius": np.append(network.pore_radius, _of_ends(network.pore_radius, source, (0.0, 0.0))),
         "porosity": np.append(porosity, _of_ends(porosity, source, (np.nan, np.nan))),
-        "volume": np.append(network.pore_volume, none), "share": np.append(network.pore_share, none),
+        "volume": np.append(network.pore_volume, none),
+        "share": np.append(network.pore_share, none),
         "end": np.append(np.zeros(count, np.uint8), np.ones(len(source), np.uint8)),
     }
 

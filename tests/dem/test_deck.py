@@ -10,15 +10,23 @@ from builders import tiny
 from fdnet.dem.deck import render_text, used_variables
 from fdnet.dem.invade_deck import render_invade
 from fdnet.dem.packing import draw_radii, render_pack
-from fdnet.errors import CaseError, DeckError
+from fdnet.errors import DeckError
 from fdnet.scales import scales_of
 from fdnet.snapshot import Kind, Snapshot
 
 
 def one_grain(case) -> Snapshot:
     box = np.column_stack([np.zeros(3), case.size_m])
-    return Snapshot(step=0, time_s=0.0, box=box, id=np.array([1]), kind=np.array([Kind.GRAIN]),
-                    position=np.array([[2e-4, 8e-4, 8e-4]]), radius=np.array([2.5e-4]), velocity=np.zeros((1, 3)))
+    return Snapshot(
+        step=0,
+        time_s=0.0,
+        box=box,
+        id=np.array([1]),
+        kind=np.array([Kind.GRAIN]),
+        position=np.array([[2e-4, 8e-4, 8e-4]]),
+        radius=np.array([2.5e-4]),
+        velocity=np.zeros((1, 3)),
+    )
 
 
 def invade_text(*assignments: str, ranks: int = 1) -> str:
@@ -50,8 +58,19 @@ def test_templates_hold_no_arithmetic():
     import jinja2
     from jinja2 import nodes
 
-    forbidden = (nodes.Add, nodes.Sub, nodes.Mul, nodes.Div, nodes.FloorDiv, nodes.Mod, nodes.Pow, nodes.Neg, nodes.Concat, nodes.Filter,
-                 nodes.Assign)
+    forbidden = (
+        nodes.Add,
+        nodes.Sub,
+        nodes.Mul,
+        nodes.Div,
+        nodes.FloorDiv,
+        nodes.Mod,
+        nodes.Pow,
+        nodes.Neg,
+        nodes.Concat,
+        nodes.Filter,
+        nodes.Assign,
+    )
     for entry in files("liggghts_templates").iterdir():
         if entry.name.endswith(".j2"):
             tree = jinja2.Environment().parse(entry.read_text())

@@ -8,7 +8,10 @@ import pytest
 from fdnet.dem.dump import parse_dump, read_dump, read_frame
 from fdnet.errors import DumpError
 
-HEADER = "ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS ff ff ff\n-1 1\n0 2\n0 3\nITEM: ATOMS id type x \n"
+HEADER = (
+    "ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\n"
+    "ITEM: BOX BOUNDS ff ff ff\n-1 1\n0 2\n0 3\nITEM: ATOMS id type x \n"
+)
 
 
 def frame(step: int, rows: list[str], count: int | None = None) -> str:
@@ -36,22 +39,25 @@ def test_empty_frame():
     assert parse(frame(0, []))[0].rows.shape == (0, 3)
 
 
-@pytest.mark.parametrize(("text", "said"), [
-    (frame(4000, ["1 1 0.5 "], count=3), r"d\.dump:11: step 4000: 1 of 3 rows, then the file ends"),
-    (frame(4000, ["1 1 0.5 ", "2 1 0."])[:-1], "rows, then the file ends"),
-    (frame(0, ["1 1 0.5 "], count=2) + frame(1, ["1 1 0.5 "]), "1 of 2 rows, then the next frame begins"),
-    (frame(0, ["1 1 0.5 ", "2 1 "]), "d.dump:11: step 0: 2 values, expected 3"),
-    (frame(0, ["1 1 0.5 ", "2 1 0.5 7 "]), "4 values, expected 3"),
-    (frame(0, ["1 1 nan "]), "column x holds b'nan', expected a finite number"),
-    (frame(0, ["1 1 0.5 ", "2 1 -inf "]), "d.dump:11: step 0: column x holds b'-inf'"),
-    (frame(0, ["1 1 abc "]), "column x holds b'abc'"),
-    ("ITEM: TIMESTEP\n12\nITEM: NUMBER OF", "the file ends in the middle of a line"),
-    ("ITEM: TIMESTEP\n12\n", "the file ends before ITEM: NUMBER OF ATOMS"),
-    ("ITEM: TIMESTEP\nx\nITEM: NUMBER OF ATOMS\n", "step is b'x'"),
-    ("hello\n", "found b'hello', expected 'ITEM: TIMESTEP'"),
-    (frame(0, ["1 1 1 "]).replace("0 2", "0"), "box bounds b'0', expected two numbers"),
-    (frame(0, ["1 1 1 "]).replace("\n1\nITEM: BOX", "\n-4\nITEM: BOX"), "number of atoms is b'-4'"),
-])
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (frame(4000, ["1 1 0.5 "], count=3), r"d\.dump:11: step 4000: 1 of 3 rows, then the file ends"),
+        (frame(4000, ["1 1 0.5 ", "2 1 0."])[:-1], "rows, then the file ends"),
+        (frame(0, ["1 1 0.5 "], count=2) + frame(1, ["1 1 0.5 "]), "1 of 2 rows, then the next frame begins"),
+        (frame(0, ["1 1 0.5 ", "2 1 "]), "d.dump:11: step 0: 2 values, expected 3"),
+        (frame(0, ["1 1 0.5 ", "2 1 0.5 7 "]), "4 values, expected 3"),
+        (frame(0, ["1 1 nan "]), "column x holds b'nan', expected a finite number"),
+        (frame(0, ["1 1 0.5 ", "2 1 -inf "]), "d.dump:11: step 0: column x holds b'-inf'"),
+        (frame(0, ["1 1 abc "]), "column x holds b'abc'"),
+        ("ITEM: TIMESTEP\n12\nITEM: NUMBER OF", "the file ends in the middle of a line"),
+        ("ITEM: TIMESTEP\n12\n", "the file ends before ITEM: NUMBER OF ATOMS"),
+        ("ITEM: TIMESTEP\nx\nITEM: NUMBER OF ATOMS\n", "step is b'x'"),
+        ("hello\n", "found b'hello', expected 'ITEM: TIMESTEP'"),
+        (frame(0, ["1 1 1 "]).replace("0 2", "0"), "box bounds b'0', expected two numbers"),
+        (frame(0, ["1 1 1 "]).replace("\n1\nITEM: BOX", "\n-4\nITEM: BOX"), "number of atoms is b'-4'"),
+    ],
+)
 def test_broken_files_are_named_by_line_and_step(text, said):
     with pytest.raises(DumpError, match=said):
         parse(text)

@@ -10,6 +10,7 @@ from fdnet.contacts import touching_pairs
 from fdnet.dem import checkpoint
 from fdnet.dem.checkpoint import last_checkpoint, read_history
 from fdnet.dem.invasion import invade
+from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
 from fdnet.dem.supply import CLEARANCE, place_fines
 from fdnet.errors import CaseError, LiggghtsError
@@ -25,11 +26,13 @@ def packed(binary, tmp_path_factory):
     grains = {}
     for sides in ("walls", "periodic"):
         case = tiny(f"box.sides={sides}")
-        grains[sides] = make_pack(case, scales_of(case), tmp_path_factory.mktemp(sides), binary=binary).grains
+        grains[sides] = make_pack(case, scales_of(case), tmp_path_factory.mktemp(sides), Launch(binary=binary)).grains
     return grains
 
 
-@pytest.mark.parametrize("assignments", [[], ["fines.radius_mm=[0.02,0.06]"], ["box.sides=periodic", "fines.concentration=0.3"]])
+@pytest.mark.parametrize(
+    "assignments", [[], ["fines.radius_mm=[0.02,0.06]"], ["box.sides=periodic", "fines.concentration=0.3"]]
+)
 def test_fines_start_clear_of_everything(packed, assignments):
     case = tiny(*assignments)
     scales = scales_of(case)
@@ -51,13 +54,21 @@ def test_a_slab_that_cannot_hold_the_fines_is_an_error(packed):
         place_fines(crowded, scales_of(crowded), packed["walls"])
 
 
-@pytest.mark.parametrize("assignments", [
-    [], ["box.sides=periodic"], ["grains.motion=mobile"], ["drag.scheme=every_step"], ["drag.upstream=darcy"],
-    ["fines.radius_mm=[0.02,0.05]", "fines.friction=0.0", "run={duration_ms=0.25}"]])
+@pytest.mark.parametrize(
+    "assignments",
+    [
+        [],
+        ["box.sides=periodic"],
+        ["grains.motion=mobile"],
+        ["drag.scheme=every_step"],
+        ["drag.upstream=darcy"],
+        ["fines.radius_mm=[0.02,0.05]", "fines.friction=0.0", "run={duration_ms=0.25}"],
+    ],
+)
 def test_supplied_is_invaded_passed_and_upstream_at_every_checkpoint(binary, packed, tmp_path, assignments):
     case = tiny("run.cap_ms=0.6", *assignments)
     scales = scales_of(case)
-    result = invade(case, scales, packed[case.box.sides], tmp_path, binary=binary)
+    result = invade(case, scales, packed[case.box.sides], tmp_path, Launch(binary=binary))
     for row in result.history:
         assert row.upstream + row.invaded + row.passed == scales.supplied_count
     x = result.damaged.fines().position[:, 0]
@@ -71,7 +82,7 @@ def test_fixed_grains_do_not_move_and_mobile_ones_do(binary, packed, tmp_path):
     grains = packed["walls"]
     for motion in ("fixed", "mobile"):
         case = tiny(f"grains.motion={motion}", "run.duration_ms=0.2")
-        result = invade(case, scales_of(case), grains, tmp_path / motion, binary=binary)
+        result = invade(case, scales_of(case), grains, tmp_path / motion, Launch(binary=binary))
         moved = np.max(np.abs(result.damaged.grains().position - grains.position))
         assert (moved > 0) == (motion == "mobile")
         assert moved < 0.2 * 0.25e-3
@@ -79,7 +90,7 @@ def test_fixed_grains_do_not_move_and_mobile_ones_do(binary, packed, tmp_path):
 
 def test_passed_fines_are_removed_and_counted(binary, packed, tmp_path):
     case = tiny("fines.radius_mm=0.02", "fines.friction=0.0", "fines.count=200", "run.cap_ms=3.0")
-    result = invade(case, scales_of(case), packed["walls"], tmp_path, binary=binary)
+    result = invade(case, scales_of(case), packed["walls"], tmp_path, Launch(binary=binary))
     assert result.history[-1].passed > 0
     assert len(result.damaged.fines()) == 200 - result.history[-1].passed
     assert result.stop_reason == "supply_exhausted"
@@ -87,10 +98,10 @@ def test_passed_fines_are_removed_and_counted(binary, packed, tmp_path):
 
 
 def test_every_stop_reason_is_told(binary, packed, tmp_path):
-    capped = tiny("run.cap_ms=0.05")
-    assert invade(capped, scales_of(capped), packed["walls"], tmp_path / "cap", binary=binary).stop_reason == "cap"
-    plugged = tiny("fines={radius_mm=0.12, count=60}")
-    assert invade(plugged, scales_of(plugged), packed["walls"], tmp_path / "plug", binary=binary).stop_reason == "plugged"
+    cases = {"cap": tiny("run.cap_ms=0.05"), "plugged": tiny("fines={radius_mm=0.12, count=60}")}
+    for reason, case in cases.items():
+        result = invade(case, scales_of(case), packed["walls"], tmp_path / reason, Launch(binary=binary))
+        assert result.stop_reason == reason
 
 
 class StopError(Exception):
@@ -101,16 +112,16 @@ class StopError(Exception):
 def test_a_cut_run_continues_bit_for_bit(binary, packed, tmp_path, monkeypatch, assignments):
     case = tiny("run.cap_ms=0.5", *assignments)
     scales, grains = scales_of(case), packed["walls"]
-    whole = invade(case, scales, grains, tmp_path / "whole", binary=binary)
+    whole = invade(case, scales, grains, tmp_path / "whole", Launch(binary=binary))
 
     def stop(line: str) -> None:
         if line.startswith("FDNET checkpoint 2 "):
             raise StopError
 
     with pytest.raises(StopError):
-        invade(case, scales, grains, tmp_path / "cut", binary=binary, follow=stop)
+        invade(case, scales, grains, tmp_path / "cut", Launch(binary=binary, follow=stop))
     assert read_history(tmp_path / "cut")[-1].chunk < whole.history[-1].chunk
-    again = invade(case, scales, grains, tmp_path / "cut", binary=binary)
+    again = invade(case, scales, grains, tmp_path / "cut", Launch(binary=binary))
     assert again.history == whole.history
     assert np.array_equal(again.damaged.position, whole.damaged.position)
 
@@ -118,28 +129,28 @@ def test_a_cut_run_continues_bit_for_bit(binary, packed, tmp_path, monkeypatch, 
 def test_broken_checkpoints_are_passed_over(binary, packed, tmp_path):
     case = tiny("run.cap_ms=0.3")
     scales, grains = scales_of(case), packed["walls"]
-    whole = invade(case, scales, grains, tmp_path, binary=binary)
+    whole = invade(case, scales, grains, tmp_path, Launch(binary=binary))
     last, before = whole.history[-1], whole.history[-2]
     dump = tmp_path / "post" / f"invade_{last.step}.dump"
     dump.write_bytes(dump.read_bytes()[:-40])
     assert last_checkpoint(tmp_path, case, grains) == before
     (tmp_path / "post" / f"invade_{before.step}.restart").write_bytes(b"")
     assert last_checkpoint(tmp_path, case, grains) is None
-    again = invade(case, scales, grains, tmp_path, binary=binary)
+    again = invade(case, scales, grains, tmp_path, Launch(binary=binary))
     assert np.array_equal(again.damaged.position, whole.damaged.position)
 
 
 def test_a_restart_cut_by_a_full_disk_is_set_aside(binary, packed, tmp_path):
     case = tiny("run.cap_ms=0.3")
     scales, grains = scales_of(case), packed["walls"]
-    whole = invade(case, scales, grains, tmp_path, binary=binary)
+    whole = invade(case, scales, grains, tmp_path, Launch(binary=binary))
     rows = (tmp_path / "history.csv").read_text().splitlines(keepends=True)
     (tmp_path / "history.csv").write_text("".join(rows[:-1]))
     kept = whole.history[-2]
     restart = tmp_path / "post" / f"invade_{kept.step}.restart"
     restart.write_bytes(restart.read_bytes()[: int(0.9 * restart.stat().st_size)])
     assert last_checkpoint(tmp_path, case, grains) == kept
-    again = invade(case, scales, grains, tmp_path, binary=binary)
+    again = invade(case, scales, grains, tmp_path, Launch(binary=binary))
     assert again.history == whole.history
     assert np.array_equal(again.damaged.position, whole.damaged.position)
 
@@ -147,11 +158,15 @@ def test_a_restart_cut_by_a_full_disk_is_set_aside(binary, packed, tmp_path):
 def test_fines_that_vanish_are_an_error(packed, tmp_path):
     case = tiny()
     (tmp_path / "post").mkdir()
-    row = checkpoint.Checkpoint(chunk=1, step=10, upstream=200, invaded=90, passed=5, removed_upstream=0, most_crossed=95, quiet=0)
+    row = checkpoint.Checkpoint(
+        chunk=1, step=10, upstream=200, invaded=90, passed=5, removed_upstream=0, most_crossed=95, quiet=0
+    )
     damaged = packed["walls"].joined(place_fines(case, scales_of(case), packed["walls"]))
     with pytest.raises(LiggghtsError, match="fines inside"):
         checkpoint.check_counts(tmp_path, row, damaged, 300)
-    row = checkpoint.Checkpoint(chunk=1, step=10, upstream=300, invaded=0, passed=0, removed_upstream=0, most_crossed=0, quiet=0)
+    row = checkpoint.Checkpoint(
+        chunk=1, step=10, upstream=300, invaded=0, passed=0, removed_upstream=0, most_crossed=0, quiet=0
+    )
     with pytest.raises(LiggghtsError, match="is not the 301 supplied"):
         checkpoint.check_counts(tmp_path, row, damaged, 301)
 

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from fdnet.dem.liggghts import Binary, find_binary, run_deck
+from fdnet.dem import liggghts
+from fdnet.dem.liggghts import Binary, Launch, find_binary, run_deck
 from fdnet.errors import LiggghtsError
 
 FAKE = """#!/bin/sh
@@ -45,7 +46,7 @@ def fake(tmp_path: Path) -> Binary:
 
 def run(fake: Binary, folder: Path, mode: str, **options):
     (folder / "mode").write_text(mode)
-    return run_deck(folder, "in.deck", binary=fake, **options)
+    return run_deck(folder, "in.deck", Launch(binary=fake, **options))
 
 
 def test_a_whole_run_is_a_run(fake, tmp_path):
@@ -56,16 +57,19 @@ def test_a_whole_run_is_a_run(fake, tmp_path):
     assert run(fake, tmp_path, "junk").ranks == 1
 
 
-@pytest.mark.parametrize(("mode", "said"), [
-    ("exit1", r"exit 1\): ERROR: Unknown command: nonsense"),
-    ("error0", r"exit 0\): ERROR on proc 0: Cannot open file"),
-    ("short", r"exit 0, no DECK_DONE line\): the last line is 'half way'"),
-    ("silent", r"exit 1, no DECK_DONE line"),
-    ("lost", "Lost atoms"),
-    ("nan", "not-a-number in the output"),
-    ("forced", "Forced restart written"),
-    ("segv", "signal 11"),
-])
+@pytest.mark.parametrize(
+    ("mode", "said"),
+    [
+        ("exit1", r"exit 1\): ERROR: Unknown command: nonsense"),
+        ("error0", r"exit 0\): ERROR on proc 0: Cannot open file"),
+        ("short", r"exit 0, no DECK_DONE line\): the last line is 'half way'"),
+        ("silent", r"exit 1, no DECK_DONE line"),
+        ("lost", "Lost atoms"),
+        ("nan", "not-a-number in the output"),
+        ("forced", "Forced restart written"),
+        ("segv", "signal 11"),
+    ],
+)
 def test_failures_are_told_with_their_evidence(fake, tmp_path, mode, said):
     with pytest.raises(LiggghtsError, match=said):
         run(fake, tmp_path, mode)
@@ -83,8 +87,8 @@ def test_the_run_dies_with_its_parent(fake, tmp_path):
     (tmp_path / "mode").write_text("hang")
     code = textwrap.dedent(f"""
         from pathlib import Path
-        from fdnet.dem.liggghts import find_binary, run_deck
-        run_deck(Path({str(tmp_path)!r}), "in.deck", binary=find_binary({str(fake.path)!r}))
+        from fdnet.dem.liggghts import Launch, find_binary, run_deck
+        run_deck(Path({str(tmp_path)!r}), "in.deck", Launch(binary=find_binary({str(fake.path)!r})))
     """)
     parent = subprocess.Popen([sys.executable, "-c", code], start_new_session=True)
     screen = tmp_path / "screen.txt"
@@ -100,9 +104,9 @@ def test_the_run_dies_with_its_parent(fake, tmp_path):
     assert not any(_alive(int(child)) for child in children)
 
 
-def test_a_folder_where_liggghts_still_writes_is_refused(fake, tmp_path):
+def test_a_folder_where_liggghts_still_writes_is_refused(fake, tmp_path, monkeypatch):
     """The lock is LIGGGHTS's own: it outlives a killed parent, also under MPI, where ranks take a moment to end."""
-    (tmp_path / "mode").write_text("hang")
+    monkeypatch.setattr(liggghts, "LOCK_PATIENCE", 0.3)
     command = ["sh", "-c", f"exec 9>{tmp_path}/.lock; flock 9; sleep 30 9>&9"]
     orphan = subprocess.Popen(command, start_new_session=True)
     time.sleep(0.5)
@@ -126,7 +130,7 @@ def test_missing_binary_deck_and_strangers(fake, tmp_path, monkeypatch):
     with pytest.raises(LiggghtsError, match="does not answer like LIGGGHTS"):
         find_binary("/bin/true")
     with pytest.raises(LiggghtsError, match="deck not found"):
-        run_deck(tmp_path, "in.other", binary=fake)
+        run_deck(tmp_path, "in.other", Launch(binary=fake))
     monkeypatch.setenv("FDNET_LIGGGHTS", str(fake.path))
     assert find_binary().path == fake.path
     with pytest.raises(LiggghtsError, match="no mpirun"):
@@ -135,11 +139,16 @@ def test_missing_binary_deck_and_strangers(fake, tmp_path, monkeypatch):
 
 @pytest.mark.liggghts
 def test_the_real_binary_fails_as_the_fake_does(binary, tmp_path):
-    for text, said in (("nonsense\n", "Unknown command"), ("units si\nread_data none.data\n", "Cannot open file"),
-                       ("units si\n", "no DECK_DONE"), ('print "${undefined}"\n', "exit 1"), ("quit\n", "exit 1")):
+    for text, said in (
+        ("nonsense\n", "Unknown command"),
+        ("units si\nread_data none.data\n", "Cannot open file"),
+        ("units si\n", "no DECK_DONE"),
+        ('print "${undefined}"\n', "exit 1"),
+        ("quit\n", "exit 1"),
+    ):
         (tmp_path / "in.bad").write_text(text)
         with pytest.raises(LiggghtsError, match=said):
-            run_deck(tmp_path, "in.bad", binary=binary)
+            run_deck(tmp_path, "in.bad", Launch(binary=binary))
 
 
 @pytest.mark.liggghts
@@ -148,4 +157,4 @@ def test_two_ranks_run(binary, tmp_path):
     (tmp_path / "in.two").write_text('units si\nprint "DECK_DONE"\n')
     if binary.launcher is None:
         pytest.skip("no mpirun on this machine")
-    assert run_deck(tmp_path, "in.two", binary=binary, ranks=2).ranks == 2
+    assert run_deck(tmp_path, "in.two", Launch(binary=binary, ranks=2)).ranks == 2

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from builders import tiny
 
+from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
 from fdnet.errors import CaseError
 from fdnet.scales import scales_of
@@ -16,20 +17,22 @@ DENSE = ("box.size_mm=[5.0,3.0,3.0]", "grains={radius_mm=0.25, porosity=0.36}")
 
 def test_porosity_is_met_at_rest_and_the_run_repeats_exactly(binary, tmp_path):
     case = tiny(*DENSE)
-    packs = [make_pack(case, scales_of(case), tmp_path / name, binary=binary) for name in "ab"]
+    packs = [make_pack(case, scales_of(case), tmp_path / name, Launch(binary=binary)) for name in "ab"]
     pack = packs[0]
     assert abs(pack.porosity - 0.36) <= 0.003
     assert pack.porosity_error < 0.001
     assert pack.porosity_sum < pack.porosity
     assert np.array_equal(pack.grains.position, packs[1].grains.position)
-    per_second = math.sqrt(scales_of(case).contacts["grain-grain"].normal_stiffness / (2650 * 4 / 3 * math.pi * 0.25e-3**3))
+    per_second = math.sqrt(
+        scales_of(case).contacts["grain-grain"].normal_stiffness / (2650 * 4 / 3 * math.pi * 0.25e-3**3)
+    )
     assert np.max(np.abs(pack.grains.velocity)) < 1e-6 * 0.5e-3 * per_second
     assert np.all((pack.grains.position >= 0) & (pack.grains.position <= case.size_m))
 
 
 def test_a_range_of_radii(binary, tmp_path):
     case = tiny("box.size_mm=[5.0,3.0,3.0]", "grains={radius_mm=[0.15,0.25], porosity=0.40}")
-    pack = make_pack(case, scales_of(case), tmp_path, binary=binary)
+    pack = make_pack(case, scales_of(case), tmp_path, Launch(binary=binary))
     assert abs(pack.porosity - 0.40) <= 0.003
     assert pack.grains.radius.min() == pytest.approx(0.15e-3, rel=0.02)
     assert pack.grains.radius.max() == pytest.approx(0.25e-3, rel=0.02)
@@ -37,25 +40,29 @@ def test_a_range_of_radii(binary, tmp_path):
 
 def test_count_overrides_porosity(binary, tmp_path):
     case = tiny("grains={radius_mm=0.25, porosity=0.9, count=66}")
-    pack = make_pack(case, scales_of(case), tmp_path, binary=binary)
+    pack = make_pack(case, scales_of(case), tmp_path, Launch(binary=binary))
     assert len(pack.grains) == 66
     assert pack.porosity_sum == pytest.approx(1 - 66 * 4 / 3 * math.pi * 0.25**3 / (3.0 * 1.6 * 1.6), rel=1e-9)
 
 
-@pytest.mark.parametrize(("porosity", "said"), [(0.12, "pushed out of it"), (0.27, "0.27 needs grains that overlap by")])
+@pytest.mark.parametrize(
+    ("porosity", "said"), [(0.12, "pushed out of it"), (0.27, "0.27 needs grains that overlap by")]
+)
 def test_unreachable_porosity_is_an_error(binary, tmp_path, porosity, said):
     case = tiny(f"grains={{radius_mm=0.25, porosity={porosity}, max_overlap=0.08}}")
     with pytest.raises(CaseError, match=said):
-        make_pack(case, scales_of(case), tmp_path, binary=binary)
+        make_pack(case, scales_of(case), tmp_path, Launch(binary=binary))
 
 
 def test_a_grain_too_coarse_for_the_tolerance_is_an_error(binary, tmp_path):
     case = tiny("box.size_mm=[1.2,1.2,1.2]", "grains={radius_mm=0.25, porosity=0.47}")
     with pytest.raises(CaseError, match="one grain is"):
-        make_pack(case, scales_of(case), tmp_path, binary=binary)
+        make_pack(case, scales_of(case), tmp_path, Launch(binary=binary))
 
 
 def test_the_overlap_limit_holds_for_a_count_too(binary, tmp_path):
     case = tiny("grains={radius_mm=0.25, count=98}")
-    with pytest.raises(CaseError, match=r"grains\.count: 98 needs (grains that overlap|more room)|98 grains needs more room"):
-        make_pack(case, scales_of(case), tmp_path, binary=binary)
+    with pytest.raises(
+        CaseError, match=r"grains\.count: 98 needs (grains that overlap|more room)|98 grains needs more room"
+    ):
+        make_pack(case, scales_of(case), tmp_path, Launch(binary=binary))

@@ -11,7 +11,7 @@ from fdnet.contacts import max_overlap, touching_pairs
 from fdnet.dem.deck import number, render_text
 from fdnet.dem.dump import read_dump
 from fdnet.dem.invasion import invade
-from fdnet.dem.liggghts import run_deck
+from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.scene import contact_variables, write_data
 from fdnet.scales import relaxation_time, scales_of
 from fdnet.snapshot import Kind, Snapshot
@@ -21,20 +21,35 @@ pytestmark = pytest.mark.liggghts
 
 def snapshot(case: Case, position: list, kind: Kind, radius: float, first: int = 1) -> Snapshot:
     count = len(position)
-    return Snapshot(step=0, time_s=0.0, box=np.column_stack([np.zeros(3), case.size_m]), id=np.arange(first, first + count),
-                    kind=np.full(count, kind), position=np.array(position), radius=np.full(count, radius),
-                    velocity=np.zeros((count, 3)))
+    return Snapshot(
+        step=0,
+        time_s=0.0,
+        box=np.column_stack([np.zeros(3), case.size_m]),
+        id=np.arange(first, first + count),
+        kind=np.full(count, kind),
+        position=np.array(position),
+        radius=np.full(count, radius),
+        velocity=np.zeros((count, 3)),
+    )
 
 
 @pytest.mark.parametrize("scheme", ["every_step", "held"])
 def test_gravity_buoyancy_and_drag_relax_to_the_terminal_velocity(binary, tmp_path, scheme):
     """v_z(t) = v_T (1 - exp(-t / tau)), v_T = 2 r^2 (rho - rho_f) g / (9 mu) (Stokes 1851), for one free fine."""
     g = -2.0e4
-    case = tiny("fines.count=1", f"drag.scheme={scheme}", "gravity.mode=on", f"gravity.acceleration_m_s2=[0.0,0.0,{g}]",
-                "box.size_mm=[3.0,3.0,3.0]", "fluid.velocity_m_s=2.0", "run.duration_ms=0.05", "run.checkpoint_ms=0.01")
+    case = tiny(
+        "fines.count=1",
+        f"drag.scheme={scheme}",
+        "gravity.mode=on",
+        f"gravity.acceleration_m_s2=[0.0,0.0,{g}]",
+        "box.size_mm=[3.0,3.0,3.0]",
+        "fluid.velocity_m_s=2.0",
+        "run.duration_ms=0.05",
+        "run.checkpoint_ms=0.01",
+    )
     scales = scales_of(case)
     lonely = snapshot(case, [[2.9e-3, 3e-4, 3e-4]], Kind.GRAIN, 2.5e-4)
-    result = invade(case, scales, lonely, tmp_path, binary=binary)
+    result = invade(case, scales, lonely, tmp_path, Launch(binary=binary))
     fine = result.damaged.fines()
     tau = relaxation_time(0.05e-3, 2146, 0.05)
     terminal = 2 * (0.05e-3) ** 2 * (2146 - 1095) * g / (9 * 0.05)
@@ -49,19 +64,23 @@ def collide(case: Case, speed: float, binary, folder) -> tuple[float, float]:
     scales = scales_of(case)
     contacts = contact_variables(case, scales, "invade", friction=False)
     pair = snapshot(case, [[1e-3, 1e-3, 1e-3], [1.1005e-3, 1e-3, 1e-3]], Kind.FINE, 0.05e-3)
-    pair = snapshot(case, [[1e-4, 1e-4, 1e-4]], Kind.GRAIN, 0.05e-3, first=3).joined(pair)   # LIGGGHTS wants a type 1
+    pair = snapshot(case, [[1e-4, 1e-4, 1e-4]], Kind.GRAIN, 0.05e-3, first=3).joined(pair)  # LIGGGHTS wants a type 1
     write_data(folder / "two.data", pair, bounds=np.array([[0, 2e-3]] * 3), density=np.full(3, 2146.0), types=3)
     step = 0.02 * scales.contacts["fine-fine"].step_limit
-    text = render_text("_header.in.j2", {"stage": "test", "case_name": "two", "digest": "-", "left_out": [], "boundary": "f f f",
-                                         "processors": ""})
+    text = render_text(
+        "_header.in.j2",
+        {"stage": "test", "case_name": "two", "digest": "-", "left_out": [], "boundary": "f f f", "processors": ""},
+    )
     text += "read_data two.data\nneighbor 5e-5 bin\nneigh_modify delay 0\n"
     text += render_text("_contacts.in.j2", {"contacts": contacts, "time_step": number(step)})
-    text += (f"fix integ all nve/sphere\ngroup a id 1\ngroup b id 2\nvelocity a set {speed / 2} 0 0 units box\n"
-             f"velocity b set {-speed / 2} 0 0 units box\ndump d all custom 20 d.dump id type x y z vx vy vz radius\n"
-             'dump_modify d sort id format "%d %d %.17g %.17g %.17g %.17g %.17g %.17g %.17g"\n'
-             f'run {round((6e-7 / (speed / 1.0) + 4e-6) / step)}\nprint "DECK_DONE"\n')
+    text += (
+        f"fix integ all nve/sphere\ngroup a id 1\ngroup b id 2\nvelocity a set {speed / 2} 0 0 units box\n"
+        f"velocity b set {-speed / 2} 0 0 units box\ndump d all custom 20 d.dump id type x y z vx vy vz radius\n"
+        'dump_modify d sort id format "%d %d %.17g %.17g %.17g %.17g %.17g %.17g %.17g"\n'
+        f'run {round((6e-7 / (speed / 1.0) + 4e-6) / step)}\nprint "DECK_DONE"\n'
+    )
     (folder / "in.two").write_text(text)
-    run_deck(folder, "in.two", binary=binary)
+    run_deck(folder, "in.two", Launch(binary=binary))
     frames = read_dump(folder / "d.dump")
     gap = np.array([frame.column("x")[1] - frame.column("x")[0] for frame in frames])  # rows are sorted by id
     last = frames[-1].column("vx")
@@ -89,9 +108,16 @@ def test_touching_pairs_against_brute_force():
     for periodic in ((False, False, False), (False, True, True)):
         size = np.array(case.size_m)
         radius = rng.choice([2.5e-4, 5e-5, 3e-5], 300)
-        spheres = Snapshot(step=0, time_s=0.0, box=np.column_stack([np.zeros(3), size]), id=np.arange(300),
-                           kind=np.where(radius > 1e-4, Kind.GRAIN, Kind.FINE), position=rng.random((300, 3)) * size, radius=radius,
-                           velocity=np.zeros((300, 3)))
+        spheres = Snapshot(
+            step=0,
+            time_s=0.0,
+            box=np.column_stack([np.zeros(3), size]),
+            id=np.arange(300),
+            kind=np.where(radius > 1e-4, Kind.GRAIN, Kind.FINE),
+            position=rng.random((300, 3)) * size,
+            radius=radius,
+            velocity=np.zeros((300, 3)),
+        )
         gap = spheres.position[:, None] - spheres.position[None]
         gap -= np.where(periodic, size * np.round(gap / size), 0.0)
         depth = radius[:, None] + radius[None] - np.sqrt(np.sum(gap**2, axis=2))
@@ -100,4 +126,5 @@ def test_touching_pairs_against_brute_force():
         assert {tuple(sorted(pair)) for pair in pairs.tolist()} == expected
         assert np.allclose(overlap, depth[pairs[:, 0], pairs[:, 1]])
         assert max_overlap(spheres, periodic) == pytest.approx(
-            max(depth[i, j] / (2 * min(radius[i], radius[j])) for i, j in expected))
+            max(depth[i, j] / (2 * min(radius[i], radius[j])) for i, j in expected)
+        )

@@ -14,21 +14,37 @@ def network_of(position: Array, pairs: Array, box: Array, *, radius: float = 0.1
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     box = np.asarray(box, float)
     fields: dict[str, object] = {
-        "box": box, "periodic": (False, False, False), "grain_radius": 1.0,
+        "box": box,
+        "periodic": (False, False, False),
+        "grain_radius": 1.0,
         "area": float(np.prod(np.ptp(box[1:], axis=1))),
-        "pore_grains": np.zeros((pores, 4), int), "pore_corner": np.zeros((pores, 4, 3)),
-        "pore_corner_radius": np.ones((pores, 4)), "pore_position": position, "pore_radius": np.full(pores, radius),
-        "pore_circumcentre": position, "pore_tetra_volume": np.ones(pores), "pore_volume": np.ones(pores),
-        "pore_wall_surface": np.ones(pores), "pore_share": np.ones(pores), "pore_group": np.arange(pores),
+        "pore_grains": np.zeros((pores, 4), int),
+        "pore_corner": np.zeros((pores, 4, 3)),
+        "pore_corner_radius": np.ones((pores, 4)),
+        "pore_position": position,
+        "pore_radius": np.full(pores, radius),
+        "pore_circumcentre": position,
+        "pore_tetra_volume": np.ones(pores),
+        "pore_volume": np.ones(pores),
+        "pore_wall_surface": np.ones(pores),
+        "pore_share": np.ones(pores),
+        "pore_group": np.arange(pores),
         "throat_pores": pairs,
-        "throat_shift": np.zeros((throats, 3), int), "throat_ends": ends, "throat_grains": np.zeros((throats, 3), int),
-        "throat_corner": np.zeros((throats, 3, 3)), "throat_corner_radius": np.ones((throats, 3)),
-        "throat_heights": np.zeros((throats, 2)), "throat_radius": np.full(throats, radius),
-        "throat_radius_effective": np.full(throats, radius), "throat_area": np.full(throats, np.pi * radius**2),
-        "throat_length": length, "counts": {"grains_outside_box": 0},
+        "throat_shift": np.zeros((throats, 3), int),
+        "throat_ends": ends,
+        "throat_grains": np.zeros((throats, 3), int),
+        "throat_corner": np.zeros((throats, 3, 3)),
+        "throat_corner_radius": np.ones((throats, 3)),
+        "throat_heights": np.zeros((throats, 2)),
+        "throat_radius": np.full(throats, radius),
+        "throat_radius_effective": np.full(throats, radius),
+        "throat_area": np.full(throats, np.pi * radius**2),
+        "throat_length": length,
+        "counts": {"grains_outside_box": 0},
     } | given
-    return Network(**{name: frozen(value) if isinstance(value, np.ndarray) else value
-                      for name, value in fields.items()})
+    return Network(
+        **{name: frozen(value) if isinstance(value, np.ndarray) else value for name, value in fields.items()}
+    )
 
 
 def chain(count: int, *, step: float = 1.0) -> Network:

@@ -10,9 +10,16 @@ from fdnet.snapshot import Array, Kind, Snapshot
 def snapshot(position: Array, radius: Array | float, box: Array, kind: Array | int = Kind.GRAIN) -> Snapshot:
     position = np.asarray(position, dtype=float).reshape(-1, 3)
     count = len(position)
-    return Snapshot(step=0, time_s=0.0, box=np.asarray(box, dtype=float), id=np.arange(1, count + 1),
-                    kind=np.broadcast_to(kind, count), position=position,
-                    radius=np.broadcast_to(np.asarray(radius, dtype=float), count), velocity=np.zeros((count, 3)))
+    return Snapshot(
+        step=0,
+        time_s=0.0,
+        box=np.asarray(box, dtype=float),
+        id=np.arange(1, count + 1),
+        kind=np.broadcast_to(kind, count),
+        position=position,
+        radius=np.broadcast_to(np.asarray(radius, dtype=float), count),
+        velocity=np.zeros((count, 3)),
+    )
 
 
 def lattice(cell: list[list[float]], edge: float, repeat: int, radius: float) -> Snapshot:
@@ -31,8 +38,9 @@ def body_centred(repeat: int = 3, radius: float = 1.0) -> Snapshot:
 
 
 def face_centred(repeat: int = 3, radius: float = 1.0) -> Snapshot:
-    return lattice([[0, 0, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [0.5, 0.5, 0]], 2.0 * radius * np.sqrt(2.0), repeat,
-                   radius)
+    return lattice(
+        [[0, 0, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [0.5, 0.5, 0]], 2.0 * radius * np.sqrt(2.0), repeat, radius
+    )
 
 
 @cache

@@ -26,11 +26,12 @@ def zick_homsy(solid, drag):
 @pytest.mark.parametrize(("law", "ratio"), [("series", 1.07), ("hydraulic", 0.97)])
 def test_touching_simple_cubic_against_stokes(law, ratio):
     found = permeability(simple_cubic(), law) / zick_homsy(np.pi / 6, 42.1)
-    assert found == pytest.approx(ratio, abs=0.015)          # ratios measured apart, by another code of these rules
+    assert found == pytest.approx(ratio, abs=0.015)  # ratios measured apart, by another code of these rules
 
 
-@pytest.mark.parametrize(("law", "ratio"), [
-    ("series", 1.00), ("hydraulic", 1.02), ("thesis", 0.27), ("effective", 1.04)])
+@pytest.mark.parametrize(
+    ("law", "ratio"), [("series", 1.00), ("hydraulic", 1.02), ("thesis", 0.27), ("effective", 1.04)]
+)
 def test_touching_body_centred_against_stokes(law, ratio):
     found = permeability(body_centred(), law) / zick_homsy(np.pi * np.sqrt(3) / 8, 162.9)
     assert found == pytest.approx(ratio, abs=0.015)
@@ -74,9 +75,19 @@ def test_body_centred_throat_by_the_formulas_on_paper():
 @pytest.mark.parametrize("law", LAWS)
 def test_closed_throats_conduct_nothing_in_any_law(law):
     pack = random_pack(60)
-    network = build_network(pack.__class__(step=0, time_s=0, box=pack.box, id=pack.id, kind=pack.kind,
-                                           position=pack.position, radius=pack.radius * 1.25,
-                                           velocity=pack.velocity), periodic=ALL)
+    network = build_network(
+        pack.__class__(
+            step=0,
+            time_s=0,
+            box=pack.box,
+            id=pack.id,
+            kind=pack.kind,
+            position=pack.position,
+            radius=pack.radius * 1.25,
+            velocity=pack.velocity,
+        ),
+        periodic=ALL,
+    )
     closed = network.throat_radius == 0
     conductance = LAWS[law](network)
     assert closed.any()

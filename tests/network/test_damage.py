@@ -17,10 +17,15 @@ def occupancy(porosity, *, fine=0.02, distance=0.9, blocked=None, solid=0.0, sur
     porosity = np.asarray(porosity, float)
     count = len(porosity)
     return SimpleNamespace(
-        throat_porosity=porosity, throat_fines=(porosity < 1).astype(int), throat_fine_radius=np.full(count, fine),
-        blocked=np.zeros(count, bool) if blocked is None else np.asarray(blocked), pair_throat=np.arange(count),
-        pair_distance=np.full(count, distance), pore_solid_volume=np.broadcast_to(solid, count + 1).astype(float),
-        pore_solid_surface=np.broadcast_to(surface, count + 1).astype(float))
+        throat_porosity=porosity,
+        throat_fines=(porosity < 1).astype(int),
+        throat_fine_radius=np.full(count, fine),
+        blocked=np.zeros(count, bool) if blocked is None else np.asarray(blocked),
+        pair_throat=np.arange(count),
+        pair_distance=np.full(count, distance),
+        pore_solid_volume=np.broadcast_to(solid, count + 1).astype(float),
+        pore_solid_surface=np.broadcast_to(surface, count + 1).astype(float),
+    )
 
 
 def damaged(law, state, **options):

@@ -23,7 +23,7 @@ def test_chain_of_equal_throats_conducts_g_over_n(count):
 def test_one_tube_is_poiseuille():
     network = chain(1, step=2.0)
     k = solve_flow(network, LAWS["thesis"](network)).inflow * 2.0 / network.area
-    assert k == pytest.approx(np.pi * 0.1**4 / 8)             # pi r^4 / 8 over a unit cross-section
+    assert k == pytest.approx(np.pi * 0.1**4 / 8)  # pi r^4 / 8 over a unit cross-section
 
 
 def test_slab_splits_throats_at_its_planes():
@@ -61,7 +61,7 @@ def test_cut_off_pores_are_counted_and_have_no_pressure():
     network = network_of(position, [(0, 1), (2, 3), (0, 4)], [[0, 1], [0, 3], [0, 1]])
     flow = solve_flow(network, np.ones(3))
     assert flow.inflow == pytest.approx(1.0)
-    assert flow.isolated_pores == 3                            # two on their own, one dead end that misses the outlet
+    assert flow.isolated_pores == 3  # two on their own, one dead end that misses the outlet
     assert np.isnan(flow.pore_pressure[2:]).all()
 
 
@@ -128,7 +128,7 @@ def test_period_of_a_pack_is_the_limit_of_many_periods_between_planes():
 
 def test_period_without_a_way_round_is_zero():
     network = build_network(random_pack(50), periodic=(True,) * 3)
-    g = np.where(network.throat_shift[:, 0] != 0, 0.0, 1.0)    # nothing crosses the x face
+    g = np.where(network.throat_shift[:, 0] != 0, 0.0, 1.0)  # nothing crosses the x face
     flow = solve_flow(network, g)
     assert flow.inflow == 0.0
     assert "no open path" in flow.reason

@@ -14,8 +14,9 @@ A = 0.1
 def cake(fines, *, periodic=(False,) * 3):
     position = np.vstack([[[1.0, 2, 2]], np.array(fines, float).reshape(-1, 3)])
     count = len(position)
-    spheres = snapshot(position, np.append(1.0, np.full(count - 1, A)), BOX,
-                       np.append(Kind.GRAIN, np.full(count - 1, Kind.FINE)))
+    spheres = snapshot(
+        position, np.append(1.0, np.full(count - 1, A)), BOX, np.append(Kind.GRAIN, np.full(count - 1, Kind.FINE))
+    )
     return measure_invaded(spheres, periodic=periodic)
 
 
@@ -42,6 +43,6 @@ def test_floating_fines_are_no_cake():
 
 
 def test_contact_reaches_across_a_periodic_side():
-    fines = [[0.05, 0.05, 2], [-0.10, 3.92, 2]]         # 0.13 apart across the side y
+    fines = [[0.05, 0.05, 2], [-0.10, 3.92, 2]]  # 0.13 apart across the side y
     assert cake(fines, periodic=(False, True, True)).cake_thickness == pytest.approx(0.2)
     assert cake(fines).cake_thickness == 0.0

@@ -12,9 +12,18 @@ from tests.network.networks import chain
 from tests.network.packs import random_pack, snapshot, with_fines
 
 ALL, NONE = (True,) * 3, (False,) * 3
-CASES = np.array([  # sphere, offset, depth, tube, length
-    [0.5, 0.75, 1.0, 1.0, 3.0], [0.5, 1.2, 0.1, 1.0, 3.0], [2.0, 0.5, 1.0, 1.0, 3.0], [1.0, 0.0, -0.3, 1.0, 3.0],
-    [0.3, 0.2, 1.0, 1.0, 3.0], [0.8, 0.6, 2.9, 1.0, 3.0], [1.5, 2.2, 0.5, 1.0, 1.0], [0.4, 0.1, 0.2, 1.0, 0.3]])
+CASES = np.array(
+    [  # sphere, offset, depth, tube, length
+        [0.5, 0.75, 1.0, 1.0, 3.0],
+        [0.5, 1.2, 0.1, 1.0, 3.0],
+        [2.0, 0.5, 1.0, 1.0, 3.0],
+        [1.0, 0.0, -0.3, 1.0, 3.0],
+        [0.3, 0.2, 1.0, 1.0, 3.0],
+        [0.8, 0.6, 2.9, 1.0, 3.0],
+        [1.5, 2.2, 0.5, 1.0, 1.0],
+        [0.4, 0.1, 0.2, 1.0, 0.3],
+    ]
+)
 
 
 def pairs_of(rows):
@@ -38,9 +47,20 @@ def test_centred_sphere_wider_than_the_tube_is_the_napkin_ring():
     assert found == pytest.approx(4 / 3 * np.pi * (8 - 3**1.5), rel=1e-4)
 
 
-@pytest.mark.parametrize(("sphere", "offset", "ratio"), [   # measured apart by quadrature of the same reading
-    (0.1, 1.0, 0.981), (0.2, 0.9, 0.984), (0.5, 0.75, 0.942), (0.5, 1.25, 0.886), (0.8, 0.5, 0.877), (1.0, 0.5, 0.770),
-    (1.0, 1.5, 0.850), (2.0, 0.5, 1.016), (2.0, 1.25, 0.859)])
+@pytest.mark.parametrize(
+    ("sphere", "offset", "ratio"),
+    [  # measured apart by quadrature of the same reading
+        (0.1, 1.0, 0.981),
+        (0.2, 0.9, 0.984),
+        (0.5, 0.75, 0.942),
+        (0.5, 1.25, 0.886),
+        (0.8, 0.5, 0.877),
+        (1.0, 0.5, 0.770),
+        (1.0, 1.5, 0.850),
+        (2.0, 0.5, 1.016),
+        (2.0, 1.25, 0.859),
+    ],
+)
 def test_two_plane_estimate_over_exact(sphere, offset, ratio):
     pair = pairs_of([sphere, offset, 50.0, 1.0, 100.0])
     assert two_plane_volume(pair)[0] / exact_volume(pair)[0] == pytest.approx(ratio, abs=1.5e-3)
@@ -55,10 +75,19 @@ def test_estimates_agree_where_no_plane_is_needed():
     assert two_plane_volume(half) == pytest.approx(2 / 3 * np.pi * 0.027)
 
 
-@pytest.mark.parametrize(("row", "covers"), [
-    ([1.01, 0.0, 1.0, 1.0, 3.0], True), ([0.99, 0.0, 1.0, 1.0, 3.0], False), ([1.5, 0.49, 1.0, 1.0, 3.0], True),
-    ([1.5, 0.51, 1.0, 1.0, 3.0], False), ([1.25, 0.0, -0.74, 1.0, 3.0], True), ([1.25, 0.0, -0.76, 1.0, 3.0], False),
-    ([1.25, 0.0, 3.74, 1.0, 3.0], True), ([1.0, 0.0, 1.0, 0.0, 3.0], False)])
+@pytest.mark.parametrize(
+    ("row", "covers"),
+    [
+        ([1.01, 0.0, 1.0, 1.0, 3.0], True),
+        ([0.99, 0.0, 1.0, 1.0, 3.0], False),
+        ([1.5, 0.49, 1.0, 1.0, 3.0], True),
+        ([1.5, 0.51, 1.0, 1.0, 3.0], False),
+        ([1.25, 0.0, -0.74, 1.0, 3.0], True),
+        ([1.25, 0.0, -0.76, 1.0, 3.0], False),
+        ([1.25, 0.0, 3.74, 1.0, 3.0], True),
+        ([1.0, 0.0, 1.0, 0.0, 3.0], False),
+    ],
+)
 def test_blocking_needs_a_whole_section_covered(row, covers):
     assert covers_section(pairs_of(row))[0] == covers
 
@@ -120,8 +149,16 @@ def test_throat_volumes_are_those_of_every_pair_taken_alone():
         image = (fines.position[:, None] + steps * size).reshape(-1, 3) - start
         depth = image @ axis
         offset = np.linalg.norm(image - depth[:, None] * axis, axis=1)
-        rows = np.stack([np.full(len(depth), 0.25), offset, depth, np.full(len(depth), network.throat_radius[throat]),
-                         np.full(len(depth), network.throat_length[throat])], axis=1)
+        rows = np.stack(
+            [
+                np.full(len(depth), 0.25),
+                offset,
+                depth,
+                np.full(len(depth), network.throat_radius[throat]),
+                np.full(len(depth), network.throat_length[throat]),
+            ],
+            axis=1,
+        )
         expected[throat] = exact_volume(pairs_of(rows)).sum()
     found = measure_occupancy(network, fines).throat_solid_volume
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-12)

@@ -21,9 +21,16 @@ def options(pair=PAIRS[1], **more):
 def rebuilt(pack, position=None, *, scale=1.0, order=None, box=None):
     position = (pack.position if position is None else position) * scale
     order = np.arange(len(pack)) if order is None else order
-    return Snapshot(step=0, time_s=0, box=(pack.box if box is None else box) * scale, id=pack.id[order],
-                    kind=pack.kind[order], position=position[order], radius=pack.radius[order] * scale,
-                    velocity=pack.velocity)
+    return Snapshot(
+        step=0,
+        time_s=0,
+        box=(pack.box if box is None else box) * scale,
+        id=pack.id[order],
+        kind=pack.kind[order],
+        position=position[order],
+        radius=pack.radius[order] * scale,
+        velocity=pack.velocity,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -62,13 +69,15 @@ def test_renumbering_quarter_turn_mirror_and_scale_leave_k(pack, walled, periodi
 def test_box_may_start_anywhere(walled, periodic):
     offset = np.array([5.0, -3.0, 2.0])
     moved = rebuilt(walled, walled.position + offset, box=walled.box + offset[:, None])
-    here, there = (analyse(one.grains(), one, periodic=periodic, options=options(sections=3))
-                   for one in (walled, moved))
+    here, there = (
+        analyse(one.grains(), one, periodic=periodic, options=options(sections=3)) for one in (walled, moved)
+    )
     assert there.k_damaged == pytest.approx(here.k_damaged, rel=1e-5)
     assert there.porosity_damaged == pytest.approx(here.porosity_damaged, abs=1e-9)
     assert there.invasion_depth == pytest.approx(here.invasion_depth)
     assert [one.k_damaged_inplace for one in there.sections] == pytest.approx(
-        [one.k_damaged_inplace for one in here.sections], rel=1e-5)
+        [one.k_damaged_inplace for one in here.sections], rel=1e-5
+    )
 
 
 def test_shifting_a_periodic_pack_leaves_k(pack):
@@ -89,8 +98,12 @@ def test_fines_never_raise_k(pack, law, damage_law):
 
 def test_more_fines_lower_k_with_the_default_law(pack):
     grains, fines = pack.grains(), pack.fines()
-    k = [analyse(grains, grains.joined(fines.where(np.arange(len(fines)) < count)), periodic=FLOW_X,
-                 options=options()).k_damaged for count in (0, 100, 200, 400)]
+    k = [
+        analyse(
+            grains, grains.joined(fines.where(np.arange(len(fines)) < count)), periodic=FLOW_X, options=options()
+        ).k_damaged
+        for count in (0, 100, 200, 400)
+    ]
     assert np.all(np.diff(k) < 0)
     assert k[0] == pytest.approx(analyse(grains, None, periodic=FLOW_X, options=options()).k_initial)
 
@@ -111,8 +124,10 @@ def test_inplace_sections_of_a_period_move_with_the_pack(pack):
     """Shifted by half a period the two halves change places; all in-place values stay."""
     moved = pack.position.copy()
     moved[:, 0] = (moved[:, 0] + 0.5 * pack.box[0, 1]) % pack.box[0, 1]
-    here, there = (analyse(one.grains(), one, periodic=ALL, options=options(sections=2)).sections
-                   for one in (pack, rebuilt(pack, moved)))
+    here, there = (
+        analyse(one.grains(), one, periodic=ALL, options=options(sections=2)).sections
+        for one in (pack, rebuilt(pack, moved))
+    )
     assert abs(here[0].k_damaged_inplace / here[1].k_damaged_inplace - 1) > 0.01
     for name in ("k_initial_inplace", "k_damaged_inplace"):
         first, second = ([getattr(one, name) for one in sections] for sections in (here, there[::-1]))
@@ -121,7 +136,7 @@ def test_inplace_sections_of_a_period_move_with_the_pack(pack):
 
 def test_one_section_is_the_whole_specimen(pack):
     found = analyse(pack.grains(), pack, periodic=FLOW_X, options=options())
-    section, = found.sections
+    (section,) = found.sections
     assert section.k_initial == pytest.approx(found.k_initial)
     assert section.k_damaged_inplace == pytest.approx(found.k_damaged)
     assert section.porosity_initial == pytest.approx(found.porosity_initial)
@@ -161,11 +176,13 @@ def test_face_sealed_by_fines_is_zero_with_a_warning():
 def test_moved_grains_make_a_second_network(pack):
     grains = pack.grains()
     rng = np.random.default_rng(1)
-    shifted = rebuilt(pack, pack.position + 0.02 * rng.normal(size=pack.position.shape)
-                      * (pack.kind == Kind.GRAIN)[:, None])
+    shifted = rebuilt(
+        pack, pack.position + 0.02 * rng.normal(size=pack.position.shape) * (pack.kind == Kind.GRAIN)[:, None]
+    )
     found = analyse(grains, shifted, periodic=ALL, options=options())
     assert found.k_moved == pytest.approx(
-        analyse(shifted.grains(), None, periodic=ALL, options=options()).k_initial, rel=1e-9)
+        analyse(shifted.grains(), None, periodic=ALL, options=options()).k_initial, rel=1e-9
+    )
     assert found.k_initial == pytest.approx(analyse(grains, None, periodic=ALL, options=options()).k_initial, rel=1e-9)
     assert found.k_damaged < found.k_moved != found.k_initial
     assert len(found.conductance_initial) == len(found.network.throat_radius) == len(found.flow_initial.throat_flux)
@@ -186,9 +203,17 @@ def test_solver_reports_the_worst_of_all_solves(pack):
     assert set(found.seconds) == {"tessellate", "occupancy", "conductance", "solve", "porosity"}
 
 
-@pytest.mark.parametrize("wrong", [
-    {"law": "magic"}, {"damage_law": "magic"}, {"sections": [0.0, 1.0]}, {"sections": []}, {"sections": 0},
-    {"profile_bin": 0.0}])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"law": "magic"},
+        {"damage_law": "magic"},
+        {"sections": [0.0, 1.0]},
+        {"sections": []},
+        {"sections": 0},
+        {"profile_bin": 0.0},
+    ],
+)
 def test_wrong_choices_are_refused(pack, wrong):
     with pytest.raises(CaseError, match=next(iter(wrong))):
         analyse(pack.grains(), None, periodic=ALL, options=AnalysisOptions(**wrong))

@@ -12,8 +12,10 @@ from tests.network.packs import body_centred, face_centred, random_pack, simple_
 ALL, NONE, SIDES = (True,) * 3, (False,) * 3, (False, True, True)
 
 
-@pytest.mark.parametrize(("pack", "expected"), [
-    (simple_cubic(), 1 - np.pi / 6), (face_centred(), 0.259520), (body_centred(), 1 - np.pi * np.sqrt(3) / 8)])
+@pytest.mark.parametrize(
+    ("pack", "expected"),
+    [(simple_cubic(), 1 - np.pi / 6), (face_centred(), 0.259520), (body_centred(), 1 - np.pi * np.sqrt(3) / 8)],
+)
 @pytest.mark.parametrize("periodic", [ALL, SIDES])
 def test_void_of_the_pores_is_the_known_porosity(pack, expected, periodic):
     network = build_network(pack, periodic=periodic)
@@ -27,7 +29,7 @@ def test_pores_of_overlapping_grains_hold_the_same_void_as_chords():
     pack = random_pack(80, 0.66, spread=0.2)
     network = build_network(pack, periodic=ALL)
     porosity = measure_porosity(pack, periodic=ALL, lines=20_000)
-    assert porosity.mean > porosity.sum + 1e-4                      # they do overlap
+    assert porosity.mean > porosity.sum + 1e-4  # they do overlap
     void = np.sum(network.pore_volume) / np.prod(pack.box[:, 1])
     assert void == pytest.approx(porosity.mean, abs=5 * porosity.standard_error + 1e-5)
 
@@ -53,7 +55,7 @@ def test_tetrahedra_tile_and_facets_pair(periodic):
     pack = random_pack(120, 0.5, periodic=False)
     network = build_network(pack, periodic=periodic)
     assert network.counts["throats_unmatched"] == 0
-    assert np.all(network.throat_heights.sum(axis=1) > 0)           # Delaunay: centres in order along the normal
+    assert np.all(network.throat_heights.sum(axis=1) > 0)  # Delaunay: centres in order along the normal
     assert len(np.unique(network.pore_position, axis=0)) > 0.8 * len(network.pore_position)
     filled = np.sum(network.pore_share * network.pore_tetra_volume)
     assert filled == pytest.approx(network.area * pack.box[0, 1])
@@ -67,8 +69,10 @@ def test_throat_ends_are_its_pores_up_to_whole_periods():
     pack = random_pack(60)
     network = build_network(pack, periodic=ALL)
     size = pack.box[:, 1]
-    place = network.pore_position[network.throat_pores] + np.stack(
-        [0 * network.throat_shift, network.throat_shift], axis=1) * size
+    place = (
+        network.pore_position[network.throat_pores]
+        + np.stack([0 * network.throat_shift, network.throat_shift], axis=1) * size
+    )
     assert network.throat_ends == pytest.approx(place, abs=1e-9)
     assert np.all(network.pore_position >= 0)
     assert np.all(network.pore_position < size)
@@ -93,13 +97,15 @@ def test_pores_on_the_x_faces_lie_on_them():
 
 def test_two_grains_at_one_place_are_refused():
     pack = random_pack(30)
-    double = np.vstack([pack.position, pack.position[7] + [0, pack.box[1, 1], 0]])     # the image across the period
+    double = np.vstack([pack.position, pack.position[7] + [0, pack.box[1, 1], 0]])  # the image across the period
     with pytest.raises(NetworkError, match=r"grains 8 and 31 coincide"):
         build_network(snapshot(double, 1.0, pack.box), periodic=ALL)
 
 
-@pytest.mark.parametrize(("position", "what"), [
-    (np.zeros((3, 3)), "at least 4"), (np.random.default_rng(0).random((9, 3)) * [8, 8, 0] + 1, "no throat")])
+@pytest.mark.parametrize(
+    ("position", "what"),
+    [(np.zeros((3, 3)), "at least 4"), (np.random.default_rng(0).random((9, 3)) * [8, 8, 0] + 1, "no throat")],
+)
 def test_degenerate_packs_are_refused(position, what):
     with pytest.raises(NetworkError, match=what):
         build_network(snapshot(position, 0.1, [[0, 10]] * 3), periodic=NONE)
@@ -124,8 +130,16 @@ def test_grains_out_of_reach_are_left_out_and_counted():
 
 def test_heavily_overlapping_grains_close_throats():
     pack = random_pack(60)
-    fat = Snapshot(step=0, time_s=0, box=pack.box, id=pack.id, kind=pack.kind, position=pack.position,
-                   radius=pack.radius * 1.25, velocity=pack.velocity)
+    fat = Snapshot(
+        step=0,
+        time_s=0,
+        box=pack.box,
+        id=pack.id,
+        kind=pack.kind,
+        position=pack.position,
+        radius=pack.radius * 1.25,
+        velocity=pack.velocity,
+    )
     network = build_network(fat, periodic=ALL)
     assert network.counts["throats_closed"] == np.sum(network.throat_radius == 0) > 0
     assert np.all(network.throat_radius >= 0)

@@ -19,9 +19,16 @@ GRAIN_RADIUS = 0.225e-3
 
 def snapshot_of(position, radius, kind, *, first_id=1, velocity=None):
     count = len(position)
-    return Snapshot(step=0, time_s=0.0, box=BOX, id=np.arange(first_id, first_id + count),
-                    kind=np.full(count, int(kind)), position=position, radius=np.broadcast_to(radius, count),
-                    velocity=np.zeros((count, 3)) if velocity is None else velocity)
+    return Snapshot(
+        step=0,
+        time_s=0.0,
+        box=BOX,
+        id=np.arange(first_id, first_id + count),
+        kind=np.full(count, int(kind)),
+        position=position,
+        radius=np.broadcast_to(radius, count),
+        velocity=np.zeros((count, 3)) if velocity is None else velocity,
+    )
 
 
 @cache
@@ -48,8 +55,9 @@ def demo_damaged(count=800):
     radius = generator.uniform(30e-6, 65e-6, 60 * count)
     distance, _ = cKDTree(grains.position).query(position)
     free = np.flatnonzero((distance > GRAIN_RADIUS + 0.9 * radius) & (depth < 4e-3))[:count]
-    fines = snapshot_of(position[free], radius[free], Kind.FINE, first_id=1001,
-                        velocity=generator.normal(0, 1e-3, (len(free), 3)))
+    fines = snapshot_of(
+        position[free], radius[free], Kind.FINE, first_id=1001, velocity=generator.normal(0, 1e-3, (len(free), 3))
+    )
     return grains.joined(fines)
 
 
@@ -76,14 +84,28 @@ def demo_network(grains):
     pores, ends, facets = np.array(pores), np.array(ends), np.array(facets)
     corners = grains.position[facets]
     throat_radius = np.clip(
-        np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).min(axis=1) - GRAIN_RADIUS, 0, None)
+        np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).min(axis=1) - GRAIN_RADIUS, 0, None
+    )
     return SimpleNamespace(
-        box=BOX, periodic=(False, False, False), pore_grains=mesh.simplices, pore_position=position,
-        pore_radius=radius, pore_volume=0.4 * volume, pore_wall_surface=volume ** (2 / 3), throat_pores=pores,
-        pore_tetra_volume=volume, pore_share=np.ones(len(position)), throat_shift=np.zeros((len(pores), 3)),
-        throat_grains=facets, throat_ends=ends, throat_radius=throat_radius,
-        throat_radius_effective=1.2 * throat_radius, throat_area=np.pi * throat_radius**2,
-        throat_length=np.maximum(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), 1e-5), counts={"throats_closed": 3})
+        box=BOX,
+        periodic=(False, False, False),
+        pore_grains=mesh.simplices,
+        pore_position=position,
+        pore_radius=radius,
+        pore_volume=0.4 * volume,
+        pore_wall_surface=volume ** (2 / 3),
+        throat_pores=pores,
+        pore_tetra_volume=volume,
+        pore_share=np.ones(len(position)),
+        throat_shift=np.zeros((len(pores), 3)),
+        throat_grains=facets,
+        throat_ends=ends,
+        throat_radius=throat_radius,
+        throat_radius_effective=1.2 * throat_radius,
+        throat_area=np.pi * throat_radius**2,
+        throat_length=np.maximum(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), 1e-5),
+        counts={"throats_closed": 3},
+    )
 
 
 def demo_occupancy(network, fines):
@@ -92,14 +114,22 @@ def demo_occupancy(network, fines):
     count = np.array([len(found) for found in near])
     mean_radius = np.array([fines.radius[found].mean() if found else 0.0 for found in near])
     porosity = np.clip(1 - 0.18 * count, 0.05, 1.0)
-    pore_porosity = np.clip(1 - 0.1 * np.array(
-        [len(f) for f in cKDTree(fines.position).query_ball_point(network.pore_position, 1.2e-4)]), 0.1, 1.0)
+    pore_porosity = np.clip(
+        1 - 0.1 * np.array([len(f) for f in cKDTree(fines.position).query_ball_point(network.pore_position, 1.2e-4)]),
+        0.1,
+        1.0,
+    )
     return SimpleNamespace(
         throat_solid_volume=(1 - porosity) * network.throat_area * network.throat_length,
-        throat_porosity=porosity, throat_fine_radius=mean_radius, throat_fines=count,
+        throat_porosity=porosity,
+        throat_fine_radius=mean_radius,
+        throat_fines=count,
         blocked=(mean_radius > network.throat_radius) & (count > 0),
         pore_solid_volume=(1 - pore_porosity) * network.pore_volume,
-        pore_solid_surface=(1 - pore_porosity) * network.pore_wall_surface, pore_porosity=pore_porosity, counts={})
+        pore_solid_surface=(1 - pore_porosity) * network.pore_wall_surface,
+        pore_porosity=pore_porosity,
+        counts={},
+    )
 
 
 def demo_flow(network, conductance):
@@ -115,9 +145,17 @@ def demo_flow(network, conductance):
     other = np.where(at_inlet, 1.0, 0.0)
     other[inner] = pressure[second[inner]]
     flux = conductance * (pressure[first] - other)
-    return SimpleNamespace(pore_pressure=pressure, throat_flux=flux, method="direct", residual=3e-15,
-                           mass_balance=2e-14, inflow=-flux[at_inlet].sum(), isolated_pores=0, reason="",
-                           outflow=flux[at_outlet].sum())
+    return SimpleNamespace(
+        pore_pressure=pressure,
+        throat_flux=flux,
+        method="direct",
+        residual=3e-15,
+        mass_balance=2e-14,
+        inflow=-flux[at_inlet].sum(),
+        isolated_pores=0,
+        reason="",
+        outflow=flux[at_outlet].sum(),
+    )
 
 
 def sampled_porosity(snapshot, edges):
@@ -137,14 +175,23 @@ def demo_sections(initial, damaged, flows, edges):
     whole = {"initial": sampled_porosity(initial, edges), "damaged": sampled_porosity(damaged, edges)}
     k_initial = 9e-11 * (1 + 0.05 * np.sin(np.arange(len(edges) - 1)))
     k_damaged = k_initial * (1 - 0.55 * np.exp(-np.arange(len(edges) - 1) * 1.1))
-    return tuple(SimpleNamespace(
-        section=i + 1, x_lo=edges[i], x_hi=edges[i + 1], porosity_initial=whole["initial"][i],
-        porosity_damaged=whole["damaged"][i], k_initial=k_initial[i], k_damaged=k_damaged[i],
-        k_reduction=1 - k_damaged[i] / k_initial[i], k_initial_inplace=1.1 * k_initial[i],
-        k_damaged_inplace=1.1 * k_damaged[i] * 0.95,
-        fines_count=int(np.sum((depth >= edges[i]) & (depth < edges[i + 1]))),
-        fines_fraction=float(np.sum((depth >= edges[i]) & (depth < edges[i + 1])) / max(invaded, 1)),
-    ) for i in range(len(edges) - 1)), invaded
+    return tuple(
+        SimpleNamespace(
+            section=i + 1,
+            x_lo=edges[i],
+            x_hi=edges[i + 1],
+            porosity_initial=whole["initial"][i],
+            porosity_damaged=whole["damaged"][i],
+            k_initial=k_initial[i],
+            k_damaged=k_damaged[i],
+            k_reduction=1 - k_damaged[i] / k_initial[i],
+            k_initial_inplace=1.1 * k_initial[i],
+            k_damaged_inplace=1.1 * k_damaged[i] * 0.95,
+            fines_count=int(np.sum((depth >= edges[i]) & (depth < edges[i + 1]))),
+            fines_fraction=float(np.sum((depth >= edges[i]) & (depth < edges[i + 1])) / max(invaded, 1)),
+        )
+        for i in range(len(edges) - 1)
+    ), invaded
 
 
 @cache
@@ -159,18 +206,41 @@ def demo_analysis():
     fine_edges = np.linspace(0, 4e-3, 21)
     depth = damaged.fines().position[:, 0]
     inside = depth[(depth >= 0) & (depth < 4e-3)]
-    profile = SimpleNamespace(edges=fine_edges, porosity_initial=sampled_porosity(initial, fine_edges),
-                              porosity_damaged=sampled_porosity(damaged, fine_edges),
-                              fines_fraction=np.histogram(inside, fine_edges)[0] / len(inside))
+    profile = SimpleNamespace(
+        edges=fine_edges,
+        porosity_initial=sampled_porosity(initial, fine_edges),
+        porosity_damaged=sampled_porosity(damaged, fine_edges),
+        fines_fraction=np.histogram(inside, fine_edges)[0] / len(inside),
+    )
     k_initial, k_damaged = (flow.inflow * 4e-3 / 4e-6 for flow in flows)
     law_used = np.where(occupancy.blocked, "blocked", np.where(occupancy.throat_fines > 0, "deposition", "clean"))
     return SimpleNamespace(
-        network=network, occupancy=occupancy, law="effective", damage_law="thesis", conductance_initial=clean,
-        conductance_damaged=dirty, law_used=law_used, flow_initial=flows[0], flow_damaged=flows[1],
-        k_initial=k_initial, k_damaged=k_damaged, k_moved=None, k_reduction=1 - k_damaged / k_initial,
-        porosity_initial=profile.porosity_initial.mean(), porosity_initial_error=8e-4, porosity_initial_sum=0.41,
-        porosity_damaged=profile.porosity_damaged.mean(), sections=sections, profile=profile, invaded_count=invaded,
+        network=network,
+        occupancy=occupancy,
+        law="effective",
+        damage_law="thesis",
+        conductance_initial=clean,
+        conductance_damaged=dirty,
+        law_used=law_used,
+        flow_initial=flows[0],
+        flow_damaged=flows[1],
+        k_initial=k_initial,
+        k_damaged=k_damaged,
+        k_moved=None,
+        k_reduction=1 - k_damaged / k_initial,
+        porosity_initial=profile.porosity_initial.mean(),
+        porosity_initial_error=8e-4,
+        porosity_initial_sum=0.41,
+        porosity_damaged=profile.porosity_damaged.mean(),
+        sections=sections,
+        profile=profile,
+        invaded_count=invaded,
         invaded_volume=float((4 / 3 * np.pi * damaged.fines().radius[depth >= 0] ** 3).sum()),
-        invasion_depth=float(inside.max()), invasion_depth_p95=float(np.quantile(inside, 0.95)),
-        cake_thickness=0.3e-3, solver={"method": "direct", "residual": 3e-15, "mass_balance": 2e-14}, counts={},
-        warnings=("section 1 is thinner than three grains <b>&</b>",), seconds={"tessellate": 0.1, "solve": 0.05})
+        invasion_depth=float(inside.max()),
+        invasion_depth_p95=float(np.quantile(inside, 0.95)),
+        cake_thickness=0.3e-3,
+        solver={"method": "direct", "residual": 3e-15, "mass_balance": 2e-14},
+        counts={},
+        warnings=("section 1 is thinner than three grains <b>&</b>",),
+        seconds={"tessellate": 0.1, "solve": 0.05},
+    )

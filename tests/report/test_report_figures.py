@@ -51,6 +51,6 @@ def test_a_ratio_to_nothing_is_no_number():
 def test_cut_circles_are_pythagoras():
     position = np.array([[1.0, 0.0, 2.0], [3.0, 3.0, 4.0], [5.0, 5.0, 6.0], [7.0, -5.1, 8.0]])
     index, centre, radius = cut_circles(snapshot_of(position, 5.0, Kind.GRAIN), 0.0)
-    assert index.tolist() == [0, 1]                  # touching (d = r) is no cut
+    assert index.tolist() == [0, 1]  # touching (d = r) is no cut
     assert centre.tolist() == [[1, 2], [3, 4]]
-    assert radius == pytest.approx([5.0, 4.0])       # the 3-4-5 triangle
+    assert radius == pytest.approx([5.0, 4.0])  # the 3-4-5 triangle

@@ -11,18 +11,46 @@ from fdnet.errors import CaseError
 from fdnet.report.html import ReportParts, headline, quantity, write_report
 
 PNG = b"\x89PNG\r\n\x1a\n" + b"anything"
-SECTION = {"section": 1, "x_lo_m": 0.0, "x_hi_m": 1e-3, "porosity_initial": 0.3, "porosity_damaged": 0.25,
-           "k_initial_m2": 7.65e-11, "k_damaged_m2": 5.0e-11, "k_reduction": 0.34641, "k_initial_inplace_m2": 7e-11,
-           "k_damaged_inplace_m2": 4e-11, "fines_count": 704, "fines_fraction": 0.7}
+SECTION = {
+    "section": 1,
+    "x_lo_m": 0.0,
+    "x_hi_m": 1e-3,
+    "porosity_initial": 0.3,
+    "porosity_damaged": 0.25,
+    "k_initial_m2": 7.65e-11,
+    "k_damaged_m2": 5.0e-11,
+    "k_reduction": 0.34641,
+    "k_initial_inplace_m2": 7e-11,
+    "k_damaged_inplace_m2": 4e-11,
+    "fines_count": 704,
+    "fines_fraction": 0.7,
+}
 SUMMARY = {
-    "case": "specimen <1>", "seed": 4, "law": "thesis", "damage_law": "thesis-code", "porosity_initial": 0.3,
-    "porosity_damaged": 0.29, "k_initial_m2": 7.65e-11, "k_damaged_m2": 5.1e-11, "k_reduction": 1 / 3,
-    "supplied_count": 3000, "invaded_count": 704, "passed_count": 6, "upstream_count": 2290,
-    "invasion_depth_m": 4e-3, "invasion_depth_p95_m": 2.5e-3, "cake_thickness_m": 3e-4, "stop_reason": "plugged",
+    "case": "specimen <1>",
+    "seed": 4,
+    "law": "thesis",
+    "damage_law": "thesis-code",
+    "porosity_initial": 0.3,
+    "porosity_damaged": 0.29,
+    "k_initial_m2": 7.65e-11,
+    "k_damaged_m2": 5.1e-11,
+    "k_reduction": 1 / 3,
+    "supplied_count": 3000,
+    "invaded_count": 704,
+    "passed_count": 6,
+    "upstream_count": 2290,
+    "invasion_depth_m": 4e-3,
+    "invasion_depth_p95_m": 2.5e-3,
+    "cake_thickness_m": 3e-4,
+    "stop_reason": "plugged",
     "sections": [SECTION, SECTION | {"section": 2, "k_initial_m2": 0.0, "k_damaged_m2": 0.0, "k_reduction": None}],
-    "throats": 10, "throats_blocked": 2, "solver": {"method": "direct", "residual": 1e-15, "mass_balance": None},
-    "seconds": {"pack": 1.5, "analyse": {"solve": 0.25}}, "left_out": ["gravity: a & b"],
-    "warnings": ["<script>alert(1)</script>"]}
+    "throats": 10,
+    "throats_blocked": 2,
+    "solver": {"method": "direct", "residual": 1e-15, "mass_balance": None},
+    "seconds": {"pack": 1.5, "analyse": {"solve": 0.25}},
+    "left_out": ["gravity: a & b"],
+    "warnings": ["<script>alert(1)</script>"],
+}
 
 
 class Reader(HTMLParser):
@@ -54,9 +82,26 @@ def page_of(folder, summary, **parts):
 
 def test_it_says_what_the_summary_says(tmp_path):
     _, text = page_of(tmp_path, SUMMARY, commands=["fdnet run a.toml"], versions={"LIGGGHTS": "3.8.0"})
-    for said in ("specimen <1>", "7.650·10⁻¹¹ m²", "33.3 % lost", "0.3000", "0.2900", "704", "of 3\u2009000 supplied",
-                 "4 mm", "95 % shallower than 2.5 mm", "plugged", "34.6", "gravity: a & b", "solve", "0.25",
-                 "LIGGGHTS", "3.8.0", "fdnet run a.toml", "<script>alert(1)</script>"):
+    for said in (
+        "specimen <1>",
+        "7.650·10⁻¹¹ m²",
+        "33.3 % lost",
+        "0.3000",
+        "0.2900",
+        "704",
+        "of 3\u2009000 supplied",
+        "4 mm",
+        "95 % shallower than 2.5 mm",
+        "plugged",
+        "34.6",
+        "gravity: a & b",
+        "solve",
+        "0.25",
+        "LIGGGHTS",
+        "3.8.0",
+        "fdnet run a.toml",
+        "<script>alert(1)</script>",
+    ):
         assert said in text, said
 
 
@@ -64,10 +109,15 @@ def test_nothing_is_taken_for_markup_or_fetched_from_outside(tmp_path):
     figure = tmp_path / "x.png"
     figure.write_bytes(PNG)
     evil = '<b onclick="x">&'
-    reader, text = page_of(tmp_path, SUMMARY | {"left_out": [evil], "solver": {evil: evil}}, case_text=evil,
-                           figures=[(figure, evil)], commands=[evil], versions={evil: evil},
-                           scales=[{"name": evil, "symbol": evil, "value": 1.0, "unit": evil, "formula": evil,
-                                    "source": evil}])
+    reader, text = page_of(
+        tmp_path,
+        SUMMARY | {"left_out": [evil], "solver": {evil: evil}},
+        case_text=evil,
+        figures=[(figure, evil)],
+        commands=[evil],
+        versions={evil: evil},
+        scales=[{"name": evil, "symbol": evil, "value": 1.0, "unit": evil, "formula": evil, "source": evil}],
+    )
     assert text.count(evil) >= 10
     assert {tag for tag, _ in reader.tags}.isdisjoint({"script", "link", "iframe", "object"})
     assert not any("onclick" in attributes for _, attributes in reader.tags)
@@ -76,8 +126,14 @@ def test_nothing_is_taken_for_markup_or_fetched_from_outside(tmp_path):
 
 
 def test_scales_are_rows_of_objects_or_mappings(tmp_path):
-    row = {"name": "Darcy velocity", "symbol": "q", "value": 0.67, "unit": "m/s", "formula": "k dP/(mu L)",
-           "source": "Darcy 1856"}
+    row = {
+        "name": "Darcy velocity",
+        "symbol": "q",
+        "value": 0.67,
+        "unit": "m/s",
+        "formula": "k dP/(mu L)",
+        "source": "Darcy 1856",
+    }
     _, text = page_of(tmp_path, SUMMARY, scales=[row, SimpleNamespace(**row | {"name": "other", "value": 2.5e-8})])
     assert "Darcy velocity q 0.67 m/s k dP/(mu L) Darcy 1856" in text
     assert "other q 2.500·10⁻⁸ m/s" in text
@@ -103,9 +159,22 @@ def test_a_missing_figure_is_named(tmp_path):
     assert not (tmp_path / "r.html").exists()
 
 
-@pytest.mark.parametrize(("value", "text"), [
-    (None, "–"), (float("nan"), "–"), (float("inf"), "∞"), (0, "0"), (0.0, "0"), (1234567, "1\u2009234\u2009567"),
-    (0.123456, "0.1235"), (7.65e-11, "7.650·10⁻¹¹"), (-2.5e7, "-2.500·10⁷"), (12345.6, "12\u2009346"), (True, "True"),
-    ("direct", "direct")])
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (None, "–"),
+        (float("nan"), "–"),
+        (float("inf"), "∞"),
+        (0, "0"),
+        (0.0, "0"),
+        (1234567, "1\u2009234\u2009567"),
+        (0.123456, "0.1235"),
+        (7.65e-11, "7.650·10⁻¹¹"),
+        (-2.5e7, "-2.500·10⁷"),
+        (12345.6, "12\u2009346"),
+        (True, "True"),
+        ("direct", "direct"),
+    ],
+)
 def test_numbers_as_a_reader_wants_them(value, text):
     assert quantity(value) == text

@@ -21,8 +21,16 @@ def analysis_of(sides="walls", *, damaged=True, moved=False):
     after = demo_damaged()
     if moved:
         shift = np.where(after.kind == Kind.GRAIN, 2e-6, 0.0)[:, None] * np.array([0.0, 1.0, 0.0])
-        after = Snapshot(step=1, time_s=1.0, box=BOX, id=after.id, kind=after.kind, position=after.position + shift,
-                         radius=after.radius, velocity=after.velocity)
+        after = Snapshot(
+            step=1,
+            time_s=1.0,
+            box=BOX,
+            id=after.id,
+            kind=after.kind,
+            position=after.position + shift,
+            radius=after.radius,
+            velocity=after.velocity,
+        )
     options = AnalysisOptions(sections=4, law="thesis", damage_law="thesis", profile_bin=0.2e-3)
     return analyse(demo_grains(), after if damaged else None, periodic=SIDES[sides], options=options)
 
@@ -63,10 +71,19 @@ def test_every_door_opens(tmp_path, variant):
     for write in (tables.write_pores, tables.write_throats, tables.write_profile, tables.write_sections):
         assert write(tmp_path / f"{write.__name__}.csv", analysis).stat().st_size > 100
     pictures = figures.draw_all(tmp_path / "figures", analysis, shown)
-    summary = tables.write_summary(tmp_path / "summary.json", {
-        "case": "real", "k_initial_m2": analysis.k_initial, "k_damaged_m2": analysis.k_damaged,
-        "sections": tables.section_rows(analysis), "solver": analysis.solver, "network_counts": analysis.counts,
-        "seconds": analysis.seconds, "warnings": analysis.warnings})
+    summary = tables.write_summary(
+        tmp_path / "summary.json",
+        {
+            "case": "real",
+            "k_initial_m2": analysis.k_initial,
+            "k_damaged_m2": analysis.k_damaged,
+            "sections": tables.section_rows(analysis),
+            "solver": analysis.solver,
+            "network_counts": analysis.counts,
+            "seconds": analysis.seconds,
+            "warnings": analysis.warnings,
+        },
+    )
     assert not [line for line in summary["warnings"] if "written as null" in line]
     captioned = [(picture, figures.CAPTIONS[picture.stem]) for picture in pictures]
     page = write_report(tmp_path / "report.html", summary, parts=ReportParts(figures=captioned))

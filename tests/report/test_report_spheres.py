@@ -42,8 +42,9 @@ def test_plain_columns_are_in_the_given_unit(tmp_path, units, metres):
 
 
 def test_comments_blank_lines_bom_crlf_quotes_and_column_order_are_fine(tmp_path):
-    path = csv_of(tmp_path, '\ufeff# pack\r\n\r\n"kind", radius_m ,z_m,y_m,x_m\r\n'
-                            '# more\r\n"fine",4,3,2,1\r\n grain,8,7,6,5')
+    path = csv_of(
+        tmp_path, '\ufeff# pack\r\n\r\n"kind", radius_m ,z_m,y_m,x_m\r\n# more\r\n"fine",4,3,2,1\r\n grain,8,7,6,5'
+    )
     position, radius, kind = read_spheres(path)
     assert position.tolist() == [[1, 2, 3], [5, 6, 7]]
     assert radius.tolist() == [4, 8]
@@ -86,11 +87,14 @@ def test_every_malformed_table_is_refused_with_file_and_line(tmp_path, name):
     assert message in str(caught.value)
 
 
-@pytest.mark.parametrize(("header", "units", "message"), [
-    ("x_m,y_m,z_m,radius_m", "mm", "in metres already"),
-    ("x,y,z,radius", None, "give --units"),
-    ("x,y,z,radius", "inch", "units 'inch': expected one of m, cm, mm, um"),
-])
+@pytest.mark.parametrize(
+    ("header", "units", "message"),
+    [
+        ("x_m,y_m,z_m,radius_m", "mm", "in metres already"),
+        ("x,y,z,radius", None, "give --units"),
+        ("x,y,z,radius", "inch", "units 'inch': expected one of m, cm, mm, um"),
+    ],
+)
 def test_units_are_given_exactly_when_the_columns_have_none(tmp_path, header, units, message):
     path = csv_of(tmp_path, header + "\n1,2,3,4\n")
     with pytest.raises(CaseError, match=message):

@@ -23,8 +23,19 @@ from fdnet.report.tables import (
 
 # DESIGN section 4, word for word
 SECTION_COLUMNS = [
-    "section", "x_lo_m", "x_hi_m", "porosity_initial", "porosity_damaged", "k_initial_m2", "k_damaged_m2",
-    "k_reduction", "k_initial_inplace_m2", "k_damaged_inplace_m2", "fines_count", "fines_fraction"]
+    "section",
+    "x_lo_m",
+    "x_hi_m",
+    "porosity_initial",
+    "porosity_damaged",
+    "k_initial_m2",
+    "k_damaged_m2",
+    "k_reduction",
+    "k_initial_inplace_m2",
+    "k_damaged_inplace_m2",
+    "fines_count",
+    "fines_fraction",
+]
 PROFILE_COLUMNS = ["x_lo_m", "x_hi_m", "porosity_initial", "porosity_damaged", "porosity_reduction", "fines_fraction"]
 
 
@@ -90,11 +101,11 @@ def test_throat_fluxes_in_the_tables_balance_in_every_pore(tmp_path):
 def test_throat_flux_follows_from_the_tables_conductance_and_pressures(tmp_path, state):
     throats = pd.read_csv(write_throats(tmp_path / "throats.csv", demo_analysis()))
     pores = pd.read_csv(write_pores(tmp_path / "pores.csv", demo_analysis()))
-    beyond = np.append(pores[f"pressure_{state}"].to_numpy(), [0.0, 1.0])      # index -1 is the inlet, -2 the outlet
+    beyond = np.append(pores[f"pressure_{state}"].to_numpy(), [0.0, 1.0])  # index -1 is the inlet, -2 the outlet
     drop = beyond[throats.throat_conns_0] - beyond[throats.throat_conns_1]
     conductance = throats[f"conductance_{state}_m3"]
     wrong = (throats[f"flux_{state}_m3"] - conductance * drop).abs()
-    assert (wrong <= 3e-9 * conductance).all()      # nine digits of two pressures up to 1
+    assert (wrong <= 3e-9 * conductance).all()  # nine digits of two pressures up to 1
     assert np.abs(drop).max() > 0.1
 
 
@@ -110,14 +121,22 @@ def test_an_intact_pack_has_open_throats_and_the_void_of_its_pores(tmp_path):
     throats = pd.read_csv(write_throats(tmp_path / "throats.csv", intact))
     pores = pd.read_csv(write_pores(tmp_path / "pores.csv", intact))
     assert throats.porosity.eq(1).all()
-    assert np.allclose(pores.porosity, 0.4)          # of the stand-in: void 0.4 of every tetrahedron
+    assert np.allclose(pores.porosity, 0.4)  # of the stand-in: void 0.4 of every tetrahedron
     assert throats.blocked.sum() == throats.fines_count.sum() == 0
 
 
 def test_summary_takes_numpy_and_names_every_value_json_cannot_hold(tmp_path):
-    summary = {"k": np.float64(2e-11), "n": np.int64(3), "flag": np.bool_(True), "none": None, "path": tmp_path,
-               "solver": {"mass_balance": float("nan")}, "sections": [{"k_reduction": np.inf}],
-               "edges": np.array([1.0, 2.0]), "warnings": ("doubtful",)}
+    summary = {
+        "k": np.float64(2e-11),
+        "n": np.int64(3),
+        "flag": np.bool_(True),
+        "none": None,
+        "path": tmp_path,
+        "solver": {"mass_balance": float("nan")},
+        "sections": [{"k_reduction": np.inf}],
+        "edges": np.array([1.0, 2.0]),
+        "warnings": ("doubtful",),
+    }
     written = write_summary(tmp_path / "summary.json", summary)
     read = json.loads((tmp_path / "summary.json").read_text(), parse_constant=pytest.fail)
     assert read == written
@@ -125,8 +144,10 @@ def test_summary_takes_numpy_and_names_every_value_json_cannot_hold(tmp_path):
     assert read["edges"] == [1.0, 2.0]
     assert read["solver"]["mass_balance"] is read["sections"][0]["k_reduction"] is None
     assert read["warnings"][0] == "doubtful"
-    assert [("solver.mass_balance" in w, "sections[0].k_reduction" in w) for w in read["warnings"][1:]] \
-        == [(True, False), (False, True)]
+    assert [("solver.mass_balance" in w, "sections[0].k_reduction" in w) for w in read["warnings"][1:]] == [
+        (True, False),
+        (False, True),
+    ]
 
 
 def test_summary_refuses_what_is_no_data(tmp_path):

@@ -20,7 +20,7 @@ def test_network_lines_join_the_ends_of_their_throats(tmp_path):
     assert mesh.n_verts == 0
     ends = mesh.points[mesh.lines.reshape(-1, 3)[:, 1:]]
     assert np.allclose(ends, network.throat_ends, rtol=0, atol=1e-12)
-    assert np.array_equal(mesh.points[:len(network.pore_radius)], network.pore_position)
+    assert np.array_equal(mesh.points[: len(network.pore_radius)], network.pore_position)
     assert np.array_equal(mesh.cell_data["conductance_damaged"], analysis.conductance_damaged)
     assert np.array_equal(mesh.cell_data["blocked"], analysis.occupancy.blocked)
 
@@ -44,7 +44,7 @@ def test_a_throat_across_a_periodic_side_ends_in_an_image(tmp_path):
     assert mesh.point_data["end"][image] == 1
     assert mesh.points[image] == pytest.approx(network.pore_position[other] + [0, 2e-3, 0])
     assert mesh.point_data["pressure_damaged"][image] == analysis.flow_damaged.pore_pressure[other]
-    assert mesh.point_data["volume"].sum() == pytest.approx(network.pore_volume.sum())     # images hold no volume
+    assert mesh.point_data["volume"].sum() == pytest.approx(network.pore_volume.sum())  # images hold no volume
 
 
 def test_the_pressure_falls_by_one_per_period_along_x(tmp_path):
@@ -87,7 +87,7 @@ def test_a_collection_reads_back_with_its_times(tmp_path):
 def test_the_picture_is_drawn_or_the_process_was_killed_for_want_of_opengl(tmp_path):
     source = vtk.write_spheres_vtp(tmp_path / "spheres_damaged.vtp", demo_damaged())
     reason = vtk.render_spheres_png(tmp_path / "spheres_3d.png", source, BOX)
-    assert "exit code" not in reason, reason        # a Python error in the child
+    assert "exit code" not in reason, reason  # a Python error in the child
     assert (tmp_path / "spheres_3d.png").exists() == (reason == "")
     if not reason:
         assert pv.read(tmp_path / "spheres_3d.png").dimensions[:2] == (1500, 950)
