@@ -46,6 +46,22 @@ def test_units_axes_and_fully_periodic_lattice(tmp_path, capsys):
     assert {"pores", "throats", "solver", "law", "damage_law", "seconds", "warnings", "porosity_damaged"} <= set(result)
 
 
+def test_a_box_that_does_not_start_at_zero(tmp_path, capsys):
+    cubic(tmp_path / "sc.csv")
+    rows = (tmp_path / "sc.csv").read_text().splitlines()
+    moved = [rows[1]] + [f"{float(row.split(',')[0]) + 7.0},{row.partition(',')[2]}" for row in rows[2:]]
+    (tmp_path / "moved.csv").write_text("\n".join(moved) + "\n")
+    values = []
+    for name, box in (("sc", "0,4,0,4,0,4"), ("moved", "7,11,0,4,0,4")):
+        code, out, err = answer(
+            capsys, tmp_path / f"{name}.csv", "--units", "mm", "--box", box, "--sections", "2", "--json"
+        )
+        assert code == 0, err
+        values.append(json.loads(out))
+    assert values[1]["k_initial_m2"] == pytest.approx(values[0]["k_initial_m2"], rel=1e-6)
+    assert [row["x_lo_m"] for row in values[1]["sections"]] == pytest.approx([0.0, 2e-3])
+
+
 def test_all_laws_as_a_table(tmp_path, capsys):
     box = cubic(tmp_path / "sc.csv")
     code, out, _ = answer(
