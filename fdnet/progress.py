@@ -39,7 +39,7 @@ class Progress:
 
         bar = Bar(
             TextColumn("{task.description:>8}"),
-            BarColumn(),
+            BarColumn(bar_width=10),
             TextColumn("{task.fields[note]}"),
             TimeElapsedColumn(),
             console=Console(stderr=True),
@@ -72,8 +72,8 @@ class Progress:
     def _text(self) -> str:
         elapsed, done = time.monotonic() - self.start, self.step - (self.first_step or 0)
         left = (self.expected - self.step) * elapsed / done if done > 0 and self.step < self.expected else 0.0
-        eta = f", about {_clock(left)} left" if left else ""
-        return f"step {self.step} of some {self.expected}, {self.note}{eta}"
+        eta = f", ~{_clock(left)} left" if left else ""
+        return f"step {self.step} of ~{self.expected}, {self.note}{eta}"
 
     def _line(self) -> None:
         now = time.monotonic()

@@ -11,7 +11,7 @@ def test_lines_of_a_run_become_progress(capsys, monkeypatch):
         progress("noise 1 2 3")
         progress("FDNET checkpoint 1 300 10 20 3")
     said = capsys.readouterr().err
-    assert "step 300 of some 1000" in said
+    assert "step 300 of ~1000" in said
     assert "invaded 20" in said
     assert "left" in said
 
