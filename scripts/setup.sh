@@ -104,7 +104,10 @@ quietly() {
     local log status=0
     log="$(mktemp)"
     "$@" >"$log" 2>&1 </dev/null || status=$?
-    [ "$status" -eq 0 ] || tail -n 5 "$log" >&2
+    if [ "$status" -ne 0 ]; then
+        grep -E '(SSLError|ERROR|Could not|Unable|No space)' "$log" | cut -c1-300 | sort -u | head -n 4 >&2 || true
+        tail -n 5 "$log" >&2
+    fi
     rm -f "$log"
     return "$status"
 }
