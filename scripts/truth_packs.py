@@ -1,0 +1,164 @@
+"""Packs for the Stokes truth, made in code: grains relaxed from overlap, fines seated one by one and relaxed."""
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.spatial import cKDTree
+
+from fdnet.network.porosity import measure_porosity
+from fdnet.report.spheres import read_spheres
+from fdnet.snapshot import Array, Kind, Snapshot
+
+MM = 1e-3
+RADIUS = 0.5
+FINE_RADIUS = 0.1
+BRIDGE_SHARE = 0.3
+REFUSALS = 1000
+PACKS: dict[str, dict[str, Any]] = {
+    "packE_80_eps30": {"seed": 301, "grains": 80, "porosity": 0.30, "push": 0.4},
+    "packF_80_eps45": {"seed": 451, "grains": 80, "porosity": 0.45},
+    "packG_100_radii12_eps38": {"seed": 381, "grains": 100, "porosity": 0.38, "ratio": 2.0},
+    "packH_40_eps40": {"seed": 401, "grains": 40, "porosity": 0.40},
+    "packH_r5_d13": {"seed": 402, "intact": "packH_40_eps40", "lost": 0.13},
+    "packH_r5_d17": {"seed": 403, "intact": "packH_40_eps40", "lost": 0.17, "push": 0.4},
+    "packH_r5_d20": {"seed": 404, "intact": "packH_40_eps40", "lost": 0.20, "push": 0.4},
+}
+"""`ratio`: radii uniform between 1 and `ratio`, mean 0.5 mm; `push`: see `relaxed`; `lost`: porosity taken by fines."""
+
+
+def snapshot(position: Array, radius: Array, edge: float, kind: Array) -> Snapshot:
+    """Spheres of a periodic cube, lengths in mm."""
+    number = len(radius)
+    return Snapshot(
+        step=0,
+        time_s=0.0,
+        box=np.array([[0.0, edge * MM]] * 3),
+        id=np.arange(1, number + 1),
+        kind=kind,
+        position=position * MM,
+        radius=radius * MM,
+        velocity=np.zeros((number, 3)),
+    )
+
+
+def relaxed(radius: Array, edge: float, position: Array, *, fixed: int = 0, push: float = 1.0) -> Array:
+    """Push overlapping spheres apart until no overlap exceeds 1e-5 mm, or 1500 times; the first `fixed`
+    stay where they are. Each time a pair is moved apart by `push` of its overlap. Returns positions in the cell."""
+    moves = np.arange(len(radius)) >= fixed
+    for _ in range(1500):
+        pairs = cKDTree(position % edge, boxsize=edge).query_pairs(2.0 * radius.max(), output_type="ndarray")
+        apart = position[pairs[:, 0]] - position[pairs[:, 1]]
+        apart -= edge * np.round(apart / edge)
+        distance = np.linalg.norm(apart, axis=1)
+        overlap = radius[pairs].sum(axis=1) - distance
+        pushed = (overlap > 0.0) & moves[pairs].any(axis=1)
+        if not np.any(overlap[pushed] > 1e-5):
+            break
+        share = moves[pairs[pushed]] / moves[pairs[pushed]].sum(axis=1, keepdims=True)
+        way = push * (overlap / distance)[pushed, None] * apart[pushed]
+        np.add.at(position, pairs[pushed, 0], share[:, :1] * way)
+        np.add.at(position, pairs[pushed, 1], -share[:, 1:] * way)
+    return position % edge
+
+
+def made_grains(name: str) -> tuple[Snapshot, float]:
+    """Grains relaxed from random places; the edge is set for the stated porosity, overlap counted once."""
+    wish = PACKS[name]
+    rng = np.random.default_rng(wish["seed"])
+    radius = 1.0 + (wish.get("ratio", 1.0) - 1.0) * rng.random(wish["grains"])
+    radius *= RADIUS / radius.mean()
+    volume = 4.0 / 3.0 * np.pi * np.sum(radius**3)
+    edge = (volume / (1.0 - wish["porosity"])) ** (1.0 / 3.0)
+    position = relaxed(radius, edge, rng.random((len(radius), 3)) * edge, push=wish.get("push", 1.0))
+    kind = np.full(len(radius), Kind.GRAIN)
+
+    def excess(scale: float) -> float:
+        pack = snapshot(position * scale, radius, edge * scale, kind)
+        return measure_porosity(pack, periodic=(True,) * 3).mean - wish["porosity"]
+
+    scale = brentq(excess, 0.95, 1.02, xtol=1e-6)
+    return snapshot(position * scale, radius, edge * scale, kind), edge * scale
+
+
+def made_deposit(name: str, folder: Path) -> tuple[Snapshot, float]:
+    """The intact pack of `name` with fines and its edge (mm).
+
+    First they are placed one by one without overlap, a share of 0.3 bridging (touching three spheres, fines among
+    them), the others uniform over the grains' surface. After REFUSALS refusals in a row the rest is put at random into
+    the void and all fines are relaxed from overlap, the grains fixed.
+    """
+    wish = PACKS[name]
+    rng = np.random.default_rng(wish["seed"])
+    grains, edge = read_pack(folder / f"{wish['intact']}.csv")
+    position, radius = grains.position / MM, grains.radius / MM
+    total = len(grains) + round(wish["lost"] * edge**3 / (4.0 / 3.0 * np.pi * FINE_RADIUS**3))
+    refused = 0
+    while len(radius) < total:
+        relaxing = refused >= REFUSALS
+        centre = rng.random(3) * edge if relaxing else seat(position, radius, len(grains), edge, rng)
+        least = -FINE_RADIUS if relaxing else -1e-7
+        if centre is None or np.any(gaps(centre, position, radius, edge) < least):
+            refused += 1
+            continue
+        refused = refused if relaxing else 0
+        position, radius = np.vstack([position, centre % edge]), np.append(radius, FINE_RADIUS)
+    position = relaxed(radius, edge, position, fixed=len(grains), push=wish.get("push", 1.0))
+    kind = np.where(np.arange(total) < len(grains), Kind.GRAIN, Kind.FINE)
+    return snapshot(position, radius, edge, kind), edge
+
+
+def gaps(centre: Array, position: Array, radius: Array, edge: float) -> Array:
+    """Free distance between a fine at `centre` and every sphere."""
+    apart = position - centre
+    apart -= edge * np.round(apart / edge)
+    return np.linalg.norm(apart, axis=1) - radius - FINE_RADIUS
+
+
+def seat(position: Array, radius: Array, grains: int, edge: float, rng: np.random.Generator) -> Array | None:
+    """A place for a fine: on a grain, or touching it and the two other spheres nearest there; None if there is none."""
+    grain = rng.integers(grains)
+    way = rng.normal(size=3)
+    centre = position[grain] + (radius[grain] + FINE_RADIUS) * way / np.linalg.norm(way)
+    if rng.random() > BRIDGE_SHARE:
+        return centre
+    others = np.argsort(gaps(centre, position, radius, edge))
+    three = np.array([grain, *[i for i in others[:4] if i != grain][:2]])
+    corners = position[three] - edge * np.round((position[three] - centre) / edge)
+    return touching_three(corners, radius[three] + FINE_RADIUS, rng)
+
+
+def touching_three(corner: Array, reach: Array, rng: np.random.Generator) -> Array | None:
+    """One of the two points at distances `reach` (3,) from `corner` (3, 3), by trilateration."""
+    u, v = corner[1] - corner[0], corner[2] - corner[0]
+    normal = np.cross(u, v)
+    if np.linalg.norm(normal) < 1e-9:
+        return None
+    right = 0.5 * np.array([u @ u + reach[0] ** 2 - reach[1] ** 2, v @ v + reach[0] ** 2 - reach[2] ** 2, 0.0])
+    foot = np.linalg.solve(np.array([u, v, normal]), right)
+    height = reach[0] ** 2 - foot @ foot
+    if height < 0.0:
+        return None
+    return corner[0] + foot + rng.choice([-1.0, 1.0]) * np.sqrt(height) * normal / np.linalg.norm(normal)
+
+
+def write_pack(path: Path, pack: Snapshot, edge: float, note: str) -> None:
+    """A pack file in mm with 7 significant digits."""
+    names = {Kind.GRAIN: "grain", Kind.FINE: "fine"}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w") as file:
+        file.write(f"# periodic cube, edge {edge:.9g} mm; lengths in mm; {note}\nx,y,z,radius,kind\n")
+        for place, radius, kind in zip(pack.position / MM, pack.radius / MM, pack.kind, strict=True):
+            file.write(",".join(f"{value:.7g}" for value in (*place, radius)) + f",{names[Kind(int(kind))]}\n")
+
+
+def read_pack(path: Path) -> tuple[Snapshot, float]:
+    """A pack file and its edge (mm)."""
+    found = re.match(r"# periodic cube, edge ([0-9.]+) mm", path.read_text())
+    if not found:
+        sys.exit(f"stokes_truth: {path}:1: expected '# periodic cube, edge NUMBER mm'")
+    position, radius, kind = read_spheres(path, units="mm")
+    return snapshot(position / MM, radius / MM, float(found[1]), kind), float(found[1])
