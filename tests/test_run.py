@@ -1,5 +1,6 @@
 """Whole runs through the command line and the real binary: the output contract, killing and resuming, refusals."""
 
+import hashlib
 import json
 import os
 import shutil
@@ -52,6 +53,10 @@ def test_the_folder_keeps_the_output_contract(finished, root):
     assert summary["supplied_count"] == 300
     assert summary["invaded_count"] > 0
     assert 0 < summary["k_damaged_m2"] < summary["k_initial_m2"]
+    manifest = json.loads((run / "manifest.json").read_text())
+    for stage, deck in (("pack", "in.pack"), ("invade", "in.invade")):
+        digest = hashlib.sha256((run / stage / deck).read_bytes()).hexdigest()
+        assert manifest[stage]["runs"][0]["deck_sha256"] == {deck: digest}
     assert {"pack", "invade", "analyse", "report"} <= set(summary["seconds"])
     for name in (
         "pack/in.pack",

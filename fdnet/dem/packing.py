@@ -118,7 +118,7 @@ def _accept(folder: Path, attempt: Path, pack: Pack, tried: list[dict[str, Any]]
         os.replace(path, target)
     attempt.rmdir()
     (folder / "attempts.json").write_text(json.dumps(tried, indent=1) + "\n")
-    return replace(pack, attempts=tuple(tried))
+    return replace(pack, attempts=tuple(tried), run=replace(pack.run, directory=folder))
 
 
 def _attempt(case: Case, scales: Scales, folder: Path, launch: Launch, *, count: int) -> Pack:
