@@ -26,8 +26,21 @@ PACKS: dict[str, dict[str, Any]] = {
     "packH_r5_d13": {"seed": 402, "intact": "packH_40_eps40", "lost": 0.13},
     "packH_r5_d17": {"seed": 403, "intact": "packH_40_eps40", "lost": 0.17, "push": 0.4},
     "packH_r5_d20": {"seed": 404, "intact": "packH_40_eps40", "lost": 0.20, "push": 0.4},
+    "packI_80_eps45": {"seed": 452, "grains": 80, "porosity": 0.45},
+    "packJ_80_eps42": {"seed": 421, "grains": 80, "porosity": 0.42},
+    "packK_80_eps33": {"seed": 331, "grains": 80, "porosity": 0.33, "push": 0.4},
+    "packL_80_eps30": {"seed": 302, "grains": 80, "porosity": 0.30, "push": 0.4},
+    "packM_100_radii12_eps35": {"seed": 351, "grains": 100, "porosity": 0.35, "ratio": 2.0},
+    "packN_100_radii13_eps40": {"seed": 402, "grains": 100, "porosity": 0.40, "ratio": 3.0},
+    "packF_r5_d10": {"seed": 453, "intact": "packF_80_eps45", "lost": 0.10},
+    "packE_r5_d4": {"seed": 303, "intact": "packE_80_eps30", "lost": 0.04},
+    "packG_r5_d8": {"seed": 382, "intact": "packG_100_radii12_eps38", "lost": 0.08},
+    "packH_r5_half": {"seed": 405, "intact": "packH_40_eps40", "lost": 0.08, "layer": 0.5},
+    "packH_r5_d1": {"seed": 406, "intact": "packH_40_eps40", "lost": 0.005},
+    "packH_r10_d10": {"seed": 407, "intact": "packH_40_eps40", "lost": 0.10, "fine": 0.05},
 }
-"""`ratio`: radii uniform between 1 and `ratio`, mean 0.5 mm; `push`: see `relaxed`; `lost`: porosity taken by fines."""
+"""`ratio`: radii uniform between 1 and `ratio`, mean 0.5 mm; `push`: see `relaxed`; `lost`: porosity taken by fines of
+radius `fine` (0.1 mm), all of them in the first `layer` of the edge along x (all of it)."""
 
 
 def snapshot(position: Array, radius: Array, edge: float, kind: Array) -> Snapshot:
@@ -95,40 +108,43 @@ def made_deposit(name: str, folder: Path) -> tuple[Snapshot, float]:
     rng = np.random.default_rng(wish["seed"])
     grains, edge = read_pack(folder / f"{wish['intact']}.csv")
     position, radius = grains.position / MM, grains.radius / MM
-    total = len(grains) + round(wish["lost"] * edge**3 / (4.0 / 3.0 * np.pi * FINE_RADIUS**3))
+    fine, layer = wish.get("fine", FINE_RADIUS), wish.get("layer", 1.0) * edge
+    total = len(grains) + round(wish["lost"] * edge**3 / (4.0 / 3.0 * np.pi * fine**3))
     refused = 0
     while len(radius) < total:
         relaxing = refused >= REFUSALS
-        centre = rng.random(3) * edge if relaxing else seat(position, radius, len(grains), edge, rng)
-        least = -FINE_RADIUS if relaxing else -1e-7
-        if centre is None or np.any(gaps(centre, position, radius, edge) < least):
+        centre = rng.random(3) * edge if relaxing else seat(position, radius, len(grains), edge, fine, rng)
+        least = -fine if relaxing else -1e-7
+        if centre is None or centre[0] % edge >= layer or np.any(gaps(centre, position, radius, edge, fine) < least):
             refused += 1
             continue
         refused = refused if relaxing else 0
-        position, radius = np.vstack([position, centre % edge]), np.append(radius, FINE_RADIUS)
+        position, radius = np.vstack([position, centre % edge]), np.append(radius, fine)
     position = relaxed(radius, edge, position, fixed=len(grains), push=wish.get("push", 1.0))
     kind = np.where(np.arange(total) < len(grains), Kind.GRAIN, Kind.FINE)
     return snapshot(position, radius, edge, kind), edge
 
 
-def gaps(centre: Array, position: Array, radius: Array, edge: float) -> Array:
-    """Free distance between a fine at `centre` and every sphere."""
+def gaps(centre: Array, position: Array, radius: Array, edge: float, fine: float) -> Array:
+    """Free distance between a fine of radius `fine` at `centre` and every sphere."""
     apart = position - centre
     apart -= edge * np.round(apart / edge)
-    return np.linalg.norm(apart, axis=1) - radius - FINE_RADIUS
+    return np.linalg.norm(apart, axis=1) - radius - fine
 
 
-def seat(position: Array, radius: Array, grains: int, edge: float, rng: np.random.Generator) -> Array | None:
+def seat(
+    position: Array, radius: Array, grains: int, edge: float, fine: float, rng: np.random.Generator
+) -> Array | None:
     """A place for a fine: on a grain, or touching it and the two other spheres nearest there; None if there is none."""
     grain = rng.integers(grains)
     way = rng.normal(size=3)
-    centre = position[grain] + (radius[grain] + FINE_RADIUS) * way / np.linalg.norm(way)
+    centre = position[grain] + (radius[grain] + fine) * way / np.linalg.norm(way)
     if rng.random() > BRIDGE_SHARE:
         return centre
-    others = np.argsort(gaps(centre, position, radius, edge))
+    others = np.argsort(gaps(centre, position, radius, edge, fine))
     three = np.array([grain, *[i for i in others[:4] if i != grain][:2]])
     corners = position[three] - edge * np.round((position[three] - centre) / edge)
-    return touching_three(corners, radius[three] + FINE_RADIUS, rng)
+    return touching_three(corners, radius[three] + fine, rng)
 
 
 def touching_three(corner: Array, reach: Array, rng: np.random.Generator) -> Array | None:

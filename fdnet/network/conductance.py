@@ -1,4 +1,4 @@
-"""Conductance of clean throats: four laws side by side. Viscosity is factored out, so g is in m3 (flux = g dp / mu).
+"""Conductance of clean throats: five laws side by side. Viscosity is factored out, so g is in m3 (flux = g dp / mu).
 
 Each law takes a Network and returns (T,) m3.
 """
@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fdnet.network import geometry
+from fdnet.network.lubrication import half_resistances
 from fdnet.network.tessellation import LENGTH_FLOOR, Network
 from fdnet.snapshot import Array
 
@@ -68,6 +69,11 @@ def series_law(network: Network) -> Array:
     return np.where(network.throat_radius > 0, 1.0 / resistance, 0.0)
 
 
+def lubrication_law(network: Network) -> Array:
+    """One over the resistance between the power centres, by extended lubrication theory; see `lubrication`."""
+    return 1.0 / half_resistances(network).sum(axis=1)
+
+
 def _section_radius(triangle: Array, disc: Array) -> Array:
     inscribed = np.nan_to_num(geometry.touching_circle(triangle, disc), nan=0.0)
     area = np.maximum(geometry.open_area(triangle, disc), 0.0)
@@ -116,5 +122,6 @@ LAWS: dict[str, Law] = {
     "effective": effective_law,
     "hydraulic": hydraulic_law,
     "series": series_law,
+    "lubrication": lubrication_law,
 }
-DEFAULT_LAW = "series"
+DEFAULT_LAW = "lubrication"
