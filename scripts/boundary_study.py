@@ -3,7 +3,7 @@
 
     .venv/bin/python scripts/boundary_study.py tiled PACK.csv ... --csv docs/validation/boundary_tiled.csv
     .venv/bin/python scripts/boundary_study.py slabs PACK.csv ... --csv docs/validation/boundary_slabs.csv
-    .venv/bin/python scripts/boundary_study.py walled --grains 200 1000 3000 10000 --csv docs/validation/boundary_walled.csv
+    .venv/bin/python scripts/boundary_study.py walled --grains 200 1000 --csv docs/validation/boundary_walled.csv
 
 `tiled`: periodic packs tiled 1, 2, 3 times and cut as a box with walls in y, z or x, y, z, over the periodic pack; with
 the grains centred inside alone, and with those that reach in.
@@ -130,17 +130,17 @@ def slab_rows(packs: list[Path], places: int) -> Iterator[dict[str, Any]]:
             }
 
 
-def walled_rows(counts: list[int], rim: float) -> Iterator[dict[str, Any]]:
+def walled_rows(counts: list[int], rim: float, *, porosity: float, seed: int) -> Iterator[dict[str, Any]]:
     """k of LIGGGHTS packs between walls over that of their inner part."""
     binary = find_binary()
     for count in counts:
-        edge = (count * 4 / 3 * np.pi * 0.25**3 / 0.6) ** (1 / 3)
+        edge = (count * 4 / 3 * np.pi * 0.25**3 / (1 - porosity)) ** (1 / 3)
         case = case_from(
             {
                 "name": f"walled_{count}",
-                "seed": 1,
+                "seed": seed,
                 "box": {"size_mm": [edge] * 3, "sides": "walls"},
-                "grains": {"radius_mm": 0.25, "porosity": 0.40},
+                "grains": {"radius_mm": 0.25, "porosity": porosity},
                 "fines": {"radius_mm": 0.05, "count": 1},
                 "fluid": {},
             }
@@ -150,15 +150,15 @@ def walled_rows(counts: list[int], rim: float) -> Iterator[dict[str, Any]]:
         network, flow, k = solved(pack, SIDES["walls x y z"])
         core = pack.box + rim * 0.5e-3 * np.array([1, -1])
         inner = inner_permeability(network, flow, core)
-        porosity, inside = (
+        whole, inside = (
             measure_porosity(pack if box is None else boxed(pack, box), periodic=(False,) * 3).mean
             for box in (None, core)
         )
         yield {
             "grains": len(pack),
-            "seed": 1,
+            "seed": seed,
             "width_diameters": edge / 0.5,
-            "porosity": porosity,
+            "porosity": whole,
             "porosity_inner": inside,
             "k_m2": k,
             "k_inner_m2": inner,
@@ -194,12 +194,14 @@ def main() -> int:
     parser.add_argument("--places", type=int, default=20)
     parser.add_argument("--grains", nargs="+", type=int, default=[200, 1000, 3000, 10000])
     parser.add_argument("--rim", type=float, default=1.5, help="grain diameters left out at every side")
+    parser.add_argument("--porosity", type=float, default=0.40, help="of the whole walled pack")
+    parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--csv", type=Path, required=True)
     given = parser.parse_args()
     rows = {
         "tiled": lambda: tiled_rows(given.packs, given.tiles),
         "slabs": lambda: slab_rows(given.packs, given.places),
-        "walled": lambda: walled_rows(given.grains, given.rim),
+        "walled": lambda: walled_rows(given.grains, given.rim, porosity=given.porosity, seed=given.seed),
     }[given.study]()
     writer = None
     with given.csv.open("w", newline="") as out:
@@ -207,7 +209,9 @@ def main() -> int:
             writer = writer or csv.DictWriter(out, list(row), lineterminator="\n")
             if out.tell() == 0:
                 writer.writeheader()
-            writer.writerow({name: f"{value:.6g}" if isinstance(value, float) else value for name, value in row.items()})
+            writer.writerow(
+                {name: f"{value:.6g}" if isinstance(value, float) else value for name, value in row.items()}
+            )
             out.flush()
             print(row, flush=True)
     return 0
