@@ -20,7 +20,7 @@ ADOPTION_ROUNDS = 8
 class Facets:
     """T facets shared by two tetrahedra.
 
-    `pore` (T, 2); `opposite` (T,) corner of the first tetrahedron that is not on the facet; `shift` (T, 3) periods
+    `pore` (T, 2); `opposite` (T, 2) the corner of each tetrahedron that is not on the facet; `shift` (T, 3) periods
     that bring the second tetrahedron beside the first; `unmatched` facets left single away from the mirrored faces.
     """
 
@@ -50,7 +50,7 @@ class Polyhedra:
 
 def facet_vertices(tetrahedra: Tetrahedra, facets: Facets, part: slice | Array) -> Array:
     """Images (K, 3) at the corners of the facets of `part`."""
-    corners = geometry.FACETS[facets.opposite[part]]
+    corners = geometry.FACETS[facets.opposite[part, 0]]
     return np.take_along_axis(tetrahedra.vertex[facets.pore[part, 0]], corners, axis=1)
 
 
@@ -62,6 +62,7 @@ def share_facets(tetrahedra: Tetrahedra, *, periodic: tuple[bool, bool, bool]) -
     beside = tetrahedra.beside
     one, opposite = np.nonzero(beside > np.arange(len(beside))[:, None])
     two = beside[one, opposite]
+    back = np.argmax(beside[two] == one[:, None], axis=1)
     first, second, shift, unmatched = _across_periods(tetrahedra, periodic)
     total = len(one) + len(first)
     if unmatched > max(4, UNMATCHED_SHARE * total):
@@ -72,7 +73,9 @@ def share_facets(tetrahedra: Tetrahedra, *, periodic: tuple[bool, bool, bool]) -
     pore = np.concatenate([np.stack([one, two], axis=1), np.stack([first // 4, second // 4], axis=1)])
     return Facets(
         pore=pore.astype(np.int32),
-        opposite=np.concatenate([opposite, first % 4]).astype(np.int8),
+        opposite=np.concatenate([np.stack([opposite, back], axis=1), np.stack([first % 4, second % 4], axis=1)]).astype(
+            np.int8
+        ),
         shift=np.concatenate([np.zeros((len(one), 3), np.int16), shift]),
         unmatched=unmatched,
     )
@@ -134,7 +137,7 @@ def _heights(tetrahedra: Tetrahedra, facets: Facets, centre: Array, size: Array)
         one, two = facets.pore[part].T
         corner = tetrahedra.shaken[facet_vertices(tetrahedra, facets, part)]
         normal = geometry.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-        apex = tetrahedra.shaken[tetrahedra.vertex[one, facets.opposite[part]]]
+        apex = tetrahedra.shaken[tetrahedra.vertex[one, facets.opposite[part, 0]]]
         normal *= (np.where(geometry.dot(apex - corner[:, 0], normal) > 0, -1.0, 1.0) / np.linalg.norm(normal, axis=1))[
             :, None
         ]

@@ -8,6 +8,7 @@ import numpy as np
 from fdnet.errors import NetworkError
 from fdnet.network.delaunay import Tetrahedra, tessellate
 from fdnet.network.facets import Facets, Polyhedra, facet_vertices, make_polyhedra, share_facets
+from fdnet.network.pierced import pierced_facets
 from fdnet.network.pores import Centres, pore_centres, pore_solids
 from fdnet.network.throats import (
     LENGTH_FLOOR,
@@ -187,6 +188,8 @@ def _pores(
     speck = 1e-9 * float(tetrahedra.image_radius.mean()) ** 3
     counts = {
         "pores_closed": int(np.sum(found["pore_radius"] == 0)),
+        "slivers": int(np.sum(tetrahedra.flat)),
+        "cospherical_groups": int(np.sum(np.bincount(polyhedra.group) > 1)),
         "pores_at_end_faces": int(np.sum(cut[:, 0])),
         "pores_at_side_walls": int(np.sum(cut[:, 1:].any(axis=1))),
         "void_negative": int(np.sum(void < -speck)),
@@ -216,6 +219,7 @@ def _throats(
     }
     counts = {
         **counts,
+        "throats_pierced": int(np.sum(pierced_facets(tetrahedra, facets, radius > 0, np.ptp(box, axis=1)))),
         "throats_short": int(np.sum(length < LENGTH_FLOOR * scale)),
         "throats_in_polyhedra": int(np.sum(polyhedra.group[one] == polyhedra.group[two])),
         "throats_in_end_faces_dropped": int(np.sum(~kept)),
