@@ -23,7 +23,6 @@ ON_FACE_HAIR = 1e-6
 FLAT = 1e-5
 SAME_CENTRE = 1e-5
 EQUAL_SPREAD = 1e-3
-FIRST_MARGIN = 3.5
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -49,36 +48,15 @@ class Tetrahedra:
     power: bool
 
 
-def tessellate(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Tetrahedra:
-    """Unique tetrahedra of `grains` in their box. Raises NetworkError on too few or coincident grains.
-
-    The power tessellation is used when the radii spread by more than 1e-3 of their mean. Images are added until every
-    sphere that must be empty lies within them.
-    """
-    _check(grains, periodic)
-    size = grains.box[:, 1] - grains.box[:, 0]
-    margin = np.full(3, FIRST_MARGIN * float(grains.radius.max()))
-    for _ in range(8):
-        margin = np.where(periodic, margin, np.minimum(margin, size))
-        found = _tessellate_once(grains, periodic, margin)
-        needed = _needed_margin(found, grains.box)
-        if len(found.vertex) and np.all((margin >= needed) | (~np.array(periodic) & (margin >= size))):
-            return found
-        margin = np.maximum(1.25 * margin, np.minimum(1.02 * needed, 4.0 * margin))
-    raise NetworkError(
-        f"tessellation of {len(grains)} grains: voids reach {needed.max():.3g} m beyond the box of {size.tolist()} m, "
-        "further than the images around it; give more grains or a smaller box"
-    )
-
-
-def _needed_margin(found: Tetrahedra, box: Array) -> Array:
+def needed_margin(found: Tetrahedra, box: Array) -> Array:
     """How far (3,) m the empty spheres reach beyond the box."""
     reach = found.reach[:, None]
     low = (box[:, 0] - found.centre + reach).max(axis=0, initial=0.0)
     return np.maximum(low, (found.centre + reach - box[:, 1]).max(axis=0, initial=0.0))
 
 
-def _check(grains: Snapshot, periodic: tuple[bool, ...]) -> None:
+def check_grains(grains: Snapshot, periodic: tuple[bool, ...]) -> None:
+    """Raises NetworkError on fewer than four grains, lengths that are not positive, and coincident grains."""
     if len(grains) < 4:
         raise NetworkError(f"tessellation: {len(grains)} grains; a tetrahedron needs at least 4, give more grains")
     if np.any(grains.radius <= 0) or np.any(grains.box[:, 1] <= grains.box[:, 0]):
@@ -103,7 +81,12 @@ def _shake(grains: Snapshot, images: Images) -> Array:
     return noise[code, rank[images.owner]]
 
 
-def _tessellate_once(grains: Snapshot, periodic: tuple[bool, ...], margin: Array) -> Tetrahedra:
+def tessellate_within(grains: Snapshot, periodic: tuple[bool, bool, bool], margin: Array) -> Tetrahedra:
+    """Unique tetrahedra of `grains` and their images within `margin` (3,) m of the box.
+
+    The power tessellation is used when the radii spread by more than 1e-3 of their mean. Raises NetworkError on
+    grains in one plane or coincident with an image.
+    """
     scale = float(grains.radius.mean())
     images = make_images(grains.position, grains.box, periodic=periodic, margin=margin, hair=ON_FACE_HAIR * scale)
     points = (images.position - grains.box[:, 0]) / scale + _shake(grains, images)

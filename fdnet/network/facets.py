@@ -8,12 +8,21 @@ from scipy.sparse.csgraph import connected_components
 
 from fdnet.errors import NetworkError
 from fdnet.network import geometry
-from fdnet.network.delaunay import SAME_CENTRE, Tetrahedra, cut_axes
+from fdnet.network.delaunay import (
+    SAME_CENTRE,
+    Tetrahedra,
+    check_grains,
+    cut_axes,
+    needed_margin,
+    tessellate_within,
+)
 from fdnet.network.images import INSIDE, MIRROR_LOW, ON_FACE, label, packed_shift
-from fdnet.snapshot import Array
+from fdnet.snapshot import Array, Snapshot
 
 UNMATCHED_SHARE = 1e-3
 ADOPTION_ROUNDS = 8
+FIRST_MARGIN = 3.5
+ROUNDS = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -54,28 +63,51 @@ def facet_vertices(tetrahedra: Tetrahedra, facets: Facets, part: slice | Array) 
     return np.take_along_axis(tetrahedra.vertex[facets.pore[part, 0]], corners, axis=1)
 
 
-def share_facets(tetrahedra: Tetrahedra, *, periodic: tuple[bool, bool, bool]) -> Facets:
-    """Pairs of tetrahedra with a common facet: neighbours, and across periods those of the same grains.
+def tessellate(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> tuple[Tetrahedra, Facets]:
+    """Unique tetrahedra of `grains` in their box, and the facets they share.
 
-    Raises NetworkError when more than a hair of the facets (1e-3) find no partner away from the mirrored faces.
+    Images are added until every sphere that must be empty lies within them and every facet has its partner; both
+    together mean that no tetrahedron is wrong or missing. Raises NetworkError on too few, coincident or coplanar
+    grains, and when more than a hair of the facets (1e-3) stay without partner away from the mirrored faces.
     """
+    check_grains(grains, periodic)
+    size = grains.box[:, 1] - grains.box[:, 0]
+    margin = np.full(3, FIRST_MARGIN * float(grains.radius.max()))
+    for _ in range(ROUNDS):
+        margin = np.where(periodic, margin, np.minimum(margin, size))
+        widest = ~np.array(periodic) & (margin >= size)
+        tetrahedra = tessellate_within(grains, periodic, margin)
+        needed = needed_margin(tetrahedra, grains.box)
+        empty = len(tetrahedra.vertex) > 0 and bool(np.all((margin >= needed) | widest))
+        facets = share_facets(tetrahedra, periodic=periodic) if empty else None
+        if facets is not None and (facets.unmatched == 0 or widest.all()):
+            break
+        margin = np.maximum(1.5 * margin, np.minimum(1.02 * needed, 4.0 * margin))
+    if facets is None:
+        raise NetworkError(
+            f"tessellation of {len(grains)} grains: voids reach {needed.max():.3g} m beyond the box of "
+            f"{size.tolist()} m, further than the images around it; give more grains or a smaller box"
+        )
+    if facets.unmatched > max(4, UNMATCHED_SHARE * len(facets.pore)):
+        raise NetworkError(
+            f"tessellation: {facets.unmatched} of {len(facets.pore)} facets have no partner; the grains do not tile "
+            "the box, check the box and the periodic sides"
+        )
+    return tetrahedra, facets
+
+
+def share_facets(tetrahedra: Tetrahedra, *, periodic: tuple[bool, bool, bool]) -> Facets:
+    """Pairs of tetrahedra with a common facet: neighbours, and across periods those of the same grains."""
     beside = tetrahedra.beside
     one, opposite = np.nonzero(beside > np.arange(len(beside))[:, None])
     two = beside[one, opposite]
     back = np.argmax(beside[two] == one[:, None], axis=1)
     first, second, shift, unmatched = _across_periods(tetrahedra, periodic)
-    total = len(one) + len(first)
-    if unmatched > max(4, UNMATCHED_SHARE * total):
-        raise NetworkError(
-            f"tessellation: {unmatched} of {total} facets have no partner; the grains do not tile "
-            "the box, check the box and the periodic sides"
-        )
     pore = np.concatenate([np.stack([one, two], axis=1), np.stack([first // 4, second // 4], axis=1)])
+    ends = np.concatenate([np.stack([opposite, back], axis=1), np.stack([first % 4, second % 4], axis=1)])
     return Facets(
         pore=pore.astype(np.int32),
-        opposite=np.concatenate([np.stack([opposite, back], axis=1), np.stack([first % 4, second % 4], axis=1)]).astype(
-            np.int8
-        ),
+        opposite=ends.astype(np.int8),
         shift=np.concatenate([np.zeros((len(one), 3), np.int16), shift]),
         unmatched=unmatched,
     )

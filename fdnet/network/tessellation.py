@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.errors import NetworkError
-from fdnet.network.delaunay import Tetrahedra, tessellate
-from fdnet.network.facets import Facets, Polyhedra, facet_vertices, make_polyhedra, share_facets
+from fdnet.network.delaunay import Tetrahedra
+from fdnet.network.facets import Facets, Polyhedra, facet_vertices, make_polyhedra, tessellate
 from fdnet.network.pierced import pierced_facets
 from fdnet.network.pores import Centres, pore_centres, pore_solids
 from fdnet.network.throats import (
@@ -123,8 +123,7 @@ def build_network(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Net
     kept = reaching(grains, periodic)
     given, scale = grains, float(grains.radius[kept].mean()) if len(kept) else 0.0
     grains, beyond = onto_walls(grains.where(kept), periodic)
-    tetrahedra = tessellate(grains, periodic=periodic)
-    facets = share_facets(tetrahedra, periodic=periodic)
+    tetrahedra, facets = tessellate(grains, periodic=periodic)
     polyhedra = make_polyhedra(tetrahedra, facets, grains.box, scale)
     if not len(facets.pore):
         raise NetworkError(

@@ -98,9 +98,35 @@ def test_grain_centred_beyond_a_wall_becomes_a_half_sphere_of_its_cap():
     assert void == pytest.approx(porosity.mean, abs=5 * porosity.standard_error + 1e-5)
 
 
-def test_grains_centred_on_walls_are_their_own_images():
-    pack = simple_cubic(4)
-    inner = snapshot(pack.position - [0.0, 0.2, 0.2], 1.0, [[0, 8.0], [0, 6], [0, 6]])
-    walled = permeabilities(inner, (True, False, False))
-    assert walled == pytest.approx(permeabilities(doubled(inner, (1, 2)), ALL), rel=1e-6)
-    assert walled == pytest.approx(permeabilities(pack, ALL), rel=1e-5)
+CELLS = {
+    "simple cubic": ([[0, 0, 0]], 2.0),
+    "body-centred": ([[0, 0, 0], [0.5, 0.5, 0.5]], 4 / np.sqrt(3)),
+    "face-centred": ([[0, 0, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [0.5, 0.5, 0]], np.sqrt(8)),
+}
+
+
+@pytest.mark.parametrize("cell", CELLS)
+@pytest.mark.parametrize("periodic", [(True, False, True), (True, False, False)])
+def test_lattice_between_its_own_mirror_planes_conducts_as_the_periodic_one(cell, periodic):
+    """Grains centred on the walls are their own images."""
+    places, edge = CELLS[cell]
+    steps = np.stack(np.meshgrid(*[np.arange(4)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    position = (steps + np.array(places)).reshape(-1, 3) * edge
+    found = []
+    for sides in (ALL, periodic):
+        last = 3 * edge + np.where(sides, -1e-9, 1e-9)
+        pack = snapshot(position[np.all(position <= last, axis=1)], 1.0, [[0, 3 * edge]] * 3)
+        found.append(permeabilities(pack, sides))
+    assert found[1] == pytest.approx(found[0], rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_few_grains_in_a_wide_box_still_tile_it(seed):
+    """Voids as wide as the box: the first images are not enough."""
+    rng = np.random.default_rng(seed)
+    for periodic in (ALL, (False, True, True), (True, False, True)):
+        pack = random_pack(int(rng.integers(8, 30)), 0.2, seed=seed, spread=0.3)
+        network = build_network(pack, periodic=periodic)
+        box = np.prod(np.ptp(pack.box, axis=1))
+        assert network.counts["throats_unmatched"] == 0
+        assert np.sum(network.pore_share * network.pore_tetra_volume) == pytest.approx(box, rel=1e-12)
