@@ -30,10 +30,10 @@ def effective_law(network: Network) -> Array:
 
 
 def hydraulic_law(network: Network) -> Array:
-    """g = S R_h^2 / (2 L), R_h = void / wall of the two pyramids from the facet to the circumcentres.
+    """g = S R_h^2 / (2 L), R_h = void / wall of the two pyramids from the facet to the power centres.
 
     Chareyre et al. 2012 (Transp. Porous Media 92, 473, alpha = 1/2; the factor makes a cylinder Poiseuille's). Signed
-    heights; overlap of grain pairs counted once. Unequal radii: circumcentres instead of power centres.
+    heights; overlap of grain pairs counted once. Equal radii: power centres are circumcentres.
     """
     heights = network.throat_heights
     angle = _apex_angles(network, heights[:, 0]) + _apex_angles(network, heights[:, 1])
@@ -51,11 +51,11 @@ def hydraulic_law(network: Network) -> Array:
 
 
 def series_law(network: Network) -> Array:
-    """1/g = integral of 8 / (pi r(z)^4) dz between the circumcentres along the facet's normal.
+    """1/g = integral of 8 / (pi r(z)^4) dz between the power centres along the facet's normal.
 
     r(z) = 0.35 r_inscribed(z) + 0.65 r_effective(z) of the section at height z, where each grain shows a disc of
     radius sqrt(R^2 - z^2). The weight was fitted to resolved Stokes flow in five lattices and three packs of equal
-    grains. Unequal radii: same sections, circumcentres instead of power centres. A facet closed at z = 0 is closed.
+    grains. A facet closed at z = 0 is closed.
     """
     low, height = -network.throat_heights[:, 0], _height(network)
     points, weights = np.polynomial.legendre.leggauss(SERIES_POINTS)
@@ -86,23 +86,19 @@ def _height(network: Network) -> Array:
 
 
 def _apex_angles(network: Network, height: Array) -> Array:
-    """Signed solid angle (T, 3) at the facet's corners of the pyramid to the point `height` above its circumcentre."""
+    """Signed solid angle (T, 3) at the facet's corners of the pyramid to the point `height` above the centre of equal
+    power to its three discs."""
     base = geometry.flat(network.throat_corner)
-    middle = _circumcentre_2d(base)
+    middle = geometry.power_centre(base, network.throat_corner_radius)[0]
     apex = np.concatenate([middle, height[:, None]], axis=1)[:, None]
     raised = np.concatenate([np.concatenate([base, np.zeros((*base.shape[:2], 1))], axis=2), apex], axis=1)
     return geometry.solid_angles(raised)[:, :3]
 
 
-def _circumcentre_2d(base: Array) -> Array:
-    x, (cx, cy) = 0.5 * base[:, 1, 0], base[:, 2].T
-    return np.stack([x, (cx**2 + cy**2 - 2.0 * x * cx) / (2.0 * cy)], axis=1)
-
-
 def _hidden_by_pairs(network: Network) -> tuple[Array, Array]:
     """Volume (T,) and surface (T,) of grain pairs' overlap within the two pyramids, by their signed dihedral angles."""
     base = geometry.flat(network.throat_corner)
-    middle = _circumcentre_2d(base)
+    middle = geometry.power_centre(base, network.throat_corner_radius)[0]
     volume, surface = np.zeros(len(base)), np.zeros(len(base))
     for first, second in geometry.SIDES:
         along = base[:, second] - base[:, first]

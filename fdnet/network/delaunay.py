@@ -1,17 +1,15 @@
-"""Delaunay tetrahedra of grains and their images, one of each, and the facets they share.
+"""Tetrahedra of grains and their images: Delaunay's, or for unequal grains those of the power tessellation.
 
-Along a periodic axis tetrahedra that differ by whole periods are one. Across the other faces mirror images close the
-space without the hull's slivers; the sphere through the corners of a tetrahedron cut by such a face is centred on the
-face, because it passes through a grain and its own image. A shake of 1e-7 grain radii, for the tessellation only and
-the same for all periodic images of a grain, makes cospherical sets (lattices, and always the prisms cut by a face)
-split in the same way everywhere.
+Along a periodic axis tetrahedra that differ by whole periods are one. A face that is not periodic is a mirror plane: it
+parts every grain from its own image, so the power centres of what lies inside are inside, and those of what the face
+cuts lie on it. A shake of 1e-7 grain radii, for the tessellation only and the same for all periodic images of a grain,
+splits cospherical sets (lattices, and always the prisms cut by a face) in the same way everywhere.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import Delaunay, QhullError
+from scipy.spatial import ConvexHull, Delaunay, QhullError
 
 from fdnet.errors import NetworkError
 from fdnet.network import geometry
@@ -20,64 +18,45 @@ from fdnet.snapshot import Array, Snapshot
 
 SHAKE = 1e-7
 SHAKE_SEED = 3_141_592
-ON_FACE_HAIR = 1e-6
 COINCIDENT = 1e-3
-UNMATCHED_SHARE = 1e-3
+ON_FACE_HAIR = 1e-6
+FLAT = 1e-5
+SAME_CENTRE = 1e-5
+EQUAL_SPREAD = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Tetrahedra:
-    """P unique tetrahedra, corners in order of label and shift.
+    """P unique tetrahedra over M images of the grains.
 
-    `grain` (P, 4) index, `corner` (P, 4, 3) m, `shift` (P, 4, 3) periods, `mirror` (P, 4, 3) codes of `images`,
-    `label` (P, 4) integers; `shaken` (P, 4, 3) m the corners as tessellated, `centre` (P, 3) m and `reach` (P,) m of
-    the sphere through them.
+    `images`; `image_radius` (M,) m; `shaken` (M, 3) m positions as tessellated; `vertex` (P, 4) images at the corners;
+    `beside` (P, 4) the tetrahedron across the facet opposite each corner, -1 where it lies across a period or a wall;
+    `centre` (P, 3) m power centre, `reach` (P,) m radius round it within which another grain's centre would have
+    changed the tetrahedron; `flat` (P,) volume below 1e-5 mean radii cubed, whose centre is arbitrary; `hidden`
+    grains without any tetrahedron; `power` whether radii took part.
     """
 
-    grain: Array
-    corner: Array
-    shift: Array
-    mirror: Array
-    label: Array
+    images: Images
+    image_radius: Array
     shaken: Array
+    vertex: Array
+    beside: Array
     centre: Array
     reach: Array
+    flat: Array
+    hidden: int
+    power: bool
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Facets:
-    """T facets shared by two tetrahedra.
-
-    `pore` (T, 2), `opposite` (T, 2) the corner that is not on the facet, `shift` (T, 3) periods that bring the second
-    tetrahedron beside the first; counts of facets left single at mirrored faces and elsewhere.
-    """
-
-    pore: Array
-    opposite: Array
-    shift: Array
-    counts: Mapping[str, int]
+def needed_margin(found: Tetrahedra, box: Array) -> Array:
+    """How far (3,) m the empty spheres reach beyond the box."""
+    reach = found.reach[:, None]
+    low = (box[:, 0] - found.centre + reach).max(axis=0, initial=0.0)
+    return np.maximum(low, (found.centre + reach - box[:, 1]).max(axis=0, initial=0.0))
 
 
-def tessellate(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Tetrahedra:
-    """Unique tetrahedra of `grains` in their box. Raises NetworkError on too few or coincident grains."""
-    _check(grains, periodic)
-    largest = float(grains.radius.max())
-    size = grains.box[:, 1] - grains.box[:, 0]
-    margin = np.full(3, 4.0 * largest)
-    for _ in range(8):
-        margin = np.where(periodic, margin, np.minimum(margin, size))
-        found = _tessellate_once(grains, periodic, margin)
-        needed = 2.02 * float(found.reach.max(initial=0.0))
-        if len(found.grain) and np.all((margin >= needed) | (~np.array(periodic) & (margin >= size))):
-            return found
-        margin = np.maximum(margin * 1.25, min(needed, 4.0 * float(margin.max())))
-    raise NetworkError(
-        f"tessellation of {len(grains)} grains: voids reach {needed:.3g} m, wider than the images "
-        f"around the box of {size.tolist()} m; give more grains or a smaller box"
-    )
-
-
-def _check(grains: Snapshot, periodic: tuple[bool, ...]) -> None:
+def check_grains(grains: Snapshot, periodic: tuple[bool, ...]) -> None:
+    """Raises NetworkError on fewer than four grains, lengths that are not positive, and coincident grains."""
     if len(grains) < 4:
         raise NetworkError(f"tessellation: {len(grains)} grains; a tetrahedron needs at least 4, give more grains")
     if np.any(grains.radius <= 0) or np.any(grains.box[:, 1] <= grains.box[:, 0]):
@@ -97,114 +76,118 @@ def _shake(grains: Snapshot, images: Images) -> Array:
     order of x, y, z, so renumbering the grains changes nothing."""
     rank = np.empty(len(grains), int)
     rank[np.lexsort(grains.position.T[::-1])] = np.arange(len(grains))
-    noise = np.random.default_rng(SHAKE_SEED).uniform(-SHAKE, SHAKE, (len(grains) * 27, 3))
-    return noise[rank[images.owner] * 27 + label(images) % 27]
+    mirrors, code = np.unique(label(images) % 27, return_inverse=True)
+    noise = np.random.default_rng(SHAKE_SEED).uniform(-SHAKE, SHAKE, (len(mirrors), len(grains), 3))
+    return noise[code, rank[images.owner]]
 
 
-def _tessellate_once(grains: Snapshot, periodic: tuple[bool, ...], margin: Array) -> Tetrahedra:
-    hair = ON_FACE_HAIR * float(grains.radius.mean())
-    images = make_images(grains.position, grains.box, periodic=periodic, margin=margin, hair=hair)
+def tessellate_within(grains: Snapshot, periodic: tuple[bool, bool, bool], margin: Array) -> Tetrahedra:
+    """Unique tetrahedra of `grains` and their images within `margin` (3,) m of the box.
+
+    The power tessellation is used when the radii spread by more than 1e-3 of their mean. Raises NetworkError on
+    grains in one plane or coincident with an image.
+    """
     scale = float(grains.radius.mean())
+    images = make_images(grains.position, grains.box, periodic=periodic, margin=margin, hair=ON_FACE_HAIR * scale)
     points = (images.position - grains.box[:, 0]) / scale + _shake(grains, images)
+    radius = grains.radius[images.owner]
+    power = float(np.ptp(grains.radius)) > EQUAL_SPREAD * scale
     try:
-        found = Delaunay(points)
+        simplices, neighbours = _power_hull(points, radius / scale) if power else _delaunay(points)
     except QhullError as error:
         raise NetworkError(
             f"tessellation of {len(grains)} grains failed, they lie in one plane or line: {str(error).splitlines()[0]}"
         ) from error
+    shaken = points * scale + grains.box[:, 0]
+    kept = _unique(images, simplices, (periodic, grains.box, shaken, radius))
+    index = np.full(len(simplices) + 1, -1, np.int32)
+    index[kept] = np.arange(len(kept))
+    vertex = simplices[kept]
+    centre, reach, flat = _centres((images.position, shaken), radius, vertex, scale)
+    found = np.zeros(len(grains), bool)
+    found[images.owner[vertex]] = True
+    return Tetrahedra(
+        images=images,
+        image_radius=radius,
+        shaken=shaken,
+        vertex=vertex,
+        beside=index[neighbours[kept]],
+        centre=centre,
+        reach=reach,
+        flat=flat,
+        hidden=int(np.sum(~found)),
+        power=power,
+    )
+
+
+def _delaunay(points: Array) -> tuple[Array, Array]:
+    found = Delaunay(points)
     if len(found.coplanar):
         raise NetworkError(
             f"tessellation: {len(found.coplanar)} grains coincide with another grain's image "
             "across a side; check the box against the grain positions"
         )
-    corner = _unique(images, found.simplices, periodic)
-    shaken = points[corner]
-    centre, reach = geometry.circumcentre(shaken)
-    return Tetrahedra(
-        grain=images.owner[corner],
-        corner=images.position[corner],
-        shift=images.shift[corner],
-        mirror=images.mirror[corner],
-        label=label(images)[corner],
-        reach=reach * scale,
-        shaken=shaken * scale + grains.box[:, 0],
-        centre=centre * scale + grains.box[:, 0],
-    )
+    return found.simplices, found.neighbors
 
 
-def _unique(images: Images, corner: Array, periodic: tuple[bool, ...]) -> Array:
-    """Tetrahedra (P, 4), corners in order of key, that reach into the box and whose first corner is unshifted."""
-    mirrored = [axis for axis in range(3) if not periodic[axis]]
-    inside = np.all(np.any(images.mirror[corner] == INSIDE, axis=1)[:, mirrored], axis=1)
-    corner = corner[inside]
-    order = np.lexsort((packed_shift(images.shift)[corner], label(images)[corner]), axis=1)
-    corner = np.take_along_axis(corner, order, axis=1)
-    return corner[np.all(images.shift[corner[:, 0]] == 0, axis=1)]
+def _power_hull(points: Array, radius: Array) -> tuple[Array, Array]:
+    """Tetrahedra and neighbours (-1: none) of the power tessellation of `points` (M, 3) with `radius` (M,).
 
-
-def share_facets(tetrahedra: Tetrahedra, *, periodic: tuple[bool, bool, bool]) -> Facets:
-    """Pairs of tetrahedra with a common facet, found by the facet's grains and relative shifts.
-
-    Raises NetworkError when more than a hair of them (1e-3) find no partner away from the mirrored faces.
+    The lower side of the convex hull of the points lifted to |x|^2 - r^2 (Aurenhammer 1987, SIAM J. Comput. 16, 78).
     """
-    count = len(tetrahedra.grain)
-    labels = tetrahedra.label[:, geometry.FACETS].reshape(-1, 3)
-    shifts = tetrahedra.shift[:, geometry.FACETS].reshape(-1, 3, 3)
-    relative = packed_shift(shifts - shifts[:, :1])
-    columns = [labels[:, 0], labels[:, 1], labels[:, 2], relative[:, 1], relative[:, 2]]
-    order = np.lexsort(columns)
-    same = np.all([column[order][1:] == column[order][:-1] for column in columns], axis=0)
-    first = order[:-1][same]
-    second = order[1:][same]
-    single = np.setdiff1d(np.arange(4 * count), np.concatenate([first, second]))
-    unmatched = int(np.sum(~_beyond(tetrahedra, single, periodic)))
-    if unmatched > max(4, UNMATCHED_SHARE * len(first)):
-        raise NetworkError(
-            f"tessellation: {unmatched} of {len(first)} facets have no partner; the grains do not tile "
-            "the box, check the box and the periodic sides"
-        )
-    base = shifts[:, 0]
-    return Facets(
-        pore=np.stack([first // 4, second // 4], axis=1),
-        opposite=np.stack([first % 4, second % 4], axis=1),
-        shift=base[first] - base[second],
-        counts={"throats_unmatched": unmatched},
-    )
+    about = points - 0.5 * (points.max(axis=0) + points.min(axis=0))
+    lifted = np.sum(about**2, axis=1) - radius**2
+    found = ConvexHull(np.column_stack([about, lifted / np.ptp(lifted) * np.ptp(about)]))
+    lower = np.flatnonzero(found.equations[:, 3] < 0)
+    index = np.full(len(found.simplices), -1, np.int32)
+    index[lower] = np.arange(len(lower))
+    return found.simplices[lower], index[found.neighbors[lower]]
 
 
-def without_side_walls(
-    tetrahedra: Tetrahedra, facets: Facets, *, periodic: tuple[bool, bool, bool]
-) -> tuple[Tetrahedra, Facets]:
-    """Without the tetrahedra cut by a side wall, their facets, and the facets cut by the x faces themselves.
-
-    What lies between a wall and the outermost facets is no part of the packing: its wide channels would carry most
-    of the flow of a small specimen. Facets cut by x = 0 or x = L join pores of the same pressure.
-    """
-    keep = ~np.any(cut_axes(tetrahedra.mirror)[:, 1:], axis=1)
-    kept_ends = keep[facets.pore].sum(axis=1)
-    corners = geometry.FACETS[facets.opposite[:, 0]]
-    mirror = np.take_along_axis(tetrahedra.mirror[facets.pore[:, 0]], corners[..., None], axis=1)
-    in_face = cut_axes(mirror)[:, 0]
-    use = (kept_ends == 2) & ~in_face
-    counts = {
-        **facets.counts,
-        "throats_at_side_walls_dropped": int(np.sum(kept_ends == 1)),
-        "throats_in_end_faces_dropped": int(np.sum((kept_ends == 2) & in_face)),
-    }
-    index = np.cumsum(keep) - 1
-    thinned = {field.name: getattr(tetrahedra, field.name)[keep] for field in fields(tetrahedra)}
-    return Tetrahedra(**thinned), Facets(
-        pore=index[facets.pore[use]], opposite=facets.opposite[use], shift=facets.shift[use], counts=counts
-    )
-
-
-def _beyond(tetrahedra: Tetrahedra, facet: Array, periodic: tuple[bool, ...]) -> Array:
-    """True where all corners of a facet lie on or beyond one mirrored face: there symmetry closes the space."""
-    mirror = tetrahedra.mirror[facet[:, None] // 4, geometry.FACETS[facet % 4]]
-    return np.any(np.all(mirror != INSIDE, axis=1) & ~np.array(periodic), axis=1)
+def _unique(images: Images, simplices: Array, place: tuple[tuple[bool, ...], Array, Array, Array]) -> Array:
+    """Indices of the tetrahedra to keep: power centre inside or on the mirrored faces, and of those that differ by
+    periods the one whose corner of least key (grain, mirror, shift) is unshifted."""
+    periodic, box, shaken, radius = place
+    plain = np.all((images.mirror == INSIDE) & (images.shift == 0), axis=1)
+    within = plain[simplices]
+    kept = np.all(within, axis=1)
+    # an unshifted corner is needed; mirrored axes have no shift
+    unshifted = np.all(images.shift == 0, axis=1)
+    doubtful = np.flatnonzero(~kept & np.any(unshifted[simplices], axis=1))
+    corner = simplices[doubtful]
+    key = label(images).astype(np.int64) * 2**30 + packed_shift(images.shift)
+    first = np.take_along_axis(corner, np.argmin(key[corner], axis=1)[:, None], axis=1)[:, 0]
+    good = unshifted[first]
+    beyond = np.zeros(len(corner), bool)
+    for axis in np.flatnonzero(~np.array(periodic)):
+        beyond |= ~np.any(images.mirror[corner, axis] == INSIDE, axis=1)
+    # sets beyond a face belong to the specimen when their centre is on it: parts of a polyhedron cut by the face
+    check = np.flatnonzero(good & beyond)
+    hair = SAME_CENTRE * float(radius.mean())
+    centre, _ = geometry.power_centre(shaken[corner[check]], radius[corner[check]])
+    off = np.maximum(box[:, 0] - centre, centre - box[:, 1])
+    inside = np.all((off <= hair) | np.array(periodic), axis=1)
+    flat = np.abs(geometry.signed_volume(shaken[corner[check]])) < FLAT * float(radius.mean()) ** 3
+    good[check] = inside & ~flat
+    kept[doubtful] = good
+    return np.flatnonzero(kept)
 
 
-def cut_axes(mirror: Array) -> Array:
-    """True (K, 3) per axis where corners with `mirror` codes (K, n, 3) lie on both sides of a mirrored face."""
+def _centres(place: tuple[Array, Array], radius: Array, vertex: Array, scale: float) -> tuple[Array, Array, Array]:
+    """Power centre (P, 3) and reach (P,) of true positions, flatness (P,); of shaken positions where flat."""
+    centre, reach, flat = np.empty((len(vertex), 3)), np.empty(len(vertex)), np.empty(len(vertex), bool)
+    largest = float(radius.max())
+    for part in geometry.slices(len(vertex)):
+        true, corner_radius = place[0][vertex[part]], radius[vertex[part]]
+        flat[part] = np.abs(geometry.signed_volume(true)) < FLAT * scale**3
+        corner = np.where(flat[part][:, None, None], place[1][vertex[part]], true)
+        centre[part], power = geometry.power_centre(corner, corner_radius)
+        reach[part] = np.sqrt(np.maximum(power + largest**2, 0.0))
+    return centre, reach, flat
+
+
+def cut_axes(images: Images, corner: Array) -> Array:
+    """True (K, 3) per axis where `corner` (K, n) images lie on both sides of a mirrored face."""
+    mirror = images.mirror[corner]
     beyond = np.any((mirror != INSIDE) & (mirror != ON_FACE), axis=1)
     return beyond & np.any(mirror == INSIDE, axis=1)

@@ -15,8 +15,8 @@ SPECK = 1e-9
 def deposit_in_pores(network: Network, fines: Snapshot) -> tuple[Array, Array]:
     """Volume (P,) m3 and surface (P,) m2 of the fines inside each tetrahedron.
 
-    Counts the fines centred in the box, with their images across periodic sides and mirrored across an x face that is
-    not periodic (a pore on that face is the whole mirrored tetrahedron). Exact: whole spheres, caps where one facet
+    Counts the fines centred in the box, with their images across periodic sides and mirrored across the other faces
+    (a pore on such a face is the whole mirrored tetrahedron). Exact: whole spheres, caps where one facet
     cuts, the `overlap` package (Strobl et al. 2016, J. Comput. Phys. 311, 158) where more do.
     """
     low, high = network.box[0]
@@ -50,7 +50,6 @@ def _with_images(network: Network, fines: Snapshot) -> tuple[Array, Array]:
         network.pore_corner.max(axis=(0, 1)) - network.box[:, 1],
     )
     margin = np.maximum(reach, 0.0) + float(fines.radius.max())
-    margin[1:] = np.where(network.periodic[1:], margin[1:], np.nan)
     images = make_images(fines.position, network.box, periodic=network.periodic, margin=margin, hair=0.0)
     return images.position, fines.radius[images.owner]
 

@@ -2,7 +2,9 @@
 
 Pressure is held on planes across x: 1 on the inlet plane, 0 on the outlet plane. Pores on or beyond a plane are at
 its pressure; a throat that crosses a plane is split there: its part inside has conductance g / f, f the share of its
-length (in x) inside. Where x is periodic and no slab is asked for, the pressure drops by 1 per period instead.
+length (in x) inside. Pores of one polyhedron (`pore_group`) are one node, the throats between them carry no flux of
+their own; a throat cut by side walls conducts by its share inside. Where x is periodic and no slab is asked for, the
+pressure drops by 1 per period instead.
 """
 
 from dataclasses import dataclass
@@ -60,17 +62,18 @@ def solve_flow(network: Network, conductance: Array, *, span: tuple[float, float
     finite, and when residual, mass balance or pressure bounds are off by more than 1e-6.
     """
     _check(conductance, len(network.throat_pores))
+    conductance = conductance * network.throat_share
     if span is None and network.periodic[0]:
         return _solve_period(network, conductance)
     low, high = (float(network.box[0, 0]), float(network.box[0, 1])) if span is None else span
-    x = network.pore_position[:, 0]
-    state = _beside_planes(network, x, low, high)
+    node, first = network.pore_group, np.unique(network.pore_group, return_index=True)[1]
+    state = _beside_planes(network, network.pore_position[first, 0], low, high)
     links = _cut_links(network, conductance, low, high)
     free = _tied_to_both(links, state)
     pressure = np.where(state == INLET, 1.0, np.where(state == OUTLET, 0.0, np.nan))
     pressure[free] = _solve(links, free)
     flux = _link_flux(links, pressure)
-    isolated = int(np.sum((state == BETWEEN) & ~free))
+    pressure, isolated = pressure[node], int(np.sum(((state == BETWEEN) & ~free)[node]))
     if not np.any(flux):
         return Flow(
             pore_pressure=frozen(pressure),
@@ -126,12 +129,14 @@ def _cut_links(network: Network, conductance: Array, low: float, high: float) ->
     x[len(conductance) :] -= (network.throat_shift[turned, 0] * (network.box[0, 1] - network.box[0, 0]))[:, None]
     side = _beside_planes(network, x, low, high)
     use = ((side[:, 0] == BETWEEN) | (side[:, 0] != side[:, 1])) & (conductance[throat] > 0)
+    pores = network.throat_pores[throat]
+    use &= (side != BETWEEN).any(axis=1) | (network.pore_group[pores[:, 0]] != network.pore_group[pores[:, 1]])
     throat, x, side = throat[use], x[use], side[use]
     inside, whole = np.diff(np.clip(x, low, high), axis=1)[:, 0], np.diff(x, axis=1)[:, 0]
     cut = np.any(side != BETWEEN, axis=1)
     share = np.divide(inside, whole, out=np.ones(len(x)), where=cut)
     return _Links(
-        ends=np.where(side == BETWEEN, network.throat_pores[throat], side),
+        ends=np.where(side == BETWEEN, network.pore_group[network.throat_pores[throat]], side),
         throat=throat,
         conductance=conductance[throat] / np.maximum(share, SHORTEST_SHARE),
     )
@@ -198,9 +203,11 @@ def _checked(flow: Flow, *, bounds: tuple[float, float]) -> Flow:
 
 def _solve_period(network: Network, conductance: Array) -> Flow:
     """A pressure drop of 1 per period along x; one pore of each connected group is the reference."""
-    count = len(network.pore_position)
-    open_throat = np.flatnonzero(conductance > 0)
-    pair, jump = network.throat_pores[open_throat], network.throat_shift[open_throat, 0].astype(float)
+    node = network.pore_group
+    count = int(node.max()) + 1
+    pair, jump = node[network.throat_pores], network.throat_shift[:, 0].astype(float)
+    open_throat = np.flatnonzero((conductance > 0) & ((pair[:, 0] != pair[:, 1]) | (jump != 0)))
+    pair, jump = pair[open_throat], jump[open_throat]
     g = conductance[open_throat]
     graph = sparse.coo_matrix((np.ones(len(pair)), (pair[:, 0], pair[:, 1])), shape=(count, count))
     _, group = connected_components(graph, directed=False)
@@ -217,25 +224,25 @@ def _solve_period(network: Network, conductance: Array) -> Flow:
     links = _Links(ends=pair, conductance=g, throat=open_throat)
     if not live.any():
         return Flow(
-            pore_pressure=frozen(np.full(count, np.nan)),
+            pore_pressure=frozen(np.full(len(node), np.nan)),
             throat_flux=frozen(per_throat),
             method=METHOD,
             residual=0.0,
             mass_balance=None,
             inflow=0.0,
-            isolated_pores=count,
+            isolated_pores=len(node),
             reason="no open path around the period along x",
         )
     per_throat[open_throat] = np.where(live[pair[:, 0]], flux, 0.0)
     return _checked(
         Flow(
-            pore_pressure=frozen(np.where(live, pressure, np.nan)),
+            pore_pressure=frozen(np.where(live, pressure, np.nan)[node]),
             throat_flux=frozen(per_throat),
             method=METHOD,
             residual=_imbalance(links, flux, np.ones(count, bool)) / inflow,
             inflow=inflow,
             mass_balance=abs(float(np.sum(flux * jump)) - inflow) / inflow,
-            isolated_pores=int(np.sum(~live)),
+            isolated_pores=int(np.sum(~live[node])),
             reason="",
         ),
         bounds=(-np.inf, np.inf),

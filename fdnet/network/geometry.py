@@ -5,6 +5,8 @@ touching given ones, Apollonius' problem solved by subtracting the sphere equati
 two caps pi h^2 (3 r - h) / 3.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from fdnet.snapshot import Array
@@ -14,10 +16,26 @@ FACETS = np.array([(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)])
 SIDES = np.array([(0, 1), (1, 2), (2, 0)])
 
 
+def slices(count: int, size: int = 100_000) -> Iterator[slice]:
+    """Consecutive slices of at most `size` that cover range(count): whole-pack arrays are worked off by these."""
+    return (slice(start, min(start + size, count)) for start in range(0, count, size))
+
+
+def cross(left: Array, right: Array) -> Array:
+    """Vector product (..., 3)."""
+    (a, b, c), (d, e, f) = ((one[..., 0], one[..., 1], one[..., 2]) for one in (left, right))
+    return np.stack([b * f - c * e, c * d - a * f, a * e - b * d], axis=-1)
+
+
+def dot(left: Array, right: Array) -> Array:
+    """Scalar product (...) of vectors (..., n)."""
+    return np.asarray(np.einsum("...i,...i->...", left, right))
+
+
 def signed_volume(corner: Array) -> Array:
     """Volume of tetrahedra (..., 4, 3), m3, positive when corner 3 sees corners 0, 1, 2 turn clockwise."""
     side = corner[..., 1:, :] - corner[..., :1, :]
-    return np.einsum("...i,...i->...", side[..., 0, :], np.cross(side[..., 1, :], side[..., 2, :])) / 6.0
+    return dot(side[..., 0, :], cross(side[..., 1, :], side[..., 2, :])) / 6.0
 
 
 def solid_angles(corner: Array) -> Array:
@@ -28,9 +46,9 @@ def solid_angles(corner: Array) -> Array:
 def _solid_angle(corner: Array) -> Array:
     a, b, c = (corner[..., k, :] - corner[..., 0, :] for k in (1, 2, 3))
     la, lb, lc = (np.linalg.norm(v, axis=-1) for v in (a, b, c))
-    dot = [np.einsum("...i,...i->...", u, v) for u, v in ((a, b), (a, c), (b, c))]
-    triple = np.einsum("...i,...i->...", a, np.cross(b, c))
-    return 2.0 * np.arctan2(triple, la * lb * lc + dot[0] * lc + dot[1] * lb + dot[2] * la)
+    ab, ac, bc = dot(a, b), dot(a, c), dot(b, c)
+    triple = dot(a, cross(b, c))
+    return 2.0 * np.arctan2(triple, la * lb * lc + ab * lc + ac * lb + bc * la)
 
 
 def dihedral_angles(corner: Array) -> Array:
@@ -39,9 +57,9 @@ def dihedral_angles(corner: Array) -> Array:
     for first, second in EDGES:
         other = [k for k in range(4) if k not in (first, second)]
         axis = corner[..., second, :] - corner[..., first, :]
-        left, right = (np.cross(axis, corner[..., k, :] - corner[..., first, :]) for k in other)
-        along = np.linalg.norm(np.cross(left, right), axis=-1)
-        found.append(np.arctan2(along, np.einsum("...i,...i->...", left, right)))
+        left, right = (cross(axis, corner[..., k, :] - corner[..., first, :]) for k in other)
+        along = np.linalg.norm(cross(left, right), axis=-1)
+        found.append(np.arctan2(along, dot(left, right)))
     return np.stack(found, axis=-1)
 
 
@@ -76,17 +94,34 @@ def _touching(corner: Array, radius: Array) -> tuple[Array, Array]:
 
 
 def _solve(matrix: Array, right: Array) -> Array:
-    """Solve (..., n, n) systems; NaN where singular."""
-    flat_system = np.linalg.det(matrix) == 0.0
-    safe = np.where(flat_system[..., None, None], np.eye(matrix.shape[-1]), matrix)
-    return np.where(flat_system[..., None, None], np.nan, np.linalg.solve(safe, right))
+    """Solve (..., n, n) systems for (..., n, m), n = 2 or 3, by Cramer's rule; NaN where singular."""
+    rows = [matrix[..., k, :] for k in range(matrix.shape[-1])]
+    if len(rows) == 2:
+        (a, b), (c, d) = ((row[..., 0], row[..., 1]) for row in rows)
+        columns = [np.stack([d, -c], axis=-1), np.stack([-b, a], axis=-1)]
+        determinant = a * d - b * c
+    else:
+        columns = [cross(rows[1], rows[2]), cross(rows[2], rows[0]), cross(rows[0], rows[1])]
+        determinant = dot(rows[0], columns[0])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        scale = np.where(determinant == 0.0, np.nan, 1.0 / determinant)
+    total = sum(
+        column[..., None] * (right[..., k, :] * scale[..., None])[..., None, :] for k, column in enumerate(columns)
+    )
+    return np.asarray(total)
 
 
-def circumcentre(corner: Array) -> tuple[Array, Array]:
-    """Centre (..., 3) and radius (...) of the sphere through four points (..., 4, 3); NaN where they are coplanar."""
+def power_centre(corner: Array, radius: Array) -> tuple[Array, Array]:
+    """Point (..., n) of equal power to the n + 1 spheres at `corner` (..., n + 1, n), and that power |x - p|^2 - r^2.
+
+    n = 3: the vertex of the power tessellation; n = 2: the radical centre of three discs; for equal radii the
+    circumcentre. NaN where the corners lie in one plane (line). Aurenhammer 1987 (SIAM J. Comput. 16, 78).
+    """
     side = corner[..., 1:, :] - corner[..., :1, :]
-    offset = _solve(side, 0.5 * np.sum(side**2, axis=-1)[..., None])[..., 0]
-    return corner[..., 0, :] + offset, np.linalg.norm(offset, axis=-1)
+    first = radius[..., :1]
+    half = 0.5 * (np.sum(side**2, axis=-1) + (first - radius[..., 1:]) * (first + radius[..., 1:]))
+    offset = _solve(side, half[..., None])[..., 0]
+    return corner[..., 0, :] + offset, dot(offset, offset) - first[..., 0] ** 2
 
 
 def contains(corner: Array, point: Array, *, hair: float = 1e-9) -> Array:
@@ -103,15 +138,15 @@ def flat(triangle: Array) -> Array:
     base = np.linalg.norm(ab, axis=-1)
     placed = np.zeros((*triangle.shape[:-1], 2))
     placed[..., 1, 0] = base
-    placed[..., 2, 0] = np.einsum("...i,...i->...", ab, ac) / base
-    placed[..., 2, 1] = np.linalg.norm(np.cross(ab, ac), axis=-1) / base
+    placed[..., 2, 0] = dot(ab, ac) / base
+    placed[..., 2, 1] = np.linalg.norm(cross(ab, ac), axis=-1) / base
     return placed
 
 
 def triangle_area(triangle: Array) -> Array:
     """Area (...) of triangles (..., 3, 3), m2."""
     ab, ac = triangle[..., 1, :] - triangle[..., 0, :], triangle[..., 2, :] - triangle[..., 0, :]
-    return 0.5 * np.linalg.norm(np.cross(ab, ac), axis=-1)
+    return 0.5 * np.linalg.norm(cross(ab, ac), axis=-1)
 
 
 def triangle_angles(triangle: Array) -> Array:
@@ -120,8 +155,8 @@ def triangle_angles(triangle: Array) -> Array:
     for k in range(3):
         left = triangle[..., (k + 1) % 3, :] - triangle[..., k, :]
         right = triangle[..., (k + 2) % 3, :] - triangle[..., k, :]
-        across = np.linalg.norm(np.cross(left, right), axis=-1)
-        found.append(np.arctan2(across, np.einsum("...i,...i->...", left, right)))
+        across = np.linalg.norm(cross(left, right), axis=-1)
+        found.append(np.arctan2(across, dot(left, right)))
     return np.stack(found, axis=-1)
 
 

@@ -44,7 +44,7 @@ def make_images(position: Array, box: Array, *, periodic: tuple[bool, ...], marg
     A centre within `hair` m of a non-periodic face, or beyond it, gets no mirror image there.
     """
     count = len(position)
-    owner, shift, mirror = np.arange(count), np.zeros((count, 3), int), np.zeros((count, 3), int)
+    owner, shift, mirror = np.arange(count), np.zeros((count, 3), np.int16), np.zeros((count, 3), np.int8)
     position = wrapped(position, box, periodic)
     for axis in range(3):
         if np.isnan(margin[axis]):
@@ -85,4 +85,5 @@ def label(images: Images) -> Array:
 
 def packed_shift(shift: Array) -> Array:
     """One integer per whole-period shift (..., 3), |shift| < 512; order is that of the rows."""
-    return ((shift[..., 0] + 512) * 1024 + shift[..., 1] + 512) * 1024 + shift[..., 2] + 512
+    steps = shift.astype(np.int64) + 512
+    return (steps[..., 0] * 1024 + steps[..., 1]) * 1024 + steps[..., 2]

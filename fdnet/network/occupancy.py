@@ -120,7 +120,8 @@ def _pairs(network: Network, fines: Snapshot) -> tuple[Array, Array, Pairs]:
 def _images(network: Network, fines: Snapshot, ends: Array) -> tuple[Array, Array]:
     beyond = np.maximum(network.box[:, 0] - ends.min(axis=(0, 1)), ends.max(axis=(0, 1)) - network.box[:, 1])
     margin = np.maximum(beyond, 0.0) + float(network.throat_radius.max()) + float(fines.radius.max())
-    margin = np.where(network.periodic, margin, np.nan)
+    if not network.periodic[0]:
+        margin[0] = np.nan  # beyond the x faces the fines themselves are seen
     images = make_images(fines.position, network.box, periodic=network.periodic, margin=margin, hair=0.0)
     return images.position, images.owner
 

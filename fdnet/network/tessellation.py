@@ -1,51 +1,61 @@
-"""The network of pores and throats of a grain pack: one pore per Delaunay tetrahedron, one throat per shared facet."""
+"""The network of pores and throats of a grain pack: one pore per tetrahedron, one throat per shared facet."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from fdnet.errors import NetworkError
-from fdnet.network import geometry
-from fdnet.network.delaunay import Facets, Tetrahedra, cut_axes, share_facets, tessellate, without_side_walls
-from fdnet.network.images import MIRROR_LOW, neighbour_tree
-from fdnet.snapshot import Array, Snapshot, frozen
+from fdnet.network.delaunay import Tetrahedra
+from fdnet.network.facets import Facets, Polyhedra, facet_vertices, make_polyhedra, tessellate
+from fdnet.network.pierced import pierced_facets
+from fdnet.network.pores import Centres, pore_centres, pore_solids
+from fdnet.network.throats import (
+    LENGTH_FLOOR,
+    throat_lengths,
+    throat_sections,
+    throat_shares,
+    without_end_faces,
+)
+from fdnet.network.walls import onto_walls, reaching
+from fdnet.snapshot import Array, Snapshot
 
-LENGTH_FLOOR = 1e-3
-SAME_CENTRE = 1e-5
+__all__ = ["LENGTH_FLOOR", "Network", "build_network"]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Network:
     """Pores (P) and throats (T) of a pack of grains; lengths m, areas m2, volumes m3. x is the flow axis.
 
-    `box` (3, 2); `periodic` (3,); `grain_radius` mean; `area` cross-section of what the pores fill (the box's when
-    both sides are periodic, else without the layer at the side walls). A pore cut by an x face that is not periodic
-    lies on that face and describes the whole mirrored tetrahedron; `pore_share` (P,) is the part inside (1/2, else
-    1). `pore_grains` (P, 4) index; `pore_corner` (P, 4, 3), images included; `pore_corner_radius` (P, 4);
+    `box` (3, 2); `periodic` (3,): the other faces are mirror planes. `grain_radius` mean; `area` the box's
+    cross-section. `image_grain` (M,) index, `image_position` (M, 3), `image_radius` (M,) of the grains and their
+    images; `pore_images` (P, 4), `throat_images` (T, 3) which of them are at the corners, `pore_wrap` (P, 3) periods by
+    which these lie beyond the place of the pore.
+    A pore cut by mirrored faces lies on them and describes the whole mirrored tetrahedron; `pore_share` (P,) is
+    the part inside (1/2 for each such face, else 1), `throat_share` (T,) that of a throat's section.
     `pore_position` (P, 3) centre of the sphere touching the four grains, the centroid where that is outside (Shi
-    2011, section 3.1.2); `pore_radius` of that sphere (0 where grains close it); `pore_circumcentre` (P, 3);
-    `pore_tetra_volume`, `pore_volume` (void), `pore_wall_surface` (P,); `pore_group` (P,) equal for pores of one
-    circumcentre, which are parts of one polyhedron (a lattice's cell, a prism cut by a face) split at will.
-    `throat_pores` (T, 2); `throat_shift` (T, 3) periods from the second pore's position to its place beside the
-    first; `throat_ends` (T, 2, 3) the two places; `throat_grains` (T, 3); `throat_corner` (T, 3, 3);
-    `throat_corner_radius` (T, 3); `throat_heights` (T, 2) distances of the circumcentres from the facet, positive on
-    their own side; `throat_radius` inscribed; `throat_area` open; `throat_radius_effective` = sqrt(area / pi);
-    `throat_length` between the pore positions (T,). `counts`: what was closed, floored, dropped or replaced.
+    2011, section 3.1.2); `pore_radius` of that sphere (0 where grains close it); `pore_power_centre` (P, 3) vertex of
+    the power tessellation, the circumcentre for equal grains; `pore_tetra_volume`, `pore_volume` (void),
+    `pore_wall_surface` (P,); `pore_group` (P,) equal for pores of one power centre, which are parts of one
+    polyhedron (a lattice's cell, a prism cut by a face) split at will: one place, one pressure.
+    `throat_pores` (T, 2); `throat_shift` (T, 3) periods from the second pore's position to its place beside the first;
+    `throat_heights` (T, 2) distances of the power centres from the facet, positive on their own side;
+    `throat_radius` inscribed; `throat_area` open; `throat_radius_effective` = sqrt(area / pi); `throat_length` between
+    the pore positions (T,). `counts`: what was closed, floored, dropped or replaced.
     """
 
     box: Array
     periodic: tuple[bool, bool, bool]
     grain_radius: float
     area: float
-    pore_grains: Array
-    pore_corner: Array
-    pore_corner_radius: Array
+    image_grain: Array
+    image_position: Array
+    image_radius: Array
+    pore_images: Array
+    pore_wrap: Array
     pore_position: Array
     pore_radius: Array
-    pore_circumcentre: Array
+    pore_power_centre: Array
     pore_tetra_volume: Array
     pore_volume: Array
     pore_wall_surface: Array
@@ -53,10 +63,8 @@ class Network:
     pore_share: Array
     throat_pores: Array
     throat_shift: Array
-    throat_ends: Array
-    throat_grains: Array
-    throat_corner: Array
-    throat_corner_radius: Array
+    throat_images: Array
+    throat_share: Array
     throat_heights: Array
     throat_radius: Array
     throat_radius_effective: Array
@@ -64,200 +72,155 @@ class Network:
     throat_length: Array
     counts: Mapping[str, int]
 
+    @property
+    def pore_grains(self) -> Array:
+        """Index (P, 4) of the grains at the corners."""
+        return self.image_grain[self.pore_images]
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Centres:
-    position: Array
-    wrap: Array
-    radius: Array
-    centroids: int
+    @property
+    def pore_corner(self) -> Array:
+        """Corners (P, 4, 3) m about the pore's position, images included."""
+        return self.image_position[self.pore_images] - (self.pore_wrap * np.ptp(self.box, axis=1))[:, None]
+
+    @property
+    def pore_corner_radius(self) -> Array:
+        """Grain radii (P, 4) m at the corners."""
+        return self.image_radius[self.pore_images]
+
+    @property
+    def throat_grains(self) -> Array:
+        """Index (T, 3) of the grains at the facet's corners."""
+        return self.image_grain[self.throat_images]
+
+    @property
+    def throat_corner(self) -> Array:
+        """Corners (T, 3, 3) m of the facet beside the first pore, images included."""
+        wrap = self.pore_wrap[self.throat_pores[:, 0]] * np.ptp(self.box, axis=1)
+        return self.image_position[self.throat_images] - wrap[:, None]
+
+    @property
+    def throat_corner_radius(self) -> Array:
+        """Grain radii (T, 3) m at the facet's corners."""
+        return self.image_radius[self.throat_images]
+
+    @property
+    def throat_ends(self) -> Array:
+        """Places (T, 2, 3) m of the first pore and of the second beside it."""
+        ends = self.pore_position[self.throat_pores]
+        ends[:, 1] += self.throat_shift * np.ptp(self.box, axis=1)
+        return ends
 
 
 def build_network(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Network:
-    """Network of `grains` alone (radii may differ; the tessellation is of the centres, Shi 2011, section 3.2.1).
+    """Network of `grains` alone (Shi 2011, section 3.2.1); unequal radii: of their power tessellation.
 
-    Periodic sides join. Across the others the grains are mirrored before tessellating; pores cut by a side wall are
-    left out, pores cut by an x face stay and lie on it. Grains that do not reach into the box are left out and
+    Periodic sides join. The others are mirror planes (walls that slip): the specimen is one half, fourth or eighth of
+    the periodic one that its mirror images make up. Grains that do not reach into the box are left out and
     counted. Raises NetworkError on fewer than four grains, coincident grains, grains in one plane, facets without
     partner, no throat at all, or an x face without pores.
     """
     periodic = (bool(periodic[0]), bool(periodic[1]), bool(periodic[2]))
-    kept = _reaching(grains, periodic)
-    outside, grains = len(grains) - len(kept), grains.where(kept)
-    tetrahedra = tessellate(grains, periodic=periodic)
-    tetrahedra, facets = without_side_walls(tetrahedra, share_facets(tetrahedra, periodic=periodic), periodic=periodic)
+    kept = reaching(grains, periodic)
+    given, scale = grains, float(grains.radius[kept].mean()) if len(kept) else 0.0
+    grains, beyond = onto_walls(grains.where(kept), periodic)
+    tetrahedra, facets = tessellate(grains, periodic=periodic)
+    polyhedra = make_polyhedra(tetrahedra, facets, grains.box, scale)
     if not len(facets.pore):
         raise NetworkError(
             f"tessellation: no throat joins two pores of these {len(grains)} grains; the box is too "
             "narrow for its side walls, give more grains or periodic sides"
         )
-    centres = _pore_centres(grains, tetrahedra, periodic)
     if not periodic[0]:
-        _check_ends(grains.box, centres.position[:, 0])
-    pores, pore_counts = _pores(grains, tetrahedra, centres, periodic)
-    throats, throat_counts = _throats(grains, tetrahedra, facets, centres)
+        _check_ends(grains.box, polyhedra.wall[:, 0])
+    centres = pore_centres(tetrahedra, polyhedra, grains.box, periodic)
     counts = {
-        "grains_outside_box": outside,
+        "grains_outside_box": len(given) - len(kept),
+        "grains_centred_beyond_walls": beyond,
+        "grains_hidden": tetrahedra.hidden,
         "centre_is_centroid": centres.centroids,
-        **pore_counts,
-        **throat_counts,
-        **facets.counts,
+        "throats_unmatched": facets.unmatched,
     }
-    # indices count all grains given
-    pores["pore_grains"], throats["throat_grains"] = kept[pores["pore_grains"]], kept[throats["throat_grains"]]
-    area = float(np.sum(pores["pore_share"] * pores["pore_tetra_volume"]) / (grains.box[0, 1] - grains.box[0, 0]))
+    pores, pore_counts = _pores(tetrahedra, polyhedra, centres, grains.box)
+    throats, throat_counts = _throats(tetrahedra, (facets, polyhedra), centres, grains.box, scale)
+    found = {
+        **pores,
+        **throats,
+        "image_grain": kept[tetrahedra.images.owner],
+        "image_position": tetrahedra.images.position,
+        "image_radius": tetrahedra.image_radius,
+    }
+    for value in found.values():
+        value.setflags(write=False)
+    size = np.ptp(grains.box, axis=1)
+    counts = {**counts, **pore_counts, **throat_counts}
     return Network(
-        box=frozen(grains.box),
-        periodic=periodic,
-        grain_radius=float(grains.radius.mean()),
-        area=area,
-        counts=counts,
-        **{name: frozen(value) for name, value in {**pores, **throats}.items()},
+        box=grains.box, periodic=periodic, grain_radius=scale, area=float(size[1] * size[2]), counts=counts, **found
     )
 
 
-def _check_ends(box: Array, x: Array) -> None:
-    for name, face in (("inlet", box[0, 0]), ("outlet", box[0, 1])):
-        if not np.any(x == face):
+def _check_ends(box: Array, wall: Array) -> None:
+    for name, face, side in (("inlet", box[0, 0], -1), ("outlet", box[0, 1], 1)):
+        if not np.any(wall == side):
             raise NetworkError(
                 f"tessellation: no pore lies on the {name} face x = {face:g} m, a whole layer of grains "
                 "is centred on it; shift the box by part of a radius or make x periodic"
             )
 
 
-def _reaching(grains: Snapshot, periodic: tuple[bool, ...]) -> Array:
-    """Indices of the grains whose sphere reaches into the box."""
-    beyond = np.maximum(grains.box[:, 0] - grains.position, grains.position - grains.box[:, 1])
-    return np.flatnonzero(np.all((beyond < grains.radius[:, None]) | np.array(periodic), axis=1))
-
-
-def _pore_centres(grains: Snapshot, tetrahedra: Tetrahedra, periodic: tuple[bool, ...]) -> _Centres:
-    """Pore positions brought into the box, and the periods `wrap` (P, 3) taken off to bring them there."""
-    low, high = grains.box.T
-    centre, radius = geometry.touching_sphere(tetrahedra.shaken, grains.radius[tetrahedra.grain])
-    centroid = tetrahedra.corner.mean(axis=1)
-    cut = cut_axes(tetrahedra.mirror)
-    inside = geometry.contains(tetrahedra.shaken, centre, hair=1e-5)
-    with np.errstate(invalid="ignore"):
-        in_box = np.all(((centre >= low) & (centre <= high)) | cut | np.array(periodic), axis=1)
-    centred = np.where(cut.any(axis=1), in_box, inside)
-    position = np.where(centred[:, None], centre, centroid)
-    face = np.where(np.any(tetrahedra.mirror == MIRROR_LOW, axis=1), low, high)
-    position = np.where(cut, face, position)
-    size = high - low
-    wrap = np.where(periodic, np.floor((position - low) / size + 1e-9), 0).astype(int)
-    position = position - wrap * size
-    return _Centres(
-        position=position, wrap=wrap, radius=np.nan_to_num(radius, nan=0.0), centroids=int(np.sum(~centred))
-    )
-
-
 def _pores(
-    grains: Snapshot, tetrahedra: Tetrahedra, centres: _Centres, periodic: tuple[bool, ...]
+    tetrahedra: Tetrahedra, polyhedra: Polyhedra, centres: Centres, box: Array
 ) -> tuple[dict[str, Array], dict[str, int]]:
-    offset = centres.wrap * (grains.box[:, 1] - grains.box[:, 0])
-    corner = tetrahedra.corner - offset[:, None]
-    radius = grains.radius[tetrahedra.grain]
-    volume = np.abs(geometry.signed_volume(corner))
-    solid, surface = solid_in_tetrahedra(corner, radius)
-    cut = cut_axes(tetrahedra.mirror)[:, 0]
+    volume, void, surface = pore_solids(tetrahedra)
+    cut = polyhedra.wall != 0
     found = {
-        "pore_grains": tetrahedra.grain,
-        "pore_corner": corner,
-        "pore_corner_radius": radius,
+        "pore_images": tetrahedra.vertex,
+        "pore_wrap": centres.wrap,
         "pore_position": centres.position,
-        "pore_radius": np.maximum(centres.radius, 0.0),
-        "pore_circumcentre": tetrahedra.centre - offset,
+        "pore_radius": np.nan_to_num(np.maximum(centres.radius, 0.0), nan=0.0),
+        "pore_power_centre": polyhedra.centre - centres.wrap * np.ptp(box, axis=1),
         "pore_tetra_volume": volume,
-        "pore_volume": volume - solid,
+        "pore_volume": void,
         "pore_wall_surface": surface,
-        "pore_group": _groups(tetrahedra.centre, grains, periodic),
-        "pore_share": np.where(cut, 0.5, 1.0),
+        "pore_group": polyhedra.group,
+        "pore_share": 0.5 ** cut.sum(axis=1),
     }
-    speck = 1e-9 * float(grains.radius.mean()) ** 3
+    speck = 1e-9 * float(tetrahedra.image_radius.mean()) ** 3
     counts = {
-        "pores_closed": int(np.sum(centres.radius <= 0)),
-        "pores_at_end_faces": int(np.sum(cut)),
-        "void_negative": int(np.sum(found["pore_volume"] < -speck)),
+        "pores_closed": int(np.sum(found["pore_radius"] == 0)),
+        "slivers": int(np.sum(tetrahedra.flat)),
+        "cospherical_groups": int(np.sum(np.bincount(polyhedra.group) > 1)),
+        "pores_at_end_faces": int(np.sum(cut[:, 0])),
+        "pores_at_side_walls": int(np.sum(cut[:, 1:].any(axis=1))),
+        "void_negative": int(np.sum(void < -speck)),
     }
     return found, counts
-
-
-def _groups(centre: Array, grains: Snapshot, periodic: tuple[bool, ...]) -> Array:
-    # the centres of the parts of one polyhedron differ by the shake, some 1e-7 radii
-    tree = neighbour_tree(centre, grains.box, periodic=periodic)
-    near = tree.query_pairs(SAME_CENTRE * float(grains.radius.mean()), output_type="ndarray")
-    graph = coo_matrix((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(len(centre), len(centre)))
-    return connected_components(graph, directed=False)[1]
-
-
-def solid_in_tetrahedra(corner: Array, radius: Array) -> tuple[Array, Array]:
-    """Volume (P,) m3 and surface (P,) m2 of the spheres on the corners (P, 4, 3) within each tetrahedron.
-
-    Sphere wedges by solid angle, less the overlap of each pair by dihedral angle: exact over a whole tessellation, and
-    in one tetrahedron as long as no sphere reaches through the opposite face and no three overlap.
-    """
-    angle = np.abs(geometry.solid_angles(corner))
-    first, second = radius[:, geometry.EDGES[:, 0]], radius[:, geometry.EDGES[:, 1]]
-    apart = np.linalg.norm(corner[:, geometry.EDGES[:, 1]] - corner[:, geometry.EDGES[:, 0]], axis=-1)
-    caps = geometry.cap_heights(first, second, apart)
-    turn = geometry.dihedral_angles(corner) / (2.0 * np.pi)
-    lens = geometry.cap_volume(first, caps[0]) + geometry.cap_volume(second, caps[1])
-    hidden = 2.0 * np.pi * (first * caps[0] + second * caps[1])
-    volume = np.sum(angle * radius**3, axis=1) / 3.0 - np.sum(turn * lens, axis=1)
-    return volume, np.sum(angle * radius**2, axis=1) - np.sum(turn * hidden, axis=1)
 
 
 def _throats(
-    grains: Snapshot, tetrahedra: Tetrahedra, facets: Facets, centres: _Centres
+    tetrahedra: Tetrahedra, shared: tuple[Facets, Polyhedra], centres: Centres, box: Array, scale: float
 ) -> tuple[dict[str, Array], dict[str, int]]:
-    size = grains.box[:, 1] - grains.box[:, 0]
+    polyhedra = shared[1]
+    facets, kept = without_end_faces(*shared)
     one, two = facets.pore.T
-    corners = geometry.FACETS[facets.opposite[:, 0]]
-    grain = np.take_along_axis(tetrahedra.grain[one], corners, axis=1)
-    corner = np.take_along_axis(tetrahedra.corner[one], corners[..., None], axis=1)
-    radius = grains.radius[grain]
-    shift = centres.wrap[two] + facets.shift - centres.wrap[one]
-    ends = np.stack([centres.position[one], centres.position[two] + shift * size], axis=1)
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    floor = LENGTH_FLOOR * float(grains.radius.mean())
-    inscribed = np.nan_to_num(geometry.touching_circle(corner, radius), nan=0.0)
-    area = np.where(inscribed > 0, geometry.open_area(corner, radius), 0.0)
+    shift = (centres.wrap[two] + facets.shift - centres.wrap[one]).astype(np.int16)
+    length = throat_lengths(centres.position, facets.pore, shift * np.ptp(box, axis=1))
+    radius, area, counts = throat_sections(tetrahedra, facets)
     found = {
         "throat_pores": facets.pore,
         "throat_shift": shift,
-        "throat_ends": ends,
-        "throat_grains": grain,
-        "throat_corner": corner - (centres.wrap[one] * size)[:, None],
-        "throat_corner_radius": radius,
-        "throat_heights": _heights(tetrahedra, facets, size),
-        "throat_radius": np.maximum(inscribed, 0.0),
-        "throat_area": np.maximum(area, 0.0),
-        "throat_radius_effective": np.sqrt(np.maximum(area, 0.0) / np.pi),
-        "throat_length": np.maximum(length, floor),
+        "throat_images": facet_vertices(tetrahedra, facets, slice(None)),
+        "throat_share": throat_shares(facets, polyhedra),
+        "throat_heights": polyhedra.heights[kept],
+        "throat_radius": radius,
+        "throat_area": area,
+        "throat_radius_effective": np.sqrt(area / np.pi),
+        "throat_length": np.maximum(length, LENGTH_FLOOR * scale),
     }
     counts = {
-        "throats_closed": int(np.sum(inscribed <= 0)),
-        "throats_short": int(np.sum(length < floor)),
-        "throat_area_negative": int(np.sum(area < 0)),
+        **counts,
+        "throats_pierced": int(np.sum(pierced_facets(tetrahedra, facets, radius > 0, np.ptp(box, axis=1)))),
+        "throats_short": int(np.sum(length < LENGTH_FLOOR * scale)),
+        "throats_in_polyhedra": int(np.sum(polyhedra.group[one] == polyhedra.group[two])),
+        "throats_in_end_faces_dropped": int(np.sum(~kept)),
     }
     return found, counts
-
-
-def _heights(tetrahedra: Tetrahedra, facets: Facets, size: Array) -> Array:
-    """Signed distances (T, 2) of the two circumcentres from the facet, positive on their own side of it."""
-    one, two = facets.pore.T
-    corners = geometry.FACETS[facets.opposite[:, 0]]
-    facet = np.take_along_axis(tetrahedra.shaken[one], corners[..., None], axis=1)
-    normal = np.cross(facet[:, 1] - facet[:, 0], facet[:, 2] - facet[:, 0])
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
-    apex = np.take_along_axis(tetrahedra.shaken[one], facets.opposite[:, 0, None, None], axis=1)[:, 0]
-    normal *= np.where(np.sum((apex - facet[:, 0]) * normal, axis=1) > 0, -1.0, 1.0)[:, None]
-    other = tetrahedra.centre[two] + facets.shift * size
-    return np.stack(
-        [
-            np.sum((facet[:, 0] - tetrahedra.centre[one]) * normal, axis=1),
-            np.sum((other - facet[:, 0]) * normal, axis=1),
-        ],
-        axis=1,
-    )

@@ -108,7 +108,8 @@ def write_throats(path: str | Path, analysis: "Analysis") -> Path:
     """One row per throat between two pores (`throat_conns_*`, rows of pores.csv; negative: beyond a face).
 
     `throat_shift_*` is how many periods the second pore is away. Conductances are times viscosity (m3), fluxes
-    times viscosity over the pressure drop (m3), positive from `throat_conns_0` to `throat_conns_1`.
+    times viscosity over the pressure drop (m3), positive from `throat_conns_0` to `throat_conns_1`. Conductances are of
+    the whole throat, fluxes of the part inside the specimen, `throat_share`.
     `initial` is without fines, on the final grain positions where grains moved.
     """
     network, occupancy = analysis.network, analysis.occupancy
@@ -122,6 +123,7 @@ def write_throats(path: str | Path, analysis: "Analysis") -> Path:
         "throat_radius_effective_m": network.throat_radius_effective,
         "throat_area_m2": network.throat_area,
         "throat_length_m": network.throat_length,
+        "throat_share": network.throat_share,
         "fines_count": np.zeros(count, int) if occupancy is None else occupancy.throat_fines,
         "fines_volume_m3": np.zeros(count) if occupancy is None else occupancy.throat_solid_volume,
         "fines_radius_mean_m": np.zeros(count) if occupancy is None else occupancy.throat_fine_radius,

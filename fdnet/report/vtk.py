@@ -159,6 +159,7 @@ def _throat_data(analysis: "Analysis") -> dict[str, Array]:
     return {
         "throat_radius": network.throat_radius,
         "throat_length": network.throat_length,
+        "throat_share": network.throat_share,
         "porosity": np.ones(count) if occupancy is None else occupancy.throat_porosity,
         "fines": np.zeros(count, int) if occupancy is None else occupancy.throat_fines,
         "blocked": blocked_throats(analysis).astype(np.uint8),

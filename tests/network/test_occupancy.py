@@ -130,9 +130,10 @@ def test_fine_in_one_pore_against_random_points():
     assert found == pytest.approx(expected, rel=4 / np.sqrt(inside.sum()))
 
 
-def test_fines_of_a_walled_pack_count_once_with_their_mirror_images():
+@pytest.mark.parametrize("periodic", [(False, True, True), (True, False, True), NONE])
+def test_fines_of_a_walled_pack_count_once_with_their_mirror_images(periodic):
     pack = with_fines(random_pack(60), 200, 0.2)
-    network = build_network(pack.grains(), periodic=(False, True, True))
+    network = build_network(pack.grains(), periodic=periodic)
     found = measure_occupancy(network, pack.fines())
     assert np.sum(network.pore_share * found.pore_solid_volume) == pytest.approx(200 * 4 / 3 * np.pi * 0.2**3, rel=1e-9)
 

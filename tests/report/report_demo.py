@@ -97,6 +97,7 @@ def demo_network(grains):
         throat_pores=pores,
         pore_tetra_volume=volume,
         pore_share=np.ones(len(position)),
+        throat_share=np.ones(len(pores)),
         throat_shift=np.zeros((len(pores), 3)),
         throat_grains=facets,
         throat_ends=ends,

@@ -59,7 +59,8 @@ def test_fluxes_in_paraview_follow_from_pressures_and_conductances(tmp_path, sid
     pressure = mesh.point_data[f"pressure_{state}"][mesh.lines.reshape(-1, 3)[:, 1:]]
     flux = mesh.cell_data[f"flux_{state}"]
     connected = np.isfinite(pressure).all(axis=1)
-    expected = mesh.cell_data[f"conductance_{state}"] * (pressure[:, 0] - pressure[:, 1])
+    conductance = mesh.cell_data[f"conductance_{state}"] * mesh.cell_data["throat_share"]
+    expected = conductance * (pressure[:, 0] - pressure[:, 1])
     assert connected.mean() > 0.9
     assert np.allclose(flux[connected], expected[connected], rtol=0, atol=1e-9 * np.abs(flux).max())
 

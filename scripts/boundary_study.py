@@ -1,0 +1,221 @@
+#!/usr/bin/env python3
+"""What walls and cut planes do to the permeability, and how fast that fades with size.
+
+    .venv/bin/python scripts/boundary_study.py tiled PACK.csv ... --csv docs/validation/boundary_tiled.csv
+    .venv/bin/python scripts/boundary_study.py slabs PACK.csv ... --csv docs/validation/boundary_slabs.csv
+    .venv/bin/python scripts/boundary_study.py walled --grains 200 1000 --csv docs/validation/boundary_walled.csv
+
+`tiled`: periodic packs tiled 1, 2, 3 times and cut as a box with walls in y, z or x, y, z, over the periodic pack; with
+the grains centred inside alone, and with those that reach in.
+`slabs`: slabs of 1, 2, ... grain diameters cut out of the periodic pack (mean and extremes over --places slabs).
+`walled`: packs made by LIGGGHTS between walls, over the k of their own inner part, --rim diameters or more from
+every side: mean flux per area there over the pressure gradient there. Law: series. Seeds are stated in the rows.
+"""
+
+import argparse
+import csv
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from truth_packs import read_pack
+
+from fdnet.case_file import case_from
+from fdnet.dem.liggghts import Launch, find_binary
+from fdnet.dem.packing import make_pack
+from fdnet.network.conductance import LAWS
+from fdnet.network.flow import Flow, solve_flow
+from fdnet.network.images import make_images
+from fdnet.network.porosity import measure_porosity
+from fdnet.network.slabs import plane_pressures
+from fdnet.network.tessellation import Network, build_network
+from fdnet.scales import carman_kozeny, scales_of
+from fdnet.snapshot import Array, Snapshot
+
+LAW = "series"
+SIDES = {"periodic": (True, True, True), "walls y z": (True, False, False), "walls x y z": (False, False, False)}
+
+
+def solved(pack: Snapshot, periodic: tuple[bool, bool, bool]) -> tuple[Network, Flow, float]:
+    """Network, flow and k (m2) of a pack."""
+    network = build_network(pack, periodic=periodic)
+    flow = solve_flow(network, LAWS[LAW](network))
+    return network, flow, flow.inflow * float(np.ptp(pack.box[0])) / network.area
+
+
+def tiled(pack: Snapshot, times: int) -> Snapshot:
+    """`times` copies of a periodic pack each way."""
+    steps = np.stack(np.meshgrid(*[np.arange(times)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    copies = times**3
+    return Snapshot(
+        step=0,
+        time_s=0.0,
+        box=pack.box[:, :1] + np.ptp(pack.box, axis=1)[:, None] * [0, times],
+        id=np.arange(1, copies * len(pack) + 1),
+        kind=np.tile(pack.kind, copies),
+        position=(pack.position + steps * np.ptp(pack.box, axis=1)).reshape(-1, 3),
+        radius=np.tile(pack.radius, copies),
+        velocity=np.zeros((copies * len(pack), 3)),
+    )
+
+
+def with_neighbours(pack: Snapshot, periodic: tuple[bool, bool, bool]) -> Snapshot:
+    """A periodic pack and those of its images that reach into the box across sides that become walls."""
+    margin = np.where(periodic, np.nan, float(pack.radius.max()))
+    images = make_images(pack.position, pack.box, periodic=(True,) * 3, margin=margin, hair=0.0)
+    count = len(images.owner)
+    return Snapshot(
+        step=0,
+        time_s=0.0,
+        box=pack.box,
+        id=np.arange(1, count + 1),
+        kind=pack.kind[images.owner],
+        position=images.position,
+        radius=pack.radius[images.owner],
+        velocity=np.zeros((count, 3)),
+    )
+
+
+def tiled_rows(packs: list[Path], tiles: int) -> Iterator[dict[str, Any]]:
+    """k of walled boxes over the periodic k."""
+    for path in packs:
+        pack = read_pack(path)[0].grains()
+        reference = solved(pack, SIDES["periodic"])[2]
+        for times in range(1, tiles + 1):
+            for sides, periodic in list(SIDES.items())[1:]:
+                big = tiled(pack, times)
+                diameters = float(np.ptp(big.box[0]) / (2 * big.radius.mean()))
+                for grains, cut in (("centred inside", big), ("reaching in", with_neighbours(big, periodic))):
+                    k = solved(cut, periodic)[2]
+                    yield {
+                        "pack": path.stem,
+                        "tiles": times,
+                        "grains": len(big),
+                        "width_diameters": diameters,
+                        "sides": sides,
+                        "cut": grains,
+                        "k_m2": k,
+                        "k_over_periodic": k / reference,
+                    }
+
+
+def slab_rows(packs: list[Path], places: int) -> Iterator[dict[str, Any]]:
+    """k of cut-out slabs over the periodic k, at `places` depths of each thickness."""
+    for path in packs:
+        pack = tiled(read_pack(path)[0].grains(), 2)
+        network, _, reference = solved(pack, SIDES["periodic"])
+        conductance, length = LAWS[LAW](network), float(np.ptp(pack.box[0]))
+        diameter = 2 * float(pack.radius.mean())
+        for thick in range(1, int(length / 2 / diameter) + 1):
+            starts = (np.arange(places) + 0.5) / places * (0.5 * length)
+            found = [
+                solve_flow(network, conductance, span=(start, start + thick * diameter)).inflow
+                * thick
+                * diameter
+                / network.area
+                / reference
+                for start in starts
+            ]
+            yield {
+                "pack": path.stem,
+                "thickness_diameters": thick,
+                "slabs": places,
+                "mean_k_over_periodic": float(np.mean(found)),
+                "least": min(found),
+                "most": max(found),
+                "series_mean": float(1 / np.mean(1 / np.array(found))),
+            }
+
+
+def walled_rows(counts: list[int], rim: float, *, porosity: float, seed: int) -> Iterator[dict[str, Any]]:
+    """k of LIGGGHTS packs between walls over that of their inner part."""
+    binary = find_binary()
+    for count in counts:
+        edge = (count * 4 / 3 * np.pi * 0.25**3 / (1 - porosity)) ** (1 / 3)
+        case = case_from(
+            {
+                "name": f"walled_{count}",
+                "seed": seed,
+                "box": {"size_mm": [edge] * 3, "sides": "walls"},
+                "grains": {"radius_mm": 0.25, "porosity": porosity},
+                "fines": {"radius_mm": 0.05, "count": 1},
+                "fluid": {},
+            }
+        )
+        with tempfile.TemporaryDirectory() as folder:
+            pack = make_pack(case, scales_of(case), Path(folder) / "pack", Launch(binary=binary)).grains
+        network, flow, k = solved(pack, SIDES["walls x y z"])
+        core = pack.box + rim * 0.5e-3 * np.array([1, -1])
+        inner = inner_permeability(network, flow, core)
+        whole, inside = (
+            measure_porosity(pack if box is None else boxed(pack, box), periodic=(False,) * 3).mean
+            for box in (None, core)
+        )
+        yield {
+            "grains": len(pack),
+            "seed": seed,
+            "width_diameters": edge / 0.5,
+            "porosity": whole,
+            "porosity_inner": inside,
+            "k_m2": k,
+            "k_inner_m2": inner,
+            "k_over_inner": k / inner,
+            "inner_over_carman_kozeny": inner / carman_kozeny(inside, 0.5e-3),
+        }
+
+
+def boxed(pack: Snapshot, box: Array) -> Snapshot:
+    """The same spheres seen through another box."""
+    return Snapshot(**{name: getattr(pack, name) for name in Snapshot.__dataclass_fields__} | {"box": box})
+
+
+def inner_permeability(network: Network, flow: Flow, core: Array) -> float:
+    """k (m2) of the part within `core` (3, 2) m: volume mean of the flux along x over the mean pressure gradient."""
+    ends = network.throat_ends
+    along = np.diff(ends[:, :, 0], axis=1)[:, 0]
+    share = np.ones(len(along))
+    for axis in range(3):
+        start, end = np.sort(ends[:, :, axis], axis=1).T
+        span = np.maximum(end - start, 1e-12 * network.grain_radius)
+        share = share * np.clip((np.minimum(end, core[axis, 1]) - np.maximum(start, core[axis, 0])) / span, 0.0, 1.0)
+    velocity = float(np.sum(flow.throat_flux * along * share) / np.prod(np.ptp(core, axis=1)))
+    high, low = plane_pressures(network, flow, core[0])
+    return velocity * float(np.ptp(core[0])) / float(high - low)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("study", choices=["tiled", "slabs", "walled"])
+    parser.add_argument("packs", nargs="*", type=Path)
+    parser.add_argument("--tiles", type=int, default=3)
+    parser.add_argument("--places", type=int, default=20)
+    parser.add_argument("--grains", nargs="+", type=int, default=[200, 1000, 3000, 10000])
+    parser.add_argument("--rim", type=float, default=1.5, help="grain diameters left out at every side")
+    parser.add_argument("--porosity", type=float, default=0.40, help="of the whole walled pack")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--csv", type=Path, required=True)
+    given = parser.parse_args()
+    rows = {
+        "tiled": lambda: tiled_rows(given.packs, given.tiles),
+        "slabs": lambda: slab_rows(given.packs, given.places),
+        "walled": lambda: walled_rows(given.grains, given.rim, porosity=given.porosity, seed=given.seed),
+    }[given.study]()
+    writer = None
+    with given.csv.open("w", newline="") as out:
+        for row in rows:
+            writer = writer or csv.DictWriter(out, list(row), lineterminator="\n")
+            if out.tell() == 0:
+                writer.writeheader()
+            writer.writerow(
+                {name: f"{value:.6g}" if isinstance(value, float) else value for name, value in row.items()}
+            )
+            out.flush()
+            print(row, flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,73 @@
+"""What is out of the ordinary is counted by stated rules."""
+
+import numpy as np
+import pytest
+
+from fdnet.network.pierced import STEPS
+from fdnet.network.porosity import measure_porosity
+from fdnet.network.tessellation import build_network
+from fdnet.report.spheres import read_spheres
+from tests.network.packs import body_centred, face_centred, random_pack, simple_cubic, snapshot
+
+ALL = (True,) * 3
+
+
+def truth_pack(root, name):
+    path = root / "tests" / "data" / "truth" / f"{name}.csv"
+    edge = float(path.read_text().split("edge ")[1].split()[0])
+    position, radius, _ = read_spheres(path, units="mm")
+    return snapshot(position * 1e3, radius * 1e3, [[0, edge]] * 3)
+
+
+def pierced_by_all(network, pack):
+    """Open facets with a grid point inside any grain but their own three, image by image."""
+    steps = np.stack(np.meshgrid(*[[-2, -1, 0, 1, 2]] * 3, indexing="ij"), axis=-1).reshape(-1, 3) * pack.box[:, 1]
+    images, radius = (pack.position[:, None] + steps).reshape(-1, 3), np.repeat(pack.radius, 125)
+    found = 0
+    for corner, own, gap in zip(
+        network.throat_corner, network.throat_corner_radius, network.throat_radius, strict=True
+    ):
+        point = STEPS @ corner
+        near = np.linalg.norm(images - corner.mean(axis=0), axis=1) < 6.0
+        near &= np.min(np.linalg.norm(images[:, None] - corner, axis=2), axis=1) > 1e-9
+        free = np.all(np.linalg.norm(point[:, None] - corner, axis=2) > own, axis=1)
+        covered = np.any(np.linalg.norm(point[:, None] - images[near], axis=2) < radius[near], axis=1)
+        found += bool(gap > 0 and np.any(free & covered))
+    return found
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.9])
+def test_pierced_facets_are_those_a_search_of_all_grains_finds(spread):
+    pack = random_pack(60, 0.3, spread=spread)  # a dense one has none
+    network = build_network(pack, periodic=ALL)
+    assert network.counts["throats_pierced"] == pierced_by_all(network, pack) > 0
+
+
+@pytest.mark.parametrize(
+    ("pack", "groups"), [(simple_cubic(), 27), (face_centred(), 27 * 4), (body_centred(), 0)], ids=["SC", "FCC", "BCC"]
+)
+def test_cospherical_groups_are_the_cells_of_the_lattice(pack, groups):
+    """One cube per grain of SC, one octahedron per grain of FCC; BCC has none."""
+    assert build_network(pack, periodic=ALL).counts["cospherical_groups"] == groups
+
+
+def test_random_packs_have_no_slivers_unless_walls_cut_them():
+    pack = random_pack(100)
+    assert build_network(pack, periodic=ALL).counts["slivers"] == 0
+    assert build_network(pack, periodic=(True, False, True)).counts["slivers"] > 0
+
+
+@pytest.mark.parametrize("name", ["packE_80_eps30", "packG_100_radii12_eps38"])
+def test_void_of_truth_packs_is_their_porosity(root, name):
+    pack = truth_pack(root, name)
+    network = build_network(pack, periodic=ALL)
+    porosity = measure_porosity(pack, periodic=ALL, lines=20_000)
+    void = network.pore_volume.sum() / np.prod(pack.box[:, 1])
+    assert void == pytest.approx(porosity.mean, abs=5 * porosity.standard_error + 1e-5)
+
+
+def test_overlapping_grains_are_counted_by_throat(root):
+    counts = build_network(truth_pack(root, "packE_80_eps30"), periodic=ALL).counts
+    assert counts["throats_overlapping"] > 100
+    touching = build_network(simple_cubic(), periodic=ALL).counts
+    assert touching["throats_overlapping"] == 0

@@ -1,0 +1,132 @@
+"""Faces that are not periodic are mirror planes: the specimen is part of the periodic pack its images make up."""
+
+import numpy as np
+import pytest
+
+from fdnet.network.conductance import LAWS
+from fdnet.network.flow import solve_flow
+from fdnet.network.porosity import measure_porosity
+from fdnet.network.slabs import inplace_permeability
+from fdnet.network.tessellation import build_network
+from fdnet.network.walls import onto_walls
+from tests.network.packs import random_pack, simple_cubic, snapshot
+
+ALL, NONE = (True,) * 3, (False,) * 3
+
+
+def doubled(pack, axes):
+    """The periodic pack made of `pack` and its mirror images across the high faces of `axes`."""
+    for axis in axes:
+        low, high = pack.box[axis]
+        image = pack.position.copy()
+        image[:, axis] = 2 * high - image[:, axis]
+        other = (pack.position[:, axis] > low) & (pack.position[:, axis] < high)
+        box = pack.box.copy()
+        box[axis, 1] = 2 * high - low
+        pack = snapshot(
+            np.vstack([pack.position, image[other]]), np.concatenate([pack.radius, pack.radius[other]]), box
+        )
+    return pack
+
+
+def permeabilities(pack, periodic):
+    network = build_network(pack, periodic=periodic)
+    length = np.ptp(pack.box[0])
+    return np.array([solve_flow(network, law(network)).inflow * length / network.area for law in LAWS.values()])
+
+
+PACKS = {
+    "beside walls": lambda: random_pack(100, 0.5, periodic=False),
+    "cut by walls": lambda: random_pack(100),
+    "radii 1:2": lambda: random_pack(100, spread=0.33),
+    "simple cubic": simple_cubic,
+}
+
+
+@pytest.mark.parametrize("pack", PACKS)
+@pytest.mark.parametrize("axes", [(1,), (1, 2), (0, 1, 2)])
+def test_walled_pack_conducts_as_the_periodic_pack_of_its_mirror_images(pack, axes):
+    pack = PACKS[pack]()
+    walled = permeabilities(pack, tuple(axis not in axes for axis in range(3)))
+    assert walled == pytest.approx(permeabilities(doubled(pack, axes), ALL), rel=1e-6)
+
+
+def test_sections_of_a_walled_pack_are_those_of_its_doubled_pack():
+    pack = random_pack(100, 0.5, periodic=False)
+    found = []
+    for one, periodic in ((pack, NONE), (doubled(pack, (1, 2)), (False, True, True))):
+        network = build_network(one, periodic=periodic)
+        flow = solve_flow(network, LAWS["series"](network))
+        found.append(inplace_permeability(network, flow, np.linspace(0, pack.box[0, 1], 5)))
+    assert found[0] == pytest.approx(found[1], rel=1e-6)
+
+
+@pytest.mark.parametrize("pack", PACKS)
+def test_void_of_a_walled_box_is_its_porosity(pack):
+    """One pair of walls: a grain cut by two of them overlaps three images in one place."""
+    pack, periodic = PACKS[pack](), (True, False, True)
+    network = build_network(pack, periodic=periodic)
+    porosity = measure_porosity(pack, periodic=periodic, lines=20_000)
+    void = np.sum(network.pore_share * network.pore_volume) / np.prod(np.ptp(pack.box, axis=1))
+    assert void == pytest.approx(porosity.mean, abs=5 * porosity.standard_error + 1e-5)
+
+
+def test_throats_in_a_wall_count_by_their_half():
+    network = build_network(simple_cubic(4), periodic=(True, False, True))
+    both = network.pore_share[network.throat_pores] < 1
+    assert set(network.throat_share[both.all(axis=1)]) == {0.5}
+    assert np.all(network.throat_share[~both.all(axis=1)] == 1)
+
+
+def test_grain_centred_beyond_a_wall_becomes_a_half_sphere_of_its_cap():
+    pack = random_pack(60, 0.5, periodic=False)
+    position = pack.position.copy()
+    position[np.argmin(position[:, 1]), 1] = -0.4
+    cut = snapshot(position, 1.0, pack.box)
+    moved, count = onto_walls(cut, NONE)
+    changed = moved.radius != 1.0
+    assert count == changed.sum() == 1
+    assert moved.position[changed, 1] == 0
+    assert 2 / 3 * np.pi * moved.radius[changed] ** 3 == pytest.approx(np.pi * 0.6**2 * (3 - 0.6) / 3)
+    network = build_network(cut, periodic=NONE)
+    assert network.counts["grains_centred_beyond_walls"] == 1
+    assert network.grain_radius == 1.0
+    porosity = measure_porosity(cut, periodic=NONE, lines=20_000)
+    box = np.prod(np.ptp(pack.box, axis=1))
+    void = np.sum(network.pore_share * network.pore_volume) / box
+    assert np.sum(network.pore_share * network.pore_tetra_volume) == pytest.approx(box, rel=1e-12)
+    assert void == pytest.approx(porosity.mean, abs=5 * porosity.standard_error + 1e-5)
+
+
+CELLS = {
+    "simple cubic": ([[0, 0, 0]], 2.0),
+    "body-centred": ([[0, 0, 0], [0.5, 0.5, 0.5]], 4 / np.sqrt(3)),
+    "face-centred": ([[0, 0, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [0.5, 0.5, 0]], np.sqrt(8)),
+}
+
+
+@pytest.mark.parametrize("cell", CELLS)
+@pytest.mark.parametrize("periodic", [(True, False, True), (True, False, False)])
+def test_lattice_between_its_own_mirror_planes_conducts_as_the_periodic_one(cell, periodic):
+    """Grains centred on the walls are their own images."""
+    places, edge = CELLS[cell]
+    steps = np.stack(np.meshgrid(*[np.arange(4)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    position = (steps + np.array(places)).reshape(-1, 3) * edge
+    found = []
+    for sides in (ALL, periodic):
+        last = 3 * edge + np.where(sides, -1e-9, 1e-9)
+        pack = snapshot(position[np.all(position <= last, axis=1)], 1.0, [[0, 3 * edge]] * 3)
+        found.append(permeabilities(pack, sides))
+    assert found[1] == pytest.approx(found[0], rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_few_grains_in_a_wide_box_still_tile_it(seed):
+    """Voids as wide as the box: the first images are not enough."""
+    rng = np.random.default_rng(seed)
+    for periodic in (ALL, (False, True, True), (True, False, True)):
+        pack = random_pack(int(rng.integers(8, 30)), 0.2, seed=seed, spread=0.3)
+        network = build_network(pack, periodic=periodic)
+        box = np.prod(np.ptp(pack.box, axis=1))
+        assert network.counts["throats_unmatched"] == 0
+        assert np.sum(network.pore_share * network.pore_tetra_volume) == pytest.approx(box, rel=1e-12)
