@@ -1,10 +1,15 @@
 """Fines in throats and pores: volumes against Monte Carlo, closed forms and sums."""
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from fdnet.errors import CaseError
 from fdnet.network.cylinder import Pairs, covers_section, exact_volume, two_plane_volume
+from fdnet.network.geometry import disc_lens_area
 from fdnet.network.occupancy import measure_occupancy
 from fdnet.network.tessellation import build_network
 from fdnet.snapshot import Kind
@@ -44,7 +49,25 @@ def test_sphere_in_cylinder_against_random_points(row):
 def test_centred_sphere_wider_than_the_tube_is_the_napkin_ring():
     """Tube through the centre: 4/3 pi (a^3 - (a^2 - r^2)^1.5)."""
     found = exact_volume(pairs_of([2.0, 0.0, 5.0, 1.0, 10.0]))[0]
-    assert found == pytest.approx(4 / 3 * np.pi * (8 - 3**1.5), rel=1e-4)
+    assert found == pytest.approx(4 / 3 * np.pi * (8 - 3**1.5), rel=1e-14)
+
+
+def test_volume_within_a_millionth_of_adaptive_quadrature():
+    rng = np.random.default_rng(6)
+    for _ in range(150):
+        sphere, length = 10 ** rng.uniform(-1.3, 0.5), rng.uniform(0.1, 4)
+        offset = rng.choice([0.0, 1.0, rng.uniform(0, 1 + sphere), rng.uniform(0, 1 + sphere)])
+        depth = rng.uniform(-0.9, 0.9) * sphere + rng.uniform(0, length)
+        low, high = max(-sphere, -depth), min(sphere, length - depth)
+        kinks = [sign * np.sqrt(max(sphere**2 - (1 + side * offset) ** 2, 0)) for sign in (-1, 1) for side in (-1, 1)]
+        edges = sorted([low, high, *(z for z in kinks if low < z < high)])
+
+        def section(z, sphere=sphere, offset=offset):
+            return float(disc_lens_area(np.sqrt(max(sphere**2 - z**2, 0.0)), 1.0, offset))
+
+        expected = sum(quad(section, *piece, epsabs=1e-12)[0] for piece in pairwise(edges))
+        found = exact_volume(pairs_of([sphere, offset, depth, 1.0, length]))[0]
+        assert found == pytest.approx(expected, abs=1e-6 * 4 / 3 * np.pi * sphere**3)
 
 
 @pytest.mark.parametrize(
@@ -135,6 +158,50 @@ def test_fines_of_a_walled_pack_count_once_with_their_mirror_images():
     network = build_network(pack.grains(), periodic=(False, True, True))
     found = measure_occupancy(network, pack.fines())
     assert np.sum(network.pore_share * found.pore_solid_volume) == pytest.approx(200 * 4 / 3 * np.pi * 0.2**3, rel=1e-9)
+
+
+def near_the_walls(network, box):
+    """The pores and throats of a doubled periodic pack in and about one of its mirror images `box`."""
+    low, high = box[:, 0] - 1.5, box[:, 1] + 1.5
+    pores = np.all((network.pore_corner >= low) & (network.pore_corner <= high), axis=(1, 2))
+    throats = np.all((network.throat_ends >= low) & (network.throat_ends <= high), axis=(1, 2))
+    fields = {name: getattr(network, name) for name in network.__slots__ if name.startswith(("pore_", "throat_"))}
+    thinned = {name: value[pores if name.startswith("pore_") else throats] for name, value in fields.items()}
+    return replace(network, **thinned, box=box), pores, throats
+
+
+@pytest.mark.parametrize("walls", [[0], [1], [1, 2], [0, 1, 2]])
+def test_walls_mirror_the_fines_as_a_doubled_periodic_pack_has_them(walls):
+    pack = with_fines(random_pack(60), 300, 0.2)
+    periodic = tuple(axis not in walls for axis in range(3))
+    doubled, box = pack, np.array(pack.box)
+    for axis in walls:
+        mirrored = np.array(doubled.position)
+        mirrored[:, axis] = 2 * box[axis, 1] - mirrored[:, axis]
+        doubled = replace(doubled.joined(replace(doubled, position=mirrored)), box=doubled.box)
+        larger = np.array(doubled.box)
+        larger[axis, 1] = 2 * box[axis, 1]
+        doubled = replace(doubled, box=larger)
+    whole = build_network(doubled.grains(), periodic=ALL)
+    expected = measure_occupancy(whole, doubled.fines())
+    network, pores, throats = near_the_walls(whole, box)
+    found = measure_occupancy(replace(network, periodic=periodic), pack.fines())
+    across = np.any((network.pore_corner < box[:, 0]) | (network.pore_corner > box[:, 1]), axis=(1, 2))
+    assert np.sum(found.pore_solid_volume[across] > 0) > 20
+    assert found.pore_solid_volume == pytest.approx(expected.pore_solid_volume[pores], abs=1e-13)
+    assert found.pore_solid_surface == pytest.approx(expected.pore_solid_surface[pores], abs=1e-12)
+    assert found.throat_solid_volume == pytest.approx(expected.throat_solid_volume[throats], abs=1e-13)
+    assert np.array_equal(found.blocked, expected.blocked[throats])
+
+
+def test_fines_outside_the_walls_are_counted_and_not_mirrored():
+    network = chain(3)
+    fines = snapshot([[1.5, -0.01, 0.5], [1.5, 0.5, 0.5], [-0.05, 0.5, 0.5]], 0.05, network.box, Kind.FINE)
+    assert measure_occupancy(network, fines).counts["fines_outside_box"] == 2
+    in_wall = replace(network, throat_ends=network.throat_ends - np.array([0, 0, 0.5]))
+    for z, times in ((-0.01, 1), (0.01, 2)):
+        fine = snapshot([[1.5, 0.5, z]], 0.05, network.box, Kind.FINE)
+        assert measure_occupancy(in_wall, fine).throat_fines.tolist() == [0, times, 0]
 
 
 def test_throat_volumes_are_those_of_every_pair_taken_alone():
