@@ -9,7 +9,7 @@ cone holds of the sphere the directions that leave the ball before the facet:
         = c phi(t) - arctan(t d / (h sqrt(t^2 + h^2 + d^2))),   phi = arctan(t / h),   tan phi = t / h,
 
 taken between the ends of each part of the edge outside the disc of radius sqrt(1 - d^2); c = d where the facet's plane
-cuts the ball, sign(d) else. With cos theta = d / sqrt(d^2 + h^2 / cos^2 phi) the second term is its integral. Volume:
+cuts the ball, 1 where the ball lies inside of it (outside of it, the piece is empty). With cos theta = d / sqrt(d^2 + h^2 / cos^2 phi) the second term is its integral. Volume:
 a third of that surface, and d/3 times the area of triangle and disc (divergence theorem; the same decomposition by
 facets and edges: Strobl, Formella and Poeschel 2016, J. Comput. Phys. 311, 158).
 """
@@ -122,7 +122,7 @@ def _edge(depth: float, height: float, start: float, end: float) -> tuple[float,
     """
     disc = 1.0 - depth**2
     if disc <= 0.0:
-        return 0.0, _shadow(copysign(1.0, depth), depth, height, start, end)[0]
+        return 0.0, _shadow(1.0, depth, height, start, end)[0]
     chord = disc - height**2
     if chord <= 0.0:
         shadow, turn = _shadow(depth, depth, height, start, end)

@@ -160,6 +160,13 @@ def test_fines_of_a_walled_pack_count_once_with_their_mirror_images():
     assert np.sum(network.pore_share * found.pore_solid_volume) == pytest.approx(200 * 4 / 3 * np.pi * 0.2**3, rel=1e-9)
 
 
+def test_a_throat_between_pores_at_one_place_is_a_disc_across_x():
+    network = replace(chain(1), throat_ends=np.full((1, 2, 3), 0.5), throat_length=np.array([1e-3]))
+    found = measure_occupancy(network, snapshot([[0.49, 0.52, 0.5]], 0.05, network.box, Kind.FINE))
+    assert found.throat_solid_volume == pytest.approx([np.pi * (0.05**2 - 0.01**2) * 1e-3], rel=0.02)
+    assert found.pair_distance == pytest.approx([0.2])
+
+
 def near_the_walls(network, box):
     """The pores and throats of a doubled periodic pack in and about one of its mirror images `box`."""
     low, high = box[:, 0] - 1.5, box[:, 1] + 1.5
