@@ -6,9 +6,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.spatial import cKDTree
 
 from fdnet.errors import CaseError
 from fdnet.network.cylinder import Pairs, covers_section, exact_volume, two_plane_volume
+from fdnet.network.deposit import mirrored_images
 from fdnet.network.geometry import disc_lens_area
 from fdnet.network.occupancy import measure_occupancy
 from fdnet.network.tessellation import build_network
@@ -167,38 +169,24 @@ def test_a_throat_between_pores_at_one_place_is_a_disc_across_x():
     assert found.pair_distance == pytest.approx([0.2])
 
 
-def near_the_walls(network, box):
-    """The pores and throats of a doubled periodic pack in and about one of its mirror images `box`."""
-    low, high = box[:, 0] - 1.5, box[:, 1] + 1.5
-    pores = np.all((network.pore_corner >= low) & (network.pore_corner <= high), axis=(1, 2))
-    throats = np.all((network.throat_ends >= low) & (network.throat_ends <= high), axis=(1, 2))
-    fields = {name: getattr(network, name) for name in network.__slots__ if name.startswith(("pore_", "throat_"))}
-    thinned = {name: value[pores if name.startswith("pore_") else throats] for name, value in fields.items()}
-    return replace(network, **thinned, box=box), pores, throats
-
-
 @pytest.mark.parametrize("walls", [[0], [1], [1, 2], [0, 1, 2]])
 def test_walls_mirror_the_fines_as_a_doubled_periodic_pack_has_them(walls):
-    pack = with_fines(random_pack(60), 300, 0.2)
-    periodic = tuple(axis not in walls for axis in range(3))
-    doubled, box = pack, np.array(pack.box)
+    rng = np.random.default_rng(9)
+    box = np.array([[0.0, 5.0], [1.0, 5.0], [-2.0, 4.0]])
+    position = box[:, 0] + rng.random((200, 3)) * (box[:, 1] - box[:, 0])
+    network = replace(chain(1), box=box, periodic=tuple(axis not in walls for axis in range(3)))
+    low, high = box[:, 0] - 1.5, box[:, 1] + 1.2
+    found, owner = mirrored_images(network, position, low, high, 0.3)
+    doubled, period = position, box[:, 1] - box[:, 0]
     for axis in walls:
-        mirrored = np.array(doubled.position)
-        mirrored[:, axis] = 2 * box[axis, 1] - mirrored[:, axis]
-        doubled = replace(doubled.joined(replace(doubled, position=mirrored)), box=doubled.box)
-        larger = np.array(doubled.box)
-        larger[axis, 1] = 2 * box[axis, 1]
-        doubled = replace(doubled, box=larger)
-    whole = build_network(doubled.grains(), periodic=ALL)
-    expected = measure_occupancy(whole, doubled.fines())
-    network, pores, throats = near_the_walls(whole, box)
-    found = measure_occupancy(replace(network, periodic=periodic), pack.fines())
-    across = np.any((network.pore_corner < box[:, 0]) | (network.pore_corner > box[:, 1]), axis=(1, 2))
-    assert np.sum(found.pore_solid_volume[across] > 0) > 20
-    assert found.pore_solid_volume == pytest.approx(expected.pore_solid_volume[pores], abs=1e-13)
-    assert found.pore_solid_surface == pytest.approx(expected.pore_solid_surface[pores], abs=1e-12)
-    assert found.throat_solid_volume == pytest.approx(expected.throat_solid_volume[throats], abs=1e-13)
-    assert np.array_equal(found.blocked, expected.blocked[throats])
+        flipped = np.where(np.arange(3) == axis, 2 * box[axis, 1] - doubled, doubled)
+        doubled, period = np.concatenate([doubled, flipped]), period * np.where(np.arange(3) == axis, 2.0, 1.0)
+    steps = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    expected = (doubled + steps * period).reshape(-1, 3)
+    counted = [places[np.all((places >= low - 0.3) & (places <= high + 0.3), axis=1)] for places in (found, expected)]
+    assert len(counted[0]) == len(counted[1]) > 300
+    assert cKDTree(counted[0]).query(counted[1])[0].max() < 1e-12
+    assert np.array_equal(np.unique(owner), np.arange(200))
 
 
 def test_fines_outside_the_walls_are_counted_and_not_mirrored():
