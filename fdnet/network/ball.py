@@ -9,9 +9,10 @@ cone holds of the sphere the directions that leave the ball before the facet:
         = c phi(t) - arctan(t d / (h sqrt(t^2 + h^2 + d^2))),   phi = arctan(t / h),   tan phi = t / h,
 
 taken between the ends of each part of the edge outside the disc of radius sqrt(1 - d^2); c = d where the facet's plane
-cuts the ball, 1 where the ball lies inside of it (outside of it, the piece is empty). With cos theta = d / sqrt(d^2 + h^2 / cos^2 phi) the second term is its integral. Volume:
-a third of that surface, and d/3 times the area of triangle and disc (divergence theorem; the same decomposition by
-facets and edges: Strobl, Formella and Poeschel 2016, J. Comput. Phys. 311, 158).
+cuts the ball, 1 where the ball lies inside of it (outside of it, the piece is empty). With
+cos theta = d / sqrt(d^2 + h^2 / cos^2 phi) the second term is its integral. Volume: a third of that surface, and d/3
+times the area of triangle and disc (divergence theorem; the same decomposition by facets and edges: Strobl, Formella
+and Poeschel 2016, J. Comput. Phys. 311, 158).
 """
 
 from math import atan2, copysign, pi, sqrt
