@@ -34,7 +34,7 @@ DOORS = {
     "pandas": {"dem/dump", "report/tables", "report/spheres"},
     "pyvista": {"report/vtk", "report/render"},
     "matplotlib": {"report/figures", "report/side_view"},
-    "overlap": {"network/deposit"},
+    "numba": {"network"},
     "pymetis": {"network/solver"},
     "pydantic": {"case", "case_file"},
     "tomli_w": {"case"},

@@ -6,14 +6,15 @@ the centre along the axis, `tube` (K,) radius, `length` (K,) of the cylinder, wh
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
+from math import atan2, pi, sqrt
 
 import numpy as np
+from numba import njit
 
 from fdnet.network import geometry
 from fdnet.snapshot import Array
 
-GAUSS_POINTS = 6
+GAUSS_POINTS = 10
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -40,38 +41,76 @@ class Pairs:
 def exact_volume(pairs: Pairs) -> Array:
     """Volume (K,) m3 common to sphere and cylinder: discs of the sphere cut by the tube, integrated along the axis.
 
-    Gauss-Legendre in the polar angle of the sphere, piece by piece between the changes of kind of the section.
+    In closed form where the disc lies within the tube or covers it; between these, where they cross, Gauss-Legendre in
+    the angle phi with place = middle + half sin(phi), which smooths the ends. Error below 1e-6 of the sphere.
     """
     volume = np.zeros(len(pairs.sphere))
-    low, high = np.maximum(pairs.depth - pairs.sphere, 0.0), np.minimum(pairs.depth + pairs.sphere, pairs.length)
-    touched = (high > low) & (pairs.offset < pairs.sphere + pairs.tube)
-    whole = touched & (pairs.offset + pairs.sphere <= pairs.tube)
-    whole &= (pairs.depth >= pairs.sphere) & (pairs.depth + pairs.sphere <= pairs.length)
-    volume[whole] = 4.0 / 3.0 * np.pi * pairs.sphere[whole] ** 3
-    cut = touched & ~whole
-    volume[cut] = _integrated(pairs.where(cut), low[cut], high[cut])
+    points, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+    angle = 0.5 * np.pi * points
+    rule = np.sin(angle), 0.5 * np.pi * weights * np.cos(angle)
+    _fill_volumes(pairs.sphere, pairs.offset, pairs.depth, pairs.tube, pairs.length, rule, volume)
     return volume
 
 
-def _integrated(pairs: Pairs, low: Array, high: Array) -> Array:
-    edges = _polar_edges(pairs, low, high)
-    points, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
-    total = np.zeros(len(low))
-    for start, end in pairwise(edges):
-        half = 0.5 * (end - start)
-        for point, weight in zip(points, weights, strict=True):
-            disc = pairs.sphere * np.cos(start + half * (1.0 + point))
-            total += weight * half * disc * geometry.disc_lens_area(disc, pairs.tube, pairs.offset)
-    return total
+@njit(cache=True)
+def _fill_volumes(
+    sphere: Array, offset: Array, depth: Array, tube: Array, length: Array, rule: tuple[Array, Array], volume: Array
+) -> None:
+    for k in range(len(sphere)):
+        a, d, r = sphere[k], offset[k], tube[k]
+        low, high = max(-depth[k], -a), min(length[k] - depth[k], a)
+        if high <= low or d >= a + r:
+            continue
+        covers = sqrt(max(a**2 - (r + d) ** 2, 0.0))
+        crosses = sqrt(max(a**2 - (r - d) ** 2, 0.0))
+        found = pi * r**2 * max(min(high, covers) - max(low, -covers), 0.0)
+        if r > d:
+            found += _segment(a, low, min(high, -crosses)) + _segment(a, max(low, crosses), high)
+        found += _crossing(a, d, r, max(low, -crosses), min(high, -covers), rule)
+        volume[k] = found + _crossing(a, d, r, max(low, covers), min(high, crosses), rule)
 
 
-def _polar_edges(pairs: Pairs, low: Array, high: Array) -> Array:
-    """Angles (6, K) between which the section keeps one kind: disc within tube, crossing it, or tube within disc."""
-    start = np.arcsin(np.clip((low - pairs.depth) / pairs.sphere, -1.0, 1.0))
-    end = np.arcsin(np.clip((high - pairs.depth) / pairs.sphere, -1.0, 1.0))
-    crossing = np.arccos(np.minimum(np.abs(pairs.tube - pairs.offset) / pairs.sphere, 1.0))
-    covering = np.arccos(np.minimum((pairs.tube + pairs.offset) / pairs.sphere, 1.0))
-    return np.clip([start, -crossing, -covering, covering, crossing, end], start, end)
+@njit(cache=True)
+def _segment(a: float, low: float, high: float) -> float:
+    """Volume of the sphere of radius `a` about 0 between two planes."""
+    return pi * (a**2 * (high - low) - (high**3 - low**3) / 3.0) if high > low else 0.0
+
+
+@njit(cache=True)
+def _crossing(a: float, d: float, r: float, low: float, high: float, rule: tuple[Array, Array]) -> float:
+    """Integral of the lens of the sphere's disc and the tube's, whose centres are `d` apart."""
+    if high <= low:
+        return 0.0
+    total = 0.0
+    for m in range(len(rule[0])):
+        square = a**2 - (0.5 * (low + high) + 0.5 * (high - low) * rule[0][m]) ** 2
+        to_chord = (d**2 + r**2 - square) / (2.0 * d)
+        half = sqrt(max(r**2 - to_chord**2, 0.0))
+        lens = r**2 * atan2(half, to_chord) + square * atan2(half, d - to_chord) - d * half
+        total += rule[1][m] * lens
+    return 0.5 * (high - low) * total
+
+
+@njit(cache=True)
+def place_by_axis(start: Array, end: Array, throat: Array, point: Array, image: Array) -> tuple[Array, Array]:
+    """Distance (K,) m of `point[image]` from the axis `start[throat]` to `end[throat]` and place (K,) m along it.
+
+    A throat between two pores at one place has the direction x.
+    """
+    offset, depth = np.empty(len(throat)), np.empty(len(throat))
+    for k in range(len(throat)):
+        a, b, p = start[throat[k]], end[throat[k]], point[image[k]]
+        x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        span = sqrt(x * x + y * y + z * z)
+        if span > 0.0:
+            x, y, z = x / span, y / span, z / span
+        else:
+            x = 1.0
+        u, v, w = p[0] - a[0], p[1] - a[1], p[2] - a[2]
+        depth[k] = u * x + v * y + w * z
+        u, v, w = u - depth[k] * x, v - depth[k] * y, w - depth[k] * z
+        offset[k] = sqrt(u * u + v * v + w * w)
+    return offset, depth
 
 
 def two_plane_volume(pairs: Pairs) -> Array:

@@ -4,12 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from fdnet.errors import CaseError
-from fdnet.network.cylinder import OVERLAPS, Pairs, covers_section
-from fdnet.network.deposit import deposit_in_pores, neighbours
-from fdnet.network.images import make_images
+from fdnet.network.cells import points_in_boxes
+from fdnet.network.cylinder import OVERLAPS, Pairs, covers_section, place_by_axis
+from fdnet.network.deposit import centred_inside, deposit_in_pores, mirrored_images
 from fdnet.network.tessellation import Network
 from fdnet.snapshot import Array, Snapshot, frozen
 
@@ -44,8 +43,9 @@ class Occupancy:
 def measure_occupancy(network: Network, fines: Snapshot, *, overlap: str = "exact") -> Occupancy:
     """Occupancy of `network` by `fines`; `overlap` "exact" or "two-plane" (the thesis) for fines in throats.
 
-    Throats see the fines whose sphere reaches into the box, pores those centred in it. Raises CaseError on an
-    unknown `overlap`.
+    Throats see the fines whose sphere reaches into the box, pores those centred in it; both see the mirror images of
+    the latter across faces that are not periodic, where pores and throats cut by the face are whole. Fines centred
+    outside are counted (`fines_outside_box`). Raises CaseError on an unknown `overlap`.
     """
     if overlap not in OVERLAPS:
         raise CaseError(f"analysis.overlap: {overlap!r} is not known; choose one of {sorted(OVERLAPS)}")
@@ -59,6 +59,7 @@ def measure_occupancy(network: Network, fines: Snapshot, *, overlap: str = "exac
     throats = _throat_sums(network, throat, pairs, inside)
     pore_porosity = _ratio(network.pore_volume - solid, network.pore_tetra_volume)
     counts = {
+        "fines_outside_box": int(np.sum(~centred_inside(network, fines.position))),
         "throat_porosity_negative": int(np.sum(throats["throat_porosity"] < 0)),
         "pore_porosity_negative": int(np.sum((solid > 0) & (solid > network.pore_volume))),
     }
@@ -94,57 +95,43 @@ def _ratio(top: Array, bottom: Array) -> Array:
 
 
 def _pairs(network: Network, fines: Snapshot) -> tuple[Array, Array, Pairs]:
-    """Throat and fine (K,) of the pairs that may overlap, with their relative places."""
-    low, high = network.box[0]
-    index = np.arange(len(fines))
-    if not network.periodic[0]:
-        x = fines.position[:, 0]
-        index = np.flatnonzero((x + fines.radius > low) & (x - fines.radius < high))
-    open_throat = np.flatnonzero(network.throat_radius > 0)
-    if not len(index) or not len(open_throat):
-        empty = np.zeros(0)
+    """Throat and fine (K,) of the pairs that touch, with their relative places."""
+    index = np.flatnonzero(_reaching_in(network, fines))
+    throat = np.flatnonzero(network.throat_radius > 0)
+    ends = network.throat_ends[throat]
+    if not len(index) or not len(throat):
         return (
-            empty.astype(int),
-            empty.astype(int),
-            Pairs(sphere=empty, offset=empty, depth=empty, tube=empty, length=empty),
+            throat[:0],
+            index[:0],
+            Pairs(**dict.fromkeys(("sphere", "offset", "depth", "tube", "length"), np.zeros(0))),
         )
-    ends = network.throat_ends[open_throat]
-    position, owner = _images(network, fines.where(index), ends)
-    half = 0.5 * network.throat_length[open_throat]
-    reach = np.hypot(half, network.throat_radius[open_throat]) + float(fines.radius[index].max())
-    row, image = neighbours(cKDTree(position), ends.mean(axis=1), reach)
-    throat, fine = open_throat[row], index[owner[image]]
-    return _touching(throat, fine, _relative(network, throat, position[image], fines.radius[fine]))
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    largest = float(fines.radius[index].max())
+    # a throat shorter than the shortest allowed reaches beyond its ends
+    beyond = network.throat_length[throat] - np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    reach = (network.throat_radius[throat] + np.maximum(beyond, 0.0) + largest)[:, None]
+    low, high = low - reach, high + reach
+    position, owner = mirrored_images(network, fines.position[index], low.min(axis=0), high.max(axis=0), 0.0)
+    row, image = points_in_boxes(position, low, high)
+    offset, depth = place_by_axis(ends[:, 0], ends[:, 1], row, position, image)
+    throat, fine = throat[row], index[owner[image]]
+    return _touching(network, throat, fine, (fines.radius[fine], offset, depth))
 
 
-def _images(network: Network, fines: Snapshot, ends: Array) -> tuple[Array, Array]:
-    beyond = np.maximum(network.box[:, 0] - ends.min(axis=(0, 1)), ends.max(axis=(0, 1)) - network.box[:, 1])
-    margin = np.maximum(beyond, 0.0) + float(network.throat_radius.max()) + float(fines.radius.max())
-    if not network.periodic[0]:
-        margin[0] = np.nan  # beyond the x faces the fines themselves are seen
-    images = make_images(fines.position, network.box, periodic=network.periodic, margin=margin, hair=0.0)
-    return images.position, images.owner
-
-
-def _relative(network: Network, throat: Array, position: Array, radius: Array) -> Pairs:
-    start, end = network.throat_ends[throat, 0], network.throat_ends[throat, 1]
-    along = end - start
-    span = np.linalg.norm(along, axis=1)
-    # a throat between two pores at one place keeps its shortest length and any direction
-    axis = np.where(span[:, None] > 0, along / np.where(span > 0, span, 1.0)[:, None], np.array([1.0, 0.0, 0.0]))
-    from_start = position - start
-    depth = np.sum(from_start * axis, axis=1)
-    offset = np.linalg.norm(from_start - depth[:, None] * axis, axis=1)
-    return Pairs(
-        sphere=radius,
-        offset=offset,
-        depth=depth,
-        tube=network.throat_radius[throat],
-        length=network.throat_length[throat],
+def _reaching_in(network: Network, fines: Snapshot) -> Array:
+    """True (N,) for fines whose sphere reaches into the box along the axes that are not periodic."""
+    low, high = network.box.T
+    reach = fines.radius[:, None]
+    return np.all(
+        ((fines.position + reach > low) & (fines.position - reach < high)) | np.array(network.periodic), axis=1
     )
 
 
-def _touching(throat: Array, fine: Array, pairs: Pairs) -> tuple[Array, Array, Pairs]:
-    use = (pairs.offset < pairs.sphere + pairs.tube) & (pairs.depth > -pairs.sphere)
-    use &= pairs.depth < pairs.length + pairs.sphere
-    return throat[use], fine[use], pairs.where(use)
+def _touching(
+    network: Network, throat: Array, fine: Array, place: tuple[Array, Array, Array]
+) -> tuple[Array, Array, Pairs]:
+    sphere, offset, depth = place
+    tube, length = network.throat_radius[throat], network.throat_length[throat]
+    use = (offset < sphere + tube) & (depth > -sphere) & (depth < length + sphere)
+    pairs = Pairs(sphere=sphere, offset=offset, depth=depth, tube=tube, length=length).where(use)
+    return throat[use], fine[use], pairs

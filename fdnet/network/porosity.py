@@ -100,11 +100,14 @@ def _crossings(spheres: Snapshot, count: Array, shift: Array, periodic: tuple[bo
     reach = spheres.radius[:, None] / step
     first, last = np.ceil(centre - reach).astype(int), np.floor(centre + reach).astype(int)
     wide = np.maximum(last - first + 1, 0)
-    sphere = np.repeat(np.arange(len(spheres)), wide.prod(axis=1))
-    rank = np.arange(len(sphere)) - np.repeat(np.cumsum(wide.prod(axis=1)) - wide.prod(axis=1), wide.prod(axis=1))
+    lines = wide[:, 0] * wide[:, 1]
+    sphere = np.repeat(np.arange(len(spheres)), lines)
+    rank = np.arange(len(sphere)) - np.repeat(np.cumsum(lines) - lines, lines)
     cell = first[sphere] + np.stack([rank // wide[sphere, 1], rank % wide[sphere, 1]], axis=1)
-    square = spheres.radius[sphere] ** 2 - np.sum(((cell - centre[sphere]) * step) ** 2, axis=1)
-    inside = (square > 0) & np.all(((cell >= 0) & (cell < count)) | np.array(periodic[1:]), axis=1)
+    aside = (cell - centre[sphere]) * step
+    square = spheres.radius[sphere] ** 2 - aside[:, 0] ** 2 - aside[:, 1] ** 2
+    within = ((cell >= 0) & (cell < count)) | np.array(periodic[1:])
+    inside = (square > 0) & within[:, 0] & within[:, 1]
     cell = cell[inside] % count
     return sphere[inside], cell[:, 0] * count[1] + cell[:, 1], np.sqrt(square[inside])
 
@@ -123,9 +126,9 @@ def _wrapped(spheres: Snapshot, sphere: Array, half: Array, periodic_x: bool) ->
 
 def _disjoint(line: Array, start: Array, end: Array, span: float) -> tuple[Array, Array]:
     """The same cover of each line by intervals that do not overlap."""
-    order = np.lexsort((start, line))
-    line, start, end = line[order], start[order], end[order]
     offset = line * (2.0 * span)
+    order = np.argsort(offset + start)
+    offset, start, end = offset[order], start[order], end[order]
     reached = np.maximum.accumulate(end + offset) if len(end) else end
     before = np.concatenate([[-np.inf], reached[:-1]]) - offset
     start = np.maximum(start, before)

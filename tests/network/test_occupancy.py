@@ -1,10 +1,17 @@
 """Fines in throats and pores: volumes against Monte Carlo, closed forms and sums."""
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from scipy.integrate import quad
+from scipy.spatial import cKDTree
 
 from fdnet.errors import CaseError
 from fdnet.network.cylinder import Pairs, covers_section, exact_volume, two_plane_volume
+from fdnet.network.deposit import mirrored_images
+from fdnet.network.geometry import disc_lens_area
 from fdnet.network.occupancy import measure_occupancy
 from fdnet.network.tessellation import build_network
 from fdnet.snapshot import Kind
@@ -44,7 +51,25 @@ def test_sphere_in_cylinder_against_random_points(row):
 def test_centred_sphere_wider_than_the_tube_is_the_napkin_ring():
     """Tube through the centre: 4/3 pi (a^3 - (a^2 - r^2)^1.5)."""
     found = exact_volume(pairs_of([2.0, 0.0, 5.0, 1.0, 10.0]))[0]
-    assert found == pytest.approx(4 / 3 * np.pi * (8 - 3**1.5), rel=1e-4)
+    assert found == pytest.approx(4 / 3 * np.pi * (8 - 3**1.5), rel=1e-14)
+
+
+def test_volume_within_a_millionth_of_adaptive_quadrature():
+    rng = np.random.default_rng(6)
+    for _ in range(150):
+        sphere, length = 10 ** rng.uniform(-1.3, 0.5), rng.uniform(0.1, 4)
+        offset = rng.choice([0.0, 1.0, rng.uniform(0, 1 + sphere), rng.uniform(0, 1 + sphere)])
+        depth = rng.uniform(-0.9, 0.9) * sphere + rng.uniform(0, length)
+        low, high = max(-sphere, -depth), min(sphere, length - depth)
+        kinks = [sign * np.sqrt(max(sphere**2 - (1 + side * offset) ** 2, 0)) for sign in (-1, 1) for side in (-1, 1)]
+        edges = sorted([low, high, *(z for z in kinks if low < z < high)])
+
+        def section(z, sphere=sphere, offset=offset):
+            return float(disc_lens_area(np.sqrt(max(sphere**2 - z**2, 0.0)), 1.0, offset))
+
+        expected = sum(quad(section, *piece, epsabs=1e-12)[0] for piece in pairwise(edges))
+        found = exact_volume(pairs_of([sphere, offset, depth, 1.0, length]))[0]
+        assert found == pytest.approx(expected, abs=1e-6 * 4 / 3 * np.pi * sphere**3)
 
 
 @pytest.mark.parametrize(
@@ -136,6 +161,43 @@ def test_fines_of_a_walled_pack_count_once_with_their_mirror_images(periodic):
     network = build_network(pack.grains(), periodic=periodic)
     found = measure_occupancy(network, pack.fines())
     assert np.sum(network.pore_share * found.pore_solid_volume) == pytest.approx(200 * 4 / 3 * np.pi * 0.2**3, rel=1e-9)
+
+
+def test_a_throat_between_pores_at_one_place_is_a_disc_across_x():
+    network = replace(chain(1), throat_ends=np.full((1, 2, 3), 0.5), throat_length=np.array([1e-3]))
+    found = measure_occupancy(network, snapshot([[0.49, 0.52, 0.5]], 0.05, network.box, Kind.FINE))
+    assert found.throat_solid_volume == pytest.approx([np.pi * (0.05**2 - 0.01**2) * 1e-3], rel=0.02)
+    assert found.pair_distance == pytest.approx([0.2])
+
+
+@pytest.mark.parametrize("walls", [[0], [1], [1, 2], [0, 1, 2]])
+def test_walls_mirror_the_fines_as_a_doubled_periodic_pack_has_them(walls):
+    rng = np.random.default_rng(9)
+    box = np.array([[0.0, 5.0], [1.0, 5.0], [-2.0, 4.0]])
+    position = box[:, 0] + rng.random((200, 3)) * (box[:, 1] - box[:, 0])
+    network = replace(chain(1), box=box, periodic=tuple(axis not in walls for axis in range(3)))
+    low, high = box[:, 0] - 1.5, box[:, 1] + 1.2
+    found, owner = mirrored_images(network, position, low, high, 0.3)
+    doubled, period = position, box[:, 1] - box[:, 0]
+    for axis in walls:
+        flipped = np.where(np.arange(3) == axis, 2 * box[axis, 1] - doubled, doubled)
+        doubled, period = np.concatenate([doubled, flipped]), period * np.where(np.arange(3) == axis, 2.0, 1.0)
+    steps = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    expected = (doubled + steps * period).reshape(-1, 3)
+    counted = [places[np.all((places >= low - 0.3) & (places <= high + 0.3), axis=1)] for places in (found, expected)]
+    assert len(counted[0]) == len(counted[1]) > 300
+    assert cKDTree(counted[0]).query(counted[1])[0].max() < 1e-12
+    assert np.array_equal(np.unique(owner), np.arange(200))
+
+
+def test_fines_outside_the_walls_are_counted_and_not_mirrored():
+    network = chain(3)
+    fines = snapshot([[1.5, -0.01, 0.5], [1.5, 0.5, 0.5], [-0.05, 0.5, 0.5]], 0.05, network.box, Kind.FINE)
+    assert measure_occupancy(network, fines).counts["fines_outside_box"] == 2
+    in_wall = replace(network, throat_ends=network.throat_ends - np.array([0, 0, 0.5]))
+    for z, times in ((-0.01, 1), (0.01, 2)):
+        fine = snapshot([[1.5, 0.5, z]], 0.05, network.box, Kind.FINE)
+        assert measure_occupancy(in_wall, fine).throat_fines.tolist() == [0, times, 0]
 
 
 def test_throat_volumes_are_those_of_every_pair_taken_alone():

@@ -1,0 +1,204 @@
+"""Run by benchmark_network.py: fdnet's network half on one pack, step by step, in this process.
+
+    benchmark_fdnet.py GRAINS FINES FOLDER      a tiled pack; spheres and networks for the peers go to FOLDER
+    benchmark_fdnet.py --pack PACK.csv FOLDER   k of a truth pack, periodic all round
+
+Prints one line `RESULT {json}`.
+"""
+
+import json
+import resource
+import sys
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+from truth_packs import read_pack, snapshot
+
+from fdnet.network import tessellation
+from fdnet.network.conductance import DEFAULT_LAW, LAWS
+from fdnet.network.damage import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW
+from fdnet.network.flow import solve_flow
+from fdnet.network.occupancy import measure_occupancy
+from fdnet.network.permeability import AnalysisOptions, analyse
+from fdnet.network.porosity import measure_porosity
+from fdnet.snapshot import Array, Kind, Snapshot
+
+TILE = Path(__file__).resolve().parent.parent / "tests" / "data" / "truth" / "packH_40_eps40.csv"
+SHAKE = 0.02
+FINE = 0.1
+SIDES = (False, True, True)
+DECADES, CLOSED = 12, 0.1
+
+
+def tiled(grains: int, rng: np.random.Generator) -> Snapshot:
+    """About `grains` grains: the tile repeated, every grain shaken by up to 2 % of its radius each way."""
+    pack, edge = read_pack(TILE)
+    across = max(round((grains / len(pack)) ** (1 / 3)), 1)
+    times = np.array([max(round(grains / len(pack) / across**2), 1), across, across])
+    steps = np.stack(np.meshgrid(*map(np.arange, times), indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    position = (pack.position + steps * edge * 1e-3).reshape(-1, 3)
+    radius = np.tile(pack.radius, len(steps))
+    position = (position + SHAKE * radius[:, None] * rng.uniform(-1, 1, position.shape)) % (times * edge * 1e-3)
+    return spheres(position, radius, times * edge * 1e-3, Kind.GRAIN)
+
+
+def spheres(position: Array, radius: Array, size: Array, kind: Kind) -> Snapshot:
+    one = snapshot(position * 1e3, radius * 1e3, 1.0, np.full(len(radius), kind))
+    box = np.stack([np.zeros(3), size], axis=1)
+    return Snapshot(
+        step=0, time_s=0.0, box=box, id=one.id, kind=one.kind, position=position, radius=radius, velocity=one.velocity
+    )
+
+
+def seated(grains: Snapshot, count: int, rng: np.random.Generator) -> Snapshot:
+    """`count` fines on the surfaces of equal grains, in no other grain."""
+    size, big, small = grains.box[:, 1], float(grains.radius.max()), FINE * float(grains.radius.max())
+    tree = cKDTree(np.minimum(grains.position, size * (1 - 1e-15)), boxsize=size)
+    found = np.zeros((0, 3))
+    while len(found) < count:
+        host = rng.integers(len(grains), size=2 * (count - len(found)) + 10)
+        way = rng.normal(size=(len(host), 3))
+        place = grains.position[host] + (big + small) * way / np.linalg.norm(way, axis=1)[:, None]
+        place = np.minimum(place % size, size * (1 - 1e-15))
+        found = np.concatenate([found, place[tree.query(place)[0] > big + 0.999 * small]])
+    return spheres(found[:count], np.full(count, small), size, Kind.FINE)
+
+
+class Clock:
+    """Seconds and peak memory of steps, in order."""
+
+    def __init__(self) -> None:
+        self.steps: dict[str, dict[str, float]] = {}
+
+    def timed(self, step: str, work: Callable[[], Any]) -> Any:
+        """The result of `work`; its CPU and wall seconds are added to `step`, its peak memory held."""
+        _forget_peak()
+        cpu, wall = time.process_time(), time.perf_counter()
+        found = work()
+        values = self.steps.setdefault(step, {"cpu_s": 0.0, "wall_s": 0.0, "peak_MB": 0.0})
+        values["cpu_s"] += time.process_time() - cpu
+        values["wall_s"] += time.perf_counter() - wall
+        values["peak_MB"] = max(values["peak_MB"], _peak())
+        return found
+
+
+def _forget_peak() -> None:
+    """Linux starts the process's peak memory anew; elsewhere it stays that of all steps so far."""
+    try:
+        Path("/proc/self/clear_refs").write_text("5")
+    except OSError:
+        return
+
+
+def _peak() -> float:
+    try:
+        status = Path("/proc/self/status").read_text()
+        return int(status.split("VmHWM:")[1].split()[0]) / 1024
+    except (OSError, IndexError):
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def _timed_call(clock: Clock, work: Callable[..., Any], *given: Any, **named: Any) -> Any:
+    return clock.timed("tessellate", lambda: work(*given, **named))
+
+
+def build_timed(clock: Clock, grains: Snapshot) -> tessellation.Network:
+    """build_network with tessellation and pairing of facets apart from the rest."""
+    inner = {name: getattr(tessellation, name) for name in ("tessellate", "share_facets")}
+    spent = Clock()
+    for name, work in inner.items():
+        setattr(tessellation, name, partial(_timed_call, spent, work))
+    network = clock.timed("geometry", lambda: tessellation.build_network(grains, periodic=SIDES))
+    for name, work in inner.items():
+        setattr(tessellation, name, work)
+    clock.steps = {"tessellate": spent.steps["tessellate"], **clock.steps}
+    for name in ("cpu_s", "wall_s"):
+        clock.steps["geometry"][name] -= spent.steps["tessellate"][name]
+    return network
+
+
+def run_steps(grains: Snapshot, fines: Snapshot | None) -> tuple[Clock, tessellation.Network, Array, float]:
+    """All steps of an analysis on default laws; also the intact conductances and their inflow."""
+    clock = Clock()
+    network = build_timed(clock, grains)
+    intact = clock.timed("conductance", lambda: LAWS[DEFAULT_LAW](network))
+    inflow = clock.timed("solve", lambda: solve_flow(network, intact)).inflow
+    if fines is not None:
+        occupancy = clock.timed("occupancy", lambda: measure_occupancy(network, fines))
+        damage = clock.timed("conductance", lambda: DAMAGE_LAWS[DEFAULT_DAMAGE_LAW](network, occupancy, intact))
+        clock.timed("solve", lambda: solve_flow(network, damage.conductance))
+        clock.timed("porosity", lambda: measure_porosity(grains.joined(fines), periodic=SIDES))
+    clock.timed("porosity", lambda: measure_porosity(grains, periodic=SIDES))
+    sums = {name: sum(step[name] for step in clock.steps.values()) for name in ("cpu_s", "wall_s")}
+    clock.steps["total"] = sums | {"peak_MB": max(step["peak_MB"] for step in clock.steps.values())}
+    return clock, network, intact, inflow
+
+
+def leave(folder: Path, network: tessellation.Network, states: dict[str, Array], inflow: dict[str, float]) -> None:
+    x, (low, high) = network.pore_position[:, 0], network.box[0]
+    hair = 1e-9 * (high - low)
+    share = getattr(network, "throat_share", 1.0)
+    for state, conductance in states.items():
+        np.savez(
+            folder / f"{state}.npz",
+            pairs=network.throat_pores,
+            position=network.pore_position,
+            conductance=conductance * share * 1e9,
+            inlet=x <= low + hair,
+            outlet=x >= high - hair,
+        )
+    (folder / "inflow.json").write_text(json.dumps({state: 1e9 * value for state, value in inflow.items()}))
+
+
+def leave_spheres(folder: Path, pack: Snapshot) -> None:
+    np.savez(
+        folder / "spheres.npz",
+        position=pack.position * 1e3,
+        radius=pack.radius * 1e3,
+        size=np.ptp(pack.box, axis=1) * 1e3,
+    )
+
+
+def tiled_result(wanted: int, fine_count: int, folder: Path) -> dict[str, Any]:
+    rng = np.random.default_rng(1)
+    small = tiled(40, rng)
+    run_steps(small, seated(small, 100, rng))  # compiles and loads
+    grains = tiled(wanted, rng)
+    fines = seated(grains, fine_count, rng) if fine_count else None
+    clock, network, intact, flux = run_steps(grains, fines)
+    stiff = intact * 10.0 ** rng.uniform(-DECADES, 0, len(intact))
+    states = {"intact": intact, "stiff": stiff, "clogged": stiff * (rng.random(len(intact)) >= CLOSED)}
+    inflow = {"intact": flux}
+    for state in ("stiff", "clogged"):
+        work = partial(solve_flow, network, states[state])
+        inflow[state] = clock.timed(f"solve {state}", work).inflow
+    leave(folder, network, states, inflow)
+    leave_spheres(folder, grains)
+    return {"grains": len(grains), "pores": len(network.pore_share), "steps": clock.steps}
+
+
+def pack_result(path: Path, folder: Path) -> dict[str, Any]:
+    pack, _ = read_pack(path)
+    leave_spheres(folder, pack)
+    fines = pack if len(pack.fines()) else None
+    found = analyse(pack.grains(), fines, periodic=(True, True, True), options=AnalysisOptions())
+    counts = {"grains": len(pack.grains()), "fines": len(pack.fines()), "pores": len(found.network.pore_share)}
+    return {"k": found.k_damaged * 1e6, **counts}
+
+
+def main() -> None:
+    folder = Path(sys.argv[3])
+    if sys.argv[1] == "--pack":
+        result = pack_result(Path(sys.argv[2]), folder)
+    else:
+        result = tiled_result(int(sys.argv[1]), int(sys.argv[2]), folder)
+    print("RESULT", json.dumps(result))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,55 @@
+"""The network benchmark: packs as stated, statuses of children, growth, a small run end to end."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+
+@pytest.fixture
+def scripts(root, monkeypatch):
+    monkeypatch.setattr(sys, "path", [str(root / "scripts"), *sys.path])
+    monkeypatch.setenv("PYTHONPATH", str(root))
+    return pytest.importorskip("benchmark_network"), pytest.importorskip("benchmark_fdnet")
+
+
+def test_packs_are_tiles_with_fines_on_the_grains(scripts):
+    rng = np.random.default_rng(1)
+    grains = scripts[1].tiled(1000, rng)
+    fines = scripts[1].seated(grains, 500, rng)
+    size, radius = grains.box[:, 1], grains.radius[0]
+    assert len(grains) == 1080
+    assert len(fines) == 500
+    assert np.all((grains.position >= 0) & (grains.position <= size))
+    nearest = cKDTree(grains.position % size, boxsize=size).query(fines.position % size)[0]
+    assert nearest == pytest.approx(np.full(500, 1.1 * radius), rel=2e-4)
+
+
+def test_a_child_ends_ok_or_failed_or_over_time(scripts):
+    run = scripts[0].child
+    assert run([sys.executable, "-c", "print('noise'); print('RESULT {\"k\": 2}')"], 60) == {"status": "ok", "k": 2}
+    assert run([sys.executable, "-c", "raise SystemExit('singular')"], 60) == {"status": "exit 1: singular"}
+    assert run([sys.executable, "-c", "import time; time.sleep(60)"], 0.5) == {"status": "stopped after 0.5 s"}
+
+
+def test_growth_is_the_exponent_of_the_time(scripts):
+    rows = [
+        {"tool": "t", "case": "tiled", "step": "s", "grains": n, "cpu_s": 3e-9 * n**1.5} for n in (1000, 10_000, 90_000)
+    ]
+    rows[0]["cpu_s"] = 1.0
+    scripts[0].set_growth(rows)
+    assert "growth" not in rows[0]
+    assert [row["growth"] for row in rows[1:]] == pytest.approx([1.5, 1.5])
+
+
+def test_small_run_of_all_steps(scripts, tmp_path):
+    rows = {row["step"]: row for row in scripts[0].fdnet_rows(80, 50, tmp_path, 300)}
+    assert {"tessellate", "geometry", "occupancy", "conductance", "solve", "porosity", "total"} < set(rows)
+    assert rows["total"]["status"] == "ok"
+    parts = sum(rows[step]["cpu_s"] for step in list(rows)[: list(rows).index("total")])
+    assert rows["total"]["cpu_s"] == pytest.approx(parts)
+    assert all(20 < row["peak_MB"] < 4000 for row in rows.values())
+    assert json.loads((tmp_path / "inflow.json").read_text())["intact"] > 0
+    assert set(np.load(tmp_path / "clogged.npz")) == {"pairs", "position", "conductance", "inlet", "outlet"}
