@@ -36,6 +36,7 @@ DOORS = {
     "matplotlib": {"report/figures", "report/side_view"},
     "overlap": {"network/deposit"},
     "pymetis": {"network/solver"},
+    "pyamg": {"network/solver"},
     "pydantic": {"case", "case_file"},
     "tomli_w": {"case"},
     "rich": {"progress"},
