@@ -16,7 +16,7 @@ from fdnet.snapshot import Array
 
 CONTRASTS = (1e8, 1e6, 1e10)
 STEP = 10.0
-SETTLED = 1e-10
+SETTLED = 1e-9
 MOST_SWEEPS = 30
 
 
@@ -66,11 +66,12 @@ def _balance(ends: Array, conductance: Array, jump: Array, level: Array, count: 
     drive = jump + _difference(height, ends)
     level = _with_those_beside(ends, level, count)
     stages = [_stage(ends, conductance, level, at, count) for at in range(int(level.max(initial=0)) + 1)]
-    pressure, flux, defect = height, np.zeros(len(ends)), np.inf
+    pressure, flux, defect, allowed = height, np.zeros(len(ends)), np.inf, None
     for _ in range(MOST_SWEEPS):
-        step, gain, drive = _sweep(stages, ends, conductance, drive, _net(ends, flux, count))
+        step, gain, drive = _sweep(stages, ends, conductance, drive, (_net(ends, flux, count), allowed))
         pressure, flux = pressure + step, flux + gain
         before, defect = defect, _defect(_net(ends, flux, count), conductance * drive, float(flux @ jump))
+        allowed = 0.3 * SETTLED * abs(float(flux @ jump))
         if defect <= SETTLED or not defect < 0.7 * before:
             break
     return Balance(pressure=pressure - pressure[0], flux=flux, defect=defect, method=stages[0].balances.method)
@@ -126,17 +127,19 @@ def _stage(ends: Array, conductance: Array, level: Array, at: int, count: int) -
 
 
 def _sweep(
-    stages: list[_Stage], ends: Array, conductance: Array, drive: Array, net: Array
+    stages: list[_Stage], ends: Array, conductance: Array, drive: Array, state: tuple[Array, float | None]
 ) -> tuple[Array, Array, Array]:
     """Increments of pressure (n,) and flux (K,) for what drives the links and what the nodes lack, and the drive
-    (K,) that the levels within have since set up for the links above."""
+    (K,) that the levels within have since set up for the links above. `state` is the net flux (n,) out of each node
+    and the sum of imbalances that may stay."""
+    net, allowed = state
     flux, late, steps = np.zeros(len(ends)), np.zeros(len(ends)), []
     for stage in stages:
         own, pushed = conductance[stage.links], drive[stage.links]
         net = net + _net(ends[stage.links], own * pushed, len(net))
         lack = np.bincount(stage.label, weights=-net, minlength=len(stage.free))
         found = np.zeros(len(stage.free))
-        found[stage.free] = stage.balances.solve(lack[stage.free])
+        found[stage.free] = stage.balances.solve(lack[stage.free], imbalance=allowed)
         steps.append(found[stage.label])
         gain = own * _difference(steps[-1], ends[stage.links])
         net = net + _net(ends[stage.links], gain, len(net))
