@@ -90,7 +90,7 @@ def solve_flow(network: Network, conductance: Array, *, span: tuple[float, float
             method=found.method,
             inflow=inflow,
             residual=found.defect,
-            mass_balance=abs(inflow - outflow) / inflow,
+            mass_balance=_apart(inflow, outflow),
             isolated_pores=isolated,
             reason="",
         ),
@@ -155,6 +155,11 @@ def _solve(links: _Links, free: Array) -> Balance:
     return balance_links(node, links.conductance, jump, int(free.sum()) + 1)
 
 
+def _apart(inflow: float, other: float) -> float:
+    """|in - other| / in, infinite for an inflow that is none."""
+    return abs(inflow - other) / inflow if inflow > 0 else np.inf
+
+
 def _through(links: _Links, flux: Array, plane: int) -> float:
     """Flux out of the plane into the pores."""
     return float(np.sum(flux[links.ends[:, 0] == plane]) - np.sum(flux[links.ends[:, 1] == plane]))
@@ -210,7 +215,7 @@ def _solve_period(network: Network, conductance: Array) -> Flow:
             method=found.method,
             residual=found.defect,
             inflow=inflow,
-            mass_balance=abs(spent - inflow) / inflow,
+            mass_balance=_apart(inflow, spent),
             isolated_pores=isolated,
             reason="",
         ),

@@ -22,12 +22,14 @@ def links(count=400, *, decades=4.0):
     return pair, 10.0 ** rng.uniform(-decades, 0, len(pair)), tied, rng.random(count)
 
 
+@pytest.mark.parametrize("unit", [1e-12, 1.0, 1e12])
 @pytest.mark.parametrize("limit", [0, 10_000])
-def test_both_methods_satisfy_every_balance(monkeypatch, limit):
+def test_both_methods_satisfy_every_balance(monkeypatch, limit, unit):
+    """In any unit of conductance and flux."""
     monkeypatch.setattr(solver, "DIRECT_UP_TO", limit)
     pair, g, tied, source = links()
-    balances = Balances(pair, g, tied)
-    p = balances.solve(source, imbalance=1e-9)
+    balances = Balances(pair, g * unit, tied * unit)
+    p = balances.solve(source * unit, imbalance=1e-9 * unit)
     flux = g * (p[pair[:, 0]] - p[pair[:, 1]])
     net = np.bincount(pair[:, 0], flux, len(tied)) - np.bincount(pair[:, 1], flux, len(tied))
     assert net + tied * p == pytest.approx(source, abs=1e-8)

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from fdnet.errors import FlowError
+from fdnet.network import stiff
 from fdnet.network.flow import solve_flow
 from fdnet.network.stiff import balance_links, stiffness
 from fdnet.network.winding import groups, heights, winding_groups
@@ -89,3 +91,20 @@ def test_only_a_closed_way_with_a_jump_winds(jumps, winds):
 
 def test_parallel_links_with_unlike_jumps_wind():
     assert winding_groups(np.array([(0, 1), (0, 1)]), np.array([0.0, 1.0]), 2)[1].all()
+
+
+def test_links_in_parallel_on_both_sides_of_the_contrast_settle(monkeypatch):
+    """A group contracted by 1.5e8 takes the 0.9e8 beside it along; otherwise each sweep gains a factor of 0.6 only."""
+    monkeypatch.setattr(stiff, "CONTRASTS", (1e8,))
+    ends, jump = np.array([(0, 1), (1, 2), (1, 2), (2, 0)]), np.array([1.0, 0.0, 0.0, 0.0])
+    found = balance_links(ends, np.array([1.0, 1.5e8, 0.9e8, 1.0]), jump, 3)
+    assert found.defect < 1e-8
+    assert found.flux == pytest.approx([0.5, 0.5 * 1.5 / 2.4, 0.5 * 0.9 / 2.4, 0.5], abs=1e-7)
+
+
+def test_what_does_not_settle_is_refused(monkeypatch):
+    """Without contraction sixteen decades cannot be held: no number is better than a wrong one."""
+    monkeypatch.setattr(stiff, "CONTRASTS", (1e99,))
+    g = 10.0 ** -np.array([0, 4, 8, 12, 16, 12, 8, 4, 0])[::-1]
+    with pytest.raises(FlowError):
+        solve_flow(chain(9), np.where(g > 1e-10, g * 1e10, g))
