@@ -3,6 +3,7 @@
 import argparse
 import math
 import time
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--sections", type=_count, default=1, metavar="N", help="slabs along the flow (default 1)")
     parser.add_argument("--law", choices=LAW_NAMES, help="conductance law (default: fdnet's own)")
     parser.add_argument("--damage-law", choices=DAMAGE_LAW_NAMES, help="damage law (default: fdnet's own)")
-    parser.add_argument("--compare-laws", action="store_true", help="all laws as a table")
+    parser.add_argument("--compare-laws", action="store_true", help="all laws with all damage laws as a table")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="write the laws, one row each, as CSV")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
@@ -50,10 +52,15 @@ def run(options: argparse.Namespace) -> int:
     turn = [("xyz".index(options.axis) + k) % 3 for k in range(3)]
     spheres = turned(spheres, turn)
     around = (periodic[turn[0]], periodic[turn[1]], periodic[turn[2]])
-    laws = [(options.law or DEFAULT_LAW, options.damage_law or DEFAULT_DAMAGE_LAW)]
+    chosen = (options.law or DEFAULT_LAW, options.damage_law or DEFAULT_DAMAGE_LAW)
+    laws = [chosen]
     if options.compare_laws:
-        laws = [(law, damage) for law in LAW_NAMES for damage in DAMAGE_LAW_NAMES]
-    results = [_measure(spheres, around, options.sections, pair, notes) for pair in laws]
+        laws += [pair for pair in product(LAW_NAMES, DAMAGE_LAW_NAMES) if pair != chosen]
+    results = _measure(spheres, around, options.sections, laws, notes)
+    if options.csv:
+        from fdnet.report.tables import write_laws
+
+        write_laws(options.csv, results)
     _print(results, options)
     return 0
 
@@ -130,24 +137,24 @@ def turned(spheres: Any, turn: list[int]) -> Any:
 
 
 def _measure(
-    spheres: Any, periodic: tuple[bool, bool, bool], sections: int, laws: tuple[str, str], notes: list[str]
-) -> dict[str, Any]:
-    from fdnet.network.permeability import AnalysisOptions, analyse
+    spheres: Any, periodic: tuple[bool, bool, bool], sections: int, laws: list[tuple[str, str]], notes: list[str]
+) -> list[dict[str, Any]]:
+    """What each pair of laws gives; the seconds of the first hold what all of them share."""
+    from fdnet.network.permeability import AnalysisOptions, compare
+
+    damaged = spheres if len(spheres.fines()) else None
+    options = AnalysisOptions(sections=sections, profile_bin=(spheres.box[0, 1] - spheres.box[0, 0]) / 32)
+    results, start = [], time.perf_counter()
+    for result in compare(spheres.grains(), damaged, periodic=periodic, options=options, laws=laws):
+        now = time.perf_counter()
+        results.append(_row(result, now - start, notes))
+        start = now
+    return results
+
+
+def _row(result: Any, seconds: float, notes: list[str]) -> dict[str, Any]:
     from fdnet.report.tables import section_rows
 
-    start = time.perf_counter()
-    damaged = spheres if len(spheres.fines()) else None
-    length = spheres.box[0, 1] - spheres.box[0, 0]
-    options = AnalysisOptions(
-        sections=sections,
-        law=laws[0],
-        damage_law=laws[1],
-        threshold=None,
-        middle_band="threshold",
-        overlap="exact",
-        profile_bin=length / 32,
-    )
-    result = analyse(spheres.grains(), damaged, periodic=periodic, options=options)
     return {
         "k_initial_m2": result.k_initial,
         "k_damaged_m2": result.k_damaged,
@@ -161,7 +168,7 @@ def _measure(
         "damage_law": result.damage_law,
         "sections": section_rows(result),
         "network_counts": result.counts,
-        "seconds": time.perf_counter() - start,
+        "seconds": seconds,
         "warnings": [*notes, *result.warnings],
     }
 
@@ -169,20 +176,36 @@ def _measure(
 def _print(results: list[dict[str, Any]], options: argparse.Namespace) -> None:
     from fdnet.report.tables import plain_json
 
-    if options.json:
-        print(plain_json({"laws": results} if options.compare_laws else results[0])[1])
-        return
     first = results[0]
+    if options.json:
+        print(plain_json({**first, "laws": results} if options.compare_laws else first)[1])
+        return
     print(
         f"porosity {first['porosity_initial']:.5f} -> {first['porosity_damaged']:.5f}, {first['pores']} pores, "
         f"{first['throats']} throats"
     )
     print(f"{'law':<10} {'damage law':<12} {'k m2':>12} {'k damaged m2':>13} {'k/k0':>8}")
     for row in results:
-        ratio = "-" if row["k_reduction"] is None else f"{1 - row['k_reduction']:.4f}"
         print(
             f"{row['law']:<10} {row['damage_law']:<12} {row['k_initial_m2']:>12.5g} "
-            f"{row['k_damaged_m2']:>13.5g} {ratio:>8}"
+            f"{row['k_damaged_m2']:>13.5g} {_ratio(row):>8}"
         )
+    if options.sections > 1:
+        _print_sections(first)
     for warning in first["warnings"]:
         print(f"warning: {warning}")
+
+
+def _print_sections(result: dict[str, Any]) -> None:
+    print(f"sections cut out, {result['law']} and {result['damage_law']}:")
+    print(f"{'from m':>10} {'to m':>10} {'porosity':>9} {'damaged':>9} {'k m2':>12} {'k damaged m2':>13} {'k/k0':>8}")
+    for row in result["sections"]:
+        print(
+            f"{row['x_lo_m']:>10.4g} {row['x_hi_m']:>10.4g} {row['porosity_initial']:>9.5f} "
+            f"{row['porosity_damaged']:>9.5f} {row['k_initial_m2']:>12.5g} {row['k_damaged_m2']:>13.5g} "
+            f"{_ratio(row):>8}"
+        )
+
+
+def _ratio(row: dict[str, Any]) -> str:
+    return "-" if row["k_reduction"] is None else f"{1 - row['k_reduction']:.4f}"

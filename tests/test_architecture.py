@@ -36,6 +36,7 @@ DOORS = {
     "matplotlib": {"report/figures", "report/side_view"},
     "numba": {"network"},
     "pymetis": {"network/solver"},
+    "pyamg": {"network/solver"},
     "pydantic": {"case", "case_file"},
     "tomli_w": {"case"},
     "rich": {"progress"},

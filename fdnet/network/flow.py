@@ -14,15 +14,16 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from fdnet.errors import FlowError
-from fdnet.network.solver import METHOD, solve_balances
+from fdnet.network.stiff import Balance, balance_links
 from fdnet.network.tessellation import Network
+from fdnet.network.winding import winding_groups
 from fdnet.snapshot import Array, frozen
 
 TOLERANCE = 1e-6
 INLET, OUTLET, BETWEEN = -1, -2, 0
 PLANE_HAIR = 1e-9
 SHORTEST_SHARE = 1e-3
-NO_FLOW = 1e-24
+NOT_SOLVED = "none"
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -30,7 +31,8 @@ class Flow:
     """Pressures and fluxes of one solve.
 
     `pore_pressure` (P,) 1 at the inlet plane, 0 at the outlet plane, NaN where cut off; `throat_flux` (T,) m3 from
-    the first to the second pore; `inflow` m3 = Q mu / dp; `residual` largest imbalance of a pore over the inflow;
+    the first to the second pore; `inflow` m3 = Q mu / dp; `residual` sum of the pores' imbalances over the inflow
+    (a bound for the inflow's relative error);
     `mass_balance` |in - out| / in, None without flow (x periodic: the flux across the period against the
     energy spent, which is flux times the drop of 1);
     `isolated_pores` not tied to both planes; `reason` why the inflow is 0, else empty.
@@ -54,6 +56,9 @@ class _Links:
     conductance: Array
     throat: Array
 
+    def where(self, kept: Array) -> "_Links":
+        return _Links(ends=self.ends[kept], conductance=self.conductance[kept], throat=self.throat[kept])
+
 
 def solve_flow(network: Network, conductance: Array, *, span: tuple[float, float] | None = None) -> Flow:
     """Flow for throat `conductance` (T,) m3, through the whole box or the cut-out slab `span` = (low, high) m.
@@ -71,20 +76,15 @@ def solve_flow(network: Network, conductance: Array, *, span: tuple[float, float
     links = _cut_links(network, conductance, low, high)
     free = _tied_to_both(links, state)
     pressure = np.where(state == INLET, 1.0, np.where(state == OUTLET, 0.0, np.nan))
-    pressure[free] = _solve(links, free)
-    flux = _link_flux(links, pressure)
-    pressure, isolated = pressure[node], int(np.sum(((state == BETWEEN) & ~free)[node]))
-    if not np.any(flux):
-        return Flow(
-            pore_pressure=frozen(pressure),
-            throat_flux=frozen(np.zeros(len(conductance))),
-            method=METHOD,
-            residual=0.0,
-            mass_balance=None,
-            inflow=0.0,
-            isolated_pores=isolated,
-            reason=f"no open path from x = {low:g} m to x = {high:g} m",
-        )
+    isolated = int(np.sum(((state == BETWEEN) & ~free)[node]))
+    live = np.all((links.ends < 0) | free[links.ends], axis=1)
+    if not live.any():
+        reason = f"no open path from x = {low:g} m to x = {high:g} m"
+        return _no_flow(pressure[node], len(conductance), isolated, reason)
+    links = links.where(live)
+    found = _solve(links, free)
+    pressure[free], flux = found.pressure[1:], found.flux
+    pressure = pressure[node]
     inflow, outflow = _through(links, flux, INLET), -_through(links, flux, OUTLET)
     per_throat = np.zeros(len(conductance))
     per_throat[links.throat] = flux
@@ -92,10 +92,10 @@ def solve_flow(network: Network, conductance: Array, *, span: tuple[float, float
         Flow(
             pore_pressure=frozen(pressure),
             throat_flux=frozen(per_throat),
-            method=METHOD,
+            method=found.method,
             inflow=inflow,
-            residual=_imbalance(links, flux, free) / inflow,
-            mass_balance=abs(inflow - outflow) / inflow,
+            residual=found.defect,
+            mass_balance=_apart(inflow, outflow),
             isolated_pores=isolated,
             reason="",
         ),
@@ -155,25 +155,16 @@ def _tied_to_both(links: _Links, state: Array) -> Array:
     return free
 
 
-def _solve(links: _Links, free: Array) -> Array:
-    """Pressures of the `free` pores."""
-    index = np.cumsum(free) - 1
-    count = int(free.sum())
-    tied, fed = np.zeros(count), np.zeros(count)
-    for own, other in (links.ends.T, links.ends.T[::-1]):
-        held = (own >= 0) & (other < 0)
-        held[held] = free[own[held]]
-        tied += np.bincount(index[own[held]], weights=links.conductance[held], minlength=count)
-        held &= other == INLET
-        fed += np.bincount(index[own[held]], weights=links.conductance[held], minlength=count)
-    inner = np.all(links.ends >= 0, axis=1)
-    inner[inner] = np.all(free[links.ends[inner]], axis=1)
-    return solve_balances(index[links.ends[inner]], links.conductance[inner], tied, fed)
+def _solve(links: _Links, free: Array) -> Balance:
+    """Balance of the `free` pores, in their order after node 0, which is both planes."""
+    node = np.where(links.ends < 0, 0, np.cumsum(free)[links.ends])
+    jump = 1.0 * (links.ends[:, 0] == INLET) - 1.0 * (links.ends[:, 1] == INLET)
+    return balance_links(node, links.conductance, jump, int(free.sum()) + 1)
 
 
-def _link_flux(links: _Links, pressure: Array) -> Array:
-    at = np.where(links.ends >= 0, pressure[np.maximum(links.ends, 0)], np.where(links.ends == INLET, 1.0, 0.0))
-    return np.nan_to_num(links.conductance * (at[:, 0] - at[:, 1]), nan=0.0)
+def _apart(inflow: float, other: float) -> float:
+    """|in - other| / in, infinite for an inflow that is none."""
+    return abs(inflow - other) / inflow if inflow > 0 else np.inf
 
 
 def _through(links: _Links, flux: Array, plane: int) -> float:
@@ -181,11 +172,17 @@ def _through(links: _Links, flux: Array, plane: int) -> float:
     return float(np.sum(flux[links.ends[:, 0] == plane]) - np.sum(flux[links.ends[:, 1] == plane]))
 
 
-def _imbalance(links: _Links, flux: Array, free: Array) -> float:
-    net = np.zeros(len(free))
-    for own, sign in ((links.ends[:, 0], 1.0), (links.ends[:, 1], -1.0)):
-        net += np.bincount(own[own >= 0], weights=sign * flux[own >= 0], minlength=len(free))
-    return float(np.abs(net[free]).max(initial=0.0))
+def _no_flow(pressure: Array, throats: int, isolated: int, reason: str) -> Flow:
+    return Flow(
+        pore_pressure=frozen(pressure),
+        throat_flux=frozen(np.zeros(throats)),
+        method=NOT_SOLVED,
+        residual=0.0,
+        mass_balance=None,
+        inflow=0.0,
+        isolated_pores=isolated,
+        reason=reason,
+    )
 
 
 def _checked(flow: Flow, *, bounds: tuple[float, float]) -> Flow:
@@ -203,61 +200,33 @@ def _checked(flow: Flow, *, bounds: tuple[float, float]) -> Flow:
 
 def _solve_period(network: Network, conductance: Array) -> Flow:
     """A pressure drop of 1 per period along x; one pore of each connected group is the reference."""
-    node = network.pore_group
-    count = int(node.max()) + 1
-    pair, jump = node[network.throat_pores], network.throat_shift[:, 0].astype(float)
-    open_throat = np.flatnonzero((conductance > 0) & ((pair[:, 0] != pair[:, 1]) | (jump != 0)))
-    pair, jump = pair[open_throat], jump[open_throat]
-    g = conductance[open_throat]
-    graph = sparse.coo_matrix((np.ones(len(pair)), (pair[:, 0], pair[:, 1])), shape=(count, count))
-    _, group = connected_components(graph, directed=False)
-    free = np.ones(count, bool)
-    free[np.unique(group, return_index=True)[1]] = False
-    pressure = np.zeros(count)
-    pressure[free] = _solve_jumps(pair, g, jump, free)
-    flux = g * (pressure[pair[:, 0]] - pressure[pair[:, 1]] + jump)
-    spent = flux**2 / g
-    inflow, driven = float(spent.sum()), float(np.sum(g * jump**2))
-    per_group = np.bincount(group[pair[:, 0]], weights=spent, minlength=count)
-    live = per_group[group] > NO_FLOW * max(driven, 1e-300)
-    per_throat = np.zeros(len(conductance))
-    links = _Links(ends=pair, conductance=g, throat=open_throat)
+    group = network.pore_group
+    count = int(group.max()) + 1
+    pair, jump = group[network.throat_pores], network.throat_shift[:, 0].astype(float)
+    throat = np.flatnonzero((conductance > 0) & ((pair[:, 0] != pair[:, 1]) | (jump != 0)))
+    pair, jump = pair[throat], jump[throat]
+    live = winding_groups(pair, jump, count)[1]
+    isolated = int(np.sum(~live[group]))
     if not live.any():
-        return Flow(
-            pore_pressure=frozen(np.full(len(node), np.nan)),
-            throat_flux=frozen(per_throat),
-            method=METHOD,
-            residual=0.0,
-            mass_balance=None,
-            inflow=0.0,
-            isolated_pores=len(node),
-            reason="no open path around the period along x",
-        )
-    per_throat[open_throat] = np.where(live[pair[:, 0]], flux, 0.0)
+        nowhere = np.full(len(group), np.nan)
+        return _no_flow(nowhere, len(conductance), isolated, "no open path around the period along x")
+    use = live[pair[:, 0]]
+    throat, node, jump = throat[use], (np.cumsum(live) - 1)[pair[use]], jump[use]
+    g = conductance[throat]
+    found = balance_links(node, g, jump, int(live.sum()))
+    pressure = np.full(count, np.nan)
+    pressure[live] = found.pressure
+    inflow, spent = float(found.flux @ jump), float(np.sum(found.flux**2 / g))
     return _checked(
         Flow(
-            pore_pressure=frozen(np.where(live, pressure, np.nan)[node]),
-            throat_flux=frozen(per_throat),
-            method=METHOD,
-            residual=_imbalance(links, flux, np.ones(count, bool)) / inflow,
+            pore_pressure=frozen(pressure[group]),
+            throat_flux=frozen(np.bincount(throat, weights=found.flux, minlength=len(conductance))),
+            method=found.method,
+            residual=found.defect,
             inflow=inflow,
-            mass_balance=abs(float(np.sum(flux * jump)) - inflow) / inflow,
-            isolated_pores=int(np.sum(~live[node])),
+            mass_balance=_apart(inflow, spent),
+            isolated_pores=isolated,
             reason="",
         ),
         bounds=(-np.inf, np.inf),
     )
-
-
-def _solve_jumps(pair: Array, g: Array, jump: Array, free: Array) -> Array:
-    index = np.cumsum(free) - 1
-    count = int(free.sum())
-    tied, source = np.zeros(count), np.zeros(count)
-    for side, sign in ((0, -1.0), (1, 1.0)):
-        own, other = pair[:, side], pair[:, 1 - side]
-        mine = free[own]
-        source += np.bincount(index[own[mine]], weights=sign * (g * jump)[mine], minlength=count)
-        held = mine & ~free[other]
-        tied += np.bincount(index[own[held]], weights=g[held], minlength=count)
-    inner = np.all(free[pair], axis=1)
-    return solve_balances(index[pair[inner]], g[inner], tied, source)

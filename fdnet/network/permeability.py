@@ -3,35 +3,24 @@
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
-from fdnet.errors import CaseError, NetworkError
+from fdnet.errors import CaseError
 from fdnet.network.conductance import DEFAULT_LAW, LAWS
 from fdnet.network.damage import CLEAN, DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, Damage
 from fdnet.network.flow import Flow, solve_flow
-from fdnet.network.invaded import measure_invaded
-from fdnet.network.occupancy import Occupancy, measure_occupancy
-from fdnet.network.porosity import Porosity, measure_porosity
-from fdnet.network.sections import (
-    Profile,
-    Section,
-    SlabK,
-    make_profile,
-    make_sections,
-    profile_edges,
-    reduction,
-    section_edges,
-)
+from fdnet.network.occupancy import Occupancy
+from fdnet.network.sections import Profile, Section, SlabK, make_profile, make_sections, reduction
 from fdnet.network.slabs import inplace_permeability, slab_permeability
-from fdnet.network.tessellation import Network, build_network
+from fdnet.network.specimen import Specimen, measure_specimen
+from fdnet.network.tessellation import Network
 from fdnet.snapshot import Array, Snapshot, frozen
 
-__all__ = ["Analysis", "AnalysisOptions", "Profile", "Section", "analyse"]
+__all__ = ["Analysis", "AnalysisOptions", "Profile", "Section", "analyse", "compare"]
 
-MOVED = 1e-9
 STAGES = ("tessellate", "occupancy", "conductance", "solve", "porosity")
 
 
@@ -100,10 +89,9 @@ class _State:
 
 @dataclass(slots=True)
 class _Log:
-    """Seconds per stage, all flows solved, and what to tell the user."""
+    """Seconds per stage, and what to tell the user."""
 
     seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
-    flows: list[Flow] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
     @contextmanager
@@ -122,23 +110,57 @@ def analyse(
     differ between the two and on degenerate geometry, FlowError on a solve that fails its checks; no open path is k = 0
     with the reason in `warnings`.
     """
-    _check_names(options)
+    pair = (options.law, options.damage_law)
+    return next(compare(initial, damaged, periodic=periodic, options=options, laws=[pair]))
+
+
+def compare(
+    initial: Snapshot,
+    damaged: Snapshot | None,
+    *,
+    periodic: tuple[bool, bool, bool],
+    options: AnalysisOptions,
+    laws: Sequence[tuple[str, str]],
+) -> Iterator[Analysis]:
+    """The same as `analyse` for each pair of (law, damage law) in `laws`; what does not depend on them (tessellation,
+    occupancy, porosity) is measured once, the clean pack solved once for each law. Seconds are of what each added."""
+    chosen = [replace(options, law=law, damage_law=damage_law) for law, damage_law in laws]
+    for one in chosen:
+        _check_names(one)
     log = _Log()
-    before = initial.grains()
-    after = before if damaged is None else _same_grains(before, damaged.grains())
-    clean = _clean_state(before, periodic, options, log)
-    moved = damaged is not None and _displaced(before, after, periodic)
-    base = _clean_state(after, periodic, options, log) if moved else clean
-    occupancy, damage = _damage(base, damaged, options, log)
+    specimen = measure_specimen(
+        initial,
+        damaged,
+        periodic=periodic,
+        sections=options.sections,
+        profile_bin=options.profile_bin,
+        overlap=options.overlap,
+        timed=log.timed,
+    )
+    clean: dict[str, tuple[_State, SlabK]] = {}
+    for one in chosen:
+        yield _analysis(specimen, one, clean, log)
+        log = _Log()
+
+
+def _analysis(
+    specimen: Specimen, options: AnalysisOptions, known: dict[str, tuple[_State, SlabK]], log: _Log
+) -> Analysis:
+    if options.law not in known:
+        state = _clean_state(specimen.first, options, log)
+        known[options.law] = state, _slab_k(state, specimen.edges, log)
+    clean, clean_slabs = known[options.law]
+    base = _clean_state(specimen.network, options, log) if specimen.moved else clean
+    damage = _damage(base, specimen.occupancy, options, log)
     final = base if damage is None else _state(base.network, damage.conductance, log)
-    spheres = before if damaged is None else after.joined(damaged.fines())
-    invaded = measure_invaded(spheres, periodic=periodic)
-    sections, profile, porosity = _by_depth(clean, final, (before, spheres), options, log)
+    slabs = clean_slabs if final is clean else _slab_k(final, specimen.edges, log)
+    sections = make_sections(specimen.edges, specimen.porosity, (clean_slabs, slabs), specimen.depth)
+    porosity, invaded = specimen.porosity, specimen.invaded
     _warn(log, (clean, final), sections)
     law_used = np.full(len(final.conductance), CLEAN) if damage is None else damage.law_used
     return Analysis(
         network=base.network,
-        occupancy=occupancy,
+        occupancy=specimen.occupancy,
         law=options.law,
         damage_law=options.damage_law,
         conductance_initial=base.conductance,
@@ -148,21 +170,21 @@ def analyse(
         flow_damaged=final.flow,
         k_initial=clean.k,
         k_damaged=final.k,
-        k_moved=base.k if moved else None,
+        k_moved=base.k if specimen.moved else None,
         k_reduction=reduction(clean.k, final.k),
         porosity_initial=porosity[0].mean,
         porosity_initial_error=porosity[0].standard_error,
         porosity_initial_sum=porosity[0].sum,
         porosity_damaged=porosity[1].mean,
         sections=sections,
-        profile=profile,
+        profile=make_profile(specimen.bins, porosity, specimen.depth),
         invaded_count=invaded.count,
         invaded_volume=invaded.volume,
         invasion_depth=invaded.depth,
         invasion_depth_p95=invaded.depth_p95,
         cake_thickness=invaded.cake_thickness,
-        solver=_worst(log.flows),
-        counts=_counts(base.network, occupancy, damage, final.flow),
+        solver=_worst([clean.flow, base.flow, final.flow, *clean_slabs.flows, *slabs.flows]),
+        counts=_counts(base.network, specimen.occupancy, damage, final.flow),
         warnings=tuple(log.warnings),
         seconds=log.seconds,
     )
@@ -174,30 +196,7 @@ def _check_names(options: AnalysisOptions) -> None:
             raise CaseError(f"analysis.{key}: {value!r} is not known; choose one of {sorted(known)}")
 
 
-def _same_grains(before: Snapshot, after: Snapshot) -> Snapshot:
-    """`after` in the order of `before`, matched by id."""
-    order, wanted = np.argsort(after.id), np.argsort(before.id)
-    if len(before) != len(after) or np.any(after.id[order] != before.id[wanted]):
-        lost = np.setxor1d(before.id, after.id)
-        raise NetworkError(
-            f"grains differ before ({len(before)}) and after ({len(after)}) the invasion, for "
-            f"example id {lost[:3].tolist()}; give the same pack twice"
-        )
-    index = np.empty(len(before), int)
-    index[wanted] = order
-    return after.where(index)
-
-
-def _displaced(before: Snapshot, after: Snapshot, periodic: tuple[bool, bool, bool]) -> bool:
-    size = before.box[:, 1] - before.box[:, 0]
-    shift = after.position - before.position
-    shift = shift - np.where(periodic, np.round(shift / size) * size, 0.0)
-    return bool(np.max(np.linalg.norm(shift, axis=1), initial=0.0) > MOVED)
-
-
-def _clean_state(grains: Snapshot, periodic: tuple[bool, bool, bool], options: AnalysisOptions, log: _Log) -> _State:
-    with log.timed("tessellate"):
-        network = build_network(grains, periodic=periodic)
+def _clean_state(network: Network, options: AnalysisOptions, log: _Log) -> _State:
     with log.timed("conductance"):
         conductance = LAWS[options.law](network)
     return _state(network, frozen(conductance), log)
@@ -206,51 +205,33 @@ def _clean_state(grains: Snapshot, periodic: tuple[bool, bool, bool], options: A
 def _state(network: Network, conductance: Array, log: _Log) -> _State:
     with log.timed("solve"):
         flow = solve_flow(network, conductance)
-    log.flows.append(flow)
     length = float(network.box[0, 1] - network.box[0, 0])
     return _State(network=network, conductance=conductance, flow=flow, k=flow.inflow * length / network.area)
 
 
-def _damage(
-    base: _State, damaged: Snapshot | None, options: AnalysisOptions, log: _Log
-) -> tuple[Occupancy | None, Damage | None]:
-    if damaged is None:
-        return None, None
-    with log.timed("occupancy"):
-        occupancy = measure_occupancy(base.network, damaged.fines(), overlap=options.overlap)
+def _damage(base: _State, occupancy: Occupancy | None, options: AnalysisOptions, log: _Log) -> Damage | None:
+    if occupancy is None:
+        return None
     with log.timed("conductance"):
-        damage = DAMAGE_LAWS[options.damage_law](
+        return DAMAGE_LAWS[options.damage_law](
             base.network, occupancy, base.conductance, threshold=options.threshold, middle_band=options.middle_band
         )
-    return occupancy, damage
-
-
-def _by_depth(
-    clean: _State, final: _State, spheres: tuple[Snapshot, Snapshot], options: AnalysisOptions, log: _Log
-) -> tuple[tuple[Section, ...], Profile, tuple[Porosity, Porosity]]:
-    box, periodic = clean.network.box, clean.network.periodic
-    edges = section_edges(options.sections, box)
-    bins = profile_edges(clean.network.grain_radius if options.profile_bin is None else options.profile_bin, box)
-    cuts = np.unique(np.concatenate([edges, bins]))
-    with log.timed("porosity"):
-        before = measure_porosity(spheres[0], periodic=periodic, edges=cuts)
-        after = before if spheres[1] is spheres[0] else measure_porosity(spheres[1], periodic=periodic, edges=cuts)
-    with log.timed("solve"):
-        k_before = _slab_k(clean, edges, log)
-        k_after = k_before if final is clean else _slab_k(final, edges, log)
-    x = spheres[1].fines().position[:, 0]
-    depth = x[(x >= box[0, 0]) & (x < box[0, 1])]
-    sections = make_sections(edges, (before, after), (k_before, k_after), depth)
-    return sections, make_profile(bins, (before, after), depth), (before, after)
 
 
 def _slab_k(state: _State, edges: Array, log: _Log) -> SlabK:
-    solved = [
-        slab_permeability(state.network, state.conductance, (float(low), float(high))) for low, high in pairwise(edges)
-    ]
-    log.flows.extend(flow for _, flow in solved)
+    network = state.network
+    with log.timed("solve"):
+        if len(edges) == 2 and not network.periodic[0]:
+            # one slab is the whole box
+            solved = [(state.k, state.flow)]
+        else:
+            solved = [
+                slab_permeability(network, state.conductance, (float(low), float(high)))
+                for low, high in pairwise(edges)
+            ]
+        inplace = inplace_permeability(network, state.flow, edges)
     return SlabK(
-        cut_out=frozen([k for k, _ in solved]), inplace=frozen(inplace_permeability(state.network, state.flow, edges))
+        cut_out=frozen([k for k, _ in solved]), inplace=frozen(inplace), flows=tuple(flow for _, flow in solved)
     )
 
 

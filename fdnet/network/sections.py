@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.errors import CaseError
+from fdnet.network.flow import Flow
 from fdnet.network.porosity import Porosity
 from fdnet.snapshot import Array, frozen
 
@@ -46,10 +47,12 @@ class Profile:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SlabK:
-    """k (S,) m2 of the slabs of one state: `cut_out` on its own, `inplace` from the whole specimen's pressures."""
+    """k (S,) m2 of the slabs of one state: `cut_out` on its own, `inplace` from the whole specimen's pressures; `flows`
+    through those cut out."""
 
     cut_out: Array
     inplace: Array
+    flows: tuple[Flow, ...]
 
 
 def section_edges(sections: int | Sequence[float], box: Array) -> Array:

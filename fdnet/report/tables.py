@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = [
     "read_spheres",
     "section_rows",
+    "write_laws",
     "write_pores",
     "write_profile",
     "write_sections",
@@ -57,6 +58,12 @@ def write_sections(path: str | Path, analysis: "Analysis") -> Path:
     """One row per section; k_reduction is empty where the intact k is 0. Edges at full precision."""
     rows = [row | {edge: repr(float(row[edge])) for edge in ("x_lo_m", "x_hi_m")} for row in section_rows(analysis)]
     return _write(path, _frame(rows))
+
+
+def write_laws(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> Path:
+    """One row per pair of laws: law, damage_law, k_initial_m2, k_damaged_m2, k_reduction, porosities."""
+    names = ("law", "damage_law", "k_initial_m2", "k_damaged_m2", "k_reduction", "porosity_initial", "porosity_damaged")
+    return _write(path, _frame({name: [row[name] for row in rows] for name in names}))
 
 
 def write_profile(path: str | Path, analysis: "Analysis") -> Path:

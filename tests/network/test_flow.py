@@ -6,7 +6,7 @@ import pytest
 from fdnet.errors import FlowError
 from fdnet.network.conductance import LAWS
 from fdnet.network.flow import solve_flow
-from fdnet.network.slabs import plane_pressures
+from fdnet.network.slabs import inplace_permeability, plane_pressures, slab_permeability
 from fdnet.network.tessellation import build_network
 from tests.network.networks import chain, network_of, random_network
 from tests.network.packs import random_pack, snapshot
@@ -132,3 +132,28 @@ def test_period_without_a_way_round_is_zero():
     flow = solve_flow(network, g)
     assert flow.inflow == 0.0
     assert "no open path" in flow.reason
+
+
+@pytest.mark.parametrize(("turns", "inflow"), [((1, 1), 0.0), ((1, 0), 0.5)])
+def test_period_across_and_back_is_no_way_round(turns, inflow):
+    """Two throats of 1 in parallel that both cross the x face close no way; if one does not, they are in series."""
+    shift = np.array([[turn, 0, 0] for turn in turns])
+    network = network_of(
+        [[0.2, 0, 0], [0.8, 0, 0]],
+        [(0, 1), (0, 1)],
+        [[0, 1]] * 3,
+        periodic=(True, False, False),
+        throat_shift=shift,
+    )
+    flow = solve_flow(network, np.ones(2))
+    assert flow.inflow == pytest.approx(inflow)
+    assert bool(flow.reason) == (inflow == 0)
+    assert flow.isolated_pores == (2 if inflow == 0 else 0)
+
+
+def test_slab_without_a_path_has_no_k_though_its_neighbours_do():
+    """The middle throat of three is closed: the whole is 0, so are all slabs that hold it, in place and cut out."""
+    network, g = chain(3), np.array([1.0, 0.0, 1.0])
+    found = [slab_permeability(network, g, span)[0] for span in ((0.0, 0.9), (0.9, 2.1), (1.2, 1.8), (2.1, 3.0))]
+    assert found == pytest.approx([1.0, 0.0, 0.0, 1.0])
+    assert inplace_permeability(network, solve_flow(network, g), np.array([0.0, 0.9, 3.0])).tolist() == [0.0, 0.0]

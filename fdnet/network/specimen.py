@@ -1,0 +1,99 @@
+"""What a specimen is, before any law: its network, where its fines sit, its porosity by depth."""
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+
+import numpy as np
+
+from fdnet.errors import NetworkError
+from fdnet.network.invaded import Invaded, measure_invaded
+from fdnet.network.occupancy import Occupancy, measure_occupancy
+from fdnet.network.porosity import Porosity, measure_porosity
+from fdnet.network.sections import profile_edges, section_edges
+from fdnet.network.tessellation import Network, build_network
+from fdnet.snapshot import Array, Snapshot
+
+MOVED = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Specimen:
+    """`first` the network of the grains as they were, `network` of where they ended, the same unless they `moved`;
+    `occupancy` of `network` by the fines, None without; `edges` (S+1,) of the sections and `bins` (B+1,) of the
+    profile, m; `porosity` before and after; `depth` (F,) m of the fines centred in the box; `invaded`."""
+
+    first: Network
+    network: Network
+    moved: bool
+    occupancy: Occupancy | None
+    edges: Array
+    bins: Array
+    porosity: tuple[Porosity, Porosity]
+    depth: Array
+    invaded: Invaded
+
+
+def measure_specimen(
+    initial: Snapshot,
+    damaged: Snapshot | None,
+    *,
+    periodic: tuple[bool, bool, bool],
+    sections: int | Sequence[float],
+    profile_bin: float | None,
+    overlap: str,
+    timed: Callable[[str], AbstractContextManager[None]],
+) -> Specimen:
+    """The specimen of `initial` grains and, unless None, the grains and fines of `damaged`. `timed` takes the name of
+    the stage that its block belongs to. Raises NetworkError, CaseError as `analyse` does."""
+    before = initial.grains()
+    after = before if damaged is None else _same_grains(before, damaged.grains())
+    box = before.box
+    edges = section_edges(sections, box)
+    with timed("tessellate"):
+        first = build_network(before, periodic=periodic)
+        moved = _displaced(before, after, periodic)
+        network = build_network(after, periodic=periodic) if moved else first
+    occupancy = None
+    if damaged is not None:
+        with timed("occupancy"):
+            occupancy = measure_occupancy(network, damaged.fines(), overlap=overlap)
+    bins = profile_edges(first.grain_radius if profile_bin is None else profile_bin, box)
+    cuts = np.unique(np.concatenate([edges, bins]))
+    spheres = before if damaged is None else after.joined(damaged.fines())
+    with timed("porosity"):
+        clean = measure_porosity(before, periodic=periodic, edges=cuts)
+        filled = clean if damaged is None else measure_porosity(spheres, periodic=periodic, edges=cuts)
+    x = spheres.fines().position[:, 0]
+    return Specimen(
+        first=first,
+        network=network,
+        moved=moved,
+        occupancy=occupancy,
+        edges=edges,
+        bins=bins,
+        porosity=(clean, filled),
+        depth=x[(x >= box[0, 0]) & (x < box[0, 1])],
+        invaded=measure_invaded(spheres, periodic=periodic),
+    )
+
+
+def _same_grains(before: Snapshot, after: Snapshot) -> Snapshot:
+    """`after` in the order of `before`, matched by id."""
+    order, wanted = np.argsort(after.id), np.argsort(before.id)
+    if len(before) != len(after) or np.any(after.id[order] != before.id[wanted]):
+        lost = np.setxor1d(before.id, after.id)
+        raise NetworkError(
+            f"grains differ before ({len(before)}) and after ({len(after)}) the invasion, for "
+            f"example id {lost[:3].tolist()}; give the same pack twice"
+        )
+    index = np.empty(len(before), int)
+    index[wanted] = order
+    return after.where(index)
+
+
+def _displaced(before: Snapshot, after: Snapshot, periodic: tuple[bool, bool, bool]) -> bool:
+    size = before.box[:, 1] - before.box[:, 0]
+    shift = after.position - before.position
+    shift = shift - np.where(periodic, np.round(shift / size) * size, 0.0)
+    return bool(np.max(np.linalg.norm(shift, axis=1), initial=0.0) > MOVED)
