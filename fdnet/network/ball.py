@@ -30,14 +30,16 @@ Vector = tuple[float, float, float]
 
 
 @njit(cache=True)
-def fill_pieces(
-    corner: Array, pore: Array, ball: Array, centre: Array, radius: Array, volume: Array, surface: Array
-) -> None:
-    """Add to `volume` (P,) m3 and `surface` (P,) m2 the pieces of ball `ball[k]` (`centre` (N, 3), `radius` (N,) m)
-    inside tetrahedron `pore[k]` of `corner` (P, 4, 3) m, for all pairs k; a pair may be apart.
+def fill_pieces(corner: Array, pairs: tuple[Array, Array], balls: tuple[Array, Array, Array], found: Array) -> None:
+    """Add to `found` (P, 2 + W) the volume m3 and surface m2 of the pieces of balls inside the tetrahedra `corner`
+    (P, 4, 3) m, and the volume times each of the balls' values.
+
+    `pairs` tetrahedron and ball (K,), which may be apart; `balls` centre (N, 3) m, radius (N,) m, value (N, W).
 
     Pieces below 1e-13 of the whole ball are rounding and left out.
     """
+    pore, ball = pairs
+    centre, radius, value = balls
     normal, place, depth = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(4)
     last = -1
     for k in range(len(pore)):
@@ -56,8 +58,10 @@ def fill_pieces(
                 place[c, axis] = (corner[p, c, axis] - centre[b, axis]) / radius[b]
         inside, area = _piece(place, normal, depth, cuts)
         if inside > ROUNDING:
-            volume[p] += inside * radius[b] ** 3
-            surface[p] += area * radius[b] ** 2
+            found[p, 0] += inside * radius[b] ** 3
+            found[p, 1] += area * radius[b] ** 2
+            for w in range(value.shape[1]):
+                found[p, 2 + w] += inside * radius[b] ** 3 * value[b, w]
 
 
 @njit(cache=True)

@@ -9,6 +9,7 @@ import numpy as np
 
 from fdnet.network import geometry
 from fdnet.network.lubrication import half_resistances
+from fdnet.network.sides import side_voids
 from fdnet.network.tessellation import LENGTH_FLOOR, Network
 from fdnet.snapshot import Array
 
@@ -36,12 +37,7 @@ def hydraulic_law(network: Network) -> Array:
     heights; overlap of grain pairs counted once. Equal radii: power centres are circumcentres.
     """
     heights = network.throat_heights
-    angle = _apex_angles(network, heights[:, 0]) + _apex_angles(network, heights[:, 1])
-    radius = network.throat_corner_radius
-    hidden_volume, hidden_surface = _hidden_by_pairs(network)
-    area = geometry.triangle_area(network.throat_corner)
-    void = area * heights.sum(axis=1) / 3.0 - np.sum(angle * radius**3, axis=1) / 3.0 + hidden_volume
-    wall = np.sum(angle * radius**2, axis=1) - hidden_surface
+    void, wall = (both.sum(axis=1) for both in side_voids(network))
     speck = 1e-12 * network.grain_radius**2
     hydraulic_radius = np.where(wall > speck, void / np.where(wall > speck, wall, 1.0), 0.0)
     # slivers between coinciding centres: their radius is that of no domain at all; the facet's own stands in
@@ -83,34 +79,6 @@ def _section_radius(triangle: Array, disc: Array) -> Array:
 
 def _height(network: Network) -> Array:
     return np.maximum(network.throat_heights.sum(axis=1), LENGTH_FLOOR * network.grain_radius)
-
-
-def _apex_angles(network: Network, height: Array) -> Array:
-    """Signed solid angle (T, 3) at the facet's corners of the pyramid to the point `height` above the centre of equal
-    power to its three discs."""
-    base = geometry.flat(network.throat_corner)
-    middle = geometry.power_centre(base, network.throat_corner_radius)[0]
-    apex = np.concatenate([middle, height[:, None]], axis=1)[:, None]
-    raised = np.concatenate([np.concatenate([base, np.zeros((*base.shape[:2], 1))], axis=2), apex], axis=1)
-    return geometry.solid_angles(raised)[:, :3]
-
-
-def _hidden_by_pairs(network: Network) -> tuple[Array, Array]:
-    """Volume (T,) and surface (T,) of grain pairs' overlap within the two pyramids, by their signed dihedral angles."""
-    base = geometry.flat(network.throat_corner)
-    middle = geometry.power_centre(base, network.throat_corner_radius)[0]
-    volume, surface = np.zeros(len(base)), np.zeros(len(base))
-    for first, second in geometry.SIDES:
-        along = base[:, second] - base[:, first]
-        apart = np.linalg.norm(along, axis=1)
-        to_middle = middle - base[:, first]
-        inward = (along[:, 0] * to_middle[:, 1] - along[:, 1] * to_middle[:, 0]) / apart
-        turn = np.arctan2(network.throat_heights, inward[:, None]).sum(axis=1) / (2.0 * np.pi)
-        radius = network.throat_corner_radius[:, first], network.throat_corner_radius[:, second]
-        caps = geometry.cap_heights(*radius, apart)
-        volume += turn * (geometry.cap_volume(radius[0], caps[0]) + geometry.cap_volume(radius[1], caps[1]))
-        surface += turn * 2.0 * np.pi * (radius[0] * caps[0] + radius[1] * caps[1])
-    return volume, surface
 
 
 LAWS: dict[str, Law] = {

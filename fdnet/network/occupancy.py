@@ -8,7 +8,7 @@ import numpy as np
 from fdnet.errors import CaseError
 from fdnet.network.cells import points_in_boxes
 from fdnet.network.cylinder import OVERLAPS, Pairs, covers_section, place_by_axis
-from fdnet.network.deposit import centred_inside, deposit_in_pores, mirrored_images
+from fdnet.network.deposit import centred_inside, deposit_in_pores, deposit_on_sides, mirrored_images
 from fdnet.network.tessellation import Network
 from fdnet.snapshot import Array, Snapshot, frozen
 
@@ -21,7 +21,10 @@ class Occupancy:
     `throat_solid_volume` m3; `throat_porosity` = 1 - solid / cylinder (negative where fines overlap, 1 where the
     radius is 0); `throat_fine_radius` mean radius m of the fines in it (0 without); `throat_fines` how many;
     `blocked` one fine covers a whole cross-section. `pore_solid_volume` m3, `pore_solid_surface` m2 in the
-    tetrahedron; `pore_porosity` = (void - fines) / tetrahedron. `pair_throat`, `pair_fine` (K,) indices,
+    tetrahedron; `pore_porosity` = (void - fines) / tetrahedron; of the fines in it, by volume, the mean
+    `pore_fine_volume` m3 of a whole fine, and `pore_layer` m, the thickness of the layer they make on the grains.
+    `side_solid_volume` m3 and `side_solid_surface` m2 (T, 2) in the pyramids from the facet to the power centres of
+    the first and second pore. `pair_throat`, `pair_fine` (K,) indices,
     `pair_distance` (K,) distance of the fine's centre from the axis over the throat radius, `pair_radius` (K,) m.
     """
 
@@ -33,6 +36,10 @@ class Occupancy:
     pore_solid_volume: Array
     pore_solid_surface: Array
     pore_porosity: Array
+    pore_fine_volume: Array
+    pore_layer: Array
+    side_solid_volume: Array
+    side_solid_surface: Array
     pair_throat: Array
     pair_fine: Array
     pair_distance: Array
@@ -55,7 +62,8 @@ def measure_occupancy(network: Network, fines: Snapshot, *, overlap: str = "exac
     blocked[throat[covers_section(pairs)]] = True
     use = inside > 0
     throat, fine, pairs, inside = throat[use], fine[use], pairs.where(use), inside[use]
-    solid, surface = deposit_in_pores(network, fines)
+    solid, surface, fine_volume, layer = deposit_in_pores(network, fines)
+    side_solid, side_surface = deposit_on_sides(network, fines)
     throats = _throat_sums(network, throat, pairs, inside)
     pore_porosity = _ratio(network.pore_volume - solid, network.pore_tetra_volume)
     counts = {
@@ -69,6 +77,10 @@ def measure_occupancy(network: Network, fines: Snapshot, *, overlap: str = "exac
         "pore_solid_volume": solid,
         "pore_solid_surface": surface,
         "pore_porosity": pore_porosity,
+        "pore_fine_volume": fine_volume,
+        "pore_layer": layer,
+        "side_solid_volume": side_solid,
+        "side_solid_surface": side_surface,
         "pair_throat": throat,
         "pair_fine": fine,
         "pair_radius": pairs.sphere,

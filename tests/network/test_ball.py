@@ -11,11 +11,11 @@ CORNER = np.array([[0, 0, 0], [50, 0, 0], [0, 50, 0], [0, 0, 50.0]])
 
 
 def piece(corner, centre, radius=1.0):
-    volume, surface, one = np.zeros(1), np.zeros(1), np.zeros(1, np.intp)
-    fill_pieces(
-        np.array([corner], float), one, one, np.array([centre], float), np.array([float(radius)]), volume, surface
-    )
-    return volume[0], surface[0]
+    found, one = np.zeros((1, 3)), np.zeros(1, np.intp)
+    balls = (np.array([centre], float), np.array([float(radius)]), np.array([[7.0]]))
+    fill_pieces(np.array([corner], float), (one, one), balls, found)
+    assert found[0, 2] == 7.0 * found[0, 0]
+    return found[0, 0], found[0, 1]
 
 
 def oriented(corner):

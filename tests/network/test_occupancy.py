@@ -164,7 +164,7 @@ def test_fines_of_a_walled_pack_count_once_with_their_mirror_images(periodic):
 
 
 def test_a_throat_between_pores_at_one_place_is_a_disc_across_x():
-    network = replace(chain(1), throat_ends=np.full((1, 2, 3), 0.5), throat_length=np.array([1e-3]))
+    network = replace(chain(1), pore_position=np.full((2, 3), 0.5), throat_length=np.array([1e-3]))
     found = measure_occupancy(network, snapshot([[0.49, 0.52, 0.5]], 0.05, network.box, Kind.FINE))
     assert found.throat_solid_volume == pytest.approx([np.pi * (0.05**2 - 0.01**2) * 1e-3], rel=0.02)
     assert found.pair_distance == pytest.approx([0.2])
@@ -194,7 +194,7 @@ def test_fines_outside_the_walls_are_counted_and_not_mirrored():
     network = chain(3)
     fines = snapshot([[1.5, -0.01, 0.5], [1.5, 0.5, 0.5], [-0.05, 0.5, 0.5]], 0.05, network.box, Kind.FINE)
     assert measure_occupancy(network, fines).counts["fines_outside_box"] == 2
-    in_wall = replace(network, throat_ends=network.throat_ends - np.array([0, 0, 0.5]))
+    in_wall = replace(network, pore_position=network.pore_position - np.array([0, 0, 0.5]))
     for z, times in ((-0.01, 1), (0.01, 2)):
         fine = snapshot([[1.5, 0.5, z]], 0.05, network.box, Kind.FINE)
         assert measure_occupancy(in_wall, fine).throat_fines.tolist() == [0, times, 0]
