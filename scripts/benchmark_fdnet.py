@@ -86,6 +86,12 @@ class Clock:
         values["peak_MB"] = max(values["peak_MB"], _peak())
         return found
 
+    def total(self, names: list[str]) -> dict[str, float]:
+        """Sum of the seconds and largest peak of the steps `names`."""
+        steps = [self.steps[name] for name in names]
+        sums = {key: sum(step[key] for step in steps) for key in ("cpu_s", "wall_s")}
+        return sums | {"peak_MB": max(step["peak_MB"] for step in steps)}
+
 
 def _forget_peak() -> None:
     """Linux starts the process's peak memory anew; elsewhere it stays that of all steps so far."""
@@ -130,12 +136,12 @@ def run_steps(grains: Snapshot, fines: Snapshot | None) -> tuple[Clock, tessella
     inflow = clock.timed("solve", lambda: solve_flow(network, intact)).inflow
     if fines is not None:
         occupancy = clock.timed("occupancy", lambda: measure_occupancy(network, fines))
-        damage = clock.timed("conductance", lambda: DAMAGE_LAWS[DEFAULT_DAMAGE_LAW](network, occupancy, intact))
-        clock.timed("solve", lambda: solve_flow(network, damage.conductance))
+        damage = clock.timed("damage", lambda: DAMAGE_LAWS[DEFAULT_DAMAGE_LAW](network, occupancy, intact))
+        clock.timed("solve damaged", lambda: solve_flow(network, damage.conductance))
         clock.timed("porosity", lambda: measure_porosity(grains.joined(fines), periodic=SIDES))
     clock.timed("porosity", lambda: measure_porosity(grains, periodic=SIDES))
-    sums = {name: sum(step[name] for step in clock.steps.values()) for name in ("cpu_s", "wall_s")}
-    clock.steps["total"] = sums | {"peak_MB": max(step["peak_MB"] for step in clock.steps.values())}
+    every, first = list(clock.steps), ["tessellate", "geometry", "conductance", "solve"]
+    clock.steps |= {"total": clock.total(every), "total intact": clock.total(first)}
     return clock, network, intact, inflow
 
 
