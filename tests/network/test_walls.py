@@ -108,9 +108,11 @@ CELLS = {
 
 
 @pytest.mark.parametrize("cell", CELLS)
-@pytest.mark.parametrize("periodic", [(True, False, True), (True, False, False)])
-def test_lattice_between_its_own_mirror_planes_conducts_as_the_periodic_one(cell, periodic):
-    """Grains centred on the walls are their own images."""
+@pytest.mark.parametrize(
+    ("periodic", "error"), [((True, False, True), 1e-6), ((True, False, False), 1e-6), (NONE, 5e-4)]
+)
+def test_lattice_between_its_own_mirror_planes_conducts_as_the_periodic_one(cell, periodic, error):
+    """Grains centred on the walls are their own images; those on the x faces are moved in by 1e-4 radii."""
     places, edge = CELLS[cell]
     steps = np.stack(np.meshgrid(*[np.arange(4)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
     position = (steps + np.array(places)).reshape(-1, 3) * edge
@@ -119,7 +121,7 @@ def test_lattice_between_its_own_mirror_planes_conducts_as_the_periodic_one(cell
         last = 3 * edge + np.where(sides, -1e-9, 1e-9)
         pack = snapshot(position[np.all(position <= last, axis=1)], 1.0, [[0, 3 * edge]] * 3)
         found.append(permeabilities(pack, sides))
-    assert found[1] == pytest.approx(found[0], rel=1e-6)
+    assert found[1] == pytest.approx(found[0], rel=error)
 
 
 @pytest.mark.parametrize(("seed", "count"), [(2, 12), (4, 19)])
