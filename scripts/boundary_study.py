@@ -3,7 +3,8 @@
 
     .venv/bin/python scripts/boundary_study.py tiled PACK.csv ... --csv docs/validation/boundary_tiled.csv
     .venv/bin/python scripts/boundary_study.py slabs PACK.csv ... --csv docs/validation/boundary_slabs.csv
-    .venv/bin/python scripts/boundary_study.py walled --grains 200 1000 --csv docs/validation/boundary_walled.csv
+    .venv/bin/python scripts/boundary_study.py walled --porosity 0.41 --grains 200 1000 3000 10000 \\
+        --csv docs/validation/boundary_walled.csv
 
 `tiled`: periodic packs tiled 1, 2, 3 times and cut as a box with walls in y, z or x, y, z, over the periodic pack; with
 the grains centred inside alone, and with those that reach in.

@@ -7,6 +7,9 @@ import numpy as np
 from fdnet.network.delaunay import ON_FACE_HAIR
 from fdnet.snapshot import Array, Snapshot
 
+INSET = 1e-4
+ITERATIONS = 20
+
 
 def reaching(grains: Snapshot, periodic: tuple[bool, ...]) -> Array:
     """Indices of the grains whose sphere reaches into the box."""
@@ -19,7 +22,8 @@ def onto_walls(grains: Snapshot, periodic: tuple[bool, ...]) -> tuple[Snapshot, 
 
     Of a grain centred beyond a face only a cap is inside; a half sphere of the cap's volume, centred on the face,
     stands for it: the specimen stays its own mirror image and keeps its void. Centres within a hair of a face
-    are put on it.
+    are put on it; at the x faces 1e-4 mean radii inside it, so that facets between three of them are throats that end
+    in pores on the face, where the pressure is held.
     """
     hair = ON_FACE_HAIR * float(grains.radius.mean()) if len(grains) else 0.0
     position, radius = grains.position.copy(), grains.radius.copy()
@@ -30,9 +34,19 @@ def onto_walls(grains: Snapshot, periodic: tuple[bool, ...]) -> tuple[Snapshot, 
         outside = beyond > hair
         height = np.where(outside, radius - beyond, radius)
         # half sphere 2 pi r^3 / 3 against cap pi h^2 (3 R - h) / 3
-        radius = np.where(outside, np.cbrt(0.5 * height**2 * (3.0 * radius - height)), radius)
-        near = beyond > -hair
+        depth = INSET * float(grains.radius.mean()) if axis == 0 else 0.0
+        radius = np.where(outside, _same_cap(radius, height, depth), radius)
+        near = beyond > -max(hair, depth)
         middle = 0.5 * (low + high)
-        position[near, axis] = np.where(position[near, axis] < middle, low, high)
+        position[near, axis] = np.where(position[near, axis] < middle, low + depth, high - depth)
         moved |= outside
     return replace(grains, position=position, radius=radius), int(moved.sum())
+
+
+def _same_cap(radius: Array, height: Array, depth: float) -> Array:
+    """Radius of the sphere centred `depth` m inside a face that shows the box the volume of a cap of `height` m."""
+    cap = 0.5 * height**2 * (3.0 * radius - height)
+    found = np.cbrt(cap)
+    for _ in range(ITERATIONS):
+        found = np.cbrt(np.maximum(cap - 1.5 * depth * found**2 + 0.5 * depth**3, 0.0))
+    return np.maximum(found, depth)

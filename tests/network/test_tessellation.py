@@ -114,13 +114,6 @@ def test_one_layer_between_walls_is_a_stack_of_its_mirror_images():
     assert np.sum(network.pore_share * network.pore_tetra_volume) == pytest.approx(1000, rel=1e-12)
 
 
-def test_layer_centred_on_the_inlet_is_refused():
-    pack = simple_cubic(4)
-    shifted = snapshot(pack.position - 0.2, 1.0, [[0, 6.0], [0, 6], [0, 6]])
-    with pytest.raises(NetworkError, match="inlet face"):
-        build_network(shifted, periodic=NONE)
-
-
 def test_grains_out_of_reach_are_left_out_and_counted():
     pack = random_pack(60, 0.5, periodic=False)
     position = np.vstack([[[-3.0, 1, 1]], pack.position])

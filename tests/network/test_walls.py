@@ -5,11 +5,13 @@ import pytest
 
 from fdnet.network.conductance import LAWS
 from fdnet.network.flow import solve_flow
+from fdnet.network.occupancy import measure_occupancy
 from fdnet.network.porosity import measure_porosity
 from fdnet.network.slabs import inplace_permeability
 from fdnet.network.tessellation import build_network
 from fdnet.network.walls import onto_walls
-from tests.network.packs import random_pack, simple_cubic, snapshot
+from fdnet.snapshot import Kind
+from tests.network.packs import random_pack, simple_cubic, snapshot, with_fines
 
 ALL, NONE = (True,) * 3, (False,) * 3
 
@@ -58,7 +60,7 @@ def test_sections_of_a_walled_pack_are_those_of_its_doubled_pack():
         network = build_network(one, periodic=periodic)
         flow = solve_flow(network, LAWS["series"](network))
         found.append(inplace_permeability(network, flow, np.linspace(0, pack.box[0, 1], 5)))
-    assert found[0] == pytest.approx(found[1], rel=1e-6)
+    assert found[0] == pytest.approx(found[1], rel=1e-4)  # stubs inside polyhedra differ by the split
 
 
 @pytest.mark.parametrize("pack", PACKS)
@@ -106,9 +108,11 @@ CELLS = {
 
 
 @pytest.mark.parametrize("cell", CELLS)
-@pytest.mark.parametrize("periodic", [(True, False, True), (True, False, False)])
-def test_lattice_between_its_own_mirror_planes_conducts_as_the_periodic_one(cell, periodic):
-    """Grains centred on the walls are their own images."""
+@pytest.mark.parametrize(
+    ("periodic", "error"), [((True, False, True), 1e-6), ((True, False, False), 1e-6), (NONE, 5e-4)]
+)
+def test_lattice_between_its_own_mirror_planes_conducts_as_the_periodic_one(cell, periodic, error):
+    """Grains centred on the walls are their own images; those on the x faces are moved in by 1e-4 radii."""
     places, edge = CELLS[cell]
     steps = np.stack(np.meshgrid(*[np.arange(4)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
     position = (steps + np.array(places)).reshape(-1, 3) * edge
@@ -117,16 +121,32 @@ def test_lattice_between_its_own_mirror_planes_conducts_as_the_periodic_one(cell
         last = 3 * edge + np.where(sides, -1e-9, 1e-9)
         pack = snapshot(position[np.all(position <= last, axis=1)], 1.0, [[0, 3 * edge]] * 3)
         found.append(permeabilities(pack, sides))
-    assert found[1] == pytest.approx(found[0], rel=1e-6)
+    assert found[1] == pytest.approx(found[0], rel=error)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_few_grains_in_a_wide_box_still_tile_it(seed):
-    """Voids as wide as the box: the first images are not enough."""
-    rng = np.random.default_rng(seed)
-    for periodic in (ALL, (False, True, True), (True, False, True)):
-        pack = random_pack(int(rng.integers(8, 30)), 0.2, seed=seed, spread=0.3)
-        network = build_network(pack, periodic=periodic)
-        box = np.prod(np.ptp(pack.box, axis=1))
-        assert network.counts["throats_unmatched"] == 0
-        assert np.sum(network.pore_share * network.pore_tetra_volume) == pytest.approx(box, rel=1e-12)
+@pytest.mark.parametrize(("seed", "count"), [(2, 12), (4, 19)])
+@pytest.mark.parametrize("periodic", [ALL, (False, True, True), (True, False, True)])
+def test_few_grains_in_a_wide_box_still_tile_it(seed, count, periodic):
+    """Voids as wide as the box: the first images are not enough, which shows only in facets without partner."""
+    pack = random_pack(count, 0.2, seed=seed, spread=0.3, aspect=0.6)
+    network = build_network(pack, periodic=periodic)
+    box = np.prod(np.ptp(pack.box, axis=1))
+    assert network.counts["throats_unmatched"] == 0
+    assert np.sum(network.pore_share * network.pore_tetra_volume) == pytest.approx(box, rel=1e-12)
+
+
+def test_fines_at_a_wall_fill_the_throats_in_it_with_their_images():
+    """The doubled pack with doubled fines has the same porosity in every throat that lies in the wall."""
+    pack = with_fines(random_pack(60, 0.5, periodic=False), 150, 0.2)
+    grains, fines = pack.grains(), pack.fines()
+    both = doubled(grains, (1,))
+    image = fines.position * [1, -1, 1] + [0, 2 * pack.box[1, 1], 0]
+    more = snapshot(np.vstack([fines.position, image]), 0.2, both.box, Kind.FINE)
+    found = []
+    for one, of_it, periodic in ((grains, fines, (True, False, True)), (both, more, ALL)):
+        network = build_network(one, periodic=periodic)
+        solid = measure_occupancy(network, of_it).throat_solid_volume
+        walls = network.throat_ends[:, :, 1] / pack.box[1, 1]
+        found.append(solid[np.all(np.abs(walls - np.round(walls)) < 1e-9, axis=1)].sum())
+    assert found[0] > 0.1
+    assert found[0] == pytest.approx(found[1], rel=1e-4)  # stubs inside polyhedra differ by the split
