@@ -154,8 +154,8 @@ class AnalysisChoices(Part):
     """How permeability is computed; the default laws are fdnet's most accurate pair."""
 
     sections: Annotated[int, Field(ge=1, le=MOST_SECTIONS)] = 8
-    law: Literal["thesis", "effective", "hydraulic", "series"] = "series"
-    damage_law: Literal["thesis", "thesis-code", "kozeny"] = "kozeny"
+    law: Literal["thesis", "effective", "hydraulic", "series", "lubrication"] = "lubrication"
+    damage_law: Literal["thesis", "thesis-code", "kozeny", "side-kozeny"] = "side-kozeny"
     clogging_threshold: Fraction | None = None
     middle_band: Literal["threshold", "position"] = "threshold"
     throat_overlap: Literal["exact", "two-plane"] = "exact"

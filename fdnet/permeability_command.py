@@ -9,9 +9,9 @@ from typing import Any
 
 from fdnet.errors import CaseError
 
-LAW_NAMES = ("thesis", "effective", "hydraulic", "series")
+LAW_NAMES = ("thesis", "effective", "hydraulic", "series", "lubrication")
 MOST_SECTIONS = 1000
-DAMAGE_LAW_NAMES = ("thesis", "thesis-code", "kozeny")
+DAMAGE_LAW_NAMES = ("thesis", "thesis-code", "kozeny", "side-kozeny")
 _METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 
 

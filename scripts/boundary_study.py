@@ -10,7 +10,7 @@
 the grains centred inside alone, and with those that reach in.
 `slabs`: slabs of 1, 2, ... grain diameters cut out of the periodic pack (mean and extremes over --places slabs).
 `walled`: packs made by LIGGGHTS between walls, over the k of their own inner part, --rim diameters or more from
-every side: mean flux per area there over the pressure gradient there. Law: series. Seeds are stated in the rows.
+every side: mean flux per area there over the pressure gradient there. Law: the default. Seeds are stated in the rows.
 """
 
 import argparse
@@ -27,7 +27,7 @@ from truth_packs import read_pack
 from fdnet.case_file import case_from
 from fdnet.dem.liggghts import Launch, find_binary
 from fdnet.dem.packing import make_pack
-from fdnet.network.conductance import LAWS
+from fdnet.network.conductance import DEFAULT_LAW, LAWS
 from fdnet.network.flow import Flow, solve_flow
 from fdnet.network.images import make_images
 from fdnet.network.porosity import measure_porosity
@@ -36,14 +36,13 @@ from fdnet.network.tessellation import Network, build_network
 from fdnet.scales import carman_kozeny, scales_of
 from fdnet.snapshot import Array, Snapshot
 
-LAW = "series"
 SIDES = {"periodic": (True, True, True), "walls y z": (True, False, False), "walls x y z": (False, False, False)}
 
 
 def solved(pack: Snapshot, periodic: tuple[bool, bool, bool]) -> tuple[Network, Flow, float]:
     """Network, flow and k (m2) of a pack."""
     network = build_network(pack, periodic=periodic)
-    flow = solve_flow(network, LAWS[LAW](network))
+    flow = solve_flow(network, LAWS[DEFAULT_LAW](network))
     return network, flow, flow.inflow * float(np.ptp(pack.box[0])) / network.area
 
 
@@ -108,7 +107,7 @@ def slab_rows(packs: list[Path], places: int) -> Iterator[dict[str, Any]]:
     for path in packs:
         pack = tiled(read_pack(path)[0].grains(), 2)
         network, _, reference = solved(pack, SIDES["periodic"])
-        conductance, length = LAWS[LAW](network), float(np.ptp(pack.box[0]))
+        conductance, length = LAWS[DEFAULT_LAW](network), float(np.ptp(pack.box[0]))
         diameter = 2 * float(pack.radius.mean())
         for thick in range(1, int(length / 2 / diameter) + 1):
             starts = (np.arange(places) + 0.5) / places * (0.5 * length)

@@ -9,7 +9,7 @@ from fdnet.network.images import make_images, wrapped
 from fdnet.network.tessellation import Network
 from fdnet.snapshot import Array, Snapshot
 
-THIN_SIDE = 1e-9
+THIN_SIDE = 1e-6
 
 
 def deposit_in_pores(network: Network, fines: Snapshot) -> tuple[Array, Array, Array, Array]:

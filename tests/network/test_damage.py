@@ -25,6 +25,8 @@ def occupancy(porosity, *, fine=0.02, distance=0.9, blocked=None, solid=0.0, sur
         pair_distance=np.full(count, distance),
         pore_solid_volume=np.broadcast_to(solid, count + 1).astype(float),
         pore_solid_surface=np.broadcast_to(surface, count + 1).astype(float),
+        pore_fine_volume=np.zeros(count + 1),
+        pore_layer=np.zeros(count + 1),
     )
 
 

@@ -227,4 +227,4 @@ def test_another_pack_after_the_invasion_is_refused(pack):
 
 def test_laws_named_by_the_contract_exist():
     assert set(LAWS) == {"thesis", "effective", "hydraulic", "series", "lubrication"}
-    assert set(DAMAGE_LAWS) == {"thesis", "thesis-code", "kozeny"}
+    assert set(DAMAGE_LAWS) == {"thesis", "thesis-code", "kozeny", "side-kozeny"}

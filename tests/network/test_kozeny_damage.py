@@ -1,0 +1,140 @@
+"""Local Kozeny factors by the side of a throat: closed forms, exact splits, limits."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fdnet.network.conductance import LAWS
+from fdnet.network.damage import DAMAGE_LAWS
+from fdnet.network.deposit import deposit_in_pores, deposit_on_sides, wall_distance
+from fdnet.network.kozeny_damage import _kept
+from fdnet.network.sides import side_voids
+from fdnet.network.tessellation import build_network
+from fdnet.snapshot import Kind
+from tests.network.packs import random_pack, snapshot, with_fines
+
+ALL = (True, True, True)
+
+
+@pytest.fixture(scope="module")
+def pack():
+    return with_fines(random_pack(40), 150, 0.2)
+
+
+@pytest.fixture(scope="module")
+def network(pack):
+    return build_network(pack.grains(), periodic=ALL)
+
+
+def even_state(network, *, volume, surface, layer=1e3, fine=0.0):
+    """Fines that take the same share of every pore and every side."""
+    void, wall = side_voids(network)
+    pores = len(network.pore_volume)
+    return SimpleNamespace(
+        pore_solid_volume=volume * network.pore_volume,
+        pore_solid_surface=surface * network.pore_wall_surface,
+        pore_fine_volume=np.full(pores, fine),
+        pore_layer=np.full(pores, layer),
+        side_solid_volume=volume * np.maximum(void, 0.0),
+        side_solid_surface=surface * np.maximum(wall, 0.0),
+    )
+
+
+def factor(network, state):
+    clean = LAWS["lubrication"](network)
+    found = DAMAGE_LAWS["side-kozeny"](network, state, clean)
+    return found, found.conductance / clean
+
+
+def test_no_fines_leave_everything_as_it_is(network):
+    found, kept = factor(network, even_state(network, volume=0.0, surface=0.0))
+    assert kept == pytest.approx(1.0, abs=1e-14)
+    assert set(found.law_used) == {"clean"}
+
+
+def test_an_even_bed_gives_the_kozeny_factor_everywhere(network):
+    _, kept = factor(network, even_state(network, volume=0.3, surface=2.0))
+    assert kept == pytest.approx(0.7**3 / 9.0, rel=1e-9)
+
+
+def test_a_thin_film_takes_the_share_of_its_ring(network):
+    """Layer of 2/10 of the tube radius, that is 4/10 of the hydraulic radius: share 1 - 0.8^2."""
+    hydraulic = network.pore_volume.sum() / network.pore_wall_surface.sum()
+    _, kept = factor(network, even_state(network, volume=0.1, surface=1.0, layer=0.4 * hydraulic))
+    assert kept == pytest.approx((1 - 0.36 * 0.1) ** 3 / 4.0, rel=1e-9)
+
+
+def test_fines_larger_than_a_pore_count_by_the_whole_pore(network):
+    state = even_state(network, volume=0.2, surface=0.5, fine=1e6)
+    state.side_solid_volume = np.zeros_like(state.side_solid_volume)
+    state.side_solid_surface = np.zeros_like(state.side_solid_surface)
+    assert factor(network, state)[1] == pytest.approx(0.8**3 / 1.5**2, rel=1e-6)
+
+
+def test_filled_pores_are_closed_and_counted(network):
+    found, kept = factor(network, even_state(network, volume=1.0, surface=1.0))
+    assert not kept.any()
+    assert found.counts["pores_filled"] == len(network.pore_volume)
+    assert set(found.law_used) == {"blocked"}
+
+
+def test_resistances_in_series_are_raised_side_by_side():
+    resistance = np.array([[1.0, 3.0], [1.0, 3.0], [0.0, 2.0], [np.inf, 1.0]])
+    factor = np.array([[0.5, 0.25], [1.0, 0.0], [0.0, 0.5], [1.0, 1.0]])
+    assert _kept(resistance, factor) == pytest.approx([4.0 / 14.0, 0.0, 0.5, 1.0])
+
+
+def whole_pores(network):
+    """Pores with their power centre inside, and their throats' sides as a sum over these pores."""
+    behind = np.zeros(len(network.pore_volume), bool)
+    for side in (0, 1):
+        np.logical_or.at(behind, network.throat_pores[:, side], network.throat_heights[:, side] <= 1e-6)
+    return ~behind
+
+
+def summed(network, by_side):
+    total = np.zeros(len(network.pore_volume))
+    for side in (0, 1):
+        np.add.at(total, network.throat_pores[:, side], by_side[:, side])
+    return total
+
+
+def test_sides_add_up_to_their_pore(network, pack):
+    whole = whole_pores(network)
+    assert whole.sum() > 50
+    void, wall = side_voids(network)
+    assert summed(network, void)[whole] == pytest.approx(network.pore_volume[whole], rel=1e-5)
+    assert summed(network, wall)[whole] == pytest.approx(network.pore_wall_surface[whole], rel=1e-5)
+    volume, surface, _, _ = deposit_in_pores(network, pack.fines())
+    side_volume, side_surface = deposit_on_sides(network, pack.fines())
+    assert summed(network, side_volume)[whole] == pytest.approx(volume[whole], rel=1e-5, abs=1e-9)
+    assert summed(network, side_surface)[whole] == pytest.approx(surface[whole], rel=1e-5, abs=1e-9)
+
+
+def test_signed_voids_add_up_to_the_pore_of_any_shape(network):
+    void, wall = side_voids(network)
+    assert summed(network, void) == pytest.approx(network.pore_volume, rel=1e-5, abs=1e-7)
+    assert summed(network, wall) == pytest.approx(network.pore_wall_surface, rel=1e-5, abs=1e-7)
+
+
+def test_layer_of_fines_on_grains_is_a_diameter_thick(network, pack):
+    grain = pack.grains().position[0]
+    fine = snapshot([grain + [1.2, 0.0, 0.0]], 0.2, pack.box, Kind.FINE)
+    near = wall_distance(network, fine.position)
+    volume, _, whole, layer = deposit_in_pores(network, fine)
+    held = volume > 0
+    assert layer[held] == pytest.approx(near[0] + 0.2)
+    assert whole[held] == pytest.approx(4 / 3 * np.pi * 0.2**3)
+    assert volume.sum() == pytest.approx(4 / 3 * np.pi * 0.2**3)
+
+
+def test_layer_of_fines_at_two_distances_spreads(network, pack):
+    """Same pore filled from two balls of radius r at y1 and y2: mean + sqrt(5 variance + r^2)."""
+    centre = network.pore_power_centre[np.argmax(network.pore_radius)]
+    places = np.array([centre, centre + [0.05, 0.02, -0.03]])
+    y = wall_distance(network, places)
+    fines = snapshot(places, 0.01, pack.box, Kind.FINE)
+    _, _, _, layer = deposit_in_pores(network, replace(fines))
+    assert layer.max() == pytest.approx(y.mean() + np.sqrt(5 * y.var() + 0.01**2), rel=1e-9)
