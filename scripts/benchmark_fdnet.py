@@ -114,14 +114,11 @@ def _timed_call(clock: Clock, work: Callable[..., Any], *given: Any, **named: An
 
 
 def build_timed(clock: Clock, grains: Snapshot) -> tessellation.Network:
-    """build_network with tessellation and pairing of facets apart from the rest."""
-    inner = {name: getattr(tessellation, name) for name in ("tessellate", "share_facets")}
-    spent = Clock()
-    for name, work in inner.items():
-        setattr(tessellation, name, partial(_timed_call, spent, work))
+    """build_network with the tessellation apart from the rest."""
+    spent, work = Clock(), tessellation.tessellate
+    tessellation.tessellate = partial(_timed_call, spent, work)
     network = clock.timed("geometry", lambda: tessellation.build_network(grains, periodic=SIDES))
-    for name, work in inner.items():
-        setattr(tessellation, name, work)
+    tessellation.tessellate = work
     clock.steps = {"tessellate": spent.steps["tessellate"], **clock.steps}
     for name in ("cpu_s", "wall_s"):
         clock.steps["geometry"][name] -= spent.steps["tessellate"][name]

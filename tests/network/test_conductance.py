@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from fdnet.network.conductance import LAWS, _apex_angles
+from fdnet.network import geometry
+from fdnet.network.conductance import LAWS
+from fdnet.network.sides import _foot_angles
 from fdnet.network.flow import solve_flow
 from fdnet.network.tessellation import build_network
 from tests.network.packs import body_centred, face_centred, random_pack, simple_cubic
@@ -100,6 +102,8 @@ def test_pyramids_to_the_power_centres_take_up_every_grain_once(spread):
     """Their solid angles at a grain add up to 4 pi, so their apexes are the same points for all facets."""
     pack = random_pack(80, spread=spread)
     network = build_network(pack, periodic=ALL)
-    angle = sum(_apex_angles(network, network.throat_heights[:, side]) for side in (0, 1))
+    base = geometry.flat(network.throat_corner)
+    middle = geometry.power_centre(base, network.throat_corner_radius)[0]
+    angle = sum(_foot_angles(base, middle, network.throat_heights[:, side]) for side in (0, 1))
     whole = np.bincount(network.throat_grains.ravel(), weights=np.asarray(angle).ravel())
     assert whole == pytest.approx(np.full(len(pack), 4 * np.pi), rel=1e-6)

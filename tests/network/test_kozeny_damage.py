@@ -121,7 +121,7 @@ def test_signed_voids_add_up_to_the_pore_of_any_shape(network):
 
 def test_layer_of_fines_on_grains_is_a_diameter_thick(network, pack):
     grain = pack.grains().position[0]
-    fine = snapshot([grain + [1.2, 0.0, 0.0]], 0.2, pack.box, Kind.FINE)
+    fine = snapshot([grain + np.array([1.2, 0.0, 0.0])], 0.2, pack.box, Kind.FINE)
     near = wall_distance(network, fine.position)
     volume, _, whole, layer = deposit_in_pores(network, fine)
     held = volume > 0
@@ -133,7 +133,7 @@ def test_layer_of_fines_on_grains_is_a_diameter_thick(network, pack):
 def test_layer_of_fines_at_two_distances_spreads(network, pack):
     """Same pore filled from two balls of radius r at y1 and y2: mean + sqrt(5 variance + r^2)."""
     centre = network.pore_power_centre[np.argmax(network.pore_radius)]
-    places = np.array([centre, centre + [0.05, 0.02, -0.03]])
+    places = centre + np.array([[0.0, 0.0, 0.0], [0.05, 0.02, -0.03]])
     y = wall_distance(network, places)
     fines = snapshot(places, 0.01, pack.box, Kind.FINE)
     _, _, _, layer = deposit_in_pores(network, replace(fines))
