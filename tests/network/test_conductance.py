@@ -6,8 +6,8 @@ from scipy.integrate import quad
 
 from fdnet.network import geometry
 from fdnet.network.conductance import LAWS
-from fdnet.network.sides import _foot_angles
 from fdnet.network.flow import solve_flow
+from fdnet.network.sides import _foot_angles
 from fdnet.network.tessellation import build_network
 from tests.network.packs import body_centred, face_centred, random_pack, simple_cubic
 
