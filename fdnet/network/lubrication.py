@@ -14,9 +14,9 @@ within 7.5 % of the exact flow through every hyperboloid from a long tube to Sam
 """
 
 import numpy as np
-from numba import njit
 
 from fdnet.network import geometry
+from fdnet.network.compiled import compiled
 from fdnet.network.section import even_flux, uneven_flux, wedges
 from fdnet.network.tessellation import LENGTH_FLOOR, Network
 from fdnet.network.wedge import ratio_table
@@ -41,7 +41,7 @@ def half_resistances(network: Network) -> Array:
     return found
 
 
-@njit(cache=True)
+@compiled
 def _halves(corner: Array, radius: Array, heights: Array, floor: float, table: Array) -> Array:
     found = np.zeros((len(corner), 2))
     for t in range(len(corner)):
@@ -59,7 +59,7 @@ def _halves(corner: Array, radius: Array, heights: Array, floor: float, table: A
     return found
 
 
-@njit(cache=True)
+@compiled
 def _resistance(base: Array, radius: Array, wedge: Array, low: float, high: float, table: Array) -> float:
     """Integral of dR between two heights: 1/a linear within a step, extrapolated from STEPS and STEPS / 2 steps."""
     step = (high - low) / STEPS
@@ -78,7 +78,7 @@ def _resistance(base: Array, radius: Array, wedge: Array, low: float, high: floa
     return (4.0 * _summed(narrow, step, 1) - _summed(narrow, step, 2)) / 3.0
 
 
-@njit(cache=True)
+@compiled
 def _summed(narrow: Array, step: float, every: int) -> float:
     total = 0.0
     for k in range(every, len(narrow), every):
