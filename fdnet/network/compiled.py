@@ -34,7 +34,7 @@ def _writable_root() -> Path:
         return Path(tempfile.gettempdir()) / f"fdnet-{os.getuid()}"
 
 
-if not config.CACHE_DIR:
-    config.CACHE_DIR = str(cache_folder(Path(__file__).parent, _writable_root()))
+if not config.CACHE_DIR:  # type: ignore[attr-defined]
+    config.CACHE_DIR = str(cache_folder(Path(__file__).parent, _writable_root()))  # type: ignore[attr-defined]
 
 compiled = numba.njit(cache=True)
