@@ -65,7 +65,7 @@ def parts(rows: dict[str, list[Row]], refit: Row, missing: list[str], validation
         "damage_table": tables.damage_table(damage, absolute=False),
         "absolute_table": tables.damage_table(damage, absolute=True),
         "held_out_damage": tables.held_out(damage, tables.RULES[2:], tables.DAMAGE_GOAL),
-        "large_fine_table": tables.large_fine_table(rows["large_fines"]),
+        "large_fine_table": tables.large_fine_table(rows["large_fines"], validation / "truth_large_fines.csv"),
         "resolved_summary": tables.summary(damage, models.RESOLVED),
         "bed_table": tables.bed_table(rows["beds"]),
         "polydisperse_table": tables.polydisperse_table(rows["polydisperse"]),

@@ -118,15 +118,17 @@ def damage_table(rows: list[Row], *, absolute: bool) -> str:
     return markdown(["case", "true k/k0", "its error", *RULES, "looked at before"], lines)
 
 
-def large_fine_table(rows: list[Row]) -> str:
-    default = RULES[3]
-    return markdown(
-        ["porosity lost, points", "fines", *(f"k/k0: {name}" for name in RULES), f"{default} over resolved"],
-        [
-            [f"{row['points']:g}", str(row["fines"]), *ratios(row, RULES, 4), ratio(row[default] / row[RESOLVED], 2)]
-            for row in rows
-        ],
-    )
+def large_fine_table(rows: list[Row], path: Path) -> str:
+    """k/k0 with fines of 1/3; over truth in brackets where `path` has it."""
+    truth = {row["case"]: row for row in read_csv(path)}
+    lines = []
+    for row in rows:
+        known = truth.get(f"packH_r3_d{row['points']:.0f}")
+        said = f"{known['k_over_k0']} ({known['relative_error']})" if known else "-"
+        over = float(known["k_over_k0"]) if known else float("nan")
+        cells = [f"{ratio(row[name], 4)} ({ratio(row[name] / over, 2)})" for name in RULES]
+        lines.append([f"{row['points']:g}", str(row["fines"]), said, *cells])
+    return markdown(["porosity lost, points", "fines", "truth (its error)", *RULES], lines)
 
 
 def bed_table(rows: list[Row]) -> str:
