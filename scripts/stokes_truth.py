@@ -45,7 +45,7 @@ def make(names: list[str], folder: Path) -> None:
     """Make packs, in the order of PACKS."""
     for name in names or PACKS:
         wish = PACKS[name]
-        pack, edge = made_deposit(name, folder) if "intact" in wish else made_grains(name)
+        pack, edge = made_deposit(wish, folder) if "intact" in wish else made_grains(name)
         write_pack(folder / f"{name}.csv", pack, edge, f"seed {wish['seed']}")
         porosity = measure_porosity(pack, periodic=(True,) * 3)
         print(

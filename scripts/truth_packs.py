@@ -97,14 +97,13 @@ def made_grains(name: str) -> tuple[Snapshot, float]:
     return snapshot(position * scale, radius, edge * scale, kind), edge * scale
 
 
-def made_deposit(name: str, folder: Path) -> tuple[Snapshot, float]:
-    """The intact pack of `name` with fines and its edge (mm).
+def made_deposit(wish: dict[str, Any], folder: Path) -> tuple[Snapshot, float]:
+    """The intact pack of `wish`, as in PACKS, with fines and its edge (mm).
 
     First they are placed one by one without overlap, a share of 0.3 bridging (touching three spheres, fines among
     them), the others uniform over the grains' surface. After REFUSALS refusals in a row the rest is put at random into
     the void and all fines are relaxed from overlap, the grains fixed.
     """
-    wish = PACKS[name]
     rng = np.random.default_rng(wish["seed"])
     grains, edge = read_pack(folder / f"{wish['intact']}.csv")
     position, radius = grains.position / MM, grains.radius / MM

@@ -46,22 +46,22 @@ def hydraulic_law(network: Network) -> Array:
     return HYDRAULIC_FACTOR * network.throat_area * hydraulic_radius**2 / _height(network)
 
 
-def series_law(network: Network) -> Array:
+def series_law(network: Network, *, weight: float = INSCRIBED_WEIGHT) -> Array:
     """1/g = integral of 8 / (pi r(z)^4) dz between the power centres along the facet's normal.
 
-    r(z) = 0.35 r_inscribed(z) + 0.65 r_effective(z) of the section at height z, where each grain shows a disc of
-    radius sqrt(R^2 - z^2). The weight was fitted to resolved Stokes flow in five lattices and three packs of equal
-    grains. A facet closed at z = 0 is closed.
+    r(z) = weight r_inscribed(z) + (1 - weight) r_effective(z) of the section at height z, where each grain shows a
+    disc of radius sqrt(R^2 - z^2). The weight, 0.35, was fitted to resolved Stokes flow in five lattices and three
+    packs of equal grains. A facet closed at z = 0 is closed.
     """
     low, height = -network.throat_heights[:, 0], _height(network)
     points, weights = np.polynomial.legendre.leggauss(SERIES_POINTS)
     corner = network.throat_corner
     resistance = np.zeros(len(height))
     with np.errstate(divide="ignore"):
-        for point, weight in zip(points, weights, strict=True):
+        for point, share in zip(points, weights, strict=True):
             z = low + 0.5 * (1.0 + point) * height
             disc = np.sqrt(np.maximum(network.throat_corner_radius**2 - z[:, None] ** 2, 0.0))
-            resistance += 0.5 * weight * height * 8.0 / (np.pi * _section_radius(corner, disc) ** 4)
+            resistance += 0.5 * share * height * 8.0 / (np.pi * _section_radius(corner, disc, weight) ** 4)
     return np.where(network.throat_radius > 0, 1.0 / resistance, 0.0)
 
 
@@ -70,10 +70,10 @@ def lubrication_law(network: Network) -> Array:
     return 1.0 / half_resistances(network).sum(axis=1)
 
 
-def _section_radius(triangle: Array, disc: Array) -> Array:
+def _section_radius(triangle: Array, disc: Array, weight: float) -> Array:
     inscribed = np.nan_to_num(geometry.touching_circle(triangle, disc), nan=0.0)
     area = np.maximum(geometry.open_area(triangle, disc), 0.0)
-    mixed = INSCRIBED_WEIGHT * inscribed + (1.0 - INSCRIBED_WEIGHT) * np.sqrt(area / np.pi)
+    mixed = weight * inscribed + (1.0 - weight) * np.sqrt(area / np.pi)
     return np.where((inscribed > 0) & (area > 0), mixed, 0.0)
 
 

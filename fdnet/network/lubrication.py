@@ -28,21 +28,22 @@ TIP = 1e-2
 EQUAL = 1e-9
 
 
-def half_resistances(network: Network) -> Array:
+def half_resistances(network: Network, *, widening: float = WIDENING) -> Array:
     """Resistance (T, 2), 1/m3 (viscosity factored out), of each throat from its facet to the power centre on either
-    side. A throat with both centres on one side of its facet is a resistance on that side alone. Infinite where closed.
-    Heights whose sum is below 1e-3 mean grain radii are taken as that."""
+    side; `widening` is the factor on da^2 above. A throat with both centres on one side of its facet is a resistance on
+    that side alone. Infinite where closed. Heights whose sum is below 1e-3 mean grain radii are taken as that."""
     corner = geometry.flat(network.throat_corner)
     radius = np.ascontiguousarray(network.throat_corner_radius)
     heights = np.ascontiguousarray(network.throat_heights)
     floor = LENGTH_FLOOR * network.grain_radius
-    found = _halves(corner, radius, heights, floor, ratio_table())
+    found = _halves(corner, radius, heights, (floor, float(widening)), ratio_table())
     found[network.throat_radius <= 0] = np.inf
     return found
 
 
 @compiled
-def _halves(corner: Array, radius: Array, heights: Array, floor: float, table: Array) -> Array:
+def _halves(corner: Array, radius: Array, heights: Array, given: tuple[float, float], table: Array) -> Array:
+    floor, widening = given
     found = np.zeros((len(corner), 2))
     for t in range(len(corner)):
         low, high = -heights[t, 0], heights[t, 1]
@@ -50,18 +51,21 @@ def _halves(corner: Array, radius: Array, heights: Array, floor: float, table: A
         even = np.max(radius[t]) - np.min(radius[t]) <= EQUAL * radius[t, 0]
         wedge = wedges(corner[t]) if even else np.empty((0, 3))
         if low < 0.0 and high > 0.0:
-            found[t, 0] = _resistance(corner[t], radius[t], wedge, 0.0, -low, table)
-            found[t, 1] = _resistance(corner[t], radius[t], wedge, 0.0, high, table)
+            found[t, 0] = _resistance(corner[t], radius[t], wedge, (0.0, -low), widening, table)
+            found[t, 1] = _resistance(corner[t], radius[t], wedge, (0.0, high), widening, table)
         elif low >= 0.0:
-            found[t, 1] = _resistance(corner[t], radius[t], wedge, low, high, table)
+            found[t, 1] = _resistance(corner[t], radius[t], wedge, (low, high), widening, table)
         else:
-            found[t, 0] = _resistance(corner[t], radius[t], wedge, -high, -low, table)
+            found[t, 0] = _resistance(corner[t], radius[t], wedge, (-high, -low), widening, table)
     return found
 
 
 @compiled
-def _resistance(base: Array, radius: Array, wedge: Array, low: float, high: float, table: Array) -> float:
+def _resistance(
+    base: Array, radius: Array, wedge: Array, span: tuple[float, float], widening: float, table: Array
+) -> float:
     """Integral of dR between two heights: 1/a linear within a step, extrapolated from STEPS and STEPS / 2 steps."""
+    low, high = span
     step = (high - low) / STEPS
     narrow = np.empty(STEPS + 1)
     disc = np.empty(3)
@@ -75,15 +79,16 @@ def _resistance(base: Array, radius: Array, wedge: Array, low: float, high: floa
         if not flux > 0.0:
             return np.inf
         narrow[k] = (8.0 * flux / np.pi) ** -0.25
-    return (4.0 * _summed(narrow, step, 1) - _summed(narrow, step, 2)) / 3.0
+    return (4.0 * summed(narrow, step, 1, widening) - summed(narrow, step, 2, widening)) / 3.0
 
 
 @compiled
-def _summed(narrow: Array, step: float, every: int) -> float:
+def summed(narrow: Array, step: float, every: int, widening: float) -> float:
+    """Resistance, 1/m3, of sections of 1/a = `narrow` (K,), `step` m apart, by every `every`-th of them: sum of dR."""
     total = 0.0
     for k in range(every, len(narrow), every):
         a, b = narrow[k - every], narrow[k]
         straight = every * step * (a**4 + a**3 * b + a**2 * b**2 + a * b**3 + b**4) / 5.0
-        widening = np.sqrt(WIDENING) * abs(b**3 - a**3) / 3.0
-        total += 8.0 / np.pi * np.hypot(straight, widening)
+        sideways = np.sqrt(widening) * abs(b**3 - a**3) / 3.0
+        total += 8.0 / np.pi * np.hypot(straight, sideways)
     return total

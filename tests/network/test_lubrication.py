@@ -15,7 +15,7 @@ def test_tube_rule_against_the_exact_hyperboloid(opening: float, bound: float) -
     narrow = 1.0 / (neck * np.sqrt(1.0 + (z / opening) ** 2))
     total = 0.0
     for a, b, step in zip(narrow, narrow[1:], np.diff(z), strict=False):
-        total += lubrication._summed(np.array([a, b]), step, 1)
+        total += lubrication.summed(np.array([a, b]), step, 1, lubrication.WIDENING)
     exact = 3.0 / ((1.0 - opening) ** 2 * (1.0 + 2.0 * opening))
     assert 2.0 * total == pytest.approx(exact, rel=bound)
 
