@@ -30,9 +30,9 @@ class Network:
     """Pores (P) and throats (T) of a pack of grains; lengths m, areas m2, volumes m3. x is the flow axis.
 
     `box` (3, 2); `periodic` (3,): the other faces are mirror planes, at the sides with `walls` "slip" or "no-slip".
-    `grain_radius` mean; `area` the box's cross-section. `image_grain` (M,) index, `image_position` (M, 3), `image_radius` (M,) of the grains and their
-    images; `pore_images` (P, 4), `throat_images` (T, 3) which of them are at the corners, `pore_wrap` (P, 3) periods by
-    which these lie beyond the place of the pore.
+    `grain_radius` mean; `area` the box's cross-section. `image_grain` (M,) index, `image_position` (M, 3),
+    `image_radius` (M,) of the grains and their images; `pore_images` (P, 4), `throat_images` (T, 3) which of them are
+    at the corners, `pore_wrap` (P, 3) periods by which these lie beyond the place of the pore.
     A pore cut by mirrored faces lies on them and describes the whole mirrored tetrahedron; `pore_share` (P,) is
     the part inside (1/2 for each such face, else 1), `throat_share` (T,) that of a throat's section.
     `pore_position` (P, 3) centre of the sphere touching the four grains, the centroid where that is outside (Shi

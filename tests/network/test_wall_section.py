@@ -5,15 +5,16 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
-from fdnet.errors import NetworkError
+from fdnet.errors import CaseError, NetworkError
 from fdnet.network.conductance import LAWS
 from fdnet.network.flow import solve_flow
 from fdnet.network.lubrication import half_resistances
+from fdnet.network.permeability import AnalysisOptions, analyse
 from fdnet.network.section import uneven_flux
 from fdnet.network.tessellation import build_network
 from fdnet.network.wall_section import wall_cuts, wall_flux
 from fdnet.network.wedge import ratio_table
-from tests.network.packs import random_pack, simple_cubic, snapshot
+from tests.network.packs import random_pack, simple_cubic, snapshot, with_fines
 
 NONE = (False,) * 3
 
@@ -166,5 +167,22 @@ def test_half_resistances_are_those_of_the_law():
 
 
 def test_unknown_walls_are_refused():
-    with pytest.raises(NetworkError, match="'sticky'.*slip"):
+    with pytest.raises(NetworkError, match=r"'sticky'.*slip"):
         build_network(random_pack(60), periodic=NONE, walls="sticky")
+    with pytest.raises(CaseError, match=r"analysis.walls: 'sticky'.*slip"):
+        analyse(random_pack(60), None, periodic=NONE, options=AnalysisOptions(walls="sticky"))
+
+
+def test_an_analysis_holds_the_fluid_at_the_walls_unless_told_otherwise():
+    pack = random_pack(100, 0.5, periodic=False)
+    found = {
+        options.walls: analyse(pack, None, periodic=NONE, options=options).k_initial
+        for options in (AnalysisOptions(), AnalysisOptions(walls="slip"))
+    }
+    assert found == pytest.approx({walls: permeability(pack, walls) for walls in ("slip", "no-slip")}, rel=1e-9)
+
+
+def test_fines_beside_walls_that_hold_the_fluid_leave_less_of_it():
+    pack = with_fines(random_pack(60, 0.5, periodic=False), 150, 0.2)
+    found = analyse(pack.grains(), pack, periodic=NONE, options=AnalysisOptions())
+    assert 0.0 < found.k_damaged < found.k_initial
