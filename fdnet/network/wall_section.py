@@ -32,9 +32,9 @@ def wall_cuts(network: Network) -> tuple[Array, Array, Array]:
     """
     count = len(network.throat_share)
     order, place, part = np.full((count, 2), -1), np.zeros((count, 3)), np.ones(count)
-    if network.walls == "slip":
-        return order, place, part
     cut = np.flatnonzero(network.throat_share < 1.0)
+    if network.walls == "slip" or not len(cut):
+        return order, place, part
     part[cut] = NARROWED
     single = cut[network.throat_share[cut] == 0.5]
     corner, hair = network.throat_corner[single], HAIR * network.grain_radius
