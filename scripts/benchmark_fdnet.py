@@ -33,6 +33,7 @@ SHAKE = 0.02
 FINE = 0.1
 SIDES = (False, True, True)
 DECADES, CLOSED = 12, 0.1
+MOST_GRAINS_STIFF = 200_000
 
 
 def tiled(grains: int, rng: np.random.Generator) -> Snapshot:
@@ -174,10 +175,11 @@ def tiled_result(wanted: int, fine_count: int, folder: Path) -> dict[str, Any]:
     grains = tiled(wanted, rng)
     fines = seated(grains, fine_count, rng) if fine_count else None
     clock, network, intact, flux = run_steps(grains, fines)
-    stiff = intact * 10.0 ** rng.uniform(-DECADES, 0, len(intact))
-    states = {"intact": intact, "stiff": stiff, "clogged": stiff * (rng.random(len(intact)) >= CLOSED)}
-    inflow = {"intact": flux}
-    for state in ("stiff", "clogged"):
+    states, inflow = {"intact": intact}, {"intact": flux}
+    if len(grains) <= MOST_GRAINS_STIFF:
+        stiff = intact * 10.0 ** rng.uniform(-DECADES, 0, len(intact))
+        states |= {"stiff": stiff, "clogged": stiff * (rng.random(len(intact)) >= CLOSED)}
+    for state in list(states)[1:]:
         work = partial(solve_flow, network, states[state])
         inflow[state] = clock.timed(f"solve {state}", work).inflow
     leave(folder, network, states, inflow)

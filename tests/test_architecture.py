@@ -34,7 +34,7 @@ DOORS = {
     "pandas": {"dem/dump", "report/tables", "report/spheres"},
     "pyvista": {"report/vtk", "report/render"},
     "matplotlib": {"report/figures", "report/side_view"},
-    "numba": {"network"},
+    "numba": {"network/compiled"},
     "pymetis": {"network/solver"},
     "pyamg": {"network/solver"},
     "pydantic": {"case", "case_file"},

@@ -18,8 +18,8 @@ and Poeschel 2016, J. Comput. Phys. 311, 158).
 from math import atan2, copysign, pi, sqrt
 
 import numpy as np
-from numba import njit
 
+from fdnet.network.compiled import compiled
 from fdnet.snapshot import Array
 
 ROUNDING = 1e-13
@@ -29,7 +29,7 @@ OTHERS = np.array([(1, 2, 3), (2, 3, 0), (3, 0, 1), (0, 1, 2)])
 Vector = tuple[float, float, float]
 
 
-@njit(cache=True)
+@compiled
 def fill_pieces(corner: Array, pairs: tuple[Array, Array], balls: tuple[Array, Array, Array], found: Array) -> None:
     """Add to `found` (P, 2 + W) the volume m3 and surface m2 of the pieces of balls inside the tetrahedra `corner`
     (P, 4, 3) m, and the volume times each of the balls' values.
@@ -64,22 +64,22 @@ def fill_pieces(corner: Array, pairs: tuple[Array, Array], balls: tuple[Array, A
                 found[p, 2 + w] += inside * radius[b] ** 3 * value[b, w]
 
 
-@njit(cache=True)
+@compiled
 def _apart(a: Array, b: Array) -> Vector:
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@njit(cache=True)
+@compiled
 def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True)
+@compiled
 def _cross(a: Vector, b: Vector) -> Vector:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True)
+@compiled
 def _facet_normals(corner: Array, normal: Array) -> None:
     """Inward unit normals (4, 3) of the facets opposite each corner."""
     turn = 1.0
@@ -94,7 +94,7 @@ def _facet_normals(corner: Array, normal: Array) -> None:
             normal[f, axis] = scale * across[axis]
 
 
-@njit(cache=True)
+@compiled
 def _piece(place: Array, normal: Array, depth: Array, cuts: int) -> tuple[float, float]:
     """Volume and surface of the unit ball about the origin inside the tetrahedron on `place` (4, 3): the whole ball,
     a cap, or the sum over facets and edges."""
@@ -119,7 +119,7 @@ def _piece(place: Array, normal: Array, depth: Array, cuts: int) -> tuple[float,
     return volume, surface
 
 
-@njit(cache=True)
+@compiled
 def _edge(depth: float, height: float, start: float, end: float) -> tuple[float, float]:
     """Area of triangle (foot, edge) within the disc, and solid angle of the triangle outside it; start < end.
 
@@ -139,7 +139,7 @@ def _edge(depth: float, height: float, start: float, end: float) -> tuple[float,
     return 0.5 * (height * (leave - enter) + disc * (turn_before + turn_after)), before + after
 
 
-@njit(cache=True)
+@compiled
 def _shadow(weight: float, depth: float, height: float, start: float, end: float) -> tuple[float, float]:
     """Solid angle over the part of an edge from `start` to `end`, and the angle this part turns about the foot."""
     if start == end:

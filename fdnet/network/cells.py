@@ -1,8 +1,8 @@
 """Points in given boxes, found by sorting the points into cubic cells."""
 
 import numpy as np
-from numba import njit
 
+from fdnet.network.compiled import compiled
 from fdnet.snapshot import Array
 
 
@@ -28,7 +28,7 @@ def points_in_boxes(point: Array, low: Array, high: Array) -> tuple[Array, Array
     return box, order[found]
 
 
-@njit(cache=True)
+@compiled
 def _search(grid: tuple[Array, float, Array, Array], point: Array, low: Array, high: Array, found: Array) -> Array:
     """Number of points (M,) in each box; writes their indices to `found` where that has room."""
     start, edge, shape, first = grid

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from math import atan2, pi, sqrt
 
 import numpy as np
-from numba import njit
 
 from fdnet.network import geometry
+from fdnet.network.compiled import compiled
 from fdnet.snapshot import Array
 
 GAUSS_POINTS = 10
@@ -52,7 +52,7 @@ def exact_volume(pairs: Pairs) -> Array:
     return volume
 
 
-@njit(cache=True)
+@compiled
 def _fill_volumes(
     sphere: Array, offset: Array, depth: Array, tube: Array, length: Array, rule: tuple[Array, Array], volume: Array
 ) -> None:
@@ -70,13 +70,13 @@ def _fill_volumes(
         volume[k] = found + _crossing(a, d, r, max(low, covers), min(high, crosses), rule)
 
 
-@njit(cache=True)
+@compiled
 def _segment(a: float, low: float, high: float) -> float:
     """Volume of the sphere of radius `a` about 0 between two planes."""
     return pi * (a**2 * (high - low) - (high**3 - low**3) / 3.0) if high > low else 0.0
 
 
-@njit(cache=True)
+@compiled
 def _crossing(a: float, d: float, r: float, low: float, high: float, rule: tuple[Array, Array]) -> float:
     """Integral of the lens of the sphere's disc and the tube's, whose centres are `d` apart."""
     if high <= low:
@@ -91,7 +91,7 @@ def _crossing(a: float, d: float, r: float, low: float, high: float, rule: tuple
     return 0.5 * (high - low) * total
 
 
-@njit(cache=True)
+@compiled
 def place_by_axis(start: Array, end: Array, throat: Array, point: Array, image: Array) -> tuple[Array, Array]:
     """Distance (K,) m of `point[image]` from the axis `start[throat]` to `end[throat]` and place (K,) m along it.
 

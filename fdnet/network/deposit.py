@@ -63,8 +63,8 @@ def _filled(network: Network, corner: Array, fines: Snapshot, value: Array) -> A
 
 
 def wall_distance(network: Network, position: Array) -> Array:
-    """Distance (N,) m of `position` (N, 3) from the nearest of the four grains with the nearest centres."""
-    near = min(4, len(network.image_position))
+    """Distance (N,) m of `position` (N, 3) from the nearest grain; unequal grains: of the four nearest centres."""
+    near = 1 if np.ptp(network.image_radius) == 0 else min(4, len(network.image_position))
     tree = cKDTree(network.image_position)
     apart, grain = tree.query(wrapped(position, network.box, network.periodic), k=np.arange(1, near + 1))
     return np.min(apart - network.image_radius[grain], axis=1, initial=np.inf)

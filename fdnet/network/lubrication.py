@@ -16,9 +16,9 @@ Side walls that hold the fluid (`Network.walls` "no-slip"): the sections they cu
 """
 
 import numpy as np
-from numba import njit
 
 from fdnet.network import geometry
+from fdnet.network.compiled import compiled
 from fdnet.network.section import even_flux, uneven_flux, wedges
 from fdnet.network.tessellation import LENGTH_FLOOR, Network
 from fdnet.network.wall_section import wall_cuts, wall_flux
@@ -44,7 +44,7 @@ def half_resistances(network: Network) -> Array:
     return found
 
 
-@njit(cache=True)
+@compiled
 def _halves(
     corner: Array, radius: Array, heights: Array, cuts: tuple[Array, Array, Array], floor: float, table: Array
 ) -> Array:
@@ -66,7 +66,7 @@ def _halves(
     return found
 
 
-@njit(cache=True)
+@compiled
 def _resistance(
     base: Array,
     radius: Array,
@@ -94,13 +94,13 @@ def _resistance(
     return (4.0 * _summed(narrow, step, 1) - _summed(narrow, step, 2)) / 3.0
 
 
-@njit(cache=True)
+@compiled
 def _slipping_flux(base: Array, disc: Array, wedge: Array, table: Array) -> float:
     flux = even_flux(wedge, disc[0], table) if len(wedge) else 0.0
     return flux if flux > 0.0 else uneven_flux(base, disc, table)
 
 
-@njit(cache=True)
+@compiled
 def _summed(narrow: Array, step: float, every: int) -> float:
     total = 0.0
     for k in range(every, len(narrow), every):

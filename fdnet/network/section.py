@@ -9,8 +9,8 @@ the shadow of the others), each disc keeps what its rays see of the triangle bef
 """
 
 import numpy as np
-from numba import njit
 
+from fdnet.network.compiled import compiled
 from fdnet.network.wedge import ray_flux, shear_ratio
 from fdnet.snapshot import Array
 
@@ -18,7 +18,7 @@ POINTS, WEIGHTS = np.polynomial.legendre.leggauss(6)
 FINE_POINTS, FINE_WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
-@njit(cache=True)
+@compiled
 def wedges(base: Array) -> Array:
     """Half edge, tangent and angle of the six wedges (3, 3) of a triangle `base` (3, 2) with equal discs, two of each;
     an angle is negative where the circumcentre lies beyond that edge."""
@@ -34,7 +34,7 @@ def wedges(base: Array) -> Array:
     return found
 
 
-@njit(cache=True)
+@compiled
 def even_flux(wedge: Array, disc: float, table: Array) -> float:
     """Flux (m4) of laplacian(w) = -1 through the section of `wedges` with three discs of radius `disc`; not positive
     where the sum of signed wedges fails."""
@@ -47,7 +47,7 @@ def even_flux(wedge: Array, disc: float, table: Array) -> float:
     return total
 
 
-@njit(cache=True)
+@compiled
 def uneven_flux(base: Array, disc: Array, table: Array) -> float:
     """Flux (m4) through the open part of a triangle `base` (3, 2), its first corner at the origin and the second on the
     x axis, with discs of radius `disc` (3,). 0 where closed."""
@@ -57,7 +57,7 @@ def uneven_flux(base: Array, disc: Array, table: Array) -> float:
     return found
 
 
-@njit(cache=True)
+@compiled
 def _inscribed(base: Array, disc: Array) -> tuple[float, float, float]:
     """Centre and radius of the circle touching three discs from outside; NaN radius where there is none."""
     a, px, py = base[1, 0], base[2, 0], base[2, 1]
@@ -81,7 +81,7 @@ def _inscribed(base: Array, disc: Array) -> tuple[float, float, float]:
     return ax + bx * radius, ay + by * radius, radius
 
 
-@njit(cache=True)
+@compiled
 def ray(reach: float, disc: float) -> float:
     """Flux (m4) per angle between a disc's rim and the distance `reach` from its centre, without shear between rays."""
     if reach <= disc:
@@ -90,7 +90,7 @@ def ray(reach: float, disc: float) -> float:
     return (4.0 * d2 * d2 * np.log(reach / disc) - 3.0 * d2 * d2 + 4.0 * d2 * r2 - r2 * r2) / 16.0
 
 
-@njit(cache=True)
+@compiled
 def _uneven(base: Array, disc: Array, table: Array) -> float:
     cx, cy, radius = _inscribed(base, disc)
     if np.isnan(radius):
@@ -117,7 +117,7 @@ def _uneven(base: Array, disc: Array, table: Array) -> float:
     return total
 
 
-@njit(cache=True)
+@compiled
 def _shadowed(base: Array, disc: Array, table: Array) -> float:
     total = 0.0
     for i in range(3):

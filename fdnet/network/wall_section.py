@@ -11,8 +11,8 @@ ends at the nearest of these lines or of the trapezoid's sides, so no share is n
 """
 
 import numpy as np
-from numba import njit
 
+from fdnet.network.compiled import compiled
 from fdnet.network.section import FINE_POINTS, FINE_WEIGHTS, POINTS, WEIGHTS, ray
 from fdnet.network.tessellation import Network
 from fdnet.network.wedge import shear_ratio
@@ -55,7 +55,7 @@ def wall_cuts(network: Network) -> tuple[Array, Array, Array]:
     return order, place, part
 
 
-@njit(cache=True)
+@compiled
 def wall_flux(place: Array, first: float, second: float, table: Array) -> float:
     """Flux (m4) of laplacian(w) = -1 between the wall and discs of radius `first` and `second`; `place` (3,) m their
     heights above the wall and distance along it."""
@@ -78,7 +78,7 @@ def wall_flux(place: Array, first: float, second: float, table: Array) -> float:
     return total + _film(place, first, second, 0.0, turn) + _film(place, first, second, turn, place[2])
 
 
-@njit(cache=True)
+@compiled
 def _meeting(place: Array, first: float, second: float) -> tuple[float, float]:
     """Where the two parabolas meet, along the wall from the foot of the first disc and above it: the centre of the
     circle that touches both discs and the wall. Midway along the wall where they do not."""
@@ -92,7 +92,7 @@ def _meeting(place: Array, first: float, second: float) -> tuple[float, float]:
     return along, 0.5 * (along**2 + near) / one
 
 
-@njit(cache=True)
+@compiled
 def _share(across: tuple[float, float, float], disc: float, other: float, low: float, high: float) -> float:
     """What a disc's rays at angles `low` to `high` from the wall's normal see before the nearest line midway or the
     trapezoid's far side; `across` its height, the other's and their distance along the wall."""
@@ -109,7 +109,7 @@ def _share(across: tuple[float, float, float], disc: float, other: float, low: f
     return flux
 
 
-@njit(cache=True)
+@compiled
 def _film(place: Array, first: float, second: float, low: float, high: float) -> float:
     """The wall's share between two distances from the foot of the first disc."""
     flux = 0.0

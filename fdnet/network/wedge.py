@@ -14,8 +14,8 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 
+from fdnet.network.compiled import compiled
 from fdnet.snapshot import Array
 
 TABLE = Path(__file__).with_name("wedge.csv")
@@ -25,7 +25,7 @@ DISCS = np.linspace(0.0, 1.0, 21)
 THINNEST = 0.02
 
 
-@njit(cache=True)
+@compiled
 def ray_flux(angle: float, slope: float, disc: float) -> float:
     """Flux over h^4 of a wedge of `angle` with tangent `slope`, `disc` = rho / h; a disc beyond the side (overlap)
     leaves the rays open that leave it. Closed form of the integral of
@@ -39,7 +39,7 @@ def ray_flux(angle: float, slope: float, disc: float) -> float:
     return whole - _antiderivative(first, np.sqrt(disc * disc - 1.0), disc)
 
 
-@njit(cache=True)
+@compiled
 def _antiderivative(angle: float, slope: float, disc: float) -> float:
     square = slope * slope
     secant4 = slope * (1.0 + square / 3.0)
@@ -48,7 +48,7 @@ def _antiderivative(angle: float, slope: float, disc: float) -> float:
     return (4.0 * spread - 3.0 * secant4 + 4.0 * disc**2 * slope - disc**4 * angle) / 16.0
 
 
-@njit(cache=True)
+@compiled
 def shear_ratio(angle: float, disc: float, table: Array) -> float:
     """exact_flux / ray_flux, bilinear in `table`; steeper wedges than the table's take its last row."""
     rows, columns = table.shape
