@@ -160,6 +160,7 @@ class AnalysisChoices(Part):
     middle_band: Literal["threshold", "position"] = "threshold"
     throat_overlap: Literal["exact", "two-plane"] = "exact"
     profile_bin_mm: Positive = 0.25
+    walls: Literal["no-slip", "slip"] = "no-slip"
 
 
 class Case(Part):

@@ -10,6 +10,7 @@ from typing import Any
 from fdnet.errors import CaseError
 
 LAW_NAMES = ("thesis", "effective", "hydraulic", "series", "lubrication")
+WALL_NAMES = ("no-slip", "slip")
 MOST_SECTIONS = 1000
 DAMAGE_LAW_NAMES = ("thesis", "thesis-code", "kozeny", "side-kozeny")
 _METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
@@ -27,6 +28,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--box", metavar="x0,x1,y0,y1,z0,z1", help="the specimen, in the unit of the columns")
     parser.add_argument(
         "--periodic", default="", metavar="DIRS", help="periodic directions, any of x, y, z together; others are walls"
+    )
+    parser.add_argument(
+        "--walls",
+        choices=WALL_NAMES,
+        default="no-slip",
+        help="side walls hold the fluid, or it slips along them: slip for spheres cut out of a larger pack (default "
+        "no-slip; known to the lubrication and side-kozeny laws)",
     )
     parser.add_argument("--sections", type=_count, default=1, metavar="N", help="slabs along the flow (default 1)")
     parser.add_argument("--law", choices=LAW_NAMES, help="conductance law (default: fdnet's own)")
@@ -56,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
     laws = [chosen]
     if options.compare_laws:
         laws += [pair for pair in product(LAW_NAMES, DAMAGE_LAW_NAMES) if pair != chosen]
-    results = _measure(spheres, around, options.sections, laws, notes)
+    results = _measure(spheres, around, options, laws, notes)
     if options.csv:
         from fdnet.report.tables import write_laws
 
@@ -137,13 +145,18 @@ def turned(spheres: Any, turn: list[int]) -> Any:
 
 
 def _measure(
-    spheres: Any, periodic: tuple[bool, bool, bool], sections: int, laws: list[tuple[str, str]], notes: list[str]
+    spheres: Any,
+    periodic: tuple[bool, bool, bool],
+    given: argparse.Namespace,
+    laws: list[tuple[str, str]],
+    notes: list[str],
 ) -> list[dict[str, Any]]:
     """What each pair of laws gives; the seconds of the first hold what all of them share."""
     from fdnet.network.permeability import AnalysisOptions, compare
 
     damaged = spheres if len(spheres.fines()) else None
-    options = AnalysisOptions(sections=sections, profile_bin=(spheres.box[0, 1] - spheres.box[0, 0]) / 32)
+    profile_bin = (spheres.box[0, 1] - spheres.box[0, 0]) / 32
+    options = AnalysisOptions(sections=given.sections, walls=given.walls, profile_bin=profile_bin)
     results, start = [], time.perf_counter()
     for result in compare(spheres.grains(), damaged, periodic=periodic, options=options, laws=laws):
         now = time.perf_counter()

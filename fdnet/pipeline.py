@@ -208,6 +208,7 @@ def _analysis_options(case: Case) -> AnalysisOptions:
         middle_band=chosen.middle_band,
         overlap=chosen.throat_overlap,
         profile_bin=chosen.profile_bin_mm * 1e-3,
+        walls=chosen.walls,
     )
 
 

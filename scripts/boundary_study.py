@@ -9,8 +9,9 @@
 `tiled`: periodic packs tiled 1, 2, 3 times and cut as a box with walls in y, z or x, y, z, over the periodic pack; with
 the grains centred inside alone, and with those that reach in.
 `slabs`: slabs of 1, 2, ... grain diameters cut out of the periodic pack (mean and extremes over --places slabs).
-`walled`: packs made by LIGGGHTS between walls, over the k of their own inner part, --rim diameters or more from
-every side: mean flux per area there over the pressure gradient there. Law: the default. Seeds are stated in the rows.
+`walled`: packs made by LIGGGHTS between walls, with side walls that slip and that hold the fluid, over the k of their
+own inner part, --rim diameters or more from every side: mean flux per area there over the pressure gradient there.
+Law: the default. Seeds are stated in the rows.
 """
 
 import argparse
@@ -32,16 +33,16 @@ from fdnet.network.flow import Flow, solve_flow
 from fdnet.network.images import make_images
 from fdnet.network.porosity import measure_porosity
 from fdnet.network.slabs import plane_pressures
-from fdnet.network.tessellation import Network, build_network
+from fdnet.network.tessellation import WALLS, Network, build_network
 from fdnet.scales import carman_kozeny, scales_of
 from fdnet.snapshot import Array, Snapshot
 
 SIDES = {"periodic": (True, True, True), "walls y z": (True, False, False), "walls x y z": (False, False, False)}
 
 
-def solved(pack: Snapshot, periodic: tuple[bool, bool, bool]) -> tuple[Network, Flow, float]:
+def solved(pack: Snapshot, periodic: tuple[bool, bool, bool], walls: str = "slip") -> tuple[Network, Flow, float]:
     """Network, flow and k (m2) of a pack."""
-    network = build_network(pack, periodic=periodic)
+    network = build_network(pack, periodic=periodic, walls=walls)
     flow = solve_flow(network, LAWS[DEFAULT_LAW](network))
     return network, flow, flow.inflow * float(np.ptp(pack.box[0])) / network.area
 
@@ -147,24 +148,26 @@ def walled_rows(counts: list[int], rim: float, *, porosity: float, seed: int) ->
         )
         with tempfile.TemporaryDirectory() as folder:
             pack = make_pack(case, scales_of(case), Path(folder) / "pack", Launch(binary=binary)).grains
-        network, flow, k = solved(pack, SIDES["walls x y z"])
-        core = pack.box + rim * 0.5e-3 * np.array([1, -1])
+        yield {"grains": len(pack), "seed": seed, "width_diameters": edge / 0.5} | walled_row(pack, rim)
+
+
+def walled_row(pack: Snapshot, rim: float) -> dict[str, float]:
+    """k of a pack between walls over that of its inner part, with walls that slip and that hold the fluid."""
+    diameter = 2.0 * float(pack.radius.mean())
+    core = pack.box + rim * diameter * np.array([1, -1])
+    whole, inside = (
+        measure_porosity(pack if box is None else boxed(pack, box), periodic=(False,) * 3).mean for box in (None, core)
+    )
+    row = {"porosity": whole, "porosity_inner": inside}
+    for walls in WALLS:
+        network, flow, k = solved(pack, SIDES["walls x y z"], walls)
         inner = inner_permeability(network, flow, core)
-        whole, inside = (
-            measure_porosity(pack if box is None else boxed(pack, box), periodic=(False,) * 3).mean
-            for box in (None, core)
-        )
-        yield {
-            "grains": len(pack),
-            "seed": seed,
-            "width_diameters": edge / 0.5,
-            "porosity": whole,
-            "porosity_inner": inside,
-            "k_m2": k,
-            "k_inner_m2": inner,
-            "k_over_inner": k / inner,
-            "inner_over_carman_kozeny": inner / carman_kozeny(inside, 0.5e-3),
-        }
+        name = walls.replace("-", "_")
+        row |= {f"k_{name}_m2": k, f"k_inner_{name}_m2": inner, f"k_over_inner_{name}": k / inner}
+    return row | {
+        "inner_over_carman_kozeny": inner / carman_kozeny(inside, diameter),
+        "k_over_carman_kozeny": k / carman_kozeny(whole, diameter),
+    }
 
 
 def boxed(pack: Snapshot, box: Array) -> Snapshot:

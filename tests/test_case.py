@@ -10,6 +10,7 @@ from builders import TINY, tiny
 
 from fdnet.case_file import case_from, known_keys, read_case, set_keys
 from fdnet.errors import CaseError
+from fdnet.pipeline import _analysis_options
 
 
 def problems(data: dict) -> str:
@@ -113,6 +114,14 @@ def test_stages_depend_only_on_their_own_keys():
     assert other_fines.digest("pack") == case.digest("pack")
     assert other_fines.digest("invade") != case.digest("invade")
     assert tiny("seed=2").digest("pack") != case.digest("pack")
+
+
+def test_analysis_choices_reach_the_analysis():
+    """What the two share by name is handed on; the default walls hold the fluid."""
+    assert tiny().analysis.walls == "no-slip"
+    options = _analysis_options(tiny("analysis.walls=slip", "analysis.sections=3", "analysis.law=thesis"))
+    assert (options.walls, options.sections, options.law) == ("slip", 3, "thesis")
+    assert "analysis.walls: 'sticky'" in problems(changed(analysis={"walls": "sticky"}))
 
 
 def test_set_reads_values_as_toml_and_refuses_nonsense():

@@ -46,6 +46,18 @@ def test_units_axes_and_fully_periodic_lattice(tmp_path, capsys):
     assert {"pores", "throats", "solver", "law", "damage_law", "seconds", "warnings", "porosity_damaged"} <= set(result)
 
 
+def test_walls_hold_the_fluid_unless_they_slip(tmp_path, capsys):
+    """A lattice between walls that slip is the endless lattice; holding the fluid they leave less."""
+    box = cubic(tmp_path / "sc.csv")
+    k = {}
+    for walls in ("", "--walls=slip", "--walls=no-slip", "--periodic=yz"):
+        code, out, err = answer(capsys, tmp_path / "sc.csv", "--units", "mm", "--box", box, "--json", *walls.split())
+        assert code == 0, err
+        k[walls] = json.loads(out)["k_initial_m2"]
+    assert k["--walls=slip"] == pytest.approx(k["--periodic=yz"], rel=1e-6)
+    assert k[""] == k["--walls=no-slip"] < 0.8 * k["--walls=slip"]
+
+
 def test_a_box_that_does_not_start_at_zero(tmp_path, capsys):
     cubic(tmp_path / "sc.csv")
     rows = (tmp_path / "sc.csv").read_text().splitlines()

@@ -11,6 +11,8 @@ expansion and the right scaling for an orifice,
 
 within 7.5 % of the exact flow through every hyperboloid from a long tube to Sampson's orifice (Happel and Brenner
 1965, section 4-29).
+
+Side walls that hold the fluid (`Network.walls` "no-slip"): the sections they cut are those of `wall_section`.
 """
 
 import numpy as np
@@ -19,6 +21,7 @@ from fdnet.network import geometry
 from fdnet.network.compiled import compiled
 from fdnet.network.section import even_flux, uneven_flux, wedges
 from fdnet.network.tessellation import LENGTH_FLOOR, Network
+from fdnet.network.wall_section import wall_cuts, wall_flux
 from fdnet.network.wedge import ratio_table
 from fdnet.snapshot import Array
 
@@ -36,13 +39,21 @@ def half_resistances(network: Network, *, widening: float = WIDENING) -> Array:
     radius = np.ascontiguousarray(network.throat_corner_radius)
     heights = np.ascontiguousarray(network.throat_heights)
     floor = LENGTH_FLOOR * network.grain_radius
-    found = _halves(corner, radius, heights, (floor, float(widening)), ratio_table())
+    found = _halves(corner, radius, heights, wall_cuts(network), (floor, float(widening)), ratio_table())
     found[network.throat_radius <= 0] = np.inf
     return found
 
 
 @compiled
-def _halves(corner: Array, radius: Array, heights: Array, given: tuple[float, float], table: Array) -> Array:
+def _halves(
+    corner: Array,
+    radius: Array,
+    heights: Array,
+    cuts: tuple[Array, Array, Array],
+    given: tuple[float, float],
+    table: Array,
+) -> Array:
+    order, place, part = cuts
     floor, widening = given
     found = np.zeros((len(corner), 2))
     for t in range(len(corner)):
@@ -50,36 +61,50 @@ def _halves(corner: Array, radius: Array, heights: Array, given: tuple[float, fl
         high = max(high, low + floor)
         even = np.max(radius[t]) - np.min(radius[t]) <= EQUAL * radius[t, 0]
         wedge = wedges(corner[t]) if even else np.empty((0, 3))
+        wall = (order[t], place[t], part[t])
         if low < 0.0 and high > 0.0:
-            found[t, 0] = _resistance(corner[t], radius[t], wedge, (0.0, -low), widening, table)
-            found[t, 1] = _resistance(corner[t], radius[t], wedge, (0.0, high), widening, table)
+            found[t, 0] = _resistance(corner[t], radius[t], wedge, wall, (0.0, -low, widening), table)
+            found[t, 1] = _resistance(corner[t], radius[t], wedge, wall, (0.0, high, widening), table)
         elif low >= 0.0:
-            found[t, 1] = _resistance(corner[t], radius[t], wedge, (low, high), widening, table)
+            found[t, 1] = _resistance(corner[t], radius[t], wedge, wall, (low, high, widening), table)
         else:
-            found[t, 0] = _resistance(corner[t], radius[t], wedge, (-high, -low), widening, table)
+            found[t, 0] = _resistance(corner[t], radius[t], wedge, wall, (-high, -low, widening), table)
     return found
 
 
 @compiled
 def _resistance(
-    base: Array, radius: Array, wedge: Array, span: tuple[float, float], widening: float, table: Array
+    base: Array,
+    radius: Array,
+    wedge: Array,
+    wall: tuple[Array, Array, float],
+    span: tuple[float, float, float],
+    table: Array,
 ) -> float:
     """Integral of dR between two heights: 1/a linear within a step, extrapolated from STEPS and STEPS / 2 steps."""
-    low, high = span
+    low, high, widening = span
     step = (high - low) / STEPS
     narrow = np.empty(STEPS + 1)
     disc = np.empty(3)
+    order, place, part = wall
     for k in range(STEPS + 1):
         z = low + k * step
         for i in range(3):
             disc[i] = np.sqrt(max(radius[i] ** 2 - z * z, (TIP * radius[i]) ** 2))
-        flux = even_flux(wedge, disc[0], table) if len(wedge) else 0.0
-        if not flux > 0.0:
-            flux = uneven_flux(base, disc, table)
+        if order[0] >= 0:
+            flux = part * wall_flux(place, disc[order[0]], disc[order[1]], table)
+        else:
+            flux = part * _slipping_flux(base, disc, wedge, table)
         if not flux > 0.0:
             return np.inf
         narrow[k] = (8.0 * flux / np.pi) ** -0.25
     return (4.0 * summed(narrow, step, 1, widening) - summed(narrow, step, 2, widening)) / 3.0
+
+
+@compiled
+def _slipping_flux(base: Array, disc: Array, wedge: Array, table: Array) -> float:
+    flux = even_flux(wedge, disc[0], table) if len(wedge) else 0.0
+    return flux if flux > 0.0 else uneven_flux(base, disc, table)
 
 
 @compiled

@@ -16,7 +16,7 @@ from fdnet.network.occupancy import Occupancy
 from fdnet.network.sections import Profile, Section, SlabK, make_profile, make_sections, reduction
 from fdnet.network.slabs import inplace_permeability, slab_permeability
 from fdnet.network.specimen import Specimen, measure_specimen
-from fdnet.network.tessellation import Network
+from fdnet.network.tessellation import WALLS, Network
 from fdnet.snapshot import Array, Snapshot, frozen
 
 __all__ = ["Analysis", "AnalysisOptions", "Profile", "Section", "analyse", "compare"]
@@ -27,7 +27,8 @@ STAGES = ("tessellate", "occupancy", "conductance", "solve", "porosity")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnalysisOptions:
     """Choices of an analysis: `sections` count or edges (m), laws by name, `threshold` of the thesis law (None: the
-    law's own), `middle_band` "threshold" or "position", `overlap` "exact" or "two-plane", `profile_bin` m."""
+    law's own), `middle_band` "threshold" or "position", `overlap` "exact" or "two-plane", `profile_bin` m; `walls`
+    "no-slip" or "slip", what side walls do to the fluid."""
 
     sections: int | Sequence[float] = 1
     law: str = DEFAULT_LAW
@@ -36,6 +37,7 @@ class AnalysisOptions:
     middle_band: str = "threshold"
     overlap: str = "exact"
     profile_bin: float | None = None
+    walls: str = "no-slip"
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -132,6 +134,7 @@ def compare(
         initial,
         damaged,
         periodic=periodic,
+        walls=options.walls,
         sections=options.sections,
         profile_bin=options.profile_bin,
         overlap=options.overlap,
@@ -191,7 +194,11 @@ def _analysis(
 
 
 def _check_names(options: AnalysisOptions) -> None:
-    for key, value, known in (("law", options.law, LAWS), ("damage_law", options.damage_law, DAMAGE_LAWS)):
+    for key, value, known in (
+        ("law", options.law, LAWS),
+        ("damage_law", options.damage_law, DAMAGE_LAWS),
+        ("walls", options.walls, WALLS),
+    ):
         if value not in known:
             raise CaseError(f"analysis.{key}: {value!r} is not known; choose one of {sorted(known)}")
 

@@ -82,7 +82,8 @@ def _inscribed(base: Array, disc: Array) -> tuple[float, float, float]:
 
 
 @compiled
-def _ray(reach: float, disc: float) -> float:
+def ray(reach: float, disc: float) -> float:
+    """Flux (m4) per angle between a disc's rim and the distance `reach` from its centre, without shear between rays."""
     if reach <= disc:
         return 0.0
     d2, r2 = reach * reach, disc * disc
@@ -111,7 +112,7 @@ def _uneven(base: Array, disc: Array, table: Array) -> float:
             for point, weight in zip(POINTS, WEIGHTS):  # noqa: B905 - numba knows no strict zip
                 turn = 0.5 * angle * (1.0 + point)
                 reach = 0.5 * (a * a - apart * apart) / (a * np.cos(turn) + apart)
-                flux += weight * 0.5 * angle * _ray(reach, disc[i])
+                flux += weight * 0.5 * angle * ray(reach, disc[i])
             total += flux * shear_ratio(abs(angle), disc[i] / half, table)
     return total
 
@@ -137,7 +138,7 @@ def _shadowed(base: Array, disc: Array, table: Array) -> float:
                 below = a * np.cos(along) + apart
                 if below > 0.0:
                     reach = min(reach, max(0.5 * (a * a - apart * apart) / below, 0.0))
-            flux += weight * 0.5 * opening * _ray(reach, disc[i])
+            flux += weight * 0.5 * opening * ray(reach, disc[i])
             nearest = min(nearest, reach)
         if flux > 0.0:
             total += flux * shear_ratio(0.5 * opening, disc[i] / nearest, table)

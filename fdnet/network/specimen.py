@@ -39,6 +39,7 @@ def measure_specimen(
     damaged: Snapshot | None,
     *,
     periodic: tuple[bool, bool, bool],
+    walls: str,
     sections: int | Sequence[float],
     profile_bin: float | None,
     overlap: str,
@@ -51,9 +52,9 @@ def measure_specimen(
     box = before.box
     edges = section_edges(sections, box)
     with timed("tessellate"):
-        first = build_network(before, periodic=periodic)
+        first = build_network(before, periodic=periodic, walls=walls)
         moved = _displaced(before, after, periodic)
-        network = build_network(after, periodic=periodic) if moved else first
+        network = build_network(after, periodic=periodic, walls=walls) if moved else first
     occupancy = None
     if damaged is not None:
         with timed("occupancy"):

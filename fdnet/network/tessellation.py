@@ -20,17 +20,19 @@ from fdnet.network.throats import (
 from fdnet.network.walls import onto_walls, reaching
 from fdnet.snapshot import Array, Snapshot
 
-__all__ = ["LENGTH_FLOOR", "Network", "build_network"]
+__all__ = ["LENGTH_FLOOR", "WALLS", "Network", "build_network"]
+
+WALLS = ("slip", "no-slip")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Network:
     """Pores (P) and throats (T) of a pack of grains; lengths m, areas m2, volumes m3. x is the flow axis.
 
-    `box` (3, 2); `periodic` (3,): the other faces are mirror planes. `grain_radius` mean; `area` the box's
-    cross-section. `image_grain` (M,) index, `image_position` (M, 3), `image_radius` (M,) of the grains and their
-    images; `pore_images` (P, 4), `throat_images` (T, 3) which of them are at the corners, `pore_wrap` (P, 3) periods by
-    which these lie beyond the place of the pore.
+    `box` (3, 2); `periodic` (3,): the other faces are mirror planes, at the sides with `walls` "slip" or "no-slip".
+    `grain_radius` mean; `area` the box's cross-section. `image_grain` (M,) index, `image_position` (M, 3),
+    `image_radius` (M,) of the grains and their images; `pore_images` (P, 4), `throat_images` (T, 3) which of them are
+    at the corners, `pore_wrap` (P, 3) periods by which these lie beyond the place of the pore.
     A pore cut by mirrored faces lies on them and describes the whole mirrored tetrahedron; `pore_share` (P,) is
     the part inside (1/2 for each such face, else 1), `throat_share` (T,) that of a throat's section.
     `pore_position` (P, 3) centre of the sphere touching the four grains, the centroid where that is outside (Shi
@@ -71,6 +73,7 @@ class Network:
     throat_area: Array
     throat_length: Array
     counts: Mapping[str, int]
+    walls: str = "slip"
 
     @property
     def pore_grains(self) -> Array:
@@ -111,14 +114,16 @@ class Network:
         return ends
 
 
-def build_network(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Network:
+def build_network(grains: Snapshot, *, periodic: tuple[bool, bool, bool], walls: str = "slip") -> Network:
     """Network of `grains` alone (Shi 2011, section 3.2.1); unequal radii: of their power tessellation.
 
-    Periodic sides join. The others are mirror planes (walls that slip): the specimen is one half, fourth or eighth of
-    the periodic one that its mirror images make up. Grains that do not reach into the box are left out and
-    counted. Raises NetworkError on fewer than four grains, coincident grains, grains in one plane, facets without
-    partner, or no throat at all.
+    Periodic sides join. The others are mirror planes: with `walls` "slip" the specimen is one half, fourth or eighth of
+    the periodic one that its mirror images make up; with "no-slip" the y and z faces also hold the fluid, for laws that
+    know it (`lubrication`). Grains that do not reach into the box are left out and counted. Raises NetworkError on
+    unknown walls, fewer than four grains, coincident grains, grains in one plane, facets without partner, or no throat.
     """
+    if walls not in WALLS:
+        raise NetworkError(f"walls: {walls!r} is not known; choose one of {list(WALLS)}")
     periodic = (bool(periodic[0]), bool(periodic[1]), bool(periodic[2]))
     kept = reaching(grains, periodic)
     given, scale = grains, float(grains.radius[kept].mean()) if len(kept) else 0.0
@@ -152,7 +157,13 @@ def build_network(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Net
     size = np.ptp(grains.box, axis=1)
     counts = {**counts, **pore_counts, **throat_counts}
     return Network(
-        box=grains.box, periodic=periodic, grain_radius=scale, area=float(size[1] * size[2]), counts=counts, **found
+        box=grains.box,
+        periodic=periodic,
+        grain_radius=scale,
+        area=float(size[1] * size[2]),
+        counts=counts,
+        walls=walls,
+        **found,
     )
 
 

@@ -1,0 +1,188 @@
+"""Side walls that hold the fluid: sections beside a wall against finite differences, and what they do to a pack."""
+
+import numpy as np
+import pytest
+from scipy.sparse import coo_matrix
+from scipy.sparse.linalg import spsolve
+
+from fdnet.errors import CaseError, NetworkError
+from fdnet.network.conductance import LAWS
+from fdnet.network.flow import solve_flow
+from fdnet.network.lubrication import half_resistances
+from fdnet.network.permeability import AnalysisOptions, analyse
+from fdnet.network.section import uneven_flux
+from fdnet.network.tessellation import build_network
+from fdnet.network.wall_section import wall_cuts, wall_flux
+from fdnet.network.wedge import ratio_table
+from tests.network.packs import random_pack, simple_cubic, snapshot, with_fines
+
+NONE = (False,) * 3
+
+
+def resolved_flux(place, disc, cells=200):
+    """Flux of laplacian(w) = -1, w = 0 on the wall and on two discs, no shear on the trapezoid's other sides."""
+    step = place[2] / cells
+    x, y = np.meshgrid((np.arange(cells) + 0.5) * step, np.arange(step / 2, max(place[:2]), step), indexing="ij")
+    first = x**2 + (y - place[0]) ** 2 < disc[0] ** 2
+    solid = first | ((x - place[2]) ** 2 + (y - place[1]) ** 2 < disc[1] ** 2)
+    inside = y < place[0] + (place[1] - place[0]) * x / place[2]
+    fluid = np.pad(inside & ~solid, 1)
+    held = np.pad(inside & solid, 1)
+    held[:, 0] = True
+    index = np.full(fluid.shape, -1)
+    index[fluid] = np.arange(fluid.sum())
+    own, rows, columns = np.zeros(fluid.sum()), [], []
+    for axis, way in ((0, 1), (0, -1), (1, 1), (1, -1)):
+        beside = np.roll(index, way, axis=axis)[fluid]
+        wall = 2.0 if (axis, way) == (1, 1) else 1.0
+        near_wall = np.nonzero(fluid)[1] == 1
+        own += (beside >= 0) + np.roll(held, way, axis=axis)[fluid] * np.where(near_wall, wall, 1.0)
+        rows.append(np.flatnonzero(beside >= 0))
+        columns.append(beside[beside >= 0])
+    row, column = np.concatenate(rows), np.concatenate(columns)
+    count = len(own)
+    system = coo_matrix((-np.ones(len(row)), (row, column)), shape=(count, count)).tolil()
+    system.setdiag(own)
+    return spsolve(system.tocsc(), np.full(count, step**2)).sum() * step**2
+
+
+@pytest.mark.parametrize(
+    ("place", "disc"),
+    [
+        ((1.0, 1.0, 2.0), (1.0, 1.0)),
+        ((1.0, 1.5, 2.1), (1.0, 1.0)),
+        ((1.5, 1.5, 2.0), (1.0, 1.0)),
+        ((1.0, 1.0, 2.0), (0.5, 0.5)),
+        ((1.0, 2.2, 1.7), (1.0, 1.0)),
+        ((0.6, 1.3, 2.2), (1.0, 0.7)),
+        ((0.0, 1.0, 2.2), (1.0, 1.0)),
+    ],
+    ids=["touching all", "one raised", "both raised", "small discs", "steep", "cut and unequal", "on the wall"],
+)
+def test_half_section_against_finite_differences(place, disc):
+    found = wall_flux(np.array(place), *disc, ratio_table())
+    assert found == pytest.approx(resolved_flux(place, disc), rel=0.06)
+
+
+def test_two_thin_discs_far_apart_leave_a_channel_with_one_wall():
+    """Between the wall and the free line of centres, L >> H: L H^3 / 3 but for what the discs hold near them."""
+    for along in (20.0, 30.0, 40.0):
+        found = wall_flux(np.array([1.0, 1.0, along]), 0.01, 0.01, ratio_table())
+        assert found == pytest.approx((along - 1.0) / 3.0, rel=0.05)
+
+
+def test_centre_of_the_touching_circle_outside_still_leaves_a_flux():
+    place, disc = (1.2, 2.8, 1.3), (1.0, 1.0)
+    found = wall_flux(np.array(place), *disc, ratio_table())
+    assert 0.5 * resolved_flux(place, disc) < found < resolved_flux(place, disc)
+
+
+def test_swapping_the_discs_leaves_the_flux():
+    one = wall_flux(np.array([1.0, 1.6, 2.1]), 0.9, 0.7, ratio_table())
+    assert one == pytest.approx(wall_flux(np.array([1.6, 1.0, 2.1]), 0.7, 0.9, ratio_table()), rel=1e-3)
+
+
+def test_overlapping_discs_leave_nothing():
+    assert wall_flux(np.array([0.2, 0.2, 0.5]), 1.0, 1.0, ratio_table()) == 0.0
+
+
+PACKS = {
+    "beside walls": lambda: random_pack(100, 0.5, periodic=False),
+    "cut by walls": lambda: random_pack(100),
+    "radii 1:2": lambda: random_pack(100, spread=0.33),
+    "simple cubic": lambda: simple_cubic(4),
+}
+
+
+def permeability(pack, walls, periodic=NONE, law="lubrication"):
+    network = build_network(pack, periodic=periodic, walls=walls)
+    return solve_flow(network, LAWS[law](network)).inflow * np.ptp(pack.box[0]) / network.area
+
+
+@pytest.mark.parametrize("pack", PACKS)
+def test_walls_that_hold_the_fluid_leave_less_of_it(pack):
+    pack = PACKS[pack]()
+    assert 0.2 < permeability(pack, "no-slip") / permeability(pack, "slip") < 0.8
+
+
+@pytest.mark.parametrize("pack", PACKS)
+def test_every_throat_cut_by_one_wall_is_a_grain_its_image_and_another(pack):
+    network = build_network(PACKS[pack](), periodic=NONE, walls="no-slip")
+    order, place, part = wall_cuts(network)
+    ends = network.pore_group[network.throat_pores]
+    free = ends[:, 0] != ends[:, 1]
+    half = free & (network.throat_share == 0.5)
+    assert np.all(order[half] >= 0)
+    assert np.all(part[free & (network.throat_share == 0.25)] == 0.25)
+    assert np.all(part[network.throat_share == 1] == 1)
+    wall = network.box[1:].ravel()
+    for t in np.flatnonzero(half)[:50]:
+        side = network.throat_corner[t][:, 1:]
+        heights = np.abs(np.repeat(side, 2, axis=1) - wall)
+        assert np.any(np.all(np.isclose(heights[order[t]], place[t, :2, None], atol=1e-9), axis=0))
+
+
+def test_a_throat_cut_by_a_wall_carries_less_than_half_of_one_that_slips():
+    pack = random_pack(100, 0.5, periodic=False)
+    network = build_network(pack, periodic=NONE, walls="no-slip")
+    order, place, _ = wall_cuts(network)
+    cut = np.flatnonzero((order[:, 0] >= 0) & (network.throat_share == 0.5))
+    assert len(cut) > 100
+    for t in cut:
+        i, j = order[t]
+        disc = network.throat_corner_radius[t]
+        held = wall_flux(place[t], disc[i], disc[j], ratio_table())
+        (h, g, apart), r, s = place[t], disc[i], disc[j]
+        lower = np.array([[0.0, 0.0], [2 * h, 0.0], [h + g, apart]])
+        upper = np.array([[0.0, 0.0], [2 * g, 0.0], [h + g, apart]])
+        slips = uneven_flux(lower, np.array([r, r, s]), ratio_table())
+        slips += uneven_flux(upper, np.array([s, s, r]), ratio_table())
+        assert held < 0.5 * slips
+
+
+def test_periodic_sides_and_other_laws_know_no_walls():
+    pack = random_pack(100)
+    assert permeability(pack, "no-slip", (False, True, True)) == permeability(pack, "slip", (False, True, True))
+    assert permeability(pack, "no-slip", law="series") == permeability(pack, "slip", law="series")
+
+
+def test_a_grain_centred_on_a_wall_has_one_triangle_for_the_whole_section():
+    """A row of grains on the wall and others above: lifting the row by a hair splits each triangle in two."""
+    pack = random_pack(60, 0.45, periodic=False)
+    found = []
+    for lift in (0.0, 1e-4):
+        position = pack.position.copy()
+        near = np.argsort(position[:, 1])[:4]
+        position[near, 1] = lift
+        moved = snapshot(position, 1.0, pack.box)
+        found.append(permeability(moved, "no-slip", (True, False, True)))
+        cuts = wall_cuts(build_network(moved, periodic=(True, False, True), walls="no-slip"))
+        assert np.any(cuts[2] == 2.0) == (lift == 0.0)
+    assert found[0] == pytest.approx(found[1], rel=2e-2)
+
+
+def test_half_resistances_are_those_of_the_law():
+    network = build_network(random_pack(100, 0.5, periodic=False), periodic=NONE, walls="no-slip")
+    assert LAWS["lubrication"](network) == pytest.approx(1.0 / half_resistances(network).sum(axis=1))
+
+
+def test_unknown_walls_are_refused():
+    with pytest.raises(NetworkError, match=r"'sticky'.*slip"):
+        build_network(random_pack(60), periodic=NONE, walls="sticky")
+    with pytest.raises(CaseError, match=r"analysis.walls: 'sticky'.*slip"):
+        analyse(random_pack(60), None, periodic=NONE, options=AnalysisOptions(walls="sticky"))
+
+
+def test_an_analysis_holds_the_fluid_at_the_walls_unless_told_otherwise():
+    pack = random_pack(100, 0.5, periodic=False)
+    found = {
+        options.walls: analyse(pack, None, periodic=NONE, options=options).k_initial
+        for options in (AnalysisOptions(), AnalysisOptions(walls="slip"))
+    }
+    assert found == pytest.approx({walls: permeability(pack, walls) for walls in ("slip", "no-slip")}, rel=1e-9)
+
+
+def test_fines_beside_walls_that_hold_the_fluid_leave_less_of_it():
+    pack = with_fines(random_pack(60, 0.5, periodic=False), 150, 0.2)
+    found = analyse(pack.grains(), pack, periodic=NONE, options=AnalysisOptions())
+    assert 0.0 < found.k_damaged < found.k_initial
