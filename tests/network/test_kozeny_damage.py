@@ -142,6 +142,18 @@ def test_layer_of_fines_on_grains_is_a_diameter_thick(network, pack):
     assert volume.sum() == pytest.approx(4 / 3 * np.pi * 0.2**3)
 
 
+@pytest.mark.parametrize("spread", [0.0, 0.3, 0.8])
+def test_distance_to_the_nearest_of_unequal_grains(spread):
+    """The nearest surface, whichever centres are nearer; by a search of all grains."""
+    pack = random_pack(120, spread=spread)
+    network = build_network(pack, periodic=ALL)
+    place = np.random.default_rng(7).random((2000, 3)) * pack.box[:, 1]
+    away = pack.position - place[:, None]
+    away -= pack.box[:, 1] * np.round(away / pack.box[:, 1])
+    nearest = np.min(np.linalg.norm(away, axis=2) - pack.radius, axis=1)
+    assert wall_distance(network, place) == pytest.approx(nearest, abs=1e-12)
+
+
 def test_layer_of_fines_at_two_distances_spreads(network, pack):
     """Same pore filled from two balls of radius r at y1 and y2: mean + sqrt(5 variance + r^2)."""
     centre = network.pore_power_centre[np.argmax(network.pore_radius)]
