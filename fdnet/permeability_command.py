@@ -56,6 +56,8 @@ def run(options: argparse.Namespace) -> int:
     from fdnet.network.damage import DEFAULT_DAMAGE_LAW
 
     periodic = _directions(options.periodic)
+    if options.csv and not options.csv.parent.is_dir():
+        raise CaseError(f"--csv: {options.csv.parent} is not a folder; make it first")
     spheres, notes = read_snapshot(options, periodic)
     turn = [("xyz".index(options.axis) + k) % 3 for k in range(3)]
     spheres = turned(spheres, turn)
@@ -197,10 +199,10 @@ def _print(results: list[dict[str, Any]], options: argparse.Namespace) -> None:
         f"porosity {first['porosity_initial']:.5f} -> {first['porosity_damaged']:.5f}, {first['pores']} pores, "
         f"{first['throats']} throats"
     )
-    print(f"{'law':<10} {'damage law':<12} {'k m2':>12} {'k damaged m2':>13} {'k/k0':>8}")
+    print(f"{'law':<11} {'damage law':<11} {'k m2':>12} {'k damaged m2':>13} {'k/k0':>8}")
     for row in results:
         print(
-            f"{row['law']:<10} {row['damage_law']:<12} {row['k_initial_m2']:>12.5g} "
+            f"{row['law']:<11} {row['damage_law']:<11} {row['k_initial_m2']:>12.5g} "
             f"{row['k_damaged_m2']:>13.5g} {_ratio(row):>8}"
         )
     if options.sections > 1:

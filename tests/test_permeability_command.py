@@ -136,3 +136,25 @@ def test_a_pack_without_an_open_path_is_an_answer(tmp_path, capsys):
     assert result["k_reduction"] is None
     assert 0 < result["porosity_initial"] < 0.05
     assert any("path" in warning for warning in result["warnings"])
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_box_beside_all_grains_is_told(tmp_path, capsys):
+    cubic(tmp_path / "sc.csv")
+    code, _, err = answer(capsys, tmp_path / "sc.csv", "--units", "mm", "--box", "50,54,50,54,50,54")
+    assert code == 4
+    assert "0 of 64 grains reach into the box" in err
+
+
+def test_a_folder_for_the_table_is_looked_for_first(tmp_path, capsys):
+    box = cubic(tmp_path / "sc.csv")
+    table = tmp_path / "none" / "laws.csv"
+    code, out, err = answer(capsys, tmp_path / "sc.csv", "--units", "mm", "--box", box, "--csv", table)
+    assert (code, out) == (2, "")
+    assert "is not a folder" in err
+
+
+def test_columns_of_the_table_stand_below_their_names(tmp_path, capsys):
+    box = cubic(tmp_path / "sc.csv")
+    _, out, _ = answer(capsys, tmp_path / "sc.csv", "--units", "mm", "--box", box, "--periodic", "yz", "--compare-laws")
+    assert len({len(line) for line in out.splitlines()[1:]}) == 1

@@ -56,9 +56,7 @@ def needed_margin(found: Tetrahedra, box: Array) -> Array:
 
 
 def check_grains(grains: Snapshot, periodic: tuple[bool, ...]) -> None:
-    """Raises NetworkError on fewer than four grains, lengths that are not positive, and coincident grains."""
-    if len(grains) < 4:
-        raise NetworkError(f"tessellation: {len(grains)} grains; a tetrahedron needs at least 4, give more grains")
+    """Raises NetworkError on lengths that are not positive, and coincident grains."""
     if np.any(grains.radius <= 0) or np.any(grains.box[:, 1] <= grains.box[:, 0]):
         raise NetworkError("tessellation: a grain radius or a box side is not positive; check the input lengths")
     tree = neighbour_tree(grains.position, grains.box, periodic=periodic)

@@ -63,11 +63,17 @@ def _filled(network: Network, corner: Array, fines: Snapshot, value: Array) -> A
 
 
 def wall_distance(network: Network, position: Array) -> Array:
-    """Distance (N,) m of `position` (N, 3) from the nearest grain; unequal grains: of the four nearest centres."""
-    near = 1 if np.ptp(network.image_radius) == 0 else min(4, len(network.image_position))
-    tree = cKDTree(network.image_position)
-    apart, grain = tree.query(wrapped(position, network.box, network.periodic), k=np.arange(1, near + 1))
-    return np.min(apart - network.image_radius[grain], axis=1, initial=np.inf)
+    """Distance (N,) m of `position` (N, 3) from the nearest grain, negative inside it: more and more of the nearest
+    centres are looked at, until no centre further away can have the nearer surface."""
+    radius, count = network.image_radius, len(network.image_radius)
+    tree, place = cKDTree(network.image_position), wrapped(position, network.box, network.periodic)
+    found, left, near = np.empty(len(place)), np.arange(len(place)), 1
+    while len(left):
+        apart, grain = tree.query(place[left], k=np.arange(1, near + 1))
+        found[left] = np.min(apart - radius[grain], axis=1)
+        left = left[(apart[:, -1] - radius.max() < found[left]) & (near < count)]
+        near = min(4 * near, count)
+    return found
 
 
 def centred_inside(network: Network, position: Array) -> Array:

@@ -67,8 +67,8 @@ def tessellate(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> tuple[
     """Unique tetrahedra of `grains` in their box, and the facets they share.
 
     Images are added until every sphere that must be empty lies within them and every facet has its partner; both
-    together mean that no tetrahedron is wrong or missing. Raises NetworkError on too few, coincident or coplanar
-    grains, and when more than a hair of the facets (1e-3) stay without partner away from the mirrored faces.
+    together mean that no tetrahedron is wrong or missing. Raises NetworkError on coincident or coplanar grains,
+    and when more than a hair of the facets (1e-3) stay without partner away from the mirrored faces.
     """
     check_grains(grains, periodic)
     size = grains.box[:, 1] - grains.box[:, 0]

@@ -53,8 +53,9 @@ def side_kozeny_damage(
     pore where it is larger: weight 1 / (1 + (4 V_fine / void)^2) on the side. s = 1 - (1 - t)^2 is the share of a
     round tube's section (radius twice the pack's hydraulic radius, void / wall) within the fines' layer on its wall, t
     the layer's thickness over that radius, at most 1: a film takes up the slow part of the void only, a bed and fines
-    as large as the tube all of it. Nothing is fitted. A side or pore whose
-    fines fill it (v >= 1) is closed and counted. `threshold` and `middle_band` play no part here.
+    as large as the tube all of it. Nothing is fitted. Fines deeper inside a grain than their radius make no layer
+    (`layers_within_grains`, t = 0) and count by their surface alone. A side or pore whose fines fill it (v >= 1) is
+    closed and counted. `threshold` and `middle_band` play no part here.
     """
     del threshold, middle_band
     pore = _pore_deposit(network, occupancy)
@@ -65,13 +66,17 @@ def side_kozeny_damage(
     volume = own * _over(occupancy.side_solid_volume, np.where(open_side, void, 0.0)) + (1.0 - own) * pore.volume[ends]
     surface = own * _over(occupancy.side_solid_surface, np.where(open_side, wall, 0.0))
     surface += (1.0 - own) * pore.surface[ends]
-    share = 1.0 - (1.0 - np.minimum(pore.layer / (2.0 * _hydraulic_radius(network)), 1.0)) ** 2
+    share = 1.0 - (1.0 - np.clip(pore.layer / (2.0 * _hydraulic_radius(network)), 0.0, 1.0)) ** 2
     filled = (volume >= 1.0) | pore.filled[ends]
     factor = np.where(filled, 0.0, _kozeny(np.minimum(volume, 1.0), surface, share[ends]))
     kept = _kept(half_resistances(network), factor)
     law = np.where((volume > 0).any(axis=1), KOZENY, CLEAN).astype("<U10")
     law[(kept == 0) & (law == KOZENY)] = BLOCKED
-    counts = {"pores_filled": int(pore.filled.sum()), "sides_filled": int(filled.sum())}
+    counts = {
+        "pores_filled": int(pore.filled.sum()),
+        "sides_filled": int(filled.sum()),
+        "layers_within_grains": int(np.sum(pore.layer < 0)),
+    }
     return Damage(conductance=frozen(clean * kept), law_used=frozen(law), counts=counts)
 
 

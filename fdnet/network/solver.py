@@ -114,7 +114,8 @@ def _order(matrix: sparse.csr_matrix) -> Array:
 
 def multigrid(matrix: sparse.csr_matrix) -> Solve:
     """Conjugate gradients with a symmetric Ruge-Stuben V-cycle; NaN where 100 steps do not reach the given norm of the
-    residual."""
+    residual. Thousands of pores without a link (a thin slab, a clogged pack) stay on the coarsest level, which
+    therefore is solved as the sparse system it is."""
     levels = pyamg.ruge_stuben_solver(
         matrix,
         strength=("classical", {"theta": STRENGTH}),
@@ -122,6 +123,7 @@ def multigrid(matrix: sparse.csr_matrix) -> Solve:
         presmoother=("gauss_seidel", {"sweep": "forward"}),
         postsmoother=("gauss_seidel", {"sweep": "backward"}),
         max_coarse=10,
+        coarse_solver="splu",
     )
     cycle = levels.aspreconditioner().matvec
 

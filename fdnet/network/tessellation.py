@@ -126,7 +126,12 @@ def build_network(grains: Snapshot, *, periodic: tuple[bool, bool, bool], walls:
         raise NetworkError(f"walls: {walls!r} is not known; choose one of {list(WALLS)}")
     periodic = (bool(periodic[0]), bool(periodic[1]), bool(periodic[2]))
     kept = reaching(grains, periodic)
-    given, scale = grains, float(grains.radius[kept].mean()) if len(kept) else 0.0
+    if len(kept) < 4:
+        raise NetworkError(
+            f"tessellation: {len(kept)} of {len(grains)} grains reach into the box; a tetrahedron needs at least 4, "
+            "give more grains or mend the box"
+        )
+    given, scale = grains, float(grains.radius[kept].mean())
     grains, beyond = onto_walls(grains.where(kept), periodic)
     tetrahedra, facets = tessellate(grains, periodic=periodic)
     polyhedra = make_polyhedra(tetrahedra, facets, grains.box, scale)

@@ -25,7 +25,8 @@ def onto_walls(grains: Snapshot, periodic: tuple[bool, ...]) -> tuple[Snapshot, 
     are put on it; at the x faces 1e-4 mean radii inside it, so that facets between three of them are throats that end
     in pores on the face, where the pressure is held.
     """
-    hair = ON_FACE_HAIR * float(grains.radius.mean()) if len(grains) else 0.0
+    scale = float(grains.radius.mean())
+    hair = ON_FACE_HAIR * scale
     position, radius = grains.position.copy(), grains.radius.copy()
     moved = np.zeros(len(grains), bool)
     for axis in np.flatnonzero(~np.array(periodic)):
@@ -34,7 +35,7 @@ def onto_walls(grains: Snapshot, periodic: tuple[bool, ...]) -> tuple[Snapshot, 
         outside = beyond > hair
         height = np.where(outside, radius - beyond, radius)
         # half sphere 2 pi r^3 / 3 against cap pi h^2 (3 R - h) / 3
-        depth = INSET * float(grains.radius.mean()) if axis == 0 else 0.0
+        depth = INSET * scale if axis == 0 else 0.0
         radius = np.where(outside, _same_cap(radius, height, depth), radius)
         near = beyond > -max(hair, depth)
         middle = 0.5 * (low + high)

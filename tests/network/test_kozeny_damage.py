@@ -10,6 +10,7 @@ from fdnet.network.conductance import LAWS
 from fdnet.network.damage import DAMAGE_LAWS
 from fdnet.network.deposit import deposit_in_pores, deposit_on_sides, wall_distance
 from fdnet.network.kozeny_damage import _kept
+from fdnet.network.occupancy import measure_occupancy
 from fdnet.network.sides import side_voids
 from fdnet.network.tessellation import build_network
 from fdnet.snapshot import Kind
@@ -64,6 +65,17 @@ def test_a_thin_film_takes_the_share_of_its_ring(network):
     hydraulic = network.pore_volume.sum() / network.pore_wall_surface.sum()
     _, kept = factor(network, even_state(network, volume=0.1, surface=1.0, layer=0.4 * hydraulic))
     assert kept == pytest.approx((1 - 0.36 * 0.1) ** 3 / 4.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("law", DAMAGE_LAWS)
+def test_fines_inside_grains_never_raise_a_conductance(network, pack, law):
+    """Their layer would be negative; counted instead."""
+    grains = pack.grains()
+    fines = snapshot(grains.position, 0.1, pack.box, Kind.FINE)
+    clean = LAWS["lubrication"](network)
+    found = DAMAGE_LAWS[law](network, measure_occupancy(network, fines), clean)
+    assert np.all(found.conductance <= clean * (1.0 + 1e-12))
+    assert law != "side-kozeny" or found.counts["layers_within_grains"] > 100
 
 
 def test_fines_larger_than_a_pore_count_by_the_whole_pore(network):
@@ -128,6 +140,18 @@ def test_layer_of_fines_on_grains_is_a_diameter_thick(network, pack):
     assert layer[held] == pytest.approx(near[0] + 0.2)
     assert whole[held] == pytest.approx(4 / 3 * np.pi * 0.2**3)
     assert volume.sum() == pytest.approx(4 / 3 * np.pi * 0.2**3)
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.3, 0.8])
+def test_distance_to_the_nearest_of_unequal_grains(spread):
+    """The nearest surface, whichever centres are nearer; by a search of all grains."""
+    pack = random_pack(120, spread=spread)
+    network = build_network(pack, periodic=ALL)
+    place = np.random.default_rng(7).random((2000, 3)) * pack.box[:, 1]
+    away = pack.position - place[:, None]
+    away -= pack.box[:, 1] * np.round(away / pack.box[:, 1])
+    nearest = np.min(np.linalg.norm(away, axis=2) - pack.radius, axis=1)
+    assert wall_distance(network, place) == pytest.approx(nearest, abs=1e-12)
 
 
 def test_layer_of_fines_at_two_distances_spreads(network, pack):

@@ -51,6 +51,18 @@ def test_multigrid_and_direct_agree_on_a_pack(monkeypatch, periodic, decades):
     assert flows[0].throat_flux == pytest.approx(flows[1].throat_flux, abs=1e-8 * flows[1].inflow)
 
 
+@pytest.mark.parametrize("pairs", [0, 3000])
+def test_multigrid_solves_pores_without_neighbours(pairs):
+    """A thin slab: pores, or pairs of pores, tied to the planes alone; nothing to coarsen. In seconds: a dense solve
+    of the coarsest level would take minutes and gigabytes."""
+    count, tied = 6000, np.linspace(1.0, 2.0, 6000)
+    pair = np.arange(2 * pairs).reshape(-1, 2)
+    balances = Balances(pair, np.ones(pairs), tied)
+    found = balances.solve(tied)
+    assert balances.method == MULTIGRID
+    assert found == pytest.approx(np.ones(count))
+
+
 def test_direct_takes_over_where_multigrid_does_not_converge(monkeypatch):
     monkeypatch.setattr(solver, "DIRECT_UP_TO", 0)
     monkeypatch.setattr(solver, "CG_STEPS", 1)
