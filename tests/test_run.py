@@ -126,7 +126,7 @@ def test_force_with_another_law_keeps_pack_and_invasion(finished, tmp_path):
     result = json.loads(again.stdout)
     assert result["law"] == "thesis"
     assert result["invaded_count"] == summary["invaded_count"]
-    assert result["k_initial_m2"] < summary["k_initial_m2"]
+    assert result["k_initial_m2"] != summary["k_initial_m2"]
     assert (copy / "invade" / "stage.json").stat().st_mtime_ns == (run / "invade" / "stage.json").stat().st_mtime_ns
 
 
