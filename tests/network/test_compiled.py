@@ -1,5 +1,7 @@
 """Compiled code is kept apart for every state of the sources."""
 
+import tempfile
+
 import numba
 
 from fdnet.network.compiled import _own_folder, cache_folder
@@ -18,8 +20,9 @@ def test_compiled_code_lies_there():
     assert "numba-" in str(numba.config.CACHE_DIR)
 
 
-def test_a_folder_that_others_may_have_filled_is_not_used(tmp_path):
+def test_a_folder_that_others_may_have_filled_is_not_used(tmp_path, monkeypatch):
     """In a place all can write to, code of somebody else must not be run."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     own = _own_folder(tmp_path / "own")
     assert own == tmp_path / "own"
     assert _own_folder(own) == own
