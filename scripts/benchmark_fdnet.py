@@ -146,13 +146,12 @@ def run_steps(grains: Snapshot, fines: Snapshot | None) -> tuple[Clock, tessella
 def leave(folder: Path, network: tessellation.Network, states: dict[str, Array], inflow: dict[str, float]) -> None:
     x, (low, high) = network.pore_position[:, 0], network.box[0]
     hair = 1e-9 * (high - low)
-    share = getattr(network, "throat_share", 1.0)
     for state, conductance in states.items():
         np.savez(
             folder / f"{state}.npz",
             pairs=network.throat_pores,
             position=network.pore_position,
-            conductance=conductance * share * 1e9,
+            conductance=conductance * network.throat_share * 1e9,
             inlet=x <= low + hair,
             outlet=x >= high - hair,
         )

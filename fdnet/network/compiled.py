@@ -5,8 +5,10 @@ module. Here the cache lies in a folder named after a digest of all sources of t
 answered by old code; it also works where the package's own folder cannot be written. NUMBA_CACHE_DIR, when set, wins.
 """
 
+import contextlib
 import hashlib
 import os
+import stat
 import tempfile
 from pathlib import Path
 
@@ -31,7 +33,17 @@ def _writable_root() -> Path:
         with tempfile.TemporaryFile(dir=wanted):
             return wanted
     except (OSError, RuntimeError):
-        return Path(tempfile.gettempdir()) / f"fdnet-{os.getuid()}"
+        return _own_folder(Path(tempfile.gettempdir()) / f"fdnet-{os.getuid()}")
+
+
+def _own_folder(wanted: Path) -> Path:
+    """`wanted`, closed to others, or a new one where somebody else made it: cached code is run as it is found."""
+    with contextlib.suppress(OSError):
+        wanted.mkdir(mode=0o700, exist_ok=True)
+        told = wanted.lstat()
+        if stat.S_ISDIR(told.st_mode) and told.st_uid == os.getuid() and not told.st_mode & 0o022:
+            return wanted
+    return Path(tempfile.mkdtemp(prefix="fdnet-"))
 
 
 if not config.CACHE_DIR:  # type: ignore[attr-defined]

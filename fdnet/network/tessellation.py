@@ -160,13 +160,12 @@ def build_network(grains: Snapshot, *, periodic: tuple[bool, bool, bool], walls:
     for value in found.values():
         value.setflags(write=False)
     size = np.ptp(grains.box, axis=1)
-    counts = {**counts, **pore_counts, **throat_counts}
     return Network(
         box=grains.box,
         periodic=periodic,
         grain_radius=scale,
         area=float(size[1] * size[2]),
-        counts=counts,
+        counts={**counts, **pore_counts, **throat_counts},
         walls=walls,
         **found,
     )

@@ -1,8 +1,10 @@
 """Compiled code is kept apart for every state of the sources."""
 
+import tempfile
+
 import numba
 
-from fdnet.network.compiled import cache_folder
+from fdnet.network.compiled import _own_folder, cache_folder
 
 
 def test_a_changed_source_has_a_cache_of_its_own(tmp_path):
@@ -16,3 +18,17 @@ def test_a_changed_source_has_a_cache_of_its_own(tmp_path):
 
 def test_compiled_code_lies_there():
     assert "numba-" in str(numba.config.CACHE_DIR)
+
+
+def test_a_folder_that_others_may_have_filled_is_not_used(tmp_path, monkeypatch):
+    """In a place all can write to, code of somebody else must not be run."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    own = _own_folder(tmp_path / "own")
+    assert own == tmp_path / "own"
+    assert _own_folder(own) == own
+    assert own.stat().st_mode & 0o077 == 0
+    (tmp_path / "open").mkdir()
+    (tmp_path / "open").chmod(0o777)
+    (tmp_path / "link").symlink_to(own)
+    for name in ("open", "link"):
+        assert _own_folder(tmp_path / name) not in (tmp_path / name, own)
