@@ -70,7 +70,8 @@ def tessellate(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> tuple[
     Images are added until every sphere that must be empty lies within them and every facet has its partner; both
     together mean that no tetrahedron is wrong or missing. A few facets of flat tetrahedra may stay without, split
     otherwise on either side of a period by rounding; more images do not help them, they are counted. Raises
-    NetworkError on coincident or coplanar grains, and when more than a hair of the facets (1e-3) stay without partner away from the mirrored faces.
+    NetworkError on coincident or coplanar grains, and when more than a hair of the facets (1e-3) stay without partner
+    away from the mirrored faces.
     """
     check_grains(grains, periodic)
     size = grains.box[:, 1] - grains.box[:, 0]

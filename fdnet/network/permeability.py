@@ -159,7 +159,7 @@ def _analysis(
     slabs = clean_slabs if final is clean else _slab_k(final, specimen.edges, log)
     sections = make_sections(specimen.edges, specimen.porosity, (clean_slabs, slabs), specimen.depth)
     porosity, invaded = specimen.porosity, specimen.invaded
-    _warn(log, (clean, final), sections)
+    _warn(log, (clean, final), sections, specimen.occupancy)
     law_used = np.full(len(final.conductance), CLEAN) if damage is None else damage.law_used
     return Analysis(
         network=base.network,
@@ -187,7 +187,7 @@ def _analysis(
         invasion_depth_p95=invaded.depth_p95,
         cake_thickness=invaded.cake_thickness,
         solver=_worst([clean.flow, base.flow, final.flow, *clean_slabs.flows, *slabs.flows]),
-        counts=_counts(base.network, specimen.occupancy, damage, final.flow),
+        counts=_counts(base, specimen.occupancy, damage, final.flow),
         warnings=tuple(log.warnings),
         seconds=log.seconds,
     )
@@ -242,7 +242,7 @@ def _slab_k(state: _State, edges: Array, log: _Log) -> SlabK:
     )
 
 
-def _warn(log: _Log, states: tuple[_State, _State], sections: tuple[Section, ...]) -> None:
+def _warn(log: _Log, states: tuple[_State, _State], sections: tuple[Section, ...], occupancy: Occupancy | None) -> None:
     for name, state in zip(("k_initial", "k_damaged"), states, strict=True):
         if state.flow.reason:
             log.warnings.append(f"{name} = 0: {state.flow.reason}")
@@ -255,6 +255,11 @@ def _warn(log: _Log, states: tuple[_State, _State], sections: tuple[Section, ...
         )
     if network.counts["grains_outside_box"]:
         log.warnings.append(f"{network.counts['grains_outside_box']} grains lie outside the box and play no part")
+    if occupancy is not None and occupancy.counts["fines_outside_box"] and not occupancy.pore_solid_volume.any():
+        log.warnings.append(
+            f"none of the {occupancy.counts['fines_outside_box']} fines is centred in the box: "
+            "no pore holds any; check the box if some should"
+        )
 
 
 def _worst(flows: list[Flow]) -> dict[str, str | float | None]:
@@ -266,8 +271,8 @@ def _worst(flows: list[Flow]) -> dict[str, str | float | None]:
     }
 
 
-def _counts(network: Network, occupancy: Occupancy | None, damage: Damage | None, flow: Flow) -> dict[str, int]:
-    found = dict(network.counts)
+def _counts(base: _State, occupancy: Occupancy | None, damage: Damage | None, flow: Flow) -> dict[str, int]:
+    found = dict(base.network.counts) | {"throats_not_conducting": int(np.sum(base.conductance == 0))}
     if occupancy is not None and damage is not None:
         found |= {**occupancy.counts, **damage.counts, "throats_blocked": int(occupancy.blocked.sum())}
     return found | {"isolated_pores": flow.isolated_pores}

@@ -228,3 +228,15 @@ def test_another_pack_after_the_invasion_is_refused(pack):
 def test_laws_named_by_the_contract_exist():
     assert set(LAWS) == {"thesis", "effective", "hydraulic", "series", "lubrication"}
     assert set(DAMAGE_LAWS) == {"thesis", "thesis-code", "kozeny", "side-kozeny"}
+
+
+def test_fines_all_outside_the_box_are_told_of(pack):
+    away = snapshot([[-1.0, 1.0, 1.0]], 0.1, pack.box, Kind.FINE)
+    found = analyse(pack.grains(), pack.grains().joined(away), periodic=(False, True, True), options=options())
+    assert found.k_damaged == found.k_initial
+    assert any("none of the 1 fines is centred in the box" in warning for warning in found.warnings)
+
+
+def test_throats_that_do_not_conduct_are_counted(pack):
+    found = analyse(pack.grains(), None, periodic=ALL, options=options(("thesis", "thesis")))
+    assert found.counts["throats_not_conducting"] == int(np.sum(found.network.throat_radius == 0))
