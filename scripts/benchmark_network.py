@@ -175,7 +175,7 @@ def measure(options: argparse.Namespace) -> list[Row]:
         runs = [(grains, round(grains * options.fines)) for grains in options.sizes]
         runs += [(options.largest, 0)] * bool(options.largest) + [(1400, 200_000)]
         for grains, fines in runs:
-            new = fdnet_rows(grains, fines, folder, (10 if grains == options.largest else 2) * options.limit)
+            new = fdnet_rows(grains, fines, folder, (10 if grains == options.largest else 5) * options.limit)
             base = {name: new[0][name] for name in ("case", "grains", "pores")}
             if new[0]["status"] == "ok" and grains in options.sizes:
                 if tools["openpnm"]:
@@ -199,7 +199,7 @@ def main() -> None:
         "--limit",
         type=float,
         default=600.0,
-        help="CPU seconds a process of a peer may take (600), fdnet's twice, its largest ten times that",
+        help="CPU seconds a process of a peer may take (600), fdnet five, its largest ten times that",
     )
     parser.add_argument("--truth", type=Path, default=HERE.parent / "tests" / "data" / "truth", help="packs with truth")
     parser.add_argument("--openpnm-python", help="a Python that has OpenPNM")
