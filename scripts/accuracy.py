@@ -72,6 +72,7 @@ def parts(rows: dict[str, list[Row]], refit: Row, missing: list[str], validation
         "tiled_table": tables.tiled_table(validation / "boundary_tiled.csv"),
         "slab_table": tables.slab_table(validation / "boundary_slabs.csv"),
         "walled_table": tables.walled_table(validation / "boundary_walled.csv"),
+        "wall_truth_table": tables.wall_truth_table(validation / "wall_truth.csv"),
         "worst_intact": named_worst(counted, DEFAULT_LAW),
         "worst_loose": named_worst([row for row in intact if row["group"] == LOOSE], DEFAULT_LAW),
         "worst_damage": named_worst(damage, DEFAULT),

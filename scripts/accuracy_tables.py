@@ -206,9 +206,44 @@ def slab_table(path: Path) -> str:
 
 
 def walled_table(path: Path) -> str:
-    names = ("grains", "width_diameters", "porosity", "porosity_inner", "k_over_inner", "inner_over_carman_kozeny")
-    header = ["grains", "W", "porosity", "inside", "k over inside", "inside over Carman-Kozeny"]
-    return markdown(header, [[f"{float(row[name]):.5g}" for name in names] for row in read_csv(path)])
+    columns = {
+        "grains": "grains",
+        "width_diameters": "W",
+        "porosity": "porosity",
+        "porosity_inner": "inside",
+        "k_over_inner_slip": "k over inside, slip",
+        "k_over_inner_no_slip": "no-slip",
+        "inner_over_carman_kozeny": "inside over Carman-Kozeny",
+        "k_over_carman_kozeny": "whole, no-slip, over Carman-Kozeny",
+    }
+    return columns_of(path, columns)
+
+
+def wall_truth_table(path: Path) -> str:
+    columns = {
+        "pack": "pack",
+        "grains": "grains",
+        "walls": "walls",
+        "width_diameters": "W",
+        "porosity": "porosity",
+        "truth_error": "truth's relative error",
+        "slip_over_truth": "slip",
+        "no_slip_over_truth": "no-slip",
+    }
+    return columns_of(path, columns)
+
+
+def columns_of(path: Path, columns: dict[str, str]) -> str:
+    """A table of some columns of a CSV file, numbers to four digits."""
+    rows = [[row[name] for name in columns] for row in read_csv(path)]
+    return markdown(list(columns.values()), [[shortened(value) for value in row] for row in rows])
+
+
+def shortened(value: str) -> str:
+    try:
+        return f"{float(value):.4g}" if "." in value else value
+    except ValueError:
+        return value
 
 
 def benchmark_tables(path: Path, own: dict[str, float]) -> str:
