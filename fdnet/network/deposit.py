@@ -52,14 +52,24 @@ def side_corners(network: Network, side: int, throat: Array) -> Array:
 
 def _filled(network: Network, corner: Array, fines: Snapshot, value: Array) -> Array:
     found = np.zeros((len(corner), 2 + value.shape[1]))
-    if len(fines) and len(corner):
-        corner = np.ascontiguousarray(corner)
-        low, high = corner.min(axis=1), corner.max(axis=1)
-        largest = float(fines.radius.max())
-        position, owner = mirrored_images(network, fines.position, low.min(axis=0), high.max(axis=0), largest)
+    if not len(fines) or not len(corner):
+        return found
+    corner = np.ascontiguousarray(corner)
+    low, high = corner.min(axis=1), corner.max(axis=1)
+    for fine in size_classes(fines.radius):
+        radius, largest = fines.radius[fine], float(fines.radius[fine].max())
+        place = fines.position[fine]
+        position, owner = mirrored_images(network, place, low.min(axis=0), high.max(axis=0), largest)
         pairs = points_in_boxes(position, low - largest, high + largest)
-        fill_pieces(corner, pairs, (position, fines.radius[owner], np.ascontiguousarray(value[owner])), found)
+        fill_pieces(corner, pairs, (position, radius[owner], np.ascontiguousarray(value[fine][owner])), found)
     return found
+
+
+def size_classes(radius: Array) -> list[Array]:
+    """Indices of `radius` (N,) in classes within a factor of two, so that a few large fines do not widen the search
+    for all."""
+    step = np.floor(np.log2(radius / radius.min())).astype(int)
+    return [np.flatnonzero(step == one) for one in np.unique(step)]
 
 
 def wall_distance(network: Network, position: Array) -> Array:

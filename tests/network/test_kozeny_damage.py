@@ -8,7 +8,7 @@ import pytest
 
 from fdnet.network.conductance import LAWS
 from fdnet.network.damage import DAMAGE_LAWS
-from fdnet.network.deposit import deposit_in_pores, deposit_on_sides, wall_distance
+from fdnet.network.deposit import deposit_in_pores, deposit_on_sides, size_classes, wall_distance
 from fdnet.network.kozeny_damage import _kept
 from fdnet.network.occupancy import measure_occupancy
 from fdnet.network.sides import side_voids
@@ -162,3 +162,18 @@ def test_layer_of_fines_at_two_distances_spreads(network, pack):
     fines = snapshot(places, 0.01, pack.box, Kind.FINE)
     _, _, _, layer = deposit_in_pores(network, replace(fines))
     assert layer.max() == pytest.approx(y.mean() + np.sqrt(5 * y.var() + 0.01**2), rel=1e-9)
+
+
+def test_size_classes_hold_every_fine_once_within_a_factor_of_two():
+    radius = np.array([0.1, 0.19, 0.2, 1.0, 0.4, 0.1])
+    classes = size_classes(radius)
+    assert sorted(np.concatenate(classes)) == list(range(6))
+    assert all(radius[one].max() < 2 * radius[one].min() for one in classes)
+
+
+def test_fines_of_many_sizes_fill_as_each_alone(network, pack):
+    places = network.pore_power_centre[:12] + 0.1
+    radius = np.geomspace(0.02, 0.6, 12)
+    together = deposit_in_pores(network, snapshot(places, radius, pack.box, Kind.FINE))[0]
+    alone = [deposit_in_pores(network, snapshot(places[[i]], radius[i], pack.box, Kind.FINE))[0] for i in range(12)]
+    assert together == pytest.approx(np.sum(alone, axis=0), rel=1e-12, abs=1e-15)
