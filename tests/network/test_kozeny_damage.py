@@ -10,6 +10,7 @@ from fdnet.network.conductance import LAWS
 from fdnet.network.damage import DAMAGE_LAWS
 from fdnet.network.deposit import deposit_in_pores, deposit_on_sides, size_classes, wall_distance
 from fdnet.network.kozeny_damage import _kept
+from fdnet.network.lubrication import half_resistances
 from fdnet.network.occupancy import measure_occupancy
 from fdnet.network.sides import side_voids
 from fdnet.network.tessellation import build_network
@@ -177,3 +178,31 @@ def test_fines_of_many_sizes_fill_as_each_alone(network, pack):
     together = deposit_in_pores(network, snapshot(places, radius, pack.box, Kind.FINE))[0]
     alone = [deposit_in_pores(network, snapshot(places[[i]], radius[i], pack.box, Kind.FINE))[0] for i in range(12)]
     assert together == pytest.approx(np.sum(alone, axis=0), rel=1e-12, abs=1e-15)
+
+
+def test_resistance_lies_on_the_side_of_the_centres_and_closed_throats_have_none(network):
+    resistance = half_resistances(network)
+    for side in (0, 1):
+        behind = network.throat_heights[:, side] < 0
+        assert behind.any()
+        assert np.all(resistance[behind, side] == 0)
+        assert np.all(resistance[behind, 1 - side] > 0)
+    shut = half_resistances(replace(network, throat_radius=np.zeros(len(network.throat_radius))))
+    assert np.all(np.isinf(shut))
+
+
+def test_distance_from_the_nearest_grain_is_the_same_in_every_period(network, pack):
+    places = network.pore_power_centre[:5]
+    period = pack.box[:, 1] - pack.box[:, 0]
+    moved = wall_distance(network, places + period * [[2, 0, -1]])
+    assert moved == pytest.approx(wall_distance(network, places), abs=1e-9)
+
+
+def test_a_side_filled_by_its_fines_closes_the_throat_though_its_pore_is_open(network):
+    state = even_state(network, volume=0.3, surface=1.0)
+    throat = int(np.argmax(network.throat_heights.min(axis=1)))
+    state.side_solid_volume[throat, 0] = 1.01 * side_voids(network)[0][throat, 0]
+    found, kept = factor(network, state)
+    assert kept[throat] == 0
+    assert np.sum(kept == 0) == 1
+    assert (found.counts["pores_filled"], found.counts["sides_filled"]) == (0, 1)
