@@ -2,13 +2,13 @@
 
 import csv
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from truth_packs import MM, RADIUS, read_pack, snapshot
 
-from fdnet.snapshot import Array, Kind, Snapshot
+from fdnet.snapshot import Kind, Snapshot
 
 EQUAL, UNEQUAL, LATTICE, LOOSE = "random, equal grains", "random, unequal grains", "touching lattices", "loose lattices"
 LOOSE_SOLIDS = (0.45, 0.343, 0.216)
@@ -103,14 +103,9 @@ def simple_cubic(solid: float, repeat: int = 3) -> Snapshot:
 def turned(pack: Snapshot, axis: int) -> Snapshot:
     """The pack with `axis` as x (a rotation)."""
     order = np.roll(np.arange(3), -axis)
-    return with_values(pack, position=pack.position[:, order], box=pack.box[order])
+    return replace(pack, position=pack.position[:, order], box=pack.box[order])
 
 
 def all_grains(pack: Snapshot) -> Snapshot:
     """The same spheres, fines taken as grains."""
-    return with_values(pack, kind=np.full(len(pack), Kind.GRAIN))
-
-
-def with_values(pack: Snapshot, **values: Array) -> Snapshot:
-    """The pack with some of its fields replaced."""
-    return Snapshot(**{name: getattr(pack, name) for name in Snapshot.__dataclass_fields__} | values)
+    return replace(pack, kind=np.full(len(pack), Kind.GRAIN))

@@ -13,9 +13,9 @@ from truth_packs import MM, RADIUS, made_deposit, read_pack, snapshot
 from fdnet.network import delaunay, geometry
 from fdnet.network.conductance import LAWS, Law, lubrication_law, series_law
 from fdnet.network.damage import DAMAGE_LAWS
-from fdnet.network.flow import solve_flow
 from fdnet.network.lubrication import TIP, WIDENING, half_resistances, summed
 from fdnet.network.occupancy import measure_occupancy
+from fdnet.network.slabs import whole_permeability
 from fdnet.network.tessellation import LENGTH_FLOOR, Network, build_network
 from fdnet.scales import carman_kozeny
 from fdnet.snapshot import Array, Kind, Snapshot
@@ -37,7 +37,7 @@ def network_of(pack: Snapshot) -> Network:
 
 def permeability(network: Network, conductance: Array) -> float:
     """k (m2) of a network with `conductance` (T,) m3."""
-    return solve_flow(network, conductance).inflow * float(np.ptp(network.box[0])) / network.area
+    return whole_permeability(network, conductance)[0]
 
 
 def resolved(pack: Snapshot) -> float:

@@ -19,6 +19,7 @@ import csv
 import sys
 import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,10 +30,10 @@ from fdnet.case_file import case_from
 from fdnet.dem.liggghts import Launch, find_binary
 from fdnet.dem.packing import make_pack
 from fdnet.network.conductance import DEFAULT_LAW, LAWS
-from fdnet.network.flow import Flow, solve_flow
+from fdnet.network.flow import Flow
 from fdnet.network.images import make_images
 from fdnet.network.porosity import measure_porosity
-from fdnet.network.slabs import plane_pressures
+from fdnet.network.slabs import plane_pressures, slab_permeability, whole_permeability
 from fdnet.network.tessellation import WALLS, Network, build_network
 from fdnet.scales import carman_kozeny, scales_of
 from fdnet.snapshot import Array, Snapshot
@@ -43,8 +44,8 @@ SIDES = {"periodic": (True, True, True), "walls y z": (True, False, False), "wal
 def solved(pack: Snapshot, periodic: tuple[bool, bool, bool], walls: str = "slip") -> tuple[Network, Flow, float]:
     """Network, flow and k (m2) of a pack."""
     network = build_network(pack, periodic=periodic, walls=walls)
-    flow = solve_flow(network, LAWS[DEFAULT_LAW](network))
-    return network, flow, flow.inflow * float(np.ptp(pack.box[0])) / network.area
+    k, flow = whole_permeability(network, LAWS[DEFAULT_LAW](network))
+    return network, flow, k
 
 
 def tiled(pack: Snapshot, times: int) -> Snapshot:
@@ -113,11 +114,7 @@ def slab_rows(packs: list[Path], places: int) -> Iterator[dict[str, Any]]:
         for thick in range(1, int(length / 2 / diameter) + 1):
             starts = (np.arange(places) + 0.5) / places * (0.5 * length)
             found = [
-                solve_flow(network, conductance, span=(start, start + thick * diameter)).inflow
-                * thick
-                * diameter
-                / network.area
-                / reference
+                slab_permeability(network, conductance, (start, start + thick * diameter))[0] / reference
                 for start in starts
             ]
             yield {
@@ -155,9 +152,7 @@ def walled_row(pack: Snapshot, rim: float) -> dict[str, float]:
     """k of a pack between walls over that of its inner part, with walls that slip and that hold the fluid."""
     diameter = 2.0 * float(pack.radius.mean())
     core = pack.box + rim * diameter * np.array([1, -1])
-    whole, inside = (
-        measure_porosity(pack if box is None else boxed(pack, box), periodic=(False,) * 3).mean for box in (None, core)
-    )
+    whole, inside = (measure_porosity(replace(pack, box=box), periodic=(False,) * 3).mean for box in (pack.box, core))
     row = {"porosity": whole, "porosity_inner": inside}
     for walls in WALLS:
         network, flow, k = solved(pack, SIDES["walls x y z"], walls)
@@ -168,11 +163,6 @@ def walled_row(pack: Snapshot, rim: float) -> dict[str, float]:
         "inner_over_carman_kozeny": inner / carman_kozeny(inside, diameter),
         "k_over_carman_kozeny": k / carman_kozeny(whole, diameter),
     }
-
-
-def boxed(pack: Snapshot, box: Array) -> Snapshot:
-    """The same spheres seen through another box."""
-    return Snapshot(**{name: getattr(pack, name) for name in Snapshot.__dataclass_fields__} | {"box": box})
 
 
 def inner_permeability(network: Network, flow: Flow, core: Array) -> float:

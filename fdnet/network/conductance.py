@@ -55,12 +55,12 @@ def series_law(network: Network, *, weight: float = INSCRIBED_WEIGHT) -> Array:
     """
     low, height = -network.throat_heights[:, 0], _height(network)
     points, weights = np.polynomial.legendre.leggauss(SERIES_POINTS)
-    corner = network.throat_corner
+    corner, radius = network.throat_corner, network.throat_corner_radius
     resistance = np.zeros(len(height))
     with np.errstate(divide="ignore"):
         for point, share in zip(points, weights, strict=True):
             z = low + 0.5 * (1.0 + point) * height
-            disc = np.sqrt(np.maximum(network.throat_corner_radius**2 - z[:, None] ** 2, 0.0))
+            disc = np.sqrt(np.maximum(radius**2 - z[:, None] ** 2, 0.0))
             resistance += 0.5 * share * height * 8.0 / (np.pi * _section_radius(corner, disc, weight) ** 4)
     return np.where(network.throat_radius > 0, 1.0 / resistance, 0.0)
 

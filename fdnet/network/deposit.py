@@ -35,19 +35,16 @@ def deposit_on_sides(network: Network, fines: Snapshot) -> tuple[Array, Array]:
     """Volume (T, 2) m3 and surface (T, 2) m2 of the same fines inside the pyramids from each throat's facet to the
     power centres on either side; 0 for a centre on or behind the facet."""
     found = np.zeros((len(network.throat_pores), 2, 2))
+    facet = network.throat_corner
     fines = fines.where(centred_inside(network, fines.position))
     for side in (0, 1):
         real = np.flatnonzero(network.throat_heights[:, side] > THIN_SIDE * network.grain_radius)
-        found[real, side] = _filled(network, side_corners(network, side, real), fines, np.zeros((len(fines), 0)))
+        apex = network.pore_power_centre[network.throat_pores[real, side]]
+        if side == 1:
+            apex = apex + network.throat_shift[real] * np.ptp(network.box, axis=1)
+        corner = np.concatenate([apex[:, None], facet[real]], axis=1)
+        found[real, side] = _filled(network, corner, fines, np.zeros((len(fines), 0)))
     return found[..., 0], found[..., 1]
-
-
-def side_corners(network: Network, side: int, throat: Array) -> Array:
-    """Corners (K, 4, 3) m of the pyramids of `throat` (K,) towards their first (0) or second (1) pore, apex first."""
-    apex = network.pore_power_centre[network.throat_pores[throat, side]]
-    if side == 1:
-        apex = apex + network.throat_shift[throat] * np.ptp(network.box, axis=1)
-    return np.concatenate([apex[:, None], network.throat_corner[throat]], axis=1)
 
 
 def _filled(network: Network, corner: Array, fines: Snapshot, value: Array) -> Array:

@@ -200,6 +200,13 @@ def cap_heights(first: Array, second: Array, apart: Array) -> tuple[Array, Array
     )
 
 
+def lens(first: Array, second: Array, apart: Array) -> tuple[Array, Array]:
+    """Volume m3 and surface m2 (of both) of what two spheres share; zero where they do not overlap."""
+    caps = cap_heights(first, second, apart)
+    volume = cap_volume(first, caps[0]) + cap_volume(second, caps[1])
+    return volume, 2.0 * np.pi * (first * caps[0] + second * caps[1])
+
+
 def cap_volume(radius: Array, height: Array) -> Array:
     """Volume of a spherical cap, m3; `height` outside [0, 2 radius] is taken as its nearer end."""
     height = np.clip(height, 0.0, 2.0 * radius)

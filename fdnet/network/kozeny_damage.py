@@ -6,7 +6,7 @@ import numpy as np
 
 from fdnet.network.damage_law import BLOCKED, CLEAN, KOZENY, Damage
 from fdnet.network.lubrication import half_resistances
-from fdnet.network.occupancy import Occupancy
+from fdnet.network.occupancy import Occupancy, ratio
 from fdnet.network.sides import side_voids
 from fdnet.network.tessellation import Network
 from fdnet.snapshot import Array, frozen
@@ -31,10 +31,9 @@ def kozeny_damage(
     taken, filled = deposit.taken, deposit.filled
     factor = np.where(filled, 0.0, _kozeny(deposit.volume, deposit.surface))
     first, second = factor[network.throat_pores].T
-    both = np.divide(2.0 * first * second, first + second, out=np.zeros(len(first)), where=first + second > 0)
-    law = np.where(taken[network.throat_pores].any(axis=1), KOZENY, CLEAN).astype("<U10")
-    law[(both == 0) & (law == KOZENY)] = BLOCKED
-    return Damage(conductance=frozen(clean * both), law_used=frozen(law), counts={"pores_filled": int(filled.sum())})
+    both = ratio(2.0 * first * second, first + second)
+    law = _law_used(np.any(taken[network.throat_pores], axis=1), both)
+    return Damage(conductance=frozen(clean * both), law_used=law, counts={"pores_filled": int(filled.sum())})
 
 
 def side_kozeny_damage(
@@ -62,22 +61,26 @@ def side_kozeny_damage(
     ends = network.throat_pores
     void, wall = side_voids(network)
     open_side = (network.throat_heights > 0) & (void > 0) & (wall > 0)
-    own = np.where(open_side, 1.0 / (1.0 + (4.0 * _over(pore.fine, pore.void))[ends] ** 2), 0.0)
-    volume = own * _over(occupancy.side_solid_volume, np.where(open_side, void, 0.0)) + (1.0 - own) * pore.volume[ends]
-    surface = own * _over(occupancy.side_solid_surface, np.where(open_side, wall, 0.0))
+    own = np.where(open_side, 1.0 / (1.0 + (4.0 * ratio(pore.fine, pore.void))[ends] ** 2), 0.0)
+    volume = own * ratio(occupancy.side_solid_volume, np.where(open_side, void, 0.0)) + (1.0 - own) * pore.volume[ends]
+    surface = own * ratio(occupancy.side_solid_surface, np.where(open_side, wall, 0.0))
     surface += (1.0 - own) * pore.surface[ends]
     share = 1.0 - (1.0 - np.clip(pore.layer / (2.0 * _hydraulic_radius(network)), 0.0, 1.0)) ** 2
     filled = (volume >= 1.0) | pore.filled[ends]
     factor = np.where(filled, 0.0, _kozeny(np.minimum(volume, 1.0), surface, share[ends]))
     kept = _kept(half_resistances(network), factor)
-    law = np.where((volume > 0).any(axis=1), KOZENY, CLEAN).astype("<U10")
-    law[(kept == 0) & (law == KOZENY)] = BLOCKED
     counts = {
         "pores_filled": int(pore.filled.sum()),
         "sides_filled": int(filled.sum()),
         "layers_within_grains": int(np.sum(pore.layer < 0)),
     }
-    return Damage(conductance=frozen(clean * kept), law_used=frozen(law), counts=counts)
+    law = _law_used(np.any(volume > 0, axis=1), kept)
+    return Damage(conductance=frozen(clean * kept), law_used=law, counts=counts)
+
+
+def _law_used(taken: Array, kept: Array) -> Array:
+    """Names (T,): clean without fines, blocked where nothing is `kept`, else kozeny."""
+    return frozen(np.where(~taken, CLEAN, np.where(kept == 0, BLOCKED, KOZENY)).astype("<U10"))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -112,11 +115,11 @@ def _pore_deposit(network: Network, occupancy: Occupancy) -> _PoreDeposit:
     filled = taken & ((void <= 0) | (wall <= 0) | (held >= void))
     safe = taken & ~filled
     return _PoreDeposit(
-        volume=_over(np.where(safe, held, 0.0), void),
-        surface=_over(np.where(safe, surface, 0.0), wall),
+        volume=ratio(np.where(safe, held, 0.0), void),
+        surface=ratio(np.where(safe, surface, 0.0), wall),
         void=void,
-        fine=_over(fine, held),
-        layer=_over(layer, held),
+        fine=ratio(fine, held),
+        layer=ratio(layer, held),
         taken=taken,
         filled=filled,
     )
@@ -135,8 +138,4 @@ def _kept(resistance: Array, factor: Array) -> Array:
     resistance = np.where(np.isfinite(resistance), resistance, 0.0)
     shut = np.any((factor == 0) & (resistance > 0), axis=1)
     raised = np.sum(resistance / np.where(factor > 0, factor, 1.0), axis=1)
-    return np.where(shut, 0.0, _over(resistance.sum(axis=1), raised))
-
-
-def _over(top: Array, bottom: Array) -> Array:
-    return np.divide(top, bottom, out=np.zeros(np.shape(top)), where=np.asarray(bottom) > 0)
+    return np.where(shut, 0.0, ratio(resistance.sum(axis=1), raised))

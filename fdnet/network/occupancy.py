@@ -65,7 +65,7 @@ def measure_occupancy(network: Network, fines: Snapshot, *, overlap: str = "exac
     solid, surface, fine_volume, layer = deposit_in_pores(network, fines)
     side_solid, side_surface = deposit_on_sides(network, fines)
     throats = _throat_sums(network, throat, pairs, inside)
-    pore_porosity = _ratio(network.pore_volume - solid, network.pore_tetra_volume)
+    pore_porosity = ratio(network.pore_volume - solid, network.pore_tetra_volume)
     counts = {
         "fines_outside_box": int(np.sum(~centred_inside(network, fines.position))),
         "throat_porosity_negative": int(np.sum(throats["throat_porosity"] < 0)),
@@ -96,14 +96,15 @@ def _throat_sums(network: Network, throat: Array, pairs: Pairs, inside: Array) -
     tube = np.pi * network.throat_radius**2 * network.throat_length
     return {
         "throat_solid_volume": solid,
-        "throat_porosity": 1.0 - _ratio(solid, tube),
+        "throat_porosity": 1.0 - ratio(solid, tube),
         "throat_fines": number,
-        "throat_fine_radius": _ratio(np.bincount(throat, weights=pairs.sphere, minlength=count), number),
+        "throat_fine_radius": ratio(np.bincount(throat, weights=pairs.sphere, minlength=count), number),
     }
 
 
-def _ratio(top: Array, bottom: Array) -> Array:
-    return np.divide(top, bottom, out=np.zeros(len(top)), where=bottom > 0)
+def ratio(top: Array, bottom: Array) -> Array:
+    """top / bottom, 0 where `bottom` is not positive."""
+    return np.divide(top, bottom, out=np.zeros(np.shape(top)), where=np.asarray(bottom) > 0)
 
 
 def _pairs(network: Network, fines: Snapshot) -> tuple[Array, Array, Pairs]:

@@ -11,10 +11,10 @@ import numpy as np
 from fdnet.errors import CaseError
 from fdnet.network.conductance import DEFAULT_LAW, LAWS
 from fdnet.network.damage import CLEAN, DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, Damage
-from fdnet.network.flow import Flow, solve_flow
+from fdnet.network.flow import Flow
 from fdnet.network.occupancy import Occupancy
 from fdnet.network.sections import Profile, Section, SlabK, make_profile, make_sections, reduction
-from fdnet.network.slabs import inplace_permeability, slab_permeability
+from fdnet.network.slabs import inplace_permeability, slab_permeability, whole_permeability
 from fdnet.network.specimen import Specimen, measure_specimen
 from fdnet.network.tessellation import WALLS, Network
 from fdnet.snapshot import Array, Snapshot, frozen
@@ -211,9 +211,8 @@ def _clean_state(network: Network, options: AnalysisOptions, log: _Log) -> _Stat
 
 def _state(network: Network, conductance: Array, log: _Log) -> _State:
     with log.timed("solve"):
-        flow = solve_flow(network, conductance)
-    length = float(network.box[0, 1] - network.box[0, 0])
-    return _State(network=network, conductance=conductance, flow=flow, k=flow.inflow * length / network.area)
+        k, flow = whole_permeability(network, conductance)
+    return _State(network=network, conductance=conductance, flow=flow, k=k)
 
 
 def _damage(base: _State, occupancy: Occupancy | None, options: AnalysisOptions, log: _Log) -> Damage | None:

@@ -99,9 +99,7 @@ def solid_in_tetrahedra(corner: Array, radius: Array) -> tuple[Array, Array]:
     angle = np.abs(geometry.solid_angles(corner))
     first, second = radius[:, geometry.EDGES[:, 0]], radius[:, geometry.EDGES[:, 1]]
     apart = np.linalg.norm(corner[:, geometry.EDGES[:, 1]] - corner[:, geometry.EDGES[:, 0]], axis=-1)
-    caps = geometry.cap_heights(first, second, apart)
     turn = geometry.dihedral_angles(corner) / (2.0 * np.pi)
-    lens = geometry.cap_volume(first, caps[0]) + geometry.cap_volume(second, caps[1])
-    hidden = 2.0 * np.pi * (first * caps[0] + second * caps[1])
+    lens, hidden = geometry.lens(first, second, apart)
     volume = np.sum(angle * radius**3, axis=1) / 3.0 - np.sum(turn * lens, axis=1)
     return volume, np.sum(angle * radius**2, axis=1) - np.sum(turn * hidden, axis=1)

@@ -91,6 +91,14 @@ def ray(reach: float, disc: float) -> float:
 
 
 @compiled
+def midway(apart: float, wider: float, turn: float) -> float:
+    """Distance from a disc's centre, at the angle `turn` from the line to another's, of the line midway between their
+    rims: centres `apart`, the other's radius `wider` by so much. Infinite where the ray never meets it."""
+    below = apart * np.cos(turn) + wider
+    return max(0.5 * (apart * apart - wider * wider) / below, 0.0) if below > 0.0 else np.inf
+
+
+@compiled
 def _uneven(base: Array, disc: Array, table: Array) -> float:
     cx, cy, radius = _inscribed(base, disc)
     if np.isnan(radius):
@@ -111,8 +119,7 @@ def _uneven(base: Array, disc: Array, table: Array) -> float:
             flux = 0.0
             for point, weight in zip(POINTS, WEIGHTS):  # noqa: B905 - numba knows no strict zip
                 turn = 0.5 * angle * (1.0 + point)
-                reach = 0.5 * (a * a - apart * apart) / (a * np.cos(turn) + apart)
-                flux += weight * 0.5 * angle * ray(reach, disc[i])
+                flux += weight * 0.5 * angle * ray(midway(a, apart, turn), disc[i])
             total += flux * shear_ratio(abs(angle), disc[i] / half, table)
     return total
 
@@ -134,10 +141,7 @@ def _shadowed(base: Array, disc: Array, table: Array) -> float:
         for point, weight in zip(FINE_POINTS, FINE_WEIGHTS):  # noqa: B905 - numba knows no strict zip
             turn = 0.5 * opening * (1.0 + point)
             reach = height / max(np.cos(turn - foot), 1e-3)
-            for a, apart, along in ((aj, disc[j] - disc[i], turn), (ak, disc[k] - disc[i], opening - turn)):
-                below = a * np.cos(along) + apart
-                if below > 0.0:
-                    reach = min(reach, max(0.5 * (a * a - apart * apart) / below, 0.0))
+            reach = min(reach, midway(aj, disc[j] - disc[i], turn), midway(ak, disc[k] - disc[i], opening - turn))
             flux += weight * 0.5 * opening * ray(reach, disc[i])
             nearest = min(nearest, reach)
         if flux > 0.0:

@@ -13,10 +13,11 @@ from fdnet.snapshot import Array
 
 def side_voids(network: Network) -> tuple[Array, Array]:
     """Void (T, 2) m3 and grain surface (T, 2) m2 of the pyramids towards the first and the second pore."""
-    base, radius = geometry.flat(network.throat_corner), network.throat_corner_radius
+    corner, radius = network.throat_corner, network.throat_corner_radius
+    base = geometry.flat(corner)
     middle = geometry.power_centre(base, radius)[0]
-    area = geometry.triangle_area(network.throat_corner)
-    hidden_volume, hidden_surface = _hidden_by_pairs(network, base, middle)
+    area = geometry.triangle_area(corner)
+    hidden_volume, hidden_surface = _hidden_by_pairs(network.throat_heights, base, middle, radius)
     void, wall = np.zeros((len(area), 2)), np.zeros((len(area), 2))
     for side in (0, 1):
         height = network.throat_heights[:, side]
@@ -34,7 +35,7 @@ def _foot_angles(base: Array, middle: Array, height: Array) -> Array:
     return geometry.solid_angles(raised)[:, :3]
 
 
-def _hidden_by_pairs(network: Network, base: Array, middle: Array) -> tuple[Array, Array]:
+def _hidden_by_pairs(heights: Array, base: Array, middle: Array, radius: Array) -> tuple[Array, Array]:
     """Volume and surface (T, 2) of grain pairs' overlap within either pyramid, by its signed dihedral angles."""
     volume, surface = np.zeros((len(base), 2)), np.zeros((len(base), 2))
     for first, second in geometry.SIDES:
@@ -42,10 +43,8 @@ def _hidden_by_pairs(network: Network, base: Array, middle: Array) -> tuple[Arra
         apart = np.linalg.norm(along, axis=1)
         to_middle = middle - base[:, first]
         inward = (along[:, 0] * to_middle[:, 1] - along[:, 1] * to_middle[:, 0]) / apart
-        turn = np.arctan2(network.throat_heights, inward[:, None]) / (2.0 * np.pi)
-        radius = network.throat_corner_radius[:, first], network.throat_corner_radius[:, second]
-        caps = geometry.cap_heights(*radius, apart)
-        lens = geometry.cap_volume(radius[0], caps[0]) + geometry.cap_volume(radius[1], caps[1])
-        volume += turn * lens[:, None]
-        surface += turn * 2.0 * np.pi * (radius[0] * caps[0] + radius[1] * caps[1])[:, None]
+        turn = np.arctan2(heights, inward[:, None]) / (2.0 * np.pi)
+        shared, hidden = geometry.lens(radius[:, first], radius[:, second], apart)
+        volume += turn * shared[:, None]
+        surface += turn * hidden[:, None]
     return volume, surface

@@ -7,6 +7,12 @@ from fdnet.network.tessellation import Network
 from fdnet.snapshot import Array
 
 
+def whole_permeability(network: Network, conductance: Array) -> tuple[float, Flow]:
+    """k (m2) of the whole box, and its flow."""
+    flow = solve_flow(network, conductance)
+    return flow.inflow * float(np.ptp(network.box[0])) / network.area, flow
+
+
 def slab_permeability(network: Network, conductance: Array, span: tuple[float, float]) -> tuple[float, Flow]:
     """k (m2) of the slab cut out, and its flow."""
     flow = solve_flow(network, conductance, span=span)

@@ -13,7 +13,7 @@ ends at the nearest of these lines or of the trapezoid's sides, so no share is n
 import numpy as np
 
 from fdnet.network.compiled import compiled
-from fdnet.network.section import FINE_POINTS, FINE_WEIGHTS, POINTS, WEIGHTS, ray
+from fdnet.network.section import FINE_POINTS, FINE_WEIGHTS, POINTS, WEIGHTS, midway, ray
 from fdnet.network.tessellation import Network
 from fdnet.network.wedge import shear_ratio
 from fdnet.snapshot import Array
@@ -96,15 +96,13 @@ def _meeting(place: Array, first: float, second: float) -> tuple[float, float]:
 def _share(across: tuple[float, float, float], disc: float, other: float, low: float, high: float) -> float:
     """What a disc's rays at angles `low` to `high` from the wall's normal see before the nearest line midway or the
     trapezoid's far side; `across` its height, the other's and their distance along the wall."""
-    apart, square = other - disc, across[2] ** 2 + (across[0] - across[1]) ** 2
-    edge, reach_far = np.arctan2(across[2], across[0] - across[1]), 0.5 * (square - apart * apart)
+    apart = np.hypot(across[2], across[0] - across[1])
+    edge = np.arctan2(across[2], across[0] - across[1])
     flux = 0.0
     for point, weight in zip(POINTS, WEIGHTS):  # noqa: B905 - numba knows no strict zip
         turn = low + 0.5 * (high - low) * (1.0 + point)
         reach = min((across[0] + disc) / (1.0 + np.cos(turn)), across[2] / max(np.sin(turn), HAIR))
-        below = np.sqrt(square) * np.cos(edge - turn) + apart
-        if below > 0.0:
-            reach = min(reach, max(reach_far / below, 0.0))
+        reach = min(reach, midway(apart, other - disc, edge - turn))
         flux += weight * 0.5 * (high - low) * ray(reach, disc)
     return flux
 

@@ -1,5 +1,7 @@
 """Conductance laws against closed forms, and k against resolved Stokes flow in lattices."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -78,16 +80,7 @@ def test_body_centred_throat_by_the_formulas_on_paper():
 def test_closed_throats_conduct_nothing_in_any_law(law):
     pack = random_pack(60)
     network = build_network(
-        pack.__class__(
-            step=0,
-            time_s=0,
-            box=pack.box,
-            id=pack.id,
-            kind=pack.kind,
-            position=pack.position,
-            radius=pack.radius * 1.25,
-            velocity=pack.velocity,
-        ),
+        replace(pack, radius=pack.radius * 1.25),
         periodic=ALL,
     )
     closed = network.throat_radius == 0

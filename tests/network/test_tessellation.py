@@ -1,12 +1,13 @@
 """The network of a pack: exact porosities, unique pores, matching facets, errors."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from fdnet.errors import NetworkError
 from fdnet.network.porosity import measure_porosity
 from fdnet.network.tessellation import build_network
-from fdnet.snapshot import Snapshot
 from tests.network.packs import body_centred, face_centred, random_pack, simple_cubic, snapshot
 
 ALL, NONE, SIDES = (True,) * 3, (False,) * 3, (False, True, True)
@@ -126,16 +127,6 @@ def test_grains_out_of_reach_are_left_out_and_counted():
 
 def test_heavily_overlapping_grains_close_throats():
     pack = random_pack(60)
-    fat = Snapshot(
-        step=0,
-        time_s=0,
-        box=pack.box,
-        id=pack.id,
-        kind=pack.kind,
-        position=pack.position,
-        radius=pack.radius * 1.25,
-        velocity=pack.velocity,
-    )
-    network = build_network(fat, periodic=ALL)
+    network = build_network(replace(pack, radius=pack.radius * 1.25), periodic=ALL)
     assert network.counts["throats_closed"] == np.sum(network.throat_radius == 0) > 0
     assert np.all(network.throat_radius >= 0)
