@@ -86,23 +86,14 @@ def read_snapshot(options: argparse.Namespace, periodic: tuple[bool, bool, bool]
     import numpy as np
 
     from fdnet.report.spheres import read_spheres
-    from fdnet.snapshot import Kind, Snapshot
+    from fdnet.snapshot import Kind, resting
 
     position, radius, kind = read_spheres(options.spheres, units=options.units)
     grains = kind == Kind.GRAIN
     if np.count_nonzero(grains) < 4:
         raise CaseError(f"{options.spheres}: {np.count_nonzero(grains)} grains, expected at least 4 for a tetrahedron")
     box, notes = _box(options, position[grains], radius[grains], periodic)
-    snapshot = Snapshot(
-        step=0,
-        time_s=0.0,
-        box=box,
-        id=np.arange(1, len(radius) + 1),
-        kind=kind,
-        position=position,
-        radius=radius,
-        velocity=np.zeros_like(position),
-    )
+    snapshot = resting(position, radius, box, kind)
     return snapshot, notes
 
 

@@ -97,3 +97,18 @@ class Snapshot:
             radius=np.concatenate([self.radius, other.radius]),
             velocity=np.concatenate([self.velocity, other.velocity]),
         )
+
+
+def resting(position: Array, radius: Array | float, box: Array, kind: Array | int = Kind.GRAIN) -> Snapshot:
+    """Spheres at rest at `position` (N, 3) m, step 0, numbered from 1; `radius` m and `kind` of each or of all."""
+    count = len(position)
+    return Snapshot(
+        step=0,
+        time_s=0.0,
+        box=box,
+        id=np.arange(1, count + 1),
+        kind=np.broadcast_to(kind, count),
+        position=position,
+        radius=np.broadcast_to(radius, count),
+        velocity=np.zeros((count, 3)),
+    )

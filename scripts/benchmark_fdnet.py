@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import truth_packs
 from scipy.spatial import cKDTree
-from truth_packs import read_pack, snapshot
+from truth_packs import read_pack
 
 from fdnet.network import tessellation
 from fdnet.network.conductance import DEFAULT_LAW, LAWS
@@ -26,7 +27,7 @@ from fdnet.network.flow import solve_flow
 from fdnet.network.occupancy import measure_occupancy
 from fdnet.network.permeability import AnalysisOptions, analyse
 from fdnet.network.porosity import measure_porosity
-from fdnet.snapshot import Array, Kind, Snapshot
+from fdnet.snapshot import Array, Kind, Snapshot, resting
 
 TILE = Path(__file__).resolve().parent.parent / "tests" / "data" / "truth" / "packH_40_eps40.csv"
 SHAKE = 0.02
@@ -38,22 +39,12 @@ MOST_GRAINS_STIFF = 200_000
 
 def tiled(grains: int, rng: np.random.Generator) -> Snapshot:
     """About `grains` grains: the tile repeated, every grain shaken by up to 2 % of its radius each way."""
-    pack, edge = read_pack(TILE)
+    pack, _ = read_pack(TILE)
     across = max(round((grains / len(pack)) ** (1 / 3)), 1)
     times = np.array([max(round(grains / len(pack) / across**2), 1), across, across])
-    steps = np.stack(np.meshgrid(*map(np.arange, times), indexing="ij"), axis=-1).reshape(-1, 1, 3)
-    position = (pack.position + steps * edge * 1e-3).reshape(-1, 3)
-    radius = np.tile(pack.radius, len(steps))
-    position = (position + SHAKE * radius[:, None] * rng.uniform(-1, 1, position.shape)) % (times * edge * 1e-3)
-    return spheres(position, radius, times * edge * 1e-3, Kind.GRAIN)
-
-
-def spheres(position: Array, radius: Array, size: Array, kind: Kind) -> Snapshot:
-    one = snapshot(position * 1e3, radius * 1e3, 1.0, np.full(len(radius), kind))
-    box = np.stack([np.zeros(3), size], axis=1)
-    return Snapshot(
-        step=0, time_s=0.0, box=box, id=one.id, kind=one.kind, position=position, radius=radius, velocity=one.velocity
-    )
+    whole = truth_packs.tiled(pack, times)
+    shaken = whole.position + SHAKE * whole.radius[:, None] * rng.uniform(-1, 1, whole.position.shape)
+    return resting(shaken % whole.box[:, 1], whole.radius, whole.box)
 
 
 def seated(grains: Snapshot, count: int, rng: np.random.Generator) -> Snapshot:
@@ -67,7 +58,7 @@ def seated(grains: Snapshot, count: int, rng: np.random.Generator) -> Snapshot:
         place = grains.position[host] + (big + small) * way / np.linalg.norm(way, axis=1)[:, None]
         place = np.minimum(place % size, size * (1 - 1e-15))
         found = np.concatenate([found, place[tree.query(place)[0] > big + 0.999 * small]])
-    return spheres(found[:count], np.full(count, small), size, Kind.FINE)
+    return resting(found[:count], small, grains.box, Kind.FINE)
 
 
 class Clock:

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from truth_packs import read_pack
+from truth_packs import read_pack, tiled
 
 from fdnet.case_file import case_from
 from fdnet.dem.liggghts import Launch, find_binary
@@ -36,7 +36,7 @@ from fdnet.network.porosity import measure_porosity
 from fdnet.network.slabs import plane_pressures, slab_permeability, whole_permeability
 from fdnet.network.tessellation import WALLS, Network, build_network
 from fdnet.scales import carman_kozeny, scales_of
-from fdnet.snapshot import Array, Snapshot
+from fdnet.snapshot import Array, Snapshot, resting
 
 SIDES = {"periodic": (True, True, True), "walls y z": (True, False, False), "walls x y z": (False, False, False)}
 
@@ -48,37 +48,11 @@ def solved(pack: Snapshot, periodic: tuple[bool, bool, bool], walls: str = "slip
     return network, flow, k
 
 
-def tiled(pack: Snapshot, times: int) -> Snapshot:
-    """`times` copies of a periodic pack each way."""
-    steps = np.stack(np.meshgrid(*[np.arange(times)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
-    copies = times**3
-    return Snapshot(
-        step=0,
-        time_s=0.0,
-        box=pack.box[:, :1] + np.ptp(pack.box, axis=1)[:, None] * [0, times],
-        id=np.arange(1, copies * len(pack) + 1),
-        kind=np.tile(pack.kind, copies),
-        position=(pack.position + steps * np.ptp(pack.box, axis=1)).reshape(-1, 3),
-        radius=np.tile(pack.radius, copies),
-        velocity=np.zeros((copies * len(pack), 3)),
-    )
-
-
 def with_neighbours(pack: Snapshot, periodic: tuple[bool, bool, bool]) -> Snapshot:
     """A periodic pack and those of its images that reach into the box across sides that become walls."""
     margin = np.where(periodic, np.nan, float(pack.radius.max()))
     images = make_images(pack.position, pack.box, periodic=(True,) * 3, margin=margin, hair=0.0)
-    count = len(images.owner)
-    return Snapshot(
-        step=0,
-        time_s=0.0,
-        box=pack.box,
-        id=np.arange(1, count + 1),
-        kind=pack.kind[images.owner],
-        position=images.position,
-        radius=pack.radius[images.owner],
-        velocity=np.zeros((count, 3)),
-    )
+    return resting(images.position, pack.radius[images.owner], pack.box, pack.kind[images.owner])
 
 
 def tiled_rows(packs: list[Path], tiles: int) -> Iterator[dict[str, Any]]:
@@ -88,7 +62,7 @@ def tiled_rows(packs: list[Path], tiles: int) -> Iterator[dict[str, Any]]:
         reference = solved(pack, SIDES["periodic"])[2]
         for times in range(1, tiles + 1):
             for sides, periodic in list(SIDES.items())[1:]:
-                big = tiled(pack, times)
+                big = tiled(pack, np.full(3, times))
                 diameters = float(np.ptp(big.box[0]) / (2 * big.radius.mean()))
                 for grains, cut in (("centred inside", big), ("reaching in", with_neighbours(big, periodic))):
                     k = solved(cut, periodic)[2]
@@ -107,7 +81,7 @@ def tiled_rows(packs: list[Path], tiles: int) -> Iterator[dict[str, Any]]:
 def slab_rows(packs: list[Path], places: int) -> Iterator[dict[str, Any]]:
     """k of cut-out slabs over the periodic k, at `places` depths of each thickness."""
     for path in packs:
-        pack = tiled(read_pack(path)[0].grains(), 2)
+        pack = tiled(read_pack(path)[0].grains(), np.full(3, 2))
         network, _, reference = solved(pack, SIDES["periodic"])
         conductance, length = LAWS[DEFAULT_LAW](network), float(np.ptp(pack.box[0]))
         diameter = 2 * float(pack.radius.mean())

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from fdnet.network.porosity import measure_porosity
 from fdnet.report.spheres import read_spheres
-from fdnet.snapshot import Array, Kind, Snapshot
+from fdnet.snapshot import Array, Kind, Snapshot, resting
 
 MM = 1e-3
 RADIUS = 0.5
@@ -45,17 +45,16 @@ radius `fine` (0.1 mm), all of them in the first `layer` of the edge along x (al
 
 def snapshot(position: Array, radius: Array, edge: float, kind: Array) -> Snapshot:
     """Spheres of a periodic cube, lengths in mm."""
-    number = len(radius)
-    return Snapshot(
-        step=0,
-        time_s=0.0,
-        box=np.array([[0.0, edge * MM]] * 3),
-        id=np.arange(1, number + 1),
-        kind=kind,
-        position=position * MM,
-        radius=radius * MM,
-        velocity=np.zeros((number, 3)),
-    )
+    return resting(position * MM, radius * MM, np.array([[0.0, edge * MM]] * 3), kind)
+
+
+def tiled(pack: Snapshot, times: Array) -> Snapshot:
+    """`times` (3,) copies of a periodic pack along each axis."""
+    size = np.ptp(pack.box, axis=1)
+    steps = np.stack(np.meshgrid(*map(np.arange, times), indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    position = (pack.position + steps * size).reshape(-1, 3)
+    box = pack.box[:, :1] + np.stack([np.zeros(3), times * size], axis=1)
+    return resting(position, np.tile(pack.radius, len(steps)), box, np.tile(pack.kind, len(steps)))
 
 
 def relaxed(radius: Array, edge: float, position: Array, *, fixed: int = 0, push: float = 1.0) -> Array:

@@ -20,7 +20,7 @@ from fdnet.network.conductance import DEFAULT_LAW, LAWS
 from fdnet.network.porosity import measure_porosity
 from fdnet.network.slabs import whole_permeability
 from fdnet.network.tessellation import WALLS, build_network
-from fdnet.snapshot import Array, Kind, Snapshot
+from fdnet.snapshot import Array, Snapshot, resting
 from fdnet.studies.stokes import extrapolate, solve_stokes
 
 CELL = 10.0
@@ -73,17 +73,7 @@ def relaxed(pack: Pack, seed: int) -> Snapshot:
 
 def spheres(position: Array, radius: Array, size: Array) -> Snapshot:
     """Grains in a box of `size` (3,) at the origin."""
-    count = len(radius)
-    return Snapshot(
-        step=0,
-        time_s=0.0,
-        box=np.stack([np.zeros(3), size], axis=1),
-        id=np.arange(1, count + 1),
-        kind=np.full(count, Kind.GRAIN),
-        position=position,
-        radius=radius,
-        velocity=np.zeros((count, 3)),
-    )
+    return resting(position, radius, np.stack([np.zeros(3), size], axis=1))
 
 
 def with_sheets(pack: Pack, grains: Snapshot) -> Snapshot:

@@ -20,7 +20,7 @@ from fdnet.dem.scene import box_of, contact_variables, header_variables, snapsho
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.network.porosity import measure_porosity
 from fdnet.scales import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES, PACK_START, Scales, grain_count
-from fdnet.snapshot import Array, Kind, Snapshot
+from fdnet.snapshot import Array, Snapshot, resting
 
 POROSITY_TOLERANCE = 0.003
 ATTEMPTS = 8
@@ -173,16 +173,8 @@ def write_pack_inputs(case: Case, scales: Scales, folder: Path, *, count: int, r
     rng = np.random.default_rng([case.seed, count])
     small, size = PACK_START * radii, np.array(case.size_m)
     margin = small[:, None] * np.array([1.0, *([0.0, 0.0] if case.box.sides == "periodic" else [1.0, 1.0])])
-    seeds = Snapshot(
-        step=0,
-        time_s=0.0,
-        box=box_of(case),
-        id=np.arange(1, count + 1),
-        kind=np.full(count, Kind.GRAIN),
-        position=margin + rng.random((count, 3)) * (size - 2 * margin),
-        radius=small,
-        velocity=np.zeros((count, 3)),
-    )
+    place = margin + rng.random((count, 3)) * (size - 2 * margin)
+    seeds = resting(place, small, box_of(case))
     write_data(
         folder / "pack.data", seeds, bounds=box_of(case), density=np.full(count, case.grains.density_kg_m3), types=2
     )

@@ -10,7 +10,7 @@ from fdnet.dem.packing import write_pack_inputs
 from fdnet.dem.scene import box_of
 from fdnet.errors import CaseError
 from fdnet.scales import grain_count, scales_of
-from fdnet.snapshot import Kind, Snapshot
+from fdnet.snapshot import Snapshot, resting
 
 
 def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
@@ -37,13 +37,4 @@ def _expected_grains(case: Case) -> Snapshot:
     """One grain that stands beyond the face as far as those of a dense pack do: only its reach matters."""
     radius = case.grains.radius_range_m[1]
     box = box_of(case)
-    return Snapshot(
-        step=0,
-        time_s=0.0,
-        box=box,
-        id=np.array([1]),
-        kind=np.array([Kind.GRAIN]),
-        position=np.array([[0.7 * radius, *(box[1:, 1] / 2)]]),
-        radius=np.array([radius]),
-        velocity=np.zeros((1, 3)),
-    )
+    return resting(np.array([[0.7 * radius, *(box[1:, 1] / 2)]]), radius, box)

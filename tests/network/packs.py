@@ -4,22 +4,12 @@ from functools import cache
 
 import numpy as np
 
-from fdnet.snapshot import Array, Kind, Snapshot
+from fdnet.snapshot import Array, Kind, Snapshot, resting
 
 
 def snapshot(position: Array, radius: Array | float, box: Array, kind: Array | int = Kind.GRAIN) -> Snapshot:
     position = np.asarray(position, dtype=float).reshape(-1, 3)
-    count = len(position)
-    return Snapshot(
-        step=0,
-        time_s=0.0,
-        box=np.asarray(box, dtype=float),
-        id=np.arange(1, count + 1),
-        kind=np.broadcast_to(kind, count),
-        position=position,
-        radius=np.broadcast_to(np.asarray(radius, dtype=float), count),
-        velocity=np.zeros((count, 3)),
-    )
+    return resting(position, radius, np.asarray(box, dtype=float), kind)
 
 
 def lattice(cell: list[list[float]], edge: float, repeat: int, radius: float) -> Snapshot:
