@@ -1,4 +1,4 @@
-"""The `fdnet` command: run, render, permeability. Thin: it reads arguments, calls the package, prints.
+"""The `fdnet` command: run, render, permeability, study. Thin: it reads arguments, calls the package, prints.
 
 Exit codes: 0 done, 2 bad input (nothing written), 3 LIGGGHTS missing or failed, 4 degenerate geometry or an unconverged
 solve, 130 stopped by the user.
@@ -74,6 +74,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_run(commands, common)
     _add_render(commands, common)
     _add_permeability(commands, common)
+    _add_study(commands, common)
     return parser
 
 
@@ -131,6 +132,14 @@ def _add_permeability(commands: Any, common: argparse.ArgumentParser) -> None:
     command = commands.add_parser(
         "permeability", parents=[common], help="permeability of a CSV of spheres, without LIGGGHTS"
     )
+    add_arguments(command)
+    command.set_defaults(action=run)
+
+
+def _add_study(commands: Any, common: argparse.ArgumentParser) -> None:
+    from fdnet.studies.command import add_arguments, run
+
+    command = commands.add_parser("study", parents=[common], help="error against run time of one of fdnet's choices")
     add_arguments(command)
     command.set_defaults(action=run)
 

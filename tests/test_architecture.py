@@ -33,7 +33,7 @@ DOORS = {
     "subprocess": {"dem/liggghts", "report/vtk"},
     "pandas": {"dem/dump", "report/tables", "report/spheres"},
     "pyvista": {"report/vtk", "report/render"},
-    "matplotlib": {"report/figures", "report/side_view"},
+    "matplotlib": {"report/figures", "report/side_view", "studies/draw"},
     "numba": {"network/compiled"},
     "pymetis": {"network/solver"},
     "pyamg": {"network/solver"},

@@ -235,9 +235,15 @@ def test_a_stage_without_its_forerunner_is_refused(tmp_path):
 
 
 def kill_when(command: list[str], ready, sign: int) -> int:
-    """Start a run, send `sign` as soon as `ready()` is true; returns the exit code."""
+    """Start a run, send `sign` as soon as `ready()` is true; returns the exit code.
+
+    A shell that runs the tests in the background makes its children ignore SIGINT, so its default is set again.
+    """
     process = subprocess.Popen(
-        [sys.executable, "-m", "fdnet.cli", *command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        [sys.executable, "-m", "fdnet.cli", *command],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     deadline = time.monotonic() + 60
     while process.poll() is None and not ready() and time.monotonic() < deadline:

@@ -1,0 +1,63 @@
+"""`fdnet study NAME`: run a study, or go on with it, and write its table, figure and text."""
+
+import argparse
+import sys
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from fdnet.atomic import write_text
+from fdnet.errors import CaseError
+from fdnet.studies.draw import draw_study
+from fdnet.studies.runner import run_points
+from fdnet.studies.study import Study
+from fdnet.studies.table import study_text, write_rows
+
+STUDIES: Mapping[str, str] = {}
+"""Name of each study and what it asks; the module has the same name with underscores."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The arguments of `fdnet study`."""
+    parser.add_argument("name", metavar="NAME", help=f"one of {', '.join(STUDIES)}; 'list' says what each asks")
+    parser.add_argument("--quick", action="store_true", help="the reduced form, below 30 s")
+    parser.add_argument("--out", type=Path, help="folder for table, figure and text (default studies/NAME)")
+    parser.add_argument("--silent", action="store_true", help="no progress")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run one study; returns the exit code. Raises CaseError on an unknown name or a folder that is not the study's."""
+    if options.name == "list":
+        for name, asks in STUDIES.items():
+            print(f"{name:<18} {asks}")
+        return 0
+    study = study_named(options.name)
+    out = options.out or Path("studies") / (f"{study.name}-quick" if options.quick else study.name)
+    text = run_study(study, out, quick=options.quick, show=not options.silent)
+    print(text)
+    print(f"table:  {out / study.name}.csv\nfigure: {out / study.name}.png\ntext:   {out / study.name}.md")
+    return 0
+
+
+def study_named(name: str) -> Study:
+    """The study of that name. Raises CaseError when there is none."""
+    if name not in STUDIES:
+        raise CaseError(f"study: {name!r} is not known, expected one of {', '.join(STUDIES)}")
+    module: Any = import_module(f"fdnet.studies.{name.replace('-', '_')}")
+    return module.STUDY
+
+
+def run_study(study: Study, out: Path, *, quick: bool, show: bool = False) -> str:
+    """Run or continue, then write NAME.csv, NAME.png and NAME.md into `out`; returns the text."""
+
+    def tell(line: str) -> None:
+        if show:
+            print(f"{study.name}: {line}", file=sys.stderr, flush=True)
+
+    rows = study.judge(run_points(study, out, quick=quick, tell=tell))
+    text = study_text(study, rows)
+    write_rows(rows, out / f"{study.name}.csv")
+    draw_study(study, rows, out / f"{study.name}.png")
+    write_text(out / f"{study.name}.md", text)
+    return text

@@ -1,0 +1,87 @@
+"""The figure of a study: error against run time, log-log, with bands over seeds and fdnet's default marked."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from fdnet.atomic import replacing
+from fdnet.studies.judge import Level, levels
+from fdnet.studies.study import Panel, Row, Study, shown
+
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#5a5a5a", "#8c564b")
+MARKERS = "osD^vP*X"
+_WIDTH, _HEIGHT = 6.2, 4.6
+_COST_LABELS = {"core_s": "run time, core s", "wall_s": "run time, s", "peak_memory_mb": "peak memory, MB"}
+
+
+def draw_study(study: Study, rows: Sequence[Row], path: Path) -> None:
+    """One axes a panel, in rows of up to three."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    columns = min(3, len(study.panels))
+    lines = math.ceil(len(study.panels) / columns)
+    figure, axes = plt.subplots(
+        lines, columns, figsize=(_WIDTH * columns, _HEIGHT * lines), squeeze=False, constrained_layout=True
+    )
+    flat = list(axes.flat)
+    for panel, place in zip(study.panels, flat, strict=False):
+        _draw_panel(place, study, panel, rows)
+    for place in flat[len(study.panels) :]:
+        place.set_visible(False)
+    figure.suptitle(f"{study.title} (labels: {study.knob_label})", fontsize=11)
+    with replacing(path) as part:
+        figure.savefig(part, dpi=110)
+    plt.close(figure)
+
+
+def series_of(panel: Panel, rows: Sequence[Row]) -> list[str]:
+    """The series a panel shows, in the order of the table."""
+    having = dict.fromkeys(row.series for row in rows if row.quantity == panel.quantity)
+    return [name for name in having if not panel.series or name in panel.series]
+
+
+def _draw_panel(axes: Any, study: Study, panel: Panel, rows: Sequence[Row]) -> None:
+    shown_levels = {name: levels(rows, name, panel.quantity, cost=panel.cost) for name in series_of(panel, rows)}
+    sizes = [level.size for found in shown_levels.values() for level in found if level.size > 0]
+    floor = 0.5 * min(sizes) if sizes else 1e-16
+    for index, (name, found) in enumerate(shown_levels.items()):
+        if found:
+            _draw_series(axes, name, found, study.defaults.get(name), index, floor)
+    axes.set(xscale="log", yscale="log")
+    axes.set_xlabel(_COST_LABELS.get(panel.cost, panel.cost))
+    axes.set_ylabel(panel.label)
+    axes.set_title(panel.title, fontsize=10)
+    axes.grid(which="major", lw=0.4, color="0.85")
+    axes.margins(0.12)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize=8, framealpha=0.9)
+
+
+def _draw_series(axes: Any, name: str, found: Sequence[Level], default: Any, index: int, floor: float) -> None:
+    colour, marker = COLOURS[index % len(COLOURS)], MARKERS[index % len(MARKERS)]
+    cost = [level.cost for level in found]
+    size = [max(level.size, floor) for level in found]
+    low = [max(level.size - level.half_width, 0.3 * floor) for level in found]
+    high = [max(level.size + level.half_width, floor) for level in found]
+    axes.plot(cost, size, "-", color=colour, lw=1.0, alpha=0.6)
+    axes.vlines(cost, low, high, color=colour, lw=2.5, alpha=0.3)
+    zero = [level.size == 0 for level in found]
+    axes.plot(
+        [c for c, z in zip(cost, zero, strict=True) if not z],
+        [s for s, z in zip(size, zero, strict=True) if not z],
+        marker,
+        color=colour,
+        ms=6,
+        label=name,
+    )
+    if any(zero):
+        at = [c for c, z in zip(cost, zero, strict=True) if z]
+        axes.plot(at, [floor] * len(at), "v", mfc="none", color=colour, ms=8, label=f"{name}: error 0")
+    for level, x, y in zip(found, cost, size, strict=True):
+        axes.annotate(shown(level.value), (x, y), xytext=(4, 5), textcoords="offset points", fontsize=7, color=colour)
+        if level.value == default:
+            axes.plot([x], [y], "*", color=colour, mec="k", mew=0.8, ms=17, zorder=5, label=f"{name}: fdnet's default")

@@ -1,0 +1,160 @@
+"""From measurements to errors: against a known value, against the ensemble of a reference, and what the levels show."""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from fdnet.studies.study import DONE, Measured, Row, Value, row_of, shown
+
+NAN = float("nan")
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Level:
+    """All runs of one value of a knob: mean cost s, mean error, half-width of its 95 % band (0 for one exact run)."""
+
+    value: Value
+    runs: int
+    cost: float
+    error: float
+    half_width: float
+
+    @property
+    def size(self) -> float:
+        """Magnitude of the mean error."""
+        return abs(self.error)
+
+
+def against_exact(
+    measured: Sequence[Measured],
+    quantity: str,
+    exact: Callable[[Measured], float],
+    *,
+    uncertainty: float = 0.0,
+    scale: Callable[[Measured], float] | None = None,
+) -> list[Row]:
+    """Errors (observed - exact) / scale of every run; `scale` is |exact| if not given. Runs that failed keep a row."""
+    rows = []
+    for run in measured:
+        if run.status != DONE or quantity not in run.observed:
+            rows.append(row_of(run, quantity, error=NAN, uncertainty=NAN))
+            continue
+        truth = exact(run)
+        size = abs(truth) if scale is None else scale(run)
+        rows.append(row_of(run, quantity, error=(run.observed[quantity] - truth) / size, uncertainty=uncertainty))
+    return rows
+
+
+def against_reference(
+    measured: Sequence[Measured],
+    quantity: str,
+    reference: Callable[[Measured], bool],
+    *,
+    relative: bool = True,
+) -> list[Row]:
+    """Errors of every run against the mean of the runs for which `reference` holds, run by run of the same seed.
+
+    Where the reference has the run's seed the difference is taken to that run (same pack, same fines), else to the
+    reference's mean. The uncertainty is the scatter of those differences among the seeds of a value; of reference runs
+    the scatter about their own mean. Relative errors are over the reference's mean.
+    """
+    done = [run for run in measured if run.status == DONE and quantity in run.observed]
+    base = {run.point.seed: run.observed[quantity] for run in done if reference(run)}
+    if not base:
+        raise ValueError(f"{quantity}: no reference run was done")
+    mean = float(np.mean(list(base.values())))
+    size = abs(mean) if relative and mean else 1.0
+
+    def error(run: Measured) -> float:
+        origin = mean if reference(run) else base.get(run.point.seed, mean)
+        return (run.observed[quantity] - origin) / size
+
+    errors = {id(run): error(run) for run in done}
+    scatter = {key: _deviation([errors[id(run)] for run in runs]) for key, runs in _grouped(done).items()}
+    widest = max((s for s in scatter.values() if not math.isnan(s)), default=NAN)
+    rows = []
+    for run in measured:
+        if id(run) not in errors:
+            rows.append(row_of(run, quantity, error=NAN, uncertainty=NAN))
+            continue
+        own = scatter[_level_of(run)]
+        rows.append(row_of(run, quantity, error=errors[id(run)], uncertainty=widest if math.isnan(own) else own))
+    return rows
+
+
+def _level_of(run: Measured) -> tuple[str, Value]:
+    return run.point.series, run.point.value
+
+
+def _grouped(runs: Iterable[Measured]) -> dict[tuple[str, Value], list[Measured]]:
+    groups: dict[tuple[str, Value], list[Measured]] = {}
+    for run in runs:
+        groups.setdefault(_level_of(run), []).append(run)
+    return groups
+
+
+def _deviation(values: Sequence[float]) -> float:
+    return float(np.std(values, ddof=1)) if len(values) > 1 else NAN
+
+
+def levels(rows: Sequence[Row], series: str, quantity: str, *, cost: str = "core_s") -> list[Level]:
+    """Means by value of the knob, in the order in which the values appear; runs without an error are left out."""
+    groups: dict[Value, list[Row]] = {}
+    for row in rows:
+        if row.series == series and row.quantity == quantity and not math.isnan(row.error):
+            groups.setdefault(row.value, []).append(row)
+    return [_level(value, group, cost) for value, group in groups.items()]
+
+
+def _level(value: Value, group: Sequence[Row], cost: str) -> Level:
+    errors = np.array([row.error for row in group])
+    count = len(errors)
+    if count > 1:
+        half = float(student.ppf(0.5 + CONFIDENCE / 2, count - 1) * np.std(errors, ddof=1) / math.sqrt(count))
+    else:
+        half = 1.96 * group[0].error_uncertainty
+    mean_cost = float(np.mean([getattr(row, cost) for row in group]))
+    return Level(value=value, runs=count, cost=mean_cost, error=float(np.mean(errors)), half_width=half)
+
+
+def knee(found: Sequence[Level]) -> Level | None:
+    """The cheapest level whose error cannot be told from the smallest: |e| - h <= least (|e| + h); None without any."""
+    if not found:
+        return None
+    best = min(level.size + level.half_width for level in found)
+    good = [level for level in found if level.size - level.half_width <= best]
+    return min(good, key=lambda level: level.cost)
+
+
+def order(found: Sequence[Level]) -> float:
+    """Exponent p of error ~ cost^-p by least squares over the levels whose error stands out of its band; else nan."""
+    clear = [level for level in found if level.size > level.half_width and level.size > 0 and level.cost > 0]
+    if len(clear) < 3:
+        return NAN
+    slope = np.polyfit(np.log([level.cost for level in clear]), np.log([level.size for level in clear]), 1)[0]
+    return float(-slope)
+
+
+def knee_sentence(found: Sequence[Level], *, default: Value | None) -> str:
+    """What the levels say, in one sentence: the knee, the order where error falls with cost, and the default."""
+    at = knee(found)
+    if at is None:
+        return "no run was done"
+    costliest = max(found, key=lambda level: level.cost)
+    power = order(found)
+    falls = f"; error falls as cost^-{power:.2g}" if not math.isnan(power) and power > 0.2 else ""
+    said = (
+        f"knee at {shown(at.value)}: error {_percent(at)} for {at.cost:.3g} s; the costliest, "
+        f"{shown(costliest.value)}, has {_percent(costliest)} for {costliest.cost:.3g} s{falls}"
+    )
+    chosen = next((level for level in found if level.value == default), None)
+    return said if chosen is None else f"{said}; default {shown(chosen.value)}: {_percent(chosen)}, {chosen.cost:.3g} s"
+
+
+def _percent(level: Level) -> str:
+    band = f" ± {100 * level.half_width:.2g}" if level.half_width else ""
+    return f"{100 * level.error:+.3g}{band} %"

@@ -1,0 +1,169 @@
+"""Runs the points of a study, each kept as soon as it is done, and goes on where an earlier session was cut."""
+
+import ctypes
+import json
+import multiprocessing as mp
+import os
+import resource
+import shutil
+import signal
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, replace
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from fdnet.errors import CaseError, FdnetError
+from fdnet.studies.study import COSTS, DONE, Measured, Point, Study
+
+POINTS, WORK = "points.jsonl", "work"
+OVER_TIME, OVER_MEMORY = "over time", "over memory"
+NAN = float("nan")
+Measure = Callable[[Point, Path], Mapping[str, float]]
+
+
+def run_points(study: Study, out: Path, *, quick: bool, tell: Callable[[str], None] = lambda _: None) -> list[Measured]:
+    """All points of the study's form, measured; those recorded in `out` by an earlier session are not run again.
+
+    `tell` gets a line after each point, with an estimate of the time left. Raises CaseError when `out` holds something
+    else. A point that is refused, fails or exceeds its limits is recorded with that status.
+    """
+    points = study.points(quick)
+    keys = [point.key for point in points]
+    assert len(set(keys)) == len(keys), f"study {study.name}: a point appears twice"
+    record = _Record(out, {"study": study.name, "form": "quick" if quick else "full"})
+    known = record.known(points)
+    todo = [point for point in points if point.key not in known]
+    if len(known):
+        tell(f"{len(known)} of {len(points)} points are there already")
+    start = time.monotonic()
+    for number, point in enumerate(todo, 1):
+        known[point.key] = measured = _measure(study, point, out / WORK)
+        record.add(measured)
+        left = (time.monotonic() - start) / number * (len(todo) - number)
+        tell(f"{len(known)} of {len(points)}: {point.key}: {measured.status}, {measured.wall_s:.1f} s{_eta(left)}")
+    shutil.rmtree(out / WORK, ignore_errors=True)
+    return [known[key] for key in keys]
+
+
+def _eta(seconds: float) -> str:
+    return (
+        f", about {seconds / 60:.0f} min left"
+        if seconds >= 60
+        else (f", about {seconds:.0f} s left" if seconds else "")
+    )
+
+
+class _Record:
+    """The file of measured points: a first line that says whose they are, then one line a point."""
+
+    def __init__(self, out: Path, owner: Mapping[str, str]) -> None:
+        self.path, self.owner = out / POINTS, dict(owner)
+        if out.exists() and not out.is_dir():
+            raise CaseError(f"{out}: is a file, expected a folder for the study; give another --out")
+        if out.exists() and any(out.iterdir()) and not self.path.exists():
+            raise CaseError(f"{out}: holds no fdnet study (no {POINTS}); give an empty or new folder with --out")
+        out.mkdir(parents=True, exist_ok=True)
+        if not self.path.exists():
+            self.path.write_text(json.dumps(self.owner) + "\n", encoding="utf-8")
+
+    def known(self, points: Sequence[Point]) -> dict[str, Measured]:
+        """Recorded points by key; an unfinished last line is cut off, points the study no longer has are passed over."""
+        text = self.path.read_text(encoding="utf-8", errors="replace")
+        whole = text[: text.rfind("\n") + 1]
+        lines = [json.loads(line) for line in whole.splitlines()]
+        if not lines or lines[0] != self.owner:
+            found = lines[0] if lines else "nothing"
+            raise CaseError(f"{self.path}: belongs to {found}, expected {self.owner}; give another --out")
+        if whole != text:
+            self.path.write_text(whole, encoding="utf-8")
+        by_key = {point.key: point for point in points}
+        return {
+            line["key"]: Measured(point=by_key[line["key"]], **_numbers(line))
+            for line in lines[1:]
+            if line["key"] in by_key
+        }
+
+    def add(self, measured: Measured) -> None:
+        fields = asdict(measured)
+        fields.pop("point")
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps({"key": measured.point.key, **fields}) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def _numbers(line: Mapping[str, object]) -> dict:
+    return {name: value for name, value in line.items() if name != "key"}
+
+
+def _measure(study: Study, point: Point, work: Path) -> Measured:
+    work.mkdir(parents=True, exist_ok=True)
+    if not study.isolated:
+        return _attempt(study.measure, point, work)
+    context = mp.get_context("spawn")
+    receiver, sender = context.Pipe(duplex=False)
+    limits = (study.seconds, study.bytes)
+    process = context.Process(target=_child, args=(study.measure, point, work, limits, sender), daemon=True)
+    start = time.monotonic()
+    process.start()
+    sender.close()
+    try:
+        receiver.recv()
+        start = time.monotonic()
+        answered = receiver.poll(study.seconds)
+        return receiver.recv() if answered else _nothing(point, OVER_TIME, time.monotonic() - start)
+    except EOFError:
+        process.join()
+        status = f"failed: its process ended with exit code {process.exitcode}"
+        return _nothing(point, status, time.monotonic() - start)
+    finally:
+        process.kill()
+        process.join()
+
+
+def _child(measure: Measure, point: Point, work: Path, limits: tuple[float, float], sender: Connection) -> None:
+    """Measures in a process of its own: memory limited, ended with its parent, deaf to Ctrl-C (the parent hears it)."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ctypes.CDLL(None).prctl(1, signal.SIGKILL, 0, 0, 0)
+    seconds, most = limits
+    resource.setrlimit(resource.RLIMIT_AS, (int(most), int(most)))
+    sender.send("ready")
+    result = _attempt(measure, point, work)
+    late = result.status == DONE and result.wall_s > seconds
+    sender.send(replace(result, status=OVER_TIME, observed={}) if late else result)
+
+
+def _attempt(measure: Measure, point: Point, work: Path) -> Measured:
+    """One measurement with its costs; what fdnet refuses is a status, what is a fault of the study is raised."""
+    wall, core = time.monotonic(), core_seconds()
+    try:
+        found = dict(measure(point, work))
+        status = DONE
+    except FdnetError as error:
+        found, status = {}, f"refused: {' '.join(str(error).split())}"
+    except MemoryError:
+        found, status = {}, OVER_MEMORY
+    costs = {
+        "wall_s": time.monotonic() - wall,
+        "core_s": core_seconds() - core,
+        "steps": NAN,
+        "peak_memory_bytes": peak_memory(),
+    }
+    costs |= {name: found.pop(name) for name in COSTS if name in found}
+    return Measured(point=point, status=status, observed=found, **costs)
+
+
+def _nothing(point: Point, status: str, wall: float) -> Measured:
+    return Measured(point=point, status=status, observed={}, wall_s=wall, core_s=NAN, steps=NAN, peak_memory_bytes=NAN)
+
+
+def core_seconds() -> float:
+    """CPU seconds, user and system, of this process and of the children it has waited for."""
+    usages = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(usage.ru_utime + usage.ru_stime for usage in usages)
+
+
+def peak_memory() -> float:
+    """Largest resident memory so far, bytes, of this process or of one child."""
+    return 1024.0 * max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))

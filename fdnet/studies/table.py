@@ -1,0 +1,95 @@
+"""The table and the text of a study: a tidy CSV; by quantity and series what each level costs and where the knee is."""
+
+import csv
+import io
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from fdnet.atomic import write_text
+from fdnet.errors import CaseError
+from fdnet.studies.draw import series_of
+from fdnet.studies.judge import Level, knee_sentence, levels
+from fdnet.studies.study import DONE, Row, Study, shown
+
+COLUMNS = tuple(field.name for field in fields(Row))
+_TEXT = ("series", "knob", "quantity", "status")
+
+
+def write_rows(rows: Sequence[Row], path: Path) -> None:
+    """The rows as CSV, floats with 9 digits, what is not known left empty."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    writer.writerows([_cell(getattr(row, name)) for name in COLUMNS] for row in rows)
+    write_text(path, text.getvalue())
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, float):
+        return "" if math.isnan(value) else f"{value:.9g}"
+    return value
+
+
+def read_rows(path: Path) -> list[Row]:
+    """The rows of such a CSV. Raises CaseError when it is not one."""
+    with path.open(newline="", encoding="utf-8") as file:
+        reader = csv.DictReader(file)
+        if tuple(reader.fieldnames or ()) != COLUMNS:
+            raise CaseError(f"{path}: columns {reader.fieldnames}, expected {list(COLUMNS)}; run fdnet study again")
+        return [_row(line) for line in reader]
+
+
+def _row(line: Mapping[str, str]) -> Row:
+    values: dict[str, Any] = {name: _value(name, line[name]) for name in COLUMNS}
+    return Row(**values)
+
+
+def _value(name: str, text: str) -> str | int | float:
+    if name in _TEXT:
+        return text
+    if name == "seed":
+        return int(text)
+    try:
+        return float(text) if text else float("nan")
+    except ValueError:
+        return text
+
+
+def study_text(study: Study, rows: Sequence[Row]) -> str:
+    """Markdown: a table of levels and the knee of every series in every panel, then the study's remarks."""
+    parts = []
+    for panel in study.panels:
+        for name in series_of(panel, rows):
+            found = levels(rows, name, panel.quantity, cost=panel.cost)
+            parts.append(f"**{panel.title}: {name}** ({panel.label})\n")
+            parts.append(_level_table(study, found, panel.cost))
+            parts.append(f"\n{_sentence_start(knee_sentence(found, default=study.defaults.get(name)))}.\n")
+    missing = _missing(rows)
+    if missing:
+        parts.append("Not done:\n\n" + "\n".join(f"- {line}" for line in missing) + "\n")
+    return "\n".join([*parts, study.remarks.strip()]).strip() + "\n"
+
+
+def _sentence_start(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _level_table(study: Study, found: Sequence[Level], cost: str) -> str:
+    unit = "MB" if cost == "peak_memory_mb" else "s"
+    lines = [f"| {study.knob_label} | runs | error | ± (95 %) | cost, {unit} |", "|---|---|---|---|---|"]
+    for level in found:
+        band = f"{level.half_width:.2g}" if level.half_width else "-"
+        lines.append(f"| {shown(level.value)} | {level.runs} | {level.error:+.3g} | {band} | {level.cost:.3g} |")
+    return "\n".join(lines)
+
+
+def _missing(rows: Sequence[Row]) -> list[str]:
+    found = {
+        f"{row.series}, {row.knob} {shown(row.value)}, seed {row.seed}: {row.status}"
+        for row in rows
+        if row.status != DONE
+    }
+    return sorted(found)
