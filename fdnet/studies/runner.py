@@ -68,7 +68,7 @@ class _Record:
             self.path.write_text(json.dumps(self.owner) + "\n", encoding="utf-8")
 
     def known(self, points: Sequence[Point]) -> dict[str, Measured]:
-        """Recorded points by key; an unfinished last line is cut off, points the study no longer has are passed over."""
+        """Recorded points by key; an unfinished last line is cut off, points not asked for stay there."""
         text = self.path.read_text(encoding="utf-8", errors="replace")
         whole = text[: text.rfind("\n") + 1]
         lines = [json.loads(line) for line in whole.splitlines()]
