@@ -14,7 +14,10 @@ from fdnet.studies.runner import run_points
 from fdnet.studies.study import Study
 from fdnet.studies.table import study_text, write_rows
 
-STUDIES: Mapping[str, str] = {}
+STUDIES: Mapping[str, str] = {
+    "stiffness": "contact stiffness, from 1e2 N/m to the nominal one",
+    "time-step": "time step over sqrt(m/k) and over the drag relaxation time",
+}
 """Name of each study and what it asks; the module has the same name with underscores."""
 
 

@@ -12,7 +12,12 @@ from fdnet.studies.study import Panel, Row, Study, shown
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#5a5a5a", "#8c564b")
 MARKERS = "osD^vP*X"
 _WIDTH, _HEIGHT = 6.2, 4.6
-_COST_LABELS = {"core_s": "run time, core s", "wall_s": "run time, s", "peak_memory_mb": "peak memory, MB"}
+_COST_LABELS = {
+    "core_s": "run time, core s",
+    "wall_s": "run time, s",
+    "peak_memory_mb": "peak memory, MB",
+    "steps": "steps",
+}
 
 
 def draw_study(study: Study, rows: Sequence[Row], path: Path) -> None:

@@ -11,6 +11,7 @@ from fdnet.studies.study import DONE, Measured, Row, Value, row_of, shown
 
 NAN = float("nan")
 CONFIDENCE = 0.95
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,8 +37,12 @@ def against_exact(
     *,
     uncertainty: float = 0.0,
     scale: Callable[[Measured], float] | None = None,
+    magnitude: bool = False,
 ) -> list[Row]:
-    """Errors (observed - exact) / scale of every run; `scale` is |exact| if not given. Runs that failed keep a row."""
+    """Errors (observed - exact) / scale of every run, or their magnitude, where signs would cancel among runs.
+
+    `scale` is |exact| if not given. Runs that were not done keep a row.
+    """
     rows = []
     for run in measured:
         if run.status != DONE or quantity not in run.observed:
@@ -45,7 +50,8 @@ def against_exact(
             continue
         truth = exact(run)
         size = abs(truth) if scale is None else scale(run)
-        rows.append(row_of(run, quantity, error=(run.observed[quantity] - truth) / size, uncertainty=uncertainty))
+        error = (run.observed[quantity] - truth) / size
+        rows.append(row_of(run, quantity, error=abs(error) if magnitude else error, uncertainty=uncertainty))
     return rows
 
 
@@ -86,6 +92,36 @@ def against_reference(
     return rows
 
 
+def profile_distance(
+    measured: Sequence[Measured], names: Sequence[str], reference: Callable[[Measured], bool], quantity: str = "profile"
+) -> list[Row]:
+    """Distance of every run's depth profile from the reference's mean profile, in units of the reference's mean depth.
+
+    Profiles are counts in equal bins, `names` in order; the distance is the area between the cumulative shares (first
+    Wasserstein distance). It is never negative: a reference run is held against the mean of the other reference runs,
+    which gives the distance that chance alone makes.
+    """
+    done = [run for run in measured if run.status == DONE and names[0] in run.observed]
+    share = {id(run): np.cumsum(_shares([run.observed[name] for name in names])) for run in done}
+    base = [run for run in done if reference(run)]
+    if len(base) < 2:
+        raise ValueError(f"{quantity}: {len(base)} reference runs were done, expected at least 2")
+
+    def distance(run: Measured) -> float:
+        others = np.mean([share[id(other)] for other in base if other is not run], axis=0)
+        middle = float(np.sum(1 - others)) + 0.5
+        return float(np.sum(np.abs(share[id(run)] - others))) / middle
+
+    return [
+        row_of(run, quantity, error=distance(run) if id(run) in share else NAN, uncertainty=NAN) for run in measured
+    ]
+
+
+def _shares(counts: Sequence[float]) -> list[float]:
+    total = sum(counts)
+    return [count / total if total else 0.0 for count in counts]
+
+
 def _level_of(run: Measured) -> tuple[str, Value]:
     return run.point.series, run.point.value
 
@@ -118,15 +154,17 @@ def _level(value: Value, group: Sequence[Row], cost: str) -> Level:
     else:
         half = 1.96 * group[0].error_uncertainty
     mean_cost = float(np.mean([getattr(row, cost) for row in group]))
-    return Level(value=value, runs=count, cost=mean_cost, error=float(np.mean(errors)), half_width=half)
+    mean = float(np.mean(errors))
+    mean = 0.0 if abs(mean) < _ROUNDING * float(np.max(np.abs(errors))) else mean
+    return Level(value=value, runs=count, cost=mean_cost, error=mean, half_width=half)
 
 
 def knee(found: Sequence[Level]) -> Level | None:
-    """The cheapest level whose error cannot be told from the smallest: |e| - h <= least (|e| + h); None without any."""
+    """The cheapest level whose error is within the band of the smallest: |e| <= least (|e| + h); None without any."""
     if not found:
         return None
     best = min(level.size + level.half_width for level in found)
-    good = [level for level in found if level.size - level.half_width <= best]
+    good = [level for level in found if level.size <= best]
     return min(good, key=lambda level: level.cost)
 
 
@@ -139,7 +177,7 @@ def order(found: Sequence[Level]) -> float:
     return float(-slope)
 
 
-def knee_sentence(found: Sequence[Level], *, default: Value | None) -> str:
+def knee_sentence(found: Sequence[Level], *, default: Value | None, unit: str = "s") -> str:
     """What the levels say, in one sentence: the knee, the order where error falls with cost, and the default."""
     at = knee(found)
     if at is None:
@@ -148,11 +186,15 @@ def knee_sentence(found: Sequence[Level], *, default: Value | None) -> str:
     power = order(found)
     falls = f"; error falls as cost^-{power:.2g}" if not math.isnan(power) and power > 0.2 else ""
     said = (
-        f"knee at {shown(at.value)}: error {_percent(at)} for {at.cost:.3g} s; the costliest, "
-        f"{shown(costliest.value)}, has {_percent(costliest)} for {costliest.cost:.3g} s{falls}"
+        f"knee at {shown(at.value)}: error {_percent(at)} for {at.cost:.3g} {unit}; the costliest, "
+        f"{shown(costliest.value)}, has {_percent(costliest)} for {costliest.cost:.3g} {unit}{falls}"
     )
     chosen = next((level for level in found if level.value == default), None)
-    return said if chosen is None else f"{said}; default {shown(chosen.value)}: {_percent(chosen)}, {chosen.cost:.3g} s"
+    return (
+        said
+        if chosen is None
+        else f"{said}; default {shown(chosen.value)}: {_percent(chosen)}, {chosen.cost:.3g} {unit}"
+    )
 
 
 def _percent(level: Level) -> str:

@@ -38,7 +38,7 @@ def run_points(study: Study, out: Path, *, quick: bool, tell: Callable[[str], No
         tell(f"{len(known)} of {len(points)} points are there already")
     start = time.monotonic()
     for number, point in enumerate(todo, 1):
-        known[point.key] = measured = _measure(study, point, out / WORK)
+        known[point.key] = measured = _measure(study, point, out / WORK, alone=study.isolated and not quick)
         record.add(measured)
         left = (time.monotonic() - start) / number * (len(todo) - number)
         tell(f"{len(known)} of {len(points)}: {point.key}: {measured.status}, {measured.wall_s:.1f} s{_eta(left)}")
@@ -97,9 +97,9 @@ def _numbers(line: Mapping[str, object]) -> dict:
     return {name: value for name, value in line.items() if name != "key"}
 
 
-def _measure(study: Study, point: Point, work: Path) -> Measured:
+def _measure(study: Study, point: Point, work: Path, *, alone: bool) -> Measured:
     work.mkdir(parents=True, exist_ok=True)
-    if not study.isolated:
+    if not alone:
         return _attempt(study.measure, point, work)
     context = mp.get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
@@ -162,6 +162,12 @@ def core_seconds() -> float:
     """CPU seconds, user and system, of this process and of the children it has waited for."""
     usages = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return sum(usage.ru_utime + usage.ru_stime for usage in usages)
+
+
+def child_core_seconds() -> float:
+    """CPU seconds, user and system, of the children this process has waited for."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def peak_memory() -> float:

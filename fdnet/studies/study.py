@@ -85,8 +85,8 @@ class Study:
     `points(quick)` lists what to run, cheapest first. `measure(point, work)` runs one and returns its observations
     and, under the names in COSTS, costs of its own; `work` is a folder all points share (packs made once).
     `judge(measured)` turns all of them into rows. `defaults` gives fdnet's own value of the knob by series, `remarks`
-    what the numbers cannot say. Points run in a process of their own, limited to `seconds` and `bytes`, unless not
-    `isolated`.
+    what the numbers cannot say. Points of the full form run in a process of their own, limited to `seconds` and
+    `bytes`, unless not `isolated`; those of the quick form all in one, without limits.
     """
 
     name: str

@@ -66,24 +66,24 @@ def study_text(study: Study, rows: Sequence[Row]) -> str:
             found = levels(rows, name, panel.quantity, cost=panel.cost)
             parts.append(f"**{panel.title}: {name}** ({panel.label})\n")
             parts.append(_level_table(study, found, panel.cost))
-            parts.append(f"\n{_sentence_start(knee_sentence(found, default=study.defaults.get(name)))}.\n")
+            sentence = knee_sentence(found, default=study.defaults.get(name), unit=_unit(panel.cost))
+            parts.append(f"\n{sentence[:1].upper()}{sentence[1:]}.\n")
     missing = _missing(rows)
     if missing:
         parts.append("Not done:\n\n" + "\n".join(f"- {line}" for line in missing) + "\n")
     return "\n".join([*parts, study.remarks.strip()]).strip() + "\n"
 
 
-def _sentence_start(text: str) -> str:
-    return text[:1].upper() + text[1:]
-
-
 def _level_table(study: Study, found: Sequence[Level], cost: str) -> str:
-    unit = "MB" if cost == "peak_memory_mb" else "s"
-    lines = [f"| {study.knob_label} | runs | error | ± (95 %) | cost, {unit} |", "|---|---|---|---|---|"]
+    lines = [f"| {study.knob_label} | runs | error | ± (95 %) | cost, {_unit(cost)} |", "|---|---|---|---|---|"]
     for level in found:
         band = f"{level.half_width:.2g}" if level.half_width else "-"
         lines.append(f"| {shown(level.value)} | {level.runs} | {level.error:+.3g} | {band} | {level.cost:.3g} |")
     return "\n".join(lines)
+
+
+def _unit(cost: str) -> str:
+    return {"peak_memory_mb": "MB", "steps": "steps"}.get(cost, "s")
 
 
 def _missing(rows: Sequence[Row]) -> list[str]:

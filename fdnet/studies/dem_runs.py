@@ -1,0 +1,158 @@
+"""What the studies of the DEM half run: small invasions and single fines, by fdnet's own decks and the real binary."""
+
+import math
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fdnet.case import Case
+from fdnet.case_file import case_from, set_keys
+from fdnet.dem.checkpoint import state_at
+from fdnet.dem.dump import read_frame
+from fdnet.dem.invasion import Invasion, invade
+from fdnet.dem.liggghts import Binary, Launch, find_binary
+from fdnet.dem.packing import make_pack
+from fdnet.dem.scene import box_of, snapshot_of
+from fdnet.network.permeability import AnalysisOptions, analyse
+from fdnet.scales import relaxation_time, scales_of
+from fdnet.snapshot import Kind, Snapshot, resting
+from fdnet.studies.runner import child_core_seconds
+
+SLAB: dict[str, Any] = {
+    "name": "study",
+    "box": {"size_mm": [4.0, 2.86, 2.86]},
+    "grains": {"radius_mm": 0.25, "count": 300},
+    "fines": {"radius_mm": 0.05, "count": 1000},
+    "fluid": {"darcy_length_mm": 8.0},
+    "run": {"duration_ms": 2.0},
+    "analysis": {"sections": 4},
+}
+"""The invasion of the studies: 300 fixed grains at porosity 0.40, 1,000 fines of 0.10 mm, 2 ms, the velocity (5.4 m/s)
+of thesis specimen 5. A given duration, so that every run follows the same span of time."""
+PROFILE_BINS = 16
+"""Equal bins of depth over the specimen in which invaded fines are counted."""
+_SMALL: dict[str, Any] = {"grains": {"count": 60}, "box": {"size_mm": [2.4, 1.7, 1.7]}, "fines": {"count": 120}}
+
+
+def slab_case(seed: int, *assignments: str, small: bool = False) -> Case:
+    """The studies' invasion with other settings ("key=value"); `small` is a fifth of it, for the quick forms."""
+    data = {key: dict(value) if isinstance(value, dict) else value for key, value in SLAB.items()}
+    if small:
+        for part, values in _SMALL.items():
+            data[part] |= values
+        data["run"] = {"duration_ms": 0.5}
+    return case_from(set_keys(data, [f"seed={seed}", *assignments]))
+
+
+@cache
+def the_binary() -> Binary:
+    """LIGGGHTS, looked up once. Raises LiggghtsError when there is none."""
+    return find_binary()
+
+
+def grains_of(case: Case, work: Path) -> Snapshot:
+    """The case's grains, packed at the default stiffness once for all points that share seed, box and grains.
+
+    Fixed grains only: their place does not depend on the stiffness (docs/physics.md).
+    """
+    plain = case.model_copy(update={"run": type(case.run)()})
+    folder = work / f"pack-{plain.digest('pack')}"
+    if not (folder / "attempts.json").exists():
+        make_pack(plain, scales_of(plain), folder, Launch(binary=the_binary()))
+    return snapshot_of(read_frame(folder / "post" / "pack.dump"), plain, time_s=0.0)
+
+
+def invasion_run(case: Case, work: Path, slug: str, *, ranks: int = 1) -> dict[str, float]:
+    """One invasion and what it left: counts, depths (m), profile, porosity, permeability, largest overlap, costs."""
+    grains = grains_of(case, work)
+    folder, scales = work / slug, scales_of(case)
+    launch, before = Launch(binary=the_binary(), ranks=ranks), child_core_seconds()
+    result = invade(case, scales, grains, folder, launch)
+    core = child_core_seconds() - before
+    costs = {
+        "steps": float(result.history[-1].step),
+        "core_s": core,
+        "wall_s": sum(run.seconds for run in result.runs),
+    }
+    return invasion_observed(case, grains, result) | costs
+
+
+def invasion_observed(case: Case, grains: Snapshot, result: Invasion) -> dict[str, float]:
+    """Numbers of a finished invasion, SI; `bin_00`... are invaded fines by equal bins of depth."""
+    last, length = result.history[-1], case.size_m[0]
+    depth = result.damaged.fines().position[:, 0]
+    depth = depth[(depth >= 0) & (depth < length)]
+    bins = np.histogram(depth, PROFILE_BINS, (0.0, length))[0]
+    analysis = analyse(
+        grains,
+        result.damaged,
+        periodic=case.periodic,
+        options=AnalysisOptions(sections=case.analysis.sections, walls=case.analysis.walls),
+    )
+    first = analysis.sections[0]
+    return {
+        "invaded": float(last.invaded),
+        "passed": float(last.passed),
+        "mean_depth": float(np.mean(depth)) if len(depth) else 0.0,
+        "porosity_loss": analysis.porosity_initial - analysis.porosity_damaged,
+        "porosity_loss_first": first.porosity_initial - first.porosity_damaged,
+        "k_ratio": analysis.k_damaged / analysis.k_initial,
+        "k_ratio_first": first.k_damaged / first.k_initial,
+        "max_overlap": result.max_overlap,
+    } | {f"bin_{number:02d}": float(count) for number, count in enumerate(bins)}
+
+
+def relaxation_run(work: Path, slug: str, *assignments: str, over_tau: float, spans: float = 3.0) -> dict[str, float]:
+    """One free fine falling into its terminal velocity: largest error of v_z over `spans` relaxation times.
+
+    v_z(t) = v_T (1 - exp(-t / tau)) (Stokes 1851), observed after every quarter of tau; the step is `over_tau` tau, or
+    the drag is held that long where the scheme is "held" (the step is then a twentieth of it). Errors are over v_T.
+    """
+    radius, density, viscosity = 0.05e-3, 2146.0, 0.05
+    tau = relaxation_time(radius, density, viscosity)
+    held = any("scheme=held" in text for text in assignments)
+    step = over_tau * tau / (20 if held else 1)
+    stiffness = 4 / 3 * math.pi * radius**3 * density * (0.1 / step) ** 2
+    gravity = -0.05 / tau
+    case = slab_case(
+        1,
+        "fines.count=1",
+        "fluid.velocity_m_s=1e-3",
+        "gravity.mode=on",
+        "gravity.buoyancy=false",
+        f"gravity.acceleration_m_s2=[0.0,0.0,{gravity!r}]",
+        f"run.stiffness_N_m={stiffness!r}",
+        f"run.time_step_s={step!r}",
+        f"run.duration_ms={1e3 * spans * tau!r}",
+        f"run.checkpoint_ms={1e3 * 0.25 * tau!r}",
+        *(["drag.refresh_steps=20"] if held else []),
+        *assignments,
+    )
+    return _relaxed(case, work / slug, terminal=gravity * tau, tau=tau)
+
+
+def _relaxed(case: Case, folder: Path, *, terminal: float, tau: float) -> dict[str, float]:
+    scales, far = scales_of(case), np.array([[3.5e-3, 1.4e-3, 1.4e-3]])
+    lonely = resting(far, 2.5e-4, box_of(case), Kind.GRAIN)
+    launch, before = Launch(binary=the_binary()), child_core_seconds()
+    result = invade(case, scales, lonely, folder, launch)
+    core = child_core_seconds() - before
+    errors = []
+    for row in result.history:
+        velocity = state_at(folder, row, case, scales, lonely).fines().velocity[0, 2]
+        exact = terminal * (1 - math.exp(-row.step * scales.time_step / tau))
+        errors.append(abs(velocity - exact) / abs(terminal))
+    return {"relaxation_error": max(errors), "steps": float(result.history[-1].step), "core_s": core}
+
+
+def with_number(value: Any) -> str:
+    """A knob's value as text for "key=value"."""
+    return value if isinstance(value, str) else repr(float(value))
+
+
+def settings_text(settings: Mapping[str, Any]) -> list[str]:
+    """Settings of a point as "key=value"."""
+    return [f"{key}={with_number(value)}" for key, value in settings.items()]

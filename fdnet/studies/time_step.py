@@ -1,0 +1,94 @@
+"""Time step: over sqrt(m/k) in collisions, in an undamped pack and in whole invasions, over tau in Stokes drag."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from fdnet.case import Run as RunControl
+from fdnet.studies.collisions import collision_run, energy_run
+from fdnet.studies.dem_runs import invasion_run, relaxation_run, slab_case
+from fdnet.studies.judge import against_exact, against_reference
+from fdnet.studies.study import Measured, Panel, Point, Row, Study
+
+COLLISION, ENERGY, INVASION, DRAG = "collision", "undamped pack", "invasion", "drag relaxation"
+_PLAIN = ("invaded", "mean_depth", "porosity_loss", "k_ratio_first")
+_SPAN, _SPANS = 1e-5, 300.0
+_STIFFNESS = 1e4
+_INVASION_STIFFNESS = 1e3
+
+
+def points(quick: bool) -> list[Point]:
+    """Steps from coarse to fine. Collisions start at four phases within a step; packs and invasions have seeds."""
+    if quick:
+        found = _ladder(COLLISION, (0.4, 0.2, 0.1, 0.05), 2) + _ladder(ENERGY, (0.4, 0.2, 0.1, 0.05), 1)
+        return found + _ladder(DRAG, (0.2, 0.1, 0.05, 0.025), 1) + _ladder(INVASION, (0.2, 0.1, 0.05), 2, size="small")
+    found = _ladder(COLLISION, (0.8, 0.4, 0.2, 0.1, 0.05, 0.025, 0.0125, 0.00625), 4)
+    found += _ladder(ENERGY, (1.2, 0.8, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.05, 0.025, 0.0125), 3)
+    found += _ladder(DRAG, (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002), 1)
+    return found + _ladder(INVASION, (0.2, 0.14, 0.1, 0.07, 0.05, 0.025, 0.0125), 6)
+
+
+def _ladder(series: str, values: Sequence[float], seeds: int, size: str = "whole") -> list[Point]:
+    knob = "dt_over_tau" if series == DRAG else "dt_over_sqrt_m_k"
+    settings = {"size": size} if series == INVASION else {}
+    return [
+        Point(series=series, knob=knob, value=value, seed=seed, settings=settings)
+        for value in values
+        for seed in range(1, seeds + 1)
+    ]
+
+
+def measure(point: Point, work: Path) -> Mapping[str, float]:
+    """One collision, pack, relaxation or invasion with this step."""
+    assert isinstance(point.value, float)
+    if point.series == COLLISION:
+        phase = (point.seed - 0.5) / 4
+        return collision_run(work, point.slug, stiffness=_STIFFNESS, factor=point.value, phase=phase, span=_SPAN)
+    if point.series == ENERGY:
+        return energy_run(work, point.slug, factor=point.value, seed=point.seed, spans=_SPANS)
+    if point.series == DRAG:
+        return relaxation_run(work, point.slug, "drag.scheme=every_step", over_tau=point.value)
+    step = (f"run.stiffness_N_m={_INVASION_STIFFNESS!r}", f"run.time_step_factor={point.value!r}")
+    return invasion_run(slab_case(point.seed, *step, small=point.settings["size"] == "small"), work, point.slug)
+
+
+def judge(measured: Sequence[Measured]) -> list[Row]:
+    """Closed forms for the small systems; invasions against the smallest step."""
+
+    def of(series: str) -> list[Measured]:
+        return [run for run in measured if run.point.series == series]
+
+    rows = []
+    for series, names in (
+        (COLLISION, ("overlap_error", "restitution_error")),
+        (ENERGY, ("energy_drift",)),
+        (DRAG, ("relaxation_error",)),
+    ):
+        rows += [row for name in names for row in _sizes(of(series), name)]
+    finest = min(float(run.point.value) for run in of(INVASION))
+    return rows + [
+        row for name in _PLAIN for row in against_reference(of(INVASION), name, lambda run: run.point.value == finest)
+    ]
+
+
+def _sizes(runs: Sequence[Measured], name: str) -> list[Row]:
+    return against_exact(runs, name, lambda _: 0.0, scale=lambda _: 1.0, magnitude=True)
+
+
+_FACTOR = RunControl().time_step_factor
+STUDY = Study(
+    name="time-step",
+    title="Time step",
+    knob_label="step over sqrt(m/k), or over tau for drag",
+    points=points,
+    measure=measure,
+    judge=judge,
+    panels=(
+        Panel(quantity="overlap_error", title="deepest overlap of two fines", cost="steps"),
+        Panel(quantity="restitution_error", title="restitution of two fines", cost="steps"),
+        Panel(quantity="energy_drift", title="energy of an undamped pack, 300 sqrt(m/k)", cost="steps"),
+        Panel(quantity="relaxation_error", title="Stokes drag, every step", cost="steps", label="error over v_T"),
+        Panel(quantity="invaded", title="invasion: fines inside"),
+        Panel(quantity="k_ratio_first", title="invasion: k/k0 of the first millimetre"),
+    ),
+    defaults={COLLISION: _FACTOR, ENERGY: _FACTOR, INVASION: _FACTOR},
+)

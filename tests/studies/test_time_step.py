@@ -1,0 +1,45 @@
+"""The study of the time step in its quick form, on the real binary: orders of convergence."""
+
+import numpy as np
+import pytest
+
+from fdnet.studies.command import run_study
+from fdnet.studies.judge import levels, order
+from fdnet.studies.table import read_rows
+from fdnet.studies.time_step import COLLISION, DRAG, ENERGY, INVASION, STUDY
+
+pytestmark = pytest.mark.liggghts
+
+
+@pytest.fixture(scope="module")
+def rows(tmp_path_factory):
+    out = tmp_path_factory.mktemp("time-step")
+    run_study(STUDY, out, quick=True)
+    return read_rows(out / "time-step.csv")
+
+
+def test_a_damped_collision_converges_in_first_order(rows):
+    found = levels(rows, COLLISION, "restitution_error")
+    slope = np.polyfit(np.log([level.value for level in found]), np.log([level.size for level in found]), 1)[0]
+    assert slope == pytest.approx(1.1, abs=0.3)
+    assert next(level.size for level in found if level.value == 0.1) < 0.02
+
+
+def test_energy_of_an_undamped_pack_converges_in_second_order(rows):
+    found = levels(rows, ENERGY, "energy_drift", cost="steps")
+    assert order(found) == pytest.approx(2.0, abs=0.3)
+    assert next(level.size for level in found if level.value == 0.1) < 1e-4
+
+
+def test_explicit_drag_converges_in_first_order(rows):
+    found = levels(rows, DRAG, "relaxation_error", cost="steps")
+    assert [level.value for level in found] == [0.2, 0.1, 0.05, 0.025]
+    assert found[-1].size < 0.55 * found[-2].size < 0.4 * found[-3].size
+    assert found[-1].size < 0.01
+
+
+def test_the_invasion_is_held_against_its_smallest_step(rows):
+    found = levels(rows, INVASION, "invaded")
+    assert [level.value for level in found] == [0.2, 0.1, 0.05]
+    assert found[-1].error == 0.0
+    assert all(level.size < 0.1 for level in found)
