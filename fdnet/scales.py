@@ -7,7 +7,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from fdnet.case import CONTACT_STEP_LIMIT, Case
+from fdnet.case import Case
+from fdnet.case_parts import CONTACT_STEP_LIMIT
 from fdnet.contact_law import Contact, contacts_of, mass_range, stiffness_factor
 from fdnet.errors import CaseError
 

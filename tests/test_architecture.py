@@ -8,7 +8,9 @@ import pytest
 LAYERS = [
     ["errors"],
     ["atomic", "snapshot"],
-    ["case", "contacts"],
+    ["case_parts", "contacts"],
+    ["case_rules"],
+    ["case"],
     ["case_file", "contact_law"],
     ["scales"],
     ["cost", "network"],
@@ -37,7 +39,7 @@ DOORS = {
     "numba": {"network/compiled"},
     "pymetis": {"network/solver"},
     "pyamg": {"network/solver"},
-    "pydantic": {"case", "case_file"},
+    "pydantic": {"case", "case_parts", "case_file"},
     "tomli_w": {"case"},
     "rich": {"progress"},
 }
