@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from fdnet.case_parts import MOST_BINS, MOST_FINES, MOST_SLAB, Box, Fines, Grains
+from fdnet.case_parts import MOST_BINS, MOST_FINES, MOST_SLAB, Box, Drag, Fines, Grains
 
 
 def cross_problems(parts: Mapping[str, Any]) -> Iterator[str]:
@@ -32,10 +32,8 @@ def cross_problems(parts: Mapping[str, Any]) -> Iterator[str]:
 
 def _choice_problems(parts: Mapping[str, Any]) -> Iterator[str]:
     drag, gravity, run, box, analysis = (parts.get(name) for name in ("drag", "gravity", "run", "box", "analysis"))
-    if drag and drag.field == "network":
-        yield "drag.field: 'network' is not available yet; expected 'uniform'"
-    if drag and drag.scheme == "every_step" and drag.refresh_steps not in (None, 1):
-        yield f"drag.refresh_steps: {drag.refresh_steps} belongs to drag.scheme 'held', not 'every_step'"
+    if drag:
+        yield from _drag_problems(drag, parts.get("fines"))
     if gravity and gravity.mode != "off" and gravity.buoyancy:
         pulled = [component for component in gravity.acceleration_m_s2 if component]
         if len(pulled) > 1 or any(component > 0 for component in pulled):
@@ -51,6 +49,23 @@ def _choice_problems(parts: Mapping[str, Any]) -> Iterator[str]:
             f"analysis.profile_bin_mm: {analysis.profile_bin_mm:g} cuts {box.size_mm[0]:g} mm into more than "
             f"{MOST_BINS} bins; "
             f"expected at least {box.size_mm[0] / MOST_BINS:.3g}"
+        )
+
+
+def _drag_problems(drag: Drag, fines: Fines | None) -> Iterator[str]:
+    if drag.field == "network":
+        yield "drag.field: 'network' is not available yet; expected 'uniform'"
+    if drag.scheme != "held" and drag.refresh_steps not in (None, 1):
+        yield f"drag.refresh_steps: {drag.refresh_steps} belongs to drag.scheme 'held', not {drag.scheme!r}"
+    if drag.scheme == "viscous" and fines and isinstance(fines.radius_mm, tuple):
+        yield (
+            f"drag.scheme: 'viscous' needs fines of one size, fines.radius_mm is {list(fines.radius_mm)} (LIGGGHTS's "
+            "viscous force is one number a material); take 'held', 'every_step' or 'implicit'"
+        )
+    if drag.scheme == "implicit" and drag.upstream == "darcy":
+        yield (
+            "drag.upstream: 'darcy' changes the fluid's velocity at x = 0, drag.scheme 'implicit' keeps one a fine; "
+            "take 'interstitial', or another drag.scheme"
         )
 
 

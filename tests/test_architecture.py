@@ -12,6 +12,7 @@ LAYERS = [
     ["case_rules"],
     ["case"],
     ["case_file", "contact_law"],
+    ["time_step"],
     ["scales"],
     ["cost", "network"],
     ["scale_table"],
