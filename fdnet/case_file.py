@@ -9,7 +9,9 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from fdnet.case import Case, Part, cross_problems
+from fdnet.case import Case
+from fdnet.case_parts import Part
+from fdnet.case_rules import cross_problems
 from fdnet.errors import CaseError
 
 

@@ -3,7 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from fdnet.case import Case, Spheres
+from fdnet.case import Case
+from fdnet.case_parts import Spheres
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

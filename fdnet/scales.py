@@ -7,13 +7,11 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from fdnet.case import CONTACT_STEP_LIMIT, Case
+from fdnet.case import Case
 from fdnet.contact_law import Contact, contacts_of, mass_range, stiffness_factor
 from fdnet.errors import CaseError
+from fdnet.time_step import drag_warnings, hold_steps, time_step
 
-HOLD_OVER_RELAXATION = 0.05
-"""Share of the drag relaxation time for which the drag is held by default (held 0.1 tau: at the seed scatter)."""
-HOLD_WARNING, HOLD_LIMIT = 0.1, 1.0
 OVERLAP_WARNING, MOST_DRAG_OVERLAP = 0.03, 0.5
 ARRIVALS = 10
 """The default plug time lets at least this many fines of the undisturbed suspension arrive."""
@@ -145,10 +143,10 @@ def _fine_scales(case: Case, contacts: dict[str, Contact], velocity: float, upst
     fines, viscosity = case.fines, case.fluid.viscosity_cP * 1e-3
     low, high = fines.radius_range_m
     tau = tuple(relaxation_time(r, fines.density_kg_m3, viscosity, case.drag.multiplier) for r in (low, high))
-    step = _time_step(case, contacts, tau[0])
-    hold = _hold_steps(case, step, tau[0])
+    step = time_step(case, contacts, tau[0])
     count, slab = _supply(case)
-    plug, cap, chunk = _times(case, slab, velocity, upstream, step * hold)
+    plug, cap, chunk = _times(case, slab, velocity, upstream)
+    hold = hold_steps(case, step, tau[0], chunk)
     stiffness = contacts["grain-fine"].normal_stiffness
     result: dict[str, Any] = {
         "supplied_count": count,
@@ -158,7 +156,7 @@ def _fine_scales(case: Case, contacts: dict[str, Contact], velocity: float, upst
         "hold_steps": hold,
         "plug_time": plug,
         "cap_time": cap,
-        "checkpoint_steps": chunk * hold,
+        "checkpoint_steps": _chunk_steps(case, chunk, step * hold) * hold,
         "reynolds": case.fluid.density_kg_m3 * velocity * 2 * high / viscosity,
         "stokes": tau[1] * velocity / (2 * case.grains.mean_radius_m),
         "gravity_over_drag": _gravity_over_drag(case, velocity),
@@ -195,38 +193,6 @@ def _gravity_over_drag(case: Case, velocity: float) -> float:
     return 2 * case.fines.radius_range_m[1] ** 2 * weight / (9 * viscosity * velocity * case.drag.multiplier)
 
 
-def _time_step(case: Case, contacts: dict[str, Contact], tau: float) -> float:
-    mobile = case.grains.motion == "mobile"
-    bound = min(c.step_limit for name, c in contacts.items() if "fine" in name or mobile)
-    if case.run.time_step_s is None:
-        return min(case.run.time_step_factor * bound, HOLD_WARNING * tau)
-    if case.run.time_step_s > CONTACT_STEP_LIMIT * bound:
-        raise CaseError(
-            f"run.time_step_s: {case.run.time_step_s:g} s is above the contact bound "
-            f"{CONTACT_STEP_LIMIT:g} sqrt(m/k) = {CONTACT_STEP_LIMIT * bound:.3g} s; lower it or "
-            "run.stiffness_N_m"
-        )
-    if case.run.time_step_s > HOLD_LIMIT * tau:
-        raise CaseError(
-            f"run.time_step_s: {case.run.time_step_s:g} s is above the drag relaxation time "
-            f"{tau:.3g} s, explicit drag would overshoot; lower it"
-        )
-    return case.run.time_step_s
-
-
-def _hold_steps(case: Case, step: float, tau: float) -> int:
-    if case.drag.scheme == "every_step":
-        return 1
-    if case.drag.refresh_steps is None:
-        return max(1, math.floor(HOLD_OVER_RELAXATION * tau / step))
-    if case.drag.refresh_steps * step > HOLD_LIMIT * tau:
-        raise CaseError(
-            f"drag.refresh_steps: {case.drag.refresh_steps} steps of {step:.3g} s exceed the drag relaxation "
-            f"time {tau:.3g} s; at most {math.floor(HOLD_LIMIT * tau / step)} steps are stable"
-        )
-    return case.drag.refresh_steps
-
-
 def _supply(case: Case) -> tuple[int, float]:
     """Number of fines and slab length: n v = c A l; a slab is never shorter than a fine (`_warnings` tells)."""
     fines = case.fines
@@ -246,10 +212,10 @@ def arrival_time(case: Case, upstream: float) -> float:
     return case.fines.mean_volume_m3 / (case.fines.concentration * case.size_m[1] * case.size_m[2] * upstream)
 
 
-def _times(case: Case, slab: float, velocity: float, upstream: float, refresh: float) -> tuple[float, float, int]:
-    """Plug time and cap, s, and the drag refreshes of a chunk: the fluid passes about one grain diameter in it.
+def _times(case: Case, slab: float, velocity: float, upstream: float) -> tuple[float, float, float]:
+    """Plug time, cap and chunk, s: the fluid passes about one grain diameter in a chunk.
 
-    A given duration is cut into equal chunks, so that it is met within one refresh a chunk.
+    A given duration is cut into equal chunks, so that it is met within one drag refresh a chunk.
     """
     passage = 2 * case.grains.mean_radius_m / velocity
     plug = max(4 * passage, ARRIVALS * arrival_time(case, upstream))
@@ -259,10 +225,13 @@ def _times(case: Case, slab: float, velocity: float, upstream: float, refresh: f
     given = case.run.duration_ms or case.run.cap_ms
     cap = cap if given is None else given * 1e-3
     chunk = min(min(passage, plug / 4) if case.run.checkpoint_ms is None else case.run.checkpoint_ms * 1e-3, cap)
-    if case.run.duration_ms is not None:
-        chunk = cap / math.ceil(cap / chunk)
-        return plug, cap, max(1, round(chunk / refresh))
-    return plug, cap, max(1, math.ceil(chunk / refresh))
+    return plug, cap, chunk if case.run.duration_ms is None else cap / math.ceil(cap / chunk)
+
+
+def _chunk_steps(case: Case, chunk: float, refresh: float) -> int:
+    """Drag refreshes in a chunk: rounded where a duration must be met, else up."""
+    refreshes = chunk / refresh
+    return max(1, math.ceil(refreshes) if case.run.duration_ms is None else round(refreshes))
 
 
 def _warnings(case: Case, fine: dict[str, Any]) -> list[str]:
@@ -282,12 +251,7 @@ def _warnings(case: Case, fine: dict[str, Any]) -> list[str]:
             f"the slab is lengthened to one fine's diameter, {1e3 * diameter:.3g} mm, so it is thinner than "
             "fines.concentration"
         )
-    held = fine["hold_steps"] * fine["time_step"] / fine["relaxation_time"][0]
-    if held > HOLD_WARNING:
-        found.append(
-            f"drag is held for {held:.2g} of the relaxation time (above {HOLD_WARNING:g}: invasion is biased upward)"
-        )
-    return found
+    return found + drag_warnings(case, fine["hold_steps"] * fine["time_step"] / fine["relaxation_time"][0])
 
 
 def grain_count(case: Case) -> int:

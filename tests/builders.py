@@ -2,8 +2,11 @@
 
 from typing import Any
 
+import numpy as np
+
 from fdnet.case import Case
 from fdnet.case_file import case_from, set_keys
+from fdnet.snapshot import Array, Kind, Snapshot
 
 TINY: dict[str, Any] = {
     "name": "tiny",
@@ -18,3 +21,18 @@ TINY: dict[str, Any] = {
 def tiny(*assignments: str) -> Case:
     """Some 70 grains and 300 fines: a run through the real binary takes a second or two."""
     return case_from(set_keys(TINY, list(assignments)))
+
+
+def resting_spheres(position: list[list[float]], radius: float, box: Array, *, kind: Kind, first: int = 1) -> Snapshot:
+    """Equal spheres at `position` (N, 3) m, at rest, numbered from `first`; `box` (3, 2) m."""
+    count = len(position)
+    return Snapshot(
+        step=0,
+        time_s=0.0,
+        box=box,
+        id=np.arange(first, first + count),
+        kind=np.full(count, kind),
+        position=np.array(position),
+        radius=np.full(count, radius),
+        velocity=np.zeros((count, 3)),
+    )

@@ -8,8 +8,11 @@ import pytest
 LAYERS = [
     ["errors"],
     ["atomic", "snapshot"],
-    ["case", "contacts"],
+    ["case_parts", "contacts"],
+    ["case_rules"],
+    ["case"],
     ["case_file", "contact_law"],
+    ["time_step"],
     ["scales"],
     ["cost", "network"],
     ["scale_table"],
@@ -37,7 +40,7 @@ DOORS = {
     "numba": {"network/compiled"},
     "pymetis": {"network/solver"},
     "pyamg": {"network/solver"},
-    "pydantic": {"case", "case_file"},
+    "pydantic": {"case", "case_parts", "case_file"},
     "tomli_w": {"case"},
     "rich": {"progress"},
 }

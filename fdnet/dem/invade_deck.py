@@ -11,6 +11,7 @@ from fdnet.case import Case
 from fdnet.contacts import touching_pairs
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, quiet_chunks
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
+from fdnet.dem.drag import BELOW_ZERO, drag_variables
 from fdnet.dem.dump import COLUMNS, FORMAT
 from fdnet.dem.scene import contact_variables, header_variables, wall_variables, write_data
 from fdnet.dem.supply import front_of, place_fines
@@ -74,8 +75,7 @@ def render_invade(
             "gravity": gravity,
             "dump_group": "all" if mobile else "fines",
             "start_velocity": number(scales.upstream_velocity),
-            "fluid_velocity": number(scales.interstitial_velocity),
-            "drag": _drag(case, scales),
+            "drag": drag_variables(case, scales),
             "regions": _regions(case, scales, grains),
             "thermo_steps": max(1, scales.checkpoint_steps // 4),
             "quiet_checkpoints": quiet_chunks(scales),
@@ -103,24 +103,13 @@ def _start(resume: Checkpoint | None) -> dict[str, int]:
     }
 
 
-def _drag(case: Case, scales: Scales) -> dict[str, Any]:
-    coefficient = 6 * math.pi * case.fluid.viscosity_cP * 1e-3 * case.drag.multiplier
-    slower = scales.interstitial_velocity - scales.upstream_velocity
-    fluid = f"(f_uf[1]-(x<0.0)*{number(slower)})" if slower else "f_uf[1]"
-    return {
-        "coefficient": number(coefficient),
-        "fluid_x": fluid,
-        "hold_steps": scales.hold_steps if scales.hold_steps > 1 else 0,
-    }
-
-
 def _regions(case: Case, scales: Scales, grains: Snapshot) -> dict[str, str]:
     bounds, length, margin = _bounds(case, scales, grains), case.size_m[0], _margin(case, scales)
     behind = bounds[0, 0] + margin
     sides = "INF INF INF INF"
     return {
         "specimen": f"0.0 {number(np.nextafter(length, 0))} {sides}",
-        "upstream": f"{number(np.nextafter(behind, 0))} {number(-5e-324)} {sides}",
+        "upstream": f"{number(np.nextafter(behind, 0))} {number(BELOW_ZERO)} {sides}",
         "beyond": f"{number(length)} INF {sides}",
         "behind": f"INF {number(behind)} {sides}",
     }

@@ -62,6 +62,8 @@ def test_a_slab_that_cannot_hold_the_fines_is_an_error(packed):
         ["grains.motion=mobile"],
         ["drag.scheme=every_step"],
         ["drag.upstream=darcy"],
+        ["drag.scheme=viscous", "drag.upstream=darcy"],
+        ["drag.scheme=implicit", "fines.radius_mm=[0.02,0.05]"],
         ["fines.radius_mm=[0.02,0.05]", "fines.friction=0.0", "run={duration_ms=0.25}"],
     ],
 )
@@ -108,7 +110,16 @@ class StopError(Exception):
     """Stands for any sudden end."""
 
 
-@pytest.mark.parametrize("assignments", [[], ["drag.scheme=every_step"], ["grains.motion=mobile"]])
+@pytest.mark.parametrize(
+    "assignments",
+    [
+        [],
+        ["drag.scheme=every_step"],
+        ["drag.scheme=implicit"],
+        ["drag.scheme=viscous", "drag.upstream=darcy"],
+        ["grains.motion=mobile"],
+    ],
+)
 def test_a_cut_run_continues_bit_for_bit(binary, packed, tmp_path, monkeypatch, assignments):
     case = tiny("run.cap_ms=0.5", *assignments)
     scales, grains = scales_of(case), packed["walls"]

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from builders import tiny
+from builders import resting_spheres, tiny
 
 from fdnet.case import Case
 from fdnet.contacts import max_overlap, touching_pairs
@@ -20,20 +20,10 @@ pytestmark = pytest.mark.liggghts
 
 
 def snapshot(case: Case, position: list, kind: Kind, radius: float, first: int = 1) -> Snapshot:
-    count = len(position)
-    return Snapshot(
-        step=0,
-        time_s=0.0,
-        box=np.column_stack([np.zeros(3), case.size_m]),
-        id=np.arange(first, first + count),
-        kind=np.full(count, kind),
-        position=np.array(position),
-        radius=np.full(count, radius),
-        velocity=np.zeros((count, 3)),
-    )
+    return resting_spheres(position, radius, np.column_stack([np.zeros(3), case.size_m]), kind=kind, first=first)
 
 
-@pytest.mark.parametrize("scheme", ["every_step", "held"])
+@pytest.mark.parametrize("scheme", ["every_step", "held", "implicit", "viscous"])
 def test_gravity_buoyancy_and_drag_relax_to_the_terminal_velocity(binary, tmp_path, scheme):
     """v_z(t) = v_T (1 - exp(-t / tau)), v_T = 2 r^2 (rho - rho_f) g / (9 mu) (Stokes 1851), for one free fine."""
     g = -2.0e4

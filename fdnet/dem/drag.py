@@ -1,0 +1,42 @@
+"""Stokes drag in the invasion deck: what each scheme of `drag.scheme` puts into `_drag.in.j2`."""
+
+import math
+from typing import Any
+
+from fdnet.case import Case
+from fdnet.dem.deck import number
+from fdnet.scales import Scales
+
+BELOW_ZERO = -5e-324
+"""The largest number below 0: a region that ends here holds exactly x < 0."""
+
+
+def drag_variables(case: Case, scales: Scales) -> dict[str, Any]:
+    """Variables of the drag block: the scheme and, as text, the numbers that it needs."""
+    coefficient = 6 * math.pi * case.fluid.viscosity_cP * 1e-3 * case.drag.multiplier
+    slower = scales.interstitial_velocity - scales.upstream_velocity
+    own = _viscous(case, scales, coefficient, slower) if case.drag.scheme == "viscous" else _by_radius(scales, slower)
+    return {
+        "scheme": case.drag.scheme,
+        "coefficient": number(coefficient),
+        "velocity": number(scales.interstitial_velocity),
+        **own,
+    }
+
+
+def _by_radius(scales: Scales, slower: float) -> dict[str, Any]:
+    """F = 6 pi mu M r (u - v), for each fine by its own radius r."""
+    fluid = f"(f_uf[1]-(x<0.0)*{number(slower)})" if slower else "f_uf[1]"
+    return {"fluid_x": fluid, "hold_steps": scales.hold_steps if scales.hold_steps > 1 else 0}
+
+
+def _viscous(case: Case, scales: Scales, coefficient: float, slower: float) -> dict[str, Any]:
+    """The same for one radius: the constant 6 pi mu M r u, less 6 pi mu M r (u - u_upstream) at x < 0, and damping."""
+    assert case.fines is not None
+    damping = coefficient * case.fines.mean_radius_m
+    return {
+        "damping": number(damping),
+        "push": number(damping * scales.interstitial_velocity),
+        "slower": number(-damping * slower) if slower else "",
+        "face": number(BELOW_ZERO),
+    }

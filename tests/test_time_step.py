@@ -1,0 +1,105 @@
+"""Bounds of the time step and of held drag: below, at and above each."""
+
+import math
+
+import pytest
+from builders import tiny
+
+from fdnet.case import Case
+from fdnet.errors import CaseError
+from fdnet.scales import Scales, relaxation_time, scales_of
+
+FINE = 4 / 3 * math.pi * (0.05e-3) ** 3 * 2146
+FAST = "drag.multiplier=1e3"
+SLOW = "fluid.velocity_m_s=0.005"
+"""So slow a fluid that drag a thousand times Stokes's does not press fines shut."""
+
+
+def bound() -> float:
+    """sqrt(m/k) of a fine against the stiffest thing it meets, a grain or wall: 1e4 N/m x 37.77 / 47.15."""
+    return math.sqrt(FINE / (1e4 * (94.3 * 63 / (94.3 + 63)) / 47.15))
+
+
+def tau(multiplier: float = 1.0) -> float:
+    return relaxation_time(0.05e-3, 2146, 0.05, multiplier)
+
+
+def said(case: Case) -> str:
+    return " | ".join(scales_of(case).warnings)
+
+
+def explicit(step: float, scheme: str) -> Case:
+    held = ["drag.refresh_steps=1"] if scheme == "held" else []
+    return tiny(f"run.time_step_s={step!r}", f"drag.scheme={scheme}", FAST, SLOW, *held)
+
+
+@pytest.mark.parametrize("scheme", ["every_step", "held", "implicit", "viscous"])
+def test_the_contact_bound_holds_for_every_scheme(scheme):
+    for factor in (0.9999, 1.0):
+        case = tiny(f"run.time_step_s={0.2 * factor * bound()!r}", f"drag.scheme={scheme}")
+        assert scales_of(case).time_step == 0.2 * factor * bound()
+    with pytest.raises(CaseError, match="contact bound"):
+        scales_of(tiny(f"run.time_step_s={0.2001 * bound()!r}", f"drag.scheme={scheme}"))
+
+
+@pytest.mark.parametrize("scheme", ["every_step", "held", "viscous"])
+def test_explicit_drag_warns_above_a_tenth_of_tau_and_is_refused_above_tau(scheme):
+    short = tau(1e3)
+    for part in (0.0999, 0.1):
+        assert "drag is held" not in said(explicit(part * short, scheme))
+    for part in (0.1001, 0.9999, 1.0):
+        assert "drag is held" in said(explicit(part * short, scheme))
+    with pytest.raises(CaseError, match=r"above the drag relaxation time .* drag\.scheme = 'implicit'"):
+        scales_of(explicit(1.0001 * short, scheme))
+
+
+def test_implicit_drag_has_no_such_bound_but_tells_what_it_does_not_resolve():
+    short = tau(1e3)
+    for part in (0.1001, 1.0):
+        assert "implicit drag" not in said(explicit(part * short, "implicit"))
+    assert "turns into 0.33 of it" in said(explicit(1.0001 * short, "implicit"))
+    assert "turns into -0.2 of it" in said(explicit(3 * short, "implicit"))
+
+
+def refreshed(count: int, step: float) -> Case:
+    return tiny(f"run.time_step_s={step!r}", f"drag.refresh_steps={count}")
+
+
+def test_a_given_refresh_warns_above_a_tenth_of_tau_and_is_refused_above_tau():
+    step = tau() / 1000
+    for count in (99, 100):
+        assert "drag is held" not in said(refreshed(count, step))
+    for count in (101, 999, 1000):
+        assert "drag is held for" in said(refreshed(count, step))
+        assert scales_of(refreshed(count, step)).hold_steps == count
+    with pytest.raises(CaseError, match="at most 1000 steps are stable"):
+        scales_of(refreshed(1001, step))
+
+
+@pytest.mark.parametrize("factor", [0.01, 0.1, 0.2])
+def test_a_derived_step_keeps_both_bounds_without_a_warning(factor):
+    def derived(*assignments: str) -> Scales:
+        return scales_of(tiny(f"run.time_step_factor={factor}", "run.checkpoint_ms=0.1", *assignments))
+
+    for scheme in ("every_step", "held", "viscous"):
+        assert derived(f"drag.scheme={scheme}").time_step == pytest.approx(factor * bound())
+        slow = derived(f"drag.scheme={scheme}", "drag.multiplier=1e4", "fluid.velocity_m_s=5e-4")
+        assert slow.time_step == pytest.approx(min(0.1 * tau(1e4), factor * bound()))
+        assert slow.hold_steps == 1
+        assert not any("drag is held" in warning for warning in slow.warnings)
+    stiff = derived("drag.scheme=implicit", "drag.multiplier=1e4", "fluid.velocity_m_s=5e-4")
+    assert stiff.time_step == pytest.approx(factor * bound())
+
+
+def test_drag_is_never_held_longer_than_a_chunk():
+    """A nearly inviscid fluid has a relaxation time of hours; the counts are still wanted every grain diameter."""
+    case = tiny("fluid.viscosity_cP=1e-9", "fluid.velocity_m_s=1.0")
+    scales = scales_of(case)
+    assert scales.relaxation_time[0] > 1.0
+    assert scales.hold_steps == scales.checkpoint_steps
+    assert scales.checkpoint_steps * scales.time_step == pytest.approx(0.5e-3, rel=1e-3)
+
+
+def test_a_refresh_beyond_the_chunk_is_refused():
+    with pytest.raises(CaseError, match=r"between checkpoints; expected at most \d+"):
+        scales_of(tiny("drag.refresh_steps=100000", "fluid.viscosity_cP=1e-6", "fluid.velocity_m_s=1.0"))
