@@ -62,8 +62,19 @@ def _draw_panel(axes: Any, study: Study, panel: Panel, rows: Sequence[Row]) -> N
     axes.set_title(panel.title, fontsize=10)
     axes.grid(which="major", lw=0.4, color="0.85")
     axes.margins(0.12)
+    _widen(axes)
+    if any(level.value == study.defaults.get(name) for name, found in shown_levels.items() for level in found):
+        axes.plot([], [], "*", color="0.6", mec="k", mew=0.8, ms=13, label="fdnet's default")
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=8, framealpha=0.9)
+
+
+def _widen(axes: Any) -> None:
+    """At least a decade of error, so that what does not change looks so."""
+    low, high = axes.get_ylim()
+    if high < 10 * low:
+        middle = math.sqrt(low * high)
+        axes.set_ylim(middle / math.sqrt(10), middle * math.sqrt(10))
 
 
 def _draw_series(axes: Any, name: str, found: Sequence[Level], default: Any, index: int, floor: float) -> None:
@@ -85,8 +96,8 @@ def _draw_series(axes: Any, name: str, found: Sequence[Level], default: Any, ind
     )
     if any(zero):
         at = [c for c, z in zip(cost, zero, strict=True) if z]
-        axes.plot(at, [floor] * len(at), "v", mfc="none", color=colour, ms=8, label=f"{name}: error 0")
+        axes.plot(at, [floor] * len(at), "v", mfc="none", color=colour, ms=8, label=f"{name}: reference, or no error")
     for level, x, y in zip(found, cost, size, strict=True):
         axes.annotate(shown(level.value), (x, y), xytext=(4, 5), textcoords="offset points", fontsize=7, color=colour)
         if level.value == default:
-            axes.plot([x], [y], "*", color=colour, mec="k", mew=0.8, ms=17, zorder=5, label=f"{name}: fdnet's default")
+            axes.plot([x], [y], "*", color=colour, mec="k", mew=0.8, ms=17, zorder=5)

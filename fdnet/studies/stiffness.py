@@ -102,8 +102,13 @@ STUDY = Study(
         Panel(quantity="k_ratio", title="k/k0 of the specimen"),
         Panel(quantity="k_ratio_first", title="k/k0 of the first millimetre"),
         Panel(quantity="max_overlap", title="largest overlap of a fine", label="overlap over diameter"),
-        Panel(quantity="overlap_over_diameter", title="overlap of two fines at 5 m/s", label="overlap over diameter"),
-        Panel(quantity="restitution_error", title="restitution of two fines"),
+        Panel(
+            quantity="overlap_over_diameter",
+            title="overlap of two fines at 5 m/s",
+            label="overlap over diameter",
+            cost="steps",
+        ),
+        Panel(quantity="restitution_error", title="restitution of two fines", cost="steps"),
     ),
     defaults={name: _DEFAULT for name in (COLLISION, *_SETTINGS) if _DEFAULT is not None},
 )
