@@ -60,23 +60,26 @@ def against_reference(
     quantity: str,
     reference: Callable[[Measured], bool],
     *,
-    relative: bool = True,
+    paired: bool = True,
+    magnitude: bool = False,
 ) -> list[Row]:
-    """Errors of every run against the mean of the runs for which `reference` holds, run by run of the same seed.
+    """Errors of every run against the mean of the runs for which `reference` holds, relative to that mean.
 
-    Where the reference has the run's seed the difference is taken to that run (same pack, same fines), else to the
-    reference's mean. The uncertainty is the scatter of those differences among the seeds of a value; of reference runs
-    the scatter about their own mean. Relative errors are over the reference's mean.
+    When `paired` and the reference has the run's seed the difference is taken to that run (same pack, same fines), else
+    to the reference's mean. The uncertainty is the scatter of those differences among the seeds of a value; of
+    reference runs the scatter about their own mean. With `magnitude` the row is called "one run's NAME" and holds
+    |error|: what one run alone may be off by.
     """
     done = [run for run in measured if run.status == DONE and quantity in run.observed]
+    name = f"one run's {quantity}" if magnitude else quantity
     base = {run.point.seed: run.observed[quantity] for run in done if reference(run)}
     if not base:
         raise ValueError(f"{quantity}: no reference run was done")
     mean = float(np.mean(list(base.values())))
-    size = abs(mean) if relative and mean else 1.0
+    size = abs(mean) if mean else 1.0
 
     def error(run: Measured) -> float:
-        origin = mean if reference(run) else base.get(run.point.seed, mean)
+        origin = mean if reference(run) or not paired else base.get(run.point.seed, mean)
         return (run.observed[quantity] - origin) / size
 
     errors = {id(run): error(run) for run in done}
@@ -85,10 +88,11 @@ def against_reference(
     rows = []
     for run in measured:
         if id(run) not in errors:
-            rows.append(row_of(run, quantity, error=NAN, uncertainty=NAN))
+            rows.append(row_of(run, name, error=NAN, uncertainty=NAN))
             continue
-        own = scatter[_level_of(run)]
-        rows.append(row_of(run, quantity, error=errors[id(run)], uncertainty=widest if math.isnan(own) else own))
+        own, value = scatter[_level_of(run)], errors[id(run)]
+        sigma = widest if math.isnan(own) else own
+        rows.append(row_of(run, name, error=abs(value) if magnitude else value, uncertainty=sigma))
     return rows
 
 
