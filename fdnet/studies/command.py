@@ -14,7 +14,9 @@ from fdnet.studies.runner import run_points
 from fdnet.studies.study import Study
 from fdnet.studies.table import study_text, write_rows
 
-STUDIES: Mapping[str, str] = {}
+STUDIES: Mapping[str, str] = {
+    "throat-occupancy": "what the thesis's two planes and quadrature make of a fine's volume in a throat",
+}
 """Name of each study and what it asks; the module has the same name with underscores."""
 
 

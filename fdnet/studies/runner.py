@@ -1,5 +1,6 @@
 """Runs the points of a study, each kept as soon as it is done, and goes on where an earlier session was cut."""
 
+import contextlib
 import ctypes
 import json
 import multiprocessing as mp
@@ -68,7 +69,7 @@ class _Record:
             self.path.write_text(json.dumps(self.owner) + "\n", encoding="utf-8")
 
     def known(self, points: Sequence[Point]) -> dict[str, Measured]:
-        """Recorded points by key; an unfinished last line is cut off, points the study no longer has are passed over."""
+        """Recorded points by key; an unfinished last line is cut off, points no longer in the study passed over."""
         text = self.path.read_text(encoding="utf-8", errors="replace")
         whole = text[: text.rfind("\n") + 1]
         lines = [json.loads(line) for line in whole.splitlines()]
@@ -99,7 +100,8 @@ def _numbers(line: Mapping[str, object]) -> dict:
 
 def _measure(study: Study, point: Point, work: Path) -> Measured:
     work.mkdir(parents=True, exist_ok=True)
-    if not study.isolated:
+    isolated = study.isolated(point) if callable(study.isolated) else study.isolated
+    if not isolated:
         return _attempt(study.measure, point, work)
     context = mp.get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
@@ -162,6 +164,12 @@ def core_seconds() -> float:
     """CPU seconds, user and system, of this process and of the children it has waited for."""
     usages = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return sum(usage.ru_utime + usage.ru_stime for usage in usages)
+
+
+def forget_peak() -> None:
+    """Lets `peak_memory` of this process begin again from what it holds now, where the system (Linux) can do that."""
+    with contextlib.suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5")
 
 
 def peak_memory() -> float:
