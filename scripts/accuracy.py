@@ -22,10 +22,10 @@ import accuracy_models as models
 import accuracy_tables as tables
 import matplotlib as mpl
 import numpy as np
-from accuracy_cases import EQUAL, LOOSE, Case, read_cases
 
 from fdnet.network.conductance import DEFAULT_LAW, LAWS
 from fdnet.network.damage import DEFAULT_DAMAGE_LAW
+from fdnet.studies.truth import EQUAL, LOOSE, Case, read_cases
 
 Row = dict[str, Any]
 ROOT = Path(__file__).resolve().parents[1]

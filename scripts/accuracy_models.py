@@ -6,46 +6,24 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from accuracy_cases import EQUAL, UNEQUAL, Case, all_grains
 from scipy.interpolate import CubicSpline
-from truth_packs import MM, RADIUS, made_deposit, read_pack, snapshot
+from truth_packs import made_deposit
 
 from fdnet.network import delaunay, geometry
 from fdnet.network.conductance import LAWS, Law, lubrication_law, series_law
-from fdnet.network.damage import DAMAGE_LAWS
 from fdnet.network.lubrication import TIP, WIDENING, half_resistances, summed
-from fdnet.network.occupancy import measure_occupancy
-from fdnet.network.slabs import whole_permeability
-from fdnet.network.tessellation import LENGTH_FLOOR, Network, build_network
+from fdnet.network.tessellation import LENGTH_FLOOR, Network
 from fdnet.scales import carman_kozeny
 from fdnet.snapshot import Array, Kind, Snapshot
+from fdnet.studies.law_models import PAIRS, RESOLVED, loss, network_of, permeability, resolved
+from fdnet.studies.packs import MM, RADIUS, read_pack, snapshot
+from fdnet.studies.truth import EQUAL, UNEQUAL, Case
 
 Row = dict[str, Any]
-PERIODIC = (True, True, True)
-RESOLVED = "all spheres as grains"
-RESOLVED_LIMIT = 2000
-PAIRS = (("thesis", "thesis"), ("thesis", "thesis-code"), ("lubrication", "kozeny"), ("lubrication", "side-kozeny"))
 SAMPSON = (9.0 * np.pi / 16.0) ** 2
 WEIGHTS = np.linspace(0.0, 0.7, 8)
 LARGE_FINE = {"seed": 408, "intact": "packH_40_eps40", "fine": RADIUS / 3.0}
 BED_SHARE = 0.6
-
-
-def network_of(pack: Snapshot) -> Network:
-    return build_network(pack.grains(), periodic=PERIODIC)
-
-
-def permeability(network: Network, conductance: Array) -> float:
-    """k (m2) of a network with `conductance` (T,) m3."""
-    return whole_permeability(network, conductance)[0]
-
-
-def resolved(pack: Snapshot) -> float:
-    """k (m2) with grains and fines tessellated alike, law `lubrication`; NaN above RESOLVED_LIMIT spheres."""
-    if len(pack) > RESOLVED_LIMIT:
-        return float("nan")
-    network = network_of(all_grains(pack))
-    return permeability(network, lubrication_law(network))
 
 
 def intact_row(case: Case) -> Row:
@@ -64,18 +42,6 @@ def damaged_row(case: Case) -> Row:
     for name in (*map(" + ".join, PAIRS), RESOLVED):
         row |= {name: found[name][0] / case.ratio, f"{name}: k": found[name][1] / case.k}
     return row
-
-
-def loss(pack: Snapshot, network: Network) -> Row:
-    """k/k0 and k (m2) of each of PAIRS by name, and k0 (m2) by law under the name k0."""
-    occupancy = measure_occupancy(network, pack.fines())
-    clean = {law: LAWS[law](network) for law in dict(PAIRS)}
-    k0 = {law: permeability(network, conductance) for law, conductance in clean.items()}
-    found: Row = {"k0": k0}
-    for law, damage_law in PAIRS:
-        k = permeability(network, DAMAGE_LAWS[damage_law](network, occupancy, clean[law]).conductance)
-        found[f"{law} + {damage_law}"] = k / k0[law], k
-    return found
 
 
 def head(case: Case) -> Row:

@@ -7,10 +7,10 @@ from statistics import fmean
 from typing import Any
 
 import numpy as np
-from accuracy_cases import EQUAL, LATTICE, LOOSE, UNEQUAL
 from accuracy_models import PAIRS, RESOLVED, rms, worst
 
 from fdnet.network.conductance import LAWS
+from fdnet.studies.truth import EQUAL, LATTICE, LOOSE, UNEQUAL
 
 Row = dict[str, Any]
 GOALS = {EQUAL: (0.03, 0.06), LATTICE: (None, 0.10), UNEQUAL: (None, 0.06)}

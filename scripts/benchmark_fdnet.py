@@ -16,9 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import truth_packs
 from scipy.spatial import cKDTree
-from truth_packs import read_pack
 
 from fdnet.network import tessellation
 from fdnet.network.conductance import DEFAULT_LAW, LAWS
@@ -28,6 +26,8 @@ from fdnet.network.occupancy import measure_occupancy
 from fdnet.network.permeability import AnalysisOptions, analyse
 from fdnet.network.porosity import measure_porosity
 from fdnet.snapshot import Array, Kind, Snapshot, resting
+from fdnet.studies import packs
+from fdnet.studies.packs import read_pack, shaken
 
 TILE = Path(__file__).resolve().parent.parent / "tests" / "data" / "truth" / "packH_40_eps40.csv"
 SHAKE = 0.02
@@ -42,9 +42,7 @@ def tiled(grains: int, rng: np.random.Generator) -> Snapshot:
     pack, _ = read_pack(TILE)
     across = max(round((grains / len(pack)) ** (1 / 3)), 1)
     times = np.array([max(round(grains / len(pack) / across**2), 1), across, across])
-    whole = truth_packs.tiled(pack, times)
-    shaken = whole.position + SHAKE * whole.radius[:, None] * rng.uniform(-1, 1, whole.position.shape)
-    return resting(shaken % whole.box[:, 1], whole.radius, whole.box)
+    return shaken(packs.tiled(pack, times), SHAKE, rng)
 
 
 def seated(grains: Snapshot, count: int, rng: np.random.Generator) -> Snapshot:

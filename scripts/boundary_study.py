@@ -24,7 +24,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from truth_packs import read_pack, tiled
 
 from fdnet.case_file import case_from
 from fdnet.dem.liggghts import Launch, find_binary
@@ -37,6 +36,7 @@ from fdnet.network.slabs import plane_pressures, slab_permeability, whole_permea
 from fdnet.network.tessellation import WALLS, Network, build_network
 from fdnet.scales import carman_kozeny, scales_of
 from fdnet.snapshot import Array, Snapshot, resting
+from fdnet.studies.packs import read_pack, tiled
 
 SIDES = {"periodic": (True, True, True), "walls y z": (True, False, False), "walls x y z": (False, False, False)}
 

@@ -19,9 +19,10 @@ import sys
 from itertools import groupby
 from pathlib import Path
 
-from truth_packs import MM, PACKS, made_deposit, made_grains, read_pack, write_pack
+from truth_packs import PACKS, made_deposit, made_grains, write_pack
 
 from fdnet.network.porosity import measure_porosity
+from fdnet.studies.packs import MM, read_pack
 from fdnet.studies.stokes import StokesFlow, extrapolate, solve_stokes
 
 GRIDS = (

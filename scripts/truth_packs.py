@@ -1,7 +1,5 @@
 """Packs for the Stokes truth, made in code: grains relaxed from overlap, fines seated one by one and relaxed."""
 
-import re
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +8,9 @@ from scipy.optimize import brentq
 from scipy.spatial import cKDTree
 
 from fdnet.network.porosity import measure_porosity
-from fdnet.report.spheres import read_spheres
-from fdnet.snapshot import Array, Kind, Snapshot, resting
+from fdnet.snapshot import Array, Kind, Snapshot
+from fdnet.studies.packs import MM, RADIUS, read_pack, snapshot
 
-MM = 1e-3
-RADIUS = 0.5
 FINE_RADIUS = 0.1
 BRIDGE_SHARE = 0.3
 REFUSALS = 1000
@@ -41,20 +37,6 @@ PACKS: dict[str, dict[str, Any]] = {
 }
 """`ratio`: radii uniform between 1 and `ratio`, mean 0.5 mm; `push`: see `relaxed`; `lost`: porosity taken by fines of
 radius `fine` (0.1 mm), all of them in the first `layer` of the edge along x (all of it)."""
-
-
-def snapshot(position: Array, radius: Array, edge: float, kind: Array) -> Snapshot:
-    """Spheres of a periodic cube, lengths in mm."""
-    return resting(position * MM, radius * MM, np.array([[0.0, edge * MM]] * 3), kind)
-
-
-def tiled(pack: Snapshot, times: Array) -> Snapshot:
-    """`times` (3,) copies of a periodic pack along each axis."""
-    size = np.ptp(pack.box, axis=1)
-    steps = np.stack(np.meshgrid(*map(np.arange, times), indexing="ij"), axis=-1).reshape(-1, 1, 3)
-    position = (pack.position + steps * size).reshape(-1, 3)
-    box = pack.box[:, :1] + np.stack([np.zeros(3), times * size], axis=1)
-    return resting(position, np.tile(pack.radius, len(steps)), box, np.tile(pack.kind, len(steps)))
 
 
 def relaxed(radius: Array, edge: float, position: Array, *, fixed: int = 0, push: float = 1.0) -> Array:
@@ -167,12 +149,3 @@ def write_pack(path: Path, pack: Snapshot, edge: float, note: str) -> None:
         file.write(f"# periodic cube, edge {edge:.9g} mm; lengths in mm; {note}\nx,y,z,radius,kind\n")
         for place, radius, kind in zip(pack.position / MM, pack.radius / MM, pack.kind, strict=True):
             file.write(",".join(f"{value:.7g}" for value in (*place, radius)) + f",{names[Kind(int(kind))]}\n")
-
-
-def read_pack(path: Path) -> tuple[Snapshot, float]:
-    """A pack file and its edge (mm)."""
-    found = re.match(r"# periodic cube, edge ([0-9.]+) mm", path.read_text())
-    if not found:
-        sys.exit(f"stokes_truth: {path}:1: expected '# periodic cube, edge NUMBER mm'")
-    position, radius, kind = read_spheres(path, units="mm")
-    return snapshot(position / MM, radius / MM, float(found[1]), kind), float(found[1])

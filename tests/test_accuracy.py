@@ -12,6 +12,7 @@ import pytest
 
 from fdnet.network.conductance import LAWS, lubrication_law
 from fdnet.snapshot import Kind
+from fdnet.studies import law_models, truth
 from tests.network.packs import face_centred
 
 DATA = Path(__file__).parent / "data" / "truth"
@@ -23,12 +24,11 @@ def study(root):
     sys.path.insert(0, str(root / "scripts"))
     try:
         import accuracy
-        import accuracy_cases
         import accuracy_models
         import accuracy_tables
     finally:
         sys.path.pop(0)
-    return SimpleNamespace(main=accuracy, cases=accuracy_cases, models=accuracy_models, tables=accuracy_tables)
+    return SimpleNamespace(main=accuracy, cases=truth, models=accuracy_models, tables=accuracy_tables)
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +89,7 @@ def test_laws_on_two_packs(study, cases):
 
 
 def test_too_many_spheres_are_not_resolved_and_shown_as_such(study, cases, monkeypatch):
-    monkeypatch.setattr(study.models, "RESOLVED_LIMIT", 100)
+    monkeypatch.setattr(law_models, "RESOLVED_LIMIT", 100)
     assert math.isnan(study.models.resolved(cases["C_r5_d2"].pack))
     assert study.tables.ratio(math.nan) == "-"
 

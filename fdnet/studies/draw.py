@@ -27,7 +27,7 @@ def draw_study(study: Study, rows: Sequence[Row], path: Path) -> None:
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    columns = min(3, len(study.panels))
+    columns = 2 if len(study.panels) == 4 else min(3, len(study.panels))
     lines = math.ceil(len(study.panels) / columns)
     figure, axes = plt.subplots(
         lines, columns, figsize=(_WIDTH * columns, _HEIGHT * lines), squeeze=False, constrained_layout=True
@@ -55,18 +55,20 @@ def _draw_panel(axes: Any, study: Study, panel: Panel, rows: Sequence[Row]) -> N
     floor = 0.5 * min(sizes) if sizes else 1e-16
     for index, (name, found) in enumerate(shown_levels.items()):
         if found:
-            _draw_series(axes, name, found, study.defaults.get(name), index, floor)
+            _draw_series(axes, name.removesuffix(panel.common), found, study.defaults.get(name), index, floor)
+            if panel.cost != "value":
+                _label(axes, found, index, floor)
     axes.set(xscale="log", yscale="log")
-    axes.set_xlabel(_COST_LABELS.get(panel.cost, panel.cost))
+    axes.set_xlabel(study.knob_label if panel.cost == "value" else _COST_LABELS.get(panel.cost, panel.cost))
     axes.set_ylabel(panel.label)
     axes.set_title(panel.title, fontsize=10)
     axes.grid(which="major", lw=0.4, color="0.85")
     axes.margins(0.12)
     _widen(axes)
-    if any(level.value == study.defaults.get(name) for name, found in shown_levels.items() for level in found):
-        axes.plot([], [], "*", color="0.6", mec="k", mew=0.8, ms=13, label="fdnet's default")
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(fontsize=8, framealpha=0.9)
+    handles, names = axes.get_legend_handles_labels()
+    once = dict(zip(names, handles, strict=True))
+    if once:
+        axes.legend([*once.values()], [*once], fontsize=8, framealpha=0.9)
 
 
 def _widen(axes: Any) -> None:
@@ -83,7 +85,9 @@ def _draw_series(axes: Any, name: str, found: Sequence[Level], default: Any, ind
     size = [max(level.size, floor) for level in found]
     low = [max(level.size - level.half_width, 0.3 * floor) for level in found]
     high = [max(level.size + level.half_width, floor) for level in found]
-    axes.plot(cost, size, "-", color=colour, lw=1.0, alpha=0.6)
+    # what has a name and no number has no place on a line
+    line = [(c, s) for c, s, level in zip(cost, size, found, strict=True) if not isinstance(level.value, str)]
+    axes.plot([c for c, _ in line], [s for _, s in line], "-", color=colour, lw=1.0, alpha=0.6)
     axes.vlines(cost, low, high, color=colour, lw=2.5, alpha=0.3)
     zero = [level.size == 0 for level in found]
     axes.plot(
@@ -98,6 +102,12 @@ def _draw_series(axes: Any, name: str, found: Sequence[Level], default: Any, ind
         at = [c for c, z in zip(cost, zero, strict=True) if z]
         axes.plot(at, [floor] * len(at), "v", mfc="none", color=colour, ms=8, label=f"{name}: reference, or no error")
     for level, x, y in zip(found, cost, size, strict=True):
-        axes.annotate(shown(level.value), (x, y), xytext=(4, 5), textcoords="offset points", fontsize=7, color=colour)
         if level.value == default:
-            axes.plot([x], [y], "*", color=colour, mec="k", mew=0.8, ms=17, zorder=5)
+            axes.plot([x], [y], "*", color=colour, mec="k", mew=0.8, ms=17, zorder=5, label="fdnet's default")
+
+
+def _label(axes: Any, found: Sequence[Level], index: int, floor: float) -> None:
+    """The knob's values beside their markers."""
+    for level in found:
+        place, colour = (level.cost, max(level.size, floor)), COLOURS[index % len(COLOURS)]
+        axes.annotate(shown(level.value), place, xytext=(4, 5), textcoords="offset points", fontsize=7, color=colour)

@@ -173,9 +173,10 @@ def knee(found: Sequence[Level]) -> Level | None:
 
 
 def order(found: Sequence[Level]) -> float:
-    """Exponent p of error ~ cost^-p by least squares over the levels whose error stands out of its band; else nan."""
+    """Exponent p of error ~ cost^-p by least squares over the levels whose error stands out of its band; nan for less
+    than three, or costs within a factor of two."""
     clear = [level for level in found if level.size > level.half_width and level.size > 0 and level.cost > 0]
-    if len(clear) < 3:
+    if len(clear) < 3 or max(level.cost for level in clear) < 2.0 * min(level.cost for level in clear):
         return NAN
     slope = np.polyfit(np.log([level.cost for level in clear]), np.log([level.size for level in clear]), 1)[0]
     return float(-slope)

@@ -1,5 +1,6 @@
 """Runs the points of a study, each kept as soon as it is done, and goes on where an earlier session was cut."""
 
+import contextlib
 import ctypes
 import json
 import multiprocessing as mp
@@ -38,7 +39,7 @@ def run_points(study: Study, out: Path, *, quick: bool, tell: Callable[[str], No
         tell(f"{len(known)} of {len(points)} points are there already")
     start = time.monotonic()
     for number, point in enumerate(todo, 1):
-        known[point.key] = measured = _measure(study, point, out / WORK, alone=study.isolated and not quick)
+        known[point.key] = measured = _measure(study, point, out / WORK, quick=quick)
         record.add(measured)
         left = (time.monotonic() - start) / number * (len(todo) - number)
         tell(f"{len(known)} of {len(points)}: {point.key}: {measured.status}, {measured.wall_s:.1f} s{_eta(left)}")
@@ -97,9 +98,10 @@ def _numbers(line: Mapping[str, object]) -> dict:
     return {name: value for name, value in line.items() if name != "key"}
 
 
-def _measure(study: Study, point: Point, work: Path, *, alone: bool) -> Measured:
+def _measure(study: Study, point: Point, work: Path, *, quick: bool) -> Measured:
     work.mkdir(parents=True, exist_ok=True)
-    if not alone:
+    isolated = study.isolated(point) if callable(study.isolated) else study.isolated
+    if quick or not isolated:
         return _attempt(study.measure, point, work)
     context = mp.get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
@@ -168,6 +170,12 @@ def child_core_seconds() -> float:
     """CPU seconds, user and system, of the children this process has waited for."""
     usage = resource.getrusage(resource.RUSAGE_CHILDREN)
     return usage.ru_utime + usage.ru_stime
+
+
+def forget_peak() -> None:
+    """Lets `peak_memory` of this process begin again from what it holds now, where the system (Linux) can do that."""
+    with contextlib.suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5")
 
 
 def peak_memory() -> float:

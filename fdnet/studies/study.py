@@ -69,13 +69,18 @@ class Row:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Panel:
-    """One axes of the figure: a quantity's error against cost for some series (all that have it when empty)."""
+    """One axes of the figure: a quantity's error against cost for some series (all that have it when empty).
+
+    `cost` is a column of the rows: a cost, or "value", the knob itself. `common` is what all its series' names end in,
+    left out of the legend.
+    """
 
     quantity: str
     title: str
     series: tuple[str, ...] = ()
     label: str = "relative error"
     cost: str = "core_s"
+    common: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,7 +91,7 @@ class Study:
     and, under the names in COSTS, costs of its own; `work` is a folder all points share (packs made once).
     `judge(measured)` turns all of them into rows. `defaults` gives fdnet's own value of the knob by series, `remarks`
     what the numbers cannot say. Points of the full form run in a process of their own, limited to `seconds` and
-    `bytes`, unless not `isolated`; those of the quick form all in one, without limits.
+    `bytes`, unless not `isolated` (or, a function, not for that point); those of the quick form all in one.
     """
 
     name: str
@@ -98,7 +103,7 @@ class Study:
     panels: tuple[Panel, ...]
     defaults: Mapping[str, Value] = field(default_factory=dict)
     remarks: str = ""
-    isolated: bool = True
+    isolated: bool | Callable[[Point], bool] = True
     seconds: float = 3600.0
     bytes: float = 16 * 2.0**30
 

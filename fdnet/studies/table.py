@@ -59,19 +59,29 @@ def _value(name: str, text: str) -> str | int | float:
 
 
 def study_text(study: Study, rows: Sequence[Row]) -> str:
-    """Markdown: a table of levels and the knee of every series in every panel, then the study's remarks."""
-    parts = []
+    """Markdown: the knee of every series in every panel, the study's remarks, what was not done, tables of levels."""
+    parts = [f"# {study.title}", "\n".join(f"- {line}" for line in knee_lines(study, rows))]
+    if study.remarks:
+        parts.append(study.remarks.strip())
+    missing = missing_lines(rows)
+    if missing:
+        parts.append("Not done:\n\n" + "\n".join(f"- {line}" for line in missing))
     for panel in study.panels:
         for name in series_of(panel, rows):
             found = levels(rows, name, panel.quantity, cost=panel.cost)
-            parts.append(f"**{panel.title}: {name}** ({panel.label})\n")
-            parts.append(_level_table(study, found, panel.cost))
-            sentence = knee_sentence(found, default=study.defaults.get(name), unit=_unit(panel.cost))
-            parts.append(f"\n{sentence[:1].upper()}{sentence[1:]}.\n")
-    missing = _missing(rows)
-    if missing:
-        parts.append("Not done:\n\n" + "\n".join(f"- {line}" for line in missing) + "\n")
-    return "\n".join([*parts, study.remarks.strip()]).strip() + "\n"
+            parts += [f"**{panel.title}: {name}** ({panel.label})", _level_table(study, found, panel.cost)]
+    return "\n\n".join(parts) + "\n"
+
+
+def knee_lines(study: Study, rows: Sequence[Row]) -> list[str]:
+    """One sentence for every series of every panel."""
+    lines = []
+    for panel in study.panels:
+        for name in series_of(panel, rows):
+            found = levels(rows, name, panel.quantity, cost=panel.cost)
+            said = knee_sentence(found, default=study.defaults.get(name), unit=_unit(panel.cost))
+            lines.append(f"{panel.title}, {name}: {said}.")
+    return lines
 
 
 def _level_table(study: Study, found: Sequence[Level], cost: str) -> str:
@@ -86,7 +96,8 @@ def _unit(cost: str) -> str:
     return {"peak_memory_mb": "MB", "steps": "steps"}.get(cost, "s")
 
 
-def _missing(rows: Sequence[Row]) -> list[str]:
+def missing_lines(rows: Sequence[Row]) -> list[str]:
+    """Points that were refused, failed or exceeded a limit."""
     found = {
         f"{row.series}, {row.knob} {shown(row.value)}, seed {row.seed}: {row.status}"
         for row in rows

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from truth_packs import MM, RADIUS, read_pack, snapshot
 
 from fdnet.snapshot import Kind, Snapshot
+from fdnet.studies.packs import MM, RADIUS, read_pack, snapshot
 
 EQUAL, UNEQUAL, LATTICE, LOOSE = "random, equal grains", "random, unequal grains", "touching lattices", "loose lattices"
 LOOSE_SOLIDS = (0.45, 0.343, 0.216)
