@@ -187,6 +187,13 @@ def knee_sentence(found: Sequence[Level], *, default: Value | None, unit: str = 
     at = knee(found)
     if at is None:
         return "no run was done"
+    costs = [level.cost for level in found]
+    if len(found) > 1 and max(costs) < 1.5 * min(costs):
+        least, most = min(found, key=lambda level: level.size), max(found, key=lambda level: level.size)
+        return (
+            f"cost does not depend on it ({min(costs):.3g} to {max(costs):.3g} {unit}); error {_percent(least)} at "
+            f"{shown(least.value)} to {_percent(most)} at {shown(most.value)}"
+        )
     costliest = max(found, key=lambda level: level.cost)
     power = order(found)
     falls = f"; error falls as cost^-{power:.2g}" if not math.isnan(power) and power > 0.2 else ""

@@ -1,0 +1,65 @@
+#!/usr/bin/env python3
+"""docs/validation.md from docs/validation.md.in, the committed tables of the studies and the table of hard cases.
+
+    .venv/bin/python scripts/validation.py [--docs docs]
+
+Reads docs/validation/NAME.csv of every study and docs/validation/stability.csv; computes nothing else, so it takes a
+second. `fdnet study NAME --out DIR` makes NAME.csv, .png and .md, which are then copied to docs/validation.
+"""
+
+import argparse
+import csv
+import sys
+from pathlib import Path
+from string import Template
+
+from fdnet.studies.command import STUDIES, study_named
+from fdnet.studies.table import knee_lines, missing_lines, read_rows
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def study_part(name: str, validation: Path) -> str:
+    """Knees, remarks and what was not done of one study, as Markdown."""
+    study, rows = study_named(name), read_rows(validation / f"{name}.csv")
+    parts = ["\n".join(f"- {line}" for line in knee_lines(study, rows))]
+    if study.remarks:
+        parts.append(" ".join(study.remarks.split()))
+    missing = missing_lines(rows)
+    if missing:
+        parts.append("Not done:\n\n" + "\n".join(f"- {line}" for line in missing))
+    runs = len({(row.series, row.value, row.seed) for row in rows})
+    hours = sum({(row.series, row.value, row.seed): row.wall_s for row in rows}.values()) / 3600
+    parts.append(
+        f"{runs} runs, {hours:.2g} h. Tables: [{name}.md](validation/{name}.md), rows: `validation/{name}.csv`."
+    )
+    return "\n\n".join(parts)
+
+
+def stability_table(path: Path) -> str:
+    """The hard cases, one row each, as Markdown."""
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    lines = ["| case | what happened | evidence |", "|---|---|---|"]
+    return "\n".join(lines + [f"| {row['case']} | {row['what_happened']} | {row['evidence']} |" for row in rows])
+
+
+def document(docs: Path) -> str:
+    """The text of docs/validation.md. Raises FileNotFoundError where a study's table is missing."""
+    validation = docs / "validation"
+    parts = {name.replace("-", "_"): study_part(name, validation) for name in STUDIES}
+    parts["stability_table"] = stability_table(validation / "stability.csv")
+    return Template((docs / "validation.md.in").read_text(encoding="utf-8")).substitute(parts)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--docs", type=Path, default=ROOT / "docs", help="where to read and write")
+    given = parser.parse_args()
+    (given.docs / "validation.md").write_text(document(given.docs), encoding="utf-8")
+    print(given.docs / "validation.md")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
