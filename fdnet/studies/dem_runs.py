@@ -34,6 +34,8 @@ SLAB: dict[str, Any] = {
 of thesis specimen 5. A given duration, so that every run follows the same span of time."""
 PROFILE_BINS = 16
 """Equal bins of depth over the specimen in which invaded fines are counted."""
+HELD_STEPS = 20
+"""Steps for which held drag is held in relaxation_run."""
 _SMALL: dict[str, Any] = {"grains": {"count": 60}, "box": {"size_mm": [2.4, 1.7, 1.7]}, "fines": {"count": 120}}
 
 
@@ -105,30 +107,33 @@ def invasion_observed(case: Case, grains: Snapshot, result: Invasion) -> dict[st
     } | {f"bin_{number:02d}": float(count) for number, count in enumerate(bins)}
 
 
-def relaxation_run(work: Path, slug: str, *assignments: str, over_tau: float, spans: float = 3.0) -> dict[str, float]:
+def relaxation_run(
+    work: Path, slug: str, *assignments: str, over_tau: float, spans: float = 3.0, looks: int | None = None
+) -> dict[str, float]:
     """One free fine falling into its terminal velocity: largest error of v_z over `spans` relaxation times.
 
-    v_z(t) = v_T (1 - exp(-t / tau)) (Stokes 1851), observed after every quarter of tau; the step is `over_tau` tau, or
-    the drag is held that long where the scheme is "held" (the step is then a twentieth of it). Errors are over v_T.
+    v_z(t) = v_T (1 - exp(-t / tau)) (Stokes 1851), observed `looks` times (every quarter of tau if not given), each the
+    end of a `run` of its own; the step is `over_tau` tau, or the drag is held that long where the scheme is "held" (the
+    step is then a twentieth of it). Errors are over v_T.
     """
     radius, density, viscosity = 0.05e-3, 2146.0, 0.05
     tau = relaxation_time(radius, density, viscosity)
     held = any("scheme=held" in text for text in assignments)
-    step = over_tau * tau / (20 if held else 1)
+    step = over_tau * tau / (HELD_STEPS if held else 1)
     stiffness = 4 / 3 * math.pi * radius**3 * density * (0.1 / step) ** 2
-    gravity = -0.05 / tau
+    gravity = -0.005 / tau
     case = slab_case(
         1,
         "fines.count=1",
-        "fluid.velocity_m_s=1e-3",
+        "fluid.velocity_m_s=1e-6",
         "gravity.mode=on",
         "gravity.buoyancy=false",
         f"gravity.acceleration_m_s2=[0.0,0.0,{gravity!r}]",
         f"run.stiffness_N_m={stiffness!r}",
         f"run.time_step_s={step!r}",
         f"run.duration_ms={1e3 * spans * tau!r}",
-        f"run.checkpoint_ms={1e3 * 0.25 * tau!r}",
-        *(["drag.refresh_steps=20"] if held else []),
+        f"run.checkpoint_ms={1e3 * tau * (1.001 * spans / looks if looks else 0.25)!r}",
+        *([f"drag.refresh_steps={HELD_STEPS}"] if held else []),
         *assignments,
     )
     return _relaxed(case, work / slug, terminal=gravity * tau, tau=tau)

@@ -83,7 +83,8 @@ def _draw_series(axes: Any, name: str, found: Sequence[Level], default: Any, ind
     size = [max(level.size, floor) for level in found]
     low = [max(level.size - level.half_width, 0.3 * floor) for level in found]
     high = [max(level.size + level.half_width, floor) for level in found]
-    axes.plot(cost, size, "-", color=colour, lw=1.0, alpha=0.6)
+    if any(not isinstance(level.value, str) for level in found):
+        axes.plot(cost, size, "-", color=colour, lw=1.0, alpha=0.6)
     axes.vlines(cost, low, high, color=colour, lw=2.5, alpha=0.3)
     zero = [level.size == 0 for level in found]
     axes.plot(
