@@ -17,6 +17,7 @@ from fdnet.studies.table import study_text, write_rows
 STUDIES: Mapping[str, str] = {
     "stiffness": "contact stiffness, from 1e2 N/m to the nominal one",
     "time-step": "time step over sqrt(m/k) and over the drag relaxation time",
+    "speed": "mobile grains, neighbour skin and bins, MPI ranks",
     "drag": "drag at every step, held, implicit, viscous",
 }
 """Name of each study and what it asks; the module has the same name with underscores."""

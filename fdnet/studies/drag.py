@@ -15,7 +15,9 @@ SCHEMES = (EVERY, HELD, IMPLICIT, VISCOUS)
 HOLDING, OTHER = "invasion, held", "invasion, not held"
 RESTARTED = "implicit, a run every tau/4"
 STIFFNESS = 1e3
-"""Of the invasions, N/m: a step of 0.005 tau, so that six seeds of every scheme fit into some minutes."""
+"""Of the invasions, N/m, so that six seeds of every scheme fit into some minutes."""
+STEPS_PER_TAU = 200
+"""Of the invasions: 0.1 sqrt(m/k) at that stiffness, to 1 %."""
 _BINS = tuple(f"bin_{number:02d}" for number in range(PROFILE_BINS))
 _PLAIN = ("invaded", "mean_depth", "porosity_loss", "k_ratio_first")
 _LOOKS = (1.0, 0.5, 2.0)
@@ -24,7 +26,7 @@ _SPANS = 3.0
 
 
 def points(quick: bool) -> list[Point]:
-    """Falling fines, the interval from long to short, then invasions."""
+    """Falling fines, the interval from long to short; then invasions, seed by seed, so that load meets all alike."""
     if quick:
         found = [point for scheme in SCHEMES for point in _falls(scheme, (0.2, 0.1, 0.05), looks=1)]
         found += _falls(IMPLICIT, (10.0,), looks=1) + _falls(EVERY, (2.0,), looks=1)
@@ -50,8 +52,8 @@ def _invasions(held: Sequence[float], *, seeds: int, size: str) -> list[Point]:
     ]
     return [
         Point(series=series, knob="drag", value=value, seed=seed, settings={"size": size})
-        for series, value in values
         for seed in range(1, seeds + 1)
+        for series, value in values
     ]
 
 
@@ -64,12 +66,24 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
 
 
 def _invasion_case(point: Point) -> Case:
-    soft, small = f"run.stiffness_N_m={STIFFNESS!r}", point.settings["size"] == "small"
-    if isinstance(point.value, str):
-        return slab_case(point.seed, soft, f"drag.scheme={point.value}", small=small)
-    scales = scales_of(slab_case(point.seed, soft, small=small))
-    steps = max(1, round(point.value * scales.relaxation_time[0] / scales.time_step))
-    return slab_case(point.seed, soft, f"drag.scheme={HELD}", f"drag.refresh_steps={steps}", small=small)
+    """Step, chunk (4 tau) and duration are whole fractions and multiples of tau: all schemes run the same steps."""
+    small = point.settings["size"] == "small"
+    tau = scales_of(slab_case(point.seed, small=small)).relaxation_time[0]
+    return slab_case(
+        point.seed,
+        f"run.stiffness_N_m={STIFFNESS!r}",
+        f"run.time_step_s={tau / STEPS_PER_TAU!r}",
+        f"run.checkpoint_ms={4e3 * tau!r}",
+        f"run.duration_ms={4e3 * tau * (5 if small else 21)!r}",
+        *_scheme_keys(point.value),
+        small=small,
+    )
+
+
+def _scheme_keys(value: Value) -> tuple[str, ...]:
+    if isinstance(value, str):
+        return (f"drag.scheme={value}",)
+    return (f"drag.scheme={HELD}", f"drag.refresh_steps={round(value * STEPS_PER_TAU)}")
 
 
 def _fall(series: str, interval: float, looks: int, work: Path, slug: str) -> dict[str, float]:
