@@ -40,7 +40,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"fdnet: {_one_line(error)}", file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
-        print("fdnet: stopped; what was written is kept, repeat the command to go on (a run: with --resume)", file=sys.stderr)
+        print(
+            "fdnet: stopped; what was written is kept, repeat the command to go on (a run: with --resume)",
+            file=sys.stderr,
+        )
         return _STOPPED
     except MemoryError as error:
         print(f"fdnet: not enough memory ({error}); supply fewer fines, or take a machine with more", file=sys.stderr)

@@ -17,8 +17,10 @@ from fdnet.studies.table import study_text, write_rows
 STUDIES: Mapping[str, str] = {
     "stiffness": "contact stiffness, from 1e2 N/m to the nominal one",
     "time-step": "time step over sqrt(m/k) and over the drag relaxation time",
-    "specimen-size": "number of grains and seed: how large a specimen must be, and what a small one is worth",
+    "drag": "drag at every step, held, implicit, viscous",
+    "speed": "mobile grains, neighbour skin and bins, MPI ranks",
     "throat-occupancy": "what the thesis's two planes and quadrature make of a fine's volume in a throat",
+    "specimen-size": "number of grains and seed: how large a specimen must be, and what a small one is worth",
 }
 """Name of each study and what it asks; the module has the same name with underscores."""
 

@@ -1,6 +1,8 @@
 """What the studies of the DEM half run: small invasions and single fines, by fdnet's own decks and the real binary."""
 
 import math
+import re
+import shutil
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -8,17 +10,19 @@ from typing import Any
 
 import numpy as np
 
+from fdnet.atomic import write_text
 from fdnet.case import Case
 from fdnet.case_file import case_from, set_keys
-from fdnet.dem.checkpoint import state_at
+from fdnet.dem.checkpoint import HISTORY, HISTORY_HEADER, state_at
 from fdnet.dem.dump import read_frame
+from fdnet.dem.invade_deck import write_invade_inputs
 from fdnet.dem.invasion import Invasion, invade
-from fdnet.dem.liggghts import Binary, Launch, find_binary
+from fdnet.dem.liggghts import Binary, Launch, find_binary, run_deck
 from fdnet.dem.packing import make_pack
 from fdnet.dem.scene import box_of, snapshot_of
 from fdnet.network.permeability import AnalysisOptions, analyse
 from fdnet.scales import relaxation_time, scales_of
-from fdnet.snapshot import Kind, Snapshot, resting
+from fdnet.snapshot import Array, Kind, Snapshot, resting
 from fdnet.studies.runner import child_core_seconds
 
 SLAB: dict[str, Any] = {
@@ -34,6 +38,8 @@ SLAB: dict[str, Any] = {
 of thesis specimen 5. A given duration, so that every run follows the same span of time."""
 PROFILE_BINS = 16
 """Equal bins of depth over the specimen in which invaded fines are counted."""
+HELD_STEPS = 20
+"""Steps for which held drag is held in relaxation_run."""
 _SMALL: dict[str, Any] = {"grains": {"count": 60}, "box": {"size_mm": [2.4, 1.7, 1.7]}, "fines": {"count": 120}}
 
 
@@ -66,9 +72,13 @@ def grains_of(case: Case, work: Path) -> Snapshot:
 
 
 def invasion_run(case: Case, work: Path, slug: str, *, ranks: int = 1) -> dict[str, float]:
-    """One invasion and what it left: counts, depths (m), profile, porosity, permeability, largest overlap, costs."""
+    """One invasion and what it left: counts, depths (m), profile, porosity, permeability, largest overlap, costs.
+
+    A run that an earlier session left unfinished is begun anew, so that costs are whole.
+    """
     grains = grains_of(case, work)
     folder, scales = work / slug, scales_of(case)
+    shutil.rmtree(folder, ignore_errors=True)
     launch, before = Launch(binary=the_binary(), ranks=ranks), child_core_seconds()
     result = invade(case, scales, grains, folder, launch)
     core = child_core_seconds() - before
@@ -80,12 +90,43 @@ def invasion_run(case: Case, work: Path, slug: str, *, ranks: int = 1) -> dict[s
     return invasion_observed(case, grains, result) | costs
 
 
+def edited_run(case: Case, work: Path, slug: str, edits: Mapping[str, str], *, ranks: int = 1) -> dict[str, float]:
+    """One invasion whose deck has other run-time settings: counts and mean depth (m) of the fines inside, and costs.
+
+    `edits` gives a line for what begins the one line of the deck that it replaces.
+    """
+    grains = grains_of(case, work)
+    folder, scales, launch = work / slug, scales_of(case), Launch(binary=the_binary(), ranks=ranks)
+    shutil.rmtree(folder, ignore_errors=True)
+    (folder / "post").mkdir(parents=True)
+    deck = write_invade_inputs(case, scales, grains, folder, ranks=ranks).text
+    for start, line in edits.items():
+        deck, count = re.subn(rf"(?m)^{re.escape(start)}.*$", line, deck)
+        assert count == 1, f"{start!r} begins {count} lines of the deck, expected 1"
+    write_text(folder / "in.invade", deck)
+    write_text(folder / HISTORY, HISTORY_HEADER + "\n")
+    before = child_core_seconds()
+    run = run_deck(folder, "in.invade", launch)
+    core = child_core_seconds() - before
+    result = invade(case, scales, grains, folder, launch)
+    assert not result.runs, f"{folder}: the edited deck did not reach the end of its invasion"
+    depth = _depths(case, result)
+    return {
+        "invaded": float(result.history[-1].invaded),
+        "mean_depth": float(np.mean(depth)) if len(depth) else 0.0,
+        "steps": float(result.history[-1].step),
+        "core_s": core,
+        "wall_s": run.seconds,
+    }
+
+
 def invasion_observed(case: Case, grains: Snapshot, result: Invasion) -> dict[str, float]:
-    """Numbers of a finished invasion, SI; `bin_00`... are invaded fines by equal bins of depth."""
-    last, length = result.history[-1], case.size_m[0]
-    depth = result.damaged.fines().position[:, 0]
-    depth = depth[(depth >= 0) & (depth < length)]
-    bins = np.histogram(depth, PROFILE_BINS, (0.0, length))[0]
+    """Numbers of a finished invasion, SI; `bin_00`... are invaded fines by equal bins of depth.
+
+    "grain_shift" is the root mean square way of the grains from where they were packed, over their radius.
+    """
+    last, depth = result.history[-1], _depths(case, result)
+    bins = np.histogram(depth, PROFILE_BINS, (0.0, case.size_m[0]))[0]
     analysis = analyse(
         grains,
         result.damaged,
@@ -105,39 +146,54 @@ def invasion_observed(case: Case, grains: Snapshot, result: Invasion) -> dict[st
         "k_ratio": analysis.k_damaged / analysis.k_initial,
         "k_ratio_first": first.k_damaged / first.k_initial,
         "max_overlap": result.max_overlap,
+        "grain_shift": _shift(grains, result.damaged.grains()),
     } | {f"bin_{number:02d}": float(count) for number, count in enumerate(bins)}
 
 
-def relaxation_run(work: Path, slug: str, *assignments: str, over_tau: float, spans: float = 3.0) -> dict[str, float]:
+def _depths(case: Case, result: Invasion) -> Array:
+    depth = result.damaged.fines().position[:, 0]
+    return depth[(depth >= 0) & (depth < case.size_m[0])]
+
+
+def _shift(before: Snapshot, after: Snapshot) -> float:
+    moved = after.position[np.argsort(after.id)] - before.position[np.argsort(before.id)]
+    return float(np.sqrt(np.mean(np.sum(moved**2, axis=1))) / np.mean(before.radius))
+
+
+def relaxation_run(
+    work: Path, slug: str, *assignments: str, over_tau: float, spans: float = 3.0, looks: int | None = None
+) -> dict[str, float]:
     """One free fine falling into its terminal velocity: largest error of v_z over `spans` relaxation times.
 
-    v_z(t) = v_T (1 - exp(-t / tau)) (Stokes 1851), observed after every quarter of tau; the step is `over_tau` tau, or
-    the drag is held that long where the scheme is "held" (the step is then a twentieth of it). Errors are over v_T.
+    v_z(t) = v_T (1 - exp(-t / tau)) (Stokes 1851), observed `looks` times (every quarter of tau if not given), each the
+    end of a `run` of its own; the step is `over_tau` tau, or the drag is held that long where the scheme is "held" (the
+    step is then a twentieth of it). Errors are over v_T.
     """
     radius, density, viscosity = 0.05e-3, 2146.0, 0.05
     tau = relaxation_time(radius, density, viscosity)
     held = any("scheme=held" in text for text in assignments)
-    step = over_tau * tau / (20 if held else 1)
+    step = over_tau * tau / (HELD_STEPS if held else 1)
     stiffness = 4 / 3 * math.pi * radius**3 * density * (0.1 / step) ** 2
-    gravity = -0.05 / tau
+    gravity = -0.005 / tau
     case = slab_case(
         1,
         "fines.count=1",
-        "fluid.velocity_m_s=1e-3",
+        "fluid.velocity_m_s=1e-6",
         "gravity.mode=on",
         "gravity.buoyancy=false",
         f"gravity.acceleration_m_s2=[0.0,0.0,{gravity!r}]",
         f"run.stiffness_N_m={stiffness!r}",
         f"run.time_step_s={step!r}",
         f"run.duration_ms={1e3 * spans * tau!r}",
-        f"run.checkpoint_ms={1e3 * 0.25 * tau!r}",
-        *(["drag.refresh_steps=20"] if held else []),
+        f"run.checkpoint_ms={1e3 * tau * (1.001 * spans / looks if looks else 0.25)!r}",
+        *([f"drag.refresh_steps={HELD_STEPS}"] if held else []),
         *assignments,
     )
     return _relaxed(case, work / slug, terminal=gravity * tau, tau=tau)
 
 
 def _relaxed(case: Case, folder: Path, *, terminal: float, tau: float) -> dict[str, float]:
+    shutil.rmtree(folder, ignore_errors=True)
     scales, far = scales_of(case), np.array([[3.5e-3, 1.4e-3, 1.4e-3]])
     lonely = resting(far, 2.5e-4, box_of(case), Kind.GRAIN)
     launch, before = Launch(binary=the_binary()), child_core_seconds()

@@ -14,7 +14,7 @@ from dataclasses import asdict, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from fdnet.errors import CaseError, FdnetError
+from fdnet.errors import CaseError, FdnetError, LiggghtsError
 from fdnet.studies.study import COSTS, DONE, Measured, Point, Study
 
 POINTS, WORK = "points.jsonl", "work"
@@ -143,7 +143,7 @@ def _attempt(measure: Measure, point: Point, work: Path) -> Measured:
         found = dict(measure(point, work))
         status = DONE
     except FdnetError as error:
-        found, status = {}, f"refused: {' '.join(str(error).split())}"
+        found, status = {}, _why(error, work)
     except MemoryError:
         found, status = {}, OVER_MEMORY
     costs = {
@@ -154,6 +154,12 @@ def _attempt(measure: Measure, point: Point, work: Path) -> Measured:
     }
     costs |= {name: found.pop(name) for name in COSTS if name in found}
     return Measured(point=point, status=status, observed=found, **costs)
+
+
+def _why(error: FdnetError, work: Path) -> str:
+    """What fdnet refused or how LIGGGHTS failed, without the advice and without the folder it happened in."""
+    said = " ".join(str(error).split()).replace(f"{work}/", "").split("; ")[0]
+    return f"{'failed' if isinstance(error, LiggghtsError) else 'refused'}: {said}"
 
 
 def _nothing(point: Point, status: str, wall: float) -> Measured:

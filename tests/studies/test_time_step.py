@@ -22,7 +22,7 @@ def test_a_damped_collision_converges_in_first_order(rows):
     found = levels(rows, COLLISION, "restitution_error")
     slope = np.polyfit(np.log([level.value for level in found]), np.log([level.size for level in found]), 1)[0]
     assert slope == pytest.approx(1.1, abs=0.3)
-    assert next(level.size for level in found if level.value == 0.1) < 0.02
+    assert next(level.size for level in found if level.value == 0.1) < 0.03
 
 
 def test_energy_of_an_undamped_pack_converges_in_second_order(rows):

@@ -1,0 +1,132 @@
+"""What should change the run time alone: grains that move or not, neighbour skin, neighbour bins, MPI ranks."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from fdnet.case import Case
+from fdnet.dem.deck import number
+from fdnet.studies.dem_runs import PROFILE_BINS, edited_run, invasion_run, slab_case
+from fdnet.studies.judge import against_exact, against_reference, profile_distance
+from fdnet.studies.study import Measured, Panel, Point, Row, Study, Value
+
+MOTION, STILL = "grains", "mobile grains, no flow"
+FIXED, MOBILE = "fixed", "mobile"
+SKIN, BIN, RANKS = "skin over fine's radius", "bin over grain's radius", "ranks, processor grid"
+OWN_SKIN, OWN_BIN, ONE_RANK = 1.0, 1.1, "1 rank"
+"""fdnet's own: a fine's radius; half the longest cut-off, 2 R + skin, which is LIGGGHTS's own; one rank."""
+MOTION_STIFFNESS = 1e3
+FEW, MANY = 2000, 20_000
+_GRIDS = {"1 x 2 x 1": "1 2 1", "1 x 1 x 2": "1 1 2", "2 x 1 x 1": "2 1 1"}
+_WINDOW_MS = {200: 0.2, FEW: 0.5, MANY: 0.1}
+_NO_FLOW = ("fluid.velocity_m_s=1e-6", "fines.count=1", "run.checkpoint_ms=0.1")
+_BINS = tuple(f"bin_{number:02d}" for number in range(PROFILE_BINS))
+_PLAIN = ("invaded", "mean_depth", "porosity_loss", "k_ratio_first")
+_OWN: Mapping[str, Value] = {MOTION: FIXED, SKIN: OWN_SKIN, BIN: OWN_BIN, RANKS: ONE_RANK}
+
+
+def points(quick: bool) -> list[Point]:
+    """Invasions with fixed and mobile grains, then short windows of an invasion; ranks last (they want both cores).
+
+    Values alternate fastest, so that what else the machine does meets all of them alike.
+    """
+    if quick:
+        found = _motion(2, "small") + _windows(SKIN, (0.25, OWN_SKIN, 4.0), 200, 1)
+        return found + _windows(BIN, (OWN_BIN, 4.0), 200, 1) + _windows(RANKS, (ONE_RANK, "1 x 2 x 1"), 200, 1)
+    found = _motion(6, "whole")
+    for fines, seeds in ((FEW, 3), (MANY, 2)):
+        found += _windows(SKIN, (0.1, 0.25, 0.5, OWN_SKIN, 2.0, 4.0), fines, seeds)
+        found += _windows(BIN, (0.25, 0.5, OWN_BIN, 2.0, 4.0), fines, seeds)
+    for fines in (FEW, MANY):
+        found += _windows(RANKS, (ONE_RANK, *_GRIDS), fines, 2)
+    return found
+
+
+def _motion(seeds: int, size: str) -> list[Point]:
+    return [
+        Point(series=series, knob="motion", value=value, seed=seed, settings={"size": size})
+        for seed in range(1, seeds + 1)
+        for series, value in ((MOTION, FIXED), (MOTION, MOBILE), (STILL, MOBILE))
+    ]
+
+
+def _windows(setting: str, values: Sequence[Value], fines: int, seeds: int) -> list[Point]:
+    return [
+        Point(series=window_of(setting, fines), knob=setting, value=value, seed=seed, settings={"fines": fines})
+        for seed in range(1, seeds + 1)
+        for value in values
+    ]
+
+
+def window_of(setting: str, fines: int) -> str:
+    """The series of one run-time setting with so many fines."""
+    return f"{setting}, {fines:,} fines"
+
+
+def measure(point: Point, work: Path) -> Mapping[str, float]:
+    """One invasion with fixed or mobile grains, or a window of one with this run-time setting."""
+    if point.knob == "motion":
+        still = _NO_FLOW if point.series == STILL else ()
+        keys = (f"run.stiffness_N_m={MOTION_STIFFNESS!r}", f"grains.motion={point.value}", *still)
+        return invasion_run(slab_case(point.seed, *keys, small=point.settings["size"] == "small"), work, point.slug)
+    fines = int(point.settings["fines"])
+    keys = (f"fines.count={fines}", f"run.duration_ms={_WINDOW_MS[fines]!r}")
+    case = slab_case(point.seed, *keys, small=fines < FEW)
+    ranks = 2 if point.value in _GRIDS else 1
+    return edited_run(case, work, point.slug, _edits(point, case), ranks=ranks)
+
+
+def _edits(point: Point, case: Case) -> dict[str, str]:
+    assert case.fines is not None
+    value = point.value
+    if value == _OWN[point.knob]:
+        return {}
+    if isinstance(value, str):
+        return {"processors": f"processors {_GRIDS[value]}"}
+    if point.knob == SKIN:
+        return {"neighbor ": f"neighbor {number(value * case.fines.mean_radius_m)} bin"}
+    return {"neigh_modify delay": f"neigh_modify delay 0 binsize {number(value * case.grains.mean_radius_m)}"}
+
+
+def judge(measured: Sequence[Measured]) -> list[Row]:
+    """Everything against fdnet's own value of the same series, seed by seed."""
+
+    def is_own(run: Measured) -> bool:
+        return run.point.value == _OWN.get(run.point.series, _OWN.get(run.point.knob))
+
+    motion = [run for run in measured if run.point.series == MOTION]
+    rows = [row for name in _PLAIN for row in against_reference(motion, name, is_own)]
+    rows += profile_distance(motion, _BINS, is_own)
+    moving = [run for run in measured if run.point.knob == "motion" and run.point.value == MOBILE]
+    rows += against_exact(moving, "grain_shift", lambda _: 0.0, scale=lambda _: 1.0)
+    for series in dict.fromkeys(run.point.series for run in measured if run.point.knob != "motion"):
+        runs = [run for run in measured if run.point.series == series]
+        rows += [row for name in ("invaded", "mean_depth") for row in against_reference(runs, name, is_own)]
+    return rows
+
+
+def _windows_panel(settings: Sequence[str], fines: int, *, cost: str = "core_s") -> Panel:
+    series = tuple(window_of(setting, fines) for setting in settings)
+    window = f"first {_WINDOW_MS[fines]:g} ms with {fines:,} fines"
+    return Panel(quantity="mean_depth", title=f"mean depth, {window}", series=series, cost=cost)
+
+
+STUDY = Study(
+    name="speed",
+    title="Run-time settings",
+    knob_label="setting",
+    points=points,
+    measure=measure,
+    judge=judge,
+    panels=(
+        Panel(quantity="invaded", title="fines inside", series=(MOTION,)),
+        Panel(quantity="mean_depth", title="mean depth", series=(MOTION,)),
+        Panel(quantity="profile", title="depth profile", label="distance over mean depth"),
+        Panel(quantity="k_ratio_first", title="k/k0 of the first millimetre"),
+        Panel(quantity="grain_shift", title="way of the grains", label="root mean square over radius"),
+        _windows_panel((SKIN, BIN), FEW),
+        _windows_panel((SKIN, BIN), MANY),
+        _windows_panel((RANKS,), FEW, cost="wall_s"),
+        _windows_panel((RANKS,), MANY, cost="wall_s"),
+    ),
+    defaults={MOTION: FIXED} | {window_of(name, n): _OWN[name] for name in (SKIN, BIN, RANKS) for n in (FEW, MANY)},
+)

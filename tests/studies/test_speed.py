@@ -1,0 +1,88 @@
+"""The study of run-time settings in its quick form, on the real binary: they change nothing but the run time."""
+
+import re
+
+import pytest
+
+from fdnet.studies.command import run_study
+from fdnet.studies.dem_runs import edited_run, slab_case
+from fdnet.studies.judge import levels
+from fdnet.studies.speed import (
+    BIN,
+    FEW,
+    FIXED,
+    MANY,
+    MOBILE,
+    MOTION,
+    ONE_RANK,
+    OWN_BIN,
+    OWN_SKIN,
+    RANKS,
+    SKIN,
+    STILL,
+    STUDY,
+    window_of,
+)
+from fdnet.studies.table import read_rows
+
+pytestmark = pytest.mark.liggghts
+BOX = "box.size_mm=[1.2,1.2,1.2]"
+TINY = (BOX, "grains.count=6", "fines.count=20", "fluid.velocity_m_s=5.0", "run.stiffness_N_m=1e3")
+
+
+@pytest.fixture(scope="module")
+def rows(tmp_path_factory):
+    out = tmp_path_factory.mktemp("speed")
+    run_study(STUDY, out, quick=True)
+    return read_rows(out / "speed.csv")
+
+
+@pytest.mark.parametrize(
+    ("setting", "values"), [(SKIN, [0.25, OWN_SKIN, 4.0]), (BIN, [OWN_BIN, 4.0]), (RANKS, [ONE_RANK, "1 x 2 x 1"])]
+)
+def test_run_time_settings_change_the_answer_by_rounding_alone(rows, setting, values):
+    series = window_of(setting, 200)
+    found = levels(rows, series, "mean_depth")
+    assert [level.value for level in found] == values
+    assert all(level.size < 1e-6 for level in found)
+    assert any(level.size > 0 for level in found), "not even the order of sums changed: was the setting used?"
+    assert all(row.error == 0.0 for row in rows if row.series == series and row.quantity == "invaded")
+    assert len({row.steps for row in rows if row.series == series}) == 1
+
+
+def test_a_pack_at_rest_stays_where_it_is_and_fines_move_it(rows):
+    shift = {
+        series: [row.observed for row in rows if row.series == series and row.quantity == "grain_shift"]
+        for series in (STILL, MOTION)
+    }
+    assert all(0 < way < 1e-3 for way in shift[STILL])
+    assert all(1e-3 < way < 0.2 for way in shift[MOTION])
+
+
+def test_mobile_grains_are_held_against_fixed_ones(rows):
+    for quantity in ("invaded", "mean_depth", "porosity_loss", "k_ratio_first"):
+        found = {level.value: level for level in levels(rows, MOTION, quantity)}
+        assert set(found) == {FIXED, MOBILE}
+        assert abs(found[FIXED].error) < 1e-12
+        assert found[MOBILE].size < 0.3
+    steps = {(row.seed, row.value): row.steps for row in rows if row.series == MOTION}
+    assert len(set(steps.values())) == 1
+
+
+def test_an_edit_reaches_the_deck_and_a_line_that_is_not_there_is_a_fault(tmp_path):
+    case = slab_case(1, *TINY, "run.duration_ms=0.02")
+    found = edited_run(case, tmp_path, "edited", {"neighbor ": "neighbor 7e-5 bin"})
+    deck = (tmp_path / "edited" / "in.invade").read_text()
+    assert re.findall(r"(?m)^neighbor .*$", deck) == ["neighbor 7e-5 bin"]
+    assert found["core_s"] > 0
+    with pytest.raises(AssertionError, match="begins 0 lines"):
+        edited_run(case, tmp_path, "edited", {"processors": "processors 2 1 1"})
+
+
+def test_the_full_form_compares_fdnets_own_value_in_every_series():
+    series = {point.series for point in STUDY.points(False)}
+    values = {(point.series, point.value) for point in STUDY.points(False)}
+    own = {(name, STUDY.defaults[name]) for name in series if name in STUDY.defaults}
+    assert own <= values
+    assert series - set(STUDY.defaults) == {STILL}
+    assert {window_of(SKIN, FEW), window_of(BIN, MANY), window_of(RANKS, MANY)} <= series
