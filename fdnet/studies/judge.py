@@ -11,7 +11,7 @@ from fdnet.studies.study import DONE, Measured, Row, Value, row_of, shown
 
 NAN = float("nan")
 CONFIDENCE = 0.95
-_ROUNDING = 1e-12
+_ROUNDING, _FALLS = 1e-12, 0.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -196,11 +196,15 @@ def knee_sentence(found: Sequence[Level], *, default: Value | None, unit: str = 
         )
     costliest = max(found, key=lambda level: level.cost)
     power = order(found)
-    falls = f"; error falls as cost^-{power:.2g}" if not math.isnan(power) and power > 0.2 else ""
-    said = (
-        f"knee at {shown(at.value)}: error {_percent(at)} for {at.cost:.3g} {unit}; the costliest, "
-        f"{shown(costliest.value)}, has {_percent(costliest)} for {costliest.cost:.3g} {unit}{falls}"
-    )
+    falls = f"error falls as cost^-{power:.2g}" if not math.isnan(power) and power > _FALLS else ""
+    end = f"{_percent(costliest)} for {costliest.cost:.3g} {unit}"
+    if at is costliest:
+        said = f"no knee, the costliest, {shown(at.value)}, is the best: {end}{'; ' if falls else ''}{falls}"
+    else:
+        said = (
+            f"knee at {shown(at.value)}: error {_percent(at)} for {at.cost:.3g} {unit}; the costliest, "
+            f"{shown(costliest.value)}, has {end}{'; ' if falls else ''}{falls}"
+        )
     chosen = next((level for level in found if level.value == default), None)
     return (
         said
