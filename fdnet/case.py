@@ -14,6 +14,9 @@ from pydantic import Field, model_validator
 from fdnet.case_parts import AnalysisChoices, Box, Drag, Fines, Fluid, Grains, Gravity, Part, Run
 from fdnet.case_rules import cross_problems
 
+POLICIES = ("max_hours",)
+"""Keys of [run] that say whether a run may go on, not what it computes."""
+
 
 class Case(Part):
     """One specimen. Without `fines` the pack stays intact and no invasion is run."""
@@ -57,8 +60,12 @@ class Case(Part):
         return tomli_w.dumps(self.data())
 
     def digest(self, stage: str = "analyse") -> str:
-        """Hash of what `stage` depends on: "pack" ignores fines, fluid and analysis, "invade" the analysis."""
+        """Hash of what `stage` depends on: "pack" ignores fines, fluid and analysis, "invade" the analysis.
+
+        No result depends on `POLICIES`, so no digest does.
+        """
         data = self.data()
+        data["run"] = {key: value for key, value in data["run"].items() if key not in POLICIES}
         if stage in ("pack", "invade"):
             data.pop("analysis")
             data.pop("name")

@@ -135,9 +135,14 @@ class Gravity(Part):
 
 
 class Run(Part):
-    """Run control. Times left out are derived from the case (see `fdnet render`)."""
+    """Run control. Times left out are derived from the case (see `fdnet render`).
 
-    stiffness_N_m: Positive | None = 1.0e4
+    `stiffness_N_m` is that of the stiffest contact; "nominal" leaves the materials as they are. `max_hours` is what a
+    run may be expected to take; it decides nothing else, so a finished stage does not depend on it.
+    """
+
+    stiffness_N_m: Positive | Literal["nominal"] = 1.0e4
+    max_hours: Positive = 24.0
     time_step_factor: Annotated[float, Field(gt=0, le=CONTACT_STEP_LIMIT)] = 0.1
     time_step_s: Positive | None = None
     duration_ms: Positive | None = None
