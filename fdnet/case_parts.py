@@ -138,11 +138,14 @@ class Run(Part):
     """Run control. Times left out are derived from the case (see `fdnet render`).
 
     `stiffness_N_m` is that of the stiffest contact; "nominal" leaves the materials as they are. `max_hours` is what a
-    run may be expected to take; it decides nothing else, so a finished stage does not depend on it.
+    run may be expected to take. An overlap of a fine above `max_overlap` of the smaller diameter is told, or stops the
+    run. These three decide nothing else, so a finished stage does not depend on them.
     """
 
     stiffness_N_m: Positive | Literal["nominal"] = 1.0e4
     max_hours: Positive = 24.0
+    max_overlap: Fraction = 0.03
+    on_overlap: Literal["warn", "stop"] = "warn"
     time_step_factor: Annotated[float, Field(gt=0, le=CONTACT_STEP_LIMIT)] = 0.1
     time_step_s: Positive | None = None
     duration_ms: Positive | None = None

@@ -12,14 +12,14 @@ STEP_SECONDS = 2.0e-6
 """One step with nothing to do."""
 FIXED_GRAIN_SECONDS, MOVING_GRAIN_SECONDS = 1.3e-8, 1.0e-7
 """One grain for one step."""
-FINE_SECONDS = {"every_step": 1.5e-7, "held": 1.2e-7, "implicit": 1.2e-7, "viscous": 1.15e-7}
+FINE_SECONDS = {"every_step": 1.8e-7, "held": 1.5e-7, "implicit": 1.5e-7, "viscous": 1.45e-7}
 """One fine for one step, contacts and drag."""
 BYTES_PER_SPHERE = 600
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cost:
-    """Expected seconds on one core (+-factor 2): one attempt at the pack, and the invasion of `steps` steps."""
+    """Expected seconds on one core, within a factor of about 3: one try at the pack, and the invasion of `steps`."""
 
     pack_seconds: float
     invade_seconds: float
@@ -27,13 +27,18 @@ class Cost:
 
 
 def cost_of(case: Case, scales: Scales) -> Cost:
-    """The cost of a case. The invasion is expected to plug one plug time after the slab is fed, or to meet its cap."""
+    """The cost of a case.
+
+    An invasion without a duration is expected to last until the slab is fed, the fluid has passed the box once and one
+    plug time is over, or to meet its cap.
+    """
     pack = grain_count(case) * (PACK_STAGES * PACK_STAGE_STEPS + PACK_RELAX_STEPS) * MOVING_GRAIN_SECONDS
     if case.fines is None:
         return Cost(pack_seconds=pack, invade_seconds=0.0, steps=0.0)
     expected = scales.cap_time
     if case.run.duration_ms is None:
-        expected = min(expected, scales.slab_length / scales.upstream_velocity + scales.plug_time)
+        passage = case.size_m[0] / scales.interstitial_velocity
+        expected = min(expected, scales.slab_length / scales.upstream_velocity + passage + scales.plug_time)
     steps = math.ceil(expected / scales.time_step)
     grain = MOVING_GRAIN_SECONDS if case.grains.motion == "mobile" else FIXED_GRAIN_SECONDS
     fines = scales.supplied_count * FINE_SECONDS[case.drag.scheme]

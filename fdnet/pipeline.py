@@ -230,7 +230,7 @@ def _write_summary(
         invasion=invasion,
         last=history[-1] if history else None,
         seconds=stage_seconds(pack, invasion, story.seconds),
-        warnings=[*story.scales.warnings, *record_warnings(pack, invasion), *notes],
+        warnings=[*story.scales.warnings, *record_warnings(story.case, pack, invasion), *notes],
     )
     summary = tables.write_summary(story.path / "summary.json", summary)
     if "report" in story.options.stages:

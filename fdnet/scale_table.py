@@ -116,7 +116,7 @@ def _cost_rows(case: Case, scales: Scales) -> list[Quantity]:
             cost.pack_seconds,
             "s",
             "N steps 1e-7 s an attempt",
-            "measured, +-factor 2",
+            "measured, within a factor of 3",
         ),
         _row(
             "memory",
@@ -135,7 +135,7 @@ def _cost_rows(case: Case, scales: Scales) -> list[Quantity]:
                 cost.invade_seconds,
                 "s",
                 "steps (2e-6 s + N and n x seconds a sphere)",
-                "measured, +-factor 2",
+                "measured, within a factor of 3",
             )
         )
     return rows

@@ -70,9 +70,19 @@ def test_the_refusal_names_what_makes_the_run_long(assignments, said):
         refuse_long(case, scales_of(case), pack=True, invade=True)
 
 
+def test_a_thousandfold_viscosity_is_refused_for_its_hours_and_implicit_drag_is_named():
+    """tau is 1/1000: explicit drag needs steps of 2 ns, implicit drag those of the contacts."""
+    thick = ("fluid.viscosity_cP=5e4", "fluid.velocity_m_s=0.01", "fines.count=3000")
+    case = tiny(*thick)
+    with pytest.raises(CaseError, match=r"a tenth of the drag relaxation time.*drag\.scheme = 'implicit'"):
+        refuse_long(case, scales_of(case), pack=True, invade=True)
+    assert hours(case) > 10 * hours(tiny(*thick, "drag.scheme=implicit"))
+
+
 def test_the_limit_is_no_part_of_a_digest():
     for stage in ("pack", "invade", "analyse"):
-        assert tiny("run.max_hours=1.0").digest(stage) == tiny().digest(stage)
+        for policy in ("run.max_hours=1.0", "run.max_overlap=0.1", "run.on_overlap=stop"):
+            assert tiny(policy).digest(stage) == tiny().digest(stage)
 
 
 def fdnet(*arguments: str | Path) -> subprocess.CompletedProcess[str]:

@@ -13,6 +13,7 @@ from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, quiet_chun
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
 from fdnet.dem.drag import BELOW_ZERO, drag_variables
 from fdnet.dem.dump import COLUMNS, FORMAT
+from fdnet.dem.overlap import is_watched, watch_variables
 from fdnet.dem.scene import contact_variables, header_variables, wall_variables, write_data
 from fdnet.dem.supply import front_of, place_fines
 from fdnet.errors import CaseError
@@ -76,6 +77,7 @@ def render_invade(
             "dump_group": "all" if mobile else "fines",
             "start_velocity": number(scales.upstream_velocity),
             "drag": drag_variables(case, scales),
+            "overlap": watch_variables(case, scales),
             "regions": _regions(case, scales, grains),
             "thermo_steps": max(1, scales.checkpoint_steps // 4),
             "quiet_checkpoints": quiet_chunks(scales),
@@ -146,6 +148,9 @@ def _left_out(case: Case, *, friction: bool, ranks: int) -> list[LeftOut]:
         found.append(LeftOut(what="tangential history", why="no pair has friction"))
     if case.box.sides == "periodic":
         found.append(LeftOut(what="side walls", why="sides are periodic"))
+    if not is_watched(case):
+        why = "pairs of grains overlap too" if case.grains.motion == "mobile" else "fines are of unequal size"
+        found.append(LeftOut(what="overlap between checkpoints", why=why))
     if ranks == 1:
         found.append(LeftOut(what="MPI processor grid", why="one rank"))
     return found

@@ -80,6 +80,17 @@ def test_supplied_is_invaded_passed_and_upstream_at_every_checkpoint(binary, pac
     assert (result.stop_reason == "duration") == (case.run.duration_ms is not None)
 
 
+def test_fines_of_one_micrometre_invade(binary, packed, tmp_path):
+    """A size ratio of 1/250 and steps of 0.1 ns: all are accounted for, and move with the fluid."""
+    case = tiny("fines={radius_mm=0.001, count=20}", "run={duration_ms=0.02}")
+    scales = scales_of(case)
+    result = invade(case, scales, packed["walls"], tmp_path, Launch(binary=binary))
+    fines = result.damaged.fines()
+    assert len(fines) == 20
+    assert fines.velocity[:, 0].max() == pytest.approx(scales.interstitial_velocity, rel=1e-6)
+    assert result.max_overlap < 0.03
+
+
 def test_fixed_grains_do_not_move_and_mobile_ones_do(binary, packed, tmp_path):
     grains = packed["walls"]
     for motion in ("fixed", "mobile"):
