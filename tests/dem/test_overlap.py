@@ -93,7 +93,8 @@ def test_watching_does_not_move_a_single_bit(binary, grains, tmp_path, monkeypat
     alone = invade(case, scales_of(case), grains, tmp_path / "alone", Launch(binary=binary))
     assert not (tmp_path / "alone" / "overlap.csv").exists()
     assert np.array_equal(watched.damaged.position, alone.damaged.position)
-    assert watched.max_overlap >= alone.max_overlap > 0
+    assert watched.overlap == deepest_of(read_watch(tmp_path / "watched"))
+    assert watched.max_overlap > alone.max_overlap > 0
 
 
 @pytest.mark.liggghts
@@ -110,6 +111,7 @@ def test_a_run_past_the_limit_stops_when_asked_and_goes_on_when_told(binary, gra
     assert again.history == whole.history
     assert np.array_equal(again.damaged.position, whole.damaged.position)
     assert again.overlap == whole.overlap
+    assert list(read_watch(tmp_path / "run")) == list(read_watch(tmp_path / "whole"))
     assert again.max_overlap > LIMIT
 
 
