@@ -24,6 +24,9 @@ UNMATCHED_FEW = 1e-5
 ADOPTION_ROUNDS = 8
 FIRST_MARGIN = 3.5
 ROUNDS = 8
+MOST_PERIODS, MOST_IMAGES, IMAGES_A_GRAIN = 64, 50_000, 30
+"""Beyond these grains or voids are far larger than the periodic sides; Qhull then takes hours (dense packs: 1 to 2
+periods, a unit cell 125 images)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -78,6 +81,7 @@ def tessellate(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> tuple[
     margin = np.full(3, FIRST_MARGIN * float(grains.radius.max()))
     for _ in range(ROUNDS):
         margin = np.where(periodic, margin, np.minimum(margin, size))
+        _refuse_crowd(len(grains), np.where(periodic, margin, 0.0), size)
         widest = ~np.array(periodic) & (margin >= size)
         tetrahedra = tessellate_within(grains, periodic, margin)
         needed = needed_margin(tetrahedra, grains.box)
@@ -97,6 +101,18 @@ def tessellate(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> tuple[
             "the box, check the box and the periodic sides"
         )
     return tetrahedra, facets
+
+
+def _refuse_crowd(count: int, margin: Array, size: Array) -> None:
+    """Raise NetworkError when images of `count` grains within `margin` (3,) m of periodic sides are too many to make."""
+    images, axis = count * float(np.prod(1.0 + 2.0 * margin / size)), int(np.argmax(margin / size))
+    most = MOST_IMAGES + IMAGES_A_GRAIN * count
+    if images > most or margin[axis] > MOST_PERIODS * size[axis]:
+        raise NetworkError(
+            f"tessellation of {count} grains: {images:.3g} images up to {margin[axis]:.3g} m beyond the periodic side "
+            f"{'xyz'[axis]} of {size[axis]:.3g} m are needed, expected at most {most} and {MOST_PERIODS} periods; "
+            "grains or voids are far larger than the box, check units and box"
+        )
 
 
 def share_facets(tetrahedra: Tetrahedra, *, periodic: tuple[bool, bool, bool]) -> Facets:
