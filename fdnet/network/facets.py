@@ -86,7 +86,7 @@ def tessellate(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> tuple[
         tetrahedra = tessellate_within(grains, periodic, margin)
         needed = needed_margin(tetrahedra, grains.box)
         empty = len(tetrahedra.vertex) > 0 and bool(np.all((margin >= needed) | widest))
-        facets = share_facets(tetrahedra, periodic=periodic) if empty else None
+        facets = share_facets(tetrahedra, grains.box, periodic=periodic) if empty else None
         if facets is not None and (facets.unmatched <= UNMATCHED_FEW * len(facets.pore) or widest.all()):
             break
         margin = np.maximum(1.5 * margin, np.minimum(1.02 * needed, 4.0 * margin))
@@ -115,13 +115,13 @@ def _refuse_crowd(count: int, margin: Array, size: Array) -> None:
         )
 
 
-def share_facets(tetrahedra: Tetrahedra, *, periodic: tuple[bool, bool, bool]) -> Facets:
+def share_facets(tetrahedra: Tetrahedra, box: Array, *, periodic: tuple[bool, bool, bool]) -> Facets:
     """Pairs of tetrahedra with a common facet: neighbours, and across periods those of the same grains."""
     beside = tetrahedra.beside
     one, opposite = np.nonzero(beside > np.arange(len(beside))[:, None])
     two = beside[one, opposite]
     back = np.argmax(beside[two] == one[:, None], axis=1)
-    first, second, shift, unmatched = _across_periods(tetrahedra, periodic)
+    first, second, shift, unmatched = _across_periods(tetrahedra, box, periodic)
     pore = np.concatenate([np.stack([one, two], axis=1), np.stack([first // 4, second // 4], axis=1)])
     ends = np.concatenate([np.stack([opposite, back], axis=1), np.stack([first % 4, second % 4], axis=1)])
     return Facets(
@@ -132,7 +132,9 @@ def share_facets(tetrahedra: Tetrahedra, *, periodic: tuple[bool, bool, bool]) -
     )
 
 
-def _across_periods(tetrahedra: Tetrahedra, periodic: tuple[bool, ...]) -> tuple[Array, Array, Array, int]:
+def _across_periods(
+    tetrahedra: Tetrahedra, box: Array, periodic: tuple[bool, ...]
+) -> tuple[Array, Array, Array, int]:
     """Facets without neighbour (index of tetrahedron times 4 + corner) paired by the names of their grains and
     relative shifts, the shift of the second, and how many stay single away from the mirrored faces."""
     images = tetrahedra.images
@@ -149,8 +151,10 @@ def _across_periods(tetrahedra: Tetrahedra, periodic: tuple[bool, ...]) -> tuple
     alone = np.ones(len(single), bool)
     alone[first] = alone[second] = False
     # on or beyond one mirrored face symmetry closes the space
-    beyond = np.any(np.all(images.mirror[corner] != INSIDE, axis=1) & ~np.array(periodic), axis=1)
-    return single[first], single[second], shifts[first, 0] - shifts[second, 0], int(np.sum(alone & ~beyond))
+    place, hair = images.position[corner[alone]], SAME_CENTRE * float(tetrahedra.image_radius.mean())
+    below, above = np.all(place <= box[:, 0] + hair, axis=1), np.all(place >= box[:, 1] - hair, axis=1)
+    beyond = np.any((below | above) & ~np.array(periodic), axis=1)
+    return single[first], single[second], shifts[first, 0] - shifts[second, 0], int(np.sum(~beyond))
 
 
 def make_polyhedra(tetrahedra: Tetrahedra, facets: Facets, box: Array, scale: float) -> Polyhedra:
