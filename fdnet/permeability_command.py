@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
     if options.csv and not options.csv.parent.is_dir():
         raise CaseError(f"--csv: {options.csv.parent} is not a folder; make it first")
     spheres, notes = read_snapshot(options, periodic)
-    check_lengths(spheres.box, spheres.grains().radius)
+    check_lengths(spheres, periodic)
     turn = [("xyz".index(options.axis) + k) % 3 for k in range(3)]
     spheres = turned(spheres, turn)
     around = (periodic[turn[0]], periodic[turn[1]], periodic[turn[2]])

@@ -58,17 +58,20 @@ def needed_margin(found: Tetrahedra, box: Array) -> Array:
     return np.maximum(low, (found.centre + reach - box[:, 1]).max(axis=0, initial=0.0))
 
 
-def check_lengths(box: Array, radius: Array) -> None:
-    """Raise NetworkError on radii or box sides that are not positive, lengths whose cubes no double holds, and a box
-    so far from the origin that coordinates are rounded by 1e-8 radii."""
+def check_lengths(spheres: Snapshot, periodic: tuple[bool, ...]) -> None:
+    """Raise NetworkError on radii or box sides that are not positive, lengths whose cubes no double holds, and where
+    the box, or centres along its periodic sides, are so far from the origin that they are rounded by 1e-8 radii."""
+    box, radius = spheres.box, spheres.radius
     if np.any(radius <= 0):
         raise NetworkError("tessellation: a grain radius is not positive; check the input lengths")
-    scale, farthest = float(radius.mean()), float(np.max(np.abs(box)))
-    if radius.min() < LENGTHS[0] or max(float(radius.max()), farthest) > LENGTHS[1]:
+    largest = max(float(np.max(np.abs(one))) for one in (box, radius, spheres.position))
+    if radius.min() < LENGTHS[0] or largest > LENGTHS[1]:
         raise NetworkError(
-            f"tessellation: radii {radius.min():.3g} to {radius.max():.3g} m in a box that reaches to {farthest:.3g} m, "
-            f"expected lengths between {LENGTHS[0]:g} and {LENGTHS[1]:g} m; check the units"
+            f"tessellation: lengths from {radius.min():.3g} m (radius) to {largest:.3g} m, expected between "
+            f"{LENGTHS[0]:g} and {LENGTHS[1]:g} m; check the units"
         )
+    around = spheres.position[:, np.array(periodic, bool)]
+    scale, farthest = float(radius.mean()), max(float(np.max(np.abs(box))), float(np.max(np.abs(around), initial=0.0)))
     if np.spacing(farthest) > COARSE * scale:
         raise NetworkError(
             f"tessellation: coordinates up to {farthest:.3g} m are rounded by {np.spacing(farthest):.1g} m, more than "

@@ -126,7 +126,7 @@ def build_network(grains: Snapshot, *, periodic: tuple[bool, bool, bool], walls:
     if walls not in WALLS:
         raise NetworkError(f"walls: {walls!r} is not known; choose one of {list(WALLS)}")
     periodic = (bool(periodic[0]), bool(periodic[1]), bool(periodic[2]))
-    check_lengths(grains.box, grains.radius)
+    check_lengths(grains, periodic)
     kept = reaching(grains, periodic)
     if len(kept) < 4:
         raise NetworkError(

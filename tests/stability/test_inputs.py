@@ -61,6 +61,19 @@ def test_radii_beyond_reason_are_refused(tmp_path, capsys, radius):
     assert "check the units" in err
 
 
+@pytest.mark.parametrize(("place", "periodic", "code"), [("1e308", "", 4), ("1e25", "x", 4), ("1e25", "", 0)])
+def test_a_stray_sphere_is_left_out_unless_a_period_would_have_to_bring_it_back(
+    tmp_path, capsys, place, periodic, code
+):
+    """1e25 periods away no digit of its place is left; beside a wall it is outside the box, counted, and told."""
+    table(tmp_path / "s.csv", x=place)
+    options = ["--units", "mm", "--box", "0,4,0,4,0,4", "--periodic", periodic, "--json"]
+    found, out, err = permeability(capsys, tmp_path / "s.csv", *options)
+    assert found == code, err
+    if code == 0:
+        assert any("1 grains lie outside the box" in one for one in json.loads(out)["warnings"])
+
+
 def frame(*, step="0", count="2", bounds="0 1", rows=("1 1 0.5 ", "2 1 0.25 ")) -> bytes:
     head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS ff ff ff\n"
     return (head + f"{bounds}\n0 1\n0 1\nITEM: ATOMS id type x \n" + "".join(f"{row}\n" for row in rows)).encode()
