@@ -15,7 +15,22 @@ VALUES += (2**31, 2**63, -(2**63), 10**30, True, False, "", "walls", "1.0", "\u0
 VALUES += ([0.3, 0.2], [1.0, 1.0, 1.0], [[1.0]], {}, {"a": 1}, [0.1] * 20)
 NUMBERS = ("nan", "inf", "-inf", "NaN", "1e400", "-1e400", "1e-400", "0", "-0", "-1", "0x10", "1_0", "", "abc", "1,5")
 NUMBERS += ("1e308", "1e-300", "1e12", "1e-12", "+5", " 7", "7.", "٣", "9" * 400, "--1", "1e", "∞", "none", "true", '"')
-_BYTES = (b"\x00", b"\xff\xfe", b"\xef\xbb\xbf", b"\r", b"\r\n", b"\n\n", b"\t", b" ", b"#", b'"', b"=", b"[", b",", b"-")
+_BYTES = (
+    b"\x00",
+    b"\xff\xfe",
+    b"\xef\xbb\xbf",
+    b"\r",
+    b"\r\n",
+    b"\n\n",
+    b"\t",
+    b" ",
+    b"#",
+    b'"',
+    b"=",
+    b"[",
+    b",",
+    b"-",
+)
 
 
 def change_bytes(rng: Random, data: bytes) -> bytes:

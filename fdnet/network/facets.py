@@ -104,7 +104,7 @@ def tessellate(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> tuple[
 
 
 def _refuse_crowd(count: int, margin: Array, size: Array) -> None:
-    """Raise NetworkError when images of `count` grains within `margin` (3,) m of periodic sides are too many to make."""
+    """Raise NetworkError when the images of `count` grains within `margin` (3,) m of periodic sides are too many."""
     images, axis = count * float(np.prod(1.0 + 2.0 * margin / size)), int(np.argmax(margin / size))
     most = MOST_IMAGES + IMAGES_A_GRAIN * count
     if images > most or margin[axis] > MOST_PERIODS * size[axis]:
@@ -132,9 +132,7 @@ def share_facets(tetrahedra: Tetrahedra, box: Array, *, periodic: tuple[bool, bo
     )
 
 
-def _across_periods(
-    tetrahedra: Tetrahedra, box: Array, periodic: tuple[bool, ...]
-) -> tuple[Array, Array, Array, int]:
+def _across_periods(tetrahedra: Tetrahedra, box: Array, periodic: tuple[bool, ...]) -> tuple[Array, Array, Array, int]:
     """Facets without neighbour (index of tetrahedron times 4 + corner) paired by the names of their grains and
     relative shifts, the shift of the second, and how many stay single away from the mirrored faces."""
     images = tetrahedra.images

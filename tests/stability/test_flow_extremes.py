@@ -131,7 +131,7 @@ def test_islands_are_counted_and_change_nothing():
     """A ring of ten pores tied to nothing, and one tied to the inlet alone."""
     angle = np.linspace(0, 2 * np.pi, 10, endpoint=False)
     ring = np.column_stack([1.5 + np.cos(angle), 3 + np.sin(angle), np.zeros(10)])
-    position = np.vstack([[[n, 0.5, 0.5] for n in range(4)], ring, ring + [0, 4, 0]])
+    position = np.vstack([[[n, 0.5, 0.5] for n in range(4)], ring, ring + np.array([0, 4, 0])])
     loop = [(n, (n + 1) % 10) for n in range(10)]
     pairs = [(0, 1), (1, 2), (2, 3), *((a + 4, b + 4) for a, b in loop), *((a + 14, b + 14) for a, b in loop), (0, 14)]
     network = network_of(position, pairs, [[0, 3], [0, 9], [0, 1]])

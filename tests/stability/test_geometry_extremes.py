@@ -94,7 +94,7 @@ def test_slivers_of_every_thickness_leave_k_continuous(name, size):
 def test_one_layer_is_the_lattice_its_mirror_images_make_up():
     layer = simple_cubic()
     one = layer.where(layer.position[:, 0] < SC_SPACING)
-    one = snapshot(one.position + [0.8, 0, 0], 1.0, [[0, SC_SPACING], [0, EDGE], [0, EDGE]])
+    one = snapshot(one.position + np.array([0.8, 0, 0]), 1.0, [[0, SC_SPACING], [0, EDGE], [0, EDGE]])
     assert measure(one).k_initial == pytest.approx(measure(layer, periodic=ALL).k_initial, rel=1e-6)
 
 
@@ -128,7 +128,8 @@ def test_a_slice_of_a_grain_has_a_k_or_is_refused(thickness):
     try:
         found = measure(snapshot(pack.position, 1.0, box))
     except NetworkError as error:
-        assert "grains" in str(error)
+        said = str(error)
+        assert "grains" in said
     else:
         assert 0 <= found.k_initial < 1.0
         assert 0 <= found.porosity_initial <= 1
@@ -138,7 +139,7 @@ def test_a_slice_of_a_grain_has_a_k_or_is_refused(thickness):
 def test_a_periodic_side_far_thinner_than_a_grain_is_refused_at_once(thickness):
     """Its images would be thousands; a tessellation of them took hours."""
     pack = random_pack(60)
-    with pytest.raises(NetworkError, match="periodic side y .* are needed, expected at most"):
+    with pytest.raises(NetworkError, match=r"periodic side y .* are needed, expected at most"):
         build_network(snapshot(pack.position, 1.0, pack.box * [[1], [thickness], [1]]), periodic=SIDES)
 
 
@@ -245,14 +246,14 @@ def test_fines_that_fill_the_pack_leave_no_k(law):
 def test_doubled_grains_are_refused_and_named():
     pack = random_pack(40)
     for apart in (0.0, 1e-12, 5e-4):
-        doubled = np.vstack([pack.position, pack.position[:1] + [apart, 0, 0]])
+        doubled = np.vstack([pack.position, pack.position[:1] + np.array([apart, 0, 0])])
         with pytest.raises(NetworkError, match="grains 1 and 41 coincide"):
             measure(snapshot(doubled, 1.0, pack.box), periodic=ALL)
 
 
 def test_a_grain_and_its_image_in_one_place_are_refused():
     pack = random_pack(40)
-    doubled = np.vstack([pack.position, pack.position[:1] + [0, pack.box[1, 1], 0]])
+    doubled = np.vstack([pack.position, pack.position[:1] + np.array([0, pack.box[1, 1], 0])])
     with pytest.raises(NetworkError, match="grains 1 and 41 coincide"):
         measure(snapshot(doubled, 1.0, pack.box), periodic=ALL)
 
@@ -260,7 +261,7 @@ def test_a_grain_and_its_image_in_one_place_are_refused():
 def test_grains_nearly_in_one_place_are_one_grain_to_the_flow():
     """Two centres 2e-3 radii apart: porosity is that of their union, k that of one grain within the shift's effect."""
     pack = random_pack(40)
-    doubled = snapshot(np.vstack([pack.position, pack.position[:1] + [2e-3, 0, 0]]), 1.0, pack.box)
+    doubled = snapshot(np.vstack([pack.position, pack.position[:1] + np.array([2e-3, 0, 0])]), 1.0, pack.box)
     one, two = measure(pack, periodic=ALL), measure(doubled, periodic=ALL)
     assert two.porosity_initial == pytest.approx(one.porosity_initial, abs=1e-4)
     assert two.k_initial == pytest.approx(one.k_initial, rel=0.05)

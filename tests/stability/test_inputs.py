@@ -81,7 +81,7 @@ def frame(*, step="0", count="2", bounds="0 1", rows=("1 1 0.5 ", "2 1 0.25 ")) 
 
 @pytest.mark.parametrize("text", ["nan", "NaN", "inf", "-inf", "1e400", "-nan", "Infinity", "nan(0x1)", "", "1e"])
 def test_numbers_that_are_none_in_a_dump_are_named_with_line_and_column(text):
-    with pytest.raises(DumpError, match="d:11: step 0: (column x holds|2 values, expected 3)"):
+    with pytest.raises(DumpError, match=r"d:11: step 0: (column x holds|2 values, expected 3)"):
         list(parse_dump(frame(rows=("1 1 0.5 ", f"2 1 {text} ")), "d"))
 
 

@@ -105,7 +105,7 @@ def test_no_fines_leave_the_pack_as_it_is(tmp_path):
 
 
 def test_fines_larger_than_every_throat_stay_at_the_face(tmp_path):
-    """Inscribed circles between grains of 0.25 mm that touch are 0.04 mm; fines of 0.2 mm cannot pass a layer of them."""
+    """Circles between three touching grains of 0.25 mm are of 0.04 mm: fines of 0.2 mm cannot pass."""
     code, summary, err = run(tmp_path, "fines.radius_mm=0.2", "fines.count=30", "run.cap_ms=0.35")
     assert code == 0, err
     check_bounds(tmp_path, summary)
@@ -197,7 +197,7 @@ def energy(frame: Frame, stiffness: float, mass: float) -> float:
 
 @pytest.mark.parametrize("factor", [0.1, 0.2])
 def test_an_undamped_closed_system_gains_no_energy(binary, tmp_path, factor):
-    """Velocity Verlet on linear springs: energy off by (w dt)^2 / 8 of what a contact holds, w^2 = 2 k / m, at the most;
+    """Velocity Verlet on linear springs: energy off by (w dt)^2 / 8 of what a contact holds at most, w^2 = 2 k / m;
     what changes hands at the start and end of each contact adds up like a random walk. Stated bound: 1 % (factor 0.1),
     2 % (factor 0.2) over 40,000 steps; momentum to the rounding of its sums."""
     case = undamped()
