@@ -5,7 +5,7 @@
 Case files go through `fdnet render`, sphere tables through `fdnet permeability`, dumps through the parser, all in this
 process. A fault is: any exception but fdnet's own, an exit code other than 0, 2, 3 or 4, more than one line of error
 message, a warning of Python, a file left by a refusal, a result that is not whole or has impossible numbers, or more
-than the time limit. Input INDEX of a seed is always the same. Ends with 1 when there were faults.
+than the limit of CPU time. Input INDEX of a seed is always the same. Ends with 1 when there were faults.
 """
 
 import argparse
@@ -190,21 +190,21 @@ def _spheres(rng: Random, *, fines: int) -> bytes:
 
 @contextlib.contextmanager
 def limited(seconds: float) -> Iterator[None]:
-    """Raise TooLong in the body after `seconds`."""
+    """Raise TooLong in the body after `seconds` of this process's CPU time."""
 
     def stop(*_: Any) -> None:
         raise TooLong
 
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     # compiled code sees no signal before it returns: this ends the process and says where it was
-    faulthandler.dump_traceback_later(3 * seconds, exit=True)
+    faulthandler.dump_traceback_later(30 * seconds, exit=True)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
         faulthandler.cancel_dump_traceback_later()
-        signal.signal(signal.SIGALRM, before)
+        signal.signal(signal.SIGPROF, before)
 
 
 def one_input(known: dict[str, Target], seed: int, index: int) -> tuple[str, bytes, Random]:

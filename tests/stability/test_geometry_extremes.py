@@ -243,6 +243,16 @@ def test_fines_that_fill_the_pack_leave_no_k(law):
         assert any("k_damaged = 0: no open path" in one for one in found.warnings)
 
 
+def test_a_fine_wider_than_a_periodic_side_is_refused_at_once():
+    """Throats times its images were more than could be searched in a day."""
+    pack = random_pack(40)
+    for radius in (0.51 * pack.box[1, 1], 1e4, 1e20):
+        with pytest.raises(NetworkError, match=r"fine 1 .* meets its own image across the periodic side"):
+            measure(pack, joined(pack, pack.box[:, 1] * np.array([[0.5, 0.5, 0.5]]), radius), ALL)
+    wide = measure(pack, joined(pack, pack.box[:, 1] * np.array([[0.5, 0.5, 0.5]]), 1e4), NONE)
+    assert wide.k_damaged == 0
+
+
 def test_doubled_grains_are_refused_and_named():
     pack = random_pack(40)
     for apart in (0.0, 1e-12, 5e-4):
