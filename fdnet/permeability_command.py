@@ -54,11 +54,13 @@ def run(options: argparse.Namespace) -> int:
     """Analyse the file and print the result. Raises CaseError for bad input (nothing is written)."""
     from fdnet.network.conductance import DEFAULT_LAW
     from fdnet.network.damage import DEFAULT_DAMAGE_LAW
+    from fdnet.network.delaunay import check_lengths
 
     periodic = _directions(options.periodic)
     if options.csv and not options.csv.parent.is_dir():
         raise CaseError(f"--csv: {options.csv.parent} is not a folder; make it first")
     spheres, notes = read_snapshot(options, periodic)
+    check_lengths(spheres, periodic)
     turn = [("xyz".index(options.axis) + k) % 3 for k in range(3)]
     spheres = turned(spheres, turn)
     around = (periodic[turn[0]], periodic[turn[1]], periodic[turn[2]])

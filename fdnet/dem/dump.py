@@ -121,7 +121,9 @@ class _Reader:
         try:
             low, high = (float(part) for part in text.split())
         except ValueError:
-            raise self.fail(f"box bounds {text[:60]!r}, expected two numbers", line) from None
+            low = high = np.nan
+        if not (np.isfinite(high - low) and low < high):
+            raise self.fail(f"box bounds {text[:60]!r}, expected two numbers, the lower one first", line)
         return [low, high]
 
     def rows(self, count: int, columns: tuple[str, ...]) -> Array:

@@ -19,7 +19,10 @@ from fdnet.snapshot import Array, Snapshot
 SHAKE = 1e-7
 SHAKE_SEED = 3_141_592
 COINCIDENT = 1e-3
+COARSE = 1e-8
+"""A tenth of the shake: coordinates rounded more than this, in grain radii, cannot hold it."""
 ON_FACE_HAIR = 1e-6
+LENGTHS = (1e-60, 1e60)
 FLAT = 1e-5
 SAME_CENTRE = 1e-5
 EQUAL_SPREAD = 1e-3
@@ -55,10 +58,31 @@ def needed_margin(found: Tetrahedra, box: Array) -> Array:
     return np.maximum(low, (found.centre + reach - box[:, 1]).max(axis=0, initial=0.0))
 
 
+def check_lengths(spheres: Snapshot, periodic: tuple[bool, ...]) -> None:
+    """Raise NetworkError on radii or box sides that are not positive, lengths whose cubes no double holds, and where
+    the box, or centres along its periodic sides, are so far from the origin that they are rounded by 1e-8 radii."""
+    box, radius = spheres.box, spheres.radius
+    if np.any(radius <= 0):
+        raise NetworkError("tessellation: a grain radius is not positive; check the input lengths")
+    largest = max(float(np.max(np.abs(one))) for one in (box, radius, spheres.position))
+    if radius.min() < LENGTHS[0] or largest > LENGTHS[1]:
+        raise NetworkError(
+            f"tessellation: lengths from {radius.min():.3g} m (radius) to {largest:.3g} m, expected between "
+            f"{LENGTHS[0]:g} and {LENGTHS[1]:g} m; check the units"
+        )
+    around = spheres.position[:, np.array(periodic, bool)]
+    scale, farthest = float(radius.mean()), max(float(np.max(np.abs(box))), float(np.max(np.abs(around), initial=0.0)))
+    if np.spacing(farthest) > COARSE * scale:
+        raise NetworkError(
+            f"tessellation: coordinates up to {farthest:.3g} m are rounded by {np.spacing(farthest):.1g} m, more than "
+            f"{COARSE:g} of a radius of {scale:.3g} m; move the specimen to the origin, check units and box"
+        )
+    if np.any(box[:, 1] <= box[:, 0]):
+        raise NetworkError("tessellation: a box side is not positive; check the input lengths")
+
+
 def check_grains(grains: Snapshot, periodic: tuple[bool, ...]) -> None:
-    """Raises NetworkError on lengths that are not positive, and coincident grains."""
-    if np.any(grains.radius <= 0) or np.any(grains.box[:, 1] <= grains.box[:, 0]):
-        raise NetworkError("tessellation: a grain radius or a box side is not positive; check the input lengths")
+    """Raises NetworkError on coincident grains."""
     tree = neighbour_tree(grains.position, grains.box, periodic=periodic)
     close = tree.query_pairs(COINCIDENT * float(grains.radius.min()), output_type="ndarray")
     if len(close):
@@ -161,14 +185,25 @@ def _unique(images: Images, simplices: Array, place: tuple[tuple[bool, ...], Arr
         beyond |= ~np.any(images.mirror[corner, axis] == INSIDE, axis=1)
     # sets beyond a face belong to the specimen when their centre is on it: parts of a polyhedron cut by the face
     check = np.flatnonzero(good & beyond)
-    hair = SAME_CENTRE * float(radius.mean())
-    centre, _ = geometry.power_centre(shaken[corner[check]], radius[corner[check]])
-    off = np.maximum(box[:, 0] - centre, centre - box[:, 1])
-    inside = np.all((off <= hair) | np.array(periodic), axis=1)
-    flat = np.abs(geometry.signed_volume(shaken[corner[check]])) < FLAT * float(radius.mean()) ** 3
-    good[check] = inside & ~flat
+    good[check] = _cut_by_face(shaken[corner[check]], radius[corner[check]], box, periodic)
     kept[doubtful] = good
     return np.flatnonzero(kept)
+
+
+def _cut_by_face(corner: Array, radius: Array, box: Array, periodic: tuple[bool, ...]) -> Array:
+    """True (K,) where the power centre of `corner` (K, 4, 3) lies within the faces that are not periodic, or on them.
+
+    The centre of a flat one is arbitrary, its centroid decides: standing across a face it is part of what parts two
+    polyhedra; lying in the face it has no room.
+    """
+    hair = SAME_CENTRE * float(radius.mean()) if len(radius) else 0.0
+    walled = ~np.array(periodic)
+    centre, _ = geometry.power_centre(corner, radius)
+    flat = np.abs(geometry.signed_volume(corner)) < FLAT * (hair / SAME_CENTRE) ** 3
+    centre = np.where(flat[:, None], corner.mean(axis=1), centre)
+    inside = np.all((np.maximum(box[:, 0] - centre, centre - box[:, 1]) <= hair) | ~walled, axis=1)
+    in_face = [np.any(np.all(np.abs(corner - face) <= hair, axis=1) & walled, axis=1) for face in box.T]
+    return inside & ~(in_face[0] | in_face[1])
 
 
 def _centres(place: tuple[Array, Array], radius: Array, vertex: Array, scale: float) -> tuple[Array, Array, Array]:

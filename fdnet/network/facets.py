@@ -24,6 +24,9 @@ UNMATCHED_FEW = 1e-5
 ADOPTION_ROUNDS = 8
 FIRST_MARGIN = 3.5
 ROUNDS = 8
+MOST_PERIODS, MOST_IMAGES, IMAGES_A_GRAIN = 64, 50_000, 30
+"""Beyond these grains or voids are far larger than the periodic sides; Qhull then takes hours (dense packs: 1 to 2
+periods, a unit cell 125 images)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -78,11 +81,12 @@ def tessellate(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> tuple[
     margin = np.full(3, FIRST_MARGIN * float(grains.radius.max()))
     for _ in range(ROUNDS):
         margin = np.where(periodic, margin, np.minimum(margin, size))
+        _refuse_crowd(len(grains), np.where(periodic, margin, 0.0), size)
         widest = ~np.array(periodic) & (margin >= size)
         tetrahedra = tessellate_within(grains, periodic, margin)
         needed = needed_margin(tetrahedra, grains.box)
         empty = len(tetrahedra.vertex) > 0 and bool(np.all((margin >= needed) | widest))
-        facets = share_facets(tetrahedra, periodic=periodic) if empty else None
+        facets = share_facets(tetrahedra, grains.box, periodic=periodic) if empty else None
         if facets is not None and (facets.unmatched <= UNMATCHED_FEW * len(facets.pore) or widest.all()):
             break
         margin = np.maximum(1.5 * margin, np.minimum(1.02 * needed, 4.0 * margin))
@@ -99,13 +103,25 @@ def tessellate(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> tuple[
     return tetrahedra, facets
 
 
-def share_facets(tetrahedra: Tetrahedra, *, periodic: tuple[bool, bool, bool]) -> Facets:
+def _refuse_crowd(count: int, margin: Array, size: Array) -> None:
+    """Raise NetworkError when the images of `count` grains within `margin` (3,) m of periodic sides are too many."""
+    images, axis = count * float(np.prod(1.0 + 2.0 * margin / size)), int(np.argmax(margin / size))
+    most = MOST_IMAGES + IMAGES_A_GRAIN * count
+    if images > most or margin[axis] > MOST_PERIODS * size[axis]:
+        raise NetworkError(
+            f"tessellation of {count} grains: {images:.3g} images up to {margin[axis]:.3g} m beyond the periodic side "
+            f"{'xyz'[axis]} of {size[axis]:.3g} m are needed, expected at most {most} and {MOST_PERIODS} periods; "
+            "grains or voids are far larger than the box, check units and box"
+        )
+
+
+def share_facets(tetrahedra: Tetrahedra, box: Array, *, periodic: tuple[bool, bool, bool]) -> Facets:
     """Pairs of tetrahedra with a common facet: neighbours, and across periods those of the same grains."""
     beside = tetrahedra.beside
     one, opposite = np.nonzero(beside > np.arange(len(beside))[:, None])
     two = beside[one, opposite]
     back = np.argmax(beside[two] == one[:, None], axis=1)
-    first, second, shift, unmatched = _across_periods(tetrahedra, periodic)
+    first, second, shift, unmatched = _across_periods(tetrahedra, box, periodic)
     pore = np.concatenate([np.stack([one, two], axis=1), np.stack([first // 4, second // 4], axis=1)])
     ends = np.concatenate([np.stack([opposite, back], axis=1), np.stack([first % 4, second % 4], axis=1)])
     return Facets(
@@ -116,7 +132,7 @@ def share_facets(tetrahedra: Tetrahedra, *, periodic: tuple[bool, bool, bool]) -
     )
 
 
-def _across_periods(tetrahedra: Tetrahedra, periodic: tuple[bool, ...]) -> tuple[Array, Array, Array, int]:
+def _across_periods(tetrahedra: Tetrahedra, box: Array, periodic: tuple[bool, ...]) -> tuple[Array, Array, Array, int]:
     """Facets without neighbour (index of tetrahedron times 4 + corner) paired by the names of their grains and
     relative shifts, the shift of the second, and how many stay single away from the mirrored faces."""
     images = tetrahedra.images
@@ -133,8 +149,10 @@ def _across_periods(tetrahedra: Tetrahedra, periodic: tuple[bool, ...]) -> tuple
     alone = np.ones(len(single), bool)
     alone[first] = alone[second] = False
     # on or beyond one mirrored face symmetry closes the space
-    beyond = np.any(np.all(images.mirror[corner] != INSIDE, axis=1) & ~np.array(periodic), axis=1)
-    return single[first], single[second], shifts[first, 0] - shifts[second, 0], int(np.sum(alone & ~beyond))
+    place, hair = images.position[corner[alone]], SAME_CENTRE * float(tetrahedra.image_radius.mean())
+    below, above = np.all(place <= box[:, 0] + hair, axis=1), np.all(place >= box[:, 1] - hair, axis=1)
+    beyond = np.any((below | above) & ~np.array(periodic), axis=1)
+    return single[first], single[second], shifts[first, 0] - shifts[second, 0], int(np.sum(~beyond))
 
 
 def make_polyhedra(tetrahedra: Tetrahedra, facets: Facets, box: Array, scale: float) -> Polyhedra:

@@ -69,8 +69,9 @@ def _shifted(x: Array, bounds: Array, margin: float, hair: float) -> tuple[Array
 def _mirrored(x: Array, bounds: Array, margin: float, hair: float) -> tuple[Array, Array, Array, Array]:
     low, high = bounds
     own = np.where((x <= low + hair) | (x >= high - hair), ON_FACE, INSIDE)
-    lower = np.flatnonzero((x > low + hair) & (x < low + margin))
-    upper = np.flatnonzero((x < high - hair) & (x > high - margin))
+    # a centre on one face has an image as far beyond the other when the margin is the whole side
+    lower = np.flatnonzero((x > low + hair) & (x < low + margin + hair))
+    upper = np.flatnonzero((x < high - hair) & (x > high - margin - hair))
     pick = np.concatenate([np.arange(len(x)), lower, upper])
     place = np.concatenate([x, 2 * low - x[lower], 2 * high - x[upper]])
     codes = np.concatenate([own, np.full(len(lower), MIRROR_LOW), np.full(len(upper), MIRROR_HIGH)])

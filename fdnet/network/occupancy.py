@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, NetworkError
 from fdnet.network.cells import points_in_boxes
 from fdnet.network.cylinder import OVERLAPS, Pairs, covers_section, place_by_axis
 from fdnet.network.deposit import centred_inside, deposit_in_pores, deposit_on_sides, mirrored_images
@@ -55,10 +55,12 @@ def measure_occupancy(
 
     Throats see the fines whose sphere reaches into the box, pores those centred in it; both see the mirror images of
     the latter across faces that are not periodic, where pores and throats cut by the face are whole. Fines centred
-    outside are counted (`fines_outside_box`). Raises CaseError on an unknown `overlap`.
+    outside are counted (`fines_outside_box`). Raises CaseError on an unknown `overlap`, NetworkError on a fine wider
+    than a periodic side.
     """
     if isinstance(overlap, str) and overlap not in OVERLAPS:
         raise CaseError(f"analysis.overlap: {overlap!r} is not known; choose one of {sorted(OVERLAPS)}")
+    _refuse_wide(network, fines)
     throat, fine, pairs = _pairs(network, fines)
     inside = OVERLAPS[overlap](pairs) if isinstance(overlap, str) else overlap(pairs)
     blocked = np.zeros(len(network.throat_radius), bool)
@@ -90,6 +92,17 @@ def measure_occupancy(
         "pair_distance": pairs.offset / pairs.tube,
     }
     return Occupancy(counts=counts, **{name: frozen(value) for name, value in found.items()})
+
+
+def _refuse_wide(network: Network, fines: Snapshot) -> None:
+    side = np.where(network.periodic, np.ptp(network.box, axis=1), np.inf)
+    wide = np.flatnonzero(2.0 * fines.radius > side.min())
+    if len(wide):
+        raise NetworkError(
+            f"occupancy: fine {fines.id[wide[0]]} of radius {fines.radius[wide[0]]:.3g} m meets its own image across "
+            f"the periodic side {'xyz'[int(np.argmin(side))]} of {side.min():.3g} m ({len(wide)} such fines); check "
+            "units and box"
+        )
 
 
 def _throat_sums(network: Network, throat: Array, pairs: Pairs, inside: Array) -> dict[str, Array]:

@@ -17,6 +17,7 @@ from fdnet.snapshot import Array, Snapshot, frozen
 LATTICES = 8
 LINES_PER_LATTICE = 5_000
 SHIFT_SEED = 20_110_501
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -50,12 +51,18 @@ def measure_porosity(
     void = 1.0 - (filled[:, -1] - filled[:, 0]) / (high[0] - low[0])
     at_bins = filled.mean(axis=0)[np.searchsorted(cuts, bins)]
     return Porosity(
-        mean=float(void.mean()),
+        mean=float(_without_hair(void.mean())),
         standard_error=float(void.std(ddof=1) / np.sqrt(LATTICES)),
         edges=frozen(bins),
-        profile=frozen(1.0 - np.diff(at_bins) / np.diff(bins)),
+        profile=frozen(_without_hair(1.0 - np.diff(at_bins) / np.diff(bins))),
         sum=_plain_sum(spheres, periodic),
     )
+
+
+def _without_hair(value: Array) -> Array:
+    """`value`, but 0 or 1 where it is beyond them by the rounding of the sums alone."""
+    bounded = np.clip(value, 0.0, 1.0)
+    return np.where(np.abs(value - bounded) < ROUNDING, bounded, value)
 
 
 def _checked_edges(edges: Array | None, low: float, high: float) -> Array:
@@ -97,8 +104,11 @@ def _crossings(spheres: Snapshot, count: Array, shift: Array, periodic: tuple[bo
     """Sphere index, line index and half chord length of every line through a sphere."""
     step = (spheres.box[1:, 1] - spheres.box[1:, 0]) / count
     centre = (spheres.position[:, 1:] - spheres.box[1:, 0]) / step - shift
-    reach = spheres.radius[:, None] / step
-    first, last = np.ceil(centre - reach).astype(int), np.floor(centre + reach).astype(int)
+    # across a period the nearest image's chord holds all others; beyond a wall there are no lines
+    reach = np.minimum(spheres.radius[:, None] / step, np.where(periodic[1:], 0.5 * count, np.inf))
+    low, high = np.where(periodic[1:], -np.inf, 0.0), np.where(periodic[1:], np.inf, count - 1.0)
+    first = np.ceil(np.maximum(centre - reach, low)).astype(int)
+    last = np.floor(np.minimum(centre + reach, high)).astype(int)
     wide = np.maximum(last - first + 1, 0)
     lines = wide[:, 0] * wide[:, 1]
     sphere = np.repeat(np.arange(len(spheres)), lines)
@@ -106,8 +116,7 @@ def _crossings(spheres: Snapshot, count: Array, shift: Array, periodic: tuple[bo
     cell = first[sphere] + np.stack([rank // wide[sphere, 1], rank % wide[sphere, 1]], axis=1)
     aside = (cell - centre[sphere]) * step
     square = spheres.radius[sphere] ** 2 - aside[:, 0] ** 2 - aside[:, 1] ** 2
-    within = ((cell >= 0) & (cell < count)) | np.array(periodic[1:])
-    inside = (square > 0) & within[:, 0] & within[:, 1]
+    inside = square > 0
     cell = cell[inside] % count
     return sphere[inside], cell[:, 0] * count[1] + cell[:, 1], np.sqrt(square[inside])
 

@@ -113,8 +113,8 @@ def make_profile(edges: Array, porosity: tuple[Porosity, Porosity], depth: Array
 
 def pooled(porosity: Porosity, edges: Array) -> Array:
     """The porosity profile, measured on finer cuts, averaged between `edges`, which are among the cuts."""
-    summed = np.concatenate([[0.0], np.cumsum(np.diff(porosity.edges) * porosity.profile)])
-    return np.diff(summed[np.searchsorted(porosity.edges, edges)]) / np.diff(edges)
+    first, width = np.searchsorted(porosity.edges, edges[:-1]), np.diff(porosity.edges)
+    return np.add.reduceat(width * porosity.profile, first) / np.add.reduceat(width, first)
 
 
 def reduction(before: float, after: float) -> float | None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.errors import NetworkError
-from fdnet.network.delaunay import Tetrahedra
+from fdnet.network.delaunay import Tetrahedra, check_lengths
 from fdnet.network.facets import Facets, Polyhedra, facet_vertices, make_polyhedra, tessellate
 from fdnet.network.pierced import pierced_facets
 from fdnet.network.pores import Centres, pore_centres, pore_solids
@@ -120,11 +120,12 @@ def build_network(grains: Snapshot, *, periodic: tuple[bool, bool, bool], walls:
     Periodic sides join. The others are mirror planes: with `walls` "slip" the specimen is one half, fourth or eighth of
     the periodic one that its mirror images make up; with "no-slip" the y and z faces also hold the fluid, for laws that
     know it (`lubrication`). Grains that do not reach into the box are left out and counted. Raises NetworkError on
-    unknown walls, fewer than four grains, coincident grains, grains in one plane, facets without partner, or no throat.
+    unknown walls, impossible lengths, too few, coincident or coplanar grains, facets without partner, or no throat.
     """
     if walls not in WALLS:
         raise NetworkError(f"walls: {walls!r} is not known; choose one of {list(WALLS)}")
     periodic = (bool(periodic[0]), bool(periodic[1]), bool(periodic[2]))
+    check_lengths(grains, periodic)
     kept = reaching(grains, periodic)
     if len(kept) < 4:
         raise NetworkError(
@@ -136,10 +137,8 @@ def build_network(grains: Snapshot, *, periodic: tuple[bool, bool, bool], walls:
     tetrahedra, facets = tessellate(grains, periodic=periodic)
     polyhedra = make_polyhedra(tetrahedra, facets, grains.box, scale)
     if not len(facets.pore):
-        raise NetworkError(
-            f"tessellation: no throat joins two pores of these {len(grains)} grains; the box is too "
-            "narrow for its side walls, give more grains or periodic sides"
-        )
+        what = f"no throat joins two pores of these {len(grains)} grains; the box is too narrow for its side walls"
+        raise NetworkError(f"tessellation: {what}, give more grains or periodic sides")
     centres = pore_centres(tetrahedra, polyhedra, grains.box, periodic)
     counts = {
         "grains_outside_box": len(given) - len(kept),

@@ -1,0 +1,314 @@
+"""Hard geometries: the right answer by symmetry, closed form or another way, or one clear refusal."""
+
+import numpy as np
+import pytest
+
+from fdnet.errors import NetworkError
+from fdnet.network.permeability import Analysis, AnalysisOptions, analyse
+from fdnet.network.porosity import measure_porosity
+from fdnet.network.tessellation import build_network
+from fdnet.snapshot import Array, Kind, Snapshot
+from tests.network.packs import face_centred, random_pack, simple_cubic, snapshot, with_fines
+
+ALL, SIDES, NONE = (True,) * 3, (False, True, True), (False,) * 3
+SC_SPACING = 2.0
+EDGE = 3 * SC_SPACING
+
+
+def measure(
+    grains: Snapshot,
+    damaged: Snapshot | None = None,
+    periodic: tuple[bool, bool, bool] = SIDES,
+    laws: tuple[str, str] = ("lubrication", "side-kozeny"),
+    sections: int = 1,
+) -> Analysis:
+    options = AnalysisOptions(law=laws[0], damage_law=laws[1], sections=sections, walls="slip")
+    return analyse(grains, damaged, periodic=periodic, options=options)
+
+
+def joined(grains: Snapshot, position: Array, radius: float) -> Snapshot:
+    return grains.joined(snapshot(position, radius, grains.box, Kind.FINE))
+
+
+def cubic_pores(repeat: int = 3) -> Array:
+    """Centres of the cells of `simple_cubic`."""
+    steps = np.stack(np.meshgrid(*[np.arange(repeat)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    return (steps + 0.6) * SC_SPACING
+
+
+def hexagonal(repeat: int = 2) -> Snapshot:
+    """Hexagonal close packing of unit spheres in an orthorhombic cell 2 x 2 sqrt(3) x 4 sqrt(2/3)."""
+    cell = np.array([[0, 0, 0], [0.5, 0.5, 0], [0.5, 1 / 6, 0.5], [0, 2 / 3, 0.5]])
+    edge = np.array([2.0, 2.0 * np.sqrt(3.0), 4.0 * np.sqrt(2.0 / 3.0)])
+    steps = np.stack(np.meshgrid(*[np.arange(repeat)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    return snapshot(((steps + cell + 0.1) * edge).reshape(-1, 3), 1.0, np.outer(repeat * edge, [0.0, 1.0]))
+
+
+LATTICES = {
+    "SC": (simple_cubic(), 1 - np.pi / 6),
+    "FCC": (face_centred(), 1 - np.pi / np.sqrt(18)),
+    "HCP": (hexagonal(), 1 - np.pi / np.sqrt(18)),
+}
+
+
+def shaken(pack: Snapshot, size: float) -> Snapshot:
+    noise = np.random.default_rng(3).uniform(-size, size, pack.position.shape)
+    return snapshot(pack.position + noise, pack.radius, pack.box)
+
+
+@pytest.mark.parametrize("name", LATTICES)
+@pytest.mark.parametrize("periodic", [ALL, SIDES, NONE])
+def test_lattice_does_not_feel_a_shake_of_1e_12(name, periodic):
+    """Cospherical sets split at will: the clean flow keeps no trace (docs: 1e-7), the void is the closed form."""
+    pack, porosity = LATTICES[name]
+    still, moved = (measure(one, periodic=periodic) for one in (pack, shaken(pack, 1e-12)))
+    assert moved.k_initial == pytest.approx(still.k_initial, rel=1e-6)
+    if periodic == ALL:
+        volume = np.prod(np.ptp(pack.box, axis=1))
+        assert still.network.pore_volume.sum() / volume == pytest.approx(porosity, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", LATTICES)
+def test_damage_of_a_lattice_depends_on_the_split_by_less_than_documented(name):
+    """0.3 % in SC with 150 fines (docs/physics_network.md, section 2)."""
+    pack, _ = LATTICES[name]
+    filled = with_fines(pack, 150, 0.1)
+    fines = filled.fines()
+    moved = shaken(pack, 1e-12)
+    found = [measure(grains, grains.joined(fines), ALL) for grains in (pack, moved)]
+    assert found[1].k_damaged == pytest.approx(found[0].k_damaged, rel=4e-3)
+    assert found[0].k_damaged < found[0].k_initial
+
+
+@pytest.mark.parametrize("size", [1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3])
+@pytest.mark.parametrize("name", LATTICES)
+def test_slivers_of_every_thickness_leave_k_continuous(name, size):
+    """A shake moves k by no more than a few times its size (cubic law: 3 times each gap's relative change)."""
+    pack, porosity = LATTICES[name]
+    still, moved = measure(pack, periodic=ALL), measure(shaken(pack, size), periodic=ALL)
+    assert moved.k_initial == pytest.approx(still.k_initial, rel=1e-5 + 100 * size)
+    void = moved.network.pore_volume.sum() / np.prod(np.ptp(pack.box, axis=1))
+    assert void == pytest.approx(porosity, abs=1e-6 + 10 * size)
+
+
+def test_one_layer_is_the_lattice_its_mirror_images_make_up():
+    layer = simple_cubic()
+    one = layer.where(layer.position[:, 0] < SC_SPACING)
+    one = snapshot(one.position + np.array([0.8, 0, 0]), 1.0, [[0, SC_SPACING], [0, EDGE], [0, EDGE]])
+    assert measure(one).k_initial == pytest.approx(measure(layer, periodic=ALL).k_initial, rel=1e-6)
+
+
+def test_one_random_layer_is_half_of_its_periodic_double():
+    rng = np.random.default_rng(2)
+    place = np.indices((1, 4, 4)).reshape(3, -1).T * 2.2 + 1.1 + rng.uniform(-0.15, 0.15, (16, 3))
+    box = np.array([[0, 2.2], [0, 8.8], [0, 8.8]])
+    mirrored = np.vstack([place, place * [-1, 1, 1] + [4.4, 0, 0]])
+    whole = measure(snapshot(mirrored, 1.0, box * [[2], [1], [1]]), periodic=ALL)
+    assert measure(snapshot(place, 1.0, box)).k_initial == pytest.approx(whole.k_initial, rel=1e-6)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_box_thinner_than_a_grain_between_planes_of_symmetry_is_the_lattice(axis):
+    """Half a cell, from the plane through the centres to that between them: one radius thick."""
+    lattice = simple_cubic()
+    centred = snapshot(lattice.position + np.where(np.arange(3) == axis, -0.2, 0.8), 1.0, lattice.box)
+    thin = centred.box.copy()
+    thin[axis, 1] = 1.0
+    kept = centred.position[centred.position[:, axis] < 0.5]
+    periodic = tuple(side != axis and side > 0 for side in range(3))
+    found = measure(snapshot(kept, 1.0, thin), periodic=periodic)
+    assert found.k_initial == pytest.approx(measure(lattice, periodic=ALL).k_initial, rel=1e-3)
+
+
+@pytest.mark.parametrize("thickness", [0.3, 0.05, 1e-3])
+def test_a_slice_of_a_grain_has_a_k_or_is_refused(thickness):
+    pack = random_pack(60)
+    box = pack.box.copy()
+    box[0] = [1.0, 1.0 + thickness]
+    try:
+        found = measure(snapshot(pack.position, 1.0, box))
+    except NetworkError as error:
+        said = str(error)
+        assert "grains" in said
+    else:
+        assert 0 <= found.k_initial < 1.0
+        assert 0 <= found.porosity_initial <= 1
+
+
+@pytest.mark.parametrize("thickness", [3e-3, 1e-5])
+def test_a_periodic_side_far_thinner_than_a_grain_is_refused_at_once(thickness):
+    """Its images would be thousands; a tessellation of them took hours."""
+    pack = random_pack(60)
+    with pytest.raises(NetworkError, match=r"periodic side y .* are needed, expected at most"):
+        build_network(snapshot(pack.position, 1.0, pack.box * [[1], [thickness], [1]]), periodic=SIDES)
+
+
+def test_one_huge_grain_in_a_periodic_box_is_refused_at_once():
+    pack = random_pack(60)
+    radius = np.where(np.arange(60) == 7, 1e6, 1.0)
+    with pytest.raises(NetworkError, match="far larger than the box"):
+        build_network(snapshot(pack.position, radius, pack.box), periodic=ALL)
+
+
+@pytest.mark.parametrize("ratio", [2, 5, 10, 20, 40])
+def test_fines_of_every_size_ratio_are_all_seen_and_lower_k(ratio):
+    """Pieces of the fines in the pores add up to the fines; the drop of porosity is their volume over the box's."""
+    pack = random_pack(60, 0.5)
+    radius = 1.0 / ratio
+    filled = with_fines(pack, min(20 * ratio, 500), radius)
+    found = measure(pack, filled, ALL)
+    count = len(filled.fines())
+    solid = 4 / 3 * np.pi * radius**3 * count
+    assert found.occupancy is not None
+    assert found.occupancy.pore_solid_volume.sum() == pytest.approx(solid, rel=1e-9)
+    assert 0 < found.k_damaged < found.k_initial
+    wanted = found.porosity_initial - solid / np.prod(np.ptp(pack.box, axis=1))
+    overlapped = 0.3 * (found.porosity_initial - wanted)  # fines may overlap each other, not grains
+    assert wanted - 1e-3 <= found.porosity_damaged <= wanted + overlapped + 1e-3
+
+
+def test_swelling_grains_close_throat_by_throat_until_no_path_is_left():
+    """k falls from size to size and ends at 0 with its reason, never below; the void is the chords' all the way."""
+    pack = random_pack(60)
+    k, closed = [], []
+    for swell in (1.0, 1.1, 1.2, 1.3, 1.5, 2.0):
+        found = measure(snapshot(pack.position, swell, pack.box), periodic=ALL)
+        k.append(found.k_initial)
+        closed.append(found.network.counts["throats_closed"])
+        assert (found.k_initial == 0) == any("k_initial = 0: no open path" in one for one in found.warnings)
+    assert k == sorted(k, reverse=True)
+    assert closed == sorted(closed)
+    assert k[0] > 0
+    assert k[-1] == 0
+    assert found.porosity_initial < 1e-3
+
+
+def test_radii_one_to_four_keep_the_void_and_the_invariances():
+    pack = random_pack(120, 0.55, spread=0.6)
+    assert pack.radius.max() / pack.radius.min() > 3.9
+    network = build_network(pack, periodic=ALL)
+    chords = measure_porosity(pack, periodic=ALL, lines=20_000)
+    void = network.pore_volume.sum() / np.prod(np.ptp(pack.box, axis=1))
+    assert void == pytest.approx(chords.mean, abs=5 * chords.standard_error + 1e-3)
+    found = measure(pack, periodic=ALL)
+    mirrored = snapshot(pack.box[:, 1] - pack.position, pack.radius, pack.box)
+    small = snapshot(1e-4 * pack.position, 1e-4 * pack.radius, 1e-4 * pack.box)
+    assert measure(mirrored, periodic=ALL).k_initial == pytest.approx(found.k_initial, rel=1e-6)
+    assert measure(small, periodic=ALL).k_initial == pytest.approx(1e-8 * found.k_initial, rel=1e-6)
+
+
+def test_no_fines_change_nothing():
+    pack = random_pack(60)
+    found = measure(pack, pack, ALL)
+    assert found.k_damaged == found.k_initial
+    assert found.porosity_damaged == found.porosity_initial
+
+
+def test_one_fine_in_one_pore_lowers_k_by_less_than_closing_that_pore():
+    """Rayleigh: lowering conductances lowers k; closing the throats of all pores the fine reaches lowers it further."""
+    lattice = simple_cubic()
+    found = measure(lattice, joined(lattice, cubic_pores()[:1], 0.2), ALL)
+    closed = measure(lattice, joined(lattice, cubic_pores()[:1], 0.73), ALL, ("lubrication", "thesis"))
+    assert closed.k_damaged < found.k_damaged < found.k_initial
+
+
+@pytest.mark.parametrize(("radius", "open_path"), [(0.40, True), (0.43, False), (0.70, False)])
+def test_fines_larger_than_every_throat_close_a_lattice(radius, open_path):
+    """SC: throats of sqrt(2) - 1 = 0.4142 between cells; one fine at each cell's centre closes it by the thesis's rule
+    (a fine that covers a section blocks), a smaller one leaves a way."""
+    lattice = simple_cubic()
+    found = measure(lattice, joined(lattice, cubic_pores(), radius), ALL, ("thesis", "thesis"))
+    assert (found.k_damaged > 0) == open_path
+    assert any("k_damaged = 0: no open path" in one for one in found.warnings) != open_path
+    if not open_path:
+        assert found.k_reduction == 1.0
+        assert found.occupancy is not None
+        assert found.occupancy.blocked.sum() > 0
+
+
+@pytest.mark.parametrize("law", ["thesis", "thesis-code", "kozeny", "side-kozeny"])
+def test_fines_that_fill_the_pack_leave_no_k(law):
+    """More volume of (overlapping) fines than void: k = 0 or next to it, and told. Fines thrown at random leave
+    exp(-n v / V) of the void (Boolean model, Matheron 1975)."""
+    pack = random_pack(40)
+    rng = np.random.default_rng(1)
+    fines = rng.random((4000, 3)) * pack.box[:, 1]
+    found = measure(pack, joined(pack, fines, 0.3), ALL, ("lubrication", law))
+    left = np.exp(-4000 * 4 / 3 * np.pi * 0.3**3 / np.prod(pack.box[:, 1]))
+    assert found.porosity_damaged == pytest.approx(left * found.porosity_initial, rel=0.1)
+    assert found.k_damaged < 1e-3 * found.k_initial
+    if "kozeny" in law:
+        assert found.k_damaged == 0
+        assert found.counts["pore_porosity_negative"] > 0
+        assert any("k_damaged = 0: no open path" in one for one in found.warnings)
+
+
+def test_a_fine_wider_than_a_periodic_side_is_refused_at_once():
+    """Throats times its images were more than could be searched in a day."""
+    pack = random_pack(40)
+    for radius in (0.51 * pack.box[1, 1], 1e4, 1e20):
+        with pytest.raises(NetworkError, match=r"fine 1 .* meets its own image across the periodic side"):
+            measure(pack, joined(pack, pack.box[:, 1] * np.array([[0.5, 0.5, 0.5]]), radius), ALL)
+    wide = measure(pack, joined(pack, pack.box[:, 1] * np.array([[0.5, 0.5, 0.5]]), 1e4), NONE)
+    assert wide.k_damaged == 0
+
+
+def test_doubled_grains_are_refused_and_named():
+    pack = random_pack(40)
+    for apart in (0.0, 1e-12, 5e-4):
+        doubled = np.vstack([pack.position, pack.position[:1] + np.array([apart, 0, 0])])
+        with pytest.raises(NetworkError, match="grains 1 and 41 coincide"):
+            measure(snapshot(doubled, 1.0, pack.box), periodic=ALL)
+
+
+def test_a_grain_and_its_image_in_one_place_are_refused():
+    pack = random_pack(40)
+    doubled = np.vstack([pack.position, pack.position[:1] + np.array([0, pack.box[1, 1], 0])])
+    with pytest.raises(NetworkError, match="grains 1 and 41 coincide"):
+        measure(snapshot(doubled, 1.0, pack.box), periodic=ALL)
+
+
+def test_grains_nearly_in_one_place_are_one_grain_to_the_flow():
+    """Two centres 2e-3 radii apart: porosity is that of their union, k that of one grain within the shift's effect."""
+    pack = random_pack(40)
+    doubled = snapshot(np.vstack([pack.position, pack.position[:1] + np.array([2e-3, 0, 0])]), 1.0, pack.box)
+    one, two = measure(pack, periodic=ALL), measure(doubled, periodic=ALL)
+    assert two.porosity_initial == pytest.approx(one.porosity_initial, abs=1e-4)
+    assert two.k_initial == pytest.approx(one.k_initial, rel=0.05)
+
+
+def test_doubled_fines_take_up_their_place_once():
+    """Porosity counts the union; laws that sum volumes see both, and never raise k."""
+    pack = random_pack(40)
+    single = with_fines(pack, 50, 0.15)
+    doubled = single.joined(snapshot(single.fines().position, 0.15, pack.box, Kind.FINE))
+    one, two = measure(pack, single, ALL), measure(pack, doubled, ALL)
+    assert two.porosity_damaged == pytest.approx(one.porosity_damaged, abs=1e-12)
+    assert two.k_damaged <= one.k_damaged < one.k_initial
+
+
+@pytest.mark.parametrize("periodic", [ALL, SIDES, NONE])
+@pytest.mark.parametrize("lengths", [1e3, 1e6])
+def test_coordinates_far_from_the_origin_cost_digits_alone(lengths, periodic):
+    """The moved pack against one at the origin with the same rounded differences."""
+    pack = with_fines(random_pack(60), 30, 0.2)
+    offset = np.round(lengths * pack.box[0, 1]) * np.array([1.0, -1.0, 1.0])
+    far, box = pack.position + offset, pack.box + offset[:, None]
+    near = [measure_pair(far - offset, pack, box - offset[:, None], periodic)]
+    near.append(measure_pair(far, pack, box, periodic))
+    digits = 1e-5 + 1e4 * np.finfo(float).eps * lengths
+    for name in ("k_initial", "k_damaged", "porosity_initial", "porosity_damaged"):
+        assert getattr(near[1], name) == pytest.approx(getattr(near[0], name), rel=digits)
+
+
+@pytest.mark.parametrize("lengths", [1e9, 1e12, 1e17])
+def test_coordinates_that_have_lost_their_digits_are_refused(lengths):
+    pack = random_pack(60)
+    offset = lengths * pack.box[0, 1]
+    with pytest.raises(NetworkError, match="move the specimen to the origin"):
+        measure(snapshot(pack.position + offset, 1.0, pack.box + offset))
+
+
+def measure_pair(position: Array, like: Snapshot, box: Array, periodic: tuple[bool, bool, bool]) -> Analysis:
+    both = snapshot(position, like.radius, box, like.kind)
+    return measure(both.grains(), both, periodic)

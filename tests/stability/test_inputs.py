@@ -1,0 +1,164 @@
+"""NaN, infinities and broken files at the doors: one clear error, nothing written."""
+
+import json
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fdnet.cli import main
+from fdnet.dem.dump import parse_dump
+from fdnet.errors import CaseError, DumpError
+from fdnet.network.occupancy import measure_occupancy
+from fdnet.network.tessellation import build_network
+from tests.network.packs import random_pack, simple_cubic, snapshot
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "scripts"))
+
+import fuzz
+
+HOSTILE = ["nan", "NaN", "inf", "-inf", "1e400", "-1e999", "", "1,5", "0x10", "1_0", "none"]
+
+
+def permeability(capsys, path: Path, *options: str) -> tuple[int, str, str]:
+    try:
+        code = main(["permeability", str(path), *options])
+    except SystemExit as stop:
+        code = int(stop.code or 0)
+    said = capsys.readouterr()
+    return code, said.out, said.err
+
+
+def table(path: Path, **swap: str) -> None:
+    """A simple cubic lattice of 64 touching spheres; `swap` replaces cells of the third sphere."""
+    names = ("x", "y", "z", "radius", "kind")
+    rows = [[*map(str, place), "0.5", "grain"] for place in np.indices((4, 4, 4)).reshape(3, -1).T + 0.5]
+    for name, text in swap.items():
+        rows[2][names.index(name)] = text
+    path.write_text("\n".join([",".join(names), *map(",".join, rows)]) + "\n")
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+@pytest.mark.parametrize("column", ["x", "radius"])
+def test_numbers_that_are_none_in_a_table_are_refused_with_their_line(tmp_path, capsys, column, text):
+    table(tmp_path / "s.csv", **{column: text})
+    code, out, err = permeability(capsys, tmp_path / "s.csv", "--units", "mm", "--box", "0,4,0,4,0,4")
+    assert code == 2
+    assert not out
+    assert len(err.splitlines()) == 1
+    assert "s.csv:4" in err
+    assert list(tmp_path.iterdir()) == [tmp_path / "s.csv"]
+
+
+@pytest.mark.parametrize("radius", ["1e308", "1e-200", "1e100"])
+def test_radii_beyond_reason_are_refused(tmp_path, capsys, radius):
+    """Their cubes are no doubles: overflow where it was not refused."""
+    table(tmp_path / "s.csv", radius=radius)
+    code, out, err = permeability(capsys, tmp_path / "s.csv", "--units", "mm", "--box", "0,4,0,4,0,4")
+    assert (code, out) == (4, "")
+    assert "check the units" in err
+
+
+@pytest.mark.parametrize(("place", "periodic", "code"), [("1e308", "", 4), ("1e25", "x", 4), ("1e25", "", 0)])
+def test_a_stray_sphere_is_left_out_unless_a_period_would_have_to_bring_it_back(
+    tmp_path, capsys, place, periodic, code
+):
+    """1e25 periods away no digit of its place is left; beside a wall it is outside the box, counted, and told."""
+    table(tmp_path / "s.csv", x=place)
+    options = ["--units", "mm", "--box", "0,4,0,4,0,4", "--periodic", periodic, "--json"]
+    found, out, err = permeability(capsys, tmp_path / "s.csv", *options)
+    assert found == code, err
+    if code == 0:
+        assert any("1 grains lie outside the box" in one for one in json.loads(out)["warnings"])
+
+
+def frame(*, step="0", count="2", bounds="0 1", rows=("1 1 0.5 ", "2 1 0.25 ")) -> bytes:
+    head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS ff ff ff\n"
+    return (head + f"{bounds}\n0 1\n0 1\nITEM: ATOMS id type x \n" + "".join(f"{row}\n" for row in rows)).encode()
+
+
+@pytest.mark.parametrize("text", ["nan", "NaN", "inf", "-inf", "1e400", "-nan", "Infinity", "nan(0x1)", "", "1e"])
+def test_numbers_that_are_none_in_a_dump_are_named_with_line_and_column(text):
+    with pytest.raises(DumpError, match=r"d:11: step 0: (column x holds|2 values, expected 3)"):
+        list(parse_dump(frame(rows=("1 1 0.5 ", f"2 1 {text} ")), "d"))
+
+
+@pytest.mark.parametrize("bounds", ["nan nan", "0 inf", "-inf 1", "1 0", "0 0", "0 1 2", "0", ""])
+def test_bounds_that_bound_nothing_are_refused(bounds):
+    with pytest.raises(DumpError, match=r"d:6: step 0: box bounds .* two numbers, the lower one first"):
+        list(parse_dump(frame(bounds=bounds), "d"))
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("name", ["position", "radius", "box"])
+def test_a_snapshot_holds_no_number_that_is_none(name, value):
+    pack = random_pack(40)
+    fields = {"position": pack.position.copy(), "radius": pack.radius.copy(), "box": pack.box.copy()}
+    fields[name].flat[1] = value
+    with pytest.raises(CaseError, match=f"{name} holds values that are not finite"):
+        snapshot(**fields)
+
+
+def test_a_pack_whose_paths_are_all_closed_is_an_answer_at_the_command_line(tmp_path, capsys):
+    """Radius 0.72 spacings closes every triangle of a cubic lattice (circumradius 0.707): k = 0, exit code 0."""
+    place = np.indices((4, 4, 4)).reshape(3, -1).T + 0.5
+    rows = "".join(f"{x},{y},{z},0.72\n" for x, y, z in place)
+    (tmp_path / "s.csv").write_text("x,y,z,radius\n" + rows)
+    code, out, _ = permeability(
+        capsys, tmp_path / "s.csv", "--units", "mm", "--box", "0,4,0,4,0,4", "--periodic", "xyz", "--json"
+    )
+    told = json.loads(out)
+    assert code == 0
+    assert told["k_initial_m2"] == told["k_damaged_m2"] == 0
+    assert told["k_reduction"] is None
+    assert any("k_initial = 0: no open path" in one for one in told["warnings"])
+
+
+def test_no_fines_are_no_fault_of_occupancy():
+    pack = simple_cubic()
+    found = measure_occupancy(build_network(pack, periodic=(True,) * 3), pack.fines())
+    assert not found.blocked.any()
+    assert found.pore_solid_volume.sum() == 0
+
+
+@pytest.mark.parametrize("seed", [11, 12])
+def test_some_hundred_mutated_inputs_make_no_fault(root, seed):
+    """The quick form of scripts/fuzz.py; its record of more than 10,000 is docs/validation/fuzz.json."""
+    record = fuzz.fuzz(root, seed=seed, indices=range(300), limit=20.0)
+    assert record["faults"] == []
+    assert len(record["kinds"]) == 9
+    assert all(sum(outcomes.values()) > 10 for outcomes in record["kinds"].values())
+
+
+def test_the_fuzz_knows_a_fault_when_it_meets_one(tmp_path):
+    """Deliberate breaks: a traceback, a hang, a warning, a file left behind, an impossible number."""
+
+    def outcome(judge, limit: float = 5.0) -> str:
+        return fuzz.outcome(fuzz.Target((b"",), {}, judge), b"", fuzz.Random(1), limit)
+
+    def left(_: bytes, folder: Path, __: fuzz.Random) -> str:
+        (folder / "decks").mkdir()
+        (folder / "decks" / "in.pack").write_text("half")
+        return fuzz.judge_case(b"name = ", folder, fuzz.Random(1))
+
+    def endless(*_: object) -> str:
+        while True:
+            pass
+
+    assert "ZeroDivisionError" in outcome(lambda *_: str(1 / 0))
+    assert "RuntimeWarning" in outcome(lambda *_: str(np.float64(1.0) / np.float64(0.0)))
+    assert "not done within" in outcome(endless, 0.2)
+    assert "in.pack was written" in outcome(left)
+    good = '{"k_initial_m2": 1, "k_damaged_m2": 0.5, "porosity_initial": 0.4, "porosity_damaged": 0.3, "sections": []}'
+    assert fuzz._numbers(good) == "accepted"
+    for bad in (good.replace("0.5", "1.5"), good.replace("0.4", "1.1"), good.replace("0.4", "NaN"), good[:-1]):
+        assert fuzz._numbers(bad).startswith("fault")
+
+
+def test_the_committed_record_is_of_ten_thousand_inputs_without_fault(root):
+    record = json.loads((root / "docs" / "validation" / "fuzz.json").read_text())
+    assert record["inputs"] >= 10_000
+    assert record["faults"] == []
+    assert sum(sum(outcomes.values()) for outcomes in record["kinds"].values()) == record["inputs"]

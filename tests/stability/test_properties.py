@@ -1,0 +1,238 @@
+"""Properties of random cases, packs, networks and dumps (hypothesis, the same examples every time)."""
+
+import copy
+import dataclasses
+import math
+import tomllib
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli_w
+from builders import TINY
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+
+from fdnet.case import Case
+from fdnet.case_file import case_from, known_keys, set_keys
+from fdnet.dem.dump import COLUMNS, parse_dump
+from fdnet.errors import CaseError, DumpError, FdnetError
+from fdnet.network.flow import solve_flow
+from fdnet.network.permeability import AnalysisOptions, analyse
+from fdnet.scales import scales_of
+from fdnet.snapshot import Kind, Snapshot
+from tests.network.networks import network_of
+from tests.network.packs import random_pack, snapshot, with_fines
+
+FIXED = settings(derandomize=True, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+SEEDS = st.integers(0, 2**31)
+LENGTHS = st.floats(0.01, 20.0)
+ODD: st.SearchStrategy[Any] = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(),
+    st.floats(),
+    st.text(max_size=5),
+    st.lists(st.floats(), max_size=4),
+    st.dictionaries(st.text(max_size=3), st.integers(), max_size=2),
+)
+
+
+@st.composite
+def plausible(draw: st.DrawFn) -> dict[str, Any]:
+    """Cases most of which are valid: the tiny one with numbers drawn over wide ranges."""
+    data = copy.deepcopy(TINY)
+    radius = draw(LENGTHS)
+    sides = [radius * draw(st.floats(2.5, 8.0)) for _ in range(3)]
+    data["box"] = {"size_mm": sides, "sides": draw(st.sampled_from(["walls", "periodic"]))}
+    data["grains"] = {"radius_mm": radius, "porosity": draw(st.floats(0.2, 0.7))}
+    data["grains"]["motion"] = draw(st.sampled_from(["fixed", "mobile"]))
+    data["fines"] = {"radius_mm": radius * draw(st.floats(0.02, 0.5)), "count": draw(st.integers(1, 1000))}
+    data["fluid"] = {"viscosity_cP": 10.0 ** draw(st.floats(-2, 5)), "overbalance_MPa": 10.0 ** draw(st.floats(-4, 2))}
+    data["run"] = {"stiffness_N_m": 10.0 ** draw(st.floats(1, 11))}
+    return data
+
+
+@given(plausible(), st.lists(st.tuples(st.sampled_from(sorted(known_keys())), ODD), max_size=3))
+@settings(FIXED, max_examples=200)
+def test_tables_make_a_case_or_a_case_error(data, changes):
+    for key, value in changes:
+        *names, last = key.split(".")
+        table = data
+        for name in names:
+            table = table.setdefault(name, {}) if isinstance(table, dict) else {}
+        if isinstance(table, dict):
+            table[last] = value
+    try:
+        case = case_from(data)
+    except CaseError as error:
+        said = str(error)
+        assert "\n" not in said
+        assert "problem" in said
+    else:
+        assert isinstance(case, Case)
+
+
+@given(st.dictionaries(st.sampled_from([*Case.model_fields, "x"]), ODD, max_size=6))
+@settings(FIXED, max_examples=150)
+def test_nonsense_tables_are_refused(data):
+    with pytest.raises(CaseError, match="problem"):
+        case_from(data)
+
+
+@given(plausible())
+@settings(FIXED, max_examples=100)
+def test_a_case_comes_back_from_its_own_toml(data):
+    try:
+        case = case_from(data)
+    except CaseError:
+        assume(False)
+    again = case_from(tomllib.loads(case.toml()))
+    assert again == case
+    assert again.digest() == case.digest()
+    assert again.toml() == case.toml()
+
+
+@given(st.text(max_size=30))
+@settings(FIXED, max_examples=150)
+def test_any_assignment_is_taken_or_refused(text):
+    try:
+        case = case_from(set_keys(TINY, [text]))
+    except CaseError as error:
+        said = str(error)
+        assert said
+    else:
+        tomli_w.dumps(case.data())
+
+
+@given(plausible())
+@settings(FIXED, max_examples=150)
+def test_scales_are_finite_and_positive_or_refused(data):
+    """Steps, times and lengths above 0; the step below the contact and relaxation bounds."""
+    try:
+        case = case_from(data)
+        scales = scales_of(case)
+    except FdnetError:
+        return
+    for field in dataclasses.fields(scales):
+        value = getattr(scales, field.name)
+        if isinstance(value, float):
+            assert math.isfinite(value), field.name
+    assert 0 < scales.time_step <= 0.2 * min(c.step_limit for name, c in scales.contacts.items() if "fine" in name)
+    assert scales.slab_length > 0
+    assert scales.supplied_count >= 1
+
+
+def analysed(grains: Snapshot, damaged: Snapshot | None, periodic: tuple[bool, bool, bool], sections: int = 3) -> Any:
+    options = AnalysisOptions(sections=sections, walls="slip")
+    return analyse(grains, damaged, periodic=periodic, options=options)
+
+
+@given(
+    seed=SEEDS,
+    count=st.integers(20, 40),
+    solid=st.floats(0.2, 0.65),
+    spread=st.sampled_from([0.0, 0.3, 0.6]),
+    fines=st.integers(0, 30),
+    around=st.sampled_from([(True, True, True), (False, True, True), (False, False, False)]),
+)
+@settings(FIXED, max_examples=25)
+def test_random_packs_keep_every_promise(seed, count, solid, spread, fines, around):
+    """k finite and not negative, fines never raise it, fluxes balance, sections in place recombine in series."""
+    grains = random_pack.__wrapped__(count, solid, seed=seed, spread=spread, periodic=True)
+    both = with_fines(grains, fines, 0.1, seed=seed % 1000) if fines else None
+    found = analysed(grains, both, around)
+    assert 0 <= found.k_damaged <= found.k_initial * (1 + 1e-12) < np.inf
+    assert 0 <= found.porosity_damaged <= found.porosity_initial <= 1
+    for flow, k in ((found.flow_initial, found.k_initial), (found.flow_damaged, found.k_damaged)):
+        assert (k > 0) == (not flow.reason)
+        assert flow.residual <= 1e-6
+        assert k == 0 or flow.mass_balance <= 1e-6
+    for name in ("k_initial", "k_damaged"):
+        parts = [getattr(section, f"{name}_inplace") for section in found.sections]
+        whole = getattr(found, name)
+        series = len(parts) / sum(1 / part for part in parts) if all(parts) else 0.0
+        assert series == pytest.approx(whole, rel=1e-6)
+
+
+@given(seed=SEEDS, spread=st.sampled_from([0.0, 0.4]), scale=st.floats(-6, 3), flip=st.tuples(*[st.booleans()] * 3))
+@settings(FIXED, max_examples=15)
+def test_renumbering_mirror_turn_and_scale_leave_k(seed, spread, scale, flip):
+    """k scales with the square of length; y and z may be exchanged; order and mirror images do not matter."""
+    grains = random_pack.__wrapped__(24, 0.55, seed=seed, spread=spread)
+    factor, order = 10.0**scale, np.random.default_rng(seed).permutation(24)
+    place = np.where(flip, grains.box[:, 1] - grains.position, grains.position)[order][:, [0, 2, 1]]
+    other = snapshot(factor * place, factor * grains.radius[order], factor * grains.box[[0, 2, 1]])
+    around = (True, True, True)
+    one, two = (analysed(pack, None, around, 1).k_initial for pack in (grains, other))
+    assert two == pytest.approx(factor**2 * one, rel=1e-5)
+
+
+@given(seed=SEEDS, pores=st.integers(6, 30), decades=st.floats(0, 6), closed=st.floats(0, 0.6))
+@settings(FIXED, max_examples=150)
+def test_random_networks_against_the_dense_pseudo_inverse(seed, pores, decades, closed):
+    rng = np.random.default_rng(seed)
+    position = rng.random((pores, 3))
+    position[:2, 0], position[2:4, 0] = 0.0, 1.0
+    pairs = np.array([(i, j) for i in range(pores) for j in rng.choice(pores, 2, replace=False) if i < j])
+    assume(len(pairs))
+    g = 10.0 ** rng.uniform(-decades, 0, len(pairs)) * (rng.random(len(pairs)) >= closed)
+    flow = solve_flow(network_of(position, pairs, [[0, 1]] * 3), g)
+    laplacian = np.zeros((pores, pores))
+    np.add.at(laplacian, tuple(pairs.T), -g)
+    laplacian += laplacian.T
+    np.fill_diagonal(laplacian, -laplacian.sum(axis=1))
+    held = np.array([1.0, 1.0, 0.0, 0.0])
+    inner = np.linalg.pinv(laplacian[4:, 4:], hermitian=True) @ -laplacian[4:, :4] @ held
+    inflow = float((laplacian @ np.append(held, inner))[:2].sum())
+    assert flow.inflow == pytest.approx(inflow, rel=1e-6, abs=1e-9 * g.max(initial=1e-300))
+    assert not flow.reason or inflow == pytest.approx(0.0, abs=1e-9 * max(g.max(), 1e-300))
+
+
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@st.composite
+def frames(draw: st.DrawFn) -> tuple[bytes, list[np.ndarray]]:
+    """Bytes of one to three frames as LIGGGHTS writes them, and their rows by id."""
+    text, tables = "", []
+    for step in range(draw(st.integers(1, 3))):
+        ids = draw(st.lists(st.integers(1, 10**6), min_size=0, max_size=5, unique=True))
+        rows = [[one, draw(st.sampled_from(list(Kind))), *(draw(FINITE) for _ in range(7))] for one in ids]
+        head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{len(rows)}\nITEM: BOX BOUNDS ff pp pp\n"
+        head += f"-1 1\n0 0.5\n-3e-3 0\nITEM: ATOMS {COLUMNS} \n"
+        text += head + "".join(f"{r[0]} {int(r[1])} " + " ".join(f"{v:.17g}" for v in r[2:]) + " \n" for r in rows)
+        tables.append(np.array(sorted(rows), float).reshape(-1, 9))
+    return text.encode(), tables
+
+
+@given(frames())
+@settings(FIXED, max_examples=100)
+def test_a_written_dump_is_read_back_to_the_last_bit(written):
+    data, tables = written
+    read = list(parse_dump(data, "d"))
+    assert [frame.step for frame in read] == list(range(len(tables)))
+    assert all(np.array_equal(frame.rows, table) for frame, table in zip(read, tables, strict=True))
+
+
+@given(frames(), st.floats(0, 1, exclude_max=True))
+@settings(FIXED, max_examples=150)
+def test_a_dump_cut_anywhere_is_refused_or_ends_between_two_frames(written, share):
+    data, tables = written
+    cut = data[: 1 + int(share * (len(data) - 1))]
+    try:
+        read = list(parse_dump(cut, "d"))
+    except DumpError:
+        return
+    assert cut == data or data[len(cut) :].startswith(b"ITEM: TIMESTEP")
+    assert all(np.array_equal(frame.rows, table) for frame, table in zip(read, tables, strict=False))
+
+
+@given(st.binary(max_size=300))
+@settings(FIXED, max_examples=150)
+def test_any_bytes_are_frames_or_a_dump_error(data):
+    try:
+        assert isinstance(list(parse_dump(data, "d")), list)
+    except DumpError as error:
+        said = str(error)
+        assert "\n" not in said
