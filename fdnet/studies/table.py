@@ -12,7 +12,7 @@ from fdnet.atomic import write_text
 from fdnet.errors import CaseError
 from fdnet.studies.draw import series_of
 from fdnet.studies.judge import Level, knee_sentence, levels
-from fdnet.studies.study import DONE, Row, Study, shown
+from fdnet.studies.study import DONE, Panel, Row, Study, shown
 
 COLUMNS = tuple(field.name for field in fields(Row))
 _TEXT = ("series", "knob", "quantity", "status")
@@ -65,8 +65,12 @@ def study_text(study: Study, rows: Sequence[Row]) -> str:
         for name in series_of(panel, rows):
             found = levels(rows, name, panel.quantity, cost=panel.cost)
             parts.append(f"**{panel.title}: {name}** ({panel.label})\n")
+            if panel.cost == "value":
+                parts.append(_value_table(panel, found) + "\n")
+                continue
             parts.append(_level_table(study, found, panel.cost))
-            parts.append(f"\n{_sentence_start(knee_sentence(found, default=study.defaults.get(name)))}.\n")
+            sentence = knee_sentence(found, default=study.defaults.get(name))
+            parts.append(f"\n{_sentence_start(sentence)}.\n")
     missing = _missing(rows)
     if missing:
         parts.append("Not done:\n\n" + "\n".join(f"- {line}" for line in missing) + "\n")
@@ -84,6 +88,11 @@ def _level_table(study: Study, found: Sequence[Level], cost: str) -> str:
         band = f"{level.half_width:.2g}" if level.half_width else "-"
         lines.append(f"| {shown(level.value)} | {level.runs} | {level.error:+.3g} | {band} | {level.cost:.3g} |")
     return "\n".join(lines)
+
+
+def _value_table(panel: Panel, found: Sequence[Level]) -> str:
+    lines = [f"| {panel.knob} | {panel.label} |", "|---|---|"]
+    return "\n".join([*lines, *(f"| {shown(level.value)} | {level.error:.3g} |" for level in found)])
 
 
 def _missing(rows: Sequence[Row]) -> list[str]:
