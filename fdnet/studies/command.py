@@ -17,6 +17,7 @@ from fdnet.studies.table import study_text, write_rows
 STUDIES: Mapping[str, str] = {
     "throat-occupancy": "what the thesis's two planes and quadrature make of a fine's volume in a throat",
     "linear-solver": "method and tolerance of the network's solve, by size and spread of conductance",
+    "laws": "conductance and damage laws, and coarse resolved flow, against Stokes truth",
 }
 """Name of each study and what it asks; the module has the same name with underscores."""
 
