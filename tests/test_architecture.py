@@ -39,7 +39,7 @@ DOORS = {
     "matplotlib": {"report/figures", "report/side_view", "studies/draw"},
     "numba": {"network/compiled"},
     "pymetis": {"network/solver"},
-    "pyamg": {"network/solver"},
+    "pyamg": {"network/solver", "studies/solver_peers"},
     "pydantic": {"case", "case_parts", "case_file"},
     "tomli_w": {"case"},
     "rich": {"progress"},

@@ -14,7 +14,7 @@ from fdnet.errors import FlowError
 from fdnet.snapshot import Array
 
 DIRECT, MULTIGRID = "splu, METIS nested dissection", "CG, Ruge-Stuben AMG"
-DIRECT_UP_TO = 5_000
+DIRECT_UP_TO = 3_000
 DIRECT_BYTES, DIRECT_GROWTH = 55.0, 1.41
 MEMORY_CAP = 8e9
 MEMORY_SHARE = 0.8
@@ -27,16 +27,17 @@ Solve = Callable[[Array, float], Array]
 class Balances:
     """The system sum of g (p_i - p_j) + tied_i p_i = source_i, kept for many sources; `method` says how it was solved.
 
-    `pair` (K, 2) nodes, `conductance` (K,) > 0, `tied` (n,) conductance to nodes of pressure 0. Up to 5,000 nodes
-    direct. Beyond: conjugate gradients with Ruge-Stuben multigrid (Ruge and Stuben 1987; second pass, strength 0.5) on
-    the system as it stands, whose near-kernel is the constant that the interpolation assumes (scaled to a unit diagonal
-    it needs ten times the steps). Where these do not converge: direct, as long as its estimated memory fits.
+    `pair` (K, 2) nodes, `conductance` (K,) > 0, `tied` (n,) conductance to nodes of pressure 0. Up to 3,000 nodes
+    (`direct_up_to`) direct. Beyond: conjugate gradients with Ruge-Stuben multigrid (Ruge and Stuben 1987; second pass,
+    strength 0.5) on the system as it stands, whose near-kernel is the constant that the interpolation assumes (scaled
+    to a unit diagonal it needs several times the steps). Where these do not converge: direct, as long as its estimated
+    memory fits. What the choices cost: study linear-solver.
     """
 
-    def __init__(self, pair: Array, conductance: Array, tied: Array) -> None:
+    def __init__(self, pair: Array, conductance: Array, tied: Array, *, direct_up_to: int | None = None) -> None:
         self._unit = float(np.median(conductance)) if len(conductance) else 1.0
-        self._matrix = _laplacian(pair, conductance / self._unit, tied / self._unit)
-        self._direct = len(tied) <= DIRECT_UP_TO
+        self._matrix = laplacian(pair, conductance / self._unit, tied / self._unit)
+        self._direct = len(tied) <= (DIRECT_UP_TO if direct_up_to is None else direct_up_to)
         self._solve: Solve | None = None
 
     @property
@@ -62,7 +63,7 @@ class Balances:
         return found
 
 
-def _laplacian(pair: Array, conductance: Array, tied: Array) -> sparse.csr_matrix:
+def laplacian(pair: Array, conductance: Array, tied: Array) -> sparse.csr_matrix:
     """The matrix; links from a node to itself and links between the same nodes add up."""
     count = len(tied)
     other = pair[:, 0] != pair[:, 1]
@@ -116,6 +117,16 @@ def multigrid(matrix: sparse.csr_matrix) -> Solve:
     """Conjugate gradients with a symmetric Ruge-Stuben V-cycle; NaN where 100 steps do not reach the given norm of the
     residual. Thousands of pores without a link (a thin slab, a clogged pack) stay on the coarsest level, which
     therefore is solved as the sparse system it is."""
+    cycle = ruge_stuben(matrix)
+
+    def solve(source: Array, within: float) -> Array:
+        return conjugate_gradients(matrix, source, cycle, within=within)
+
+    return solve
+
+
+def ruge_stuben(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
+    """One symmetric V-cycle of classical multigrid (Ruge and Stuben 1987), as a preconditioner."""
     levels = pyamg.ruge_stuben_solver(
         matrix,
         strength=("classical", {"theta": STRENGTH}),
@@ -125,24 +136,24 @@ def multigrid(matrix: sparse.csr_matrix) -> Solve:
         max_coarse=10,
         coarse_solver="splu",
     )
-    cycle = levels.aspreconditioner().matvec
-
-    def solve(source: Array, within: float) -> Array:
-        return conjugate_gradients(matrix, source, cycle, within=within)
-
-    return solve
+    return levels.aspreconditioner().matvec
 
 
 def conjugate_gradients(
-    matrix: sparse.csr_matrix, source: Array, precondition: Callable[[Array], Array], *, within: float
+    matrix: sparse.csr_matrix,
+    source: Array,
+    precondition: Callable[[Array], Array],
+    *,
+    within: float,
+    steps: int | None = None,
 ) -> Array:
-    """Solution (n,) to a norm `within` of the residual (Hestenes and Stiefel 1952), NaN after 100 steps without.
+    """Solution (n,) to a norm `within` of the residual (Hestenes and Stiefel 1952), NaN after `steps` (100) without.
 
     Dot products without BLAS, whose threads would change the last digits and wait for each other.
     """
     found, missing = np.zeros(len(source)), source.copy()
     along, before = np.zeros(len(source)), 1.0
-    for _ in range(CG_STEPS):
+    for _ in range(steps or CG_STEPS):
         if np.sqrt(_dot(missing, missing)) <= within:
             return found
         better = precondition(missing)

@@ -41,31 +41,37 @@ class _Stage:
     balances: Balances
 
 
-def balance_links(ends: Array, conductance: Array, jump: Array, count: int) -> Balance:
+def balance_links(
+    ends: Array, conductance: Array, jump: Array, count: int, *, direct_up_to: int | None = None
+) -> Balance:
     """Balance of all `count` nodes, every one of them in a group that winds.
 
     `ends` (K, 2), `conductance` (K,) > 0, `jump` (K,). Solved with a contrast of 1e8 between the levels of stiffness;
     where links of like conductance fall on both sides of that border and the sweeps do not settle, with another. The
-    best is returned, its `defect` for the caller to judge.
+    best is returned, its `defect` for the caller to judge. `direct_up_to` nodes: see `Balances`.
     """
     found = []
     for contrast in CONTRASTS:
         level = stiffness(ends, conductance, jump, count, contrast=contrast)
-        found.append(_balance(ends, conductance, jump, level, count))
+        found.append(_balance(ends, conductance, jump, (level, count), direct_up_to))
         if found[-1].defect <= SETTLED or not level.any():
             break
     return min(found, key=lambda one: one.defect)
 
 
-def _balance(ends: Array, conductance: Array, jump: Array, level: Array, count: int) -> Balance:
+def _balance(
+    ends: Array, conductance: Array, jump: Array, levels: tuple[Array, int], direct_up_to: int | None
+) -> Balance:
     """Level by level, then again with what is left over: the imbalances, and the pressure differences within the
     contracted groups, which the links beside them had not seen. Fluxes add up by increments, never as differences of
-    nearly equal pressures."""
+    nearly equal pressures. `levels`: that of each link (K,), and the number of nodes."""
+    level, count = levels
     stiff = level > 0
     height = heights(ends[stiff], jump[stiff], groups(ends[stiff], count)) if stiff.any() else np.zeros(count)
     drive = jump + _difference(height, ends)
     level = _with_those_beside(ends, level, count)
-    stages = [_stage(ends, conductance, level, at, count) for at in range(int(level.max(initial=0)) + 1)]
+    parts = [_contracted(ends, level, at, count) for at in range(int(level.max(initial=0)) + 1)]
+    stages = [_stage(ends, conductance, part, direct_up_to) for part in parts]
     pressure, flux, defect, allowed = height, np.zeros(len(ends)), np.inf, None
     for _ in range(MOST_SWEEPS):
         step, gain, drive = _sweep(stages, ends, conductance, drive, (_net(ends, flux, count), allowed))
@@ -110,9 +116,13 @@ def _with_those_beside(ends: Array, level: Array, count: int) -> Array:
     return level
 
 
-def _stage(ends: Array, conductance: Array, level: Array, at: int, count: int) -> _Stage:
-    label = groups(ends[level > at], count)
-    links = np.flatnonzero(level == at)
+def _contracted(ends: Array, level: Array, at: int, count: int) -> tuple[Array, Array]:
+    """The links of level `at`, and the nodes' labels where all higher levels are contracted."""
+    return np.flatnonzero(level == at), groups(ends[level > at], count)
+
+
+def _stage(ends: Array, conductance: Array, contracted: tuple[Array, Array], direct_up_to: int | None) -> _Stage:
+    links, label = contracted
     pair, size = label[ends[links]], int(label.max(initial=-1)) + 1
     free = np.ones(size, bool)
     free[np.unique(groups(pair, size), return_index=True)[1]] = False
@@ -123,7 +133,8 @@ def _stage(ends: Array, conductance: Array, level: Array, at: int, count: int) -
         held = free[pair[:, side]] & ~free[pair[:, 1 - side]]
         tied += np.bincount(index[pair[held, side]], weights=own[held], minlength=len(tied))
     inner = np.all(free[pair], axis=1)
-    return _Stage(links=links, label=label, free=free, balances=Balances(index[pair[inner]], own[inner], tied))
+    balances = Balances(index[pair[inner]], own[inner], tied, direct_up_to=direct_up_to)
+    return _Stage(links=links, label=label, free=free, balances=balances)
 
 
 def _sweep(

@@ -20,6 +20,8 @@ STUDIES: Mapping[str, str] = {
     "drag": "drag at every step, held, implicit, viscous",
     "speed": "mobile grains, neighbour skin and bins, MPI ranks",
     "throat-occupancy": "what the thesis's two planes and quadrature make of a fine's volume in a throat",
+    "linear-solver": "method and tolerance of the network's solve, by size and spread of conductance",
+    "laws": "conductance and damage laws, and coarse resolved flow, against Stokes truth",
     "specimen-size": "number of grains and seed: how large a specimen must be, and what a small one is worth",
 }
 """Name of each study and what it asks; the module has the same name with underscores."""

@@ -10,7 +10,10 @@ from fdnet.studies.judge import Level, levels
 from fdnet.studies.study import Panel, Row, Study, shown
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#5a5a5a", "#8c564b")
-MARKERS = "osD^vP*X"
+MARKERS = "osD^vP<X"
+TURN = 0.75
+"""Share of the run times' range beyond which words stand to the left of their markers."""
+NEAR = 1.25
 _WIDTH, _HEIGHT = 6.2, 4.6
 _COST_LABELS = {
     "core_s": "run time, core s",
@@ -21,21 +24,22 @@ _COST_LABELS = {
 
 
 def draw_study(study: Study, rows: Sequence[Row], path: Path) -> None:
-    """One axes a panel, in rows of up to three."""
+    """One axes a panel that has rows, in rows of up to three."""
     import matplotlib as mpl
 
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    columns = 2 if len(study.panels) == 4 else min(3, len(study.panels))
-    lines = math.ceil(len(study.panels) / columns)
+    panels = [panel for panel in study.panels if series_of(panel, rows)]
+    columns = 2 if len(panels) == 4 else min(3, max(len(panels), 1))
+    lines = max(math.ceil(len(panels) / columns), 1)
     figure, axes = plt.subplots(
         lines, columns, figsize=(_WIDTH * columns, _HEIGHT * lines), squeeze=False, constrained_layout=True
     )
     flat = list(axes.flat)
-    for panel, place in zip(study.panels, flat, strict=False):
+    for panel, place in zip(panels, flat, strict=False):
         _draw_panel(place, study, panel, rows)
-    for place in flat[len(study.panels) :]:
+    for place in flat[len(panels) :]:
         place.set_visible(False)
     figure.suptitle(f"{study.title} (labels: {study.knob_label})", fontsize=11)
     with replacing(path) as part:
@@ -53,18 +57,21 @@ def _draw_panel(axes: Any, study: Study, panel: Panel, rows: Sequence[Row]) -> N
     shown_levels = {name: levels(rows, name, panel.quantity, cost=panel.cost) for name in series_of(panel, rows)}
     sizes = [level.size for found in shown_levels.values() for level in found if level.size > 0]
     floor = 0.5 * min(sizes) if sizes else 1e-16
+    costs = [level.cost for found in shown_levels.values() for level in found if level.cost > 0]
+    turn = min(costs, default=1.0) * (max(costs, default=1.0) / min(costs, default=1.0)) ** TURN
     for index, (name, found) in enumerate(shown_levels.items()):
         if found:
             _draw_series(axes, name.removesuffix(panel.common), found, study.defaults.get(name), index, floor)
             if panel.cost != "value":
-                _label(axes, found, index, floor)
+                _label(axes, found, index, floor, turn)
     axes.set(xscale="log", yscale="log")
-    axes.set_xlabel(study.knob_label if panel.cost == "value" else _COST_LABELS.get(panel.cost, panel.cost))
+    axes.set_xlabel(panel.knob if panel.cost == "value" else _COST_LABELS.get(panel.cost, panel.cost))
     axes.set_ylabel(panel.label)
     axes.set_title(panel.title, fontsize=10)
     axes.grid(which="major", lw=0.4, color="0.85")
     axes.margins(0.12)
     _widen(axes)
+    axes.tick_params(which="minor", labelsize=6)
     handles, names = axes.get_legend_handles_labels()
     once = dict(zip(names, handles, strict=True))
     if once:
@@ -86,8 +93,9 @@ def _draw_series(axes: Any, name: str, found: Sequence[Level], default: Any, ind
     low = [max(level.size - level.half_width, 0.3 * floor) for level in found]
     high = [max(level.size + level.half_width, floor) for level in found]
     # what has a name and no number has no place on a line
-    line = [(c, s) for c, s, level in zip(cost, size, found, strict=True) if not isinstance(level.value, str)]
-    axes.plot([c for c, _ in line], [s for _, s in line], "-", color=colour, lw=1.0, alpha=0.6)
+    places = zip(found, cost, size, strict=True)
+    line = sorted((level.value, c, s) for level, c, s in places if not isinstance(level.value, str))
+    axes.plot([c for _, c, _ in line], [s for *_, s in line], "-", color=colour, lw=1.0, alpha=0.6)
     axes.vlines(cost, low, high, color=colour, lw=2.5, alpha=0.3)
     zero = [level.size == 0 for level in found]
     axes.plot(
@@ -106,8 +114,22 @@ def _draw_series(axes: Any, name: str, found: Sequence[Level], default: Any, ind
             axes.plot([x], [y], "*", color=colour, mec="k", mew=0.8, ms=17, zorder=5, label="fdnet's default")
 
 
-def _label(axes: Any, found: Sequence[Level], index: int, floor: float) -> None:
-    """The knob's values beside their markers."""
-    for level in found:
-        place, colour = (level.cost, max(level.size, floor)), COLOURS[index % len(COLOURS)]
-        axes.annotate(shown(level.value), place, xytext=(4, 5), textcoords="offset points", fontsize=7, color=colour)
+def _label(axes: Any, found: Sequence[Level], index: int, floor: float, turn: float) -> None:
+    """The knob's values beside their markers: below where an earlier marker is near, words to the left from `turn`."""
+    for number, level in enumerate(found):
+        left = isinstance(level.value, str) and level.cost > turn
+        below = any(_near(level, other) for other in found[:number])
+        axes.annotate(
+            shown(level.value),
+            (level.cost, max(level.size, floor)),
+            xytext=(-5 if left else 4, -10 if below else 5),
+            textcoords="offset points",
+            ha="right" if left else "left",
+            fontsize=7,
+            color=COLOURS[index % len(COLOURS)],
+        )
+
+
+def _near(one: Level, other: Level) -> bool:
+    pairs = ((one.cost, other.cost), (one.size, other.size))
+    return all(1.0 / NEAR < a / b < NEAR for a, b in pairs if a > 0 and b > 0)

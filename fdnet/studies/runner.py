@@ -185,5 +185,13 @@ def forget_peak() -> None:
 
 
 def peak_memory() -> float:
-    """Largest resident memory so far, bytes, of this process or of one child."""
-    return 1024.0 * max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    """Largest resident memory so far, bytes, of this process or of one child.
+
+    Its own as the kernel counts it since the start of the program: getrusage also holds what the process had as a copy
+    of its parent.
+    """
+    told = Path("/proc/self/status")
+    lines = told.read_text().splitlines() if told.exists() else []
+    own = next((float(line.split()[1]) for line in lines if line.startswith("VmHWM")), 0.0)
+    own = own or resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return 1024.0 * max(own, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)

@@ -71,8 +71,8 @@ class Row:
 class Panel:
     """One axes of the figure: a quantity's error against cost for some series (all that have it when empty).
 
-    `cost` is a column of the rows: a cost, or "value", the knob itself. `common` is what all its series' names end in,
-    left out of the legend.
+    `cost` is a column of the rows: a cost, or "value", the knob itself, called `knob` there; `common` is what all its
+    series' names end in, left out of the legend.
     """
 
     quantity: str
@@ -81,6 +81,7 @@ class Panel:
     label: str = "relative error"
     cost: str = "core_s"
     common: str = ""
+    knob: str = "value"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,7 +12,7 @@ from fdnet.atomic import write_text
 from fdnet.errors import CaseError
 from fdnet.studies.draw import series_of
 from fdnet.studies.judge import Level, knee_sentence, levels
-from fdnet.studies.study import DONE, Row, Study, shown
+from fdnet.studies.study import DONE, Panel, Row, Study, shown
 
 COLUMNS = tuple(field.name for field in fields(Row))
 _TEXT = ("series", "knob", "quantity", "status")
@@ -69,7 +69,11 @@ def study_text(study: Study, rows: Sequence[Row]) -> str:
     for panel in study.panels:
         for name in series_of(panel, rows):
             found = levels(rows, name, panel.quantity, cost=panel.cost)
-            parts += [f"**{panel.title}: {name}** ({panel.label})", _level_table(study, found, panel.cost)]
+            parts.append(f"**{panel.title}: {name}** ({panel.label})")
+            if panel.cost == "value":
+                parts.append(_value_table(panel, found))
+            else:
+                parts.append(_level_table(study, found, panel.cost))
     return "\n\n".join(parts) + "\n"
 
 
@@ -77,7 +81,7 @@ def knee_lines(study: Study, rows: Sequence[Row]) -> list[str]:
     """One sentence for every series of every panel."""
     lines = []
     for panel in study.panels:
-        for name in series_of(panel, rows):
+        for name in series_of(panel, rows) if panel.cost != "value" else ():
             found = levels(rows, name, panel.quantity, cost=panel.cost)
             said = knee_sentence(found, default=study.defaults.get(name), unit=_unit(panel.cost))
             lines.append(f"{panel.title}, {name}: {said}.")
@@ -90,6 +94,11 @@ def _level_table(study: Study, found: Sequence[Level], cost: str) -> str:
         band = f"{level.half_width:.2g}" if level.half_width else "-"
         lines.append(f"| {shown(level.value)} | {level.runs} | {level.error:+.3g} | {band} | {level.cost:.3g} |")
     return "\n".join(lines)
+
+
+def _value_table(panel: Panel, found: Sequence[Level]) -> str:
+    lines = [f"| {panel.knob} | {panel.label} |", "|---|---|"]
+    return "\n".join([*lines, *(f"| {shown(level.value)} | {level.error:.3g} |" for level in found)])
 
 
 def _unit(cost: str) -> str:

@@ -1,12 +1,10 @@
 """How much of a fine lies in a throat's cylinder: the thesis's two planes against quadrature, and what it does to k."""
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from functools import cache, partial
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.integrate import quad
@@ -19,6 +17,7 @@ from fdnet.snapshot import Array
 from fdnet.studies.law_models import network_of, permeability
 from fdnet.studies.packs import read_pack, truth_folder
 from fdnet.studies.study import Measured, Panel, Point, Row, Study, row_of
+from fdnet.studies.timing import least_time
 
 TWO_PLANE = "two-plane"
 RATIOS = (0.05, 0.2, 0.5, 1.0, 1.5, 2.0)
@@ -120,17 +119,7 @@ def _segment(radius: float, height: float) -> float:
 def _seconds(volume: Callable[[Pairs], Array], ratio: float) -> float:
     """Core seconds for 1e5 pairs with centres uniform around tubes, the least of three."""
     pairs = sample(ratio, TIMED)[1]
-    return _least_time(lambda: volume(pairs))[1]
-
-
-def _least_time(work: Callable[[], Any]) -> tuple[Any, float]:
-    """What `work` returns, and the core seconds of the quickest of three."""
-    took = []
-    for _ in range(3):
-        start = time.process_time()
-        found = work()
-        took.append(time.process_time() - start)
-    return found, min(took)
+    return least_time(lambda: volume(pairs))[1]
 
 
 def _in_a_pack(point: Point) -> dict[str, float]:
@@ -138,7 +127,7 @@ def _in_a_pack(point: Point) -> dict[str, float]:
     pack = read_pack(truth_folder() / f"{PACKS[point.series]}.csv")[0]
     volume = two_plane_volume if point.value == TWO_PLANE else partial(exact_volume, points=int(point.value))
     network = network_of(pack)
-    occupancy, seconds = _least_time(lambda: measure_occupancy(network, pack.fines(), overlap=volume))
+    occupancy, seconds = least_time(lambda: measure_occupancy(network, pack.fines(), overlap=volume))
     clean = LAWS["thesis"](network)
     damaged = thesis_damage(network, occupancy, clean).conductance
     inside = occupancy.throat_fines > 0

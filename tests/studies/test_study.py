@@ -12,7 +12,7 @@ from fdnet.errors import CaseError
 from fdnet.studies.command import STUDIES, run_study, study_named
 from fdnet.studies.judge import Level, against_reference, knee, knee_sentence, levels, order
 from fdnet.studies.runner import POINTS, run_points
-from fdnet.studies.study import DONE, Measured, Point, Row
+from fdnet.studies.study import DONE, Measured, Panel, Point, Row
 from fdnet.studies.table import read_rows
 
 NAN = float("nan")
@@ -140,3 +140,24 @@ def test_the_record_says_whose_it_is(tmp_path):
     run_points(toy(), tmp_path / "out", quick=True)
     first = (tmp_path / "out" / POINTS).read_text().splitlines()[0]
     assert json.loads(first) == {"study": "toy", "form": "quick"}
+
+
+def test_memory_is_that_of_the_point_and_not_of_who_started_it(tmp_path):
+    """A process starts as a copy of its parent, whose memory getrusage goes on counting."""
+    held = b"x" * 800_000_000
+    study = toy(points=lambda _: toy_study.points(True)[:1], isolated=lambda point: point.value == 4.0)
+    (run,) = run_points(study, tmp_path / "out", quick=True)
+    assert 1e7 < run.peak_memory_bytes < len(held)
+
+
+def test_a_panel_over_the_knob_has_a_table_of_its_own(tmp_path):
+    panel = Panel(quantity="integral", title="by cells", label="error", cost="value", knob="cells", common="point")
+    text = run_study(toy(panels=(panel,)), tmp_path / "out", quick=True)
+    assert "| cells | error |\n|---|---|\n| 4 | -0.0156 |" in text
+    assert "knee" not in text
+
+
+def test_costs_within_a_factor_of_two_have_no_order():
+    near, far = ([level(n, cost, 0.1**n) for n, cost in enumerate(costs)] for costs in ((1, 1.3, 1.9), (1, 2, 4)))
+    assert math.isnan(order(near))
+    assert order(far) == pytest.approx(math.log(10) / math.log(2))

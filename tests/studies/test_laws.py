@@ -1,0 +1,76 @@
+"""The study of laws: errors within what accuracy.md states of them, and resolved flow that converges."""
+
+import csv
+
+import pytest
+
+from fdnet.cli import main
+from fdnet.network.conductance import DEFAULT_LAW, LAWS
+from fdnet.studies import laws, packs
+from fdnet.studies.command import run_study
+from fdnet.studies.law_models import PAIRS, RESOLVED
+from fdnet.studies.table import read_rows
+from fdnet.studies.truth import EQUAL, LATTICE
+
+FIFTH = "fines of 1/5"
+
+
+@pytest.fixture(scope="module")
+def rows(tmp_path_factory):
+    out = tmp_path_factory.mktemp("study") / "out"
+    run_study(laws.STUDY, out, quick=True)
+    return read_rows(out / "laws.csv")
+
+
+def errors(rows, series, quantity="k"):
+    return {row.value: row.error for row in rows if row.series == series and row.quantity == quantity}
+
+
+def test_the_default_law_is_within_its_stated_span(rows):
+    """accuracy.md: random packs worst 1.2 %, touching lattices 1.2 %; nothing fitted."""
+    assert abs(errors(rows, EQUAL)[DEFAULT_LAW]) < 0.012
+    assert abs(errors(rows, LATTICE)[DEFAULT_LAW]) < 0.012
+
+
+@pytest.mark.parametrize(("group", "file_case"), [(EQUAL, "H_40_eps40"), (LATTICE, "SC_touching")])
+def test_every_law_has_the_error_the_document_tells(rows, root, group, file_case):
+    with (root / "docs" / "validation" / "accuracy_intact.csv").open(newline="") as file:
+        told = next(row for row in csv.DictReader(file) if row["case"] == file_case)
+    assert {law: 1 + off for law, off in errors(rows, group).items()} == {
+        law: pytest.approx(float(told[law]), abs=2e-5) for law in LAWS
+    }
+
+
+def test_every_damage_law_has_the_error_the_document_tells(rows, root):
+    with (root / "docs" / "validation" / "accuracy_damage.csv").open(newline="") as file:
+        told = next(row for row in csv.DictReader(file) if row["case"] == laws.DAMAGED)
+    found = errors(rows, FIFTH, "k/k0")
+    names = [*(" + ".join(pair) for pair in PAIRS), RESOLVED]
+    assert {name: 1 + found[name] for name in names} == {
+        name: pytest.approx(float(told[name]), abs=2e-4) for name in names
+    }
+    assert abs(found[laws.DEFAULT]) < 0.12 < found["thesis + thesis"]
+
+
+def test_resolved_flow_converges_from_above_and_two_grids_are_nearer(rows):
+    one, two = errors(rows, laws.GRID), errors(rows, laws.TWO_GRIDS)
+    assert one[16] > 1.5 * one[24] > 1.5**1.5 * one[32] > 0
+    assert abs(two[24]) < 0.5 * one[24]
+
+
+def test_truth_brings_its_own_uncertainty(rows):
+    assert {row.error_uncertainty for row in rows if row.series == FIFTH} == {0.013}
+    own = laws.cases()[laws.INTACT].error
+    assert {row.error_uncertainty for row in rows if row.series == EQUAL} == {own}
+
+
+def test_an_installed_fdnet_refuses_for_want_of_the_packs(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(packs, "PROJECT", tmp_path)
+    laws.cases.cache_clear()
+    out = tmp_path / "out"
+    try:
+        assert main(["study", "laws", "--quick", "--out", str(out)]) == 2
+    finally:
+        laws.cases.cache_clear()
+    assert "tests/data/truth is not there" in capsys.readouterr().err
+    assert not out.exists()
