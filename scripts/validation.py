@@ -9,6 +9,7 @@ second. `fdnet study NAME --out DIR` makes NAME.csv, .png and .md, which are the
 
 import argparse
 import csv
+import re
 import sys
 from pathlib import Path
 from string import Template
@@ -41,7 +42,14 @@ def stability_table(path: Path) -> str:
     with path.open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     lines = ["| case | what happened | evidence |", "|---|---|---|"]
-    return "\n".join(lines + [f"| {row['case']} | {row['what_happened']} | {row['evidence']} |" for row in rows])
+    return "\n".join(
+        lines + [f"| {row['case']} | {row['what_happened']} | {evidence(row['evidence'])} |" for row in rows]
+    )
+
+
+def evidence(text: str) -> str:
+    """Words and tests: a test as a link to its file with its name for a text."""
+    return re.sub(r"tests/(\S+\.py)::(\w+)", lambda m: f"([{m[2].removeprefix('test_')}](../tests/{m[1]}))", text)
 
 
 def document(docs: Path) -> str:
