@@ -56,7 +56,7 @@ def points(quick: bool) -> list[Point]:
     found += _falls(IMPLICIT, (100.0, 30.0, 10.0, 5.0, *common), looks=3)
     found += _falls(RESTARTED, (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002), looks=0)
     held = (1.0, 0.5, 0.2, 0.1, HOLD_OVER_RELAXATION, 0.02)
-    return found + _invasions(held, seeds=12, form="whole") + _invasions(held, seeds=3, form="window")
+    return found + _invasions(held, seeds=8, form="whole") + _invasions(held, seeds=2, form="window")
 
 
 def _falls(series: str, intervals: Sequence[float], *, looks: int) -> list[Point]:

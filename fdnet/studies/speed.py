@@ -33,9 +33,9 @@ def points(quick: bool) -> list[Point]:
         found = _motion(2, "small") + _windows(SKIN, (0.25, OWN_SKIN, 4.0), 200, 1)
         return found + _windows(BIN, (OWN_BIN, 4.0), 200, 1) + _windows(RANKS, (ONE_RANK, "1 x 2 x 1"), 200, 1)
     found = _motion(6, "whole")
-    for fines, seeds in ((FEW, 3), (MANY, 2)):
-        found += _windows(SKIN, (0.1, 0.25, 0.5, OWN_SKIN, 2.0, 4.0), fines, seeds)
-        found += _windows(BIN, (0.25, 0.5, OWN_BIN, 2.0, 4.0), fines, seeds)
+    for fines in (FEW, MANY):
+        found += _windows(SKIN, (0.1, 0.25, 0.5, OWN_SKIN, 2.0, 4.0), fines, 2)
+        found += _windows(BIN, (0.5, OWN_BIN, 2.0, 4.0), fines, 2)
     for fines in (FEW, MANY):
         found += _windows(RANKS, (ONE_RANK, *_GRIDS), fines, 2)
     return found
