@@ -6,6 +6,7 @@ every default. Its tables are in `fdnet.case_parts`, what must hold between them
 
 import hashlib
 import json
+import tomllib
 from typing import Annotated, Any
 
 import tomli_w
@@ -13,6 +14,9 @@ from pydantic import Field, model_validator
 
 from fdnet.case_parts import AnalysisChoices, Box, Drag, Fines, Fluid, Grains, Gravity, Part, Run
 from fdnet.case_rules import cross_problems
+
+POLICIES = ("max_hours", "max_overlap", "on_overlap")
+"""Keys of [run] that say whether a run may go on, not what it computes."""
 
 
 class Case(Part):
@@ -57,8 +61,12 @@ class Case(Part):
         return tomli_w.dumps(self.data())
 
     def digest(self, stage: str = "analyse") -> str:
-        """Hash of what `stage` depends on: "pack" ignores fines, fluid and analysis, "invade" the analysis."""
+        """Hash of what `stage` depends on: "pack" ignores fines, fluid and analysis, "invade" the analysis.
+
+        No result depends on `POLICIES`, so no digest does.
+        """
         data = self.data()
+        data["run"] = {key: value for key, value in data["run"].items() if key not in POLICIES}
         if stage in ("pack", "invade"):
             data.pop("analysis")
             data.pop("name")
@@ -68,6 +76,13 @@ class Case(Part):
             scaling = {"stiffness": self.run.stiffness_N_m, "fines_stiffness": fines}
             data = {key: data[key] for key in ("seed", "box", "grains")} | scaling
         return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
+
+    def same_specimen(self, text: bytes) -> bool:
+        """Whether a case.toml as `toml` wrote it is this case but for `POLICIES`."""
+        try:
+            return Case.model_validate(tomllib.loads(text.decode())).digest() == self.digest()
+        except ValueError:
+            return False
 
 
 def _without_none(value: Any) -> Any:

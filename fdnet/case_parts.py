@@ -11,6 +11,9 @@ MAX_CONCENTRATION = 0.30
 MOST_FINES, MOST_SLAB, MOST_BINS, MOST_SECTIONS = 10_000_000, 1000, 10_000, 1000
 """Bounds on what a case may ask for: number of fines, slab over box length, profile bins, sections."""
 
+LEAST_SKIN, MOST_NEIGHBOUR_BINS = 0.01, 10_000_000
+"""Smallest skin over the smallest fine's radius, most bins of the neighbour search in the box."""
+
 CONTACT_STEP_LIMIT = 0.2
 """Largest time step over sqrt(m/k): at 0.3 energy still holds, at 0.5 it grows (measured, docs/physics.md)."""
 
@@ -135,15 +138,26 @@ class Gravity(Part):
 
 
 class Run(Part):
-    """Run control. Times left out are derived from the case (see `fdnet render`)."""
+    """Run control. Times left out are derived from the case (see `fdnet render`).
 
-    stiffness_N_m: Positive | None = 1.0e4
+    `stiffness_N_m` is that of the stiffest contact; "nominal" leaves the materials as they are. `max_hours` is what a
+    run may be expected to take. An overlap of a fine above `max_overlap` of the smaller diameter is told, or stops the
+    run. These three decide nothing else, so a finished stage does not depend on them. `skin_mm` and `neighbour_bin_mm`
+    are LIGGGHTS's neighbour search in the invasion: time, and the order of sums.
+    """
+
+    stiffness_N_m: Positive | Literal["nominal"] = 1.0e4
+    max_hours: Positive = 24.0
+    max_overlap: Fraction = 0.03
+    on_overlap: Literal["warn", "stop"] = "warn"
     time_step_factor: Annotated[float, Field(gt=0, le=CONTACT_STEP_LIMIT)] = 0.1
     time_step_s: Positive | None = None
     duration_ms: Positive | None = None
     plug_time_ms: Positive | None = None
     cap_ms: Positive | None = None
     checkpoint_ms: Positive | None = None
+    skin_mm: Positive | None = None
+    neighbour_bin_mm: Positive | None = None
 
 
 class AnalysisChoices(Part):

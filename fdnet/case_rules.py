@@ -4,7 +4,18 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from fdnet.case_parts import MOST_BINS, MOST_FINES, MOST_SLAB, Box, Drag, Fines, Grains
+from fdnet.case_parts import (
+    LEAST_SKIN,
+    MOST_BINS,
+    MOST_FINES,
+    MOST_NEIGHBOUR_BINS,
+    MOST_SLAB,
+    Box,
+    Drag,
+    Fines,
+    Grains,
+    Run,
+)
 
 
 def cross_problems(parts: Mapping[str, Any]) -> Iterator[str]:
@@ -27,7 +38,27 @@ def cross_problems(parts: Mapping[str, Any]) -> Iterator[str]:
             f"fines.radius_mm: {fines.radius_mm} is not below grains.radius_mm {grains.radius_mm} "
             "(the network needs a clear gap)"
         )
+    run = parts.get("run")
+    if run and box and grains and fines:
+        yield from _search_problems(run, box, grains, fines)
     yield from _choice_problems(parts)
+
+
+def _search_problems(run: Run, box: Box, grains: Grains, fines: Fines) -> Iterator[str]:
+    """The skin lies between a hundredth of a fine and a grain, the bins between memory's limit and the box."""
+    low, high = LEAST_SKIN * 1e3 * fines.radius_range_m[0], 1e3 * grains.radius_range_m[1]
+    if run.skin_mm is not None and not low <= run.skin_mm <= high:
+        yield (
+            f"run.skin_mm: {run.skin_mm:g} mm, expected {low:.3g} ({LEAST_SKIN:g} of the smallest fine's radius: else "
+            f"neighbours are searched anew nearly every step) to {high:.3g} (a grain's radius)"
+        )
+    volume = math.prod(box.size_mm)
+    least, most = (volume / MOST_NEIGHBOUR_BINS) ** (1 / 3), min(box.size_mm)
+    if run.neighbour_bin_mm is not None and not least <= run.neighbour_bin_mm <= most:
+        yield (
+            f"run.neighbour_bin_mm: {run.neighbour_bin_mm:g} mm, expected {least:.3g} ({MOST_NEIGHBOUR_BINS:.0e} bins "
+            f"in the box) to {most:.3g} (its shortest side)"
+        )
 
 
 def _choice_problems(parts: Mapping[str, Any]) -> Iterator[str]:

@@ -195,6 +195,7 @@ def _print_summary(summary: dict[str, Any], out: Path) -> None:
 
 
 def _render(options: argparse.Namespace) -> int:
+    from fdnet.cost import over_limit
     from fdnet.dem.render import render_decks
     from fdnet.scale_table import scale_rows
     from fdnet.scales import scales_of
@@ -204,7 +205,7 @@ def _render(options: argparse.Namespace) -> int:
     decks = render_decks(case, options.out, ranks=options.np)
     for row in scale_rows(case, scales):
         print(f"{row.name:<36} {row.symbol:<11} {row.value:>12.4g} {row.unit:<5} {row.formula:<40} {row.source}")
-    for warning in scales.warnings:
+    for warning in filter(None, [*scales.warnings, over_limit(case, scales)]):
         print(f"warning: {warning}")
     for deck in decks:
         print(f"deck: {deck}")

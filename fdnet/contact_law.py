@@ -54,7 +54,7 @@ def _pairs(case: Case) -> list[tuple[str, str]]:
 
 def stiffness_factor(case: Case) -> float:
     """What all contact stiffnesses are multiplied by: run.stiffness_N_m over the stiffest pair's nominal value."""
-    if case.run.stiffness_N_m is None:
+    if case.run.stiffness_N_m == "nominal":
         return 1.0
     nominal = _nominal(case)
     return case.run.stiffness_N_m / max(series(nominal[a][0], nominal[b][0]) for a, b in _pairs(case))

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fdnet.case import Case
+from fdnet.cost import refuse_long
 from fdnet.dem.checkpoint import read_history, state_at
 from fdnet.dem.dump import read_frame
 from fdnet.dem.invasion import invade
@@ -77,7 +78,10 @@ def run_case(case: Case, options: RunOptions) -> dict[str, Any]:
     written stays and `resume` continues from it.
     """
     scales = scales_of(case)
-    _refuse_without_binary(case, options)
+    needed = _stages_to_run(case, options)
+    refuse_long(case, scales, pack="pack" in needed, invade="invade" in needed)
+    if needed:
+        find_binary(options.liggghts)
     folder = open_folder(options.out, case, stages=options.stages, resume=options.resume, force=options.force)
     try:
         story = _Story(case=case, scales=scales, folder=folder, options=options)
@@ -89,11 +93,10 @@ def run_case(case: Case, options: RunOptions) -> dict[str, Any]:
         folder.close()
 
 
-def _refuse_without_binary(case: Case, options: RunOptions) -> None:
-    """A run that will need LIGGGHTS is refused before anything is written."""
-    needed = [stage for stage in ("pack", "invade") if stage in options.stages and (stage == "pack" or case.fines)]
-    if options.force or not all((options.out / stage / "stage.json").exists() for stage in needed):
-        find_binary(options.liggghts)
+def _stages_to_run(case: Case, options: RunOptions) -> list[str]:
+    """The stages that will need LIGGGHTS: a run is refused for them before anything is written."""
+    asked = [stage for stage in ("pack", "invade") if stage in options.stages and (stage == "pack" or case.fines)]
+    return [s for s in asked if options.force or not (options.out / s / "stage.json").exists()]
 
 
 def _read_summary(folder: RunFolder) -> dict[str, Any]:
@@ -227,7 +230,7 @@ def _write_summary(
         invasion=invasion,
         last=history[-1] if history else None,
         seconds=stage_seconds(pack, invasion, story.seconds),
-        warnings=[*story.scales.warnings, *record_warnings(pack, invasion), *notes],
+        warnings=[*story.scales.warnings, *record_warnings(story.case, pack, invasion), *notes],
     )
     summary = tables.write_summary(story.path / "summary.json", summary)
     if "report" in story.options.stages:

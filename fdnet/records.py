@@ -9,6 +9,7 @@ from typing import Any
 from fdnet.case import Case
 from fdnet.dem.invasion import Invasion
 from fdnet.dem.liggghts import KNOWN_VERSION, Run
+from fdnet.dem.overlap import Deepest, overlap_text
 from fdnet.dem.packing import Pack
 from fdnet.run_folder import RECORD_FORMAT
 
@@ -42,7 +43,8 @@ def invade_record(case: Case, result: Invasion, supplied: int, seconds: float) -
         "digest": case.digest("invade"),
         "seconds": seconds,
         "stop_reason": result.stop_reason,
-        "max_overlap": result.max_overlap,
+        "max_overlap": result.overlap.fraction,
+        "max_overlap_step": result.overlap.step,
         "steps": result.history[-1].step,
         "dt_s": result.step_s,
         "supplied": supplied,
@@ -64,7 +66,7 @@ def run_record(run: Run) -> dict[str, Any]:
     }
 
 
-def record_warnings(pack: dict[str, Any], invasion: dict[str, Any] | None) -> list[str]:
+def record_warnings(case: Case, pack: dict[str, Any], invasion: dict[str, Any] | None) -> list[str]:
     """Doubts about the DEM runs: another LIGGGHTS than fdnet was measured with, large overlaps, how it ended."""
     version = pack["runs"][0]["version"]
     found = (
@@ -83,11 +85,9 @@ def record_warnings(pack: dict[str, Any], invasion: dict[str, Any] | None) -> li
         )
     if invasion is None:
         return found
-    if invasion["max_overlap"] > OVERLAP_WARNING:
-        found.append(
-            f"largest overlap of a fine at a checkpoint is {100 * invasion['max_overlap']:.1f} % of a diameter (above "
-            f"{100 * OVERLAP_WARNING:.0f} %): raise run.stiffness_N_m"
-        )
+    deepest = Deepest(step=invasion.get("max_overlap_step", invasion["steps"]), fraction=invasion["max_overlap"])
+    if deepest.fraction > case.run.max_overlap:
+        found.append(f"{overlap_text(case, deepest)}: raise run.stiffness_N_m")
     return [*invasion["warnings"], *found]
 
 

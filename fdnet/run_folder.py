@@ -159,7 +159,7 @@ def _admit(folder: RunFolder, case: Case, stages: tuple[str, ...], resume: bool,
     written = folder.path / CASE
     if force:
         _force(folder, case, stages)
-    elif written.exists() and written.read_bytes() != case.toml().encode():
+    elif written.exists() and not case.same_specimen(written.read_bytes()):
         raise CaseError(
             f"{folder.path}: holds a run of another case (see {written}); give another --out, or --force to replace it"
         )

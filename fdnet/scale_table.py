@@ -1,7 +1,7 @@
 """The scales of a case as rows: name, symbol, value, unit, formula, source."""
 
 from fdnet.case import Case
-from fdnet.cost import memory_bytes, pack_seconds, run_seconds
+from fdnet.cost import cost_of, memory_bytes
 from fdnet.scales import Quantity, Scales, grain_count
 
 
@@ -107,15 +107,16 @@ def _contact_rows(scales: Scales) -> list[Quantity]:
 
 
 def _cost_rows(case: Case, scales: Scales) -> list[Quantity]:
+    cost = cost_of(case, scales)
     rows = [
         _row("grains, first guess", "N", grain_count(case), "-", "(1-phi) V / v", "plain sum"),
         _row(
             "pack run time, one core",
             "t_pack",
-            pack_seconds(case),
+            cost.pack_seconds,
             "s",
-            "N steps / 5e6 an attempt",
-            "measured, +-factor 2",
+            "N steps 1e-7 s an attempt",
+            "measured, within a factor of 3",
         ),
         _row(
             "memory",
@@ -131,10 +132,10 @@ def _cost_rows(case: Case, scales: Scales) -> list[Quantity]:
             _row(
                 "invasion run time, one core",
                 "t_run",
-                run_seconds(case, scales),
+                cost.invade_seconds,
                 "s",
-                "n steps / rate",
-                "measured, +-factor 2",
+                "steps (2e-6 s + N and n x seconds a sphere)",
+                "measured, within a factor of 3",
             )
         )
     return rows

@@ -12,7 +12,8 @@ from fdnet.contact_law import Contact, contacts_of, mass_range, stiffness_factor
 from fdnet.errors import CaseError
 from fdnet.time_step import drag_warnings, hold_steps, time_step
 
-OVERLAP_WARNING, MOST_DRAG_OVERLAP = 0.03, 0.5
+MOST_OVERLAP = 0.5
+"""Predicted overlap over a fine's diameter from which a case is refused: beyond it a fine could pass a grain."""
 ARRIVALS = 10
 """The default plug time lets at least this many fines of the undisturbed suspension arrive."""
 MOST_STEPS = 2**31 - 1
@@ -163,13 +164,7 @@ def _fine_scales(case: Case, contacts: dict[str, Contact], velocity: float, upst
         "impact_overlap": velocity * math.sqrt(mass_range(fines)[1] / stiffness) / (2 * high),
         "drag_overlap": 6 * math.pi * viscosity * case.drag.multiplier * velocity / (2 * stiffness),
     }
-    if result["drag_overlap"] > MOST_DRAG_OVERLAP:
-        raise CaseError(
-            f"run.stiffness_N_m: drag alone would press a fine {100 * result['drag_overlap']:.3g} % of its "
-            "diameter into "
-            f"a grain (limit {100 * MOST_DRAG_OVERLAP:.0f} %); raise it, or lower drag.multiplier, viscosity "
-            "or velocity"
-        )
+    _refuse_deep_overlap(result)
     if result["checkpoint_steps"] > MOST_STEPS:
         raise CaseError(
             f"run.time_step_s: {step:.3g} s needs {result['checkpoint_steps']:.3g} steps between checkpoints (limit "
@@ -183,6 +178,16 @@ def _fine_scales(case: Case, contacts: dict[str, Contact], velocity: float, upst
             "the invasion may be called plugged too early"
         )
     return result | {"warnings": tuple(warnings)}
+
+
+def _refuse_deep_overlap(fine: dict[str, Any]) -> None:
+    for name in ("drag", "impact"):
+        if fine[f"{name}_overlap"] > MOST_OVERLAP:
+            raise CaseError(
+                f"run.stiffness_N_m: {name} alone would press a fine {100 * fine[f'{name}_overlap']:.3g} % of its "
+                f"diameter into a grain (limit {100 * MOST_OVERLAP:.0f} %); raise it, or lower "
+                + ("drag.multiplier, viscosity or velocity" if name == "drag" else "the velocity (fluid.velocity_m_s)")
+            )
 
 
 def _gravity_over_drag(case: Case, velocity: float) -> float:
@@ -239,10 +244,10 @@ def _warnings(case: Case, fine: dict[str, Any]) -> list[str]:
     if fine["reynolds"] > 1:
         found.append(f"particle Reynolds number {fine['reynolds']:.2g} is outside the range of Stokes drag (below 1)")
     for name in ("impact", "drag"):
-        if fine[f"{name}_overlap"] > OVERLAP_WARNING:
+        if fine[f"{name}_overlap"] > case.run.max_overlap:
             found.append(
                 f"predicted overlap under {name} is {100 * fine[f'{name}_overlap']:.2g} % of a fine's diameter (above "
-                f"{100 * OVERLAP_WARNING:.0f} %): raise run.stiffness_N_m"
+                f"run.max_overlap, {100 * case.run.max_overlap:.3g} %): raise run.stiffness_N_m"
             )
     assert case.fines is not None
     diameter = 2 * case.fines.radius_range_m[1]

@@ -73,6 +73,14 @@ def test_every_problem_is_listed_at_once():
         ("drag", {"field": "network"}, "not available yet"),
         ("drag", {"scheme": "every_step", "refresh_steps": 5}, "belongs to drag.scheme 'held'"),
         ("run", {"time_step_factor": 0.3}, "run.time_step_factor: 0.3"),
+        ("run", {"skin_mm": 1e-5}, "run.skin_mm: 1e-05 mm, expected 0.0005"),
+        ("run", {"skin_mm": 0.26}, "to 0.25 (a grain's radius)"),
+        ("run", {"neighbour_bin_mm": 0.009}, "run.neighbour_bin_mm: 0.009 mm, expected 0.00916"),
+        ("run", {"neighbour_bin_mm": 1.7}, "to 1.6 (its shortest side)"),
+        ("run", {"max_hours": 0.0}, "run.max_hours: 0.0"),
+        ("run", {"max_overlap": 1.0}, "run.max_overlap: 1.0"),
+        ("run", {"on_overlap": "stopp"}, "run.on_overlap: 'stopp'"),
+        ("run", {"stiffness_N_m": "nominel"}, "run.stiffness_N_m: 'nominel'"),
         ("analysis", {"law": "darcy"}, "analysis.law: 'darcy'"),
         ("fluid", {"viscosity_Pas": 0.05}, "unknown key"),
     ],
@@ -103,6 +111,13 @@ def test_toml_comes_back_as_the_same_case():
     again = case_from(tomllib.loads(case.toml()))
     assert again == case
     assert again.digest() == case.digest()
+
+
+def test_the_neighbour_search_belongs_to_the_invasion():
+    """It changes the order of sums, so a finished invasion with another one is another invasion; the pack is not."""
+    for setting in ("run.skin_mm=0.04", "run.neighbour_bin_mm=0.2"):
+        assert tiny(setting).digest("pack") == tiny().digest("pack")
+        assert tiny(setting).digest("invade") != tiny().digest("invade")
 
 
 def test_stages_depend_only_on_their_own_keys():

@@ -213,6 +213,25 @@ def test_the_time_limit_holds_for_packing_too(finished, tmp_path):
     assert time.monotonic() - start < 30
 
 
+def test_an_overlap_past_its_limit_stops_the_run_if_asked_and_is_told(finished, tmp_path):
+    """Tiny's fines overlap by some 5 %: exit 3 with the state kept; --resume with another policy completes it."""
+    _, case, summary = finished
+    out = tmp_path / "run"
+    told = [warning for warning in summary["warnings"] if "run.max_overlap" in warning and "at step" in warning]
+    assert len(told) == 1
+    command = ["run", case, "--out", out, "--stages", "pack,invade,analyse", "--json"]
+    for extra in ([], ["--resume"]):
+        stopped = fdnet(*command, "--set", "run.on_overlap=stop", *extra)
+        assert stopped.returncode == 3
+        assert "--resume --set run.on_overlap=warn" in stopped.stderr
+    done = fdnet(*command, "--resume", "--set", "run.max_overlap=0.2", "--set", "run.on_overlap=stop")
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert result["max_overlap_fraction"] == summary["max_overlap_fraction"] > 0.03
+    assert result["k_damaged_m2"] == summary["k_damaged_m2"]
+    assert not any("run.max_overlap" in warning for warning in result["warnings"])
+
+
 def test_stages_one_after_the_other_equal_all_at_once(finished, tmp_path):
     run, case, summary = finished
     for stage in ("pack", "invade", "analyse,report"):

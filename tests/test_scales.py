@@ -109,6 +109,28 @@ def test_drag_that_presses_contacts_shut_is_refused():
         scales_of(tiny("drag.multiplier=1000"))
 
 
+def test_an_inviscid_fluid_is_refused_for_its_speed_and_works_with_a_given_one():
+    """Darcy's law makes 1e-12 cP a speed of 1e14 m/s; with 1 m/s given the fines fly free, nearly without drag."""
+    with pytest.raises(CaseError, match=r"impact alone would press a fine .* lower the velocity"):
+        scales_of(tiny("fluid.viscosity_cP=1e-12"))
+    scales = scales_of(tiny("fluid.viscosity_cP=1e-12", "fluid.velocity_m_s=1.0"))
+    assert any("Reynolds" in warning for warning in scales.warnings)
+    assert scales.drag_overlap == pytest.approx(0, abs=1e-12)
+
+
+def test_impact_is_refused_above_half_a_diameter():
+    scales = scales_of(tiny("fluid.velocity_m_s=1.0"))
+    limit = 0.5 / scales.impact_overlap
+    assert scales_of(tiny(f"fluid.velocity_m_s={0.999 * limit}")).impact_overlap == pytest.approx(0.4995)
+    with pytest.raises(CaseError, match="impact alone"):
+        scales_of(tiny(f"fluid.velocity_m_s={1.001 * limit}"))
+
+
+def test_the_limit_of_the_warning_is_the_cases_own():
+    assert "overlap under impact" in " ".join(scales_of(tiny()).warnings)
+    assert "overlap under impact" not in " ".join(scales_of(tiny("run.max_overlap=0.2")).warnings)
+
+
 @pytest.mark.parametrize(
     "assignment", ["fluid.overbalance_MPa=1e-17", "fluid.viscosity_cP=1e15", "run.time_step_s=1e-18"]
 )

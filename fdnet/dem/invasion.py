@@ -6,7 +6,6 @@ from pathlib import Path
 
 from fdnet.atomic import disk_is_full, write_text
 from fdnet.case import Case
-from fdnet.contacts import max_overlap
 from fdnet.dem.checkpoint import (
     HISTORY,
     HISTORY_HEADER,
@@ -23,6 +22,7 @@ from fdnet.dem.checkpoint import (
 from fdnet.dem.deck import Deck, LeftOut
 from fdnet.dem.invade_deck import render_invade, write_invade_inputs
 from fdnet.dem.liggghts import SCREEN, Launch, Run, run_deck
+from fdnet.dem.overlap import WATCH, Deepest, cut_watch, deepest_of, overlap_in, read_watch, refuse_overlap
 from fdnet.errors import LiggghtsError
 from fdnet.scales import Scales
 from fdnet.snapshot import Snapshot
@@ -35,11 +35,16 @@ class Invasion:
     damaged: Snapshot
     history: tuple[Checkpoint, ...]
     stop_reason: str
-    max_overlap: float
+    overlap: Deepest
     step_s: float
     left_out: tuple[LeftOut, ...]
     warnings: tuple[str, ...]
     runs: tuple[Run, ...]
+
+    @property
+    def max_overlap(self) -> float:
+        """Largest overlap of a fine with any sphere, over the smaller diameter."""
+        return self.overlap.fraction
 
 
 def invade(case: Case, scales: Scales, grains: Snapshot, folder: Path, launch: Launch) -> Invasion:
@@ -53,7 +58,7 @@ def invade(case: Case, scales: Scales, grains: Snapshot, folder: Path, launch: L
     history = read_history(folder)
     overlaps, damaged = [], grains
     for _, damaged in readable_states(folder, history, case, scales, grains):
-        overlaps.append(max_overlap(damaged, case.periodic, only_fines=True))
+        overlaps.append(overlap_in(case, damaged))
     reason, warnings = _ending(case, scales, history)
     if anew:
         warnings.append("no checkpoint of the cut invasion could be used, it was begun anew")
@@ -67,7 +72,7 @@ def invade(case: Case, scales: Scales, grains: Snapshot, folder: Path, launch: L
         damaged=damaged,
         history=history,
         stop_reason=reason,
-        max_overlap=max(overlaps),
+        overlap=deepest_of([*overlaps, *read_watch(folder)]),
         step_s=scales.time_step,
         left_out=deck.left_out,
         warnings=tuple(warnings),
@@ -82,12 +87,19 @@ def _has_history(folder: Path) -> bool:
 
 def _drive(case: Case, scales: Scales, grains: Snapshot, folder: Path, launch: Launch) -> tuple[Deck, Run | None]:
     """Run to the end of the invasion; no run when the last checkpoint was the end already."""
+
+    def check(step: int) -> None:
+        row = next(row for row in read_history(folder) if row.step == step)
+        refuse_overlap(case, scales, grains, folder, history=[row], last=row)
+
     while True:
         last = last_checkpoint(folder, case, grains)
         deck = _prepare(case, scales, grains, folder, ranks=launch.ranks, last=last)
+        if last is not None:
+            refuse_overlap(case, scales, grains, folder, history=read_history(folder), last=last)
         if _over(case, scales, last):
             return deck, None
-        run = _run(folder, last, replace(launch, follow=_Keeper(folder, launch.follow)))
+        run = _run(folder, last, replace(launch, follow=_Keeper(folder, check, launch.follow)))
         if run is not None:
             return deck, run
 
@@ -109,13 +121,14 @@ def _run(folder: Path, last: Checkpoint | None, launch: Launch) -> Run | None:
 
 
 class _Keeper:
-    """Follows the screen: keeps the two newest restarts, stops a run that writes to a full disk, passes every line on.
+    """Follows the screen: at each checkpoint keeps the two newest restarts, stops a run that writes to a full disk or
+    fails `check` (which is given the step); passes every line on.
 
     LIGGGHTS goes on after a failed write and ends with 0; older restarts are removed only while there is room.
     """
 
-    def __init__(self, folder: Path, follow: Callable[[str], None] | None) -> None:
-        self.folder, self.follow = folder, follow
+    def __init__(self, folder: Path, check: Callable[[int], None], follow: Callable[[str], None] | None) -> None:
+        self.folder, self.check, self.follow = folder, check, follow
 
     def __call__(self, line: str) -> None:
         if line.startswith("FDNET checkpoint"):
@@ -126,6 +139,7 @@ class _Keeper:
             files = sorted((self.folder / "post").glob("invade_*.restart"), key=step_of)
             for old in files[:-2]:
                 old.unlink(missing_ok=True)
+            self.check(int(line.split()[3]))
         if self.follow:
             self.follow(line)
 
@@ -140,13 +154,14 @@ def _prepare(
     case: Case, scales: Scales, grains: Snapshot, folder: Path, *, ranks: int, last: Checkpoint | None
 ) -> Deck:
     if last is None:
-        for stale in [folder / HISTORY, *(folder / "post").glob("invade_*")]:
+        for stale in [folder / HISTORY, folder / WATCH, *(folder / "post").glob("invade_*")]:
             stale.unlink(missing_ok=True)
         deck = write_invade_inputs(case, scales, grains, folder, ranks=ranks)
         write_text(folder / HISTORY, HISTORY_HEADER + "\n")
         return deck
     rows = [row for row in read_history(folder) if row.step <= last.step]
     write_text(folder / HISTORY, "\n".join([HISTORY_HEADER, *(csv_row(row) for row in rows)]) + "\n")
+    cut_watch(folder, last.step)
     for path in (folder / "post").glob("invade_*"):
         if step_of(path) > last.step:
             path.unlink()

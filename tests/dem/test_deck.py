@@ -120,6 +120,14 @@ def test_sides_friction_and_ranks_leave_lines_out():
     assert has(invade_text(ranks=2), r"^processors 1 \* \*")
 
 
+def test_the_neighbour_search_is_the_cases_or_the_measured_best():
+    assert has(invade_text(), r"^neighbor 5e-05 bin$")
+    assert not has(invade_text(), "binsize")
+    own = invade_text("run.skin_mm=0.02", "run.neighbour_bin_mm=0.2")
+    assert has(own, r"^neighbor 2e-05 bin$")
+    assert has(own, r"^neigh_modify binsize 0.0002$")
+
+
 def test_lost_atoms_are_errors_and_the_end_is_marked():
     case = tiny()
     for text in (invade_text(), render_pack(case, scales_of(case), count=66).text):

@@ -80,6 +80,31 @@ def test_supplied_is_invaded_passed_and_upstream_at_every_checkpoint(binary, pac
     assert (result.stop_reason == "duration") == (case.run.duration_ms is not None)
 
 
+def test_fines_of_one_micrometre_invade(binary, packed, tmp_path):
+    """A size ratio of 1/250 and steps of 0.1 ns: all are accounted for, and move with the fluid."""
+    case = tiny("fines={radius_mm=0.001, count=20}", "run={duration_ms=0.02}")
+    scales = scales_of(case)
+    result = invade(case, scales, packed["walls"], tmp_path, Launch(binary=binary))
+    fines = result.damaged.fines()
+    assert len(fines) == 20
+    assert fines.velocity[:, 0].max() == pytest.approx(scales.interstitial_velocity, rel=1e-6)
+    assert result.max_overlap < 0.03
+
+
+@pytest.mark.parametrize(
+    "assignment", ["run.skin_mm=0.01", "run.skin_mm=0.25", "run.neighbour_bin_mm=0.05", "run.neighbour_bin_mm=1.6"]
+)
+def test_the_neighbour_search_changes_time_not_motion(binary, packed, tmp_path, assignment):
+    """Up to the order of sums: before chaos has had time to grow, positions agree to a millionth of a fine."""
+    ends = []
+    for name, extra in (("own", [assignment]), ("default", [])):
+        case = tiny("run.duration_ms=0.04", *extra)
+        result = invade(case, scales_of(case), packed["walls"], tmp_path / name, Launch(binary=binary))
+        assert result.max_overlap > 0.01
+        ends.append(result.damaged.position)
+    assert np.allclose(ends[0], ends[1], rtol=0, atol=1e-10)
+
+
 def test_fixed_grains_do_not_move_and_mobile_ones_do(binary, packed, tmp_path):
     grains = packed["walls"]
     for motion in ("fixed", "mobile"):
