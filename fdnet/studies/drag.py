@@ -6,7 +6,7 @@ from pathlib import Path
 
 from fdnet.case import Case
 from fdnet.scales import scales_of
-from fdnet.studies.dem_runs import PROFILE_BINS, edited_run, invasion_run, relaxation_run, slab_case
+from fdnet.studies.dem_runs import PROFILE_BINS, invasion_run, relaxation_run, slab_case, window_run
 from fdnet.studies.judge import against_exact, against_reference, profile_distance
 from fdnet.studies.study import Measured, Panel, Point, Row, Study, Value
 from fdnet.time_step import HOLD_OVER_RELAXATION
@@ -54,7 +54,7 @@ def points(quick: bool) -> list[Point]:
     common = (2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002)
     found = [point for scheme in (EVERY, HELD, VISCOUS) for point in _falls(scheme, common, looks=3)]
     found += _falls(IMPLICIT, (100.0, 30.0, 10.0, 5.0, *common), looks=3)
-    found += _falls(RESTARTED, (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002), looks=0)
+    found += _falls(RESTARTED, (0.05, 0.02, 0.01, 0.005, 0.002), looks=0)
     held = (1.0, 0.5, 0.2, 0.1, HOLD_OVER_RELAXATION, 0.02)
     return found + _invasions(held, seeds=8, form="whole") + _invasions(held, seeds=2, form="window")
 
@@ -66,7 +66,8 @@ def _falls(series: str, intervals: Sequence[float], *, looks: int) -> list[Point
 
 def _invasions(held: Sequence[float], *, seeds: int, form: str) -> list[Point]:
     holding, other = (WINDOW_HOLDING, WINDOW_OTHER) if form == "window" else (HOLDING, OTHER)
-    values: list[tuple[str, Value]] = [(holding, EVERY), *((holding, value) for value in held)]
+    intervals: tuple[Value, ...] = (*held, EVERY)
+    values: list[tuple[str, Value]] = [(holding, value) for value in intervals]
     values += [(other, VISCOUS), (other, IMPLICIT)]
     return [
         Point(series=series, knob="drag", value=value, seed=seed, settings={"form": form})
@@ -82,7 +83,7 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
         return _fall(point.series, point.value, int(point.settings["looks"]), work, point.slug)
     form = str(point.settings["form"])
     case = _invasion_case(point, FORMS[form])
-    return edited_run(case, work, point.slug, {}) if form == "window" else invasion_run(case, work, point.slug)
+    return window_run(case, work, point.slug) if form == "window" else invasion_run(case, work, point.slug)
 
 
 def _invasion_case(point: Point, form: Form) -> Case:
@@ -158,6 +159,11 @@ STUDY = Study(
         Panel(quantity="profile", title="invasion: depth profile", label="distance over mean depth"),
         Panel(quantity="porosity_loss", title="invasion: porosity lost"),
         Panel(quantity="k_ratio_first", title="invasion: k/k0 of the first millimetre"),
+        Panel(
+            quantity="invaded",
+            title="fines inside, first 0.1 ms with 20,000 fines",
+            series=(WINDOW_HOLDING, WINDOW_OTHER),
+        ),
         Panel(
             quantity="mean_depth",
             title="mean depth, first 0.1 ms with 20,000 fines",

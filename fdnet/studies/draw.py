@@ -63,6 +63,7 @@ def _draw_panel(axes: Any, study: Study, panel: Panel, rows: Sequence[Row]) -> N
     axes.grid(which="major", lw=0.4, color="0.85")
     axes.margins(0.12)
     _widen(axes)
+    _plain_ticks(axes)
     if any(level.value == study.defaults.get(name) for name, found in shown_levels.items() for level in found):
         axes.plot([], [], "*", color="0.6", mec="k", mew=0.8, ms=13, label="fdnet's default")
     if axes.get_legend_handles_labels()[0]:
@@ -75,6 +76,17 @@ def _widen(axes: Any) -> None:
     if high < 10 * low:
         middle = math.sqrt(low * high)
         axes.set_ylim(middle / math.sqrt(10), middle * math.sqrt(10))
+
+
+def _plain_ticks(axes: Any) -> None:
+    """Some plain numbers along a cost of less than a decade, where powers of ten would crowd."""
+    from matplotlib.ticker import MaxNLocator, NullLocator, StrMethodFormatter
+
+    low, high = axes.get_xlim()
+    if high < 10 * low:
+        axes.xaxis.set_major_locator(MaxNLocator(6))
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
 
 
 def _draw_series(axes: Any, name: str, found: Sequence[Level], default: Any, index: int, floor: float) -> None:

@@ -3,9 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from fdnet.case import Case
-from fdnet.dem.deck import number
-from fdnet.studies.dem_runs import PROFILE_BINS, edited_run, invasion_run, slab_case
+from fdnet.studies.dem_runs import PROFILE_BINS, SLAB, invasion_run, slab_case, window_run
 from fdnet.studies.judge import against_exact, against_reference, profile_distance
 from fdnet.studies.study import Measured, Panel, Point, Row, Study, Value
 
@@ -16,7 +14,7 @@ OWN_SKIN, OWN_BIN, ONE_RANK = 1.0, 1.1, "1 rank"
 """fdnet's own: a fine's radius; half the longest cut-off, 2 R + skin, which is LIGGGHTS's own; one rank."""
 MOTION_STIFFNESS = 1e3
 FEW, MANY = 2000, 20_000
-_GRIDS = {"1 x 2 x 1": "1 2 1", "1 x 1 x 2": "1 1 2", "2 x 1 x 1": "2 1 1"}
+_GRIDS: Mapping[str, tuple[int, ...]] = {"1 x 2 x 1": (1, 2, 1), "1 x 1 x 2": (1, 1, 2), "2 x 1 x 1": (2, 1, 1)}
 _WINDOW_MS = {200: 0.2, FEW: 0.5, MANY: 0.1}
 _NO_FLOW = ("fluid.velocity_m_s=1e-6", "fines.count=1", "run.checkpoint_ms=0.1")
 _BINS = tuple(f"bin_{number:02d}" for number in range(PROFILE_BINS))
@@ -69,22 +67,17 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
         keys = (f"run.stiffness_N_m={MOTION_STIFFNESS!r}", f"grains.motion={point.value}", *still)
         return invasion_run(slab_case(point.seed, *keys, small=point.settings["size"] == "small"), work, point.slug)
     fines = int(point.settings["fines"])
-    keys = (f"fines.count={fines}", f"run.duration_ms={_WINDOW_MS[fines]!r}")
-    case = slab_case(point.seed, *keys, small=fines < FEW)
-    ranks = 2 if point.value in _GRIDS else 1
-    return edited_run(case, work, point.slug, _edits(point, case), ranks=ranks)
+    keys = (f"fines.count={fines}", f"run.duration_ms={_WINDOW_MS[fines]!r}", *_search_keys(point))
+    grid = _GRIDS.get(str(point.value), ())
+    return window_run(slab_case(point.seed, *keys, small=fines < FEW), work, point.slug, grid=grid)
 
 
-def _edits(point: Point, case: Case) -> dict[str, str]:
-    assert case.fines is not None
-    value = point.value
-    if value == _OWN[point.knob]:
-        return {}
-    if isinstance(value, str):
-        return {"processors": f"processors {_GRIDS[value]}"}
+def _search_keys(point: Point) -> tuple[str, ...]:
+    if isinstance(point.value, str) or point.value == _OWN[point.knob]:
+        return ()
     if point.knob == SKIN:
-        return {"neighbor ": f"neighbor {number(value * case.fines.mean_radius_m)} bin"}
-    return {"neigh_modify delay": f"neigh_modify delay 0 binsize {number(value * case.grains.mean_radius_m)}"}
+        return (f"run.skin_mm={point.value * SLAB['fines']['radius_mm']!r}",)
+    return (f"run.neighbour_bin_mm={point.value * SLAB['grains']['radius_mm']!r}",)
 
 
 def judge(measured: Sequence[Measured]) -> list[Row]:
