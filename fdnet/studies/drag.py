@@ -148,7 +148,7 @@ The default is `held`, for 0.05 tau. What the study says of it:
   left between any two schemes is chance of the size of these bands. At this stiffness holding for up to 1 tau is not
   told from `every_step` in counts, porosity or k, although a falling fine's velocity is then off by a third: the
   deposit, not the flight, decides. In the window of 20,000 fines the depth does show it.
-- Of some forty means in the full form three stand out of their 95 % bands, about what chance gives; one of them is the
+- Of the 32 means of the full form three stand out of their 95 % bands, about what chance gives; one of them is the
   default's mean depth, while neither shorter nor longer holding shows it. More seeds would be needed to exclude it.
 - `viscous` is the best buy wherever fines have one size: equal to `every_step` at the same step, without a knob, and
   the cheapest of all (the more so the more fines are in flight). It should become the default there, `held` staying for
