@@ -103,7 +103,9 @@ def _draw_series(axes: Any, name: str, found: Sequence[Level], default: Any, ind
     high = [max(level.size + level.half_width, floor) for level in found]
     if any(not isinstance(level.value, str) for level in found):
         axes.plot(cost, size, "-", color=colour, lw=1.0, alpha=0.6)
-    axes.vlines(cost, low, high, color=colour, lw=2.5, alpha=0.3)
+    for level, x, bottom, top in zip(found, cost, low, high, strict=True):
+        if level.half_width > 0:
+            axes.vlines(x, bottom, top, color=colour, lw=2.5, alpha=0.3)
     zero = [level.size == 0 for level in found]
     axes.plot(
         [c for c, z in zip(cost, zero, strict=True) if not z],

@@ -98,20 +98,22 @@ def judge(measured: Sequence[Measured]) -> list[Row]:
 def _windows_panel(settings: Sequence[str], fines: int, *, cost: str = "core_s") -> Panel:
     series = tuple(window_of(setting, fines) for setting in settings)
     window = f"first {_WINDOW_MS[fines]:g} ms with {fines:,} fines"
-    return Panel(quantity="mean_depth", title=f"mean depth, {window}", series=series, cost=cost)
+    title = f"mean depth, {window}" + (": MPI" if RANKS in settings else "")
+    return Panel(quantity="mean_depth", title=title, series=series, cost=cost)
 
 
 _REMARKS = """
 - Skin, bins and ranks change only the order of sums. While contacts are few (20,000 fines, first 0.1 ms) nothing is
   left of that; after 0.5 ms with 2,000 fines chaos has made it as much as these errors, which do not fall with cost and
   lie far inside the scatter of seeds (the band of fdnet's own value). So they are chosen by run time alone.
-- The skin's optimum is flat around a fine's radius, fdnet's own; a tenth of it and four times it cost half as much
-  again and more. LIGGGHTS's own bins are as fast as any.
+- The skin's optimum is flat around a fine's radius, fdnet's own; a tenth of it, and four times it, take from half as
+  long again to two and a half times as long. LIGGGHTS's own bins are the fastest at both numbers of fines.
 - Grains that move are another model, not a finer one: the fines push them (root mean square way, the pack's own drift
   without flow beside it), the face gives way and more fines get in. The error of fixed grains is therefore not chaos
   and no other setting removes it.
-- Core seconds of LIGGGHTS, on a machine shared with other work. Two ranks (run time by the clock) were given less than
-  two idle cores: these figures say that MPI loses on a busy machine, not what it would gain on an idle one.
+- Core seconds of LIGGGHTS, on two cores shared with other work (a load of 7 to 9 while the ranks ran, and they ran
+  last). Two ranks wait for each other there, four to eleven times the clock of one: it says that MPI loses on a busy
+  machine, not what it would gain on an idle one. Of the grids the one that cuts the flow direction is the worst.
 """
 
 
