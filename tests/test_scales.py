@@ -7,6 +7,7 @@ from builders import tiny
 
 from fdnet.case_file import read_case
 from fdnet.contact_law import series
+from fdnet.dem.checkpoint import chunks_of
 from fdnet.errors import CaseError
 from fdnet.scale_table import scale_rows
 from fdnet.scales import carman_kozeny, relaxation_time, scales_of
@@ -147,10 +148,14 @@ def test_the_plug_time_waits_for_fines_to_arrive():
     assert scales_of(tiny()).plug_time == pytest.approx(4 * 0.5e-3 / scales_of(tiny()).interstitial_velocity)
 
 
-def test_a_duration_is_met_by_whole_chunks():
-    scales = scales_of(tiny("run.duration_ms=0.08"))
-    chunk = scales.checkpoint_steps * scales.time_step
-    assert round(0.08e-3 / chunk) * chunk == pytest.approx(0.08e-3, rel=0.02)
+@pytest.mark.parametrize("stiffness", [1e2, 3e2, 1e3, 3e3, 1e4, 1e5, 1e6])
+@pytest.mark.parametrize("duration_ms", [0.08, 0.2, 2.0])
+def test_a_duration_is_met_by_whole_chunks(stiffness, duration_ms):
+    """To half a refresh of drag a chunk, whichever way the steps of a chunk were rounded."""
+    scales = scales_of(tiny(f"run.duration_ms={duration_ms!r}", f"run.stiffness_N_m={stiffness!r}"))
+    chunks, refresh = chunks_of(scales), scales.hold_steps * scales.time_step
+    run = chunks * scales.checkpoint_steps * scales.time_step
+    assert abs(run - duration_ms * 1e-3) <= 0.5001 * chunks * refresh
 
 
 def test_damping_against_a_fixed_grain_makes_up_for_the_mass_liggghts_takes():

@@ -33,8 +33,8 @@ class Checkpoint:
 
 
 def chunks_of(scales: Scales) -> int:
-    """Number of chunks until the cap."""
-    return max(1, math.ceil(scales.cap_time / (scales.checkpoint_steps * scales.time_step) - 1e-9))
+    """Number of chunks that comes nearest to the cap, so that chunks rounded to whole steps never make one too many."""
+    return max(1, round(scales.cap_time / (scales.checkpoint_steps * scales.time_step)))
 
 
 def quiet_chunks(scales: Scales) -> int:

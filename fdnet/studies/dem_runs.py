@@ -17,7 +17,7 @@ from fdnet.dem.checkpoint import HISTORY, HISTORY_HEADER, state_at
 from fdnet.dem.dump import read_frame
 from fdnet.dem.invade_deck import write_invade_inputs
 from fdnet.dem.invasion import Invasion, invade
-from fdnet.dem.liggghts import Binary, Launch, find_binary, run_deck
+from fdnet.dem.liggghts import Binary, Launch, Run, find_binary, run_deck
 from fdnet.dem.packing import make_pack
 from fdnet.dem.scene import box_of, snapshot_of
 from fdnet.network.permeability import AnalysisOptions, analyse
@@ -90,34 +90,37 @@ def invasion_run(case: Case, work: Path, slug: str, *, ranks: int = 1) -> dict[s
     return invasion_observed(case, grains, result) | costs
 
 
-def edited_run(case: Case, work: Path, slug: str, edits: Mapping[str, str], *, ranks: int = 1) -> dict[str, float]:
-    """One invasion whose deck has other run-time settings: counts and mean depth (m) of the fines inside, and costs.
+def window_run(case: Case, work: Path, slug: str, *, grid: tuple[int, ...] = ()) -> dict[str, float]:
+    """One invasion without its permeability: counts and mean depth (m) of the fines inside, and costs.
 
-    `edits` gives a line for what begins the one line of the deck that it replaces.
+    `grid` runs it on as many MPI ranks, cut in x, y and z as it says.
     """
     grains = grains_of(case, work)
-    folder, scales, launch = work / slug, scales_of(case), Launch(binary=the_binary(), ranks=ranks)
+    folder, scales = work / slug, scales_of(case)
     shutil.rmtree(folder, ignore_errors=True)
-    (folder / "post").mkdir(parents=True)
-    deck = write_invade_inputs(case, scales, grains, folder, ranks=ranks).text
-    for start, line in edits.items():
-        deck, count = re.subn(rf"(?m)^{re.escape(start)}.*$", line, deck)
-        assert count == 1, f"{start!r} begins {count} lines of the deck, expected 1"
-    write_text(folder / "in.invade", deck)
-    write_text(folder / HISTORY, HISTORY_HEADER + "\n")
     before = child_core_seconds()
-    run = run_deck(folder, "in.invade", launch)
-    core = child_core_seconds() - before
-    result = invade(case, scales, grains, folder, launch)
-    assert not result.runs, f"{folder}: the edited deck did not reach the end of its invasion"
-    depth = _depths(case, result)
+    runs = [_gridded(case, grains, folder, grid)] if grid else []
+    result = invade(case, scales, grains, folder, Launch(binary=the_binary()))
+    core, depth = child_core_seconds() - before, _depths(case, result)
     return {
         "invaded": float(result.history[-1].invaded),
         "mean_depth": float(np.mean(depth)) if len(depth) else 0.0,
         "steps": float(result.history[-1].step),
         "core_s": core,
-        "wall_s": run.seconds,
+        "wall_s": sum(run.seconds for run in [*runs, *result.runs]),
     }
+
+
+def _gridded(case: Case, grains: Snapshot, folder: Path, grid: tuple[int, ...]) -> Run:
+    """The whole invasion under another processor grid than fdnet's, so that `invade` finds it done."""
+    (folder / "post").mkdir(parents=True)
+    ranks = math.prod(grid)
+    deck = write_invade_inputs(case, scales_of(case), grains, folder, ranks=ranks).text
+    text, count = re.subn(r"(?m)^processors .*$", "processors " + " ".join(map(str, grid)), deck)
+    assert count == 1, f"{count} lines of the deck begin with processors, expected 1"
+    write_text(folder / "in.invade", text)
+    write_text(folder / HISTORY, HISTORY_HEADER + "\n")
+    return run_deck(folder, "in.invade", Launch(binary=the_binary(), ranks=ranks))
 
 
 def invasion_observed(case: Case, grains: Snapshot, result: Invasion) -> dict[str, float]:
@@ -145,7 +148,7 @@ def invasion_observed(case: Case, grains: Snapshot, result: Invasion) -> dict[st
         "porosity_loss_first": first.porosity_initial - first.porosity_damaged,
         "k_ratio": analysis.k_damaged / analysis.k_initial,
         "k_ratio_first": first.k_damaged / first.k_initial,
-        "max_overlap": result.max_overlap,
+        "max_overlap": result.overlap.fraction,
         "grain_shift": _shift(grains, result.damaged.grains()),
     } | {f"bin_{number:02d}": float(count) for number, count in enumerate(bins)}
 

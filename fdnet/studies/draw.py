@@ -55,8 +55,7 @@ def series_of(panel: Panel, rows: Sequence[Row]) -> list[str]:
 
 def _draw_panel(axes: Any, study: Study, panel: Panel, rows: Sequence[Row]) -> None:
     shown_levels = {name: levels(rows, name, panel.quantity, cost=panel.cost) for name in series_of(panel, rows)}
-    sizes = [level.size for found in shown_levels.values() for level in found if level.size > 0]
-    floor = 0.5 * min(sizes) if sizes else 1e-16
+    floor = _floor([level for found in shown_levels.values() for level in found])
     costs = [level.cost for found in shown_levels.values() for level in found if level.cost > 0]
     turn = min(costs, default=1.0) * (max(costs, default=1.0) / min(costs, default=1.0)) ** TURN
     for index, (name, found) in enumerate(shown_levels.items()):
@@ -71,11 +70,19 @@ def _draw_panel(axes: Any, study: Study, panel: Panel, rows: Sequence[Row]) -> N
     axes.grid(which="major", lw=0.4, color="0.85")
     axes.margins(0.12)
     _widen(axes)
+    _plain_ticks(axes)
     axes.tick_params(which="minor", labelsize=6)
     handles, names = axes.get_legend_handles_labels()
     once = dict(zip(names, handles, strict=True))
     if once:
         axes.legend([*once.values()], [*once], fontsize=8, framealpha=0.9)
+
+
+def _floor(found: Sequence[Level]) -> float:
+    """Where errors of 0 are drawn: below the smallest error, or well within the bands if there is none."""
+    sizes = [level.size for level in found if level.size > 0]
+    bands = [level.half_width for level in found if level.half_width > 0]
+    return 0.5 * min(sizes) if sizes else 0.1 * min(bands, default=1e-15)
 
 
 def _widen(axes: Any) -> None:
@@ -84,6 +91,17 @@ def _widen(axes: Any) -> None:
     if high < 10 * low:
         middle = math.sqrt(low * high)
         axes.set_ylim(middle / math.sqrt(10), middle * math.sqrt(10))
+
+
+def _plain_ticks(axes: Any) -> None:
+    """Some plain numbers along a cost of less than a decade, where powers of ten would crowd."""
+    from matplotlib.ticker import MaxNLocator, NullLocator, StrMethodFormatter
+
+    low, high = axes.get_xlim()
+    if high < 10 * low:
+        axes.xaxis.set_major_locator(MaxNLocator(6))
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
 
 
 def _draw_series(axes: Any, name: str, found: Sequence[Level], default: Any, index: int, floor: float) -> None:
@@ -96,7 +114,9 @@ def _draw_series(axes: Any, name: str, found: Sequence[Level], default: Any, ind
     places = zip(found, cost, size, strict=True)
     line = sorted((level.value, c, s) for level, c, s in places if not isinstance(level.value, str))
     axes.plot([c for _, c, _ in line], [s for *_, s in line], "-", color=colour, lw=1.0, alpha=0.6)
-    axes.vlines(cost, low, high, color=colour, lw=2.5, alpha=0.3)
+    for level, x, bottom, top in zip(found, cost, low, high, strict=True):
+        if level.half_width > 0:
+            axes.vlines(x, bottom, top, color=colour, lw=2.5, alpha=0.3)
     zero = [level.size == 0 for level in found]
     axes.plot(
         [c for c, z in zip(cost, zero, strict=True) if not z],

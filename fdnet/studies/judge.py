@@ -16,7 +16,7 @@ _ROUNDING, _FALLS = 1e-12, 0.2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Level:
-    """All runs of one value of a knob: mean cost s, mean error, half-width of its 95 % band (0 for one exact run)."""
+    """All runs of one value of a knob: mean cost s, mean error, half-width of its 95 % band (0: one run)."""
 
     value: Value
     runs: int
@@ -68,7 +68,7 @@ def against_reference(
     When `paired` and the reference has the run's seed the difference is taken to that run (same pack, same fines), else
     to the reference's mean. The uncertainty is the scatter of those differences among the seeds of a value; of
     reference runs the scatter about their own mean. With `magnitude` the row is called "one run's NAME" and holds
-    |error|: what one run alone may be off by.
+    |error|: what one run alone may be off by. What is rounding of the sums is 0.
     """
     done = [run for run in measured if run.status == DONE and quantity in run.observed]
     name = f"one run's {quantity}" if magnitude else quantity
@@ -80,7 +80,8 @@ def against_reference(
 
     def error(run: Measured) -> float:
         origin = mean if reference(run) or not paired else base.get(run.point.seed, mean)
-        return (run.observed[quantity] - origin) / size
+        found = run.observed[quantity] - origin
+        return found / size if abs(found) > _ROUNDING * abs(mean) else 0.0
 
     errors = {id(run): error(run) for run in done}
     scatter = {key: _deviation([errors[id(run)] for run in runs]) for key, runs in _grouped(done).items()}
@@ -156,7 +157,8 @@ def _level(value: Value, group: Sequence[Row], cost: str) -> Level:
     if count > 1:
         half = float(student.ppf(0.5 + CONFIDENCE / 2, count - 1) * np.std(errors, ddof=1) / math.sqrt(count))
     else:
-        half = 1.96 * group[0].error_uncertainty
+        known = group[0].error_uncertainty
+        half = 0.0 if math.isnan(known) else 1.96 * known
     mean_cost = float(np.mean([getattr(row, cost) for row in group]))
     mean = float(np.mean(errors))
     mean = 0.0 if abs(mean) < _ROUNDING * float(np.max(np.abs(errors))) else mean

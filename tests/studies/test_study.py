@@ -86,6 +86,13 @@ def test_errors_against_a_reference_are_taken_seed_by_seed():
     assert rows[2].error_uncertainty == pytest.approx(0.1155 / 15, rel=1e-3)
 
 
+def test_rounding_of_a_sum_is_no_error():
+    runs = [measured("good", 0, q=0.3), measured("same", 0, q=0.1 + 0.2), measured("near", 0, q=0.3 * (1 + 1e-9))]
+    rows = against_reference(runs, "q", lambda run: run.point.value == "good")
+    assert rows[1].error == 0.0 != 0.1 + 0.2 - 0.3
+    assert rows[2].error == pytest.approx(1e-9, rel=1e-6)
+
+
 def test_a_level_has_the_confidence_band_of_its_seeds():
     runs = [measured("good", 0, q=1.0), *(measured("poor", seed, q=q) for seed, q in enumerate((1.1, 1.2, 1.3)))]
     rows = against_reference(runs, "q", lambda run: run.point.value == "good")
