@@ -8,6 +8,7 @@ from fdnet.case_parts import (
     LEAST_SKIN,
     MOST_BINS,
     MOST_FINES,
+    MOST_GRAINS,
     MOST_NEIGHBOUR_BINS,
     MOST_SLAB,
     Box,
@@ -117,6 +118,10 @@ def _supply_problems(box: Box, fines: Fines) -> Iterator[str]:
 
 
 def _box_problems(box: Box, grains: Grains) -> Iterator[str]:
+    solid = 1 - grains.porosity if grains.porosity is not None else 0.0
+    expected = grains.count or solid * math.prod(box.size_mm) / (grains.mean_volume_m3 * 1e9)
+    if expected > MOST_GRAINS:
+        yield f"box.size_mm: {list(box.size_mm)} holds {expected:.3g} grains; expected at most {MOST_GRAINS:.0e}"
     if grains.count is not None and grains.count * grains.mean_volume_m3 * 1e9 >= math.prod(box.size_mm):
         room = int(math.prod(box.size_mm) / (grains.mean_volume_m3 * 1e9))
         yield f"grains.count: {grains.count} spheres sum to more than the box; expected at most {room}"

@@ -16,6 +16,7 @@ from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Binary, Launch, find_binary
 from fdnet.dem.packing import make_pack
 from fdnet.dem.scene import snapshot_of
+from fdnet.dem.supply import refuse_crowded_supply
 from fdnet.errors import CaseError
 from fdnet.network.permeability import AnalysisOptions, analyse
 from fdnet.outputs import Results, draw_figures, write_paraview, write_tables
@@ -80,6 +81,8 @@ def run_case(case: Case, options: RunOptions) -> dict[str, Any]:
     scales = scales_of(case)
     needed = _stages_to_run(case, options)
     refuse_long(case, scales, pack="pack" in needed, invade="invade" in needed)
+    if "invade" in needed:
+        refuse_crowded_supply(case, scales)
     if needed:
         find_binary(options.liggghts)
     folder = open_folder(options.out, case, stages=options.stages, resume=options.resume, force=options.force)
@@ -89,6 +92,9 @@ def run_case(case: Case, options: RunOptions) -> dict[str, Any]:
         if manifest is not None and set(options.stages) <= set(manifest["stages"]):
             return _read_summary(folder)
         return _run_stages(story)
+    except CaseError:
+        folder.discard()
+        raise
     finally:
         folder.close()
 

@@ -43,10 +43,11 @@ _OUTPUTS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunFolder:
-    """A folder this process holds the lock of."""
+    """A folder this process holds the lock of; `before` is what was there: "absent", "empty" or "filled"."""
 
     path: Path
     lock: int
+    before: str
 
     def record(self, stage: str) -> dict[str, Any] | None:
         """What a finished stage (pack, invade) left behind, or None. Raises CaseError when it cannot be understood."""
@@ -91,6 +92,14 @@ class RunFolder:
             else:
                 target.unlink(missing_ok=True)
 
+    def discard(self) -> None:
+        """Bad input leaves nothing behind: a new folder is as before, unless a stage was finished in it."""
+        if self.before == "filled" or any((self.path / name).exists() for name in _RECORDS.values()):
+            return
+        shutil.rmtree(self.path)
+        if self.before == "empty":
+            self.path.mkdir()
+
     def close(self) -> None:
         """Give the lock back."""
         os.close(self.lock)
@@ -112,12 +121,13 @@ def open_folder(path: Path, case: Case, *, stages: tuple[str, ...], resume: bool
     """
     _refuse_foreign(path)
     _refuse_gap(path, case, stages)
+    before = "absent" if not path.exists() else ("filled" if any(path.iterdir()) else "empty")
     try:
         path.mkdir(parents=True, exist_ok=True)
         lock = os.open(path / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
     except OSError as error:
         raise CaseError(f"{path}: cannot be made or written: {error.strerror}; give another --out") from error
-    folder = RunFolder(path=path, lock=lock)
+    folder = RunFolder(path=path, lock=lock, before=before)
     try:
         _take_lock(folder)
         _admit(folder, case, stages, resume, force)

@@ -194,3 +194,9 @@ def test_shipped_cases_are_valid_and_short(root: Path, name: str):
     path = root / "cases" / f"{name}.toml"
     assert read_case(path).name == name
     assert len(path.read_text().splitlines()) < 40
+
+
+def test_a_box_for_more_grains_than_memory_is_refused():
+    huge = TINY | {"box": {"size_mm": [800.0, 800.0, 800.0]}, "grains": {"radius_mm": 0.25, "porosity": 0.4}}
+    with pytest.raises(CaseError, match=r"box\.size_mm: \[800.0, 800.0, 800.0\] holds 4\.69e\+09 grains; expected at"):
+        case_from(huge)

@@ -18,17 +18,18 @@ def front_of(grains: Snapshot) -> float:
     return float(min(0.0, np.min(grains.position[:, 0] - grains.radius)))
 
 
+def refuse_crowded_supply(case: Case, scales: Scales) -> None:
+    """Raises CaseError when the slab cannot hold its fines, which does not depend on the grains."""
+    _draw(case, scales, end=0.0)
+
+
 def place_fines(case: Case, scales: Scales, grains: Snapshot) -> Snapshot:
     """Fines (N) in the slab upstream of all grains, moving with the fluid.
 
     Raises CaseError when the slab cannot hold them without overlap.
     """
     assert case.fines is not None
-    rng = np.random.default_rng([case.seed, 11])
-    low, high = case.fines.radius_range_m
-    radius = rng.uniform(low, high, scales.supplied_count)
-    end = front_of(grains) - 2 * high
-    position = _add_sequentially(case, radius, (end - scales.slab_length, end), rng)
+    position, radius = _draw(case, scales, end=front_of(grains) - 2 * case.fines.radius_range_m[1])
     velocity = np.zeros((len(radius), 3))
     velocity[:, 0] = scales.upstream_velocity
     first = int(grains.id.max()) + 1
@@ -42,6 +43,14 @@ def place_fines(case: Case, scales: Scales, grains: Snapshot) -> Snapshot:
         radius=radius,
         velocity=velocity,
     )
+
+
+def _draw(case: Case, scales: Scales, *, end: float) -> tuple[Array, Array]:
+    """Places (N, 3) and radii (N,) m of the slab's fines; it ends at x = `end`."""
+    assert case.fines is not None
+    rng = np.random.default_rng([case.seed, 11])
+    radius = rng.uniform(*case.fines.radius_range_m, scales.supplied_count)
+    return _add_sequentially(case, radius, (end - scales.slab_length, end), rng), radius
 
 
 def _add_sequentially(case: Case, radius: Array, slab: tuple[float, float], rng: np.random.Generator) -> Array:

@@ -139,12 +139,13 @@ def test_a_pack_denser_than_reachable_is_refused_with_the_overlap_it_needs(tmp_p
     assert code == 2
     assert "grains.count: 110 needs grains that overlap by" in err
     assert len(err.strip().splitlines()) == 1
-    assert not (tmp_path / "run" / "manifest.json").exists()
+    assert not (tmp_path / "run").exists()
 
 
-@pytest.mark.xfail(strict=True, reason="dem/packing refuses after pack/ was written: exit 2 should leave nothing")
-def test_a_pack_denser_than_reachable_leaves_no_folder(tmp_path):
-    assert run(tmp_path, "grains.count=110")[0] == 2
+def test_a_supply_that_finds_no_place_leaves_no_folder(tmp_path):
+    code, _, err = run(tmp_path, "fines.count=6000", "fines.concentration=0.3", "fines.radius_mm=0.0999")
+    assert code == 2
+    assert "fines.concentration: 0.3 leaves" in err
     assert not (tmp_path / "run").exists()
 
 
