@@ -54,8 +54,10 @@ class Case(Part):
 
     @property
     def drag_scheme(self) -> str:
-        """`drag.scheme`; "auto" is "viscous" for fines of one size (exact and cheapest), "held" for a range or a refresh
-        that is given (docs/validation.md, section 3)."""
+        """`drag.scheme`; "auto" is "viscous" for fines of one size, "held" for a range or where a refresh is given.
+
+        Both by the study of drag (docs/validation.md, section 3).
+        """
         if self.drag.scheme != "auto":
             return self.drag.scheme
         ranged = self.fines is not None and isinstance(self.fines.radius_mm, tuple)

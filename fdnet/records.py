@@ -28,6 +28,7 @@ def pack_record(case: Case, pack: Pack, assumed: float, seconds: float) -> dict[
         "porosity_error": pack.porosity_error,
         "porosity_sum": pack.porosity_sum,
         "max_overlap": pack.max_overlap,
+        "creep_m_s": pack.creep,
         "steps": pack.steps,
         "dt_s": pack.step_s,
         "attempts": list(pack.attempts),
@@ -76,6 +77,10 @@ def record_warnings(case: Case, pack: dict[str, Any], invasion: dict[str, Any] |
         found.append(
             f"grains overlap by up to {100 * pack['max_overlap']:.1f} % of a diameter: the pack is denser than "
             "rigid spheres get"
+        )
+    if pack.get("creep_m_s"):
+        found.append(
+            f"the pack is barely jammed and still creeps, at {pack['creep_m_s']:.2g} m/s; it is taken as it is"
         )
     if abs(pack["porosity"] - pack["porosity_assumed"]) > POROSITY_WARNING:
         found.append(

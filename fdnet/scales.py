@@ -33,7 +33,8 @@ _NO_FINES: dict[str, Any] = {
     "drag_overlap": 0.0,
     "warnings": (),
 }
-PACK_STAGES, PACK_STAGE_STEPS, PACK_RELAX_STEPS, PACK_START = 30, 300, 20_000, 0.6
+PACK_STAGES, PACK_STAGE_STEPS, PACK_RELAX_STEPS, PACK_START, PACK_STEP = 30, 300, 20_000, 0.6, 0.15
+"""Growth of a pack: stages and their steps, first run of relaxation, first size, step over sqrt(m/k)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,7 +108,7 @@ def _scales(case: Case) -> Scales:
     darcy, interstitial = _velocities(case, porosity, permeability)
     upstream = interstitial if case.drag.upstream == "interstitial" else darcy
     contacts = contacts_of(case)
-    pack_step = 0.15 * math.sqrt(mass_range(case.grains)[0] / contacts["grain-grain"].normal_stiffness)
+    pack_step = PACK_STEP * math.sqrt(mass_range(case.grains)[0] / contacts["grain-grain"].normal_stiffness)
     fine = _fine_scales(case, contacts, interstitial, upstream)
     return Scales(
         porosity=porosity,

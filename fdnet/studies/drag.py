@@ -141,18 +141,16 @@ def _is_every_step(run: Measured) -> bool:
 
 
 _REMARKS = """
-The default is `held`, for 0.05 tau. What the study says of it:
-
 - In whole invasions no scheme's error falls with its cost. Contacts are chaotic: `viscous`, which gives the very
   numbers of `every_step` while contacts are few (20,000 fines, first 0.1 ms), leaves them within 2 ms, and what is then
   left between any two schemes is chance of the size of these bands. At this stiffness holding for up to 1 tau is not
   told from `every_step` in counts, porosity or k, although a falling fine's velocity is then off by a third: the
   deposit, not the flight, decides. In the window of 20,000 fines the depth does show it.
-- Of the 32 means of the full form three stand out of their 95 % bands, about what chance gives; one of them is the
-  default's mean depth, while neither shorter nor longer holding shows it. More seeds would be needed to exclude it.
+- Of the 32 means of the full form three stand out of their 95 % bands, where chance would give one or two; one is the
+  mean depth of drag held for 0.05 tau, while neither shorter nor longer holding shows it. Eight seeds cannot tell.
 - `viscous` is the best buy wherever fines have one size: equal to `every_step` at the same step, without a knob, and
-  the cheapest of all (the more so the more fines are in flight). It should become the default there, `held` staying for
-  ranges of radii and for a fluid velocity that differs from fine to fine, which `viscous` cannot have.
+  the cheapest of all (the more so the more fines are in flight). So it is the default there (`drag.scheme = "auto"`),
+  `held` for 0.05 tau staying for ranges of radii, which `viscous` cannot have.
 - `implicit` is of second order and bounded at any step, but bounded is not accurate: above 1 tau its error is of order
   one. It loses the forward half of drag in the first step of every `run`, which makes it first order and worse than the
   explicit schemes where runs are as short as tau/4; the chunks of these invasions are 4 tau long, sixteen times that.
@@ -189,6 +187,6 @@ STUDY = Study(
             series=(WINDOW_HOLDING, WINDOW_OTHER),
         ),
     ),
-    defaults=dict.fromkeys((HELD, HOLDING, WINDOW_HOLDING), HOLD_OVER_RELAXATION),
+    defaults=dict.fromkeys((OTHER, WINDOW_OTHER), VISCOUS),
     remarks=_REMARKS,
 )

@@ -193,7 +193,7 @@ def knee_sentence(found: Sequence[Level], *, default: Value | None, unit: str = 
     if len(found) > 1 and max(costs) < 1.5 * min(costs):
         least, most = min(found, key=lambda level: level.size), max(found, key=lambda level: level.size)
         return (
-            f"cost does not depend on it ({min(costs):.3g} to {max(costs):.3g} {unit}); error {_percent(least)} at "
+            f"all cost about the same ({min(costs):.3g} to {max(costs):.3g} {unit}); error {_percent(least)} at "
             f"{shown(least.value)} to {_percent(most)} at {shown(most.value)}"
         )
     costliest = max(found, key=lambda level: level.cost)

@@ -1,15 +1,18 @@
 """Packs made by the real binary."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from builders import tiny
 
 from fdnet.dem.liggghts import Launch
-from fdnet.dem.packing import make_pack
-from fdnet.errors import CaseError
+from fdnet.dem.packing import _creep, make_pack
+from fdnet.dem.scene import box_of
+from fdnet.errors import CaseError, LiggghtsError
 from fdnet.scales import scales_of
+from fdnet.snapshot import resting
 
 pytestmark = pytest.mark.liggghts
 DENSE = ("box.size_mm=[5.0,3.0,3.0]", "grains={radius_mm=0.25, porosity=0.36}")
@@ -28,6 +31,21 @@ def test_porosity_is_met_at_rest_and_the_run_repeats_exactly(binary, tmp_path):
     )
     assert np.max(np.abs(pack.grains.velocity)) < 1e-6 * 0.5e-3 * per_second
     assert np.all((pack.grains.position >= 0) & (pack.grains.position <= case.size_m))
+
+
+def test_a_pack_that_creeps_is_taken_and_one_that_moves_is_refused(tmp_path):
+    """The limit is 1e-5 grain diameters per sqrt(m/k)."""
+    case = tiny()
+    scales = scales_of(case)
+    mass = 2650 * 4 / 3 * math.pi * 0.25e-3**3
+    natural = 0.5e-3 * math.sqrt(scales.contacts["grain-grain"].normal_stiffness / mass)
+    still = resting(np.random.default_rng(1).random((50, 3)) * 1e-3, 0.25e-3, box_of(case))
+    direction = np.random.default_rng(2).normal(size=(50, 3))
+    direction /= np.sqrt(np.mean(np.sum(direction**2, axis=1)))
+    slow = replace(still, velocity=0.99e-5 * natural * direction)
+    assert _creep(case, scales, tmp_path, slow) == pytest.approx(0.99e-5 * natural)
+    with pytest.raises(LiggghtsError, match="did not come to rest in 80000 steps, its grains still move at"):
+        _creep(case, scales, tmp_path, replace(still, velocity=1.01e-5 * natural * direction))
 
 
 def test_a_range_of_radii(binary, tmp_path):
