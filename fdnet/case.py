@@ -52,17 +52,6 @@ class Case(Part):
         sideways = self.box.sides == "periodic"
         return False, sideways, sideways
 
-    @property
-    def drag_scheme(self) -> str:
-        """`drag.scheme`; "auto" is "viscous" for fines of one size, "held" for a range or where a refresh is given.
-
-        Both by the study of drag (docs/validation.md, section 3).
-        """
-        if self.drag.scheme != "auto":
-            return self.drag.scheme
-        ranged = self.fines is not None and isinstance(self.fines.radius_mm, tuple)
-        return "held" if ranged or self.drag.refresh_steps is not None else "viscous"
-
     def data(self) -> dict[str, Any]:
         """All keys with a value, defaults written out (TOML has no null: keys without a value are left out)."""
         return _without_none(self.model_dump(mode="json"))

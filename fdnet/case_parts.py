@@ -115,7 +115,7 @@ class Fluid(Part):
 
 
 class Drag(Part):
-    """Stokes drag on every fine, by one of four schemes; `auto` takes the cheapest exact one (`Case.drag_scheme`).
+    """Stokes drag on every fine, by one of four schemes.
 
     `every_step` and `held` (for `refresh_steps` steps) evaluate the force; `viscous` splits it into a constant force
     and viscous damping (one size of fines only); `implicit` solves it for the new velocity, stable at any step.
@@ -123,7 +123,7 @@ class Drag(Part):
 
     field: Literal["uniform", "network"] = "uniform"
     multiplier: Positive = 1.0
-    scheme: Literal["auto", "every_step", "held", "implicit", "viscous"] = "auto"
+    scheme: Literal["every_step", "held", "implicit", "viscous"] = "held"
     refresh_steps: Annotated[int, Field(ge=1)] | None = None
     upstream: Literal["interstitial", "darcy"] = "interstitial"
 

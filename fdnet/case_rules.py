@@ -87,7 +87,7 @@ def _choice_problems(parts: Mapping[str, Any]) -> Iterator[str]:
 def _drag_problems(drag: Drag, fines: Fines | None) -> Iterator[str]:
     if drag.field == "network":
         yield "drag.field: 'network' is not available yet; expected 'uniform'"
-    if drag.scheme not in ("auto", "held") and drag.refresh_steps not in (None, 1):
+    if drag.scheme != "held" and drag.refresh_steps not in (None, 1):
         yield f"drag.refresh_steps: {drag.refresh_steps} belongs to drag.scheme 'held', not {drag.scheme!r}"
     if drag.scheme == "viscous" and fines and isinstance(fines.radius_mm, tuple):
         yield (

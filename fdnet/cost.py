@@ -41,7 +41,7 @@ def cost_of(case: Case, scales: Scales) -> Cost:
         expected = min(expected, scales.slab_length / scales.upstream_velocity + passage + scales.plug_time)
     steps = math.ceil(expected / scales.time_step)
     grain = MOVING_GRAIN_SECONDS if case.grains.motion == "mobile" else FIXED_GRAIN_SECONDS
-    fines = scales.supplied_count * FINE_SECONDS[case.drag_scheme]
+    fines = scales.supplied_count * FINE_SECONDS[case.drag.scheme]
     return Cost(
         pack_seconds=pack, invade_seconds=steps * (STEP_SECONDS + grain_count(case) * grain + fines), steps=steps
     )

@@ -28,13 +28,13 @@ def time_step(case: Case, contacts: dict[str, Contact], tau: float) -> float:
     bound, given = contact_step(case, contacts), case.run.time_step_s
     if given is None:
         derived = case.run.time_step_factor * bound
-        return derived if case.drag_scheme == "implicit" else min(derived, DRAG_WARNING * tau)
+        return derived if case.drag.scheme == "implicit" else min(derived, DRAG_WARNING * tau)
     if given > CONTACT_STEP_LIMIT * bound * _ROUNDING:
         raise CaseError(
             f"run.time_step_s: {given:g} s is above the contact bound {CONTACT_STEP_LIMIT:g} sqrt(m/k) = "
             f"{CONTACT_STEP_LIMIT * bound:.3g} s; lower it or run.stiffness_N_m"
         )
-    if case.drag_scheme != "implicit" and given > DRAG_LIMIT * tau * _ROUNDING:
+    if case.drag.scheme != "implicit" and given > DRAG_LIMIT * tau * _ROUNDING:
         raise CaseError(
             f"run.time_step_s: {given:g} s is above the drag relaxation time {tau:.3g} s, explicit drag would "
             "overshoot; lower it, or take drag.scheme = 'implicit'"
@@ -47,7 +47,7 @@ def hold_steps(case: Case, step: float, tau: float, longest: float) -> int:
 
     Raises CaseError when the given refresh is longer than tau or than the chunk.
     """
-    if case.drag_scheme != "held":
+    if case.drag.scheme != "held":
         return 1
     given, most = case.drag.refresh_steps, math.ceil(longest / step)
     if given is None:
@@ -67,10 +67,10 @@ def hold_steps(case: Case, step: float, tau: float, longest: float) -> int:
 
 def drag_warnings(case: Case, held: float) -> list[str]:
     """What a drag interval of `held` relaxation times costs in accuracy; empty up to 0.1 (implicit: 1)."""
-    limit = DRAG_LIMIT if case.drag_scheme == "implicit" else DRAG_WARNING
+    limit = DRAG_LIMIT if case.drag.scheme == "implicit" else DRAG_WARNING
     if held <= limit * _ROUNDING:
         return []
-    if case.drag_scheme == "implicit":
+    if case.drag.scheme == "implicit":
         return [
             f"implicit drag with a time step of {held:.3g} relaxation times (above {limit:g}): what a fine's velocity "
             f"is off the fluid's turns into {(2 - held) / (2 + held):.2g} of it each step instead of "
@@ -78,5 +78,5 @@ def drag_warnings(case: Case, held: float) -> list[str]:
         ]
     return [
         f"drag is held for {held:.2g} of the relaxation time (above {limit:g}: invasion is biased upward): lower "
-        + ("drag.refresh_steps or run.time_step_s" if case.drag_scheme == "held" else "run.time_step_s")
+        + ("drag.refresh_steps or run.time_step_s" if case.drag.scheme == "held" else "run.time_step_s")
     ]

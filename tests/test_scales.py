@@ -152,7 +152,9 @@ def test_the_plug_time_waits_for_fines_to_arrive():
 @pytest.mark.parametrize("duration_ms", [0.08, 0.2, 2.0])
 def test_a_duration_is_met_by_whole_chunks(stiffness, duration_ms):
     """To half a refresh of drag a chunk, whichever way the steps of a chunk were rounded."""
-    scales = scales_of(tiny(f"run.duration_ms={duration_ms!r}", f"run.stiffness_N_m={stiffness!r}"))
+    scales = scales_of(
+        tiny(f"run.duration_ms={duration_ms!r}", f"run.stiffness_N_m={stiffness!r}", "fluid.velocity_m_s=5.0")
+    )
     chunks, refresh = chunks_of(scales), scales.hold_steps * scales.time_step
     run = chunks * scales.checkpoint_steps * scales.time_step
     assert abs(run - duration_ms * 1e-3) <= 0.5001 * chunks * refresh

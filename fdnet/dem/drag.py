@@ -15,9 +15,9 @@ def drag_variables(case: Case, scales: Scales) -> dict[str, Any]:
     """Variables of the drag block: the scheme and, as text, the numbers that it needs."""
     coefficient = 6 * math.pi * case.fluid.viscosity_cP * 1e-3 * case.drag.multiplier
     slower = scales.interstitial_velocity - scales.upstream_velocity
-    own = _viscous(case, scales, coefficient, slower) if case.drag_scheme == "viscous" else _by_radius(scales, slower)
+    own = _viscous(case, scales, coefficient, slower) if case.drag.scheme == "viscous" else _by_radius(scales, slower)
     return {
-        "scheme": case.drag_scheme,
+        "scheme": case.drag.scheme,
         "coefficient": number(coefficient),
         "velocity": number(scales.interstitial_velocity),
         **own,

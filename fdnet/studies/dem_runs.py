@@ -31,11 +31,13 @@ SLAB: dict[str, Any] = {
     "grains": {"radius_mm": 0.25, "count": 300},
     "fines": {"radius_mm": 0.05, "count": 1000},
     "fluid": {"darcy_length_mm": 8.0},
+    "drag": {"scheme": "viscous"},
     "run": {"duration_ms": 2.0},
     "analysis": {"sections": 4},
 }
 """The invasion of the studies: 300 fixed grains at porosity 0.40, 1,000 fines of 0.10 mm, 2 ms, the velocity (5.4 m/s)
-of thesis specimen 5. A given duration, so that every run follows the same span of time."""
+of thesis specimen 5. A given duration, so that every run follows the same span of time; drag without an error of its
+own (study of drag)."""
 PROFILE_BINS = 16
 """Equal bins of depth over the specimen in which invaded fines are counted."""
 HELD_STEPS = 20
