@@ -113,8 +113,9 @@ def make_profile(edges: Array, porosity: tuple[Porosity, Porosity], depth: Array
 
 def pooled(porosity: Porosity, edges: Array) -> Array:
     """The porosity profile, measured on finer cuts, averaged between `edges`, which are among the cuts."""
-    first, width = np.searchsorted(porosity.edges, edges[:-1]), np.diff(porosity.edges)
-    return np.add.reduceat(width * porosity.profile, first) / np.add.reduceat(width, first)
+    first, end = np.searchsorted(porosity.edges, edges[:-1]), np.searchsorted(porosity.edges, edges[-1])
+    width, void = np.diff(porosity.edges)[:end], porosity.profile[:end]
+    return np.add.reduceat(width * void, first) / np.add.reduceat(width, first)
 
 
 def reduction(before: float, after: float) -> float | None:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from fdnet.errors import CaseError
-from fdnet.network.porosity import measure_porosity
+from fdnet.network.porosity import Porosity, measure_porosity
+from fdnet.network.sections import pooled
 from tests.network.packs import face_centred, random_pack, simple_cubic, snapshot
 
 BOX = np.array([[0.0, 2.0]] * 3)
@@ -58,3 +59,17 @@ def test_empty_box_is_all_void_and_wrong_edges_are_refused():
     assert measure_porosity(empty, periodic=(False,) * 3).mean == 1.0
     with pytest.raises(CaseError, match="ascend"):
         measure_porosity(empty, periodic=(False,) * 3, edges=np.array([0.0, 3.0]))
+
+
+def test_pooling_averages_between_edges_that_leave_out_both_ends():
+    """Cuts 0, 1, 3, 4, 6 with porosities 0.1, 0.4, 0.7, 0.2: between 1 and 4 (0.4 x 2 + 0.7 x 1) / 3."""
+    fine = Porosity(
+        mean=0.0,
+        standard_error=0.0,
+        edges=np.array([0.0, 1.0, 3.0, 4.0, 6.0]),
+        profile=np.array([0.1, 0.4, 0.7, 0.2]),
+        sum=0.0,
+    )
+    assert pooled(fine, np.array([1.0, 3.0, 4.0])) == pytest.approx([0.4, 0.7])
+    assert pooled(fine, np.array([1.0, 4.0])) == pytest.approx([0.5])
+    assert pooled(fine, np.array([0.0, 3.0, 6.0])) == pytest.approx([0.3, 1.1 / 3])
