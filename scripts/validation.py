@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """docs/validation.md from docs/validation.md.in, the committed tables of the studies and the table of hard cases.
 
-    .venv/bin/python scripts/validation.py [--docs docs]
+    .venv/bin/python scripts/validation.py [--docs docs] [--redraw]
 
-Reads docs/validation/NAME.csv of every study and docs/validation/stability.csv; computes nothing else, so it takes a
-second. `fdnet study NAME --out DIR` makes NAME.csv, .png and .md, which are then copied to docs/validation.
+Reads docs/validation/NAME.csv of every study and docs/validation/stability.csv; runs nothing, so it takes a second.
+`fdnet study NAME --out DIR` makes NAME.csv, .png and .md, which are then copied to docs/validation; --redraw makes the
+last two anew from the first.
 """
 
 import argparse
@@ -14,8 +15,10 @@ import sys
 from pathlib import Path
 from string import Template
 
+from fdnet.atomic import write_text
 from fdnet.studies.command import STUDIES, study_named
-from fdnet.studies.table import knee_lines, missing_lines, read_rows
+from fdnet.studies.draw import draw_study
+from fdnet.studies.table import knee_lines, missing_lines, read_rows, study_text
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -23,9 +26,8 @@ ROOT = Path(__file__).resolve().parents[1]
 def study_part(name: str, validation: Path) -> str:
     """Knees, remarks and what was not done of one study, as Markdown."""
     study, rows = study_named(name), read_rows(validation / f"{name}.csv")
-    parts = ["\n".join(f"- {line}" for line in knee_lines(study, rows))]
-    if study.remarks:
-        parts.append(" ".join(study.remarks.split()))
+    parts = [study.remarks.strip()] if study.remarks else []
+    parts.append("In numbers:\n\n" + "\n".join(f"- {line}" for line in knee_lines(study, rows)))
     missing = missing_lines(rows)
     if missing:
         parts.append("Not done:\n\n" + "\n".join(f"- {line}" for line in missing))
@@ -60,10 +62,21 @@ def document(docs: Path) -> str:
     return Template((docs / "validation.md.in").read_text(encoding="utf-8")).substitute(parts)
 
 
+def redraw(validation: Path) -> None:
+    """Figure and text of every study from its committed table."""
+    for name in STUDIES:
+        study, rows = study_named(name), read_rows(validation / f"{name}.csv")
+        draw_study(study, rows, validation / f"{name}.png")
+        write_text(validation / f"{name}.md", study_text(study, rows))
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--docs", type=Path, default=ROOT / "docs", help="where to read and write")
+    parser.add_argument("--redraw", action="store_true", help="figures and texts of the studies from their tables too")
     given = parser.parse_args()
+    if given.redraw:
+        redraw(given.docs / "validation")
     (given.docs / "validation.md").write_text(document(given.docs), encoding="utf-8")
     print(given.docs / "validation.md")
     return 0

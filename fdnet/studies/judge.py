@@ -11,7 +11,8 @@ from fdnet.studies.study import DONE, Measured, Row, Value, row_of, shown
 
 NAN = float("nan")
 CONFIDENCE = 0.95
-_ROUNDING, _FALLS = 1e-12, 0.2
+_ROUNDING, _NINE_DIGITS, _FALLS = 1e-12, 1e-8, 0.2
+"""What counts as no error: of sums, of means of what the table holds; exponent from which error falls with cost."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,7 +162,7 @@ def _level(value: Value, group: Sequence[Row], cost: str) -> Level:
         half = 0.0 if math.isnan(known) else 1.96 * known
     mean_cost = float(np.mean([getattr(row, cost) for row in group]))
     mean = float(np.mean(errors))
-    mean = 0.0 if abs(mean) < _ROUNDING * float(np.max(np.abs(errors))) else mean
+    mean = 0.0 if abs(mean) < _NINE_DIGITS * float(np.max(np.abs(errors))) else mean
     return Level(value=value, runs=count, cost=mean_cost, error=mean, half_width=half)
 
 
@@ -189,8 +190,10 @@ def knee_sentence(found: Sequence[Level], *, default: Value | None, unit: str = 
     at = knee(found)
     if at is None:
         return "no run was done"
+    if len(found) == 1:
+        return f"error {_percent(at)} for {at.cost:.3g} {unit}"
     costs = [level.cost for level in found]
-    if len(found) > 1 and max(costs) < 1.5 * min(costs):
+    if max(costs) < 1.5 * min(costs):
         least, most = min(found, key=lambda level: level.size), max(found, key=lambda level: level.size)
         return (
             f"all cost about the same ({min(costs):.3g} to {max(costs):.3g} {unit}); error {_percent(least)} at "
