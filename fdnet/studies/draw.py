@@ -128,7 +128,7 @@ def _draw_series(axes: Any, name: str, found: Sequence[Level], default: Any, ind
     )
     if any(zero):
         at = [c for c, z in zip(cost, zero, strict=True) if z]
-        axes.plot(at, [floor] * len(at), "v", mfc="none", color=colour, ms=8, label=f"{name}: reference, or no error")
+        axes.plot(at, [floor] * len(at), "v", mfc="none", color=colour, ms=8, label="reference, or no error")
     for level, x, y in zip(found, cost, size, strict=True):
         if level.value == default:
             axes.plot([x], [y], "*", color=colour, mec="k", mew=0.8, ms=17, zorder=5, label="fdnet's default")
