@@ -77,6 +77,6 @@ def drag_warnings(case: Case, held: float) -> list[str]:
             f"{math.exp(-held):.2g}; lower run.time_step_s to resolve it"
         ]
     return [
-        f"drag is held for {held:.2g} of the relaxation time (above {limit:g}: invasion is biased upward): lower "
-        + ("drag.refresh_steps or run.time_step_s" if case.drag.scheme == "held" else "run.time_step_s")
+        f"drag is held for {held:.2g} of the relaxation time (above {limit:g}: a fine's velocity is off by over "
+        "2 %): lower " + ("drag.refresh_steps or run.time_step_s" if case.drag.scheme == "held" else "run.time_step_s")
     ]

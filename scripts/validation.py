@@ -31,11 +31,9 @@ def study_part(name: str, validation: Path) -> str:
     missing = missing_lines(rows)
     if missing:
         parts.append("Not done:\n\n" + "\n".join(f"- {line}" for line in missing))
-    runs = len({(row.series, row.value, row.seed) for row in rows})
-    hours = sum({(row.series, row.value, row.seed): row.wall_s for row in rows}.values()) / 3600
-    parts.append(
-        f"{runs} runs, {hours:.2g} h. Tables: [{name}.md](validation/{name}.md), rows: `validation/{name}.csv`."
-    )
+    seconds = {row.run: row.wall_s for row in rows}
+    tables = f"Tables: [{name}.md](validation/{name}.md), rows: `validation/{name}.csv`."
+    parts.append(f"{len(seconds)} runs, {sum(seconds.values()) / 3600:.2g} h. {tables}")
     return "\n\n".join(parts)
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fdnet.atomic import write_text
+from fdnet.dem.liggghts import find_binary
 from fdnet.errors import CaseError
 from fdnet.studies.draw import draw_study
 from fdnet.studies.runner import run_points
@@ -58,12 +59,17 @@ def study_named(name: str) -> Study:
 
 
 def run_study(study: Study, out: Path, *, quick: bool, show: bool = False) -> str:
-    """Run or continue, then write NAME.csv, NAME.png and NAME.md into `out`; returns the text."""
+    """Run or continue, then write NAME.csv, NAME.png and NAME.md into `out`; returns the text.
+
+    Raises LiggghtsError when the study needs a LIGGGHTS that is not there, CaseError when `out` is not this study's.
+    """
 
     def tell(line: str) -> None:
         if show:
             print(f"{study.name}: {line}", file=sys.stderr, flush=True)
 
+    if study.needs_liggghts:
+        find_binary()
     rows = study.judge(run_points(study, out, quick=quick, tell=tell))
     text = study_text(study, rows)
     write_rows(rows, out / f"{study.name}.csv")

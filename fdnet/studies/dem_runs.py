@@ -3,7 +3,6 @@
 import math
 import re
 import shutil
-from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -40,9 +39,17 @@ of thesis specimen 5. A given duration, so that every run follows the same span 
 own (study of drag)."""
 PROFILE_BINS = 16
 """Equal bins of depth over the specimen in which invaded fines are counted."""
+BINS = tuple(f"bin_{number:02d}" for number in range(PROFILE_BINS))
+OBSERVED = ("invaded", "mean_depth", "porosity_loss", "k_ratio_first")
+"""What is asked of an invasion in most studies."""
 HELD_STEPS = 20
 """Steps for which held drag is held in relaxation_run."""
 _SMALL: dict[str, Any] = {"grains": {"count": 60}, "box": {"size_mm": [2.4, 1.7, 1.7]}, "fines": {"count": 120}}
+
+
+def base_inputs() -> str:
+    """What all invasions of the studies start from, as text: whose numbers a record holds."""
+    return slab_case(1).toml()
 
 
 def slab_case(seed: int, *assignments: str, small: bool = False) -> Case:
@@ -210,13 +217,3 @@ def _relaxed(case: Case, folder: Path, *, terminal: float, tau: float) -> dict[s
         exact = terminal * (1 - math.exp(-row.step * scales.time_step / tau))
         errors.append(abs(velocity - exact) / abs(terminal))
     return {"relaxation_error": max(errors), "steps": float(result.history[-1].step), "core_s": core}
-
-
-def with_number(value: Any) -> str:
-    """A knob's value as text for "key=value"."""
-    return value if isinstance(value, str) else repr(float(value))
-
-
-def settings_text(settings: Mapping[str, Any]) -> list[str]:
-    """Settings of a point as "key=value"."""
-    return [f"{key}={with_number(value)}" for key, value in settings.items()]

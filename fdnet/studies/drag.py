@@ -6,8 +6,8 @@ from pathlib import Path
 
 from fdnet.case import Case
 from fdnet.scales import scales_of
-from fdnet.studies.dem_runs import PROFILE_BINS, invasion_run, relaxation_run, slab_case, window_run
-from fdnet.studies.judge import against_exact, against_reference, profile_distance
+from fdnet.studies.dem_runs import BINS, OBSERVED, base_inputs, invasion_run, relaxation_run, slab_case, window_run
+from fdnet.studies.judge import against_reference, profile_distance, sizes
 from fdnet.studies.study import Measured, Panel, Point, Row, Study, Value
 from fdnet.time_step import HOLD_OVER_RELAXATION
 
@@ -38,8 +38,6 @@ FORMS: Mapping[str, Form] = {
     "window": Form(stiffness=1e4, steps_per_tau=700, chunks=1, keys=("fines.count=20000",)),
 }
 """Whole invasions are run at 1e3 N/m, so that many seeds fit into some minutes."""
-_BINS = tuple(f"bin_{number:02d}" for number in range(PROFILE_BINS))
-_PLAIN = ("invaded", "mean_depth", "porosity_loss", "k_ratio_first")
 _LOOKS = (1.0, 0.5, 2.0)
 """Times, in tau, at which a falling fine is looked at; the quick form takes the first alone."""
 _SPANS = 3.0
@@ -128,9 +126,9 @@ def judge(measured: Sequence[Measured]) -> list[Row]:
     falls = [run for run in measured if "looks" in run.point.settings]
     windows = [run for run in measured if run.point.settings.get("form") == "window"]
     invasions = [run for run in measured if run not in falls and run not in windows]
-    rows = against_exact(falls, "relaxation_error", lambda _: 0.0, scale=lambda _: 1.0)
-    rows += [row for name in _PLAIN for row in against_reference(invasions, name, _is_every_step)]
-    rows += profile_distance(invasions, _BINS, _is_every_step)
+    rows = sizes(falls, "relaxation_error")
+    rows += [row for name in OBSERVED for row in against_reference(invasions, name, _is_every_step)]
+    rows += profile_distance(invasions, BINS, _is_every_step)
     if windows:
         rows += [row for name in ("invaded", "mean_depth") for row in against_reference(windows, name, _is_every_step)]
     return rows
@@ -145,7 +143,7 @@ _REMARKS = """
   numbers of `every_step` while contacts are few (20,000 fines, first 0.1 ms), leaves them within 2 ms, and what is then
   left between any two schemes is chance of the size of these bands. At this stiffness holding for up to 1 tau is not
   told from `every_step` in counts, porosity or k, although a falling fine's velocity is then off by a third: the
-  deposit, not the flight, decides. In the window of 20,000 fines the depth does show it.
+  deposit, not the flight, decides.
 - Of the 32 means of the full form three stand out of their 95 % bands, where chance would give one or two; one is the
   mean depth of drag held for 0.05 tau, while neither shorter nor longer holding shows it. Eight seeds cannot tell.
 - `viscous` is the best buy where fines have one size: equal to `every_step` at the same step, without a knob, and the
@@ -164,6 +162,8 @@ STUDY = Study(
     points=points,
     measure=measure,
     judge=judge,
+    inputs=base_inputs,
+    needs_liggghts=True,
     panels=(
         Panel(
             quantity="relaxation_error",

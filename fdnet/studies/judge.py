@@ -2,33 +2,46 @@
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import t as student
 
+from fdnet.errors import CaseError
 from fdnet.studies.study import DONE, Measured, Row, Value, row_of, shown
 
 NAN = float("nan")
 CONFIDENCE = 0.95
-_ROUNDING, _NINE_DIGITS, _FALLS = 1e-12, 1e-8, 0.2
-"""What counts as no error: of sums, of means of what the table holds; exponent from which error falls with cost."""
+NEARLY, ALIKE, FALLS, FEW_SEEDS = 2.0, 1.5, 0.2, 2
+"""A knee's error over the best one; costs that are alike; exponent from which error falls; seeds too few for a knee."""
+_ROUNDING, _NINE_DIGITS = 1e-12, 1e-8
+"""What counts as no error: of sums, of means of what the table holds."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Level:
-    """All runs of one value of a knob: mean cost s, mean error, half-width of its 95 % band (0: one run)."""
+    """All runs of one value of a knob: mean cost s, mean error, half-width of its 95 % band.
+
+    The band is that of the mean over seeds, widened by the reference's own; of a single run 1.96 times its uncertainty.
+    `reference` marks the level that the errors are taken from.
+    """
 
     value: Value
     runs: int
     cost: float
     error: float
     half_width: float
+    reference: bool = False
 
     @property
     def size(self) -> float:
         """Magnitude of the mean error."""
         return abs(self.error)
+
+    @property
+    def bound(self) -> float:
+        """What the error may be, its band included."""
+        return self.size + self.half_width
 
 
 def against_exact(
@@ -68,14 +81,15 @@ def against_reference(
 
     When `paired` and the reference has the run's seed the difference is taken to that run (same pack, same fines), else
     to the reference's mean. The uncertainty is the scatter of those differences among the seeds of a value; of
-    reference runs the scatter about their own mean. With `magnitude` the row is called "one run's NAME" and holds
+    reference runs the scatter about their own mean; unpaired, the band of the reference's mean is told too. Raises
+    CaseError when no reference run was done. With `magnitude` the row is called "one run's NAME" and holds
     |error|: what one run alone may be off by. What is rounding of the sums is 0.
     """
     done = [run for run in measured if run.status == DONE and quantity in run.observed]
     name = f"one run's {quantity}" if magnitude else quantity
     base = {run.point.seed: run.observed[quantity] for run in done if reference(run)}
     if not base:
-        raise ValueError(f"{quantity}: no reference run was done")
+        raise _without_reference(measured, quantity)
     mean = float(np.mean(list(base.values())))
     size = abs(mean) if mean else 1.0
 
@@ -86,6 +100,7 @@ def against_reference(
 
     errors = {id(run): error(run) for run in done}
     scatter = {key: _deviation([errors[id(run)] for run in runs]) for key, runs in _grouped(done).items()}
+    band = 0.0 if paired else _half_width(list(base.values())) / size
     widest = max((s for s in scatter.values() if not math.isnan(s)), default=NAN)
     rows = []
     for run in measured:
@@ -93,9 +108,31 @@ def against_reference(
             rows.append(row_of(run, name, error=NAN, uncertainty=NAN))
             continue
         own, value = scatter[_level_of(run)], errors[id(run)]
-        sigma = widest if math.isnan(own) else own
-        rows.append(row_of(run, name, error=abs(value) if magnitude else value, uncertainty=sigma))
+        own_band, role = (0.0, "reference") if reference(run) else (band, "")
+        rows.append(
+            row_of(
+                run,
+                name,
+                error=abs(value) if magnitude else value,
+                uncertainty=widest if math.isnan(own) else own,
+                band=0.0 if magnitude else own_band,
+                role="" if magnitude else role,
+            )
+        )
     return rows
+
+
+def _without_reference(measured: Sequence[Measured], quantity: str) -> CaseError:
+    why = "; ".join(sorted({run.status for run in measured if run.status != DONE})[:3]) or "none was asked for"
+    return CaseError(f"{quantity}: no reference run was done ({why}); mend the cause and repeat the command")
+
+
+def _half_width(values: Sequence[float]) -> float:
+    """Half-width of the 95 % band of the mean (Student's t); 0 of a single value."""
+    count = len(values)
+    if count < 2:
+        return 0.0
+    return float(student.ppf(0.5 + CONFIDENCE / 2, count - 1) * np.std(values, ddof=1) / math.sqrt(count))
 
 
 def profile_distance(
@@ -104,23 +141,29 @@ def profile_distance(
     """Distance of every run's depth profile from the reference's mean profile, in units of the reference's mean depth.
 
     Profiles are counts in equal bins, `names` in order; the distance is the area between the cumulative shares (first
-    Wasserstein distance). It is never negative: a reference run is held against the mean of the other reference runs,
-    which gives the distance that chance alone makes.
+    Wasserstein distance). It is never negative: every run is held against the mean of the reference runs of other
+    seeds, so that the reference's own distance is the one that chance alone makes. Raises CaseError when less than two
+    reference runs were done.
     """
     done = [run for run in measured if run.status == DONE and names[0] in run.observed]
     share = {id(run): np.cumsum(_shares([run.observed[name] for name in names])) for run in done}
     base = [run for run in done if reference(run)]
-    if len(base) < 2:
-        raise ValueError(f"{quantity}: {len(base)} reference runs were done, expected at least 2")
+    if len({run.point.seed for run in base}) < 2:
+        raise _without_reference(measured, f"{quantity} (two seeds of a reference are needed)")
 
     def distance(run: Measured) -> float:
-        others = np.mean([share[id(other)] for other in base if other is not run], axis=0)
+        others = np.mean([share[id(other)] for other in base if other.point.seed != run.point.seed], axis=0)
         middle = float(np.sum(1 - others)) + 0.5
         return float(np.sum(np.abs(share[id(run)] - others))) / middle
 
     return [
         row_of(run, quantity, error=distance(run) if id(run) in share else NAN, uncertainty=NAN) for run in measured
     ]
+
+
+def sizes(runs: Sequence[Measured], quantity: str) -> list[Row]:
+    """Rows of a quantity that is an error already, by its magnitude."""
+    return against_exact(runs, quantity, lambda _: 0.0, scale=lambda _: 1.0, magnitude=True)
 
 
 def _shares(counts: Sequence[float]) -> list[float]:
@@ -144,7 +187,12 @@ def _deviation(values: Sequence[float]) -> float:
 
 
 def levels(rows: Sequence[Row], series: str, quantity: str, *, cost: str = "core_s") -> list[Level]:
-    """Means by value of the knob, in the order in which the values appear; runs without an error are left out."""
+    """Means by value of the knob, in the order in which the values appear; runs without an error are left out.
+
+    With `cost` "value" the observed values take the place of errors: a quantity over the knob.
+    """
+    if cost == "value":
+        rows = [replace(row, error=row.observed, error_uncertainty=0.0) for row in rows]
     groups: dict[Value, list[Row]] = {}
     for row in rows:
         if row.series == series and row.quantity == quantity and not math.isnan(row.error):
@@ -155,24 +203,29 @@ def levels(rows: Sequence[Row], series: str, quantity: str, *, cost: str = "core
 def _level(value: Value, group: Sequence[Row], cost: str) -> Level:
     errors = np.array([row.error for row in group])
     count = len(errors)
-    if count > 1:
-        half = float(student.ppf(0.5 + CONFIDENCE / 2, count - 1) * np.std(errors, ddof=1) / math.sqrt(count))
-    else:
-        known = group[0].error_uncertainty
-        half = 0.0 if math.isnan(known) else 1.96 * known
+    known = group[0].error_uncertainty
+    half = _half_width(list(errors)) if count > 1 else (0.0 if math.isnan(known) else 1.96 * known)
+    half = math.hypot(half, group[0].reference_band)
     mean_cost = float(np.mean([getattr(row, cost) for row in group]))
     mean = float(np.mean(errors))
     mean = 0.0 if abs(mean) < _NINE_DIGITS * float(np.max(np.abs(errors))) else mean
-    return Level(value=value, runs=count, cost=mean_cost, error=mean, half_width=half)
+    role = group[0].role == "reference"
+    return Level(value=value, runs=count, cost=mean_cost, error=mean, half_width=half, reference=role)
 
 
 def knee(found: Sequence[Level]) -> Level | None:
-    """The cheapest level whose error is within the band of the smallest: |e| <= least (|e| + h); None without any."""
-    if not found:
+    """The cheapest level whose error, band included, is at most twice the best one's.
+
+    Levels of two seeds, whose bands say nothing, are passed over. None when errors go on falling with cost, or without
+    levels beside the reference.
+    """
+    own = [level for level in found if not level.reference and level.runs != FEW_SEEDS]
+    if not own:
         return None
-    best = min(level.size + level.half_width for level in found)
-    good = [level for level in found if level.size <= best]
-    return min(good, key=lambda level: level.cost)
+    best, costliest = min(level.bound for level in own), max(own, key=lambda level: level.cost)
+    if order(own) > FALLS and costliest.bound == best:
+        return None
+    return min((level for level in own if level.bound <= NEARLY * best), key=lambda level: level.cost)
 
 
 def order(found: Sequence[Level]) -> float:
@@ -187,35 +240,45 @@ def order(found: Sequence[Level]) -> float:
 
 def knee_sentence(found: Sequence[Level], *, default: Value | None, unit: str = "s") -> str:
     """What the levels say, in one sentence: the knee, the order where error falls with cost, and the default."""
-    at = knee(found)
-    if at is None:
-        return "no run was done"
-    if len(found) == 1:
-        return f"error {_percent(at)} for {at.cost:.3g} {unit}"
-    costs = [level.cost for level in found]
-    if max(costs) < 1.5 * min(costs):
-        least, most = min(found, key=lambda level: level.size), max(found, key=lambda level: level.size)
+    own = [level for level in found if not level.reference]
+    if not own:
+        return f"nothing beside the reference, {shown(found[0].value)}" if found else "no run was done"
+    parts = [_knee_words(own, unit), *_order_words(own)]
+    parts += [f"default {_cost_words(level, unit)}" for level in found if level.value == default and len(found) > 1]
+    parts += [
+        f"errors from {shown(level.value)}, which costs {level.cost:.3g} {unit}" for level in found if level.reference
+    ]
+    return "; ".join(parts)
+
+
+def _knee_words(own: Sequence[Level], unit: str) -> str:
+    least, most = min(own, key=lambda level: level.cost), max(own, key=lambda level: level.cost)
+    if len(own) == 1:
+        return f"error {_cost_words(own[0], unit, named=False)}"
+    if most.cost < ALIKE * least.cost:
+        low, high = min(own, key=lambda level: level.size), max(own, key=lambda level: level.size)
         return (
-            f"all cost about the same ({min(costs):.3g} to {max(costs):.3g} {unit}); error {_percent(least)} at "
-            f"{shown(least.value)} to {_percent(most)} at {shown(most.value)}"
+            f"all cost about the same ({least.cost:.3g} to {most.cost:.3g} {unit}); error {_percent(low)} at "
+            f"{shown(low.value)} to {_percent(high)} at {shown(high.value)}"
         )
-    costliest = max(found, key=lambda level: level.cost)
-    power = order(found)
-    falls = f"error falls as cost^-{power:.2g}" if not math.isnan(power) and power > _FALLS else ""
-    end = f"{_percent(costliest)} for {costliest.cost:.3g} {unit}"
-    if at is costliest:
-        said = f"no knee, the costliest, {shown(at.value)}, is the best: {end}{'; ' if falls else ''}{falls}"
-    else:
-        said = (
-            f"knee at {shown(at.value)}: error {_percent(at)} for {at.cost:.3g} {unit}; the costliest, "
-            f"{shown(costliest.value)}, has {end}{'; ' if falls else ''}{falls}"
-        )
-    chosen = next((level for level in found if level.value == default), None)
-    return (
-        said
-        if chosen is None
-        else f"{said}; default {shown(chosen.value)}: {_percent(chosen)}, {chosen.cost:.3g} {unit}"
-    )
+    if all(level.runs == FEW_SEEDS for level in own):
+        return f"too few seeds for a knee; the costliest {_cost_words(most, unit)}"
+    at = knee(own)
+    if at is None:
+        return f"no knee: the costliest is the best, {_cost_words(most, unit)}"
+    if at is most:
+        return f"only the costliest will do, {_cost_words(most, unit)}"
+    return f"knee at {_cost_words(at, unit)}; the costliest {_cost_words(most, unit)}"
+
+
+def _order_words(own: Sequence[Level]) -> list[str]:
+    power = order(own)
+    return [f"error falls as cost^-{power:.2g}"] if power > FALLS else []
+
+
+def _cost_words(level: Level, unit: str, *, named: bool = True) -> str:
+    name = f"{shown(level.value)}: " if named else ""
+    return f"{name}{_percent(level)} for {level.cost:.3g} {unit}"
 
 
 def _percent(level: Level) -> str:

@@ -174,7 +174,7 @@ def _cost_rows(run: Measured) -> Iterator[Row]:
     method, decades = str(run.point.settings["method"]), run.point.settings["decades"]
     costs = {CORE: run.core_s, MEMORY: run.peak_memory_bytes / 1e6, STEPS: run.steps}
     for name, value in costs.items():
-        row = row_of(run, name, error=value, uncertainty=0.0)
+        row = row_of(run, name, error=float("nan"), uncertainty=float("nan"))
         yield replace(row, series=f"{method}, {decades:g} decades", knob="pores", value=_pores(run), observed=value)
 
 

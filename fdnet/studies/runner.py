@@ -2,6 +2,8 @@
 
 import contextlib
 import ctypes
+import fcntl
+import hashlib
 import json
 import multiprocessing as mp
 import os
@@ -13,18 +15,20 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Self
 
 from fdnet.errors import CaseError, FdnetError, LiggghtsError
 from fdnet.studies.study import COSTS, DONE, Measured, Point, Study
 
 POINTS, WORK = "points.jsonl", "work"
-OVER_TIME, OVER_MEMORY = "over time", "over memory"
+OVER_TIME, OVER_MEMORY, FAILED = "over time", "over memory", "failed"
 NAN = float("nan")
 Measure = Callable[[Point, Path], Mapping[str, float]]
 
 
 def run_points(study: Study, out: Path, *, quick: bool, tell: Callable[[str], None] = lambda _: None) -> list[Measured]:
-    """All points of the study's form, measured; those recorded in `out` by an earlier session are not run again.
+    """All points of the study's form, measured; those recorded in `out` by an earlier session are not run again,
+    unless they failed.
 
     `tell` gets a line after each point, with an estimate of the time left. Raises CaseError when `out` holds something
     else. A point that is refused, fails or exceeds its limits is recorded with that status.
@@ -32,19 +36,30 @@ def run_points(study: Study, out: Path, *, quick: bool, tell: Callable[[str], No
     points = study.points(quick)
     keys = [point.key for point in points]
     assert len(set(keys)) == len(keys), f"study {study.name}: a point appears twice"
-    record = _Record(out, {"study": study.name, "form": "quick" if quick else "full"})
-    known = record.known(points)
+    owner = {"study": study.name, "form": "quick" if quick else "full", "inputs": _digest(study.inputs())}
+    with _Record(out, owner) as record:
+        return _run_all(study, points, record, quick=quick, tell=tell)
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _run_all(
+    study: Study, points: Sequence[Point], record: "_Record", *, quick: bool, tell: Callable[[str], None]
+) -> list[Measured]:
+    known, work = record.known(points), record.path.parent / WORK
     todo = [point for point in points if point.key not in known]
     if len(known):
         tell(f"{len(known)} of {len(points)} points are there already")
     start = time.monotonic()
     for number, point in enumerate(todo, 1):
-        known[point.key] = measured = _measure(study, point, out / WORK, quick=quick)
+        known[point.key] = measured = _measure(study, point, work, quick=quick)
         record.add(measured)
         left = (time.monotonic() - start) / number * (len(todo) - number)
         tell(f"{len(known)} of {len(points)}: {point.key}: {measured.status}, {measured.wall_s:.1f} s{_eta(left)}")
-    shutil.rmtree(out / WORK, ignore_errors=True)
-    return [known[key] for key in keys]
+    shutil.rmtree(work, ignore_errors=True)
+    return [known[point.key] for point in points]
 
 
 def _eta(seconds: float) -> str:
@@ -65,14 +80,27 @@ class _Record:
         if out.exists() and any(out.iterdir()) and not self.path.exists():
             raise CaseError(f"{out}: holds no fdnet study (no {POINTS}); give an empty or new folder with --out")
         out.mkdir(parents=True, exist_ok=True)
-        if not self.path.exists():
+        self.lock = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o644)
+
+    def __enter__(self) -> Self:
+        try:
+            fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            os.close(self.lock)
+            raise CaseError(f"{self.path}: another session of this study is writing here; wait for it") from error
+        if not self.path.stat().st_size:
             self.path.write_text(json.dumps(self.owner) + "\n", encoding="utf-8")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        os.close(self.lock)
 
     def known(self, points: Sequence[Point]) -> dict[str, Measured]:
-        """Recorded points by key; an unfinished last line is cut off, points not asked for stay there."""
+        """Recorded points by key; an unfinished last line is cut off, points not asked for stay there, failed ones are
+        left to be run again."""
         text = self.path.read_text(encoding="utf-8", errors="replace")
         whole = text[: text.rfind("\n") + 1]
-        lines = [json.loads(line) for line in whole.splitlines()]
+        lines = [self._line(number, line) for number, line in enumerate(whole.splitlines(), 1)]
         if not lines or lines[0] != self.owner:
             found = lines[0] if lines else "nothing"
             raise CaseError(f"{self.path}: belongs to {found}, expected {self.owner}; give another --out")
@@ -82,8 +110,17 @@ class _Record:
         return {
             line["key"]: Measured(point=by_key[line["key"]], **_numbers(line))
             for line in lines[1:]
-            if line["key"] in by_key
+            if line["key"] in by_key and not str(line["status"]).startswith(FAILED)
         }
+
+    def _line(self, number: int, text: str) -> dict:
+        try:
+            found = json.loads(text)
+        except ValueError:
+            found = None
+        if not isinstance(found, dict) or (number > 1 and not {"key", "status"} <= set(found)):
+            raise CaseError(f"{self.path}:{number}: is no record of a point; remove the line, or give another --out")
+        return found
 
     def add(self, measured: Measured) -> None:
         fields = asdict(measured)
@@ -117,7 +154,7 @@ def _measure(study: Study, point: Point, work: Path, *, quick: bool) -> Measured
         return receiver.recv() if answered else _nothing(point, OVER_TIME, time.monotonic() - start)
     except EOFError:
         process.join()
-        status = f"failed: its process ended with exit code {process.exitcode}"
+        status = f"{FAILED}: its process ended with exit code {process.exitcode}"
         return _nothing(point, status, time.monotonic() - start)
     finally:
         process.kill()
@@ -138,6 +175,7 @@ def _child(measure: Measure, point: Point, work: Path, limits: tuple[float, floa
 
 def _attempt(measure: Measure, point: Point, work: Path) -> Measured:
     """One measurement with its costs; what fdnet refuses is a status, what is a fault of the study is raised."""
+    forget_peak()
     wall, core = time.monotonic(), core_seconds()
     try:
         found = dict(measure(point, work))
@@ -159,7 +197,7 @@ def _attempt(measure: Measure, point: Point, work: Path) -> Measured:
 def _why(error: FdnetError, work: Path) -> str:
     """What fdnet refused or how LIGGGHTS failed, without the advice and without the folder it happened in."""
     said = " ".join(str(error).split()).replace(f"{work}/", "").split("; ")[0]
-    return f"{'failed' if isinstance(error, LiggghtsError) else 'refused'}: {said}"
+    return f"{FAILED if isinstance(error, LiggghtsError) else 'refused'}: {said}"
 
 
 def _nothing(point: Point, status: str, wall: float) -> Measured:

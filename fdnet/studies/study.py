@@ -50,7 +50,11 @@ class Measured:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """One line of the table: the error of one quantity of one run, with the error's own (one sigma) uncertainty."""
+    """One line of the table: the error of one quantity of one run, with the error's own (one sigma) uncertainty.
+
+    `reference_band` is the 95 % half-width of the mean the error is taken from, 0 where it is exact or the same seed's;
+    `role` is "reference" for the runs that are that mean themselves; `run` is the point's key.
+    """
 
     series: str
     knob: str
@@ -60,11 +64,14 @@ class Row:
     observed: float
     error: float
     error_uncertainty: float
+    reference_band: float
     wall_s: float
     core_s: float
     steps: float
     peak_memory_mb: float
     status: str
+    role: str
+    run: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,6 +100,7 @@ class Study:
     `judge(measured)` turns all of them into rows. `defaults` gives fdnet's own value of the knob by series, `remarks`
     what the numbers cannot say. Points of the full form run in a process of their own, limited to `seconds` and
     `bytes`, unless not `isolated` (or, a function, not for that point); those of the quick form all in one.
+    `inputs()` names whatever else decides the numbers (a base case), so that a study is not continued with another.
     """
 
     name: str
@@ -105,6 +113,8 @@ class Study:
     defaults: Mapping[str, Value] = field(default_factory=dict)
     remarks: str = ""
     isolated: bool | Callable[[Point], bool] = True
+    inputs: Callable[[], str] = str
+    needs_liggghts: bool = False
     seconds: float = 3600.0
     bytes: float = 16 * 2.0**30
 
@@ -114,7 +124,9 @@ def shown(value: Value) -> str:
     return value if isinstance(value, str) else f"{value:.6g}"
 
 
-def row_of(measured: Measured, quantity: str, *, error: float, uncertainty: float) -> Row:
+def row_of(
+    measured: Measured, quantity: str, *, error: float, uncertainty: float, band: float = 0.0, role: str = ""
+) -> Row:
     """The row of one quantity of one run; `uncertainty` is one standard deviation of the error."""
     point = measured.point
     return Row(
@@ -126,9 +138,12 @@ def row_of(measured: Measured, quantity: str, *, error: float, uncertainty: floa
         observed=measured.observed.get(quantity, float("nan")),
         error=error,
         error_uncertainty=uncertainty,
+        reference_band=band,
         wall_s=measured.wall_s,
         core_s=measured.core_s,
         steps=measured.steps,
         peak_memory_mb=measured.peak_memory_bytes / 1e6,
         status=measured.status,
+        role=role,
+        run=point.key,
     )

@@ -15,7 +15,7 @@ from fdnet.studies.judge import Level, knee_sentence, levels
 from fdnet.studies.study import DONE, Panel, Row, Study, shown
 
 COLUMNS = tuple(field.name for field in fields(Row))
-_TEXT = ("series", "knob", "quantity", "status")
+_TEXT = ("series", "knob", "quantity", "status", "role", "run")
 
 
 def write_rows(rows: Sequence[Row], path: Path) -> None:
@@ -60,7 +60,9 @@ def _value(name: str, text: str) -> str | int | float:
 
 def study_text(study: Study, rows: Sequence[Row]) -> str:
     """Markdown: the knee of every series in every panel, the study's remarks, what was not done, tables of levels."""
-    parts = [f"# {study.title}", "\n".join(f"- {line}" for line in knee_lines(study, rows))]
+    parts = [f"# {study.title}"]
+    if knees := knee_lines(study, rows):
+        parts.append("\n".join(f"- {line}" for line in knees))
     if study.remarks:
         parts.append(study.remarks.strip())
     missing = missing_lines(rows)

@@ -5,12 +5,11 @@ from pathlib import Path
 
 from fdnet.case import Run as RunControl
 from fdnet.studies.collisions import collision_run, energy_run
-from fdnet.studies.dem_runs import invasion_run, relaxation_run, slab_case
-from fdnet.studies.judge import against_exact, against_reference
+from fdnet.studies.dem_runs import OBSERVED, base_inputs, invasion_run, relaxation_run, slab_case
+from fdnet.studies.judge import against_reference, sizes
 from fdnet.studies.study import Measured, Panel, Point, Row, Study
 
 COLLISION, ENERGY, INVASION, DRAG = "collision", "undamped pack", "invasion", "drag relaxation"
-_PLAIN = ("invaded", "mean_depth", "porosity_loss", "k_ratio_first")
 _SPAN, _SPANS = 1e-5, 300.0
 _STIFFNESS = 1e4
 _INVASION_STIFFNESS = 1e3
@@ -73,15 +72,11 @@ def judge(measured: Sequence[Measured]) -> list[Row]:
         (ENERGY, ("energy_drift",)),
         (DRAG, ("relaxation_error",)),
     ):
-        rows += [row for name in names for row in _sizes(of(series), name)]
+        rows += [row for name in names for row in sizes(of(series), name)]
     finest = min(float(run.point.value) for run in of(INVASION))
     return rows + [
-        row for name in _PLAIN for row in against_reference(of(INVASION), name, lambda run: run.point.value == finest)
+        row for name in OBSERVED for row in against_reference(of(INVASION), name, lambda run: run.point.value == finest)
     ]
-
-
-def _sizes(runs: Sequence[Measured], name: str) -> list[Row]:
-    return against_exact(runs, name, lambda _: 0.0, scale=lambda _: 1.0, magnitude=True)
 
 
 _FACTOR = RunControl().time_step_factor
@@ -92,6 +87,8 @@ STUDY = Study(
     points=points,
     measure=measure,
     judge=judge,
+    inputs=base_inputs,
+    needs_liggghts=True,
     panels=(
         Panel(quantity="overlap_error", title="deepest overlap of two fines", cost="steps"),
         Panel(quantity="restitution_error", title="restitution of two fines", cost="steps"),

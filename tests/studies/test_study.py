@@ -1,16 +1,19 @@
 """The study command: rows, errors, knees, and going on where a session was cut."""
 
+import fcntl
 import json
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 import toy_study
 from toy_study import toy
 
 from fdnet.cli import main
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, LiggghtsError
 from fdnet.studies.command import STUDIES, run_study, study_named
-from fdnet.studies.judge import Level, against_reference, knee, knee_sentence, levels, order
+from fdnet.studies.judge import Level, against_reference, knee, knee_sentence, levels, order, profile_distance
 from fdnet.studies.runner import POINTS, run_points
 from fdnet.studies.study import DONE, Measured, Panel, Point, Row
 from fdnet.studies.table import read_rows
@@ -102,15 +105,103 @@ def test_a_level_has_the_confidence_band_of_its_seeds():
     assert band.half_width == pytest.approx(4.302653 * 0.1 / math.sqrt(3), rel=1e-6)
 
 
-def test_the_knee_is_the_cheapest_that_cannot_be_told_from_the_best():
+def test_the_knee_is_the_cheapest_within_twice_the_best_bound():
     noisy = [level(1, 1.0, 0.5, 0.1), level(2, 2.0, 0.028, 0.02), level(3, 4.0, 0.01, 0.02), level(4, 8.0, 0.012, 0.02)]
     found = knee(noisy)
     assert found is not None
     assert found.value == 2
-    exact = [level(1, 1.0, 0.5), level(2, 2.0, 0.25), level(3, 4.0, 0.125)]
-    assert knee(exact) == exact[2]
-    assert "cost^-1" in knee_sentence(exact, default=2)
     assert knee([]) is None
+
+
+def test_errors_that_go_on_falling_have_no_knee():
+    exact = [level(1, 1.0, 0.5), level(2, 2.0, 0.25), level(3, 4.0, 0.125)]
+    assert knee(exact) is None
+    said = knee_sentence(exact, default=2)
+    assert said.startswith("no knee: the costliest is the best, 3: +12.5 %")
+    assert "cost^-1" in said
+
+
+def test_neither_the_reference_nor_a_lucky_pair_of_seeds_is_a_knee():
+    """Two seeds can cancel to an error of 0; the reference has none by construction."""
+    found = [
+        Level(value="lucky", runs=2, cost=1.0, error=0.0, half_width=0.5),
+        Level(value="fair", runs=5, cost=2.0, error=0.02, half_width=0.02),
+        Level(value="good", runs=5, cost=4.0, error=0.01, half_width=0.02),
+        Level(value="truth", runs=5, cost=9.0, error=0.0, half_width=0.01, reference=True),
+    ]
+    at = knee(found)
+    assert at is not None
+    assert at.value == "fair"
+    assert "errors from truth, which costs 9 s" in knee_sentence(found, default="good")
+    assert knee_sentence(found[:1], default=None) == "error +0 ± 50 % for 1 s"
+
+
+def test_unpaired_levels_carry_the_band_of_their_reference():
+    """Both means of the same distribution: the band of their difference holds 0 in some 95 of 100 trials."""
+    rng = np.random.default_rng(5)
+    outside = 0
+    for _ in range(200):
+        runs = [measured("poor", seed, q=q) for seed, q in enumerate(rng.normal(1.0, 0.1, 10))]
+        runs += [measured("good", 100 + seed, q=q) for seed, q in enumerate(rng.normal(1.0, 0.1, 5))]
+        rows = against_reference(runs, "q", lambda run: run.point.value == "good", paired=False)
+        poor = next(found for found in levels(rows, "s", "q") if found.value == "poor")
+        outside += poor.size > poor.half_width
+    assert outside < 0.08 * 200
+
+
+def test_a_setting_equal_to_the_reference_has_the_references_own_distance():
+    rng = np.random.default_rng(3)
+    profiles = rng.integers(1, 50, (4, 6)).astype(float)
+    names = [f"bin_{n}" for n in range(6)]
+    runs = [
+        measured(value, seed, **dict(zip(names, profile, strict=True)))
+        for value in ("same", "reference")
+        for seed, profile in enumerate(profiles)
+    ]
+    rows = profile_distance(runs, names, lambda run: run.point.value == "reference")
+    same, reference = levels(rows, "s", "profile")
+    assert same.error == pytest.approx(reference.error)
+
+
+def test_without_a_reference_the_refusal_says_why():
+    lost = replace(measured("good", 1, q=1.0), status="failed: LIGGGHTS not found", observed={})
+    with pytest.raises(CaseError, match=r"no reference run was done \(failed: LIGGGHTS not found\)"):
+        against_reference([lost, measured("poor", 1, q=2.0)], "q", lambda run: run.point.value == "good")
+
+
+def test_a_study_that_needs_liggghts_says_so_before_its_first_point(tmp_path, monkeypatch):
+    monkeypatch.setenv("FDNET_LIGGGHTS", "/nowhere/liggghts")
+    with pytest.raises(LiggghtsError, match="not found"):
+        run_study(toy(needs_liggghts=True), tmp_path / "out", quick=True)
+    assert not (tmp_path / "out").exists()
+
+
+def test_failed_points_are_run_again_and_refused_ones_are_not(tmp_path):
+    out = tmp_path / "out"
+    run_points(toy(), out, quick=True)
+    record = out / POINTS
+    lines = [json.loads(line) for line in record.read_text().splitlines()]
+    lines[1] |= {"status": "failed: disk full", "observed": {}}
+    lines[2] |= {"status": "refused: no", "observed": {}}
+    record.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    found = run_points(toy(), out, quick=True)
+    assert [run.status for run in found] == [DONE, "refused: no", DONE]
+    assert [run.status for run in run_points(toy(), out, quick=True)] == [DONE, "refused: no", DONE]
+
+
+def test_a_record_of_other_inputs_or_of_a_session_under_way_is_refused(tmp_path):
+    out = tmp_path / "out"
+    run_points(toy(), out, quick=True)
+    with pytest.raises(CaseError, match="belongs to"):
+        run_points(toy(inputs=lambda: "another base case"), out, quick=True)
+    with (out / POINTS).open("r+") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        with pytest.raises(CaseError, match="another session"):
+            run_points(toy(), out, quick=True)
+    with (out / POINTS).open("a") as file:
+        file.write("{broken\n")
+    with pytest.raises(CaseError, match=r"points\.jsonl:5: is no record"):
+        run_points(toy(), out, quick=True)
 
 
 def test_rows_survive_the_table(tmp_path):
@@ -118,7 +209,7 @@ def test_rows_survive_the_table(tmp_path):
 
     row = Row(
         series="a, b", knob="k", value="held", seed=3, quantity="q", observed=1.5, error=NAN, error_uncertainty=NAN,
-        wall_s=1.0, core_s=2.0, steps=NAN, peak_memory_mb=3.0, status="over time",
+        reference_band=0.0, wall_s=1.0, core_s=2.0, steps=NAN, peak_memory_mb=3.0, status="over time", role="", run="x",
     )  # fmt: skip
     write_rows([row], tmp_path / "rows.csv")
     (again,) = read_rows(tmp_path / "rows.csv")
@@ -146,7 +237,7 @@ def test_every_study_has_quick_points_and_unique_keys(name):
 def test_the_record_says_whose_it_is(tmp_path):
     run_points(toy(), tmp_path / "out", quick=True)
     first = (tmp_path / "out" / POINTS).read_text().splitlines()[0]
-    assert json.loads(first) == {"study": "toy", "form": "quick"}
+    assert json.loads(first) == {"study": "toy", "form": "quick", "inputs": "e3b0c44298fc1c14"}
 
 
 def test_memory_is_that_of_the_point_and_not_of_who_started_it(tmp_path):
@@ -160,7 +251,7 @@ def test_memory_is_that_of_the_point_and_not_of_who_started_it(tmp_path):
 def test_a_panel_over_the_knob_has_a_table_of_its_own(tmp_path):
     panel = Panel(quantity="integral", title="by cells", label="error", cost="value", knob="cells", common="point")
     text = run_study(toy(panels=(panel,)), tmp_path / "out", quick=True)
-    assert "| cells | error |\n|---|---|\n| 4 | -0.0156 |" in text
+    assert "| cells | error |\n|---|---|\n| 4 | 0.328 |" in text
     assert "knee" not in text
 
 
