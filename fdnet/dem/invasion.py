@@ -147,7 +147,7 @@ class _Keeper:
 def _over(case: Case, scales: Scales, last: Checkpoint | None) -> bool:
     if last is None:
         return False
-    return (case.run.duration_ms is None and quiet_enough(case, scales, last)) or last.chunk >= chunks_of(scales)
+    return (case.run.duration_ms is None and quiet_enough(case, scales, last)) or last.chunk >= chunks_of(case, scales)
 
 
 def _prepare(
