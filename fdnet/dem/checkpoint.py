@@ -78,6 +78,12 @@ def read_history(folder: Path) -> tuple[Checkpoint, ...]:
     return tuple(rows)
 
 
+def has_history(folder: Path) -> bool:
+    """Whether history.csv holds any whole line below its title."""
+    path = folder / HISTORY
+    return path.exists() and path.read_text(errors="replace").count("\n") > 1
+
+
 def _is_count(text: str) -> bool:
     try:
         return float(text) == int(float(text))
