@@ -127,7 +127,7 @@ def test_a_run_within_the_limit_is_not_stopped(binary, grains, tmp_path):
 def test_a_checkpoint_without_its_row_is_named_where_it_is_looked_at(
     binary, grains, tmp_path, monkeypatch, policy, raised
 ):
-    case = tiny("run.cap_ms=0.2", "fluid.velocity_m_s=1.0", f"run.on_overlap={policy}")
+    case = tiny("run.cap_ms=0.2", "run.checkpoint_ms=0.1", "fluid.velocity_m_s=1.0", f"run.on_overlap={policy}")
     real = invasion.read_history
     monkeypatch.setattr(invasion, "read_history", lambda folder: tuple(r for r in real(folder) if r.chunk != 1))
     with pytest.raises(LiggghtsError, match=raised) if raised else nullcontext():
