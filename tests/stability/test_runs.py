@@ -76,6 +76,9 @@ def test_a_hard_case_runs_and_keeps_its_bounds(tmp_path, name, assignments):
     wanted = {"porosity 0.60": 0.60, "porosity 0.30": 0.30}
     if name in wanted:
         assert summary["porosity_initial"] == pytest.approx(wanted[name], abs=0.01)
+    if name == "the contact bound":
+        limits = [contact.step_limit for contact in scales_of(read_case(tmp_path / "case.toml")).contacts.values()]
+        assert summary["dem_dt_s"] == pytest.approx(0.2 * min(limits), rel=1e-6)
     if name == "porosity 0.30":
         assert any("denser than rigid spheres get" in one for one in summary["warnings"])
 
