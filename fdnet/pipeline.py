@@ -10,7 +10,7 @@ from typing import Any
 
 from fdnet.case import Case
 from fdnet.cost import refuse_long
-from fdnet.dem.checkpoint import read_history, state_at
+from fdnet.dem.checkpoint import has_history, read_history, state_at
 from fdnet.dem.dump import read_frame
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Binary, Launch, find_binary
@@ -81,19 +81,20 @@ def run_case(case: Case, options: RunOptions) -> dict[str, Any]:
     scales = scales_of(case)
     needed = _stages_to_run(case, options)
     refuse_long(case, scales, pack="pack" in needed, invade="invade" in needed)
-    if "invade" in needed:
+    if "invade" in needed and (options.force or not has_history(options.out / "invade")):
         refuse_crowded_supply(case, scales)
     if needed:
         find_binary(options.liggghts)
     folder = open_folder(options.out, case, stages=options.stages, resume=options.resume, force=options.force)
     try:
         story = _Story(case=case, scales=scales, folder=folder, options=options)
-        manifest = folder.manifest()
-        if manifest is not None and set(options.stages) <= set(manifest["stages"]):
+        if folder.manifest() is not None and folder.holds(case, options.stages):
             return _read_summary(folder)
         return _run_stages(story)
-    except CaseError:
-        folder.discard()
+    except CaseError as error:
+        left = folder.discard()
+        if left:
+            raise CaseError(f"{error}; {left}") from error
         raise
     finally:
         folder.close()

@@ -43,11 +43,12 @@ _OUTPUTS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunFolder:
-    """A folder this process holds the lock of; `before` is what was there: "absent", "empty" or "filled"."""
+    """A folder this process holds the lock of; `was_empty` before, `made` with these folders, innermost first."""
 
     path: Path
     lock: int
-    before: str
+    was_empty: bool
+    made: tuple[Path, ...]
 
     def record(self, stage: str) -> dict[str, Any] | None:
         """What a finished stage (pack, invade) left behind, or None. Raises CaseError when it cannot be understood."""
@@ -76,6 +77,14 @@ class RunFolder:
             )
         return manifest
 
+    def holds(self, case: Case, stages: tuple[str, ...]) -> bool:
+        """Whether every one of `stages` is done already. Raises CaseError as `manifest` and `record` do."""
+        manifest = self.manifest()
+        if manifest is not None:
+            return set(stages) <= set(manifest["stages"])
+        needed = [stage for stage in stages if stage != "invade" or case.fines]
+        return set(needed) <= set(_RECORDS) and all(self.record(stage) is not None for stage in needed)
+
     def complete(self, manifest: dict[str, Any] | None) -> None:
         """End this session well; a manifest (None: not analysed yet) makes the run complete."""
         if manifest is not None:
@@ -86,23 +95,36 @@ class RunFolder:
         """Remove the outputs of these stages; the manifest goes first, so a half-cleared run is never complete."""
         (self.path / MANIFEST).unlink(missing_ok=True)
         for name in (name for stage in stages for name in _OUTPUTS[stage]):
-            target = self.path / name
-            if target.is_dir():
-                shutil.rmtree(target)
-            else:
-                target.unlink(missing_ok=True)
+            _remove(self.path / name)
 
-    def discard(self) -> None:
-        """Bad input leaves nothing behind: a new folder is as before, unless a stage was finished in it."""
-        if self.before == "filled" or any((self.path / name).exists() for name in _RECORDS.values()):
-            return
-        shutil.rmtree(self.path)
-        if self.before == "empty":
-            self.path.mkdir()
+    def discard(self) -> str:
+        """Bad input leaves nothing behind: a new folder is as before, unless a stage was finished in it.
+
+        Returns what could not be cleared, in words; "" when all could.
+        """
+        if not self.was_empty or any((self.path / name).exists() for name in _RECORDS.values()):
+            return ""
+        try:
+            for child in list(self.path.iterdir()):
+                _remove(child)
+            for folder in self.made:
+                if any(folder.iterdir()):
+                    break
+                folder.rmdir()
+        except OSError as error:
+            return f"{self.path} could not be cleared ({error.strerror}): remove what is left in it"
+        return ""
 
     def close(self) -> None:
         """Give the lock back."""
         os.close(self.lock)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def _expected(manifest: dict[str, Any], stage: str) -> tuple[str, ...]:
@@ -113,7 +135,7 @@ def _expected(manifest: dict[str, Any], stage: str) -> tuple[str, ...]:
 
 
 def open_folder(path: Path, case: Case, *, stages: tuple[str, ...], resume: bool, force: bool) -> RunFolder:
-    """Lock the folder for this case, making it if need be, and write case.toml.
+    """Lock the folder for this case, making it if need be, and write case.toml if anything is left to run.
 
     Raises CaseError, with nothing changed, when a stage asked for lacks its forerunner, when another run is writing
     there, when the folder holds another case or an unfinished run and neither resume nor force was asked for, or when
@@ -121,13 +143,14 @@ def open_folder(path: Path, case: Case, *, stages: tuple[str, ...], resume: bool
     """
     _refuse_foreign(path)
     _refuse_gap(path, case, stages)
-    before = "absent" if not path.exists() else ("filled" if any(path.iterdir()) else "empty")
+    made = tuple(folder for folder in (path, *path.parents) if not folder.exists())
+    was_empty = bool(made) or not any(path.iterdir())
     try:
         path.mkdir(parents=True, exist_ok=True)
         lock = os.open(path / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
     except OSError as error:
         raise CaseError(f"{path}: cannot be made or written: {error.strerror}; give another --out") from error
-    folder = RunFolder(path=path, lock=lock, before=before)
+    folder = RunFolder(path=path, lock=lock, was_empty=was_empty, made=made)
     try:
         _take_lock(folder)
         _admit(folder, case, stages, resume, force)
@@ -177,7 +200,8 @@ def _admit(folder: RunFolder, case: Case, stages: tuple[str, ...], resume: bool,
         raise CaseError(f"{folder.path}: holds an unfinished run; continue it with --resume or start over with --force")
     if force or folder.manifest() is None:
         write_text(folder.path / UNFINISHED, " ".join(stages) + "\n")
-    write_text(written, case.toml())
+    if force or not written.exists() or not folder.holds(case, stages):
+        write_text(written, case.toml())
 
 
 def _force(folder: RunFolder, case: Case, stages: tuple[str, ...]) -> None:

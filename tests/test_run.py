@@ -1,5 +1,6 @@
 """Whole runs through the command line and the real binary: the output contract, killing and resuming, refusals."""
 
+import errno
 import hashlib
 import json
 import os
@@ -14,8 +15,14 @@ import numpy as np
 import pytest
 from builders import tiny
 
+from fdnet.errors import CaseError
+from fdnet.pipeline import RunOptions, run_case
+
 pytestmark = pytest.mark.liggghts
 SHORT = ("run.cap_ms=0.35",)
+MORE_HOURS = "run.max_hours=99"
+TOO_DENSE = "grains.count=110"
+"""Refused only after packing, when the folder holds something already."""
 
 
 def fdnet(*arguments: str | Path, **options) -> subprocess.CompletedProcess[str]:
@@ -77,6 +84,25 @@ def test_a_finished_run_is_not_repeated(finished):
         assert again.returncode == 0
         assert json.loads(again.stdout) == summary
     assert (run / "manifest.json").stat().st_mtime_ns == before
+
+
+def test_a_finished_run_keeps_its_case_when_a_policy_differs(finished):
+    run, case, _ = finished
+    before = (run / "case.toml").read_text()
+    for stages in ("pack,invade,analyse,report", "pack"):
+        again = fdnet("run", case, "--out", run, "--set", MORE_HOURS, "--stages", stages)
+        assert again.returncode == 0, again.stderr
+        assert (run / "case.toml").read_text() == before
+
+
+def test_stages_still_to_run_take_the_new_policy(finished, tmp_path):
+    _, case, _ = finished
+    assert fdnet("run", case, "--out", tmp_path / "run", "--stages", "pack").returncode == 0
+    before = (tmp_path / "run" / "case.toml").read_text()
+    assert fdnet("run", case, "--out", tmp_path / "run", "--stages", "pack", "--set", MORE_HOURS).returncode == 0
+    assert (tmp_path / "run" / "case.toml").read_text() == before
+    assert fdnet("run", case, "--out", tmp_path / "run", "--set", MORE_HOURS).returncode == 0
+    assert "max_hours = 99" in (tmp_path / "run" / "case.toml").read_text()
 
 
 def test_its_spheres_feed_the_permeability_command(finished):
@@ -340,6 +366,34 @@ def test_bad_input_writes_nothing_and_ends_with_2(tmp_path):
         assert refused.returncode == 2, arguments
         assert len(refused.stderr.strip().splitlines()) == 1, refused.stderr
         assert not out.exists()
+
+
+def test_bad_input_leaves_an_empty_folder_behind_a_link_as_it_was(tmp_path):
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "link").symlink_to("empty")
+    refused = fdnet("run", write_case(tmp_path), "--set", TOO_DENSE, "--out", tmp_path / "link")
+    assert refused.returncode == 2
+    assert "grains.count: 110 needs grains that overlap" in refused.stderr
+    assert (tmp_path / "link").is_symlink()
+    assert not any((tmp_path / "empty").iterdir())
+
+
+@pytest.mark.parametrize("kept", ["", "a", "a/b"])
+def test_bad_input_removes_the_parents_it_made_and_no_others(tmp_path, kept):
+    (tmp_path / "runs" / kept).mkdir(parents=True)
+    case = write_case(tmp_path)
+    before = sorted(tmp_path.rglob("*"))
+    assert fdnet("run", case, "--set", TOO_DENSE, "--out", tmp_path / "runs" / "a" / "b" / "c").returncode == 2
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_folder_that_cannot_be_cleared_does_not_hide_the_refusal(tmp_path, monkeypatch):
+    def stuck(path):
+        raise OSError(errno.EBUSY, "Device or resource busy", str(path))
+
+    monkeypatch.setattr(shutil, "rmtree", stuck)
+    with pytest.raises(CaseError, match=r"needs grains that overlap .*; .*run could not be cleared \(Device or res"):
+        run_case(tiny(TOO_DENSE), RunOptions(out=tmp_path / "run", show_progress=False))
 
 
 def test_a_missing_binary_ends_with_3_before_anything_is_written(tmp_path):

@@ -152,12 +152,21 @@ def test_the_plug_time_waits_for_fines_to_arrive():
 @pytest.mark.parametrize("duration_ms", [0.08, 0.2, 2.0])
 def test_a_duration_is_met_by_whole_chunks(stiffness, duration_ms):
     """To half a refresh of drag a chunk, whichever way the steps of a chunk were rounded."""
-    scales = scales_of(
-        tiny(f"run.duration_ms={duration_ms!r}", f"run.stiffness_N_m={stiffness!r}", "fluid.velocity_m_s=5.0")
-    )
-    chunks, refresh = chunks_of(scales), scales.hold_steps * scales.time_step
+    case = tiny(f"run.duration_ms={duration_ms!r}", f"run.stiffness_N_m={stiffness!r}", "fluid.velocity_m_s=5.0")
+    scales = scales_of(case)
+    chunks, refresh = chunks_of(case, scales), scales.hold_steps * scales.time_step
     run = chunks * scales.checkpoint_steps * scales.time_step
     assert abs(run - duration_ms * 1e-3) <= 0.5001 * chunks * refresh
+
+
+@pytest.mark.parametrize(("cap_ms", "expected"), [(0.05, 1), (0.09, 1), (0.12, 2), (0.18, 2), (0.2, 3)])
+def test_a_cap_is_reached_by_whole_chunks(cap_ms, expected):
+    """The least number of chunks of 0.09 ms that does not end before the cap; 0.12 ms is nearer to one than to two."""
+    case = tiny(f"run.cap_ms={cap_ms}", "run.checkpoint_ms=0.09", "fluid.velocity_m_s=5.0")
+    scales = scales_of(case)
+    chunk = scales.checkpoint_steps * scales.time_step
+    assert chunks_of(case, scales) == expected
+    assert (expected - 1) * chunk < cap_ms * 1e-3 <= expected * chunk * (1 + 1e-9)
 
 
 def test_damping_against_a_fixed_grain_makes_up_for_the_mass_liggghts_takes():

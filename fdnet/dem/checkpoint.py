@@ -32,9 +32,14 @@ class Checkpoint:
     quiet: int
 
 
-def chunks_of(scales: Scales) -> int:
-    """Number of chunks that comes nearest to the cap, so that chunks rounded to whole steps never make one too many."""
-    return max(1, round(scales.cap_time / (scales.checkpoint_steps * scales.time_step)))
+def chunks_of(case: Case, scales: Scales) -> int:
+    """Number of chunks of the whole run.
+
+    With a duration the one that comes nearest to it, so that chunks rounded to whole steps never make one too many;
+    else enough to reach the cap.
+    """
+    chunks = scales.cap_time / (scales.checkpoint_steps * scales.time_step)
+    return max(1, round(chunks) if case.run.duration_ms is not None else math.ceil(chunks - 1e-9))
 
 
 def quiet_chunks(scales: Scales) -> int:
@@ -71,6 +76,12 @@ def read_history(folder: Path) -> tuple[Checkpoint, ...]:
     if not rows:
         raise LiggghtsError(f"{folder / HISTORY}: no checkpoint recorded; see {folder}/screen.txt, run again")
     return tuple(rows)
+
+
+def has_history(folder: Path) -> bool:
+    """Whether history.csv holds any whole line below its title."""
+    path = folder / HISTORY
+    return path.exists() and path.read_text(errors="replace").count("\n") > 1
 
 
 def _is_count(text: str) -> bool:

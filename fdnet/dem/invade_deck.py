@@ -84,7 +84,7 @@ def render_invade(
             "quiet_checkpoints": quiet_chunks(scales),
             "empty_checkpoints": empty_chunks(case, scales),
             "start": _start(resume),
-            "chunks": chunks_of(scales),
+            "chunks": chunks_of(case, scales),
             "chunk_steps": scales.checkpoint_steps,
             "stop_when_plugged": case.run.duration_ms is None,
             "dump_columns": COLUMNS,

@@ -12,6 +12,7 @@ from fdnet.dem.checkpoint import (
     Checkpoint,
     chunks_of,
     csv_row,
+    has_history,
     last_checkpoint,
     quiet_chunks,
     quiet_enough,
@@ -53,7 +54,7 @@ def invade(case: Case, scales: Scales, grains: Snapshot, folder: Path, launch: L
     Raises LiggghtsError when a run fails or fines are lost, CaseError when the fines cannot be placed.
     """
     (folder / "post").mkdir(parents=True, exist_ok=True)
-    anew = _has_history(folder) and last_checkpoint(folder, case, grains) is None
+    anew = has_history(folder) and last_checkpoint(folder, case, grains) is None
     deck, run = _drive(case, scales, grains, folder, launch)
     history = read_history(folder)
     overlaps, damaged = [], grains
@@ -80,17 +81,16 @@ def invade(case: Case, scales: Scales, grains: Snapshot, folder: Path, launch: L
     )
 
 
-def _has_history(folder: Path) -> bool:
-    path = folder / HISTORY
-    return path.exists() and path.read_text(errors="replace").count("\n") > 1
-
-
 def _drive(case: Case, scales: Scales, grains: Snapshot, folder: Path, launch: Launch) -> tuple[Deck, Run | None]:
     """Run to the end of the invasion; no run when the last checkpoint was the end already."""
 
     def check(step: int) -> None:
-        row = next(row for row in read_history(folder) if row.step == step)
-        refuse_overlap(case, scales, grains, folder, history=[row], last=row)
+        if case.run.on_overlap != "stop":
+            return
+        rows = [row for row in read_history(folder) if row.step == step]
+        if not rows:
+            raise LiggghtsError(f"{folder / HISTORY}: no row for the checkpoint at step {step}; continue with --resume")
+        refuse_overlap(case, scales, grains, folder, history=rows[-1:], last=rows[-1])
 
     while True:
         last = last_checkpoint(folder, case, grains)
@@ -147,7 +147,7 @@ class _Keeper:
 def _over(case: Case, scales: Scales, last: Checkpoint | None) -> bool:
     if last is None:
         return False
-    return (case.run.duration_ms is None and quiet_enough(case, scales, last)) or last.chunk >= chunks_of(scales)
+    return (case.run.duration_ms is None and quiet_enough(case, scales, last)) or last.chunk >= chunks_of(case, scales)
 
 
 def _prepare(

@@ -1,18 +1,20 @@
 """Invasions by the real binary: every fine is accounted for, and a cut run goes on as if never cut."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from builders import tiny
 
+from fdnet import pipeline
 from fdnet.contacts import touching_pairs
-from fdnet.dem import checkpoint
-from fdnet.dem.checkpoint import last_checkpoint, read_history
+from fdnet.dem import checkpoint, supply
+from fdnet.dem.checkpoint import HISTORY_HEADER, last_checkpoint, read_history
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
-from fdnet.dem.supply import CLEARANCE, place_fines
+from fdnet.dem.supply import CLEARANCE, SURE_CROWDING, crowding, place_fines, refuse_crowded_supply
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.scales import scales_of
 from fdnet.snapshot import Kind
@@ -52,6 +54,60 @@ def test_a_slab_that_cannot_hold_the_fines_is_an_error(packed):
     crowded = case.model_copy(update={"fines": case.fines.model_copy(update={"concentration": 0.6})})
     with pytest.raises(CaseError, match=r"fines\.concentration: 0\.6 leaves"):
         place_fines(crowded, scales_of(crowded), packed["walls"])
+
+
+@pytest.mark.parametrize("radius_mm", ["0.05", "[0.015,0.05]", "0.2"])
+@pytest.mark.parametrize("sides", ["walls", "periodic"])
+@pytest.mark.parametrize("length", [1, 20])
+def test_every_fine_finds_a_place_up_to_the_sure_crowding(monkeypatch, radius_mm, sides, length):
+    """Drawn just above the limit, slabs of 1 and 20 diameters; below the limit nothing is drawn beforehand."""
+    high = float(radius_mm.strip("[]").rsplit(",", 1)[-1])
+    case = tiny(f"box.sides={sides}", f"fines={{radius_mm={radius_mm}, slab_mm={2 * high * length}}}")
+    fines = case.fines.model_copy(update={"concentration": 1.0})
+    fines = fines.model_copy(
+        update={"concentration": SURE_CROWDING / crowding(case.model_copy(update={"fines": fines}))}
+    )
+    for seed in range(5):
+        full = fines.model_copy(update={"concentration": 1.001 * fines.concentration})
+        full = case.model_copy(update={"fines": full, "seed": seed})
+        assert crowding(full) > SURE_CROWDING
+        refuse_crowded_supply(full, scales_of(full))
+    monkeypatch.setattr(supply, "_draw", None)
+    sure = case.model_copy(update={"fines": fines.model_copy(update={"concentration": 0.999 * fines.concentration})})
+    refuse_crowded_supply(sure, scales_of(sure))
+
+
+def test_crowding_of_equal_fines_far_from_walls_is_their_concentration():
+    assert crowding(tiny("box.sides=periodic")) == pytest.approx(tiny().fines.concentration)
+    assert crowding(tiny()) == pytest.approx(tiny().fines.concentration * (1.6 / 1.5) ** 2)
+
+
+def test_crowding_of_unequal_fines_by_quadrature():
+    radius = np.linspace(0.02, 0.06, 100_001)
+    shut = np.mean((0.06 + radius) ** 3) / (8 * np.mean(radius**3))
+    case = tiny("box.sides=periodic", "fines.radius_mm=[0.02,0.06]")
+    assert crowding(case) == pytest.approx(case.fines.concentration * shut, rel=1e-4)
+
+
+def test_a_begun_invasion_is_not_tried_out_again(tmp_path, monkeypatch):
+    """Its supply has found its places: a folder with a checkpoint goes to the next question, which is its own."""
+    monkeypatch.setattr(pipeline, "refuse_crowded_supply", refuse_all)
+    (tmp_path / "run" / "invade").mkdir(parents=True)
+    history = tmp_path / "run" / "invade" / "history.csv"
+    options = pipeline.RunOptions(out=tmp_path / "run", show_progress=False)
+    for text, said in (
+        (HISTORY_HEADER + "\n", "crowded"),
+        (HISTORY_HEADER + "\n1,2,3,4,5,6,7,8\n", "holds no fdnet run"),
+    ):
+        history.write_text(text)
+        with pytest.raises(CaseError, match=said):
+            pipeline.run_case(tiny(), options)
+    with pytest.raises(CaseError, match="crowded"):
+        pipeline.run_case(tiny(), replace(options, force=True))
+
+
+def refuse_all(*_):
+    raise CaseError("crowded")
 
 
 @pytest.mark.parametrize(

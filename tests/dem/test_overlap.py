@@ -1,12 +1,13 @@
 """The overlap of fines while an invasion runs: measured right, the motion untouched, told or stopping the run."""
 
 import math
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 from builders import resting_spheres, tiny
 
-from fdnet.dem import invade_deck
+from fdnet.dem import invade_deck, invasion
 from fdnet.dem.deck import number, render_text
 from fdnet.dem.invade_deck import render_invade
 from fdnet.dem.invasion import invade
@@ -119,3 +120,15 @@ def test_a_run_past_the_limit_stops_when_asked_and_goes_on_when_told(binary, gra
 def test_a_run_within_the_limit_is_not_stopped(binary, grains, tmp_path):
     case = tiny("run.cap_ms=0.2", "fluid.velocity_m_s=1.0", "run.on_overlap=stop")
     assert 0 < invade(case, scales_of(case), grains, tmp_path, Launch(binary=binary)).max_overlap < 0.03
+
+
+@pytest.mark.liggghts
+@pytest.mark.parametrize(("policy", "raised"), [("stop", "history.csv: no row for the checkpoint"), ("warn", None)])
+def test_a_checkpoint_without_its_row_is_named_where_it_is_looked_at(
+    binary, grains, tmp_path, monkeypatch, policy, raised
+):
+    case = tiny("run.cap_ms=0.2", "run.checkpoint_ms=0.1", "fluid.velocity_m_s=1.0", f"run.on_overlap={policy}")
+    real = invasion.read_history
+    monkeypatch.setattr(invasion, "read_history", lambda folder: tuple(r for r in real(folder) if r.chunk != 1))
+    with pytest.raises(LiggghtsError, match=raised) if raised else nullcontext():
+        invade(case, scales_of(case), grains, tmp_path, Launch(binary=binary))
