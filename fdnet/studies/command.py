@@ -10,10 +10,7 @@ from typing import Any
 from fdnet.atomic import write_text
 from fdnet.dem.liggghts import find_binary
 from fdnet.errors import CaseError
-from fdnet.studies.draw import draw_study
-from fdnet.studies.runner import run_points
 from fdnet.studies.study import Study
-from fdnet.studies.table import study_text, write_rows
 
 STUDIES: Mapping[str, str] = {
     "stiffness": "contact stiffness, from 1e2 N/m to the nominal one",
@@ -63,6 +60,9 @@ def run_study(study: Study, out: Path, *, quick: bool, show: bool = False) -> st
 
     Raises LiggghtsError when the study needs a LIGGGHTS that is not there, CaseError when `out` is not this study's.
     """
+    from fdnet.studies.draw import draw_study
+    from fdnet.studies.runner import run_points
+    from fdnet.studies.table import study_text, write_rows
 
     def tell(line: str) -> None:
         if show:
