@@ -254,7 +254,7 @@ def knee_sentence(found: Sequence[Level], *, default: Value | None, unit: str = 
 def _knee_words(own: Sequence[Level], unit: str) -> str:
     least, most = min(own, key=lambda level: level.cost), max(own, key=lambda level: level.cost)
     if len(own) == 1:
-        return f"error {_cost_words(own[0], unit, named=False)}"
+        return f"error {_cost_words(own[0], unit, named=isinstance(own[0].value, str))}"
     if most.cost < ALIKE * least.cost:
         low, high = min(own, key=lambda level: level.size), max(own, key=lambda level: level.size)
         return (

@@ -119,6 +119,17 @@ class Study:
     bytes: float = 16 * 2.0**30
 
 
+def ladder(
+    series: str, knob: str, values: Sequence[float], *, seeds: int, settings: Mapping[str, Value]
+) -> list[Point]:
+    """Points at these values of the knob, each with seeds 1 to `seeds`."""
+    return [
+        Point(series=series, knob=knob, value=value, seed=seed, settings=settings)
+        for value in values
+        for seed in range(1, seeds + 1)
+    ]
+
+
 def shown(value: Value) -> str:
     """A knob's value in words."""
     return value if isinstance(value, str) else f"{value:.6g}"

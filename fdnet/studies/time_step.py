@@ -7,7 +7,7 @@ from fdnet.case import Run as RunControl
 from fdnet.studies.collisions import collision_run, energy_run
 from fdnet.studies.dem_runs import OBSERVED, base_inputs, invasion_run, relaxation_run, slab_case
 from fdnet.studies.judge import against_reference, sizes
-from fdnet.studies.study import Measured, Panel, Point, Row, Study
+from fdnet.studies.study import Measured, Panel, Point, Row, Study, Value, ladder
 
 COLLISION, ENERGY, INVASION, DRAG = "collision", "undamped pack", "invasion", "drag relaxation"
 _SPAN, _SPANS = 1e-5, 300.0
@@ -28,12 +28,8 @@ def points(quick: bool) -> list[Point]:
 
 def _ladder(series: str, values: Sequence[float], seeds: int, size: str = "whole") -> list[Point]:
     knob = "dt_over_tau" if series == DRAG else "dt_over_sqrt_m_k"
-    settings = {"size": size} if series == INVASION else {}
-    return [
-        Point(series=series, knob=knob, value=value, seed=seed, settings=settings)
-        for value in values
-        for seed in range(1, seeds + 1)
-    ]
+    settings: dict[str, Value] = {"size": size} if series == INVASION else {}
+    return ladder(series, knob, values, seeds=seeds, settings=settings)
 
 
 def measure(point: Point, work: Path) -> Mapping[str, float]:

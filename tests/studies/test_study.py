@@ -133,7 +133,7 @@ def test_neither_the_reference_nor_a_lucky_pair_of_seeds_is_a_knee():
     assert at is not None
     assert at.value == "fair"
     assert "errors from truth, which costs 9 s" in knee_sentence(found, default="good")
-    assert knee_sentence(found[:1], default=None) == "error +0 ± 50 % for 1 s"
+    assert knee_sentence(found[:1], default=None) == "error lucky: +0 ± 50 % for 1 s"
 
 
 def test_unpaired_levels_carry_the_band_of_their_reference():
