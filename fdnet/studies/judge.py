@@ -216,10 +216,12 @@ def _level(value: Value, group: Sequence[Row], cost: str) -> Level:
 def knee(found: Sequence[Level]) -> Level | None:
     """The cheapest level whose error, band included, is at most twice the best one's.
 
-    Levels of two seeds, whose bands say nothing, are passed over. None when errors go on falling with cost, or without
-    levels beside the reference.
+    Levels of two seeds, whose bands say nothing, are passed over, and single runs beside ensembles. None when errors go
+    on falling with cost, or without levels beside the reference.
     """
-    own = [level for level in found if not level.reference and level.runs != FEW_SEEDS]
+    own = [level for level in found if not level.reference]
+    alone = all(level.runs == 1 for level in own)
+    own = [level for level in own if alone or level.runs > FEW_SEEDS]
     if not own:
         return None
     best, costliest = min(level.bound for level in own), max(own, key=lambda level: level.cost)

@@ -125,6 +125,7 @@ def test_neither_the_reference_nor_a_lucky_pair_of_seeds_is_a_knee():
     """Two seeds can cancel to an error of 0; the reference has none by construction."""
     found = [
         Level(value="lucky", runs=2, cost=1.0, error=0.0, half_width=0.5),
+        Level(value="single", runs=1, cost=1.5, error=0.0, half_width=0.0),
         Level(value="fair", runs=5, cost=2.0, error=0.02, half_width=0.02),
         Level(value="good", runs=5, cost=4.0, error=0.01, half_width=0.02),
         Level(value="truth", runs=5, cost=9.0, error=0.0, half_width=0.01, reference=True),
