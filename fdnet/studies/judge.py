@@ -219,15 +219,20 @@ def knee(found: Sequence[Level]) -> Level | None:
     Levels of two seeds, whose bands say nothing, are passed over, and single runs beside ensembles. None when errors go
     on falling with cost, or without levels beside the reference.
     """
-    own = [level for level in found if not level.reference]
-    alone = all(level.runs == 1 for level in own)
-    own = [level for level in own if alone or level.runs > FEW_SEEDS]
+    own = _with_bands(found)
     if not own:
         return None
     best, costliest = min(level.bound for level in own), max(own, key=lambda level: level.cost)
     if order(own) > FALLS and costliest.bound == best:
         return None
     return min((level for level in own if level.bound <= NEARLY * best), key=lambda level: level.cost)
+
+
+def _with_bands(found: Sequence[Level]) -> list[Level]:
+    """Levels beside the reference that a knee can be told from: of more than two seeds, or all of one exact run."""
+    own = [level for level in found if not level.reference]
+    alone = all(level.runs == 1 for level in own)
+    return [level for level in own if alone or level.runs > FEW_SEEDS]
 
 
 def order(found: Sequence[Level]) -> float:
@@ -263,13 +268,14 @@ def _knee_words(own: Sequence[Level], unit: str) -> str:
             f"all cost about the same ({least.cost:.3g} to {most.cost:.3g} {unit}); error {_percent(low)} at "
             f"{shown(low.value)} to {_percent(high)} at {shown(high.value)}"
         )
-    if all(level.runs == FEW_SEEDS for level in own):
+    judged = _with_bands(own)
+    if not judged:
         return f"too few seeds for a knee; the costliest {_cost_words(most, unit)}"
-    at = knee(own)
+    at, last = knee(own), max(judged, key=lambda level: level.cost)
     if at is None:
-        return f"no knee: the costliest is the best, {_cost_words(most, unit)}"
-    if at is most:
-        return f"only the costliest will do, {_cost_words(most, unit)}"
+        return f"no knee: the costliest is the best, {_cost_words(last, unit)}"
+    if at is last:
+        return f"only the costliest will do, {_cost_words(last, unit)}"
     return f"knee at {_cost_words(at, unit)}; the costliest {_cost_words(most, unit)}"
 
 

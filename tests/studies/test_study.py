@@ -137,6 +137,14 @@ def test_neither_the_reference_nor_a_lucky_pair_of_seeds_is_a_knee():
     assert knee_sentence(found[:1], default=None) == "error lucky: +0 ± 50 % for 1 s"
 
 
+def test_no_knee_is_told_from_levels_without_bands():
+    pairs = [Level(value=n, runs=2, cost=float(n), error=1.0 / n, half_width=0.1) for n in (1, 2, 4)]
+    assert knee(pairs) is None
+    assert knee_sentence(pairs, default=None).startswith("too few seeds for a knee; the costliest 4: +25 ± 10 %")
+    mixed = [*pairs, level(8, 8.0, 0.0), Level(value=3, runs=5, cost=3.0, error=0.3, half_width=0.1)]
+    assert "only the costliest will do, 3:" in knee_sentence(mixed, default=None)
+
+
 def test_unpaired_levels_carry_the_band_of_their_reference():
     """Both means of the same distribution: the band of their difference holds 0 in some 95 of 100 trials."""
     rng = np.random.default_rng(5)
