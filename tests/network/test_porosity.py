@@ -73,3 +73,10 @@ def test_pooling_averages_between_edges_that_leave_out_both_ends():
     assert pooled(fine, np.array([1.0, 3.0, 4.0])) == pytest.approx([0.4, 0.7])
     assert pooled(fine, np.array([1.0, 4.0])) == pytest.approx([0.5])
     assert pooled(fine, np.array([0.0, 3.0, 6.0])) == pytest.approx([0.3, 1.1 / 3])
+
+
+@pytest.mark.parametrize("radius", [0.3, 0.42, 0.48])
+def test_a_sphere_nearly_as_wide_as_its_period_is_whole(radius):
+    sphere = snapshot(np.array([[0.9, 0.05, 0.97]]), radius, np.array([[0.0, 1.0]] * 3))
+    found = measure_porosity(sphere, periodic=(True,) * 3)
+    assert abs(found.mean - (1 - 4 / 3 * np.pi * radius**3)) < 6 * found.standard_error + 1e-6
