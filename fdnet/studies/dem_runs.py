@@ -80,22 +80,10 @@ def grains_of(case: Case, work: Path) -> Snapshot:
     return snapshot_of(read_frame(folder / "post" / "pack.dump"), plain, time_s=0.0)
 
 
-def invasion_run(case: Case, work: Path, slug: str, *, ranks: int = 1) -> dict[str, float]:
-    """One invasion and what it left: counts, depths (m), profile, porosity, permeability, largest overlap, costs.
-
-    A run that an earlier session left unfinished is begun anew, so that costs are whole.
-    """
+def invasion_run(case: Case, work: Path, slug: str) -> dict[str, float]:
+    """One invasion and what it left: counts, depths (m), profile, porosity, permeability, largest overlap, costs."""
     grains = grains_of(case, work)
-    folder, scales = work / slug, scales_of(case)
-    shutil.rmtree(folder, ignore_errors=True)
-    launch, before = Launch(binary=the_binary(), ranks=ranks), child_core_seconds()
-    result = invade(case, scales, grains, folder, launch)
-    core = child_core_seconds() - before
-    costs = {
-        "steps": float(result.history[-1].step),
-        "core_s": core,
-        "wall_s": sum(run.seconds for run in result.runs),
-    }
+    result, costs = _fresh(case, grains, work / slug)
     return invasion_observed(case, grains, result) | costs
 
 
@@ -104,18 +92,19 @@ def window_run(case: Case, work: Path, slug: str, *, grid: tuple[int, ...] = ())
 
     `grid` runs it on as many MPI ranks, cut in x, y and z as it says.
     """
-    grains = grains_of(case, work)
-    folder, scales = work / slug, scales_of(case)
+    result, costs = _fresh(case, grains_of(case, work), work / slug, grid)
+    return {"invaded": float(result.history[-1].invaded), "mean_depth": _mean(_depths(case, result))} | costs
+
+
+def _fresh(case: Case, grains: Snapshot, folder: Path, grid: tuple[int, ...] = ()) -> tuple[Invasion, dict[str, float]]:
+    """An invasion and its costs. One that an earlier session left unfinished is begun anew, so that costs are whole."""
     shutil.rmtree(folder, ignore_errors=True)
-    before = child_core_seconds()
+    scales, launch, before = scales_of(case), Launch(binary=the_binary()), child_core_seconds()
     runs = [_gridded(case, grains, folder, grid)] if grid else []
-    result = invade(case, scales, grains, folder, Launch(binary=the_binary()))
-    core, depth = child_core_seconds() - before, _depths(case, result)
-    return {
-        "invaded": float(result.history[-1].invaded),
-        "mean_depth": float(np.mean(depth)) if len(depth) else 0.0,
+    result = invade(case, scales, grains, folder, launch)
+    return result, {
         "steps": float(result.history[-1].step),
-        "core_s": core,
+        "core_s": child_core_seconds() - before,
         "wall_s": sum(run.seconds for run in [*runs, *result.runs]),
     }
 
@@ -149,7 +138,7 @@ def invasion_observed(case: Case, grains: Snapshot, result: Invasion) -> dict[st
     return {
         "invaded": float(last.invaded),
         "passed": float(last.passed),
-        "mean_depth": float(np.mean(depth)) if len(depth) else 0.0,
+        "mean_depth": _mean(depth),
         "count_first": float(first.fines_count),
         "porosity_initial": analysis.porosity_initial,
         "k_initial": analysis.k_initial,
@@ -165,6 +154,10 @@ def invasion_observed(case: Case, grains: Snapshot, result: Invasion) -> dict[st
 def _depths(case: Case, result: Invasion) -> Array:
     depth = result.damaged.fines().position[:, 0]
     return depth[(depth >= 0) & (depth < case.size_m[0])]
+
+
+def _mean(depth: Array) -> float:
+    return float(np.mean(depth)) if len(depth) else 0.0
 
 
 def _shift(before: Snapshot, after: Snapshot) -> float:
@@ -205,15 +198,12 @@ def relaxation_run(
 
 
 def _relaxed(case: Case, folder: Path, *, terminal: float, tau: float) -> dict[str, float]:
-    shutil.rmtree(folder, ignore_errors=True)
     scales, far = scales_of(case), np.array([[3.5e-3, 1.4e-3, 1.4e-3]])
     lonely = resting(far, 2.5e-4, box_of(case), Kind.GRAIN)
-    launch, before = Launch(binary=the_binary()), child_core_seconds()
-    result = invade(case, scales, lonely, folder, launch)
-    core = child_core_seconds() - before
+    result, costs = _fresh(case, lonely, folder)
     errors = []
     for row in result.history:
         velocity = state_at(folder, row, case, scales, lonely).fines().velocity[0, 2]
         exact = terminal * (1 - math.exp(-row.step * scales.time_step / tau))
         errors.append(abs(velocity - exact) / abs(terminal))
-    return {"relaxation_error": max(errors), "steps": float(result.history[-1].step), "core_s": core}
+    return {"relaxation_error": max(errors), "steps": costs["steps"], "core_s": costs["core_s"]}
