@@ -35,3 +35,10 @@ def write_text(path: str | Path, text: str) -> Path:
     with replacing(path) as part:
         part.write_text(text, encoding="utf-8", newline="\n")
     return Path(path)
+
+
+def write_bytes(path: str | Path, content: bytes) -> Path:
+    """Write `content`, atomically; returns the path."""
+    with replacing(path) as part:
+        part.write_bytes(content)
+    return Path(path)

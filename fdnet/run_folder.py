@@ -52,7 +52,7 @@ class RunFolder:
 
     def record(self, stage: str) -> dict[str, Any] | None:
         """What a finished stage (pack, invade) left behind, or None. Raises CaseError when it cannot be understood."""
-        return _read_record(self.path / _RECORDS[stage])
+        return read_record(self.path, stage)
 
     def finish(self, stage: str, record: dict[str, Any]) -> None:
         """Mark a stage as done; the record's presence means whole."""
@@ -222,6 +222,14 @@ def _force(folder: RunFolder, case: Case, stages: tuple[str, ...]) -> None:
 def write_json(path: Path, value: Any) -> None:
     """Write a mapping as JSON, whole or not at all."""
     write_text(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
+
+
+def read_record(folder: Path, stage: str) -> dict[str, Any] | None:
+    """What a finished stage (pack, invade) of the run in `folder` left behind, or None.
+
+    Raises CaseError when it cannot be understood.
+    """
+    return _read_record(folder / _RECORDS[stage])
 
 
 def _read_record(path: Path) -> dict[str, Any] | None:
