@@ -94,7 +94,10 @@ class Grains(Spheres):
 
 
 class Fines(Spheres):
-    """The invading particles: a slab upstream, given by its length or by the number of fines."""
+    """The invading particles: a slab upstream, given by its length or by the number of fines.
+
+    `supply` puts the whole slab into the simulation at once, or feeds it in batches, each when it is about to arrive.
+    """
 
     density_kg_m3: Positive = 2146.0
     normal_stiffness_N_m: Positive = 63.0e9
@@ -102,6 +105,7 @@ class Fines(Spheres):
     concentration: Annotated[float, Field(gt=0, le=MAX_CONCENTRATION)] = 0.10
     count: Annotated[int, Field(ge=1)] | None = None
     slab_mm: Positive | None = None
+    supply: Literal["slab", "batches"] = "slab"
 
 
 class Fluid(Part):

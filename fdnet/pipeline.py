@@ -179,7 +179,7 @@ def _invade_stage(story: _Story) -> None:
     )
     with story.timed("invade"), Progress("invade", expected, show=story.options.show_progress) as progress:
         result = invade(case, scales, grains, folder, story.launch(progress))
-    story.folder.finish("invade", invade_record(case, result, scales.supplied_count, story.seconds["invade"]))
+    story.folder.finish("invade", invade_record(case, result, story.seconds["invade"]))
 
 
 def _analyse_and_report(story: _Story) -> dict[str, Any]:

@@ -37,7 +37,7 @@ def pack_record(case: Case, pack: Pack, assumed: float, seconds: float) -> dict[
     }
 
 
-def invade_record(case: Case, result: Invasion, supplied: int, seconds: float) -> dict[str, Any]:
+def invade_record(case: Case, result: Invasion, seconds: float) -> dict[str, Any]:
     """invade/stage.json: how the invasion ended."""
     return {
         "format": RECORD_FORMAT,
@@ -48,7 +48,7 @@ def invade_record(case: Case, result: Invasion, supplied: int, seconds: float) -
         "max_overlap_step": result.overlap.step,
         "steps": result.history[-1].step,
         "dt_s": result.step_s,
-        "supplied": supplied,
+        "supplied": result.supplied,
         "warnings": list(result.warnings),
         "runs": [run_record(run) for run in result.runs],
         "left_out": [str(item) for item in result.left_out],

@@ -10,6 +10,7 @@ import numpy as np
 from fdnet.case import Case
 from fdnet.dem.dump import read_frame
 from fdnet.dem.scene import snapshot_of
+from fdnet.dem.supply import batches_of
 from fdnet.errors import DumpError, LiggghtsError
 from fdnet.scales import Scales
 from fdnet.snapshot import Kind, Snapshot
@@ -149,6 +150,7 @@ def readable_states(
 
     Raises DumpError when the last one is, LiggghtsError when counts disagree.
     """
+    batches = batches_of(case, scales)
     for row in history:
         try:
             state = state_at(folder, row, case, scales, grains)
@@ -156,5 +158,5 @@ def readable_states(
             if row == history[-1]:
                 raise
             continue
-        check_counts(folder, row, state, scales.supplied_count)
+        check_counts(folder, row, state, batches.supplied_at(row.chunk))
         yield row, state

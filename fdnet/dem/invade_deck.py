@@ -1,6 +1,7 @@
 """The invasion deck and its data file."""
 
 import math
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +16,22 @@ from fdnet.dem.drag import BELOW_ZERO, drag_variables
 from fdnet.dem.dump import COLUMNS, FORMAT
 from fdnet.dem.overlap import is_watched, watch_variables
 from fdnet.dem.scene import contact_variables, header_variables, wall_variables, write_data
-from fdnet.dem.supply import front_of, place_fines
+from fdnet.dem.supply import AT_ONCE, batches_of, place_batches, place_fines, slab_end
 from fdnet.errors import CaseError
 from fdnet.scales import Scales
 from fdnet.snapshot import Array, Kind, Snapshot
 
+SUPPLY = "supply"
+"""Folder of the batches, inside that of the invasion."""
+
 
 def write_invade_inputs(case: Case, scales: Scales, grains: Snapshot, folder: Path, *, ranks: int = 1) -> Deck:
-    """Write in.invade and invade.data (grains and the slab of fines) into `folder`."""
+    """Write in.invade and invade.data (grains and the first fines) into `folder`, and the batches that follow."""
     assert case.fines is not None
-    spheres = grains.joined(place_fines(case, scales, grains))
+    batched = case.fines.supply == "batches"
+    spheres = grains.joined(
+        write_batches(case, scales, grains, folder) if batched else place_fines(case, scales, grains)
+    )
     pairs, _ = touching_pairs(spheres, case.periodic)
     if np.any(spheres.kind[pairs] == Kind.FINE):
         raise CaseError("fines: a fine would start in contact; this is an fdnet fault, please report the case and seed")
@@ -33,6 +40,35 @@ def write_invade_inputs(case: Case, scales: Scales, grains: Snapshot, folder: Pa
     deck = render_invade(case, scales, grains, ranks=ranks)
     write_text(folder / "in.invade", deck.text)
     return deck
+
+
+def write_batches(case: Case, scales: Scales, grains: Snapshot, folder: Path) -> Snapshot:
+    """Write supply/batch_N.data and .in, taken in before chunk N; returns the fines of the start."""
+    assert case.fines is not None
+    batches = list(place_batches(case, scales, grains))
+    (folder / SUPPLY).mkdir(exist_ok=True)
+    for chunk, fines in enumerate(batches[AT_ONCE:], AT_ONCE):
+        name = f"{SUPPLY}/batch_{chunk}"
+        density = np.full(len(fines), case.fines.density_kg_m3)
+        write_data(folder / f"{name}.data", fines, bounds=_bounds(case, scales, grains), density=density, types=3)
+        text = render_text(
+            "batch.in.j2",
+            {
+                "name": name,
+                "first": int(fines.id[0]),
+                "last": int(fines.id[-1]),
+                "start_velocity": number(scales.upstream_velocity),
+                "drag": drag_variables(case, scales),
+            },
+        )
+        write_text(folder / f"{name}.in", text)
+    return reduce(Snapshot.joined, batches[:AT_ONCE])
+
+
+def _feeding(case: Case, scales: Scales) -> dict[str, int] | None:
+    """First and last chunk that take in a batch; None when all fines are there from the start."""
+    later = len(batches_of(case, scales).counts) - AT_ONCE
+    return {"first": AT_ONCE, "last": AT_ONCE + later - 1} if later > 0 else None
 
 
 def _margin(case: Case, scales: Scales) -> float:
@@ -45,7 +81,7 @@ def _margin(case: Case, scales: Scales) -> float:
 def _bounds(case: Case, scales: Scales, grains: Snapshot) -> Array:
     """The simulation box (3, 2): it extends past the outlet and upstream of the slab, where fines are removed."""
     assert case.fines is not None
-    start = front_of(grains) - 2 * case.fines.radius_range_m[1] - scales.slab_length
+    start = slab_end(case, grains) - batches_of(case, scales).reach
     margin = _margin(case, scales)
     size = case.size_m
     return np.array([[start - 2 * margin, size[0] + 2 * margin], [0.0, size[1]], [0.0, size[2]]])
@@ -84,6 +120,8 @@ def render_invade(
             "quiet_checkpoints": quiet_chunks(scales),
             "empty_checkpoints": empty_chunks(case, scales),
             "start": _start(resume),
+            "feeding": _feeding(case, scales),
+            "supply": SUPPLY,
             "chunks": chunks_of(case, scales),
             "chunk_steps": scales.checkpoint_steps,
             "stop_when_plugged": case.run.duration_ms is None,
@@ -158,6 +196,8 @@ def _left_out(case: Case, *, friction: bool, ranks: int) -> list[LeftOut]:
     if not is_watched(case):
         why = "pairs of grains overlap too" if case.grains.motion == "mobile" else "fines are of unequal size"
         found.append(LeftOut(what="overlap between checkpoints", why=why))
+    if case.fines is not None and case.fines.supply == "batches":
+        found.append(LeftOut(what="fines far upstream", why="they come in batches, each when it is about to arrive"))
     if ranks == 1:
         found.append(LeftOut(what="MPI processor grid", why="one rank"))
     return found

@@ -21,9 +21,10 @@ from fdnet.dem.checkpoint import (
     step_of,
 )
 from fdnet.dem.deck import Deck, LeftOut
-from fdnet.dem.invade_deck import render_invade, write_invade_inputs
+from fdnet.dem.invade_deck import SUPPLY, render_invade, write_batches, write_invade_inputs
 from fdnet.dem.liggghts import SCREEN, Launch, Run, run_deck
 from fdnet.dem.overlap import WATCH, Deepest, cut_watch, deepest_of, overlap_in, read_watch, refuse_overlap
+from fdnet.dem.supply import batches_of
 from fdnet.errors import LiggghtsError
 from fdnet.scales import Scales
 from fdnet.snapshot import Snapshot
@@ -31,11 +32,15 @@ from fdnet.snapshot import Snapshot
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Invasion:
-    """A finished invasion: the last state (grains and fines, fines upstream included) and how it ended."""
+    """A finished invasion: the last state (grains and fines, fines upstream included) and how it ended.
+
+    `supplied` fines took part: all, or those of the batches that had come.
+    """
 
     damaged: Snapshot
     history: tuple[Checkpoint, ...]
     stop_reason: str
+    supplied: int
     overlap: Deepest
     step_s: float
     left_out: tuple[LeftOut, ...]
@@ -73,6 +78,7 @@ def invade(case: Case, scales: Scales, grains: Snapshot, folder: Path, launch: L
         damaged=damaged,
         history=history,
         stop_reason=reason,
+        supplied=batches_of(case, scales).supplied_at(history[-1].chunk),
         overlap=deepest_of([*overlaps, *read_watch(folder)]),
         step_s=scales.time_step,
         left_out=deck.left_out,
@@ -165,6 +171,8 @@ def _prepare(
     for path in (folder / "post").glob("invade_*"):
         if step_of(path) > last.step:
             path.unlink()
+    if case.fines is not None and case.fines.supply == "batches" and not (folder / SUPPLY).exists():
+        write_batches(case, scales, grains, folder)
     deck = render_invade(case, scales, grains, ranks=ranks, resume=last)
     write_text(folder / "in.invade.resume", deck.text)
     return deck

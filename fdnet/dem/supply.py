@@ -1,6 +1,13 @@
-"""The slab of fines upstream of the face: random, at the given concentration, touching nothing."""
+"""The slab of fines upstream of the face: random, at the given concentration, touching nothing.
+
+Fed in batches (`fines.supply`) it is cut across the flow; a batch enters the simulation at the start of a chunk, where
+the fluid would have carried it by then. The length of a batch is what the suspension moves in a chunk and what the cake
+may have grown by (`LOOSEST_CAKE`), so that with one batch in hand none can be overtaken by the cake.
+"""
 
 import math
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -13,6 +20,10 @@ from fdnet.snapshot import Array, Kind, Snapshot
 CLEARANCE = 1.02
 """Fines start at least this many radius sums apart."""
 _ROUNDS = 400
+LOOSEST_CAKE = 0.4
+"""Volume fraction of the loosest cake that batches leave room for; random loose packing has 0.55 (Onoda 1990)."""
+AT_ONCE = 2
+"""Batches there from the start: the one that arrives in the first chunk, and one in hand."""
 SURE_CROWDING = 0.2
 """Up to this `crowding` every fine finds a place: random sequential addition of equal spheres saturates at 0.38 (Talbot
 et al. 1991), and none of 8,465 draws at 0.2 failed (docs/physics.md, section 3).
@@ -29,8 +40,9 @@ def refuse_crowded_supply(case: Case, scales: Scales) -> None:
 
     Tries it only where they might not fit: the draw takes seconds for a million fines.
     """
+    assert case.fines is not None
     if crowding(case) > SURE_CROWDING:
-        _draw(case, scales, end=0.0)
+        _draw(case, scales, end=0.0) if case.fines.supply == "slab" else list(_draw_batches(case, scales, end=0.0))
 
 
 def crowding(case: Case) -> float:
@@ -53,10 +65,19 @@ def place_fines(case: Case, scales: Scales, grains: Snapshot) -> Snapshot:
     Raises CaseError when the slab cannot hold them without overlap.
     """
     assert case.fines is not None
-    position, radius = _draw(case, scales, end=front_of(grains) - 2 * case.fines.radius_range_m[1])
+    position, radius = _draw(case, scales, end=slab_end(case, grains))
+    return _moving(case, scales, grains, position, radius, first=int(grains.id.max()) + 1)
+
+
+def slab_end(case: Case, grains: Snapshot) -> float:
+    """x (m) where the slab ends: a largest fine's diameter upstream of all grains."""
+    assert case.fines is not None
+    return front_of(grains) - 2 * case.fines.radius_range_m[1]
+
+
+def _moving(case: Case, scales: Scales, grains: Snapshot, position: Array, radius: Array, *, first: int) -> Snapshot:
     velocity = np.zeros((len(radius), 3))
     velocity[:, 0] = scales.upstream_velocity
-    first = int(grains.id.max()) + 1
     return Snapshot(
         step=0,
         time_s=0.0,
@@ -69,6 +90,63 @@ def place_fines(case: Case, scales: Scales, grains: Snapshot) -> Snapshot:
     )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Batches:
+    """How a slab is cut: `counts` of fines, `length` m of each batch, `travel` m of the suspension in a chunk."""
+
+    counts: tuple[int, ...]
+    length: float
+    travel: float
+
+    @property
+    def reach(self) -> float:
+        """How far upstream of the slab's end a fine is when it enters the simulation, at most, m."""
+        later = max(0, len(self.counts) - AT_ONCE)
+        return min(AT_ONCE, len(self.counts)) * self.length + later * (self.length - self.travel)
+
+    def supplied_at(self, chunk: int) -> int:
+        """Fines supplied by the end of a chunk (numbered from 1)."""
+        return sum(self.counts[: chunk + AT_ONCE - 1])
+
+
+def batches_of(case: Case, scales: Scales) -> Batches:
+    """The batches of a case: equal lengths, the slab's fines shared out evenly. One holds all of a slab fed at once."""
+    assert case.fines is not None
+    travel = scales.upstream_velocity * scales.checkpoint_steps * scales.time_step
+    length = travel * (1 + case.fines.concentration / LOOSEST_CAKE)
+    if case.fines.supply == "slab" or scales.slab_length <= AT_ONCE * length:
+        return Batches(counts=(scales.supplied_count,), length=scales.slab_length, travel=travel)
+    number = math.ceil(scales.slab_length / length - 1e-9)
+    share = np.minimum(np.arange(1, number + 1) * length / scales.slab_length, 1.0)
+    counts = np.diff(np.round(share * scales.supplied_count).astype(int), prepend=0)
+    return Batches(counts=tuple(int(count) for count in counts), length=length, travel=travel)
+
+
+def place_batches(case: Case, scales: Scales, grains: Snapshot) -> Iterator[Snapshot]:
+    """The slab batch by batch, each where the fluid has carried it when it enters; ids run on through all of them.
+
+    The first batches do not depend on how many follow.
+    """
+    travel, first = batches_of(case, scales).travel, int(grains.id.max()) + 1
+    for number, (position, radius) in enumerate(_draw_batches(case, scales, end=slab_end(case, grains)), 1):
+        carried = np.array([max(0, number - AT_ONCE) * travel, 0.0, 0.0])
+        yield _moving(case, scales, grains, position + carried, radius, first=first)
+        first += len(radius)
+
+
+def _draw_batches(case: Case, scales: Scales, *, end: float) -> Iterator[tuple[Array, Array]]:
+    """Places (n, 3) in the slab and radii (n,) m of each batch; each clears the one before, that next to it."""
+    assert case.fines is not None
+    batches, before = batches_of(case, scales), (np.empty((0, 3)), np.empty(0))
+    for number, count in enumerate(batches.counts):
+        rng = np.random.default_rng([case.seed, 11, number])
+        radius = rng.uniform(*case.fines.radius_range_m, count)
+        high = end - number * batches.length
+        low = max(high - batches.length, end - scales.slab_length)
+        before = (_add_sequentially(case, radius, (low, high), rng, there=before), radius)
+        yield before
+
+
 def _draw(case: Case, scales: Scales, *, end: float) -> tuple[Array, Array]:
     """Places (N, 3) and radii (N,) m of the slab's fines; it ends at x = `end`."""
     assert case.fines is not None
@@ -77,23 +155,33 @@ def _draw(case: Case, scales: Scales, *, end: float) -> tuple[Array, Array]:
     return _add_sequentially(case, radius, (end - scales.slab_length, end), rng), radius
 
 
-def _add_sequentially(case: Case, radius: Array, slab: tuple[float, float], rng: np.random.Generator) -> Array:
-    """Random sequential addition, largest first, in batches: of two that overlap the later one is drawn again."""
+def _add_sequentially(
+    case: Case,
+    radius: Array,
+    slab: tuple[float, float],
+    rng: np.random.Generator,
+    there: tuple[Array, Array] = (np.empty((0, 3)), np.empty(0)),
+) -> Array:
+    """Random sequential addition, largest first, in rounds: of two that overlap the later one is drawn again.
+
+    `there` are places (M, 3) and radii (M,) m of spheres to keep clear of.
+    """
     size = np.array([slab[1] - slab[0], *case.size_m[1:]])
     period = np.where(case.periodic, size, 0.0)
     order = np.argsort(-radius, kind="stable")
-    placed = np.empty((0, 3))
+    corner = np.array([slab[0], 0.0, 0.0])
+    placed = there[0] - corner
     position = np.empty((len(radius), 3))
     waiting = order
-    done: Array = np.empty(0, int)
+    done = there[1]
     for _ in range(_ROUNDS):
         if not len(waiting):
-            return position + np.array([slab[0], 0.0, 0.0])
+            return position + corner
         margin = np.where(period > 0, 0.0, radius[waiting][:, None]) * np.array([0.0, 1.0, 1.0])
         drawn = margin + rng.random((len(waiting), 3)) * (size - 2 * margin)
-        free = _free(np.concatenate([placed, drawn]), radius[np.concatenate([done, waiting])], len(placed), period)
+        free = _free(np.concatenate([placed, drawn]), np.concatenate([done, radius[waiting]]), len(placed), period)
         position[waiting[free]] = drawn[free]
-        done, placed = np.concatenate([done, waiting[free]]), np.concatenate([placed, drawn[free]])
+        done, placed = np.concatenate([done, radius[waiting[free]]]), np.concatenate([placed, drawn[free]])
         waiting = waiting[~free]
     raise CaseError(
         f"fines.concentration: {case.fines.concentration if case.fines else 0:g} leaves {len(waiting)} of "
