@@ -1,0 +1,101 @@
+"""Which runs the study of the thesis is made of."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+
+from fdnet.case import Case
+from fdnet.case_file import read_case
+from fdnet.errors import CaseError
+
+SPECIMENS = tuple(f"specimen{number}" for number in range(1, 9))
+VARIANTS = ("specimen1-7to8", "specimen1-1410", "specimen5-5to6", "table3")
+CHEAP = frozenset({"specimen1", "specimen2", "specimen4", "specimen5", "specimen1-7to8", "specimen1-1410"})
+"""Run with SEEDS seeds; the others, of up to an hour each, with one (their trends come from the quick forms)."""
+SEEDS, QUICK_SEEDS, SCAN_SEEDS = 3, 5, 3
+FRICTIONS = (0.0, 0.1, 0.3)
+"""Friction of the fines beside the cases' own 0.55."""
+MULTIPLIERS = (0.3, 3.0, 10.0, 30.0, 100.0)
+"""Drag multipliers beside 1."""
+SUPPLIES = (0.25, 0.5, 2.0)
+"""Fines supplied over those of the case."""
+QUICK = "quick-"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Planned:
+    """One run: a case file of `cases/` with other settings ("key=value") and seed.
+
+    `group` is "specimen", "variant", "quick" or what is scanned: "friction", "drag", "supply"; `value` that knob.
+    """
+
+    case: str
+    group: str
+    seed: int = 1
+    settings: tuple[str, ...] = ()
+    value: float = float("nan")
+
+    @property
+    def id(self) -> str:
+        """Name of the run among all seeds."""
+        return " ".join([self.case, *self.settings])
+
+    @property
+    def slug(self) -> str:
+        """Name of its files."""
+        return "".join(c if c.isalnum() or c in ".=-" else "_" for c in self.id) + f"-seed{self.seed}"
+
+    def load(self) -> Case:
+        """Its case. Raises CaseError when the case file is missing or wrong."""
+        return read_case(case_path(self.case), assignments=[f"seed={self.seed}", *self.settings])
+
+
+def cases_folder() -> Path:
+    """Where the shipped cases are: inside an installed package, beside an editable one."""
+    package = Path(str(files("fdnet")))
+    for folder in (package / "cases", package.parent / "cases"):
+        if folder.is_dir():
+            return folder
+    raise CaseError(f"{package.parent / 'cases'}: the shipped case files are missing; install fdnet again")
+
+
+def case_path(name: str) -> Path:
+    """The file of a shipped case; "quick-NAME" is the quick form of NAME."""
+    quick = name.startswith(QUICK)
+    return cases_folder() / ("quick" if quick else "") / f"{name.removeprefix(QUICK) if quick else name}.toml"
+
+
+def planned(*, quick: bool) -> list[Planned]:
+    """All runs of the study, or one of each quick form."""
+    forms = [QUICK + name for name in (*SPECIMENS, *VARIANTS)]
+    if quick:
+        return [Planned(case=name, group="quick") for name in forms]
+    runs = [
+        Planned(case=name, group="specimen" if name in SPECIMENS else "variant", seed=seed)
+        for name in (*SPECIMENS, *VARIANTS)
+        for seed in range(1, (SEEDS if name in CHEAP else 1) + 1)
+    ]
+    runs += [Planned(case=name, group="quick", seed=seed) for name in forms for seed in range(1, QUICK_SEEDS + 1)]
+    return [*runs, *_scans()]
+
+
+def _scans() -> Iterator[Planned]:
+    yield from _scan("friction", "fines.friction", ("specimen1", "specimen5"), FRICTIONS)
+    quick = [QUICK + name for name in ("specimen1", "specimen5", "specimen7")]
+    yield from _scan("drag", "drag.multiplier", quick, MULTIPLIERS)
+    for name in (QUICK + "specimen5", QUICK + "specimen6"):
+        case = read_case(case_path(name))
+        assert case.fines is not None
+        assert case.fines.count is not None
+        for factor in SUPPLIES:
+            setting = f"fines.count={round(factor * case.fines.count)}"
+            for seed in range(1, SCAN_SEEDS + 1):
+                yield Planned(case=name, group="supply", seed=seed, settings=(setting,), value=factor)
+
+
+def _scan(group: str, key: str, cases: Sequence[str], values: Sequence[float]) -> Iterator[Planned]:
+    for case in cases:
+        for value in values:
+            for seed in range(1, SCAN_SEEDS + 1):
+                yield Planned(case=case, group=group, seed=seed, settings=(f"{key}={value:g}",), value=value)

@@ -1,0 +1,99 @@
+"""Runs what is planned, several side by side, and keeps the state each ended in; goes on where it was cut."""
+
+import multiprocessing as mp
+import shutil
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+
+from fdnet.case import Case
+from fdnet.cost import cost_of
+from fdnet.errors import CaseError, FdnetError
+from fdnet.pipeline import RunOptions, run_case
+from fdnet.scales import scales_of
+from fdnet.studies.thesis.plan import Planned
+from fdnet.studies.thesis.state import State, read_state, state_of_run, write_state
+
+Tell = Callable[[str], None]
+
+
+def carry_out(plan: Sequence[Planned], out: Path, runs: Path, *, jobs: int, tell: Tell) -> dict[Planned, str]:
+    """Run all that has no state in `out` yet, the cheapest first; returns what failed, with the reason.
+
+    A run folder in `runs` that was cut is continued, and removed once its state is kept. Two runs whose invasions are
+    the same (Table 3 and specimen 7) are run once.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    cases = {item: item.load() for item in plan}
+    costs = {item: _expected(case) for item, case in cases.items()}
+    waiting = sorted((item for item in plan if not _has_state(out, item, cases[item])), key=lambda item: costs[item])
+    first: dict[str, Planned] = {}
+    twins = {item: first.setdefault(cases[item].digest("invade"), item) for item in waiting}
+    todo = [item for item in waiting if twins[item] is item]
+    failed = _run_all(todo, costs, out, runs, jobs=jobs, tell=tell)
+    for item in waiting:
+        if twins[item] is not item and twins[item] not in failed:
+            _adopt(state_path(out, twins[item]), state_path(out, item), cases[item])
+    return failed
+
+
+def _run_all(
+    todo: Sequence[Planned], costs: dict[Planned, float], out: Path, runs: Path, *, jobs: int, tell: Tell
+) -> dict[Planned, str]:
+    failed: dict[Planned, str] = {}
+    left, done, start = sum(costs[item] for item in todo), 0.0, time.monotonic()
+    context = mp.get_context("spawn")
+    with ProcessPoolExecutor(max_workers=jobs, mp_context=context) as pool:
+        futures = {pool.submit(run_one, item, out, runs): item for item in todo}
+        for future in as_completed(futures):
+            item, error = futures[future], future.result()
+            left, done = left - costs[item], done + costs[item]
+            if error:
+                failed[item] = error
+            ahead = (time.monotonic() - start) * left / done if done else 0.0
+            tell(f"{item.id}, seed {item.seed}: {error or 'done'}; about {ahead / 60:.0f} min left")
+    return failed
+
+
+def run_one(item: Planned, out: Path, runs: Path) -> str:
+    """Run or continue one; returns "" or why it failed. Its run folder stays when it failed."""
+    folder = runs / item.slug
+    try:
+        case = item.load()
+        options = RunOptions(out=folder, resume=folder.exists(), stages=("pack", "invade"), show_progress=False)
+        run_case(case, options)
+        write_state(state_path(out, item), state_of_run(folder))
+    except FdnetError as error:
+        return str(error)
+    shutil.rmtree(folder, ignore_errors=True)
+    return ""
+
+
+def state_path(out: Path, item: Planned) -> Path:
+    """Where the state of a run is kept."""
+    return out / f"{item.slug}.npz"
+
+
+def _has_state(out: Path, item: Planned, case: Case) -> bool:
+    """Whether a state of this very case is there. Raises CaseError when it is of another."""
+    path = state_path(out, item)
+    if not path.exists():
+        return False
+    found = read_state(path).case
+    if found.digest("invade") != case.digest("invade"):
+        raise CaseError(f"{path}: is the state of another case than {item.id}; remove it to run the case anew")
+    return True
+
+
+def _adopt(source: Path, target: Path, case: Case) -> None:
+    """The same invasion under another name."""
+    state = read_state(source)
+    write_state(
+        target,
+        State(case=case, grains=state.grains, damaged=state.damaged, history=state.history, ending=state.ending),
+    )
+
+
+def _expected(case: Case) -> float:
+    return cost_of(case, scales_of(case)).invade_seconds
