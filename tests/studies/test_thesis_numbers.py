@@ -6,10 +6,12 @@ within the specimen are centred at 0.6, 1.1 and 1.6 mm; those at the ends are cu
 """
 
 from dataclasses import fields, replace
+from itertools import combinations
 from math import pi, sqrt
 
 import numpy as np
 import pytest
+from scipy.spatial import Delaunay
 
 from fdnet.errors import CaseError
 from fdnet.snapshot import Kind
@@ -18,8 +20,18 @@ from fdnet.studies.thesis.deposition import deposition, wilson_interval, write_d
 from fdnet.studies.thesis.examine import DEFAULT_PAIR, THESIS_PAIR, Examined, examine
 from fdnet.studies.thesis.first_section import first_section
 from fdnet.studies.thesis.results import COLUMNS, porosity_loss, read_results, result_rows, write_results
+from fdnet.studies.thesis.sizes import sizes_of_grains_alone
 from fdnet.studies.thesis.state import State
-from fdnet.studies.thesis.statistics import SINGLES, SPREADS, measure, statistics, within, write_statistics
+from fdnet.studies.thesis.statistics import (
+    POROSITY,
+    SINGLES,
+    SIZES,
+    measure,
+    share_of_sizes,
+    statistics,
+    within,
+    write_statistics,
+)
 from fdnet.studies.thesis.values import ThesisSpecimen, specimen_number, thesis_of, thesis_values
 from tests.builders import resting_spheres, tiny
 
@@ -77,7 +89,7 @@ def test_every_number_told_has_its_source():
         assert told.source.startswith(("Figure", "Table", "section"))
         assert told.sense in ("exact", "about", "at least", "at most")
     for told in values.statistics:
-        assert told.quantity in (SINGLES if told.between is None else SPREADS)
+        assert told.quantity in (SINGLES if told.between is None else {*SIZES, POROSITY})
 
 
 def test_tables_8_and_10_are_read_by_section():
@@ -184,6 +196,50 @@ def test_sizes_of_the_lattice(lattice):
     assert measure(section, inscribed, (0.999 * ball(pore), 1.001 * ball(pore)))[0] == 1.0
 
 
+def test_sizes_of_the_grains_alone(lattice):
+    """A regular tetrahedron of touching grains and a fifth grain mirrored in one of its facets: two pores of radius
+    (sqrt(3/2) - 1) R, centred sqrt(2/3) R / 2 off the facet they share, of inscribed radius (2/sqrt(3) - 1) R."""
+    corner = R * np.array([[1, 1 / sqrt(3), 0], [-1, 1 / sqrt(3), 0], [0, -2 / sqrt(3), 0]])
+    tips = R * np.array([[0, 0, sqrt(8 / 3)], [0, 0, -sqrt(8 / 3)], [8, 0, 0], [9, 1, 0]])
+    box = lattice.state.grains.box
+    grains = resting_spheres(MM * (np.vstack([corner, tips]) + 0.5), R * MM, box, kind=Kind.GRAIN)
+    changed = Examined(**_parts(lattice) | {"state": replace(lattice.state, grains=grains, damaged=grains)})
+    sizes = sizes_of_grains_alone(changed)
+    assert sizes.pore_radius == pytest.approx([(sqrt(1.5) - 1) * R * MM] * 2)
+    assert sizes.throat_radius == pytest.approx([(2 / sqrt(3) - 1) * R * MM])
+    assert sizes.throat_length == pytest.approx([sqrt(2 / 3) * R * MM])
+    # porosity of that tetrahedron, edge 2 R
+    void = 0.220364 * (2 * R) ** 3 / (6 * sqrt(2))
+    assert 1e9 * sizes.pore_volume == pytest.approx([void] * 2, rel=1e-5)
+    for quantity, size in (("throat length", sqrt(2 / 3) * R), ("pore volume", void)):
+        assert share_of_sizes(sizes, quantity, (0.999 * size, 1.001 * size)) == 1.0
+
+
+def test_throats_of_the_grains_alone_are_the_facets_that_two_tetrahedra_share(lattice):
+    place = 0.2 + 0.7 * np.random.default_rng(3).random((12, 3))
+    grains = resting_spheres(MM * place, 0.05 * MM, lattice.state.grains.box, kind=Kind.GRAIN)
+    changed = Examined(**_parts(lattice) | {"state": replace(lattice.state, grains=grains, damaged=grains)})
+    corners = [set(one.tolist()) for one in Delaunay(place).simplices]
+    shared = [sorted(one & other) for one, other in combinations(corners, 2) if len(one & other) == 3]
+    side = np.array([[np.linalg.norm(place[a] - place[b]) for a, b in combinations(one, 2)] for one in shared]).T
+    half = side.sum(axis=0) / 2
+    area = np.sqrt(half * np.prod(half - side, axis=0))
+    # equal grains: the circle touching three is their circumcircle less the radius
+    expected = np.maximum(np.prod(side, axis=0) / (4 * area) - 0.05, 0)
+    assert np.sort(1e3 * sizes_of_grains_alone(changed).throat_radius) == pytest.approx(np.sort(expected))
+
+
+def test_a_pore_whose_sphere_is_centred_outside_has_no_radius(lattice):
+    """A flat tetrahedron: three grains around a fourth just above their plane."""
+    place = [[0.3, 0, 0], [-0.15, 0.26, 0], [-0.15, -0.26, 0], [0, 0, 0.05]]
+    grains = resting_spheres(MM * (np.array(place) + 0.5), 0.1 * MM, lattice.state.grains.box, kind=Kind.GRAIN)
+    changed = Examined(**_parts(lattice) | {"state": replace(lattice.state, grains=grains, damaged=grains)})
+    sizes = sizes_of_grains_alone(changed)
+    assert (sizes.pore_weight.tolist(), sizes.sphere_weight.tolist()) == ([1.0], [0.0])
+    few = replace(lattice.state, damaged=grains.where(np.arange(4) < 3))
+    assert len(sizes_of_grains_alone(Examined(**_parts(lattice) | {"state": few})).throat_radius) == 0
+
+
 def test_parts_cut_by_the_face_fill_the_section(lattice):
     """The layer at the face is 0.35 mm deep, of which the mirrored half does not count."""
     section = first_section(lattice, whole=False)
@@ -222,7 +278,8 @@ def test_statistics_name_the_figure_of_their_own_specimen_only(lattice, tmp_path
     rows = statistics(lattice)
     told = [row for row in rows if row.source]
     mine = [one for one in thesis_values().statistics if one.specimen == "5"]
-    assert len(told) == 2 * len(mine)
+    # sizes in three ways, the rest in two
+    assert len(told) == 2 * len(mine) + sum(one.quantity in SIZES for one in mine)
     assert {(row.source, row.thesis) for row in told} == {(one.source, one.value) for one in mine}
     assert all(np.isnan(row.thesis) and not row.sense for row in rows if not row.source)
     lines = write_statistics(tmp_path / "statistics.csv", rows).read_text().splitlines()

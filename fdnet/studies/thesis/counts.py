@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import Delaunay
 
 from fdnet.snapshot import Array, Kind
 from fdnet.studies.thesis.csv_rows import write_flat
 from fdnet.studies.thesis.examine import Examined
+from fdnet.studies.thesis.sizes import tessellated
 from fdnet.studies.thesis.values import thesis_values
 
 
@@ -47,12 +47,9 @@ def count_tetrahedra(examined: Examined) -> TetrahedraCount:
 
 
 def tetrahedra(position: Array) -> int:
-    """How many Delaunay tetrahedra the points (N, 3) m have; 0 for fewer than four. Lengths are taken over their
-    spread, for Qhull's tolerances are of coordinates near 1."""
-    if len(position) < 4:
-        return 0
-    centred = position - position.mean(axis=0)
-    return len(Delaunay(centred / np.ptp(centred, axis=0).max()).simplices)
+    """How many Delaunay tetrahedra the points (N, 3) m have; 0 for fewer than four."""
+    found = tessellated(position)
+    return 0 if found is None else len(found[0])
 
 
 def write_counts(path: Path, counts: Sequence[TetrahedraCount]) -> Path:

@@ -9,6 +9,7 @@ from fdnet.network.occupancy import Occupancy
 from fdnet.network.tessellation import Network
 from fdnet.snapshot import Array
 from fdnet.studies.thesis.examine import Examined
+from fdnet.studies.thesis.sizes import Sizes
 from fdnet.studies.thesis.values import thesis_values
 
 
@@ -16,9 +17,9 @@ from fdnet.studies.thesis.values import thesis_values
 class FirstSection:
     """Pores (P) and throats (T) of the whole network with the weight each has here, 0 for those centred elsewhere.
 
-    `whole`: only pores of four grains of the specimen and throats between two such count, 1 each, as in the thesis,
-    whose tessellation ends at the outermost grains. Else those cut by a face count as well, each by the part inside
-    (1/2, 1/4, 1/8): together they fill the section. Facets within one polyhedron, split at will, are no throats.
+    `whole`: only pores of four grains of the specimen and throats between two such count, 1 each. Else those cut by a
+    face count as well, each by the part inside (1/2, 1/4, 1/8): together they fill the section. Facets within one
+    polyhedron, split at will, are no throats.
     """
 
     network: Network
@@ -26,6 +27,19 @@ class FirstSection:
     pore_weight: Array
     throat_weight: Array
     whole: bool
+
+    @property
+    def sizes(self) -> Sizes:
+        """Sizes of its pores and throats."""
+        return Sizes(
+            pore_radius=self.network.pore_radius,
+            pore_volume=self.network.pore_volume,
+            throat_radius=self.network.throat_radius,
+            throat_length=self.network.throat_length,
+            pore_weight=self.pore_weight,
+            sphere_weight=self.pore_weight,
+            throat_weight=self.throat_weight,
+        )
 
     @property
     def tube(self) -> Array:

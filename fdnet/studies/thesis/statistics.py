@@ -11,9 +11,12 @@ from fdnet.snapshot import Array
 from fdnet.studies.thesis.csv_rows import write_flat
 from fdnet.studies.thesis.examine import Examined
 from fdnet.studies.thesis.first_section import FirstSection, first_section
+from fdnet.studies.thesis.sizes import Sizes, sizes_of_grains_alone
 from fdnet.studies.thesis.values import Statistic, specimen_number, thesis_values
 
-CUT, WHOLE = "with those cut by a face, by the part inside", "pores of four grains, throats between two such"
+WHOLE = "pores of four grains, throats between two such"
+CUT = "with those cut by a face, by the part inside"
+ALONE = "tessellation of the section's grains alone, as the thesis"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,11 +36,11 @@ class StatisticRow:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Spread:
-    """A quantity that has a value for each pore or throat: `values` in `unit` and their weights."""
+class Size:
+    """A size in `unit`: `values` of each pore or throat and their weights."""
 
     unit: str
-    values: Callable[[FirstSection], tuple[Array, Array]]
+    values: Callable[[Sizes], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,29 +52,36 @@ class Single:
 
 
 def statistics(examined: Examined) -> list[StatisticRow]:
-    """Every quantity the thesis has for any specimen, twice: over whole pores as it had them, and over all."""
-    told = thesis_values().statistics
-    number = specimen_number(examined.id)
+    """Every quantity the thesis has for any specimen, twice: over whole pores and over those cut by faces as well;
+    sizes also in the tessellation of the section's grains alone."""
     rows = []
-    for section in (first_section(examined, whole=True), first_section(examined, whole=False)):
-        for quantity, between in dict.fromkeys((one.quantity, one.between) for one in told):
-            same = [
-                one for one in told if one.specimen == number and (one.quantity, one.between) == (quantity, between)
-            ]
-            value, unit = measure(section, quantity, between)
-            label = quantity if between is None else _band_label(quantity, between)
-            note = WHOLE if section.whole else CUT
-            rows.append(_row(examined, (label, value, unit, note), same[0] if same else None))
+    asked = dict.fromkeys((one.quantity, one.between) for one in thesis_values().statistics)
+    for section, note in ((first_section(examined, whole=True), WHOLE), (first_section(examined, whole=False), CUT)):
+        for quantity, between in asked:
+            rows.append(_row(examined, (quantity, between), measure(section, quantity, between), note))
+    alone = sizes_of_grains_alone(examined)
+    for quantity, between in asked:
+        if quantity in SIZES and between is not None:
+            found = share_of_sizes(alone, quantity, between), "share"
+            rows.append(_row(examined, (quantity, between), found, ALONE))
     return rows
 
 
 def measure(section: FirstSection, quantity: str, between: tuple[float, float] | None) -> tuple[float, str]:
     """The value and unit of `quantity`; with `between` the share of it in [low, high), sizes in mm, volumes in mm3."""
     if between is None:
-        single = SINGLES[quantity]
-        return single.value(section), single.unit
-    values, weights = SPREADS[quantity].values(section)
-    return share(within(values, between), weights), "share"
+        return SINGLES[quantity].value(section), SINGLES[quantity].unit
+    if quantity in SIZES:
+        return share_of_sizes(section.sizes, quantity, between), "share"
+    if quantity != POROSITY:
+        raise KeyError(quantity)
+    return share(within(section.occupancy.throat_porosity, between), _with_fines(section)), "share"
+
+
+def share_of_sizes(sizes: Sizes, quantity: str, between: tuple[float, float]) -> float:
+    """Share of one of SIZES in [low, high), mm or mm3."""
+    values, weights = SIZES[quantity].values(sizes)
+    return share(within(values, between), weights)
 
 
 def within(values: Array, between: tuple[float, float]) -> Array:
@@ -91,24 +101,35 @@ def write_statistics(path: Path, rows: Sequence[StatisticRow]) -> Path:
     return write_flat(path, StatisticRow, rows)
 
 
-def _band_label(quantity: str, between: tuple[float, float]) -> str:
-    unit = SPREADS[quantity].unit
-    return f"{quantity} {between[0]:g} to {between[1]:g}" + (f" {unit}" if unit else "")
+def _label(quantity: str, between: tuple[float, float] | None) -> str:
+    if between is None:
+        return quantity
+    unit = f" {SIZES[quantity].unit}" if quantity in SIZES else ""
+    return f"{quantity} {between[0]:g} to {between[1]:g}{unit}"
 
 
-def _row(examined: Examined, found: tuple[str, float, str, str], told: Statistic | None) -> StatisticRow:
-    label, value, unit, note = found
+def _row(
+    examined: Examined, asked: tuple[str, tuple[float, float] | None], found: tuple[float, str], note: str
+) -> StatisticRow:
+    told = _told(examined.id, *asked)
     return StatisticRow(
         id=examined.id,
         seed=examined.seed,
         source=told.source if told else "",
-        quantity=label,
-        ours=value,
+        quantity=_label(*asked),
+        ours=found[0],
         thesis=told.value if told else math.nan,
         sense=told.sense if told else "",
-        unit=unit,
+        unit=found[1],
         note=f"{note}; {told.note}" if told and told.note else note,
     )
+
+
+def _told(run: str, quantity: str, between: tuple[float, float] | None) -> Statistic | None:
+    """The thesis's number for the run's specimen."""
+    asked = specimen_number(run), quantity, between
+    told = thesis_values().statistics
+    return next((one for one in told if (one.specimen, one.quantity, one.between) == asked), None)
 
 
 def _with_fines(section: FirstSection) -> Array:
@@ -146,16 +167,16 @@ def _throat_share(section: FirstSection) -> float:
     return _fines_in_throats(section) / both if both > 0 else math.nan
 
 
-SPREADS: Mapping[str, Spread] = {
-    "pore radius": Spread(unit="mm", values=lambda s: (1e3 * s.network.pore_radius, s.pore_weight)),
-    "throat radius": Spread(unit="mm", values=lambda s: (1e3 * s.network.throat_radius, s.throat_weight)),
-    "throat length": Spread(unit="mm", values=lambda s: (1e3 * s.network.throat_length, s.throat_weight)),
-    "porosity of throats with fines": Spread(unit="", values=lambda s: (s.occupancy.throat_porosity, _with_fines(s))),
-    "pore volume": Spread(unit="mm3", values=lambda s: (1e9 * s.network.pore_volume, s.pore_weight)),
-    "volume of the inscribed sphere of a pore": Spread(
-        unit="mm3", values=lambda s: (4e9 / 3.0 * np.pi * s.network.pore_radius**3, s.pore_weight)
+SIZES: Mapping[str, Size] = {
+    "pore radius": Size(unit="mm", values=lambda s: (1e3 * s.pore_radius, s.sphere_weight)),
+    "throat radius": Size(unit="mm", values=lambda s: (1e3 * s.throat_radius, s.throat_weight)),
+    "throat length": Size(unit="mm", values=lambda s: (1e3 * s.throat_length, s.throat_weight)),
+    "pore volume": Size(unit="mm3", values=lambda s: (1e9 * s.pore_volume, s.pore_weight)),
+    "volume of the inscribed sphere of a pore": Size(
+        unit="mm3", values=lambda s: (4e9 / 3.0 * np.pi * s.pore_radius**3, s.sphere_weight)
     ),
 }
+POROSITY = "porosity of throats with fines"
 SINGLES: Mapping[str, Single] = {
     "throats without fines": Single(unit="share", value=lambda s: share(~s.has_fines, s.throat_weight)),
     "throats with fines": Single(unit="share", value=lambda s: share(s.has_fines, s.throat_weight)),
