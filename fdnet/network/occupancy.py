@@ -25,7 +25,8 @@ class Occupancy:
     `pore_fine_volume` m3 of a whole fine, and `pore_layer` m, the thickness of the layer they make on the grains.
     `side_solid_volume` m3 and `side_solid_surface` m2 (T, 2) in the pyramids from the facet to the power centres of
     the first and second pore. `pair_throat`, `pair_fine` (K,) indices,
-    `pair_distance` (K,) distance of the fine's centre from the axis over the throat radius, `pair_radius` (K,) m.
+    `pair_distance` (K,) distance of the fine's centre from the axis over the throat radius, `pair_radius` (K,) m,
+    `pair_volume` (K,) m3 of the fine in the throat.
     """
 
     throat_solid_volume: Array
@@ -44,6 +45,7 @@ class Occupancy:
     pair_fine: Array
     pair_distance: Array
     pair_radius: Array
+    pair_volume: Array
     counts: Mapping[str, int]
 
 
@@ -90,6 +92,7 @@ def measure_occupancy(
         "pair_fine": fine,
         "pair_radius": pairs.sphere,
         "pair_distance": pairs.offset / pairs.tube,
+        "pair_volume": inside,
     }
     return Occupancy(counts=counts, **{name: frozen(value) for name, value in found.items()})
 
