@@ -127,7 +127,7 @@ def test_the_plan_names_every_run_once_with_its_seeds():
     for name in (*SPECIMENS, *VARIANTS):
         assert sum(item.id == name for item in plan) == (3 if name in CHEAP else 1)
         assert sum(item.id == f"quick-{name}" for item in plan) == QUICK_SEEDS
-    assert {item.group for item in plan} == {"specimen", "variant", "quick", "friction", "drag", "supply"}
+    assert {item.group for item in plan} == {"specimen", "variant", "quick", "reason", "friction", "drag", "supply"}
     assert sum(item.id == "specimen5 fines.friction=0" for item in plan) == SCAN_SEEDS
     assert {item.id for item in planned(quick=True)} == {f"quick-{name}" for name in (*SPECIMENS, *VARIANTS)}
     for item in plan:
