@@ -16,7 +16,7 @@ CHEAP = frozenset({"specimen1", "specimen2", "specimen4", "specimen5", "specimen
 SEEDS, QUICK_SEEDS, SCAN_SEEDS = 3, 5, 3
 FRICTIONS = (0.0, 0.1, 0.3)
 """Friction of the fines beside the cases' own 0.55."""
-MULTIPLIERS = (0.3, 3.0, 10.0, 30.0, 100.0)
+MULTIPLIERS = (0.3, 3.0, 10.0, 30.0)
 """Drag multipliers beside 1."""
 SUPPLIES = (0.25, 0.5, 2.0)
 """Fines supplied over those of the case."""
