@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from fdnet.cli import main
+from fdnet.dem.liggghts import Launch
 from fdnet.errors import CaseError
 from fdnet.studies.thesis import plan as plans
 from fdnet.studies.thesis import runs
 from fdnet.studies.thesis.examine import DEFAULT_PAIR, THESIS_PAIR, examine
+from fdnet.studies.thesis.growth import grow, read_growth, write_growth
 from fdnet.studies.thesis.plan import CHEAP, QUICK_SEEDS, SCAN_SEEDS, SPECIMENS, VARIANTS, Planned, planned
 from fdnet.studies.thesis.state import read_state, state_of_run, write_state
 
@@ -150,3 +152,20 @@ def test_every_quick_form_runs_to_its_end(binary, root, tmp_path, name):
     assert summary["supplied_count"] == sum(counts)
     assert 0 < summary["k_reduction"] < 1
     assert summary["max_overlap_fraction"] < 0.15
+
+
+@pytest.mark.liggghts
+def test_the_growth_of_a_pack_is_kept(binary, tmp_path):
+    """Radii rise from 0.6 to 1 in 30 equal stages; forces are highest when grown, velocities lowest at rest."""
+    case = small().load()
+    stages = grow(case, tmp_path / "grown", Launch(binary=binary), count=26)
+    write_growth(tmp_path / "growth.npz", stages)
+    kept = read_growth(tmp_path / "growth.npz", case)
+    assert [np.unique(np.round(one.radius / 2.5e-4, 6)).tolist() for one in kept] == [[0.613333], [1.0], [1.0]]
+    speeds = [np.abs(one.velocity).max() for one in kept]
+    assert speeds[2] < 1e-3 * min(speeds[:2])
+    for one, other in zip(stages, kept, strict=True):
+        assert np.abs(one.position - other.position).max() < 1e-9
+    (tmp_path / "growth.npz").write_bytes(b"no")
+    with pytest.raises(CaseError, match="holds no growth of a pack"):
+        read_growth(tmp_path / "growth.npz", case)

@@ -7,7 +7,7 @@ from pathlib import Path
 from fdnet.dem.liggghts import find_binary
 from fdnet.errors import LiggghtsError
 from fdnet.studies.thesis.plan import Planned, planned
-from fdnet.studies.thesis.runs import carry_out
+from fdnet.studies.thesis.runs import Tell, carry_out
 
 STATES = "states"
 
@@ -39,7 +39,7 @@ def run_thesis(options: ThesisOptions) -> str:
     return ""
 
 
-def _teller(show: bool):
+def _teller(show: bool) -> Tell:
     def tell(line: str) -> None:
         if show:
             print(f"thesis: {line}", file=sys.stderr, flush=True)
