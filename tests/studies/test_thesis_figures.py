@@ -22,6 +22,8 @@ from fdnet.studies.thesis.examine import examine
 from fdnet.studies.thesis.marks import ThesisMarks, Told, percent, said
 from fdnet.studies.thesis.section_sizes import section_sizes, share_within
 from fdnet.studies.thesis.state import ENDING, State
+from fdnet.studies.thesis.thesis_marks import thesis_marks
+from fdnet.studies.thesis.values import thesis_values
 
 FINE = 0.04e-3
 DEPTHS = {1: [0.5] * 3 + [1.0], 2: [0.5] * 2 + [1.0, 1.5]}
@@ -151,7 +153,7 @@ def test_compared_permeability_has_a_panel_for_each_pair_of_laws():
 
 
 def test_the_first_section_holds_whole_pores_and_their_throats():
-    cut = section_sizes(run(1).thesis)
+    cut = section_sizes(run(1))
     network = run(1).thesis.network
     assert len(cut.pore_radius) == np.sum((network.pore_position[:, 0] < 1e-3) & (network.pore_share == 1))
     assert 0 < len(cut.throat_radius) < len(network.throat_radius)
@@ -162,7 +164,7 @@ def test_the_first_section_holds_whole_pores_and_their_throats():
 
 def test_sizes_are_densities_of_all():
     figure = drawn(sizes, sources(), specimen="specimen1")
-    cut = section_sizes(run(1).thesis)
+    cut = section_sizes(run(1))
     heights, edges, _ = labelled(figure.axes[0], f"{len(cut.throat_radius)} throats").get_data()
     within = share_within(cut.throat_radius, 0.0, edges[-1])
     assert np.sum(heights * np.diff(edges)) == pytest.approx(within, abs=0.01)
@@ -174,7 +176,7 @@ def test_density_counts_what_lies_outside_in_the_whole():
 
 
 def test_throats_are_closed_empty_filled_or_blocked():
-    cut = section_sizes(run(1).thesis)
+    cut = section_sizes(run(1))
     found = contents(cut)
     assert sum(found.values()) == pytest.approx(1.0)
     assert found["with fines"] == pytest.approx(np.mean((cut.throat_fines > 0) & ~cut.blocked))
@@ -185,7 +187,7 @@ def test_throats_are_closed_empty_filled_or_blocked():
 
 def test_a_blocked_throat_is_not_among_those_with_fines():
     cut = replace(
-        section_sizes(run(1).thesis),
+        section_sizes(run(1)),
         throat_radius=np.array([0.0, 0.1, 0.1, 0.1, 0.1]),
         throat_fines=np.array([0, 0, 1, 2, 0]),
         blocked=np.array([False, False, False, True, True]),
@@ -195,7 +197,7 @@ def test_a_blocked_throat_is_not_among_those_with_fines():
 
 def test_throats_by_depth_count_each_once():
     axes = drawn(throats_by_depth, sources(), specimen="specimen1").axes[0]
-    count = len(section_sizes(run(1).thesis).throat_radius)
+    count = len(section_sizes(run(1)).throat_radius)
     assert labelled(axes, f"all throats, {count}").get_data().values.sum() == count
 
 
@@ -225,9 +227,9 @@ def test_fines_are_counted_by_size_class():
     assert list(large[:3]) == [0, 3, 1]
 
 
-def scan(seed, value, depth):
+def scan(seed, value, depth, specimen="quick-specimen7"):
     return ScanRow(
-        specimen="specimen1",
+        specimen=specimen,
         seed=seed,
         value=value,
         depth_mean_mm=0.5 * depth,
@@ -244,7 +246,16 @@ def test_the_drag_figure_shows_the_mean_and_range_over_seeds():
     axes = drawn(invasion_depth, sources(drag=rows, specimens=("table3",))).axes[0]
     assert list(labelled(axes, "deepest fine").get_ydata()) == pytest.approx([2.0, 6.0])
     assert axes.get_xscale() == "log"
+    assert axes.get_title(loc="left") == "specimen 7, quick form, mean and range of 2 seeds"
     assert list(labelled(axes, "thesis, Table 3").get_ydata()) == [2.0]
+
+
+def test_table_3_stands_beside_its_own_fines_alone():
+    rows = [scan(1, 1.0, 1.0, "quick-specimen5"), scan(1, 1.0, 2.0, "quick-specimen7")]
+    five, seven = drawn(invasion_depth, sources(drag=rows, specimens=("table3",))).axes
+    assert not [line for line in five.lines if line.get_label().startswith("thesis")]
+    assert labelled(seven, "mean depth").get_ydata() == [1.0]
+    assert labelled(seven, "thesis") is not None
 
 
 def test_distances_are_shares_by_place():
@@ -280,6 +291,7 @@ def test_all_that_is_there_is_drawn_and_what_is_missing_named(tmp_path):
     caption = by_name["figure_15_invaded_fraction_specimen1.png"].caption
     assert caption.startswith("Thesis Figure 15, specimen 1:")
     assert "about 70% in its first bin" in caption
+    assert "Thesis: throat radius 0 to 0.05 mm about 30 %." in by_name["figure_42_sizes_specimen1.png"].caption
 
 
 def test_every_figure_of_the_thesis_that_can_be_drawn_is_in_the_table():
@@ -292,6 +304,20 @@ def test_sentences_without_their_number_are_left_out():
     assert said("{specimen1.reductions[5]:g} there", {"specimen1": MARKS}) == ""
     assert said("{specimen2.depth_mm:g} mm", {"specimen1": MARKS}) == ""
     assert said("{specimen1.depth_mm:g} mm", {"specimen1": ThesisMarks()}) == ""
+
+
+def test_the_values_file_becomes_marks_by_specimen():
+    marks = thesis_marks(thesis_values())
+    assert set(marks) == {"table3", *(f"specimen{number}" for number in range(1, 9))}
+    assert marks["specimen5"].porosity_loss == pytest.approx(0.08)
+    assert marks["specimen5"].reductions[0] == 0.32
+    assert marks["specimen8"].reductions == (0.25,)
+    assert [told.quantity for told in marks["specimen5"].deposition.values()] == ["axis", "wall", "wall"]
+    assert list(marks["specimen5"].deposition) == list(DISTANCE_CLASSES)
+    assert marks["specimen7"].size_classes_mm == ((0.025, 0.03), (0.045, 0.05))
+    assert marks["specimen1"].depth_mm == 4.0
+    (share,) = [told for told in marks["specimen1"].statistics if told.quantity == "throat length"]
+    assert (share.between, share.words) == ((0.2, 0.6), "about 80 %")
 
 
 def test_percent():

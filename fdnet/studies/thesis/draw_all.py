@@ -39,14 +39,26 @@ def draw_all(
 
 
 def _drawn(name: str, drawing: Drawing, sources: Sources, folder: Path) -> Drawn:
-    told = [said(sentence, sources.thesis) for sentence in drawing.thesis]
-    caption = " ".join([drawing.caption, *(one for one in told if one)])
+    caption = " ".join([drawing.caption, *_told(drawing, sources)])
     missing = tuple(_missing(drawing, sources))
     if missing:
         return Drawn(name=name, path=None, caption=caption, missing=missing)
     with canvas(folder / name) as figure:
         drawing.draw(figure, sources)
     return Drawn(name=name, path=folder / name, caption=caption)
+
+
+def _told(drawing: Drawing, sources: Sources) -> Iterator[str]:
+    """What the thesis says of the figure, as far as it is known."""
+    yield from filter(None, (said(sentence, sources.thesis) for sentence in drawing.thesis))
+    for specimen in drawing.specimens[:1]:
+        for one in sources.marks(specimen).statistics:
+            if one.quantity in drawing.quantities:
+                yield f"Thesis: {one.what} {one.words}."
+    if drawing.table == "distances" and drawing.key is not None:
+        near = sources.marks("specimen5").deposition.get(drawing.key)
+        if near is not None:
+            yield f"Thesis: {near.words} nearer the {near.quantity}."
 
 
 def _missing(drawing: Drawing, sources: Sources) -> Iterator[str]:

@@ -1,6 +1,6 @@
 """What the thesis's figures share: sources, files, colours, and curves with their range over seeds."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +13,8 @@ from fdnet.report.figures import STYLE
 from fdnet.snapshot import Array
 from fdnet.studies.thesis.examine import Examined
 from fdnet.studies.thesis.marks import NONE, ThesisMarks
+from fdnet.studies.thesis.plan import QUICK
+from fdnet.studies.thesis.values import specimen_number
 
 MM = 1e3
 DPI = 150
@@ -62,10 +64,10 @@ class ScanRow:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Tables:
-    """What other studies found: `drag`, `friction` and `supply` rows of scans over the drag multiplier, the fines'
-    friction and the fines supplied; `tetrahedra` by specimen, how many with all spheres and with the grains alone;
-    `distances` by class of throat porosity (`DISTANCE_CLASSES`), (K,) of a fine's centre from the throat's axis over
-    the throat's radius."""
+    """What other studies found: `drag`, `friction`, `supply` rows of scans over the drag multiplier, the fines'
+    friction and the fines supplied over those of the case; `tetrahedra` by specimen, how many with all spheres and with
+    the grains alone; `distances` by class of throat porosity (`DISTANCE_CLASSES`), (K,) of a fine's centre from the
+    throat's axis over the throat's radius."""
 
     drag: Sequence[ScanRow] = ()
     friction: Sequence[ScanRow] = ()
@@ -141,14 +143,21 @@ def bars(axes: Any, edges: Array, rows: Any, *, colour: str, label: str) -> None
         axes.vlines((edges[1:] + edges[:-1]) / 2, rows.min(axis=0), rows.max(axis=0), color="black", linewidth=1)
 
 
-def seeds(runs: Sequence[Any]) -> str:
+def seeds(runs: Collection[Any]) -> str:
     """ "", or how many seeds the mean and its band are of."""
     return f", mean and range of {len(runs)} seeds" if len(runs) > 1 else ""
 
 
-def titled(specimen: str) -> str:
-    """ "specimen 1" of "specimen1"."""
-    return specimen.replace("specimen", "specimen ")
+def titled(name: str) -> str:
+    """Such as "specimen 1" of "specimen1" and "specimen 1, quick form" of "quick-specimen1"."""
+    plain = name.removeprefix(QUICK).replace("specimen", "specimen ")
+    return f"{plain}, quick form" if name.startswith(QUICK) else plain
+
+
+def own_style(name: str) -> dict[str, str]:
+    """Colour and marker of a run's specimen."""
+    specimen = f"specimen{specimen_number(name) or ''}"
+    return {"color": SPECIMEN_COLOURS.get(specimen, BLACK), "marker": SPECIMEN_MARKERS.get(specimen, "x")}
 
 
 def sized(run: Examined, name: str) -> str:

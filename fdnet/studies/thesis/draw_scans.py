@@ -10,12 +10,17 @@ from fdnet.studies.thesis.draw_canvas import (
     BLUE,
     GREEN,
     ORANGE,
-    SPECIMEN_COLOURS,
-    SPECIMEN_MARKERS,
+    THESIS,
     ScanRow,
     Sources,
+    own_style,
+    seeds,
     titled,
 )
+from fdnet.studies.thesis.values import TABLE3, specimen_number
+
+AS_TABLE3 = (TABLE3, "7")
+"""Specimens with the pack and the fines of Table 3."""
 
 
 def over_seeds(rows: Sequence[ScanRow], name: str) -> tuple[Array, Array]:
@@ -26,28 +31,36 @@ def over_seeds(rows: Sequence[ScanRow], name: str) -> tuple[Array, Array]:
 
 
 def invasion_depth(figure: Any, sources: Sources) -> None:
-    """Deepest fine, depth of 95 % and mean depth against the drag multiplier."""
-    axes = figure.add_subplot()
-    seeds = len({row.seed for row in sources.tables.drag})
+    """Deepest fine, depth of 95 % and mean depth against the drag multiplier; a panel a specimen."""
+    rows = sources.tables.drag
+    specimens = sorted({row.specimen for row in rows})
+    figure.set_size_inches(max(7.2, 3.6 * len(specimens)), 4.4)
+    panels = figure.subplots(1, len(specimens), squeeze=False, sharey=True)[0]
+    for axes, specimen in zip(panels, specimens, strict=True):
+        _depths(axes, [row for row in rows if row.specimen == specimen], sources.marks("table3").depth_mm)
+        axes.set_title(f"{titled(specimen)}{seeds({row.seed for row in rows})}", fontsize=10, loc="left")
+    panels[0].set_ylabel("depth of the invaded fines (mm)")
+    handles = [axes.get_legend_handles_labels() for axes in panels]
+    once = {label: handle for some, labels in handles for handle, label in zip(some, labels, strict=True)}
+    figure.legend([*once.values()], [*once], loc="outside lower center", ncols=4, fontsize=9.5)
+
+
+def _depths(axes: Any, rows: Sequence[ScanRow], told: float | None) -> None:
     for name, words, style in (
         ("depth_max_mm", "deepest fine", {"color": ORANGE, "marker": "^"}),
         ("depth_p95_mm", "95 % lie shallower", {"color": BLUE, "marker": "o"}),
         ("depth_mean_mm", "mean depth", {"color": GREEN, "marker": "s"}),
     ):
-        _curve(axes, sources.tables.drag, name, words, style)
-    depth = sources.marks("table3").depth_mm
-    if depth is not None:
-        axes.axhline(depth, color="black", linestyle=":", linewidth=1.5)
-        label = f"thesis, Table 3, nominal drag: {depth:g} mm"
-        axes.plot([1.0], [depth], "D", color="black", markerfacecolor="white", markersize=7, label=label)
-    axes.set(xscale="log", xlabel="drag over Stokes's drag, multiplier (–)", ylabel="depth of the invaded fines (mm)")
-    ticks = sorted({row.value for row in sources.tables.drag})
+        _curve(axes, rows, name, words, style)
+    if told is not None and specimen_number(rows[0].specimen) in AS_TABLE3:
+        label = f"thesis, Table 3, nominal drag: {told:g} mm"
+        axes.plot([1.0], [told], linestyle="", zorder=5, label=label, **THESIS)
+    ticks = sorted({row.value for row in rows})
+    axes.set(xscale="log", xlabel="multiplier of Stokes's drag (–)")
     axes.minorticks_off()
     axes.set_xticks(ticks, [f"{one:g}" for one in ticks])
-    axes.margins(y=0.15)
+    axes.margins(y=0.1)
     axes.set_ylim(bottom=0)
-    title = f"range of {seeds} seeds" if seeds > 1 else ""
-    axes.legend(loc="best", fontsize=9.5, title=title)
 
 
 def _curve(axes: Any, rows: Sequence[ScanRow], name: str, label: str, style: dict[str, Any]) -> None:
@@ -62,8 +75,8 @@ def friction(figure: Any, sources: Sources) -> None:
 
 
 def supply(figure: Any, sources: Sources) -> None:
-    """Against the number of fines supplied."""
-    _scan(figure, sources, sources.tables.supply, "fines supplied (–)")
+    """Against the fines supplied over those of the case."""
+    _scan(figure, sources, sources.tables.supply, "fines supplied / those of the case (–)")
 
 
 def _scan(figure: Any, sources: Sources, rows: Sequence[ScanRow], label: str) -> None:
@@ -76,7 +89,7 @@ def _scan(figure: Any, sources: Sources, rows: Sequence[ScanRow], label: str) ->
     )
     for axes, (name, words, told) in zip(figure.subplots(1, 3), panels, strict=True):
         for specimen in sorted({row.specimen for row in rows}):
-            style = {"color": SPECIMEN_COLOURS[specimen], "marker": SPECIMEN_MARKERS[specimen]}
+            style = own_style(specimen)
             _curve(axes, [row for row in rows if row.specimen == specimen], name, titled(specimen), style)
             mark = None if told is None else getattr(sources.marks(specimen), told)
             if mark is not None:

@@ -14,7 +14,7 @@ BINS = 40
 TAIL = 0.995
 """Share of the values a figure's axis reaches to; the rest is told."""
 DEPTH_BINS = 10
-FULL = (
+CONTENTS = (
     "throats without fines",
     "throats with fines",
     "throats blocked",
@@ -53,7 +53,7 @@ def density(values: Array, edges: Array) -> Array:
 
 def _densities(figure: Any, sources: Sources, specimen: str, wanted: Sequence[tuple[str, str, str]]) -> None:
     runs = sources.examined[specimen]
-    cuts = [section_sizes(run.thesis) for run in runs]
+    cuts = [section_sizes(run) for run in runs]
     every = np.concatenate([getattr(cut, name) for cut in cuts for name, *_ in wanted])
     edges = np.linspace(0.0, float(np.quantile(every, TAIL)), BINS + 1)
     axes = figure.add_subplot()
@@ -75,8 +75,7 @@ def _shares(told: Sequence[Told], cuts: Sequence[SectionSizes], wanted: Sequence
         if one.between is not None and name in wanted:
             low, high = one.between
             ours = float(np.mean([share_within(getattr(cut, name), low, high) for cut in cuts]))
-            unit = "mm³" if name.endswith("volume") else "mm"
-            lines.append(f"{one.quantity} {low:g} to {high:g} {unit}: {percent(ours)} (thesis: {one.words})")
+            lines.append(f"{one.what}: {percent(ours)} (thesis: {one.words})")
     return lines
 
 
@@ -88,7 +87,7 @@ def _tell(axes: Any, specimen: str, lines: Sequence[str]) -> None:
 def throats_by_depth(figure: Any, sources: Sources, *, specimen: str) -> None:
     """All and blocked throats in bins of 0.1 mm."""
     runs, marks = sources.examined[specimen], sources.marks(specimen)
-    cuts = [section_sizes(run.thesis) for run in runs]
+    cuts = [section_sizes(run) for run in runs]
     edges = np.linspace(0.0, 1.0, DEPTH_BINS + 1)
     every = np.mean([np.histogram(cut.throat_depth, edges)[0] for cut in cuts], axis=0)
     blocked = np.mean([np.histogram(cut.throat_depth[cut.blocked], edges)[0] for cut in cuts], axis=0)
@@ -123,7 +122,7 @@ def contents(cut: SectionSizes) -> dict[str, float]:
 def throat_porosity(figure: Any, sources: Sources, *, specimen: str) -> None:
     """What the throats hold (left), and the density of porosity of those that hold fines and are not blocked."""
     runs = sources.examined[specimen]
-    cuts = [section_sizes(run.thesis) for run in runs]
+    cuts = [section_sizes(run) for run in runs]
     figure.set_size_inches(9.6, 4.4)
     left, right = figure.subplots(1, 2, width_ratios=(1.1, 1.6))
     found = [contents(cut) for cut in cuts]
@@ -144,14 +143,14 @@ def throat_porosity(figure: Any, sources: Sources, *, specimen: str) -> None:
     right.margins(y=0.15)
     right.set_ylim(bottom=0)
     right.legend(loc="upper left", fontsize=9.5)
-    told = [one for one in sources.marks(specimen).statistics if one.quantity in FULL]
+    told = [one for one in sources.marks(specimen).statistics if one.quantity in CONTENTS]
     _tell(left, specimen, [f"thesis: {one.quantity} {one.words}" for one in told] or [""])
 
 
 def conductances(figure: Any, sources: Sources, *, specimen: str) -> None:
     """Density per decade of the open throats' conductance before and after, by the thesis's laws."""
     runs = sources.examined[specimen]
-    cuts = [section_sizes(run.thesis) for run in runs]
+    cuts = [section_sizes(run) for run in runs]
     first = np.concatenate([cut.conductance_initial for cut in cuts])
     low, high = np.log10(np.quantile(first[first > 0], [1 - TAIL, TAIL]))
     edges = np.linspace(np.floor(2 * low) / 2, np.ceil(2 * high) / 2, BINS + 1)

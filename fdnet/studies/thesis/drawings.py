@@ -1,7 +1,7 @@
 """The figures of the thesis by file name: how each is drawn, from what, and what stands under it."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -16,7 +16,8 @@ BY_POROSITY = ("specimen3", "specimen6")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawing:
     """How a figure is made: `draw(figure, sources)`; the `specimens` it needs, and which of the other `table`s, under
-    which `key`; its `caption`, and sentences of the `thesis` which stand when their numbers are known."""
+    which `key`; its `caption`, and sentences of the `thesis` which stand when their numbers are known; `quantities`
+    of the first specimen's statistics that the caption tells too."""
 
     draw: Callable[[Any, Sources], None]
     caption: str
@@ -24,6 +25,7 @@ class Drawing:
     table: str | None = None
     key: str | None = None
     thesis: Sequence[str] = ()
+    quantities: Sequence[str] = ()
 
 
 def _single(name: str, specimen: str, draw: Any, what: str, *thesis: str) -> Named:
@@ -109,22 +111,34 @@ NOTE = " (The thesis calls it specimen 7 there.)"
 
 def _sections(specimen: str) -> list[Named]:
     kinds = (
-        ("sizes", draw_sections.sizes, "inscribed radii of throats and pore bodies."),
-        ("lengths", draw_sections.lengths, "throat lengths."),
-        ("throats_by_depth", draw_sections.throats_by_depth, "all throats and those that a fine blocks, by depth."),
+        ("sizes", ("throat radius", "pore radius"), draw_sections.sizes, "inscribed radii of throats and pore bodies."),
+        ("lengths", ("throat length",), draw_sections.lengths, "throat lengths."),
+        (
+            "throats_by_depth",
+            ("throats blocked",),
+            draw_sections.throats_by_depth,
+            "all throats and those that a fine blocks, by depth.",
+        ),
         (
             "throat_porosity",
+            draw_sections.CONTENTS,
             draw_sections.throat_porosity,
             "what the throats hold, and the porosity of those with fines.",
         ),
-        ("pore_volume", draw_sections.volumes, "void volume of the pores before and after the invasion."),
-        ("conductance", draw_sections.conductances, "conductance of the throats before and after the invasion."),
+        (
+            "pore_volume",
+            ("pore volume",),
+            draw_sections.volumes,
+            "void volume of the pores before and after the invasion.",
+        ),
+        ("conductance", (), draw_sections.conductances, "conductance of the throats before and after the invasion."),
     )
     note = NOTE if specimen == "specimen8" else ""
-    return [
-        _single(f"figure_{number}_{words}", specimen, draw, f"in the first 1 mm, {what}{note}")
-        for number, (words, draw, what) in zip(NUMBERS[specimen], kinds, strict=True)
-    ]
+    made = (
+        (_single(f"figure_{number}_{words}", specimen, draw, f"in the first 1 mm, {what}{note}"), quantities)
+        for number, (words, quantities, draw, what) in zip(NUMBERS[specimen], kinds, strict=True)
+    )
+    return [(name, replace(drawing, quantities=quantities)) for (name, drawing), quantities in made]
 
 
 def _permeability(number: int, specimen: str) -> Named:
@@ -175,17 +189,12 @@ def _comparisons() -> list[Named]:
 
 
 def _scans() -> list[Named]:
-    words = "count and lost porosity of the first 1 mm, and depth of 95 % of the invaded fines, against"
-    none = "The thesis gives none."
+    against = "Count and lost porosity of the first 1 mm, and depth of 95 % of the invaded fines, against"
+    friction = f"{against} the friction of the fines, of which the thesis tells nothing."
+    supply = f"{against} the fines supplied, of which the thesis tells nothing."
     return [
-        (
-            "scan_friction.png",
-            Drawing(draw=draw_scans.friction, caption=f"{words} the friction of the fines. {none}", table="friction"),
-        ),
-        (
-            "scan_supply.png",
-            Drawing(draw=draw_scans.supply, caption=f"{words} the fines supplied. {none}", table="supply"),
-        ),
+        ("scan_friction.png", Drawing(draw=draw_scans.friction, caption=friction, table="friction")),
+        ("scan_supply.png", Drawing(draw=draw_scans.supply, caption=supply, table="supply")),
     ]
 
 

@@ -24,6 +24,14 @@ class Told:
         """ "about 70 %"."""
         return percent(self.value) if self.sense == "exact" else f"{self.sense} {percent(self.value)}"
 
+    @property
+    def what(self) -> str:
+        """ "throat radius 0 to 0.05 mm"."""
+        if self.between is None:
+            return self.quantity
+        unit = "mm³" if self.quantity.endswith("volume") else "mm"
+        return f"{self.quantity} {self.between[0]:g} to {self.between[1]:g} {unit}"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThesisMarks:

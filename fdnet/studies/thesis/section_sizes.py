@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fdnet.network.permeability import Analysis
 from fdnet.snapshot import Array
+from fdnet.studies.thesis.examine import Examined
+from fdnet.studies.thesis.first_section import first_section
 
-DEPTH = 1e-3
-"""Thickness m of the thesis's sections."""
 MM = 1e3
 
 
@@ -18,7 +17,7 @@ class SectionSizes:
 
     `throat_radius`, `pore_radius` inscribed (0 where grains close it); `throat_depth` of the middle;
     `throat_porosity` of the cylinder, 0 where fines overlap so that it would be negative; `throat_fines` how many;
-    `conductance_initial`, `conductance_damaged` by the analysis's law; `pore_volume` void of the tetrahedron,
+    `conductance_initial`, `conductance_damaged` by the thesis's laws; `pore_volume` void of the tetrahedron,
     `pore_volume_left` without the fines.
     """
 
@@ -35,34 +34,26 @@ class SectionSizes:
     pore_volume_left: Array
 
 
-def section_sizes(analysis: Analysis) -> SectionSizes:
-    """Pores of four grains of the specimen and throats between two such, as in the thesis, whose tessellation ends at
-    the outermost grains: none cut by a face, and no facets within one polyhedron, which are split at will."""
-    network, occupancy = analysis.network, analysis.occupancy
-    face = network.box[0, 0]
-    middle = network.throat_ends[:, :, 0].mean(axis=1) - face
-    uncut = network.pore_share == 1.0
-    group = network.pore_group[network.throat_pores]
-    throat = (middle < DEPTH) & uncut[network.throat_pores].all(axis=1) & (group[:, 0] != group[:, 1])
-    pore = (network.pore_position[:, 0] - face < DEPTH) & uncut
+def section_sizes(examined: Examined) -> SectionSizes:
+    """Its whole pores, of four grains of the specimen, and the throats between two such (`first_section`); conductance
+    by the thesis's laws. Raises CaseError on a specimen without fines."""
+    section, analysis = first_section(examined, whole=True), examined.thesis
+    network, occupancy = section.network, section.occupancy
+    pore, throat = section.pore_weight > 0, section.throat_weight > 0
+    depth = network.throat_ends[:, :, 0].mean(axis=1) - network.box[0, 0]
     volume = np.maximum(network.pore_volume, 0.0)
-    count = len(throat)
-    porosity, fines, blocked, solid = np.ones(count), np.zeros(count, int), np.zeros(count, bool), np.zeros(len(pore))
-    if occupancy is not None:
-        porosity, fines = np.maximum(occupancy.throat_porosity, 0.0), occupancy.throat_fines
-        blocked, solid = occupancy.blocked, occupancy.pore_solid_volume
     return SectionSizes(
         throat_radius=network.throat_radius[throat] * MM,
         throat_length=network.throat_length[throat] * MM,
-        throat_depth=middle[throat] * MM,
-        throat_porosity=porosity[throat],
-        throat_fines=fines[throat],
-        blocked=blocked[throat],
+        throat_depth=depth[throat] * MM,
+        throat_porosity=np.maximum(occupancy.throat_porosity, 0.0)[throat],
+        throat_fines=occupancy.throat_fines[throat],
+        blocked=occupancy.blocked[throat],
         conductance_initial=analysis.conductance_initial[throat] * MM**3,
         conductance_damaged=analysis.conductance_damaged[throat] * MM**3,
         pore_radius=network.pore_radius[pore] * MM,
         pore_volume=volume[pore] * MM**3,
-        pore_volume_left=np.maximum(volume - solid, 0.0)[pore] * MM**3,
+        pore_volume_left=np.maximum(volume - occupancy.pore_solid_volume, 0.0)[pore] * MM**3,
     )
 
 
