@@ -17,9 +17,12 @@ from fdnet.studies.thesis.draw_packs import fines_by_size, middle_slab, pack
 from fdnet.studies.thesis.draw_permeability import compared_permeability, permeability, ratios
 from fdnet.studies.thesis.draw_scans import invasion_depth, over_seeds
 from fdnet.studies.thesis.draw_sections import contents, density, sizes, throat_porosity, throats_by_depth
+from fdnet.studies.thesis.draw_tables import distances_found, scan_row, tetrahedra_counted
 from fdnet.studies.thesis.drawings import FIGURES
 from fdnet.studies.thesis.examine import examine
+from fdnet.studies.thesis.first_section import first_section
 from fdnet.studies.thesis.marks import ThesisMarks, Told, percent, said
+from fdnet.studies.thesis.results import result_rows
 from fdnet.studies.thesis.section_sizes import section_sizes, share_within
 from fdnet.studies.thesis.state import ENDING, State
 from fdnet.studies.thesis.thesis_marks import thesis_marks
@@ -246,7 +249,7 @@ def test_the_drag_figure_shows_the_mean_and_range_over_seeds():
     axes = drawn(invasion_depth, sources(drag=rows, specimens=("table3",))).axes[0]
     assert list(labelled(axes, "deepest fine").get_ydata()) == pytest.approx([2.0, 6.0])
     assert axes.get_xscale() == "log"
-    assert axes.get_title(loc="left") == "specimen 7, quick form, mean and range of 2 seeds"
+    assert axes.get_title(loc="left") == "specimen 7, quick form"
     assert list(labelled(axes, "thesis, Table 3").get_ydata()) == [2.0]
 
 
@@ -318,6 +321,24 @@ def test_the_values_file_becomes_marks_by_specimen():
     assert marks["specimen1"].depth_mm == 4.0
     (share,) = [told for told in marks["specimen1"].statistics if told.quantity == "throat length"]
     assert (share.between, share.words) == ((0.2, 0.6), "about 80 %")
+
+
+def test_tables_are_filled_from_what_is_examined():
+    assert tetrahedra_counted({"specimen1": [run(1)], "specimen2": []})["specimen1"][0] > 0
+    found = distances_found([run(1), run(2)])
+    assert list(found) == list(DISTANCE_CLASSES)
+    sections = [first_section(run(seed), whole=True) for seed in (1, 2)]
+    pairs = [np.sum(section.throat_weight[section.occupancy.pair_throat]) for section in sections]
+    assert sum(len(one) for one in found.values()) == sum(pairs) > 0
+    assert distances_found([]) == {}
+
+
+def test_a_scan_s_row_is_a_result():
+    row = result_rows(run(2))[0]
+    found = scan_row("specimen5", 0.3, row)
+    assert (found.seed, found.value, found.count_first_mm) == (2, 0.3, row.count_first_mm)
+    assert (found.depth_mean_mm, found.depth_max_mm) == pytest.approx((0.875, 1.5))
+    assert found.depth_p95_mm == row.invasion_depth_p95_mm
 
 
 def test_percent():

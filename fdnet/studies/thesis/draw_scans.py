@@ -38,11 +38,12 @@ def invasion_depth(figure: Any, sources: Sources) -> None:
     panels = figure.subplots(1, len(specimens), squeeze=False, sharey=True)[0]
     for axes, specimen in zip(panels, specimens, strict=True):
         _depths(axes, [row for row in rows if row.specimen == specimen], sources.marks("table3").depth_mm)
-        axes.set_title(f"{titled(specimen)}{seeds({row.seed for row in rows})}", fontsize=10, loc="left")
+        axes.set_title(titled(specimen), fontsize=11, loc="left")
     panels[0].set_ylabel("depth of the invaded fines (mm)")
     handles = [axes.get_legend_handles_labels() for axes in panels]
     once = {label: handle for some, labels in handles for handle, label in zip(some, labels, strict=True)}
-    figure.legend([*once.values()], [*once], loc="outside lower center", ncols=4, fontsize=9.5)
+    band = seeds({row.seed for row in rows}).removeprefix(", ")
+    figure.legend([*once.values()], [*once], loc="outside lower center", ncols=4, fontsize=9.5, title=band or None)
 
 
 def _depths(axes: Any, rows: Sequence[ScanRow], told: float | None) -> None:
