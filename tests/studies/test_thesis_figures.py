@@ -12,7 +12,7 @@ from fdnet.snapshot import Kind, resting
 from fdnet.studies.thesis.draw_all import draw_all
 from fdnet.studies.thesis.draw_canvas import DISTANCE_CLASSES, ScanRow, Sources, Tables, few_colours
 from fdnet.studies.thesis.draw_deposition import distances, tetrahedra
-from fdnet.studies.thesis.draw_depth import compared_fraction, invaded_fraction, lost_within, porosity_reduction
+from fdnet.studies.thesis.draw_depth import compared_fraction, invaded_fraction, porosity_reduction, total_reduction
 from fdnet.studies.thesis.draw_packs import fines_by_size, middle_slab, pack
 from fdnet.studies.thesis.draw_permeability import compared_permeability, permeability, ratios
 from fdnet.studies.thesis.draw_scans import invasion_depth, over_seeds
@@ -129,11 +129,15 @@ def test_the_lost_porosity_is_the_fines_volume_over_the_box():
     assert labelled(axes, "thesis, initial less damaged").get_ydata()[0] == 0.01
 
 
-def test_the_loss_of_the_first_part_counts_part_of_a_bin():
-    analysis = run(1).thesis
-    lost = analysis.profile.porosity_initial - analysis.profile.porosity_damaged
-    assert lost_within(analysis, 1e-3) == pytest.approx(lost[:4].mean())
-    assert lost_within(analysis, 0.625e-3) == pytest.approx((lost[0] + lost[1] + 0.5 * lost[2]) / 2.5)
+def test_the_total_loss_stands_beside_that_of_the_first_millimetre():
+    found = sources(1, 2, specimens=("specimen1", "specimen3"))
+    axes = drawn(total_reduction, found, specimens=("specimen1", "specimen3")).axes[0]
+    whole, first = axes.containers
+    fine = 4 / 3 * np.pi * 0.04**3 / 1.6**2
+    assert [bar.get_height() for bar in whole] == pytest.approx([4 * fine / 3] * 2, rel=0.05)
+    assert [bar.get_height() for bar in first] == pytest.approx([3 * fine] * 2, rel=0.05)
+    low, high = axes.collections[1].get_segments()[0][:, 1]
+    assert (low, high) == pytest.approx((2.5 * fine, 3.5 * fine), rel=0.05)
 
 
 def test_permeability_stands_beside_the_thesis_s_sections():

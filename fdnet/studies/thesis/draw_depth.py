@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.network.permeability import Analysis
 from fdnet.snapshot import Array
 from fdnet.studies.thesis.draw_canvas import (
     BLUE,
@@ -23,23 +22,19 @@ from fdnet.studies.thesis.draw_canvas import (
 )
 from fdnet.studies.thesis.examine import Examined
 from fdnet.studies.thesis.marks import percent
+from fdnet.studies.thesis.results import invaded_depth, porosity_loss
 
 BIN_MM = 0.25
+FIRST = 1e-3
+"""Thickness m of the section looked at in detail."""
 DEEPER_MM = 0.5
-
-
-def invaded_depths(run: Examined) -> Array:
-    """Depth mm of the fines centred in the specimen."""
-    low, high = run.state.damaged.box[0]
-    x = run.state.damaged.fines().position[:, 0]
-    return (x[(x >= low) & (x < high)] - low) * MM
 
 
 def fraction_by_depth(run: Examined) -> tuple[Array, Array]:
     """Edges (B+1,) mm of bins of 0.25 mm, and the share (B,) of the invaded fines in each, by number."""
     length = float(np.ptp(run.state.damaged.box[0])) * MM
     edges = np.linspace(0.0, length, max(1, round(length / BIN_MM)) + 1)
-    depth = invaded_depths(run)
+    depth = invaded_depth(run.state) * MM
     return edges, np.histogram(depth, edges)[0] / max(len(depth), 1)
 
 
@@ -47,13 +42,6 @@ def lost_by_depth(run: Examined) -> tuple[Array, Array]:
     """Edges (B+1,) mm of the profile, and the porosity (B,) lost to the fines."""
     profile = run.thesis.profile
     return profile.edges * MM, profile.porosity_initial - profile.porosity_damaged
-
-
-def lost_within(analysis: Analysis, depth: float) -> float:
-    """Porosity lost from the formation face to `depth` m, over the part of each bin that lies in it."""
-    profile = analysis.profile
-    edges = np.minimum(profile.edges - profile.edges[0], depth)
-    return float(np.average(profile.porosity_initial - profile.porosity_damaged, weights=np.diff(edges)))
 
 
 def invaded_fraction(figure: Any, sources: Sources, *, specimen: str) -> None:
@@ -68,7 +56,9 @@ def invaded_fraction(figure: Any, sources: Sources, *, specimen: str) -> None:
         label = f"thesis, its first bin (width not given): about {percent(marks.fraction_first_bin)}"
         axes.plot([edges[:2].mean()], [marks.fraction_first_bin], linestyle="", label=label, **THESIS)
     _deepest(axes, runs, marks.depth_mm)
-    beyond = np.mean([np.mean(invaded_depths(run) > DEEPER_MM) if run.thesis.invaded_count else 0.0 for run in runs])
+    beyond = np.mean(
+        [np.mean(invaded_depth(run.state) * MM > DEEPER_MM) if run.thesis.invaded_count else 0.0 for run in runs]
+    )
     told = "" if marks.fraction_beyond_0p5mm is None else f" (thesis: below {percent(marks.fraction_beyond_0p5mm)})"
     axes.plot([], [], " ", label=f"deeper than {DEEPER_MM} mm: {percent(beyond)}{told}")
     axes.set(xlabel=DEPTH_LABEL, ylabel=f"share of the invaded fines per {BIN_MM} mm (–)", xlim=edges[[0, -1]])
@@ -137,7 +127,7 @@ def total_reduction(figure: Any, sources: Sources, *, specimens: Sequence[str]) 
     axes = figure.add_subplot()
     places = np.arange(len(specimens), dtype=float)
     whole = [[r.thesis.porosity_initial - r.thesis.porosity_damaged for r in sources.examined[s]] for s in specimens]
-    first = [[lost_within(r.thesis, 1e-3) for r in sources.examined[s]] for s in specimens]
+    first = [[porosity_loss(r.state, r.thesis, FIRST) for r in sources.examined[s]] for s in specimens]
     for shift, rows, colour, label in ((-0.2, whole, BLUE, "whole specimen"), (0.2, first, ORANGE, "first 1 mm")):
         axes.bar(places + shift, [np.mean(one) for one in rows], 0.36, color=colour, alpha=0.7, label=label)
         axes.vlines(places + shift, [min(r) for r in rows], [max(r) for r in rows], color="black", linewidth=1)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from fdnet.snapshot import Array
-from fdnet.studies.thesis.draw_canvas import BLUE, GREEN, GREY, ORANGE, Sources, seeds, steps, titled
+from fdnet.studies.thesis.draw_canvas import BLUE, GREEN, GREY, ORANGE, Sources, bars, seeds, steps, titled
 from fdnet.studies.thesis.marks import Told, percent
 from fdnet.studies.thesis.section_sizes import SectionSizes, section_sizes, share_within
 
@@ -89,10 +89,11 @@ def throats_by_depth(figure: Any, sources: Sources, *, specimen: str) -> None:
     runs, marks = sources.examined[specimen], sources.marks(specimen)
     cuts = [section_sizes(run) for run in runs]
     edges = np.linspace(0.0, 1.0, DEPTH_BINS + 1)
-    every = np.mean([np.histogram(cut.throat_depth, edges)[0] for cut in cuts], axis=0)
+    every = [np.histogram(cut.throat_depth, edges)[0] for cut in cuts]
     blocked = np.mean([np.histogram(cut.throat_depth[cut.blocked], edges)[0] for cut in cuts], axis=0)
     axes = figure.add_subplot()
-    axes.stairs(every, edges, fill=True, color=BLUE, alpha=0.35, label=f"all throats, {every.sum():.0f}{seeds(runs)}")
+    count = np.mean([one.sum() for one in every])
+    bars(axes, edges, every, colour=BLUE, label=f"all throats, {count:.0f}{seeds(runs)}")
     axes.stairs(blocked, edges, fill=True, color=ORANGE, label=f"blocked throats, {blocked.sum():.0f}")
     for middle, height in zip((edges[1:] + edges[:-1]) / 2, blocked, strict=True):
         offset: Any = {"xytext": (0, 3), "textcoords": "offset points"}
