@@ -10,7 +10,7 @@ import numpy as np
 
 from fdnet.atomic import replacing
 from fdnet.report.figures import STYLE
-from fdnet.snapshot import Array
+from fdnet.snapshot import Array, Snapshot
 from fdnet.studies.thesis.examine import Examined
 from fdnet.studies.thesis.marks import NONE, ThesisMarks
 from fdnet.studies.thesis.plan import QUICK
@@ -67,13 +67,14 @@ class Tables:
     """What other studies found: `drag`, `friction`, `supply` rows of scans over the drag multiplier, the fines'
     friction and the fines supplied over those of the case; `tetrahedra` by specimen, how many with all spheres and with
     the grains alone; `distances` by class of throat porosity (`DISTANCE_CLASSES`), (K,) of a fine's centre from the
-    throat's axis over the throat's radius."""
+    throat's axis over the throat's radius; `growth` a pack after its first and last stage of growth, and at rest."""
 
     drag: Sequence[ScanRow] = ()
     friction: Sequence[ScanRow] = ()
     supply: Sequence[ScanRow] = ()
     tetrahedra: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     distances: Mapping[str, Array] = field(default_factory=dict)
+    growth: Sequence[Snapshot] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -24,6 +24,23 @@ def pack(figure: Any, sources: Sources, *, specimen: str) -> None:
     axes.set_title(f"{titled(specimen)}: {len(run.state.grains)} grains", fontsize=11, loc="left")
 
 
+def growth(figure: Any, sources: Sources) -> None:
+    """A slab through the middle of a growing pack, with the velocities of its grains as arrows, each state its own
+    scale."""
+    stages = sources.tables.growth
+    figure.set_size_inches(7.2, 10.2)
+    words = ("small spheres, after the first stage of growth", "grown to their size, before they relax", "at rest")
+    for axes, spheres, said in zip(figure.subplots(len(stages), 1), stages, words, strict=True):
+        slab = middle_slab(spheres)
+        _frame(axes, slab, start=0.0)
+        _grains(axes, slab)
+        x, _, z = (slab.position * MM).T
+        arrows: Any = {"color": FINE, "width": 0.0025, "angles": "xy"}
+        axes.quiver(x, z, slab.velocity[:, 0], slab.velocity[:, 2], **arrows)
+        fastest = float(np.linalg.norm(spheres.velocity, axis=1).max())
+        axes.set_title(f"{said}; fastest grain {fastest:.2g} m/s", fontsize=11, loc="left")
+
+
 def invaded_pack(figure: Any, sources: Sources, *, specimen: str) -> None:
     """A slab one grain thick through the middle, cut open towards us: grains grey, fines coloured, cake included."""
     run = sources.examined[specimen][0]

@@ -198,6 +198,11 @@ def _scans() -> list[Named]:
     ]
 
 
+def _growth() -> Named:
+    caption = "Thesis Figures 73 and 74: growth of a pack; slab one grain thick, arrows are velocities."
+    return "figure_73-74_growth.png", Drawing(draw=draw_packs.growth, caption=caption, table="growth")
+
+
 FIGURES: dict[str, Drawing] = dict(
     [
         *_packs(),
@@ -213,6 +218,7 @@ FIGURES: dict[str, Drawing] = dict(
         _permeability(65, "specimen8"),
         *_comparisons(),
         *_scans(),
+        _growth(),
     ]
 )
-"""In the thesis's order; Figures 73 and 74 (the growth of a pack) need stages of packing that no run keeps."""
+"""In the thesis's order, the scans before the appendix."""
