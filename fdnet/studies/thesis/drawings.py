@@ -215,4 +215,4 @@ FIGURES: dict[str, Drawing] = dict(
         *_scans(),
     ]
 )
-"""In the thesis's order; Figures 73 and 74 (the growth of a pack) need stages of packing that no run keeps."""
+"""In the order of the thesis; Figures 73 and 74 (`fdnet.studies.thesis.growth`) are not among them."""
