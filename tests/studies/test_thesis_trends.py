@@ -146,6 +146,7 @@ def test_what_grows_with_the_specimen_keeps_at_least_its_relative_spread():
     [
         (MORE, 0.1, 2.0, HOLDS),
         (MORE, -0.1, 2.0, UNDECIDED),
+        (MORE, -2.0, 0.1, UNDECIDED),
         (MORE, -2.0, -0.1, FAILS),
         (ABOVE, 0.0, 0.0, UNDECIDED),
         (ABOVE, 1e-16, 1e-16, UNDECIDED),
