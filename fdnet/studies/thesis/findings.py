@@ -33,8 +33,8 @@ KEPT = ("specimen", "variant")
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Findings:
-    """`rows` of all runs, two a run; `examined` runs of the groups KEPT by id, one a seed; `missing` had neither a state
-    nor rows of an earlier time."""
+    """`rows` of all runs, two a run; `examined` runs of the groups KEPT by id, one a seed; `missing` ones had neither a
+    state nor rows of an earlier time."""
 
     rows: tuple[ResultRow, ...]
     examined: Mapping[str, Sequence[Examined]]
