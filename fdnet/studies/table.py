@@ -59,10 +59,13 @@ def _value(name: str, text: str) -> str | int | float:
 
 
 def study_text(study: Study, rows: Sequence[Row]) -> str:
-    """Markdown: the knee of every series in every panel, the study's remarks, what was not done, tables of levels."""
+    """Markdown: the knee of every series in every panel, what the study itself says, what was not done, tables of
+    levels."""
     parts = [f"# {study.title}"]
     if knees := knee_lines(study, rows):
         parts.append("\n".join(f"- {line}" for line in knees))
+    if study.summary:
+        parts.append(study.summary(rows))
     if study.remarks:
         parts.append(study.remarks.strip())
     missing = missing_lines(rows)
