@@ -146,8 +146,9 @@ class Run(Part):
 
     `stiffness_N_m` is that of the stiffest contact; "nominal" leaves the materials as they are. `max_hours` is what a
     run may be expected to take. An overlap of a fine above `max_overlap` of the smaller diameter is told, or stops the
-    run. These three decide nothing else, so a finished stage does not depend on them. `skin_mm` and `neighbour_bin_mm`
-    are LIGGGHTS's neighbour search in the invasion: time, and the order of sums.
+    run. These three decide nothing else, so a finished stage does not depend on them. The face counts as plugged when
+    in `plug_time_ms` no more fines cross it than `plug_rate` of those the undisturbed suspension would bring. `skin_mm`
+    and `neighbour_bin_mm` are LIGGGHTS's neighbour search in the invasion: time, and the order of sums.
     """
 
     stiffness_N_m: Positive | Literal["nominal"] = 1.0e4
@@ -158,6 +159,7 @@ class Run(Part):
     time_step_s: Positive | None = None
     duration_ms: Positive | None = None
     plug_time_ms: Positive | None = None
+    plug_rate: Annotated[float, Field(ge=0, lt=1)] = 0.0
     cap_ms: Positive | None = None
     checkpoint_ms: Positive | None = None
     skin_mm: Positive | None = None

@@ -11,6 +11,7 @@ from builders import TINY, tiny
 from fdnet.case_file import case_from, known_keys, read_case, set_keys
 from fdnet.errors import CaseError
 from fdnet.pipeline import _analysis_options
+from fdnet.studies.thesis.plan import SPECIMENS, VARIANTS
 
 
 def problems(data: dict) -> str:
@@ -189,11 +190,25 @@ def test_fixed_keys_of_the_contract_exist():
     assert fixed <= set(known_keys())
 
 
-@pytest.mark.parametrize("name", ["quick", "specimen1", "specimen5"])
-def test_shipped_cases_are_valid_and_short(root: Path, name: str):
-    path = root / "cases" / f"{name}.toml"
-    assert read_case(path).name == name
-    assert len(path.read_text().splitlines()) < 40
+def test_shipped_cases_are_valid_short_and_named_as_their_files(root: Path):
+    full, quick = ({path.stem: path for path in (root / folder).glob("*.toml")} for folder in ("cases", "cases/quick"))
+    assert set(full) == {"quick", *SPECIMENS, *VARIANTS}
+    assert set(quick) == {*SPECIMENS, *VARIANTS}
+    for name, path in [*full.items(), *((f"quick-{name}", path) for name, path in quick.items())]:
+        assert read_case(path).name == name
+        assert len(path.read_text().splitlines()) < 50
+
+
+def test_a_quick_form_differs_from_its_specimen_only_in_what_it_gives_up(root: Path):
+    may = {"name", "box", "run", "fines.count", "grains.count", "analysis.sections"}
+    for path in (root / "cases/quick").glob("*.toml"):
+        quick, full = read_case(path).data(), read_case(root / "cases" / path.name).data()
+        for part in set(quick) | set(full):
+            if part in may:
+                continue
+            for key in set(quick[part]) | set(full[part]) if isinstance(full[part], dict) else {""}:
+                pair = [data[part].get(key) if key else data[part] for data in (quick, full)]
+                assert f"{part}.{key}" in may or pair[0] == pair[1], f"{path.name}: {part}.{key}"
 
 
 def test_a_box_for_more_grains_than_memory_is_refused():

@@ -55,3 +55,4 @@ def test_a_wheel_installed_elsewhere_renders_a_deck(root, tmp_path):
     assert all(path.startswith(str(target)) for path in done.stdout.splitlines()[0].split())
     assert "fix drag fines addforce" in (tmp_path / "decks" / "invade" / "in.invade").read_text()
     assert (target / "fdnet" / "report" / "report.html.j2").exists()
+    assert (target / "fdnet" / "cases" / "quick" / "specimen1.toml").exists()

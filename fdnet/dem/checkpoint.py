@@ -12,7 +12,7 @@ from fdnet.dem.dump import read_frame
 from fdnet.dem.scene import snapshot_of
 from fdnet.dem.supply import batches_of
 from fdnet.errors import DumpError, LiggghtsError
-from fdnet.scales import Scales
+from fdnet.scales import Scales, arrival_time
 from fdnet.snapshot import Kind, Snapshot
 
 HISTORY = "history.csv"
@@ -21,7 +21,8 @@ HISTORY_HEADER = "chunk,step,upstream,invaded,passed,removed_upstream,most_cross
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Checkpoint:
-    """Counts after one chunk. `upstream` includes `removed_upstream`; `most_crossed` the most crossings so far."""
+    """Counts after one chunk. `upstream` includes `removed_upstream`; `most_crossed` is the most crossings when the
+    clock of the stop rule last began anew, `quiet` chunks ago."""
 
     chunk: int
     step: int
@@ -46,6 +47,12 @@ def chunks_of(case: Case, scales: Scales) -> int:
 def quiet_chunks(scales: Scales) -> int:
     """Chunks without a crossing that make the plug time."""
     return max(1, math.ceil(scales.plug_time / (scales.checkpoint_steps * scales.time_step) - 1e-9))
+
+
+def plug_allowance(case: Case, scales: Scales) -> int:
+    """Fines that may cross the face within the plug time though it counts as plugged: `run.plug_rate` of all that the
+    undisturbed suspension would bring."""
+    return math.floor(case.run.plug_rate * scales.plug_time / arrival_time(case, scales.upstream_velocity))
 
 
 def empty_chunks(case: Case, scales: Scales) -> int:

@@ -10,7 +10,7 @@ import numpy as np
 from fdnet.atomic import write_text
 from fdnet.case import Case
 from fdnet.contacts import touching_pairs
-from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, quiet_chunks
+from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, plug_allowance, quiet_chunks
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
 from fdnet.dem.drag import BELOW_ZERO, drag_variables
 from fdnet.dem.dump import COLUMNS, FORMAT
@@ -119,6 +119,7 @@ def render_invade(
             "thermo_steps": max(1, scales.checkpoint_steps // 4),
             "quiet_checkpoints": quiet_chunks(scales),
             "empty_checkpoints": empty_chunks(case, scales),
+            "allowance": plug_allowance(case, scales),
             "start": _start(resume),
             "feeding": _feeding(case, scales),
             "supply": SUPPLY,

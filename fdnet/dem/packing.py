@@ -180,9 +180,11 @@ def _run(case: Case, folder: Path, count: int, launch: Launch) -> Run:
         ) from error
 
 
-def write_pack_inputs(case: Case, scales: Scales, folder: Path, *, count: int, ranks: int = 1) -> Deck:
-    """Write in.pack and pack.data (random small spheres) into `folder`."""
-    deck = render_pack(case, scales, count=count, ranks=ranks)
+def write_pack_inputs(
+    case: Case, scales: Scales, folder: Path, *, count: int, ranks: int = 1, shown: tuple[int, ...] = ()
+) -> Deck:
+    """Write in.pack and pack.data (random small spheres) into `folder`; see `render_pack`."""
+    deck = render_pack(case, scales, count=count, ranks=ranks, shown=shown)
     (folder / "in.pack").write_text(deck.text)
     radii = draw_radii(case, count)
     rng = np.random.default_rng([case.seed, count])
@@ -206,8 +208,11 @@ def draw_radii(case: Case, count: int) -> Array:
     return radii
 
 
-def render_pack(case: Case, scales: Scales, *, count: int, ranks: int = 1) -> Deck:
-    """The packing deck: soft frictionless springs, viscous damping, growth in separate runs, rest test."""
+def render_pack(case: Case, scales: Scales, *, count: int, ranks: int = 1, shown: tuple[int, ...] = ()) -> Deck:
+    """The packing deck: soft frictionless springs, viscous damping, growth in separate runs, rest test.
+
+    After the stages `shown` (1 to PACK_STAGES) it also dumps to post/grown_STAGE.dump.
+    """
     stiffness = scales.contacts["grain-grain"].normal_stiffness
     low, high = case.grains.radius_range_m
     mass = sphere_mass(low, case.grains.density_kg_m3)
@@ -236,6 +241,7 @@ def render_pack(case: Case, scales: Scales, *, count: int, ranks: int = 1) -> De
                 for s in range(1, PACK_STAGES + 1)
             ],
             "stage_steps": PACK_STAGE_STEPS,
+            "shown": shown,
             "relax_runs": REST_RUNS,
             "relax_steps": RELAX_RUN_STEPS,
             "rest_energy": number(count * 1e-10 * 0.5 * stiffness * (0.02 * high) ** 2),

@@ -164,3 +164,15 @@ def test_radii_are_uniform_by_number_and_the_last_closes_the_target():
     short = 2000 * case.grains.mean_volume_m3 - 4 / 3 * math.pi * np.sum(radii[:-1] ** 3)
     expected = np.clip(np.cbrt(max(short, 0) * 3 / (4 * math.pi)), 0.15e-3, 0.25e-3)
     assert radii[-1] == pytest.approx(expected)
+
+
+def test_the_stop_rule_allows_a_share_of_the_inflow():
+    """At rate 0 not one; else the share of c A u t_plug / v fines, over the whole plug time."""
+    strict = invade_text()
+    assert has(strict, r"variable still equal \$\{most\}$")
+    case = tiny("run.plug_rate=0.3", "run.plug_time_ms=0.2")
+    scales = scales_of(case)
+    area, volume = 1.6e-3**2, 4 / 3 * math.pi * (0.05e-3) ** 3
+    arrivals = 0.1 * area * scales.upstream_velocity * 0.2e-3 / volume
+    text = invade_text("run.plug_rate=0.3", "run.plug_time_ms=0.2")
+    assert has(text, rf"variable still equal \$\{{most\}}\+{math.floor(0.3 * arrivals)}$")

@@ -10,7 +10,7 @@ from builders import tiny
 from fdnet import pipeline
 from fdnet.contacts import touching_pairs
 from fdnet.dem import checkpoint, supply
-from fdnet.dem.checkpoint import HISTORY_HEADER, last_checkpoint, read_history
+from fdnet.dem.checkpoint import HISTORY_HEADER, last_checkpoint, plug_allowance, read_history
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
@@ -273,3 +273,21 @@ def test_history_with_a_half_written_line(tmp_path: Path):
     assert [row.chunk for row in read_history(tmp_path)] == [1]
     with pytest.raises(LiggghtsError, match="no checkpoint recorded"):
         read_history(tmp_path / "none")
+
+
+def test_a_trickle_may_count_as_plugged(binary, packed, tmp_path):
+    """With a share of the inflow allowed the end comes at the first plug time with no more crossings than that."""
+    case = tiny(
+        "fines.count=900", "run.checkpoint_ms=0.01", "run.plug_time_ms=0.05", "run.plug_rate=0.5", "run.cap_ms=2"
+    )
+    scales, grains = scales_of(case), packed["walls"]
+    result = invade(case, scales, grains, tmp_path, Launch(binary=binary))
+    allowed = plug_allowance(case, scales)
+    crossed = [row.invaded + row.passed for row in result.history]
+    assert result.stop_reason == "plugged"
+    assert 0 < crossed[-1] - crossed[-6] <= allowed
+    assert all(
+        crossed[n] - result.history[n - 5].most_crossed > allowed
+        for n in range(5, len(crossed) - 1)
+        if result.history[n].quiet == 0
+    )

@@ -80,9 +80,14 @@ def write_state(path: Path, state: State) -> None:
         arrays[f"{name}_place"] = np.column_stack([spheres.position, spheres.radius]).astype(np.float32)
         arrays[f"{name}_kind"] = spheres.kind.astype(np.uint8)
         arrays[f"{name}_id"] = spheres.id.astype(np.uint32)
+    write_bytes(path, packed_bytes(arrays))
+
+
+def packed_bytes(arrays: Mapping[str, Array]) -> bytes:
+    """The arrays as a compressed npz."""
     buffer = BytesIO()
     np.savez_compressed(buffer, allow_pickle=False, **arrays)
-    write_bytes(path, buffer.getvalue())
+    return buffer.getvalue()
 
 
 def read_state(path: Path) -> State:

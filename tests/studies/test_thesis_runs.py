@@ -1,0 +1,171 @@
+"""The thesis study's runs: states kept whole, a cut run continued, a wrong state refused, every quick form through."""
+
+import json
+import shutil
+import subprocess
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fdnet.cli import main
+from fdnet.dem.liggghts import Launch
+from fdnet.errors import CaseError
+from fdnet.studies.thesis import plan as plans
+from fdnet.studies.thesis import runs
+from fdnet.studies.thesis.examine import DEFAULT_PAIR, THESIS_PAIR, examine
+from fdnet.studies.thesis.growth import grow, read_growth, write_growth
+from fdnet.studies.thesis.plan import CHEAP, QUICK_SEEDS, SCAN_SEEDS, SPECIMENS, VARIANTS, Planned, planned
+from fdnet.studies.thesis.state import read_state, state_of_run, write_state
+
+SMALL = ("box.size_mm=[2.0,1.2,1.2]", "grains.count=26", "fines.count=60", "run.cap_ms=0.1")
+
+
+def small(name="quick-specimen5", *settings, seed=1):
+    return Planned(case=name, group="quick", seed=seed, settings=(*SMALL, *settings))
+
+
+@pytest.fixture(scope="module")
+def finished(binary, tmp_path_factory):
+    """A run folder with a finished invasion."""
+    folder = tmp_path_factory.mktemp("thesis") / "run"
+    assert main(["run", str(plans.case_path("quick-specimen5")), "--out", str(folder), *_sets(), "--quiet"]) == 0
+    return folder
+
+
+def _sets():
+    return [word for setting in SMALL for word in ("--set", setting)]
+
+
+def test_a_state_keeps_spheres_to_a_nanometre_and_the_ending(finished, tmp_path):
+    whole = state_of_run(finished)
+    write_state(tmp_path / "a.npz", whole)
+    kept = read_state(tmp_path / "a.npz")
+    assert kept.case == whole.case
+    assert kept.ending == whole.ending
+    assert np.array_equal(kept.history, whole.history)
+    for name in ("grains", "damaged"):
+        one, other = getattr(kept, name), getattr(whole, name)
+        assert np.array_equal(one.id, other.id)
+        assert np.array_equal(one.kind, other.kind)
+        assert np.array_equal(one.radius, other.radius)
+        assert np.abs(one.position - other.position).max() < 1e-9
+    summary = json.loads((finished / "summary.json").read_text())
+    ending = kept.ending
+    assert ending["supplied"] == summary["invaded_count"] + ending["passed"] + ending["upstream"]
+    assert ending["stop_reason"] == summary["stop_reason"]
+
+
+def test_a_state_is_examined_as_the_run_was(finished, tmp_path):
+    write_state(tmp_path / "a.npz", state_of_run(finished))
+    found = examine("quick-specimen5", read_state(tmp_path / "a.npz"))
+    summary = json.loads((finished / "summary.json").read_text())
+    assert (found.thesis.law, found.thesis.damage_law) == THESIS_PAIR == (summary["law"], summary["damage_law"])
+    assert (found.default.law, found.default.damage_law) == DEFAULT_PAIR
+    assert found.thesis.k_damaged == pytest.approx(summary["k_damaged_m2"], rel=1e-5)
+    assert found.thesis.invaded_count == summary["invaded_count"]
+
+
+def test_a_broken_state_is_refused(finished, tmp_path):
+    path = tmp_path / "a.npz"
+    write_state(path, state_of_run(finished))
+    path.write_bytes(path.read_bytes()[:-200])
+    with pytest.raises(CaseError, match=r"a\.npz: is no state of an invasion"):
+        read_state(path)
+    with pytest.raises(CaseError, match=r"b\.npz: is no state"):
+        read_state(tmp_path / "b.npz")
+
+
+def test_a_folder_without_a_finished_invasion_has_no_state(finished, tmp_path):
+    shutil.copytree(finished, tmp_path / "run")
+    (tmp_path / "run" / "invade" / "stage.json").unlink()
+    with pytest.raises(CaseError, match="holds no finished invasion"):
+        state_of_run(tmp_path / "run")
+
+
+@pytest.mark.liggghts
+def test_runs_are_done_once_twins_shared_and_failures_told(binary, tmp_path, monkeypatch):
+    said: list[str] = []
+    same = small("quick-table3", "fines.radius_mm=[0.025,0.05]"), small("quick-specimen7")
+    bad = small("quick-specimen5", "fines.concentration=0.29", "run.max_hours=1e-9")
+    failed = runs.carry_out([*same, bad], tmp_path / "out", tmp_path / "runs", jobs=1, tell=said.append)
+    assert list(failed) == [bad]
+    assert "run.max_hours" in failed[bad]
+    assert len(said) == 2
+    states = [read_state(runs.state_path(tmp_path / "out", item)) for item in same]
+    assert [state.case.name for state in states] == ["quick-table3", "quick-specimen7"]
+    assert np.array_equal(states[0].damaged.position, states[1].damaged.position)
+    assert not list((tmp_path / "runs").glob("quick-table3*"))
+    monkeypatch.setattr(runs, "_run_all", lambda todo, *_, **__: dict.fromkeys(todo, "ran"))
+    assert runs.carry_out(same, tmp_path / "out", tmp_path / "runs", jobs=1, tell=said.append) == {}
+
+
+@pytest.mark.liggghts
+def test_a_state_of_another_case_is_refused(finished, tmp_path):
+    item = small()
+    write_state(runs.state_path(tmp_path, item), replace(state_of_run(finished), case=small(seed=2).load()))
+    with pytest.raises(CaseError, match="is the state of another case"):
+        runs.carry_out([item], tmp_path, tmp_path / "runs", jobs=1, tell=print)
+
+
+@pytest.mark.liggghts
+def test_a_cut_run_is_continued(binary, tmp_path):
+    item = small()
+    folder = tmp_path / "runs" / item.slug
+    sets = [word for setting in item.settings for word in ("--set", setting)]
+    run = ["run", str(plans.case_path(item.case)), "--out", str(folder), *sets, "--quiet"]
+    assert main([*run, "--stages", "pack"]) == 0
+    (folder / ".unfinished").touch()
+    made = (folder / "pack" / "stage.json").stat().st_mtime_ns
+    assert runs.run_one(item, tmp_path, tmp_path / "runs") == ""
+    assert not folder.exists()
+    assert runs.state_path(tmp_path, item).stat().st_mtime_ns > made
+
+
+def test_the_plan_names_every_run_once_with_its_seeds():
+    plan = planned(quick=False)
+    slugs = [item.slug for item in plan]
+    assert len(set(slugs)) == len(slugs)
+    for name in (*SPECIMENS, *VARIANTS):
+        assert sum(item.id == name for item in plan) == (3 if name in CHEAP else 1)
+        assert sum(item.id == f"quick-{name}" for item in plan) == QUICK_SEEDS
+    assert {item.group for item in plan} == {"specimen", "variant", "quick", "reason", "friction", "drag", "supply"}
+    assert sum(item.id == "specimen5 fines.friction=0" for item in plan) == SCAN_SEEDS
+    assert {item.id for item in planned(quick=True)} == {f"quick-{name}" for name in (*SPECIMENS, *VARIANTS)}
+    for item in plan:
+        assert item.load().seed == item.seed
+
+
+@pytest.mark.liggghts
+@pytest.mark.parametrize("name", [*SPECIMENS, *VARIANTS])
+def test_every_quick_form_runs_to_its_end(binary, root, tmp_path, name):
+    """Through the command, whole: counts hold and the output contract is kept by construction of the run folder."""
+    folder = tmp_path / "run"
+    case = root / "cases" / "quick" / f"{name}.toml"
+    command = [str(root / "scripts" / "run_case.py"), str(case), "--out", str(folder), "--quiet"]
+    command += ["--stages", "pack,invade,analyse"]
+    subprocess.run(command, check=True, timeout=300)
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["stop_reason"] in {"plugged", "supply_exhausted"}
+    assert summary["invaded_count"] > 0
+    counts = [summary[f"{part}_count"] for part in ("invaded", "passed", "upstream")]
+    assert summary["supplied_count"] == sum(counts)
+    assert 0 < summary["k_reduction"] < 1
+    assert summary["max_overlap_fraction"] < 0.15
+
+
+@pytest.mark.liggghts
+def test_the_growth_of_a_pack_is_kept(binary, tmp_path):
+    """Radii rise from 0.6 to 1 in 30 equal stages; forces are highest when grown, velocities lowest at rest."""
+    case = small().load()
+    stages = grow(case, tmp_path / "grown", Launch(binary=binary), count=26)
+    write_growth(tmp_path / "growth.npz", stages)
+    kept = read_growth(tmp_path / "growth.npz", case)
+    assert [np.unique(np.round(one.radius / 2.5e-4, 6)).tolist() for one in kept] == [[0.613333], [1.0], [1.0]]
+    speeds = [np.abs(one.velocity).max() for one in kept]
+    assert speeds[2] < 1e-3 * min(speeds[:2])
+    for one, other in zip(stages, kept, strict=True):
+        assert np.abs(one.position - other.position).max() < 1e-9
+    (tmp_path / "growth.npz").write_bytes(b"no")
+    with pytest.raises(CaseError, match="holds no growth of a pack"):
+        read_growth(tmp_path / "growth.npz", case)
