@@ -28,7 +28,8 @@ def study_part(name: str, validation: Path) -> str:
     study, rows = study_named(name), read_rows(validation / f"{name}.csv")
     parts = [study.summary(rows)] if study.summary else []
     parts += [study.remarks.strip()] if study.remarks else []
-    parts.append("In numbers:\n\n" + "\n".join(f"- {line}" for line in knee_lines(study, rows)))
+    if knees := knee_lines(study, rows):
+        parts.append("In numbers:\n\n" + "\n".join(f"- {line}" for line in knees))
     missing = missing_lines(rows)
     if missing:
         parts.append("Not done:\n\n" + "\n".join(f"- {line}" for line in missing))

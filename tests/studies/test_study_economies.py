@@ -70,7 +70,7 @@ def test_a_speed_up_is_the_ratio_of_core_seconds_seed_by_seed():
     assert speed_ups(toy_rows(), EQUAL) == {PLAIN: [1.0, 1.0], ALL: [2.0, 4.0]}
     lines = summary(toy_rows()).splitlines()
     assert len(lines) == 2 + 2 * len(SERIES)
-    assert lines[2].startswith("| equal fines, plain | 2 | 50 | 1 | ± ")
+    assert lines[2].startswith("| equal fines, plain | 2 | 50 | 1 | reference ± ")
     assert lines[3].startswith("| equal fines, all | 2 | 17.5 | 3.00 ± 1.41 | +4.76 ± ")
 
 
@@ -155,6 +155,7 @@ def test_a_step_twice_as_long_takes_half_the_steps(quick):
 @pytest.mark.liggghts
 def test_the_text_names_speed_up_and_error_of_every_economy(quick):
     _, text = quick
+    assert "knee" not in text
     for point in STUDY.points(True):
         speed = "1" if point.value == PLAIN else r"\d+\.\d\d ± \d+\.\d\d"
         assert re.search(rf"(?m)^\| {point.series}, {point.value} \| 2 \| \S+ \| {speed} \| .* %", text), point.key
