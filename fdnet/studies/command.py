@@ -25,6 +25,9 @@ STUDIES: Mapping[str, str] = {
 }
 """Name of each study and what it asks; the module has the same name with underscores."""
 
+THESIS = "thesis"
+"""The study beside them, of runs and figures rather than of error against run time."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of `fdnet study`."""
@@ -32,6 +35,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quick", action="store_true", help="the reduced form, below 30 s")
     parser.add_argument("--out", type=Path, help="folder for table, figure and text (default studies/NAME)")
     parser.add_argument("--silent", action="store_true", help="no progress")
+    thesis = parser.add_argument_group("only for 'thesis', all specimens of the thesis beside its numbers")
+    thesis.add_argument("--jobs", type=int, default=1, help="runs side by side (default 1)")
+    thesis.add_argument("--runs", type=Path, default=Path("runs/thesis"), help="run folders while they are needed")
+    thesis.add_argument("--redraw", action="store_true", help="run nothing: tables and figures from the states kept")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -39,12 +46,34 @@ def run(options: argparse.Namespace) -> int:
     if options.name == "list":
         for name, asks in STUDIES.items():
             print(f"{name:<18} {asks}")
+        print(f"{THESIS:<18} all specimens of the thesis at full scale, beside its numbers")
         return 0
+    if options.name == THESIS:
+        return _run_thesis(options)
     study = study_named(options.name)
     out = options.out or Path("studies") / (f"{study.name}-quick" if options.quick else study.name)
     text = run_study(study, out, quick=options.quick, show=not options.silent)
     print(text)
     print(f"table:  {out / study.name}.csv\nfigure: {out / study.name}.png\ntext:   {out / study.name}.md")
+    return 0
+
+
+def _run_thesis(options: argparse.Namespace) -> int:
+    from fdnet.studies.thesis.command import ThesisOptions, run_thesis
+
+    if options.jobs < 1:
+        raise CaseError(f"--jobs: {options.jobs} runs side by side, expected at least 1")
+    out = options.out or Path("studies/thesis-quick" if options.quick else "docs/thesis")
+    asked = ThesisOptions(
+        out=out,
+        runs=options.runs,
+        quick=options.quick,
+        jobs=options.jobs,
+        redraw=options.redraw,
+        show=not options.silent,
+    )
+    print(run_thesis(asked))
+    print(f"tables and figures: {out}")
     return 0
 
 

@@ -15,6 +15,7 @@ from fdnet.scales import PACK_STAGES, scales_of
 from fdnet.snapshot import Kind, Snapshot
 from fdnet.studies.thesis.state import packed_bytes
 
+GROWTH = "growth.npz"
 SHOWN = (1, PACK_STAGES)
 """Stages shown beside the pack at rest: the first, and the last, when spheres have their size and overlap most."""
 

@@ -22,7 +22,8 @@ class ThesisSpecimen:
     `fine_diameter_mm` of Table 4, `fine_radius_mm` and `grain_radius_mm` (low, high) of the tables that give radii;
     `damaged_porosity` one value a table, the one the results are compared with first; `section_reduction` of the
     permeability of eight sections of 1 mm; `first_section_reduction` read off a figure; `fraction_first_bin` of the
-    invaded fines in the figure's first bin; `face_porosity_loss` at x = 0. `sources` by field; `senses` by field, of
+    invaded fines in the figure's first bin; `face_porosity_loss` at x = 0; `size_classes_mm` radii of the fines
+    it shows by size. `sources` by field; `senses` by field, of
     those not "exact".
     """
 
@@ -40,6 +41,7 @@ class ThesisSpecimen:
     face_porosity_loss: float | None = None
     section_reduction: tuple[float, ...] | None = None
     first_section_reduction: float | None = None
+    size_classes_mm: tuple[tuple[float, float], ...] | None = None
     sources: Mapping[str, str] = field(default_factory=dict)
     senses: Mapping[str, str] = field(default_factory=dict)
 
@@ -126,7 +128,7 @@ def _frozen(table: Mapping[str, Any]) -> Mapping[str, Any]:
     frozen: dict[str, Any] = {}
     for name, value in table.items():
         if isinstance(value, list):
-            frozen[name] = tuple(value)
+            frozen[name] = tuple(tuple(one) if isinstance(one, list) else one for one in value)
         else:
             frozen[name] = _frozen(value) if isinstance(value, dict) else value
     return MappingProxyType(frozen)

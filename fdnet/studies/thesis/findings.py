@@ -1,0 +1,125 @@
+"""What the runs came to: their states examined, tables written, figures drawn."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fdnet.studies.thesis.counts import count_tetrahedra, write_counts
+from fdnet.studies.thesis.deposition import deposition, write_deposition
+from fdnet.studies.thesis.examine import THESIS_PAIR, Examined, examine
+from fdnet.studies.thesis.plan import Planned, base_value
+from fdnet.studies.thesis.results import ResultRow, read_results, result_rows, write_results
+from fdnet.studies.thesis.runs import state_path
+from fdnet.studies.thesis.state import read_state
+from fdnet.studies.thesis.statistics import statistics, write_statistics
+from fdnet.studies.thesis.trends import compare_trends, write_trends
+from fdnet.studies.thesis.values import thesis_values
+
+if TYPE_CHECKING:
+    from fdnet.studies.thesis.draw_canvas import ScanRow
+
+RESULTS, STATISTICS, DEPOSITION, TETRAHEDRA, TRENDS, CAPTIONS = (
+    "results.csv",
+    "statistics.csv",
+    "deposition.csv",
+    "tetrahedra.csv",
+    "trends.csv",
+    "captions.csv",
+)
+KEPT = ("specimen", "variant")
+"""Groups whose runs are drawn one by one; of the others only the rows are needed."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Findings:
+    """`rows` of all runs, two a run; `examined` runs of the groups KEPT by id, one a seed; `missing` had neither a state
+    nor rows of an earlier time."""
+
+    rows: tuple[ResultRow, ...]
+    examined: Mapping[str, Sequence[Examined]]
+    missing: tuple[Planned, ...]
+
+
+def collect(plan: Sequence[Planned], out: Path, states: Path, *, tell: Callable[[str], None]) -> Findings:
+    """Examine every state there is; of a run without one take the rows that results.csv in `out` has already.
+
+    Raises CaseError on a broken state or table, NetworkError and FlowError as `examine` does.
+    """
+    known = _known(out / RESULTS)
+    rows: list[ResultRow] = []
+    examined: dict[str, list[Examined]] = {}
+    missing = []
+    for number, item in enumerate(plan, 1):
+        path, key = state_path(states, item), (item.id, item.seed)
+        if path.exists():
+            found = examine(item.id, read_state(path))
+            rows += result_rows(found)
+            if item.group in KEPT:
+                examined.setdefault(item.id, []).append(found)
+        elif key in known:
+            rows += known[key]
+        else:
+            missing.append(item)
+        if number % 20 == 0:
+            tell(f"examined {number} of {len(plan)}")
+    return Findings(rows=tuple(rows), examined=examined, missing=tuple(missing))
+
+
+def _known(path: Path) -> dict[tuple[str, int], list[ResultRow]]:
+    found: dict[tuple[str, int], list[ResultRow]] = {}
+    for row in read_results(path) if path.exists() else []:
+        found.setdefault((row.id, row.seed), []).append(row)
+    return found
+
+
+def write_findings(findings: Findings, plan: Sequence[Planned], out: Path, states: Path) -> None:
+    """All tables and figures into `out`."""
+    runs = [run for seeds in findings.examined.values() for run in seeds]
+    write_results(out / RESULTS, findings.rows)
+    write_statistics(out / STATISTICS, [row for run in runs for row in statistics(run)])
+    write_deposition(out / DEPOSITION, [row for run in runs for row in deposition(run)])
+    write_counts(out / TETRAHEDRA, [count_tetrahedra(run) for run in runs])
+    write_trends(out / TRENDS, compare_trends(findings.rows))
+    _draw(findings, plan, out, states)
+
+
+def _draw(findings: Findings, plan: Sequence[Planned], out: Path, states: Path) -> None:
+    from fdnet.studies.thesis.csv_rows import write_csv
+    from fdnet.studies.thesis.draw_all import draw_all
+    from fdnet.studies.thesis.draw_canvas import Tables
+    from fdnet.studies.thesis.draw_tables import distances_found, tetrahedra_counted
+    from fdnet.studies.thesis.growth import GROWTH, read_growth
+    from fdnet.studies.thesis.thesis_marks import thesis_marks
+
+    examined = findings.examined
+    first = next(iter(examined.get("specimen1", ())), None)
+    growth = states / GROWTH
+    tables = Tables(
+        drag=_scan(findings, plan, "drag"),
+        friction=_scan(findings, plan, "friction"),
+        supply=_scan(findings, plan, "supply"),
+        tetrahedra=tetrahedra_counted(
+            {name: examined[name] for name in ("specimen1", "specimen5") if name in examined}
+        ),
+        distances=distances_found(examined.get("specimen5", ())),
+        growth=read_growth(growth, first.state.case) if first is not None and growth.exists() else (),
+    )
+    drawn = draw_all(examined, out, thesis=thesis_marks(thesis_values()), tables=tables)
+    lines = [(one.name, one.caption, "; ".join(one.missing)) for one in drawn]
+    write_csv(out / CAPTIONS, ("figure", "caption", "missing"), lines)
+
+
+def _scan(findings: Findings, plan: Sequence[Planned], group: str) -> "list[ScanRow]":
+    """Rows of a scan, with those of the case itself at its own value of the knob."""
+    from fdnet.studies.thesis.draw_tables import scan_row
+
+    scanned = [item for item in plan if item.group == group]
+    values = {item.id: item.value for item in scanned}
+    for case in dict.fromkeys(item.case for item in scanned):
+        values[case] = base_value(group)
+    return [
+        scan_row(row.id.split(" ")[0], values[row.id], row)
+        for row in findings.rows
+        if row.id in values and (row.law, row.damage_law) == THESIS_PAIR
+    ]
