@@ -24,10 +24,12 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def study_part(name: str, validation: Path) -> str:
-    """Knees, remarks and what was not done of one study, as Markdown."""
+    """Summary, remarks, knees and what was not done of one study, as Markdown."""
     study, rows = study_named(name), read_rows(validation / f"{name}.csv")
-    parts = [study.remarks.strip()] if study.remarks else []
-    parts.append("In numbers:\n\n" + "\n".join(f"- {line}" for line in knee_lines(study, rows)))
+    parts = [study.summary(rows)] if study.summary else []
+    parts += [study.remarks.strip()] if study.remarks else []
+    if knees := knee_lines(study, rows):
+        parts.append("In numbers:\n\n" + "\n".join(f"- {line}" for line in knees))
     missing = missing_lines(rows)
     if missing:
         parts.append("Not done:\n\n" + "\n".join(f"- {line}" for line in missing))

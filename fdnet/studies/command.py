@@ -21,6 +21,7 @@ STUDIES: Mapping[str, str] = {
     "linear-solver": "method and tolerance of the network's solve, by size and spread of conductance",
     "laws": "conductance and damage laws, and coarse resolved flow, against Stokes truth",
     "specimen-size": "number of grains and seed: how large a specimen must be, and what a small one is worth",
+    "economies": "what makes full-scale invasions affordable: each economy with its error and its speed-up",
 }
 """Name of each study and what it asks; the module has the same name with underscores."""
 

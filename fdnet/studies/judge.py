@@ -265,8 +265,8 @@ def _knee_words(own: Sequence[Level], unit: str) -> str:
     if most.cost < ALIKE * least.cost:
         low, high = min(own, key=lambda level: level.size), max(own, key=lambda level: level.size)
         return (
-            f"all cost about the same ({least.cost:.3g} to {most.cost:.3g} {unit}); error {_percent(low)} at "
-            f"{shown(low.value)} to {_percent(high)} at {shown(high.value)}"
+            f"all cost about the same ({least.cost:.3g} to {most.cost:.3g} {unit}); error {percent(low)} at "
+            f"{shown(low.value)} to {percent(high)} at {shown(high.value)}"
         )
     judged = _with_bands(own)
     if not judged:
@@ -286,9 +286,10 @@ def _order_words(own: Sequence[Level]) -> list[str]:
 
 def _cost_words(level: Level, unit: str, *, named: bool = True) -> str:
     name = f"{shown(level.value)}: " if named else ""
-    return f"{name}{_percent(level)} for {level.cost:.3g} {unit}"
+    return f"{name}{percent(level)} for {level.cost:.3g} {unit}"
 
 
-def _percent(level: Level) -> str:
+def percent(level: Level) -> str:
+    """A level's mean error with its band."""
     band = f" ± {100 * level.half_width:.2g}" if level.half_width else ""
     return f"{100 * level.error:+.3g}{band} %"

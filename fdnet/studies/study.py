@@ -98,9 +98,10 @@ class Study:
     `points(quick)` lists what to run, cheapest first. `measure(point, work)` runs one and returns its observations
     and, under the names in COSTS, costs of its own; `work` is a folder all points share (packs made once).
     `judge(measured)` turns all of them into rows. `defaults` gives fdnet's own value of the knob by series, `remarks`
-    what the numbers cannot say. Points of the full form run in a process of their own, limited to `seconds` and
-    `bytes`, unless not `isolated` (or, a function, not for that point); those of the quick form all in one.
-    `inputs()` names whatever else decides the numbers (a base case), so that a study is not continued with another.
+    what the numbers cannot say, `summary(rows)` what is told of the rows in place of knees (Markdown). Points of the
+    full form run in a process of their own, limited to `seconds` and `bytes`, unless not `isolated` (or, a function,
+    not for that point); those of the quick form all in one. `inputs()` names whatever else decides the numbers (a base
+    case), so that a study is not continued with another.
     """
 
     name: str
@@ -112,6 +113,7 @@ class Study:
     panels: tuple[Panel, ...]
     defaults: Mapping[str, Value] = field(default_factory=dict)
     remarks: str = ""
+    summary: Callable[[Sequence[Row]], str] | None = None
     isolated: bool | Callable[[Point], bool] = True
     inputs: Callable[[], str] = str
     needs_liggghts: bool = False

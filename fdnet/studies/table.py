@@ -59,10 +59,13 @@ def _value(name: str, text: str) -> str | int | float:
 
 
 def study_text(study: Study, rows: Sequence[Row]) -> str:
-    """Markdown: the knee of every series in every panel, the study's remarks, what was not done, tables of levels."""
+    """Markdown: the knee of every series in every panel or the study's own summary, its remarks, what was not done,
+    tables of levels."""
     parts = [f"# {study.title}"]
     if knees := knee_lines(study, rows):
         parts.append("\n".join(f"- {line}" for line in knees))
+    if study.summary:
+        parts.append(study.summary(rows))
     if study.remarks:
         parts.append(study.remarks.strip())
     missing = missing_lines(rows)
@@ -80,8 +83,10 @@ def study_text(study: Study, rows: Sequence[Row]) -> str:
 
 
 def knee_lines(study: Study, rows: Sequence[Row]) -> list[str]:
-    """One sentence for every series of every panel."""
-    lines = []
+    """One sentence for every series of every panel; none where the study has a summary of its own."""
+    lines: list[str] = []
+    if study.summary:
+        return lines
     for panel in study.panels:
         for name in series_of(panel, rows) if panel.cost != "value" else ():
             found = levels(rows, name, panel.quantity, cost=panel.cost)
