@@ -75,25 +75,20 @@ def _contact(
     frequency = math.sqrt(
         normal / _effective_mass(case, pair, grains_fixed="fine" in pair and case.grains.motion == "fixed")
     )
-    by_liggghts = _effective_mass(case, pair, grains_fixed=False)
     small = case.fines if "fine" in pair and case.fines else case.grains
     return Contact(
         pair=f"{first}-{second}",
         normal_stiffness=normal,
         shear_stiffness=factor * series(nominal[first][1], nominal[second][1]),
         friction=min(nominal[first][2], nominal[second][2]),
-        damping_rate=2 * damping * normal / (frequency * by_liggghts),
+        damping_rate=2 * damping * frequency,
         contact_time=math.pi / (frequency * math.sqrt(1 - damping**2)),
         step_limit=math.sqrt(mass_range(small)[0] / normal),
     )
 
 
 def _effective_mass(case: Case, pair: tuple[str, str], *, grains_fixed: bool) -> float:
-    """m1 m2 / (m1 + m2) of a typical contact, kg; walls and fixed grains have infinite mass.
-
-    LIGGGHTS multiplies the damping rate by the effective mass of both spheres' own masses, also where the grain is
-    not integrated; the motion has the fine's mass alone. The rate makes up for the difference.
-    """
+    """m1 m2 / (m1 + m2) of a typical contact, kg; walls and fixed grains have infinite mass, in LIGGGHTS too."""
 
     def inverse(name: str) -> float:
         spheres = case.grains if name == "grain" else case.fines

@@ -169,12 +169,14 @@ def test_a_cap_is_reached_by_whole_chunks(cap_ms, expected):
     assert (expected - 1) * chunk < cap_ms * 1e-3 <= expected * chunk * (1 + 1e-9)
 
 
-def test_damping_against_a_fixed_grain_makes_up_for_the_mass_liggghts_takes():
-    """LIGGGHTS damps with rate x m1 m2/(m1+m2), the fine moves alone: rate = 2 zeta sqrt(k m_fine) (1/m1 + 1/m2)."""
-    contact = scales_of(tiny("fines.radius_mm=0.2", "fines.count=60")).contacts["grain-fine"]
+@pytest.mark.parametrize(("motion", "heavy"), [("fixed", 0.0), ("mobile", 1.0)])
+def test_damping_takes_the_mass_of_what_moves(motion, heavy):
+    """A frozen grain is infinitely heavy, in LIGGGHTS too: rate = 2 zeta sqrt(k / m), 1/m = 1/m_fine + 1/m_grain if
+    the grain moves."""
+    contact = scales_of(tiny("fines.radius_mm=0.2", "fines.count=60", f"grains.motion={motion}")).contacts["grain-fine"]
     fine, grain = (4 / 3 * math.pi * r**3 * rho for r, rho in ((0.2e-3, 2146), (0.25e-3, 2650)))
     assert contact.damping_rate == pytest.approx(
-        2 * 0.2 * math.sqrt(contact.normal_stiffness * fine) * (1 / fine + 1 / grain)
+        2 * 0.2 * math.sqrt(contact.normal_stiffness * (1 / fine + heavy / grain))
     )
 
 

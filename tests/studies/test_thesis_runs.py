@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import subprocess
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +15,7 @@ from fdnet.studies.thesis import runs
 from fdnet.studies.thesis.examine import DEFAULT_PAIR, THESIS_PAIR, examine
 from fdnet.studies.thesis.growth import grow, read_growth, write_growth
 from fdnet.studies.thesis.plan import CHEAP, QUICK_SEEDS, SCAN_SEEDS, SPECIMENS, VARIANTS, Planned, planned
+from fdnet.studies.thesis.results import read_results
 from fdnet.studies.thesis.state import read_state, state_of_run, write_state
 
 SMALL = ("box.size_mm=[2.0,1.2,1.2]", "grains.count=26", "fines.count=60", "run.cap_ms=0.1")
@@ -137,21 +137,34 @@ def test_the_plan_names_every_run_once_with_its_seeds():
 
 
 @pytest.mark.liggghts
-@pytest.mark.parametrize("name", [*SPECIMENS, *VARIANTS])
-def test_every_quick_form_runs_to_its_end(binary, root, tmp_path, name):
-    """Through the command, whole: counts hold and the output contract is kept by construction of the run folder."""
-    folder = tmp_path / "run"
-    case = root / "cases" / "quick" / f"{name}.toml"
-    command = [str(root / "scripts" / "run_case.py"), str(case), "--out", str(folder), "--quiet"]
-    command += ["--stages", "pack,invade,analyse"]
-    subprocess.run(command, check=True, timeout=300)
-    summary = json.loads((folder / "summary.json").read_text())
-    assert summary["stop_reason"] in {"plugged", "supply_exhausted"}
-    assert summary["invaded_count"] > 0
-    counts = [summary[f"{part}_count"] for part in ("invaded", "passed", "upstream")]
-    assert summary["supplied_count"] == sum(counts)
-    assert 0 < summary["k_reduction"] < 1
-    assert summary["max_overlap_fraction"] < 0.15
+def test_the_quick_study_runs_every_form_to_its_end(binary, tmp_path, capsys):
+    """All quick forms through the command: counts hold, tables and figures are there; redrawing runs nothing."""
+    out, runs_folder = tmp_path / "out", tmp_path / "runs"
+    command = ["study", "thesis", "--quick", "--out", str(out), "--runs", str(runs_folder), "--silent"]
+    assert main(command) == 0
+    rows = read_results(out / "results.csv")
+    assert [(row.id, row.law) for row in rows[::2]] == [(item.id, "thesis") for item in planned(quick=True)]
+    assert len(rows) == 24
+    for row in rows:
+        assert row.stop_reason in {"plugged", "supply_exhausted", "cap"}
+        assert 0 < row.invaded_count <= row.supplied_count - row.passed_count
+        assert 0 < row.k_reduction < 1
+        assert 0 < row.porosity_loss_first_mm < row.porosity_initial
+        assert row.max_overlap < 0.15
+    drawn = {path.name for path in out.glob("*.png")}
+    assert {
+        "figure_15_invaded_fraction_specimen1.png",
+        "figure_72_permeability.png",
+        "figure_67_total_reduction.png",
+    } <= drawn
+    assert len(drawn) > 35
+    assert not list(runs_folder.glob("*"))
+    before = (out / "results.csv").read_bytes()
+    (out / "states" / "quick-specimen1-seed1.npz").unlink()
+    capsys.readouterr()
+    assert main([*command, "--redraw"]) == 0
+    assert "higher initial porosity" in capsys.readouterr().out
+    assert (out / "results.csv").read_bytes() == before
 
 
 @pytest.mark.liggghts

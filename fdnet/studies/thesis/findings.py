@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from fdnet.studies.thesis.counts import count_tetrahedra, write_counts
 from fdnet.studies.thesis.deposition import deposition, write_deposition
 from fdnet.studies.thesis.examine import THESIS_PAIR, Examined, examine
-from fdnet.studies.thesis.plan import Planned, base_value
+from fdnet.studies.thesis.plan import QUICK, Planned, base_value
 from fdnet.studies.thesis.results import ResultRow, read_results, result_rows, write_results
 from fdnet.studies.thesis.runs import state_path
 from fdnet.studies.thesis.state import read_state
@@ -28,13 +28,13 @@ RESULTS, STATISTICS, DEPOSITION, TETRAHEDRA, TRENDS, CAPTIONS = (
     "captions.csv",
 )
 KEPT = ("specimen", "variant")
-"""Groups whose runs are drawn one by one; of the others only the rows are needed."""
+"""Groups whose runs are drawn one by one; of the others only the rows are needed, unless there is nothing else."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Findings:
-    """`rows` of all runs, two a run; `examined` runs of the groups KEPT by id, one a seed; `missing` ones had neither a
-    state nor rows of an earlier time."""
+    """`rows` of all runs, two a run; `examined` runs to draw by specimen or variant, one a seed; `missing` ones had
+    neither a state nor rows of an earlier time."""
 
     rows: tuple[ResultRow, ...]
     examined: Mapping[str, Sequence[Examined]]
@@ -47,6 +47,7 @@ def collect(plan: Sequence[Planned], out: Path, states: Path, *, tell: Callable[
     Raises CaseError on a broken state or table, NetworkError and FlowError as `examine` does.
     """
     known = _known(out / RESULTS)
+    kept = KEPT if any(item.group in KEPT for item in plan) else ("quick",)
     rows: list[ResultRow] = []
     examined: dict[str, list[Examined]] = {}
     missing = []
@@ -55,8 +56,8 @@ def collect(plan: Sequence[Planned], out: Path, states: Path, *, tell: Callable[
         if path.exists():
             found = examine(item.id, read_state(path))
             rows += result_rows(found)
-            if item.group in KEPT:
-                examined.setdefault(item.id, []).append(found)
+            if item.group in kept:
+                examined.setdefault(item.id.removeprefix(QUICK), []).append(found)
         elif key in known:
             rows += known[key]
         else:
