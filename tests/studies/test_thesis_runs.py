@@ -122,6 +122,14 @@ def test_a_cut_run_is_continued(binary, tmp_path):
     assert runs.state_path(tmp_path, item).stat().st_mtime_ns > made
 
 
+def test_nothing_to_redraw_is_told(tmp_path, capsys):
+    assert main(["study", "thesis", "--redraw", "--out", str(tmp_path / "none")]) == 2
+    assert "holds no state and no results" in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()
+    assert main(["study", "thesis", "--jobs", "0", "--out", str(tmp_path / "none")]) == 2
+    assert "--jobs: 0" in capsys.readouterr().err
+
+
 def test_the_plan_names_every_run_once_with_its_seeds():
     plan = planned(quick=False)
     slugs = [item.slug for item in plan]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fdnet.dem.liggghts import Launch, find_binary
-from fdnet.errors import LiggghtsError
+from fdnet.errors import CaseError, LiggghtsError
 from fdnet.studies.thesis.findings import collect, write_findings
 from fdnet.studies.thesis.growth import GROWTH, grow, write_growth
 from fdnet.studies.thesis.plan import Planned, planned
@@ -33,11 +33,14 @@ class ThesisOptions:
 def run_thesis(options: ThesisOptions) -> str:
     """Run or continue the study, write its tables and figures into `out`; returns the trends as text.
 
-    Raises LiggghtsError when runs failed, after the results of all others are written.
+    Raises LiggghtsError when runs failed, after the results of all others are written; CaseError when there is nothing
+    to draw.
     """
     plan, states, tell = planned(quick=options.quick), options.out / STATES, _teller(options.show)
     failed = {} if options.redraw else _run(plan, options, states, tell)
     findings = collect(plan, options.out, states, tell=tell)
+    if not findings.rows:
+        raise CaseError(f"{options.out}: holds no state and no results of this study; leave out --redraw to run it")
     write_findings(findings, plan, options.out, states)
     if failed:
         lines = "; ".join(f"{item.id} seed {item.seed}: {why}" for item, why in failed.items())

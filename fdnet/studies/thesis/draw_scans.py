@@ -40,6 +40,7 @@ def invasion_depth(figure: Any, sources: Sources) -> None:
         _depths(axes, [row for row in rows if row.specimen == specimen], sources.marks("table3").depth_mm)
         axes.set_title(titled(specimen), fontsize=11, loc="left")
     panels[0].set_ylabel("depth of the invaded fines (mm)")
+    panels[0].set_ylim(bottom=0)
     handles = [axes.get_legend_handles_labels() for axes in panels]
     once = {label: handle for some, labels in handles for handle, label in zip(some, labels, strict=True)}
     band = seeds({row.seed for row in rows}).removeprefix(", ")
@@ -61,7 +62,6 @@ def _depths(axes: Any, rows: Sequence[ScanRow], told: float | None) -> None:
     axes.minorticks_off()
     axes.set_xticks(ticks, [f"{one:g}" for one in ticks])
     axes.margins(y=0.1)
-    axes.set_ylim(bottom=0)
 
 
 def _curve(axes: Any, rows: Sequence[ScanRow], name: str, label: str, style: dict[str, Any]) -> None:

@@ -63,7 +63,7 @@ def _densities(figure: Any, sources: Sources, specimen: str, wanted: Sequence[tu
         label = f"{np.mean([len(one) for one in values]):.0f} {words}, {percent(closed)} of them 0{seeds(runs)}"
         steps(axes, edges, [density(one, edges) for one in values], colour=colour, line=line, label=label)
     _tell(axes, specimen, _shares(sources.marks(specimen).statistics, cuts, [name for name, *_ in wanted]))
-    axes.set(xlim=edges[[0, -1]], ylim=(0, None))
+    axes.set(xlim=edges[[0, -1]], ylim=(0, 1.25 * axes.get_ylim()[1]))
     axes.legend(loc="upper right", fontsize=9.5)
 
 

@@ -116,11 +116,11 @@ def _scan(findings: Findings, plan: Sequence[Planned], group: str) -> "list[Scan
     from fdnet.studies.thesis.draw_tables import scan_row
 
     scanned = [item for item in plan if item.group == group]
-    values = {item.id: item.value for item in scanned}
+    values, seeds = {item.id: item.value for item in scanned}, {item.seed for item in scanned}
     for case in dict.fromkeys(item.case for item in scanned):
         values[case] = base_value(group)
     return [
         scan_row(row.id.split(" ")[0], values[row.id], row)
         for row in findings.rows
-        if row.id in values and (row.law, row.damage_law) == THESIS_PAIR
+        if row.id in values and row.seed in seeds and (row.law, row.damage_law) == THESIS_PAIR
     ]
