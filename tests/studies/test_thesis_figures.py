@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from builders import tiny
 from matplotlib.figure import Figure
+from matplotlib.quiver import Quiver
 
 from fdnet.snapshot import Kind, resting
 from fdnet.studies.thesis.draw_all import draw_all
 from fdnet.studies.thesis.draw_canvas import DISTANCE_CLASSES, ScanRow, Sources, Tables, few_colours
 from fdnet.studies.thesis.draw_deposition import distances, tetrahedra
 from fdnet.studies.thesis.draw_depth import compared_fraction, invaded_fraction, porosity_reduction, total_reduction
-from fdnet.studies.thesis.draw_packs import fines_by_size, middle_slab, pack
+from fdnet.studies.thesis.draw_packs import fines_by_size, growth, middle_slab, pack
 from fdnet.studies.thesis.draw_permeability import compared_permeability, permeability, ratios
 from fdnet.studies.thesis.draw_scans import invasion_depth, over_seeds
 from fdnet.studies.thesis.draw_sections import contents, density, sizes, throat_porosity, throats_by_depth
@@ -302,8 +303,22 @@ def test_all_that_is_there_is_drawn_and_what_is_missing_named(tmp_path):
 
 
 def test_every_figure_of_the_thesis_that_can_be_drawn_is_in_the_table():
-    numbers = {9, 13, *range(14, 23), 33, 42, *range(44, 73)}
+    numbers = {9, 13, *range(14, 23), 33, 42, *range(44, 74)}
     assert {int(name.split("_")[1].split("-")[0].rstrip("BCb")) for name in FIGURES if name[0] == "f"} == numbers
+
+
+def test_a_growing_pack_shows_the_velocities_of_each_state():
+    """Arrows are the grains' velocities in x and z, the title names the fastest of all grains."""
+    box = np.array([[0, 3e-3], [0, 1.6e-3], [0, 1.6e-3]])
+    grains = lattice(box)
+    stages = [replace(grains, velocity=speed * np.tile([0.6, 0.0, 0.8], (len(grains), 1))) for speed in (2.0, 5.0, 0.0)]
+    figure = Figure()
+    growth(figure, Sources(examined={}, tables=Tables(growth=stages)))
+    for axes, speed in zip(figure.axes, (2.0, 5.0, 0.0), strict=True):
+        (arrows,) = [one for one in axes.collections if isinstance(one, Quiver)]
+        assert np.allclose(arrows.U, 0.6 * speed)
+        assert np.allclose(arrows.V, 0.8 * speed)
+        assert f"fastest grain {speed:.2g} m/s" in axes.get_title(loc="left")
 
 
 def test_sentences_without_their_number_are_left_out():
