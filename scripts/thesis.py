@@ -19,6 +19,7 @@ from fdnet.studies.thesis.findings import CAPTIONS, DEPOSITION, RESULTS, STATIST
 from fdnet.studies.thesis.markdown import figure, markdown_table, with_band
 from fdnet.studies.thesis.plan import REASONS, SPECIMENS, VARIANTS, planned
 from fdnet.studies.thesis.results import ResultRow, read_results
+from fdnet.studies.thesis.statistics import ALONE, CUT, WHOLE
 from fdnet.studies.thesis.thesis_tables import thesis_tables
 from fdnet.studies.thesis.trend_table import caveats, trends_table
 from fdnet.studies.thesis.trends import compare_trends
@@ -92,8 +93,7 @@ def reasons(rows: Rows) -> str:
 
 def table_of(path: Path, columns: Mapping[str, str], keep: Callable[[dict[str, str]], bool] = lambda _: True) -> str:
     """A CSV as Markdown, its `columns` under other names."""
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if keep(row)]
+    rows = [row for row in _read(path) if keep(row)]
     return markdown_table(list(columns.values()), [[_cell(row[name]) for name in columns] for row in rows])
 
 
@@ -104,10 +104,26 @@ def _cell(text: str) -> str:
         return text
 
 
+def statistics_table(path: Path) -> str:
+    """What the thesis tells of the first section, beside each reading of which pores and throats belong to it."""
+    found: dict[tuple[str, ...], dict[str, str]] = {}
+    for row in _read(path):
+        if row["seed"] == "1" and row["thesis"] and row["id"] in SPECIMENS:
+            key = (row["id"], row["source"], row["quantity"], f"{row['sense']} {_cell(row['thesis'])}")
+            found.setdefault(key, {})[row["note"].split("; ")[0]] = _cell(row["ours"])
+    readings = {WHOLE: "whole pores", CUT: "and cut ones", ALONE: "the section alone"}
+    lines = [[*key, *(ours.get(note, "-") for note in readings)] for key, ours in found.items()]
+    return markdown_table(["run", "thesis", "quantity", "thesis's", *readings.values()], lines)
+
+
+def _read(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
 def figures(path: Path) -> str:
     """Every figure with its caption."""
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = _read(path)
     drawn = [f"![{row['caption']}](thesis/{row['figure']})\n\n*{row['caption']}*" for row in rows if not row["missing"]]
     left = [f"{row['figure']} (needs {row['missing']})" for row in rows if row["missing"]]
     return "\n\n".join(drawn + (["Not drawn: " + ", ".join(left) + "."] if left else []))
@@ -128,12 +144,7 @@ def document(docs: Path) -> str:
         "supply": scan(rows, "supply"),
         "reasons": reasons(rows),
         "quick": compared(rows, [(f"quick-{run}", run) for run in (*SPECIMENS, *VARIANTS)]),
-        "statistics": table_of(
-            thesis / STATISTICS,
-            {"id": "run", "source": "thesis", "quantity": "quantity", "thesis": "thesis's", "sense": "", "ours": "ours"}
-            | {"note": "counted"},
-            lambda row: row["seed"] == "1" and bool(row["thesis"]) and row["id"] in SPECIMENS,
-        ),
+        "statistics": statistics_table(thesis / STATISTICS),
         "deposition": table_of(
             thesis / DEPOSITION,
             {"id": "run", "low": "porosity from", "high": "to", "throats": "throats", "fines": "fines"}

@@ -97,7 +97,9 @@ def test_runs_are_done_once_twins_shared_and_failures_told(binary, tmp_path, mon
     assert np.array_equal(states[0].damaged.position, states[1].damaged.position)
     assert not list((tmp_path / "runs").glob("quick-table3*"))
     monkeypatch.setattr(runs, "_run_all", lambda todo, *_, **__: dict.fromkeys(todo, "ran"))
+    runs.state_path(tmp_path / "out", same[0]).unlink()
     assert runs.carry_out(same, tmp_path / "out", tmp_path / "runs", jobs=1, tell=said.append) == {}
+    assert read_state(runs.state_path(tmp_path / "out", same[0])).case.name == "quick-table3"
 
 
 @pytest.mark.liggghts

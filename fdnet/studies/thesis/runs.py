@@ -27,11 +27,11 @@ def carry_out(plan: Sequence[Planned], out: Path, runs: Path, *, jobs: int, tell
     out.mkdir(parents=True, exist_ok=True)
     cases = {item: item.load() for item in plan}
     costs = {item: _expected(case) for item, case in cases.items()}
-    waiting = sorted((item for item in plan if not _has_state(out, item, cases[item])), key=lambda item: costs[item])
+    done = [item for item in plan if _has_state(out, item, cases[item])]
+    waiting = sorted(set(plan) - set(done), key=lambda item: (costs[item], item.slug))
     first: dict[str, Planned] = {}
-    twins = {item: first.setdefault(cases[item].digest("invade"), item) for item in waiting}
-    todo = [item for item in waiting if twins[item] is item]
-    failed = _run_all(todo, costs, out, runs, jobs=jobs, tell=tell)
+    twins = {item: first.setdefault(cases[item].digest("invade"), item) for item in [*done, *waiting]}
+    failed = _run_all([item for item in waiting if twins[item] is item], costs, out, runs, jobs=jobs, tell=tell)
     for item in waiting:
         if twins[item] is not item and twins[item] not in failed:
             _adopt(state_path(out, twins[item]), state_path(out, item), cases[item])
