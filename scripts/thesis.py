@@ -8,19 +8,22 @@ Runs nothing and draws nothing, so it takes a second.
 
 import argparse
 import csv
+import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from string import Template
 
+from fdnet.scales import scales_of
 from fdnet.studies.thesis.bands import Sample, band
 from fdnet.studies.thesis.examine import DEFAULT_PAIR, THESIS_PAIR
 from fdnet.studies.thesis.findings import CAPTIONS, DEPOSITION, RESULTS, STATISTICS, TETRAHEDRA
 from fdnet.studies.thesis.markdown import figure, markdown_table, with_band
-from fdnet.studies.thesis.plan import REASONS, SPECIMENS, VARIANTS, planned
+from fdnet.studies.thesis.plan import REASONS, SCAN_SEEDS, SPECIMENS, VARIANTS, Planned, planned
 from fdnet.studies.thesis.results import ResultRow, read_results
 from fdnet.studies.thesis.statistics import ALONE, CUT, WHOLE
 from fdnet.studies.thesis.thesis_tables import thesis_tables
+from fdnet.studies.thesis.trend_quantities import known
 from fdnet.studies.thesis.trend_table import caveats, trends_table
 from fdnet.studies.thesis.trends import compare_trends
 
@@ -31,7 +34,7 @@ COLUMNS: Mapping[str, tuple[float, Pick]] = {
     "invaded": (1, lambda row: row.invaded_count),
     "in the first mm": (1, lambda row: row.count_first_mm),
     "passed": (1, lambda row: row.passed_count),
-    "porosity lost, first mm": (1, lambda row: row.porosity_loss_first_mm),
+    "porosity lost, first mm, points": (100, lambda row: row.porosity_loss_first_mm),
     "mean depth, mm": (1, lambda row: row.mean_depth_mm),
     "95 % above, mm": (1, lambda row: row.invasion_depth_p95_mm),
 }
@@ -44,7 +47,7 @@ def of(rows: Rows, run: str, pair: tuple[str, str] = THESIS_PAIR) -> Rows:
 
 def mean(found: Rows, pick: Pick, scale: float = 1) -> str:
     """Mean over seeds, with its 95 % band from three on."""
-    return with_band(band(Sample(values=tuple(scale * pick(row) for row in found))))
+    return with_band(band(Sample(values=known([scale * pick(row) for row in found]))))
 
 
 def compared(rows: Rows, runs: Iterable[tuple[str, str]]) -> str:
@@ -64,20 +67,22 @@ def compared(rows: Rows, runs: Iterable[tuple[str, str]]) -> str:
 
 def costs(rows: Rows) -> str:
     """Supply, simulated time and seconds of the full-scale runs."""
-    header = ("run", "seed", "supplied", "ended", "simulated, ms", "invasion, s", "pack, s", "largest overlap, %")
+    header = ("run", "seed", "supplied", "invaded", "passed", "ended", "simulated, ms", "way of the fluid, mm")
+    header += ("invasion, s", "pack, s", "largest overlap, %")
     lines = []
     for run in (*SPECIMENS, *VARIANTS):
+        velocity = scales_of(Planned(case=run, group="").load()).interstitial_velocity
         for row in of(rows, run):
-            numbers = (row.time_ms, row.seconds, row.pack_seconds, 100 * row.max_overlap)
-            lines.append(
-                [run, str(row.seed), str(row.supplied_count), row.stop_reason, *(figure(one) for one in numbers)]
-            )
+            counts = (row.seed, row.supplied_count, row.invaded_count, row.passed_count)
+            numbers = (row.time_ms, row.time_ms * velocity, row.seconds, row.pack_seconds, 100 * row.max_overlap)
+            lines.append([run, *map(str, counts), row.stop_reason, *map(figure, numbers)])
     return markdown_table(header, lines)
 
 
 def scan(rows: Rows, group: str) -> str:
     """The runs of a scan by case and value, each case's own value among them."""
     items = {item.id: item for item in planned(quick=False) if item.group == group}
+    rows = [row for row in rows if row.seed <= SCAN_SEEDS]
     runs: list[tuple[str, str]] = []
     for case in dict.fromkeys(item.case for item in items.values()):
         own = [item for item in items.values() if item.case == case]
@@ -160,7 +165,9 @@ def document(docs: Path) -> str:
         ),
         "figures": figures(thesis / CAPTIONS),
     }
-    return Template((docs / "thesis.md.in").read_text(encoding="utf-8")).substitute(parts)
+    text = Template((docs / "thesis.md.in").read_text(encoding="utf-8")).substitute(parts)
+    assert not re.search(r"(?m)^[A-Z]{5,}$", text), "docs/thesis.md.in: a part is not written yet"
+    return text
 
 
 def main() -> int:

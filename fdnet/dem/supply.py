@@ -1,8 +1,9 @@
 """The slab of fines upstream of the face: random, at the given concentration, touching nothing.
 
 Fed in batches (`fines.supply`) it is cut across the flow; a batch enters the simulation at the start of a chunk, where
-the fluid would have carried it by then. The length of a batch is what the suspension moves in a chunk and what the cake
-may have grown by (`LOOSEST_CAKE`), so that with one batch in hand none can be overtaken by the cake.
+the fluid would have carried it by then. The length of a batch is what the suspension moves in a chunk against a cake
+that grows towards it, h = c (u t + h) / phi with phi = LOOSEST_CAKE, so that with one batch in hand no cake overtakes
+any.
 """
 
 import math
@@ -20,8 +21,9 @@ from fdnet.snapshot import Array, Kind, Snapshot
 CLEARANCE = 1.02
 """Fines start at least this many radius sums apart."""
 _ROUNDS = 400
-LOOSEST_CAKE = 0.4
-"""Volume fraction of the loosest cake that batches leave room for; random loose packing has 0.55 (Onoda 1990)."""
+LOOSEST_CAKE = 0.5
+"""Volume fraction of the loosest cake that batches leave room for; random loose packing has 0.55 (Onoda & Liniger
+1990)."""
 AT_ONCE = 2
 """Batches there from the start: the one that arrives in the first chunk, and one in hand."""
 SURE_CROWDING = 0.2
@@ -110,15 +112,21 @@ class Batches:
 
 
 def batches_of(case: Case, scales: Scales) -> Batches:
-    """The batches of a case: equal lengths, the slab's fines shared out evenly. One holds all of a slab fed at once."""
+    """The batches of a case: equal lengths, the slab's fines shared out evenly. One holds all of a slab fed at once, or
+    of so few fines that some batch would be empty. None is thinner than a fine, so that each need clear only the next.
+    """
     assert case.fines is not None
     travel = scales.upstream_velocity * scales.checkpoint_steps * scales.time_step
-    length = travel * (1 + case.fines.concentration / LOOSEST_CAKE)
+    apart = 1.01 * CLEARANCE * 2 * case.fines.radius_range_m[1]
+    length = max(travel / (1 - case.fines.concentration / LOOSEST_CAKE), apart)
+    whole = Batches(counts=(scales.supplied_count,), length=scales.slab_length, travel=travel)
     if case.fines.supply == "slab" or scales.slab_length <= AT_ONCE * length:
-        return Batches(counts=(scales.supplied_count,), length=scales.slab_length, travel=travel)
+        return whole
     number = math.ceil(scales.slab_length / length - 1e-9)
     share = np.minimum(np.arange(1, number + 1) * length / scales.slab_length, 1.0)
     counts = np.diff(np.round(share * scales.supplied_count).astype(int), prepend=0)
+    if not counts.all():
+        return whole
     return Batches(counts=tuple(int(count) for count in counts), length=length, travel=travel)
 
 

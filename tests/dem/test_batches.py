@@ -49,15 +49,19 @@ def test_batches_make_up_the_slab(radius, sides):
     assert np.all(apart >= CLEARANCE * (radii[:, None] + radii) * (1 - 1e-12))
 
 
-def test_a_batch_enters_before_it_could_meet_the_cake():
-    """At the end of the chunk before it enters no fine of it has come nearer than the loosest cake is thick."""
-    case = tiny(*BATCHED)
+@pytest.mark.parametrize("concentration", [0.05, 0.1, 0.2])
+def test_a_batch_enters_before_it_could_meet_the_cake(concentration):
+    """At the end of the chunk before it enters no fine of it has come nearer than the loosest cake is thick, h with
+    phi h = c (u t + h): all fines that the suspension and the front's own way have brought."""
+    case = tiny(*BATCHED, f"fines.concentration={concentration}")
     scales, grains = scales_of(case), one_grain(case)
     end, batches = slab_end(case, grains), batches_of(case, scales)
     for number, (_, place) in enumerate(in_the_slab(case, scales, grains), 1):
         chunk = number - AT_ONCE
         nearest = end - place[:, 0].max() - max(0, chunk) * batches.travel
-        cake = case.fines.concentration / LOOSEST_CAKE * batches.travel * max(0, chunk)
+        arrived = batches.travel * max(0, chunk)
+        cake = concentration * arrived / (LOOSEST_CAKE - concentration)
+        assert LOOSEST_CAKE * cake == pytest.approx(concentration * (arrived + cake))
         assert nearest >= cake + (batches.length if chunk > 0 else 0) - 1e-15
     entered = [end - fines.position[:, 0].min() for fines in place_batches(case, scales, grains)]
     assert max(entered) <= batches.reach + 1e-15
@@ -69,6 +73,21 @@ def test_supplied_counts_the_batches_that_have_come():
     assert batches.supplied_at(1) == sum(batches.counts[:2])
     assert batches.supplied_at(2) == sum(batches.counts[:3])
     assert batches.supplied_at(10_000) == 900
+
+
+def test_thin_chunks_make_no_batch_thinner_than_a_fine():
+    """Else batches that are not neighbours could overlap, which each is drawn without regard to."""
+    case = tiny("fines.supply=batches", "run.checkpoint_ms=0.0005")
+    scales, grains = scales_of(case), one_grain(case)
+    assert batches_of(case, scales).travel < 0.2 * 2 * 0.05e-3
+    place = np.concatenate([place for _, place in in_the_slab(case, scales, grains)])
+    apart = np.linalg.norm(place[:, None] - place, axis=2) + np.eye(len(place))
+    assert apart.min() >= CLEARANCE * 0.1e-3 * (1 - 1e-12)
+
+
+def test_so_few_fines_that_a_batch_would_be_empty_come_at_once():
+    case = tiny("fines={radius_mm=0.05, count=60, supply='batches', concentration=0.0003}", "run.checkpoint_ms=0.01")
+    assert batches_of(case, scales_of(case)).counts == (60,)
 
 
 def test_a_short_slab_is_one_batch():

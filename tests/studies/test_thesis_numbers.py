@@ -165,7 +165,7 @@ def test_results_survive_their_file(lattice, tmp_path):
     assert np.isnan(found[2].thesis_depth_mm)
     header = (tmp_path / "results.csv").read_text().splitlines()[0].split(",")
     assert header == list(COLUMNS)
-    assert header[16:32] == [f"k_reduction_{s}" for s in range(1, 9)] + [
+    assert header[17:33] == [f"k_reduction_{s}" for s in range(1, 9)] + [
         f"k_reduction_inplace_{s}" for s in range(1, 9)
     ]
 

@@ -79,7 +79,7 @@ BASE = {
 
 
 def row(run: str, seed: int = 1, laws: tuple[str, str] = THESIS_PAIR, **changed) -> ResultRow:
-    return ResultRow(id=run, seed=seed, law=laws[0], damage_law=laws[1], **BASE | changed)
+    return ResultRow(id=run, seed=seed, digest="", law=laws[0], damage_law=laws[1], **BASE | changed)
 
 
 def rows_of(run: str, field: str, values, laws: tuple[str, str] = THESIS_PAIR, **changed) -> list[ResultRow]:

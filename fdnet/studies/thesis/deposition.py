@@ -31,7 +31,8 @@ class DepositionRow:
 
     `throats` with fines and `fines` in them (a fine once in each throat; a throat cut by a face by its part inside);
     shares by number and by the volume in the throat: nearer the axis, nearer the wall, centred beyond it. `law` is
-    "deposition" where most, of the two latter together, are nearer the wall, else "clogging", empty without fines;
+    "deposition" where most, of the two latter together, are nearer the wall, else "clogging", empty without fines (the
+    thesis's rule: an even spread, 3/4 of it nearer the wall, is deposition by it);
     `wall_low`, `wall_high` the 95 % interval of their share, and `decided` when it leaves out 1/2. It takes the fines
     as independent, which those of one throat are not quite. `thesis`: its share `nearer` the axis or the wall.
     """

@@ -10,8 +10,7 @@ from fdnet.studies.thesis.deposition import deposition, write_deposition
 from fdnet.studies.thesis.examine import THESIS_PAIR, Examined, examine
 from fdnet.studies.thesis.plan import QUICK, Planned, base_value
 from fdnet.studies.thesis.results import ResultRow, read_results, result_rows, write_results
-from fdnet.studies.thesis.runs import state_path
-from fdnet.studies.thesis.state import read_state
+from fdnet.studies.thesis.runs import find_state
 from fdnet.studies.thesis.statistics import statistics, write_statistics
 from fdnet.studies.thesis.trends import compare_trends, write_trends
 from fdnet.studies.thesis.values import thesis_values
@@ -42,9 +41,11 @@ class Findings:
 
 
 def collect(plan: Sequence[Planned], out: Path, states: Path, *, tell: Callable[[str], None]) -> Findings:
-    """Examine every state there is; of a run without one take the rows that results.csv in `out` has already.
+    """Examine every state there is; of a run without one take the rows that results.csv in `out` has already, if they
+    are of the same case.
 
-    Raises CaseError on a broken state or table, NetworkError and FlowError as `examine` does.
+    Raises CaseError on a broken state or table or a state of another case, NetworkError and FlowError as `examine`
+    does.
     """
     known = _known(out / RESULTS)
     kept = KEPT if any(item.group in KEPT for item in plan) else ("quick",)
@@ -52,9 +53,10 @@ def collect(plan: Sequence[Planned], out: Path, states: Path, *, tell: Callable[
     examined: dict[str, list[Examined]] = {}
     missing = []
     for number, item in enumerate(plan, 1):
-        path, key = state_path(states, item), (item.id, item.seed)
-        if path.exists():
-            found = examine(item.id, read_state(path))
+        case = item.load()
+        state, key = find_state(states, item, case), (item.id, item.seed, case.digest())
+        if state is not None:
+            found = examine(item.id, state)
             rows += result_rows(found)
             if item.group in kept:
                 examined.setdefault(item.id.removeprefix(QUICK), []).append(found)
@@ -67,10 +69,10 @@ def collect(plan: Sequence[Planned], out: Path, states: Path, *, tell: Callable[
     return Findings(rows=tuple(rows), examined=examined, missing=tuple(missing))
 
 
-def _known(path: Path) -> dict[tuple[str, int], list[ResultRow]]:
-    found: dict[tuple[str, int], list[ResultRow]] = {}
+def _known(path: Path) -> dict[tuple[str, int, str], list[ResultRow]]:
+    found: dict[tuple[str, int, str], list[ResultRow]] = {}
     for row in read_results(path) if path.exists() else []:
-        found.setdefault((row.id, row.seed), []).append(row)
+        found.setdefault((row.id, row.seed, row.digest), []).append(row)
     return found
 
 
@@ -106,8 +108,10 @@ def _draw(findings: Findings, plan: Sequence[Planned], out: Path, states: Path) 
         distances=distances_found(examined.get("specimen5", ())),
         growth=read_growth(growth, first.state.case) if first is not None and growth.exists() else (),
     )
-    drawn = draw_all(examined, out, thesis=thesis_marks(thesis_values()), tables=tables)
-    lines = [(one.name, one.caption, "; ".join(one.missing)) for one in drawn]
+    quick = not any(item.group in KEPT for item in plan)
+    drawn = draw_all(examined, out, thesis={} if quick else thesis_marks(thesis_values()), tables=tables)
+    start = "Quick forms. " if quick else ""
+    lines = [(one.name, start + one.caption, "; ".join(one.missing)) for one in drawn]
     write_csv(out / CAPTIONS, ("figure", "caption", "missing"), lines)
 
 

@@ -13,7 +13,7 @@ from fdnet.dem.scene import box_of, snapshot_of
 from fdnet.errors import CaseError
 from fdnet.scales import PACK_STAGES, scales_of
 from fdnet.snapshot import Kind, Snapshot
-from fdnet.studies.thesis.state import packed_bytes
+from fdnet.studies.thesis.state import BROKEN, packed_bytes
 
 GROWTH = "growth.npz"
 SHOWN = (1, PACK_STAGES)
@@ -41,7 +41,7 @@ def read_growth(path: Path, case: Case) -> tuple[Snapshot, ...]:
     try:
         with np.load(path) as file:
             tables, steps = file["grains"].astype(float), file["steps"]
-    except (OSError, ValueError, KeyError) as error:
+    except BROKEN as error:
         raise CaseError(f"{path}: holds no growth of a pack ({error}); run the study anew to write it") from error
     return tuple(
         Snapshot(

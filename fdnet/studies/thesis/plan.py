@@ -1,13 +1,14 @@
 """Which runs the study of the thesis is made of."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 
 from fdnet.case import Case
 from fdnet.case_file import read_case
 from fdnet.errors import CaseError
+from fdnet.scales import scales_of
 
 SPECIMENS = tuple(f"specimen{number}" for number in range(1, 9))
 VARIANTS = ("specimen1-7to8", "specimen1-1410", "specimen5-5to6", "table3")
@@ -16,8 +17,8 @@ CHEAP = frozenset({"specimen1", "specimen2", "specimen4", "specimen5", "specimen
 SEEDS, QUICK_SEEDS, SCAN_SEEDS = 3, 5, 3
 FRICTIONS = (0.0, 0.1, 0.3)
 """Friction of the fines beside the cases' own 0.55."""
-MULTIPLIERS = (0.3, 3.0, 10.0, 30.0)
-"""Drag multipliers beside 1."""
+MULTIPLIERS = (0.3, 3.0, 10.0)
+"""Drag multipliers beside 1; springs are stiffened with them, so that stronger drag does not press spheres together."""
 SUPPLIES = (0.25, 0.5, 2.0)
 """Fines supplied over those of the case."""
 REASONS = (
@@ -38,14 +39,15 @@ QUICK = "quick-"
 class Planned:
     """One run: a case file of `cases/` with other settings ("key=value") and seed.
 
-    `group` is "specimen", "variant", "quick", "reason" or what is scanned: "friction", "drag", "supply"; `value` that
-    knob.
+    `beside` are settings that go with the others and are not told in the name. `group` is "specimen", "variant",
+    "quick", "reason" or what is scanned: "friction", "drag", "supply"; `value` that knob.
     """
 
     case: str
     group: str
     seed: int = 1
     settings: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
     value: float = float("nan")
 
     @property
@@ -60,7 +62,7 @@ class Planned:
 
     def load(self) -> Case:
         """Its case. Raises CaseError when the case file is missing or wrong."""
-        return read_case(case_path(self.case), assignments=[f"seed={self.seed}", *self.settings])
+        return read_case(case_path(self.case), assignments=[f"seed={self.seed}", *self.settings, *self.beside])
 
 
 def base_value(group: str) -> float:
@@ -99,11 +101,14 @@ def planned(*, quick: bool) -> list[Planned]:
 
 def _scans() -> Iterator[Planned]:
     yield from _scan("friction", "fines.friction", ("specimen1", "specimen5"), FRICTIONS)
-    quick = [QUICK + name for name in ("specimen1", "specimen5", "specimen7")]
     for setting in REASONS:
         for seed in range(1, SCAN_SEEDS + 1):
             yield Planned(case="specimen1", group="reason", seed=seed, settings=(setting,))
-    yield from _scan("drag", "drag.multiplier", quick, MULTIPLIERS)
+    for name in ("specimen1", "specimen5", "specimen7"):
+        for item in _scan("drag", "drag.multiplier", [QUICK + name], MULTIPLIERS):
+            stiffness = read_case(case_path(item.case)).run.stiffness_N_m
+            assert isinstance(stiffness, float)
+            yield replace(item, beside=(f"run.stiffness_N_m={stiffness * max(1.0, item.value)!r}",))
     for name in (QUICK + "specimen5", QUICK + "specimen6"):
         case = read_case(case_path(name))
         assert case.fines is not None
@@ -111,7 +116,17 @@ def _scans() -> Iterator[Planned]:
         for factor in SUPPLIES:
             setting = f"fines.count={round(factor * case.fines.count)}"
             for seed in range(1, SCAN_SEEDS + 1):
-                yield Planned(case=name, group="supply", seed=seed, settings=(setting,), value=factor)
+                beside = _longer(case, factor)
+                yield Planned(case=name, group="supply", seed=seed, settings=(setting,), beside=beside, value=factor)
+
+
+def _longer(case: Case, factor: float) -> tuple[str, ...]:
+    """A cap moved by what the slab's arrival takes longer."""
+    if case.run.cap_ms is None:
+        return ()
+    scales = scales_of(case)
+    arrival = 1e3 * scales.slab_length / scales.upstream_velocity
+    return (f"run.cap_ms={case.run.cap_ms + (factor - 1) * arrival:.4g}",)
 
 
 def _scan(group: str, key: str, cases: Sequence[str], values: Sequence[float]) -> Iterator[Planned]:

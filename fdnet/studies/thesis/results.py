@@ -15,6 +15,7 @@ from fdnet.network.sections import reduction
 from fdnet.snapshot import Array
 from fdnet.studies.thesis.csv_rows import parsed, read_csv, write_csv
 from fdnet.studies.thesis.examine import Examined
+from fdnet.studies.thesis.plan import QUICK
 from fdnet.studies.thesis.state import State
 from fdnet.studies.thesis.values import ThesisSpecimen, thesis_of
 
@@ -40,7 +41,7 @@ TOLD = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResultRow:
-    """One run under one pair of laws; nan where there is no value.
+    """One run under one pair of laws; nan where there is no value. `digest` is its case's.
 
     Porosity counts overlap once, `porosity_loss_first_mm` is its loss between x = 0 and 1 mm; fractions are of the
     invaded fines by number; `k_reduction` of the whole, `k_reductions` (8) of the slabs cut out,
@@ -50,6 +51,7 @@ class ResultRow:
 
     id: str
     seed: int
+    digest: str
     law: str
     damage_law: str
     porosity_initial: float
@@ -103,10 +105,16 @@ def result_rows(examined: Examined) -> list[ResultRow]:
         **_porosities(examined.state, examined.thesis),
         **_invasion(examined.state, examined.thesis),
         **_ending(examined.state),
-        **_told(thesis_of(examined.id)),
+        **_told(thesis_of(examined.id), counted=not examined.id.startswith(QUICK)),
     }
     return [
-        ResultRow(id=examined.id, seed=examined.seed, **shared, **_permeabilities(examined.id, analysis))
+        ResultRow(
+            id=examined.id,
+            seed=examined.seed,
+            digest=examined.state.case.digest(),
+            **shared,
+            **_permeabilities(examined.id, analysis),
+        )
         for analysis in examined.analyses.values()
     ]
 
@@ -203,8 +211,12 @@ def _permeabilities(run: str, analysis: Analysis) -> dict[str, Any]:
     }
 
 
-def _told(thesis: ThesisSpecimen | None) -> dict[str, Any]:
-    told: dict[str, Any] = {name: _known(getattr(thesis, field, None)) for name, field in TOLD.items()}
+def _told(thesis: ThesisSpecimen | None, *, counted: bool) -> dict[str, Any]:
+    """The thesis's numbers; counts only when `counted`, for specimens of its size."""
+    told: dict[str, Any] = {
+        name: _known(getattr(thesis, field, None)) if counted or "count" not in name else math.nan
+        for name, field in TOLD.items()
+    }
     return told | {
         "thesis_damaged_porosity": thesis.damaged_porosity[0] if thesis else math.nan,
         "thesis_k_reductions": _filled(thesis.reductions if thesis else ()),

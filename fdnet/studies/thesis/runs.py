@@ -4,7 +4,8 @@ import multiprocessing as mp
 import shutil
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from dataclasses import replace
 from pathlib import Path
 
 from fdnet.case import Case
@@ -47,13 +48,21 @@ def _run_all(
     with ProcessPoolExecutor(max_workers=jobs, mp_context=context) as pool:
         futures = {pool.submit(run_one, item, out, runs): item for item in todo}
         for future in as_completed(futures):
-            item, error = futures[future], future.result()
+            item, error = futures[future], _result(future)
             left, done = left - costs[item], done + costs[item]
             if error:
                 failed[item] = error
             ahead = (time.monotonic() - start) * left / done if done else 0.0
             tell(f"{item.id}, seed {item.seed}: {error or 'done'}; about {ahead / 60:.0f} min left")
     return failed
+
+
+def _result(future: Future[str]) -> str:
+    """What a run says, or how its process failed: the others go on."""
+    try:
+        return future.result()
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
 
 
 def run_one(item: Planned, out: Path, runs: Path) -> str:
@@ -77,22 +86,26 @@ def state_path(out: Path, item: Planned) -> Path:
 
 def _has_state(out: Path, item: Planned, case: Case) -> bool:
     """Whether a state of this very case is there. Raises CaseError when it is of another."""
+    return find_state(out, item, case) is not None
+
+
+def find_state(out: Path, item: Planned, case: Case) -> State | None:
+    """The kept state of a run, to be examined as the case now asks; None when there is none.
+
+    Raises CaseError when it is broken or the state of another invasion.
+    """
     path = state_path(out, item)
     if not path.exists():
-        return False
-    found = read_state(path).case
-    if found.digest("invade") != case.digest("invade"):
+        return None
+    found = read_state(path)
+    if found.case.digest("invade") != case.digest("invade"):
         raise CaseError(f"{path}: is the state of another case than {item.id}; remove it to run the case anew")
-    return True
+    return replace(found, case=case)
 
 
 def _adopt(source: Path, target: Path, case: Case) -> None:
     """The same invasion under another name."""
-    state = read_state(source)
-    write_state(
-        target,
-        State(case=case, grains=state.grains, damaged=state.damaged, history=state.history, ending=state.ending),
-    )
+    write_state(target, replace(read_state(source), case=case))
 
 
 def _expected(case: Case) -> float:

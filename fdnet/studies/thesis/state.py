@@ -3,6 +3,7 @@
 import json
 import tomllib
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from io import BytesIO
@@ -34,6 +35,9 @@ ENDING = (
     "max_overlap",
     "warnings",
 )
+
+BROKEN = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error)
+"""What reading a damaged npz raises."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -104,7 +108,7 @@ def read_state(path: Path) -> State:
             history=arrays["history"],
             ending={name: told["ending"][name] for name in ENDING},
         )
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+    except BROKEN as error:
         raise CaseError(f"{path}: is no state of an invasion ({error}); run the study anew to write it") from error
 
 

@@ -28,6 +28,8 @@ from fdnet.studies.thesis.trend_quantities import (
 
 FULL_SCALE, QUICK_FORMS = "full scale", "quick forms"
 HOLDS, FAILS, UNDECIDED = "holds", "does not hold", "not decided"
+OVERLAP = 0.05
+"""Largest overlap over a diameter from which it is told: squeezed fines pass where others would not."""
 PASSED = 0.05
 """Share passed through from which the depth of those inside says too little: the depth of 95 % is beyond the end."""
 
@@ -154,6 +156,9 @@ def _note(rows: Sequence[ResultRow], names: Sequence[str], claim: Claim) -> str:
         ends = sorted({row.stop_reason for row in runs} - {"plugged"})
         if ends:
             notes.append(f"{name} ended by {', '.join(ends)}")
+        deepest = max((row.max_overlap for row in runs), default=0.0)
+        if deepest > OVERLAP:
+            notes.append(f"fines of {name} overlap by up to {deepest:.0%} of a diameter")
         inside, passed = sum(row.invaded_count for row in runs), sum(row.passed_count for row in runs)
         if _quantity(claim).deep and passed > PASSED * (inside + passed):
             share = passed / (inside + passed)
