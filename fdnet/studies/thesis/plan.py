@@ -15,7 +15,7 @@ VARIANTS = ("specimen1-7to8", "specimen1-1410", "specimen5-5to6", "table3")
 CHEAP = frozenset({"specimen1", "specimen2", "specimen4", "specimen5", "specimen1-7to8", "specimen1-1410"})
 """Run with SEEDS seeds; the others, of up to an hour each, with one (their trends come from the quick forms)."""
 SEEDS, QUICK_SEEDS, SCAN_SEEDS = 3, 5, 3
-FRICTIONS = (0.0, 0.1, 0.3)
+FRICTIONS = (0.0, 0.1)
 """Friction of the fines beside the cases' own 0.55."""
 MULTIPLIERS = (0.3, 3.0, 10.0)
 """Drag multipliers beside 1; springs are stiffened with them, so that stronger drag does not press spheres together."""
