@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Seconds inside and outside LIGGGHTS for whole runs.
 
-    .venv/bin/python scripts/benchmark.py cases/specimen1.toml cases/specimen5.toml --csv docs/benchmark.csv
+    .venv/bin/python scripts/benchmark.py cases/specimen1.toml cases/specimen5.toml --csv benchmark.csv
 
 Every case is run anew in its own folder below --out. "outside" is the wall time of the whole command less the time of
 all LIGGGHTS processes; how much of that went into rejected packs is listed too.

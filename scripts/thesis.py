@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""docs/thesis.md from docs/thesis.md.in and the tables that `fdnet study thesis` left in docs/thesis.
+"""docs/thesis.md from docs/thesis.md.in, and README.md's overview, from what `fdnet study thesis` left in docs/thesis.
 
     .venv/bin/python scripts/thesis.py [--docs docs]
 
@@ -26,6 +26,7 @@ from fdnet.studies.thesis.thesis_tables import thesis_tables
 from fdnet.studies.thesis.trend_quantities import known
 from fdnet.studies.thesis.trend_table import caveats, trends_table
 from fdnet.studies.thesis.trends import compare_trends
+from fdnet.studies.thesis.values import thesis_of
 
 ROOT = Path(__file__).resolve().parents[1]
 Rows = Sequence[ResultRow]
@@ -77,6 +78,36 @@ def costs(rows: Rows) -> str:
             numbers = (row.time_ms, row.time_ms * velocity, row.seconds, row.pack_seconds, 100 * row.max_overlap)
             lines.append([run, *map(str, counts), row.stop_reason, *map(figure, numbers)])
     return markdown_table(header, lines)
+
+
+def overview(rows: Rows) -> str:
+    """The specimens in one table, for the README: counts, depth, porosity and the first section's permeability."""
+    header = ["specimen", "invaded", "95 % above, mm", "points of porosity lost, first mm", "whole", "thesis, whole"]
+    header += ["k lost, first mm: thesis", "by its laws, %", "by fdnet's, %", "ended"]
+    lines = []
+    for run in SPECIMENS:
+        found, other, thesis = of(rows, run), of(rows, run, DEFAULT_PAIR), thesis_of(run)
+        assert thesis is not None
+        told = thesis.reductions[:1]
+        lines.append(
+            [run.removeprefix("specimen")]
+            + [mean(found, pick) for pick in (lambda row: row.invaded_count, lambda row: row.invasion_depth_p95_mm)]
+            + [mean(found, lambda row: row.porosity_loss_first_mm, 100)]
+            + [mean(found, lambda row: row.porosity_initial - row.porosity_damaged, 100)]
+            + [figure(100 * (thesis.porosity - thesis.damaged_porosity[0]), digits=1)]
+            + [f"{100 * told[0]:.0f}" if told else "–"]
+            + [mean(some, lambda row: row.k_reductions[0], 100) for some in (found, other)]
+            + [", ".join(dict.fromkeys(row.stop_reason for row in found))]
+        )
+    return markdown_table(header, lines)
+
+
+def readme(text: str, rows: Rows) -> str:
+    """README.md with the overview between its two marks."""
+    start, end = "<!-- thesis: written by scripts/thesis.py -->", "<!-- /thesis -->"
+    before, _, rest = text.partition(start)
+    assert end in rest, f"README.md: no {start} ... {end}"
+    return f"{before}{start}\n\n{overview(rows)}\n\n{end}{rest.partition(end)[2]}"
 
 
 def scan(rows: Rows, group: str) -> str:
@@ -175,7 +206,10 @@ def main() -> int:
     parser.add_argument("--docs", type=Path, default=ROOT / "docs", help="where to read and write")
     docs = parser.parse_args().docs
     (docs / "thesis.md").write_text(document(docs), encoding="utf-8")
-    print(docs / "thesis.md")
+    page = docs.parent / "README.md"
+    rows = read_results(docs / "thesis" / RESULTS)
+    page.write_text(readme(page.read_text(encoding="utf-8"), rows), encoding="utf-8")
+    print(docs / "thesis.md", page)
     return 0
 
 

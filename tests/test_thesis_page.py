@@ -29,6 +29,12 @@ def test_the_page_is_written_from_the_committed_tables(root, thesis):
     assert (root / "docs/thesis.md").read_text(encoding="utf-8") == thesis.document(root / "docs")
 
 
+def test_the_readme_shows_the_same_overview(root, thesis, rows):
+    text = (root / "README.md").read_text(encoding="utf-8")
+    assert text == thesis.readme(text, rows)
+    assert thesis.overview(rows).count("\n") == 9
+
+
 def test_every_specimen_and_variant_has_rows_of_all_its_seeds(rows):
     found = {(row.id, row.seed, row.law) for row in rows}
     for name in (*SPECIMENS, *VARIANTS):
