@@ -69,13 +69,14 @@ def compared(rows: Rows, runs: Iterable[tuple[str, str]]) -> str:
 def costs(rows: Rows) -> str:
     """Supply, simulated time and seconds of the full-scale runs."""
     header = ("run", "seed", "supplied", "invaded", "passed", "ended", "simulated, ms", "way of the fluid, mm")
-    header += ("invasion, s", "pack, s", "largest overlap, %")
+    header += ("beyond 1 mm and near a wall, %", "invasion, s", "pack, s", "largest overlap, %")
     lines = []
     for run in (*SPECIMENS, *VARIANTS):
         velocity = scales_of(Planned(case=run, group="").load()).interstitial_velocity
         for row in of(rows, run):
             counts = (row.seed, row.supplied_count, row.invaded_count, row.passed_count)
-            numbers = (row.time_ms, row.time_ms * velocity, row.seconds, row.pack_seconds, 100 * row.max_overlap)
+            numbers = [row.time_ms, row.time_ms * velocity, 100 * row.fraction_deep_near_wall]
+            numbers += [row.seconds, row.pack_seconds, 100 * row.max_overlap]
             lines.append([run, *map(str, counts), row.stop_reason, *map(figure, numbers)])
     return markdown_table(header, lines)
 

@@ -11,15 +11,24 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
+from builders import resting_spheres, tiny
 from scipy.spatial import Delaunay
 
+from fdnet.dem.scene import box_of
 from fdnet.errors import CaseError
-from fdnet.snapshot import Kind
+from fdnet.snapshot import Kind, resting
 from fdnet.studies.thesis.counts import count_tetrahedra, tetrahedra, write_counts
 from fdnet.studies.thesis.deposition import deposition, wilson_interval, write_deposition
 from fdnet.studies.thesis.examine import DEFAULT_PAIR, THESIS_PAIR, Examined, examine
 from fdnet.studies.thesis.first_section import first_section
-from fdnet.studies.thesis.results import COLUMNS, porosity_loss, read_results, result_rows, write_results
+from fdnet.studies.thesis.results import (
+    COLUMNS,
+    deep_near_wall,
+    porosity_loss,
+    read_results,
+    result_rows,
+    write_results,
+)
 from fdnet.studies.thesis.sizes import sizes_of_grains_alone
 from fdnet.studies.thesis.state import State
 from fdnet.studies.thesis.statistics import (
@@ -33,7 +42,6 @@ from fdnet.studies.thesis.statistics import (
     write_statistics,
 )
 from fdnet.studies.thesis.values import ThesisSpecimen, specimen_number, thesis_of, thesis_values
-from tests.builders import resting_spheres, tiny
 
 MM = 1e-3
 A, R = 0.5, 0.25
@@ -142,6 +150,17 @@ def test_fines_are_counted_by_depth(lattice):
     assert row.porosity_loss_first_mm == porosity_loss(lattice.state, lattice.thesis, MM)
 
 
+def test_deep_fines_near_a_wall():
+    """Of four beyond 1 mm two lie within 0.25 mm of a side; one at the face and one beyond the outlet do not count."""
+    case = tiny("grains.radius_mm=0.25")
+    x, y, z = [1.2, 1.4, 1.6, 2.9, 0.1, 3.1], [0.2, 0.8, 0.8, 0.8, 0.1, 0.1], [0.8, 0.8, 1.4, 1.3, 0.8, 0.8]
+    spheres = resting(1e-3 * np.column_stack([x, y, z]), 1e-5, box_of(case), Kind.FINE)
+    made = State(case=case, grains=spheres.grains(), damaged=spheres, history=np.zeros((1, 4)), ending={})
+    assert deep_near_wall(made) == 0.5
+    assert np.isnan(deep_near_wall(replace(made, case=tiny("box.sides=periodic"))))
+    assert np.isnan(deep_near_wall(replace(made, damaged=spheres.where(spheres.position[:, 0] < 1e-3))))
+
+
 @pytest.mark.parametrize("cut", ["analysis.profile_bin_mm=0.2", "analysis.sections=11", "analysis.sections=3"])
 def test_porosity_loss_of_the_first_millimetre_whatever_the_cuts(cut):
     """Fines apart from the grains; the three at one place count once."""
@@ -165,7 +184,7 @@ def test_results_survive_their_file(lattice, tmp_path):
     assert np.isnan(found[2].thesis_depth_mm)
     header = (tmp_path / "results.csv").read_text().splitlines()[0].split(",")
     assert header == list(COLUMNS)
-    assert header[17:33] == [f"k_reduction_{s}" for s in range(1, 9)] + [
+    assert header[18:34] == [f"k_reduction_{s}" for s in range(1, 9)] + [
         f"k_reduction_inplace_{s}" for s in range(1, 9)
     ]
 

@@ -52,6 +52,7 @@ BASE = {
     "fraction_first_0p25mm": 0.4,
     "fraction_first_mm": 0.9,
     "fraction_beyond_0p5mm": 0.2,
+    "fraction_deep_near_wall": nan,
     "k_reduction": 0.10,
     "k_reductions": (0.3, 0.1, 0.06, 0.04, 0.0, 0.0, 0.0, 0.0),
     "k_reductions_inplace": (0.2,) * 8,

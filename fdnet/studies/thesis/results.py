@@ -44,9 +44,10 @@ class ResultRow:
     """One run under one pair of laws; nan where there is no value. `digest` is its case's.
 
     Porosity counts overlap once, `porosity_loss_first_mm` is its loss between x = 0 and 1 mm; fractions are of the
-    invaded fines by number; `k_reduction` of the whole, `k_reductions` (8) of the slabs cut out,
-    `k_reductions_inplace` (8) of the slabs in the whole specimen; `time_ms` simulated, `seconds` and `pack_seconds` of
-    the computer; `max_overlap` over the smaller diameter. `thesis_*`: see `values.ThesisSpecimen`.
+    invaded fines by number, `fraction_deep_near_wall` of those beyond 1 mm, the ones less than a grain radius from a
+    side wall; `k_reduction` of the whole, `k_reductions` (8) of the slabs cut out, `k_reductions_inplace` (8) of the
+    slabs in the whole specimen; `time_ms` simulated, `seconds` and `pack_seconds` of the computer; `max_overlap` over
+    the smaller diameter. `thesis_*`: see `values.ThesisSpecimen`.
     """
 
     id: str
@@ -65,6 +66,7 @@ class ResultRow:
     fraction_first_0p25mm: float
     fraction_first_mm: float
     fraction_beyond_0p5mm: float
+    fraction_deep_near_wall: float
     k_reduction: float
     k_reductions: tuple[float, ...]
     k_reductions_inplace: tuple[float, ...]
@@ -136,6 +138,19 @@ def invaded_depth(state: State) -> Array:
     return x[(x >= low) & (x < high)] - low
 
 
+def deep_near_wall(state: State) -> float:
+    """Of the fines beyond 1 mm, the share centred less than a mean grain radius from a side wall; nan without either."""
+    fines, reach = state.damaged.fines(), state.case.grains.mean_radius_m
+    (low, high), *sides = state.damaged.box
+    deep = (fines.position[:, 0] >= low + FIRST) & (fines.position[:, 0] < high)
+    if any(state.case.periodic) or not deep.any():
+        return math.nan
+    to_wall = [
+        np.minimum(fines.position[deep, i] - a, b - fines.position[deep, i]) for i, (a, b) in enumerate(sides, 1)
+    ]
+    return float(np.mean(np.minimum(*to_wall) < reach))
+
+
 def porosity_loss(state: State, analysis: Analysis, depth: float) -> float:
     """Loss of porosity between the face and `depth` m (the whole specimen when it is shorter): pooled from the
     profile's bins or the sections where they have a cut there, else measured anew."""
@@ -176,6 +191,7 @@ def _invasion(state: State, analysis: Analysis) -> dict[str, Any]:
         "fraction_first_0p25mm": share(depth < FIRST_BIN),
         "fraction_first_mm": share(depth < FIRST),
         "fraction_beyond_0p5mm": share(depth >= SHALLOW),
+        "fraction_deep_near_wall": deep_near_wall(state),
         "cake_thickness_mm": 1e3 * analysis.cake_thickness,
     }
 
