@@ -200,9 +200,10 @@ def test_shipped_cases_are_valid_short_and_named_as_their_files(root: Path):
 
 
 def test_a_quick_form_differs_from_its_specimen_only_in_what_it_gives_up(root: Path):
-    may = {"name", "box", "run", "fines.count", "grains.count", "analysis.sections"}
     for path in (root / "cases/quick").glob("*.toml"):
         quick, full = read_case(path).data(), read_case(root / "cases" / path.name).data()
+        may = {"name", "box", "run", "fines.count", "grains.count", "analysis.sections"}
+        may |= {"grains.porosity"} if "count" in quick["grains"] else set()
         for part in set(quick) | set(full):
             if part in may:
                 continue
