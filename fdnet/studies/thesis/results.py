@@ -139,7 +139,7 @@ def invaded_depth(state: State) -> Array:
 
 
 def deep_near_wall(state: State) -> float:
-    """Of the fines beyond 1 mm, the share centred less than a mean grain radius from a side wall; nan without either."""
+    """Share of the fines beyond 1 mm that are centred within a mean grain radius of a side wall; nan without either."""
     fines, reach = state.damaged.fines(), state.case.grains.mean_radius_m
     (low, high), *sides = state.damaged.box
     deep = (fines.position[:, 0] >= low + FIRST) & (fines.position[:, 0] < high)
