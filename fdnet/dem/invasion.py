@@ -21,7 +21,7 @@ from fdnet.dem.checkpoint import (
     step_of,
 )
 from fdnet.dem.deck import Deck, LeftOut
-from fdnet.dem.invade_deck import SUPPLY, render_invade, write_batches, write_invade_inputs
+from fdnet.dem.invade_deck import render_invade, write_batches, write_invade_inputs
 from fdnet.dem.liggghts import SCREEN, Launch, Run, run_deck
 from fdnet.dem.overlap import WATCH, Deepest, cut_watch, deepest_of, overlap_in, read_watch, refuse_overlap
 from fdnet.dem.supply import batches_of
@@ -171,7 +171,7 @@ def _prepare(
     for path in (folder / "post").glob("invade_*"):
         if step_of(path) > last.step:
             path.unlink()
-    if case.fines is not None and case.fines.supply == "batches" and not (folder / SUPPLY).exists():
+    if case.fines is not None and case.fines.supply == "batches":
         write_batches(case, scales, grains, folder)
     deck = render_invade(case, scales, grains, ranks=ranks, resume=last)
     write_text(folder / "in.invade.resume", deck.text)
