@@ -16,14 +16,14 @@ from string import Template
 
 from fdnet.scales import scales_of
 from fdnet.studies.thesis.bands import Sample, band
-from fdnet.studies.thesis.examine import DEFAULT_PAIR, THESIS_PAIR
+from fdnet.studies.thesis.examine import DEFAULT_PAIR
 from fdnet.studies.thesis.findings import CAPTIONS, DEPOSITION, RESULTS, STATISTICS, TETRAHEDRA
 from fdnet.studies.thesis.markdown import figure, markdown_table, with_band
 from fdnet.studies.thesis.plan import REASONS, SCAN_SEEDS, SPECIMENS, VARIANTS, Planned, planned
 from fdnet.studies.thesis.results import ResultRow, read_results
 from fdnet.studies.thesis.statistics import ALONE, CUT, WHOLE
 from fdnet.studies.thesis.thesis_tables import thesis_tables
-from fdnet.studies.thesis.trend_quantities import known
+from fdnet.studies.thesis.trend_quantities import known, runs_of
 from fdnet.studies.thesis.trend_table import caveats, trends_table
 from fdnet.studies.thesis.trends import compare_trends
 from fdnet.studies.thesis.values import thesis_of
@@ -41,11 +41,6 @@ COLUMNS: Mapping[str, tuple[float, Pick]] = {
 }
 
 
-def of(rows: Rows, run: str, pair: tuple[str, str] = THESIS_PAIR) -> Rows:
-    """The rows of a run under a pair of laws, one a seed."""
-    return [row for row in rows if row.id == run and (row.law, row.damage_law) == pair]
-
-
 def mean(found: Rows, pick: Pick, scale: float = 1) -> str:
     """Mean over seeds, with its 95 % band from three on."""
     return with_band(band(Sample(values=known([scale * pick(row) for row in found]))))
@@ -56,7 +51,7 @@ def compared(rows: Rows, runs: Iterable[tuple[str, str]]) -> str:
     header = ["", "seeds", *COLUMNS, "k lost, first mm, %", "by fdnet's laws", "ended"]
     lines = []
     for run, words in runs:
-        found, other = of(rows, run), of(rows, run, DEFAULT_PAIR)
+        found, other = runs_of(rows, run), runs_of(rows, run, DEFAULT_PAIR)
         if not found:
             continue
         numbers = [mean(found, pick, scale) for scale, pick in COLUMNS.values()]
@@ -73,7 +68,7 @@ def costs(rows: Rows) -> str:
     lines = []
     for run in (*SPECIMENS, *VARIANTS):
         velocity = scales_of(Planned(case=run, group="").load()).interstitial_velocity
-        for row in of(rows, run):
+        for row in runs_of(rows, run):
             counts = (row.seed, row.supplied_count, row.invaded_count, row.passed_count)
             numbers = [row.time_ms, row.time_ms * velocity, 100 * row.fraction_deep_near_wall]
             numbers += [row.seconds, row.pack_seconds, 100 * row.max_overlap]
@@ -87,7 +82,7 @@ def overview(rows: Rows) -> str:
     header += ["k lost, first mm: thesis", "by its laws, %", "by fdnet's, %", "ended"]
     lines = []
     for run in SPECIMENS:
-        found, other, thesis = of(rows, run), of(rows, run, DEFAULT_PAIR), thesis_of(run)
+        found, other, thesis = runs_of(rows, run), runs_of(rows, run, DEFAULT_PAIR), thesis_of(run)
         assert thesis is not None
         told = thesis.reductions[:1]
         lines.append(
