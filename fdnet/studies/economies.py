@@ -185,8 +185,9 @@ scatter by 8 to 9 % in counts, and seeds are not paired, for batches draw anothe
 - **The step** of 0.2 sqrt(m/k) buys 1.9.
 - **Softer springs** buy less than the root of the stiffness, and of all economies theirs is the largest difference in
   fines inside, growing as springs soften: +5 % at 3e3 N/m, +10 % at 1e3. The bands of 12 % are those of packs: of the
-  same pack and fines every seed takes more, 3 to 6 % and 10 to 11 %. At full scale, while the suspension arrived undisturbed (three chunks), specimen 3 took 17,446 fines at 1e4 N/m,
-  18,667 at 2e3 and 17,625 at 1e3, specimen 6 took 25,833 at 1e4 and 26,417 at 3e3: 1 to 7 %, one seed each.
+  same pack and fines every seed takes more, 3 to 6 % and 10 to 11 %. At full scale, while the suspension arrived
+  undisturbed (three chunks), specimen 3 took 17,446 fines at 1e4 N/m, 18,667 at 2e3 and 17,625 at 1e3, specimen 6 took
+  25,833 at 1e4 and 26,417 at 3e3: 1 to 7 %, one seed each.
 - **Drag** that is `viscous` (equal fines) or `held` (unequal ones) buys a third; `implicit` no more than `held`.
 - **All together** buy about the product of the parts, 2.4, with a long supply 14.
 
