@@ -45,23 +45,15 @@ def write_invade_inputs(case: Case, scales: Scales, grains: Snapshot, folder: Pa
 def write_batches(case: Case, scales: Scales, grains: Snapshot, folder: Path) -> Snapshot:
     """Write supply/batch_N.data and .in, taken in before chunk N; returns the fines of the start."""
     assert case.fines is not None
-    batches = list(place_batches(case, scales, grains))
+    batches, bounds = list(place_batches(case, scales, grains)), _bounds(case, scales, grains)
+    shared = {"start_velocity": number(scales.upstream_velocity), "drag": drag_variables(case, scales)}
     (folder / SUPPLY).mkdir(exist_ok=True)
     for chunk, fines in enumerate(batches[AT_ONCE:], AT_ONCE):
         name = f"{SUPPLY}/batch_{chunk}"
         density = np.full(len(fines), case.fines.density_kg_m3)
-        write_data(folder / f"{name}.data", fines, bounds=_bounds(case, scales, grains), density=density, types=3)
-        text = render_text(
-            "batch.in.j2",
-            {
-                "name": name,
-                "first": int(fines.id[0]),
-                "last": int(fines.id[-1]),
-                "start_velocity": number(scales.upstream_velocity),
-                "drag": drag_variables(case, scales),
-            },
-        )
-        write_text(folder / f"{name}.in", text)
+        write_data(folder / f"{name}.data", fines, bounds=bounds, density=density, types=3)
+        own = {"name": name, "first": int(fines.id[0]), "last": int(fines.id[-1])}
+        write_text(folder / f"{name}.in", render_text("batch.in.j2", shared | own))
     return reduce(Snapshot.joined, batches[:AT_ONCE])
 
 

@@ -43,8 +43,12 @@ def refuse_crowded_supply(case: Case, scales: Scales) -> None:
     Tries it only where they might not fit: the draw takes seconds for a million fines.
     """
     assert case.fines is not None
-    if crowding(case) > SURE_CROWDING:
-        _draw(case, scales, end=0.0) if case.fines.supply == "slab" else list(_draw_batches(case, scales, end=0.0))
+    if crowding(case) <= SURE_CROWDING:
+        return
+    if case.fines.supply == "slab":
+        _draw(case, scales, end=0.0)
+    else:
+        list(_draw_batches(case, scales, end=0.0))
 
 
 def crowding(case: Case) -> float:

@@ -57,12 +57,13 @@ def _run_all(
         known[point.key] = measured = _measure(study, point, work, quick=quick)
         record.add(measured)
         left = (time.monotonic() - start) / number * (len(todo) - number)
-        tell(f"{len(known)} of {len(points)}: {point.key}: {measured.status}, {measured.wall_s:.1f} s{_eta(left)}")
+        tell(f"{len(known)} of {len(points)}: {point.key}: {measured.status}, {measured.wall_s:.1f} s{eta(left)}")
     shutil.rmtree(work, ignore_errors=True)
     return [known[point.key] for point in points]
 
 
-def _eta(seconds: float) -> str:
+def eta(seconds: float) -> str:
+    """The time left in words, to end a line; nothing at 0."""
     return (
         f", about {seconds / 60:.0f} min left"
         if seconds >= 60

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-CONFIDENCE = 0.95
+from fdnet.studies.judge import CONFIDENCE
+
 FEWEST = 3
 """Runs that a spread is taken from; fewer say too little of it."""
 ROUNDING = 1e-9

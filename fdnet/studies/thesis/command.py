@@ -13,7 +13,6 @@ from fdnet.studies.thesis.growth import GROWTH, grow, write_growth
 from fdnet.studies.thesis.plan import Planned, planned
 from fdnet.studies.thesis.runs import Tell, carry_out
 from fdnet.studies.thesis.trend_table import trends_table
-from fdnet.studies.thesis.trends import compare_trends
 
 STATES = "states"
 
@@ -41,11 +40,11 @@ def run_thesis(options: ThesisOptions) -> str:
     findings = collect(plan, options.out, states, tell=tell)
     if not findings.rows:
         raise CaseError(f"{options.out}: holds no state and no results of this study; leave out --redraw to run it")
-    write_findings(findings, plan, options.out, states)
+    comparisons = write_findings(findings, plan, options.out, states)
     if failed:
         lines = "; ".join(f"{item.id} seed {item.seed}: {why}" for item, why in failed.items())
         raise LiggghtsError(f"{len(failed)} of {len(plan)} runs failed, run the study again to continue: {lines}")
-    text = trends_table(compare_trends(findings.rows))
+    text = trends_table(comparisons)
     if findings.missing:
         text += f"\n\n{len(findings.missing)} of {len(plan)} runs are missing: leave out --redraw to run them"
     return text

@@ -23,6 +23,7 @@ from fdnet.studies.thesis.values import DepositionTold, specimen_number, thesis_
 HALFWAY, WALL = 0.5, 1.0
 Z_95 = 1.959963984540054
 TOLD_OF = "5"
+"""The specimen Figures 56 and 57 are of."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

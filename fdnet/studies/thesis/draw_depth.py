@@ -22,12 +22,9 @@ from fdnet.studies.thesis.draw_canvas import (
 )
 from fdnet.studies.thesis.examine import Examined
 from fdnet.studies.thesis.marks import percent
-from fdnet.studies.thesis.results import invaded_depth, porosity_loss
+from fdnet.studies.thesis.results import FIRST, SHALLOW, invaded_depth, porosity_loss
 
 BIN_MM = 0.25
-FIRST = 1e-3
-"""Thickness m of the section looked at in detail."""
-DEEPER_MM = 0.5
 
 
 def fraction_by_depth(run: Examined) -> tuple[Array, Array]:
@@ -57,10 +54,10 @@ def invaded_fraction(figure: Any, sources: Sources, *, specimen: str) -> None:
         axes.plot([edges[:2].mean()], [marks.fraction_first_bin], linestyle="", label=label, **THESIS)
     _deepest(axes, runs, marks.depth_mm)
     beyond = np.mean(
-        [np.mean(invaded_depth(run.state) * MM > DEEPER_MM) if run.thesis.invaded_count else 0.0 for run in runs]
+        [np.mean(invaded_depth(run.state) >= SHALLOW) if run.thesis.invaded_count else 0.0 for run in runs]
     )
     told = "" if marks.fraction_beyond_0p5mm is None else f" (thesis: below {percent(marks.fraction_beyond_0p5mm)})"
-    axes.plot([], [], " ", label=f"deeper than {DEEPER_MM} mm: {percent(beyond)}{told}")
+    axes.plot([], [], " ", label=f"deeper than {SHALLOW * MM:g} mm: {percent(beyond)}{told}")
     axes.set(xlabel=DEPTH_LABEL, ylabel=f"share of the invaded fines per {BIN_MM} mm (–)", xlim=edges[[0, -1]])
     axes.set_ylim(0, 1.1 * max(np.max(rows), marks.fraction_first_bin or 0.0, 0.01))
     axes.legend(loc="upper right", fontsize=9.5)

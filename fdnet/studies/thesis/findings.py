@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 from fdnet.studies.thesis.counts import count_tetrahedra, write_counts
 from fdnet.studies.thesis.deposition import deposition, write_deposition
 from fdnet.studies.thesis.examine import THESIS_PAIR, Examined, examine
-from fdnet.studies.thesis.plan import QUICK, Planned, base_value
+from fdnet.studies.thesis.plan import BASE_VALUES, QUICK, Planned
 from fdnet.studies.thesis.results import ResultRow, read_results, result_rows, write_results
 from fdnet.studies.thesis.runs import find_state
 from fdnet.studies.thesis.statistics import statistics, write_statistics
-from fdnet.studies.thesis.trends import compare_trends, write_trends
+from fdnet.studies.thesis.trends import Comparison, compare_trends, write_trends
 from fdnet.studies.thesis.values import thesis_values
 
 if TYPE_CHECKING:
@@ -76,15 +76,17 @@ def _known(path: Path) -> dict[tuple[str, int, str], list[ResultRow]]:
     return found
 
 
-def write_findings(findings: Findings, plan: Sequence[Planned], out: Path, states: Path) -> None:
-    """All tables and figures into `out`."""
+def write_findings(findings: Findings, plan: Sequence[Planned], out: Path, states: Path) -> list[Comparison]:
+    """All tables and figures into `out`; returns the comparisons of the trends."""
     runs = [run for seeds in findings.examined.values() for run in seeds]
     write_results(out / RESULTS, findings.rows)
     write_statistics(out / STATISTICS, [row for run in runs for row in statistics(run)])
     write_deposition(out / DEPOSITION, [row for run in runs for row in deposition(run)])
     write_counts(out / TETRAHEDRA, [count_tetrahedra(run) for run in runs])
-    write_trends(out / TRENDS, compare_trends(findings.rows))
+    comparisons = compare_trends(findings.rows)
+    write_trends(out / TRENDS, comparisons)
     _draw(findings, plan, out, states)
+    return comparisons
 
 
 def _draw(findings: Findings, plan: Sequence[Planned], out: Path, states: Path) -> None:
@@ -122,7 +124,7 @@ def _scan(findings: Findings, plan: Sequence[Planned], group: str) -> "list[Scan
     scanned = [item for item in plan if item.group == group]
     values, seeds = {item.id: item.value for item in scanned}, {item.seed for item in scanned}
     for case in dict.fromkeys(item.case for item in scanned):
-        values[case] = base_value(group)
+        values[case] = BASE_VALUES[group]
     return [
         scan_row(row.id.split(" ")[0], values[row.id], row)
         for row in findings.rows

@@ -31,7 +31,7 @@ REASONS = (
 """What might let more fines into specimen 1: grains that give way, soft contacts, porosity counted as a plain sum of
 spheres (1,369 leave 0.30), drag, no walls."""
 BASE_VALUES = {"friction": 0.55, "drag": 1.0, "supply": 1.0}
-"""What the cases themselves have of each knob."""
+"""What the cases themselves have of each knob, by group."""
 QUICK = "quick-"
 
 
@@ -63,11 +63,6 @@ class Planned:
     def load(self) -> Case:
         """Its case. Raises CaseError when the case file is missing or wrong."""
         return read_case(case_path(self.case), assignments=[f"seed={self.seed}", *self.settings, *self.beside])
-
-
-def base_value(group: str) -> float:
-    """The cases' own value of the knob that runs of `group` scan."""
-    return BASE_VALUES[group]
 
 
 def cases_folder() -> Path:

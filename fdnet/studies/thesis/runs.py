@@ -13,6 +13,7 @@ from fdnet.cost import cost_of
 from fdnet.errors import CaseError, FdnetError
 from fdnet.pipeline import RunOptions, run_case
 from fdnet.scales import scales_of
+from fdnet.studies.runner import eta
 from fdnet.studies.thesis.plan import Planned
 from fdnet.studies.thesis.state import State, read_state, state_of_run, write_state
 
@@ -28,7 +29,7 @@ def carry_out(plan: Sequence[Planned], out: Path, runs: Path, *, jobs: int, tell
     out.mkdir(parents=True, exist_ok=True)
     cases = {item: item.load() for item in plan}
     costs = {item: _expected(case) for item, case in cases.items()}
-    done = [item for item in plan if _has_state(out, item, cases[item])]
+    done = [item for item in plan if find_state(out, item, cases[item]) is not None]
     waiting = sorted(set(plan) - set(done), key=lambda item: (costs[item], item.slug))
     first: dict[str, Planned] = {}
     twins = {item: first.setdefault(cases[item].digest("invade"), item) for item in [*done, *waiting]}
@@ -53,7 +54,7 @@ def _run_all(
             if error:
                 failed[item] = error
             ahead = (time.monotonic() - start) * left / done if done else 0.0
-            tell(f"{item.id}, seed {item.seed}: {error or 'done'}; about {ahead / 60:.0f} min left")
+            tell(f"{item.id}, seed {item.seed}: {error or 'done'}{eta(ahead)}")
     return failed
 
 
@@ -82,11 +83,6 @@ def run_one(item: Planned, out: Path, runs: Path) -> str:
 def state_path(out: Path, item: Planned) -> Path:
     """Where the state of a run is kept."""
     return out / f"{item.slug}.npz"
-
-
-def _has_state(out: Path, item: Planned, case: Case) -> bool:
-    """Whether a state of this very case is there. Raises CaseError when it is of another."""
-    return find_state(out, item, case) is not None
 
 
 def find_state(out: Path, item: Planned, case: Case) -> State | None:

@@ -1,11 +1,10 @@
 """The thesis's numbers as its figures show them: from values.toml to `ThesisMarks` by specimen."""
 
+from fdnet.studies.thesis.deposition import TOLD_OF
 from fdnet.studies.thesis.draw_canvas import DISTANCE_CLASSES
 from fdnet.studies.thesis.marks import ThesisMarks, Told
 from fdnet.studies.thesis.values import TABLE3, DepositionTold, Statistic, ThesisSpecimen, ThesisValues
 
-DEPOSITION_OF = "5"
-"""The specimen Figures 56 and 57 are of."""
 CLASS_BOUNDS = ((0.0, 0.4), (0.4, 0.6), (0.6, 1.0))
 """Throat porosities of the DISTANCE_CLASSES."""
 
@@ -31,7 +30,7 @@ def _marks(one: ThesisSpecimen, values: ThesisValues) -> ThesisMarks:
         reductions=one.reductions,
         size_classes_mm=one.size_classes_mm or (),
         statistics=tuple(_told(told) for told in values.statistics if told.specimen == one.id),
-        deposition=_deposition(values.deposition) if one.id == DEPOSITION_OF else {},
+        deposition=_deposition(values.deposition) if one.id == TOLD_OF else {},
     )
 
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from fdnet.studies.thesis.bands import Sample, band
 from fdnet.studies.thesis.examine import DEFAULT_PAIR, THESIS_PAIR
 from fdnet.studies.thesis.markdown import NONE, as_told, markdown_table, with_band
+from fdnet.studies.thesis.plan import SPECIMENS
 from fdnet.studies.thesis.results import SECTIONS, ResultRow
 from fdnet.studies.thesis.table_properties import ENDED, IN_SETTINGS, OURS_ONLY, PROPERTIES, RUNS, told_number
-from fdnet.studies.thesis.trend_claims import SPECIMENS
 from fdnet.studies.thesis.trend_quantities import known, runs_of
 from fdnet.studies.thesis.values import TABLE3, ThesisSpecimen, thesis_of
 

@@ -3,6 +3,7 @@
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
+from fdnet.studies.thesis.plan import SPECIMENS
 from fdnet.studies.thesis.trend_quantities import RESPONSES
 from fdnet.studies.thesis.values import thesis_of
 
@@ -19,7 +20,6 @@ MORE, ALIKE, ABOVE = "more", "alike", "above"
 """`one` has more than `other`; as much within MARGIN of the larger; more than `bound`."""
 MARGIN = 0.20
 """Of the larger of two losses of porosity: what still is "about the same amount". The thesis's own are within 13 %."""
-SPECIMENS = tuple(f"specimen{number}" for number in range(1, 9))
 BY_SIZE = (SPECIMENS[0:3], SPECIMENS[3:6])
 """From coarse to fine, at porosity 0.30 and 0.40."""
 SPREAD = SPECIMENS[6]

@@ -10,9 +10,9 @@ from scipy.stats import spearmanr
 
 from fdnet.studies.thesis.bands import Sample
 from fdnet.studies.thesis.examine import THESIS_PAIR
+from fdnet.studies.thesis.plan import QUICK
 from fdnet.studies.thesis.results import ResultRow
 
-QUICK = "quick-"
 DEEP = slice(1, 4)
 """Sections 2 to 4, between 1 and 4 mm: as deep as the quick forms go."""
 _DRAG = re.compile(r"(\S+) drag\.multiplier=(\S+)")

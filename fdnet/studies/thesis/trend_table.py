@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from fdnet.studies.thesis.bands import Band
 from fdnet.studies.thesis.examine import DEFAULT_PAIR, THESIS_PAIR
 from fdnet.studies.thesis.markdown import figure, markdown_table
+from fdnet.studies.thesis.plan import QUICK
 from fdnet.studies.thesis.trend_claims import ABOVE, TRENDS
-from fdnet.studies.thesis.trend_quantities import QUICK
 from fdnet.studies.thesis.trends import FAILS, FULL_SCALE, HOLDS, QUICK_FORMS, UNDECIDED, Comparison
 
 IN_PART, NO_RUNS = "holds in part", "no runs"

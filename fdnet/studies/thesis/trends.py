@@ -13,11 +13,11 @@ from pathlib import Path
 from fdnet.studies.thesis.bands import ROUNDING, Band, Sample, band, difference
 from fdnet.studies.thesis.csv_rows import write_flat
 from fdnet.studies.thesis.examine import DEFAULT_PAIR, THESIS_PAIR
+from fdnet.studies.thesis.plan import QUICK, SPECIMENS
 from fdnet.studies.thesis.results import ResultRow
-from fdnet.studies.thesis.trend_claims import ALIKE, MARGIN, SPECIMENS, Claim, claims
+from fdnet.studies.thesis.trend_claims import ALIKE, MARGIN, Claim, claims
 from fdnet.studies.thesis.trend_quantities import (
     QUANTITIES,
-    QUICK,
     RESPONSES,
     Quantity,
     drag_sample,
