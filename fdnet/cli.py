@@ -46,7 +46,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
         return _STOPPED
     except MemoryError as error:
-        print(f"fdnet: not enough memory ({error}); supply fewer fines, or take a machine with more", file=sys.stderr)
+        print(
+            f"fdnet: not enough memory ({error}); supply fewer fines, or take a machine with more",
+            file=sys.stderr,
+        )
         return 2
     except OSError as error:
         if options.debug:
@@ -93,9 +96,15 @@ def _add_case(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("case", type=Path, metavar="CASE.toml", help="the case file")
     parser.add_argument("--seed", type=int, help="overrides the seed of the case")
     parser.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", help="overrides a key, e.g. fines.count=500"
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="overrides a key, e.g. fines.count=500",
     )
-    parser.add_argument("--np", type=_ranks, default=1, metavar="N", help="MPI ranks for LIGGGHTS (default 1)")
+    parser.add_argument(
+        "--np", type=_ranks, default=1, metavar="N", help="MPI ranks for LIGGGHTS (default 1)"
+    )
 
 
 def _ranks(text: str) -> int:
@@ -105,16 +114,25 @@ def _ranks(text: str) -> int:
 
 
 def _add_run(commands: Any, common: argparse.ArgumentParser) -> None:
-    run = commands.add_parser("run", parents=[common], help="pack, invade, analyse and report one case")
+    run = commands.add_parser(
+        "run", parents=[common], help="pack, invade, analyse and report one case"
+    )
     _add_case(run)
     run.add_argument("--out", type=Path, help="run folder (default runs/NAME)")
     run.add_argument("--resume", action="store_true", help="continue an unfinished run")
     run.add_argument("--force", action="store_true", help="replace what is there")
-    run.add_argument("--stages", default="pack,invade,analyse,report", help="comma-separated (default: all four)")
+    run.add_argument(
+        "--stages",
+        default="pack,invade,analyse,report",
+        help="comma-separated (default: all four)",
+    )
     run.add_argument("--json", action="store_true", help="print summary.json on standard output")
     run.add_argument("--liggghts", metavar="PATH", help="the LIGGGHTS binary")
     run.add_argument(
-        "--timeout", type=float, metavar="SECONDS", help="stop LIGGGHTS after this time (continue with --resume)"
+        "--timeout",
+        type=float,
+        metavar="SECONDS",
+        help="stop LIGGGHTS after this time (continue with --resume)",
     )
     run.add_argument("--quiet", action="store_true", help="no progress")
     run.set_defaults(action=_run)
@@ -142,13 +160,15 @@ def _add_permeability(commands: Any, common: argparse.ArgumentParser) -> None:
 def _add_study(commands: Any, common: argparse.ArgumentParser) -> None:
     from fdnet.studies.command import add_arguments, run
 
-    command = commands.add_parser("study", parents=[common], help="error against run time of one of fdnet's choices")
+    command = commands.add_parser(
+        "study", parents=[common], help="error against run time of one of fdnet's choices"
+    )
     add_arguments(command)
     command.set_defaults(action=run)
 
 
 def _case_of(options: argparse.Namespace) -> Any:
-    from fdnet.case_file import read_case
+    from fdnet.case.file import read_case
 
     seed = [] if options.seed is None else [f"seed={options.seed}"]
     return read_case(options.case, assignments=[*options.set, *seed])
@@ -156,17 +176,19 @@ def _case_of(options: argparse.Namespace) -> Any:
 
 def _stages(text: str) -> tuple[str, ...]:
     from fdnet.errors import CaseError
-    from fdnet.run_folder import STAGES
+    from fdnet.run.folder import STAGES
 
     asked = [part.strip() for part in text.split(",") if part.strip()]
     unknown = [part for part in asked if part not in STAGES]
     if unknown or not asked:
-        raise CaseError(f"--stages: {text!r} has {unknown or 'nothing'}, expected some of {','.join(STAGES)}")
+        raise CaseError(
+            f"--stages: {text!r} has {unknown or 'nothing'}, expected some of {','.join(STAGES)}"
+        )
     return tuple(stage for stage in STAGES if stage in asked)
 
 
 def _run(options: argparse.Namespace) -> int:
-    from fdnet.pipeline import RunOptions, run_case
+    from fdnet.run.pipeline import RunOptions, run_case
 
     case = _case_of(options)
     out = options.out or Path("runs") / case.name
@@ -190,7 +212,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _print_summary(summary: dict[str, Any], out: Path) -> None:
-    from fdnet.summary_text import summary_lines
+    from fdnet.run.summary_text import summary_lines
 
     for line in summary_lines(summary) if summary else ["done (no analysis was asked for)"]:
         print(line)
@@ -198,16 +220,18 @@ def _print_summary(summary: dict[str, Any], out: Path) -> None:
 
 
 def _render(options: argparse.Namespace) -> int:
-    from fdnet.cost import over_limit
     from fdnet.dem.render import render_decks
-    from fdnet.scale_table import scale_rows
-    from fdnet.scales import scales_of
+    from fdnet.scales.cost import over_limit
+    from fdnet.scales.scales import scales_of
+    from fdnet.scales.table import scale_rows
 
     case = _case_of(options)
     scales = scales_of(case)
     decks = render_decks(case, options.out, ranks=options.np)
     for row in scale_rows(case, scales):
-        print(f"{row.name:<36} {row.symbol:<11} {row.value:>12.4g} {row.unit:<5} {row.formula:<40} {row.source}")
+        print(
+            f"{row.name:<36} {row.symbol:<11} {row.value:>12.4g} {row.unit:<5} {row.formula:<40} {row.source}"
+        )
     for warning in filter(None, [*scales.warnings, over_limit(case, scales)]):
         print(f"warning: {warning}")
     for deck in decks:

@@ -19,15 +19,27 @@ _METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of the command."""
     parser.add_argument(
-        "spheres", type=Path, metavar="SPHERES.csv", help="columns x,y,z,radius[,kind] or x_m,...,radius_m[,kind]"
+        "spheres",
+        type=Path,
+        metavar="SPHERES.csv",
+        help="columns x,y,z,radius[,kind] or x_m,...,radius_m[,kind]",
     )
     parser.add_argument(
-        "--units", choices=tuple(_METRES), help="unit of the columns and of --box (not with x_m columns)"
+        "--units",
+        choices=tuple(_METRES),
+        help="unit of the columns and of --box (not with x_m columns)",
     )
-    parser.add_argument("--axis", choices=("x", "y", "z"), default="x", help="flow direction (default x)")
-    parser.add_argument("--box", metavar="x0,x1,y0,y1,z0,z1", help="the specimen, in the unit of the columns")
     parser.add_argument(
-        "--periodic", default="", metavar="DIRS", help="periodic directions, any of x, y, z together; others are walls"
+        "--axis", choices=("x", "y", "z"), default="x", help="flow direction (default x)"
+    )
+    parser.add_argument(
+        "--box", metavar="x0,x1,y0,y1,z0,z1", help="the specimen, in the unit of the columns"
+    )
+    parser.add_argument(
+        "--periodic",
+        default="",
+        metavar="DIRS",
+        help="periodic directions, any of x, y, z together; others are walls",
     )
     parser.add_argument(
         "--walls",
@@ -36,11 +48,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="side walls hold the fluid, or it slips along them: slip for spheres cut out of a larger pack (default "
         "no-slip; known to the lubrication and side-kozeny laws)",
     )
-    parser.add_argument("--sections", type=_count, default=1, metavar="N", help="slabs along the flow (default 1)")
+    parser.add_argument(
+        "--sections", type=_count, default=1, metavar="N", help="slabs along the flow (default 1)"
+    )
     parser.add_argument("--law", choices=LAW_NAMES, help="conductance law (default: fdnet's own)")
-    parser.add_argument("--damage-law", choices=DAMAGE_LAW_NAMES, help="damage law (default: fdnet's own)")
-    parser.add_argument("--compare-laws", action="store_true", help="all laws with all damage laws as a table")
-    parser.add_argument("--csv", type=Path, metavar="FILE", help="write the laws, one row each, as CSV")
+    parser.add_argument(
+        "--damage-law", choices=DAMAGE_LAW_NAMES, help="damage law (default: fdnet's own)"
+    )
+    parser.add_argument(
+        "--compare-laws", action="store_true", help="all laws with all damage laws as a table"
+    )
+    parser.add_argument(
+        "--csv", type=Path, metavar="FILE", help="write the laws, one row each, as CSV"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
@@ -52,9 +72,8 @@ def _count(text: str) -> int:
 
 def run(options: argparse.Namespace) -> int:
     """Analyse the file and print the result. Raises CaseError for bad input (nothing is written)."""
-    from fdnet.network.conductance import DEFAULT_LAW
-    from fdnet.network.damage import DEFAULT_DAMAGE_LAW
-    from fdnet.network.delaunay import check_lengths
+    from fdnet.network.laws.named import DEFAULT_DAMAGE_LAW, DEFAULT_LAW
+    from fdnet.network.tessellation.delaunay import check_lengths
 
     periodic = _directions(options.periodic)
     if options.csv and not options.csv.parent.is_dir():
@@ -83,17 +102,21 @@ def _directions(text: str) -> tuple[bool, bool, bool]:
     return "x" in text, "y" in text, "z" in text
 
 
-def read_snapshot(options: argparse.Namespace, periodic: tuple[bool, bool, bool]) -> tuple[Any, list[str]]:
+def read_snapshot(
+    options: argparse.Namespace, periodic: tuple[bool, bool, bool]
+) -> tuple[Any, list[str]]:
     """The spheres of the file as a Snapshot in SI, and notes. Raises CaseError for bad input."""
     import numpy as np
 
-    from fdnet.report.spheres import read_spheres
-    from fdnet.snapshot import Kind, resting
+    from fdnet.spheres.csv_file import read_spheres
+    from fdnet.spheres.snapshot import Kind, resting
 
     position, radius, kind = read_spheres(options.spheres, units=options.units)
     grains = kind == Kind.GRAIN
     if np.count_nonzero(grains) < 4:
-        raise CaseError(f"{options.spheres}: {np.count_nonzero(grains)} grains, expected at least 4 for a tetrahedron")
+        raise CaseError(
+            f"{options.spheres}: {np.count_nonzero(grains)} grains, expected at least 4 for a tetrahedron"
+        )
     box, notes = _box(options, position[grains], radius[grains], periodic)
     snapshot = resting(position, radius, box, kind)
     return snapshot, notes
@@ -106,14 +129,23 @@ def _box(
 
     if options.box is None:
         if any(periodic):
-            raise CaseError("--box: missing, a periodic direction needs its length; give --box x0,x1,y0,y1,z0,z1")
-        low, high = np.min(position - radius[:, None], axis=0), np.max(position + radius[:, None], axis=0)
+            raise CaseError(
+                "--box: missing, a periodic direction needs its length; give --box x0,x1,y0,y1,z0,z1"
+            )
+        low, high = (
+            np.min(position - radius[:, None], axis=0),
+            np.max(position + radius[:, None], axis=0),
+        )
         return np.column_stack([low, high]), ["no --box given: the box around all grains was used"]
     try:
         values = [float(part) for part in options.box.split(",")]
     except ValueError:
         values = []
-    if len(values) != 6 or not all(map(math.isfinite, values)) or any(values[i] >= values[i + 1] for i in (0, 2, 4)):
+    if (
+        len(values) != 6
+        or not all(map(math.isfinite, values))
+        or any(values[i] >= values[i + 1] for i in (0, 2, 4))
+    ):
         raise CaseError(
             f"--box: {options.box!r}, expected six numbers x0,x1,y0,y1,z0,z1 with each lower bound below the upper"
         )
@@ -124,7 +156,7 @@ def turned(spheres: Any, turn: list[int]) -> Any:
     """The same spheres with axes in the order `turn`, moved so that the box starts at x = 0."""
     import numpy as np
 
-    from fdnet.snapshot import Snapshot
+    from fdnet.spheres.snapshot import Snapshot
 
     start = np.array([spheres.box[turn[0], 0], 0.0, 0.0])
     return Snapshot(
@@ -153,7 +185,9 @@ def _measure(
     profile_bin = (spheres.box[0, 1] - spheres.box[0, 0]) / 32
     options = AnalysisOptions(sections=given.sections, walls=given.walls, profile_bin=profile_bin)
     results, start = [], time.perf_counter()
-    for result in compare(spheres.grains(), damaged, periodic=periodic, options=options, laws=laws):
+    for result in compare(
+        spheres.grains(), damaged, periodic=periodic, options=options, laws=laws
+    ):
         now = time.perf_counter()
         results.append(_row(result, now - start, notes))
         start = now
@@ -206,7 +240,9 @@ def _print(results: list[dict[str, Any]], options: argparse.Namespace) -> None:
 
 def _print_sections(result: dict[str, Any]) -> None:
     print(f"sections cut out, {result['law']} and {result['damage_law']}:")
-    print(f"{'from m':>10} {'to m':>10} {'porosity':>9} {'damaged':>9} {'k m2':>12} {'k damaged m2':>13} {'k/k0':>8}")
+    print(
+        f"{'from m':>10} {'to m':>10} {'porosity':>9} {'damaged':>9} {'k m2':>12} {'k damaged m2':>13} {'k/k0':>8}"
+    )
     for row in result["sections"]:
         print(
             f"{row['x_lo_m']:>10.4g} {row['x_hi_m']:>10.4g} {row['porosity_initial']:>9.5f} "

@@ -23,9 +23,8 @@ import accuracy_tables as tables
 import matplotlib as mpl
 import numpy as np
 
-from fdnet.network.conductance import DEFAULT_LAW, LAWS
-from fdnet.network.damage import DEFAULT_DAMAGE_LAW
-from fdnet.studies.truth import EQUAL, LOOSE, Case, read_cases
+from fdnet.network.laws.named import DEFAULT_DAMAGE_LAW, DEFAULT_LAW, LAWS
+from fdnet.studies.truth.truth import EQUAL, LOOSE, Case, read_cases
 
 Row = dict[str, Any]
 ROOT = Path(__file__).resolve().parents[1]
@@ -47,7 +46,9 @@ def computed(cases: list[Case], folder: Path) -> dict[str, list[Row]]:
     }
 
 
-def parts(rows: dict[str, list[Row]], refit: Row, missing: list[str], validation: Path) -> dict[str, str]:
+def parts(
+    rows: dict[str, list[Row]], refit: Row, missing: list[str], validation: Path
+) -> dict[str, str]:
     """The names of docs/accuracy.md.in and what stands for them."""
     intact, damage = rows["intact"], rows["damage"]
     counted = [row for row in intact if row["group"] != LOOSE]
@@ -65,7 +66,9 @@ def parts(rows: dict[str, list[Row]], refit: Row, missing: list[str], validation
         "damage_table": tables.damage_table(damage, absolute=False),
         "absolute_table": tables.damage_table(damage, absolute=True),
         "held_out_damage": tables.held_out(damage, tables.RULES[2:], tables.DAMAGE_GOAL),
-        "large_fine_table": tables.large_fine_table(rows["large_fines"], validation / "truth_large_fines.csv"),
+        "large_fine_table": tables.large_fine_table(
+            rows["large_fines"], validation / "truth_large_fines.csv"
+        ),
         "resolved_summary": tables.summary(damage, models.RESOLVED),
         "bed_table": tables.bed_table(rows["beds"]),
         "polydisperse_table": tables.polydisperse_table(rows["polydisperse"]),
@@ -78,7 +81,9 @@ def parts(rows: dict[str, list[Row]], refit: Row, missing: list[str], validation
         "worst_damage": named_worst(damage, DEFAULT),
         "worst_resolved": named_worst(damage, models.RESOLVED),
         "bed_span": between(row[DEFAULT] / row["bed"] for row in rows["beds"]),
-        "large_fine_span": between(row[DEFAULT] / row[models.RESOLVED] for row in rows["large_fines"]),
+        "large_fine_span": between(
+            row[DEFAULT] / row[models.RESOLVED] for row in rows["large_fines"]
+        ),
         "least_ratio": f"{min(row['k_over_k0'] for row in damage):.4f}",
         "most_ratio": f"{max(row['k_over_k0'] for row in damage):.2f}",
         "bed_percent": f"{100 * models.BED_SHARE:.0f}",
@@ -138,11 +143,23 @@ def draw(intact: list[Row], damage: list[Row], path: Path) -> None:
 def draw_intact(axes: Any, rows: list[Row]) -> None:
     place = np.arange(len(rows))[::-1]
     goal = np.array([tables.GOALS.get(row["group"], (None, np.nan))[1] for row in rows])
-    axes.barh(place, 2 * goal, left=1 - goal, height=1.0, color="#b7e0b1", label="goal, worst case", zorder=0)
+    axes.barh(
+        place,
+        2 * goal,
+        left=1 - goal,
+        height=1.0,
+        color="#b7e0b1",
+        label="goal, worst case",
+        zorder=0,
+    )
     for law, colour, marker in zip(LAWS, COLOURS, MARKERS, strict=True):
-        axes.plot([row[law] for row in rows], place, marker, color=colour, ms=6, label=law, alpha=0.85)
+        axes.plot(
+            [row[law] for row in rows], place, marker, color=colour, ms=6, label=law, alpha=0.85
+        )
     axes.axvline(1.0, color="k", lw=0.6)
-    axes.set(xscale="log", xlim=(0.17, 3.4), ylim=(-0.6, len(rows) - 0.4), xlabel="k, model over truth")
+    axes.set(
+        xscale="log", xlim=(0.17, 3.4), ylim=(-0.6, len(rows) - 0.4), xlabel="k, model over truth"
+    )
     axes.set_xticks([0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0])
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.xaxis.set_minor_formatter(lambda *_: "")
@@ -156,16 +173,26 @@ def draw_damage(axes: Any, rows: list[Row]) -> None:
     truth = np.array([row["k_over_k0"] for row in rows])
     line = np.array([0.7 * truth.min(), 1.2])
     most = tables.DAMAGE_GOAL[1]
-    axes.fill_between(line, (1 - most) * line, (1 + most) * line, color="#b7e0b1", label="goal, worst case")
+    axes.fill_between(
+        line, (1 - most) * line, (1 + most) * line, color="#b7e0b1", label="goal, worst case"
+    )
     axes.plot(line, line, "k-", lw=0.6)
     styles = zip(
-        tables.RULES, ("#b2182b", "#ef8a62", "#67a9cf", "#1a1a1a", "#7b3294"), ("v", "1", "s", "o", "x"), strict=True
+        tables.RULES,
+        ("#b2182b", "#ef8a62", "#67a9cf", "#1a1a1a", "#7b3294"),
+        ("v", "1", "s", "o", "x"),
+        strict=True,
     )
     for name, colour, marker in styles:
         model = truth * np.array([row[name] for row in rows])
         axes.plot(truth, model, marker, color=colour, ms=7, label=name, alpha=0.85)
     axes.set(
-        xscale="log", yscale="log", xlim=line, ylim=(line[0] * 0.85, 1.2), xlabel="k/k0, truth", ylabel="k/k0, model"
+        xscale="log",
+        yscale="log",
+        xlim=line,
+        ylim=(line[0] * 0.85, 1.2),
+        xlabel="k/k0, truth",
+        ylabel="k/k0, model",
     )
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_ticks([0.02, 0.05, 0.1, 0.2, 0.5, 1.0])
@@ -185,10 +212,26 @@ def write_rows(path: Path, rows: list[Row]) -> None:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--packs", type=Path, default=ROOT / "tests/data/truth", help="packs and truth.csv")
-    parser.add_argument("--more", type=Path, nargs="*", default=[], metavar="DIR", help="where further packs may be")
-    parser.add_argument("--own", type=Path, default=ROOT / "docs/validation/truth_own.csv", help="fdnet's own truth")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--packs", type=Path, default=ROOT / "tests/data/truth", help="packs and truth.csv"
+    )
+    parser.add_argument(
+        "--more",
+        type=Path,
+        nargs="*",
+        default=[],
+        metavar="DIR",
+        help="where further packs may be",
+    )
+    parser.add_argument(
+        "--own",
+        type=Path,
+        default=ROOT / "docs/validation/truth_own.csv",
+        help="fdnet's own truth",
+    )
     parser.add_argument("--benchmark", type=Path, default=ROOT / "docs/benchmark_network.csv")
     parser.add_argument("--docs", type=Path, default=ROOT / "docs", help="where to write")
     given = parser.parse_args()
@@ -202,7 +245,11 @@ def main() -> int:
     text["benchmark"] = tables.benchmark_tables(given.benchmark, own_errors(rows))
     template = Template((given.docs / "accuracy.md.in").read_text())
     (given.docs / "accuracy.md").write_text(template.substitute(text))
-    print(tables.intact_summary(rows["intact"]), tables.damage_table(rows["damage"], absolute=False), sep="\n\n")
+    print(
+        tables.intact_summary(rows["intact"]),
+        tables.damage_table(rows["damage"], absolute=False),
+        sep="\n\n",
+    )
     return 0
 
 

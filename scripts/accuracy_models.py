@@ -9,15 +9,24 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from truth_packs import made_deposit
 
-from fdnet.network import delaunay, geometry
-from fdnet.network.conductance import LAWS, Law, lubrication_law, series_law
-from fdnet.network.lubrication import TIP, WIDENING, half_resistances, summed
-from fdnet.network.tessellation import LENGTH_FLOOR, Network
-from fdnet.scales import carman_kozeny
-from fdnet.snapshot import Array, Kind, Snapshot
-from fdnet.studies.law_models import PAIRS, RESOLVED, loss, network_of, permeability, resolved
-from fdnet.studies.packs import MM, RADIUS, read_pack, snapshot
-from fdnet.studies.truth import EQUAL, UNEQUAL, Case
+from fdnet.network import geometry
+from fdnet.network.laws.conductance import Law, lubrication_law, series_law
+from fdnet.network.laws.lubrication import TIP, WIDENING, half_resistances, summed
+from fdnet.network.laws.named import LAWS
+from fdnet.network.network import LENGTH_FLOOR, Network
+from fdnet.network.tessellation import delaunay
+from fdnet.scales.scales import carman_kozeny
+from fdnet.spheres.snapshot import Array, Kind, Snapshot
+from fdnet.studies.network.law_models import (
+    PAIRS,
+    RESOLVED,
+    loss,
+    network_of,
+    permeability,
+    resolved,
+)
+from fdnet.studies.truth.packs import MM, RADIUS, read_pack, snapshot
+from fdnet.studies.truth.truth import EQUAL, UNEQUAL, Case
 
 Row = dict[str, Any]
 SAMPSON = (9.0 * np.pi / 16.0) ** 2
@@ -29,7 +38,9 @@ BED_SHARE = 0.6
 def intact_row(case: Case) -> Row:
     """Model over truth of each law."""
     network = network_of(case.pack)
-    return head(case) | {law: permeability(network, rule(network)) / case.k for law, rule in LAWS.items()}
+    return head(case) | {
+        law: permeability(network, rule(network)) / case.k for law, rule in LAWS.items()
+    }
 
 
 def damaged_row(case: Case) -> Row:
@@ -73,7 +84,10 @@ def refitted_series(cases: list[Case]) -> Row:
     logs = []
     for case in cases:
         network = network_of(case.pack)
-        at = [permeability(network, series_law(network, weight=float(weight))) / case.k for weight in WEIGHTS]
+        at = [
+            permeability(network, series_law(network, weight=float(weight))) / case.k
+            for weight in WEIGHTS
+        ]
         logs.append(CubicSpline(WEIGHTS, np.log(at)))
     packs = np.array([case.name.split()[0] for case in cases])
     tried = np.linspace(WEIGHTS[0], WEIGHTS[-1], 1401)
@@ -89,15 +103,21 @@ def refitted_series(cases: list[Case]) -> Row:
 def section_by_area(network: Network) -> Array:
     """Conductance (T,) as `lubrication_law`, each section taken as the round one of its open area."""
     low = -network.throat_heights[:, 0]
-    step = np.maximum(network.throat_heights.sum(axis=1), LENGTH_FLOOR * network.grain_radius) / 16.0
+    step = (
+        np.maximum(network.throat_heights.sum(axis=1), LENGTH_FLOOR * network.grain_radius) / 16.0
+    )
     narrow = []
     for k in range(17):
         flat = network.throat_corner_radius**2 - (low + k * step)[:, None] ** 2
         disc = np.sqrt(np.maximum(flat, (TIP * network.throat_corner_radius) ** 2))
-        area = np.maximum(geometry.open_area(network.throat_corner, disc), 1e-12 * network.grain_radius**2)
+        area = np.maximum(
+            geometry.open_area(network.throat_corner, disc), 1e-12 * network.grain_radius**2
+        )
         narrow.append(np.sqrt(np.pi / area))
     sections = zip(np.stack(narrow, axis=1), step, strict=True)
-    resistance = [(4.0 * summed(a, dz, 1, WIDENING) - summed(a, dz, 2, WIDENING)) / 3.0 for a, dz in sections]
+    resistance = [
+        (4.0 * summed(a, dz, 1, WIDENING) - summed(a, dz, 2, WIDENING)) / 3.0 for a, dz in sections
+    ]
     return np.where(network.throat_radius > 0, 1.0 / np.array(resistance), 0.0)
 
 
@@ -114,11 +134,14 @@ CHOICES: Mapping[str, Law] = {
 }
 
 
-def choice_rows(cases: list[Case], choices: Mapping[str, Callable[[Network], Array]] = CHOICES) -> list[Row]:
+def choice_rows(
+    cases: list[Case], choices: Mapping[str, Callable[[Network], Array]] = CHOICES
+) -> list[Row]:
     """Model over truth of variants of the default law, intact."""
     networks = [(case, network_of(case.pack)) for case in cases]
     return [
-        {"choice": name} | {case.name: permeability(network, law(network)) / case.k for case, network in networks}
+        {"choice": name}
+        | {case.name: permeability(network, law(network)) / case.k for case, network in networks}
         for name, law in choices.items()
     ]
 
@@ -133,7 +156,9 @@ def polydisperse_rows(cases: list[Case]) -> list[Row]:
             with patch.object(delaunay, "EQUAL_SPREAD", spread):
                 network = network_of(case.pack)
             row = head(case) | {"tessellation": tessellation, "pores": len(network.pore_volume)}
-            row |= {law: permeability(network, rule(network)) / case.k for law, rule in LAWS.items()}
+            row |= {
+                law: permeability(network, rule(network)) / case.k for law, rule in LAWS.items()
+            }
             rows.append(row | {"void_negative": network.counts["void_negative"]})
     return rows
 
@@ -145,7 +170,11 @@ def large_fine_rows(folder: Path, points: tuple[float, ...] = (0.04, 0.10, 0.16)
         pack = made_deposit(LARGE_FINE | {"lost": lost}, folder)[0]
         network = network_of(pack)
         found = loss(pack, network)
-        row = {"points": 100 * lost, "fines": len(pack.fines()), RESOLVED: resolved(pack) / found["k0"]["lubrication"]}
+        row = {
+            "points": 100 * lost,
+            "fines": len(pack.fines()),
+            RESOLVED: resolved(pack) / found["k0"]["lubrication"],
+        }
         rows.append(row | {" + ".join(pair): found[" + ".join(pair)][0] for pair in PAIRS})
     return rows
 
@@ -159,7 +188,9 @@ def bed_rows(folder: Path, ratios: tuple[float, ...] = (5.0, 10.0, 20.0, 40.0)) 
     rows = []
     for ratio in ratios:
         fine = RADIUS * MM / ratio
-        fines = bed(grains, edge, RADIUS / ratio, round(BED_SHARE * void / (4.0 / 3.0 * np.pi * fine**3)))
+        fines = bed(
+            grains, edge, RADIUS / ratio, round(BED_SHARE * void / (4.0 / 3.0 * np.pi * fine**3))
+        )
         found = loss(grains.joined(fines), network)
         porous = carman_kozeny(1.0 - BED_SHARE, 2.0 * fine) * (void / (edge * MM) ** 3) ** 1.5
         expected = porous / found["k0"]["lubrication"]

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from accuracy_models import PAIRS, RESOLVED, rms, worst
 
-from fdnet.network.conductance import LAWS
-from fdnet.studies.truth import EQUAL, LATTICE, LOOSE, UNEQUAL
+from fdnet.network.laws.named import LAWS
+from fdnet.studies.truth.truth import EQUAL, LATTICE, LOOSE, UNEQUAL
 
 Row = dict[str, Any]
 GOALS = {EQUAL: (0.03, 0.06), LATTICE: (None, 0.10), UNEQUAL: (None, 0.06)}
@@ -19,7 +19,9 @@ ERROR_FREE = 0.02
 RULES = (*map(" + ".join, PAIRS), RESOLVED)
 OWN_TOOL = "fdnet"
 COST_STEPS = ("total", "total intact", "solve", "solve stiff", "solve clogged")
-NO_BENCHMARK = "`docs/benchmark_network.csv` is not there yet; `scripts/benchmark_network.py` writes it."
+NO_BENCHMARK = (
+    "`docs/benchmark_network.csv` is not there yet; `scripts/benchmark_network.py` writes it."
+)
 
 
 def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -48,7 +50,9 @@ def reached(rows: list[Row], name: str, goal: tuple[float | None, float]) -> str
     """Whether rms and worst are within the goal; truth's own error comes on top where it exceeds 2 %."""
     spread, most = goal
     rows = [row for row in rows if not np.isnan(row[name])]
-    allowed = [most + (row["truth_error"] if row["truth_error"] > ERROR_FREE else 0.0) for row in rows]
+    allowed = [
+        most + (row["truth_error"] if row["truth_error"] > ERROR_FREE else 0.0) for row in rows
+    ]
     good = all(abs(row[name] - 1.0) <= limit for row, limit in zip(rows, allowed, strict=True))
     return "yes" if good and (spread is None or rms(values(rows, name)) <= spread) else "no"
 
@@ -64,7 +68,13 @@ def intact_table(rows: list[Row]) -> str:
     return markdown(
         header,
         [
-            [row["case"], str(row["grains"]), percent(row["truth_error"]), *ratios(row, LAWS), row["known_before"]]
+            [
+                row["case"],
+                str(row["grains"]),
+                percent(row["truth_error"]),
+                *ratios(row, LAWS),
+                row["known_before"],
+            ]
             for row in rows
         ],
     )
@@ -85,7 +95,11 @@ def intact_summary(rows: list[Row]) -> str:
 
 def held_out(rows: list[Row], names: Sequence[str], goal: tuple[float | None, float]) -> str:
     """rms and worst by what was known of the truth when the law was fixed, and whether they reach the goal."""
-    kinds = {"looked at before": ["yes"], "not looked at before": ["no", "later"], "solved after the commit": ["later"]}
+    kinds = {
+        "looked at before": ["yes"],
+        "not looked at before": ["no", "later"],
+        "solved after the commit": ["later"],
+    }
     lines = []
     for said, known in kinds.items():
         of = [row for row in rows if row["known_before"] in known]
@@ -99,8 +113,13 @@ def choice_table(rows: list[Row], cases: list[Row]) -> str:
     groups = (EQUAL, UNEQUAL, LATTICE, LOOSE)
     lines = []
     for row in rows:
-        of = {group: [row[case["case"]] for case in cases if case["group"] == group] for group in groups}
-        lines.append([row["choice"], *(f"{percent(rms(of[g]))}, {ratio(worst(of[g]))}" for g in groups)])
+        of = {
+            group: [row[case["case"]] for case in cases if case["group"] == group]
+            for group in groups
+        }
+        lines.append(
+            [row["choice"], *(f"{percent(rms(of[g]))}, {ratio(worst(of[g]))}" for g in groups)]
+        )
     return markdown(["lubrication: rms of ln, worst", *groups], lines)
 
 
@@ -108,7 +127,13 @@ def damage_table(rows: list[Row], *, absolute: bool) -> str:
     """Model over truth of k/k0, or of k itself, each case and pair of laws, with rms, worst and goal."""
     names = [f"{name}: k" if absolute else name for name in RULES]
     lines = [
-        [row["case"], ratio(row["k_over_k0"], 4), percent(row["truth_error"]), *ratios(row, names), row["known_before"]]
+        [
+            row["case"],
+            ratio(row["k_over_k0"], 4),
+            percent(row["truth_error"]),
+            *ratios(row, names),
+            row["known_before"],
+        ]
         for row in rows
     ]
     lines.append(["**rms of ln, worst**", "", "", *(summary(rows, name) for name in names), ""])
@@ -145,7 +170,10 @@ def bed_table(rows: list[Row]) -> str:
 def polydisperse_table(rows: list[Row]) -> str:
     return markdown(
         ["case", "tessellation", "pores", *LAWS],
-        [[row["case"], row["tessellation"], str(row["pores"]), *ratios(row, LAWS)] for row in rows],
+        [
+            [row["case"], row["tessellation"], str(row["pores"]), *ratios(row, LAWS)]
+            for row in rows
+        ],
     )
 
 
@@ -154,7 +182,9 @@ def read_csv(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def grouped(rows: list[dict[str, str]], key: Callable[[dict[str, str]], Any]) -> dict[Any, list[dict[str, str]]]:
+def grouped(
+    rows: list[dict[str, str]], key: Callable[[dict[str, str]], Any]
+) -> dict[Any, list[dict[str, str]]]:
     found: dict[Any, list[dict[str, str]]] = {}
     for row in rows:
         found.setdefault(key(row), []).append(row)
@@ -169,16 +199,22 @@ def span(numbers: Iterable[float]) -> str:
 def tiled_table(path: Path) -> str:
     """k over periodic by size (range over packs), and c of 1 + c / W at the largest size."""
     lines = []
-    for (sides, cut), rows in grouped(read_csv(path), lambda row: (row["sides"], row["cut"])).items():
+    for (sides, cut), rows in grouped(
+        read_csv(path), lambda row: (row["sides"], row["cut"])
+    ).items():
         sizes = grouped(rows, lambda row: row["tiles"])
         last = [
-            (float(row["k_over_periodic"]) - 1.0) * float(row["width_diameters"]) for row in list(sizes.values())[-1]
+            (float(row["k_over_periodic"]) - 1.0) * float(row["width_diameters"])
+            for row in list(sizes.values())[-1]
         ]
         spans = [span(float(row["k_over_periodic"]) for row in of) for of in sizes.values()]
-        lines.append([f"{sides}; grains {cut}", *spans, f"{min(last):+.2f} to {max(last):+.2f}", rate(rows)])
+        lines.append(
+            [f"{sides}; grains {cut}", *spans, f"{min(last):+.2f} to {max(last):+.2f}", rate(rows)]
+        )
     widths = grouped(read_csv(path), lambda row: row["tiles"]).values()
     header = [
-        f"W = {min(w):.0f} to {max(w):.0f}" for w in ([float(row["width_diameters"]) for row in of] for of in widths)
+        f"W = {min(w):.0f} to {max(w):.0f}"
+        for w in ([float(row["width_diameters"]) for row in of] for of in widths)
     ]
     return markdown(["k over periodic", *header, "c in 1 + c/W", "falls as W to the"], lines)
 
@@ -199,7 +235,10 @@ def rate(rows: list[dict[str, str]]) -> str:
 def slab_table(path: Path) -> str:
     lines = []
     for thick, rows in grouped(read_csv(path), lambda row: row["thickness_diameters"]).items():
-        mean, ends = [float(row["mean_k_over_periodic"]) for row in rows], (rows, ("least", "most"))
+        mean, ends = (
+            [float(row["mean_k_over_periodic"]) for row in rows],
+            (rows, ("least", "most")),
+        )
         single = [float(row[name]) for row in ends[0] for name in ends[1]]
         lines.append([thick, str(len(rows)), span(mean), span(single)])
     return markdown(["slab, diameters", "packs", "mean k over periodic", "single slabs"], lines)
@@ -258,7 +297,15 @@ def benchmark_tables(path: Path, own: dict[str, float]) -> str:
     for case, of in grouped(peers, lambda row: row["case"].removeprefix("pack")).items():
         found = {row["tool"]: row["k_over_truth"] or row["status"] for row in of}
         mine = ratio(own.get(case, float("nan")))
-        errors.append([case, of[0]["grains"], of[0]["fines"], mine, *(found.get(tool, "-") for tool in tools)])
+        errors.append(
+            [
+                case,
+                of[0]["grains"],
+                of[0]["fines"],
+                mine,
+                *(found.get(tool, "-") for tool in tools),
+            ]
+        )
     return (
         "Model over truth, with fines where there are fines (fdnet: default laws, this page's numbers):\n\n"
         + markdown(["case", "grains", "fines", OWN_TOOL, *tools], errors)
@@ -280,4 +327,8 @@ def cost_table(rows: list[dict[str, str]]) -> str:
 
 
 def cost(row: dict[str, str]) -> str:
-    return f"{float(row['cpu_s']):.3g} s, {float(row['peak_MB']):.0f}" if row["status"] == "ok" else row["status"]
+    return (
+        f"{float(row['cpu_s']):.3g} s, {float(row['peak_MB']):.0f}"
+        if row["status"] == "ok"
+        else row["status"]
+    )

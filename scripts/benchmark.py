@@ -51,7 +51,9 @@ def measure(case: Path, out: Path) -> dict[str, Any]:
     wall = time.monotonic() - start
     if done.returncode:
         sys.exit(f"benchmark: {case} ended with {done.returncode}")
-    return row_of(json.loads(done.stdout), json.loads((folder / "manifest.json").read_text()), wall)
+    return row_of(
+        json.loads(done.stdout), json.loads((folder / "manifest.json").read_text()), wall
+    )
 
 
 def row_of(summary: dict[str, Any], manifest: dict[str, Any], wall: float) -> dict[str, Any]:
@@ -60,7 +62,9 @@ def row_of(summary: dict[str, Any], manifest: dict[str, Any], wall: float) -> di
     attempts = manifest["pack"]["attempts"]
     rejected = sum(attempt["liggghts_s"] for attempt in attempts[:-1])
     outside = wall - seconds["liggghts"]
-    network = sum(seconds[f"analyse_{part}"] for part in ("tessellate", "occupancy", "conductance", "solve"))
+    network = sum(
+        seconds[f"analyse_{part}"] for part in ("tessellate", "occupancy", "conductance", "solve")
+    )
     peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
     values = (
         summary["case"],
@@ -88,12 +92,20 @@ def main() -> None:
     rows = [measure(case, options.out) for case in options.cases]
     print("  ".join(f"{name:>16}" for name in COLUMNS))
     for row in rows:
-        print("  ".join(f"{value:>16.3f}" if isinstance(value, float) else f"{value:>16}" for value in row.values()))
+        print(
+            "  ".join(
+                f"{value:>16.3f}" if isinstance(value, float) else f"{value:>16}"
+                for value in row.values()
+            )
+        )
     if options.csv:
         with options.csv.open("w", newline="") as file:
             writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
             writer.writeheader()
-            writer.writerows({k: f"{v:.3f}" if isinstance(v, float) else v for k, v in row.items()} for row in rows)
+            writer.writerows(
+                {k: f"{v:.3f}" if isinstance(v, float) else v for k, v in row.items()}
+                for row in rows
+            )
 
 
 if __name__ == "__main__":

@@ -18,16 +18,15 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fdnet.network import tessellation
-from fdnet.network.conductance import DEFAULT_LAW, LAWS
-from fdnet.network.damage import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW
-from fdnet.network.flow import solve_flow
-from fdnet.network.occupancy import measure_occupancy
+from fdnet.network import network as tessellation
+from fdnet.network.fines.occupancy import measure_occupancy
+from fdnet.network.flow.flow import solve_flow
+from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, LAWS
 from fdnet.network.permeability import AnalysisOptions, analyse
-from fdnet.network.porosity import measure_porosity
-from fdnet.snapshot import Array, Kind, Snapshot, resting
-from fdnet.studies import packs
-from fdnet.studies.packs import read_pack, shaken
+from fdnet.spheres.porosity import measure_porosity
+from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
+from fdnet.studies.truth import packs
+from fdnet.studies.truth.packs import read_pack, shaken
 
 TILE = Path(__file__).resolve().parent.parent / "tests" / "data" / "truth" / "packH_40_eps40.csv"
 SHAKE = 0.02
@@ -47,7 +46,11 @@ def tiled(grains: int, rng: np.random.Generator) -> Snapshot:
 
 def seated(grains: Snapshot, count: int, rng: np.random.Generator) -> Snapshot:
     """`count` fines on the surfaces of equal grains, in no other grain."""
-    size, big, small = grains.box[:, 1], float(grains.radius.max()), FINE * float(grains.radius.max())
+    size, big, small = (
+        grains.box[:, 1],
+        float(grains.radius.max()),
+        FINE * float(grains.radius.max()),
+    )
     tree = cKDTree(np.minimum(grains.position, size * (1 - 1e-15)), boxsize=size)
     found = np.zeros((0, 3))
     while len(found) < count:
@@ -115,7 +118,9 @@ def build_timed(clock: Clock, grains: Snapshot) -> tessellation.Network:
     return network
 
 
-def run_steps(grains: Snapshot, fines: Snapshot | None) -> tuple[Clock, tessellation.Network, Array, float]:
+def run_steps(
+    grains: Snapshot, fines: Snapshot | None
+) -> tuple[Clock, tessellation.Network, Array, float]:
     """All steps of an analysis on default laws; also the intact conductances and their inflow."""
     clock = Clock()
     network = build_timed(clock, grains)
@@ -123,7 +128,9 @@ def run_steps(grains: Snapshot, fines: Snapshot | None) -> tuple[Clock, tessella
     inflow = clock.timed("solve", lambda: solve_flow(network, intact)).inflow
     if fines is not None:
         occupancy = clock.timed("occupancy", lambda: measure_occupancy(network, fines))
-        damage = clock.timed("damage", lambda: DAMAGE_LAWS[DEFAULT_DAMAGE_LAW](network, occupancy, intact))
+        damage = clock.timed(
+            "damage", lambda: DAMAGE_LAWS[DEFAULT_DAMAGE_LAW](network, occupancy, intact)
+        )
         clock.timed("solve damaged", lambda: solve_flow(network, damage.conductance))
         clock.timed("porosity", lambda: measure_porosity(grains.joined(fines), periodic=SIDES))
     clock.timed("porosity", lambda: measure_porosity(grains, periodic=SIDES))
@@ -132,7 +139,9 @@ def run_steps(grains: Snapshot, fines: Snapshot | None) -> tuple[Clock, tessella
     return clock, network, intact, inflow
 
 
-def leave(folder: Path, network: tessellation.Network, states: dict[str, Array], inflow: dict[str, float]) -> None:
+def leave(
+    folder: Path, network: tessellation.Network, states: dict[str, Array], inflow: dict[str, float]
+) -> None:
     x, (low, high) = network.pore_position[:, 0], network.box[0]
     hair = 1e-9 * (high - low)
     for state, conductance in states.items():
@@ -144,7 +153,9 @@ def leave(folder: Path, network: tessellation.Network, states: dict[str, Array],
             inlet=x <= low + hair,
             outlet=x >= high - hair,
         )
-    (folder / "inflow.json").write_text(json.dumps({state: 1e9 * value for state, value in inflow.items()}))
+    (folder / "inflow.json").write_text(
+        json.dumps({state: 1e9 * value for state, value in inflow.items()})
+    )
 
 
 def leave_spheres(folder: Path, pack: Snapshot) -> None:
@@ -180,7 +191,11 @@ def pack_result(path: Path, folder: Path) -> dict[str, Any]:
     leave_spheres(folder, pack)
     fines = pack if len(pack.fines()) else None
     found = analyse(pack.grains(), fines, periodic=(True, True, True), options=AnalysisOptions())
-    counts = {"grains": len(pack.grains()), "fines": len(pack.fines()), "pores": len(found.network.pore_share)}
+    counts = {
+        "grains": len(pack.grains()),
+        "fines": len(pack.fines()),
+        "pores": len(found.network.pore_share),
+    }
     return {"k": found.k_damaged * 1e6, **counts}
 
 

@@ -68,7 +68,11 @@ def child(command: list[str], limit: float, **settings: str) -> Row:
     except subprocess.TimeoutExpired:
         return {"status": f"stopped after {10 * limit:g} s by the clock"}
     if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
-        return {"status": f"stopped after {limit:g} s" if done.returncode == -signal.SIGXCPU else "killed (memory?)"}
+        return {
+            "status": f"stopped after {limit:g} s"
+            if done.returncode == -signal.SIGXCPU
+            else "killed (memory?)"
+        }
     lines = [line for line in done.stdout.splitlines() if line.startswith("RESULT ")]
     if lines and done.returncode == 0:
         return {"status": "ok", **json.loads(lines[-1].removeprefix("RESULT "))}
@@ -78,10 +82,21 @@ def child(command: list[str], limit: float, **settings: str) -> Row:
 
 def fdnet_rows(grains: int, fines: int, folder: Path, limit: float) -> list[Row]:
     """One row per step of fdnet; leaves the spheres and the network in `folder` for the others."""
-    found = child([sys.executable, str(HERE / "benchmark_fdnet.py"), str(grains), str(fines), str(folder)], limit)
-    common = {"tool": "fdnet", "case": "tiled", "grains": found.get("grains", grains), "fines": fines}
+    found = child(
+        [sys.executable, str(HERE / "benchmark_fdnet.py"), str(grains), str(fines), str(folder)],
+        limit,
+    )
+    common = {
+        "tool": "fdnet",
+        "case": "tiled",
+        "grains": found.get("grains", grains),
+        "fines": fines,
+    }
     common |= {"status": found["status"], "pores": found.get("pores")}
-    return [common | {"step": step} | values for step, values in found.get("steps", {"total": {}}).items()]
+    return [
+        common | {"step": step} | values
+        for step, values in found.get("steps", {"total": {}}).items()
+    ]
 
 
 def openpnm_rows(python: str, folder: Path, base: Row, limit: float) -> list[Row]:
@@ -94,7 +109,9 @@ def openpnm_rows(python: str, folder: Path, base: Row, limit: float) -> list[Row
             found = child([python, str(HERE / "peer_openpnm.py"), str(file), solver], limit)
             row = base | {"tool": f"OpenPNM {solver}", "step": step}
             if "inflow" in found:
-                found["flux_difference"] = abs(found["inflow"] / expected - 1.0) if expected else math.nan
+                found["flux_difference"] = (
+                    abs(found["inflow"] / expected - 1.0) if expected else math.nan
+                )
             rows.append(row | {name: value for name, value in found.items() if name in COLUMNS})
     return rows
 
@@ -103,7 +120,11 @@ def yade_row(spheres: Path, sides: str, base: Row, limit: float) -> Row:
     """Yade's flow engine on the spheres; `k` in mm2 rides along."""
     command = ["yade", "-j1", "-n", "-x", str(HERE / "peer_yade.py")]
     found = child(command, limit, BENCHMARK_SPHERES=str(spheres), BENCHMARK_SIDES=sides)
-    return base | {"tool": f"Yade {sides}", "step": "total", "pores": found.pop("cells", None)} | found
+    return (
+        base
+        | {"tool": f"Yade {sides}", "step": "total", "pores": found.pop("cells", None)}
+        | found
+    )
 
 
 def error_rows(data: Path, tools: dict[str, str | None], folder: Path, limit: float) -> list[Row]:
@@ -113,12 +134,19 @@ def error_rows(data: Path, tools: dict[str, str | None], folder: Path, limit: fl
         truths = [row for row in csv.DictReader(table) if row["axis"] == "x"]
     for truth in truths:
         pack = data / truth["file"]
-        found = child([sys.executable, str(HERE / "benchmark_fdnet.py"), "--pack", str(pack), str(folder)], limit)
+        found = child(
+            [sys.executable, str(HERE / "benchmark_fdnet.py"), "--pack", str(pack), str(folder)],
+            limit,
+        )
         case = {"case": truth["case"], "grains": found.get("grains"), "fines": found.get("fines")}
-        ours = {"tool": "fdnet", "step": "error", **case} | {k: v for k, v in found.items() if k in (*COLUMNS, "k")}
+        ours = {"tool": "fdnet", "step": "error", **case} | {
+            k: v for k, v in found.items() if k in (*COLUMNS, "k")
+        }
         rows.append(ours)
         if tools["yade"] and "k" in found:
-            rows.append(yade_row(folder / "spheres.npz", "periodic", case, limit) | {"step": "error"})
+            rows.append(
+                yade_row(folder / "spheres.npz", "periodic", case, limit) | {"step": "error"}
+            )
         for row in rows[-2:]:
             if row["case"] == truth["case"] and "k" in row:
                 row["k_over_truth"] = row["k"] / float(truth["k_mm2"])
@@ -150,13 +178,21 @@ def show(rows: list[Row]) -> None:
     for row in rows:
         values = [text_of(row.get(name)) for name in COLUMNS]
         widths = (15, 24, 14, 8, 8, 8, 9, 9, 9, 7, 12, 15, 0)
-        print(" ".join(f"{value:<{width}}" for value, width in zip(values, widths, strict=True)), flush=True)
+        print(
+            " ".join(f"{value:<{width}}" for value, width in zip(values, widths, strict=True)),
+            flush=True,
+        )
 
 
 def find_tools(options: argparse.Namespace) -> dict[str, str | None]:
     """Where the peers are; says which are missing."""
     python = options.openpnm_python
-    if python is None or subprocess.run([python, "-c", "import openpnm"], check=False, capture_output=True).returncode:
+    if (
+        python is None
+        or subprocess.run(
+            [python, "-c", "import openpnm"], check=False, capture_output=True
+        ).returncode
+    ):
         print("OpenPNM: not found, left out (name a Python that has it with --openpnm-python)")
         python = None
     yade = shutil.which("yade")
@@ -175,7 +211,9 @@ def measure(options: argparse.Namespace) -> list[Row]:
         runs = [(grains, round(grains * options.fines)) for grains in options.sizes]
         runs += [(options.largest, 0)] * bool(options.largest) + [(1400, 200_000)]
         for grains, fines in runs:
-            new = fdnet_rows(grains, fines, folder, (10 if grains == options.largest else 5) * options.limit)
+            new = fdnet_rows(
+                grains, fines, folder, (10 if grains == options.largest else 5) * options.limit
+            )
             base = {name: new[0][name] for name in ("case", "grains", "pores")}
             if new[0]["status"] == "ok" and grains in options.sizes:
                 if tools["openpnm"]:
@@ -192,22 +230,36 @@ def measure(options: argparse.Namespace) -> list[Row]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
-    parser.add_argument("--sizes", type=int, nargs="+", default=[1000, 10_000, 100_000], metavar="GRAINS")
+    parser.add_argument(
+        "--sizes", type=int, nargs="+", default=[1000, 10_000, 100_000], metavar="GRAINS"
+    )
     parser.add_argument("--fines", type=float, default=10.0, help="fines per grain (default 10)")
-    parser.add_argument("--largest", type=int, metavar="GRAINS", help="also this size, without fines and by fdnet only")
+    parser.add_argument(
+        "--largest",
+        type=int,
+        metavar="GRAINS",
+        help="also this size, without fines and by fdnet only",
+    )
     parser.add_argument(
         "--limit",
         type=float,
         default=600.0,
         help="CPU seconds a process of a peer may take (600), fdnet five, its largest ten times that",
     )
-    parser.add_argument("--truth", type=Path, default=HERE.parent / "tests" / "data" / "truth", help="packs with truth")
+    parser.add_argument(
+        "--truth",
+        type=Path,
+        default=HERE.parent / "tests" / "data" / "truth",
+        help="packs with truth",
+    )
     parser.add_argument("--openpnm-python", help="a Python that has OpenPNM")
     parser.add_argument("--csv", type=Path, help="also write the table here")
     options = parser.parse_args()
     rows = measure(options)
     print("\ngrowth exponents of CPU time")
-    for tool, step, growth in sorted({(r["tool"], r["step"], r["growth"]) for r in rows if r.get("growth")}):
+    for tool, step, growth in sorted(
+        {(r["tool"], r["step"], r["growth"]) for r in rows if r.get("growth")}
+    ):
         print(f"  {tool:<16} {step:<14} {growth:.2f}")
     if options.csv:
         with options.csv.open("w", newline="") as file:

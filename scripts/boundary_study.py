@@ -25,23 +25,29 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.case_file import case_from
+from fdnet.case.file import case_from
 from fdnet.dem.liggghts import Launch, find_binary
 from fdnet.dem.packing import make_pack
-from fdnet.network.conductance import DEFAULT_LAW, LAWS
-from fdnet.network.flow import Flow
-from fdnet.network.images import make_images
-from fdnet.network.porosity import measure_porosity
-from fdnet.network.slabs import plane_pressures, slab_permeability, whole_permeability
-from fdnet.network.tessellation import WALLS, Network, build_network
-from fdnet.scales import carman_kozeny, scales_of
-from fdnet.snapshot import Array, Snapshot, resting
-from fdnet.studies.packs import read_pack, tiled
+from fdnet.network.flow.flow import Flow
+from fdnet.network.flow.slabs import plane_pressures, slab_permeability, whole_permeability
+from fdnet.network.laws.named import DEFAULT_LAW, LAWS
+from fdnet.network.network import WALLS, Network, build_network
+from fdnet.scales.scales import carman_kozeny, scales_of
+from fdnet.spheres.images import make_images
+from fdnet.spheres.porosity import measure_porosity
+from fdnet.spheres.snapshot import Array, Snapshot, resting
+from fdnet.studies.truth.packs import read_pack, tiled
 
-SIDES = {"periodic": (True, True, True), "walls y z": (True, False, False), "walls x y z": (False, False, False)}
+SIDES = {
+    "periodic": (True, True, True),
+    "walls y z": (True, False, False),
+    "walls x y z": (False, False, False),
+}
 
 
-def solved(pack: Snapshot, periodic: tuple[bool, bool, bool], walls: str = "slip") -> tuple[Network, Flow, float]:
+def solved(
+    pack: Snapshot, periodic: tuple[bool, bool, bool], walls: str = "slip"
+) -> tuple[Network, Flow, float]:
     """Network, flow and k (m2) of a pack."""
     network = build_network(pack, periodic=periodic, walls=walls)
     k, flow = whole_permeability(network, LAWS[DEFAULT_LAW](network))
@@ -64,7 +70,10 @@ def tiled_rows(packs: list[Path], tiles: int) -> Iterator[dict[str, Any]]:
             for sides, periodic in list(SIDES.items())[1:]:
                 big = tiled(pack, np.full(3, times))
                 diameters = float(np.ptp(big.box[0]) / (2 * big.radius.mean()))
-                for grains, cut in (("centred inside", big), ("reaching in", with_neighbours(big, periodic))):
+                for grains, cut in (
+                    ("centred inside", big),
+                    ("reaching in", with_neighbours(big, periodic)),
+                ):
                     k = solved(cut, periodic)[2]
                     yield {
                         "pack": path.stem,
@@ -88,7 +97,8 @@ def slab_rows(packs: list[Path], places: int) -> Iterator[dict[str, Any]]:
         for thick in range(1, int(length / 2 / diameter) + 1):
             starts = (np.arange(places) + 0.5) / places * (0.5 * length)
             found = [
-                slab_permeability(network, conductance, (start, start + thick * diameter))[0] / reference
+                slab_permeability(network, conductance, (start, start + thick * diameter))[0]
+                / reference
                 for start in starts
             ]
             yield {
@@ -102,7 +112,9 @@ def slab_rows(packs: list[Path], places: int) -> Iterator[dict[str, Any]]:
             }
 
 
-def walled_rows(counts: list[int], rim: float, *, porosity: float, seed: int) -> Iterator[dict[str, Any]]:
+def walled_rows(
+    counts: list[int], rim: float, *, porosity: float, seed: int
+) -> Iterator[dict[str, Any]]:
     """k of LIGGGHTS packs between walls over that of their inner part."""
     binary = find_binary()
     for count in counts:
@@ -118,15 +130,22 @@ def walled_rows(counts: list[int], rim: float, *, porosity: float, seed: int) ->
             }
         )
         with tempfile.TemporaryDirectory() as folder:
-            pack = make_pack(case, scales_of(case), Path(folder) / "pack", Launch(binary=binary)).grains
-        yield {"grains": len(pack), "seed": seed, "width_diameters": edge / 0.5} | walled_row(pack, rim)
+            pack = make_pack(
+                case, scales_of(case), Path(folder) / "pack", Launch(binary=binary)
+            ).grains
+        yield {"grains": len(pack), "seed": seed, "width_diameters": edge / 0.5} | walled_row(
+            pack, rim
+        )
 
 
 def walled_row(pack: Snapshot, rim: float) -> dict[str, float]:
     """k of a pack between walls over that of its inner part, with walls that slip and that hold the fluid."""
     diameter = 2.0 * float(pack.radius.mean())
     core = pack.box + rim * diameter * np.array([1, -1])
-    whole, inside = (measure_porosity(replace(pack, box=box), periodic=(False,) * 3).mean for box in (pack.box, core))
+    whole, inside = (
+        measure_porosity(replace(pack, box=box), periodic=(False,) * 3).mean
+        for box in (pack.box, core)
+    )
     row = {"porosity": whole, "porosity_inner": inside}
     for walls in WALLS:
         network, flow, k = solved(pack, SIDES["walls x y z"], walls)
@@ -147,20 +166,26 @@ def inner_permeability(network: Network, flow: Flow, core: Array) -> float:
     for axis in range(3):
         start, end = np.sort(ends[:, :, axis], axis=1).T
         span = np.maximum(end - start, 1e-12 * network.grain_radius)
-        share = share * np.clip((np.minimum(end, core[axis, 1]) - np.maximum(start, core[axis, 0])) / span, 0.0, 1.0)
+        share = share * np.clip(
+            (np.minimum(end, core[axis, 1]) - np.maximum(start, core[axis, 0])) / span, 0.0, 1.0
+        )
     velocity = float(np.sum(flow.throat_flux * along * share) / np.prod(np.ptp(core, axis=1)))
     high, low = plane_pressures(network, flow, core[0])
     return velocity * float(np.ptp(core[0])) / float(high - low)
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("study", choices=["tiled", "slabs", "walled"])
     parser.add_argument("packs", nargs="*", type=Path)
     parser.add_argument("--tiles", type=int, default=3)
     parser.add_argument("--places", type=int, default=20)
     parser.add_argument("--grains", nargs="+", type=int, default=[200, 1000, 3000, 10000])
-    parser.add_argument("--rim", type=float, default=1.5, help="grain diameters left out at every side")
+    parser.add_argument(
+        "--rim", type=float, default=1.5, help="grain diameters left out at every side"
+    )
     parser.add_argument("--porosity", type=float, default=0.40, help="of the whole walled pack")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--csv", type=Path, required=True)
@@ -168,7 +193,9 @@ def main() -> int:
     rows = {
         "tiled": lambda: tiled_rows(given.packs, given.tiles),
         "slabs": lambda: slab_rows(given.packs, given.places),
-        "walled": lambda: walled_rows(given.grains, given.rim, porosity=given.porosity, seed=given.seed),
+        "walled": lambda: walled_rows(
+            given.grains, given.rim, porosity=given.porosity, seed=given.seed
+        ),
     }[given.study]()
     writer = None
     with given.csv.open("w", newline="") as out:
@@ -177,7 +204,10 @@ def main() -> int:
             if out.tell() == 0:
                 writer.writeheader()
             writer.writerow(
-                {name: f"{value:.6g}" if isinstance(value, float) else value for name, value in row.items()}
+                {
+                    name: f"{value:.6g}" if isinstance(value, float) else value
+                    for name, value in row.items()
+                }
             )
             out.flush()
             print(row, flush=True)

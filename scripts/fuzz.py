@@ -36,8 +36,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 import fuzz_mutations as mutations
 
 from fdnet.cli import main as fdnet
-from fdnet.dem.dump import COLUMNS, parse_dump
 from fdnet.errors import DumpError
+from fdnet.spheres.dump import COLUMNS, parse_dump
 
 LIMIT_S = 10.0
 MEMORY_BYTES = 6 << 30
@@ -90,7 +90,9 @@ def refusal(told: Told) -> str | None:
     if told.code not in (2, 3, 4):
         return fault(f"exit code {told.code}")
     if len(lines) != 1 or told.out:
-        return fault(f"exit code {told.code} with {len(lines)} lines of error and {len(told.out)} characters of output")
+        return fault(
+            f"exit code {told.code} with {len(lines)} lines of error and {len(told.out)} characters of output"
+        )
     return {2: "refused", 3: "refused (3)", 4: "degenerate"}[told.code]
 
 
@@ -106,7 +108,11 @@ def judge_case(data: bytes, folder: Path, _: Random) -> str:
     if not {"in.pack", "pack.data"} <= names <= {"in.pack", "pack.data", "in.invade"}:
         return fault(f"decks {sorted(names)}")
     words = [word for path in written for word in path.read_text().split() if len(word) < 10]
-    return fault("a deck holds nan or inf") if {"nan", "inf", "-nan", "-inf", "NaN"} & set(words) else "accepted"
+    return (
+        fault("a deck holds nan or inf")
+        if {"nan", "inf", "-nan", "-inf", "NaN"} & set(words)
+        else "accepted"
+    )
 
 
 def judge_dump(data: bytes, _: Path, __: Random) -> str:
@@ -115,7 +121,9 @@ def judge_dump(data: bytes, _: Path, __: Random) -> str:
         frames = list(parse_dump(data, "fuzz.dump"))
     except DumpError as error:
         return fault("message of several lines") if "\n" in str(error) else "refused"
-    whole = all(np.all(np.isfinite(one.rows)) and one.rows.shape[1] == len(one.columns) for one in frames)
+    whole = all(
+        np.all(np.isfinite(one.rows)) and one.rows.shape[1] == len(one.columns) for one in frames
+    )
     bounded = all(np.all(np.isfinite(one.box)) for one in frames)
     return "accepted" if whole and bounded else fault("a frame holds numbers that are not finite")
 
@@ -132,10 +140,33 @@ def judge_spheres(data: bytes, folder: Path, rng: Random) -> str:
 
 def _options(rng: Random) -> list[str]:
     sides = rng.choice(("", "x", "yz", "xyz", "xyz"))
-    box = rng.choice((None, f"0,{EDGE},0,0.5,0,{EDGE}", "0,1e-3,0,1e3,0,1", *(f"0,{EDGE},0,{EDGE},0,{EDGE}",) * 4))
-    chosen = ["--units", rng.choice(("m", "mm", "um")), "--axis", rng.choice("xyz"), "--periodic", sides]
-    chosen += ["--sections", rng.choice(("1", "3", "8")), "--walls", rng.choice(("slip", "no-slip"))]
-    return chosen + (["--box", box] if box else []) + rng.choice(([], [], ["--law", "thesis"], ["--compare-laws"]))
+    box = rng.choice(
+        (
+            None,
+            f"0,{EDGE},0,0.5,0,{EDGE}",
+            "0,1e-3,0,1e3,0,1",
+            *(f"0,{EDGE},0,{EDGE},0,{EDGE}",) * 4,
+        )
+    )
+    chosen = [
+        "--units",
+        rng.choice(("m", "mm", "um")),
+        "--axis",
+        rng.choice("xyz"),
+        "--periodic",
+        sides,
+    ]
+    chosen += [
+        "--sections",
+        rng.choice(("1", "3", "8")),
+        "--walls",
+        rng.choice(("slip", "no-slip")),
+    ]
+    return (
+        chosen
+        + (["--box", box] if box else [])
+        + rng.choice(([], [], ["--law", "thesis"], ["--compare-laws"]))
+    )
 
 
 def _numbers(text: str) -> str:
@@ -146,7 +177,10 @@ def _numbers(text: str) -> str:
     for one in (found, *found["sections"]):
         before, after = one["k_initial_m2"], one["k_damaged_m2"]
         numbers = [before, after, one["porosity_initial"], one["porosity_damaged"]]
-        if not all(isinstance(value, float | int) and math.isfinite(value) and value >= 0 for value in numbers):
+        if not all(
+            isinstance(value, float | int) and math.isfinite(value) and value >= 0
+            for value in numbers
+        ):
             return fault(f"k, k damaged, porosities {numbers}")
         if max(numbers[2:]) > 1 or (one is found and after > before * (1 + 1e-9)):
             return fault(f"k, k damaged, porosities {numbers}")
@@ -159,31 +193,54 @@ def _refuse(name: str) -> None:
 
 def targets(root: Path) -> dict[str, Target]:
     """The entries by name, with the shipped cases, small dumps and small packs to start from."""
-    cases = tuple(path.read_bytes() for path in sorted((root / "cases").glob("*.toml")) if path.stem != "specimen1")
+    cases = tuple(
+        path.read_bytes()
+        for path in sorted((root / "cases").glob("*.toml"))
+        if path.stem != "specimen1"
+    )
     small = "[box]\nsize_mm = [3.0, 1.6, 1.6]\n[grains]\nradius_mm = 0.25\ncount = 40\n"
     rich = (
-        small + "[fines]\nradius_mm = [0.03, 0.05]\nslab_mm = 0.5\n[gravity]\nmode = 'on'\n[run]\nduration_ms = 0.1\n"
+        small
+        + "[fines]\nradius_mm = [0.03, 0.05]\nslab_mm = 0.5\n[gravity]\nmode = 'on'\n[run]\nduration_ms = 0.1\n"
     )
     cases += (f"name = 'a'\n{small}".encode(), f"name = 'b'\nseed = 3\n{rich}".encode())
     return {
         "case": Target(cases, mutations.CASE, judge_case),
         "dump": Target(tuple(_dump(Random(n), n) for n in (1, 2, 3)), mutations.DUMP, judge_dump),
-        "spheres": Target(tuple(_spheres(Random(n), fines=n % 2) for n in range(4)), mutations.SPHERES, judge_spheres),
+        "spheres": Target(
+            tuple(_spheres(Random(n), fines=n % 2) for n in range(4)),
+            mutations.SPHERES,
+            judge_spheres,
+        ),
     }
 
 
 def _dump(rng: Random, frames: int) -> bytes:
     text = ""
     for step in range(frames):
-        rows = [f"{n + 1} 2 " + " ".join(repr(rng.gauss(0, 1e-3)) for _ in range(7)) + " \n" for n in range(8)]
+        rows = [
+            f"{n + 1} 2 " + " ".join(repr(rng.gauss(0, 1e-3)) for _ in range(7)) + " \n"
+            for n in range(8)
+        ]
         head = f"ITEM: TIMESTEP\n{100 * step}\nITEM: NUMBER OF ATOMS\n{len(rows)}\nITEM: BOX BOUNDS ff ff ff\n"
-        text += head + "-0.001 0.003\n0 0.0016\n0 0.0016\n" + f"ITEM: ATOMS {COLUMNS} \n" + "".join(rows)
+        text += (
+            head
+            + "-0.001 0.003\n0 0.0016\n0 0.0016\n"
+            + f"ITEM: ATOMS {COLUMNS} \n"
+            + "".join(rows)
+        )
     return text.encode()
 
 
 def _spheres(rng: Random, *, fines: int) -> bytes:
-    points = [[EDGE / 3 * (n // 9 + 0.5), EDGE / 3 * (n // 3 % 3 + 0.5), EDGE / 3 * (n % 3 + 0.5)] for n in range(27)]
-    rows = [[x + rng.uniform(-0.25, 0.25) for x in point] + [rng.uniform(0.5, 0.65), "grain"] for point in points]
+    points = [
+        [EDGE / 3 * (n // 9 + 0.5), EDGE / 3 * (n // 3 % 3 + 0.5), EDGE / 3 * (n % 3 + 0.5)]
+        for n in range(27)
+    ]
+    rows = [
+        [x + rng.uniform(-0.25, 0.25) for x in point] + [rng.uniform(0.5, 0.65), "grain"]
+        for point in points
+    ]
     rows += [[rng.uniform(0, EDGE) for _ in range(3)] + [0.1, "fine"] for _ in range(12 * fines)]
     return "\n".join(["x,y,z,radius,kind", *(",".join(map(str, row)) for row in rows)]).encode()
 
@@ -240,7 +297,9 @@ def _refuse_bad_seeds(target: Target) -> None:
             raise RuntimeError(f"a good input is not accepted: {found}")
 
 
-def fuzz(root: Path, *, seed: int, indices: range, limit: float = LIMIT_S, keep: Path | None = None) -> dict[str, Any]:
+def fuzz(
+    root: Path, *, seed: int, indices: range, limit: float = LIMIT_S, keep: Path | None = None
+) -> dict[str, Any]:
     """Run the inputs `indices` of `seed`; counts by kind and outcome, and every fault with its index."""
     known, counts, faults = targets(root), Counter(), []
     for target in known.values():
@@ -279,14 +338,21 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", type=int, metavar="INDEX", help="this input alone")
     parser.add_argument("--record", type=Path, metavar="FILE.json")
-    parser.add_argument("--keep", type=Path, metavar="DIR", help="keep the inputs that made faults")
+    parser.add_argument(
+        "--keep", type=Path, metavar="DIR", help="keep the inputs that made faults"
+    )
     options = parser.parse_args()
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     if options.keep:
         options.keep.mkdir(parents=True, exist_ok=True)
-    indices = range(options.inputs) if options.only is None else range(options.only, options.only + 1)
+    indices = (
+        range(options.inputs) if options.only is None else range(options.only, options.only + 1)
+    )
     root = Path(__file__).resolve().parents[1]
-    text = json.dumps(fuzz(root, seed=options.seed, indices=indices, keep=options.keep), indent=1) + "\n"
+    text = (
+        json.dumps(fuzz(root, seed=options.seed, indices=indices, keep=options.keep), indent=1)
+        + "\n"
+    )
     if options.record:
         options.record.write_text(text, encoding="utf-8")
     print(text, end="")

@@ -10,11 +10,73 @@ import tomli_w
 
 Mutation = Callable[[Random, bytes], bytes]
 
-VALUES = (0, -1, 1, 2, -0.0, 1e-300, 5e-324, 1e-9, 1e3, 1e15, 1e16, 1e308, float("inf"), float("-inf"), float("nan"))
-VALUES += (2**31, 2**63, -(2**63), 10**30, True, False, "", "walls", "1.0", "\u00b5\n\x00", [], [1.0], [1.0, 2.0])
+VALUES = (
+    0,
+    -1,
+    1,
+    2,
+    -0.0,
+    1e-300,
+    5e-324,
+    1e-9,
+    1e3,
+    1e15,
+    1e16,
+    1e308,
+    float("inf"),
+    float("-inf"),
+    float("nan"),
+)
+VALUES += (
+    2**31,
+    2**63,
+    -(2**63),
+    10**30,
+    True,
+    False,
+    "",
+    "walls",
+    "1.0",
+    "\u00b5\n\x00",
+    [],
+    [1.0],
+    [1.0, 2.0],
+)
 VALUES += ([0.3, 0.2], [1.0, 1.0, 1.0], [[1.0]], {}, {"a": 1}, [0.1] * 20)
-NUMBERS = ("nan", "inf", "-inf", "NaN", "1e400", "-1e400", "1e-400", "0", "-0", "-1", "0x10", "1_0", "", "abc", "1,5")
-NUMBERS += ("1e308", "1e-300", "1e12", "1e-12", "+5", " 7", "7.", "٣", "9" * 400, "--1", "1e", "∞", "none", "true", '"')
+NUMBERS = (
+    "nan",
+    "inf",
+    "-inf",
+    "NaN",
+    "1e400",
+    "-1e400",
+    "1e-400",
+    "0",
+    "-0",
+    "-1",
+    "0x10",
+    "1_0",
+    "",
+    "abc",
+    "1,5",
+)
+NUMBERS += (
+    "1e308",
+    "1e-300",
+    "1e12",
+    "1e-12",
+    "+5",
+    " 7",
+    "7.",
+    "٣",
+    "9" * 400,
+    "--1",
+    "1e",
+    "∞",
+    "none",
+    "true",
+    '"',
+)
 _BYTES = (
     b"\x00",
     b"\xff\xfe",
@@ -37,8 +99,14 @@ def change_bytes(rng: Random, data: bytes) -> bytes:
     """One to eight bytes or stretches flipped, put in, cut out, doubled, or the end cut off."""
     for _ in range(rng.choice((1, 1, 1, 2, 4, 8))):
         at, length = rng.randrange(len(data) + 1), rng.choice((1, 1, 2, 5, 40))
-        put = rng.choice((b"", bytes([rng.randrange(256)]), rng.choice(_BYTES), data[at : at + length] * 2))
-        data = data[:at] if rng.random() < 0.1 else data[:at] + put + data[at + rng.choice((0, length)) :]
+        put = rng.choice(
+            (b"", bytes([rng.randrange(256)]), rng.choice(_BYTES), data[at : at + length] * 2)
+        )
+        data = (
+            data[:at]
+            if rng.random() < 0.1
+            else data[:at] + put + data[at + rng.choice((0, length)) :]
+        )
     return data
 
 
@@ -60,7 +128,9 @@ def change_structure(rng: Random, data: bytes) -> bytes:
         elif change == 3:
             table[key] = rng.choice(({key: table[key]}, [table[key]], copy.deepcopy(tables)))
         else:
-            table[rng.choice(("", "a b", "ä", "x" * 300, "-", "0", "name", "__class__"))] = rng.choice(VALUES)
+            table[rng.choice(("", "a b", "ä", "x" * 300, "-", "0", "name", "__class__"))] = (
+                rng.choice(VALUES)
+            )
     return tomli_w.dumps(tables).encode("utf-8", "surrogatepass")
 
 
@@ -106,7 +176,9 @@ def change_dump_rows(rng: Random, data: bytes) -> bytes:
 def change_dump_headers(rng: Random, data: bytes) -> bytes:
     """A line of a dump's headers replaced, dropped, doubled or its numbers exchanged for hostile ones."""
     lines = data.split(b"\n")
-    heads = [at for at, line in enumerate(lines) if line.startswith(b"ITEM") or line.count(b" ") < 3]
+    heads = [
+        at for at, line in enumerate(lines) if line.startswith(b"ITEM") or line.count(b" ") < 3
+    ]
     for _ in range(rng.choice((1, 1, 2))):
         at = rng.choice(heads) % len(lines)
         change = rng.randrange(5)
@@ -118,7 +190,9 @@ def change_dump_headers(rng: Random, data: bytes) -> bytes:
             lines[at] = rng.choice(NUMBERS).encode()
         elif change == 3:
             parts = lines[at].split(b" ")
-            parts[rng.randrange(len(parts))] = rng.choice((rng.choice(NUMBERS).encode(), b"id", b"ITEM:"))
+            parts[rng.randrange(len(parts))] = rng.choice(
+                (rng.choice(NUMBERS).encode(), b"id", b"ITEM:")
+            )
             lines[at] = b" ".join(parts)
         else:
             lines[at] = lines[rng.choice(heads) % len(lines)]
@@ -139,7 +213,9 @@ def change_sphere_rows(rng: Random, data: bytes) -> bytes:
         elif change == 2:
             lines[at] = rng.choice((";", "\t", ",,", ", ")).join(cells)
         else:
-            cells[rng.randrange(len(cells))] = rng.choice((*NUMBERS, "x", "radius", "kind", "fine", "grain", "x_m"))
+            cells[rng.randrange(len(cells))] = rng.choice(
+                (*NUMBERS, "x", "radius", "kind", "fine", "grain", "x_m")
+            )
             lines[at] = ",".join(cells)
     return "\n".join(lines).encode()
 
@@ -172,6 +248,18 @@ def change_geometry(rng: Random, data: bytes) -> bytes:
     return "\n".join([head, *(",".join(map(str, row)) for row in rows)]).encode()
 
 
-CASE: dict[str, Mutation] = {"bytes": change_bytes, "structure": change_structure, "values": change_values}
-DUMP: dict[str, Mutation] = {"bytes": change_bytes, "rows": change_dump_rows, "headers": change_dump_headers}
-SPHERES: dict[str, Mutation] = {"bytes": change_bytes, "rows": change_sphere_rows, "geometry": change_geometry}
+CASE: dict[str, Mutation] = {
+    "bytes": change_bytes,
+    "structure": change_structure,
+    "values": change_values,
+}
+DUMP: dict[str, Mutation] = {
+    "bytes": change_bytes,
+    "rows": change_dump_rows,
+    "headers": change_dump_headers,
+}
+SPHERES: dict[str, Mutation] = {
+    "bytes": change_bytes,
+    "rows": change_sphere_rows,
+    "geometry": change_geometry,
+}

@@ -26,12 +26,18 @@ def solve(data: dict[str, np.ndarray], solver: object) -> float:
     pressure, pairs = flow["pore.pressure"], data["pairs"]
     flux = data["conductance"] * (pressure[pairs[:, 0]] - pressure[pairs[:, 1]])
     inlet = data["inlet"][pairs]
-    return float(np.sum(flux[inlet[:, 0] & ~inlet[:, 1]]) - np.sum(flux[inlet[:, 1] & ~inlet[:, 0]]))
+    return float(
+        np.sum(flux[inlet[:, 0] & ~inlet[:, 1]]) - np.sum(flux[inlet[:, 1] & ~inlet[:, 0]])
+    )
 
 
 def main() -> None:
     data = dict(np.load(sys.argv[1]))
-    solver = openpnm.solvers.ScipyCG(tol=1e-10) if sys.argv[2] == "cg" else openpnm.solvers.PardisoSpsolve()
+    solver = (
+        openpnm.solvers.ScipyCG(tol=1e-10)
+        if sys.argv[2] == "cg"
+        else openpnm.solvers.PardisoSpsolve()
+    )
     cpu, wall = time.process_time(), time.perf_counter()
     inflow = solve(data, solver)
     result = {

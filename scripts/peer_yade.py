@@ -32,11 +32,22 @@ if os.environ["BENCHMARK_SIDES"] == "periodic":
     O.cell.hSize = Matrix3(size[0], 0, 0, 0, size[1], 0, 0, 0, size[2])
     # spheres nearer than this to a side are copied across; less than two diameters breaks its periodicity
     reach = 4.0 * float(radius.max())
-    sides = {"wallIds": [-1] * 6, "bndCondIsPressure": [0] * 6, "duplicateThreshold": reach, "gradP": Vector3(1, 0, 0)}
+    sides = {
+        "wallIds": [-1] * 6,
+        "bndCondIsPressure": [0] * 6,
+        "duplicateThreshold": reach,
+        "gradP": Vector3(1, 0, 0),
+    }
     flow = PeriodicFlowEngine(**COMMON, **sides)
 else:
-    walls = O.bodies.append(aabbWalls([Vector3(0, 0, 0), Vector3(*size)], thickness=0, oversizeFactor=1.5))
-    sides = {"wallIds": walls, "bndCondIsPressure": [1, 1, 0, 0, 0, 0], "bndCondValue": [1, 0, 0, 0, 0, 0]}
+    walls = O.bodies.append(
+        aabbWalls([Vector3(0, 0, 0), Vector3(*size)], thickness=0, oversizeFactor=1.5)
+    )
+    sides = {
+        "wallIds": walls,
+        "bndCondIsPressure": [1, 1, 0, 0, 0, 0],
+        "bndCondValue": [1, 0, 0, 0, 0, 0],
+    }
     flow = FlowEngine(boundaryUseMaxMin=[0] * 6, **COMMON, **sides)
 for place, r in zip(data["position"], radius, strict=True):
     O.bodies.append(sphere(Vector3(*place), r))
@@ -50,5 +61,7 @@ if O.periodic:
 else:
     k = abs(flow.getBoundaryFlux(walls[0])) * size[0] / (size[1] * size[2])
 peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-print("RESULT", json.dumps({**seconds, "k": k, "cells": flow.nCells(), "peak_MB": peak}), flush=True)
+print(
+    "RESULT", json.dumps({**seconds, "k": k, "cells": flow.nCells(), "peak_MB": peak}), flush=True
+)
 os._exit(0)

@@ -14,7 +14,10 @@ def main() -> int:
     except ImportError as error:
         python = ROOT / ".venv" / "bin" / "python"
         if not python.exists() or sys.prefix == str(python.parents[1]):
-            print(f"run_case: fdnet is not installed ({error}); run bash scripts/setup.sh first", file=sys.stderr)
+            print(
+                f"run_case: fdnet is not installed ({error}); run bash scripts/setup.sh first",
+                file=sys.stderr,
+            )
             return 2
         os.execv(python, [str(python), *sys.argv])
     return fdnet(["run", *sys.argv[1:]])

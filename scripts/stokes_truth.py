@@ -21,9 +21,9 @@ from pathlib import Path
 
 from truth_packs import PACKS, made_deposit, made_grains, write_pack
 
-from fdnet.network.porosity import measure_porosity
-from fdnet.studies.packs import MM, read_pack
-from fdnet.studies.stokes import StokesFlow, extrapolate, solve_stokes
+from fdnet.spheres.porosity import measure_porosity
+from fdnet.studies.stokes.stokes import StokesFlow, extrapolate, solve_stokes
+from fdnet.studies.truth.packs import MM, read_pack
 
 GRIDS = (
     "case",
@@ -60,10 +60,15 @@ def solve(path: Path, options: argparse.Namespace) -> None:
     """All wanted grids of one pack, each a row as soon as it is done."""
     for cells in options.cells:
         rows = read_rows(options.grids)
-        if any((row["case"], row["axis"], row["cells"]) == (path.stem, options.axis, str(cells)) for row in rows):
+        if any(
+            (row["case"], row["axis"], row["cells"]) == (path.stem, options.axis, str(cells))
+            for row in rows
+        ):
             continue
         pack, edge = read_pack(path)
-        flow = solve_stokes(pack, cells=cells, axis="xyz".index(options.axis), tolerance=options.tolerance)
+        flow = solve_stokes(
+            pack, cells=cells, axis="xyz".index(options.axis), tolerance=options.tolerance
+        )
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         values = (
             path.stem,
@@ -99,7 +104,8 @@ def tabulated(rows: list[dict[str, str]]) -> list[dict[str, str]]:
             "k_mm2": f"{end.k:.6g}",
             "k_over_k0": f"{end.k / float(intact['k_mm2']):.4f}" if intact else "",
             "relative_error": f"{100 * end.relative_error:.2g}%",
-            "source": "own Stokes extrapolated (2nd order) from N=" + "+".join(row["cells"] for row in grids),
+            "source": "own Stokes extrapolated (2nd order) from N="
+            + "+".join(row["cells"] for row in grids),
         }
     return list(table.values())
 
@@ -134,7 +140,9 @@ def write_rows(path: Path, columns: tuple[str, ...], rows: list[dict[str, str]])
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     verbs = parser.add_subparsers(dest="verb", required=True)
     maker = verbs.add_parser("make", help="write the packs")
     maker.add_argument("names", nargs="*", choices=[[], *PACKS], metavar="NAME")

@@ -14,19 +14,26 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from string import Template
 
-from fdnet.scales import scales_of
-from fdnet.studies.thesis.bands import Sample, band
-from fdnet.studies.thesis.examine import DEFAULT_PAIR
+from fdnet.scales.scales import scales_of
+from fdnet.studies.thesis.compare.bands import Sample, band
+from fdnet.studies.thesis.compare.markdown import figure, markdown_table, with_band
+from fdnet.studies.thesis.compare.tables import thesis_tables
+from fdnet.studies.thesis.compare.trend_quantities import known, runs_of
+from fdnet.studies.thesis.compare.trend_table import caveats, trends_table
+from fdnet.studies.thesis.compare.trends import compare_trends
 from fdnet.studies.thesis.findings import CAPTIONS, DEPOSITION, RESULTS, STATISTICS, TETRAHEDRA
-from fdnet.studies.thesis.markdown import figure, markdown_table, with_band
-from fdnet.studies.thesis.plan import REASONS, SCAN_SEEDS, SPECIMENS, VARIANTS, Planned, planned
-from fdnet.studies.thesis.results import ResultRow, read_results
-from fdnet.studies.thesis.statistics import ALONE, CUT, WHOLE
-from fdnet.studies.thesis.thesis_tables import thesis_tables
-from fdnet.studies.thesis.trend_quantities import known, runs_of
-from fdnet.studies.thesis.trend_table import caveats, trends_table
-from fdnet.studies.thesis.trends import compare_trends
-from fdnet.studies.thesis.values import thesis_of
+from fdnet.studies.thesis.numbers.examine import DEFAULT_PAIR
+from fdnet.studies.thesis.numbers.results import ResultRow, read_results
+from fdnet.studies.thesis.numbers.statistics import ALONE, CUT, WHOLE
+from fdnet.studies.thesis.numbers.values import thesis_of
+from fdnet.studies.thesis.runs.plan import (
+    REASONS,
+    SCAN_SEEDS,
+    SPECIMENS,
+    VARIANTS,
+    Planned,
+    planned,
+)
 
 ROOT = Path(__file__).resolve().parents[1]
 Rows = Sequence[ResultRow]
@@ -63,7 +70,16 @@ def compared(rows: Rows, runs: Iterable[tuple[str, str]]) -> str:
 
 def costs(rows: Rows) -> str:
     """Supply, simulated time and seconds of the full-scale runs."""
-    header = ("run", "seed", "supplied", "invaded", "passed", "ended", "simulated, ms", "way of the fluid, mm")
+    header = (
+        "run",
+        "seed",
+        "supplied",
+        "invaded",
+        "passed",
+        "ended",
+        "simulated, ms",
+        "way of the fluid, mm",
+    )
     header += ("beyond 1 mm and near a wall, %", "invasion, s", "pack, s", "largest overlap, %")
     lines = []
     for run in (*SPECIMENS, *VARIANTS):
@@ -78,7 +94,14 @@ def costs(rows: Rows) -> str:
 
 def overview(rows: Rows) -> str:
     """The specimens in one table, for the README: counts, depth, porosity and the first section's permeability."""
-    header = ["specimen", "invaded", "95 % above, mm", "points of porosity lost, first mm", "whole", "thesis, whole"]
+    header = [
+        "specimen",
+        "invaded",
+        "95 % above, mm",
+        "points of porosity lost, first mm",
+        "whole",
+        "thesis, whole",
+    ]
     header += ["k lost, first mm: thesis", "by its laws, %", "by fdnet's, %", "ended"]
     lines = []
     for run in SPECIMENS:
@@ -87,7 +110,10 @@ def overview(rows: Rows) -> str:
         told = thesis.reductions[:1]
         lines.append(
             [run.removeprefix("specimen")]
-            + [mean(found, pick) for pick in (lambda row: row.invaded_count, lambda row: row.invasion_depth_p95_mm)]
+            + [
+                mean(found, pick)
+                for pick in (lambda row: row.invaded_count, lambda row: row.invasion_depth_p95_mm)
+            ]
             + [mean(found, lambda row: row.porosity_loss_first_mm, 100)]
             + [mean(found, lambda row: row.porosity_initial - row.porosity_damaged, 100)]
             + [figure(100 * (thesis.porosity - thesis.damaged_porosity[0]), digits=1)]
@@ -120,13 +146,24 @@ def scan(rows: Rows, group: str) -> str:
 def reasons(rows: Rows) -> str:
     """Specimen 1 and what might let more fines in."""
     settings = [("specimen1", "specimen 1"), *((f"specimen1 {one}", one) for one in REASONS)]
-    return compared(rows, [*settings, ("specimen1-7to8", "radii 0.07 to 0.08 mm"), ("specimen1-1410", "1,410 grains")])
+    return compared(
+        rows,
+        [
+            *settings,
+            ("specimen1-7to8", "radii 0.07 to 0.08 mm"),
+            ("specimen1-1410", "1,410 grains"),
+        ],
+    )
 
 
-def table_of(path: Path, columns: Mapping[str, str], keep: Callable[[dict[str, str]], bool] = lambda _: True) -> str:
+def table_of(
+    path: Path, columns: Mapping[str, str], keep: Callable[[dict[str, str]], bool] = lambda _: True
+) -> str:
     """A CSV as Markdown, its `columns` under other names."""
     rows = [row for row in _read(path) if keep(row)]
-    return markdown_table(list(columns.values()), [[_cell(row[name]) for name in columns] for row in rows])
+    return markdown_table(
+        list(columns.values()), [[_cell(row[name]) for name in columns] for row in rows]
+    )
 
 
 def _cell(text: str) -> str:
@@ -141,7 +178,12 @@ def statistics_table(path: Path) -> str:
     found: dict[tuple[str, ...], dict[str, str]] = {}
     for row in _read(path):
         if row["seed"] == "1" and row["thesis"] and row["id"] in SPECIMENS:
-            key = (row["id"], row["source"], row["quantity"], f"{row['sense']} {_cell(row['thesis'])}")
+            key = (
+                row["id"],
+                row["source"],
+                row["quantity"],
+                f"{row['sense']} {_cell(row['thesis'])}",
+            )
             found.setdefault(key, {})[row["note"].split("; ")[0]] = _cell(row["ours"])
     readings = {WHOLE: "whole pores", CUT: "and cut ones", ALONE: "the section alone"}
     lines = [[*key, *(ours.get(note, "-") for note in readings)] for key, ours in found.items()]
@@ -156,7 +198,11 @@ def _read(path: Path) -> list[dict[str, str]]:
 def figures(path: Path) -> str:
     """Every figure with its caption."""
     rows = _read(path)
-    drawn = [f"![{row['caption']}](thesis/{row['figure']})\n\n*{row['caption']}*" for row in rows if not row["missing"]]
+    drawn = [
+        f"![{row['caption']}](thesis/{row['figure']})\n\n*{row['caption']}*"
+        for row in rows
+        if not row["missing"]
+    ]
     left = [f"{row['figure']} (needs {row['missing']})" for row in rows if row["missing"]]
     return "\n\n".join(drawn + (["Not drawn: " + ", ".join(left) + "."] if left else []))
 
@@ -179,14 +225,30 @@ def document(docs: Path) -> str:
         "statistics": statistics_table(thesis / STATISTICS),
         "deposition": table_of(
             thesis / DEPOSITION,
-            {"id": "run", "low": "porosity from", "high": "to", "throats": "throats", "fines": "fines"}
+            {
+                "id": "run",
+                "low": "porosity from",
+                "high": "to",
+                "throats": "throats",
+                "fines": "fines",
+            }
             | {"nearer_axis": "nearer axis", "nearer_wall": "nearer wall", "beyond_wall": "beyond"}
-            | {"wall_low": "wall, 95 % from", "wall_high": "to ", "law": "law", "decided": "decided"},
+            | {
+                "wall_low": "wall, 95 % from",
+                "wall_high": "to ",
+                "law": "law",
+                "decided": "decided",
+            },
             lambda row: row["seed"] == "1" and row["id"] in SPECIMENS,
         ),
         "tetrahedra": table_of(
             thesis / TETRAHEDRA,
-            {"id": "run", "grains": "grains", "fines": "fines", "tetrahedra_all": "tetrahedra of all spheres"}
+            {
+                "id": "run",
+                "grains": "grains",
+                "fines": "fines",
+                "tetrahedra_all": "tetrahedra of all spheres",
+            }
             | {"tetrahedra_grains": "of the grains", "ratio": "ratio"},
             lambda row: row["seed"] == "1" and row["id"] in SPECIMENS,
         ),
@@ -198,7 +260,9 @@ def document(docs: Path) -> str:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--docs", type=Path, default=ROOT / "docs", help="where to read and write")
     docs = parser.parse_args().docs
     (docs / "thesis.md").write_text(document(docs), encoding="utf-8")

@@ -7,9 +7,9 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.spatial import cKDTree
 
-from fdnet.network.porosity import measure_porosity
-from fdnet.snapshot import Array, Kind, Snapshot
-from fdnet.studies.packs import MM, RADIUS, read_pack, snapshot
+from fdnet.spheres.porosity import measure_porosity
+from fdnet.spheres.snapshot import Array, Kind, Snapshot
+from fdnet.studies.truth.packs import MM, RADIUS, read_pack, snapshot
 
 FINE_RADIUS = 0.1
 BRIDGE_SHARE = 0.3
@@ -39,12 +39,16 @@ PACKS: dict[str, dict[str, Any]] = {
 radius `fine` (0.1 mm), all of them in the first `layer` of the edge along x (all of it)."""
 
 
-def relaxed(radius: Array, edge: float, position: Array, *, fixed: int = 0, push: float = 1.0) -> Array:
+def relaxed(
+    radius: Array, edge: float, position: Array, *, fixed: int = 0, push: float = 1.0
+) -> Array:
     """Push overlapping spheres apart until no overlap exceeds 1e-5 mm, or 1500 times; the first `fixed`
     stay where they are. Each time a pair is moved apart by `push` of its overlap. Returns positions in the cell."""
     moves = np.arange(len(radius)) >= fixed
     for _ in range(1500):
-        pairs = cKDTree(position % edge, boxsize=edge).query_pairs(2.0 * radius.max(), output_type="ndarray")
+        pairs = cKDTree(position % edge, boxsize=edge).query_pairs(
+            2.0 * radius.max(), output_type="ndarray"
+        )
         apart = position[pairs[:, 0]] - position[pairs[:, 1]]
         apart -= edge * np.round(apart / edge)
         distance = np.linalg.norm(apart, axis=1)
@@ -67,7 +71,9 @@ def made_grains(name: str) -> tuple[Snapshot, float]:
     radius *= RADIUS / radius.mean()
     volume = 4.0 / 3.0 * np.pi * np.sum(radius**3)
     edge = (volume / (1.0 - wish["porosity"])) ** (1.0 / 3.0)
-    position = relaxed(radius, edge, rng.random((len(radius), 3)) * edge, push=wish.get("push", 1.0))
+    position = relaxed(
+        radius, edge, rng.random((len(radius), 3)) * edge, push=wish.get("push", 1.0)
+    )
     kind = np.full(len(radius), Kind.GRAIN)
 
     def excess(scale: float) -> float:
@@ -93,9 +99,17 @@ def made_deposit(wish: dict[str, Any], folder: Path) -> tuple[Snapshot, float]:
     refused = 0
     while len(radius) < total:
         relaxing = refused >= REFUSALS
-        centre = rng.random(3) * edge if relaxing else seat(position, radius, len(grains), edge, fine, rng)
+        centre = (
+            rng.random(3) * edge
+            if relaxing
+            else seat(position, radius, len(grains), edge, fine, rng)
+        )
         least = -fine if relaxing else -1e-7
-        if centre is None or centre[0] % edge >= layer or np.any(gaps(centre, position, radius, edge, fine) < least):
+        if (
+            centre is None
+            or centre[0] % edge >= layer
+            or np.any(gaps(centre, position, radius, edge, fine) < least)
+        ):
             refused += 1
             continue
         refused = refused if relaxing else 0
@@ -133,12 +147,18 @@ def touching_three(corner: Array, reach: Array, rng: np.random.Generator) -> Arr
     normal = np.cross(u, v)
     if np.linalg.norm(normal) < 1e-9:
         return None
-    right = 0.5 * np.array([u @ u + reach[0] ** 2 - reach[1] ** 2, v @ v + reach[0] ** 2 - reach[2] ** 2, 0.0])
+    right = 0.5 * np.array(
+        [u @ u + reach[0] ** 2 - reach[1] ** 2, v @ v + reach[0] ** 2 - reach[2] ** 2, 0.0]
+    )
     foot = np.linalg.solve(np.array([u, v, normal]), right)
     height = reach[0] ** 2 - foot @ foot
     if height < 0.0:
         return None
-    return corner[0] + foot + rng.choice([-1.0, 1.0]) * np.sqrt(height) * normal / np.linalg.norm(normal)
+    return (
+        corner[0]
+        + foot
+        + rng.choice([-1.0, 1.0]) * np.sqrt(height) * normal / np.linalg.norm(normal)
+    )
 
 
 def write_pack(path: Path, pack: Snapshot, edge: float, note: str) -> None:
@@ -146,6 +166,13 @@ def write_pack(path: Path, pack: Snapshot, edge: float, note: str) -> None:
     names = {Kind.GRAIN: "grain", Kind.FINE: "fine"}
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w") as file:
-        file.write(f"# periodic cube, edge {edge:.9g} mm; lengths in mm; {note}\nx,y,z,radius,kind\n")
-        for place, radius, kind in zip(pack.position / MM, pack.radius / MM, pack.kind, strict=True):
-            file.write(",".join(f"{value:.7g}" for value in (*place, radius)) + f",{names[Kind(int(kind))]}\n")
+        file.write(
+            f"# periodic cube, edge {edge:.9g} mm; lengths in mm; {note}\nx,y,z,radius,kind\n"
+        )
+        for place, radius, kind in zip(
+            pack.position / MM, pack.radius / MM, pack.kind, strict=True
+        ):
+            file.write(
+                ",".join(f"{value:.7g}" for value in (*place, radius))
+                + f",{names[Kind(int(kind))]}\n"
+            )

@@ -17,8 +17,8 @@ from string import Template
 
 from fdnet.atomic import write_text
 from fdnet.studies.command import STUDIES, study_named
-from fdnet.studies.draw import draw_study
-from fdnet.studies.table import knee_lines, missing_lines, read_rows, study_text
+from fdnet.studies.engine.draw import draw_study
+from fdnet.studies.engine.table import knee_lines, missing_lines, read_rows, study_text
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -45,13 +45,21 @@ def stability_table(path: Path) -> str:
         rows = list(csv.DictReader(file))
     lines = ["| case | what happened | evidence |", "|---|---|---|"]
     return "\n".join(
-        lines + [f"| {row['case']} | {row['what_happened']} | {evidence(row['evidence'])} |" for row in rows]
+        lines
+        + [
+            f"| {row['case']} | {row['what_happened']} | {evidence(row['evidence'])} |"
+            for row in rows
+        ]
     )
 
 
 def evidence(text: str) -> str:
     """Words and tests: a test as a link to its file with its name for a text."""
-    return re.sub(r"tests/(\S+\.py)::(\w+)", lambda m: f"([{m[2].removeprefix('test_')}](../tests/{m[1]}))", text)
+    return re.sub(
+        r"tests/(\S+\.py)::(\w+)",
+        lambda m: f"([{m[2].removeprefix('test_')}](../tests/{m[1]}))",
+        text,
+    )
 
 
 def document(docs: Path) -> str:
@@ -71,9 +79,15 @@ def redraw(validation: Path) -> None:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--docs", type=Path, default=ROOT / "docs", help="where to read and write")
-    parser.add_argument("--redraw", action="store_true", help="figures and texts of the studies from their tables too")
+    parser.add_argument(
+        "--redraw",
+        action="store_true",
+        help="figures and texts of the studies from their tables too",
+    )
     given = parser.parse_args()
     if given.redraw:
         redraw(given.docs / "validation")

@@ -16,12 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.network.conductance import DEFAULT_LAW, LAWS
-from fdnet.network.porosity import measure_porosity
-from fdnet.network.slabs import whole_permeability
-from fdnet.network.tessellation import WALLS, build_network
-from fdnet.snapshot import Array, Snapshot, resting
-from fdnet.studies.stokes import extrapolate, solve_stokes
+from fdnet.network.flow.slabs import whole_permeability
+from fdnet.network.laws.named import DEFAULT_LAW, LAWS
+from fdnet.network.network import WALLS, build_network
+from fdnet.spheres.porosity import measure_porosity
+from fdnet.spheres.snapshot import Array, Snapshot, resting
+from fdnet.studies.stokes.stokes import extrapolate, solve_stokes
 
 CELL = 10.0
 SHEET = CELL / 48
@@ -65,7 +65,9 @@ def relaxed(pack: Pack, seed: int) -> Snapshot:
         overlap = np.maximum(radius[:, None] + radius - distance, 0.0) * (1.0 - np.eye(pack.count))
         push = np.sum((overlap / distance)[:, :, None] * apart, axis=1)
         moved = position + 0.5 * push
-        position = np.where(walled, np.clip(moved, radius[:, None], size - radius[:, None]), moved % size)
+        position = np.where(
+            walled, np.clip(moved, radius[:, None], size - radius[:, None]), moved % size
+        )
         if np.abs(push).max() < SETTLED:
             break
     return spheres(position, radius, size)
@@ -116,9 +118,13 @@ def row(pack: Pack, seed: int, grids: list[int]) -> dict[str, object]:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--csv", type=Path, required=True)
-    parser.add_argument("--grids", type=int, nargs=2, default=[72, 96], help="cells along x, the second finer")
+    parser.add_argument(
+        "--grids", type=int, nargs=2, default=[72, 96], help="cells along x, the second finer"
+    )
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
     with given.csv.open("w", newline="") as out:
@@ -127,7 +133,9 @@ def main() -> int:
             writer = csv.DictWriter(out, list(found), lineterminator="\n")
             if number == 0:
                 writer.writeheader()
-            writer.writerow({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in found.items()})
+            writer.writerow(
+                {k: f"{v:.6g}" if isinstance(v, float) else v for k, v in found.items()}
+            )
             out.flush()
             print(found, flush=True)
     return 0

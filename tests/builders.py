@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.case import Case
-from fdnet.case_file import case_from, set_keys
-from fdnet.snapshot import Array, Kind, Snapshot
+from fdnet.case.case import Case
+from fdnet.case.file import case_from, set_keys
+from fdnet.spheres.snapshot import Array, Kind, Snapshot
 
 TINY: dict[str, Any] = {
     "name": "tiny",
@@ -23,7 +23,9 @@ def tiny(*assignments: str) -> Case:
     return case_from(set_keys(TINY, list(assignments)))
 
 
-def resting_spheres(position: list[list[float]], radius: float, box: Array, *, kind: Kind, first: int = 1) -> Snapshot:
+def resting_spheres(
+    position: list[list[float]], radius: float, box: Array, *, kind: Kind, first: int = 1
+) -> Snapshot:
     """Equal spheres at `position` (N, 3) m, at rest, numbered from `first`; `box` (3, 2) m."""
     count = len(position)
     return Snapshot(

@@ -10,9 +10,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fdnet.network.conductance import LAWS, lubrication_law
-from fdnet.snapshot import Kind
-from fdnet.studies import law_models, truth
+from fdnet.network.laws.conductance import lubrication_law
+from fdnet.network.laws.named import LAWS
+from fdnet.spheres.snapshot import Kind
+from fdnet.studies.network import law_models
+from fdnet.studies.truth import truth
 from tests.network.packs import face_centred
 
 DATA = Path(__file__).parent / "data" / "truth"
@@ -28,7 +30,9 @@ def study(root):
         import accuracy_tables
     finally:
         sys.path.pop(0)
-    return SimpleNamespace(main=accuracy, cases=truth, models=accuracy_models, tables=accuracy_tables)
+    return SimpleNamespace(
+        main=accuracy, cases=truth, models=accuracy_models, tables=accuracy_tables
+    )
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +45,9 @@ def test_truth_is_read_with_its_class_and_what_is_missing_is_named(study, cases)
     rows = list(csv.DictReader(TRUTH.open()))
     named = {row["file"] for row in rows if row["file"]}
     assert set(missing) == {name for name in named if not (DATA / name).exists()}
-    assert len(found) == len([row for row in rows if row["file"]]) - len(missing) + len(study.cases.LOOSE_SOLIDS)
+    assert len(found) == len([row for row in rows if row["file"]]) - len(missing) + len(
+        study.cases.LOOSE_SOLIDS
+    )
     assert cases["SC_touching"].group == study.cases.LATTICE
     assert cases["A_200_eps40"].group == study.cases.EQUAL
     assert cases["A_200_eps40"].k == pytest.approx(0.00100982e-6)
@@ -51,7 +57,9 @@ def test_truth_is_read_with_its_class_and_what_is_missing_is_named(study, cases)
 
 def test_loose_lattices_have_their_volume_fraction(cases):
     pack = cases["SC c = 0.343"].pack
-    assert np.sum(4 / 3 * np.pi * pack.radius**3) / np.prod(np.ptp(pack.box, axis=1)) == pytest.approx(0.343)
+    assert np.sum(4 / 3 * np.pi * pack.radius**3) / np.prod(
+        np.ptp(pack.box, axis=1)
+    ) == pytest.approx(0.343)
 
 
 def test_turned_packs_have_the_axis_as_x(study, cases):
@@ -72,7 +80,10 @@ def test_goal_adds_truths_error_above_two_percent_only(study):
     assert study.tables.reached([row], "law", (None, 0.06)) == "no"
     assert study.tables.reached([row | {"truth_error": 0.021}], "law", (None, 0.06)) == "yes"
     assert study.tables.reached([row | {"truth_error": 0.021}], "law", (0.03, 0.06)) == "no"
-    assert study.tables.reached([row | {"law": math.nan}, row | {"law": 1.05}], "law", (None, 0.06)) == "yes"
+    assert (
+        study.tables.reached([row | {"law": math.nan}, row | {"law": 1.05}], "law", (None, 0.06))
+        == "yes"
+    )
 
 
 def test_laws_on_two_packs(study, cases):
@@ -97,7 +108,10 @@ def test_too_many_spheres_are_not_resolved_and_shown_as_such(study, cases, monke
 def test_round_sections_are_those_of_the_law_without_corners(study):
     """In FCC the facets are far from round: their area overrates them about twice; loosely spaced discs do not."""
     network = study.models.network_of(face_centred(2))
-    flux = [study.models.permeability(network, law(network)) for law in (study.models.section_by_area, lubrication_law)]
+    flux = [
+        study.models.permeability(network, law(network))
+        for law in (study.models.section_by_area, lubrication_law)
+    ]
     assert 1.8 < flux[0] / flux[1] < 2.3
 
 
@@ -105,7 +119,9 @@ def test_refit_finds_the_weight_that_made_the_truth(study, cases):
     case = cases["C_80_eps40"]
     network = study.models.network_of(case.pack)
     k = study.models.permeability(network, study.models.series_law(network, weight=0.4))
-    refit = study.models.refitted_series([replace(case, name=name, k=k) for name in ("one", "two", "two y")])
+    refit = study.models.refitted_series(
+        [replace(case, name=name, k=k) for name in ("one", "two", "two y")]
+    )
     assert refit["weight"] == pytest.approx(0.4, abs=1e-3)
     assert refit["weights"] == pytest.approx((0.4, 0.4), abs=1e-3)
     assert refit["held_out"] == pytest.approx([1.0] * 3, abs=1e-3)
@@ -115,8 +131,13 @@ def test_left_out_packs_do_not_fit_themselves(study, cases):
     """Two packs that want different weights: each is judged by the other's."""
     case = cases["C_80_eps40"]
     network = study.models.network_of(case.pack)
-    k = [study.models.permeability(network, study.models.series_law(network, weight=w)) for w in (0.2, 0.5)]
-    refit = study.models.refitted_series([replace(case, name=f"p{i}", k=value) for i, value in enumerate(k)])
+    k = [
+        study.models.permeability(network, study.models.series_law(network, weight=w))
+        for w in (0.2, 0.5)
+    ]
+    refit = study.models.refitted_series(
+        [replace(case, name=f"p{i}", k=value) for i, value in enumerate(k)]
+    )
     assert refit["weights"] == pytest.approx((0.2, 0.5), abs=1e-3)
     assert refit["held_out"] == pytest.approx([k[1] / k[0], k[0] / k[1]], rel=2e-3)
 
@@ -138,7 +159,9 @@ def test_tables_of_other_studies_are_read_from_their_files(study, root, tmp_path
 
 def test_every_name_of_the_document_is_given(study, root):
     """Template and code agree; rows are those of the written tables, so nothing long is computed."""
-    names = set(study.main.Template((root / "docs" / "accuracy.md.in").read_text()).get_identifiers())
+    names = set(
+        study.main.Template((root / "docs" / "accuracy.md.in").read_text()).get_identifiers()
+    )
     source = (root / "scripts" / "accuracy.py").read_text()
     assert names
     assert all(f'"{name}"' in source for name in names)

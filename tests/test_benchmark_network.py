@@ -29,8 +29,13 @@ def test_packs_are_tiles_with_fines_on_the_grains(scripts):
 
 def test_a_child_ends_ok_or_failed_or_over_time(scripts):
     run = scripts[0].child
-    assert run([sys.executable, "-c", "print('noise'); print('RESULT {\"k\": 2}')"], 60) == {"status": "ok", "k": 2}
-    assert run([sys.executable, "-c", "raise SystemExit('singular')"], 60) == {"status": "exit 1: singular"}
+    assert run([sys.executable, "-c", "print('noise'); print('RESULT {\"k\": 2}')"], 60) == {
+        "status": "ok",
+        "k": 2,
+    }
+    assert run([sys.executable, "-c", "raise SystemExit('singular')"], 60) == {
+        "status": "exit 1: singular"
+    }
     assert run([sys.executable, "-c", "while True: pass"], 1) == {"status": "stopped after 1 s"}
     asleep = run([sys.executable, "-c", "import time; time.sleep(60)"], 0.1)
     assert asleep == {"status": "stopped after 1 s by the clock"}
@@ -38,7 +43,8 @@ def test_a_child_ends_ok_or_failed_or_over_time(scripts):
 
 def test_growth_is_the_exponent_of_the_time(scripts):
     rows = [
-        {"tool": "t", "case": "tiled", "step": "s", "grains": n, "cpu_s": 3e-9 * n**1.5} for n in (1000, 10_000, 90_000)
+        {"tool": "t", "case": "tiled", "step": "s", "grains": n, "cpu_s": 3e-9 * n**1.5}
+        for n in (1000, 10_000, 90_000)
     ]
     rows[0]["cpu_s"] = 1.0
     scripts[0].set_growth(rows)
@@ -48,11 +54,25 @@ def test_growth_is_the_exponent_of_the_time(scripts):
 
 def test_small_run_of_all_steps(scripts, tmp_path):
     rows = {row["step"]: row for row in scripts[0].fdnet_rows(80, 50, tmp_path, 300)}
-    assert {"tessellate", "geometry", "occupancy", "conductance", "solve", "damage", "porosity"} < set(rows)
+    assert {
+        "tessellate",
+        "geometry",
+        "occupancy",
+        "conductance",
+        "solve",
+        "damage",
+        "porosity",
+    } < set(rows)
     assert rows["total"]["status"] == "ok"
     parts = sum(rows[step]["cpu_s"] for step in list(rows)[: list(rows).index("total")])
     assert rows["total"]["cpu_s"] == pytest.approx(parts)
     assert rows["total intact"]["cpu_s"] < parts
     assert all(20 < row["peak_MB"] < 4000 for row in rows.values())
     assert json.loads((tmp_path / "inflow.json").read_text())["intact"] > 0
-    assert set(np.load(tmp_path / "clogged.npz")) == {"pairs", "position", "conductance", "inlet", "outlet"}
+    assert set(np.load(tmp_path / "clogged.npz")) == {
+        "pairs",
+        "position",
+        "conductance",
+        "inlet",
+        "outlet",
+    }

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from builders import TINY, tiny
 
-from fdnet.case_file import case_from, known_keys, read_case, set_keys
+from fdnet.case.file import case_from, known_keys, read_case, set_keys
 from fdnet.errors import CaseError
-from fdnet.pipeline import _analysis_options
-from fdnet.studies.thesis.plan import SPECIMENS, VARIANTS
+from fdnet.run.pipeline import _analysis_options
+from fdnet.studies.thesis.runs.plan import SPECIMENS, VARIANTS
 
 
 def problems(data: dict) -> str:
@@ -90,7 +90,9 @@ def test_a_bad_value_is_named_with_its_path(part, values, expected):
     assert expected in problems(changed(**{part: values}))
 
 
-@pytest.mark.parametrize(("part", "values"), [("fines", {"count": True}), ("grains", {"count": 66.0})])
+@pytest.mark.parametrize(
+    ("part", "values"), [("fines", {"count": True}), ("grains", {"count": 66.0})]
+)
 def test_a_bad_key_brings_no_false_problem_with_it(part, values):
     text = problems(changed(**{part: values}))
     assert "1 problem:" in text
@@ -135,7 +137,9 @@ def test_stages_depend_only_on_their_own_keys():
 def test_analysis_choices_reach_the_analysis():
     """What the two share by name is handed on; the default walls hold the fluid."""
     assert tiny().analysis.walls == "no-slip"
-    options = _analysis_options(tiny("analysis.walls=slip", "analysis.sections=3", "analysis.law=thesis"))
+    options = _analysis_options(
+        tiny("analysis.walls=slip", "analysis.sections=3", "analysis.law=thesis")
+    )
     assert (options.walls, options.sections, options.law) == ("slip", 3, "thesis")
     assert "analysis.walls: 'sticky'" in problems(changed(analysis={"walls": "sticky"}))
 
@@ -191,7 +195,10 @@ def test_fixed_keys_of_the_contract_exist():
 
 
 def test_shipped_cases_are_valid_short_and_named_as_their_files(root: Path):
-    full, quick = ({path.stem: path for path in (root / folder).glob("*.toml")} for folder in ("cases", "cases/quick"))
+    full, quick = (
+        {path.stem: path for path in (root / folder).glob("*.toml")}
+        for folder in ("cases", "cases/quick")
+    )
     assert set(full) == {"quick", *SPECIMENS, *VARIANTS}
     assert set(quick) == {*SPECIMENS, *VARIANTS}
     for name, path in [*full.items(), *((f"quick-{name}", path) for name, path in quick.items())]:
@@ -207,12 +214,20 @@ def test_a_quick_form_differs_from_its_specimen_only_in_what_it_gives_up(root: P
         for part in set(quick) | set(full):
             if part in may:
                 continue
-            for key in set(quick[part]) | set(full[part]) if isinstance(full[part], dict) else {""}:
+            for key in (
+                set(quick[part]) | set(full[part]) if isinstance(full[part], dict) else {""}
+            ):
                 pair = [data[part].get(key) if key else data[part] for data in (quick, full)]
                 assert f"{part}.{key}" in may or pair[0] == pair[1], f"{path.name}: {part}.{key}"
 
 
 def test_a_box_for_more_grains_than_memory_is_refused():
-    huge = TINY | {"box": {"size_mm": [800.0, 800.0, 800.0]}, "grains": {"radius_mm": 0.25, "porosity": 0.4}}
-    with pytest.raises(CaseError, match=r"box\.size_mm: \[800.0, 800.0, 800.0\] holds 4\.69e\+09 grains; expected at"):
+    huge = TINY | {
+        "box": {"size_mm": [800.0, 800.0, 800.0]},
+        "grains": {"radius_mm": 0.25, "porosity": 0.4},
+    }
+    with pytest.raises(
+        CaseError,
+        match=r"box\.size_mm: \[800.0, 800.0, 800.0\] holds 4\.69e\+09 grains; expected at",
+    ):
         case_from(huge)

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from builders import tiny
 
-from fdnet.case import Case
-from fdnet.case_file import case_from
-from fdnet.cost import cost_of, over_limit, refuse_long
+from fdnet.case.case import Case
+from fdnet.case.file import case_from
 from fdnet.errors import CaseError
-from fdnet.scales import scales_of
+from fdnet.scales.cost import cost_of, over_limit, refuse_long
+from fdnet.scales.scales import scales_of
 
 
 def hours(case: Case) -> float:
@@ -29,7 +29,9 @@ def test_nominal_stiffness_is_the_materials_own():
 
 
 def test_steps_and_so_hours_go_with_the_root_of_the_stiffness():
-    soft, stiff = (cost_of(case, scales_of(case)) for case in (tiny(), tiny("run.stiffness_N_m=1e10")))
+    soft, stiff = (
+        cost_of(case, scales_of(case)) for case in (tiny(), tiny("run.stiffness_N_m=1e10"))
+    )
     assert stiff.steps / soft.steps == pytest.approx(1e3, rel=1e-3)
     assert stiff.invade_seconds / soft.invade_seconds == pytest.approx(1e3, rel=1e-3)
 
@@ -58,9 +60,15 @@ def test_only_the_stages_to_run_count():
 @pytest.mark.parametrize(
     ("assignments", "said"),
     [
-        (["run.stiffness_N_m=nominal"], r"set by contacts of 4.72e\+10 N/m\).* lower run.stiffness_N_m"),
+        (
+            ["run.stiffness_N_m=nominal"],
+            r"set by contacts of 4.72e\+10 N/m\).* lower run.stiffness_N_m",
+        ),
         (["run.time_step_s=1e-12"], r"\(as given\).* raise run.time_step_s"),
-        (["drag.multiplier=1e5", "fluid.velocity_m_s=1e-5"], r"drag relaxation time\).* drag.scheme = 'implicit'"),
+        (
+            ["drag.multiplier=1e5", "fluid.velocity_m_s=1e-5"],
+            r"drag relaxation time\).* drag.scheme = 'implicit'",
+        ),
         (["fines.count=1", "run.duration_ms=1e-4"], "most of it packing 66 grains"),
     ],
 )
@@ -74,7 +82,9 @@ def test_a_thousandfold_viscosity_is_refused_for_its_hours_and_implicit_drag_is_
     """tau is 1/1000: explicit drag needs steps of 2 ns, implicit drag those of the contacts."""
     thick = ("fluid.viscosity_cP=5e4", "fluid.velocity_m_s=0.01", "fines.count=3000")
     case = tiny(*thick)
-    with pytest.raises(CaseError, match=r"a tenth of the drag relaxation time.*drag\.scheme = 'implicit'"):
+    with pytest.raises(
+        CaseError, match=r"a tenth of the drag relaxation time.*drag\.scheme = 'implicit'"
+    ):
         refuse_long(case, scales_of(case), pack=True, invade=True)
     assert hours(case) > 10 * hours(tiny(*thick, "drag.scheme=implicit"))
 
@@ -87,13 +97,18 @@ def test_the_limit_is_no_part_of_a_digest():
 
 def fdnet(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "fdnet.cli", *map(str, arguments)], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "fdnet.cli", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
     )
 
 
 def test_a_long_run_is_refused_before_anything_is_written_and_render_still_shows_it(tmp_path):
     path, out = tmp_path / "case.toml", tmp_path / "run"
-    path.write_text(tiny("run.stiffness_N_m=nominal", "fines.count=3000", "run.max_hours=0.5").toml())
+    path.write_text(
+        tiny("run.stiffness_N_m=nominal", "fines.count=3000", "run.max_hours=0.5").toml()
+    )
     refused = fdnet("run", path, "--out", out, "--timeout", "5")
     assert refused.returncode == 2
     assert "run.max_hours: 0.5 h, but this case is expected to take" in refused.stderr

@@ -44,7 +44,15 @@ def test_a_wheel_installed_elsewhere_renders_a_deck(root, tmp_path):
     )
     environment = os.environ | {"PYTHONPATH": str(target)}
     done = subprocess.run(
-        [sys.executable, "-c", code, "render", str(root / "cases" / "quick.toml"), "--out", str(tmp_path / "decks")],
+        [
+            sys.executable,
+            "-c",
+            code,
+            "render",
+            str(root / "cases" / "quick.toml"),
+            "--out",
+            str(tmp_path / "decks"),
+        ],
         capture_output=True,
         text=True,
         check=False,

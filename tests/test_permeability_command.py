@@ -33,7 +33,17 @@ def test_units_axes_and_fully_periodic_lattice(tmp_path, capsys):
     values = {}
     for units, axis in (("mm", "x"), ("mm", "z"), ("um", "y")):
         code, out, err = answer(
-            capsys, tmp_path / "sc.csv", "--units", units, "--box", box, "--periodic", "xyz", "--axis", axis, "--json"
+            capsys,
+            tmp_path / "sc.csv",
+            "--units",
+            units,
+            "--box",
+            box,
+            "--periodic",
+            "xyz",
+            "--axis",
+            axis,
+            "--json",
         )
         assert code == 0, err
         values[units, axis] = json.loads(out)
@@ -42,8 +52,19 @@ def test_units_axes_and_fully_periodic_lattice(tmp_path, capsys):
     assert result["k_initial_m2"] == pytest.approx(0.00252e-6, rel=0.10)
     assert result["k_damaged_m2"] == result["k_initial_m2"]
     assert values["mm", "z"]["k_initial_m2"] == pytest.approx(result["k_initial_m2"], rel=1e-3)
-    assert values["um", "y"]["k_initial_m2"] == pytest.approx(1e-6 * result["k_initial_m2"], rel=1e-3)
-    assert {"pores", "throats", "solver", "law", "damage_law", "seconds", "warnings", "porosity_damaged"} <= set(result)
+    assert values["um", "y"]["k_initial_m2"] == pytest.approx(
+        1e-6 * result["k_initial_m2"], rel=1e-3
+    )
+    assert {
+        "pores",
+        "throats",
+        "solver",
+        "law",
+        "damage_law",
+        "seconds",
+        "warnings",
+        "porosity_damaged",
+    } <= set(result)
 
 
 def test_walls_hold_the_fluid_unless_they_slip(tmp_path, capsys):
@@ -51,7 +72,9 @@ def test_walls_hold_the_fluid_unless_they_slip(tmp_path, capsys):
     box = cubic(tmp_path / "sc.csv")
     k = {}
     for walls in ("", "--walls=slip", "--walls=no-slip", "--periodic=yz"):
-        code, out, err = answer(capsys, tmp_path / "sc.csv", "--units", "mm", "--box", box, "--json", *walls.split())
+        code, out, err = answer(
+            capsys, tmp_path / "sc.csv", "--units", "mm", "--box", box, "--json", *walls.split()
+        )
         assert code == 0, err
         k[walls] = json.loads(out)["k_initial_m2"]
     assert k["--walls=slip"] == pytest.approx(k["--periodic=yz"], rel=1e-6)
@@ -61,12 +84,22 @@ def test_walls_hold_the_fluid_unless_they_slip(tmp_path, capsys):
 def test_a_box_that_does_not_start_at_zero(tmp_path, capsys):
     cubic(tmp_path / "sc.csv")
     rows = (tmp_path / "sc.csv").read_text().splitlines()
-    moved = [rows[1]] + [f"{float(row.split(',')[0]) + 7.0},{row.partition(',')[2]}" for row in rows[2:]]
+    moved = [rows[1]] + [
+        f"{float(row.split(',')[0]) + 7.0},{row.partition(',')[2]}" for row in rows[2:]
+    ]
     (tmp_path / "moved.csv").write_text("\n".join(moved) + "\n")
     values = []
     for name, box in (("sc", "0,4,0,4,0,4"), ("moved", "7,11,0,4,0,4")):
         code, out, err = answer(
-            capsys, tmp_path / f"{name}.csv", "--units", "mm", "--box", box, "--sections", "2", "--json"
+            capsys,
+            tmp_path / f"{name}.csv",
+            "--units",
+            "mm",
+            "--box",
+            box,
+            "--sections",
+            "2",
+            "--json",
         )
         assert code == 0, err
         values.append(json.loads(out))
@@ -77,7 +110,15 @@ def test_a_box_that_does_not_start_at_zero(tmp_path, capsys):
 def test_all_laws_as_a_table(tmp_path, capsys):
     box = cubic(tmp_path / "sc.csv")
     code, out, _ = answer(
-        capsys, tmp_path / "sc.csv", "--units", "mm", "--box", box, "--periodic", "yz", "--compare-laws"
+        capsys,
+        tmp_path / "sc.csv",
+        "--units",
+        "mm",
+        "--box",
+        box,
+        "--periodic",
+        "yz",
+        "--compare-laws",
     )
     assert code == 0
     for law in ("thesis", "effective", "hydraulic", "series", "thesis-code", "kozeny"):
@@ -129,7 +170,9 @@ def test_too_few_grains_and_missing_file(tmp_path, capsys):
 def test_a_pack_without_an_open_path_is_an_answer(tmp_path, capsys):
     """Spheres of 0.72 spacings close every triangle of the lattice (circumradius 0.707) but leave voids: k = 0."""
     box = cubic(tmp_path / "sc.csv", radius=0.72)
-    code, out, err = answer(capsys, tmp_path / "sc.csv", "--units", "mm", "--box", box, "--periodic", "xyz", "--json")
+    code, out, err = answer(
+        capsys, tmp_path / "sc.csv", "--units", "mm", "--box", box, "--periodic", "xyz", "--json"
+    )
     assert code == 0, err
     result = json.loads(out)
     assert result["k_initial_m2"] == 0
@@ -141,7 +184,9 @@ def test_a_pack_without_an_open_path_is_an_answer(tmp_path, capsys):
 @pytest.mark.filterwarnings("error")
 def test_a_box_beside_all_grains_is_told(tmp_path, capsys):
     cubic(tmp_path / "sc.csv")
-    code, _, err = answer(capsys, tmp_path / "sc.csv", "--units", "mm", "--box", "50,54,50,54,50,54")
+    code, _, err = answer(
+        capsys, tmp_path / "sc.csv", "--units", "mm", "--box", "50,54,50,54,50,54"
+    )
     assert code == 4
     assert "0 of 64 grains reach into the box" in err
 
@@ -149,12 +194,24 @@ def test_a_box_beside_all_grains_is_told(tmp_path, capsys):
 def test_a_folder_for_the_table_is_looked_for_first(tmp_path, capsys):
     box = cubic(tmp_path / "sc.csv")
     table = tmp_path / "none" / "laws.csv"
-    code, out, err = answer(capsys, tmp_path / "sc.csv", "--units", "mm", "--box", box, "--csv", table)
+    code, out, err = answer(
+        capsys, tmp_path / "sc.csv", "--units", "mm", "--box", box, "--csv", table
+    )
     assert (code, out) == (2, "")
     assert "is not a folder" in err
 
 
 def test_columns_of_the_table_stand_below_their_names(tmp_path, capsys):
     box = cubic(tmp_path / "sc.csv")
-    _, out, _ = answer(capsys, tmp_path / "sc.csv", "--units", "mm", "--box", box, "--periodic", "yz", "--compare-laws")
+    _, out, _ = answer(
+        capsys,
+        tmp_path / "sc.csv",
+        "--units",
+        "mm",
+        "--box",
+        box,
+        "--periodic",
+        "yz",
+        "--compare-laws",
+    )
     assert len({len(line) for line in out.splitlines()[1:]}) == 1

@@ -8,13 +8,14 @@ from pathlib import Path
 import pytest
 
 from fdnet.cli import main
-from fdnet.network.conductance import DEFAULT_LAW, LAWS
-from fdnet.network.damage import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW
+from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, LAWS
 from fdnet.permeability_command import DAMAGE_LAW_NAMES, LAW_NAMES
 
 DATA = Path(__file__).parent / "data" / "truth"
 OWN = Path(__file__).parents[1] / "docs" / "validation" / "truth_own.csv"
-ROWS = [row for path in (DATA / "truth.csv", OWN) for row in csv.DictReader(path.open()) if row["file"]]
+ROWS = [
+    row for path in (DATA / "truth.csv", OWN) for row in csv.DictReader(path.open()) if row["file"]
+]
 TRUTH = {f"{row['case']}-{row['axis']}": row for row in ROWS if (DATA / row["file"]).exists()}
 INTACT = [name for name, row in TRUTH.items() if not row["k_over_k0"]]
 FILLED = [name for name, row in TRUTH.items() if row["k_over_k0"]]
@@ -28,7 +29,16 @@ def error(name: str) -> float:
 def run(capsys: pytest.CaptureFixture[str], name: str, *more: str) -> dict:
     row = TRUTH[name]
     box = ",".join(["0", row["edge_mm"]] * 3)
-    command = ["permeability", str(DATA / row["file"]), "--units", "mm", "--box", box, "--periodic", "xyz"]
+    command = [
+        "permeability",
+        str(DATA / row["file"]),
+        "--units",
+        "mm",
+        "--box",
+        box,
+        "--periodic",
+        "xyz",
+    ]
     assert main([*command, "--axis", row["axis"], "--json", *more]) == 0
     return json.loads(capsys.readouterr().out)
 
@@ -45,7 +55,9 @@ def test_intact_packs_and_lattices_within_2_percent(capsys, name):
 def test_loss_by_fines_within_10_percent(capsys, name):
     """k/k0 from 0.89 down to 0.0175, fines 1/5 and 1/10, even and in layers across and along the flow."""
     found = run(capsys, name)
-    assert 1 - found["k_reduction"] == pytest.approx(float(TRUTH[name]["k_over_k0"]), rel=0.10 + error(name))
+    assert 1 - found["k_reduction"] == pytest.approx(
+        float(TRUTH[name]["k_over_k0"]), rel=0.10 + error(name)
+    )
     assert found["porosity_damaged"] < found["porosity_initial"]
 
 
@@ -53,8 +65,14 @@ def test_root_mean_square_errors_are_within_the_goals(capsys):
     """Intact 3 %, loss by fines 5 %."""
     for names, key, goal in ((INTACT, "k_mm2", 0.03), (FILLED, "k_over_k0", 0.05)):
         found = [run(capsys, name) for name in names]
-        model = [one["k_initial_m2"] * 1e6 if key == "k_mm2" else 1 - one["k_reduction"] for one in found]
-        logs = [math.log(value / float(TRUTH[name][key])) for value, name in zip(model, names, strict=True)]
+        model = [
+            one["k_initial_m2"] * 1e6 if key == "k_mm2" else 1 - one["k_reduction"]
+            for one in found
+        ]
+        logs = [
+            math.log(value / float(TRUTH[name][key]))
+            for value, name in zip(model, names, strict=True)
+        ]
         assert math.sqrt(sum(log * log for log in logs) / len(logs)) < goal
 
 
@@ -69,13 +87,28 @@ def test_compared_laws_give_what_each_gives_alone(capsys, tmp_path):
     pairs = {(one["law"], one["damage_law"]): one for one in found["laws"]}
     assert set(pairs) == {(law, damage) for law in LAWS for damage in DAMAGE_LAWS}
     assert found["k_damaged_m2"] == pairs[DEFAULT_LAW, DEFAULT_DAMAGE_LAW]["k_damaged_m2"]
-    alone = run(capsys, "packC_r5_d2-x", "--law", "thesis", "--damage-law", "thesis", "--sections", "2")
+    alone = run(
+        capsys, "packC_r5_d2-x", "--law", "thesis", "--damage-law", "thesis", "--sections", "2"
+    )
     both = pairs["thesis", "thesis"]
-    for key in ("k_initial_m2", "k_damaged_m2", "sections", "porosity_damaged", "solver", "network_counts", "warnings"):
+    for key in (
+        "k_initial_m2",
+        "k_damaged_m2",
+        "sections",
+        "porosity_damaged",
+        "solver",
+        "network_counts",
+        "warnings",
+    ):
         assert both[key] == alone[key], key
     with table.open() as rows:
-        written = {(row["law"], row["damage_law"]): float(row["k_damaged_m2"]) for row in csv.DictReader(rows)}
-    assert written == pytest.approx({pair: one["k_damaged_m2"] for pair, one in pairs.items()}, rel=1e-8)
+        written = {
+            (row["law"], row["damage_law"]): float(row["k_damaged_m2"])
+            for row in csv.DictReader(rows)
+        }
+    assert written == pytest.approx(
+        {pair: one["k_damaged_m2"] for pair, one in pairs.items()}, rel=1e-8
+    )
 
 
 @pytest.mark.parametrize(("periodic", "axis"), [("xyz", "x"), ("yz", "x"), ("xy", "z"), ("", "y")])
@@ -86,13 +119,29 @@ def test_sections_in_place_recombine_in_series(capsys, periodic, axis):
     for name in ("initial", "damaged"):
         rows = found["sections"]
         thickness = [row["x_hi_m"] - row["x_lo_m"] for row in rows]
-        series = sum(dx / row[f"k_{name}_inplace_m2"] for dx, row in zip(thickness, rows, strict=True))
+        series = sum(
+            dx / row[f"k_{name}_inplace_m2"] for dx, row in zip(thickness, rows, strict=True)
+        )
         assert sum(thickness) / series == pytest.approx(found[f"k_{name}_m2"], rel=1e-9)
 
 
 def test_sections_are_printed_with_their_units(capsys):
     box = ",".join(["0", TRUTH["packC_r5_d2-x"]["edge_mm"]] * 3)
-    assert main(["permeability", str(DATA / "packC_r5_d2.csv"), "--units", "mm", "--box", box, "--sections", "3"]) == 0
+    assert (
+        main(
+            [
+                "permeability",
+                str(DATA / "packC_r5_d2.csv"),
+                "--units",
+                "mm",
+                "--box",
+                box,
+                "--sections",
+                "3",
+            ]
+        )
+        == 0
+    )
     said = capsys.readouterr().out
     assert "from m" in said
     assert len([row for row in said.splitlines() if row.startswith(" ")]) == 4

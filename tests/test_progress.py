@@ -1,11 +1,11 @@
 """Progress says the step, the invaded count and the time left."""
 
-from fdnet.progress import Progress
+from fdnet.run.progress import Progress
 
 
 def test_lines_of_a_run_become_progress(capsys, monkeypatch):
     clock = iter(range(0, 1000, 6))
-    monkeypatch.setattr("fdnet.progress.time.monotonic", lambda: float(next(clock)))
+    monkeypatch.setattr("fdnet.run.progress.time.monotonic", lambda: float(next(clock)))
     with Progress("invade", 1000) as progress:
         progress("      100     1369   1.5e-07     0.21")
         progress("noise 1 2 3")

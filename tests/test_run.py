@@ -16,7 +16,7 @@ import pytest
 from builders import tiny
 
 from fdnet.errors import CaseError
-from fdnet.pipeline import RunOptions, run_case
+from fdnet.run.pipeline import RunOptions, run_case
 
 pytestmark = pytest.mark.liggghts
 SHORT = ("run.cap_ms=0.35",)
@@ -55,7 +55,9 @@ def test_the_folder_keeps_the_output_contract(finished, root):
     run, _, summary = finished
     checker = root.parent / "shared" / "checks" / "contract.py"
     if checker.exists():
-        checked = subprocess.run([sys.executable, str(checker), str(run)], capture_output=True, text=True, check=False)
+        checked = subprocess.run(
+            [sys.executable, str(checker), str(run)], capture_output=True, text=True, check=False
+        )
         assert checked.stdout.strip() == "contract holds"
     assert summary["supplied_count"] == 300
     assert summary["invaded_count"] > 0
@@ -99,7 +101,12 @@ def test_stages_still_to_run_take_the_new_policy(finished, tmp_path):
     _, case, _ = finished
     assert fdnet("run", case, "--out", tmp_path / "run", "--stages", "pack").returncode == 0
     before = (tmp_path / "run" / "case.toml").read_text()
-    assert fdnet("run", case, "--out", tmp_path / "run", "--stages", "pack", "--set", MORE_HOURS).returncode == 0
+    assert (
+        fdnet(
+            "run", case, "--out", tmp_path / "run", "--stages", "pack", "--set", MORE_HOURS
+        ).returncode
+        == 0
+    )
     assert (tmp_path / "run" / "case.toml").read_text() == before
     assert fdnet("run", case, "--out", tmp_path / "run", "--set", MORE_HOURS).returncode == 0
     assert "max_hours = 99" in (tmp_path / "run" / "case.toml").read_text()
@@ -146,21 +153,42 @@ def test_force_with_another_law_keeps_pack_and_invasion(finished, tmp_path):
     copy = tmp_path / "run"
     shutil.copytree(run, copy)
     again = fdnet(
-        "run", case, "--out", copy, "--set", "analysis.law=thesis", "--stages", "analyse,report", "--force", "--json"
+        "run",
+        case,
+        "--out",
+        copy,
+        "--set",
+        "analysis.law=thesis",
+        "--stages",
+        "analyse,report",
+        "--force",
+        "--json",
     )
     assert again.returncode == 0, again.stderr
     result = json.loads(again.stdout)
     assert result["law"] == "thesis"
     assert result["invaded_count"] == summary["invaded_count"]
     assert result["k_initial_m2"] != summary["k_initial_m2"]
-    assert (copy / "invade" / "stage.json").stat().st_mtime_ns == (run / "invade" / "stage.json").stat().st_mtime_ns
+    assert (copy / "invade" / "stage.json").stat().st_mtime_ns == (
+        run / "invade" / "stage.json"
+    ).stat().st_mtime_ns
 
 
 def test_force_that_would_need_an_unasked_stage_changes_nothing(finished, tmp_path):
     run, case, _ = finished
     copy = tmp_path / "run"
     shutil.copytree(run, copy)
-    refused = fdnet("run", case, "--out", copy, "--set", "fines.friction=0.3", "--stages", "analyse,report", "--force")
+    refused = fdnet(
+        "run",
+        case,
+        "--out",
+        copy,
+        "--set",
+        "fines.friction=0.3",
+        "--stages",
+        "analyse,report",
+        "--force",
+    )
     assert refused.returncode == 2
     assert "add invade to --stages" in refused.stderr
     refused = fdnet("run", case, "--out", copy, "--force", "--liggghts", "/nowhere")
@@ -202,7 +230,10 @@ def test_a_broken_dump_in_mid_history_is_counted_not_fatal(finished, tmp_path):
     shutil.copytree(run, copy)
     (copy / "manifest.json").unlink()
     (copy / "invade" / "stage.json").unlink()
-    steps = [line.split(",")[1] for line in (copy / "invade" / "history.csv").read_text().splitlines()[1:]]
+    steps = [
+        line.split(",")[1]
+        for line in (copy / "invade" / "history.csv").read_text().splitlines()[1:]
+    ]
     (copy / "invade" / "post" / f"invade_{steps[0]}.dump").write_bytes(b"")
     done = fdnet("run", case, "--out", copy, "--resume", "--json")
     assert done.returncode == 0, done.stderr
@@ -230,7 +261,9 @@ def test_counts_are_checked_at_every_checkpoint(finished, tmp_path):
 def test_the_time_limit_holds_for_packing_too(finished, tmp_path):
     _, case, _ = finished
     fake = tmp_path / "liggghts"
-    fake.write_text('#!/bin/sh\necho "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0)"\n[ "$1" = -h ] || sleep 100\n')
+    fake.write_text(
+        '#!/bin/sh\necho "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0)"\n[ "$1" = -h ] || sleep 100\n'
+    )
     fake.chmod(0o755)
     start = time.monotonic()
     stopped = fdnet("run", case, "--out", tmp_path / "run", "--liggghts", fake, "--timeout", "1")
@@ -243,14 +276,20 @@ def test_an_overlap_past_its_limit_stops_the_run_if_asked_and_is_told(finished, 
     """Tiny's fines overlap by some 5 %: exit 3 with the state kept; --resume with another policy completes it."""
     _, case, summary = finished
     out = tmp_path / "run"
-    told = [warning for warning in summary["warnings"] if "run.max_overlap" in warning and "at step" in warning]
+    told = [
+        warning
+        for warning in summary["warnings"]
+        if "run.max_overlap" in warning and "at step" in warning
+    ]
     assert len(told) == 1
     command = ["run", case, "--out", out, "--stages", "pack,invade,analyse", "--json"]
     for extra in ([], ["--resume"]):
         stopped = fdnet(*command, "--set", "run.on_overlap=stop", *extra)
         assert stopped.returncode == 3
         assert "--resume --set run.on_overlap=warn" in stopped.stderr
-    done = fdnet(*command, "--resume", "--set", "run.max_overlap=0.2", "--set", "run.on_overlap=stop")
+    done = fdnet(
+        *command, "--resume", "--set", "run.max_overlap=0.2", "--set", "run.on_overlap=stop"
+    )
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     assert result["max_overlap_fraction"] == summary["max_overlap_fraction"] > 0.03
@@ -265,7 +304,9 @@ def test_stages_one_after_the_other_equal_all_at_once(finished, tmp_path):
         assert done.returncode == 0, done.stderr
     result = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert result["k_damaged_m2"] == summary["k_damaged_m2"]
-    assert np.array_equal(*(Path(p, "spheres_damaged.csv").read_text() for p in (run, tmp_path / "run")))
+    assert np.array_equal(
+        *(Path(p, "spheres_damaged.csv").read_text() for p in (run, tmp_path / "run"))
+    )
 
 
 def test_a_stage_without_its_forerunner_is_refused(tmp_path):
@@ -383,7 +424,12 @@ def test_bad_input_removes_the_parents_it_made_and_no_others(tmp_path, kept):
     (tmp_path / "runs" / kept).mkdir(parents=True)
     case = write_case(tmp_path)
     before = sorted(tmp_path.rglob("*"))
-    assert fdnet("run", case, "--set", TOO_DENSE, "--out", tmp_path / "runs" / "a" / "b" / "c").returncode == 2
+    assert (
+        fdnet(
+            "run", case, "--set", TOO_DENSE, "--out", tmp_path / "runs" / "a" / "b" / "c"
+        ).returncode
+        == 2
+    )
     assert sorted(tmp_path.rglob("*")) == before
 
 
@@ -392,12 +438,17 @@ def test_a_folder_that_cannot_be_cleared_does_not_hide_the_refusal(tmp_path, mon
         raise OSError(errno.EBUSY, "Device or resource busy", str(path))
 
     monkeypatch.setattr(shutil, "rmtree", stuck)
-    with pytest.raises(CaseError, match=r"needs grains that overlap .*; .*run could not be cleared \(Device or res"):
+    with pytest.raises(
+        CaseError,
+        match=r"needs grains that overlap .*; .*run could not be cleared \(Device or res",
+    ):
         run_case(tiny(TOO_DENSE), RunOptions(out=tmp_path / "run", show_progress=False))
 
 
 def test_a_missing_binary_ends_with_3_before_anything_is_written(tmp_path):
-    refused = fdnet("run", write_case(tmp_path), "--out", tmp_path / "run", "--liggghts", "/nowhere/liggghts")
+    refused = fdnet(
+        "run", write_case(tmp_path), "--out", tmp_path / "run", "--liggghts", "/nowhere/liggghts"
+    )
     assert refused.returncode == 3
     assert "LIGGGHTS not found" in refused.stderr
     assert not (tmp_path / "run").exists()
@@ -406,7 +457,9 @@ def test_a_missing_binary_ends_with_3_before_anything_is_written(tmp_path):
 def test_a_failing_binary_ends_with_3_and_keeps_what_was_written(finished, tmp_path):
     _, case, _ = finished
     fake = tmp_path / "liggghts"
-    fake.write_text('#!/bin/sh\necho "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0)"\necho "ERROR: played"\nexit 1\n')
+    fake.write_text(
+        '#!/bin/sh\necho "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0)"\necho "ERROR: played"\nexit 1\n'
+    )
     fake.chmod(0o755)
     failed = fdnet("run", case, "--out", tmp_path / "run", "--liggghts", fake)
     assert failed.returncode == 3
@@ -430,7 +483,15 @@ def small_disk(tmp_path, request):
 
 def test_a_full_disk_is_named_and_room_completes_the_run(finished, small_disk):
     _, case, summary = finished
-    command = ["run", case, "--out", small_disk / "run", "--stages", "pack,invade,analyse", "--json"]
+    command = [
+        "run",
+        case,
+        "--out",
+        small_disk / "run",
+        "--stages",
+        "pack,invade,analyse",
+        "--json",
+    ]
     full = fdnet(*command)
     assert full.returncode == 3
     assert "the disk is full" in full.stderr
@@ -444,7 +505,17 @@ def test_two_ranks_complete_a_run(finished, tmp_path, binary):
     if binary.launcher is None:
         pytest.skip("no mpirun on this machine")
     _, case, summary = finished
-    done = fdnet("run", case, "--out", tmp_path / "run", "--np", "2", "--stages", "pack,invade,analyse", "--json")
+    done = fdnet(
+        "run",
+        case,
+        "--out",
+        tmp_path / "run",
+        "--np",
+        "2",
+        "--stages",
+        "pack,invade,analyse",
+        "--json",
+    )
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     assert abs(result["invaded_count"] - summary["invaded_count"]) < 0.2 * summary["invaded_count"]
@@ -479,7 +550,9 @@ def test_an_intact_pack_needs_no_fines(tmp_path):
 
 
 def test_mobile_grains_give_a_moved_permeability(tmp_path):
-    done = fdnet("run", write_case(tmp_path, "grains.motion=mobile"), "--out", tmp_path / "run", "--json")
+    done = fdnet(
+        "run", write_case(tmp_path, "grains.motion=mobile"), "--out", tmp_path / "run", "--json"
+    )
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout)
     assert summary["k_damaged_m2"] <= summary["k_moved_m2"]
@@ -512,5 +585,7 @@ def test_help_is_quick_to_import():
     """The heavy libraries are imported only by the commands that need them."""
     heavy = ("numpy", "pandas", "pyvista", "scipy")
     code = f"import sys, fdnet.cli; fdnet.cli._parser(); print([m for m in {heavy} if m in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
     assert done.stdout.strip() == "[]"

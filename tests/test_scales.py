@@ -5,12 +5,12 @@ import math
 import pytest
 from builders import tiny
 
-from fdnet.case_file import read_case
-from fdnet.contact_law import series
+from fdnet.case.file import read_case
 from fdnet.dem.checkpoint import chunks_of
 from fdnet.errors import CaseError
-from fdnet.scale_table import scale_rows
-from fdnet.scales import carman_kozeny, relaxation_time, scales_of
+from fdnet.scales.scales import carman_kozeny, relaxation_time, scales_of
+from fdnet.scales.springs import series
+from fdnet.scales.table import scale_rows
 
 
 @pytest.fixture
@@ -29,21 +29,30 @@ def test_specimen_1_has_the_velocities_of_the_thesis(specimen1):
 
 
 def test_specimen_5_is_further_outside_stokes(root):
-    assert scales_of(read_case(root / "cases" / "specimen5.toml")).reynolds == pytest.approx(12, abs=0.3)
+    assert scales_of(read_case(root / "cases" / "specimen5.toml")).reynolds == pytest.approx(
+        12, abs=0.3
+    )
 
 
 def test_carman_kozeny_by_hand():
     assert carman_kozeny(0.5, 1e-3) == pytest.approx(1e-6 * 0.125 / (180 * 0.25), rel=1e-12)
 
 
-@pytest.mark.parametrize(("diameter_mm", "microseconds"), [(0.05, 5.96), (0.10, 23.8), (0.16, 61.0)])
+@pytest.mark.parametrize(
+    ("diameter_mm", "microseconds"), [(0.05, 5.96), (0.10, 23.8), (0.16, 61.0)]
+)
 def test_relaxation_times(diameter_mm, microseconds):
-    assert relaxation_time(0.5e-3 * diameter_mm, 2146, 0.05) == pytest.approx(1e-6 * microseconds, rel=2e-3)
+    assert relaxation_time(0.5e-3 * diameter_mm, 2146, 0.05) == pytest.approx(
+        1e-6 * microseconds, rel=2e-3
+    )
 
 
 def test_springs_in_series_and_smaller_friction(specimen1):
     _, scales = specimen1
-    nominal = {name: contact.normal_stiffness / scales.stiffness_factor for name, contact in scales.contacts.items()}
+    nominal = {
+        name: contact.normal_stiffness / scales.stiffness_factor
+        for name, contact in scales.contacts.items()
+    }
     assert nominal["grain-grain"] == pytest.approx(47.15e9)
     assert nominal["grain-fine"] == pytest.approx(37.77e9, rel=1e-3)
     assert nominal["fine-fine"] == pytest.approx(31.5e9)
@@ -58,21 +67,29 @@ def test_scaling_keeps_ratios_of_stiffness(specimen1):
     assert max(c.normal_stiffness for c in used.values()) == pytest.approx(1e4)
     ratio = used["fine-fine"].normal_stiffness / used["grain-grain"].normal_stiffness
     assert ratio == pytest.approx(31.5 / 47.15, rel=1e-9)
-    assert scales_of(tiny("run.stiffness_N_m=94.3e9")).contacts["grain-grain"].normal_stiffness == pytest.approx(94.3e9)
+    assert scales_of(tiny("run.stiffness_N_m=94.3e9")).contacts[
+        "grain-grain"
+    ].normal_stiffness == pytest.approx(94.3e9)
 
 
 def test_damping_rate_gives_the_damping_ratio():
     case = tiny("fines.damping_ratio=0.3", "grains.damping_ratio=0.3")
     contact = scales_of(case).contacts["fine-fine"]
     mass = 4 / 3 * math.pi * (0.05e-3) ** 3 * 2146 / 2
-    assert contact.damping_rate == pytest.approx(2 * 0.3 * math.sqrt(contact.normal_stiffness / mass))
+    assert contact.damping_rate == pytest.approx(
+        2 * 0.3 * math.sqrt(contact.normal_stiffness / mass)
+    )
 
 
 def test_supply_from_count_and_from_slab():
     counted = scales_of(tiny())
-    assert counted.slab_length == pytest.approx(300 * 4 / 3 * math.pi * (0.05e-3) ** 3 / (0.1 * 1.6e-3**2))
+    assert counted.slab_length == pytest.approx(
+        300 * 4 / 3 * math.pi * (0.05e-3) ** 3 / (0.1 * 1.6e-3**2)
+    )
     slab = scales_of(tiny("fines={radius_mm=0.05, slab_mm=0.5}"))
-    assert slab.supplied_count == round(0.1 * 0.5e-3 * 1.6e-3**2 / (4 / 3 * math.pi * (0.05e-3) ** 3))
+    assert slab.supplied_count == round(
+        0.1 * 0.5e-3 * 1.6e-3**2 / (4 / 3 * math.pi * (0.05e-3) ** 3)
+    )
 
 
 def test_given_velocity_replaces_darcy():
@@ -82,7 +99,8 @@ def test_given_velocity_replaces_darcy():
 
 
 @pytest.mark.parametrize(
-    ("assignment", "bound"), [("run.time_step_s=1e-6", "contact bound"), ("drag.refresh_steps=100000", "are stable")]
+    ("assignment", "bound"),
+    [("run.time_step_s=1e-6", "contact bound"), ("drag.refresh_steps=100000", "are stable")],
 )
 def test_a_step_beyond_its_bound_is_refused_with_the_bound(assignment, bound):
     with pytest.raises(CaseError, match=bound):
@@ -99,7 +117,9 @@ def test_doubtful_input_warns():
     assert "held for" in text
     assert "overlap under impact" in text
     assert "fewer than 10 fines" in " ".join(scales_of(tiny("run.plug_time_ms=0.0001")).warnings)
-    assert "lengthened to one fine's diameter" in " ".join(scales_of(tiny("fines.count=1")).warnings)
+    assert "lengthened to one fine's diameter" in " ".join(
+        scales_of(tiny("fines.count=1")).warnings
+    )
     assert "overlap under drag" in " ".join(scales_of(tiny("drag.multiplier=40")).warnings)
 
 
@@ -121,7 +141,9 @@ def test_an_inviscid_fluid_is_refused_for_its_speed_and_works_with_a_given_one()
 def test_impact_is_refused_above_half_a_diameter():
     scales = scales_of(tiny("fluid.velocity_m_s=1.0"))
     limit = 0.5 / scales.impact_overlap
-    assert scales_of(tiny(f"fluid.velocity_m_s={0.999 * limit}")).impact_overlap == pytest.approx(0.4995)
+    assert scales_of(tiny(f"fluid.velocity_m_s={0.999 * limit}")).impact_overlap == pytest.approx(
+        0.4995
+    )
     with pytest.raises(CaseError, match="impact alone"):
         scales_of(tiny(f"fluid.velocity_m_s={1.001 * limit}"))
 
@@ -132,7 +154,8 @@ def test_the_limit_of_the_warning_is_the_cases_own():
 
 
 @pytest.mark.parametrize(
-    "assignment", ["fluid.overbalance_MPa=1e-17", "fluid.viscosity_cP=1e15", "run.time_step_s=1e-18"]
+    "assignment",
+    ["fluid.overbalance_MPa=1e-17", "fluid.viscosity_cP=1e15", "run.time_step_s=1e-18"],
 )
 def test_extreme_numbers_are_refused_not_crashed_on(assignment):
     with pytest.raises(CaseError):
@@ -145,21 +168,29 @@ def test_the_plug_time_waits_for_fines_to_arrive():
     scales = scales_of(case)
     arrival = 4 / 3 * math.pi * 1e-4**3 / (0.001 * 1.6e-3**2 * scales.upstream_velocity)
     assert scales.plug_time == pytest.approx(10 * arrival)
-    assert scales_of(tiny()).plug_time == pytest.approx(4 * 0.5e-3 / scales_of(tiny()).interstitial_velocity)
+    assert scales_of(tiny()).plug_time == pytest.approx(
+        4 * 0.5e-3 / scales_of(tiny()).interstitial_velocity
+    )
 
 
 @pytest.mark.parametrize("stiffness", [1e2, 3e2, 1e3, 3e3, 1e4, 1e5, 1e6])
 @pytest.mark.parametrize("duration_ms", [0.08, 0.2, 2.0])
 def test_a_duration_is_met_by_whole_chunks(stiffness, duration_ms):
     """To half a refresh of drag a chunk, whichever way the steps of a chunk were rounded."""
-    case = tiny(f"run.duration_ms={duration_ms!r}", f"run.stiffness_N_m={stiffness!r}", "fluid.velocity_m_s=5.0")
+    case = tiny(
+        f"run.duration_ms={duration_ms!r}",
+        f"run.stiffness_N_m={stiffness!r}",
+        "fluid.velocity_m_s=5.0",
+    )
     scales = scales_of(case)
     chunks, refresh = chunks_of(case, scales), scales.hold_steps * scales.time_step
     run = chunks * scales.checkpoint_steps * scales.time_step
     assert abs(run - duration_ms * 1e-3) <= 0.5001 * chunks * refresh
 
 
-@pytest.mark.parametrize(("cap_ms", "expected"), [(0.05, 1), (0.09, 1), (0.12, 2), (0.18, 2), (0.2, 3)])
+@pytest.mark.parametrize(
+    ("cap_ms", "expected"), [(0.05, 1), (0.09, 1), (0.12, 2), (0.18, 2), (0.2, 3)]
+)
 def test_a_cap_is_reached_by_whole_chunks(cap_ms, expected):
     """The least number of chunks of 0.09 ms that does not end before the cap; 0.12 ms is nearer to one than to two."""
     case = tiny(f"run.cap_ms={cap_ms}", "run.checkpoint_ms=0.09", "fluid.velocity_m_s=5.0")
@@ -173,7 +204,9 @@ def test_a_cap_is_reached_by_whole_chunks(cap_ms, expected):
 def test_damping_takes_the_mass_of_what_moves(motion, heavy):
     """A frozen grain is infinitely heavy, in LIGGGHTS too: rate = 2 zeta sqrt(k / m), 1/m = 1/m_fine + 1/m_grain if
     the grain moves."""
-    contact = scales_of(tiny("fines.radius_mm=0.2", "fines.count=60", f"grains.motion={motion}")).contacts["grain-fine"]
+    contact = scales_of(
+        tiny("fines.radius_mm=0.2", "fines.count=60", f"grains.motion={motion}")
+    ).contacts["grain-fine"]
     fine, grain = (4 / 3 * math.pi * r**3 * rho for r, rho in ((0.2e-3, 2146), (0.25e-3, 2650)))
     assert contact.damping_rate == pytest.approx(
         2 * 0.2 * math.sqrt(contact.normal_stiffness * (1 / fine + heavy / grain))

@@ -4,12 +4,12 @@ import sys
 
 import pytest
 
-from fdnet.studies.thesis.examine import examine
 from fdnet.studies.thesis.findings import CAPTIONS, RESULTS
-from fdnet.studies.thesis.plan import CHEAP, SEEDS, SPECIMENS, VARIANTS, Planned, planned
-from fdnet.studies.thesis.results import read_results, result_rows
-from fdnet.studies.thesis.runs import state_path
-from fdnet.studies.thesis.state import read_state
+from fdnet.studies.thesis.numbers.examine import examine
+from fdnet.studies.thesis.numbers.results import read_results, result_rows
+from fdnet.studies.thesis.runs.carry_out import state_path
+from fdnet.studies.thesis.runs.plan import CHEAP, SEEDS, SPECIMENS, VARIANTS, Planned, planned
+from fdnet.studies.thesis.runs.state import read_state
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +59,10 @@ def test_a_kept_state_gives_its_rows_again(root, rows, name):
     assert state.case == item.load()
     kept = [row for row in rows if (row.id, row.seed) == (name, 1)]
     for row, told in zip(result_rows(examine(item.id, state)), kept, strict=True):
-        assert (row.law, row.invaded_count, row.stop_reason) == (told.law, told.invaded_count, told.stop_reason)
+        assert (row.law, row.invaded_count, row.stop_reason) == (
+            told.law,
+            told.invaded_count,
+            told.stop_reason,
+        )
         assert row.k_reductions == pytest.approx(told.k_reductions, rel=1e-6, abs=1e-9)
         assert row.porosity_damaged == pytest.approx(told.porosity_damaged, rel=1e-6)

@@ -5,9 +5,9 @@ import math
 import pytest
 from builders import tiny
 
-from fdnet.case import Case
+from fdnet.case.case import Case
 from fdnet.errors import CaseError
-from fdnet.scales import Scales, relaxation_time, scales_of
+from fdnet.scales.scales import Scales, relaxation_time, scales_of
 
 FINE = 4 / 3 * math.pi * (0.05e-3) ** 3 * 2146
 FAST = "drag.multiplier=1e3"
@@ -49,7 +49,9 @@ def test_explicit_drag_warns_above_a_tenth_of_tau_and_is_refused_above_tau(schem
         assert "drag is held" not in said(explicit(part * short, scheme))
     for part in (0.1001, 0.9999, 1.0):
         assert "drag is held" in said(explicit(part * short, scheme))
-    with pytest.raises(CaseError, match=r"above the drag relaxation time .* drag\.scheme = 'implicit'"):
+    with pytest.raises(
+        CaseError, match=r"above the drag relaxation time .* drag\.scheme = 'implicit'"
+    ):
         scales_of(explicit(1.0001 * short, scheme))
 
 
@@ -79,7 +81,9 @@ def test_a_given_refresh_warns_above_a_tenth_of_tau_and_is_refused_above_tau():
 @pytest.mark.parametrize("factor", [0.01, 0.1, 0.2])
 def test_a_derived_step_keeps_both_bounds_without_a_warning(factor):
     def derived(*assignments: str) -> Scales:
-        return scales_of(tiny(f"run.time_step_factor={factor}", "run.checkpoint_ms=0.1", *assignments))
+        return scales_of(
+            tiny(f"run.time_step_factor={factor}", "run.checkpoint_ms=0.1", *assignments)
+        )
 
     for scheme in ("every_step", "held", "viscous"):
         assert derived(f"drag.scheme={scheme}").time_step == pytest.approx(factor * bound())
@@ -102,4 +106,6 @@ def test_drag_is_never_held_longer_than_a_chunk():
 
 def test_a_refresh_beyond_the_chunk_is_refused():
     with pytest.raises(CaseError, match=r"between checkpoints; expected at most \d+"):
-        scales_of(tiny("drag.refresh_steps=100000", "fluid.viscosity_cP=1e-6", "fluid.velocity_m_s=1.0"))
+        scales_of(
+            tiny("drag.refresh_steps=100000", "fluid.viscosity_cP=1e-6", "fluid.velocity_m_s=1.0")
+        )

@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from fdnet.studies.command import STUDIES, study_named
-from fdnet.studies.table import read_rows, study_text
+from fdnet.studies.engine.table import read_rows, study_text
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +17,9 @@ def validation(root):
 
 
 def test_the_page_is_written_from_the_committed_tables(root, validation):
-    assert (root / "docs/validation.md").read_text(encoding="utf-8") == validation.document(root / "docs")
+    assert (root / "docs/validation.md").read_text(encoding="utf-8") == validation.document(
+        root / "docs"
+    )
 
 
 @pytest.mark.parametrize("name", list(STUDIES))
@@ -29,5 +31,7 @@ def test_every_study_has_its_table_text_and_figure(root, name):
 
 
 def test_evidence_becomes_links(validation):
-    found = validation.evidence("as told tests/dem/test_a.py::test_it_holds; tests/test_b.py::test_c")
+    found = validation.evidence(
+        "as told tests/dem/test_a.py::test_it_holds; tests/test_b.py::test_c"
+    )
     assert found == "as told ([it_holds](../tests/dem/test_a.py)); ([c](../tests/test_b.py))"

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.case import Case
-from fdnet.dem.dump import read_frame
+from fdnet.case.case import Case
 from fdnet.dem.scene import snapshot_of
 from fdnet.dem.supply import batches_of
 from fdnet.errors import DumpError, LiggghtsError
-from fdnet.scales import Scales, arrival_time
-from fdnet.snapshot import Kind, Snapshot
+from fdnet.scales.scales import Scales, arrival_time
+from fdnet.spheres.dump import read_frame
+from fdnet.spheres.snapshot import Kind, Snapshot
 
 HISTORY = "history.csv"
 HISTORY_HEADER = "chunk,step,upstream,invaded,passed,removed_upstream,most_crossed,quiet"
@@ -46,19 +46,25 @@ def chunks_of(case: Case, scales: Scales) -> int:
 
 def quiet_chunks(scales: Scales) -> int:
     """Chunks without a crossing that make the plug time."""
-    return max(1, math.ceil(scales.plug_time / (scales.checkpoint_steps * scales.time_step) - 1e-9))
+    return max(
+        1, math.ceil(scales.plug_time / (scales.checkpoint_steps * scales.time_step) - 1e-9)
+    )
 
 
 def plug_allowance(case: Case, scales: Scales) -> int:
     """Fines that may cross the face within the plug time though it counts as plugged: `run.plug_rate` of all that the
     undisturbed suspension would bring."""
-    return math.floor(case.run.plug_rate * scales.plug_time / arrival_time(case, scales.upstream_velocity))
+    return math.floor(
+        case.run.plug_rate * scales.plug_time / arrival_time(case, scales.upstream_velocity)
+    )
 
 
 def empty_chunks(case: Case, scales: Scales) -> int:
     """Chunks without a fine leaving once the slab is empty: twice the fluid's passage, at least the plug time."""
     passage = 2 * case.size_m[0] / scales.interstitial_velocity
-    return max(quiet_chunks(scales), math.ceil(passage / (scales.checkpoint_steps * scales.time_step)))
+    return max(
+        quiet_chunks(scales), math.ceil(passage / (scales.checkpoint_steps * scales.time_step))
+    )
 
 
 def quiet_enough(case: Case, scales: Scales, row: Checkpoint) -> bool:
@@ -80,9 +86,18 @@ def read_history(folder: Path) -> tuple[Checkpoint, ...]:
     for line in text[: text.rfind("\n") + 1].splitlines()[1:]:
         parts = line.split(",")
         if len(parts) == len(HISTORY_HEADER.split(",")) and all(_is_count(p) for p in parts):
-            rows.append(Checkpoint(**{n: int(float(p)) for n, p in zip(HISTORY_HEADER.split(","), parts, strict=True)}))
+            rows.append(
+                Checkpoint(
+                    **{
+                        n: int(float(p))
+                        for n, p in zip(HISTORY_HEADER.split(","), parts, strict=True)
+                    }
+                )
+            )
     if not rows:
-        raise LiggghtsError(f"{folder / HISTORY}: no checkpoint recorded; see {folder}/screen.txt, run again")
+        raise LiggghtsError(
+            f"{folder / HISTORY}: no checkpoint recorded; see {folder}/screen.txt, run again"
+        )
     return tuple(rows)
 
 
@@ -123,7 +138,9 @@ def _whole(folder: Path, row: Checkpoint, grain_number: int) -> bool:
     return fines == remaining and size > 100 * (fines + grain_number)
 
 
-def state_at(folder: Path, row: Checkpoint, case: Case, scales: Scales, grains: Snapshot) -> Snapshot:
+def state_at(
+    folder: Path, row: Checkpoint, case: Case, scales: Scales, grains: Snapshot
+) -> Snapshot:
     """Grains and remaining fines at a checkpoint. Raises DumpError when its dump is missing or cut."""
     frame = read_frame(folder / "post" / f"invade_{row.step}.dump")
     moved = snapshot_of(frame, case, time_s=row.step * scales.time_step)

@@ -62,7 +62,9 @@ def _used(template: str) -> Iterator[str]:
     try:
         source, _, _ = environment.loader.get_source(environment, template)  # type: ignore[union-attr]
     except jinja2.TemplateNotFound as error:
-        raise DeckError(f"liggghts_templates/{error.name}: template not found; reinstall fdnet") from error
+        raise DeckError(
+            f"liggghts_templates/{error.name}: template not found; reinstall fdnet"
+        ) from error
     tree = environment.parse(source)
     yield from meta.find_undeclared_variables(tree)
     for name in meta.find_referenced_templates(tree):
@@ -77,7 +79,9 @@ def render_text(template: str, variables: dict[str, Any]) -> str:
     """
     unused = set(variables) - used_variables(template)
     if unused:
-        raise DeckError(f"{template}: variables offered but never used: {', '.join(sorted(unused))}")
+        raise DeckError(
+            f"{template}: variables offered but never used: {', '.join(sorted(unused))}"
+        )
     try:
         return _environment().get_template(template).render(variables)
     except jinja2.UndefinedError as error:

@@ -3,9 +3,9 @@
 import math
 from typing import Any
 
-from fdnet.case import Case
+from fdnet.case.case import Case
 from fdnet.dem.deck import number
-from fdnet.scales import Scales
+from fdnet.scales.scales import Scales
 
 BELOW_ZERO = -5e-324
 """The largest number below 0: a region that ends here holds exactly x < 0."""
@@ -15,7 +15,11 @@ def drag_variables(case: Case, scales: Scales) -> dict[str, Any]:
     """Variables of the drag block: the scheme and, as text, the numbers that it needs."""
     coefficient = 6 * math.pi * case.fluid.viscosity_cP * 1e-3 * case.drag.multiplier
     slower = scales.interstitial_velocity - scales.upstream_velocity
-    own = _viscous(case, scales, coefficient, slower) if case.drag.scheme == "viscous" else _by_radius(scales, slower)
+    own = (
+        _viscous(case, scales, coefficient, slower)
+        if case.drag.scheme == "viscous"
+        else _by_radius(scales, slower)
+    )
     return {
         "scheme": case.drag.scheme,
         "coefficient": number(coefficient),

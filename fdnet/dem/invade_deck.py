@@ -8,35 +8,49 @@ from typing import Any
 import numpy as np
 
 from fdnet.atomic import write_text
-from fdnet.case import Case
-from fdnet.contacts import touching_pairs
+from fdnet.case.case import Case
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, plug_allowance, quiet_chunks
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
 from fdnet.dem.drag import BELOW_ZERO, drag_variables
-from fdnet.dem.dump import COLUMNS, FORMAT
 from fdnet.dem.overlap import is_watched, watch_variables
 from fdnet.dem.scene import contact_variables, header_variables, wall_variables, write_data
 from fdnet.dem.supply import AT_ONCE, batches_of, place_batches, place_fines, slab_end
 from fdnet.errors import CaseError
-from fdnet.scales import Scales
-from fdnet.snapshot import Array, Kind, Snapshot
+from fdnet.scales.scales import Scales
+from fdnet.spheres.contacts import touching_pairs
+from fdnet.spheres.dump import COLUMNS, FORMAT
+from fdnet.spheres.snapshot import Array, Kind, Snapshot
 
 SUPPLY = "supply"
 """Folder of the batches, inside that of the invasion."""
 
 
-def write_invade_inputs(case: Case, scales: Scales, grains: Snapshot, folder: Path, *, ranks: int = 1) -> Deck:
+def write_invade_inputs(
+    case: Case, scales: Scales, grains: Snapshot, folder: Path, *, ranks: int = 1
+) -> Deck:
     """Write in.invade and invade.data (grains and the first fines) into `folder`, and the batches that follow."""
     assert case.fines is not None
     batched = case.fines.supply == "batches"
     spheres = grains.joined(
-        write_batches(case, scales, grains, folder) if batched else place_fines(case, scales, grains)
+        write_batches(case, scales, grains, folder)
+        if batched
+        else place_fines(case, scales, grains)
     )
     pairs, _ = touching_pairs(spheres, case.periodic)
     if np.any(spheres.kind[pairs] == Kind.FINE):
-        raise CaseError("fines: a fine would start in contact; this is an fdnet fault, please report the case and seed")
-    density = np.where(spheres.kind == Kind.GRAIN, case.grains.density_kg_m3, case.fines.density_kg_m3)
-    write_data(folder / "invade.data", spheres, bounds=_bounds(case, scales, grains), density=density, types=3)
+        raise CaseError(
+            "fines: a fine would start in contact; this is an fdnet fault, please report the case and seed"
+        )
+    density = np.where(
+        spheres.kind == Kind.GRAIN, case.grains.density_kg_m3, case.fines.density_kg_m3
+    )
+    write_data(
+        folder / "invade.data",
+        spheres,
+        bounds=_bounds(case, scales, grains),
+        density=density,
+        types=3,
+    )
     deck = render_invade(case, scales, grains, ranks=ranks)
     write_text(folder / "in.invade", deck.text)
     return deck
@@ -46,7 +60,10 @@ def write_batches(case: Case, scales: Scales, grains: Snapshot, folder: Path) ->
     """Write supply/batch_N.data and .in, taken in before chunk N; returns the fines of the start."""
     assert case.fines is not None
     batches, bounds = list(place_batches(case, scales, grains)), _bounds(case, scales, grains)
-    shared = {"start_velocity": number(scales.upstream_velocity), "drag": drag_variables(case, scales)}
+    shared = {
+        "start_velocity": number(scales.upstream_velocity),
+        "drag": drag_variables(case, scales),
+    }
     (folder / SUPPLY).mkdir(exist_ok=True)
     for chunk, fines in enumerate(batches[AT_ONCE:], AT_ONCE):
         name = f"{SUPPLY}/batch_{chunk}"
@@ -80,7 +97,12 @@ def _bounds(case: Case, scales: Scales, grains: Snapshot) -> Array:
 
 
 def render_invade(
-    case: Case, scales: Scales, grains: Snapshot, *, ranks: int = 1, resume: Checkpoint | None = None
+    case: Case,
+    scales: Scales,
+    grains: Snapshot,
+    *,
+    ranks: int = 1,
+    resume: Checkpoint | None = None,
 ) -> Deck:
     """The invasion deck, fresh or continued from a checkpoint's restart."""
     assert case.fines is not None
@@ -96,7 +118,9 @@ def render_invade(
         | {
             "resume": {"restart": f"post/invade_{resume.step}.restart"} if resume else None,
             "skin": number(_skin(case)),
-            "neighbour_bin": number(case.run.neighbour_bin_mm * 1e-3) if case.run.neighbour_bin_mm else "",
+            "neighbour_bin": number(case.run.neighbour_bin_mm * 1e-3)
+            if case.run.neighbour_bin_mm
+            else "",
             "contacts": contact_variables(case, scales, "invade", friction=friction),
             "time_step": number(scales.time_step),
             "walls": wall_variables(case, "invade", friction=wall_friction),
@@ -175,7 +199,9 @@ def _gravity(case: Case, scales: Scales) -> tuple[dict[str, Any] | None, list[Le
     if not case.gravity.buoyancy:
         return pull, [LeftOut(what="buoyancy", why="switched off")]
     axis = next(name for name, component in zip("xyz", vector, strict=True) if component)
-    return pull | {"buoyancy": {"density": number(case.fluid.density_kg_m3), "axis": axis, "level": "1.0"}}, []
+    return pull | {
+        "buoyancy": {"density": number(case.fluid.density_kg_m3), "axis": axis, "level": "1.0"}
+    }, []
 
 
 def _left_out(case: Case, *, friction: bool, ranks: int) -> list[LeftOut]:
@@ -187,10 +213,19 @@ def _left_out(case: Case, *, friction: bool, ranks: int) -> list[LeftOut]:
     if case.box.sides == "periodic":
         found.append(LeftOut(what="side walls", why="sides are periodic"))
     if not is_watched(case):
-        why = "pairs of grains overlap too" if case.grains.motion == "mobile" else "fines are of unequal size"
+        why = (
+            "pairs of grains overlap too"
+            if case.grains.motion == "mobile"
+            else "fines are of unequal size"
+        )
         found.append(LeftOut(what="overlap between checkpoints", why=why))
     if case.fines is not None and case.fines.supply == "batches":
-        found.append(LeftOut(what="fines far upstream", why="they come in batches, each when it is about to arrive"))
+        found.append(
+            LeftOut(
+                what="fines far upstream",
+                why="they come in batches, each when it is about to arrive",
+            )
+        )
     if ranks == 1:
         found.append(LeftOut(what="MPI processor grid", why="one rank"))
     return found

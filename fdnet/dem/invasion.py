@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fdnet.atomic import disk_is_full, write_text
-from fdnet.case import Case
+from fdnet.case.case import Case
 from fdnet.dem.checkpoint import (
     HISTORY,
     HISTORY_HEADER,
@@ -23,11 +23,19 @@ from fdnet.dem.checkpoint import (
 from fdnet.dem.deck import Deck, LeftOut
 from fdnet.dem.invade_deck import render_invade, write_batches, write_invade_inputs
 from fdnet.dem.liggghts import SCREEN, Launch, Run, run_deck
-from fdnet.dem.overlap import WATCH, Deepest, cut_watch, deepest_of, overlap_in, read_watch, refuse_overlap
+from fdnet.dem.overlap import (
+    WATCH,
+    Deepest,
+    cut_watch,
+    deepest_of,
+    overlap_in,
+    read_watch,
+    refuse_overlap,
+)
 from fdnet.dem.supply import batches_of
 from fdnet.errors import LiggghtsError
-from fdnet.scales import Scales
-from fdnet.snapshot import Snapshot
+from fdnet.scales.scales import Scales
+from fdnet.spheres.snapshot import Snapshot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,7 +95,9 @@ def invade(case: Case, scales: Scales, grains: Snapshot, folder: Path, launch: L
     )
 
 
-def _drive(case: Case, scales: Scales, grains: Snapshot, folder: Path, launch: Launch) -> tuple[Deck, Run | None]:
+def _drive(
+    case: Case, scales: Scales, grains: Snapshot, folder: Path, launch: Launch
+) -> tuple[Deck, Run | None]:
     """Run to the end of the invasion; no run when the last checkpoint was the end already."""
 
     def check(step: int) -> None:
@@ -95,7 +105,9 @@ def _drive(case: Case, scales: Scales, grains: Snapshot, folder: Path, launch: L
             return
         rows = [row for row in read_history(folder) if row.step == step]
         if not rows:
-            raise LiggghtsError(f"{folder / HISTORY}: no row for the checkpoint at step {step}; continue with --resume")
+            raise LiggghtsError(
+                f"{folder / HISTORY}: no row for the checkpoint at step {step}; continue with --resume"
+            )
         refuse_overlap(case, scales, grains, folder, history=rows[-1:], last=rows[-1])
 
     while True:
@@ -133,7 +145,9 @@ class _Keeper:
     LIGGGHTS goes on after a failed write and ends with 0; older restarts are removed only while there is room.
     """
 
-    def __init__(self, folder: Path, check: Callable[[int], None], follow: Callable[[str], None] | None) -> None:
+    def __init__(
+        self, folder: Path, check: Callable[[int], None], follow: Callable[[str], None] | None
+    ) -> None:
         self.folder, self.check, self.follow = folder, check, follow
 
     def __call__(self, line: str) -> None:
@@ -153,11 +167,19 @@ class _Keeper:
 def _over(case: Case, scales: Scales, last: Checkpoint | None) -> bool:
     if last is None:
         return False
-    return (case.run.duration_ms is None and quiet_enough(case, scales, last)) or last.chunk >= chunks_of(case, scales)
+    return (
+        case.run.duration_ms is None and quiet_enough(case, scales, last)
+    ) or last.chunk >= chunks_of(case, scales)
 
 
 def _prepare(
-    case: Case, scales: Scales, grains: Snapshot, folder: Path, *, ranks: int, last: Checkpoint | None
+    case: Case,
+    scales: Scales,
+    grains: Snapshot,
+    folder: Path,
+    *,
+    ranks: int,
+    last: Checkpoint | None,
 ) -> Deck:
     if last is None:
         for stale in [folder / HISTORY, folder / WATCH, *(folder / "post").glob("invade_*")]:
@@ -166,7 +188,9 @@ def _prepare(
         write_text(folder / HISTORY, HISTORY_HEADER + "\n")
         return deck
     rows = [row for row in read_history(folder) if row.step <= last.step]
-    write_text(folder / HISTORY, "\n".join([HISTORY_HEADER, *(csv_row(row) for row in rows)]) + "\n")
+    write_text(
+        folder / HISTORY, "\n".join([HISTORY_HEADER, *(csv_row(row) for row in rows)]) + "\n"
+    )
     cut_watch(folder, last.step)
     for path in (folder / "post").glob("invade_*"):
         if step_of(path) > last.step:

@@ -23,7 +23,9 @@ LOCK_PATIENCE = 20.0
 """Seconds to wait for processes of an earlier run to end."""
 _STOP_SIGNALS = {signal.SIGINT, signal.SIGTERM}
 _PROJECT = Path(__file__).resolve().parents[2]
-_BAD_LINE = re.compile(r"^(ERROR|Lost atoms)|Signal: |Segmentation fault|Forced restart written|No space left")
+_BAD_LINE = re.compile(
+    r"^(ERROR|Lost atoms)|Signal: |Segmentation fault|Forced restart written|No space left"
+)
 _NAN = re.compile(r"(?i)(?:^|\s)[-+]?(?:nan|inf)(?:\s|$)")
 
 
@@ -48,7 +50,14 @@ class Binary:
             raise LiggghtsError(
                 f"--np {ranks}: no mpirun beside {self.path} or on PATH; install openmpi-bin or use --np 1"
             )
-        return [str(self.launcher), "--allow-run-as-root", "--oversubscribe", "-np", str(ranks), *base]
+        return [
+            str(self.launcher),
+            "--allow-run-as-root",
+            "--oversubscribe",
+            "-np",
+            str(ranks),
+            *base,
+        ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,7 +96,9 @@ def find_binary(option: str | None = None) -> Binary:
         )
     path = Path(found).absolute()
     beside = path.parent / "mpirun"
-    launcher = str(beside) if beside.exists() else (shutil.which("mpirun") or shutil.which("orterun"))
+    launcher = (
+        str(beside) if beside.exists() else (shutil.which("mpirun") or shutil.which("orterun"))
+    )
     return Binary(path=path, version=_version(path), launcher=Path(launcher) if launcher else None)
 
 
@@ -102,7 +113,9 @@ def _version(path: Path) -> str:
             cwd="/tmp",
         )
     except (OSError, subprocess.TimeoutExpired) as error:
-        raise LiggghtsError(f"{path}: cannot be started: {error}; check the file or run scripts/setup.sh") from error
+        raise LiggghtsError(
+            f"{path}: cannot be started: {error}; check the file or run scripts/setup.sh"
+        ) from error
     text = (answer.stdout + answer.stderr).decode("utf-8", "replace")
     match = re.search(r"Version LIGGGHTS[-A-Z]*\s+([0-9.]+)", text)
     if not match:
@@ -150,7 +163,11 @@ def run_deck(folder: Path, deck: str, launch: Launch) -> Run:
     _verify(folder, deck, process.returncode)
     seconds = time.monotonic() - start
     return Run(
-        directory=folder, command=tuple(command), version=launch.binary.version, seconds=seconds, ranks=launch.ranks
+        directory=folder,
+        command=tuple(command),
+        version=launch.binary.version,
+        seconds=seconds,
+        ranks=launch.ranks,
     )
 
 
@@ -160,11 +177,16 @@ def _only_writer(folder: Path) -> Iterator[int]:
 
     Open MPI's daemon of a serial run outlives it by a moment, so a taken lock is waited for.
     """
-    lock, deadline = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644), time.monotonic() + LOCK_PATIENCE
+    lock, deadline = (
+        os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644),
+        time.monotonic() + LOCK_PATIENCE,
+    )
     try:
         while not _locked(lock):
             if time.monotonic() > deadline:
-                raise LiggghtsError(f"{folder}: a LIGGGHTS of an earlier run is still writing here; wait until it ends")
+                raise LiggghtsError(
+                    f"{folder}: a LIGGGHTS of an earlier run is still writing here; wait until it ends"
+                )
             time.sleep(0.05)
         yield lock
     finally:
@@ -180,7 +202,11 @@ def _locked(lock: int) -> bool:
 
 
 def _environment() -> dict[str, str]:
-    return os.environ | {"OMP_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    return os.environ | {
+        "OMP_NUM_THREADS": "1",
+        "OMPI_ALLOW_RUN_AS_ROOT": "1",
+        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    }
 
 
 def _prepare_child(ranks: int, mask: set[int]) -> Callable[[], None]:
@@ -200,7 +226,10 @@ def _prepare_child(ranks: int, mask: set[int]) -> Callable[[], None]:
 
 
 def _wait(
-    process: subprocess.Popen, screen: Path, follow: Callable[[str], None] | None, deadline: float | None
+    process: subprocess.Popen,
+    screen: Path,
+    follow: Callable[[str], None] | None,
+    deadline: float | None,
 ) -> None:
     with screen.open("r", encoding="utf-8", errors="replace") as lines:
         while True:
@@ -237,14 +266,20 @@ def _verify(folder: Path, deck: str, code: int) -> None:
     bad = [line.strip() for line in lines if _BAD_LINE.search(line)]
     where = f"{folder / deck}"
     if code == 0 and not bad and any(line.strip() == END_MARK for line in lines):
-        numbers = [line for line in lines if _NAN.search(line) and not line.lstrip().startswith(("#", "print", "fix"))]
+        numbers = [
+            line
+            for line in lines
+            if _NAN.search(line) and not line.lstrip().startswith(("#", "print", "fix"))
+        ]
         if numbers:
             raise LiggghtsError(
                 f"{where}: not-a-number in the output ({numbers[0].strip()[:80]!r}); "
                 "lower run.time_step_factor and start over with --force or another --out"
             )
         return
-    evidence = bad[0] if bad else (f"the last line is {lines[-1].strip()!r}" if lines else "no output")
+    evidence = (
+        bad[0] if bad else (f"the last line is {lines[-1].strip()!r}" if lines else "no output")
+    )
     if disk_is_full(folder):
         evidence = f"the disk is full ({evidence})"
     state = f"ended by signal {-code}" if code < 0 else f"exit {code}"

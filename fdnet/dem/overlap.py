@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from fdnet.atomic import write_text
-from fdnet.case import Case
-from fdnet.contacts import max_overlap
+from fdnet.case.case import Case
 from fdnet.dem.checkpoint import Checkpoint, readable_states
 from fdnet.dem.deck import number
 from fdnet.errors import LiggghtsError
-from fdnet.scales import Scales
-from fdnet.snapshot import Snapshot
+from fdnet.scales.scales import Scales
+from fdnet.spheres.contacts import max_overlap
+from fdnet.spheres.snapshot import Snapshot
 
 WATCH = "overlap.csv"
 EVERY, MOST_ROWS = 50, 200
@@ -29,7 +29,11 @@ class Deepest:
 
 def is_watched(case: Case) -> bool:
     """Whether the deck can watch: LIGGGHTS reduces overlaps in metres over all pairs, of grains too."""
-    return case.grains.motion == "fixed" and case.fines is not None and not isinstance(case.fines.radius_mm, tuple)
+    return (
+        case.grains.motion == "fixed"
+        and case.fines is not None
+        and not isinstance(case.fines.radius_mm, tuple)
+    )
 
 
 def watch_variables(case: Case, scales: Scales) -> dict[str, Any] | None:
@@ -63,7 +67,9 @@ def _number(text: str) -> float:
 def cut_watch(folder: Path, last_step: int) -> None:
     """Forget what was seen after `last_step`, from which the run goes on."""
     if (folder / WATCH).exists():
-        rows = [f"{row.step},{row.fraction!r}\n" for row in read_watch(folder) if row.step <= last_step]
+        rows = [
+            f"{row.step},{row.fraction!r}\n" for row in read_watch(folder) if row.step <= last_step
+        ]
         write_text(folder / WATCH, "".join(rows))
 
 
@@ -78,7 +84,13 @@ def deepest_of(seen: Iterable[Deepest]) -> Deepest:
 
 
 def refuse_overlap(
-    case: Case, scales: Scales, grains: Snapshot, folder: Path, *, history: Sequence[Checkpoint], last: Checkpoint
+    case: Case,
+    scales: Scales,
+    grains: Snapshot,
+    folder: Path,
+    *,
+    history: Sequence[Checkpoint],
+    last: Checkpoint,
 ) -> None:
     """Raises LiggghtsError when `run.on_overlap` is "stop" and a fine overlapped too much up to checkpoint `last`.
 

@@ -10,17 +10,32 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.case import Case
-from fdnet.contact_law import sphere_mass
-from fdnet.contacts import max_overlap
+from fdnet.case.case import Case
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
-from fdnet.dem.dump import COLUMNS, FORMAT, read_frame
 from fdnet.dem.liggghts import Launch, Run, run_deck
-from fdnet.dem.scene import box_of, contact_variables, header_variables, snapshot_of, wall_variables, write_data
+from fdnet.dem.scene import (
+    box_of,
+    contact_variables,
+    header_variables,
+    snapshot_of,
+    wall_variables,
+    write_data,
+)
 from fdnet.errors import CaseError, LiggghtsError
-from fdnet.network.porosity import measure_porosity
-from fdnet.scales import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES, PACK_START, PACK_STEP, Scales, grain_count
-from fdnet.snapshot import Array, Snapshot, resting
+from fdnet.scales.scales import (
+    PACK_RELAX_STEPS,
+    PACK_STAGE_STEPS,
+    PACK_STAGES,
+    PACK_START,
+    PACK_STEP,
+    Scales,
+    grain_count,
+)
+from fdnet.scales.springs import sphere_mass
+from fdnet.spheres.contacts import max_overlap
+from fdnet.spheres.dump import COLUMNS, FORMAT, read_frame
+from fdnet.spheres.porosity import measure_porosity
+from fdnet.spheres.snapshot import Array, Snapshot, resting
 
 POROSITY_TOLERANCE = 0.003
 ATTEMPTS = 8
@@ -99,11 +114,17 @@ def _next_count(case: Case, tried: list[dict[str, Any]]) -> int:
     nearest = sorted(tried, key=lambda row: abs(row["porosity"] - target))
     slope = -grain
     if len(nearest) > 1 and nearest[0]["grains"] != nearest[1]["grains"]:
-        secant = (nearest[0]["porosity"] - nearest[1]["porosity"]) / (nearest[0]["grains"] - nearest[1]["grains"])
+        secant = (nearest[0]["porosity"] - nearest[1]["porosity"]) / (
+            nearest[0]["grains"] - nearest[1]["grains"]
+        )
         slope = min(max(secant, -1.5 * grain), -0.4 * grain)
     guess = round(nearest[0]["grains"] + (target - nearest[0]["porosity"]) / slope)
     done = {row["grains"] for row in tried}
-    around = [count for count in (guess, guess + 1, guess - 1, guess + 2, guess - 2) if count > 0 and count not in done]
+    around = [
+        count
+        for count in (guess, guess + 1, guess - 1, guess + 2, guess - 2)
+        if count > 0 and count not in done
+    ]
     if not around or len(tried) >= ATTEMPTS:
         raise CaseError(
             f"grains.porosity: {target} not met within {POROSITY_TOLERANCE} after {len(tried)} packs, nearest "
@@ -135,7 +156,9 @@ def _attempt(case: Case, scales: Scales, folder: Path, launch: Launch, *, count:
     grains = snapshot_of(frame, case, time_s=0.0)
     creep = _creep(case, scales, folder, grains) if "FDNET restless" in screen else 0.0
     if len(grains) != count:
-        raise LiggghtsError(f"{folder}/post/pack.dump: {len(grains)} grains, expected {count}: some were lost")
+        raise LiggghtsError(
+            f"{folder}/post/pack.dump: {len(grains)} grains, expected {count}: some were lost"
+        )
     porosity = measure_porosity(grains, periodic=case.periodic)
     return Pack(
         grains=grains,
@@ -181,7 +204,13 @@ def _run(case: Case, folder: Path, count: int, launch: Launch) -> Run:
 
 
 def write_pack_inputs(
-    case: Case, scales: Scales, folder: Path, *, count: int, ranks: int = 1, shown: tuple[int, ...] = ()
+    case: Case,
+    scales: Scales,
+    folder: Path,
+    *,
+    count: int,
+    ranks: int = 1,
+    shown: tuple[int, ...] = (),
 ) -> Deck:
     """Write in.pack and pack.data (random small spheres) into `folder`; see `render_pack`."""
     deck = render_pack(case, scales, count=count, ranks=ranks, shown=shown)
@@ -189,11 +218,17 @@ def write_pack_inputs(
     radii = draw_radii(case, count)
     rng = np.random.default_rng([case.seed, count])
     small, size = PACK_START * radii, np.array(case.size_m)
-    margin = small[:, None] * np.array([1.0, *([0.0, 0.0] if case.box.sides == "periodic" else [1.0, 1.0])])
+    margin = small[:, None] * np.array(
+        [1.0, *([0.0, 0.0] if case.box.sides == "periodic" else [1.0, 1.0])]
+    )
     place = margin + rng.random((count, 3)) * (size - 2 * margin)
     seeds = resting(place, small, box_of(case))
     write_data(
-        folder / "pack.data", seeds, bounds=box_of(case), density=np.full(count, case.grains.density_kg_m3), types=2
+        folder / "pack.data",
+        seeds,
+        bounds=box_of(case),
+        density=np.full(count, case.grains.density_kg_m3),
+        types=2,
     )
     return deck
 
@@ -208,7 +243,9 @@ def draw_radii(case: Case, count: int) -> Array:
     return radii
 
 
-def render_pack(case: Case, scales: Scales, *, count: int, ranks: int = 1, shown: tuple[int, ...] = ()) -> Deck:
+def render_pack(
+    case: Case, scales: Scales, *, count: int, ranks: int = 1, shown: tuple[int, ...] = ()
+) -> Deck:
     """The packing deck: soft frictionless springs, viscous damping, growth in separate runs, rest test.
 
     After the stages `shown` (1 to PACK_STAGES) it also dumps to post/grown_STAGE.dump.
@@ -224,7 +261,9 @@ def render_pack(case: Case, scales: Scales, *, count: int, ranks: int = 1, shown
     if ranks == 1:
         left_out.append(LeftOut(what="MPI processor grid", why="one rank"))
     contacts = contact_variables(case, scales, "pack", friction=False)
-    contacts["damping"] = " ".join([number(0.8 * math.sqrt(stiffness / mass))] * contacts["size"] ** 2)
+    contacts["damping"] = " ".join(
+        [number(0.8 * math.sqrt(stiffness / mass))] * contacts["size"] ** 2
+    )
     text = render_text(
         "pack.in.j2",
         header_variables(case, "pack", left_out, ranks)

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.case import Case
+from fdnet.case.case import Case
 from fdnet.dem.invade_deck import render_invade
 from fdnet.dem.packing import write_pack_inputs
 from fdnet.dem.scene import box_of
 from fdnet.errors import CaseError
-from fdnet.scales import grain_count, scales_of
-from fdnet.snapshot import Snapshot, resting
+from fdnet.scales.scales import grain_count, scales_of
+from fdnet.spheres.snapshot import Snapshot, resting
 
 
 def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:

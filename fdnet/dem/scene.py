@@ -6,16 +6,18 @@ from typing import Any
 import numpy as np
 
 from fdnet.atomic import write_text
-from fdnet.case import Case
+from fdnet.case.case import Case
 from fdnet.dem.deck import LeftOut, number
-from fdnet.dem.dump import Frame
-from fdnet.scales import Contact, Scales
-from fdnet.snapshot import Array, Snapshot
+from fdnet.scales.scales import Contact, Scales
+from fdnet.spheres.dump import Frame
+from fdnet.spheres.snapshot import Array, Snapshot
 
 _MATERIALS = {"pack": ("grain", "wall"), "invade": ("grain", "fine", "wall")}
 
 
-def header_variables(case: Case, stage: str, left_out: list[LeftOut], ranks: int) -> dict[str, Any]:
+def header_variables(
+    case: Case, stage: str, left_out: list[LeftOut], ranks: int
+) -> dict[str, Any]:
     """Variables of `_header.in.j2`; several ranks never cut the flow direction (fines crowd at the face)."""
     sideways = "p p" if case.box.sides == "periodic" else "f f"
     return {
@@ -33,7 +35,9 @@ def contact_variables(case: Case, scales: Scales, stage: str, *, friction: bool)
     materials = _MATERIALS[stage]
 
     def matrix(value: str) -> str:
-        return " ".join(number(getattr(_contact(scales, a, b), value)) for a in materials for b in materials)
+        return " ".join(
+            number(getattr(_contact(scales, a, b), value)) for a in materials for b in materials
+        )
 
     size = len(materials)
     tangential = " tangential history" if friction else ""
@@ -65,7 +69,11 @@ def wall_variables(case: Case, stage: str, *, friction: bool) -> list[dict[str, 
     """Planes at the sides; at both ends too for grains that move (fines pass freely)."""
     size, material = case.size_m, len(_MATERIALS[stage])
     ends_hold = "all" if stage == "pack" else ("grains" if case.grains.motion == "mobile" else "")
-    sides_hold = "" if case.box.sides == "periodic" else ("all" if stage == "pack" or ends_hold else "fines")
+    sides_hold = (
+        ""
+        if case.box.sides == "periodic"
+        else ("all" if stage == "pack" or ends_hold else "fines")
+    )
     walls = []
     for axis, held in ((0, ends_hold), (1, sides_hold), (2, sides_hold)):
         for end, position in enumerate((0.0, size[axis])):
@@ -87,15 +95,23 @@ def _wall(name: str, group: str, material: int, position: float, friction: bool)
     }
 
 
-def write_data(path: Path, spheres: Snapshot, *, bounds: Array, density: Array, types: int) -> None:
+def write_data(
+    path: Path, spheres: Snapshot, *, bounds: Array, density: Array, types: int
+) -> None:
     """The spheres (N) as a LIGGGHTS data file; `bounds` (3, 2) m of the simulation box, `density` (N,) kg/m3."""
     lines = ["spheres", "", f"{len(spheres)} atoms", f"{types} atom types", ""]
     lines += [
-        f"{number(low)} {number(high)} {axis}lo {axis}hi" for (low, high), axis in zip(bounds, "xyz", strict=True)
+        f"{number(low)} {number(high)} {axis}lo {axis}hi"
+        for (low, high), axis in zip(bounds, "xyz", strict=True)
     ]
     lines += ["", "Atoms", ""]
-    table = np.column_stack([spheres.id, spheres.kind, 2 * spheres.radius, density, spheres.position])
-    lines += [f"{atom:.0f} {kind:.0f} " + " ".join(f"{value:.17g}" for value in rest) for atom, kind, *rest in table]
+    table = np.column_stack(
+        [spheres.id, spheres.kind, 2 * spheres.radius, density, spheres.position]
+    )
+    lines += [
+        f"{atom:.0f} {kind:.0f} " + " ".join(f"{value:.17g}" for value in rest)
+        for atom, kind, *rest in table
+    ]
     write_text(path, "\n".join(lines) + "\n")
 
 

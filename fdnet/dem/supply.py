@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fdnet.case import Case
+from fdnet.case.case import Case
 from fdnet.errors import CaseError
-from fdnet.scales import Scales
-from fdnet.snapshot import Array, Kind, Snapshot
+from fdnet.scales.scales import Scales
+from fdnet.spheres.snapshot import Array, Kind, Snapshot
 
 CLEARANCE = 1.02
 """Fines start at least this many radius sums apart."""
@@ -59,7 +59,11 @@ def crowding(case: Case) -> float:
     """
     assert case.fines is not None
     low, high = case.fines.radius_range_m
-    shut = (2 * high + low + high) * ((2 * high) ** 2 + (low + high) ** 2) / (8 * (low + high) * (low**2 + high**2))
+    shut = (
+        (2 * high + low + high)
+        * ((2 * high) ** 2 + (low + high) ** 2)
+        / (8 * (low + high) * (low**2 + high**2))
+    )
     sides = zip(case.size_m[1:], case.periodic[1:], strict=True)
     reach = [1.0 if periodic else 1 - 2 * high / side for side, periodic in sides]
     return case.fines.concentration * shut / math.prod(reach) if min(reach) > 0 else math.inf
@@ -81,7 +85,9 @@ def slab_end(case: Case, grains: Snapshot) -> float:
     return front_of(grains) - 2 * case.fines.radius_range_m[1]
 
 
-def _moving(case: Case, scales: Scales, grains: Snapshot, position: Array, radius: Array, *, first: int) -> Snapshot:
+def _moving(
+    case: Case, scales: Scales, grains: Snapshot, position: Array, radius: Array, *, first: int
+) -> Snapshot:
     velocity = np.zeros((len(radius), 3))
     velocity[:, 0] = scales.upstream_velocity
     return Snapshot(
@@ -140,7 +146,9 @@ def place_batches(case: Case, scales: Scales, grains: Snapshot) -> Iterator[Snap
     The first batches do not depend on how many follow.
     """
     travel, first = batches_of(case, scales).travel, int(grains.id.max()) + 1
-    for number, (position, radius) in enumerate(_draw_batches(case, scales, end=slab_end(case, grains)), 1):
+    for number, (position, radius) in enumerate(
+        _draw_batches(case, scales, end=slab_end(case, grains)), 1
+    ):
         carried = np.array([max(0, number - AT_ONCE) * travel, 0.0, 0.0])
         yield _moving(case, scales, grains, position + carried, radius, first=first)
         first += len(radius)
@@ -191,9 +199,17 @@ def _add_sequentially(
             return position + corner
         margin = np.where(period > 0, 0.0, radius[waiting][:, None]) * np.array([0.0, 1.0, 1.0])
         drawn = margin + rng.random((len(waiting), 3)) * (size - 2 * margin)
-        free = _free(np.concatenate([placed, drawn]), np.concatenate([done, radius[waiting]]), len(placed), period)
+        free = _free(
+            np.concatenate([placed, drawn]),
+            np.concatenate([done, radius[waiting]]),
+            len(placed),
+            period,
+        )
         position[waiting[free]] = drawn[free]
-        done, placed = np.concatenate([done, radius[waiting[free]]]), np.concatenate([placed, drawn[free]])
+        done, placed = (
+            np.concatenate([done, radius[waiting[free]]]),
+            np.concatenate([placed, drawn[free]]),
+        )
         waiting = waiting[~free]
     raise CaseError(
         f"fines.concentration: {case.fines.concentration if case.fines else 0:g} leaves {len(waiting)} of "

@@ -21,8 +21,8 @@ __all__ = ["compiled"]
 def cache_folder(sources: Path, root: Path) -> Path:
     """Folder below `root` for the code compiled from all modules in `sources`."""
     digest = hashlib.sha256()
-    for path in sorted(sources.glob("*.py")):
-        digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    for path in sorted(sources.rglob("*.py")):
+        digest.update(str(path.relative_to(sources)).encode() + b"\0" + path.read_bytes())
     return root / f"numba-{digest.hexdigest()[:16]}"
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fdnet.snapshot import Array
+from fdnet.spheres.snapshot import Array
 
 EDGES = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
 FACETS = np.array([(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)])
@@ -40,7 +40,9 @@ def signed_volume(corner: Array) -> Array:
 
 def solid_angles(corner: Array) -> Array:
     """Signed solid angle (..., 4), sr, at each corner of tetrahedra (..., 4, 3); sign of the volume."""
-    return np.stack([_solid_angle(np.roll(corner, -k, axis=-2)) * (-1.0) ** k for k in range(4)], axis=-1)
+    return np.stack(
+        [_solid_angle(np.roll(corner, -k, axis=-2)) * (-1.0) ** k for k in range(4)], axis=-1
+    )
 
 
 def _solid_angle(corner: Array) -> Array:
@@ -106,7 +108,8 @@ def _solve(matrix: Array, right: Array) -> Array:
     with np.errstate(invalid="ignore", divide="ignore"):
         scale = np.where(determinant == 0.0, np.nan, 1.0 / determinant)
     total = sum(
-        column[..., None] * (right[..., k, :] * scale[..., None])[..., None, :] for k, column in enumerate(columns)
+        column[..., None] * (right[..., k, :] * scale[..., None])[..., None, :]
+        for k, column in enumerate(columns)
     )
     return np.asarray(total)
 

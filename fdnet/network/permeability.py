@@ -9,15 +9,22 @@ from itertools import pairwise
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.network.conductance import DEFAULT_LAW, LAWS
-from fdnet.network.damage import CLEAN, DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, Damage
-from fdnet.network.flow import Flow
-from fdnet.network.occupancy import Occupancy
-from fdnet.network.sections import Profile, Section, SlabK, make_profile, make_sections, reduction
-from fdnet.network.slabs import inplace_permeability, slab_permeability, whole_permeability
+from fdnet.network.fines.occupancy import Occupancy
+from fdnet.network.flow.flow import Flow
+from fdnet.network.flow.sections import (
+    Profile,
+    Section,
+    SlabK,
+    make_profile,
+    make_sections,
+    reduction,
+)
+from fdnet.network.flow.slabs import inplace_permeability, slab_permeability, whole_permeability
+from fdnet.network.laws.damage import CLEAN, Damage
+from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, LAWS
+from fdnet.network.network import WALLS, Network
 from fdnet.network.specimen import Specimen, measure_specimen
-from fdnet.network.tessellation import WALLS, Network
-from fdnet.snapshot import Array, Snapshot, frozen
+from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
 __all__ = ["Analysis", "AnalysisOptions", "Profile", "Section", "analyse", "compare"]
 
@@ -104,7 +111,11 @@ class _Log:
 
 
 def analyse(
-    initial: Snapshot, damaged: Snapshot | None, *, periodic: tuple[bool, bool, bool], options: AnalysisOptions
+    initial: Snapshot,
+    damaged: Snapshot | None,
+    *,
+    periodic: tuple[bool, bool, bool],
+    options: AnalysisOptions,
 ) -> Analysis:
     """Permeability of the grains of `initial`, and with the fines of `damaged` (grains, moved or not, and all fines).
 
@@ -157,7 +168,9 @@ def _analysis(
     damage = _damage(base, specimen.occupancy, options, log)
     final = base if damage is None else _state(base.network, damage.conductance, log)
     slabs = clean_slabs if final is clean else _slab_k(final, specimen.edges, log)
-    sections = make_sections(specimen.edges, specimen.porosity, (clean_slabs, slabs), specimen.depth)
+    sections = make_sections(
+        specimen.edges, specimen.porosity, (clean_slabs, slabs), specimen.depth
+    )
     porosity, invaded = specimen.porosity, specimen.invaded
     _warn(log, (clean, final), sections, specimen.occupancy)
     law_used = np.full(len(final.conductance), CLEAN) if damage is None else damage.law_used
@@ -200,7 +213,9 @@ def _check_names(options: AnalysisOptions) -> None:
         ("walls", options.walls, WALLS),
     ):
         if value not in known:
-            raise CaseError(f"analysis.{key}: {value!r} is not known; choose one of {sorted(known)}")
+            raise CaseError(
+                f"analysis.{key}: {value!r} is not known; choose one of {sorted(known)}"
+            )
 
 
 def _clean_state(network: Network, options: AnalysisOptions, log: _Log) -> _State:
@@ -215,12 +230,18 @@ def _state(network: Network, conductance: Array, log: _Log) -> _State:
     return _State(network=network, conductance=conductance, flow=flow, k=k)
 
 
-def _damage(base: _State, occupancy: Occupancy | None, options: AnalysisOptions, log: _Log) -> Damage | None:
+def _damage(
+    base: _State, occupancy: Occupancy | None, options: AnalysisOptions, log: _Log
+) -> Damage | None:
     if occupancy is None:
         return None
     with log.timed("conductance"):
         return DAMAGE_LAWS[options.damage_law](
-            base.network, occupancy, base.conductance, threshold=options.threshold, middle_band=options.middle_band
+            base.network,
+            occupancy,
+            base.conductance,
+            threshold=options.threshold,
+            middle_band=options.middle_band,
         )
 
 
@@ -237,11 +258,18 @@ def _slab_k(state: _State, edges: Array, log: _Log) -> SlabK:
             ]
         inplace = inplace_permeability(network, state.flow, edges)
     return SlabK(
-        cut_out=frozen([k for k, _ in solved]), inplace=frozen(inplace), flows=tuple(flow for _, flow in solved)
+        cut_out=frozen([k for k, _ in solved]),
+        inplace=frozen(inplace),
+        flows=tuple(flow for _, flow in solved),
     )
 
 
-def _warn(log: _Log, states: tuple[_State, _State], sections: tuple[Section, ...], occupancy: Occupancy | None) -> None:
+def _warn(
+    log: _Log,
+    states: tuple[_State, _State],
+    sections: tuple[Section, ...],
+    occupancy: Occupancy | None,
+) -> None:
     for name, state in zip(("k_initial", "k_damaged"), states, strict=True):
         if state.flow.reason:
             log.warnings.append(f"{name} = 0: {state.flow.reason}")
@@ -253,8 +281,14 @@ def _warn(log: _Log, states: tuple[_State, _State], sections: tuple[Section, ...
             "their k is of single throats"
         )
     if network.counts["grains_outside_box"]:
-        log.warnings.append(f"{network.counts['grains_outside_box']} grains lie outside the box and play no part")
-    if occupancy is not None and occupancy.counts["fines_outside_box"] and not occupancy.pore_solid_volume.any():
+        log.warnings.append(
+            f"{network.counts['grains_outside_box']} grains lie outside the box and play no part"
+        )
+    if (
+        occupancy is not None
+        and occupancy.counts["fines_outside_box"]
+        and not occupancy.pore_solid_volume.any()
+    ):
         log.warnings.append(
             f"none of the {occupancy.counts['fines_outside_box']} fines is centred in the box: "
             "no pore holds any; check the box if some should"
@@ -270,8 +304,16 @@ def _worst(flows: list[Flow]) -> dict[str, str | float | None]:
     }
 
 
-def _counts(base: _State, occupancy: Occupancy | None, damage: Damage | None, flow: Flow) -> dict[str, int]:
-    found = dict(base.network.counts) | {"throats_not_conducting": int(np.sum(base.conductance == 0))}
+def _counts(
+    base: _State, occupancy: Occupancy | None, damage: Damage | None, flow: Flow
+) -> dict[str, int]:
+    found = dict(base.network.counts) | {
+        "throats_not_conducting": int(np.sum(base.conductance == 0))
+    }
     if occupancy is not None and damage is not None:
-        found |= {**occupancy.counts, **damage.counts, "throats_blocked": int(occupancy.blocked.sum())}
+        found |= {
+            **occupancy.counts,
+            **damage.counts,
+            "throats_blocked": int(occupancy.blocked.sum()),
+        }
     return found | {"isolated_pores": flow.isolated_pores}

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.errors import NetworkError
-from fdnet.network.invaded import Invaded, measure_invaded
-from fdnet.network.occupancy import Occupancy, measure_occupancy
-from fdnet.network.porosity import Porosity, measure_porosity
-from fdnet.network.sections import profile_edges, section_edges
-from fdnet.network.tessellation import Network, build_network
-from fdnet.snapshot import Array, Snapshot
+from fdnet.network.fines.invaded import Invaded, measure_invaded
+from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
+from fdnet.network.flow.sections import profile_edges, section_edges
+from fdnet.network.network import Network, build_network
+from fdnet.spheres.porosity import Porosity, measure_porosity
+from fdnet.spheres.snapshot import Array, Snapshot
 
 MOVED = 1e-9
 
@@ -64,7 +64,9 @@ def measure_specimen(
     spheres = before if damaged is None else after.joined(damaged.fines())
     with timed("porosity"):
         clean = measure_porosity(before, periodic=periodic, edges=cuts)
-        filled = clean if damaged is None else measure_porosity(spheres, periodic=periodic, edges=cuts)
+        filled = (
+            clean if damaged is None else measure_porosity(spheres, periodic=periodic, edges=cuts)
+        )
     x = spheres.fines().position[:, 0]
     return Specimen(
         first=first,

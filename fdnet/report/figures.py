@@ -10,7 +10,7 @@ import numpy as np
 
 from fdnet.atomic import replacing
 from fdnet.report.side_view import fill_side_view
-from fdnet.snapshot import Array, Snapshot
+from fdnet.spheres.snapshot import Array, Snapshot
 
 if TYPE_CHECKING:
     from fdnet.network.permeability import Analysis
@@ -97,7 +97,13 @@ def _figure(path: Path) -> Iterator[Any]:
 
 
 def _stairs(axes: Any, edges: Array, values: Any, **style: Any) -> None:
-    axes.stairs(np.asarray(values, float), np.asarray(edges, float) * MM, baseline=None, linewidth=2, **style)
+    axes.stairs(
+        np.asarray(values, float),
+        np.asarray(edges, float) * MM,
+        baseline=None,
+        linewidth=2,
+        **style,
+    )
 
 
 def _section_edges(analysis: "Analysis") -> Array:
@@ -119,9 +125,15 @@ def _porosity_reduction(figure: Any, *, analysis: "Analysis") -> None:
     axes = _depth_axes(figure, analysis, "porosity reduction, intact − damaged (–)")
     profile, edges = analysis.profile, _section_edges(analysis)
     lost = np.subtract(profile.porosity_initial, profile.porosity_damaged)
-    axes.stairs(lost, np.asarray(profile.edges) * MM, fill=True, color=BLUE, alpha=0.3, label="bins")
+    axes.stairs(
+        lost, np.asarray(profile.edges) * MM, fill=True, color=BLUE, alpha=0.3, label="bins"
+    )
     _stairs(
-        axes, edges, [s.porosity_initial - s.porosity_damaged for s in analysis.sections], color=BLUE, label="sections"
+        axes,
+        edges,
+        [s.porosity_initial - s.porosity_damaged for s in analysis.sections],
+        color=BLUE,
+        label="sections",
     )
     axes.axhline(0, color=GREY, linewidth=0.8)
     _legend(axes)
@@ -161,19 +173,25 @@ def _invaded_fraction(figure: Any, *, analysis: "Analysis") -> None:
 def _ratios(damaged: Sequence[float], initial: Sequence[float]) -> Array:
     """Damaged over initial, NaN where there is no intact permeability to compare with."""
     below = np.asarray(initial, float)
-    return np.divide(np.asarray(damaged, float), below, out=np.full(len(below), np.nan), where=below > 0)
+    return np.divide(
+        np.asarray(damaged, float), below, out=np.full(len(below), np.nan), where=below > 0
+    )
 
 
 def _permeability_ratio(figure: Any, *, analysis: "Analysis") -> None:
     axes = _depth_axes(figure, analysis, "permeability damaged / intact, k/k₀ (–)")
     edges, sections = _section_edges(analysis), analysis.sections
     cut_out = _ratios([s.k_damaged for s in sections], [s.k_initial for s in sections])
-    in_place = _ratios([s.k_damaged_inplace for s in sections], [s.k_initial_inplace for s in sections])
+    in_place = _ratios(
+        [s.k_damaged_inplace for s in sections], [s.k_initial_inplace for s in sections]
+    )
     _stairs(axes, edges, cut_out, color=BLUE, label="section cut out")
     _stairs(axes, edges, in_place, color=ORANGE, linestyle="--", label="section in place")
     if analysis.k_initial > 0:
         whole = analysis.k_damaged / analysis.k_initial
-        axes.axhline(whole, color=GREY, linewidth=1.2, linestyle=":", label=f"whole specimen {whole:.3f}")
+        axes.axhline(
+            whole, color=GREY, linewidth=1.2, linestyle=":", label=f"whole specimen {whole:.3f}"
+        )
     highest = np.nanmax([1.0, *cut_out, *in_place])
     axes.set_ylim(0, 1.05 * highest)
     _legend(axes, loc="lower right")
@@ -183,7 +201,11 @@ def _porosity_profile(figure: Any, *, analysis: "Analysis") -> None:
     axes = _depth_axes(figure, analysis, "porosity (–)")
     profile = analysis.profile
     _stairs(
-        axes, profile.edges, profile.porosity_initial, color=GREY, label=f"intact, mean {analysis.porosity_initial:.4f}"
+        axes,
+        profile.edges,
+        profile.porosity_initial,
+        color=GREY,
+        label=f"intact, mean {analysis.porosity_initial:.4f}",
     )
     if analysis.occupancy is not None:
         _stairs(
@@ -206,7 +228,9 @@ def _size_distributions(figure: Any, *, analysis: "Analysis", fines: Snapshot | 
     ):
         open_ones = np.asarray(radius)[np.asarray(radius) > 0] * MICRON
         closed = len(radius) - len(open_ones)
-        label = f"{len(radius)} {name}s" + (f",\n{closed} of them closed\n(not drawn)" if closed else "")
+        label = f"{len(radius)} {name}s" + (
+            f",\n{closed} of them closed\n(not drawn)" if closed else ""
+        )
         if len(open_ones):
             weights = np.full(len(open_ones), 1 / len(radius))
             axes.hist(open_ones, bins=30, weights=weights, color=colour, alpha=0.7, label=label)

@@ -60,25 +60,39 @@ def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportP
     """
     template = _environment().from_string(_template_text())
     figures = [
-        {"data": _data_uri(Path(file)), "caption": caption, "name": Path(file).name} for file, caption in parts.figures
+        {"data": _data_uri(Path(file)), "caption": caption, "name": Path(file).name}
+        for file, caption in parts.figures
     ]
     text = template.render(
-        summary=summary, parts=parts, figures=figures, headline=headline(summary), columns=SECTION_COLUMNS
+        summary=summary,
+        parts=parts,
+        figures=figures,
+        headline=headline(summary),
+        columns=SECTION_COLUMNS,
     )
     return write_text(path, text)
 
 
 def headline(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """The numbers on top: label, value, remark."""
-    lost, invaded, supplied = (summary.get(key) for key in ("k_reduction", "invaded_count", "supplied_count"))
+    lost, invaded, supplied = (
+        summary.get(key) for key in ("k_reduction", "invaded_count", "supplied_count")
+    )
     whole = [
-        ("permeability intact", quantity(summary.get("k_initial_m2"), "m²"), _darcy(summary.get("k_initial_m2"))),
+        (
+            "permeability intact",
+            quantity(summary.get("k_initial_m2"), "m²"),
+            _darcy(summary.get("k_initial_m2")),
+        ),
         ("porosity intact", fixed(summary.get("porosity_initial")), "overlap counted once"),
     ]
     if summary.get("stop_reason") is None and not invaded:
         return whole
     reason, loss = summary.get("stop_reason"), DASH if lost is None else f"{100 * lost:.1f} % lost"
-    passed, upstream = quantity(summary.get("passed_count")), quantity(summary.get("upstream_count"))
+    passed, upstream = (
+        quantity(summary.get("passed_count")),
+        quantity(summary.get("upstream_count")),
+    )
     return [
         whole[0],
         (
@@ -88,13 +102,21 @@ def headline(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         ),
         whole[1],
         ("porosity damaged", fixed(summary.get("porosity_damaged")), "overlap counted once"),
-        ("fines invaded", quantity(invaded), f"of {quantity(supplied)} supplied; {passed} passed, {upstream} upstream"),
+        (
+            "fines invaded",
+            quantity(invaded),
+            f"of {quantity(supplied)} supplied; {passed} passed, {upstream} upstream",
+        ),
         (
             "invasion depth",
             _millimetres(summary, "invasion_depth_m"),
             f"95 % shallower than {_millimetres(summary, 'invasion_depth_p95_m')}",
         ),
-        ("cake thickness", _millimetres(summary, "cake_thickness_m"), "deposit upstream of the face"),
+        (
+            "cake thickness",
+            _millimetres(summary, "cake_thickness_m"),
+            "deposit upstream of the face",
+        ),
         ("end of the run", quantity(reason), STOP_WORDS.get(str(reason), "")),
     ]
 
@@ -140,7 +162,9 @@ def _millimetres(summary: Mapping[str, Any], key: str) -> str:
 def _environment() -> "Environment":
     from jinja2 import Environment, StrictUndefined
 
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
     environment.filters.update(quantity=quantity, fixed=fixed, scaled=scaled)
     return environment
 

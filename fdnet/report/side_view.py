@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.snapshot import Array, Snapshot
+from fdnet.spheres.snapshot import Array, Snapshot
 
 MM, MICRON = 1e3, 1e6
 GRAIN_FACE, GRAIN_EDGE, FINE_FACE = "#D9D9D9", "#8C8C8C", "#D55E00"
@@ -62,7 +62,13 @@ def _fines(figure: Any, axes: Any, fines: Snapshot, plane: float) -> None:
         axes.legend(loc="lower right", bbox_to_anchor=(1, 1), fontsize=9)
         return
     circles = _circles(
-        axes, fines, plane, values=fines.radius * MICRON, cmap="plasma", edgecolor="black", linewidth=0.3
+        axes,
+        fines,
+        plane,
+        values=fines.radius * MICRON,
+        cmap="plasma",
+        edgecolor="black",
+        linewidth=0.3,
     )
     circles.set_clim(low, high)
     figure.colorbar(circles, ax=axes, label="radius of the fine (µm)", shrink=0.8)
@@ -77,7 +83,14 @@ def _frame(figure: Any, axes: Any, snapshot: Snapshot) -> None:
     start = max(min(x_lo, float(reach[0])), x_lo - 0.35 * (x_hi - x_lo)) - margin
     axes.plot([x_lo, x_hi, x_hi, x_lo], [z_lo, z_lo, z_hi, z_hi], color="black", linewidth=1)
     axes.axvline(x_lo, color="#0072B2", linestyle="--", linewidth=1.6)
-    axes.annotate("formation face", (x_lo, z_hi), (3, 3), textcoords="offset points", color="#0072B2", fontsize=9)
+    axes.annotate(
+        "formation face",
+        (x_lo, z_hi),
+        (3, 3),
+        textcoords="offset points",
+        color="#0072B2",
+        fontsize=9,
+    )
     axes.set(
         xlim=(start, x_hi + overhang),
         ylim=(z_lo - overhang, z_hi + overhang),

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fdnet.atomic import replacing, write_text
-from fdnet.report.spheres import read_spheres, write_spheres
-from fdnet.snapshot import Array
+from fdnet.spheres.csv_file import read_spheres, write_spheres
+from fdnet.spheres.snapshot import Array
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,13 +56,24 @@ def section_rows(analysis: "Analysis") -> list[dict[str, Any]]:
 
 def write_sections(path: str | Path, analysis: "Analysis") -> Path:
     """One row per section; k_reduction is empty where the intact k is 0. Edges at full precision."""
-    rows = [row | {edge: repr(float(row[edge])) for edge in ("x_lo_m", "x_hi_m")} for row in section_rows(analysis)]
+    rows = [
+        row | {edge: repr(float(row[edge])) for edge in ("x_lo_m", "x_hi_m")}
+        for row in section_rows(analysis)
+    ]
     return _write(path, _frame(rows))
 
 
 def write_laws(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> Path:
     """One row per pair of laws: law, damage_law, k_initial_m2, k_damaged_m2, k_reduction, porosities."""
-    names = ("law", "damage_law", "k_initial_m2", "k_damaged_m2", "k_reduction", "porosity_initial", "porosity_damaged")
+    names = (
+        "law",
+        "damage_law",
+        "k_initial_m2",
+        "k_damaged_m2",
+        "k_reduction",
+        "porosity_initial",
+        "porosity_damaged",
+    )
     return _write(path, _frame({name: [row[name] for row in rows] for name in names}))
 
 
@@ -78,7 +89,9 @@ def write_profile(path: str | Path, analysis: "Analysis") -> Path:
                 "x_hi_m": edges[1:],
                 "porosity_initial": profile.porosity_initial,
                 "porosity_damaged": profile.porosity_damaged,
-                "porosity_reduction": np.subtract(profile.porosity_initial, profile.porosity_damaged),
+                "porosity_reduction": np.subtract(
+                    profile.porosity_initial, profile.porosity_damaged
+                ),
                 "fines_fraction": profile.fines_fraction,
             }
         ),
@@ -133,7 +146,9 @@ def write_throats(path: str | Path, analysis: "Analysis") -> Path:
         "throat_share": network.throat_share,
         "fines_count": np.zeros(count, int) if occupancy is None else occupancy.throat_fines,
         "fines_volume_m3": np.zeros(count) if occupancy is None else occupancy.throat_solid_volume,
-        "fines_radius_mean_m": np.zeros(count) if occupancy is None else occupancy.throat_fine_radius,
+        "fines_radius_mean_m": np.zeros(count)
+        if occupancy is None
+        else occupancy.throat_fine_radius,
         "porosity": np.ones(count) if occupancy is None else occupancy.throat_porosity,
         "blocked": blocked_throats(analysis).astype(int),
         "law_used": analysis.law_used,
@@ -200,7 +215,10 @@ def _write(path: str | Path, frame: "pd.DataFrame") -> Path:
 def _plain(value: Any, where: str, refused: list[str]) -> Any:
     """`value` as JSON knows it; NaN and infinities become None and are named in `refused`."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item, f"{where}.{key}".lstrip("."), refused) for key, item in value.items()}
+        return {
+            str(key): _plain(item, f"{where}.{key}".lstrip("."), refused)
+            for key, item in value.items()
+        }
     if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.ndim):
         return [_plain(item, f"{where}[{i}]", refused) for i, item in enumerate(value)]
     if isinstance(value, np.generic | np.ndarray):

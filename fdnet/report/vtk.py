@@ -13,7 +13,7 @@ import numpy as np
 
 from fdnet.atomic import replacing, write_text
 from fdnet.report.tables import blocked_throats, pore_porosity
-from fdnet.snapshot import Array, Snapshot
+from fdnet.spheres.snapshot import Array, Snapshot
 
 if TYPE_CHECKING:
     from fdnet.network.permeability import Analysis
@@ -69,7 +69,9 @@ def write_pvd(path: str | Path, entries: Sequence[tuple[float, str | Path]]) -> 
     )
 
 
-def render_spheres_png(path: str | Path, spheres_vtp: str | Path, box: Array, *, seconds: float = 120.0) -> str:
+def render_spheres_png(
+    path: str | Path, spheres_vtp: str | Path, box: Array, *, seconds: float = 120.0
+) -> str:
     """Draw the 3-D view of `spheres_vtp` into `path` in a child process; returns "" or why there is no picture.
 
     `box` (3, 2) m. Without usable OpenGL, VTK kills its process with no Python error; here that costs the
@@ -100,7 +102,14 @@ def _command(spheres_vtp: str | Path, box: Array) -> list[str]:
     bounds = ",".join(repr(float(value)) for value in np.asarray(box).ravel())
     libraries = Path(__file__).resolve().parents[2] / ".prefix" / "bin" / "with-libraries"
     wrapper = [str(libraries)] if os.access(libraries, os.X_OK) else []
-    return [*wrapper, sys.executable, "-m", "fdnet.report.render", str(Path(spheres_vtp).absolute()), f"--box={bounds}"]
+    return [
+        *wrapper,
+        sys.executable,
+        "-m",
+        "fdnet.report.picture",
+        str(Path(spheres_vtp).absolute()),
+        f"--box={bounds}",
+    ]
 
 
 def _child_environment() -> dict[str, str]:
@@ -117,7 +126,9 @@ def _refuse_failure(done: "subprocess.CompletedProcess[str]", part: Path) -> Non
     """Raise _NoPictureError, with the reason, unless the child ended well and left a whole PNG."""
     if done.returncode:
         said = [line.strip() for line in (done.stderr or "").splitlines() if line.strip()]
-        how = f"signal {-done.returncode}" if done.returncode < 0 else f"exit code {done.returncode}"
+        how = (
+            f"signal {-done.returncode}" if done.returncode < 0 else f"exit code {done.returncode}"
+        )
         why = said[-1][:200] if said else "no usable OpenGL?"
         raise _NoPictureError(f"the drawing process ended with {how}; {why}")
     picture = part.read_bytes() if part.is_file() else b""
@@ -149,12 +160,20 @@ def _drawing(network: Any) -> _Drawing:
     away[~away] = np.linalg.norm(ends[~away] - pores[source[~away]], axis=1) > 1e-9
     points, source = ends[away], source[away]
     lines[away.reshape(lines.shape)] = len(pores) + np.arange(len(points))
-    periods = np.where(source < 0, 0, np.rint((points[:, 0] - pores[source, 0]) / np.ptp(network.box[0])))
-    return _Drawing(points=np.concatenate([pores, points]), lines=lines, source=source, periods=periods)
+    periods = np.where(
+        source < 0, 0, np.rint((points[:, 0] - pores[source, 0]) / np.ptp(network.box[0]))
+    )
+    return _Drawing(
+        points=np.concatenate([pores, points]), lines=lines, source=source, periods=periods
+    )
 
 
 def _throat_data(analysis: "Analysis") -> dict[str, Array]:
-    network, occupancy, count = analysis.network, analysis.occupancy, len(analysis.network.throat_radius)
+    network, occupancy, count = (
+        analysis.network,
+        analysis.occupancy,
+        len(analysis.network.throat_radius),
+    )
     codes = [LAW_CODES.get(str(name), -1) for name in analysis.law_used]
     return {
         "throat_radius": network.throat_radius,
@@ -180,10 +199,16 @@ def _pore_data(analysis: "Analysis", drawing: _Drawing) -> dict[str, Array]:
         "pressure_initial": analysis.flow_initial.pore_pressure,
         "pressure_damaged": analysis.flow_damaged.pore_pressure,
     }
-    fall = drawing.periods if network.periodic[0] else none  # periodic x: the pressure falls by 1 per period
-    data = {name: np.append(p, _of_ends(p, source, (1.0, 0.0)) - fall) for name, p in pressures.items()}
+    fall = (
+        drawing.periods if network.periodic[0] else none
+    )  # periodic x: the pressure falls by 1 per period
+    data = {
+        name: np.append(p, _of_ends(p, source, (1.0, 0.0)) - fall) for name, p in pressures.items()
+    }
     return data | {
-        "radius": np.append(network.pore_radius, _of_ends(network.pore_radius, source, (0.0, 0.0))),
+        "radius": np.append(
+            network.pore_radius, _of_ends(network.pore_radius, source, (0.0, 0.0))
+        ),
         "porosity": np.append(porosity, _of_ends(porosity, source, (np.nan, np.nan))),
         "volume": np.append(network.pore_volume, none),
         "share": np.append(network.pore_share, none),

@@ -10,7 +10,7 @@ from typing import Any
 from fdnet.atomic import write_text
 from fdnet.dem.liggghts import find_binary
 from fdnet.errors import CaseError
-from fdnet.studies.study import Study
+from fdnet.studies.engine.study import Study
 
 STUDIES: Mapping[str, str] = {
     "stiffness": "contact stiffness, from 1e2 N/m to the nominal one",
@@ -25,20 +25,35 @@ STUDIES: Mapping[str, str] = {
 }
 """Name of each study and what it asks; the module has the same name with underscores."""
 
+OF_NETWORK = ("throat-occupancy", "linear-solver", "laws", "specimen-size")
+"""The studies of the network half; the others are of the invasion."""
+
 THESIS = "thesis"
 """The study beside them, of runs and figures rather than of error against run time."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of `fdnet study`."""
-    parser.add_argument("name", metavar="NAME", help=f"one of {', '.join(STUDIES)}; 'list' says what each asks")
+    parser.add_argument(
+        "name", metavar="NAME", help=f"one of {', '.join(STUDIES)}; 'list' says what each asks"
+    )
     parser.add_argument("--quick", action="store_true", help="the reduced form, below 30 s")
-    parser.add_argument("--out", type=Path, help="folder for table, figure and text (default studies/NAME)")
+    parser.add_argument(
+        "--out", type=Path, help="folder for table, figure and text (default studies/NAME)"
+    )
     parser.add_argument("--silent", action="store_true", help="no progress")
-    thesis = parser.add_argument_group("only for 'thesis', all specimens of the thesis beside its numbers")
+    thesis = parser.add_argument_group(
+        "only for 'thesis', all specimens of the thesis beside its numbers"
+    )
     thesis.add_argument("--jobs", type=int, default=1, help="runs side by side (default 1)")
-    thesis.add_argument("--runs", type=Path, default=Path("runs/thesis"), help="run folders while they are needed")
-    thesis.add_argument("--redraw", action="store_true", help="run nothing: tables and figures from the states kept")
+    thesis.add_argument(
+        "--runs", type=Path, default=Path("runs/thesis"), help="run folders while they are needed"
+    )
+    thesis.add_argument(
+        "--redraw",
+        action="store_true",
+        help="run nothing: tables and figures from the states kept",
+    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -54,7 +69,9 @@ def run(options: argparse.Namespace) -> int:
     out = options.out or Path("studies") / (f"{study.name}-quick" if options.quick else study.name)
     text = run_study(study, out, quick=options.quick, show=not options.silent)
     print(text)
-    print(f"table:  {out / study.name}.csv\nfigure: {out / study.name}.png\ntext:   {out / study.name}.md")
+    print(
+        f"table:  {out / study.name}.csv\nfigure: {out / study.name}.png\ntext:   {out / study.name}.md"
+    )
     return 0
 
 
@@ -81,8 +98,13 @@ def study_named(name: str) -> Study:
     """The study of that name. Raises CaseError when there is none."""
     if name not in STUDIES:
         raise CaseError(f"study: {name!r} is not known, expected one of {', '.join(STUDIES)}")
-    module: Any = import_module(f"fdnet.studies.{name.replace('-', '_')}")
+    module: Any = import_module(_module(name))
     return module.STUDY
+
+
+def _module(name: str) -> str:
+    room = "network" if name in OF_NETWORK else "dem"
+    return f"fdnet.studies.{room}.{name.replace('-', '_')}"
 
 
 def run_study(study: Study, out: Path, *, quick: bool, show: bool = False) -> str:
@@ -90,9 +112,9 @@ def run_study(study: Study, out: Path, *, quick: bool, show: bool = False) -> st
 
     Raises LiggghtsError when the study needs a LIGGGHTS that is not there, CaseError when `out` is not this study's.
     """
-    from fdnet.studies.draw import draw_study
-    from fdnet.studies.runner import run_points
-    from fdnet.studies.table import study_text, write_rows
+    from fdnet.studies.engine.draw import draw_study
+    from fdnet.studies.engine.runner import run_points
+    from fdnet.studies.engine.table import study_text, write_rows
 
     def tell(line: str) -> None:
         if show:

@@ -10,8 +10,8 @@ from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
 from fdnet.dem.scene import box_of
 from fdnet.dem.supply import AT_ONCE, CLEARANCE, LOOSEST_CAKE, batches_of, place_batches, slab_end
-from fdnet.scales import scales_of
-from fdnet.snapshot import Kind
+from fdnet.scales.scales import scales_of
+from fdnet.spheres.snapshot import Kind
 
 BATCHED = ("fines.supply=batches", "fines.count=900", "run.checkpoint_ms=0.005")
 
@@ -30,7 +30,9 @@ def in_the_slab(case, scales, grains):
 @pytest.mark.parametrize("radius", ["0.05", "[0.02,0.06]"])
 @pytest.mark.parametrize("sides", ["walls", "periodic"])
 def test_batches_make_up_the_slab(radius, sides):
-    case = tiny(*BATCHED, f"fines.radius_mm={radius}", f"box.sides={sides}", "fines.concentration=0.15")
+    case = tiny(
+        *BATCHED, f"fines.radius_mm={radius}", f"box.sides={sides}", "fines.concentration=0.15"
+    )
     scales, grains = scales_of(case), one_grain(case)
     found = list(in_the_slab(case, scales, grains))
     end, batches = slab_end(case, grains), batches_of(case, scales)
@@ -40,8 +42,14 @@ def test_batches_make_up_the_slab(radius, sides):
     for number, (fines, place) in enumerate(found):
         assert len(fines) == batches.counts[number]
         assert np.all(place[:, 0] <= end - number * batches.length)
-        assert np.all(place[:, 0] >= max(end - (number + 1) * batches.length, end - scales.slab_length) - 1e-18)
-    place, radii = np.concatenate([p for _, p in found]), np.concatenate([f.radius for f, _ in found])
+        assert np.all(
+            place[:, 0]
+            >= max(end - (number + 1) * batches.length, end - scales.slab_length) - 1e-18
+        )
+    place, radii = (
+        np.concatenate([p for _, p in found]),
+        np.concatenate([f.radius for f, _ in found]),
+    )
     gap = place[:, None] - place
     for axis, size in enumerate(case.size_m):
         gap[..., axis] -= size * np.round(gap[..., axis] / size) if case.periodic[axis] else 0.0
@@ -86,7 +94,10 @@ def test_thin_chunks_make_no_batch_thinner_than_a_fine():
 
 
 def test_so_few_fines_that_a_batch_would_be_empty_come_at_once():
-    case = tiny("fines={radius_mm=0.05, count=60, supply='batches', concentration=0.0003}", "run.checkpoint_ms=0.01")
+    case = tiny(
+        "fines={radius_mm=0.05, count=60, supply='batches', concentration=0.0003}",
+        "run.checkpoint_ms=0.01",
+    )
     assert batches_of(case, scales_of(case)).counts == (60,)
 
 
@@ -97,7 +108,8 @@ def test_a_short_slab_is_one_batch():
 
 
 @pytest.mark.parametrize(
-    ("scheme", "sets"), [("viscous", set()), ("held", {"uf"}), ("every_step", {"uf"}), ("implicit", {"uf", "Ksl"})]
+    ("scheme", "sets"),
+    [("viscous", set()), ("held", {"uf"}), ("every_step", {"uf"}), ("implicit", {"uf", "Ksl"})],
 )
 def test_the_deck_takes_each_batch_in_once_and_gives_it_its_drag(tmp_path, scheme, sets):
     case = tiny(*BATCHED, f"drag.scheme={scheme}")
@@ -109,7 +121,9 @@ def test_the_deck_takes_each_batch_in_once_and_gives_it_its_drag(tmp_path, schem
     text = render_invade(case, scales, grains).text
     assert f'if "${{chunk}} < 2 || ${{chunk}} > {last}" then "jump SELF fed"' in text
     lines = files[0].read_text().splitlines()
-    assert {line.split()[4] for line in lines if line.startswith("set group batch property/atom")} == sets
+    assert {
+        line.split()[4] for line in lines if line.startswith("set group batch property/atom")
+    } == sets
     assert any(line.startswith("velocity batch set") for line in lines)
 
 
@@ -122,7 +136,11 @@ def test_a_batched_invasion_accounts_for_every_fine_and_resumes(binary, tmp_path
     whole = invade(case, scales, grains, tmp_path / "whole", Launch(binary=binary))
     last, batches = whole.history[-1], batches_of(case, scales)
     assert len(batches.counts) > 5
-    assert whole.supplied == batches.supplied_at(last.chunk) == last.upstream + last.invaded + last.passed
+    assert (
+        whole.supplied
+        == batches.supplied_at(last.chunk)
+        == last.upstream + last.invaded + last.passed
+    )
     assert whole.max_overlap < 0.1
 
     def stop(line: str) -> None:

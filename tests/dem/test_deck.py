@@ -11,8 +11,8 @@ from fdnet.dem.deck import render_text, used_variables
 from fdnet.dem.invade_deck import render_invade
 from fdnet.dem.packing import draw_radii, render_pack
 from fdnet.errors import DeckError
-from fdnet.scales import scales_of
-from fdnet.snapshot import Kind, Snapshot
+from fdnet.scales.scales import scales_of
+from fdnet.spheres.snapshot import Kind, Snapshot
 
 
 def one_grain(case) -> Snapshot:
@@ -95,7 +95,9 @@ def test_gravity_is_left_out_when_negligible_and_told():
     assert not has(text, "gravity|buoyancy")
     assert "# left out: gravity and buoyancy (gravity is" in text
     assert has(invade_text("gravity.mode=on"), r"^fix grav fines gravity 9.81 vector 0.0 0.0 -1.0")
-    assert has(invade_text("gravity.mode=on"), r"^fix buoy fines buoyancy density 1095.0 dim z level")
+    assert has(
+        invade_text("gravity.mode=on"), r"^fix buoy fines buoyancy density 1095.0 dim z level"
+    )
     assert not has(invade_text("gravity.mode=on", "gravity.buoyancy=false"), "buoyancy")
 
 

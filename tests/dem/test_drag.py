@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from builders import resting_spheres, tiny
 
-from fdnet.case import Case
-from fdnet.case_file import case_from
+from fdnet.case.case import Case
+from fdnet.case.file import case_from
 from fdnet.dem.deck import number, render_text
 from fdnet.dem.drag import drag_variables
-from fdnet.dem.dump import COLUMNS, Frame, read_dump
 from fdnet.dem.liggghts import Binary, Launch, run_deck
 from fdnet.dem.scene import contact_variables, write_data
 from fdnet.errors import CaseError
-from fdnet.scales import Scales, relaxation_time, scales_of
-from fdnet.snapshot import Kind
+from fdnet.scales.scales import Scales, relaxation_time, scales_of
+from fdnet.spheres.dump import COLUMNS, Frame, read_dump
+from fdnet.spheres.snapshot import Kind
 
 SCHEMES = ("every_step", "held", "implicit", "viscous")
 SPEED, RADIUS = 2.0, 0.05e-3
@@ -56,7 +56,9 @@ def test_the_viscous_split_is_stokes_drag_of_one_radius():
     scales = scales_of(case)
     text, damping = drag_text(case, scales), 6 * math.pi * 0.05 * 3 * RADIUS
     assert float(re.search(r"drag fines viscous (\S+)", text).group(1)) == pytest.approx(damping)
-    assert float(re.search(r"push fines addforce (\S+) 0.0 0.0", text).group(1)) == pytest.approx(damping * SPEED)
+    assert float(re.search(r"push fines addforce (\S+) 0.0 0.0", text).group(1)) == pytest.approx(
+        damping * SPEED
+    )
     slower = float(re.search(r"slow fines addforce (\S+) 0.0 0.0 region slow", text).group(1))
     assert slower == pytest.approx(-damping * SPEED * (1 - scales.porosity))
     case = drag_case("drag.scheme=viscous")
@@ -77,8 +79,14 @@ def test_implicit_drag_gives_every_fine_its_own_coefficient():
     [
         (["drag.scheme=viscous", "fines.radius_mm=[0.04, 0.06]"], "needs fines of one size"),
         (["drag.scheme=implicit", "drag.upstream=darcy"], "keeps one a fine"),
-        (["drag.scheme=implicit", "drag.refresh_steps=5"], "belongs to drag.scheme 'held', not 'implicit'"),
-        (["drag.scheme=viscous", "drag.refresh_steps=5"], "belongs to drag.scheme 'held', not 'viscous'"),
+        (
+            ["drag.scheme=implicit", "drag.refresh_steps=5"],
+            "belongs to drag.scheme 'held', not 'implicit'",
+        ),
+        (
+            ["drag.scheme=viscous", "drag.refresh_steps=5"],
+            "belongs to drag.scheme 'held', not 'viscous'",
+        ),
         (["drag.scheme=explicit"], "drag.scheme: 'explicit'"),
     ],
 )
@@ -97,13 +105,29 @@ def drive(
     box = np.column_stack([np.zeros(3), case.size_m])
     grain = resting_spheres([[2e-3, 8e-4, 8e-4]], 2.5e-4, box, kind=Kind.GRAIN)
     at = 2e-3 - 2.5e-4 - RADIUS - gap
-    spheres = grain.joined(resting_spheres([[at, 8e-4, 8e-4]], RADIUS, box, kind=Kind.FINE, first=2))
-    write_data(folder / "one.data", spheres, bounds=box, density=np.array([2650.0, 2146.0]), types=3)
-    header = {"stage": "test", "case_name": "one", "digest": "-", "left_out": [], "boundary": "f f f", "processors": ""}
+    spheres = grain.joined(
+        resting_spheres([[at, 8e-4, 8e-4]], RADIUS, box, kind=Kind.FINE, first=2)
+    )
+    write_data(
+        folder / "one.data", spheres, bounds=box, density=np.array([2650.0, 2146.0]), types=3
+    )
+    header = {
+        "stage": "test",
+        "case_name": "one",
+        "digest": "-",
+        "left_out": [],
+        "boundary": "f f f",
+        "processors": "",
+    }
     contacts = contact_variables(case, scales, "invade", friction=False)
-    text = render_text("_header.in.j2", header) + "read_data one.data\nneighbor 5e-5 bin\nneigh_modify delay 0\n"
+    text = (
+        render_text("_header.in.j2", header)
+        + "read_data one.data\nneighbor 5e-5 bin\nneigh_modify delay 0\n"
+    )
     text += "group grains type 1\ngroup fines type 2\n"
-    text += render_text("_contacts.in.j2", {"contacts": contacts, "time_step": number(scales.time_step)})
+    text += render_text(
+        "_contacts.in.j2", {"contacts": contacts, "time_step": number(scales.time_step)}
+    )
     text += "neigh_modify exclude group grains grains\nfix integ fines nve/sphere\n"
     text += drag_text(case, scales) + f"dump d fines custom {every} d.dump {COLUMNS}\n"
     text += 'dump_modify d format "%d %d %.17g %.17g %.17g %.17g %.17g %.17g %.17g"\n'
@@ -121,7 +145,9 @@ def relaxation_error(scheme: str, step: float, binary: Binary, folder: Path) -> 
     """Largest error over u of v(t) = u (1 - exp(-t / tau)) in two relaxation times, tested every 0.2 tau."""
     every = round(0.2 * TAU / step)
     held = ["drag.refresh_steps=1"] if scheme == "held" else []
-    case = drag_case(f"drag.scheme={scheme}", f"run.time_step_s={step}", "run.stiffness_N_m=500.0", *held)
+    case = drag_case(
+        f"drag.scheme={scheme}", f"run.time_step_s={step}", "run.stiffness_N_m=500.0", *held
+    )
     _, frames = drive(case, binary, folder, gap=1e-3, steps=10 * every, every=every)
     time = step * np.array([frame.step for frame in frames])
     assert len(time) == 11
@@ -132,7 +158,10 @@ def relaxation_error(scheme: str, step: float, binary: Binary, folder: Path) -> 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_fine_relaxes_to_the_fluid_as_stokes_has_it(binary, tmp_path, scheme):
     """v = u (1 - exp(-t / tau)); every scheme is of first order in dt, and within 0.5 dt / tau of it."""
-    errors = [relaxation_error(scheme, TAU * part, binary, tmp_path / str(part)) for part in (0.01, 0.005)]
+    errors = [
+        relaxation_error(scheme, TAU * part, binary, tmp_path / str(part))
+        for part in (0.01, 0.005)
+    ]
     assert errors[0] < 0.5 * 0.01
     assert errors[0] / errors[1] == pytest.approx(2.0, abs=0.1)
 
@@ -141,8 +170,12 @@ def test_a_fine_relaxes_to_the_fluid_as_stokes_has_it(binary, tmp_path, scheme):
 def test_the_viscous_split_moves_a_fine_as_drag_at_every_step_does(binary, tmp_path):
     moved = []
     for scheme in ("every_step", "viscous"):
-        case = drag_case(f"drag.scheme={scheme}", f"run.time_step_s={0.01 * TAU}", "run.stiffness_N_m=500.0")
-        moved.append(speeds(drive(case, binary, tmp_path / scheme, gap=1e-3, steps=200, every=20)[1]))
+        case = drag_case(
+            f"drag.scheme={scheme}", f"run.time_step_s={0.01 * TAU}", "run.stiffness_N_m=500.0"
+        )
+        moved.append(
+            speeds(drive(case, binary, tmp_path / scheme, gap=1e-3, steps=200, every=20)[1])
+        )
     assert moved[0] == pytest.approx(moved[1], rel=1e-12)
 
 
@@ -153,7 +186,12 @@ def test_implicit_drag_is_bounded_at_any_step(binary, tmp_path, ratio):
 
     |q| < 1 for every k. The first half step has no drag yet: u - v_n = u q^n / (1 - k / 2).
     """
-    case = drag_case("drag.scheme=implicit", f"drag.multiplier={ratio * TAU / 3e-8}", "run.time_step_s=3e-8", SLOW)
+    case = drag_case(
+        "drag.scheme=implicit",
+        f"drag.multiplier={ratio * TAU / 3e-8}",
+        "run.time_step_s=3e-8",
+        SLOW,
+    )
     _, frames = drive(case, binary, tmp_path / "run", gap=1e-4, steps=100, every=10)
     step = np.array([float(frame.step) for frame in frames[1:]])
     expected = 0.02 * (1 - ((2 - ratio) / (2 + ratio)) ** step / (1 - ratio / 2))
@@ -162,7 +200,8 @@ def test_implicit_drag_is_bounded_at_any_step(binary, tmp_path, ratio):
 
 @pytest.mark.liggghts
 @pytest.mark.parametrize(
-    ("scheme", "ratio"), [("every_step", 0.5), ("viscous", 0.5), ("implicit", 0.1), ("implicit", 10)]
+    ("scheme", "ratio"),
+    [("every_step", 0.5), ("viscous", 0.5), ("implicit", 0.1), ("implicit", 10)],
 )
 def test_a_fine_at_rest_is_pressed_by_the_drag_of_the_fluid(binary, tmp_path, scheme, ratio):
     """Overlap 6 pi mu M r u / k, whatever the step."""
@@ -176,4 +215,6 @@ def test_a_fine_at_rest_is_pressed_by_the_drag_of_the_fluid(binary, tmp_path, sc
     scales, frames = drive(case, binary, tmp_path / "run", gap=1e-8, steps=40_000, every=40_000)
     overlap = frames[-1].column("x")[0] - (2e-3 - 2.5e-4 - RADIUS)
     force = 6 * math.pi * 0.05 * case.drag.multiplier * RADIUS * 0.02
-    assert overlap == pytest.approx(force / scales.contacts["grain-fine"].normal_stiffness, rel=1e-4)
+    assert overlap == pytest.approx(
+        force / scales.contacts["grain-fine"].normal_stiffness, rel=1e-4
+    )

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fdnet.dem.dump import parse_dump, read_dump, read_frame
 from fdnet.errors import DumpError
+from fdnet.spheres.dump import parse_dump, read_dump, read_frame
 
 HEADER = (
     "ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\n"
@@ -15,7 +15,9 @@ HEADER = (
 
 
 def frame(step: int, rows: list[str], count: int | None = None) -> str:
-    return HEADER.format(step=step, count=len(rows) if count is None else count) + "".join(row + "\n" for row in rows)
+    return HEADER.format(step=step, count=len(rows) if count is None else count) + "".join(
+        row + "\n" for row in rows
+    )
 
 
 def parse(text: str) -> list:
@@ -23,7 +25,9 @@ def parse(text: str) -> list:
 
 
 def test_full_precision_any_order_and_several_frames():
-    first, second = parse(frame(5, ["2 1 0.12345678901234568 ", "1 2 -3e-9 "]) + frame(10, ["1 2 7 "]))
+    first, second = parse(
+        frame(5, ["2 1 0.12345678901234568 ", "1 2 -3e-9 "]) + frame(10, ["1 2 7 "])
+    )
     assert (first.step, second.step) == (5, 10)
     assert first.column("id").tolist() == [1, 2]
     assert first.column("x").tolist() == [-3e-9, 0.12345678901234568]
@@ -42,9 +46,15 @@ def test_empty_frame():
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (frame(4000, ["1 1 0.5 "], count=3), r"d\.dump:11: step 4000: 1 of 3 rows, then the file ends"),
+        (
+            frame(4000, ["1 1 0.5 "], count=3),
+            r"d\.dump:11: step 4000: 1 of 3 rows, then the file ends",
+        ),
         (frame(4000, ["1 1 0.5 ", "2 1 0."])[:-1], "rows, then the file ends"),
-        (frame(0, ["1 1 0.5 "], count=2) + frame(1, ["1 1 0.5 "]), "1 of 2 rows, then the next frame begins"),
+        (
+            frame(0, ["1 1 0.5 "], count=2) + frame(1, ["1 1 0.5 "]),
+            "1 of 2 rows, then the next frame begins",
+        ),
         (frame(0, ["1 1 0.5 ", "2 1 "]), "d.dump:11: step 0: 2 values, expected 3"),
         (frame(0, ["1 1 0.5 ", "2 1 0.5 7 "]), "4 values, expected 3"),
         (frame(0, ["1 1 nan "]), "column x holds b'nan', expected a finite number"),
@@ -55,7 +65,10 @@ def test_empty_frame():
         ("ITEM: TIMESTEP\nx\nITEM: NUMBER OF ATOMS\n", "step is b'x'"),
         ("hello\n", "found b'hello', expected 'ITEM: TIMESTEP'"),
         (frame(0, ["1 1 1 "]).replace("0 2", "0"), "box bounds b'0', expected two numbers"),
-        (frame(0, ["1 1 1 "]).replace("\n1\nITEM: BOX", "\n-4\nITEM: BOX"), "number of atoms is b'-4'"),
+        (
+            frame(0, ["1 1 1 "]).replace("\n1\nITEM: BOX", "\n-4\nITEM: BOX"),
+            "number of atoms is b'-4'",
+        ),
     ],
 )
 def test_broken_files_are_named_by_line_and_step(text, said):

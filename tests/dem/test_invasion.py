@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 from builders import tiny
 
-from fdnet import pipeline
-from fdnet.contacts import touching_pairs
 from fdnet.dem import checkpoint, supply
 from fdnet.dem.checkpoint import HISTORY_HEADER, last_checkpoint, plug_allowance, read_history
 from fdnet.dem.invasion import invade
@@ -16,8 +14,10 @@ from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
 from fdnet.dem.supply import CLEARANCE, SURE_CROWDING, crowding, place_fines, refuse_crowded_supply
 from fdnet.errors import CaseError, LiggghtsError
-from fdnet.scales import scales_of
-from fdnet.snapshot import Kind
+from fdnet.run import pipeline
+from fdnet.scales.scales import scales_of
+from fdnet.spheres.contacts import touching_pairs
+from fdnet.spheres.snapshot import Kind
 
 pytestmark = pytest.mark.liggghts
 
@@ -28,12 +28,15 @@ def packed(binary, tmp_path_factory):
     grains = {}
     for sides in ("walls", "periodic"):
         case = tiny(f"box.sides={sides}")
-        grains[sides] = make_pack(case, scales_of(case), tmp_path_factory.mktemp(sides), Launch(binary=binary)).grains
+        grains[sides] = make_pack(
+            case, scales_of(case), tmp_path_factory.mktemp(sides), Launch(binary=binary)
+        ).grains
     return grains
 
 
 @pytest.mark.parametrize(
-    "assignments", [[], ["fines.radius_mm=[0.02,0.06]"], ["box.sides=periodic", "fines.concentration=0.3"]]
+    "assignments",
+    [[], ["fines.radius_mm=[0.02,0.06]"], ["box.sides=periodic", "fines.concentration=0.3"]],
 )
 def test_fines_start_clear_of_everything(packed, assignments):
     case = tiny(*assignments)
@@ -51,7 +54,9 @@ def test_fines_start_clear_of_everything(packed, assignments):
 
 def test_a_slab_that_cannot_hold_the_fines_is_an_error(packed):
     case = tiny("fines={radius_mm=0.05, count=300, concentration=0.3}")
-    crowded = case.model_copy(update={"fines": case.fines.model_copy(update={"concentration": 0.6})})
+    crowded = case.model_copy(
+        update={"fines": case.fines.model_copy(update={"concentration": 0.6})}
+    )
     with pytest.raises(CaseError, match=r"fines\.concentration: 0\.6 leaves"):
         place_fines(crowded, scales_of(crowded), packed["walls"])
 
@@ -62,10 +67,14 @@ def test_a_slab_that_cannot_hold_the_fines_is_an_error(packed):
 def test_every_fine_finds_a_place_up_to_the_sure_crowding(monkeypatch, radius_mm, sides, length):
     """Drawn just above the limit, slabs of 1 and 20 diameters; below the limit nothing is drawn beforehand."""
     high = float(radius_mm.strip("[]").rsplit(",", 1)[-1])
-    case = tiny(f"box.sides={sides}", f"fines={{radius_mm={radius_mm}, slab_mm={2 * high * length}}}")
+    case = tiny(
+        f"box.sides={sides}", f"fines={{radius_mm={radius_mm}, slab_mm={2 * high * length}}}"
+    )
     fines = case.fines.model_copy(update={"concentration": 1.0})
     fines = fines.model_copy(
-        update={"concentration": SURE_CROWDING / crowding(case.model_copy(update={"fines": fines}))}
+        update={
+            "concentration": SURE_CROWDING / crowding(case.model_copy(update={"fines": fines}))
+        }
     )
     for seed in range(5):
         full = fines.model_copy(update={"concentration": 1.001 * fines.concentration})
@@ -73,7 +82,9 @@ def test_every_fine_finds_a_place_up_to_the_sure_crowding(monkeypatch, radius_mm
         assert crowding(full) > SURE_CROWDING
         refuse_crowded_supply(full, scales_of(full))
     monkeypatch.setattr(supply, "_draw", None)
-    sure = case.model_copy(update={"fines": fines.model_copy(update={"concentration": 0.999 * fines.concentration})})
+    sure = case.model_copy(
+        update={"fines": fines.model_copy(update={"concentration": 0.999 * fines.concentration})}
+    )
     refuse_crowded_supply(sure, scales_of(sure))
 
 
@@ -123,7 +134,9 @@ def refuse_all(*_):
         ["fines.radius_mm=[0.02,0.05]", "fines.friction=0.0", "run={duration_ms=0.25}"],
     ],
 )
-def test_supplied_is_invaded_passed_and_upstream_at_every_checkpoint(binary, packed, tmp_path, assignments):
+def test_supplied_is_invaded_passed_and_upstream_at_every_checkpoint(
+    binary, packed, tmp_path, assignments
+):
     case = tiny("run.cap_ms=0.6", *assignments)
     scales = scales_of(case)
     result = invade(case, scales, packed[case.box.sides], tmp_path, Launch(binary=binary))
@@ -148,14 +161,22 @@ def test_fines_of_one_micrometre_invade(binary, packed, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "assignment", ["run.skin_mm=0.01", "run.skin_mm=0.25", "run.neighbour_bin_mm=0.05", "run.neighbour_bin_mm=1.6"]
+    "assignment",
+    [
+        "run.skin_mm=0.01",
+        "run.skin_mm=0.25",
+        "run.neighbour_bin_mm=0.05",
+        "run.neighbour_bin_mm=1.6",
+    ],
 )
 def test_the_neighbour_search_changes_time_not_motion(binary, packed, tmp_path, assignment):
     """Up to the order of sums: before chaos has had time to grow, positions agree to a millionth of a fine."""
     ends = []
     for name, extra in (("own", [assignment]), ("default", [])):
         case = tiny("run.duration_ms=0.04", *extra)
-        result = invade(case, scales_of(case), packed["walls"], tmp_path / name, Launch(binary=binary))
+        result = invade(
+            case, scales_of(case), packed["walls"], tmp_path / name, Launch(binary=binary)
+        )
         assert result.max_overlap > 0.01
         ends.append(result.damaged.position)
     assert np.allclose(ends[0], ends[1], rtol=0, atol=1e-10)
@@ -183,7 +204,9 @@ def test_passed_fines_are_removed_and_counted(binary, packed, tmp_path):
 def test_every_stop_reason_is_told(binary, packed, tmp_path):
     cases = {"cap": tiny("run.cap_ms=0.05"), "plugged": tiny("fines={radius_mm=0.12, count=60}")}
     for reason, case in cases.items():
-        result = invade(case, scales_of(case), packed["walls"], tmp_path / reason, Launch(binary=binary))
+        result = invade(
+            case, scales_of(case), packed["walls"], tmp_path / reason, Launch(binary=binary)
+        )
         assert result.stop_reason == reason
 
 
@@ -256,13 +279,27 @@ def test_fines_that_vanish_are_an_error(packed, tmp_path):
     case = tiny()
     (tmp_path / "post").mkdir()
     row = checkpoint.Checkpoint(
-        chunk=1, step=10, upstream=200, invaded=90, passed=5, removed_upstream=0, most_crossed=95, quiet=0
+        chunk=1,
+        step=10,
+        upstream=200,
+        invaded=90,
+        passed=5,
+        removed_upstream=0,
+        most_crossed=95,
+        quiet=0,
     )
     damaged = packed["walls"].joined(place_fines(case, scales_of(case), packed["walls"]))
     with pytest.raises(LiggghtsError, match="fines inside"):
         checkpoint.check_counts(tmp_path, row, damaged, 300)
     row = checkpoint.Checkpoint(
-        chunk=1, step=10, upstream=300, invaded=0, passed=0, removed_upstream=0, most_crossed=0, quiet=0
+        chunk=1,
+        step=10,
+        upstream=300,
+        invaded=0,
+        passed=0,
+        removed_upstream=0,
+        most_crossed=0,
+        quiet=0,
     )
     with pytest.raises(LiggghtsError, match="is not the 301 supplied"):
         checkpoint.check_counts(tmp_path, row, damaged, 301)
@@ -278,7 +315,11 @@ def test_history_with_a_half_written_line(tmp_path: Path):
 def test_a_trickle_may_count_as_plugged(binary, packed, tmp_path):
     """With a share of the inflow allowed the end comes at the first plug time with no more crossings than that."""
     case = tiny(
-        "fines.count=900", "run.checkpoint_ms=0.01", "run.plug_time_ms=0.05", "run.plug_rate=0.5", "run.cap_ms=2"
+        "fines.count=900",
+        "run.checkpoint_ms=0.01",
+        "run.plug_time_ms=0.05",
+        "run.plug_rate=0.5",
+        "run.cap_ms=2",
     )
     scales, grains = scales_of(case), packed["walls"]
     result = invade(case, scales, grains, tmp_path, Launch(binary=binary))

@@ -93,7 +93,9 @@ def test_the_run_dies_with_its_parent(fake, tmp_path):
     parent = subprocess.Popen([sys.executable, "-c", code], start_new_session=True)
     screen = tmp_path / "screen.txt"
     deadline = time.monotonic() + 30
-    while time.monotonic() < deadline and not (screen.exists() and "started" in screen.read_text()):
+    while time.monotonic() < deadline and not (
+        screen.exists() and "started" in screen.read_text()
+    ):
         time.sleep(0.05)
     children = Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text().split()
     assert children

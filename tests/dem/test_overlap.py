@@ -16,8 +16,8 @@ from fdnet.dem.overlap import Deepest, cut_watch, deepest_of, read_watch, watch_
 from fdnet.dem.packing import make_pack
 from fdnet.dem.scene import box_of, contact_variables, write_data
 from fdnet.errors import LiggghtsError
-from fdnet.scales import scales_of
-from fdnet.snapshot import Kind
+from fdnet.scales.scales import scales_of
+from fdnet.spheres.snapshot import Kind
 
 LIMIT = 0.03
 FAST = ("run.cap_ms=0.3", f"run.max_overlap={LIMIT}")
@@ -26,7 +26,9 @@ FAST = ("run.cap_ms=0.3", f"run.max_overlap={LIMIT}")
 @pytest.fixture(scope="module")
 def grains(binary, tmp_path_factory):
     case = tiny()
-    return make_pack(case, scales_of(case), tmp_path_factory.mktemp("pack"), Launch(binary=binary)).grains
+    return make_pack(
+        case, scales_of(case), tmp_path_factory.mktemp("pack"), Launch(binary=binary)
+    ).grains
 
 
 def deck_of(*assignments: str):
@@ -37,10 +39,16 @@ def deck_of(*assignments: str):
 
 def test_the_deck_watches_where_it_can_and_says_where_it_cannot():
     assert "fix overlap all print 50 " in deck_of().text
-    for assignment, why in (("grains.motion=mobile", "pairs of grains"), ("fines.radius_mm=[0.04,0.05]", "unequal")):
+    for assignment, why in (
+        ("grains.motion=mobile", "pairs of grains"),
+        ("fines.radius_mm=[0.04,0.05]", "unequal"),
+    ):
         deck = deck_of(assignment)
         assert "compute" not in deck.text
-        assert any(item.what == "overlap between checkpoints" and why in item.why for item in deck.left_out)
+        assert any(
+            item.what == "overlap between checkpoints" and why in item.why
+            for item in deck.left_out
+        )
 
 
 def test_the_watch_never_writes_more_than_some_hundred_rows_a_chunk():
@@ -52,9 +60,16 @@ def test_the_watch_never_writes_more_than_some_hundred_rows_a_chunk():
 
 def test_what_was_seen_is_read_line_by_line(tmp_path):
     assert list(read_watch(tmp_path)) == []
-    (tmp_path / "overlap.csv").write_text("# step,overlap\n50,-1e+24\n100,0.02\n# step,overlap\n150,0.01\n1,x\n200,0.")
+    (tmp_path / "overlap.csv").write_text(
+        "# step,overlap\n50,-1e+24\n100,0.02\n# step,overlap\n150,0.01\n1,x\n200,0."
+    )
     seen = list(read_watch(tmp_path))
-    assert [(row.step, row.fraction) for row in seen] == [(50, 0.0), (100, 0.02), (150, 0.01), (1, 0.0)]
+    assert [(row.step, row.fraction) for row in seen] == [
+        (50, 0.0),
+        (100, 0.02),
+        (150, 0.01),
+        (1, 0.0),
+    ]
     assert deepest_of(seen) == Deepest(step=100, fraction=0.02)
     assert deepest_of([]) == Deepest(step=0, fraction=0.0)
     cut_watch(tmp_path, 100)
@@ -67,21 +82,43 @@ def test_the_deck_sees_the_overlap_of_an_impact(binary, tmp_path):
     case = tiny("fines.damping_ratio=0.0", "grains.damping_ratio=0.0", "fines.friction=0.0")
     scales, radius, speed = scales_of(case), 0.05e-3, 2.0
     grain = resting_spheres([[2e-3, 8e-4, 8e-4]], 2.5e-4, box_of(case), kind=Kind.GRAIN)
-    fine = resting_spheres([[2e-3 - 3.05e-4, 8e-4, 8e-4]], radius, box_of(case), kind=Kind.FINE, first=2)
-    write_data(
-        tmp_path / "hit.data", grain.joined(fine), bounds=box_of(case), density=np.array([2650.0, 2146.0]), types=3
+    fine = resting_spheres(
+        [[2e-3 - 3.05e-4, 8e-4, 8e-4]], radius, box_of(case), kind=Kind.FINE, first=2
     )
-    header = {"stage": "test", "case_name": "hit", "digest": "-", "left_out": [], "boundary": "f f f", "processors": ""}
-    text = render_text("_header.in.j2", header) + "read_data hit.data\nneighbor 5e-5 bin\nneigh_modify delay 0\n"
+    write_data(
+        tmp_path / "hit.data",
+        grain.joined(fine),
+        bounds=box_of(case),
+        density=np.array([2650.0, 2146.0]),
+        types=3,
+    )
+    header = {
+        "stage": "test",
+        "case_name": "hit",
+        "digest": "-",
+        "left_out": [],
+        "boundary": "f f f",
+        "processors": "",
+    }
+    text = (
+        render_text("_header.in.j2", header)
+        + "read_data hit.data\nneighbor 5e-5 bin\nneigh_modify delay 0\n"
+    )
     contacts = contact_variables(case, scales, "invade", friction=False)
-    text += render_text("_contacts.in.j2", {"contacts": contacts, "time_step": number(scales.time_step / 5)})
+    text += render_text(
+        "_contacts.in.j2", {"contacts": contacts, "time_step": number(scales.time_step / 5)}
+    )
     text += f"group fines type 2\nfix integ fines nve/sphere\nvelocity fines set {speed} 0 0 units box\n"
-    text += render_text("_overlap.in.j2", {"overlap": watch_variables(case, scales) | {"every": 2}})
+    text += render_text(
+        "_overlap.in.j2", {"overlap": watch_variables(case, scales) | {"every": 2}}
+    )
     (tmp_path / "in.hit").write_text(text + 'run 2000\nprint "DECK_DONE"\n')
     run_deck(tmp_path, "in.hit", Launch(binary=binary))
     seen = list(read_watch(tmp_path))
     mass = 4 / 3 * math.pi * radius**3 * 2146
-    expected = speed * math.sqrt(mass / scales.contacts["grain-fine"].normal_stiffness) / (2 * radius)
+    expected = (
+        speed * math.sqrt(mass / scales.contacts["grain-fine"].normal_stiffness) / (2 * radius)
+    )
     assert deepest_of(seen).fraction == pytest.approx(expected, rel=2e-3)
     assert seen[0].fraction == seen[-1].fraction == 0.0
 
@@ -100,12 +137,16 @@ def test_watching_does_not_move_a_single_bit(binary, grains, tmp_path, monkeypat
 
 @pytest.mark.liggghts
 @pytest.mark.parametrize("motion", ["fixed", "mobile"])
-def test_a_run_past_the_limit_stops_when_asked_and_goes_on_when_told(binary, grains, tmp_path, motion):
+def test_a_run_past_the_limit_stops_when_asked_and_goes_on_when_told(
+    binary, grains, tmp_path, motion
+):
     stopping = tiny(*FAST, f"grains.motion={motion}", "run.on_overlap=stop")
     warning = tiny(*FAST, f"grains.motion={motion}")
     scales = scales_of(stopping)
     for _ in range(2):
-        with pytest.raises(LiggghtsError, match=r"a fine overlapped by .* at step \d+ .*stopped at checkpoint"):
+        with pytest.raises(
+            LiggghtsError, match=r"a fine overlapped by .* at step \d+ .*stopped at checkpoint"
+        ):
             invade(stopping, scales, grains, tmp_path / "run", Launch(binary=binary))
     whole = invade(warning, scales, grains, tmp_path / "whole", Launch(binary=binary))
     again = invade(warning, scales, grains, tmp_path / "run", Launch(binary=binary))
@@ -119,16 +160,29 @@ def test_a_run_past_the_limit_stops_when_asked_and_goes_on_when_told(binary, gra
 @pytest.mark.liggghts
 def test_a_run_within_the_limit_is_not_stopped(binary, grains, tmp_path):
     case = tiny("run.cap_ms=0.2", "fluid.velocity_m_s=1.0", "run.on_overlap=stop")
-    assert 0 < invade(case, scales_of(case), grains, tmp_path, Launch(binary=binary)).max_overlap < 0.03
+    assert (
+        0
+        < invade(case, scales_of(case), grains, tmp_path, Launch(binary=binary)).max_overlap
+        < 0.03
+    )
 
 
 @pytest.mark.liggghts
-@pytest.mark.parametrize(("policy", "raised"), [("stop", "history.csv: no row for the checkpoint"), ("warn", None)])
+@pytest.mark.parametrize(
+    ("policy", "raised"), [("stop", "history.csv: no row for the checkpoint"), ("warn", None)]
+)
 def test_a_checkpoint_without_its_row_is_named_where_it_is_looked_at(
     binary, grains, tmp_path, monkeypatch, policy, raised
 ):
-    case = tiny("run.cap_ms=0.2", "run.checkpoint_ms=0.1", "fluid.velocity_m_s=1.0", f"run.on_overlap={policy}")
+    case = tiny(
+        "run.cap_ms=0.2",
+        "run.checkpoint_ms=0.1",
+        "fluid.velocity_m_s=1.0",
+        f"run.on_overlap={policy}",
+    )
     real = invasion.read_history
-    monkeypatch.setattr(invasion, "read_history", lambda folder: tuple(r for r in real(folder) if r.chunk != 1))
+    monkeypatch.setattr(
+        invasion, "read_history", lambda folder: tuple(r for r in real(folder) if r.chunk != 1)
+    )
     with pytest.raises(LiggghtsError, match=raised) if raised else nullcontext():
         invade(case, scales_of(case), grains, tmp_path, Launch(binary=binary))

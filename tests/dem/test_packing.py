@@ -11,8 +11,8 @@ from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import _creep, make_pack
 from fdnet.dem.scene import box_of
 from fdnet.errors import CaseError, LiggghtsError
-from fdnet.scales import scales_of
-from fdnet.snapshot import resting
+from fdnet.scales.scales import scales_of
+from fdnet.spheres.snapshot import resting
 
 pytestmark = pytest.mark.liggghts
 DENSE = ("box.size_mm=[5.0,3.0,3.0]", "grains={radius_mm=0.25, porosity=0.36}")
@@ -20,14 +20,17 @@ DENSE = ("box.size_mm=[5.0,3.0,3.0]", "grains={radius_mm=0.25, porosity=0.36}")
 
 def test_porosity_is_met_at_rest_and_the_run_repeats_exactly(binary, tmp_path):
     case = tiny(*DENSE)
-    packs = [make_pack(case, scales_of(case), tmp_path / name, Launch(binary=binary)) for name in "ab"]
+    packs = [
+        make_pack(case, scales_of(case), tmp_path / name, Launch(binary=binary)) for name in "ab"
+    ]
     pack = packs[0]
     assert abs(pack.porosity - 0.36) <= 0.003
     assert pack.porosity_error < 0.001
     assert pack.porosity_sum < pack.porosity
     assert np.array_equal(pack.grains.position, packs[1].grains.position)
     per_second = math.sqrt(
-        scales_of(case).contacts["grain-grain"].normal_stiffness / (2650 * 4 / 3 * math.pi * 0.25e-3**3)
+        scales_of(case).contacts["grain-grain"].normal_stiffness
+        / (2650 * 4 / 3 * math.pi * 0.25e-3**3)
     )
     assert np.max(np.abs(pack.grains.velocity)) < 1e-6 * 0.5e-3 * per_second
     assert np.all((pack.grains.position >= 0) & (pack.grains.position <= case.size_m))
@@ -44,7 +47,9 @@ def test_a_pack_that_creeps_is_taken_and_one_that_moves_is_refused(tmp_path):
     direction /= np.sqrt(np.mean(np.sum(direction**2, axis=1)))
     slow = replace(still, velocity=0.99e-5 * natural * direction)
     assert _creep(case, scales, tmp_path, slow) == pytest.approx(0.99e-5 * natural)
-    with pytest.raises(LiggghtsError, match="did not come to rest in 80000 steps, its grains still move at"):
+    with pytest.raises(
+        LiggghtsError, match="did not come to rest in 80000 steps, its grains still move at"
+    ):
         _creep(case, scales, tmp_path, replace(still, velocity=1.01e-5 * natural * direction))
 
 
@@ -60,7 +65,9 @@ def test_count_overrides_porosity(binary, tmp_path):
     case = tiny("grains={radius_mm=0.25, porosity=0.9, count=66}")
     pack = make_pack(case, scales_of(case), tmp_path, Launch(binary=binary))
     assert len(pack.grains) == 66
-    assert pack.porosity_sum == pytest.approx(1 - 66 * 4 / 3 * math.pi * 0.25**3 / (3.0 * 1.6 * 1.6), rel=1e-9)
+    assert pack.porosity_sum == pytest.approx(
+        1 - 66 * 4 / 3 * math.pi * 0.25**3 / (3.0 * 1.6 * 1.6), rel=1e-9
+    )
 
 
 @pytest.mark.parametrize(
@@ -81,6 +88,7 @@ def test_a_grain_too_coarse_for_the_tolerance_is_an_error(binary, tmp_path):
 def test_the_overlap_limit_holds_for_a_count_too(binary, tmp_path):
     case = tiny("grains={radius_mm=0.25, count=98}")
     with pytest.raises(
-        CaseError, match=r"grains\.count: 98 needs (grains that overlap|more room)|98 grains needs more room"
+        CaseError,
+        match=r"grains\.count: 98 needs (grains that overlap|more room)|98 grains needs more room",
     ):
         make_pack(case, scales_of(case), tmp_path, Launch(binary=binary))

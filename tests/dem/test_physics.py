@@ -6,21 +6,23 @@ import numpy as np
 import pytest
 from builders import resting_spheres, tiny
 
-from fdnet.case import Case
-from fdnet.contacts import max_overlap, touching_pairs
+from fdnet.case.case import Case
 from fdnet.dem.deck import number, render_text
-from fdnet.dem.dump import read_dump
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.scene import contact_variables, write_data
-from fdnet.scales import relaxation_time, scales_of
-from fdnet.snapshot import Kind, Snapshot
+from fdnet.scales.scales import relaxation_time, scales_of
+from fdnet.spheres.contacts import max_overlap, touching_pairs
+from fdnet.spheres.dump import read_dump
+from fdnet.spheres.snapshot import Kind, Snapshot
 
 pytestmark = pytest.mark.liggghts
 
 
 def snapshot(case: Case, position: list, kind: Kind, radius: float, first: int = 1) -> Snapshot:
-    return resting_spheres(position, radius, np.column_stack([np.zeros(3), case.size_m]), kind=kind, first=first)
+    return resting_spheres(
+        position, radius, np.column_stack([np.zeros(3), case.size_m]), kind=kind, first=first
+    )
 
 
 @pytest.mark.parametrize("scheme", ["every_step", "held", "implicit", "viscous"])
@@ -44,7 +46,9 @@ def test_gravity_buoyancy_and_drag_relax_to_the_terminal_velocity(binary, tmp_pa
     tau = relaxation_time(0.05e-3, 2146, 0.05)
     terminal = 2 * (0.05e-3) ** 2 * (2146 - 1095) * g / (9 * 0.05)
     elapsed = result.history[-1].step * scales.time_step
-    assert fine.velocity[0, 2] == pytest.approx(terminal * (1 - math.exp(-elapsed / tau)), rel=0.03)
+    assert fine.velocity[0, 2] == pytest.approx(
+        terminal * (1 - math.exp(-elapsed / tau)), rel=0.03
+    )
     assert fine.velocity[0, 0] == pytest.approx(2.0, rel=1e-6)
     assert result.stop_reason == "duration"
 
@@ -54,12 +58,27 @@ def collide(case: Case, speed: float, binary, folder) -> tuple[float, float]:
     scales = scales_of(case)
     contacts = contact_variables(case, scales, "invade", friction=False)
     pair = snapshot(case, [[1e-3, 1e-3, 1e-3], [1.1005e-3, 1e-3, 1e-3]], Kind.FINE, 0.05e-3)
-    pair = snapshot(case, [[1e-4, 1e-4, 1e-4]], Kind.GRAIN, 0.05e-3, first=3).joined(pair)  # LIGGGHTS wants a type 1
-    write_data(folder / "two.data", pair, bounds=np.array([[0, 2e-3]] * 3), density=np.full(3, 2146.0), types=3)
+    pair = snapshot(case, [[1e-4, 1e-4, 1e-4]], Kind.GRAIN, 0.05e-3, first=3).joined(
+        pair
+    )  # LIGGGHTS wants a type 1
+    write_data(
+        folder / "two.data",
+        pair,
+        bounds=np.array([[0, 2e-3]] * 3),
+        density=np.full(3, 2146.0),
+        types=3,
+    )
     step = 0.02 * scales.contacts["fine-fine"].step_limit
     text = render_text(
         "_header.in.j2",
-        {"stage": "test", "case_name": "two", "digest": "-", "left_out": [], "boundary": "f f f", "processors": ""},
+        {
+            "stage": "test",
+            "case_name": "two",
+            "digest": "-",
+            "left_out": [],
+            "boundary": "f f f",
+            "processors": "",
+        },
     )
     text += "read_data two.data\nneighbor 5e-5 bin\nneigh_modify delay 0\n"
     text += render_text("_contacts.in.j2", {"contacts": contacts, "time_step": number(step)})
@@ -72,7 +91,9 @@ def collide(case: Case, speed: float, binary, folder) -> tuple[float, float]:
     (folder / "in.two").write_text(text)
     run_deck(folder, "in.two", Launch(binary=binary))
     frames = read_dump(folder / "d.dump")
-    gap = np.array([frame.column("x")[1] - frame.column("x")[0] for frame in frames])  # rows are sorted by id
+    gap = np.array(
+        [frame.column("x")[1] - frame.column("x")[0] for frame in frames]
+    )  # rows are sorted by id
     last = frames[-1].column("vx")
     return float((last[1] - last[0]) / speed), float(np.max(1e-4 - gap))
 

@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from fdnet.snapshot import Array
+from fdnet.spheres.snapshot import Array
 
 
 def exact_balance(ends: Array, conductance: Array, jump: Array, count: int) -> tuple[float, Array]:
@@ -29,13 +29,22 @@ def exact_balance(ends: Array, conductance: Array, jump: Array, count: int) -> t
                     rows[below][column] -= share * rows[pivot][column]
     p = [Fraction(0)] * count
     for row in reversed(range(count)):
-        rest = sum((rows[row][column] * p[column] for column in range(row + 1, count)), Fraction(0))
+        rest = sum(
+            (rows[row][column] * p[column] for column in range(row + 1, count)), Fraction(0)
+        )
         p[row] = (rows[row][count] - rest) / rows[row][row]
-    flux = [value * (p[a] - p[b] + push) for (a, b), value, push in zip(ends.tolist(), g, drive, strict=True)]
-    return float(sum(f * push for f, push in zip(flux, drive, strict=True))), np.array([float(f) for f in flux])
+    flux = [
+        value * (p[a] - p[b] + push)
+        for (a, b), value, push in zip(ends.tolist(), g, drive, strict=True)
+    ]
+    return float(sum(f * push for f, push in zip(flux, drive, strict=True))), np.array(
+        [float(f) for f in flux]
+    )
 
 
-def random_links(seed: int, *, decades: float, period: bool, count: int = 16) -> tuple[Array, Array, Array]:
+def random_links(
+    seed: int, *, decades: float, period: bool, count: int = 16
+) -> tuple[Array, Array, Array]:
     """Links of a random tree with as many more between random nodes, conductances log-uniform over `decades`.
 
     Planes: node 0 is both, a third of its links come from the inlet plane. Period: jumps of -1, 0 or 1 on some links.

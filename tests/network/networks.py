@@ -2,11 +2,13 @@
 
 import numpy as np
 
-from fdnet.network.tessellation import Network
-from fdnet.snapshot import Array, frozen
+from fdnet.network.network import Network
+from fdnet.spheres.snapshot import Array, frozen
 
 
-def network_of(position: Array, pairs: Array, box: Array, *, radius: float = 0.1, **given: object) -> Network:
+def network_of(
+    position: Array, pairs: Array, box: Array, *, radius: float = 0.1, **given: object
+) -> Network:
     """Pores at `position` (P, 3) joined by throats `pairs` (T, 2), not periodic; `given` fields replace the zeros."""
     position, pairs = np.asarray(position, float), np.asarray(pairs, int)
     pores, throats = len(position), len(pairs)
@@ -43,13 +45,18 @@ def network_of(position: Array, pairs: Array, box: Array, *, radius: float = 0.1
         "counts": {"grains_outside_box": 0},
     } | given
     return Network(
-        **{name: frozen(value) if isinstance(value, np.ndarray) else value for name, value in fields.items()}
+        **{
+            name: frozen(value) if isinstance(value, np.ndarray) else value
+            for name, value in fields.items()
+        }
     )
 
 
 def chain(count: int, *, step: float = 1.0) -> Network:
     """`count` throats in a row along x, the first and last pore on the faces."""
-    position = np.stack([np.arange(count + 1) * step, np.full(count + 1, 0.5), np.full(count + 1, 0.5)], axis=1)
+    position = np.stack(
+        [np.arange(count + 1) * step, np.full(count + 1, 0.5), np.full(count + 1, 0.5)], axis=1
+    )
     pairs = np.stack([np.arange(count), np.arange(1, count + 1)], axis=1)
     return network_of(position, pairs, [[0, count * step], [0, 1], [0, 1]])
 
@@ -59,5 +66,7 @@ def random_network(count: int = 30, *, seed: int = 3) -> tuple[Network, Array]:
     rng = np.random.default_rng(seed)
     position = rng.random((count, 3))
     position[:4, 0], position[4:8, 0] = 0.0, 1.0
-    pairs = np.array([(i, j) for i in range(count) for j in rng.choice(count, 3, replace=False) if i < j])
+    pairs = np.array(
+        [(i, j) for i in range(count) for j in rng.choice(count, 3, replace=False) if i < j]
+    )
     return network_of(position, pairs, [[0, 1]] * 3), 10.0 ** rng.uniform(-6, 0, len(pairs))

@@ -4,17 +4,21 @@ from functools import cache
 
 import numpy as np
 
-from fdnet.snapshot import Array, Kind, Snapshot, resting
+from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
 
 
-def snapshot(position: Array, radius: Array | float, box: Array, kind: Array | int = Kind.GRAIN) -> Snapshot:
+def snapshot(
+    position: Array, radius: Array | float, box: Array, kind: Array | int = Kind.GRAIN
+) -> Snapshot:
     position = np.asarray(position, dtype=float).reshape(-1, 3)
     return resting(position, radius, np.asarray(box, dtype=float), kind)
 
 
 def lattice(cell: list[list[float]], edge: float, repeat: int, radius: float) -> Snapshot:
     """`repeat` cubic cells each way; `cell` holds positions in units of the cell edge."""
-    steps = np.stack(np.meshgrid(*[np.arange(repeat)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    steps = np.stack(np.meshgrid(*[np.arange(repeat)] * 3, indexing="ij"), axis=-1).reshape(
+        -1, 1, 3
+    )
     position = ((steps + np.array(cell) + 0.1).reshape(-1, 3)) * edge
     return snapshot(position, radius, np.array([[0.0, repeat * edge]] * 3))
 
@@ -29,13 +33,22 @@ def body_centred(repeat: int = 3, radius: float = 1.0) -> Snapshot:
 
 def face_centred(repeat: int = 3, radius: float = 1.0) -> Snapshot:
     return lattice(
-        [[0, 0, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [0.5, 0.5, 0]], 2.0 * radius * np.sqrt(2.0), repeat, radius
+        [[0, 0, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [0.5, 0.5, 0]],
+        2.0 * radius * np.sqrt(2.0),
+        repeat,
+        radius,
     )
 
 
 @cache
 def random_pack(
-    count: int, solid: float = 0.58, *, seed: int = 1, periodic: bool = True, spread: float = 0.0, aspect: float = 1.0
+    count: int,
+    solid: float = 0.58,
+    *,
+    seed: int = 1,
+    periodic: bool = True,
+    spread: float = 0.0,
+    aspect: float = 1.0,
 ) -> Snapshot:
     """Random pack of radius about 1 relaxed from overlap; box aspect x : y : z = aspect : 1 : 1."""
     rng = np.random.default_rng(seed)
@@ -46,7 +59,11 @@ def random_pack(
     for _ in range(600):
         push = _push(position, radius, size, periodic)
         position = position + 0.5 * push
-        position = position % size if periodic else np.clip(position, radius[:, None], size - radius[:, None])
+        position = (
+            position % size
+            if periodic
+            else np.clip(position, radius[:, None], size - radius[:, None])
+        )
         if np.abs(push).max() < 2e-3:
             break
     return snapshot(position, radius, np.stack([np.zeros(3), size], axis=1))
@@ -57,7 +74,9 @@ def _push(position: Array, radius: Array, size: Array, periodic: bool) -> Array:
     if periodic:
         apart -= size * np.round(apart / size)
     distance = np.linalg.norm(apart, axis=2) + np.eye(len(position))
-    overlap = np.maximum(radius[:, None] + radius[None] - distance, 0.0) * (1.0 - np.eye(len(position)))
+    overlap = np.maximum(radius[:, None] + radius[None] - distance, 0.0) * (
+        1.0 - np.eye(len(position))
+    )
     return np.sum((overlap / distance)[:, :, None] * apart, axis=1)
 
 
@@ -69,7 +88,9 @@ def with_fines(grains: Snapshot, count: int, radius: float, *, seed: int = 5) ->
     while len(found) < count:
         host = rng.integers(len(grains))
         normal = rng.normal(size=3)
-        place = grains.position[host] + normal / np.linalg.norm(normal) * (grains.radius[host] + radius)
+        place = grains.position[host] + normal / np.linalg.norm(normal) * (
+            grains.radius[host] + radius
+        )
         place = grains.box[:, 0] + (place - grains.box[:, 0]) % size
         apart = grains.position - place
         apart -= size * np.round(apart / size)

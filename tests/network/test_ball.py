@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from overlap import Sphere, Tetrahedron, overlap_area, overlap_volume
 
-from fdnet.network.ball import fill_pieces
+from fdnet.network.fines.ball import fill_pieces
 
 BALL, SPHERE = 4 / 3 * np.pi, 4 * np.pi
 CORNER = np.array([[0, 0, 0], [50, 0, 0], [0, 50, 0], [0, 0, 50.0]])
@@ -23,10 +23,13 @@ def oriented(corner):
 
 
 @pytest.mark.parametrize(
-    ("centre", "share"), [([5, 5, 5], 1), ([0, 5, 5], 1 / 2), ([0, 0, 5], 1 / 4), ([0, 0, 0], 1 / 8), ([-1, 5, 5], 0)]
+    ("centre", "share"),
+    [([5, 5, 5], 1), ([0, 5, 5], 1 / 2), ([0, 0, 5], 1 / 4), ([0, 0, 0], 1 / 8), ([-1, 5, 5], 0)],
 )
 def test_whole_half_quarter_and_eighth_of_a_ball(centre, share):
-    assert piece(CORNER, centre) == pytest.approx((share * BALL, share * SPHERE), rel=1e-14, abs=1e-14)
+    assert piece(CORNER, centre) == pytest.approx(
+        (share * BALL, share * SPHERE), rel=1e-14, abs=1e-14
+    )
 
 
 def test_cap_beyond_one_facet():
@@ -46,11 +49,17 @@ def test_wedge_of_any_angle_through_the_centre():
 def cases():
     rng = np.random.default_rng(4)
     for k in range(4000):
-        corner, centre, radius = rng.normal(size=(4, 3)), 0.7 * rng.normal(size=3), rng.uniform(0.1, 1.5)
+        corner, centre, radius = (
+            rng.normal(size=(4, 3)),
+            0.7 * rng.normal(size=3),
+            rng.uniform(0.1, 1.5),
+        )
         share = rng.uniform(-1, 2)
         match k % 8:
             case 1:  # flat
-                corner[3] = 0.4 * corner[0] + 0.3 * corner[1] + 0.3 * corner[2] + 1e-7 * rng.normal(size=3)
+                corner[3] = (
+                    0.4 * corner[0] + 0.3 * corner[1] + 0.3 * corner[2] + 1e-7 * rng.normal(size=3)
+                )
             case 2:  # sliver: four corners of a quadrilateral
                 corner[3] = corner[0] + corner[1] - corner[2] + 1e-7 * rng.normal(size=3)
             case 3:  # an edge's line through the centre
@@ -60,7 +69,10 @@ def cases():
             case 5:  # a corner in the centre
                 centre = corner[0]
             case 6:  # a tiny ball at an edge
-                centre, radius = 0.3 * corner[0] + 0.7 * corner[1] + 1e-3 * rng.normal(size=3), 2e-3
+                centre, radius = (
+                    0.3 * corner[0] + 0.7 * corner[1] + 1e-3 * rng.normal(size=3),
+                    2e-3,
+                )
         yield oriented(corner), centre, radius
 
 

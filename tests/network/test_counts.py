@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from fdnet.network.pierced import STEPS
-from fdnet.network.porosity import measure_porosity
-from fdnet.network.tessellation import build_network
-from fdnet.report.spheres import read_spheres
+from fdnet.network.network import build_network
+from fdnet.network.tessellation.pierced import STEPS
+from fdnet.spheres.csv_file import read_spheres
+from fdnet.spheres.porosity import measure_porosity
 from tests.network.packs import body_centred, face_centred, random_pack, simple_cubic, snapshot
 
 ALL = (True,) * 3
@@ -21,7 +21,10 @@ def truth_pack(root, name):
 
 def pierced_by_all(network, pack):
     """Open facets with a grid point inside any grain but their own three, image by image."""
-    steps = np.stack(np.meshgrid(*[[-2, -1, 0, 1, 2]] * 3, indexing="ij"), axis=-1).reshape(-1, 3) * pack.box[:, 1]
+    steps = (
+        np.stack(np.meshgrid(*[[-2, -1, 0, 1, 2]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+        * pack.box[:, 1]
+    )
     images, radius = (pack.position[:, None] + steps).reshape(-1, 3), np.repeat(pack.radius, 125)
     found = 0
     for corner, own, gap in zip(
@@ -31,7 +34,9 @@ def pierced_by_all(network, pack):
         near = np.linalg.norm(images - corner.mean(axis=0), axis=1) < 6.0
         near &= np.min(np.linalg.norm(images[:, None] - corner, axis=2), axis=1) > 1e-9
         free = np.all(np.linalg.norm(point[:, None] - corner, axis=2) > own, axis=1)
-        covered = np.any(np.linalg.norm(point[:, None] - images[near], axis=2) < radius[near], axis=1)
+        covered = np.any(
+            np.linalg.norm(point[:, None] - images[near], axis=2) < radius[near], axis=1
+        )
         found += bool(gap > 0 and np.any(free & covered))
     return found
 
@@ -44,7 +49,9 @@ def test_pierced_facets_are_those_a_search_of_all_grains_finds(spread):
 
 
 @pytest.mark.parametrize(
-    ("pack", "groups"), [(simple_cubic(), 27), (face_centred(), 27 * 4), (body_centred(), 0)], ids=["SC", "FCC", "BCC"]
+    ("pack", "groups"),
+    [(simple_cubic(), 27), (face_centred(), 27 * 4), (body_centred(), 0)],
+    ids=["SC", "FCC", "BCC"],
 )
 def test_cospherical_groups_are_the_cells_of_the_lattice(pack, groups):
     """One cube per grain of SC, one octahedron per grain of FCC; BCC has none."""

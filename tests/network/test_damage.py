@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fdnet.errors import CaseError
-from fdnet.network.damage import DAMAGE_LAWS
+from fdnet.network.laws.named import DAMAGE_LAWS
 from tests.network.networks import chain
 
 R, L = 0.1, 1.0
@@ -42,9 +42,23 @@ def carman_kozeny(porosity, fine):
 
 def test_thesis_law_by_throat_porosity():
     found = damaged("thesis", occupancy([1.0, 0.8, 0.4, 0.39, 0.2, -0.1]))
-    expected = [CLEAN, CLEAN * 0.64, CLEAN * 0.16, carman_kozeny(0.39, 0.02), carman_kozeny(0.2, 0.02), 0.0]
+    expected = [
+        CLEAN,
+        CLEAN * 0.64,
+        CLEAN * 0.16,
+        carman_kozeny(0.39, 0.02),
+        carman_kozeny(0.2, 0.02),
+        0.0,
+    ]
     assert found.conductance == pytest.approx(expected, rel=1e-12, abs=1e-18)
-    assert found.law_used.tolist() == ["clean", "deposition", "deposition", "clogging", "clogging", "clogging"]
+    assert found.law_used.tolist() == [
+        "clean",
+        "deposition",
+        "deposition",
+        "clogging",
+        "clogging",
+        "clogging",
+    ]
     assert found.counts["throats_filled"] == 1
 
 

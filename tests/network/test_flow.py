@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from fdnet.errors import FlowError
-from fdnet.network.conductance import LAWS
-from fdnet.network.flow import solve_flow
-from fdnet.network.slabs import inplace_permeability, plane_pressures, slab_permeability
-from fdnet.network.tessellation import build_network
+from fdnet.network.flow.flow import solve_flow
+from fdnet.network.flow.slabs import inplace_permeability, plane_pressures, slab_permeability
+from fdnet.network.laws.named import LAWS
+from fdnet.network.network import build_network
 from tests.network.networks import chain, network_of, random_network
 from tests.network.packs import random_pack, snapshot
 
@@ -48,7 +48,11 @@ def test_random_network_against_the_pseudo_inverse():
     held = np.arange(8)
     inner = np.arange(8, 30)
     pressure = np.append(np.ones(4), np.zeros(4))
-    solved = np.linalg.pinv(laplacian[np.ix_(inner, inner)]) @ -laplacian[np.ix_(inner, held)] @ pressure
+    solved = (
+        np.linalg.pinv(laplacian[np.ix_(inner, inner)])
+        @ -laplacian[np.ix_(inner, held)]
+        @ pressure
+    )
     inflow = (laplacian @ np.append(pressure, solved))[:4].sum()
     assert flow.inflow == pytest.approx(inflow, rel=1e-7)
     tied = np.isfinite(flow.pore_pressure[8:])
@@ -85,13 +89,17 @@ def test_twelve_decades_with_blocked_throats_still_balance():
     pack = random_pack(120)
     network = build_network(pack, periodic=(False, True, True))
     rng = np.random.default_rng(4)
-    g = 10.0 ** rng.uniform(-12, 0, len(network.throat_pores)) * (rng.random(len(network.throat_pores)) > 0.25)
+    g = 10.0 ** rng.uniform(-12, 0, len(network.throat_pores)) * (
+        rng.random(len(network.throat_pores)) > 0.25
+    )
     flow = solve_flow(network, g)
     assert flow.mass_balance < 1e-6
     assert flow.inflow > 0
     for pore in np.flatnonzero((network.pore_share == 1) & np.isfinite(flow.pore_pressure))[:50]:
         out = flow.throat_flux[network.throat_pores[:, 0] == pore].sum()
-        assert out == pytest.approx(flow.throat_flux[network.throat_pores[:, 1] == pore].sum(), abs=1e-9 * flow.inflow)
+        assert out == pytest.approx(
+            flow.throat_flux[network.throat_pores[:, 1] == pore].sum(), abs=1e-9 * flow.inflow
+        )
 
 
 def three_in_a_row(pack):
@@ -110,7 +118,9 @@ def test_slab_of_a_period_is_the_slab_of_the_middle_copy(law, span):
     three = build_network(three_in_a_row(pack), periodic=(False, True, True))
     low, high = np.array(span) * edge
     found = solve_flow(one, LAWS[law](one), span=(low, high)).inflow
-    assert found == pytest.approx(solve_flow(three, LAWS[law](three), span=(low + edge, high + edge)).inflow, rel=1e-5)
+    assert found == pytest.approx(
+        solve_flow(three, LAWS[law](three), span=(low + edge, high + edge)).inflow, rel=1e-5
+    )
 
 
 def test_period_of_a_pack_is_the_limit_of_many_periods_between_planes():
@@ -154,6 +164,11 @@ def test_period_across_and_back_is_no_way_round(turns, inflow):
 def test_slab_without_a_path_has_no_k_though_its_neighbours_do():
     """The middle throat of three is closed: the whole is 0, so are all slabs that hold it, in place and cut out."""
     network, g = chain(3), np.array([1.0, 0.0, 1.0])
-    found = [slab_permeability(network, g, span)[0] for span in ((0.0, 0.9), (0.9, 2.1), (1.2, 1.8), (2.1, 3.0))]
+    found = [
+        slab_permeability(network, g, span)[0]
+        for span in ((0.0, 0.9), (0.9, 2.1), (1.2, 1.8), (2.1, 3.0))
+    ]
     assert found == pytest.approx([1.0, 0.0, 0.0, 1.0])
-    assert inplace_permeability(network, solve_flow(network, g), np.array([0.0, 0.9, 3.0])).tolist() == [0.0, 0.0]
+    assert inplace_permeability(
+        network, solve_flow(network, g), np.array([0.0, 0.9, 3.0])
+    ).tolist() == [0.0, 0.0]

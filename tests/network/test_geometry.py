@@ -4,21 +4,29 @@ import numpy as np
 import pytest
 
 from fdnet.network import geometry
-from fdnet.network.pores import solid_in_tetrahedra
+from fdnet.network.tessellation.pores import solid_in_tetrahedra
 
-TOUCHING = np.array([[0, 0, 0], [2, 0, 0], [1, np.sqrt(3), 0], [1, 1 / np.sqrt(3), 2 * np.sqrt(2 / 3)]])
+TOUCHING = np.array(
+    [[0, 0, 0], [2, 0, 0], [1, np.sqrt(3), 0], [1, 1 / np.sqrt(3), 2 * np.sqrt(2 / 3)]]
+)
 
 
 def test_four_touching_spheres_leave_a_porosity_of_0_220364():
     solid, surface = solid_in_tetrahedra(TOUCHING[None], np.ones((1, 4)))
-    assert 1 - solid[0] / abs(geometry.signed_volume(TOUCHING)) == pytest.approx(0.220364, abs=1e-6)
+    assert 1 - solid[0] / abs(geometry.signed_volume(TOUCHING)) == pytest.approx(
+        0.220364, abs=1e-6
+    )
     assert surface[0] == pytest.approx(3 * solid[0])
 
 
 def test_three_touching_discs_leave_0_161254_and_pass_a_sphere_of_0_1547():
     triangle = TOUCHING[:3]
-    assert geometry.open_area(triangle[None], np.ones((1, 3)))[0] == pytest.approx(0.161254, abs=1e-6)
-    assert geometry.touching_circle(triangle[None], np.ones((1, 3)))[0] == pytest.approx(2 / np.sqrt(3) - 1)
+    assert geometry.open_area(triangle[None], np.ones((1, 3)))[0] == pytest.approx(
+        0.161254, abs=1e-6
+    )
+    assert geometry.touching_circle(triangle[None], np.ones((1, 3)))[0] == pytest.approx(
+        2 / np.sqrt(3) - 1
+    )
 
 
 def test_sphere_between_four_touching_spheres_is_0_224745():
@@ -50,10 +58,17 @@ def test_solid_angles_and_dihedrals_of_regular_tetrahedron_and_octant():
 
 
 def test_lens_of_discs_against_a_fine_grid():
-    for first, second, apart in ((1.0, 0.7, 1.2), (1.0, 0.5, 0.7), (0.4, 1.0, 0.3), (1.0, 1.0, 2.1)):
+    for first, second, apart in (
+        (1.0, 0.7, 1.2),
+        (1.0, 0.5, 0.7),
+        (0.4, 1.0, 0.3),
+        (1.0, 1.0, 2.1),
+    ):
         x, y = np.meshgrid(np.linspace(-1, 1.7, 1351), np.linspace(-1, 1, 1001))
         both = (x**2 + y**2 < first**2) & ((x - apart) ** 2 + y**2 < second**2)
-        found = geometry.disc_lens_area(np.array([first]), np.array([second]), np.array([apart]))[0]
+        found = geometry.disc_lens_area(np.array([first]), np.array([second]), np.array([apart]))[
+            0
+        ]
         assert found == pytest.approx(both.sum() * 0.002**2, abs=2e-3)
 
 
@@ -64,7 +79,9 @@ def test_overlapping_pair_is_counted_once_in_the_tetrahedron():
     share = rng.dirichlet(np.ones(4), 400_000)
     point = share @ TOUCHING
     solid = np.any(np.linalg.norm(point[:, None] - TOUCHING, axis=2) < radius, axis=1).mean()
-    found = solid_in_tetrahedra(TOUCHING[None], radius[None])[0][0] / abs(geometry.signed_volume(TOUCHING))
+    found = solid_in_tetrahedra(TOUCHING[None], radius[None])[0][0] / abs(
+        geometry.signed_volume(TOUCHING)
+    )
     assert found == pytest.approx(solid, abs=4 * np.sqrt(0.25 / 400_000))
 
 
@@ -75,4 +92,6 @@ def test_open_area_between_overlapping_discs_against_a_fine_grid():
     inside = (y * 0.8 < x * 1.9) & (y * (0.8 - 1.8) > (x - 1.8) * 1.9)
     for corner, size in zip(triangle, radius, strict=True):
         inside &= (x - corner[0]) ** 2 + (y - corner[1]) ** 2 > size**2
-    assert geometry.open_area(triangle[None], radius[None])[0] == pytest.approx(inside.sum() * 1e-6, abs=2e-3)
+    assert geometry.open_area(triangle[None], radius[None])[0] == pytest.approx(
+        inside.sum() * 1e-6, abs=2e-3
+    )

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fdnet.network.invaded import measure_invaded
-from fdnet.snapshot import Kind
+from fdnet.network.fines.invaded import measure_invaded
+from fdnet.spheres.snapshot import Kind
 from tests.network.packs import snapshot
 
 BOX = np.array([[0, 10], [0, 4], [0, 4.0]])
@@ -15,7 +15,10 @@ def cake(fines, *, periodic=(False,) * 3):
     position = np.vstack([[[1.0, 2, 2]], np.array(fines, float).reshape(-1, 3)])
     count = len(position)
     spheres = snapshot(
-        position, np.append(1.0, np.full(count - 1, A)), BOX, np.append(Kind.GRAIN, np.full(count - 1, Kind.FINE))
+        position,
+        np.append(1.0, np.full(count - 1, A)),
+        BOX,
+        np.append(Kind.GRAIN, np.full(count - 1, Kind.FINE)),
     )
     return measure_invaded(spheres, periodic=periodic)
 

@@ -6,15 +6,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fdnet.network.conductance import LAWS
-from fdnet.network.damage import DAMAGE_LAWS
-from fdnet.network.deposit import deposit_in_pores, deposit_on_sides, size_classes, wall_distance
-from fdnet.network.kozeny_damage import _kept
-from fdnet.network.lubrication import half_resistances
-from fdnet.network.occupancy import measure_occupancy
-from fdnet.network.sides import side_voids
-from fdnet.network.tessellation import build_network
-from fdnet.snapshot import Kind
+from fdnet.network.fines.deposit import (
+    deposit_in_pores,
+    deposit_on_sides,
+    size_classes,
+    wall_distance,
+)
+from fdnet.network.fines.occupancy import measure_occupancy
+from fdnet.network.laws.kozeny_damage import _kept
+from fdnet.network.laws.lubrication import half_resistances
+from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
+from fdnet.network.laws.pyramids import side_voids
+from fdnet.network.network import build_network
+from fdnet.spheres.snapshot import Kind
 from tests.network.packs import random_pack, snapshot, with_fines
 
 ALL = (True, True, True)
@@ -103,7 +107,9 @@ def whole_pores(network):
     """Pores with their power centre inside, and their throats' sides as a sum over these pores."""
     behind = np.zeros(len(network.pore_volume), bool)
     for side in (0, 1):
-        np.logical_or.at(behind, network.throat_pores[:, side], network.throat_heights[:, side] <= 1e-6)
+        np.logical_or.at(
+            behind, network.throat_pores[:, side], network.throat_heights[:, side] <= 1e-6
+        )
     return ~behind
 
 
@@ -119,11 +125,15 @@ def test_sides_add_up_to_their_pore(network, pack):
     assert whole.sum() > 50
     void, wall = side_voids(network)
     assert summed(network, void)[whole] == pytest.approx(network.pore_volume[whole], rel=1e-5)
-    assert summed(network, wall)[whole] == pytest.approx(network.pore_wall_surface[whole], rel=1e-5)
+    assert summed(network, wall)[whole] == pytest.approx(
+        network.pore_wall_surface[whole], rel=1e-5
+    )
     volume, surface, _, _ = deposit_in_pores(network, pack.fines())
     side_volume, side_surface = deposit_on_sides(network, pack.fines())
     assert summed(network, side_volume)[whole] == pytest.approx(volume[whole], rel=1e-5, abs=1e-9)
-    assert summed(network, side_surface)[whole] == pytest.approx(surface[whole], rel=1e-5, abs=1e-9)
+    assert summed(network, side_surface)[whole] == pytest.approx(
+        surface[whole], rel=1e-5, abs=1e-9
+    )
 
 
 def test_signed_voids_add_up_to_the_pore_of_any_shape(network):
@@ -176,7 +186,10 @@ def test_fines_of_many_sizes_fill_as_each_alone(network, pack):
     places = network.pore_power_centre[:12] + 0.1
     radius = np.geomspace(0.02, 0.6, 12)
     together = deposit_in_pores(network, snapshot(places, radius, pack.box, Kind.FINE))[0]
-    alone = [deposit_in_pores(network, snapshot(places[[i]], radius[i], pack.box, Kind.FINE))[0] for i in range(12)]
+    alone = [
+        deposit_in_pores(network, snapshot(places[[i]], radius[i], pack.box, Kind.FINE))[0]
+        for i in range(12)
+    ]
     assert together == pytest.approx(np.sum(alone, axis=0), rel=1e-12, abs=1e-15)
 
 

@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 
-from fdnet.network import lubrication, section, wedge
-from fdnet.network.wedge import ratio_table
+from fdnet.network.laws import cross_section as section
+from fdnet.network.laws import lubrication, wedge
+from fdnet.network.laws.wedge import ratio_table
 
 
-@pytest.mark.parametrize(("opening", "bound"), [(0.99, 1e-3), (0.9, 2e-3), (0.7, 0.015), (0.3, 0.05), (0.03, 0.08)])
+@pytest.mark.parametrize(
+    ("opening", "bound"), [(0.99, 1e-3), (0.9, 2e-3), (0.7, 0.015), (0.3, 0.05), (0.03, 0.08)]
+)
 def test_tube_rule_against_the_exact_hyperboloid(opening: float, bound: float) -> None:
     """Exact: 3 / (c^3 (1 - q)^2 (1 + 2 q)), focal distance c = 1, q = cosine of the asymptote's angle to the plane."""
     neck = np.sqrt(1.0 - opening**2)
@@ -29,25 +32,34 @@ def triangle(*side: float) -> np.ndarray:
 def test_equilateral_section_is_six_exact_wedges() -> None:
     base = triangle(2.0, 2.0, 2.0)
     exact = 6.0 * wedge.exact_flux(np.pi / 6.0, 0.9)
-    assert section.even_flux(section.wedges(base), 0.9, ratio_table()) == pytest.approx(exact, rel=1e-4)
+    assert section.even_flux(section.wedges(base), 0.9, ratio_table()) == pytest.approx(
+        exact, rel=1e-4
+    )
 
 
 def test_half_a_square_is_four_exact_wedges() -> None:
     base = triangle(2.0, 2.0, np.sqrt(8.0))
     exact = 4.0 * wedge.exact_flux(np.pi / 4.0, 0.95)
-    assert section.even_flux(section.wedges(base), 0.95, ratio_table()) == pytest.approx(exact, rel=2e-3)
+    assert section.even_flux(section.wedges(base), 0.95, ratio_table()) == pytest.approx(
+        exact, rel=2e-3
+    )
 
 
 @pytest.mark.parametrize("side", [(2.0, 2.1, 2.3), (2.0, 2.0, 2.7), (2.0, 2.0, 2.9)])
 def test_unequal_rule_with_equal_discs_is_the_equal_rule(side: tuple[float, float, float]) -> None:
     base, disc = triangle(*side), 0.93
     even = section.even_flux(section.wedges(base), disc, ratio_table())
-    assert section.uneven_flux(base, np.full(3, disc), ratio_table()) == pytest.approx(even, rel=1e-4)
+    assert section.uneven_flux(base, np.full(3, disc), ratio_table()) == pytest.approx(
+        even, rel=1e-4
+    )
 
 
 def test_a_disc_in_the_shadow_of_two_still_leaves_a_flux() -> None:
     """A small disc close to the line between two large ones: the signed wedges add up to less than nothing."""
-    base, disc = np.array([[0.0, 0.0], [3.0, 0.0], [1.608, 0.2306]]), np.array([1.2458, 1.2458, 0.1584])
+    base, disc = (
+        np.array([[0.0, 0.0], [3.0, 0.0], [1.608, 0.2306]]),
+        np.array([1.2458, 1.2458, 0.1584]),
+    )
     assert section._uneven(base, disc, ratio_table()) <= 0.0
     assert 0.0 < section.uneven_flux(base, disc, ratio_table()) < 1e-2
 

@@ -9,12 +9,12 @@ from scipy.integrate import quad
 from scipy.spatial import cKDTree
 
 from fdnet.errors import CaseError
-from fdnet.network.cylinder import Pairs, covers_section, exact_volume, two_plane_volume
-from fdnet.network.deposit import mirrored_images
+from fdnet.network.fines.cylinder import Pairs, covers_section, exact_volume, two_plane_volume
+from fdnet.network.fines.deposit import mirrored_images
+from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.geometry import disc_lens_area
-from fdnet.network.occupancy import measure_occupancy
-from fdnet.network.tessellation import build_network
-from fdnet.snapshot import Kind
+from fdnet.network.network import build_network
+from fdnet.spheres.snapshot import Kind
 from tests.network.networks import chain
 from tests.network.packs import random_pack, snapshot, with_fines
 
@@ -34,7 +34,13 @@ CASES = np.array(
 
 
 def pairs_of(rows):
-    return Pairs(**dict(zip(("sphere", "offset", "depth", "tube", "length"), np.atleast_2d(rows).T, strict=True)))
+    return Pairs(
+        **dict(
+            zip(
+                ("sphere", "offset", "depth", "tube", "length"), np.atleast_2d(rows).T, strict=True
+            )
+        )
+    )
 
 
 @pytest.mark.parametrize("row", CASES)
@@ -45,7 +51,9 @@ def test_sphere_in_cylinder_against_random_points(row):
     inside = (point[:, 2] + depth > 0) & (point[:, 2] + depth < length)
     inside &= (point[:, 0] + offset) ** 2 + point[:, 1] ** 2 < tube**2
     ball = 4 / 3 * np.pi * sphere**3
-    assert exact_volume(pairs_of(row))[0] / ball == pytest.approx(inside.mean(), abs=4 * 0.5 / np.sqrt(len(point)))
+    assert exact_volume(pairs_of(row))[0] / ball == pytest.approx(
+        inside.mean(), abs=4 * 0.5 / np.sqrt(len(point))
+    )
 
 
 def test_centred_sphere_wider_than_the_tube_is_the_napkin_ring():
@@ -61,7 +69,11 @@ def test_volume_within_a_millionth_of_adaptive_quadrature():
         offset = rng.choice([0.0, 1.0, rng.uniform(0, 1 + sphere), rng.uniform(0, 1 + sphere)])
         depth = rng.uniform(-0.9, 0.9) * sphere + rng.uniform(0, length)
         low, high = max(-sphere, -depth), min(sphere, length - depth)
-        kinks = [sign * np.sqrt(max(sphere**2 - (1 + side * offset) ** 2, 0)) for sign in (-1, 1) for side in (-1, 1)]
+        kinks = [
+            sign * np.sqrt(max(sphere**2 - (1 + side * offset) ** 2, 0))
+            for sign in (-1, 1)
+            for side in (-1, 1)
+        ]
         edges = sorted([low, high, *(z for z in kinks if low < z < high)])
 
         def section(z, sphere=sphere, offset=offset):
@@ -148,7 +160,9 @@ def test_fine_in_one_pore_against_random_points():
     pore = int(np.argmax(network.pore_volume))
     corner = network.pore_corner[pore]
     place = corner.mean(axis=0) + np.array([0.3, 0.1, 0.0])
-    found = measure_occupancy(network, snapshot([place], 0.7, pack.box, Kind.FINE)).pore_solid_volume[pore]
+    found = measure_occupancy(
+        network, snapshot([place], 0.7, pack.box, Kind.FINE)
+    ).pore_solid_volume[pore]
     share = np.random.default_rng(1).dirichlet(np.ones(4), 500_000)
     inside = np.linalg.norm(share @ corner - place, axis=1) < 0.7
     expected = inside.mean() * network.pore_tetra_volume[pore]
@@ -160,13 +174,17 @@ def test_fines_of_a_walled_pack_count_once_with_their_mirror_images(periodic):
     pack = with_fines(random_pack(60), 200, 0.2)
     network = build_network(pack.grains(), periodic=periodic)
     found = measure_occupancy(network, pack.fines())
-    assert np.sum(network.pore_share * found.pore_solid_volume) == pytest.approx(200 * 4 / 3 * np.pi * 0.2**3, rel=1e-9)
+    assert np.sum(network.pore_share * found.pore_solid_volume) == pytest.approx(
+        200 * 4 / 3 * np.pi * 0.2**3, rel=1e-9
+    )
 
 
 def test_a_throat_between_pores_at_one_place_is_a_disc_across_x():
     network = replace(chain(1), pore_position=np.full((2, 3), 0.5), throat_length=np.array([1e-3]))
     found = measure_occupancy(network, snapshot([[0.49, 0.52, 0.5]], 0.05, network.box, Kind.FINE))
-    assert found.throat_solid_volume == pytest.approx([np.pi * (0.05**2 - 0.01**2) * 1e-3], rel=0.02)
+    assert found.throat_solid_volume == pytest.approx(
+        [np.pi * (0.05**2 - 0.01**2) * 1e-3], rel=0.02
+    )
     assert found.pair_distance == pytest.approx([0.2])
 
 
@@ -181,10 +199,16 @@ def test_walls_mirror_the_fines_as_a_doubled_periodic_pack_has_them(walls):
     doubled, period = position, box[:, 1] - box[:, 0]
     for axis in walls:
         flipped = np.where(np.arange(3) == axis, 2 * box[axis, 1] - doubled, doubled)
-        doubled, period = np.concatenate([doubled, flipped]), period * np.where(np.arange(3) == axis, 2.0, 1.0)
+        doubled, period = (
+            np.concatenate([doubled, flipped]),
+            period * np.where(np.arange(3) == axis, 2.0, 1.0),
+        )
     steps = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
     expected = (doubled + steps * period).reshape(-1, 3)
-    counted = [places[np.all((places >= low - 0.3) & (places <= high + 0.3), axis=1)] for places in (found, expected)]
+    counted = [
+        places[np.all((places >= low - 0.3) & (places <= high + 0.3), axis=1)]
+        for places in (found, expected)
+    ]
     assert len(counted[0]) == len(counted[1]) > 300
     assert cKDTree(counted[0]).query(counted[1])[0].max() < 1e-12
     assert np.array_equal(np.unique(owner), np.arange(200))
@@ -192,7 +216,9 @@ def test_walls_mirror_the_fines_as_a_doubled_periodic_pack_has_them(walls):
 
 def test_fines_outside_the_walls_are_counted_and_not_mirrored():
     network = chain(3)
-    fines = snapshot([[1.5, -0.01, 0.5], [1.5, 0.5, 0.5], [-0.05, 0.5, 0.5]], 0.05, network.box, Kind.FINE)
+    fines = snapshot(
+        [[1.5, -0.01, 0.5], [1.5, 0.5, 0.5], [-0.05, 0.5, 0.5]], 0.05, network.box, Kind.FINE
+    )
     assert measure_occupancy(network, fines).counts["fines_outside_box"] == 2
     in_wall = replace(network, pore_position=network.pore_position - np.array([0, 0, 0.5]))
     for z, times in ((-0.01, 1), (0.01, 2)):
@@ -230,4 +256,6 @@ def test_throat_volumes_are_those_of_every_pair_taken_alone():
 
 def test_unknown_overlap_is_refused():
     with pytest.raises(CaseError, match="two-plane"):
-        measure_occupancy(chain(2), snapshot(np.zeros((0, 3)), 1.0, [[0, 2], [0, 1], [0, 1]]), overlap="rough")
+        measure_occupancy(
+            chain(2), snapshot(np.zeros((0, 3)), 1.0, [[0, 2], [0, 1], [0, 1]]), overlap="rough"
+        )

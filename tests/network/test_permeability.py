@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from fdnet.errors import CaseError, NetworkError
-from fdnet.network.conductance import LAWS
-from fdnet.network.damage import DAMAGE_LAWS
+from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
 from fdnet.network.permeability import AnalysisOptions, analyse
-from fdnet.snapshot import Kind, Snapshot
+from fdnet.spheres.snapshot import Kind, Snapshot
 from tests.network.packs import random_pack, simple_cubic, snapshot, with_fines
 
 ALL, FLOW_X, WALLED = (True,) * 3, (False, True, True), (False,) * 3
@@ -54,15 +53,21 @@ def test_renumbering_quarter_turn_mirror_and_scale_leave_k(pack, walled, periodi
     spheres = walled if periodic == WALLED else pack
     k = both(spheres, periodic, pair)
     rng = np.random.default_rng(8)
-    assert both(rebuilt(spheres, order=rng.permutation(len(spheres))), periodic, pair) == pytest.approx(k, rel=1e-5)
+    assert both(
+        rebuilt(spheres, order=rng.permutation(len(spheres))), periodic, pair
+    ) == pytest.approx(k, rel=1e-5)
     high = spheres.box[:, 1]
-    turned = np.stack([spheres.position[:, 0], high[2] - spheres.position[:, 2], spheres.position[:, 1]], axis=1)
+    turned = np.stack(
+        [spheres.position[:, 0], high[2] - spheres.position[:, 2], spheres.position[:, 1]], axis=1
+    )
     assert both(rebuilt(spheres, turned), periodic, pair) == pytest.approx(k, rel=1e-5)
     for axis in range(3):
         mirrored = spheres.position.copy()
         mirrored[:, axis] = high[axis] - mirrored[:, axis]
         assert both(rebuilt(spheres, mirrored), periodic, pair) == pytest.approx(k, rel=1e-5)
-    assert both(rebuilt(spheres, scale=2.5e-4), periodic, pair) == pytest.approx(k * 6.25e-8, rel=1e-5)
+    assert both(rebuilt(spheres, scale=2.5e-4), periodic, pair) == pytest.approx(
+        k * 6.25e-8, rel=1e-5
+    )
 
 
 @pytest.mark.parametrize("periodic", [ALL, FLOW_X, WALLED])
@@ -70,7 +75,8 @@ def test_box_may_start_anywhere(walled, periodic):
     offset = np.array([5.0, -3.0, 2.0])
     moved = rebuilt(walled, walled.position + offset, box=walled.box + offset[:, None])
     here, there = (
-        analyse(one.grains(), one, periodic=periodic, options=options(sections=3)) for one in (walled, moved)
+        analyse(one.grains(), one, periodic=periodic, options=options(sections=3))
+        for one in (walled, moved)
     )
     assert there.k_damaged == pytest.approx(here.k_damaged, rel=1e-5)
     assert there.porosity_damaged == pytest.approx(here.porosity_damaged, abs=1e-9)
@@ -100,21 +106,31 @@ def test_more_fines_lower_k_with_the_default_law(pack):
     grains, fines = pack.grains(), pack.fines()
     k = [
         analyse(
-            grains, grains.joined(fines.where(np.arange(len(fines)) < count)), periodic=FLOW_X, options=options()
+            grains,
+            grains.joined(fines.where(np.arange(len(fines)) < count)),
+            periodic=FLOW_X,
+            options=options(),
         ).k_damaged
         for count in (0, 100, 200, 400)
     ]
     assert np.all(np.diff(k) < 0)
-    assert k[0] == pytest.approx(analyse(grains, None, periodic=FLOW_X, options=options()).k_initial)
+    assert k[0] == pytest.approx(
+        analyse(grains, None, periodic=FLOW_X, options=options()).k_initial
+    )
 
 
 @pytest.mark.parametrize("periodic", [ALL, FLOW_X, WALLED])
 @pytest.mark.parametrize("sections", [5, "uneven"])
 def test_inplace_sections_recombine_in_series(pack, periodic, sections):
     length = pack.box[0, 1]
-    wanted = sections if sections == 5 else [0.0, 0.13 * length, 0.2 * length, 0.71 * length, length]
+    wanted = (
+        sections if sections == 5 else [0.0, 0.13 * length, 0.2 * length, 0.71 * length, length]
+    )
     found = analyse(pack.grains(), pack, periodic=periodic, options=options(sections=wanted))
-    for k, name in ((found.k_initial, "k_initial_inplace"), (found.k_damaged, "k_damaged_inplace")):
+    for k, name in (
+        (found.k_initial, "k_initial_inplace"),
+        (found.k_damaged, "k_damaged_inplace"),
+    ):
         resistance = [(one.x_hi - one.x_lo) / getattr(one, name) for one in found.sections]
         assert length / sum(resistance) == pytest.approx(k, rel=1e-9)
         assert min(resistance) > 0
@@ -130,7 +146,9 @@ def test_inplace_sections_of_a_period_move_with_the_pack(pack):
     )
     assert abs(here[0].k_damaged_inplace / here[1].k_damaged_inplace - 1) > 0.01
     for name in ("k_initial_inplace", "k_damaged_inplace"):
-        first, second = ([getattr(one, name) for one in sections] for sections in (here, there[::-1]))
+        first, second = (
+            [getattr(one, name) for one in sections] for sections in (here, there[::-1])
+        )
         assert first == pytest.approx(second, rel=1e-5)
 
 
@@ -162,10 +180,14 @@ def test_face_sealed_by_fines_is_zero_with_a_warning():
     grains = simple_cubic(4)
     network = analyse(grains, None, periodic=FLOW_X, options=options(("thesis", "thesis"))).network
     first = network.throat_ends.mean(axis=1)
-    cork = first[(np.abs(np.diff(network.throat_ends[:, :, 0], axis=1)[:, 0]) > 1e-6) & (first[:, 0] < 3)]
+    cork = first[
+        (np.abs(np.diff(network.throat_ends[:, :, 0], axis=1)[:, 0]) > 1e-6) & (first[:, 0] < 3)
+    ]
     spheres = grains.joined(snapshot(cork, 0.9, grains.box, Kind.FINE))
     spheres = rebuilt(spheres)
-    found = analyse(grains, spheres, periodic=FLOW_X, options=options(("thesis", "thesis"), sections=2))
+    found = analyse(
+        grains, spheres, periodic=FLOW_X, options=options(("thesis", "thesis"), sections=2)
+    )
     assert found.k_damaged == 0.0
     assert found.k_reduction == 1.0
     assert any("no open path" in one for one in found.warnings)
@@ -177,21 +199,32 @@ def test_moved_grains_make_a_second_network(pack):
     grains = pack.grains()
     rng = np.random.default_rng(1)
     shifted = rebuilt(
-        pack, pack.position + 0.02 * rng.normal(size=pack.position.shape) * (pack.kind == Kind.GRAIN)[:, None]
+        pack,
+        pack.position
+        + 0.02 * rng.normal(size=pack.position.shape) * (pack.kind == Kind.GRAIN)[:, None],
     )
     found = analyse(grains, shifted, periodic=ALL, options=options())
     assert found.k_moved == pytest.approx(
         analyse(shifted.grains(), None, periodic=ALL, options=options()).k_initial, rel=1e-9
     )
-    assert found.k_initial == pytest.approx(analyse(grains, None, periodic=ALL, options=options()).k_initial, rel=1e-9)
+    assert found.k_initial == pytest.approx(
+        analyse(grains, None, periodic=ALL, options=options()).k_initial, rel=1e-9
+    )
     assert found.k_damaged < found.k_moved != found.k_initial
-    assert len(found.conductance_initial) == len(found.network.throat_radius) == len(found.flow_initial.throat_flux)
+    assert (
+        len(found.conductance_initial)
+        == len(found.network.throat_radius)
+        == len(found.flow_initial.throat_flux)
+    )
 
 
 def test_grains_in_another_order_or_wrapped_have_not_moved(pack):
     grains = pack.grains()
     order = np.random.default_rng(2).permutation(len(pack))
-    assert analyse(grains, rebuilt(pack, order=order), periodic=ALL, options=options()).k_moved is None
+    assert (
+        analyse(grains, rebuilt(pack, order=order), periodic=ALL, options=options()).k_moved
+        is None
+    )
     across = pack.position + pack.box[:, 1] * (np.arange(len(pack)) % 2)[:, None]
     assert analyse(grains, rebuilt(pack, across), periodic=ALL, options=options()).k_moved is None
 
@@ -232,9 +265,13 @@ def test_laws_named_by_the_contract_exist():
 
 def test_fines_all_outside_the_box_are_told_of(pack):
     away = snapshot([[-1.0, 1.0, 1.0]], 0.1, pack.box, Kind.FINE)
-    found = analyse(pack.grains(), pack.grains().joined(away), periodic=(False, True, True), options=options())
+    found = analyse(
+        pack.grains(), pack.grains().joined(away), periodic=(False, True, True), options=options()
+    )
     assert found.k_damaged == found.k_initial
-    assert any("none of the 1 fines is centred in the box" in warning for warning in found.warnings)
+    assert any(
+        "none of the 1 fines is centred in the box" in warning for warning in found.warnings
+    )
 
 
 def test_throats_that_do_not_conduct_are_counted(pack):

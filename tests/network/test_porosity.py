@@ -4,14 +4,16 @@ import numpy as np
 import pytest
 
 from fdnet.errors import CaseError
-from fdnet.network.porosity import Porosity, measure_porosity
-from fdnet.network.sections import pooled
+from fdnet.network.flow.sections import pooled
+from fdnet.spheres.porosity import Porosity, measure_porosity
 from tests.network.packs import face_centred, random_pack, simple_cubic, snapshot
 
 BOX = np.array([[0.0, 2.0]] * 3)
 
 
-@pytest.mark.parametrize(("pack", "expected"), [(simple_cubic(), 1 - np.pi / 6), (face_centred(), 0.259520)])
+@pytest.mark.parametrize(
+    ("pack", "expected"), [(simple_cubic(), 1 - np.pi / 6), (face_centred(), 0.259520)]
+)
 def test_lattices_have_their_known_porosity(pack, expected):
     found = measure_porosity(pack, periodic=(True,) * 3)
     assert found.mean == pytest.approx(expected, abs=2e-4)
@@ -33,9 +35,15 @@ def test_overlap_counts_once():
 def test_walls_clip_and_periodic_sides_reach_round():
     corner = snapshot([[0, 0, 0]], 0.8, BOX)
     volume = 4 / 3 * np.pi * 0.8**3
-    assert measure_porosity(corner, periodic=(False,) * 3).mean == pytest.approx(1 - volume / 8 / 8, abs=2e-4)
-    assert measure_porosity(corner, periodic=(True,) * 3).mean == pytest.approx(1 - volume / 8, abs=1e-4)
-    assert measure_porosity(corner, periodic=(True, False, False)).mean == pytest.approx(1 - volume / 32, abs=1e-4)
+    assert measure_porosity(corner, periodic=(False,) * 3).mean == pytest.approx(
+        1 - volume / 8 / 8, abs=2e-4
+    )
+    assert measure_porosity(corner, periodic=(True,) * 3).mean == pytest.approx(
+        1 - volume / 8, abs=1e-4
+    )
+    assert measure_porosity(corner, periodic=(True, False, False)).mean == pytest.approx(
+        1 - volume / 32, abs=1e-4
+    )
 
 
 def test_bins_of_one_sphere_are_its_spherical_segments():

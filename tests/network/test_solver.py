@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from fdnet.errors import FlowError
-from fdnet.network import solver
-from fdnet.network.conductance import series_law
-from fdnet.network.flow import solve_flow
-from fdnet.network.solver import DIRECT, MULTIGRID, Balances
-from fdnet.network.tessellation import build_network
+from fdnet.network.flow import solver
+from fdnet.network.flow.flow import solve_flow
+from fdnet.network.flow.solver import DIRECT, MULTIGRID, Balances
+from fdnet.network.laws.conductance import series_law
+from fdnet.network.network import build_network
 from tests.network.packs import random_pack
 
 
@@ -16,7 +16,10 @@ def links(count=400, *, decades=4.0):
     """A ring with chords; one node in ten tied to pressure 0."""
     rng = np.random.default_rng(2)
     pair = np.concatenate(
-        [np.stack([np.arange(count), (np.arange(count) + 1) % count], 1), rng.integers(count, size=(count, 2))]
+        [
+            np.stack([np.arange(count), (np.arange(count) + 1) % count], 1),
+            rng.integers(count, size=(count, 2)),
+        ]
     )
     tied = np.where(np.arange(count) % 10 == 0, 1.0, 0.0)
     return pair, 10.0 ** rng.uniform(-decades, 0, len(pair)), tied, rng.random(count)

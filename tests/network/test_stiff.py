@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from fdnet.errors import FlowError
-from fdnet.network import stiff
-from fdnet.network.flow import solve_flow
-from fdnet.network.stiff import balance_links, stiffness
-from fdnet.network.winding import groups, heights, winding_groups
+from fdnet.network.flow import stiff
+from fdnet.network.flow.flow import solve_flow
+from fdnet.network.flow.stiff import balance_links, stiffness
+from fdnet.network.flow.winding import groups, heights, winding_groups
 from tests.network.exact import exact_balance, random_links
 from tests.network.networks import chain, network_of
 
@@ -28,7 +28,9 @@ def test_fluxes_against_rational_arithmetic(decades, within, period):
         found = balance_links(ends, g, jump, NODES)
         assert found.flux @ jump == pytest.approx(throughput, rel=within)
         assert found.flux == pytest.approx(flux, abs=within * throughput)
-        net = np.bincount(ends[:, 0], found.flux, NODES) - np.bincount(ends[:, 1], found.flux, NODES)
+        net = np.bincount(ends[:, 0], found.flux, NODES) - np.bincount(
+            ends[:, 1], found.flux, NODES
+        )
         assert np.abs(net[1:]).max() <= 1e-6 * throughput
     assert solved > 15
 
@@ -79,7 +81,8 @@ def test_heights_take_up_the_jumps_of_a_forest():
 
 
 @pytest.mark.parametrize(
-    ("jumps", "winds"), [([0, 0, 0, 1, -1], False), ([1, 0, -1, 0, 0], False), ([1, 1, 1, 0, 0], True)]
+    ("jumps", "winds"),
+    [([0, 0, 0, 1, -1], False), ([1, 0, -1, 0, 0], False), ([1, 1, 1, 0, 0], True)],
 )
 def test_only_a_closed_way_with_a_jump_winds(jumps, winds):
     """A triangle 0-1-2 and two pores joined to it: a jump there and back is no way round; three turns are."""

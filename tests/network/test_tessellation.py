@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fdnet.errors import NetworkError
-from fdnet.network.porosity import measure_porosity
-from fdnet.network.tessellation import build_network
+from fdnet.network.network import build_network
+from fdnet.spheres.porosity import measure_porosity
 from tests.network.packs import body_centred, face_centred, random_pack, simple_cubic, snapshot
 
 ALL, NONE, SIDES = (True,) * 3, (False,) * 3, (False, True, True)
@@ -15,7 +15,11 @@ ALL, NONE, SIDES = (True,) * 3, (False,) * 3, (False, True, True)
 
 @pytest.mark.parametrize(
     ("pack", "expected"),
-    [(simple_cubic(), 1 - np.pi / 6), (face_centred(), 0.259520), (body_centred(), 1 - np.pi * np.sqrt(3) / 8)],
+    [
+        (simple_cubic(), 1 - np.pi / 6),
+        (face_centred(), 0.259520),
+        (body_centred(), 1 - np.pi * np.sqrt(3) / 8),
+    ],
 )
 @pytest.mark.parametrize("periodic", [ALL, SIDES])
 def test_void_of_the_pores_is_the_known_porosity(pack, expected, periodic):
@@ -56,7 +60,9 @@ def test_tetrahedra_tile_and_facets_pair(periodic):
     pack = random_pack(120, 0.5, periodic=False)
     network = build_network(pack, periodic=periodic)
     assert network.counts["throats_unmatched"] == 0
-    assert network.throat_heights.sum(axis=1).min() > -1e-9  # Delaunay: centres in order along the normal
+    assert (
+        network.throat_heights.sum(axis=1).min() > -1e-9
+    )  # Delaunay: centres in order along the normal
     places = len(np.unique(network.pore_position, axis=0))  # one for all parts of a polyhedron
     assert 0.99 * (network.pore_group.max() + 1) < places <= network.pore_group.max() + 1
     filled = np.sum(network.pore_share * network.pore_tetra_volume)
@@ -78,7 +84,9 @@ def test_throat_ends_are_its_pores_up_to_whole_periods():
     assert np.all(network.pore_position >= 0)
     assert np.all(network.pore_position < size)
     # the two places are those beside the facet, not an image of them elsewhere
-    away = np.linalg.norm(network.throat_ends - network.throat_corner.mean(axis=1)[:, None], axis=2)
+    away = np.linalg.norm(
+        network.throat_ends - network.throat_corner.mean(axis=1)[:, None], axis=2
+    )
     assert away.max() < 2.5
     # both pores hold the throat's three grains
     for side in (0, 1):
@@ -99,7 +107,9 @@ def test_pores_on_the_x_faces_lie_on_them():
 
 def test_two_grains_at_one_place_are_refused():
     pack = random_pack(30)
-    double = np.vstack([pack.position, pack.position[7] + [0, pack.box[1, 1], 0]])  # the image across the period
+    double = np.vstack(
+        [pack.position, pack.position[7] + [0, pack.box[1, 1], 0]]
+    )  # the image across the period
     with pytest.raises(NetworkError, match=r"grains 8 and 31 coincide"):
         build_network(snapshot(double, 1.0, pack.box), periodic=ALL)
 
@@ -118,7 +128,9 @@ def test_one_layer_between_walls_is_a_stack_of_its_mirror_images():
 def test_grains_out_of_reach_are_left_out_and_counted():
     pack = random_pack(60, 0.5, periodic=False)
     position = np.vstack([[[-3.0, 1, 1]], pack.position])
-    network = build_network(snapshot(position, np.append(1.0, pack.radius), pack.box), periodic=NONE)
+    network = build_network(
+        snapshot(position, np.append(1.0, pack.radius), pack.box), periodic=NONE
+    )
     alone = build_network(pack, periodic=NONE)
     assert network.counts["grains_outside_box"] == 1
     assert np.array_equal(network.pore_grains, alone.pore_grains + 1)

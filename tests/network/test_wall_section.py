@@ -6,14 +6,14 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
 from fdnet.errors import CaseError, NetworkError
-from fdnet.network.conductance import LAWS
-from fdnet.network.flow import solve_flow
-from fdnet.network.lubrication import half_resistances
+from fdnet.network.flow.flow import solve_flow
+from fdnet.network.laws.cross_section import uneven_flux
+from fdnet.network.laws.lubrication import half_resistances
+from fdnet.network.laws.named import LAWS
+from fdnet.network.laws.wall_cross_section import wall_cuts, wall_flux
+from fdnet.network.laws.wedge import ratio_table
+from fdnet.network.network import build_network
 from fdnet.network.permeability import AnalysisOptions, analyse
-from fdnet.network.section import uneven_flux
-from fdnet.network.tessellation import build_network
-from fdnet.network.wall_section import wall_cuts, wall_flux
-from fdnet.network.wedge import ratio_table
 from tests.network.packs import random_pack, simple_cubic, snapshot, with_fines
 
 NONE = (False,) * 3
@@ -22,7 +22,9 @@ NONE = (False,) * 3
 def resolved_flux(place, disc, cells=200):
     """Flux of laplacian(w) = -1, w = 0 on the wall and on two discs, no shear on the trapezoid's other sides."""
     step = place[2] / cells
-    x, y = np.meshgrid((np.arange(cells) + 0.5) * step, np.arange(step / 2, max(place[:2]), step), indexing="ij")
+    x, y = np.meshgrid(
+        (np.arange(cells) + 0.5) * step, np.arange(step / 2, max(place[:2]), step), indexing="ij"
+    )
     first = x**2 + (y - place[0]) ** 2 < disc[0] ** 2
     solid = first | ((x - place[2]) ** 2 + (y - place[1]) ** 2 < disc[1] ** 2)
     inside = y < place[0] + (place[1] - place[0]) * x / place[2]
@@ -36,7 +38,9 @@ def resolved_flux(place, disc, cells=200):
         beside = np.roll(index, way, axis=axis)[fluid]
         wall = 2.0 if (axis, way) == (1, 1) else 1.0
         near_wall = np.nonzero(fluid)[1] == 1
-        own += (beside >= 0) + np.roll(held, way, axis=axis)[fluid] * np.where(near_wall, wall, 1.0)
+        own += (beside >= 0) + np.roll(held, way, axis=axis)[fluid] * np.where(
+            near_wall, wall, 1.0
+        )
         rows.append(np.flatnonzero(beside >= 0))
         columns.append(beside[beside >= 0])
     row, column = np.concatenate(rows), np.concatenate(columns)
@@ -57,7 +61,15 @@ def resolved_flux(place, disc, cells=200):
         ((0.6, 1.3, 2.2), (1.0, 0.7)),
         ((0.0, 1.0, 2.2), (1.0, 1.0)),
     ],
-    ids=["touching all", "one raised", "both raised", "small discs", "steep", "cut and unequal", "on the wall"],
+    ids=[
+        "touching all",
+        "one raised",
+        "both raised",
+        "small discs",
+        "steep",
+        "cut and unequal",
+        "on the wall",
+    ],
 )
 def test_half_section_against_finite_differences(place, disc):
     found = wall_flux(np.array(place), *disc, ratio_table())
@@ -79,7 +91,9 @@ def test_centre_of_the_touching_circle_outside_still_leaves_a_flux():
 
 def test_swapping_the_discs_leaves_the_flux():
     one = wall_flux(np.array([1.0, 1.6, 2.1]), 0.9, 0.7, ratio_table())
-    assert one == pytest.approx(wall_flux(np.array([1.6, 1.0, 2.1]), 0.7, 0.9, ratio_table()), rel=1e-3)
+    assert one == pytest.approx(
+        wall_flux(np.array([1.6, 1.0, 2.1]), 0.7, 0.9, ratio_table()), rel=1e-3
+    )
 
 
 def test_overlapping_discs_leave_nothing():
@@ -142,7 +156,9 @@ def test_a_throat_cut_by_a_wall_carries_less_than_half_of_one_that_slips():
 
 def test_periodic_sides_and_other_laws_know_no_walls():
     pack = random_pack(100)
-    assert permeability(pack, "no-slip", (False, True, True)) == permeability(pack, "slip", (False, True, True))
+    assert permeability(pack, "no-slip", (False, True, True)) == permeability(
+        pack, "slip", (False, True, True)
+    )
     assert permeability(pack, "no-slip", law="series") == permeability(pack, "slip", law="series")
 
 
@@ -163,7 +179,9 @@ def test_a_grain_centred_on_a_wall_has_one_triangle_for_the_whole_section():
 
 def test_half_resistances_are_those_of_the_law():
     network = build_network(random_pack(100, 0.5, periodic=False), periodic=NONE, walls="no-slip")
-    assert LAWS["lubrication"](network) == pytest.approx(1.0 / half_resistances(network).sum(axis=1))
+    assert LAWS["lubrication"](network) == pytest.approx(
+        1.0 / half_resistances(network).sum(axis=1)
+    )
 
 
 def test_unknown_walls_are_refused():
@@ -179,7 +197,9 @@ def test_an_analysis_holds_the_fluid_at_the_walls_unless_told_otherwise():
         options.walls: analyse(pack, None, periodic=NONE, options=options).k_initial
         for options in (AnalysisOptions(), AnalysisOptions(walls="slip"))
     }
-    assert found == pytest.approx({walls: permeability(pack, walls) for walls in ("slip", "no-slip")}, rel=1e-9)
+    assert found == pytest.approx(
+        {walls: permeability(pack, walls) for walls in ("slip", "no-slip")}, rel=1e-9
+    )
 
 
 def test_fines_beside_walls_that_hold_the_fluid_leave_less_of_it():

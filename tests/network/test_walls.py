@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from fdnet.network.conductance import LAWS
-from fdnet.network.flow import solve_flow
-from fdnet.network.occupancy import measure_occupancy
-from fdnet.network.porosity import measure_porosity
-from fdnet.network.slabs import inplace_permeability
-from fdnet.network.tessellation import build_network
-from fdnet.network.walls import onto_walls
-from fdnet.snapshot import Kind
+from fdnet.network.fines.occupancy import measure_occupancy
+from fdnet.network.flow.flow import solve_flow
+from fdnet.network.flow.slabs import inplace_permeability
+from fdnet.network.laws.named import LAWS
+from fdnet.network.network import build_network
+from fdnet.network.tessellation.walls import onto_walls
+from fdnet.spheres.porosity import measure_porosity
+from fdnet.spheres.snapshot import Kind
 from tests.network.packs import random_pack, simple_cubic, snapshot, with_fines
 
 ALL, NONE = (True,) * 3, (False,) * 3
@@ -26,7 +26,9 @@ def doubled(pack, axes):
         box = pack.box.copy()
         box[axis, 1] = 2 * high - low
         pack = snapshot(
-            np.vstack([pack.position, image[other]]), np.concatenate([pack.radius, pack.radius[other]]), box
+            np.vstack([pack.position, image[other]]),
+            np.concatenate([pack.radius, pack.radius[other]]),
+            box,
         )
     return pack
 
@@ -34,7 +36,9 @@ def doubled(pack, axes):
 def permeabilities(pack, periodic):
     network = build_network(pack, periodic=periodic)
     length = np.ptp(pack.box[0])
-    return np.array([solve_flow(network, law(network)).inflow * length / network.area for law in LAWS.values()])
+    return np.array(
+        [solve_flow(network, law(network)).inflow * length / network.area for law in LAWS.values()]
+    )
 
 
 PACKS = {
@@ -60,7 +64,9 @@ def test_sections_of_a_walled_pack_are_those_of_its_doubled_pack():
         network = build_network(one, periodic=periodic)
         flow = solve_flow(network, LAWS["series"](network))
         found.append(inplace_permeability(network, flow, np.linspace(0, pack.box[0, 1], 5)))
-    assert found[0] == pytest.approx(found[1], rel=1e-4)  # stubs inside polyhedra differ by the split
+    assert found[0] == pytest.approx(
+        found[1], rel=1e-4
+    )  # stubs inside polyhedra differ by the split
 
 
 @pytest.mark.parametrize("pack", PACKS)
@@ -89,7 +95,9 @@ def test_grain_centred_beyond_a_wall_becomes_a_half_sphere_of_its_cap():
     changed = moved.radius != 1.0
     assert count == changed.sum() == 1
     assert moved.position[changed, 1] == 0
-    assert 2 / 3 * np.pi * moved.radius[changed] ** 3 == pytest.approx(np.pi * 0.6**2 * (3 - 0.6) / 3)
+    assert 2 / 3 * np.pi * moved.radius[changed] ** 3 == pytest.approx(
+        np.pi * 0.6**2 * (3 - 0.6) / 3
+    )
     network = build_network(cut, periodic=NONE)
     assert network.counts["grains_centred_beyond_walls"] == 1
     assert network.grain_radius == 1.0
@@ -109,7 +117,8 @@ CELLS = {
 
 @pytest.mark.parametrize("cell", CELLS)
 @pytest.mark.parametrize(
-    ("periodic", "error"), [((True, False, True), 1e-6), ((True, False, False), 1e-6), (NONE, 5e-4)]
+    ("periodic", "error"),
+    [((True, False, True), 1e-6), ((True, False, False), 1e-6), (NONE, 5e-4)],
 )
 def test_lattice_between_its_own_mirror_planes_conducts_as_the_periodic_one(cell, periodic, error):
     """Grains centred on the walls are their own images; those on the x faces are moved in by 1e-4 radii."""
@@ -149,4 +158,6 @@ def test_fines_at_a_wall_fill_the_throats_in_it_with_their_images():
         walls = network.throat_ends[:, :, 1] / pack.box[1, 1]
         found.append(solid[np.all(np.abs(walls - np.round(walls)) < 1e-9, axis=1)].sum())
     assert found[0] > 0.1
-    assert found[0] == pytest.approx(found[1], rel=1e-4)  # stubs inside polyhedra differ by the split
+    assert found[0] == pytest.approx(
+        found[1], rel=1e-4
+    )  # stubs inside polyhedra differ by the split

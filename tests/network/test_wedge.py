@@ -5,7 +5,7 @@ import pytest
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from fdnet.network import wedge
+from fdnet.network.laws import wedge
 
 
 def rays(angle: float, disc: float) -> float:
@@ -17,7 +17,9 @@ def rays(angle: float, disc: float) -> float:
     return float(0.5 * (angle - first) * np.sum(weight * flux))
 
 
-@pytest.mark.parametrize(("degrees", "disc"), [(5, 0.3), (30, 1.0), (60, 0.9), (70, 0.1), (50, 1.2), (80, 1.05)])
+@pytest.mark.parametrize(
+    ("degrees", "disc"), [(5, 0.3), (30, 1.0), (60, 0.9), (70, 0.1), (50, 1.2), (80, 1.05)]
+)
 def test_closed_form_of_the_rays_is_their_integral(degrees: float, disc: float) -> None:
     angle = np.radians(degrees)
     assert wedge.ray_flux(angle, np.tan(angle), disc) == pytest.approx(rays(angle, disc), rel=1e-9)
@@ -96,4 +98,6 @@ def test_between_its_points_the_table_is_good_to_a_thousandth() -> None:
     for degrees, disc in [(31, 0.52), (44.9, 0.77), (59.1, 0.93), (17.3, 0.4)]:
         angle = np.radians(degrees)
         exact = wedge.exact_flux(angle, disc) / wedge.ray_flux(angle, np.tan(angle), disc)
-        assert wedge.shear_ratio(angle, disc, wedge.ratio_table()) == pytest.approx(exact, rel=1e-3)
+        assert wedge.shear_ratio(angle, disc, wedge.ratio_table()) == pytest.approx(
+            exact, rel=1e-3
+        )

@@ -11,7 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import Delaunay, cKDTree
 
-from fdnet.snapshot import Kind, Snapshot
+from fdnet.spheres.snapshot import Kind, Snapshot
 
 BOX = np.array([[0.0, 4e-3], [0.0, 2e-3], [0.0, 2e-3]])
 GRAIN_RADIUS = 0.225e-3
@@ -56,7 +56,11 @@ def demo_damaged(count=800):
     distance, _ = cKDTree(grains.position).query(position)
     free = np.flatnonzero((distance > GRAIN_RADIUS + 0.9 * radius) & (depth < 4e-3))[:count]
     fines = snapshot_of(
-        position[free], radius[free], Kind.FINE, first_id=1001, velocity=generator.normal(0, 1e-3, (len(free), 3))
+        position[free],
+        radius[free],
+        Kind.FINE,
+        first_id=1001,
+        velocity=generator.normal(0, 1e-3, (len(free), 3)),
     )
     return grains.joined(fines)
 
@@ -65,7 +69,9 @@ def demo_network(grains):
     mesh = Delaunay(grains.position)
     corner = grains.position[mesh.simplices]
     position = corner.mean(axis=1)
-    radius = np.clip(np.linalg.norm(corner - position[:, None], axis=2).min(axis=1) - GRAIN_RADIUS, 0, None)
+    radius = np.clip(
+        np.linalg.norm(corner - position[:, None], axis=2).min(axis=1) - GRAIN_RADIUS, 0, None
+    )
     volume = np.abs(np.linalg.det(corner[:, 1:] - corner[:, :1])) / 6
     pores, ends, facets = [], [], []
     for pore, neighbours in enumerate(mesh.neighbors):
@@ -84,7 +90,10 @@ def demo_network(grains):
     pores, ends, facets = np.array(pores), np.array(ends), np.array(facets)
     corners = grains.position[facets]
     throat_radius = np.clip(
-        np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).min(axis=1) - GRAIN_RADIUS, 0, None
+        np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).min(axis=1)
+        - GRAIN_RADIUS,
+        0,
+        None,
     )
     return SimpleNamespace(
         box=BOX,
@@ -116,7 +125,14 @@ def demo_occupancy(network, fines):
     mean_radius = np.array([fines.radius[found].mean() if found else 0.0 for found in near])
     porosity = np.clip(1 - 0.18 * count, 0.05, 1.0)
     pore_porosity = np.clip(
-        1 - 0.1 * np.array([len(f) for f in cKDTree(fines.position).query_ball_point(network.pore_position, 1.2e-4)]),
+        1
+        - 0.1
+        * np.array(
+            [
+                len(f)
+                for f in cKDTree(fines.position).query_ball_point(network.pore_position, 1.2e-4)
+            ]
+        ),
         0.1,
         1.0,
     )
@@ -141,7 +157,9 @@ def demo_flow(network, conductance):
     diagonal = np.bincount(first, g, count) + np.bincount(second[inner], g[inner], count)
     rows = np.concatenate([np.arange(count), first[inner], second[inner]])
     columns = np.concatenate([np.arange(count), second[inner], first[inner]])
-    matrix = coo_matrix((np.concatenate([diagonal, -g[inner], -g[inner]]), (rows, columns)), (count, count))
+    matrix = coo_matrix(
+        (np.concatenate([diagonal, -g[inner], -g[inner]]), (rows, columns)), (count, count)
+    )
     pressure = spsolve(matrix.tocsc(), np.bincount(first[at_inlet], g[at_inlet], count))
     other = np.where(at_inlet, 1.0, 0.0)
     other[inner] = pressure[second[inner]]
@@ -173,7 +191,10 @@ def sampled_porosity(snapshot, edges):
 def demo_sections(initial, damaged, flows, edges):
     depth = damaged.fines().position[:, 0]
     invaded = int(((depth >= 0) & (depth < edges[-1])).sum())
-    whole = {"initial": sampled_porosity(initial, edges), "damaged": sampled_porosity(damaged, edges)}
+    whole = {
+        "initial": sampled_porosity(initial, edges),
+        "damaged": sampled_porosity(damaged, edges),
+    }
     k_initial = 9e-11 * (1 + 0.05 * np.sin(np.arange(len(edges) - 1)))
     k_damaged = k_initial * (1 - 0.55 * np.exp(-np.arange(len(edges) - 1) * 1.1))
     return tuple(
@@ -189,7 +210,9 @@ def demo_sections(initial, damaged, flows, edges):
             k_initial_inplace=1.1 * k_initial[i],
             k_damaged_inplace=1.1 * k_damaged[i] * 0.95,
             fines_count=int(np.sum((depth >= edges[i]) & (depth < edges[i + 1]))),
-            fines_fraction=float(np.sum((depth >= edges[i]) & (depth < edges[i + 1])) / max(invaded, 1)),
+            fines_fraction=float(
+                np.sum((depth >= edges[i]) & (depth < edges[i + 1])) / max(invaded, 1)
+            ),
         )
         for i in range(len(edges) - 1)
     ), invaded
@@ -214,7 +237,9 @@ def demo_analysis():
         fines_fraction=np.histogram(inside, fine_edges)[0] / len(inside),
     )
     k_initial, k_damaged = (flow.inflow * 4e-3 / 4e-6 for flow in flows)
-    law_used = np.where(occupancy.blocked, "blocked", np.where(occupancy.throat_fines > 0, "deposition", "clean"))
+    law_used = np.where(
+        occupancy.blocked, "blocked", np.where(occupancy.throat_fines > 0, "deposition", "clean")
+    )
     return SimpleNamespace(
         network=network,
         occupancy=occupancy,

@@ -10,7 +10,7 @@ from report_demo import demo_analysis, demo_damaged, demo_grains, snapshot_of
 
 from fdnet.report import figures
 from fdnet.report.side_view import cut_circles
-from fdnet.snapshot import Kind
+from fdnet.spheres.snapshot import Kind
 
 HISTORY = [{"time_s": 1e-4 * i, "invaded": i, "passed": 0, "upstream": 50 - i} for i in range(50)]
 DAMAGE = {"porosity_reduction", "invaded_fraction", "permeability_ratio"}
@@ -40,7 +40,9 @@ def test_sections_without_flow_fines_of_one_size_and_no_invasion_can_be_drawn(tm
     fines = snapshot_of([[-1e-4, 1e-3, 1e-3]], 5e-5, Kind.FINE, first_id=900)
     values = {"sections": tuple(dead), "k_initial": 0.0, "invaded_count": 0}
     analysis = SimpleNamespace(**(vars(demo_analysis()) | values))
-    stems = {path.stem for path in figures.draw_all(tmp_path, analysis, demo_grains().joined(fines))}
+    stems = {
+        path.stem for path in figures.draw_all(tmp_path, analysis, demo_grains().joined(fines))
+    }
     assert stems >= DAMAGE
 
 

@@ -43,7 +43,10 @@ SUMMARY = {
     "invasion_depth_p95_m": 2.5e-3,
     "cake_thickness_m": 3e-4,
     "stop_reason": "plugged",
-    "sections": [SECTION, SECTION | {"section": 2, "k_initial_m2": 0.0, "k_damaged_m2": 0.0, "k_reduction": None}],
+    "sections": [
+        SECTION,
+        SECTION | {"section": 2, "k_initial_m2": 0.0, "k_damaged_m2": 0.0, "k_reduction": None},
+    ],
     "throats": 10,
     "throats_blocked": 2,
     "solver": {"method": "direct", "residual": 1e-15, "mass_balance": None},
@@ -75,13 +78,19 @@ class Reader(HTMLParser):
 
 def page_of(folder, summary, **parts):
     reader = Reader()
-    reader.feed(write_report(folder / "report.html", summary, parts=ReportParts(**parts)).read_text(encoding="utf-8"))
+    reader.feed(
+        write_report(folder / "report.html", summary, parts=ReportParts(**parts)).read_text(
+            encoding="utf-8"
+        )
+    )
     assert reader.open == []
     return reader, re.sub("[ \\n]+", " ", " ".join(reader.text))
 
 
 def test_it_says_what_the_summary_says(tmp_path):
-    _, text = page_of(tmp_path, SUMMARY, commands=["fdnet run a.toml"], versions={"LIGGGHTS": "3.8.0"})
+    _, text = page_of(
+        tmp_path, SUMMARY, commands=["fdnet run a.toml"], versions={"LIGGGHTS": "3.8.0"}
+    )
     for said in (
         "specimen <1>",
         "7.650·10⁻¹¹ m²",
@@ -116,7 +125,16 @@ def test_nothing_is_taken_for_markup_or_fetched_from_outside(tmp_path):
         figures=[(figure, evil)],
         commands=[evil],
         versions={evil: evil},
-        scales=[{"name": evil, "symbol": evil, "value": 1.0, "unit": evil, "formula": evil, "source": evil}],
+        scales=[
+            {
+                "name": evil,
+                "symbol": evil,
+                "value": 1.0,
+                "unit": evil,
+                "formula": evil,
+                "source": evil,
+            }
+        ],
     )
     assert text.count(evil) >= 10
     assert {tag for tag, _ in reader.tags}.isdisjoint({"script", "link", "iframe", "object"})
@@ -134,13 +152,22 @@ def test_scales_are_rows_of_objects_or_mappings(tmp_path):
         "formula": "k dP/(mu L)",
         "source": "Darcy 1856",
     }
-    _, text = page_of(tmp_path, SUMMARY, scales=[row, SimpleNamespace(**row | {"name": "other", "value": 2.5e-8})])
+    _, text = page_of(
+        tmp_path,
+        SUMMARY,
+        scales=[row, SimpleNamespace(**row | {"name": "other", "value": 2.5e-8})],
+    )
     assert "Darcy velocity q 0.67 m/s k dP/(mu L) Darcy 1856" in text
     assert "other q 2.500·10⁻⁸ m/s" in text
 
 
 def test_a_summary_of_an_intact_pack_or_nothing_at_all_still_makes_a_page(tmp_path):
-    intact = SUMMARY | {"stop_reason": None, "invaded_count": 0, "k_damaged_m2": 7.65e-11, "warnings": []}
+    intact = SUMMARY | {
+        "stop_reason": None,
+        "invaded_count": 0,
+        "k_damaged_m2": 7.65e-11,
+        "warnings": [],
+    }
     _, text = page_of(tmp_path, intact)
     assert "permeability damaged" not in text
     assert "No warnings" in text
@@ -155,7 +182,9 @@ def test_a_run_with_invaders_but_no_stop_reason_shows_the_damage():
 
 def test_a_missing_figure_is_named(tmp_path):
     with pytest.raises(CaseError, match=r"none\.png"):
-        write_report(tmp_path / "r.html", SUMMARY, parts=ReportParts(figures=[(tmp_path / "none.png", "")]))
+        write_report(
+            tmp_path / "r.html", SUMMARY, parts=ReportParts(figures=[(tmp_path / "none.png", "")])
+        )
     assert not (tmp_path / "r.html").exists()
 
 

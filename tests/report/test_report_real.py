@@ -11,7 +11,7 @@ from report_demo import BOX, demo_damaged, demo_grains
 from fdnet.network.permeability import AnalysisOptions, analyse
 from fdnet.report import figures, tables, vtk
 from fdnet.report.html import ReportParts, write_report
-from fdnet.snapshot import Kind, Snapshot
+from fdnet.spheres.snapshot import Kind, Snapshot
 
 SIDES = {"walls": (False, False, False), "periodic": (True, True, True)}
 
@@ -32,7 +32,9 @@ def analysis_of(sides="walls", *, damaged=True, moved=False):
             velocity=after.velocity,
         )
     options = AnalysisOptions(sections=4, law="thesis", damage_law="thesis", profile_bin=0.2e-3)
-    return analyse(demo_grains(), after if damaged else None, periodic=SIDES[sides], options=options)
+    return analyse(
+        demo_grains(), after if damaged else None, periodic=SIDES[sides], options=options
+    )
 
 
 @pytest.mark.parametrize("sides", SIDES)
@@ -55,21 +57,32 @@ def test_tables_of_a_real_analysis_agree_with_each_other(tmp_path, sides):
 @pytest.mark.parametrize("moved", [False, True])
 @pytest.mark.parametrize("state", ["initial", "damaged"])
 def test_fluxes_in_paraview_follow_from_pressures_and_conductances(tmp_path, sides, moved, state):
-    mesh = pv.read(vtk.write_network_vtp(tmp_path / "network.vtp", analysis_of(sides, moved=moved)))
+    mesh = pv.read(
+        vtk.write_network_vtp(tmp_path / "network.vtp", analysis_of(sides, moved=moved))
+    )
     pressure = mesh.point_data[f"pressure_{state}"][mesh.lines.reshape(-1, 3)[:, 1:]]
     flux = mesh.cell_data[f"flux_{state}"]
     connected = np.isfinite(pressure).all(axis=1)
     conductance = mesh.cell_data[f"conductance_{state}"] * mesh.cell_data["throat_share"]
     expected = conductance * (pressure[:, 0] - pressure[:, 1])
     assert connected.mean() > 0.9
-    assert np.allclose(flux[connected], expected[connected], rtol=0, atol=1e-9 * np.abs(flux).max())
+    assert np.allclose(
+        flux[connected], expected[connected], rtol=0, atol=1e-9 * np.abs(flux).max()
+    )
 
 
-@pytest.mark.parametrize("variant", [{}, {"damaged": False}, {"moved": True}], ids=["fixed", "intact", "moved"])
+@pytest.mark.parametrize(
+    "variant", [{}, {"damaged": False}, {"moved": True}], ids=["fixed", "intact", "moved"]
+)
 def test_every_door_opens(tmp_path, variant):
     analysis = analysis_of(**variant)
     shown = demo_damaged() if variant.get("damaged", True) else demo_grains()
-    for write in (tables.write_pores, tables.write_throats, tables.write_profile, tables.write_sections):
+    for write in (
+        tables.write_pores,
+        tables.write_throats,
+        tables.write_profile,
+        tables.write_sections,
+    ):
         assert write(tmp_path / f"{write.__name__}.csv", analysis).stat().st_size > 100
     pictures = figures.draw_all(tmp_path / "figures", analysis, shown)
     summary = tables.write_summary(

@@ -5,8 +5,8 @@ import pytest
 from report_demo import demo_damaged, snapshot_of
 
 from fdnet.errors import CaseError
-from fdnet.report.spheres import read_spheres, write_spheres
-from fdnet.snapshot import Kind
+from fdnet.spheres.csv_file import read_spheres, write_spheres
+from fdnet.spheres.snapshot import Kind
 
 
 def csv_of(folder, text, *, encoding="utf-8"):
@@ -32,7 +32,9 @@ def test_spheres_a_hair_off_a_section_edge_stay_on_their_side(tmp_path):
     assert (position[:, 0] >= 0).tolist() == [True, True, True, False, True]
 
 
-@pytest.mark.parametrize(("units", "metres"), [("m", 1.0), ("cm", 0.01), ("mm", 0.001), ("um", 1e-6)])
+@pytest.mark.parametrize(
+    ("units", "metres"), [("m", 1.0), ("cm", 0.01), ("mm", 0.001), ("um", 1e-6)]
+)
 def test_plain_columns_are_in_the_given_unit(tmp_path, units, metres):
     path = csv_of(tmp_path, "x,y,z,radius\n1,2,-3,4e0\n")
     position, radius, kind = read_spheres(path, units=units)
@@ -43,7 +45,8 @@ def test_plain_columns_are_in_the_given_unit(tmp_path, units, metres):
 
 def test_comments_blank_lines_bom_crlf_quotes_and_column_order_are_fine(tmp_path):
     path = csv_of(
-        tmp_path, '\ufeff# pack\r\n\r\n"kind", radius_m ,z_m,y_m,x_m\r\n# more\r\n"fine",4,3,2,1\r\n grain,8,7,6,5'
+        tmp_path,
+        '\ufeff# pack\r\n\r\n"kind", radius_m ,z_m,y_m,x_m\r\n# more\r\n"fine",4,3,2,1\r\n grain,8,7,6,5',
     )
     position, radius, kind = read_spheres(path)
     assert position.tolist() == [[1, 2, 3], [5, 6, 7]]
@@ -59,7 +62,10 @@ BROKEN = {
     "text": ("# c\n\n" + HEADER + GOOD + "1,2,zwei,1,grain\n", ":5: z is 'zwei'"),
     "empty value": (HEADER + "1,2,,1,grain\n", ":2: z is ''"),
     "python's underscore": (HEADER + "1_0,2,3,1,grain\n", ":2: x is '1_0'"),
-    "negative radius": (HEADER + "1,2,3,-0.5,fine\n", ":2: radius is -0.5, expected a number above 0"),
+    "negative radius": (
+        HEADER + "1,2,3,-0.5,fine\n",
+        ":2: radius is -0.5, expected a number above 0",
+    ),
     "zero radius": (HEADER + "1,2,3,0,fine\n", ":2: radius is 0, expected"),
     "unknown kind": (HEADER + "1,2,3,1,sand\n", ":2: kind is 'sand', expected grain or fine"),
     "short row": (HEADER + GOOD + "1,2,3,1\n", ":3: 4 values, expected 5"),

@@ -11,7 +11,6 @@ import pytest
 from report_demo import demo_analysis, demo_damaged
 
 from fdnet.atomic import replacing, write_text
-from fdnet.report.spheres import write_spheres
 from fdnet.report.tables import (
     section_rows,
     write_pores,
@@ -20,6 +19,7 @@ from fdnet.report.tables import (
     write_summary,
     write_throats,
 )
+from fdnet.spheres.csv_file import write_spheres
 
 # DESIGN section 4, word for word
 SECTION_COLUMNS = [
@@ -36,7 +36,14 @@ SECTION_COLUMNS = [
     "fines_count",
     "fines_fraction",
 ]
-PROFILE_COLUMNS = ["x_lo_m", "x_hi_m", "porosity_initial", "porosity_damaged", "porosity_reduction", "fines_fraction"]
+PROFILE_COLUMNS = [
+    "x_lo_m",
+    "x_hi_m",
+    "porosity_initial",
+    "porosity_damaged",
+    "porosity_reduction",
+    "fines_fraction",
+]
 
 
 def rows_of(path):
@@ -54,7 +61,9 @@ def test_sections_hold_the_contract_columns_and_count_what_the_sphere_table_says
     assert list(sections[0]) == SECTION_COLUMNS
     depth = [float(sphere["x_m"]) for sphere in spheres if sphere["kind"] == "fine"]
     for row in sections:
-        assert int(row["fines_count"]) == sum(float(row["x_lo_m"]) <= x < float(row["x_hi_m"]) for x in depth)
+        assert int(row["fines_count"]) == sum(
+            float(row["x_lo_m"]) <= x < float(row["x_hi_m"]) for x in depth
+        )
     assert sum(float(row["fines_fraction"]) for row in sections) == pytest.approx(1, abs=1e-8)
 
 
@@ -63,7 +72,9 @@ def test_section_edges_are_written_to_the_last_bit(tmp_path):
     rows = [copy.copy(s) for s in demo_analysis().sections[:2]]
     for row, lo, hi in zip(rows, edges, edges[1:], strict=False):
         row.x_lo, row.x_hi = np.float64(lo), np.float64(hi)
-    path = write_sections(tmp_path / "sections.csv", changed(demo_analysis(), sections=tuple(rows)))
+    path = write_sections(
+        tmp_path / "sections.csv", changed(demo_analysis(), sections=tuple(rows))
+    )
     written = rows_of(path)
     assert [float(row["x_lo_m"]) for row in written] == edges[:2].tolist()
     assert [float(row["x_hi_m"]) for row in written] == edges[1:].tolist()
@@ -101,7 +112,9 @@ def test_throat_fluxes_in_the_tables_balance_in_every_pore(tmp_path):
 def test_throat_flux_follows_from_the_tables_conductance_and_pressures(tmp_path, state):
     throats = pd.read_csv(write_throats(tmp_path / "throats.csv", demo_analysis()))
     pores = pd.read_csv(write_pores(tmp_path / "pores.csv", demo_analysis()))
-    beyond = np.append(pores[f"pressure_{state}"].to_numpy(), [0.0, 1.0])  # index -1 is the inlet, -2 the outlet
+    beyond = np.append(
+        pores[f"pressure_{state}"].to_numpy(), [0.0, 1.0]
+    )  # index -1 is the inlet, -2 the outlet
     drop = beyond[throats.throat_conns_0] - beyond[throats.throat_conns_1]
     conductance = throats[f"conductance_{state}_m3"]
     wrong = (throats[f"flux_{state}_m3"] - conductance * drop).abs()
@@ -144,7 +157,9 @@ def test_summary_takes_numpy_and_names_every_value_json_cannot_hold(tmp_path):
     assert read["edges"] == [1.0, 2.0]
     assert read["solver"]["mass_balance"] is read["sections"][0]["k_reduction"] is None
     assert read["warnings"][0] == "doubtful"
-    assert [("solver.mass_balance" in w, "sections[0].k_reduction" in w) for w in read["warnings"][1:]] == [
+    assert [
+        ("solver.mass_balance" in w, "sections[0].k_reduction" in w) for w in read["warnings"][1:]
+    ] == [
         (True, False),
         (False, True),
     ]

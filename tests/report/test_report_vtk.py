@@ -29,7 +29,9 @@ def test_pressures_at_the_faces_drive_every_flux(tmp_path):
     mesh = pv.read(vtk.write_network_vtp(tmp_path / "network.vtp", demo_analysis()))
     pressure = mesh.point_data["pressure_damaged"][mesh.lines.reshape(-1, 3)[:, 1:]]
     expected = mesh.cell_data["conductance_damaged"] * (pressure[:, 0] - pressure[:, 1])
-    assert np.allclose(mesh.cell_data["flux_damaged"], expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+    assert np.allclose(
+        mesh.cell_data["flux_damaged"], expected, rtol=0, atol=1e-12 * np.abs(expected).max()
+    )
 
 
 def test_a_throat_across_a_periodic_side_ends_in_an_image(tmp_path):
@@ -44,7 +46,9 @@ def test_a_throat_across_a_periodic_side_ends_in_an_image(tmp_path):
     assert mesh.point_data["end"][image] == 1
     assert mesh.points[image] == pytest.approx(network.pore_position[other] + [0, 2e-3, 0])
     assert mesh.point_data["pressure_damaged"][image] == analysis.flow_damaged.pore_pressure[other]
-    assert mesh.point_data["volume"].sum() == pytest.approx(network.pore_volume.sum())  # images hold no volume
+    assert mesh.point_data["volume"].sum() == pytest.approx(
+        network.pore_volume.sum()
+    )  # images hold no volume
 
 
 def test_the_pressure_falls_by_one_per_period_along_x(tmp_path):
@@ -94,11 +98,17 @@ def test_the_picture_is_drawn_or_the_process_was_killed_for_want_of_opengl(tmp_p
 
 
 CRASHES = {
-    "segmentation fault": ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "signal 11; no usable OpenGL?"),
+    "segmentation fault": (
+        "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)",
+        "signal 11; no usable OpenGL?",
+    ),
     "exit 139 as a shell tells it": ("import sys; sys.exit(139)", "exit code 139"),
     "error": ("raise RuntimeError('no context')", "exit code 1; RuntimeError: no context"),
     "nothing left": ("pass", "left no complete PNG"),
-    "cut picture": (r"import sys; open(sys.argv[1], 'wb').write(b'\x89PNG\r\n\x1a\nhalf')", "left no complete PNG"),
+    "cut picture": (
+        r"import sys; open(sys.argv[1], 'wb').write(b'\x89PNG\r\n\x1a\nhalf')",
+        "left no complete PNG",
+    ),
 }
 
 
@@ -114,9 +124,13 @@ def test_a_dead_child_gives_a_reason_and_touches_nothing(tmp_path, monkeypatch, 
 
 
 def test_a_hanging_child_is_given_up(tmp_path, monkeypatch):
-    monkeypatch.setattr(vtk, "_command", lambda *_: [sys.executable, "-c", "import time; time.sleep(60)"])
+    monkeypatch.setattr(
+        vtk, "_command", lambda *_: [sys.executable, "-c", "import time; time.sleep(60)"]
+    )
     start = time.monotonic()
-    assert vtk.render_spheres_png(tmp_path / "v.png", "s.vtp", BOX, seconds=0.5).endswith("given up after 0.5 s")
+    assert vtk.render_spheres_png(tmp_path / "v.png", "s.vtp", BOX, seconds=0.5).endswith(
+        "given up after 0.5 s"
+    )
     assert time.monotonic() - start < 20
 
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from fdnet.errors import FlowError
-from fdnet.network.conductance import LAWS
-from fdnet.network.flow import INLET, OUTLET, Flow, solve_flow
-from fdnet.network.slabs import plane_pressures, whole_permeability
-from fdnet.network.tessellation import Network, build_network
-from fdnet.snapshot import Array
+from fdnet.network.flow.flow import INLET, OUTLET, Flow, solve_flow
+from fdnet.network.flow.slabs import plane_pressures, whole_permeability
+from fdnet.network.laws.named import LAWS
+from fdnet.network.network import Network, build_network
+from fdnet.spheres.snapshot import Array
 from tests.network.exact import exact_balance
 from tests.network.networks import chain, network_of
 from tests.network.packs import random_pack
@@ -21,7 +21,9 @@ def random_pores(seed: int, *, decades: float, count: int = 18) -> tuple[Network
     rng = np.random.default_rng(seed)
     position = rng.uniform(0.1, 0.9, (count, 3))
     position[:FACES, 0], position[FACES : 2 * FACES, 0] = 0.0, 1.0
-    pairs = np.array([(i, j) for i in range(count) for j in rng.choice(count, 3, replace=False) if i != j])
+    pairs = np.array(
+        [(i, j) for i in range(count) for j in rng.choice(count, 3, replace=False) if i != j]
+    )
     conductance = 10.0 ** rng.uniform(0, decades, len(pairs)) * (rng.random(len(pairs)) > 0.15)
     return network_of(position, pairs, [[0, 1]] * 3), conductance
 
@@ -33,7 +35,9 @@ def exact_inflow(network: Network, conductance: Array, flow: Flow) -> float:
     free = (state == 0) & np.isfinite(flow.pore_pressure)
     node = np.where(state < 0, 0, np.cumsum(free))
     ends, state = network.throat_pores, state[network.throat_pores]
-    live = np.all((state < 0) | free[ends], axis=1) & (conductance > 0) & (state[:, 0] != state[:, 1])
+    live = (
+        np.all((state < 0) | free[ends], axis=1) & (conductance > 0) & (state[:, 0] != state[:, 1])
+    )
     live |= np.all(free[ends], axis=1) & (conductance > 0)
     jump = 1.0 * (state[live, 0] == INLET) - 1.0 * (state[live, 1] == INLET)
     return exact_balance(node[ends[live]], conductance[live], jump, int(free.sum()) + 1)[0]
@@ -56,7 +60,9 @@ def test_conductances_from_0_over_sixteen_decades_against_rational_arithmetic(de
 @pytest.mark.parametrize("unit", [1e-300, 1e-30, 1e16, 1e200])
 def test_the_unit_of_conductance_does_not_matter(unit):
     network, g = random_pores(3, decades=6)
-    assert solve_flow(network, unit * g).inflow == pytest.approx(unit * solve_flow(network, g).inflow, rel=1e-9)
+    assert solve_flow(network, unit * g).inflow == pytest.approx(
+        unit * solve_flow(network, g).inflow, rel=1e-9
+    )
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -1.0, -1e-300])
@@ -85,7 +91,9 @@ def test_a_section_with_all_throats_blocked_leaves_k_0_there_and_k_elsewhere():
     k, flow = whole_permeability(network, g)
     assert k == 0
     assert "no open path from x = 0 m" in flow.reason
-    assert flow.isolated_pores == np.sum((network.pore_position[:, 0] > 0) & (network.pore_position[:, 0] < length))
+    assert flow.isolated_pores == np.sum(
+        (network.pore_position[:, 0] > 0) & (network.pore_position[:, 0] < length)
+    )
     assert solve_flow(network, g, span=(0.0, 0.2 * length)).inflow > 0
     assert solve_flow(network, g, span=(0.4 * length, 0.6 * length)).inflow == 0
 
@@ -95,7 +103,9 @@ def one_way(network: Network, conductance: Array) -> list[int]:
     x, length = network.pore_position[:, 0], network.box[0, 1]
     came: dict[int, tuple[int, int]] = {int(pore): (-1, -1) for pore in np.flatnonzero(x <= 0)}
     edge = list(came)
-    links = [np.flatnonzero(np.any(network.throat_pores == pore, axis=1)) for pore in range(len(x))]
+    links = [
+        np.flatnonzero(np.any(network.throat_pores == pore, axis=1)) for pore in range(len(x))
+    ]
     while edge:
         pore = edge.pop(0)
         if x[pore] >= length:
@@ -122,7 +132,9 @@ def test_a_single_open_way_is_its_throats_in_series(decades):
     g = np.zeros(len(clean))
     g[way] = clean[way] * 10.0 ** np.random.default_rng(0).uniform(0, decades, len(way))
     flow = solve_flow(network, g)
-    assert flow.inflow == pytest.approx(1.0 / np.sum(1.0 / (g * network.throat_share)[way]), rel=1e-9)
+    assert flow.inflow == pytest.approx(
+        1.0 / np.sum(1.0 / (g * network.throat_share)[way]), rel=1e-9
+    )
     assert np.abs(flow.throat_flux[way]) == pytest.approx(flow.inflow, rel=1e-9)
     assert np.count_nonzero(flow.throat_flux) == len(way)
 
@@ -133,7 +145,14 @@ def test_islands_are_counted_and_change_nothing():
     ring = np.column_stack([1.5 + np.cos(angle), 3 + np.sin(angle), np.zeros(10)])
     position = np.vstack([[[n, 0.5, 0.5] for n in range(4)], ring, ring + np.array([0, 4, 0])])
     loop = [(n, (n + 1) % 10) for n in range(10)]
-    pairs = [(0, 1), (1, 2), (2, 3), *((a + 4, b + 4) for a, b in loop), *((a + 14, b + 14) for a, b in loop), (0, 14)]
+    pairs = [
+        (0, 1),
+        (1, 2),
+        (2, 3),
+        *((a + 4, b + 4) for a, b in loop),
+        *((a + 14, b + 14) for a, b in loop),
+        (0, 14),
+    ]
     network = network_of(position, pairs, [[0, 3], [0, 9], [0, 1]])
     flow = solve_flow(network, np.ones(len(pairs)))
     alone = solve_flow(chain(3), np.ones(3))

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from fdnet.errors import NetworkError
+from fdnet.network.network import build_network
 from fdnet.network.permeability import Analysis, AnalysisOptions, analyse
-from fdnet.network.porosity import measure_porosity
-from fdnet.network.tessellation import build_network
-from fdnet.snapshot import Array, Kind, Snapshot
+from fdnet.spheres.porosity import measure_porosity
+from fdnet.spheres.snapshot import Array, Kind, Snapshot
 from tests.network.packs import face_centred, random_pack, simple_cubic, snapshot, with_fines
 
 ALL, SIDES, NONE = (True,) * 3, (False, True, True), (False,) * 3
@@ -40,8 +40,12 @@ def hexagonal(repeat: int = 2) -> Snapshot:
     """Hexagonal close packing of unit spheres in an orthorhombic cell 2 x 2 sqrt(3) x 4 sqrt(2/3)."""
     cell = np.array([[0, 0, 0], [0.5, 0.5, 0], [0.5, 1 / 6, 0.5], [0, 2 / 3, 0.5]])
     edge = np.array([2.0, 2.0 * np.sqrt(3.0), 4.0 * np.sqrt(2.0 / 3.0)])
-    steps = np.stack(np.meshgrid(*[np.arange(repeat)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
-    return snapshot(((steps + cell + 0.1) * edge).reshape(-1, 3), 1.0, np.outer(repeat * edge, [0.0, 1.0]))
+    steps = np.stack(np.meshgrid(*[np.arange(repeat)] * 3, indexing="ij"), axis=-1).reshape(
+        -1, 1, 3
+    )
+    return snapshot(
+        ((steps + cell + 0.1) * edge).reshape(-1, 3), 1.0, np.outer(repeat * edge, [0.0, 1.0])
+    )
 
 
 LATTICES = {
@@ -94,8 +98,12 @@ def test_slivers_of_every_thickness_leave_k_continuous(name, size):
 def test_one_layer_is_the_lattice_its_mirror_images_make_up():
     layer = simple_cubic()
     one = layer.where(layer.position[:, 0] < SC_SPACING)
-    one = snapshot(one.position + np.array([0.8, 0, 0]), 1.0, [[0, SC_SPACING], [0, EDGE], [0, EDGE]])
-    assert measure(one).k_initial == pytest.approx(measure(layer, periodic=ALL).k_initial, rel=1e-6)
+    one = snapshot(
+        one.position + np.array([0.8, 0, 0]), 1.0, [[0, SC_SPACING], [0, EDGE], [0, EDGE]]
+    )
+    assert measure(one).k_initial == pytest.approx(
+        measure(layer, periodic=ALL).k_initial, rel=1e-6
+    )
 
 
 def test_one_random_layer_is_half_of_its_periodic_double():
@@ -111,7 +119,9 @@ def test_one_random_layer_is_half_of_its_periodic_double():
 def test_a_box_thinner_than_a_grain_between_planes_of_symmetry_is_the_lattice(axis):
     """Half a cell, from the plane through the centres to that between them: one radius thick."""
     lattice = simple_cubic()
-    centred = snapshot(lattice.position + np.where(np.arange(3) == axis, -0.2, 0.8), 1.0, lattice.box)
+    centred = snapshot(
+        lattice.position + np.where(np.arange(3) == axis, -0.2, 0.8), 1.0, lattice.box
+    )
     thin = centred.box.copy()
     thin[axis, 1] = 1.0
     kept = centred.position[centred.position[:, axis] < 0.5]
@@ -140,7 +150,9 @@ def test_a_periodic_side_far_thinner_than_a_grain_is_refused_at_once(thickness):
     """Its images would be thousands; a tessellation of them took hours."""
     pack = random_pack(60)
     with pytest.raises(NetworkError, match=r"periodic side y .* are needed, expected at most"):
-        build_network(snapshot(pack.position, 1.0, pack.box * [[1], [thickness], [1]]), periodic=SIDES)
+        build_network(
+            snapshot(pack.position, 1.0, pack.box * [[1], [thickness], [1]]), periodic=SIDES
+        )
 
 
 def test_one_huge_grain_in_a_periodic_box_is_refused_at_once():
@@ -163,7 +175,9 @@ def test_fines_of_every_size_ratio_are_all_seen_and_lower_k(ratio):
     assert found.occupancy.pore_solid_volume.sum() == pytest.approx(solid, rel=1e-9)
     assert 0 < found.k_damaged < found.k_initial
     wanted = found.porosity_initial - solid / np.prod(np.ptp(pack.box, axis=1))
-    overlapped = 0.3 * (found.porosity_initial - wanted)  # fines may overlap each other, not grains
+    overlapped = 0.3 * (
+        found.porosity_initial - wanted
+    )  # fines may overlap each other, not grains
     assert wanted - 1e-3 <= found.porosity_damaged <= wanted + overlapped + 1e-3
 
 
@@ -175,7 +189,9 @@ def test_swelling_grains_close_throat_by_throat_until_no_path_is_left():
         found = measure(snapshot(pack.position, swell, pack.box), periodic=ALL)
         k.append(found.k_initial)
         closed.append(found.network.counts["throats_closed"])
-        assert (found.k_initial == 0) == any("k_initial = 0: no open path" in one for one in found.warnings)
+        assert (found.k_initial == 0) == any(
+            "k_initial = 0: no open path" in one for one in found.warnings
+        )
     assert k == sorted(k, reverse=True)
     assert closed == sorted(closed)
     assert k[0] > 0
@@ -194,7 +210,9 @@ def test_radii_one_to_four_keep_the_void_and_the_invariances():
     mirrored = snapshot(pack.box[:, 1] - pack.position, pack.radius, pack.box)
     small = snapshot(1e-4 * pack.position, 1e-4 * pack.radius, 1e-4 * pack.box)
     assert measure(mirrored, periodic=ALL).k_initial == pytest.approx(found.k_initial, rel=1e-6)
-    assert measure(small, periodic=ALL).k_initial == pytest.approx(1e-8 * found.k_initial, rel=1e-6)
+    assert measure(small, periodic=ALL).k_initial == pytest.approx(
+        1e-8 * found.k_initial, rel=1e-6
+    )
 
 
 def test_no_fines_change_nothing():
@@ -208,7 +226,9 @@ def test_one_fine_in_one_pore_lowers_k_by_less_than_closing_that_pore():
     """Rayleigh: lowering conductances lowers k; closing the throats of all pores the fine reaches lowers it further."""
     lattice = simple_cubic()
     found = measure(lattice, joined(lattice, cubic_pores()[:1], 0.2), ALL)
-    closed = measure(lattice, joined(lattice, cubic_pores()[:1], 0.73), ALL, ("lubrication", "thesis"))
+    closed = measure(
+        lattice, joined(lattice, cubic_pores()[:1], 0.73), ALL, ("lubrication", "thesis")
+    )
     assert closed.k_damaged < found.k_damaged < found.k_initial
 
 
@@ -247,7 +267,9 @@ def test_a_fine_wider_than_a_periodic_side_is_refused_at_once():
     """Throats times its images were more than could be searched in a day."""
     pack = random_pack(40)
     for radius in (0.51 * pack.box[1, 1], 1e4, 1e20):
-        with pytest.raises(NetworkError, match=r"fine 1 .* meets its own image across the periodic side"):
+        with pytest.raises(
+            NetworkError, match=r"fine 1 .* meets its own image across the periodic side"
+        ):
             measure(pack, joined(pack, pack.box[:, 1] * np.array([[0.5, 0.5, 0.5]]), radius), ALL)
     wide = measure(pack, joined(pack, pack.box[:, 1] * np.array([[0.5, 0.5, 0.5]]), 1e4), NONE)
     assert wide.k_damaged == 0
@@ -271,7 +293,9 @@ def test_a_grain_and_its_image_in_one_place_are_refused():
 def test_grains_nearly_in_one_place_are_one_grain_to_the_flow():
     """Two centres 2e-3 radii apart: porosity is that of their union, k that of one grain within the shift's effect."""
     pack = random_pack(40)
-    doubled = snapshot(np.vstack([pack.position, pack.position[:1] + np.array([2e-3, 0, 0])]), 1.0, pack.box)
+    doubled = snapshot(
+        np.vstack([pack.position, pack.position[:1] + np.array([2e-3, 0, 0])]), 1.0, pack.box
+    )
     one, two = measure(pack, periodic=ALL), measure(doubled, periodic=ALL)
     assert two.porosity_initial == pytest.approx(one.porosity_initial, abs=1e-4)
     assert two.k_initial == pytest.approx(one.k_initial, rel=0.05)
@@ -309,6 +333,8 @@ def test_coordinates_that_have_lost_their_digits_are_refused(lengths):
         measure(snapshot(pack.position + offset, 1.0, pack.box + offset))
 
 
-def measure_pair(position: Array, like: Snapshot, box: Array, periodic: tuple[bool, bool, bool]) -> Analysis:
+def measure_pair(
+    position: Array, like: Snapshot, box: Array, periodic: tuple[bool, bool, bool]
+) -> Analysis:
     both = snapshot(position, like.radius, box, like.kind)
     return measure(both.grains(), both, periodic)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from fdnet.cli import main
-from fdnet.dem.dump import parse_dump
 from fdnet.errors import CaseError, DumpError
-from fdnet.network.occupancy import measure_occupancy
-from fdnet.network.tessellation import build_network
+from fdnet.network.fines.occupancy import measure_occupancy
+from fdnet.network.network import build_network
+from fdnet.spheres.dump import parse_dump
 from tests.network.packs import random_pack, simple_cubic, snapshot
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "scripts"))
@@ -34,7 +34,10 @@ def permeability(capsys, path: Path, *options: str) -> tuple[int, str, str]:
 def table(path: Path, **swap: str) -> None:
     """A simple cubic lattice of 64 touching spheres; `swap` replaces cells of the third sphere."""
     names = ("x", "y", "z", "radius", "kind")
-    rows = [[*map(str, place), "0.5", "grain"] for place in np.indices((4, 4, 4)).reshape(3, -1).T + 0.5]
+    rows = [
+        [*map(str, place), "0.5", "grain"]
+        for place in np.indices((4, 4, 4)).reshape(3, -1).T + 0.5
+    ]
     for name, text in swap.items():
         rows[2][names.index(name)] = text
     path.write_text("\n".join([",".join(names), *map(",".join, rows)]) + "\n")
@@ -42,9 +45,13 @@ def table(path: Path, **swap: str) -> None:
 
 @pytest.mark.parametrize("text", HOSTILE)
 @pytest.mark.parametrize("column", ["x", "radius"])
-def test_numbers_that_are_none_in_a_table_are_refused_with_their_line(tmp_path, capsys, column, text):
+def test_numbers_that_are_none_in_a_table_are_refused_with_their_line(
+    tmp_path, capsys, column, text
+):
     table(tmp_path / "s.csv", **{column: text})
-    code, out, err = permeability(capsys, tmp_path / "s.csv", "--units", "mm", "--box", "0,4,0,4,0,4")
+    code, out, err = permeability(
+        capsys, tmp_path / "s.csv", "--units", "mm", "--box", "0,4,0,4,0,4"
+    )
     assert code == 2
     assert not out
     assert len(err.splitlines()) == 1
@@ -56,12 +63,16 @@ def test_numbers_that_are_none_in_a_table_are_refused_with_their_line(tmp_path, 
 def test_radii_beyond_reason_are_refused(tmp_path, capsys, radius):
     """Their cubes are no doubles: overflow where it was not refused."""
     table(tmp_path / "s.csv", radius=radius)
-    code, out, err = permeability(capsys, tmp_path / "s.csv", "--units", "mm", "--box", "0,4,0,4,0,4")
+    code, out, err = permeability(
+        capsys, tmp_path / "s.csv", "--units", "mm", "--box", "0,4,0,4,0,4"
+    )
     assert (code, out) == (4, "")
     assert "check the units" in err
 
 
-@pytest.mark.parametrize(("place", "periodic", "code"), [("1e308", "", 4), ("1e25", "x", 4), ("1e25", "", 0)])
+@pytest.mark.parametrize(
+    ("place", "periodic", "code"), [("1e308", "", 4), ("1e25", "x", 4), ("1e25", "", 0)]
+)
 def test_a_stray_sphere_is_left_out_unless_a_period_would_have_to_bring_it_back(
     tmp_path, capsys, place, periodic, code
 ):
@@ -76,10 +87,16 @@ def test_a_stray_sphere_is_left_out_unless_a_period_would_have_to_bring_it_back(
 
 def frame(*, step="0", count="2", bounds="0 1", rows=("1 1 0.5 ", "2 1 0.25 ")) -> bytes:
     head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS ff ff ff\n"
-    return (head + f"{bounds}\n0 1\n0 1\nITEM: ATOMS id type x \n" + "".join(f"{row}\n" for row in rows)).encode()
+    return (
+        head
+        + f"{bounds}\n0 1\n0 1\nITEM: ATOMS id type x \n"
+        + "".join(f"{row}\n" for row in rows)
+    ).encode()
 
 
-@pytest.mark.parametrize("text", ["nan", "NaN", "inf", "-inf", "1e400", "-nan", "Infinity", "nan(0x1)", "", "1e"])
+@pytest.mark.parametrize(
+    "text", ["nan", "NaN", "inf", "-inf", "1e400", "-nan", "Infinity", "nan(0x1)", "", "1e"]
+)
 def test_numbers_that_are_none_in_a_dump_are_named_with_line_and_column(text):
     with pytest.raises(DumpError, match=r"d:11: step 0: (column x holds|2 values, expected 3)"):
         list(parse_dump(frame(rows=("1 1 0.5 ", f"2 1 {text} ")), "d"))
@@ -87,7 +104,9 @@ def test_numbers_that_are_none_in_a_dump_are_named_with_line_and_column(text):
 
 @pytest.mark.parametrize("bounds", ["nan nan", "0 inf", "-inf 1", "1 0", "0 0", "0 1 2", "0", ""])
 def test_bounds_that_bound_nothing_are_refused(bounds):
-    with pytest.raises(DumpError, match=r"d:6: step 0: box bounds .* two numbers, the lower one first"):
+    with pytest.raises(
+        DumpError, match=r"d:6: step 0: box bounds .* two numbers, the lower one first"
+    ):
         list(parse_dump(frame(bounds=bounds), "d"))
 
 
@@ -95,7 +114,11 @@ def test_bounds_that_bound_nothing_are_refused(bounds):
 @pytest.mark.parametrize("name", ["position", "radius", "box"])
 def test_a_snapshot_holds_no_number_that_is_none(name, value):
     pack = random_pack(40)
-    fields = {"position": pack.position.copy(), "radius": pack.radius.copy(), "box": pack.box.copy()}
+    fields = {
+        "position": pack.position.copy(),
+        "radius": pack.radius.copy(),
+        "box": pack.box.copy(),
+    }
     fields[name].flat[1] = value
     with pytest.raises(CaseError, match=f"{name} holds values that are not finite"):
         snapshot(**fields)
@@ -107,7 +130,15 @@ def test_a_pack_whose_paths_are_all_closed_is_an_answer_at_the_command_line(tmp_
     rows = "".join(f"{x},{y},{z},0.72\n" for x, y, z in place)
     (tmp_path / "s.csv").write_text("x,y,z,radius\n" + rows)
     code, out, _ = permeability(
-        capsys, tmp_path / "s.csv", "--units", "mm", "--box", "0,4,0,4,0,4", "--periodic", "xyz", "--json"
+        capsys,
+        tmp_path / "s.csv",
+        "--units",
+        "mm",
+        "--box",
+        "0,4,0,4,0,4",
+        "--periodic",
+        "xyz",
+        "--json",
     )
     told = json.loads(out)
     assert code == 0
@@ -153,7 +184,12 @@ def test_the_fuzz_knows_a_fault_when_it_meets_one(tmp_path):
     assert "in.pack was written" in outcome(left)
     good = '{"k_initial_m2": 1, "k_damaged_m2": 0.5, "porosity_initial": 0.4, "porosity_damaged": 0.3, "sections": []}'
     assert fuzz._numbers(good) == "accepted"
-    for bad in (good.replace("0.5", "1.5"), good.replace("0.4", "1.1"), good.replace("0.4", "NaN"), good[:-1]):
+    for bad in (
+        good.replace("0.5", "1.5"),
+        good.replace("0.4", "1.1"),
+        good.replace("0.4", "NaN"),
+        good[:-1],
+    ):
         assert fuzz._numbers(bad).startswith("fault")
 
 

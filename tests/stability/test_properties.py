@@ -13,18 +13,20 @@ from builders import TINY
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from fdnet.case import Case
-from fdnet.case_file import case_from, known_keys, set_keys
-from fdnet.dem.dump import COLUMNS, parse_dump
+from fdnet.case.case import Case
+from fdnet.case.file import case_from, known_keys, set_keys
 from fdnet.errors import CaseError, DumpError, FdnetError
-from fdnet.network.flow import solve_flow
+from fdnet.network.flow.flow import solve_flow
 from fdnet.network.permeability import AnalysisOptions, analyse
-from fdnet.scales import scales_of
-from fdnet.snapshot import Kind, Snapshot
+from fdnet.scales.scales import scales_of
+from fdnet.spheres.dump import COLUMNS, parse_dump
+from fdnet.spheres.snapshot import Kind, Snapshot
 from tests.network.networks import network_of
 from tests.network.packs import random_pack, snapshot, with_fines
 
-FIXED = settings(derandomize=True, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+FIXED = settings(
+    derandomize=True, deadline=None, database=None, suppress_health_check=list(HealthCheck)
+)
 SEEDS = st.integers(0, 2**31)
 LENGTHS = st.floats(0.01, 20.0)
 ODD: st.SearchStrategy[Any] = st.one_of(
@@ -47,8 +49,14 @@ def plausible(draw: st.DrawFn) -> dict[str, Any]:
     data["box"] = {"size_mm": sides, "sides": draw(st.sampled_from(["walls", "periodic"]))}
     data["grains"] = {"radius_mm": radius, "porosity": draw(st.floats(0.2, 0.7))}
     data["grains"]["motion"] = draw(st.sampled_from(["fixed", "mobile"]))
-    data["fines"] = {"radius_mm": radius * draw(st.floats(0.02, 0.5)), "count": draw(st.integers(1, 1000))}
-    data["fluid"] = {"viscosity_cP": 10.0 ** draw(st.floats(-2, 5)), "overbalance_MPa": 10.0 ** draw(st.floats(-4, 2))}
+    data["fines"] = {
+        "radius_mm": radius * draw(st.floats(0.02, 0.5)),
+        "count": draw(st.integers(1, 1000)),
+    }
+    data["fluid"] = {
+        "viscosity_cP": 10.0 ** draw(st.floats(-2, 5)),
+        "overbalance_MPa": 10.0 ** draw(st.floats(-4, 2)),
+    }
     data["run"] = {"stiffness_N_m": 10.0 ** draw(st.floats(1, 11))}
     return data
 
@@ -118,12 +126,21 @@ def test_scales_are_finite_and_positive_or_refused(data):
         value = getattr(scales, field.name)
         if isinstance(value, float):
             assert math.isfinite(value), field.name
-    assert 0 < scales.time_step <= 0.2 * min(c.step_limit for name, c in scales.contacts.items() if "fine" in name)
+    assert (
+        0
+        < scales.time_step
+        <= 0.2 * min(c.step_limit for name, c in scales.contacts.items() if "fine" in name)
+    )
     assert scales.slab_length > 0
     assert scales.supplied_count >= 1
 
 
-def analysed(grains: Snapshot, damaged: Snapshot | None, periodic: tuple[bool, bool, bool], sections: int = 3) -> Any:
+def analysed(
+    grains: Snapshot,
+    damaged: Snapshot | None,
+    periodic: tuple[bool, bool, bool],
+    sections: int = 3,
+) -> Any:
     options = AnalysisOptions(sections=sections, walls="slip")
     return analyse(grains, damaged, periodic=periodic, options=options)
 
@@ -155,13 +172,20 @@ def test_random_packs_keep_every_promise(seed, count, solid, spread, fines, arou
         assert series == pytest.approx(whole, rel=1e-6)
 
 
-@given(seed=SEEDS, spread=st.sampled_from([0.0, 0.4]), scale=st.floats(-6, 3), flip=st.tuples(*[st.booleans()] * 3))
+@given(
+    seed=SEEDS,
+    spread=st.sampled_from([0.0, 0.4]),
+    scale=st.floats(-6, 3),
+    flip=st.tuples(*[st.booleans()] * 3),
+)
 @settings(FIXED, max_examples=15)
 def test_renumbering_mirror_turn_and_scale_leave_k(seed, spread, scale, flip):
     """k scales with the square of length; y and z may be exchanged; order and mirror images do not matter."""
     grains = random_pack.__wrapped__(24, 0.55, seed=seed, spread=spread)
     factor, order = 10.0**scale, np.random.default_rng(seed).permutation(24)
-    place = np.where(flip, grains.box[:, 1] - grains.position, grains.position)[order][:, [0, 2, 1]]
+    place = np.where(flip, grains.box[:, 1] - grains.position, grains.position)[order][
+        :, [0, 2, 1]
+    ]
     other = snapshot(factor * place, factor * grains.radius[order], factor * grains.box[[0, 2, 1]])
     around = (True, True, True)
     one, two = (analysed(pack, None, around, 1).k_initial for pack in (grains, other))
@@ -174,7 +198,9 @@ def test_random_networks_against_the_dense_pseudo_inverse(seed, pores, decades, 
     rng = np.random.default_rng(seed)
     position = rng.random((pores, 3))
     position[:2, 0], position[2:4, 0] = 0.0, 1.0
-    pairs = np.array([(i, j) for i in range(pores) for j in rng.choice(pores, 2, replace=False) if i < j])
+    pairs = np.array(
+        [(i, j) for i in range(pores) for j in rng.choice(pores, 2, replace=False) if i < j]
+    )
     assume(len(pairs))
     g = 10.0 ** rng.uniform(-decades, 0, len(pairs)) * (rng.random(len(pairs)) >= closed)
     flow = solve_flow(network_of(position, pairs, [[0, 1]] * 3), g)
@@ -198,10 +224,15 @@ def frames(draw: st.DrawFn) -> tuple[bytes, list[np.ndarray]]:
     text, tables = "", []
     for step in range(draw(st.integers(1, 3))):
         ids = draw(st.lists(st.integers(1, 10**6), min_size=0, max_size=5, unique=True))
-        rows = [[one, draw(st.sampled_from(list(Kind))), *(draw(FINITE) for _ in range(7))] for one in ids]
+        rows = [
+            [one, draw(st.sampled_from(list(Kind))), *(draw(FINITE) for _ in range(7))]
+            for one in ids
+        ]
         head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{len(rows)}\nITEM: BOX BOUNDS ff pp pp\n"
         head += f"-1 1\n0 0.5\n-3e-3 0\nITEM: ATOMS {COLUMNS} \n"
-        text += head + "".join(f"{r[0]} {int(r[1])} " + " ".join(f"{v:.17g}" for v in r[2:]) + " \n" for r in rows)
+        text += head + "".join(
+            f"{r[0]} {int(r[1])} " + " ".join(f"{v:.17g}" for v in r[2:]) + " \n" for r in rows
+        )
         tables.append(np.array(sorted(rows), float).reshape(-1, 9))
     return text.encode(), tables
 
@@ -212,7 +243,9 @@ def test_a_written_dump_is_read_back_to_the_last_bit(written):
     data, tables = written
     read = list(parse_dump(data, "d"))
     assert [frame.step for frame in read] == list(range(len(tables)))
-    assert all(np.array_equal(frame.rows, table) for frame, table in zip(read, tables, strict=True))
+    assert all(
+        np.array_equal(frame.rows, table) for frame, table in zip(read, tables, strict=True)
+    )
 
 
 @given(frames(), st.floats(0, 1, exclude_max=True))
@@ -225,7 +258,9 @@ def test_a_dump_cut_anywhere_is_refused_or_ends_between_two_frames(written, shar
     except DumpError:
         return
     assert cut == data or data[len(cut) :].startswith(b"ITEM: TIMESTEP")
-    assert all(np.array_equal(frame.rows, table) for frame, table in zip(read, tables, strict=False))
+    assert all(
+        np.array_equal(frame.rows, table) for frame, table in zip(read, tables, strict=False)
+    )
 
 
 @given(st.binary(max_size=300))

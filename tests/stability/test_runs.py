@@ -13,16 +13,16 @@ import pytest
 import tomli_w
 from builders import TINY, tiny
 
-from fdnet.case import Case
-from fdnet.case_file import read_case, set_keys
+from fdnet.case.case import Case
+from fdnet.case.file import read_case, set_keys
 from fdnet.cli import main
-from fdnet.contacts import touching_pairs
 from fdnet.dem.deck import number, render_text
-from fdnet.dem.dump import Frame, read_dump
 from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.scene import contact_variables, write_data
-from fdnet.scales import scales_of
-from fdnet.snapshot import Kind, Snapshot, resting
+from fdnet.scales.scales import scales_of
+from fdnet.spheres.contacts import touching_pairs
+from fdnet.spheres.dump import Frame, read_dump
+from fdnet.spheres.snapshot import Kind, Snapshot, resting
 
 pytestmark = pytest.mark.liggghts
 RADIUS = 0.05e-3
@@ -30,7 +30,9 @@ RADIUS = 0.05e-3
 
 def run(folder: Path, *assignments: str, without: str = "") -> tuple[int, dict[str, Any], str]:
     """The tiny case with `assignments` through the command line: exit code, summary, message."""
-    data = set_keys(copy.deepcopy(TINY), ["run.cap_ms=0.1", "fluid.velocity_m_s=2.0", *assignments])
+    data = set_keys(
+        copy.deepcopy(TINY), ["run.cap_ms=0.1", "fluid.velocity_m_s=2.0", *assignments]
+    )
     data.pop(without, None)
     (folder / "case.toml").write_text(tomli_w.dumps(data))
     out, err = io.StringIO(), io.StringIO()
@@ -47,11 +49,18 @@ def check_bounds(folder: Path, summary: dict[str, Any]) -> None:
     assert case.fines is not None
     counts = [summary[f"{name}_count"] for name in ("invaded", "passed", "upstream")]
     assert sum(counts) == summary["supplied_count"]
-    assert sum(section["fines_count"] for section in summary["sections"]) == summary["invaded_count"]
+    assert (
+        sum(section["fines_count"] for section in summary["sections"]) == summary["invaded_count"]
+    )
     assert 0 <= summary["k_damaged_m2"] <= summary["k_initial_m2"] < 1e-6
     assert 0 <= summary["porosity_damaged"] <= summary["porosity_initial"] <= 1
-    solid = summary["invaded_volume_m3"] + 0.5 * summary["upstream_count"] * case.fines.mean_volume_m3
-    assert summary["porosity_initial"] - summary["porosity_damaged"] <= solid / math.prod(case.size_m) + 1e-3
+    solid = (
+        summary["invaded_volume_m3"] + 0.5 * summary["upstream_count"] * case.fines.mean_volume_m3
+    )
+    assert (
+        summary["porosity_initial"] - summary["porosity_damaged"]
+        <= solid / math.prod(case.size_m) + 1e-3
+    )
     assert math.isfinite(summary["max_overlap_fraction"])
     assert summary["solver"]["residual"] <= 1e-6
 
@@ -65,8 +74,19 @@ def check_bounds(folder: Path, summary: dict[str, Any]) -> None:
         ("inviscid", ["fluid.viscosity_cP=1e-12"]),
         ("the contact bound", ["run.time_step_factor=0.2"]),
         ("mobile grains", ["grains.motion='mobile'", "fines.count=100"]),
-        ("supply of more than the void", ["fines.radius_mm=0.09", "fines.count=1200", "fines.concentration=0.2"]),
-        ("drag x 1000", ["drag.multiplier=1000.0", "run.stiffness_N_m=1e7", "fines.count=50", "run.cap_ms=0.01"]),
+        (
+            "supply of more than the void",
+            ["fines.radius_mm=0.09", "fines.count=1200", "fines.concentration=0.2"],
+        ),
+        (
+            "drag x 1000",
+            [
+                "drag.multiplier=1000.0",
+                "run.stiffness_N_m=1e7",
+                "fines.count=50",
+                "run.cap_ms=0.01",
+            ],
+        ),
     ],
 )
 def test_a_hard_case_runs_and_keeps_its_bounds(tmp_path, name, assignments):
@@ -77,7 +97,10 @@ def test_a_hard_case_runs_and_keeps_its_bounds(tmp_path, name, assignments):
     if name in wanted:
         assert summary["porosity_initial"] == pytest.approx(wanted[name], abs=0.01)
     if name == "the contact bound":
-        limits = [contact.step_limit for contact in scales_of(read_case(tmp_path / "case.toml")).contacts.values()]
+        limits = [
+            contact.step_limit
+            for contact in scales_of(read_case(tmp_path / "case.toml")).contacts.values()
+        ]
         assert summary["dem_dt_s"] == pytest.approx(0.2 * min(limits), rel=1e-6)
     if name == "porosity 0.30":
         assert any("denser than rigid spheres get" in one for one in summary["warnings"])
@@ -85,7 +108,9 @@ def test_a_hard_case_runs_and_keeps_its_bounds(tmp_path, name, assignments):
 
 def test_one_layer_of_grains_runs(tmp_path):
     """3 mm x 0.55 mm x 2.5 mm: grains of 0.5 mm side by side between two walls."""
-    code, summary, err = run(tmp_path, "box.size_mm=[3.0, 0.55, 2.5]", "grains.count=22", "fines.count=100")
+    code, summary, err = run(
+        tmp_path, "box.size_mm=[3.0, 0.55, 2.5]", "grains.count=22", "fines.count=100"
+    )
     assert code == 0, err
     assert summary["supplied_count"] == 100
     assert 0 < summary["k_damaged_m2"] <= summary["k_initial_m2"]
@@ -122,11 +147,23 @@ def test_fines_larger_than_every_throat_stay_at_the_face(tmp_path):
 @pytest.mark.parametrize(
     ("assignments", "said"),
     [
-        (["box.size_mm=[0.4, 2.5, 2.5]", "grains.count=20"], "side x is 0.4 mm, expected at least 0.5 mm"),
-        (["box.size_mm=[3.0, 0.4, 2.5]", "grains.count=20"], "side y is 0.4 mm, expected at least 0.5 mm"),
-        (["box.sides='periodic'", "box.size_mm=[3.0, 0.9, 2.5]"], "a grain would meet its own image"),
+        (
+            ["box.size_mm=[0.4, 2.5, 2.5]", "grains.count=20"],
+            "side x is 0.4 mm, expected at least 0.5 mm",
+        ),
+        (
+            ["box.size_mm=[3.0, 0.4, 2.5]", "grains.count=20"],
+            "side y is 0.4 mm, expected at least 0.5 mm",
+        ),
+        (
+            ["box.sides='periodic'", "box.size_mm=[3.0, 0.9, 2.5]"],
+            "a grain would meet its own image",
+        ),
         (["grains.count=118"], "spheres sum to more than the box; expected at most 117"),
-        (["drag.multiplier=1000.0", "fluid.velocity_m_s=40.0"], "run.stiffness_N_m: drag alone would press a fine"),
+        (
+            ["drag.multiplier=1000.0", "fluid.velocity_m_s=40.0"],
+            "run.stiffness_N_m: drag alone would press a fine",
+        ),
         (["fines.count=0"], "fines.count: 0"),
         (["fines.radius_mm=0.25"], "not below grains.radius_mm"),
     ],
@@ -148,20 +185,31 @@ def test_a_pack_denser_than_reachable_is_refused_with_the_overlap_it_needs(tmp_p
 
 
 def test_a_supply_that_finds_no_place_leaves_no_folder(tmp_path):
-    code, _, err = run(tmp_path, "fines.count=6000", "fines.concentration=0.3", "fines.radius_mm=0.0999")
+    code, _, err = run(
+        tmp_path, "fines.count=6000", "fines.concentration=0.3", "fines.radius_mm=0.0999"
+    )
     assert code == 2
     assert "fines.concentration: 0.3 leaves" in err
     assert not (tmp_path / "run").exists()
 
 
-def closed_system(case: Case, fines: Snapshot, binary, folder: Path, *, factor: float, steps: int) -> list[Frame]:
+def closed_system(
+    case: Case, fines: Snapshot, binary, folder: Path, *, factor: float, steps: int
+) -> list[Frame]:
     """Fines in a periodic box with the deck's own contact lines and nothing else; frames of the whole run."""
     scales = scales_of(case)
     contacts = contact_variables(case, scales, "invade", friction=False)
     density = np.full(len(fines), case.fines.density_kg_m3)
     write_data(folder / "c.data", fines, bounds=fines.box, density=density, types=3)
     step = factor * scales.contacts["fine-fine"].step_limit
-    header = {"stage": "test", "case_name": "c", "digest": "-", "left_out": [], "boundary": "p p p", "processors": ""}
+    header = {
+        "stage": "test",
+        "case_name": "c",
+        "digest": "-",
+        "left_out": [],
+        "boundary": "p p p",
+        "processors": "",
+    }
     text = render_text("_header.in.j2", header)
     text += "read_data c.data\nneighbor 5e-5 bin\nneigh_modify delay 0\n"
     text += render_text("_contacts.in.j2", {"contacts": contacts, "time_step": number(step)})
@@ -178,8 +226,15 @@ def closed_system(case: Case, fines: Snapshot, binary, folder: Path, *, factor: 
 
 def undamped() -> Case:
     """Grains and fines of one material, so that LIGGGHTS's compulsory type 1 is like the others; no damping."""
-    same = ["normal_stiffness_N_m=63e9", "shear_stiffness_N_m=26e9", "density_kg_m3=2146.0", "damping_ratio=0.0"]
-    return tiny(*(f"{part}.{key}" for part in ("grains", "fines") for key in same), "run.stiffness_N_m=1e4")
+    same = [
+        "normal_stiffness_N_m=63e9",
+        "shear_stiffness_N_m=26e9",
+        "density_kg_m3=2146.0",
+        "damping_ratio=0.0",
+    ]
+    return tiny(
+        *(f"{part}.{key}" for part in ("grains", "fines") for key in same), "run.stiffness_N_m=1e4"
+    )
 
 
 def gas(count_a_side: int, edge: float, speed: float) -> Snapshot:
@@ -188,7 +243,13 @@ def gas(count_a_side: int, edge: float, speed: float) -> Snapshot:
     still = resting(place, RADIUS, np.array([[0.0, edge]] * 3), Kind.FINE)
     velocity = np.random.default_rng(1).normal(0.0, speed, place.shape)
     kind = np.where(np.arange(len(place)) == 0, Kind.GRAIN, Kind.FINE)
-    parts = {"id": still.id, "kind": kind, "position": place, "radius": still.radius, "box": still.box}
+    parts = {
+        "id": still.id,
+        "kind": kind,
+        "position": place,
+        "radius": still.radius,
+        "box": still.box,
+    }
     return Snapshot(step=0, time_s=0.0, velocity=velocity - velocity.mean(axis=0), **parts)
 
 
@@ -207,7 +268,9 @@ def test_an_undamped_closed_system_gains_no_energy(binary, tmp_path, factor):
     what changes hands at the start and end of each contact adds up like a random walk. Stated bound: 1 % (factor 0.1),
     2 % (factor 0.2) over 40,000 steps; momentum to the rounding of its sums."""
     case = undamped()
-    frames = closed_system(case, gas(4, 0.6e-3, 1.0), binary, tmp_path, factor=factor, steps=40_000)
+    frames = closed_system(
+        case, gas(4, 0.6e-3, 1.0), binary, tmp_path, factor=factor, steps=40_000
+    )
     stiffness = scales_of(case).contacts["fine-fine"].normal_stiffness
     mass = 4 / 3 * math.pi * RADIUS**3 * 2146.0
     found = np.array([energy(frame, stiffness, mass) for frame in frames])

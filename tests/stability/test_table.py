@@ -9,7 +9,9 @@ HAPPENED = {"completed", "refused", "warned", "completed or refused", "refused o
 
 
 def test_every_row_of_the_stability_table_names_tests_that_exist(root):
-    with (root / "docs" / "validation" / "stability.csv").open(encoding="utf-8", newline="") as handle:
+    with (root / "docs" / "validation" / "stability.csv").open(
+        encoding="utf-8", newline=""
+    ) as handle:
         rows = list(csv.DictReader(handle, strict=True))
     assert len(rows) > 50
     assert all(row["what_happened"] in HAPPENED for row in rows)
@@ -20,4 +22,6 @@ def test_every_row_of_the_stability_table_names_tests_that_exist(root):
         assert found, row
         for path, name in found:
             tree = ast.parse((root / path).read_text(encoding="utf-8"))
-            assert name in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}, (path, name)
+            assert name in {
+                node.name for node in tree.body if isinstance(node, ast.FunctionDef)
+            }, (path, name)

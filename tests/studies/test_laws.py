@@ -5,12 +5,13 @@ import csv
 import pytest
 
 from fdnet.cli import main
-from fdnet.network.conductance import DEFAULT_LAW, LAWS
-from fdnet.studies import laws, packs
+from fdnet.network.laws.named import DEFAULT_LAW, LAWS
 from fdnet.studies.command import run_study
-from fdnet.studies.law_models import PAIRS, RESOLVED
-from fdnet.studies.table import read_rows
-from fdnet.studies.truth import EQUAL, LATTICE
+from fdnet.studies.engine.table import read_rows
+from fdnet.studies.network import laws
+from fdnet.studies.network.law_models import PAIRS, RESOLVED
+from fdnet.studies.truth import packs
+from fdnet.studies.truth.truth import EQUAL, LATTICE
 
 FIFTH = "fines of 1/5"
 
@@ -23,7 +24,9 @@ def rows(tmp_path_factory):
 
 
 def errors(rows, series, quantity="k"):
-    return {row.value: row.error for row in rows if row.series == series and row.quantity == quantity}
+    return {
+        row.value: row.error for row in rows if row.series == series and row.quantity == quantity
+    }
 
 
 def test_the_default_law_is_within_its_stated_span(rows):

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from fdnet.errors import FlowError
-from fdnet.studies.circuit import Circuit, circuit_of, exact_fluxes
 from fdnet.studies.command import run_study
-from fdnet.studies.linear_solver import OWN, STUDY, suffix
-from fdnet.studies.solver_peers import (
+from fdnet.studies.engine.study import DONE
+from fdnet.studies.engine.table import read_rows
+from fdnet.studies.network.circuit import Circuit, circuit_of, exact_fluxes
+from fdnet.studies.network.linear_solver import OWN, STUDY, suffix
+from fdnet.studies.network.solver_peers import (
     AGGREGATION,
     DIRECT,
     FDNET,
@@ -21,8 +23,6 @@ from fdnet.studies.solver_peers import (
     UNIT_DIAGONAL,
     solve_by,
 )
-from fdnet.studies.study import DONE
-from fdnet.studies.table import read_rows
 from tests.network.exact import exact_balance, random_links
 
 
@@ -37,7 +37,9 @@ def rows(tmp_path_factory):
 
 def errors(rows, method, decades, quantity, pores=200):
     name = f"{method}{suffix(pores, decades)}"
-    return {row.value: row.error for row in rows if row.series == name and row.quantity == quantity}
+    return {
+        row.value: row.error for row in rows if row.series == name and row.quantity == quantity
+    }
 
 
 def circuit_of_links(seed: int, decades: float) -> tuple[Circuit, np.ndarray]:
@@ -53,7 +55,9 @@ def circuit_of_links(seed: int, decades: float) -> tuple[Circuit, np.ndarray]:
 @pytest.mark.parametrize("seed", range(3))
 def test_eighty_digits_are_the_rational_answer(seed, decades):
     circuit, exact = circuit_of_links(seed, decades)
-    assert exact_fluxes(circuit) == pytest.approx(exact, rel=1e-14, abs=1e-30 * np.abs(exact).max())
+    assert exact_fluxes(circuit) == pytest.approx(
+        exact, rel=1e-14, abs=1e-30 * np.abs(exact).max()
+    )
 
 
 @pytest.mark.parametrize("decades", [0, 8, 16])
@@ -83,7 +87,9 @@ def test_errors_follow_the_tolerance_and_stay_below_the_residual(rows, method, d
 
 def test_the_norm_of_the_residual_says_little_about_the_worst_throat(rows):
     """1e-8 of the source's norm leaves 1e-6 of the inflow and more: why fdnet stops by the sum of imbalances."""
-    assert all(errors(rows, JACOBI, decades, "worst throat")[1e-8] > 1e-6 for decades in (0, 8, 16))
+    assert all(
+        errors(rows, JACOBI, decades, "worst throat")[1e-8] > 1e-6 for decades in (0, 8, 16)
+    )
 
 
 def test_beyond_the_exact_size_methods_agree(rows):
@@ -104,11 +110,15 @@ def test_a_chain_carries_its_series_conductance(method):
 
 def test_steps_that_run_out_are_refused(tmp_path, monkeypatch):
     monkeypatch.setitem(ITERATIVE, JACOBI, 5)
-    with pytest.raises(FlowError, match="CG \\+ Jacobi: residual not below 1e-12 of the source in 5 steps"):
+    with pytest.raises(
+        FlowError, match="CG \\+ Jacobi: residual not below 1e-12 of the source in 5 steps"
+    ):
         solve_by(JACOBI, circuit_of(200, 8.0, 0, tmp_path), 1e-12)
 
 
 def test_a_unit_diagonal_costs_multigrid_steps(tmp_path):
     circuit = circuit_of(3000, 0.0, 0, tmp_path)
-    plain, scaled = (solve_by(method, circuit, 1e-8).steps for method in (RUGE_STUBEN, UNIT_DIAGONAL))
+    plain, scaled = (
+        solve_by(method, circuit, 1e-8).steps for method in (RUGE_STUBEN, UNIT_DIAGONAL)
+    )
     assert scaled > 3 * plain

@@ -3,9 +3,9 @@
 import pytest
 
 from fdnet.studies.command import run_study
-from fdnet.studies.judge import levels
-from fdnet.studies.specimen_size import INTACT, INVADED, NAMED, PERIODIC, STUDY
-from fdnet.studies.table import read_rows
+from fdnet.studies.engine.judge import levels
+from fdnet.studies.engine.table import read_rows
+from fdnet.studies.network.specimen_size import INTACT, INVADED, NAMED, PERIODIC, STUDY
 
 pytestmark = pytest.mark.liggghts
 
@@ -33,13 +33,16 @@ def test_packs_of_equal_count_meet_the_porosity_of_their_grains(rows):
 def test_every_seed_is_a_run_of_its_own(rows):
     found = [row.observed for row in rows if row.quantity == "porosity_loss_first"]
     assert len(set(found)) == len(found) == 6
-    assert {level.value for level in levels(rows, f"{INVADED}, {PERIODIC}", "k_ratio_first")} == {43.0, 84.0}
+    assert {level.value for level in levels(rows, f"{INVADED}, {PERIODIC}", "k_ratio_first")} == {
+        43.0,
+        84.0,
+    }
 
 
 def test_boxes_in_use_are_those_of_the_cases(root):
     from builders import TINY
 
-    from fdnet.case_file import read_case
+    from fdnet.case.file import read_case
 
     def size(text):
         return tuple(float(side) for side in text.split(","))

@@ -4,15 +4,15 @@ import math
 
 import pytest
 
-from fdnet.contact_law import sphere_mass
-from fdnet.scales import scales_of
-from fdnet.studies.closed import deepest_overlap_of, restitution_of
-from fdnet.studies.collisions import SPEED
+from fdnet.scales.scales import scales_of
+from fdnet.scales.springs import sphere_mass
 from fdnet.studies.command import run_study
-from fdnet.studies.dem_runs import slab_case
-from fdnet.studies.judge import levels
-from fdnet.studies.stiffness import COLLISION, LONG, NOMINAL, STUDY
-from fdnet.studies.table import read_rows
+from fdnet.studies.dem.closed import deepest_overlap_of, restitution_of
+from fdnet.studies.dem.collisions import SPEED
+from fdnet.studies.dem.runs import slab_case
+from fdnet.studies.dem.stiffness import COLLISION, LONG, NOMINAL, STUDY
+from fdnet.studies.engine.judge import levels
+from fdnet.studies.engine.table import read_rows
 
 pytestmark = pytest.mark.liggghts
 
@@ -26,11 +26,17 @@ def rows(tmp_path_factory):
 
 def test_overlap_falls_as_the_root_of_the_stiffness_up_to_the_nominal_value(rows):
     """v sqrt(m_eff / k) exp(...) of a damped spring, at 1e2, 1e4 and 94.3e9 N/m; 2 % for a step of 0.1 sqrt(m/k)."""
-    found = {level.value: level.error for level in levels(rows, COLLISION, "overlap_over_diameter")}
+    found = {
+        level.value: level.error for level in levels(rows, COLLISION, "overlap_over_diameter")
+    }
     case = slab_case(1)
     mass = sphere_mass(case.fines.mean_radius_m, case.fines.density_kg_m3)
     for value in (1e2, 1e4, NOMINAL):
-        pair = scales_of(slab_case(1, f"run.stiffness_N_m={value!r}")).contacts["fine-fine"].normal_stiffness
+        pair = (
+            scales_of(slab_case(1, f"run.stiffness_N_m={value!r}"))
+            .contacts["fine-fine"]
+            .normal_stiffness
+        )
         exact = deepest_overlap_of(case.fines.damping_ratio, SPEED, pair, mass / 2)
         assert found[value] * 2 * case.fines.mean_radius_m == pytest.approx(exact, rel=0.025)
 
@@ -66,7 +72,9 @@ def test_closed_forms_of_a_damped_contact():
         return 2 * zeta * y[1] + y[0] if y[0] > 1e-9 or y[1] < 0 else 1.0
 
     released.terminal = True
-    found = solve_ivp(moving, (0, 10), [1e-12, 1.0], events=released, rtol=1e-10, atol=1e-12, max_step=0.01)
+    found = solve_ivp(
+        moving, (0, 10), [1e-12, 1.0], events=released, rtol=1e-10, atol=1e-12, max_step=0.01
+    )
     assert -found.y[1, -1] == pytest.approx(restitution_of(zeta), rel=1e-5)
     assert max(found.y[0]) == pytest.approx(deepest_overlap_of(zeta, 1.0, 1.0, 1.0), rel=1e-4)
     assert math.isclose(found.y[0].max(), max(found.y[0]))

@@ -9,18 +9,22 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from fdnet.errors import CaseError, FlowError
-from fdnet.snapshot import Array, Snapshot
-from fdnet.studies import stokes
-from fdnet.studies.stokes import extrapolate, solve_stokes
-from fdnet.studies.stokes_green import build_green
-from fdnet.studies.stokes_walls import find_walls
+from fdnet.spheres.snapshot import Array, Snapshot
+from fdnet.studies.stokes import stokes
+from fdnet.studies.stokes.green import build_green
+from fdnet.studies.stokes.stokes import extrapolate, solve_stokes
+from fdnet.studies.stokes.walls import find_walls
 
 SC = [[0.31, 0.17, 0.43]]
 BCC = [[0.1, 0.2, 0.3], [0.6, 0.7, 0.8]]
 FCC = [[0.1, 0.2, 0.3], [0.1, 0.7, 0.8], [0.6, 0.2, 0.8], [0.6, 0.7, 0.3]]
 
 
-def cell(position: Array | list, radius: Array | list | float, edges: tuple[float, ...] = (1.0, 1.0, 1.0)) -> Snapshot:
+def cell(
+    position: Array | list,
+    radius: Array | list | float,
+    edges: tuple[float, ...] = (1.0, 1.0, 1.0),
+) -> Snapshot:
     place = np.asarray(position, float)
     count = len(place)
     return Snapshot(
@@ -72,7 +76,10 @@ def test_second_order():
 
 def test_grid_offset_within_the_error():
     radius = lattice_radius(SC, 0.45)
-    ks = [solve_stokes(cell([[x, x / 3, 0.7 * x]], radius), cells=32).k for x in (0.0, 0.01, 0.5 / 32, 0.02, 0.5)]
+    ks = [
+        solve_stokes(cell([[x, x / 3, 0.7 * x]], radius), cells=32).k
+        for x in (0.0, 0.01, 0.5 / 32, 0.02, 0.5)
+    ]
     assert np.ptp(ks) < 0.006 * np.mean(ks)
 
 
@@ -101,22 +108,37 @@ def direct_tensor(pack: Snapshot, cells: int) -> Array:
     size = int(np.prod(shape))
     index = np.arange(size).reshape(shape)
     shift = [
-        sparse.csr_matrix((np.ones(size), (index.ravel(), np.roll(index, -1, axis=d).ravel())), (size, size))
+        sparse.csr_matrix(
+            (np.ones(size), (index.ravel(), np.roll(index, -1, axis=d).ravel())), (size, size)
+        )
         for d in range(3)
     ]
     one = sparse.identity(size)
     laplace = sum(2.0 * one - s - s.T for s in shift)
     blocks, right = [], []
     for d in range(3):
-        walls = find_walls((pack.position - pack.box[:, 0]) / spacing, pack.radius / spacing, shape, component=d)
+        walls = find_walls(
+            (pack.position - pack.box[:, 0]) / spacing, pack.radius / spacing, shape, component=d
+        )
         drag = np.zeros(size)
         drag[walls.node] = 1.0 / np.maximum(walls.slack, 1e-9)
-        blocks.append([laplace + sparse.diags(drag) if e == d else None for e in range(3)] + [one - shift[d].T])
+        blocks.append(
+            [laplace + sparse.diags(drag) if e == d else None for e in range(3)]
+            + [one - shift[d].T]
+        )
         right.append([np.ones(size) if e == d else np.zeros(size) for e in range(3)])
-    blocks.append([(one - shift[d].T).T for d in range(3)] + [sparse.diags(np.where(np.arange(size), 0.0, 1.0))])
+    blocks.append(
+        [(one - shift[d].T).T for d in range(3)]
+        + [sparse.diags(np.where(np.arange(size), 0.0, 1.0))]
+    )
     solver = splu(sparse.bmat(blocks, format="csc"))
-    flows = [solver.solve(np.concatenate([*(right[d][a] for d in range(3)), np.zeros(size)])) for a in range(3)]
-    return np.array([flow[: 3 * size].reshape(3, size).mean(axis=1) for flow in flows]) * spacing**2
+    flows = [
+        solver.solve(np.concatenate([*(right[d][a] for d in range(3)), np.zeros(size)]))
+        for a in range(3)
+    ]
+    return (
+        np.array([flow[: 3 * size].reshape(3, size).mean(axis=1) for flow in flows]) * spacing**2
+    )
 
 
 def test_a_direct_solve_gives_the_same_tensor():
@@ -126,7 +148,8 @@ def test_a_direct_solve_gives_the_same_tensor():
     np.testing.assert_allclose(tensor, tensor.T, atol=1e-9 * tensor.max())
     for axis in range(3):
         free, held = (
-            solve_stokes(pack, cells=10, axis=axis, tolerance=1e-6, transverse=way).k for way in (True, False)
+            solve_stokes(pack, cells=10, axis=axis, tolerance=1e-6, transverse=way).k
+            for way in (True, False)
         )
         assert free == pytest.approx(tensor[axis, axis], rel=1e-4)
         assert held == pytest.approx(1.0 / np.linalg.inv(tensor)[axis, axis], rel=1e-4)
@@ -151,7 +174,8 @@ def test_walls_stand_where_the_sphere_is():
         assert depth < 0.0
         assert 1.0 / slack == pytest.approx(drag, rel=1e-3, abs=1e-4)
     assert np.count_nonzero(walls.slack == 0.0) == sum(
-        0.0 <= r - np.linalg.norm(np.array(i) + offset - point) < 1.0 for i in np.ndindex(9, 10, 11)
+        0.0 <= r - np.linalg.norm(np.array(i) + offset - point) < 1.0
+        for i in np.ndindex(9, 10, 11)
     )
 
 
@@ -162,7 +186,8 @@ def test_turning_scaling_tiling_and_shifting_by_a_cell_change_nothing():
     turned = solve_stokes(cell(place[:, [1, 2, 0]], radius), cells=20, axis=2).k
     large = solve_stokes(cell(1e-3 * place, 1e-3 * radius, (1e-3,) * 3), cells=20).k
     tiled = solve_stokes(
-        cell(np.vstack([place, place + np.array([0, 1, 0])]), np.tile(radius, 2), (1, 2, 1)), cells=40
+        cell(np.vstack([place, place + np.array([0, 1, 0])]), np.tile(radius, 2), (1, 2, 1)),
+        cells=40,
     ).k
     shifted = solve_stokes(cell(place + np.array([0.05, 0.1, -0.15]), radius), cells=20).k
     assert [turned, 1e6 * large, tiled, shifted] == pytest.approx([k] * 4, rel=3e-4)
@@ -175,7 +200,9 @@ def test_necks_between_overlapping_spheres_do_not_leak():
     neck = np.array([[0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [0.5, 0.5, 0.0]])
     buried = cell(np.vstack([middle, neck]), [radius, *[0.28] * 3])
     assert np.all(np.hypot(0.28, 0.5) < radius)
-    open_, closed = (solve_stokes(pack, cells=40, tolerance=2e-5).k for pack in (cell(middle, radius), buried))
+    open_, closed = (
+        solve_stokes(pack, cells=40, tolerance=2e-5).k for pack in (cell(middle, radius), buried)
+    )
     assert open_ == pytest.approx(closed, rel=2e-3)
 
 
@@ -191,7 +218,10 @@ def test_stored_truth_lies_below_a_coarse_grid_by_its_error(root):
     with data.open(newline="") as file:
         truth = next(row for row in csv.DictReader(file) if row["case"] == "packH_40_eps40")
     table = np.genfromtxt(
-        root / "tests" / "data" / "truth" / truth["file"], delimiter=",", skip_header=2, usecols=range(4)
+        root / "tests" / "data" / "truth" / truth["file"],
+        delimiter=",",
+        skip_header=2,
+        usecols=range(4),
     )
     pack = cell(table[:, :3], table[:, 3], (float(truth["edge_mm"]),) * 3)
     grids = [solve_stokes(pack, cells=n) for n in (32, 48)]

@@ -13,10 +13,18 @@ from toy_study import toy
 from fdnet.cli import main
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.studies.command import STUDIES, run_study, study_named
-from fdnet.studies.judge import Level, against_reference, knee, knee_sentence, levels, order, profile_distance
-from fdnet.studies.runner import POINTS, run_points
-from fdnet.studies.study import DONE, Measured, Panel, Point, Row
-from fdnet.studies.table import read_rows
+from fdnet.studies.engine.judge import (
+    Level,
+    against_reference,
+    knee,
+    knee_sentence,
+    levels,
+    order,
+    profile_distance,
+)
+from fdnet.studies.engine.runner import POINTS, run_points
+from fdnet.studies.engine.study import DONE, Measured, Panel, Point, Row
+from fdnet.studies.engine.table import read_rows
 
 NAN = float("nan")
 
@@ -28,7 +36,13 @@ def level(value, cost, error, half=0.0) -> Level:
 def measured(value, seed, **observed) -> Measured:
     point = Point(series="s", knob="k", value=value, seed=seed)
     return Measured(
-        point=point, status=DONE, observed=observed, wall_s=1.0, core_s=1.0, steps=NAN, peak_memory_bytes=NAN
+        point=point,
+        status=DONE,
+        observed=observed,
+        wall_s=1.0,
+        core_s=1.0,
+        steps=NAN,
+        peak_memory_bytes=NAN,
     )
 
 
@@ -76,7 +90,12 @@ def test_points_that_fail_are_rows_with_their_status(tmp_path):
     study = toy(measure=toy_study.failing, isolated=True, seconds=2.0)
     text = run_study(study, tmp_path / "out", quick=False)
     status = {row.value: row.status for row in read_rows(tmp_path / "out" / "toy.csv")}
-    assert status == {4.0: DONE, 8.0: "refused: no path at 8", 16.0: "over time", 32.0: "over memory"}
+    assert status == {
+        4.0: DONE,
+        8.0: "refused: no path at 8",
+        16.0: "over time",
+        32.0: "over memory",
+    }
     assert "seed 0: over time" in text
 
 
@@ -85,19 +104,28 @@ def test_errors_against_a_reference_are_taken_seed_by_seed():
     runs = [measured("good", 1, q=10.0), measured("good", 2, q=20.0)]
     runs += [measured("poor", 1, q=11.0), measured("poor", 2, q=21.2), measured("poor", 3, q=16.0)]
     rows = against_reference(runs, "q", lambda run: run.point.value == "good")
-    assert [row.error for row in rows] == pytest.approx([-5 / 15, 5 / 15, 1 / 15, 1.2 / 15, 1 / 15])
+    assert [row.error for row in rows] == pytest.approx(
+        [-5 / 15, 5 / 15, 1 / 15, 1.2 / 15, 1 / 15]
+    )
     assert rows[2].error_uncertainty == pytest.approx(0.1155 / 15, rel=1e-3)
 
 
 def test_rounding_of_a_sum_is_no_error():
-    runs = [measured("good", 0, q=0.3), measured("same", 0, q=0.1 + 0.2), measured("near", 0, q=0.3 * (1 + 1e-9))]
+    runs = [
+        measured("good", 0, q=0.3),
+        measured("same", 0, q=0.1 + 0.2),
+        measured("near", 0, q=0.3 * (1 + 1e-9)),
+    ]
     rows = against_reference(runs, "q", lambda run: run.point.value == "good")
     assert rows[1].error == 0.0 != 0.1 + 0.2 - 0.3
     assert rows[2].error == pytest.approx(1e-9, rel=1e-6)
 
 
 def test_a_level_has_the_confidence_band_of_its_seeds():
-    runs = [measured("good", 0, q=1.0), *(measured("poor", seed, q=q) for seed, q in enumerate((1.1, 1.2, 1.3)))]
+    runs = [
+        measured("good", 0, q=1.0),
+        *(measured("poor", seed, q=q) for seed, q in enumerate((1.1, 1.2, 1.3))),
+    ]
     rows = against_reference(runs, "q", lambda run: run.point.value == "good")
     (band,) = [found for found in levels(rows, "s", "q") if found.value == "poor"]
     # mean 0.2, s = 0.1, t(0.975, 2) = 4.3027
@@ -106,7 +134,12 @@ def test_a_level_has_the_confidence_band_of_its_seeds():
 
 
 def test_the_knee_is_the_cheapest_within_twice_the_best_bound():
-    noisy = [level(1, 1.0, 0.5, 0.1), level(2, 2.0, 0.028, 0.02), level(3, 4.0, 0.01, 0.02), level(4, 8.0, 0.012, 0.02)]
+    noisy = [
+        level(1, 1.0, 0.5, 0.1),
+        level(2, 2.0, 0.028, 0.02),
+        level(3, 4.0, 0.01, 0.02),
+        level(4, 8.0, 0.012, 0.02),
+    ]
     found = knee(noisy)
     assert found is not None
     assert found.value == 2
@@ -138,10 +171,18 @@ def test_neither_the_reference_nor_a_lucky_pair_of_seeds_is_a_knee():
 
 
 def test_no_knee_is_told_from_levels_without_bands():
-    pairs = [Level(value=n, runs=2, cost=float(n), error=1.0 / n, half_width=0.1) for n in (1, 2, 4)]
+    pairs = [
+        Level(value=n, runs=2, cost=float(n), error=1.0 / n, half_width=0.1) for n in (1, 2, 4)
+    ]
     assert knee(pairs) is None
-    assert knee_sentence(pairs, default=None).startswith("too few seeds for a knee; the costliest 4: +25 ± 10 %")
-    mixed = [*pairs, level(8, 8.0, 0.0), Level(value=3, runs=5, cost=3.0, error=0.3, half_width=0.1)]
+    assert knee_sentence(pairs, default=None).startswith(
+        "too few seeds for a knee; the costliest 4: +25 ± 10 %"
+    )
+    mixed = [
+        *pairs,
+        level(8, 8.0, 0.0),
+        Level(value=3, runs=5, cost=3.0, error=0.3, half_width=0.1),
+    ]
     assert "only the costliest will do, 3:" in knee_sentence(mixed, default=None)
 
 
@@ -151,7 +192,9 @@ def test_unpaired_levels_carry_the_band_of_their_reference():
     outside = 0
     for _ in range(200):
         runs = [measured("poor", seed, q=q) for seed, q in enumerate(rng.normal(1.0, 0.1, 10))]
-        runs += [measured("good", 100 + seed, q=q) for seed, q in enumerate(rng.normal(1.0, 0.1, 5))]
+        runs += [
+            measured("good", 100 + seed, q=q) for seed, q in enumerate(rng.normal(1.0, 0.1, 5))
+        ]
         rows = against_reference(runs, "q", lambda run: run.point.value == "good", paired=False)
         poor = next(found for found in levels(rows, "s", "q") if found.value == "poor")
         outside += poor.size > poor.half_width
@@ -174,8 +217,12 @@ def test_a_setting_equal_to_the_reference_has_the_references_own_distance():
 
 def test_without_a_reference_the_refusal_says_why():
     lost = replace(measured("good", 1, q=1.0), status="failed: LIGGGHTS not found", observed={})
-    with pytest.raises(CaseError, match=r"no reference run was done \(failed: LIGGGHTS not found\)"):
-        against_reference([lost, measured("poor", 1, q=2.0)], "q", lambda run: run.point.value == "good")
+    with pytest.raises(
+        CaseError, match=r"no reference run was done \(failed: LIGGGHTS not found\)"
+    ):
+        against_reference(
+            [lost, measured("poor", 1, q=2.0)], "q", lambda run: run.point.value == "good"
+        )
 
 
 def test_a_study_that_needs_liggghts_says_so_before_its_first_point(tmp_path, monkeypatch):
@@ -195,7 +242,11 @@ def test_failed_points_are_run_again_and_refused_ones_are_not(tmp_path):
     record.write_text("".join(json.dumps(line) + "\n" for line in lines))
     found = run_points(toy(), out, quick=True)
     assert [run.status for run in found] == [DONE, "refused: no", DONE]
-    assert [run.status for run in run_points(toy(), out, quick=True)] == [DONE, "refused: no", DONE]
+    assert [run.status for run in run_points(toy(), out, quick=True)] == [
+        DONE,
+        "refused: no",
+        DONE,
+    ]
 
 
 def test_a_record_of_other_inputs_or_of_a_session_under_way_is_refused(tmp_path):
@@ -214,7 +265,7 @@ def test_a_record_of_other_inputs_or_of_a_session_under_way_is_refused(tmp_path)
 
 
 def test_rows_survive_the_table(tmp_path):
-    from fdnet.studies.table import write_rows
+    from fdnet.studies.engine.table import write_rows
 
     row = Row(
         series="a, b", knob="k", value="held", seed=3, quantity="q", observed=1.5, error=NAN, error_uncertainty=NAN,
@@ -252,19 +303,31 @@ def test_the_record_says_whose_it_is(tmp_path):
 def test_memory_is_that_of_the_point_and_not_of_who_started_it(tmp_path):
     """A process starts as a copy of its parent, whose memory getrusage goes on counting."""
     held = b"x" * 800_000_000
-    study = toy(points=lambda _: toy_study.points(True)[:1], isolated=lambda point: point.value == 4.0)
+    study = toy(
+        points=lambda _: toy_study.points(True)[:1], isolated=lambda point: point.value == 4.0
+    )
     (run,) = run_points(study, tmp_path / "out", quick=False)
     assert 1e7 < run.peak_memory_bytes < len(held)
 
 
 def test_a_panel_over_the_knob_has_a_table_of_its_own(tmp_path):
-    panel = Panel(quantity="integral", title="by cells", label="error", cost="value", knob="cells", common="point")
+    panel = Panel(
+        quantity="integral",
+        title="by cells",
+        label="error",
+        cost="value",
+        knob="cells",
+        common="point",
+    )
     text = run_study(toy(panels=(panel,)), tmp_path / "out", quick=True)
     assert "| cells | error |\n|---|---|\n| 4 | 0.328 |" in text
     assert "knee" not in text
 
 
 def test_costs_within_a_factor_of_two_have_no_order():
-    near, far = ([level(n, cost, 0.1**n) for n, cost in enumerate(costs)] for costs in ((1, 1.3, 1.9), (1, 2, 4)))
+    near, far = (
+        [level(n, cost, 0.1**n) for n, cost in enumerate(costs)]
+        for costs in ((1, 1.3, 1.9), (1, 2, 4))
+    )
     assert math.isnan(order(near))
     assert order(far) == pytest.approx(math.log(10) / math.log(2))

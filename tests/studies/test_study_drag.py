@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fdnet.studies.command import run_study
-from fdnet.studies.drag import EVERY, HELD, HOLDING, IMPLICIT, OTHER, STUDY, VISCOUS
-from fdnet.studies.judge import levels
-from fdnet.studies.table import read_rows
+from fdnet.studies.dem.drag import EVERY, HELD, HOLDING, IMPLICIT, OTHER, STUDY, VISCOUS
+from fdnet.studies.engine.judge import levels
+from fdnet.studies.engine.table import read_rows
 
 pytestmark = pytest.mark.liggghts
 
@@ -21,7 +21,10 @@ def rows(tmp_path_factory):
 
 
 def errors(rows, scheme) -> dict[float, float]:
-    return {level.value: level.error for level in levels(rows, scheme, "relaxation_error", cost="steps")}
+    return {
+        level.value: level.error
+        for level in levels(rows, scheme, "relaxation_error", cost="steps")
+    }
 
 
 def order_in_interval(rows, scheme) -> float:
@@ -42,7 +45,9 @@ def test_errors_at_one_tau_are_those_of_the_schemes_closed_forms(rows):
         implicit, explicit = ((2 - interval) / (2 + interval)) ** n, (1 - interval) ** n
         assert errors(rows, IMPLICIT)[interval] == pytest.approx(math.exp(-1) - implicit, rel=0.05)
         for scheme in (EVERY, HELD, VISCOUS):
-            assert errors(rows, scheme)[interval] == pytest.approx(math.exp(-1) - explicit, rel=0.12), scheme
+            assert errors(rows, scheme)[interval] == pytest.approx(
+                math.exp(-1) - explicit, rel=0.12
+            ), scheme
 
 
 def test_viscous_is_drag_at_every_step_to_rounding(rows):

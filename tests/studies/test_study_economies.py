@@ -7,8 +7,7 @@ from dataclasses import replace
 import pytest
 
 from fdnet.studies.command import run_study
-from fdnet.studies.dem_runs import OBSERVED
-from fdnet.studies.economies import (
+from fdnet.studies.dem.economies import (
     ALL,
     BATCHES,
     EQUAL,
@@ -28,9 +27,10 @@ from fdnet.studies.economies import (
     speed_ups,
     summary,
 )
-from fdnet.studies.judge import levels
-from fdnet.studies.study import DONE, Measured, Point
-from fdnet.studies.table import read_rows
+from fdnet.studies.dem.runs import OBSERVED
+from fdnet.studies.engine.judge import levels
+from fdnet.studies.engine.study import DONE, Measured, Point
+from fdnet.studies.engine.table import read_rows
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,11 @@ def quick(tmp_path_factory):
 
 
 def observed(rows, quantity, value, series=EQUAL) -> list[float]:
-    return [row.observed for row in rows if (row.series, row.value, row.quantity) == (series, value, quantity)]
+    return [
+        row.observed
+        for row in rows
+        if (row.series, row.value, row.quantity) == (series, value, quantity)
+    ]
 
 
 def measured(value, seed, invaded, core_s) -> Measured:
@@ -56,11 +60,21 @@ def toy_rows():
     """Two seeds: plain invades 100 and 110 in 40 and 60 s; "all" 105 and 115 in 20 and 15 s."""
     runs = [measured(PLAIN, 1, 100.0, 40.0), measured(PLAIN, 2, 110.0, 60.0)]
     runs += [measured(ALL, 1, 105.0, 20.0), measured(ALL, 2, 115.0, 15.0)]
-    return judge([replace(run, point=replace(run.point, series=series)) for series in SERIES for run in runs])
+    return judge(
+        [
+            replace(run, point=replace(run.point, series=series))
+            for series in SERIES
+            for run in runs
+        ]
+    )
 
 
 def test_errors_are_taken_from_the_plain_mean_and_not_seed_by_seed():
-    errors = [row.error for row in toy_rows() if (row.series, row.value, row.quantity) == (EQUAL, ALL, "invaded")]
+    errors = [
+        row.error
+        for row in toy_rows()
+        if (row.series, row.value, row.quantity) == (EQUAL, ALL, "invaded")
+    ]
     assert errors == pytest.approx([0.0, 10 / 105])
     assert all(row.reference_band > 0 for row in toy_rows() if row.value == ALL)
     assert {row.role for row in toy_rows() if row.value == PLAIN} == {"reference"}
@@ -80,7 +94,12 @@ def test_a_seed_whose_plain_run_is_missing_has_no_speed_up():
 
 
 def test_an_economy_changes_its_own_keys_alone():
-    plain = {series: point for point in STUDY.points(False) if point.value == PLAIN for series in [point.series]}
+    plain = {
+        series: point
+        for point in STUDY.points(False)
+        if point.value == PLAIN
+        for series in [point.series]
+    }
     own = {
         BATCHES: {("fines", "supply", "batches")},
         STEP: {("run", "time_step_factor", 0.2)},
@@ -99,17 +118,21 @@ def test_an_economy_changes_its_own_keys_alone():
             for key, value in keys.items()
             if before[part].get(key) != value
         }
-        expected = together[point.series] if point.value == ALL else own.get(str(point.value), set())
+        expected = (
+            together[point.series] if point.value == ALL else own.get(str(point.value), set())
+        )
         assert found == expected, point.key
 
 
 def test_the_thesis_cases_use_what_all_stands_for(root):
-    from fdnet.case_file import read_case
+    from fdnet.case.file import read_case
 
     for number in range(1, 9):
         case = read_case(root / "cases" / f"specimen{number}.toml")
         series = UNEQUAL if number > 6 else EQUAL
-        mine = case_of(Point(series=series, knob="economy", value=ALL, seed=1, settings={"size": "whole"}))
+        mine = case_of(
+            Point(series=series, knob="economy", value=ALL, seed=1, settings={"size": "whole"})
+        )
         own = (case.fines.supply, case.run.time_step_factor, case.drag.scheme)
         assert own == (mine.fines.supply, mine.run.time_step_factor, mine.drag.scheme)
 
@@ -129,7 +152,9 @@ def test_batches_hold_what_the_slab_holds_to_a_twentieth(quick):
     """Seeds alone scatter by 1 % of the fines inside, by a tenth of their depth."""
     rows, _ = quick
     for value in (BATCHES, ALL):
-        assert sum(observed(rows, "invaded", value)) == pytest.approx(sum(observed(rows, "invaded", PLAIN)), rel=0.05)
+        assert sum(observed(rows, "invaded", value)) == pytest.approx(
+            sum(observed(rows, "invaded", PLAIN)), rel=0.05
+        )
     few, many = (sum(observed(rows, "invaded", value, LONG)) for value in (BATCHES, PLAIN))
     assert few == pytest.approx(many, rel=0.1)
 
@@ -138,7 +163,9 @@ def test_batches_hold_what_the_slab_holds_to_a_twentieth(quick):
 def test_viscous_drag_is_drag_at_every_step(quick):
     rows, _ = quick
     for quantity in OBSERVED:
-        assert observed(rows, quantity, VISCOUS) == pytest.approx(observed(rows, quantity, PLAIN), rel=1e-6), quantity
+        assert observed(rows, quantity, VISCOUS) == pytest.approx(
+            observed(rows, quantity, PLAIN), rel=1e-6
+        ), quantity
     assert observed(rows, "invaded", PLAIN)[0] > 20
 
 
@@ -157,4 +184,6 @@ def test_the_text_names_speed_up_and_error_of_every_economy(quick):
     assert "knee" not in text
     for point in STUDY.points(True):
         speed = "1" if point.value == PLAIN else r"\d+\.\d\d ± \d+\.\d\d"
-        assert re.search(rf"(?m)^\| {point.series}, {point.value} \| 2 \| \S+ \| {speed} \| .* %", text), point.key
+        assert re.search(
+            rf"(?m)^\| {point.series}, {point.value} \| 2 \| \S+ \| {speed} \| .* %", text
+        ), point.key

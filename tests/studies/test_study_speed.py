@@ -5,8 +5,7 @@ import re
 import pytest
 
 from fdnet.studies.command import run_study
-from fdnet.studies.judge import levels
-from fdnet.studies.speed import (
+from fdnet.studies.dem.speed import (
     BIN,
     FEW,
     FIXED,
@@ -23,8 +22,9 @@ from fdnet.studies.speed import (
     measure,
     window_of,
 )
-from fdnet.studies.study import Point
-from fdnet.studies.table import read_rows
+from fdnet.studies.engine.judge import levels
+from fdnet.studies.engine.study import Point
+from fdnet.studies.engine.table import read_rows
 
 pytestmark = pytest.mark.liggghts
 
@@ -37,20 +37,25 @@ def rows(tmp_path_factory):
 
 
 @pytest.mark.parametrize(
-    ("setting", "values"), [(SKIN, [0.25, OWN_SKIN, 4.0]), (BIN, [OWN_BIN, 4.0]), (RANKS, [ONE_RANK, "1 x 2 x 1"])]
+    ("setting", "values"),
+    [(SKIN, [0.25, OWN_SKIN, 4.0]), (BIN, [OWN_BIN, 4.0]), (RANKS, [ONE_RANK, "1 x 2 x 1"])],
 )
 def test_run_time_settings_change_the_answer_by_rounding_alone(rows, setting, values):
     series = window_of(setting, 200)
     found = levels(rows, series, "mean_depth")
     assert [level.value for level in found] == values
     assert all(level.size < 1e-6 for level in found)
-    assert all(row.error == 0.0 for row in rows if row.series == series and row.quantity == "invaded")
+    assert all(
+        row.error == 0.0 for row in rows if row.series == series and row.quantity == "invaded"
+    )
     assert len({row.steps for row in rows if row.series == series}) == 1
 
 
 def test_a_pack_at_rest_stays_where_it_is_and_fines_move_it(rows):
     shift = {
-        series: [row.observed for row in rows if row.series == series and row.quantity == "grain_shift"]
+        series: [
+            row.observed for row in rows if row.series == series and row.quantity == "grain_shift"
+        ]
         for series in (STILL, MOTION)
     }
     assert all(0 < way < 1e-3 for way in shift[STILL])

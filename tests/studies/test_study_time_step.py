@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from fdnet.studies.command import run_study
-from fdnet.studies.judge import levels, order
-from fdnet.studies.table import read_rows
-from fdnet.studies.time_step import COLLISION, DRAG, ENERGY, INVASION, STUDY
+from fdnet.studies.dem.time_step import COLLISION, DRAG, ENERGY, INVASION, STUDY
+from fdnet.studies.engine.judge import levels, order
+from fdnet.studies.engine.table import read_rows
 
 pytestmark = pytest.mark.liggghts
 
@@ -20,7 +20,9 @@ def rows(tmp_path_factory):
 
 def test_a_damped_collision_converges_in_first_order(rows):
     found = levels(rows, COLLISION, "restitution_error")
-    slope = np.polyfit(np.log([level.value for level in found]), np.log([level.size for level in found]), 1)[0]
+    slope = np.polyfit(
+        np.log([level.value for level in found]), np.log([level.size for level in found]), 1
+    )[0]
     assert slope == pytest.approx(1.1, abs=0.3)
     assert next(level.size for level in found if level.value == 0.1) < 0.03
 

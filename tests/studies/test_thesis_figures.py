@@ -9,25 +9,42 @@ from builders import tiny
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 
-from fdnet.snapshot import Kind, resting
-from fdnet.studies.thesis.draw_all import draw_all
-from fdnet.studies.thesis.draw_canvas import DISTANCE_CLASSES, ScanRow, Sources, Tables, few_colours
-from fdnet.studies.thesis.draw_deposition import distances, tetrahedra
-from fdnet.studies.thesis.draw_depth import compared_fraction, invaded_fraction, porosity_reduction, total_reduction
-from fdnet.studies.thesis.draw_packs import fines_by_size, growth, middle_slab, pack
-from fdnet.studies.thesis.draw_permeability import compared_permeability, permeability, ratios
-from fdnet.studies.thesis.draw_scans import invasion_depth, over_seeds
-from fdnet.studies.thesis.draw_sections import contents, density, sizes, throat_porosity, throats_by_depth
-from fdnet.studies.thesis.draw_tables import distances_found, scan_row, tetrahedra_counted
-from fdnet.studies.thesis.drawings import FIGURES
-from fdnet.studies.thesis.examine import examine
-from fdnet.studies.thesis.first_section import first_section
-from fdnet.studies.thesis.marks import ThesisMarks, Told, percent, said
-from fdnet.studies.thesis.results import result_rows
-from fdnet.studies.thesis.section_sizes import section_sizes, share_within
-from fdnet.studies.thesis.state import ENDING, State
-from fdnet.studies.thesis.thesis_marks import thesis_marks
-from fdnet.studies.thesis.values import thesis_values
+from fdnet.spheres.snapshot import Kind, resting
+from fdnet.studies.thesis.figures.canvas import (
+    DISTANCE_CLASSES,
+    ScanRow,
+    Sources,
+    Tables,
+    few_colours,
+)
+from fdnet.studies.thesis.figures.deposition import distances, tetrahedra
+from fdnet.studies.thesis.figures.depth import (
+    compared_fraction,
+    invaded_fraction,
+    porosity_reduction,
+    total_reduction,
+)
+from fdnet.studies.thesis.figures.draw_all import draw_all
+from fdnet.studies.thesis.figures.drawings import FIGURES
+from fdnet.studies.thesis.figures.marks import ThesisMarks, Told, percent, said
+from fdnet.studies.thesis.figures.packs import fines_by_size, growth, middle_slab, pack
+from fdnet.studies.thesis.figures.permeability import compared_permeability, permeability, ratios
+from fdnet.studies.thesis.figures.scans import invasion_depth, over_seeds
+from fdnet.studies.thesis.figures.sections import (
+    contents,
+    density,
+    sizes,
+    throat_porosity,
+    throats_by_depth,
+)
+from fdnet.studies.thesis.figures.tables import distances_found, scan_row, tetrahedra_counted
+from fdnet.studies.thesis.figures.thesis_marks import thesis_marks
+from fdnet.studies.thesis.numbers.examine import examine
+from fdnet.studies.thesis.numbers.first_section import first_section
+from fdnet.studies.thesis.numbers.results import result_rows
+from fdnet.studies.thesis.numbers.section_sizes import section_sizes, share_within
+from fdnet.studies.thesis.numbers.values import thesis_values
+from fdnet.studies.thesis.runs.state import ENDING, State
 
 FINE = 0.04e-3
 DEPTHS = {1: [0.5] * 3 + [1.0], 2: [0.5] * 2 + [1.0, 1.5]}
@@ -49,7 +66,9 @@ MARKS = ThesisMarks(
 
 def lattice(box):
     """6 x 3 x 3 grains nearly touching, moved a little so that no eight lie on one sphere."""
-    place = np.stack(np.meshgrid(np.arange(6), np.arange(3), np.arange(3), indexing="ij"), axis=-1).reshape(-1, 3)
+    place = np.stack(
+        np.meshgrid(np.arange(6), np.arange(3), np.arange(3), indexing="ij"), axis=-1
+    ).reshape(-1, 3)
     jitter = np.random.default_rng(5).uniform(-1, 1, place.shape)
     position = 1e-3 * (np.array([0.25, 0.3, 0.3]) + 0.5 * place + 0.01 * jitter)
     return resting(position, 0.24e-3, box)
@@ -60,7 +79,9 @@ def run(seed):
     case = tiny(f"seed={seed}", "grains.radius_mm=0.24", "fines.radius_mm=0.04")
     box = np.array([[0, 3e-3], [0, 1.6e-3], [0, 1.6e-3]])
     grains = lattice(box)
-    invaded = [(x * 1e-3, y * 1e-3, z * 1e-3) for x, (y, z) in zip(DEPTHS[seed], HOLES, strict=True)]
+    invaded = [
+        (x * 1e-3, y * 1e-3, z * 1e-3) for x, (y, z) in zip(DEPTHS[seed], HOLES, strict=True)
+    ]
     fines = resting(np.array([*invaded, (-0.3e-3, 0.8e-3, 0.8e-3)]), FINE, box, Kind.FINE)
     state = State(
         case=case,
@@ -75,7 +96,9 @@ def run(seed):
 def sources(*seeds, specimens=("specimen1",), **tables):
     runs = [run(seed) for seed in seeds or (1,)]
     return Sources(
-        examined=dict.fromkeys(specimens, runs), thesis=dict.fromkeys(specimens, MARKS), tables=Tables(**tables)
+        examined=dict.fromkeys(specimens, runs),
+        thesis=dict.fromkeys(specimens, MARKS),
+        tables=Tables(**tables),
     )
 
 
@@ -105,7 +128,9 @@ def test_the_invaded_fraction_is_of_the_fines_inside():
 
 def test_several_seeds_show_their_mean_and_range():
     axes = drawn(invaded_fraction, sources(1, 2), specimen="specimen1").axes[0]
-    heights = labelled(axes, "4 invaded fines (thesis 704), mean and range of 2 seeds").get_data().values
+    heights = (
+        labelled(axes, "4 invaded fines (thesis 704), mean and range of 2 seeds").get_data().values
+    )
     assert heights[[2, 4, 6]] == pytest.approx([0.625, 0.25, 0.125])
     segments = axes.collections[0].get_segments()
     assert segments[2][:, 1] == pytest.approx([0.5, 0.75])
@@ -116,7 +141,9 @@ def test_curves_of_several_seeds_have_a_band():
     axes = drawn(compared_fraction, found, specimens=("specimen3", "specimen6")).axes[0]
     band = axes.collections[0].get_paths()[0].vertices
     assert band[:, 1].max() == pytest.approx(0.75)
-    assert labelled(axes, "specimen 3: fines 0.08 mm across").get_data().values.sum() == pytest.approx(1.0)
+    assert labelled(
+        axes, "specimen 3: fines 0.08 mm across"
+    ).get_data().values.sum() == pytest.approx(1.0)
 
 
 def test_the_lost_porosity_is_the_fines_volume_over_the_box():
@@ -145,9 +172,13 @@ def test_permeability_stands_beside_the_thesis_s_sections():
     found = run(1)
     axes = drawn(permeability, sources(), specimen="specimen1").axes[0]
     wanted = [s.k_damaged / s.k_initial for s in found.thesis.sections]
-    assert labelled(axes, "the thesis's laws, section cut out").get_data().values == pytest.approx(wanted)
+    assert labelled(axes, "the thesis's laws, section cut out").get_data().values == pytest.approx(
+        wanted
+    )
     wanted = [s.k_damaged_inplace / s.k_initial_inplace for s in found.default.sections]
-    assert labelled(axes, "fdnet's default laws, section in place").get_data().values == pytest.approx(wanted)
+    assert labelled(
+        axes, "fdnet's default laws, section in place"
+    ).get_data().values == pytest.approx(wanted)
     points = labelled(axes, "thesis, 1 mm sections")
     assert list(points.get_xdata()) == [0.5, 1.5]
     assert list(points.get_ydata()) == pytest.approx([0.75, 0.96])
@@ -157,13 +188,17 @@ def test_compared_permeability_has_a_panel_for_each_pair_of_laws():
     names = ("specimen3", "specimen6")
     figure = drawn(compared_permeability, sources(specimens=names), specimens=names)
     for axes, analysis in zip(figure.axes, (run(1).thesis, run(1).default), strict=True):
-        assert labelled(axes, "specimen 3").get_ydata() == pytest.approx(ratios(analysis, inplace=False))
+        assert labelled(axes, "specimen 3").get_ydata() == pytest.approx(
+            ratios(analysis, inplace=False)
+        )
 
 
 def test_the_first_section_holds_whole_pores_and_their_throats():
     cut = section_sizes(run(1))
     network = run(1).thesis.network
-    assert len(cut.pore_radius) == np.sum((network.pore_position[:, 0] < 1e-3) & (network.pore_share == 1))
+    assert len(cut.pore_radius) == np.sum(
+        (network.pore_position[:, 0] < 1e-3) & (network.pore_share == 1)
+    )
     assert 0 < len(cut.throat_radius) < len(network.throat_radius)
     assert cut.throat_depth.max() < 1.0
     inside = 3 * 4 / 3 * np.pi * 0.04**3
@@ -180,7 +215,9 @@ def test_sizes_are_densities_of_all():
 
 
 def test_density_counts_what_lies_outside_in_the_whole():
-    assert density(np.array([0.1, 0.6, 0.7, 3.0]), np.array([0.0, 0.5, 1.0])) == pytest.approx([0.5, 1.0])
+    assert density(np.array([0.1, 0.6, 0.7, 3.0]), np.array([0.0, 0.5, 1.0])) == pytest.approx(
+        [0.5, 1.0]
+    )
 
 
 def test_throats_are_closed_empty_filled_or_blocked():
@@ -267,23 +304,35 @@ def test_table_3_stands_beside_its_own_fines_alone():
 
 
 def test_distances_are_shares_by_place():
-    found = sources(distances={"below 0.4": np.array([0.2, 0.45, 0.75, 1.5])}, specimens=("specimen5",))
+    found = sources(
+        distances={"below 0.4": np.array([0.2, 0.45, 0.75, 1.5])}, specimens=("specimen5",)
+    )
     axes = drawn(distances, found, kind="below 0.4").axes[0]
     assert sum(bar.get_height() for bar in axes.patches) == pytest.approx(1.0)
     labels = [one.get_label() for one in axes.containers]
-    assert labels == ["nearer the axis: 50 %", "nearer the wall: 25 %", "centred outside the throat: 25 %"]
+    assert labels == [
+        "nearer the axis: 50 %",
+        "nearer the wall: 25 %",
+        "centred outside the throat: 25 %",
+    ]
     assert "thesis: about 50 % nearer the axis" in axes.get_title(loc="left")
 
 
 def test_tetrahedra_stand_side_by_side():
-    axes = drawn(tetrahedra, sources(tetrahedra={"specimen1": (50, 12), "specimen5": (400, 11)})).axes[0]
+    axes = drawn(
+        tetrahedra, sources(tetrahedra={"specimen1": (50, 12), "specimen5": (400, 11)})
+    ).axes[0]
     assert [bar.get_height() for bar in axes.patches] == [50, 400, 12, 11]
 
 
 def test_all_that_is_there_is_drawn_and_what_is_missing_named(tmp_path):
     rows = [scan(1, 1.0, 1.0), scan(2, 1.0, 2.0)]
-    tables = Tables(drag=rows, friction=rows, supply=rows, distances={DISTANCE_CLASSES[0]: np.array([0.3])})
-    found = draw_all({"specimen1": [run(1), run(2)]}, tmp_path, thesis={"specimen1": MARKS}, tables=tables)
+    tables = Tables(
+        drag=rows, friction=rows, supply=rows, distances={DISTANCE_CLASSES[0]: np.array([0.3])}
+    )
+    found = draw_all(
+        {"specimen1": [run(1), run(2)]}, tmp_path, thesis={"specimen1": MARKS}, tables=tables
+    )
     assert [one.name for one in found] == list(FIGURES)
     by_name = {one.name: one for one in found}
     for one in found:
@@ -291,7 +340,9 @@ def test_all_that_is_there_is_drawn_and_what_is_missing_named(tmp_path):
         if one.path is not None:
             assert one.path.stat().st_size < 150_000
     made = {name for name, one in by_name.items() if one.path is not None}
-    assert {name for name in made if "specimen1" in name} == {name for name in FIGURES if "specimen1" in name}
+    assert {name for name in made if "specimen1" in name} == {
+        name for name in FIGURES if "specimen1" in name
+    }
     assert "figure_56_distances_specimen5.png" in made
     assert by_name["figure_57_distances_specimen5.png"].missing == ("distances 0.4 to 0.6",)
     assert by_name["figure_72_permeability.png"].missing == ("specimen3", "specimen6")
@@ -299,19 +350,27 @@ def test_all_that_is_there_is_drawn_and_what_is_missing_named(tmp_path):
     caption = by_name["figure_15_invaded_fraction_specimen1.png"].caption
     assert caption.startswith("Thesis Figure 15, specimen 1:")
     assert "about 70% in its first bin" in caption
-    assert "Thesis: throat radius 0 to 0.05 mm about 30 %." in by_name["figure_42_sizes_specimen1.png"].caption
+    assert (
+        "Thesis: throat radius 0 to 0.05 mm about 30 %."
+        in by_name["figure_42_sizes_specimen1.png"].caption
+    )
 
 
 def test_every_figure_of_the_thesis_that_can_be_drawn_is_in_the_table():
     numbers = {9, 13, *range(14, 23), 33, 42, *range(44, 74)}
-    assert {int(name.split("_")[1].split("-")[0].rstrip("BCb")) for name in FIGURES if name[0] == "f"} == numbers
+    assert {
+        int(name.split("_")[1].split("-")[0].rstrip("BCb")) for name in FIGURES if name[0] == "f"
+    } == numbers
 
 
 def test_a_growing_pack_shows_the_velocities_of_each_state():
     """Arrows are the grains' velocities in x and z, the title names the fastest of all grains."""
     box = np.array([[0, 3e-3], [0, 1.6e-3], [0, 1.6e-3]])
     grains = lattice(box)
-    stages = [replace(grains, velocity=speed * np.tile([0.6, 0.0, 0.8], (len(grains), 1))) for speed in (2.0, 5.0, 0.0)]
+    stages = [
+        replace(grains, velocity=speed * np.tile([0.6, 0.0, 0.8], (len(grains), 1)))
+        for speed in (2.0, 5.0, 0.0)
+    ]
     figure = Figure()
     growth(figure, Sources(examined={}, tables=Tables(growth=stages)))
     for axes, speed in zip(figure.axes, (2.0, 5.0, 0.0), strict=True):
@@ -334,7 +393,11 @@ def test_the_values_file_becomes_marks_by_specimen():
     assert marks["specimen5"].porosity_loss == pytest.approx(0.08)
     assert marks["specimen5"].reductions[0] == 0.32
     assert marks["specimen8"].reductions == (0.25,)
-    assert [told.quantity for told in marks["specimen5"].deposition.values()] == ["axis", "wall", "wall"]
+    assert [told.quantity for told in marks["specimen5"].deposition.values()] == [
+        "axis",
+        "wall",
+        "wall",
+    ]
     assert list(marks["specimen5"].deposition) == list(DISTANCE_CLASSES)
     assert marks["specimen7"].size_classes_mm == ((0.025, 0.03), (0.045, 0.05))
     assert marks["specimen1"].depth_mm == 4.0
@@ -361,7 +424,12 @@ def test_a_scan_s_row_is_a_result():
 
 
 def test_percent():
-    assert [percent(one) for one in (0.0, 0.0333, 0.704, 0.998)] == ["0 %", "3.3 %", "70 %", "100 %"]
+    assert [percent(one) for one in (0.0, 0.0333, 0.704, 0.998)] == [
+        "0 %",
+        "3.3 %",
+        "70 %",
+        "100 %",
+    ]
 
 
 def test_few_colours_keep_the_frequent_ones():

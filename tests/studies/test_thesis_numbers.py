@@ -16,12 +16,12 @@ from scipy.spatial import Delaunay
 
 from fdnet.dem.scene import box_of
 from fdnet.errors import CaseError
-from fdnet.snapshot import Kind, resting
-from fdnet.studies.thesis.counts import count_tetrahedra, tetrahedra, write_counts
-from fdnet.studies.thesis.deposition import deposition, wilson_interval, write_deposition
-from fdnet.studies.thesis.examine import DEFAULT_PAIR, THESIS_PAIR, Examined, examine
-from fdnet.studies.thesis.first_section import first_section
-from fdnet.studies.thesis.results import (
+from fdnet.spheres.snapshot import Kind, resting
+from fdnet.studies.thesis.numbers.counts import count_tetrahedra, tetrahedra, write_counts
+from fdnet.studies.thesis.numbers.deposition import deposition, wilson_interval, write_deposition
+from fdnet.studies.thesis.numbers.examine import DEFAULT_PAIR, THESIS_PAIR, Examined, examine
+from fdnet.studies.thesis.numbers.first_section import first_section
+from fdnet.studies.thesis.numbers.results import (
     COLUMNS,
     deep_near_wall,
     porosity_loss,
@@ -29,9 +29,8 @@ from fdnet.studies.thesis.results import (
     result_rows,
     write_results,
 )
-from fdnet.studies.thesis.sizes import sizes_of_grains_alone
-from fdnet.studies.thesis.state import State
-from fdnet.studies.thesis.statistics import (
+from fdnet.studies.thesis.numbers.sizes import sizes_of_grains_alone
+from fdnet.studies.thesis.numbers.statistics import (
     POROSITY,
     SINGLES,
     SIZES,
@@ -41,7 +40,13 @@ from fdnet.studies.thesis.statistics import (
     within,
     write_statistics,
 )
-from fdnet.studies.thesis.values import ThesisSpecimen, specimen_number, thesis_of, thesis_values
+from fdnet.studies.thesis.numbers.values import (
+    ThesisSpecimen,
+    specimen_number,
+    thesis_of,
+    thesis_values,
+)
+from fdnet.studies.thesis.runs.state import State
 
 MM = 1e-3
 A, R = 0.5, 0.25
@@ -62,15 +67,29 @@ def ball(radius):
 
 
 def state(*assignments, fines=FINES):
-    case = tiny("box.size_mm=[2.2,2.0,2.0]", "box.sides=periodic", "analysis.sections=2", *assignments)
+    case = tiny(
+        "box.size_mm=[2.2,2.0,2.0]", "box.sides=periodic", "analysis.sections=2", *assignments
+    )
     box = MM * np.array([[0.0, 2.2], [0.0, 2.0], [0.0, 2.0]])
     x, side = 0.35 + A * np.arange(4), A * np.arange(4)
     place = MM * np.stack(np.meshgrid(x, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
     grains = resting_spheres(place, R * MM, box, kind=Kind.GRAIN)
     fines = MM * np.array(fines)
     small = resting_spheres(fines[:, :3], 1.0, box, kind=Kind.FINE, first=1000)
-    ending = {"supplied": len(fines), "passed": 0, "upstream": 1, "stop_reason": "plugged", "seconds": 12.0}
-    ending |= {"pack_seconds": 1.5, "steps": 1000, "dt_s": 2e-6, "max_overlap": 0.01, "warnings": []}
+    ending = {
+        "supplied": len(fines),
+        "passed": 0,
+        "upstream": 1,
+        "stop_reason": "plugged",
+        "seconds": 12.0,
+    }
+    ending |= {
+        "pack_seconds": 1.5,
+        "steps": 1000,
+        "dt_s": 2e-6,
+        "max_overlap": 0.01,
+        "warnings": [],
+    }
     return State(
         case=case,
         grains=grains,
@@ -88,9 +107,21 @@ def lattice():
 def test_every_number_told_has_its_source():
     values = thesis_values()
     assert sorted(values.specimens) == [*"12345678", "table3"]
-    plain = {"id", "porosity", "fine_diameter_mm", "fine_radius_mm", "grain_radius_mm", "sources", "senses"}
+    plain = {
+        "id",
+        "porosity",
+        "fine_diameter_mm",
+        "fine_radius_mm",
+        "grain_radius_mm",
+        "sources",
+        "senses",
+    }
     for one in values.specimens.values():
-        told = {field.name for field in fields(ThesisSpecimen) if getattr(one, field.name) not in (None, {})} - plain
+        told = {
+            field.name
+            for field in fields(ThesisSpecimen)
+            if getattr(one, field.name) not in (None, {})
+        } - plain
         assert told == set(one.sources), one.id
         assert set(one.senses) <= told
     for told in (*values.statistics, *(one for one in values.deposition if one.nearer)):
@@ -132,7 +163,9 @@ def test_one_row_for_each_pair_of_laws_with_the_thesis_beside_it(lattice):
         assert row.k_reduction == analysis.k_reduction
         assert row.k_reductions[:2] == tuple(one.k_reduction for one in analysis.sections)
         second = analysis.sections[1]
-        assert row.k_reductions_inplace[1] == 1 - second.k_damaged_inplace / second.k_initial_inplace
+        assert (
+            row.k_reductions_inplace[1] == 1 - second.k_damaged_inplace / second.k_initial_inplace
+        )
         assert np.all(np.isnan([*row.k_reductions[2:], *row.k_reductions_inplace[2:]]))
         assert row.thesis_k_reductions == thesis_of("specimen5").section_reduction
         assert (row.thesis_depth_mm, row.thesis_count_first_mm) == (8.0, 2000)
@@ -153,24 +186,39 @@ def test_fines_are_counted_by_depth(lattice):
 def test_deep_fines_near_a_wall():
     """Of four beyond 1 mm two lie within 0.25 mm of a side; one at the face and one beyond the outlet do not count."""
     case = tiny("grains.radius_mm=0.25")
-    x, y, z = [1.2, 1.4, 1.6, 2.9, 0.1, 3.1], [0.2, 0.8, 0.8, 0.8, 0.1, 0.1], [0.8, 0.8, 1.4, 1.3, 0.8, 0.8]
+    x, y, z = (
+        [1.2, 1.4, 1.6, 2.9, 0.1, 3.1],
+        [0.2, 0.8, 0.8, 0.8, 0.1, 0.1],
+        [0.8, 0.8, 1.4, 1.3, 0.8, 0.8],
+    )
     spheres = resting(1e-3 * np.column_stack([x, y, z]), 1e-5, box_of(case), Kind.FINE)
-    made = State(case=case, grains=spheres.grains(), damaged=spheres, history=np.zeros((1, 4)), ending={})
+    made = State(
+        case=case, grains=spheres.grains(), damaged=spheres, history=np.zeros((1, 4)), ending={}
+    )
     assert deep_near_wall(made) == 0.5
     assert np.isnan(deep_near_wall(replace(made, case=tiny("box.sides=periodic"))))
-    assert np.isnan(deep_near_wall(replace(made, damaged=spheres.where(spheres.position[:, 0] < 1e-3))))
+    assert np.isnan(
+        deep_near_wall(replace(made, damaged=spheres.where(spheres.position[:, 0] < 1e-3)))
+    )
 
 
-@pytest.mark.parametrize("cut", ["analysis.profile_bin_mm=0.2", "analysis.sections=11", "analysis.sections=3"])
+@pytest.mark.parametrize(
+    "cut", ["analysis.profile_bin_mm=0.2", "analysis.sections=11", "analysis.sections=3"]
+)
 def test_porosity_loss_of_the_first_millimetre_whatever_the_cuts(cut):
     """Fines apart from the grains; the three at one place count once."""
     filled = ball(0.05) + 2 * ball(THIN) + ball(WIDE)
     changed = examine("specimen5", state(cut))
-    assert porosity_loss(changed.state, changed.thesis, MM) == pytest.approx(filled / 4.0, rel=0.02)
+    assert porosity_loss(changed.state, changed.thesis, MM) == pytest.approx(
+        filled / 4.0, rel=0.02
+    )
 
 
 def test_results_survive_their_file(lattice, tmp_path):
-    rows = [*result_rows(lattice), *result_rows(Examined(**_parts(lattice) | {"id": "other", "seed": 7}))]
+    rows = [
+        *result_rows(lattice),
+        *result_rows(Examined(**_parts(lattice) | {"id": "other", "seed": 7})),
+    ]
     found = read_results(write_results(tmp_path / "results.csv", rows))
     assert [row.id for row in found] == ["specimen5-5to6"] * 2 + ["other"] * 2
     for one, other in zip(rows, found, strict=True):
@@ -206,7 +254,9 @@ def test_sizes_of_the_lattice(lattice):
     section = first_section(lattice, whole=True)
     # 16 cells; their faces across y and z, and those towards the second layer, at 0.85 mm
     assert section.throat_weight.sum() == 2 * (32 + 16)
-    assert np.sum(section.pore_weight * section.network.pore_volume) == pytest.approx(16 * (A**3 - ball(R)) * MM**3)
+    assert np.sum(section.pore_weight * section.network.pore_volume) == pytest.approx(
+        16 * (A**3 - ball(R)) * MM**3
+    )
     pore, throat = (sqrt(3) / 2 - 0.5) * A, TUBE
     for quantity, size in (("pore radius", pore), ("throat radius", throat), ("throat length", A)):
         assert measure(section, quantity, (0.999 * size, 1.001 * size)) == (1.0, "share")
@@ -222,7 +272,9 @@ def test_sizes_of_the_grains_alone(lattice):
     tips = R * np.array([[0, 0, sqrt(8 / 3)], [0, 0, -sqrt(8 / 3)], [8, 0, 0], [9, 1, 0]])
     box = lattice.state.grains.box
     grains = resting_spheres(MM * (np.vstack([corner, tips]) + 0.5), R * MM, box, kind=Kind.GRAIN)
-    changed = Examined(**_parts(lattice) | {"state": replace(lattice.state, grains=grains, damaged=grains)})
+    changed = Examined(
+        **_parts(lattice) | {"state": replace(lattice.state, grains=grains, damaged=grains)}
+    )
     sizes = sizes_of_grains_alone(changed)
     assert sizes.pore_radius == pytest.approx([(sqrt(1.5) - 1) * R * MM] * 2)
     assert sizes.throat_radius == pytest.approx([(2 / sqrt(3) - 1) * R * MM])
@@ -237,26 +289,40 @@ def test_sizes_of_the_grains_alone(lattice):
 def test_throats_of_the_grains_alone_are_the_facets_that_two_tetrahedra_share(lattice):
     place = 0.2 + 0.7 * np.random.default_rng(3).random((12, 3))
     grains = resting_spheres(MM * place, 0.05 * MM, lattice.state.grains.box, kind=Kind.GRAIN)
-    changed = Examined(**_parts(lattice) | {"state": replace(lattice.state, grains=grains, damaged=grains)})
+    changed = Examined(
+        **_parts(lattice) | {"state": replace(lattice.state, grains=grains, damaged=grains)}
+    )
     corners = [set(one.tolist()) for one in Delaunay(place).simplices]
-    shared = [sorted(one & other) for one, other in combinations(corners, 2) if len(one & other) == 3]
-    side = np.array([[np.linalg.norm(place[a] - place[b]) for a, b in combinations(one, 2)] for one in shared]).T
+    shared = [
+        sorted(one & other) for one, other in combinations(corners, 2) if len(one & other) == 3
+    ]
+    side = np.array(
+        [[np.linalg.norm(place[a] - place[b]) for a, b in combinations(one, 2)] for one in shared]
+    ).T
     half = side.sum(axis=0) / 2
     area = np.sqrt(half * np.prod(half - side, axis=0))
     # equal grains: the circle touching three is their circumcircle less the radius
     expected = np.maximum(np.prod(side, axis=0) / (4 * area) - 0.05, 0)
-    assert np.sort(1e3 * sizes_of_grains_alone(changed).throat_radius) == pytest.approx(np.sort(expected))
+    assert np.sort(1e3 * sizes_of_grains_alone(changed).throat_radius) == pytest.approx(
+        np.sort(expected)
+    )
 
 
 def test_a_pore_whose_sphere_is_centred_outside_has_no_radius(lattice):
     """A flat tetrahedron: three grains around a fourth just above their plane."""
     place = [[0.3, 0, 0], [-0.15, 0.26, 0], [-0.15, -0.26, 0], [0, 0, 0.05]]
-    grains = resting_spheres(MM * (np.array(place) + 0.5), 0.1 * MM, lattice.state.grains.box, kind=Kind.GRAIN)
-    changed = Examined(**_parts(lattice) | {"state": replace(lattice.state, grains=grains, damaged=grains)})
+    grains = resting_spheres(
+        MM * (np.array(place) + 0.5), 0.1 * MM, lattice.state.grains.box, kind=Kind.GRAIN
+    )
+    changed = Examined(
+        **_parts(lattice) | {"state": replace(lattice.state, grains=grains, damaged=grains)}
+    )
     sizes = sizes_of_grains_alone(changed)
     assert (sizes.pore_weight.tolist(), sizes.sphere_weight.tolist()) == ([1.0], [0.0])
     few = replace(lattice.state, damaged=grains.where(np.arange(4) < 3))
-    assert len(sizes_of_grains_alone(Examined(**_parts(lattice) | {"state": few})).throat_radius) == 0
+    assert (
+        len(sizes_of_grains_alone(Examined(**_parts(lattice) | {"state": few})).throat_radius) == 0
+    )
 
 
 def test_parts_cut_by_the_face_fill_the_section(lattice):
@@ -286,11 +352,19 @@ def test_fines_in_throats_and_bodies(lattice):
     assert measure(section, "share of throats in the volume of fines", None)[0] == pytest.approx(
         throats / (throats + bodies)
     )
-    assert measure(section, "overall throat porosity", None)[0] == pytest.approx(1 - throats / (96 * tube))
+    assert measure(section, "overall throat porosity", None)[0] == pytest.approx(
+        1 - throats / (96 * tube)
+    )
     void = 16 * (A**3 - ball(R))
-    assert measure(section, "overall pore-body porosity", None)[0] == pytest.approx(1 - bodies / void)
-    assert measure(section, "mean porosity of throats with fines", None)[0] == pytest.approx(1 - throats / (8 * tube))
-    assert measure(section, "porosity of throats with fines", (0.6, 1.0))[0] == pytest.approx(6 / 8)
+    assert measure(section, "overall pore-body porosity", None)[0] == pytest.approx(
+        1 - bodies / void
+    )
+    assert measure(section, "mean porosity of throats with fines", None)[0] == pytest.approx(
+        1 - throats / (8 * tube)
+    )
+    assert measure(section, "porosity of throats with fines", (0.6, 1.0))[0] == pytest.approx(
+        6 / 8
+    )
 
 
 def test_statistics_name_the_figure_of_their_own_specimen_only(lattice, tmp_path):
@@ -316,7 +390,12 @@ def test_bands_hold_their_low_end_and_not_their_high_one():
 def test_deposition_by_throat_porosity(lattice, tmp_path):
     rows = {(row.low, row.high): row for row in deposition(lattice)}
     clogged, middle, open_ = rows[0.0, 0.4], rows[0.4, 0.6], rows[0.6, 1.0]
-    assert (clogged.throats, clogged.fines, clogged.nearer_axis, clogged.law) == (2, 6, 1.0, "clogging")
+    assert (clogged.throats, clogged.fines, clogged.nearer_axis, clogged.law) == (
+        2,
+        6,
+        1.0,
+        "clogging",
+    )
     assert clogged.decided
     assert (middle.fines, middle.law, middle.decided) == (0, "", False)
     assert (open_.throats, open_.fines, open_.law) == (6, 6, "deposition")
@@ -327,7 +406,14 @@ def test_deposition_by_throat_porosity(lattice, tmp_path):
     assert open_.nearer_axis_volume / open_.nearer_wall_volume == pytest.approx((0.05 / THIN) ** 3)
     assert (clogged.nearer, clogged.thesis) == ("axis", 0.50)
     assert (open_.nearer, open_.thesis, open_.sense) == ("wall", 0.85, "at least")
-    assert len(write_deposition(tmp_path / "deposition.csv", list(rows.values())).read_text().splitlines()) == 7
+    assert (
+        len(
+            write_deposition(tmp_path / "deposition.csv", list(rows.values()))
+            .read_text()
+            .splitlines()
+        )
+        == 7
+    )
 
 
 def test_wilson_interval_of_eight_in_ten():
@@ -347,16 +433,27 @@ def test_a_point_within_a_tetrahedron_makes_four_of_it():
 
 def test_tetrahedra_of_the_first_millimetre(lattice, tmp_path):
     """Four grains there and a fine between them; what is upstream or deeper does not count."""
-    place = 0.5 + 0.3 * np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1], [6, 0, 0], [7, 0, 0]])
+    place = 0.5 + 0.3 * np.array(
+        [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1], [6, 0, 0], [7, 0, 0]]
+    )
     box = lattice.state.grains.box
     grains = resting_spheres(MM * place, R * MM, box, kind=Kind.GRAIN)
     small = [[0.5, 0.5, 0.5], [-0.1, 0.5, 0.5], [1.01, 0.6, 0.7]]
     fines = resting_spheres(MM * np.array(small), 0.05 * MM, box, kind=Kind.FINE, first=1000)
     changed = replace(lattice.state, grains=grains, damaged=grains.joined(fines))
     count = count_tetrahedra(Examined(**_parts(lattice) | {"state": changed}))
-    assert (count.grains, count.fines, count.tetrahedra_grains, count.tetrahedra_all) == (4, 1, 1, 4)
+    assert (count.grains, count.fines, count.tetrahedra_grains, count.tetrahedra_all) == (
+        4,
+        1,
+        1,
+        4,
+    )
     assert count.ratio == 4
-    assert write_counts(tmp_path / "counts.csv", [count]).read_text().endswith("specimen5-5to6,1,4,1,4,1,4\n")
+    assert (
+        write_counts(tmp_path / "counts.csv", [count])
+        .read_text()
+        .endswith("specimen5-5to6,1,4,1,4,1,4\n")
+    )
 
 
 def _parts(examined):

@@ -10,13 +10,21 @@ import pytest
 from fdnet.cli import main
 from fdnet.dem.liggghts import Launch
 from fdnet.errors import CaseError
-from fdnet.studies.thesis import plan as plans
-from fdnet.studies.thesis import runs
-from fdnet.studies.thesis.examine import DEFAULT_PAIR, THESIS_PAIR, examine
-from fdnet.studies.thesis.growth import grow, read_growth, write_growth
-from fdnet.studies.thesis.plan import CHEAP, QUICK_SEEDS, SCAN_SEEDS, SPECIMENS, VARIANTS, Planned, planned
-from fdnet.studies.thesis.results import read_results
-from fdnet.studies.thesis.state import read_state, state_of_run, write_state
+from fdnet.studies.thesis.numbers.examine import DEFAULT_PAIR, THESIS_PAIR, examine
+from fdnet.studies.thesis.numbers.results import read_results
+from fdnet.studies.thesis.runs import carry_out as runs
+from fdnet.studies.thesis.runs import plan as plans
+from fdnet.studies.thesis.runs.growth import grow, read_growth, write_growth
+from fdnet.studies.thesis.runs.plan import (
+    CHEAP,
+    QUICK_SEEDS,
+    SCAN_SEEDS,
+    SPECIMENS,
+    VARIANTS,
+    Planned,
+    planned,
+)
+from fdnet.studies.thesis.runs.state import read_state, state_of_run, write_state
 
 SMALL = ("box.size_mm=[2.0,1.2,1.2]", "grains.count=26", "fines.count=60", "run.cap_ms=0.1")
 
@@ -29,7 +37,19 @@ def small(name="quick-specimen5", *settings, seed=1):
 def finished(binary, tmp_path_factory):
     """A run folder with a finished invasion."""
     folder = tmp_path_factory.mktemp("thesis") / "run"
-    assert main(["run", str(plans.case_path("quick-specimen5")), "--out", str(folder), *_sets(), "--quiet"]) == 0
+    assert (
+        main(
+            [
+                "run",
+                str(plans.case_path("quick-specimen5")),
+                "--out",
+                str(folder),
+                *_sets(),
+                "--quiet",
+            ]
+        )
+        == 0
+    )
     return folder
 
 
@@ -60,7 +80,11 @@ def test_a_state_is_examined_as_the_run_was(finished, tmp_path):
     write_state(tmp_path / "a.npz", state_of_run(finished))
     found = examine("quick-specimen5", read_state(tmp_path / "a.npz"))
     summary = json.loads((finished / "summary.json").read_text())
-    assert (found.thesis.law, found.thesis.damage_law) == THESIS_PAIR == (summary["law"], summary["damage_law"])
+    assert (
+        (found.thesis.law, found.thesis.damage_law)
+        == THESIS_PAIR
+        == (summary["law"], summary["damage_law"])
+    )
     assert (found.default.law, found.default.damage_law) == DEFAULT_PAIR
     assert found.thesis.k_damaged == pytest.approx(summary["k_damaged_m2"], rel=1e-5)
     assert found.thesis.invaded_count == summary["invaded_count"]
@@ -88,7 +112,9 @@ def test_runs_are_done_once_twins_shared_and_failures_told(binary, tmp_path, mon
     said: list[str] = []
     same = small("quick-table3", "fines.radius_mm=[0.025,0.05]"), small("quick-specimen7")
     bad = small("quick-specimen5", "fines.concentration=0.29", "run.max_hours=1e-9")
-    failed = runs.carry_out([*same, bad], tmp_path / "out", tmp_path / "runs", jobs=1, tell=said.append)
+    failed = runs.carry_out(
+        [*same, bad], tmp_path / "out", tmp_path / "runs", jobs=1, tell=said.append
+    )
     assert list(failed) == [bad]
     assert "run.max_hours" in failed[bad]
     assert len(said) == 2
@@ -98,14 +124,18 @@ def test_runs_are_done_once_twins_shared_and_failures_told(binary, tmp_path, mon
     assert not list((tmp_path / "runs").glob("quick-table3*"))
     monkeypatch.setattr(runs, "_run_all", lambda todo, *_, **__: dict.fromkeys(todo, "ran"))
     runs.state_path(tmp_path / "out", same[0]).unlink()
-    assert runs.carry_out(same, tmp_path / "out", tmp_path / "runs", jobs=1, tell=said.append) == {}
+    assert (
+        runs.carry_out(same, tmp_path / "out", tmp_path / "runs", jobs=1, tell=said.append) == {}
+    )
     assert read_state(runs.state_path(tmp_path / "out", same[0])).case.name == "quick-table3"
 
 
 @pytest.mark.liggghts
 def test_a_state_of_another_case_is_refused(finished, tmp_path):
     item = small()
-    write_state(runs.state_path(tmp_path, item), replace(state_of_run(finished), case=small(seed=2).load()))
+    write_state(
+        runs.state_path(tmp_path, item), replace(state_of_run(finished), case=small(seed=2).load())
+    )
     with pytest.raises(CaseError, match="is the state of another case"):
         runs.carry_out([item], tmp_path, tmp_path / "runs", jobs=1, tell=print)
 
@@ -139,9 +169,19 @@ def test_the_plan_names_every_run_once_with_its_seeds():
     for name in (*SPECIMENS, *VARIANTS):
         assert sum(item.id == name for item in plan) == (3 if name in CHEAP else 1)
         assert sum(item.id == f"quick-{name}" for item in plan) == QUICK_SEEDS
-    assert {item.group for item in plan} == {"specimen", "variant", "quick", "reason", "friction", "drag", "supply"}
+    assert {item.group for item in plan} == {
+        "specimen",
+        "variant",
+        "quick",
+        "reason",
+        "friction",
+        "drag",
+        "supply",
+    }
     assert sum(item.id == "specimen5 fines.friction=0" for item in plan) == SCAN_SEEDS
-    assert {item.id for item in planned(quick=True)} == {f"quick-{name}" for name in (*SPECIMENS, *VARIANTS)}
+    assert {item.id for item in planned(quick=True)} == {
+        f"quick-{name}" for name in (*SPECIMENS, *VARIANTS)
+    }
     for item in plan:
         assert item.load().seed == item.seed
 
@@ -150,10 +190,21 @@ def test_the_plan_names_every_run_once_with_its_seeds():
 def test_the_quick_study_runs_every_form_to_its_end(binary, tmp_path, capsys):
     """All quick forms through the command: counts hold, tables and figures are there; redrawing runs nothing."""
     out, runs_folder = tmp_path / "out", tmp_path / "runs"
-    command = ["study", "thesis", "--quick", "--out", str(out), "--runs", str(runs_folder), "--silent"]
+    command = [
+        "study",
+        "thesis",
+        "--quick",
+        "--out",
+        str(out),
+        "--runs",
+        str(runs_folder),
+        "--silent",
+    ]
     assert main(command) == 0
     rows = read_results(out / "results.csv")
-    assert [(row.id, row.law) for row in rows[::2]] == [(item.id, "thesis") for item in planned(quick=True)]
+    assert [(row.id, row.law) for row in rows[::2]] == [
+        (item.id, "thesis") for item in planned(quick=True)
+    ]
     assert len(rows) == 24
     for row in rows:
         assert row.stop_reason in {"plugged", "supply_exhausted", "cap"}
@@ -184,7 +235,11 @@ def test_the_growth_of_a_pack_is_kept(binary, tmp_path):
     stages = grow(case, tmp_path / "grown", Launch(binary=binary), count=26)
     write_growth(tmp_path / "growth.npz", stages)
     kept = read_growth(tmp_path / "growth.npz", case)
-    assert [np.unique(np.round(one.radius / 2.5e-4, 6)).tolist() for one in kept] == [[0.613333], [1.0], [1.0]]
+    assert [np.unique(np.round(one.radius / 2.5e-4, 6)).tolist() for one in kept] == [
+        [0.613333],
+        [1.0],
+        [1.0],
+    ]
     speeds = [np.abs(one.velocity).max() for one in kept]
     assert speeds[2] < 1e-3 * min(speeds[:2])
     for one, other in zip(stages, kept, strict=True):

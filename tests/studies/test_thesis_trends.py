@@ -9,13 +9,18 @@ from math import nan, sqrt
 
 import pytest
 
-from fdnet.studies.thesis.bands import Band, Sample, band, difference
-from fdnet.studies.thesis.examine import DEFAULT_PAIR, THESIS_PAIR
-from fdnet.studies.thesis.markdown import as_told, figure, markdown_table, with_band
-from fdnet.studies.thesis.results import ResultRow
-from fdnet.studies.thesis.thesis_tables import TABLES, table_of, thesis_tables
-from fdnet.studies.thesis.trend_claims import ABOVE, ALIKE, MORE, TRENDS, claims, share_at_the_face
-from fdnet.studies.thesis.trend_quantities import (
+from fdnet.studies.thesis.compare.bands import Band, Sample, band, difference
+from fdnet.studies.thesis.compare.markdown import as_told, figure, markdown_table, with_band
+from fdnet.studies.thesis.compare.tables import TABLES, table_of, thesis_tables
+from fdnet.studies.thesis.compare.trend_claims import (
+    ABOVE,
+    ALIKE,
+    MORE,
+    TRENDS,
+    claims,
+    share_at_the_face,
+)
+from fdnet.studies.thesis.compare.trend_quantities import (
     QUANTITIES,
     beyond_the_others,
     first_share,
@@ -24,8 +29,8 @@ from fdnet.studies.thesis.trend_quantities import (
     sample_of,
     slope_per_decade,
 )
-from fdnet.studies.thesis.trend_table import caveats, trends_table, verdict_of
-from fdnet.studies.thesis.trends import (
+from fdnet.studies.thesis.compare.trend_table import caveats, trends_table, verdict_of
+from fdnet.studies.thesis.compare.trends import (
     FAILS,
     FULL_SCALE,
     HOLDS,
@@ -36,6 +41,8 @@ from fdnet.studies.thesis.trends import (
     verdict,
     write_trends,
 )
+from fdnet.studies.thesis.numbers.examine import DEFAULT_PAIR, THESIS_PAIR
+from fdnet.studies.thesis.numbers.results import ResultRow
 
 T2, T4, T8 = 4.3027, 2.7764, 2.3060
 SCATTER = (-1.0, 0.0, 1.0)
@@ -80,12 +87,19 @@ BASE = {
 
 
 def row(run: str, seed: int = 1, laws: tuple[str, str] = THESIS_PAIR, **changed) -> ResultRow:
-    return ResultRow(id=run, seed=seed, digest="", law=laws[0], damage_law=laws[1], **BASE | changed)
+    return ResultRow(
+        id=run, seed=seed, digest="", law=laws[0], damage_law=laws[1], **BASE | changed
+    )
 
 
-def rows_of(run: str, field: str, values, laws: tuple[str, str] = THESIS_PAIR, **changed) -> list[ResultRow]:
+def rows_of(
+    run: str, field: str, values, laws: tuple[str, str] = THESIS_PAIR, **changed
+) -> list[ResultRow]:
     """One row a value, seeds from 1."""
-    return [row(run, seed, laws, **{field: value}, **changed) for seed, value in enumerate(values, start=1)]
+    return [
+        row(run, seed, laws, **{field: value}, **changed)
+        for seed, value in enumerate(values, start=1)
+    ]
 
 
 def around(mean: float, scatter: float) -> list[float]:
@@ -93,8 +107,14 @@ def around(mean: float, scatter: float) -> list[float]:
     return [mean + scatter * one for one in SCATTER]
 
 
-def found(comparisons: list[Comparison], *, quantity: str, one: str, other: str = "", laws: str = "") -> Comparison:
-    match = [c for c in comparisons if (c.quantity, c.one, c.other) == (quantity, one, other) and laws in c.laws]
+def found(
+    comparisons: list[Comparison], *, quantity: str, one: str, other: str = "", laws: str = ""
+) -> Comparison:
+    match = [
+        c
+        for c in comparisons
+        if (c.quantity, c.one, c.other) == (quantity, one, other) and laws in c.laws
+    ]
     assert len(match) == 1
     return match[0]
 
@@ -129,13 +149,18 @@ def test_a_single_run_borrows_the_spread_of_the_quick_form():
     single = Sample(values=(9.0,), lent=lent)
     assert (single.spread_of, single.mean) == ("quick form", 9)
     assert band(single).half_width == pytest.approx(T4 * sqrt(2.5), rel=1e-4)
-    assert band(Sample(values=(9.0,), lent=lent, widened=2.0)).half_width == pytest.approx(2 * T4 * sqrt(2.5), rel=1e-4)
+    assert band(Sample(values=(9.0,), lent=lent, widened=2.0)).half_width == pytest.approx(
+        2 * T4 * sqrt(2.5), rel=1e-4
+    )
     assert Sample(values=tuple(around(1, 1)), lent=lent).spread_of == "seeds"
     assert Sample(values=(), lent=lent).spread_of == ""
 
 
 def test_what_grows_with_the_specimen_keeps_at_least_its_relative_spread():
-    rows = [*rows_of("quick-specimen3", "invaded_count", (90, 100, 110)), row("specimen3", invaded_count=800)]
+    rows = [
+        *rows_of("quick-specimen3", "invaded_count", (90, 100, 110)),
+        row("specimen3", invaded_count=800),
+    ]
     assert sample_of(rows, "specimen3", QUANTITIES["invaded fines"]).widened == pytest.approx(8)
     fewer = [*rows[:3], row("specimen3", invaded_count=50)]
     assert sample_of(fewer, "specimen3", QUANTITIES["invaded fines"]).widened == 1
@@ -175,9 +200,19 @@ def test_finer_fines_go_deeper_when_they_do():
     deeper = found(result, quantity="mean depth", one="specimen2", other="specimen1")
     assert deeper.difference == pytest.approx(1)
     assert deeper.high - deeper.difference == pytest.approx(T4 * sqrt(2 * 0.01 / 3), rel=1e-4)
-    assert (deeper.verdict, deeper.runs_one, deeper.runs_other, deeper.spread) == (HOLDS, 3, 3, "seeds")
-    assert found(result, quantity="mean depth", one="specimen3", other="specimen2").verdict == FAILS
-    assert found(result, quantity="mean depth", one="specimen3", other="specimen1").verdict == UNDECIDED
+    assert (deeper.verdict, deeper.runs_one, deeper.runs_other, deeper.spread) == (
+        HOLDS,
+        3,
+        3,
+        "seeds",
+    )
+    assert (
+        found(result, quantity="mean depth", one="specimen3", other="specimen2").verdict == FAILS
+    )
+    assert (
+        found(result, quantity="mean depth", one="specimen3", other="specimen1").verdict
+        == UNDECIDED
+    )
     missing = found(result, quantity="mean depth", one="specimen5", other="specimen4")
     assert (missing.verdict, missing.runs_one) == (UNDECIDED, 0)
     assert missing.note == "no run of specimen5; no run of specimen4"
@@ -207,8 +242,13 @@ def test_fines_of_a_third_stop_at_the_face_as_in_the_thesis():
     rows = rows_of("specimen1", "fraction_first_mm", around(0.95, 0.001))
     rows += rows_of("specimen4", "fraction_first_mm", around(0.50, 0.001))
     result = compare_trends(rows)
-    bounds = [one for one in result if one.sense == ABOVE and one.trend == 1 and one.scale == FULL_SCALE]
-    assert [(one.one, one.verdict) for one in bounds] == [("specimen1", HOLDS), ("specimen4", FAILS)]
+    bounds = [
+        one for one in result if one.sense == ABOVE and one.trend == 1 and one.scale == FULL_SCALE
+    ]
+    assert [(one.one, one.verdict) for one in bounds] == [
+        ("specimen1", HOLDS),
+        ("specimen4", FAILS),
+    ]
     assert bounds[0].difference == pytest.approx(95 - 100 * 600 / 704)
     assert bounds[0].high - bounds[0].difference == pytest.approx(T2 * 0.1 / sqrt(3), rel=1e-4)
 
@@ -220,7 +260,11 @@ def test_alike_is_within_a_fifth_of_the_larger():
         rows += rows_of(run, "porosity_damaged", around(0.30 - loss, 1e-4))
     result = [one for one in compare_trends(rows) if one.scale == FULL_SCALE]
     alike = found(result, quantity="porosity loss", one="specimen2", other="specimen3")
-    assert (alike.margin, alike.difference, alike.verdict) == (pytest.approx(1.0), pytest.approx(0.5), HOLDS)
+    assert (alike.margin, alike.difference, alike.verdict) == (
+        pytest.approx(1.0),
+        pytest.approx(0.5),
+        HOLDS,
+    )
     apart = found(result, quantity="porosity loss", one="specimen2", other="specimen7")
     assert (apart.difference, apart.verdict) == (pytest.approx(1.5), FAILS)
 
@@ -248,7 +292,9 @@ def test_permeability_is_judged_under_each_pair_of_laws():
         rows += rows_of(run, "k_reductions", reductions(default), DEFAULT_PAIR)
     result = compare_trends(rows)
     asked = {"quantity": "k reduction in the first mm", "one": "specimen2", "other": "specimen1"}
-    by_thesis, by_default = (found(result, **asked, laws=laws[0]) for laws in (THESIS_PAIR, DEFAULT_PAIR))
+    by_thesis, by_default = (
+        found(result, **asked, laws=laws[0]) for laws in (THESIS_PAIR, DEFAULT_PAIR)
+    )
     assert (by_thesis.verdict, by_thesis.difference) == (HOLDS, pytest.approx(10))
     assert (by_default.verdict, by_default.difference) == (FAILS, pytest.approx(-10))
     lines = trends_table(result).splitlines()
@@ -281,7 +327,12 @@ def scan(run: str, slope: float, seeds: int = 3) -> list[ResultRow]:
 
 def test_drag_response_keeps_to_each_pack():
     """Depths of the seeds are 1, 2, 3 mm apart, the slopes 0.49, 0.50, 0.51: only the slopes count."""
-    rows = [*scan("quick-specimen5", 0.5), *scan("quick-specimen7", -0.5), row("quick-specimen5", 4), row("specimen5")]
+    rows = [
+        *scan("quick-specimen5", 0.5),
+        *scan("quick-specimen7", -0.5),
+        row("quick-specimen5", 4),
+        row("specimen5"),
+    ]
     rows.append(row("quick-specimen5 fines.friction=0.1"))
     assert [x for x, _ in multipliers_of(rows, "quick-specimen5")[1]] == [0.1, 1, 10, 100]
     result = [one for one in compare_trends(rows) if one.trend == 7]
@@ -300,14 +351,22 @@ def test_drag_response_keeps_to_each_pack():
 
 
 def test_notes_tell_what_weakens_a_comparison(tmp_path):
-    rows = [row("specimen5"), row("specimen6", stop_reason="supply_exhausted", invaded_count=900, passed_count=100)]
+    rows = [
+        row("specimen5"),
+        row("specimen6", stop_reason="supply_exhausted", invaded_count=900, passed_count=100),
+    ]
     result = compare_trends(rows)
     note = found(result, quantity="mean depth", one="specimen6", other="specimen5").note
     assert note == (
         "specimen6 ended by supply_exhausted; 10% of the fines passed through specimen6, so they went deeper still"
     )
-    assert found(result, quantity="porosity loss", one="specimen5", other="specimen6").note.startswith("specimen6 end")
-    assert "passed" not in found(result, quantity="porosity loss", one="specimen5", other="specimen6").note
+    assert found(
+        result, quantity="porosity loss", one="specimen5", other="specimen6"
+    ).note.startswith("specimen6 end")
+    assert (
+        "passed"
+        not in found(result, quantity="porosity loss", one="specimen5", other="specimen6").note
+    )
     told = caveats(result)
     assert "no run of specimen1" in told
     assert len(told) == len(set(told))
@@ -340,7 +399,10 @@ def test_the_table_of_trends_tells_the_numbers():
 def test_verdict_of_several():
     result = compare_trends(rows_of("specimen1", "mean_depth_mm", around(1, 0.1)))
     one = found(result, quantity="mean depth", one="specimen2", other="specimen1")
-    made = {name: {**_fields(one), "verdict": name, "runs_one": 3} for name in (HOLDS, FAILS, UNDECIDED)}
+    made = {
+        name: {**_fields(one), "verdict": name, "runs_one": 3}
+        for name in (HOLDS, FAILS, UNDECIDED)
+    }
     holds, fails, open_ = (Comparison(**made[name]) for name in (HOLDS, FAILS, UNDECIDED))
     assert verdict_of([holds, holds]) == "holds (2 of 2)"
     assert verdict_of([holds, fails, open_]) == "holds in part (1 of 3; 1 not, 1 not decided)"
@@ -351,18 +413,31 @@ def test_verdict_of_several():
 
 def table(number: str, rows: list[ResultRow]) -> list[list[str]]:
     text = table_of(next(one for one in TABLES if one.number == number), rows)
-    return [line.strip("| ").split(" | ") for line in text.splitlines() if not line.startswith("| ---")]
+    return [
+        line.strip("| ").split(" | ") for line in text.splitlines() if not line.startswith("| ---")
+    ]
 
 
 def test_table_4_side_by_side():
-    rows = [*rows_of("specimen2", "porosity_damaged", around(0.28, 0.01)), row("specimen3", stop_reason="duration")]
+    rows = [
+        *rows_of("specimen2", "porosity_damaged", around(0.28, 0.01)),
+        row("specimen3", stop_reason="duration"),
+    ]
     header, one, two, three, *_ = table("Table 4", rows)
     line = dict(zip(header, two, strict=True))
-    assert (line["run"], line["fine diameter, mm"], line["damaged porosity, %, thesis"]) == ("specimen2", "0.1", "23")
+    assert (line["run"], line["fine diameter, mm"], line["damaged porosity, %, thesis"]) == (
+        "specimen2",
+        "0.1",
+        "23",
+    )
     # 1 point over the root of 3, times t; the last "ours" of the line is the depth
     assert "28.0 ± 2.5" in two
     assert "2.00 ± 2.5" in two
-    assert (line["porosity loss, points, thesis"], line["runs"], line["ended by"]) == ("7", "3", "plugged")
+    assert (line["porosity loss, points, thesis"], line["runs"], line["ended by"]) == (
+        "7",
+        "3",
+        "plugged",
+    )
     assert line["porosity loss of the first mm, points"] == "8.00 ± 0"
     assert three[-2:] == ["1", "duration"]
     assert "28.0" in three
@@ -370,7 +445,11 @@ def test_table_4_side_by_side():
 
 
 def test_tables_of_one_specimen():
-    rows = [row("specimen5"), row("specimen5", laws=DEFAULT_PAIR, k_reduction=0.25), row("specimen5-5to6")]
+    rows = [
+        row("specimen5"),
+        row("specimen5", laws=DEFAULT_PAIR, k_reduction=0.25),
+        row("specimen5-5to6"),
+    ]
     lines = {line[0]: line[1:] for line in table("Table 9", rows)}
     assert lines["fine radius, mm"] == ["0.05–0.06", "0.05", "0.05–0.06"]
     assert lines["invaded fines in the first mm"] == ["above 2000", "500", "500"]
@@ -379,7 +458,10 @@ def test_tables_of_one_specimen():
 
 
 def test_tables_by_section():
-    rows = [row("specimen5"), row("specimen5", laws=DEFAULT_PAIR, k_reductions=(0.5,) + (0.0,) * 7)]
+    rows = [
+        row("specimen5"),
+        row("specimen5", laws=DEFAULT_PAIR, k_reductions=(0.5,) + (0.0,) * 7),
+    ]
     lines = {line[0]: line[1:] for line in table("Table 10", rows)}
     assert lines["0–1"] == ["32", "30.0", "20.0", "50.0", "20.0", "–"]
     assert lines["5–6"][0] == "0.3"

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fdnet.network.cylinder import GAUSS_POINTS, Pairs
-from fdnet.studies import packs
+from fdnet.network.fines.cylinder import GAUSS_POINTS, Pairs
 from fdnet.studies.command import run_study
-from fdnet.studies.table import read_rows
-from fdnet.studies.throat_occupancy import STUDY, TWO_PLANE, reference_volume
+from fdnet.studies.engine.table import read_rows
+from fdnet.studies.network.throat_occupancy import STUDY, TWO_PLANE, reference_volume
+from fdnet.studies.truth import packs
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +18,9 @@ def rows(tmp_path_factory):
 
 
 def errors(rows, series, quantity):
-    return {row.value: row.error for row in rows if row.series == series and row.quantity == quantity}
+    return {
+        row.value: row.error for row in rows if row.series == series and row.quantity == quantity
+    }
 
 
 @pytest.mark.parametrize("where", ["inside", "ends"])
@@ -32,7 +34,9 @@ def test_gauss_error_falls_a_hundredfold_per_doubling(rows, ratio, where):
 @pytest.mark.parametrize(("ratio", "bias"), [(0.2, -0.008), (1.0, -0.20)])
 def test_two_planes_have_their_published_bias(rows, ratio, bias):
     """Centres uniform around a long tube; measured apart by quadrature of the same reading."""
-    assert errors(rows, TWO_PLANE, "bias of the sum, inside")[ratio] == pytest.approx(bias, rel=0.03)
+    assert errors(rows, TWO_PLANE, "bias of the sum, inside")[ratio] == pytest.approx(
+        bias, rel=0.03
+    )
     assert errors(rows, TWO_PLANE, "largest, inside")[1.0] == pytest.approx(0.25, abs=0.01)
 
 
@@ -53,12 +57,18 @@ def test_the_reference_has_the_closed_forms():
         [30.0, 2.0, 0.5, 1, 1],
         [0.4, 1.5, 5, 1, 9],
     ]
-    pairs = Pairs(**dict(zip(("sphere", "offset", "depth", "tube", "length"), np.array(rows).T, strict=True)))
+    pairs = Pairs(
+        **dict(zip(("sphere", "offset", "depth", "tube", "length"), np.array(rows).T, strict=True))
+    )
     ring = 4 / 3 * np.pi * (8 - 3**1.5)
-    assert reference_volume(pairs) == pytest.approx([4 / 3 * np.pi * 0.027, ring, ring / 2, np.pi, 0.0], rel=1e-12)
+    assert reference_volume(pairs) == pytest.approx(
+        [4 / 3 * np.pi * 0.027, ring, ring / 2, np.pi, 0.0], rel=1e-12
+    )
 
 
 def test_without_the_project_the_packs_are_missed_by_name(monkeypatch, tmp_path):
     monkeypatch.setattr(packs, "PROJECT", tmp_path)
-    with pytest.raises(packs.CaseError, match=r"tests/data/truth is not there.*run it from a checkout"):
+    with pytest.raises(
+        packs.CaseError, match=r"tests/data/truth is not there.*run it from a checkout"
+    ):
         packs.truth_folder()

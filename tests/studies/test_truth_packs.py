@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from fdnet.network.porosity import measure_porosity
+from fdnet.spheres.porosity import measure_porosity
 
 STATED = {
     "packE_80_eps30": 0.30,
@@ -27,7 +27,9 @@ def scripts(root, monkeypatch):
 @pytest.mark.parametrize("name", STATED)
 def test_porosity_as_stated(scripts, root, name):
     pack, edge = scripts[1].read_pack(root / "tests" / "data" / "truth" / f"{name}.csv")
-    assert measure_porosity(pack, periodic=(True,) * 3).mean == pytest.approx(STATED[name], abs=0.001)
+    assert measure_porosity(pack, periodic=(True,) * 3).mean == pytest.approx(
+        STATED[name], abs=0.001
+    )
     assert np.all((pack.position >= 0.0) & (pack.position <= edge * 1e-3))
     assert len(pack.fines()) == 0 or np.all(pack.fines().radius == pytest.approx(1e-4))
 

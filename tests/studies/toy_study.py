@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from fdnet.errors import FlowError
-from fdnet.studies.judge import against_exact
-from fdnet.studies.study import Panel, Point, Study
+from fdnet.studies.engine.judge import against_exact
+from fdnet.studies.engine.study import Panel, Point, Study
 
 
 def points(quick: bool) -> list[Point]:

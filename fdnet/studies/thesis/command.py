@@ -8,11 +8,11 @@ from pathlib import Path
 
 from fdnet.dem.liggghts import Launch, find_binary
 from fdnet.errors import CaseError, LiggghtsError
+from fdnet.studies.thesis.compare.trend_table import trends_table
 from fdnet.studies.thesis.findings import collect, write_findings
-from fdnet.studies.thesis.growth import GROWTH, grow, write_growth
-from fdnet.studies.thesis.plan import Planned, planned
-from fdnet.studies.thesis.runs import Tell, carry_out
-from fdnet.studies.thesis.trend_table import trends_table
+from fdnet.studies.thesis.runs.carry_out import Tell, carry_out
+from fdnet.studies.thesis.runs.growth import GROWTH, grow, write_growth
+from fdnet.studies.thesis.runs.plan import Planned, planned
 
 STATES = "states"
 
@@ -39,18 +39,24 @@ def run_thesis(options: ThesisOptions) -> str:
     failed = {} if options.redraw else _run(plan, options, states, tell)
     findings = collect(plan, options.out, states, tell=tell)
     if not findings.rows:
-        raise CaseError(f"{options.out}: holds no state and no results of this study; leave out --redraw to run it")
+        raise CaseError(
+            f"{options.out}: holds no state and no results of this study; leave out --redraw to run it"
+        )
     comparisons = write_findings(findings, plan, options.out, states)
     if failed:
         lines = "; ".join(f"{item.id} seed {item.seed}: {why}" for item, why in failed.items())
-        raise LiggghtsError(f"{len(failed)} of {len(plan)} runs failed, run the study again to continue: {lines}")
+        raise LiggghtsError(
+            f"{len(failed)} of {len(plan)} runs failed, run the study again to continue: {lines}"
+        )
     text = trends_table(comparisons)
     if findings.missing:
         text += f"\n\n{len(findings.missing)} of {len(plan)} runs are missing: leave out --redraw to run them"
     return text
 
 
-def _run(plan: Sequence[Planned], options: ThesisOptions, states: Path, tell: Tell) -> dict[Planned, str]:
+def _run(
+    plan: Sequence[Planned], options: ThesisOptions, states: Path, tell: Tell
+) -> dict[Planned, str]:
     binary = find_binary()
     if not options.quick and not (states / GROWTH).exists():
         keep_growth(states / GROWTH, options.runs / "growth", Launch(binary=binary))

@@ -5,18 +5,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fdnet.studies.thesis.counts import count_tetrahedra, write_counts
-from fdnet.studies.thesis.deposition import deposition, write_deposition
-from fdnet.studies.thesis.examine import THESIS_PAIR, Examined, examine
-from fdnet.studies.thesis.plan import BASE_VALUES, QUICK, Planned
-from fdnet.studies.thesis.results import ResultRow, read_results, result_rows, write_results
-from fdnet.studies.thesis.runs import find_state
-from fdnet.studies.thesis.statistics import statistics, write_statistics
-from fdnet.studies.thesis.trends import Comparison, compare_trends, write_trends
-from fdnet.studies.thesis.values import thesis_values
+from fdnet.studies.thesis.compare.trends import Comparison, compare_trends, write_trends
+from fdnet.studies.thesis.numbers.counts import count_tetrahedra, write_counts
+from fdnet.studies.thesis.numbers.deposition import deposition, write_deposition
+from fdnet.studies.thesis.numbers.examine import THESIS_PAIR, Examined, examine
+from fdnet.studies.thesis.numbers.results import (
+    ResultRow,
+    read_results,
+    result_rows,
+    write_results,
+)
+from fdnet.studies.thesis.numbers.statistics import statistics, write_statistics
+from fdnet.studies.thesis.numbers.values import thesis_values
+from fdnet.studies.thesis.runs.carry_out import find_state
+from fdnet.studies.thesis.runs.plan import BASE_VALUES, QUICK, Planned
 
 if TYPE_CHECKING:
-    from fdnet.studies.thesis.draw_canvas import ScanRow
+    from fdnet.studies.thesis.figures.canvas import ScanRow
 
 RESULTS, STATISTICS, DEPOSITION, TETRAHEDRA, TRENDS, CAPTIONS = (
     "results.csv",
@@ -40,7 +45,9 @@ class Findings:
     missing: tuple[Planned, ...]
 
 
-def collect(plan: Sequence[Planned], out: Path, states: Path, *, tell: Callable[[str], None]) -> Findings:
+def collect(
+    plan: Sequence[Planned], out: Path, states: Path, *, tell: Callable[[str], None]
+) -> Findings:
     """Examine every state there is; of a run without one take the rows that results.csv in `out` has already, if they
     are of the same case.
 
@@ -76,7 +83,9 @@ def _known(path: Path) -> dict[tuple[str, int, str], list[ResultRow]]:
     return found
 
 
-def write_findings(findings: Findings, plan: Sequence[Planned], out: Path, states: Path) -> list[Comparison]:
+def write_findings(
+    findings: Findings, plan: Sequence[Planned], out: Path, states: Path
+) -> list[Comparison]:
     """All tables and figures into `out`; returns the comparisons of the trends."""
     runs = [run for seeds in findings.examined.values() for run in seeds]
     write_results(out / RESULTS, findings.rows)
@@ -90,12 +99,12 @@ def write_findings(findings: Findings, plan: Sequence[Planned], out: Path, state
 
 
 def _draw(findings: Findings, plan: Sequence[Planned], out: Path, states: Path) -> None:
-    from fdnet.studies.thesis.csv_rows import write_csv
-    from fdnet.studies.thesis.draw_all import draw_all
-    from fdnet.studies.thesis.draw_canvas import Tables
-    from fdnet.studies.thesis.draw_tables import distances_found, tetrahedra_counted
-    from fdnet.studies.thesis.growth import GROWTH, read_growth
-    from fdnet.studies.thesis.thesis_marks import thesis_marks
+    from fdnet.studies.thesis.figures.canvas import Tables
+    from fdnet.studies.thesis.figures.draw_all import draw_all
+    from fdnet.studies.thesis.figures.tables import distances_found, tetrahedra_counted
+    from fdnet.studies.thesis.figures.thesis_marks import thesis_marks
+    from fdnet.studies.thesis.numbers.csv_rows import write_csv
+    from fdnet.studies.thesis.runs.growth import GROWTH, read_growth
 
     examined = findings.examined
     first = next(iter(examined.get("specimen1", ())), None)
@@ -108,10 +117,14 @@ def _draw(findings: Findings, plan: Sequence[Planned], out: Path, states: Path) 
             {name: examined[name] for name in ("specimen1", "specimen5") if name in examined}
         ),
         distances=distances_found(examined.get("specimen5", ())),
-        growth=read_growth(growth, first.state.case) if first is not None and growth.exists() else (),
+        growth=read_growth(growth, first.state.case)
+        if first is not None and growth.exists()
+        else (),
     )
     quick = not any(item.group in KEPT for item in plan)
-    drawn = draw_all(examined, out, thesis={} if quick else thesis_marks(thesis_values()), tables=tables)
+    drawn = draw_all(
+        examined, out, thesis={} if quick else thesis_marks(thesis_values()), tables=tables
+    )
     start = "Quick forms. " if quick else ""
     lines = [(one.name, start + one.caption, "; ".join(one.missing)) for one in drawn]
     write_csv(out / CAPTIONS, ("figure", "caption", "missing"), lines)
@@ -119,7 +132,7 @@ def _draw(findings: Findings, plan: Sequence[Planned], out: Path, states: Path) 
 
 def _scan(findings: Findings, plan: Sequence[Planned], group: str) -> "list[ScanRow]":
     """Rows of a scan, with those of the case itself at its own value of the knob."""
-    from fdnet.studies.thesis.draw_tables import scan_row
+    from fdnet.studies.thesis.figures.tables import scan_row
 
     scanned = [item for item in plan if item.group == group]
     values, seeds = {item.id: item.value for item in scanned}, {item.seed for item in scanned}

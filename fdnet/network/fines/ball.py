@@ -1,0 +1,163 @@
+"""The piece of a ball inside a tetrahedron: volume and surface in closed form, for any place of the two.
+
+The tetrahedron is the signed sum of the cones from the ball's centre to its facets, each cone the signed sum over the
+facet's edges of the cones to the triangles (foot of the centre on the facet, edge). In units of the ball's radius, d
+the distance of the facet, h that of the edge from the foot, t the place along the edge from its foot, all signed, a
+cone holds of the sphere the directions that leave the ball before the facet:
+
+    integral of (1 - cos theta) d phi  less the same within the facet's disc
+        = c phi(t) - arctan(t d / (h sqrt(t^2 + h^2 + d^2))),   phi = arctan(t / h),   tan phi = t / h,
+
+taken between the ends of each part of the edge outside the disc of radius sqrt(1 - d^2); c = d where the facet's plane
+cuts the ball, 1 where the ball lies inside of it (outside of it, the piece is empty). With
+cos theta = d / sqrt(d^2 + h^2 / cos^2 phi) the second term is its integral. Volume: a third of that surface, and d/3
+times the area of triangle and disc (divergence theorem; the same decomposition by facets and edges: Strobl, Formella
+and Poeschel 2016, J. Comput. Phys. 311, 158).
+"""
+
+from math import atan2, copysign, pi, sqrt
+
+import numpy as np
+
+from fdnet.network.compiled import compiled
+from fdnet.spheres.snapshot import Array
+
+ROUNDING = 1e-13
+OTHERS = np.array([(1, 2, 3), (2, 3, 0), (3, 0, 1), (0, 1, 2)])
+
+
+Vector = tuple[float, float, float]
+
+
+@compiled
+def fill_pieces(
+    corner: Array, pairs: tuple[Array, Array], balls: tuple[Array, Array, Array], found: Array
+) -> None:
+    """Add to `found` (P, 2 + W) the volume m3 and surface m2 of the pieces of balls inside the tetrahedra `corner`
+    (P, 4, 3) m, and the volume times each of the balls' values.
+
+    `pairs` tetrahedron and ball (K,), which may be apart; `balls` centre (N, 3) m, radius (N,) m, value (N, W).
+
+    Pieces below 1e-13 of the whole ball are rounding and left out.
+    """
+    pore, ball = pairs
+    centre, radius, value = balls
+    normal, place, depth = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(4)
+    last = -1
+    for k in range(len(pore)):
+        p, b = pore[k], ball[k]
+        if p != last:
+            _facet_normals(corner[p], normal)
+            last = p
+        cuts = 0
+        for f in range(4):
+            depth[f] = _dot(normal[f], _apart(corner[p, OTHERS[f, 0]], centre[b])) / -radius[b]
+            cuts += 1 if depth[f] < 1.0 else 0
+        if min(min(depth[0], depth[1]), min(depth[2], depth[3])) <= -1.0:
+            continue
+        for c in range(4):
+            for axis in range(3):
+                place[c, axis] = (corner[p, c, axis] - centre[b, axis]) / radius[b]
+        inside, area = _piece(place, normal, depth, cuts)
+        if inside > ROUNDING:
+            found[p, 0] += inside * radius[b] ** 3
+            found[p, 1] += area * radius[b] ** 2
+            for w in range(value.shape[1]):
+                found[p, 2 + w] += inside * radius[b] ** 3 * value[b, w]
+
+
+@compiled
+def _apart(a: Array, b: Array) -> Vector:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@compiled
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@compiled
+def _cross(a: Vector, b: Vector) -> Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@compiled
+def _facet_normals(corner: Array, normal: Array) -> None:
+    """Inward unit normals (4, 3) of the facets opposite each corner."""
+    turn = 1.0
+    for f in range(4):
+        a, b, c = corner[OTHERS[f, 0]], corner[OTHERS[f, 1]], corner[OTHERS[f, 2]]
+        across = _cross(_apart(b, a), _apart(c, a))
+        if f == 0:
+            # one sign for all four, so that the facets of a flat tetrahedron face each other
+            turn = copysign(1.0, _dot(_apart(corner[0], a), across))
+        scale = (turn if f % 2 == 0 else -turn) / sqrt(_dot(across, across))
+        for axis in range(3):
+            normal[f, axis] = scale * across[axis]
+
+
+@compiled
+def _piece(place: Array, normal: Array, depth: Array, cuts: int) -> tuple[float, float]:
+    """Volume and surface of the unit ball about the origin inside the tetrahedron on `place` (4, 3): the whole ball,
+    a cap, or the sum over facets and edges."""
+    if cuts == 0:
+        return 4.0 / 3.0 * pi, 4.0 * pi
+    if cuts == 1:
+        height = 1.0 + min(min(depth[0], depth[1]), min(depth[2], depth[3]))
+        return pi * height**2 * (3.0 - height) / 3.0, 2.0 * pi * height
+    volume, surface = 0.0, 0.0
+    for f in range(4):
+        for e in range(3):
+            start, end, third = (
+                place[OTHERS[f, e]],
+                place[OTHERS[f, e - 2]],
+                place[OTHERS[f, e - 1]],
+            )
+            side = _apart(end, start)
+            length = sqrt(_dot(side, side))
+            inward = _cross(normal[f], side)
+            height = -_dot(inward, start) / length
+            if _dot(inward, _apart(third, start)) < 0.0:
+                height = -height
+            area, shadow = _edge(
+                depth[f], height, _dot(side, start) / length, _dot(side, end) / length
+            )
+            volume += (shadow + depth[f] * area) / 3.0
+            surface += shadow
+    return volume, surface
+
+
+@compiled
+def _edge(depth: float, height: float, start: float, end: float) -> tuple[float, float]:
+    """Area of triangle (foot, edge) within the disc, and solid angle of the triangle outside it; start < end.
+
+    The sign of the area is that of `height`, of the angle that of `depth` times `height`.
+    """
+    disc = 1.0 - depth**2
+    if disc <= 0.0:
+        return 0.0, _shadow(1.0, depth, height, start, end)[0]
+    chord = disc - height**2
+    if chord <= 0.0:
+        shadow, turn = _shadow(depth, depth, height, start, end)
+        return 0.5 * disc * turn, shadow
+    enter = min(max(-sqrt(chord), start), end)
+    leave = min(max(sqrt(chord), start), end)
+    before, turn_before = _shadow(depth, depth, height, start, enter)
+    after, turn_after = _shadow(depth, depth, height, leave, end)
+    return 0.5 * (height * (leave - enter) + disc * (turn_before + turn_after)), before + after
+
+
+@compiled
+def _shadow(
+    weight: float, depth: float, height: float, start: float, end: float
+) -> tuple[float, float]:
+    """Solid angle over the part of an edge from `start` to `end`, and the angle this part turns about the foot."""
+    if start == end:
+        return 0.0, 0.0
+    side, away = copysign(1.0, height), abs(height)
+    square = height**2 + depth**2
+    turn = side * (atan2(end, away) - atan2(start, away))
+    tilt = atan2(end * depth, away * sqrt(end**2 + square)) - atan2(
+        start * depth, away * sqrt(start**2 + square)
+    )
+    return weight * turn - side * tilt, turn

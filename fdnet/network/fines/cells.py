@@ -1,0 +1,66 @@
+"""Points in given boxes, found by sorting the points into cubic cells."""
+
+import numpy as np
+
+from fdnet.network.compiled import compiled
+from fdnet.spheres.snapshot import Array
+
+
+def points_in_boxes(point: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """Index of the box and of the point (K,), in order of the boxes, for all `point` (N, 3) with
+    `low` <= point <= `high` (M, 3), m."""
+    if not len(point) or not len(low):
+        return np.zeros(0, np.intp), np.zeros(0, np.intp)
+    start = point.min(axis=0)
+    # as many cells as points at the most
+    edge = max(float(np.ptp(point, axis=0).max()) / len(point) ** (1.0 / 3.0), 1e-300)
+    cell = ((point - start) / edge).astype(np.intp)
+    shape = cell.max(axis=0) + 1
+    flat = np.ravel_multi_index(tuple(cell.T), tuple(shape))
+    order = np.argsort(flat, kind="stable")
+    first = np.concatenate([[0], np.cumsum(np.bincount(flat, minlength=int(shape.prod())))])
+    grid = (start, edge, shape, first)
+    placed = point[order]
+    count = _search(grid, placed, low, high, np.zeros(0, np.intp))
+    box = np.repeat(np.arange(len(low)), count)
+    found = np.empty(len(box), np.intp)
+    _search(grid, placed, low, high, found)
+    return box, order[found]
+
+
+@compiled
+def _search(
+    grid: tuple[Array, float, Array, Array], point: Array, low: Array, high: Array, found: Array
+) -> Array:
+    """Number of points (M,) in each box; writes their indices to `found` where that has room."""
+    start, edge, shape, first = grid
+    count = np.zeros(len(low), np.intp)
+    cell = np.empty((3, 2), np.intp)
+    total = 0
+    for box in range(len(low)):
+        x, y, z, u, v, w = (
+            low[box, 0],
+            low[box, 1],
+            low[box, 2],
+            high[box, 0],
+            high[box, 1],
+            high[box, 2],
+        )
+        for axis in range(3):
+            cell[axis, 0] = int(
+                min(max((low[box, axis] - start[axis]) / edge, 0.0), float(shape[axis]))
+            )
+            cell[axis, 1] = int(
+                min(max((high[box, axis] - start[axis]) / edge + 1.0, 0.0), float(shape[axis]))
+            )
+        before = total
+        for i in range(cell[0, 0], cell[0, 1]):
+            for j in range(cell[1, 0], cell[1, 1]):
+                row = (i * shape[1] + j) * shape[2]
+                for k in range(first[row + cell[2, 0]], first[row + max(cell[2, 1], cell[2, 0])]):
+                    if x <= point[k, 0] <= u and y <= point[k, 1] <= v and z <= point[k, 2] <= w:
+                        if total < len(found):
+                            found[total] = k
+                        total += 1
+        count[box] = total - before
+    return count

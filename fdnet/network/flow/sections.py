@@ -1,0 +1,140 @@
+"""Permeability, porosity and fines by depth: sections (slabs with their own k) and a finer profile."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fdnet.errors import CaseError
+from fdnet.network.flow.flow import Flow
+from fdnet.spheres.porosity import Porosity
+from fdnet.spheres.snapshot import Array, frozen
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """Slab [x_lo, x_hi) m across the flow; k m2.
+
+    `k_initial`, `k_damaged` of the slab cut out, pressure held on its two planes (Shi 2011, section 3.3.1);
+    `k_initial_inplace`, `k_damaged_inplace` from the pressures of the whole specimen, in series they make up the
+    whole; `k_reduction` = 1 - k_damaged / k_initial, None where k_initial is 0. Porosities overlap counted once;
+    `fines_count` fines centred in the slab, `fines_fraction` of all invaded.
+    """
+
+    section: int
+    x_lo: float
+    x_hi: float
+    porosity_initial: float
+    porosity_damaged: float
+    k_initial: float
+    k_damaged: float
+    k_reduction: float | None
+    k_initial_inplace: float
+    k_damaged_inplace: float
+    fines_count: int
+    fines_fraction: float
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Profile:
+    """Finer bins: `edges` (B+1,) m, porosities (B,), `fines_fraction` (B,) of all invaded."""
+
+    edges: Array
+    porosity_initial: Array
+    porosity_damaged: Array
+    fines_fraction: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class SlabK:
+    """k (S,) m2 of the slabs of one state: `cut_out` on its own, `inplace` from the whole specimen's pressures; `flows`
+    through those cut out."""
+
+    cut_out: Array
+    inplace: Array
+    flows: tuple[Flow, ...]
+
+
+def section_edges(sections: int | Sequence[float], box: Array) -> Array:
+    """Edges (S+1,) m of equal slabs, or the given ones. Raises CaseError unless they ascend from face to face."""
+    low, high = float(box[0, 0]), float(box[0, 1])
+    if isinstance(sections, int | np.integer):
+        if sections < 1:
+            raise CaseError(
+                f"analysis.sections: {sections} is not a count of slabs; give 1 or more"
+            )
+        return np.linspace(low, high, int(sections) + 1)
+    edges = np.array(sections, dtype=float)
+    hair = 1e-6 * (high - low)
+    if (
+        len(edges) < 2
+        or np.any(np.diff(edges) <= 0)
+        or abs(edges[0] - low) > hair
+        or abs(edges[-1] - high) > hair
+    ):
+        raise CaseError(
+            f"analysis.sections: edges {edges.tolist()} do not ascend from {low:g} to {high:g} m"
+        )
+    edges[0], edges[-1] = low, high
+    return edges
+
+
+def profile_edges(bin_size: float, box: Array) -> Array:
+    """Edges (B+1,) m of equal bins as near to `bin_size` m as fill the box. Raises CaseError on a bin not above 0."""
+    low, high = float(box[0, 0]), float(box[0, 1])
+    if not bin_size > 0:
+        raise CaseError(f"analysis.profile_bin: {bin_size} m is not above 0; give a bin thickness")
+    return np.linspace(low, high, max(1, round((high - low) / bin_size)) + 1)
+
+
+def make_sections(
+    edges: Array, porosity: tuple[Porosity, Porosity], k: tuple[SlabK, SlabK], depth: Array
+) -> tuple[Section, ...]:
+    """Sections between `edges` (S+1,) from the states before and after, `depth` (F,) x of the invaded fines."""
+    count = np.histogram(depth, edges)[0]
+    share = count / max(len(depth), 1)
+    before, after = (pooled(one, edges) for one in porosity)
+    return tuple(
+        Section(
+            section=s + 1,
+            x_lo=float(edges[s]),
+            x_hi=float(edges[s + 1]),
+            porosity_initial=float(before[s]),
+            porosity_damaged=float(after[s]),
+            k_initial=float(k[0].cut_out[s]),
+            k_damaged=float(k[1].cut_out[s]),
+            k_reduction=reduction(float(k[0].cut_out[s]), float(k[1].cut_out[s])),
+            k_initial_inplace=float(k[0].inplace[s]),
+            k_damaged_inplace=float(k[1].inplace[s]),
+            fines_count=int(count[s]),
+            fines_fraction=float(share[s]),
+        )
+        for s in range(len(edges) - 1)
+    )
+
+
+def make_profile(edges: Array, porosity: tuple[Porosity, Porosity], depth: Array) -> Profile:
+    """Profile between `edges` (B+1,) of porosity before and after, and of the invaded fines at `depth` (F,)."""
+    before, after = (frozen(pooled(one, edges)) for one in porosity)
+    share = np.histogram(depth, edges)[0] / max(len(depth), 1)
+    return Profile(
+        edges=frozen(edges),
+        porosity_initial=before,
+        porosity_damaged=after,
+        fines_fraction=frozen(share),
+    )
+
+
+def pooled(porosity: Porosity, edges: Array) -> Array:
+    """The porosity profile, measured on finer cuts, averaged between `edges`, which are among the cuts."""
+    first, end = (
+        np.searchsorted(porosity.edges, edges[:-1]),
+        np.searchsorted(porosity.edges, edges[-1]),
+    )
+    width, void = np.diff(porosity.edges)[:end], porosity.profile[:end]
+    return np.add.reduceat(width * void, first) / np.add.reduceat(width, first)
+
+
+def reduction(before: float, after: float) -> float | None:
+    """1 - after / before, None where `before` is 0."""
+    return None if before == 0 else 1.0 - after / before

@@ -1,0 +1,200 @@
+"""Pressures and fluxes of links whose conductances differ by any number of decades.
+
+A link (a, b) carries g (p_a - p_b + jump), jumps being whole numbers; node 0 and the first node of every further group
+have pressure 0. Links far more conductive than the way round that their nodes have (their critical conductance: the
+weakest link of the best closed way with a jump) show no pressure difference that a number could hold. Their nodes are
+contracted into one; their fluxes follow from the balance within the contracted group, where the same is done again.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fdnet.network.flow.solver import Balances
+from fdnet.network.flow.winding import groups, heights, winding_groups
+from fdnet.spheres.snapshot import Array
+
+CONTRASTS = (1e8, 1e6, 1e10)
+STEP = 10.0
+SETTLED = 1e-9
+MOST_SWEEPS = 30
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Balance:
+    """`pressure` (n,), `flux` (K,) from first to second end; `defect` sum of what the nodes' balances and the links'
+    own laws are off by, over the throughput: a bound for the relative error of the throughput; `method`."""
+
+    pressure: Array
+    flux: Array
+    defect: float
+    method: str
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Stage:
+    """The links (indices `links`) of one level, between nodes contracted to `label` (n,)."""
+
+    links: Array
+    label: Array
+    free: Array
+    balances: Balances
+
+
+def balance_links(
+    ends: Array, conductance: Array, jump: Array, count: int, *, direct_up_to: int | None = None
+) -> Balance:
+    """Balance of all `count` nodes, every one of them in a group that winds.
+
+    `ends` (K, 2), `conductance` (K,) > 0, `jump` (K,). Solved with a contrast of 1e8 between the levels of stiffness;
+    where links of like conductance fall on both sides of that border and the sweeps do not settle, with another. The
+    best is returned, its `defect` for the caller to judge. `direct_up_to` nodes: see `Balances`.
+    """
+    found = []
+    for contrast in CONTRASTS:
+        level = stiffness(ends, conductance, jump, count, contrast=contrast)
+        found.append(_balance(ends, conductance, jump, (level, count), direct_up_to))
+        if found[-1].defect <= SETTLED or not level.any():
+            break
+    return min(found, key=lambda one: one.defect)
+
+
+def _balance(
+    ends: Array,
+    conductance: Array,
+    jump: Array,
+    levels: tuple[Array, int],
+    direct_up_to: int | None,
+) -> Balance:
+    """Level by level, then again with what is left over: the imbalances, and the pressure differences within the
+    contracted groups, which the links beside them had not seen. Fluxes add up by increments, never as differences of
+    nearly equal pressures. `levels`: that of each link (K,), and the number of nodes."""
+    level, count = levels
+    stiff = level > 0
+    height = (
+        heights(ends[stiff], jump[stiff], groups(ends[stiff], count))
+        if stiff.any()
+        else np.zeros(count)
+    )
+    drive = jump + _difference(height, ends)
+    level = _with_those_beside(ends, level, count)
+    parts = [_contracted(ends, level, at, count) for at in range(int(level.max(initial=0)) + 1)]
+    stages = [_stage(ends, conductance, part, direct_up_to) for part in parts]
+    pressure, flux, defect, allowed = height, np.zeros(len(ends)), np.inf, None
+    for _ in range(MOST_SWEEPS):
+        step, gain, drive = _sweep(
+            stages, ends, conductance, drive, (_net(ends, flux, count), allowed)
+        )
+        pressure, flux = pressure + step, flux + gain
+        before, defect = (
+            defect,
+            _defect(_net(ends, flux, count), conductance * drive, float(flux @ jump)),
+        )
+        allowed = 0.3 * SETTLED * abs(float(flux @ jump))
+        if defect <= SETTLED or not defect < 0.7 * before:
+            break
+    return Balance(
+        pressure=pressure - pressure[0], flux=flux, defect=defect, method=stages[0].balances.method
+    )
+
+
+def stiffness(
+    ends: Array, conductance: Array, jump: Array, count: int, *, contrast: float = CONTRASTS[0]
+) -> Array:
+    """Level (K,) of each link: 0 up to `contrast` times the critical conductance of its nodes, 1 up to its square, and
+    so on.
+
+    A node's critical conductance is the greatest at which the links as good or better still join it to a closed way
+    with a jump (Ambegaokar, Halperin and Langer 1971), found within a factor of 10. No more than a few times that,
+    per unit of drive, flows through the node, so a link of level 1 takes some 1 / contrast of the drive at most.
+    """
+    level = np.zeros(len(ends), int)
+    lowest, highest = float(conductance.min(initial=1.0)), float(conductance.max(initial=1.0))
+    if highest <= contrast * lowest:
+        return level
+    critical, bound = np.zeros(count), highest / contrast
+    while True:
+        strong = conductance >= bound
+        winds = winding_groups(ends[strong], jump[strong], count)[1]
+        critical[winds & (critical == 0)] = bound
+        if bound <= lowest or np.all(critical > 0):
+            break
+        bound = max(min(bound / STEP, float(conductance[~strong].max())), lowest)
+    ratio = conductance / np.maximum(critical[ends[:, 0]], critical[ends[:, 1]])
+    return np.maximum(np.ceil(np.log(ratio) / np.log(contrast)).astype(int) - 1, 0)
+
+
+def _with_those_beside(ends: Array, level: Array, count: int) -> Array:
+    """The levels (K,), where a link between nodes that higher levels contract into one is raised to these."""
+    level = level.copy()
+    for at in range(int(level.max(initial=0))):
+        label = groups(ends[level > at], count)
+        level[(level == at) & (label[ends[:, 0]] == label[ends[:, 1]])] = at + 1
+    return level
+
+
+def _contracted(ends: Array, level: Array, at: int, count: int) -> tuple[Array, Array]:
+    """The links of level `at`, and the nodes' labels where all higher levels are contracted."""
+    return np.flatnonzero(level == at), groups(ends[level > at], count)
+
+
+def _stage(
+    ends: Array, conductance: Array, contracted: tuple[Array, Array], direct_up_to: int | None
+) -> _Stage:
+    links, label = contracted
+    pair, size = label[ends[links]], int(label.max(initial=-1)) + 1
+    free = np.ones(size, bool)
+    free[np.unique(groups(pair, size), return_index=True)[1]] = False
+    index = np.cumsum(free) - 1
+    own = conductance[links]
+    tied = np.zeros(int(free.sum()))
+    for side in (0, 1):
+        held = free[pair[:, side]] & ~free[pair[:, 1 - side]]
+        tied += np.bincount(index[pair[held, side]], weights=own[held], minlength=len(tied))
+    inner = np.all(free[pair], axis=1)
+    balances = Balances(index[pair[inner]], own[inner], tied, direct_up_to=direct_up_to)
+    return _Stage(links=links, label=label, free=free, balances=balances)
+
+
+def _sweep(
+    stages: list[_Stage],
+    ends: Array,
+    conductance: Array,
+    drive: Array,
+    state: tuple[Array, float | None],
+) -> tuple[Array, Array, Array]:
+    """Increments of pressure (n,) and flux (K,) for what drives the links and what the nodes lack, and the drive
+    (K,) that the levels within have since set up for the links above. `state` is the net flux (n,) out of each node
+    and the sum of imbalances that may stay."""
+    net, allowed = state
+    flux, late, steps = np.zeros(len(ends)), np.zeros(len(ends)), []
+    for stage in stages:
+        own, pushed = conductance[stage.links], drive[stage.links]
+        net = net + _net(ends[stage.links], own * pushed, len(net))
+        lack = np.bincount(stage.label, weights=-net, minlength=len(stage.free))
+        found = np.zeros(len(stage.free))
+        found[stage.free] = stage.balances.solve(lack[stage.free], imbalance=allowed)
+        steps.append(found[stage.label])
+        gain = own * _difference(steps[-1], ends[stage.links])
+        net = net + _net(ends[stage.links], gain, len(net))
+        flux[stage.links] = gain + own * pushed
+    for at, stage in enumerate(stages):
+        for step in steps[at + 1 :]:
+            late[stage.links] += _difference(step, ends[stage.links])
+    return np.sum(steps, axis=0), flux, late
+
+
+def _difference(pressure: Array, ends: Array) -> Array:
+    return pressure[ends[:, 0]] - pressure[ends[:, 1]]
+
+
+def _net(ends: Array, flux: Array, count: int) -> Array:
+    """Net flux (n,) out of each node."""
+    return np.bincount(ends[:, 0], weights=flux, minlength=count) - np.bincount(
+        ends[:, 1], weights=flux, minlength=count
+    )
+
+
+def _defect(net: Array, late: Array, throughput: float) -> float:
+    off = float(np.abs(net).sum() + np.abs(late).sum())
+    return off / throughput if throughput > 0 else np.inf

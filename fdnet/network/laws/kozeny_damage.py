@@ -1,0 +1,146 @@
+"""Local Kozeny factors of the fines: per pore, and per side of a throat."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fdnet.network.fines.occupancy import Occupancy, ratio
+from fdnet.network.laws.damage import BLOCKED, CLEAN, KOZENY, Damage
+from fdnet.network.laws.lubrication import half_resistances
+from fdnet.network.laws.pyramids import side_voids
+from fdnet.network.network import Network
+from fdnet.spheres.snapshot import Array, frozen
+
+
+def kozeny_damage(
+    network: Network,
+    occupancy: Occupancy,
+    clean: Array,
+    *,
+    threshold: float | None = None,
+    middle_band: str = "threshold",
+) -> Damage:
+    """Local Kozeny factor per pore, (1 - v)^3 / (1 + a)^2, harmonic mean of a throat's two pores on its conductance.
+
+    v = volume of fines / void, a = surface of fines / wall, in the tetrahedron (k ~ porosity^3 / surface^2, Kozeny
+    1927, Carman 1937); pores of one `pore_group` are taken together. A pore whose fines fill it (v >= 1) is closed and
+    counted. `threshold` and `middle_band` play no part here.
+    """
+    del threshold, middle_band
+    deposit = _pore_deposit(network, occupancy)
+    taken, filled = deposit.taken, deposit.filled
+    factor = np.where(filled, 0.0, _kozeny(deposit.volume, deposit.surface))
+    first, second = factor[network.throat_pores].T
+    both = ratio(2.0 * first * second, first + second)
+    law = _law_used(np.any(taken[network.throat_pores], axis=1), both)
+    return Damage(
+        conductance=frozen(clean * both), law_used=law, counts={"pores_filled": int(filled.sum())}
+    )
+
+
+def side_kozeny_damage(
+    network: Network,
+    occupancy: Occupancy,
+    clean: Array,
+    *,
+    threshold: float | None = None,
+    middle_band: str = "threshold",
+) -> Damage:
+    """Local Kozeny factor per side of a throat, (1 - s v)^3 / (1 + a)^2, on that side's share of the resistance.
+
+    The sides are the pyramids from the facet to the power centres; their clean resistances R are those of
+    `half_resistances`, so the throat keeps (R1 + R2) / (R1 / f1 + R2 / f2) of its clean conductance. v and a as in
+    `kozeny_damage`, taken in the side where a fine is much smaller than a quarter of the pore's void and in the whole
+    pore where it is larger: weight 1 / (1 + (4 V_fine / void)^2) on the side. s = 1 - (1 - t)^2 is the share of a
+    round tube's section (radius twice the pack's hydraulic radius, void / wall) within the fines' layer on its wall, t
+    the layer's thickness over that radius, at most 1: a film takes up the slow part of the void only, a bed and fines
+    as large as the tube all of it. Nothing is fitted. Fines deeper inside a grain than their radius make no layer
+    (`layers_within_grains`, t = 0) and count by their surface alone. A side or pore whose fines fill it (v >= 1) is
+    closed and counted. `threshold` and `middle_band` play no part here.
+    """
+    del threshold, middle_band
+    pore = _pore_deposit(network, occupancy)
+    ends = network.throat_pores
+    void, wall = side_voids(network)
+    open_side = (network.throat_heights > 0) & (void > 0) & (wall > 0)
+    own = np.where(open_side, 1.0 / (1.0 + (4.0 * ratio(pore.fine, pore.void))[ends] ** 2), 0.0)
+    volume = (
+        own * ratio(occupancy.side_solid_volume, np.where(open_side, void, 0.0))
+        + (1.0 - own) * pore.volume[ends]
+    )
+    surface = own * ratio(occupancy.side_solid_surface, np.where(open_side, wall, 0.0))
+    surface += (1.0 - own) * pore.surface[ends]
+    share = 1.0 - (1.0 - np.clip(pore.layer / (2.0 * _hydraulic_radius(network)), 0.0, 1.0)) ** 2
+    filled = (volume >= 1.0) | pore.filled[ends]
+    factor = np.where(filled, 0.0, _kozeny(np.minimum(volume, 1.0), surface, share[ends]))
+    kept = _kept(half_resistances(network), factor)
+    counts = {
+        "pores_filled": int(pore.filled.sum()),
+        "sides_filled": int(filled.sum()),
+        "layers_within_grains": int(np.sum(pore.layer < 0)),
+    }
+    law = _law_used(np.any(volume > 0, axis=1), kept)
+    return Damage(conductance=frozen(clean * kept), law_used=law, counts=counts)
+
+
+def _law_used(taken: Array, kept: Array) -> Array:
+    """Names (T,): clean without fines, blocked where nothing is `kept`, else kozeny."""
+    return frozen(np.where(~taken, CLEAN, np.where(kept == 0, BLOCKED, KOZENY)).astype("<U10"))
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _PoreDeposit:
+    """Per pore (P,), pores of one group together: fines' `volume` over void and `surface` over wall (0 where filled),
+    `void` m3, mean volume of a `fine` m3, `layer` m thick on the wall, whether `taken` and whether `filled`."""
+
+    volume: Array
+    surface: Array
+    void: Array
+    fine: Array
+    layer: Array
+    taken: Array
+    filled: Array
+
+
+def _pore_deposit(network: Network, occupancy: Occupancy) -> _PoreDeposit:
+    group = network.pore_group
+    solid = occupancy.pore_solid_volume
+    held, surface, void, wall, fine, layer = (
+        np.bincount(group, weights=weights)[group]
+        for weights in (
+            solid,
+            occupancy.pore_solid_surface,
+            network.pore_volume,
+            network.pore_wall_surface,
+            solid * occupancy.pore_fine_volume,
+            solid * occupancy.pore_layer,
+        )
+    )
+    taken = held > 0
+    filled = taken & ((void <= 0) | (wall <= 0) | (held >= void))
+    safe = taken & ~filled
+    return _PoreDeposit(
+        volume=ratio(np.where(safe, held, 0.0), void),
+        surface=ratio(np.where(safe, surface, 0.0), wall),
+        void=void,
+        fine=ratio(fine, held),
+        layer=ratio(layer, held),
+        taken=taken,
+        filled=filled,
+    )
+
+
+def _kozeny(volume: Array, surface: Array, share: Array | float = 1.0) -> Array:
+    return (1.0 - share * volume) ** 3 / (1.0 + surface) ** 2
+
+
+def _hydraulic_radius(network: Network) -> float:
+    return float(np.sum(np.maximum(network.pore_volume, 0.0)) / np.sum(network.pore_wall_surface))
+
+
+def _kept(resistance: Array, factor: Array) -> Array:
+    """Share (T,) of the conductance left of two resistances (T, 2) in series, each divided by its factor (T, 2)."""
+    resistance = np.where(np.isfinite(resistance), resistance, 0.0)
+    shut = np.any((factor == 0) & (resistance > 0), axis=1)
+    raised = np.sum(resistance / np.where(factor > 0, factor, 1.0), axis=1)
+    return np.where(shut, 0.0, ratio(resistance.sum(axis=1), raised))

@@ -1,0 +1,120 @@
+"""Axial flow through one right-angled wedge of a throat's section: half of a disc's share on one edge.
+
+The wedge has its tip at the disc's centre, one side of length h along the edge to the neighbour's side of the gap, the
+far side perpendicular to it, and the angle phi at the tip. The disc (radius rho) holds the fluid still; the straight
+sides carry no shear. The flux of laplacian(w) = -1 over h^4 depends on phi and x = rho / h alone.
+
+`ray_flux` neglects shear between neighbouring rays: on each ray the annulus of Happel (1959) with its free surface at
+the far side, an upper bound. `exact_flux` is the series of Sparrow and Loeffler (1959, AIChE J. 5, 325), least squares
+on the far side. Their ratio varies slowly; `ratio_table` reads it from wedge.csv, which
+`python -m fdnet.network.laws.wedge` writes anew.
+"""
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from fdnet.network.compiled import compiled
+from fdnet.spheres.snapshot import Array
+
+TABLE = Path(__file__).with_name("wedge.csv")
+STEEPEST = np.radians(84.0)
+ANGLES = np.linspace(0.0, STEEPEST, 43)
+DISCS = np.linspace(0.0, 1.0, 21)
+THINNEST = 0.02
+
+
+@compiled
+def ray_flux(angle: float, slope: float, disc: float) -> float:
+    """Flux over h^4 of a wedge of `angle` with tangent `slope`, `disc` = rho / h; a disc beyond the side (overlap)
+    leaves the rays open that leave it. Closed form of the integral of
+    (4 d^4 ln(d / rho) - 3 d^4 + 4 d^2 rho^2 - rho^4) / 16 over the angle, d = h / cos(angle)."""
+    whole = _antiderivative(angle, slope, disc)
+    if disc <= 1.0:
+        return whole
+    first = np.arccos(1.0 / disc)
+    if angle <= first:
+        return 0.0
+    return whole - _antiderivative(first, np.sqrt(disc * disc - 1.0), disc)
+
+
+@compiled
+def _antiderivative(angle: float, slope: float, disc: float) -> float:
+    square = slope * slope
+    secant4 = slope * (1.0 + square / 3.0)
+    log_secant = 0.5 * np.log1p(square)
+    spread = (
+        secant4 * (log_secant - np.log(disc)) - (slope - angle) * 2.0 / 3.0 - slope * square / 9.0
+    )
+    return (4.0 * spread - 3.0 * secant4 + 4.0 * disc**2 * slope - disc**4 * angle) / 16.0
+
+
+@compiled
+def shear_ratio(angle: float, disc: float, table: Array) -> float:
+    """exact_flux / ray_flux, bilinear in `table`; steeper wedges than the table's take its last row."""
+    rows, columns = table.shape
+    row = min(angle / STEEPEST, 1.0) * (rows - 1)
+    column = min(disc, 1.0) * (columns - 1)
+    i, j = min(int(row), rows - 2), min(int(column), columns - 2)
+    u, v = row - i, column - j
+    low = (1.0 - v) * table[i, j] + v * table[i, j + 1]
+    high = (1.0 - v) * table[i + 1, j] + v * table[i + 1, j + 1]
+    return (1.0 - u) * low + u * high
+
+
+@lru_cache(maxsize=1)
+def ratio_table() -> Array:
+    """exact_flux / ray_flux at ANGLES (rows) and DISCS (columns)."""
+    return np.loadtxt(TABLE, delimiter=",")
+
+
+def exact_flux(angle: float, disc: float, *, terms: int = 24, points: int = 300) -> float:
+    """Flux over h^4 for 0 < angle < pi / 2, 0 < disc <= 1; good to 1e-4 up to 60 degrees, 1e-2 at 80."""
+    place = 0.5 * (1.0 - np.cos(np.pi * (np.arange(points) + 0.5) / points))
+    height = place * np.tan(angle)
+    reach, turn = np.hypot(1.0, height), np.arctan2(height, 1.0)
+    order = np.pi / angle * np.arange(1, int(min(terms, max(6, 40.0 * angle / np.pi))) + 1)
+    longest = 1.0 / np.cos(angle)
+    log_term = (0.5 * np.tan(angle) - 0.5 * disc**2 * angle) / angle + 0.5 * disc**2
+    outward = reach[:, None] ** (order - 1.0) * np.cos((order - 1.0) * turn[:, None])
+    inward = (
+        disc ** (2.0 * order)
+        * reach[:, None] ** (-order - 1.0)
+        * np.cos((order + 1.0) * turn[:, None])
+    )
+    slopes = order * (outward + inward) / longest**order
+    wanted = np.cos(turn) * (0.5 * reach - log_term / reach)
+    weight = np.sqrt(np.sin(np.pi * (np.arange(points) + 0.5) / points))
+    factor = np.linalg.lstsq(slopes * weight[:, None], wanted * weight, rcond=1e-13)[0]
+    return _total(angle, disc, log_term, order, factor, longest)
+
+
+def _total(
+    angle: float, disc: float, log_term: float, order: Array, factor: Array, longest: float
+) -> float:
+    point, weight = np.polynomial.legendre.leggauss(48)
+    turn = 0.5 * angle * (1.0 + point)[:, None]
+    depth = 1.0 / np.cos(turn) - disc
+    r = disc + 0.5 * depth * (1.0 + point)
+    speed = 0.25 * (disc**2 - r**2) + log_term * np.log(r / disc)
+    for one, by in zip(order, factor, strict=True):
+        speed += (
+            by
+            * ((r / longest) ** one - (disc / longest) ** one * (disc / r) ** one)
+            * np.cos(one * turn)
+        )
+    return float(np.sum(0.25 * angle * weight[:, None] * weight * depth * speed * r))
+
+
+def make_table() -> Array:
+    """The ratios of `ratio_table`, computed; 1 for a wedge without width."""
+    table = np.ones((len(ANGLES), len(DISCS)))
+    for i, angle in enumerate(ANGLES[1:], start=1):
+        for j, disc in enumerate(np.maximum(DISCS, THINNEST)):
+            table[i, j] = exact_flux(angle, disc) / ray_flux(angle, np.tan(angle), disc)
+    return table
+
+
+if __name__ == "__main__":
+    np.savetxt(TABLE, make_table(), delimiter=",", fmt="%.6f")

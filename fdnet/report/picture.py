@@ -1,0 +1,181 @@
+"""The 3-D picture of a sphere file. Runs as a process of its own (see vtk.render_spheres_png), for OpenGL may kill it.
+
+Usage: python -m fdnet.report.picture SPHERES.vtp --box=x0,x1,y0,y1,z0,z1 PICTURE.png     bounds in m
+"""
+
+import sys
+from typing import Any
+
+import numpy as np
+
+from fdnet.spheres.snapshot import Array, Kind
+
+MM, MICRON = 1e3, 1e6
+WINDOW = [1500, 950]
+UPSTREAM_SHOWN = 0.12
+FACETS = (
+    6e5  # about half the triangles all fines together may have: memory and time of the picture
+)
+FACE_COLOUR = "#0072B2"
+
+
+def render(source: str, box: Array, target: str) -> None:
+    """Draw `source` into `target`: the grains of the far half grey, the fines in colour, axes in mm.
+
+    Fines further upstream than `UPSTREAM_SHOWN` of the length stay out of the picture.
+    """
+    import pyvista as pv
+
+    spheres = pv.read(source)
+    bounds = box * MM
+    plotter: Any = pv.Plotter(off_screen=True, window_size=WINDOW)
+    plotter.set_background("white")
+    _add_grains(plotter, spheres, bounds)
+    _add_fines(plotter, spheres, bounds)
+    _add_frame(plotter, bounds)
+    _look(plotter, bounds)
+    plotter.screenshot(target)
+    plotter.close()
+
+
+def _balls(spheres: Any, mask: Array, resolution: int) -> Any:
+    """Spheres as triangles in mm, carrying `radius` in um and `depth` in mm."""
+    import pyvista as pv
+
+    points = pv.PolyData(spheres.points[mask] * MM)
+    radius = spheres.point_data["radius"][mask]
+    points.point_data["diameter"] = 2 * radius * MM
+    points.point_data["radius_um"] = radius * MICRON
+    points.point_data["depth_mm"] = points.points[:, 0]
+    ball = pv.Sphere(radius=0.5, theta_resolution=resolution, phi_resolution=resolution)
+    return points.glyph(geom=ball, scale="diameter", orient=False)
+
+
+def _add_grains(plotter: Any, spheres: Any, bounds: Array) -> None:
+    far = (spheres.point_data["kind"] == Kind.GRAIN) & (
+        spheres.points[:, 1] * MM > bounds[1].mean()
+    )
+    if far.any():
+        plotter.add_mesh(
+            _balls(spheres, far, 32), color="#E2E2E2", smooth_shading=True, ambient=0.15
+        )
+
+
+def _add_fines(plotter: Any, spheres: Any, bounds: Array) -> None:
+    """Coloured by radius, or by depth when they are (nearly) of one size."""
+    shown = spheres.points[:, 0] * MM > bounds[0, 0] - UPSTREAM_SHOWN * np.ptp(bounds[0])
+    mask = (spheres.point_data["kind"] == Kind.FINE) & shown
+    if not mask.any():
+        return
+    radius = spheres.point_data["radius"][mask]
+    name, title, limits = (
+        "radius_um",
+        "fines, radius (µm)",
+        [radius.min() * MICRON, radius.max() * MICRON],
+    )
+    if np.ptp(radius) < 0.02 * radius.max():
+        deepest = min(spheres.points[mask, 0].max() * MM, bounds[0, 1])
+        name, title, limits = (
+            "depth_mm",
+            "fines, depth (mm)",
+            [bounds[0, 0], max(deepest, 0.1 * bounds[0, 1])],
+        )
+    balls = _balls(spheres, mask, int(np.clip(np.sqrt(FACETS / mask.sum()), 5, 16)))
+    bar = {
+        "title": title,
+        "color": "black",
+        "title_font_size": 22,
+        "label_font_size": 22,
+        "fmt": "%.3g",
+        "n_labels": 5,
+        "vertical": True,
+        "position_x": 0.88,
+        "position_y": 0.15,
+        "width": 0.07,
+        "height": 0.65,
+    }
+    plotter.add_mesh(
+        balls, scalars=name, clim=limits, cmap="plasma", smooth_shading=True, scalar_bar_args=bar
+    )
+
+
+def _add_frame(plotter: Any, bounds: Array) -> None:
+    import pyvista as pv
+
+    (x0, x1), (y0, y1), (z0, z1) = bounds
+    plotter.add_mesh(
+        pv.Box((x0, x1, y0, y1, z0, z1)), style="wireframe", color="black", line_width=2
+    )
+    face = pv.Plane(
+        center=(x0, (y0 + y1) / 2, (z0 + z1) / 2),
+        direction=(1, 0, 0),
+        i_size=z1 - z0,
+        j_size=y1 - y0,
+        i_resolution=1,
+        j_resolution=1,
+    )
+    plotter.add_mesh(
+        face,
+        color=FACE_COLOUR,
+        opacity=0.18,
+        show_edges=True,
+        edge_color=FACE_COLOUR,
+        line_width=3,
+    )
+    plotter.add_point_labels(
+        [(x0, y1, z1 + 0.12 * (z1 - z0))],
+        ["formation face x = 0"],
+        font_size=22,
+        text_color=FACE_COLOUR,
+        shape=None,
+        show_points=False,
+        always_visible=True,
+    )
+    plotter.show_bounds(
+        bounds=(x0, x1, y0, y1, z0, z1),
+        xtitle="x (mm)",
+        ytitle="y (mm)",
+        ztitle="z (mm)",
+        color="black",
+        font_size=18,
+        location="outer",
+        grid=False,
+        fmt="%.1f",
+        n_xlabels=5,
+        n_ylabels=3,
+        n_zlabels=3,
+    )
+
+
+def _look(plotter: Any, bounds: Array) -> None:
+    """From the front, a little from upstream and above; the projected box fills the window left of the scalar bar."""
+    toward = np.array([-1.1, -1.9, 0.9]) / np.linalg.norm([-1.1, -1.9, 0.9])
+    right = np.cross([0.0, 0.0, 1.0], toward)
+    right /= np.linalg.norm(right)
+    up = np.cross(toward, right)
+    corners = np.stack(np.meshgrid(*bounds), axis=-1).reshape(-1, 3) - bounds.mean(axis=1)
+    width, height = np.ptp(corners @ right), np.ptp(corners @ up)
+    scale = max(
+        0.62 * height, 0.7 * width * WINDOW[1] / WINDOW[0]
+    )  # half the height of the window, mm
+    focus = bounds.mean(axis=1) + 0.08 * scale * WINDOW[0] / WINDOW[1] * right - 0.05 * scale * up
+    distance = 4.6 * scale  # the axis labels grow with it
+    plotter.camera_position = [tuple(focus + distance * toward), tuple(focus), (0, 0, 1)]
+    plotter.enable_parallel_projection()
+    plotter.camera.parallel_scale = scale
+    plotter.reset_camera_clipping_range()
+
+
+def main(arguments: list[str]) -> None:
+    source, bounds, target = arguments
+    render(
+        source,
+        np.array([float(value) for value in bounds.removeprefix("--box=").split(",")]).reshape(
+            3, 2
+        ),
+        target,
+    )
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

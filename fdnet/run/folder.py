@@ -1,0 +1,262 @@
+"""A run folder: who may write into it, which stages are done, and when it is complete."""
+
+import fcntl
+import json
+import os
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fdnet.atomic import write_text
+from fdnet.case.case import Case
+from fdnet.errors import CaseError
+
+STAGES = ("pack", "invade", "analyse", "report")
+RECORD_FORMAT = 1
+MANIFEST, CASE, LOCK, UNFINISHED = "manifest.json", "case.toml", ".lock", ".unfinished"
+_RECORDS = {"pack": "pack/stage.json", "invade": "invade/stage.json"}
+_OUTPUTS = {
+    "pack": ("pack",),
+    "invade": ("invade",),
+    "analyse": (
+        "spheres_initial.csv",
+        "spheres_damaged.csv",
+        "sections.csv",
+        "profile.csv",
+        "pores.csv",
+        "throats.csv",
+        "summary.json",
+    ),
+    "report": (
+        "figures",
+        "frames",
+        "network.vtp",
+        "spheres_initial.vtp",
+        "spheres_damaged.vtp",
+        "spheres.pvd",
+        "invasion.pvd",
+        "report.html",
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunFolder:
+    """A folder this process holds the lock of; `was_empty` before, `made` with these folders, innermost first."""
+
+    path: Path
+    lock: int
+    was_empty: bool
+    made: tuple[Path, ...]
+
+    def record(self, stage: str) -> dict[str, Any] | None:
+        """What a finished stage (pack, invade) left behind, or None. Raises CaseError when it cannot be understood."""
+        return read_record(self.path, stage)
+
+    def finish(self, stage: str, record: dict[str, Any]) -> None:
+        """Mark a stage as done; the record's presence means whole."""
+        write_json(self.path / _RECORDS[stage], record)
+
+    def manifest(self) -> dict[str, Any] | None:
+        """The manifest of an analysed run, or None. Raises CaseError when it or what it lists is damaged."""
+        manifest = _read_record(self.path / MANIFEST)
+        missing = (
+            []
+            if manifest is None
+            else [
+                name
+                for stage in ("pack", "invade", "analyse")
+                for name in _expected(manifest, stage)
+                if not (self.path / name).exists()
+            ]
+        )
+        if missing:
+            raise CaseError(
+                f"{self.path}: {MANIFEST} says complete, but {missing[0]} is missing; start over with --force"
+            )
+        return manifest
+
+    def holds(self, case: Case, stages: tuple[str, ...]) -> bool:
+        """Whether every one of `stages` is done already. Raises CaseError as `manifest` and `record` do."""
+        manifest = self.manifest()
+        if manifest is not None:
+            return set(stages) <= set(manifest["stages"])
+        needed = [stage for stage in stages if stage != "invade" or case.fines]
+        return set(needed) <= set(_RECORDS) and all(
+            self.record(stage) is not None for stage in needed
+        )
+
+    def complete(self, manifest: dict[str, Any] | None) -> None:
+        """End this session well; a manifest (None: not analysed yet) makes the run complete."""
+        if manifest is not None:
+            write_json(self.path / MANIFEST, {"format": RECORD_FORMAT} | manifest)
+        (self.path / UNFINISHED).unlink(missing_ok=True)
+
+    def clear(self, stages: tuple[str, ...]) -> None:
+        """Remove the outputs of these stages; the manifest goes first, so a half-cleared run is never complete."""
+        (self.path / MANIFEST).unlink(missing_ok=True)
+        for name in (name for stage in stages for name in _OUTPUTS[stage]):
+            _remove(self.path / name)
+
+    def discard(self) -> str:
+        """Bad input leaves nothing behind: a new folder is as before, unless a stage was finished in it.
+
+        Returns what could not be cleared, in words; "" when all could.
+        """
+        if not self.was_empty or any((self.path / name).exists() for name in _RECORDS.values()):
+            return ""
+        try:
+            for child in list(self.path.iterdir()):
+                _remove(child)
+            for folder in self.made:
+                if any(folder.iterdir()):
+                    break
+                folder.rmdir()
+        except OSError as error:
+            return (
+                f"{self.path} could not be cleared ({error.strerror}): remove what is left in it"
+            )
+        return ""
+
+    def close(self) -> None:
+        """Give the lock back."""
+        os.close(self.lock)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _expected(manifest: dict[str, Any], stage: str) -> tuple[str, ...]:
+    """Files that must exist when `stage` is listed as done."""
+    if stage not in manifest["stages"] or (stage == "invade" and manifest["invade"] is None):
+        return ()
+    return (_RECORDS[stage],) if stage in _RECORDS else _OUTPUTS[stage]
+
+
+def open_folder(
+    path: Path, case: Case, *, stages: tuple[str, ...], resume: bool, force: bool
+) -> RunFolder:
+    """Lock the folder for this case, making it if need be, and write case.toml if anything is left to run.
+
+    Raises CaseError, with nothing changed, when a stage asked for lacks its forerunner, when another run is writing
+    there, when the folder holds another case or an unfinished run and neither resume nor force was asked for, or when
+    it holds something that is not a run.
+    """
+    _refuse_foreign(path)
+    _refuse_gap(path, case, stages)
+    made = tuple(folder for folder in (path, *path.parents) if not folder.exists())
+    was_empty = bool(made) or not any(path.iterdir())
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        lock = os.open(path / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+    except OSError as error:
+        raise CaseError(
+            f"{path}: cannot be made or written: {error.strerror}; give another --out"
+        ) from error
+    folder = RunFolder(path=path, lock=lock, was_empty=was_empty, made=made)
+    try:
+        _take_lock(folder)
+        _admit(folder, case, stages, resume, force)
+    except BaseException:
+        folder.close()
+        raise
+    return folder
+
+
+def _take_lock(folder: RunFolder) -> None:
+    try:
+        fcntl.flock(folder.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        raise CaseError(
+            f"{folder.path}: another fdnet run is writing here; wait for it or give another --out"
+        ) from error
+
+
+def _refuse_foreign(path: Path) -> None:
+    """A case.toml alone does not make a folder ours: it may be the user's."""
+    if path.exists() and not path.is_dir():
+        raise CaseError(f"{path}: is a file, expected a folder for --out")
+    ours = any((path / name).exists() for name in (LOCK, MANIFEST, *_RECORDS.values()))
+    if path.is_dir() and not ours and any(path.iterdir()):
+        raise CaseError(
+            f"{path}: is not empty and holds no fdnet run; give another --out (nothing was changed)"
+        )
+
+
+def _refuse_gap(path: Path, case: Case, stages: tuple[str, ...]) -> None:
+    needed = ["pack"] * (stages != ("pack",)) + ["invade"] * (
+        bool(case.fines) and bool({"analyse", "report"} & set(stages))
+    )
+    for stage in needed:
+        if stage not in stages and not (path / _RECORDS[stage]).exists():
+            what = "pack" if stage == "pack" else "invasion"
+            raise CaseError(
+                f"{path}: no finished {what} here; run the stage {stage} first (--stages {stage},...)"
+            )
+
+
+def _admit(
+    folder: RunFolder, case: Case, stages: tuple[str, ...], resume: bool, force: bool
+) -> None:
+    written = folder.path / CASE
+    if force:
+        _force(folder, case, stages)
+    elif written.exists() and not case.same_specimen(written.read_bytes()):
+        raise CaseError(
+            f"{folder.path}: holds a run of another case (see {written}); give another --out, or --force to replace it"
+        )
+    elif (folder.path / UNFINISHED).exists() and not resume:
+        raise CaseError(
+            f"{folder.path}: holds an unfinished run; continue it with --resume or start over with --force"
+        )
+    if force or folder.manifest() is None:
+        write_text(folder.path / UNFINISHED, " ".join(stages) + "\n")
+    if force or not written.exists() or not folder.holds(case, stages):
+        write_text(written, case.toml())
+
+
+def _force(folder: RunFolder, case: Case, stages: tuple[str, ...]) -> None:
+    """Clear the stages asked for and every later one. Refused when a kept earlier one belongs to another case."""
+    first = min(STAGES.index(stage) for stage in stages)
+    for stage in _RECORDS:
+        if STAGES.index(stage) >= first:
+            continue
+        record = folder.record(stage)
+        if record is not None and record["digest"] != case.digest(stage):
+            raise CaseError(
+                f"{folder.path / stage}: belongs to another case; add {stage} to --stages, or give another --out "
+                "(nothing was changed)"
+            )
+    folder.clear(STAGES[first:])
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write a mapping as JSON, whole or not at all."""
+    write_text(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
+
+
+def read_record(folder: Path, stage: str) -> dict[str, Any] | None:
+    """What a finished stage (pack, invade) of the run in `folder` left behind, or None.
+
+    Raises CaseError when it cannot be understood.
+    """
+    return _read_record(folder / _RECORDS[stage])
+
+
+def _read_record(path: Path) -> dict[str, Any] | None:
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        raise CaseError(f"{path}: cannot be read ({error}); start over with --force") from error
+    if not isinstance(record, dict) or record.get("format") != RECORD_FORMAT:
+        raise CaseError(
+            f"{path}: is no record of this fdnet (format {RECORD_FORMAT} expected); start over with --force"
+        )
+    return record

@@ -1,0 +1,143 @@
+"""What stages leave behind for later ones, for resuming and for the manifest."""
+
+import hashlib
+import platform
+import sys
+from importlib import metadata
+from typing import Any
+
+from fdnet.case.case import Case
+from fdnet.dem.invasion import Invasion
+from fdnet.dem.liggghts import KNOWN_VERSION, Run
+from fdnet.dem.overlap import Deepest, overlap_text
+from fdnet.dem.packing import Pack
+from fdnet.run.folder import RECORD_FORMAT
+
+OVERLAP_WARNING, POROSITY_WARNING = 0.03, 0.02
+_PACKAGES = (
+    "fdnet",
+    "numpy",
+    "scipy",
+    "pandas",
+    "jinja2",
+    "pyvista",
+    "matplotlib",
+    "pydantic",
+    "overlap",
+    "pymetis",
+)
+
+
+def pack_record(case: Case, pack: Pack, assumed: float, seconds: float) -> dict[str, Any]:
+    """pack/stage.json: how the pack was reached."""
+    return {
+        "format": RECORD_FORMAT,
+        "digest": case.digest("pack"),
+        "seconds": seconds,
+        "porosity_assumed": assumed,
+        "porosity": pack.porosity,
+        "porosity_error": pack.porosity_error,
+        "porosity_sum": pack.porosity_sum,
+        "max_overlap": pack.max_overlap,
+        "creep_m_s": pack.creep,
+        "steps": pack.steps,
+        "dt_s": pack.step_s,
+        "attempts": list(pack.attempts),
+        "runs": [run_record(pack.run)],
+        "left_out": [str(item) for item in pack.left_out],
+    }
+
+
+def invade_record(case: Case, result: Invasion, seconds: float) -> dict[str, Any]:
+    """invade/stage.json: how the invasion ended."""
+    return {
+        "format": RECORD_FORMAT,
+        "digest": case.digest("invade"),
+        "seconds": seconds,
+        "stop_reason": result.stop_reason,
+        "max_overlap": result.overlap.fraction,
+        "max_overlap_step": result.overlap.step,
+        "steps": result.history[-1].step,
+        "dt_s": result.step_s,
+        "supplied": result.supplied,
+        "warnings": list(result.warnings),
+        "runs": [run_record(run) for run in result.runs],
+        "left_out": [str(item) for item in result.left_out],
+    }
+
+
+def run_record(run: Run) -> dict[str, Any]:
+    """One LIGGGHTS execution, with the digests of its decks."""
+    decks = {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(run.directory.glob("in.*"))
+    }
+    return {
+        "command": " ".join(run.command),
+        "version": run.version,
+        "seconds": run.seconds,
+        "ranks": run.ranks,
+        "deck_sha256": decks,
+    }
+
+
+def record_warnings(
+    case: Case, pack: dict[str, Any], invasion: dict[str, Any] | None
+) -> list[str]:
+    """Doubts about the DEM runs: another LIGGGHTS than fdnet was measured with, large overlaps, how it ended."""
+    version = pack["runs"][0]["version"]
+    found = (
+        []
+        if version == KNOWN_VERSION
+        else [f"LIGGGHTS {version}: fdnet was measured and tested with {KNOWN_VERSION}"]
+    )
+    if pack["max_overlap"] > OVERLAP_WARNING:
+        found.append(
+            f"grains overlap by up to {100 * pack['max_overlap']:.1f} % of a diameter: the pack is denser than "
+            "rigid spheres get"
+        )
+    if pack.get("creep_m_s"):
+        found.append(
+            f"the pack is barely jammed and still creeps, at {pack['creep_m_s']:.2g} m/s; it is taken as it is"
+        )
+    if abs(pack["porosity"] - pack["porosity_assumed"]) > POROSITY_WARNING:
+        found.append(
+            f"the fluid's velocity follows from a porosity of {pack['porosity_assumed']:.3f} (plain sum of "
+            "grains.count), the pack "
+            f"has {pack['porosity']:.3f}: give fluid.velocity_m_s"
+        )
+    if invasion is None:
+        return found
+    deepest = Deepest(
+        step=invasion.get("max_overlap_step", invasion["steps"]), fraction=invasion["max_overlap"]
+    )
+    if deepest.fraction > case.run.max_overlap:
+        found.append(f"{overlap_text(case, deepest)}: raise run.stiffness_N_m")
+    return [*invasion["warnings"], *found]
+
+
+def stage_seconds(
+    pack: dict[str, Any], invasion: dict[str, Any] | None, own: dict[str, float]
+) -> dict[str, float]:
+    """Seconds per stage, and how many of them LIGGGHTS took (of the session that finished each stage)."""
+    runs = pack["runs"] + (invasion["runs"] if invasion else [])
+    return {
+        "pack": pack["seconds"],
+        "invade": invasion["seconds"] if invasion else 0.0,
+        "analyse": own.get("analyse", 0.0),
+        "report": own.get("report", 0.0),
+        "liggghts": sum(run["seconds"] for run in runs)
+        + sum(row["liggghts_s"] for row in pack["attempts"][:-1]),
+    }
+
+
+def versions(pack: dict[str, Any] | None) -> dict[str, str]:
+    """Versions of everything that shaped the run."""
+    found = {}
+    for name in _PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = "not installed as a package"
+    liggghts = {"liggghts": pack["runs"][0]["version"]} if pack else {}
+    return {**found, "python": sys.version.split()[0], **liggghts, "system": platform.platform()}

@@ -1,0 +1,98 @@
+"""summary.json: the numbers a program reads."""
+
+from typing import Any
+
+from fdnet.case.case import Case
+from fdnet.dem.checkpoint import Checkpoint
+from fdnet.network.permeability import Analysis
+from fdnet.report.tables import section_rows
+
+
+def summarise(
+    case: Case,
+    analysis: Analysis,
+    *,
+    pack: dict[str, Any],
+    invasion: dict[str, Any] | None,
+    last: Checkpoint | None,
+    seconds: dict[str, float],
+    warnings: list[str],
+) -> dict[str, Any]:
+    """The mapping of summary.json (output contract); `pack` and `invasion` are the records of their stages."""
+    result = {
+        "case": case.name,
+        "seed": case.seed,
+        "law": analysis.law,
+        "damage_law": analysis.damage_law,
+        **_porosities(analysis),
+        **_permeabilities(analysis),
+        **_counts(analysis, last, invasion),
+        "stop_reason": invasion["stop_reason"] if invasion else None,
+        "sections": section_rows(analysis),
+        **_network(analysis),
+        "solver": analysis.solver,
+        "max_overlap_fraction": invasion["max_overlap"] if invasion else pack["max_overlap"],
+        "grain_overlap_fraction": pack["max_overlap"],
+        "dem_steps": pack["steps"] + (invasion["steps"] if invasion else 0),
+        "dem_dt_s": invasion["dt_s"] if invasion else pack["dt_s"],
+        "seconds": seconds
+        | {f"analyse_{name}": value for name, value in analysis.seconds.items()},
+        "left_out": _left_out(pack, invasion),
+        "warnings": [*warnings, *analysis.warnings],
+    }
+    return result
+
+
+def _porosities(analysis: Analysis) -> dict[str, Any]:
+    return {
+        "porosity_initial": analysis.porosity_initial,
+        "porosity_initial_error": analysis.porosity_initial_error,
+        "porosity_damaged": analysis.porosity_damaged,
+        "porosity_initial_sum": analysis.porosity_initial_sum,
+    }
+
+
+def _permeabilities(analysis: Analysis) -> dict[str, Any]:
+    moved = {} if analysis.k_moved is None else {"k_moved_m2": analysis.k_moved}
+    return {
+        "k_initial_m2": analysis.k_initial,
+        "k_damaged_m2": analysis.k_damaged,
+        "k_reduction": analysis.k_reduction,
+        **moved,
+    }
+
+
+def _counts(
+    analysis: Analysis, last: Checkpoint | None, invasion: dict[str, Any] | None
+) -> dict[str, Any]:
+    passed, upstream = (last.passed, last.upstream) if last else (0, 0)
+    return {
+        "supplied_count": invasion["supplied"] if invasion else 0,
+        "invaded_count": analysis.invaded_count,
+        "passed_count": passed,
+        "upstream_count": upstream,
+        "invaded_volume_m3": analysis.invaded_volume,
+        "invasion_depth_m": analysis.invasion_depth,
+        "invasion_depth_p95_m": analysis.invasion_depth_p95,
+        "cake_thickness_m": analysis.cake_thickness,
+    }
+
+
+def _network(analysis: Analysis) -> dict[str, Any]:
+    blocked = 0 if analysis.occupancy is None else int(analysis.occupancy.blocked.sum())
+    return {
+        "pores": len(analysis.network.pore_radius),
+        "throats": len(analysis.network.throat_radius),
+        "throats_blocked": blocked,
+        "network_counts": analysis.counts,
+    }
+
+
+def _left_out(pack: dict[str, Any], invasion: dict[str, Any] | None) -> list[str]:
+    found = [f"pack: {item}" for item in pack["left_out"]]
+    found += (
+        [f"invade: {item}" for item in invasion["left_out"]]
+        if invasion
+        else ["invade: the whole invasion (no fines in the case)"]
+    )
+    return found

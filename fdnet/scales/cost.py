@@ -1,0 +1,108 @@
+"""What a run will cost, from rates measured on one core (docs/physics.md, section 5), and the limit on it."""
+
+import math
+from dataclasses import dataclass
+
+from fdnet.case.case import Case
+from fdnet.errors import CaseError
+from fdnet.scales.scales import (
+    PACK_RELAX_STEPS,
+    PACK_STAGE_STEPS,
+    PACK_STAGES,
+    Scales,
+    grain_count,
+)
+from fdnet.scales.time_step import contact_step
+
+STEP_SECONDS = 2.0e-6
+"""One step with nothing to do."""
+FIXED_GRAIN_SECONDS, MOVING_GRAIN_SECONDS = 1.3e-8, 1.0e-7
+"""One grain for one step."""
+FINE_SECONDS = {"every_step": 1.8e-7, "held": 1.5e-7, "implicit": 1.5e-7, "viscous": 1.45e-7}
+"""One fine for one step, contacts and drag."""
+BYTES_PER_SPHERE = 600
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cost:
+    """Expected seconds on one core, within a factor of about 3: one try at the pack, and the invasion of `steps`."""
+
+    pack_seconds: float
+    invade_seconds: float
+    steps: float
+
+
+def cost_of(case: Case, scales: Scales) -> Cost:
+    """The cost of a case.
+
+    An invasion without a duration is expected to last until the slab is fed, the fluid has passed the box once and one
+    plug time is over, or to meet its cap.
+    """
+    pack = (
+        grain_count(case)
+        * (PACK_STAGES * PACK_STAGE_STEPS + PACK_RELAX_STEPS)
+        * MOVING_GRAIN_SECONDS
+    )
+    if case.fines is None:
+        return Cost(pack_seconds=pack, invade_seconds=0.0, steps=0.0)
+    expected = scales.cap_time
+    if case.run.duration_ms is None:
+        passage = case.size_m[0] / scales.interstitial_velocity
+        expected = min(
+            expected, scales.slab_length / scales.upstream_velocity + passage + scales.plug_time
+        )
+    steps = math.ceil(expected / scales.time_step)
+    grain = MOVING_GRAIN_SECONDS if case.grains.motion == "mobile" else FIXED_GRAIN_SECONDS
+    fines = scales.supplied_count * FINE_SECONDS[case.drag.scheme]
+    return Cost(
+        pack_seconds=pack,
+        invade_seconds=steps * (STEP_SECONDS + grain_count(case) * grain + fines),
+        steps=steps,
+    )
+
+
+def memory_bytes(case: Case, scales: Scales) -> float:
+    """Memory of LIGGGHTS."""
+    return 9e6 + BYTES_PER_SPHERE * (grain_count(case) + scales.supplied_count)
+
+
+def over_limit(case: Case, scales: Scales, *, pack: bool = True, invade: bool = True) -> str:
+    """What is wrong when the stages named are expected to take longer than `run.max_hours`; empty when they fit."""
+    cost = cost_of(case, scales)
+    seconds = pack * cost.pack_seconds + invade * cost.invade_seconds
+    if seconds <= 3600 * case.run.max_hours:
+        return ""
+    said = f"run.max_hours: {case.run.max_hours:g} h, but this case is expected to take {_hours(seconds)} on one core"
+    if not invade or cost.pack_seconds > cost.invade_seconds:
+        return f"{said}, most of it packing {grain_count(case):.3g} grains: take a smaller box, or raise run.max_hours"
+    reason, remedy = _step_reason(case, scales)
+    return (
+        f"{said}: {cost.steps:.3g} steps of {scales.time_step:.3g} s ({reason}) with {scales.supplied_count} fines and "
+        f"{grain_count(case)} {case.grains.motion} grains: {remedy}, supply fewer fines, shorten run.duration_ms or "
+        "run.cap_ms, or raise run.max_hours"
+    )
+
+
+def refuse_long(case: Case, scales: Scales, *, pack: bool, invade: bool) -> None:
+    """Raises CaseError when the stages named are expected to take longer than `run.max_hours`."""
+    said = over_limit(case, scales, pack=pack, invade=invade)
+    if said:
+        raise CaseError(said)
+
+
+def _hours(seconds: float) -> str:
+    years = f" ({seconds / (365.25 * 86400):.2g} years)" if seconds > 365.25 * 86400 else ""
+    return f"{seconds / 3600:.3g} h{years}"
+
+
+def _step_reason(case: Case, scales: Scales) -> tuple[str, str]:
+    """What sets the time step, and what would make it longer."""
+    if case.run.time_step_s is not None:
+        return "as given", "raise run.time_step_s"
+    if scales.time_step < 0.999 * case.run.time_step_factor * contact_step(case, scales.contacts):
+        return "a tenth of the drag relaxation time", "take drag.scheme = 'implicit'"
+    stiffness = max(contact.normal_stiffness for contact in scales.contacts.values())
+    return (
+        f"set by contacts of {stiffness:.3g} N/m",
+        "lower run.stiffness_N_m (the time goes with its square root)",
+    )

@@ -1,0 +1,62 @@
+"""Which spheres touch: pairs, overlaps, and the largest of them."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fdnet.spheres.snapshot import Array, Kind, Snapshot
+
+
+def touching_pairs(
+    spheres: Snapshot, periodic: tuple[bool, bool, bool], *, gap: float = 0.0
+) -> tuple[Array, Array]:
+    """Pairs (K, 2) of spheres nearer than `gap` smaller diameters, and their overlaps (K,) m (negative: a gap).
+
+    Spheres are searched in two classes of size, so that a few large ones do not widen the search of all.
+    """
+    radius = spheres.radius
+    if len(radius) == 0:
+        return np.empty((0, 2), int), np.empty(0)
+    period = np.where(periodic, spheres.box[:, 1] - spheres.box[:, 0], 0.0)
+    position = spheres.position - spheres.box[:, 0]
+    position = np.where(period > 0, np.mod(position, np.where(period > 0, period, 1.0)), position)
+    small = radius <= 0.5 * radius.max()
+    groups = [group for group in (np.flatnonzero(small), np.flatnonzero(~small)) if len(group)]
+    trees = [cKDTree(position[group], boxsize=period) for group in groups]
+    found = [
+        _pairs((trees[i], trees[j]), (groups[i], groups[j]), radius, gap)
+        for i in range(len(groups))
+        for j in range(i, len(groups))
+    ]
+    return np.concatenate([pairs for pairs, _ in found]), np.concatenate(
+        [overlap for _, overlap in found]
+    )
+
+
+def _pairs(
+    trees: tuple[cKDTree, cKDTree], groups: tuple[Array, Array], radius: Array, gap: float
+) -> tuple[Array, Array]:
+    first, second = groups
+    reach = radius[first].max() + radius[second].max()
+    reach += 2 * gap * min(radius[first].max(), radius[second].max())
+    near = trees[0].sparse_distance_matrix(trees[1], reach, output_type="coo_matrix")
+    pairs = np.column_stack([first[near.row], second[near.col]])
+    overlap = radius[pairs].sum(axis=1) - near.data
+    limit = -2 * gap * radius[pairs].min(axis=1)
+    keep = (overlap > limit) & ((pairs[:, 0] < pairs[:, 1]) | (trees[0] is not trees[1]))
+    return pairs[keep], overlap[keep]
+
+
+def max_overlap(
+    spheres: Snapshot, periodic: tuple[bool, bool, bool], *, only_fines: bool = False
+) -> float:
+    """Largest overlap of two spheres over the smaller one's diameter; 0 if none touch.
+
+    `only_fines` leaves out pairs of grains.
+    """
+    pairs, overlap = touching_pairs(spheres, periodic)
+    if only_fines:
+        fine = np.any(spheres.kind[pairs] == Kind.FINE, axis=1)
+        pairs, overlap = pairs[fine], overlap[fine]
+    if len(pairs) == 0:
+        return 0.0
+    return float(np.max(overlap / (2 * np.min(spheres.radius[pairs], axis=1))))

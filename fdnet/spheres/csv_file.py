@@ -1,0 +1,172 @@
+"""Sphere tables: written at full precision, read back strictly."""
+
+import csv
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+
+import numpy as np
+
+from fdnet.atomic import replacing
+from fdnet.errors import CaseError
+from fdnet.spheres.snapshot import Array, Kind, Snapshot, frozen
+
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+KIND_NAMES = {"grain": Kind.GRAIN, "fine": Kind.FINE}
+PLAIN = ("x", "y", "z", "radius")
+METRES = ("x_m", "y_m", "z_m", "radius_m")
+OPTIONAL = ("kind", "id")
+
+
+def write_spheres(path: str | Path, snapshot: Snapshot) -> Path:
+    """Write x_m, y_m, z_m, radius_m, kind, id; one row per sphere, atomically.
+
+    Coordinates are the shortest decimals that read back to the same double (`repr`), so that a count by
+    `lo <= x < hi` is the same from the file as from memory.
+    """
+    import pandas as pd
+
+    names = {int(kind): name for name, kind in KIND_NAMES.items()}
+    columns = dict(zip(METRES, (*snapshot.position.T, snapshot.radius), strict=True))
+    frame = pd.DataFrame(
+        columns | {"kind": [names[int(k)] for k in snapshot.kind], "id": snapshot.id}
+    )
+    with replacing(path) as part:
+        frame.to_csv(part, index=False, lineterminator="\n")
+    return Path(path)
+
+
+def read_spheres(path: str | Path, *, units: str | None = None) -> tuple[Array, Array, Array]:
+    """Read a sphere table: position (N, 3) m, radius (N,) m, kind (N,) int64 of `Kind`.
+
+    Columns, in any order: `x,y,z,radius[,kind][,id]` in `units` (one of `UNITS`), or
+    `x_m,y_m,z_m,radius_m[,kind][,id]`, where `units` must be None. `kind` is grain or fine (grain when
+    there is no such column), `id` is ignored. Blank lines and lines starting with `#` are skipped.
+    Raises CaseError naming file, line, what was found and what was expected.
+    """
+    source = Path(path)
+    if units is not None and units not in UNITS:
+        raise CaseError(f"units {units!r}: expected one of {', '.join(UNITS)}")
+    lines = _Lines(source)
+    reader = csv.reader(lines, strict=True)
+    try:
+        header = _header(next(reader, None), lines.where(), units)
+        rows = [_row(fields, header, lines.where()) for fields in reader]
+    except csv.Error as error:
+        raise CaseError(f"{lines.where()}: {error}; expected comma-separated values") from error
+    if not rows:
+        raise CaseError(f"{source}: no spheres after the header; expected at least one row")
+    values = np.array([row[:4] for row in rows])
+    return frozen(values[:, :3]), frozen(values[:, 3]), frozen([row[4] for row in rows], np.int64)
+
+
+class _Lines:
+    """The lines of a text file that carry data, counting all of them from 1."""
+
+    def __init__(self, source: Path) -> None:
+        self.source, self.number = source, 0
+
+    def where(self) -> str:
+        return f"{self.source}:{self.number}" if self.number else str(self.source)
+
+    def __iter__(self) -> Iterator[str]:
+        try:
+            with self.source.open(encoding="utf-8-sig", newline=None) as handle:
+                for self.number, line in enumerate(handle, start=1):
+                    if line.strip() and not line.lstrip().startswith("#"):
+                        yield line
+        except UnicodeDecodeError as error:
+            raise CaseError(
+                f"{self.source}: not UTF-8 text ({error.reason}); expected CSV"
+            ) from error
+        except OSError as error:
+            raise CaseError(
+                f"{self.source}: {error.strerror}; expected a CSV file of spheres"
+            ) from error
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Header:
+    """Where each wanted column stands: `numbers` x, y, z, radius; `kind` or None; `scale` to metres."""
+
+    width: int
+    names: tuple[str, ...]
+    numbers: tuple[int, ...]
+    kind: int | None
+    scale: float
+
+
+def _header(fields: list[str] | None, where: str, units: str | None) -> _Header:
+    if fields is None:
+        raise CaseError(f"{where}: the file is empty; expected a header {','.join(PLAIN)}[,kind]")
+    names = tuple(field.strip() for field in fields)
+    wanted = METRES if any(name in METRES for name in names) else PLAIN
+    _refuse_columns(names, wanted, where)
+    if wanted is METRES and units is not None:
+        raise CaseError(
+            f"{where}: the columns {','.join(METRES)} are in metres already, "
+            f"but units {units!r} were given; leave out --units"
+        )
+    if wanted is PLAIN and units is None:
+        raise CaseError(
+            f"{where}: the columns {','.join(PLAIN)} have no unit; give --units "
+            f"({', '.join(UNITS)}) or name them {','.join(METRES)}"
+        )
+    return _Header(
+        width=len(names),
+        names=wanted,
+        numbers=tuple(names.index(name) for name in wanted),
+        kind=names.index("kind") if "kind" in names else None,
+        scale=UNITS[units or "m"],
+    )
+
+
+def _refuse_columns(names: tuple[str, ...], wanted: tuple[str, ...], where: str) -> None:
+    expected = f"expected {','.join(wanted)}[,kind][,id]"
+    missing = [name for name in wanted if name not in names]
+    if missing:
+        raise CaseError(
+            f"{where}: no column {', '.join(missing)} in header {','.join(names)!r}; {expected}"
+        )
+    for name in names:
+        if name not in (*wanted, *OPTIONAL):
+            near = get_close_matches(name.lower(), (*wanted, *OPTIONAL), n=1)
+            hint = f" (did you mean {near[0]!r}?)" if near else "; remove it"
+            raise CaseError(f"{where}: unknown column {name!r}{hint}; {expected}")
+        if names.count(name) > 1:
+            raise CaseError(f"{where}: column {name!r} occurs twice; {expected}")
+
+
+def _row(fields: list[str], header: _Header, where: str) -> tuple[float, float, float, float, int]:
+    if len(fields) != header.width:
+        raise CaseError(f"{where}: {len(fields)} values, expected {header.width} as in the header")
+    x, y, z, radius = (
+        _number(fields[i], name, where) * header.scale
+        for i, name in zip(header.numbers, header.names, strict=True)
+    )
+    if radius <= 0:
+        given = fields[header.numbers[3]].strip()
+        raise CaseError(f"{where}: {header.names[3]} is {given}, expected a number above 0")
+    kind = Kind.GRAIN if header.kind is None else _kind(fields[header.kind], where)
+    return x, y, z, radius, int(kind)
+
+
+def _number(text: str, name: str, where: str) -> float:
+    try:
+        value = math.nan if "_" in text else float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise CaseError(
+            f"{where}: {name} is {text.strip()!r}, expected a finite number (decimal point)"
+        )
+    return value
+
+
+def _kind(text: str, where: str) -> Kind:
+    kind = KIND_NAMES.get(text.strip())
+    if kind is None:
+        raise CaseError(f"{where}: kind is {text.strip()!r}, expected {' or '.join(KIND_NAMES)}")
+    return kind

@@ -1,0 +1,210 @@
+"""LIGGGHTS text dumps: the one strict parser, and the columns fdnet writes."""
+
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from fdnet.atomic import disk_is_full
+from fdnet.errors import DumpError
+from fdnet.spheres.snapshot import Array, frozen
+
+COLUMNS = "id type x y z vx vy vz radius"
+FORMAT = "%d %d %.17g %.17g %.17g %.9g %.9g %.9g %.17g"
+_EXACT: dict[str, Any] = (
+    {"float_precision": "round_trip"} if int(pd.__version__.split(".")[0]) < 3 else {}
+)
+"""From pandas 3 on, exact numbers are the default and the option is deprecated."""
+_ITEMS = (b"ITEM: TIMESTEP", b"ITEM: NUMBER OF ATOMS", b"ITEM: BOX BOUNDS", b"ITEM: ATOMS")
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Frame:
+    """One dump frame: `columns` names, `rows` (N, C) float64 sorted by id where there is one, `box` (3, 2)."""
+
+    step: int
+    box: Array
+    columns: tuple[str, ...]
+    rows: Array
+
+    def column(self, name: str) -> Array:
+        """The values (N,) of one column. Raises DumpError when the dump has no such column."""
+        if name not in self.columns:
+            raise DumpError(
+                f"dump at step {self.step}: no column {name}, found {' '.join(self.columns)}"
+            )
+        return self.rows[:, self.columns.index(name)]
+
+
+def read_dump(path: Path) -> list[Frame]:
+    """All frames of a dump file; raises DumpError naming path, line and step where it is malformed or cut."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise DumpError(
+            f"{path}: cannot be read: {error.strerror}; the run did not write it"
+        ) from error
+    return list(parse_dump(data, str(path)))
+
+
+def read_frame(path: Path) -> Frame:
+    """The only frame of a dump file. Raises DumpError, also when there are none or several."""
+    try:
+        frames = read_dump(path)
+        if len(frames) != 1:
+            raise DumpError(
+                f"{path}: {len(frames)} frames, expected one. The run was cut; continue it with --resume."
+            )
+    except DumpError as error:
+        if path.parent.exists() and disk_is_full(path.parent):
+            raise DumpError(f"{error} Make room first: the disk is full.") from error
+        raise
+    return frames[0]
+
+
+def parse_dump(data: bytes, source: str) -> Iterator[Frame]:
+    """Frames of the bytes of a dump; `source` names it in errors. Raises DumpError."""
+    reader = _Reader(data, source)
+    while reader.position < len(data):
+        yield reader.frame()
+
+
+class _Reader:
+    """A position in the bytes of a dump; knows the line it stands on."""
+
+    def __init__(self, data: bytes, source: str) -> None:
+        self.data, self.source, self.position, self.line = data, source, 0, 1
+        self.step: int | None = None
+
+    def fail(self, what: str, line: int | None = None) -> DumpError:
+        step = "" if self.step is None else f" step {self.step}:"
+        return DumpError(f"{self.source}:{line or self.line}:{step} {what}")
+
+    def take(self) -> bytes:
+        end = self.data.find(b"\n", self.position)
+        if end < 0:
+            raise self.fail(
+                "the file ends in the middle of a line. The run was cut; continue it with --resume."
+            )
+        text = self.data[self.position : end]
+        self.position, self.line = end + 1, self.line + 1
+        return text
+
+    def item(self, expected: bytes) -> bytes:
+        line = self.line
+        if self.position >= len(self.data):
+            raise self.fail(
+                f"the file ends before {expected.decode()}. The run was cut; continue it with --resume."
+            )
+        text = self.take()
+        if not text.startswith(expected):
+            raise self.fail(f"found {text[:60]!r}, expected {expected.decode()!r}", line)
+        return text[len(expected) :]
+
+    def whole(self, what: str) -> int:
+        line, text = self.line, self.take()
+        try:
+            value = int(text)
+        except ValueError:
+            value = -1
+        if value < 0:
+            raise self.fail(f"{what} is {text[:40]!r}, expected a whole number, 0 or more", line)
+        return value
+
+    def frame(self) -> Frame:
+        self.step = None
+        self.item(_ITEMS[0])
+        self.step = self.whole("step")
+        self.item(_ITEMS[1])
+        count = self.whole("number of atoms")
+        self.item(_ITEMS[2])
+        box = [self.bounds() for _ in range(3)]
+        columns = tuple(self.item(_ITEMS[3]).decode("ascii", "replace").split())
+        if not columns:
+            raise self.fail("ITEM: ATOMS names no columns", self.line - 1)
+        return Frame(
+            step=self.step, box=frozen(box, float), columns=columns, rows=self.rows(count, columns)
+        )
+
+    def bounds(self) -> list[float]:
+        line, text = self.line, self.take()
+        try:
+            low, high = (float(part) for part in text.split())
+        except ValueError:
+            low = high = np.nan
+        if not (np.isfinite(high - low) and low < high):
+            raise self.fail(
+                f"box bounds {text[:60]!r}, expected two numbers, the lower one first", line
+            )
+        return [low, high]
+
+    def rows(self, count: int, columns: tuple[str, ...]) -> Array:
+        end = self.data.find(_ITEMS[0], self.position)
+        end = len(self.data) if end < 0 else end
+        body, first = self.data[self.position : end], self.line
+        found = body.count(b"\n")
+        if found != count or (body and not body.endswith(b"\n")):
+            what = "then the file ends" if end == len(self.data) else "then the next frame begins"
+            raise self.fail(
+                f"{found} of {count} rows, {what}. The run was cut; continue it with --resume.",
+                first + found,
+            )
+        self.position, self.line = end, first + found
+        table = _table(body, columns) if count else np.empty((0, len(columns)))
+        if table is None:
+            raise self.fail(*_bad_row(body, columns, first))
+        return frozen(
+            table[np.argsort(table[:, columns.index("id")], kind="stable")]
+            if "id" in columns
+            else table
+        )
+
+
+def _table(body: bytes, columns: tuple[str, ...]) -> Array | None:
+    """The rows as numbers (N, C), or None when one is short, long, not a number or not finite."""
+    trailing = ["trailing space"] if body[: body.index(b"\n")].endswith(b" ") else []
+    try:
+        table = pd.read_csv(
+            io.BytesIO(body),
+            sep=" ",
+            header=None,
+            names=[*columns, *trailing],
+            usecols=list(columns),
+            dtype=np.float64,
+            engine="c",
+            na_filter=False,
+            index_col=False,
+            on_bad_lines="error",
+            skip_blank_lines=False,
+            **_EXACT,
+        )
+    except (ValueError, pd.errors.ParserError):
+        return None
+    values = table.to_numpy()
+    whole = body.count(b" ") == len(values) * (len(columns) - 1 + len(trailing))
+    return values if whole and np.all(np.isfinite(values)) else None
+
+
+def _bad_row(body: bytes, columns: tuple[str, ...], first: int) -> tuple[str, int]:
+    for index, row in enumerate(body.split(b"\n")):
+        parts = row.split()
+        if len(parts) != len(columns):
+            return (
+                f"{len(parts)} values, expected {len(columns)} ({' '.join(columns)})",
+                first + index,
+            )
+        for name, part in zip(columns, parts, strict=True):
+            try:
+                finite = np.isfinite(float(part))
+            except ValueError:
+                finite = False
+            if not finite:
+                return (
+                    f"column {name} holds {part[:40]!r}, expected a finite number",
+                    first + index,
+                )
+    return "rows are not separated by single spaces", first

@@ -1,0 +1,104 @@
+"""Images of spheres beyond the faces of a box: shifted across periodic sides, mirrored across the others."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fdnet.spheres.snapshot import Array
+
+INSIDE, MIRROR_LOW, MIRROR_HIGH, ON_FACE = 0, 1, 2, 3
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Images:
+    """M images, the spheres themselves among them.
+
+    `owner` (M,) index of the sphere; `position` (M, 3) m; `shift` (M, 3) periods; `mirror` (M, 3) INSIDE,
+    MIRROR_LOW, MIRROR_HIGH or ON_FACE (centre on or beyond a face: it has no mirror image across that axis).
+    """
+
+    owner: Array
+    position: Array
+    shift: Array
+    mirror: Array
+
+
+def wrapped(position: Array, box: Array, periodic: tuple[bool, ...]) -> Array:
+    """Positions (N, 3) brought into [low, high) along the periodic axes."""
+    low, size = box[:, 0], box[:, 1] - box[:, 0]
+    return np.where(periodic, low + (position - low) % size, position)
+
+
+def neighbour_tree(position: Array, box: Array, *, periodic: tuple[bool, ...]) -> cKDTree:
+    """Search tree of `position` (N, 3) that sees across the periodic sides."""
+    low, size = box[:, 0], box[:, 1] - box[:, 0]
+    place = wrapped(position, box, periodic) - low
+    # rounding may leave a wrapped place at the size itself
+    return cKDTree(
+        np.where(periodic & (place >= size), 0.0, place), boxsize=np.where(periodic, size, 0.0)
+    )
+
+
+def make_images(
+    position: Array, box: Array, *, periodic: tuple[bool, ...], margin: Array, hair: float
+) -> Images:
+    """All images of `position` (N, 3) within `margin` (3,) m of the box; NaN margin: no images along that axis.
+
+    A centre within `hair` m of a non-periodic face, or beyond it, gets no mirror image there.
+    """
+    count = len(position)
+    owner, shift, mirror = (
+        np.arange(count),
+        np.zeros((count, 3), np.int16),
+        np.zeros((count, 3), np.int8),
+    )
+    position = wrapped(position, box, periodic)
+    for axis in range(3):
+        if np.isnan(margin[axis]):
+            continue
+        make = _shifted if periodic[axis] else _mirrored
+        pick, place, steps, codes = make(position[:, axis], box[axis], float(margin[axis]), hair)
+        owner, position, shift, mirror = owner[pick], position[pick], shift[pick], mirror[pick]
+        position[:, axis], shift[:, axis], mirror[:, axis] = place, steps, codes
+    return Images(owner=owner, position=position, shift=shift, mirror=mirror)
+
+
+def _shifted(
+    x: Array, bounds: Array, margin: float, hair: float
+) -> tuple[Array, Array, Array, Array]:
+    low, high = bounds
+    reach = int(np.ceil(margin / (high - low)))
+    steps = np.repeat(np.arange(-reach, reach + 1), len(x))
+    pick = np.tile(np.arange(len(x)), 2 * reach + 1)
+    place = x[pick] + steps * (high - low)
+    near = (place >= low - margin) & (place < high + margin)
+    return pick[near], place[near], steps[near], np.zeros(near.sum(), int)
+
+
+def _mirrored(
+    x: Array, bounds: Array, margin: float, hair: float
+) -> tuple[Array, Array, Array, Array]:
+    low, high = bounds
+    own = np.where((x <= low + hair) | (x >= high - hair), ON_FACE, INSIDE)
+    # a centre on one face has an image as far beyond the other when the margin is the whole side
+    lower = np.flatnonzero((x > low + hair) & (x < low + margin + hair))
+    upper = np.flatnonzero((x < high - hair) & (x > high - margin - hair))
+    pick = np.concatenate([np.arange(len(x)), lower, upper])
+    place = np.concatenate([x, 2 * low - x[lower], 2 * high - x[upper]])
+    codes = np.concatenate(
+        [own, np.full(len(lower), MIRROR_LOW), np.full(len(upper), MIRROR_HIGH)]
+    )
+    return pick, place, np.zeros(len(pick), int), codes
+
+
+def label(images: Images) -> Array:
+    """One integer (M,) per sphere and mirror combination; images that differ by whole periods share it."""
+    mirror = np.where(images.mirror == ON_FACE, INSIDE, images.mirror)
+    return images.owner * 27 + mirror @ np.array([9, 3, 1])
+
+
+def packed_shift(shift: Array) -> Array:
+    """One integer per whole-period shift (..., 3), |shift| < 512; order is that of the rows."""
+    steps = shift.astype(np.int64) + 512
+    return (steps[..., 0] * 1024 + steps[..., 1]) * 1024 + steps[..., 2]

@@ -1,0 +1,225 @@
+"""What the studies of the DEM half run: small invasions and single fines, by fdnet's own decks and the real binary."""
+
+import math
+import re
+import shutil
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fdnet.atomic import write_text
+from fdnet.case.case import Case
+from fdnet.case.file import case_from, set_keys
+from fdnet.dem.checkpoint import HISTORY, HISTORY_HEADER, state_at
+from fdnet.dem.invade_deck import write_invade_inputs
+from fdnet.dem.invasion import Invasion, invade
+from fdnet.dem.liggghts import Binary, Launch, Run, find_binary, run_deck
+from fdnet.dem.packing import make_pack
+from fdnet.dem.scene import box_of, snapshot_of
+from fdnet.network.permeability import AnalysisOptions, analyse
+from fdnet.scales.scales import relaxation_time, scales_of
+from fdnet.spheres.dump import read_frame
+from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
+from fdnet.studies.engine.runner import child_core_seconds
+
+SLAB: dict[str, Any] = {
+    "name": "study",
+    "box": {"size_mm": [4.0, 2.86, 2.86]},
+    "grains": {"radius_mm": 0.25, "count": 300},
+    "fines": {"radius_mm": 0.05, "count": 1000},
+    "fluid": {"darcy_length_mm": 8.0},
+    "drag": {"scheme": "viscous"},
+    "run": {"duration_ms": 2.0},
+    "analysis": {"sections": 4},
+}
+"""The invasion of the studies: 300 fixed grains at porosity 0.40, 1,000 fines of 0.10 mm, 2 ms, the velocity (5.4 m/s)
+of thesis specimen 5. A given duration, so that every run follows the same span of time; drag without an error of its
+own (study of drag)."""
+PROFILE_BINS = 16
+"""Equal bins of depth over the specimen in which invaded fines are counted."""
+BINS = tuple(f"bin_{number:02d}" for number in range(PROFILE_BINS))
+OBSERVED = ("invaded", "mean_depth", "porosity_loss", "k_ratio_first")
+"""What is asked of an invasion in most studies."""
+HELD_STEPS = 20
+"""Steps for which held drag is held in relaxation_run."""
+_SMALL: dict[str, Any] = {
+    "grains": {"count": 60},
+    "box": {"size_mm": [2.4, 1.7, 1.7]},
+    "fines": {"count": 120},
+}
+
+
+def base_inputs() -> str:
+    """What all invasions of the studies start from, as text: whose numbers a record holds."""
+    return slab_case(1).toml()
+
+
+def slab_case(seed: int, *assignments: str, small: bool = False) -> Case:
+    """The studies' invasion with other settings ("key=value"); `small` is a fifth of it, for the quick forms."""
+    data = {key: dict(value) if isinstance(value, dict) else value for key, value in SLAB.items()}
+    if small:
+        for part, values in _SMALL.items():
+            data[part] |= values
+        data["run"] = {"duration_ms": 0.5}
+    return case_from(set_keys(data, [f"seed={seed}", *assignments]))
+
+
+@cache
+def the_binary() -> Binary:
+    """LIGGGHTS, looked up once. Raises LiggghtsError when there is none."""
+    return find_binary()
+
+
+def grains_of(case: Case, work: Path) -> Snapshot:
+    """The case's grains, packed at the default stiffness once for all points that share seed, box and grains.
+
+    Fixed grains only: their place does not depend on the stiffness (docs/physics.md).
+    """
+    plain = case.model_copy(update={"run": type(case.run)()})
+    folder = work / f"pack-{plain.digest('pack')}"
+    if not (folder / "attempts.json").exists():
+        make_pack(plain, scales_of(plain), folder, Launch(binary=the_binary()))
+    return snapshot_of(read_frame(folder / "post" / "pack.dump"), plain, time_s=0.0)
+
+
+def invasion_run(case: Case, work: Path, slug: str) -> dict[str, float]:
+    """One invasion and what it left: counts, depths (m), profile, porosity, permeability, largest overlap, costs."""
+    grains = grains_of(case, work)
+    result, costs = _fresh(case, grains, work / slug)
+    return invasion_observed(case, grains, result) | costs
+
+
+def window_run(
+    case: Case, work: Path, slug: str, *, grid: tuple[int, ...] = ()
+) -> dict[str, float]:
+    """One invasion without its permeability: counts and mean depth (m) of the fines inside, and costs.
+
+    `grid` runs it on as many MPI ranks, cut in x, y and z as it says.
+    """
+    result, costs = _fresh(case, grains_of(case, work), work / slug, grid)
+    return {
+        "invaded": float(result.history[-1].invaded),
+        "mean_depth": _mean(_depths(case, result)),
+    } | costs
+
+
+def _fresh(
+    case: Case, grains: Snapshot, folder: Path, grid: tuple[int, ...] = ()
+) -> tuple[Invasion, dict[str, float]]:
+    """An invasion and its costs. One that an earlier session left unfinished is begun anew, so that costs are whole."""
+    shutil.rmtree(folder, ignore_errors=True)
+    scales, launch, before = scales_of(case), Launch(binary=the_binary()), child_core_seconds()
+    runs = [_gridded(case, grains, folder, grid)] if grid else []
+    result = invade(case, scales, grains, folder, launch)
+    return result, {
+        "steps": float(result.history[-1].step),
+        "core_s": child_core_seconds() - before,
+        "wall_s": sum(run.seconds for run in [*runs, *result.runs]),
+    }
+
+
+def _gridded(case: Case, grains: Snapshot, folder: Path, grid: tuple[int, ...]) -> Run:
+    """The whole invasion under another processor grid than fdnet's, so that `invade` finds it done."""
+    (folder / "post").mkdir(parents=True)
+    ranks = math.prod(grid)
+    deck = write_invade_inputs(case, scales_of(case), grains, folder, ranks=ranks).text
+    text, count = re.subn(r"(?m)^processors .*$", "processors " + " ".join(map(str, grid)), deck)
+    assert count == 1, f"{count} lines of the deck begin with processors, expected 1"
+    write_text(folder / "in.invade", text)
+    write_text(folder / HISTORY, HISTORY_HEADER + "\n")
+    return run_deck(folder, "in.invade", Launch(binary=the_binary(), ranks=ranks))
+
+
+def invasion_observed(case: Case, grains: Snapshot, result: Invasion) -> dict[str, float]:
+    """Numbers of a finished invasion, SI; `bin_00`... are invaded fines by equal bins of depth.
+
+    "grain_shift" is the root mean square way of the grains from where they were packed, over their radius.
+    """
+    last, depth = result.history[-1], _depths(case, result)
+    bins = np.histogram(depth, PROFILE_BINS, (0.0, case.size_m[0]))[0]
+    analysis = analyse(
+        grains,
+        result.damaged,
+        periodic=case.periodic,
+        options=AnalysisOptions(sections=case.analysis.sections, walls=case.analysis.walls),
+    )
+    first = analysis.sections[0]
+    return {
+        "invaded": float(last.invaded),
+        "passed": float(last.passed),
+        "mean_depth": _mean(depth),
+        "count_first": float(first.fines_count),
+        "porosity_initial": analysis.porosity_initial,
+        "k_initial": analysis.k_initial,
+        "porosity_loss": analysis.porosity_initial - analysis.porosity_damaged,
+        "porosity_loss_first": first.porosity_initial - first.porosity_damaged,
+        "k_ratio": analysis.k_damaged / analysis.k_initial,
+        "k_ratio_first": first.k_damaged / first.k_initial,
+        "max_overlap": result.overlap.fraction,
+        "grain_shift": _shift(grains, result.damaged.grains()),
+    } | {f"bin_{number:02d}": float(count) for number, count in enumerate(bins)}
+
+
+def _depths(case: Case, result: Invasion) -> Array:
+    depth = result.damaged.fines().position[:, 0]
+    return depth[(depth >= 0) & (depth < case.size_m[0])]
+
+
+def _mean(depth: Array) -> float:
+    return float(np.mean(depth)) if len(depth) else 0.0
+
+
+def _shift(before: Snapshot, after: Snapshot) -> float:
+    moved = after.position[np.argsort(after.id)] - before.position[np.argsort(before.id)]
+    return float(np.sqrt(np.mean(np.sum(moved**2, axis=1))) / np.mean(before.radius))
+
+
+def relaxation_run(
+    work: Path,
+    slug: str,
+    *assignments: str,
+    over_tau: float,
+    spans: float = 3.0,
+    looks: int | None = None,
+) -> dict[str, float]:
+    """One free fine falling into its terminal velocity: largest error of v_z over `spans` relaxation times.
+
+    v_z(t) = v_T (1 - exp(-t / tau)) (Stokes 1851), observed `looks` times (every quarter of tau if not given), each the
+    end of a `run` of its own; the step is `over_tau` tau, or the drag is held that long where the scheme is "held" (the
+    step is then a twentieth of it). Errors are over v_T.
+    """
+    radius, density, viscosity = 0.05e-3, 2146.0, 0.05
+    tau = relaxation_time(radius, density, viscosity)
+    held = any("scheme=held" in text for text in assignments)
+    step = over_tau * tau / (HELD_STEPS if held else 1)
+    stiffness = 4 / 3 * math.pi * radius**3 * density * (0.1 / step) ** 2
+    gravity = -0.005 / tau
+    case = slab_case(
+        1,
+        "fines.count=1",
+        "fluid.velocity_m_s=1e-6",
+        "gravity.mode=on",
+        "gravity.buoyancy=false",
+        f"gravity.acceleration_m_s2=[0.0,0.0,{gravity!r}]",
+        f"run.stiffness_N_m={stiffness!r}",
+        f"run.time_step_s={step!r}",
+        f"run.duration_ms={1e3 * spans * tau!r}",
+        f"run.checkpoint_ms={1e3 * tau * (1.001 * spans / looks if looks else 0.25)!r}",
+        *([f"drag.refresh_steps={HELD_STEPS}"] if held else []),
+        *assignments,
+    )
+    return _relaxed(case, work / slug, terminal=gravity * tau, tau=tau)
+
+
+def _relaxed(case: Case, folder: Path, *, terminal: float, tau: float) -> dict[str, float]:
+    scales, far = scales_of(case), np.array([[3.5e-3, 1.4e-3, 1.4e-3]])
+    lonely = resting(far, 2.5e-4, box_of(case), Kind.GRAIN)
+    result, costs = _fresh(case, lonely, folder)
+    errors = []
+    for row in result.history:
+        velocity = state_at(folder, row, case, scales, lonely).fines().velocity[0, 2]
+        exact = terminal * (1 - math.exp(-row.step * scales.time_step / tau))
+        errors.append(abs(velocity - exact) / abs(terminal))
+    return {"relaxation_error": max(errors), "steps": costs["steps"], "core_s": costs["core_s"]}

@@ -1,0 +1,193 @@
+"""The figure of a study: error against run time, log-log, with bands over seeds and fdnet's default marked."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from fdnet.atomic import replacing
+from fdnet.studies.engine.judge import Level, levels
+from fdnet.studies.engine.study import Panel, Row, Study, shown
+
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#5a5a5a", "#8c564b")
+MARKERS = "osD^vP<X"
+TURN = 0.75
+"""Share of the run times' range beyond which words stand to the left of their markers."""
+NEAR = 1.25
+_WIDTH, _HEIGHT = 6.2, 4.6
+_COST_LABELS = {
+    "core_s": "run time, core s",
+    "wall_s": "run time, s",
+    "peak_memory_mb": "peak memory, MB",
+    "steps": "steps",
+}
+
+
+def draw_study(study: Study, rows: Sequence[Row], path: Path) -> None:
+    """One axes a panel that has rows, in rows of up to three."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    panels = [panel for panel in study.panels if series_of(panel, rows)]
+    columns = 2 if len(panels) == 4 else min(3, max(len(panels), 1))
+    lines = max(math.ceil(len(panels) / columns), 1)
+    figure, axes = plt.subplots(
+        lines,
+        columns,
+        figsize=(_WIDTH * columns, _HEIGHT * lines),
+        squeeze=False,
+        constrained_layout=True,
+    )
+    flat = list(axes.flat)
+    for panel, place in zip(panels, flat, strict=False):
+        _draw_panel(place, study, panel, rows)
+    for place in flat[len(panels) :]:
+        place.set_visible(False)
+    figure.suptitle(f"{study.title} (labels: {study.knob_label})", fontsize=11)
+    with replacing(path) as part:
+        figure.savefig(part, dpi=110)
+    plt.close(figure)
+
+
+def series_of(panel: Panel, rows: Sequence[Row]) -> list[str]:
+    """The series a panel shows, in the order of the table."""
+    having = dict.fromkeys(row.series for row in rows if row.quantity == panel.quantity)
+    return [name for name in having if not panel.series or name in panel.series]
+
+
+def _draw_panel(axes: Any, study: Study, panel: Panel, rows: Sequence[Row]) -> None:
+    shown_levels = {
+        name: levels(rows, name, panel.quantity, cost=panel.cost)
+        for name in series_of(panel, rows)
+    }
+    floor = _floor([level for found in shown_levels.values() for level in found])
+    costs = [level.cost for found in shown_levels.values() for level in found if level.cost > 0]
+    turn = min(costs, default=1.0) * (max(costs, default=1.0) / min(costs, default=1.0)) ** TURN
+    for index, (name, found) in enumerate(shown_levels.items()):
+        if found:
+            _draw_series(
+                axes,
+                name.removesuffix(panel.common),
+                found,
+                study.defaults.get(name),
+                index,
+                floor,
+            )
+            if panel.cost != "value":
+                _label(axes, found, index, floor, turn)
+    axes.set(xscale="log", yscale="log")
+    axes.set_xlabel(
+        panel.knob if panel.cost == "value" else _COST_LABELS.get(panel.cost, panel.cost)
+    )
+    axes.set_ylabel(panel.label)
+    axes.set_title(panel.title, fontsize=10)
+    axes.grid(which="major", lw=0.4, color="0.85")
+    axes.margins(0.12)
+    _widen(axes)
+    _plain_ticks(axes)
+    axes.tick_params(which="minor", labelsize=6)
+    handles, names = axes.get_legend_handles_labels()
+    once = dict(zip(names, handles, strict=True))
+    if once:
+        axes.legend([*once.values()], [*once], fontsize=8, framealpha=0.9)
+
+
+def _floor(found: Sequence[Level]) -> float:
+    """Where errors of 0 are drawn: below the smallest error, or well within the bands if there is none."""
+    sizes = [level.size for level in found if level.size > 0]
+    bands = [level.half_width for level in found if level.half_width > 0]
+    return 0.5 * min(sizes) if sizes else 0.1 * min(bands, default=1e-15)
+
+
+def _widen(axes: Any) -> None:
+    """At least a decade of error, so that what does not change looks so."""
+    low, high = axes.get_ylim()
+    if high < 10 * low:
+        middle = math.sqrt(low * high)
+        axes.set_ylim(middle / math.sqrt(10), middle * math.sqrt(10))
+
+
+def _plain_ticks(axes: Any) -> None:
+    """Some plain numbers along a cost of less than a decade, where powers of ten would crowd."""
+    from matplotlib.ticker import MaxNLocator, NullLocator, StrMethodFormatter
+
+    low, high = axes.get_xlim()
+    if high < 10 * low:
+        axes.xaxis.set_major_locator(MaxNLocator(6))
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+
+
+def _draw_series(
+    axes: Any, name: str, found: Sequence[Level], default: Any, index: int, floor: float
+) -> None:
+    colour, marker = COLOURS[index % len(COLOURS)], MARKERS[index % len(MARKERS)]
+    cost = [level.cost for level in found]
+    size = [max(level.size, floor) for level in found]
+    low = [max(level.size - level.half_width, 0.3 * floor) for level in found]
+    high = [max(level.size + level.half_width, floor) for level in found]
+    # what has a name and no number has no place on a line
+    places = zip(found, cost, size, strict=True)
+    line = sorted(
+        (level.value, c, s) for level, c, s in places if not isinstance(level.value, str)
+    )
+    axes.plot([c for _, c, _ in line], [s for *_, s in line], "-", color=colour, lw=1.0, alpha=0.6)
+    for level, x, bottom, top in zip(found, cost, low, high, strict=True):
+        if level.half_width > 0:
+            axes.vlines(x, bottom, top, color=colour, lw=2.5, alpha=0.3)
+    zero = [level.size == 0 for level in found]
+    axes.plot(
+        [c for c, z in zip(cost, zero, strict=True) if not z],
+        [s for s, z in zip(size, zero, strict=True) if not z],
+        marker,
+        color=colour,
+        ms=6,
+        label=name,
+    )
+    if any(zero):
+        at = [c for c, z in zip(cost, zero, strict=True) if z]
+        axes.plot(
+            at,
+            [floor] * len(at),
+            "v",
+            mfc="none",
+            color=colour,
+            ms=8,
+            label="reference, or no error",
+        )
+    for level, x, y in zip(found, cost, size, strict=True):
+        if level.value == default:
+            axes.plot(
+                [x],
+                [y],
+                "*",
+                color=colour,
+                mec="k",
+                mew=0.8,
+                ms=17,
+                zorder=5,
+                label="fdnet's default",
+            )
+
+
+def _label(axes: Any, found: Sequence[Level], index: int, floor: float, turn: float) -> None:
+    """The knob's values beside their markers: below where an earlier marker is near, words to the left from `turn`."""
+    for number, level in enumerate(found):
+        left = isinstance(level.value, str) and level.cost > turn
+        below = any(_near(level, other) for other in found[:number])
+        axes.annotate(
+            shown(level.value),
+            (level.cost, max(level.size, floor)),
+            xytext=(-5 if left else 4, -10 if below else 5),
+            textcoords="offset points",
+            ha="right" if left else "left",
+            fontsize=7,
+            color=COLOURS[index % len(COLOURS)],
+        )
+
+
+def _near(one: Level, other: Level) -> bool:
+    pairs = ((one.cost, other.cost), (one.size, other.size))
+    return all(1.0 / NEAR < a / b < NEAR for a, b in pairs if a > 0 and b > 0)

@@ -1,0 +1,273 @@
+"""Runs the points of a study, each kept as soon as it is done, and goes on where an earlier session was cut."""
+
+import contextlib
+import ctypes
+import fcntl
+import hashlib
+import json
+import multiprocessing as mp
+import os
+import resource
+import shutil
+import signal
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, replace
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Self
+
+from fdnet.errors import CaseError, FdnetError, LiggghtsError
+from fdnet.studies.engine.study import COSTS, DONE, Measured, Point, Study
+
+POINTS, WORK = "points.jsonl", "work"
+OVER_TIME, OVER_MEMORY, FAILED = "over time", "over memory", "failed"
+NAN = float("nan")
+Measure = Callable[[Point, Path], Mapping[str, float]]
+
+
+def run_points(
+    study: Study, out: Path, *, quick: bool, tell: Callable[[str], None] = lambda _: None
+) -> list[Measured]:
+    """All points of the study's form, measured; those recorded in `out` by an earlier session are not run again,
+    unless they failed.
+
+    `tell` gets a line after each point, with an estimate of the time left. Raises CaseError when `out` holds something
+    else. A point that is refused, fails or exceeds its limits is recorded with that status.
+    """
+    points = study.points(quick)
+    keys = [point.key for point in points]
+    assert len(set(keys)) == len(keys), f"study {study.name}: a point appears twice"
+    owner = {
+        "study": study.name,
+        "form": "quick" if quick else "full",
+        "inputs": _digest(study.inputs()),
+    }
+    with _Record(out, owner) as record:
+        return _run_all(study, points, record, quick=quick, tell=tell)
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _run_all(
+    study: Study,
+    points: Sequence[Point],
+    record: "_Record",
+    *,
+    quick: bool,
+    tell: Callable[[str], None],
+) -> list[Measured]:
+    known, work = record.known(points), record.path.parent / WORK
+    todo = [point for point in points if point.key not in known]
+    if len(known):
+        tell(f"{len(known)} of {len(points)} points are there already")
+    start = time.monotonic()
+    for number, point in enumerate(todo, 1):
+        known[point.key] = measured = _measure(study, point, work, quick=quick)
+        record.add(measured)
+        left = (time.monotonic() - start) / number * (len(todo) - number)
+        tell(
+            f"{len(known)} of {len(points)}: {point.key}: {measured.status}, {measured.wall_s:.1f} s{eta(left)}"
+        )
+    shutil.rmtree(work, ignore_errors=True)
+    return [known[point.key] for point in points]
+
+
+def eta(seconds: float) -> str:
+    """The time left in words, to end a line; nothing at 0."""
+    return (
+        f", about {seconds / 60:.0f} min left"
+        if seconds >= 60
+        else (f", about {seconds:.0f} s left" if seconds else "")
+    )
+
+
+class _Record:
+    """The file of measured points: a first line that says whose they are, then one line a point."""
+
+    def __init__(self, out: Path, owner: Mapping[str, str]) -> None:
+        self.path, self.owner = out / POINTS, dict(owner)
+        if out.exists() and not out.is_dir():
+            raise CaseError(
+                f"{out}: is a file, expected a folder for the study; give another --out"
+            )
+        if out.exists() and any(out.iterdir()) and not self.path.exists():
+            raise CaseError(
+                f"{out}: holds no fdnet study (no {POINTS}); give an empty or new folder with --out"
+            )
+        out.mkdir(parents=True, exist_ok=True)
+        self.lock = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o644)
+
+    def __enter__(self) -> Self:
+        try:
+            fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            os.close(self.lock)
+            raise CaseError(
+                f"{self.path}: another session of this study is writing here; wait for it"
+            ) from error
+        if not self.path.stat().st_size:
+            self.path.write_text(json.dumps(self.owner) + "\n", encoding="utf-8")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        os.close(self.lock)
+
+    def known(self, points: Sequence[Point]) -> dict[str, Measured]:
+        """Recorded points by key; an unfinished last line is cut off, points not asked for stay there, failed ones are
+        left to be run again."""
+        text = self.path.read_text(encoding="utf-8", errors="replace")
+        whole = text[: text.rfind("\n") + 1]
+        lines = [self._line(number, line) for number, line in enumerate(whole.splitlines(), 1)]
+        if not lines or lines[0] != self.owner:
+            found = lines[0] if lines else "nothing"
+            raise CaseError(
+                f"{self.path}: belongs to {found}, expected {self.owner}; give another --out"
+            )
+        if whole != text:
+            self.path.write_text(whole, encoding="utf-8")
+        by_key = {point.key: point for point in points}
+        return {
+            line["key"]: Measured(point=by_key[line["key"]], **_numbers(line))
+            for line in lines[1:]
+            if line["key"] in by_key and not str(line["status"]).startswith(FAILED)
+        }
+
+    def _line(self, number: int, text: str) -> dict:
+        try:
+            found = json.loads(text)
+        except ValueError:
+            found = None
+        if not isinstance(found, dict) or (number > 1 and not {"key", "status"} <= set(found)):
+            raise CaseError(
+                f"{self.path}:{number}: is no record of a point; remove the line, or give another --out"
+            )
+        return found
+
+    def add(self, measured: Measured) -> None:
+        fields = asdict(measured)
+        fields.pop("point")
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps({"key": measured.point.key, **fields}) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def _numbers(line: Mapping[str, object]) -> dict:
+    return {name: value for name, value in line.items() if name != "key"}
+
+
+def _measure(study: Study, point: Point, work: Path, *, quick: bool) -> Measured:
+    work.mkdir(parents=True, exist_ok=True)
+    isolated = study.isolated(point) if callable(study.isolated) else study.isolated
+    if quick or not isolated:
+        return _attempt(study.measure, point, work)
+    context = mp.get_context("spawn")
+    receiver, sender = context.Pipe(duplex=False)
+    limits = (study.seconds, study.bytes)
+    process = context.Process(
+        target=_child, args=(study.measure, point, work, limits, sender), daemon=True
+    )
+    start = time.monotonic()
+    process.start()
+    sender.close()
+    try:
+        receiver.recv()
+        start = time.monotonic()
+        answered = receiver.poll(study.seconds)
+        return (
+            receiver.recv() if answered else _nothing(point, OVER_TIME, time.monotonic() - start)
+        )
+    except EOFError:
+        process.join()
+        status = f"{FAILED}: its process ended with exit code {process.exitcode}"
+        return _nothing(point, status, time.monotonic() - start)
+    finally:
+        process.kill()
+        process.join()
+
+
+def _child(
+    measure: Measure, point: Point, work: Path, limits: tuple[float, float], sender: Connection
+) -> None:
+    """Measures in a process of its own: memory limited, ended with its parent, deaf to Ctrl-C (the parent hears it)."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ctypes.CDLL(None).prctl(1, signal.SIGKILL, 0, 0, 0)
+    seconds, most = limits
+    resource.setrlimit(resource.RLIMIT_AS, (int(most), int(most)))
+    sender.send("ready")
+    result = _attempt(measure, point, work)
+    late = result.status == DONE and result.wall_s > seconds
+    sender.send(replace(result, status=OVER_TIME, observed={}) if late else result)
+
+
+def _attempt(measure: Measure, point: Point, work: Path) -> Measured:
+    """One measurement with its costs; what fdnet refuses is a status, what is a fault of the study is raised."""
+    forget_peak()
+    wall, core = time.monotonic(), core_seconds()
+    try:
+        found = dict(measure(point, work))
+        status = DONE
+    except FdnetError as error:
+        found, status = {}, _why(error, work)
+    except MemoryError:
+        found, status = {}, OVER_MEMORY
+    costs = {
+        "wall_s": time.monotonic() - wall,
+        "core_s": core_seconds() - core,
+        "steps": NAN,
+        "peak_memory_bytes": peak_memory(),
+    }
+    costs |= {name: found.pop(name) for name in COSTS if name in found}
+    return Measured(point=point, status=status, observed=found, **costs)
+
+
+def _why(error: FdnetError, work: Path) -> str:
+    """What fdnet refused or how LIGGGHTS failed, without the advice and without the folder it happened in."""
+    said = " ".join(str(error).split()).replace(f"{work}/", "").split("; ")[0]
+    return f"{FAILED if isinstance(error, LiggghtsError) else 'refused'}: {said}"
+
+
+def _nothing(point: Point, status: str, wall: float) -> Measured:
+    return Measured(
+        point=point,
+        status=status,
+        observed={},
+        wall_s=wall,
+        core_s=NAN,
+        steps=NAN,
+        peak_memory_bytes=NAN,
+    )
+
+
+def core_seconds() -> float:
+    """CPU seconds, user and system, of this process and of the children it has waited for."""
+    usages = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(usage.ru_utime + usage.ru_stime for usage in usages)
+
+
+def child_core_seconds() -> float:
+    """CPU seconds, user and system, of the children this process has waited for."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
+def forget_peak() -> None:
+    """Lets `peak_memory` of this process begin again from what it holds now, where the system (Linux) can do that."""
+    with contextlib.suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5")
+
+
+def peak_memory() -> float:
+    """Largest resident memory so far, bytes, of this process or of one child.
+
+    Its own as the kernel counts it since the start of the program: getrusage also holds what the process had as a copy
+    of its parent.
+    """
+    told = Path("/proc/self/status")
+    lines = told.read_text().splitlines() if told.exists() else []
+    own = next((float(line.split()[1]) for line in lines if line.startswith("VmHWM")), 0.0)
+    own = own or resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return 1024.0 * max(own, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)

@@ -1,0 +1,167 @@
+"""Specimen size and seed: how porosity, permeability and damage converge with the number of grains."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from fdnet.network.permeability import AnalysisOptions, analyse
+from fdnet.studies.dem.runs import grains_of, invasion_run, slab_case
+from fdnet.studies.engine.judge import against_reference
+from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study, Value
+
+PERIODIC, WALLS = "periodic sides", "walls at the sides"
+INTACT, INVADED = "intact", "invaded"
+NAMED: Mapping[str, tuple[str, int]] = {
+    "tests' tiny case": ("3.0,1.6,1.6", 70),
+    "quick case": ("4.0,2.4,2.4", 211),
+    "specimen 5": ("8.0,4.0,4.0", 1173),
+}
+"""Boxes in use, mm, and their grains at porosity 0.40: what a quick case is worth beside the real one."""
+_BOXES = {f"invaded, {name}" for name in NAMED}
+_SIDES = {PERIODIC: "periodic", WALLS: "walls"}
+_GRAIN_MM3 = 4 / 3 * 3.141592653589793 * 0.25**3
+_FINES_PER_MM2 = 122.0
+_LENGTH_MM = 3.0
+_STIFFNESS = 1e3
+_QUANTITIES = {
+    INTACT: ("porosity_initial", "k_initial"),
+    INVADED: ("porosity_loss_first", "count_per_mm2", "k_ratio_first"),
+}
+
+
+def points(quick: bool) -> list[Point]:
+    """Cubes for the intact pack, slabs of equal length and growing face for the invasion, then the boxes in use."""
+    if quick:
+        found = [*_cubes((1.25, 1.75, 2.5), 4, PERIODIC), *_faces((1.25, 1.75), 3, PERIODIC)]
+        return found
+    found = []
+    for sides in (PERIODIC, WALLS):
+        found += _cubes((1.25, 1.5, 2.0, 2.5, 3.0, 4.0), 10, sides) + _cubes((5.5, 8.0), 5, sides)
+        found += _faces((1.25, 1.6, 2.4, 3.4), 10, sides) + _faces((4.8, 6.8), 6, sides)
+    return found + [
+        Point(
+            series=f"{INVADED}, {name}",
+            knob="grains",
+            value=float(n),
+            seed=seed,
+            settings={"size_mm": size, "count": n},
+        )
+        for name, (size, n) in NAMED.items()
+        for seed in range(1, 7)
+    ]
+
+
+def _cubes(edges: Sequence[float], seeds: int, sides: str) -> list[Point]:
+    return [
+        _point(INTACT, sides, (edge, edge, edge), seed)
+        for edge in edges
+        for seed in range(1, seeds + 1)
+    ]
+
+
+def _faces(edges: Sequence[float], seeds: int, sides: str) -> list[Point]:
+    return [
+        _point(INVADED, sides, (_LENGTH_MM, edge, edge), seed)
+        for edge in edges
+        for seed in range(1, seeds + 1)
+    ]
+
+
+def _point(what: str, sides: str, size: tuple[float, float, float], seed: int) -> Point:
+    count = round(0.6 * size[0] * size[1] * size[2] / _GRAIN_MM3)
+    settings: dict[str, Value] = {"size_mm": ",".join(f"{s:g}" for s in size), "count": count}
+    return Point(
+        series=f"{what}, {sides}", knob="grains", value=float(count), seed=seed, settings=settings
+    )
+
+
+def measure(point: Point, work: Path) -> Mapping[str, float]:
+    """One pack, or one invasion of 2 ms with 122 fines of 0.10 mm a mm2 of face."""
+    what, sides = point.series.split(", ")
+    size = str(point.settings["size_mm"])
+    length, width, height = (float(s) for s in size.split(","))
+    assignments = (
+        f"box.size_mm=[{size}]",
+        f"box.sides={_SIDES.get(sides, 'walls')}",
+        f"grains.count={point.settings['count']}",
+        f"fines.count={round(_FINES_PER_MM2 * width * height)}",
+        f"run.stiffness_N_m={_STIFFNESS}",
+        f"analysis.sections={round(length)}",
+    )
+    case = slab_case(point.seed, *assignments)
+    if what == INTACT:
+        found = analyse(
+            grains_of(case, work), None, periodic=case.periodic, options=AnalysisOptions()
+        )
+        return {"porosity_initial": found.porosity_initial, "k_initial": found.k_initial}
+    run = invasion_run(case, work, point.slug)
+    return run | {"count_per_mm2": run["count_first"] / (width * height)}
+
+
+def judge(measured: Sequence[Measured]) -> list[Row]:
+    """Everything against the mean of the largest periodic specimens: bias of the mean, and what one run is off by."""
+    rows = []
+    for what, names in _QUANTITIES.items():
+        runs = [
+            run
+            for run in measured
+            if run.point.series.startswith(what) or run.point.series in _BOXES
+        ]
+        largest = max(run.point.value for run in runs if run.point.series == f"{what}, {PERIODIC}")
+
+        def is_largest(run: Measured, what: str = what, largest: Value = largest) -> bool:
+            return run.point.series == f"{what}, {PERIODIC}" and run.point.value == largest
+
+        for name in names:
+            rows += against_reference(runs, name, is_largest, paired=False)
+            rows += against_reference(runs, name, is_largest, paired=False, magnitude=True)
+    return rows
+
+
+_REMARKS = """
+With periodic sides the error of one run falls with the number of grains, roughly as its root. With walls it does not:
+a wall's layer is a fixed share of a given face, so a walled specimen is biased against the bulk however many seeds are
+averaged, and more so in what fines do than in the intact k. More seeds narrow the bands, only a wider face or periodic
+sides remove the bias. Damage needs larger specimens than permeability: k/k0 hangs on a few layers at the face.
+
+What a quick case is worth: of the damage it says what specimen 5 says, whose walls leave k/k0 of the first millimetre
+some 40 to 60 % above the bulk's as well, with twice the scatter of the 1,272 grains; its intact k is 23 % below the
+bulk's, specimen 5's 11 %, for more of it is wall.
+"""
+STUDY = Study(
+    name="specimen-size",
+    title="Specimen size and seed",
+    knob_label="grains",
+    points=points,
+    measure=measure,
+    judge=judge,
+    panels=(
+        Panel(quantity="k_initial", title="permeability: bias of the mean"),
+        Panel(
+            quantity="one run's k_initial",
+            title="permeability: one run",
+            label="mean |relative error|",
+        ),
+        Panel(
+            quantity="one run's porosity_initial",
+            title="porosity: one run",
+            label="mean |relative error|",
+        ),
+        Panel(
+            quantity="one run's porosity_loss_first",
+            title="porosity lost, first mm: one run",
+            label="mean |relative error|",
+        ),
+        Panel(
+            quantity="one run's count_per_mm2",
+            title="fines a mm² of face, first mm: one run",
+            label="mean |relative error|",
+        ),
+        Panel(quantity="k_ratio_first", title="k/k0 of the first mm: bias of the mean"),
+        Panel(
+            quantity="one run's k_ratio_first",
+            title="k/k0 of the first mm: one run",
+            label="mean |relative error|",
+        ),
+    ),
+    remarks=_REMARKS,
+)

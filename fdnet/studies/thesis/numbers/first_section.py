@@ -1,0 +1,85 @@
+"""The first millimetre of a specimen, which the thesis examines in detail (Shi 2011, section 3.3)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fdnet.errors import CaseError
+from fdnet.network.fines.occupancy import Occupancy
+from fdnet.network.network import Network
+from fdnet.spheres.snapshot import Array
+from fdnet.studies.thesis.numbers.examine import Examined
+from fdnet.studies.thesis.numbers.sizes import Sizes
+from fdnet.studies.thesis.numbers.values import thesis_values
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class FirstSection:
+    """Pores (P) and throats (T) of the whole network with the weight each has here, 0 for those centred elsewhere.
+
+    `whole`: only pores of four grains of the specimen and throats between two such count, 1 each. Else those cut by a
+    face count as well, each by the part inside (1/2, 1/4, 1/8): together they fill the section. Facets within one
+    polyhedron, split at will, are no throats.
+    """
+
+    network: Network
+    occupancy: Occupancy
+    pore_weight: Array
+    throat_weight: Array
+    whole: bool
+
+    @property
+    def sizes(self) -> Sizes:
+        """Sizes of its pores and throats."""
+        return Sizes(
+            pore_radius=self.network.pore_radius,
+            pore_volume=self.network.pore_volume,
+            throat_radius=self.network.throat_radius,
+            throat_length=self.network.throat_length,
+            pore_weight=self.pore_weight,
+            sphere_weight=self.pore_weight,
+            throat_weight=self.throat_weight,
+        )
+
+    @property
+    def tube(self) -> Array:
+        """Volume (T,) m3 of the throats' cylinders."""
+        return np.pi * self.network.throat_radius**2 * self.network.throat_length
+
+    @property
+    def has_fines(self) -> Array:
+        """True (T,) for throats that a fine reaches into."""
+        return self.occupancy.throat_fines > 0
+
+
+def first_section(examined: Examined, *, whole: bool) -> FirstSection:
+    """Those centred within 1 mm of the face; a throat's centre is midway between its pores. Raises CaseError on a
+    specimen without fines, whose occupancy was not measured."""
+    network, occupancy = examined.thesis.network, examined.thesis.occupancy
+    if occupancy is None:
+        raise CaseError(
+            f"{examined.id}: holds no fines, so what they fill was not measured; give an invaded specimen"
+        )
+    end = network.box[0, 0] + 1e-3 * thesis_values().first_section_mm
+    pore = network.pore_position[:, 0] < end
+    throat = network.throat_ends[:, :, 0].mean(axis=1) < end
+    group = network.pore_group[network.throat_pores]
+    throat &= group[:, 0] != group[:, 1]
+    if whole:
+        uncut = network.pore_share == 1.0
+        weights = (
+            (pore & uncut).astype(float),
+            (throat & uncut[network.throat_pores].all(axis=1)).astype(float),
+        )
+    else:
+        weights = (
+            np.where(pore, network.pore_share, 0.0),
+            np.where(throat, network.throat_share, 0.0),
+        )
+    return FirstSection(
+        network=network,
+        occupancy=occupancy,
+        pore_weight=weights[0],
+        throat_weight=weights[1],
+        whole=whole,
+    )

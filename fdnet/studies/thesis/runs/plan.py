@@ -1,0 +1,131 @@
+"""Which runs the study of the thesis is made of."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from importlib.resources import files
+from pathlib import Path
+
+from fdnet.case.case import Case
+from fdnet.case.file import read_case
+from fdnet.errors import CaseError
+from fdnet.scales.scales import scales_of
+
+SPECIMENS = tuple(f"specimen{number}" for number in range(1, 9))
+VARIANTS = ("specimen1-7to8", "specimen1-1410", "specimen5-5to6", "table3")
+CHEAP = frozenset({"specimen1", "specimen2", "specimen4", "specimen5", "specimen1-7to8", "specimen1-1410"})
+"""Run with SEEDS seeds; the others, of up to an hour each, with one (their trends come from the quick forms)."""
+SEEDS, QUICK_SEEDS, SCAN_SEEDS = 3, 5, 3
+FRICTIONS = (0.0, 0.1)
+"""Friction of the fines beside the cases' own 0.55."""
+MULTIPLIERS = (0.3, 3.0, 10.0)
+"""Drag multipliers beside 1; springs are stiffened with them, so that stronger drag does not press spheres together."""
+SUPPLIES = (0.25, 0.5, 2.0)
+"""Fines supplied over those of the case."""
+REASONS = (
+    "grains.motion=mobile",
+    "run.stiffness_N_m=100.0",
+    "grains.count=1369",
+    "drag.multiplier=30",
+    "box.sides=periodic",
+)
+"""What might let more fines into specimen 1: grains that give way, soft contacts, porosity counted as a plain sum of
+spheres (1,369 leave 0.30), drag, no walls."""
+BASE_VALUES = {"friction": 0.55, "drag": 1.0, "supply": 1.0}
+"""What the cases themselves have of each knob, by group."""
+QUICK = "quick-"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Planned:
+    """One run: a case file of `cases/` with other settings ("key=value") and seed.
+
+    `beside` are settings that go with the others and are not told in the name. `group` is "specimen", "variant",
+    "quick", "reason" or what is scanned: "friction", "drag", "supply"; `value` that knob.
+    """
+
+    case: str
+    group: str
+    seed: int = 1
+    settings: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
+    value: float = float("nan")
+
+    @property
+    def id(self) -> str:
+        """Name of the run among all seeds."""
+        return " ".join([self.case, *self.settings])
+
+    @property
+    def slug(self) -> str:
+        """Name of its files."""
+        return "".join(c if c.isalnum() or c in ".=-" else "_" for c in self.id) + f"-seed{self.seed}"
+
+    def load(self) -> Case:
+        """Its case. Raises CaseError when the case file is missing or wrong."""
+        return read_case(case_path(self.case), assignments=[f"seed={self.seed}", *self.settings, *self.beside])
+
+
+def cases_folder() -> Path:
+    """Where the shipped cases are: inside an installed package, beside an editable one."""
+    package = Path(str(files("fdnet")))
+    for folder in (package / "cases", package.parent / "cases"):
+        if folder.is_dir():
+            return folder
+    raise CaseError(f"{package.parent / 'cases'}: the shipped case files are missing; install fdnet again")
+
+
+def case_path(name: str) -> Path:
+    """The file of a shipped case; "quick-NAME" is the quick form of NAME."""
+    quick = name.startswith(QUICK)
+    return cases_folder() / ("quick" if quick else "") / f"{name.removeprefix(QUICK) if quick else name}.toml"
+
+
+def planned(*, quick: bool) -> list[Planned]:
+    """All runs of the study, or one of each quick form."""
+    forms = [QUICK + name for name in (*SPECIMENS, *VARIANTS)]
+    if quick:
+        return [Planned(case=name, group="quick") for name in forms]
+    runs = [
+        Planned(case=name, group="specimen" if name in SPECIMENS else "variant", seed=seed)
+        for name in (*SPECIMENS, *VARIANTS)
+        for seed in range(1, (SEEDS if name in CHEAP else 1) + 1)
+    ]
+    runs += [Planned(case=name, group="quick", seed=seed) for name in forms for seed in range(1, QUICK_SEEDS + 1)]
+    return [*runs, *_scans()]
+
+
+def _scans() -> Iterator[Planned]:
+    yield from _scan("friction", "fines.friction", ("specimen1", "specimen5"), FRICTIONS)
+    for setting in REASONS:
+        for seed in range(1, SCAN_SEEDS + 1):
+            yield Planned(case="specimen1", group="reason", seed=seed, settings=(setting,))
+    for name in ("specimen1", "specimen5", "specimen7"):
+        for item in _scan("drag", "drag.multiplier", [QUICK + name], MULTIPLIERS):
+            stiffness = read_case(case_path(item.case)).run.stiffness_N_m
+            assert isinstance(stiffness, float)
+            yield replace(item, beside=(f"run.stiffness_N_m={stiffness * max(1.0, item.value)!r}",))
+    for name in (QUICK + "specimen5", QUICK + "specimen6"):
+        case = read_case(case_path(name))
+        assert case.fines is not None
+        assert case.fines.count is not None
+        for factor in SUPPLIES:
+            setting = f"fines.count={round(factor * case.fines.count)}"
+            for seed in range(1, SCAN_SEEDS + 1):
+                beside = _longer(case, factor)
+                yield Planned(case=name, group="supply", seed=seed, settings=(setting,), beside=beside, value=factor)
+
+
+def _longer(case: Case, factor: float) -> tuple[str, ...]:
+    """A cap moved by what the slab's arrival takes longer."""
+    if case.run.cap_ms is None:
+        return ()
+    scales = scales_of(case)
+    arrival = 1e3 * scales.slab_length / scales.upstream_velocity
+    return (f"run.cap_ms={case.run.cap_ms + (factor - 1) * arrival:.4g}",)
+
+
+def _scan(group: str, key: str, cases: Sequence[str], values: Sequence[float]) -> Iterator[Planned]:
+    for case in cases:
+        for value in values:
+            for seed in range(1, SCAN_SEEDS + 1):
+                yield Planned(case=case, group=group, seed=seed, settings=(f"{key}={value:g}",), value=value)
