@@ -15,8 +15,8 @@ from pathlib import Path
 from string import Template
 
 from fdnet.scales.scales import scales_of
-from fdnet.studies.thesis.compare.bands import Sample, band
-from fdnet.studies.thesis.compare.markdown import figure, markdown_table, with_band
+from fdnet.studies.engine.bands import Sample, band
+from fdnet.studies.engine.markdown import figure, markdown_table, with_band
 from fdnet.studies.thesis.compare.tables import thesis_tables
 from fdnet.studies.thesis.compare.trend_quantities import known, runs_of
 from fdnet.studies.thesis.compare.trend_table import caveats, trends_table

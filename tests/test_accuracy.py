@@ -66,7 +66,11 @@ def test_turned_packs_have_the_axis_as_x(study, cases):
     pack = cases["C_r5_d2"].pack
     turned = study.cases.turned(pack, 1)
     assert np.array_equal(turned.position[:, 0], pack.position[:, 1])
-    assert np.linalg.det(np.eye(3)[:, np.roll(np.arange(3), -1)]) == pytest.approx(1.0)
+    assert np.ptp(turned.box, axis=1) == pytest.approx(np.roll(np.ptp(pack.box, axis=1), -1))
+    # turned, not mirrored: the signed volume of four spheres stays
+    volumes = [np.linalg.det(one.position[1:4] - one.position[0]) for one in (pack, turned)]
+    assert abs(volumes[0]) > 0
+    assert volumes[1] == pytest.approx(volumes[0], rel=1e-9)
     assert set(study.cases.all_grains(pack).kind) == {Kind.GRAIN}
 
 

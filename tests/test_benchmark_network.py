@@ -2,6 +2,7 @@
 
 import json
 import sys
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from scipy.spatial import cKDTree
 def scripts(root, monkeypatch):
     monkeypatch.setattr(sys, "path", [str(root / "scripts"), *sys.path])
     monkeypatch.setenv("PYTHONPATH", str(root))
-    return pytest.importorskip("benchmark_network"), pytest.importorskip("benchmark_fdnet")
+    return import_module("benchmark_network"), import_module("benchmark_fdnet")
 
 
 def test_packs_are_tiles_with_fines_on_the_grains(scripts):

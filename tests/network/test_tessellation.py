@@ -25,8 +25,14 @@ ALL, NONE, SIDES = (True,) * 3, (False,) * 3, (False, True, True)
 def test_void_of_the_pores_is_the_known_porosity(pack, expected, periodic):
     network = build_network(pack, periodic=periodic)
     void = np.sum(network.pore_share * network.pore_volume) / np.prod(pack.box[:, 1])
-    if periodic == ALL:
-        assert void == pytest.approx(expected, abs=1e-6)
+    if periodic == SIDES:
+        # the mirrored faces cut the lattice, so the porosity comes from chords, a second method
+        chords = measure_porosity(pack, periodic=SIDES, lines=20_000)
+        assert chords.mean > expected + 0.03
+        expected, tolerance = chords.mean, 5 * chords.standard_error
+    else:
+        tolerance = 1e-6
+    assert void == pytest.approx(expected, abs=tolerance)
     assert network.area == pytest.approx(pack.box[1, 1] ** 2)
 
 

@@ -8,10 +8,10 @@ import numpy as np
 from scipy.stats import t as student
 
 from fdnet.errors import CaseError
+from fdnet.studies.engine.bands import CONFIDENCE
 from fdnet.studies.engine.study import DONE, Measured, Row, Value, row_of, shown
 
 NAN = float("nan")
-CONFIDENCE = 0.95
 NEARLY, ALIKE, FALLS, FEW_SEEDS = 2.0, 1.5, 0.2, 2
 """A knee's error over the best one; costs that are alike; exponent from which error falls; seeds too few for a knee."""
 _ROUNDING, _NINE_DIGITS = 1e-12, 1e-8

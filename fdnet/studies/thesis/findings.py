@@ -99,11 +99,11 @@ def write_findings(
 
 
 def _draw(findings: Findings, plan: Sequence[Planned], out: Path, states: Path) -> None:
+    from fdnet.studies.engine.csv_rows import write_csv
     from fdnet.studies.thesis.figures.canvas import Tables
     from fdnet.studies.thesis.figures.draw_all import draw_all
     from fdnet.studies.thesis.figures.tables import distances_found, tetrahedra_counted
     from fdnet.studies.thesis.figures.thesis_marks import thesis_marks
-    from fdnet.studies.thesis.numbers.csv_rows import write_csv
     from fdnet.studies.thesis.runs.growth import GROWTH, read_growth
 
     examined = findings.examined

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from fdnet.studies.thesis.compare.markdown import NONE, as_told
+from fdnet.studies.engine.markdown import NONE, as_told
 from fdnet.studies.thesis.numbers.results import ResultRow
 from fdnet.studies.thesis.numbers.values import ThesisSpecimen
 

@@ -4,8 +4,8 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 
-from fdnet.studies.thesis.compare.bands import Band
-from fdnet.studies.thesis.compare.markdown import figure, markdown_table
+from fdnet.studies.engine.bands import Band
+from fdnet.studies.engine.markdown import figure, markdown_table
 from fdnet.studies.thesis.compare.trend_claims import ABOVE, TRENDS
 from fdnet.studies.thesis.compare.trends import (
     FAILS,

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fdnet.studies.thesis.compare.bands import ROUNDING, Band, Sample, band, difference
+from fdnet.studies.engine.bands import ROUNDING, Band, Sample, band, difference
+from fdnet.studies.engine.csv_rows import write_flat
 from fdnet.studies.thesis.compare.trend_claims import ALIKE, MARGIN, Claim, claims
 from fdnet.studies.thesis.compare.trend_quantities import (
     QUANTITIES,
@@ -21,7 +22,6 @@ from fdnet.studies.thesis.compare.trend_quantities import (
     runs_of,
     sample_of,
 )
-from fdnet.studies.thesis.numbers.csv_rows import write_flat
 from fdnet.studies.thesis.numbers.examine import DEFAULT_PAIR, THESIS_PAIR
 from fdnet.studies.thesis.numbers.results import ResultRow
 from fdnet.studies.thesis.runs.plan import QUICK, SPECIMENS

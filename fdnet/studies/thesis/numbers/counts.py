@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.spheres.snapshot import Array, Kind
-from fdnet.studies.thesis.numbers.csv_rows import write_flat
+from fdnet.studies.engine.csv_rows import write_flat
 from fdnet.studies.thesis.numbers.examine import Examined
 from fdnet.studies.thesis.numbers.sizes import tessellated
 from fdnet.studies.thesis.numbers.values import thesis_values

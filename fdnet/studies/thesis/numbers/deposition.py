@@ -14,7 +14,7 @@ import numpy as np
 
 from fdnet.network.laws.damage import CLOGGING, DEPOSITION
 from fdnet.spheres.snapshot import Array
-from fdnet.studies.thesis.numbers.csv_rows import write_flat
+from fdnet.studies.engine.csv_rows import write_flat
 from fdnet.studies.thesis.numbers.examine import Examined
 from fdnet.studies.thesis.numbers.first_section import FirstSection, first_section
 from fdnet.studies.thesis.numbers.statistics import share, within

@@ -13,7 +13,7 @@ from fdnet.network.flow.sections import reduction
 from fdnet.network.permeability import Analysis
 from fdnet.spheres.porosity import measure_porosity
 from fdnet.spheres.snapshot import Array
-from fdnet.studies.thesis.numbers.csv_rows import parsed, read_csv, write_csv
+from fdnet.studies.engine.csv_rows import parsed, read_csv, write_csv
 from fdnet.studies.thesis.numbers.examine import Examined
 from fdnet.studies.thesis.numbers.values import ThesisSpecimen, thesis_of
 from fdnet.studies.thesis.runs.plan import QUICK

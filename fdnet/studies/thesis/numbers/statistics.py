@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.spheres.snapshot import Array
-from fdnet.studies.thesis.numbers.csv_rows import write_flat
+from fdnet.studies.engine.csv_rows import write_flat
 from fdnet.studies.thesis.numbers.examine import Examined
 from fdnet.studies.thesis.numbers.first_section import FirstSection, first_section
 from fdnet.studies.thesis.numbers.sizes import Sizes, sizes_of_grains_alone

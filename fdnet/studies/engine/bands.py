@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-from fdnet.studies.engine.judge import CONFIDENCE
-
+CONFIDENCE = 0.95
 FEWEST = 3
 """Runs that a spread is taken from; fewer say too little of it."""
 ROUNDING = 1e-9

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 
-from fdnet.studies.thesis.compare.bands import ROUNDING, Band
+from fdnet.studies.engine.bands import ROUNDING, Band
 
 NONE = "–"
 
