@@ -59,7 +59,7 @@ def invaded_fraction(figure: Any, sources: Sources, *, specimen: str) -> None:
     _deepest(axes, runs, marks.depth_mm)
     beyond = np.mean(
         [
-            np.mean(invaded_depth(run.state) >= SHALLOW) if run.thesis.invaded_count else 0.0
+            np.mean(invaded_depth(run.state) > SHALLOW) if run.thesis.invaded_count else 0.0
             for run in runs
         ]
     )
