@@ -7,9 +7,9 @@ from typing import Any
 
 from fdnet.atomic import replacing
 from fdnet.studies.engine.judge import Level, levels
+from fdnet.studies.engine.palette import CURVES
 from fdnet.studies.engine.study import Panel, Row, Study, shown
 
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#5a5a5a", "#8c564b")
 MARKERS = "osD^vP<X"
 TURN = 0.75
 """Share of the run times' range beyond which words stand to the left of their markers."""
@@ -123,7 +123,7 @@ def _plain_ticks(axes: Any) -> None:
 def _draw_series(
     axes: Any, name: str, found: Sequence[Level], default: Any, index: int, floor: float
 ) -> None:
-    colour, marker = COLOURS[index % len(COLOURS)], MARKERS[index % len(MARKERS)]
+    colour, marker = CURVES[index % len(CURVES)], MARKERS[index % len(MARKERS)]
     cost = [level.cost for level in found]
     size = [max(level.size, floor) for level in found]
     low = [max(level.size - level.half_width, 0.3 * floor) for level in found]
@@ -184,7 +184,7 @@ def _label(axes: Any, found: Sequence[Level], index: int, floor: float, turn: fl
             textcoords="offset points",
             ha="right" if left else "left",
             fontsize=7,
-            color=COLOURS[index % len(COLOURS)],
+            color=CURVES[index % len(CURVES)],
         )
 
 
