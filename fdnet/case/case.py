@@ -1,7 +1,8 @@
 """Case: what the specimen is. Validated once, at birth.
 
 A case holds no paths and no binary. `fdnet.case.file` reads one from TOML, `Case.toml()` writes it back with
-every default. Its tables are in `fdnet.case.parts`, what must hold between them in `fdnet.case.rules`.
+every default. Its tables are in `fdnet.case.particles` and `fdnet.case.parts`, what must hold
+between them in `fdnet.case.rules`.
 """
 
 import hashlib
@@ -12,8 +13,10 @@ from typing import Annotated, Any
 import tomli_w
 from pydantic import Field, model_validator
 
-from fdnet.case.parts import AnalysisChoices, Box, Drag, Fines, Fluid, Grains, Gravity, Part, Run
+from fdnet.case.particles import Fines, Grains
+from fdnet.case.parts import AnalysisChoices, Box, Drag, Fluid, Gravity, Run
 from fdnet.case.rules import cross_problems
+from fdnet.case.values import Part
 
 POLICIES = ("max_hours", "max_overlap", "on_overlap")
 """Keys of [run] that say whether a run may go on, not what it computes."""
@@ -22,8 +25,13 @@ POLICIES = ("max_hours", "max_overlap", "on_overlap")
 class Case(Part):
     """One specimen. Without `fines` the pack stays intact and no invasion is run."""
 
-    name: Annotated[str, Field(min_length=1, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")]
-    seed: Annotated[int, Field(ge=0, lt=2**31)] = 1
+    name: Annotated[str, Field(min_length=1, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")] = Field(
+        description="Name of the case: letters, digits, dot, underscore and hyphen. It also names "
+        "the run folder."
+    )
+    seed: Annotated[int, Field(ge=0, lt=2**31)] = Field(
+        1, description="Seed of all random numbers. The same case and seed give the same result."
+    )
     box: Box
     grains: Grains
     fines: Fines | None = None
