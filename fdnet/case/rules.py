@@ -4,8 +4,9 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from fdnet.case.control import Run
 from fdnet.case.particles import Fines, Grains
-from fdnet.case.parts import Box, Drag, Run
+from fdnet.case.parts import Box, Drag
 from fdnet.case.values import (
     LEAST_SKIN,
     MOST_BINS,

@@ -37,6 +37,11 @@ Vector = Annotated[tuple[Finite, Finite, Finite], BeforeValidator(_as_tuple)]
 Radius = Annotated[Positive | Pair, Field(union_mode="smart")]
 
 
+def scaled(value: float | None, factor: float) -> float | None:
+    """`value` times `factor`, which turns the unit of a key into SI; None stays None."""
+    return None if value is None else value * factor
+
+
 class Part(BaseModel):
     """A table of the case file: frozen, no unknown keys, no conversion of text to numbers."""
 

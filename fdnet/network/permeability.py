@@ -21,7 +21,13 @@ from fdnet.network.flow.sections import (
 )
 from fdnet.network.flow.slabs import inplace_permeability, slab_permeability, whole_permeability
 from fdnet.network.laws.damage import CLEAN, Damage
-from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, LAWS
+from fdnet.network.laws.named import (
+    DAMAGE_LAWS,
+    DEFAULT_DAMAGE_LAW,
+    DEFAULT_LAW,
+    LAWS,
+    damage_law,
+)
 from fdnet.network.network import WALLS, Network
 from fdnet.network.specimen import Specimen, measure_specimen
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
@@ -236,13 +242,12 @@ def _damage(
     if occupancy is None:
         return None
     with log.timed("conductance"):
-        return DAMAGE_LAWS[options.damage_law](
-            base.network,
-            occupancy,
-            base.conductance,
-            threshold=options.threshold,
+        law = damage_law(
+            options.damage_law,
+            clogging_threshold=options.threshold,
             middle_band=options.middle_band,
         )
+        return law(base.network, occupancy, base.conductance)
 
 
 def _slab_k(state: _State, edges: Array, log: _Log) -> SlabK:

@@ -245,7 +245,7 @@ def _analysis_options(case: Case) -> AnalysisOptions:
         threshold=chosen.clogging_threshold,
         middle_band=chosen.middle_band,
         overlap=chosen.throat_overlap,
-        profile_bin=chosen.profile_bin_mm * 1e-3,
+        profile_bin=chosen.profile_bin_m,
         walls=chosen.walls,
     )
 

@@ -41,7 +41,7 @@ def examine(name: str, state: State) -> Examined:
         sections=chosen.sections,
         walls=chosen.walls,
         overlap=chosen.throat_overlap,
-        profile_bin=chosen.profile_bin_mm * 1e-3,
+        profile_bin=chosen.profile_bin_m,
     )
     pairs = (THESIS_PAIR, DEFAULT_PAIR)
     found = compare(
