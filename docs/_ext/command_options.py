@@ -56,7 +56,8 @@ def option_rows(parser: argparse.ArgumentParser) -> Iterator[tuple[str, str]]:
 def _name(action: argparse.Action) -> str:
     if not action.option_strings:
         return f"`{action.metavar or action.dest}`"
-    value = action.metavar or ("{" + ",".join(action.choices) + "}" if action.choices else "")
+    choices = "{" + ",".join(action.choices) + "}" if action.choices else ""
+    value = action.metavar or choices
     if not value and action.nargs != 0:
         value = action.dest.upper()
     return f"`{' '.join([action.option_strings[0], str(value)]).strip()}`"
