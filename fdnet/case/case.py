@@ -12,7 +12,8 @@ from typing import Annotated, Any
 import tomli_w
 from pydantic import Field, model_validator
 
-from fdnet.case.parts import AnalysisChoices, Box, Drag, Fines, Fluid, Grains, Gravity, Part, Run
+from fdnet.case.analysis import AnalysisChoices
+from fdnet.case.parts import Box, Drag, Fines, Fluid, Grains, Gravity, Part, Run
 from fdnet.case.rules import cross_problems
 
 POLICIES = ("max_hours", "max_overlap", "on_overlap")

@@ -8,14 +8,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 MAX_CONCENTRATION = 0.30
 """Random sequential addition of spheres saturates near 0.38 (Torquato, Uche & Stillinger 2006)."""
 
-MOST_GRAINS, MOST_FINES, MOST_SLAB, MOST_BINS, MOST_SECTIONS = (
-    10_000_000,
-    10_000_000,
-    1000,
-    10_000,
-    1000,
-)
-"""Bounds on what a case may ask for: number of grains and of fines, slab over box length, profile bins, sections."""
+MOST_GRAINS, MOST_FINES, MOST_SLAB, MOST_BINS = 10_000_000, 10_000_000, 1000, 10_000
+"""Bounds on what a case may ask for: number of grains and of fines, slab over box length, bins."""
 
 LEAST_SKIN, MOST_NEIGHBOUR_BINS = 0.01, 10_000_000
 """Smallest skin over the smallest fine's radius, most bins of the neighbour search in the box."""
@@ -176,16 +170,3 @@ class Run(Part):
     checkpoint_ms: Positive | None = None
     skin_mm: Positive | None = None
     neighbour_bin_mm: Positive | None = None
-
-
-class AnalysisChoices(Part):
-    """How permeability is computed; the default laws are fdnet's most accurate pair."""
-
-    sections: Annotated[int, Field(ge=1, le=MOST_SECTIONS)] = 8
-    law: Literal["thesis", "effective", "hydraulic", "series", "lubrication"] = "lubrication"
-    damage_law: Literal["thesis", "thesis-code", "kozeny", "side-kozeny"] = "side-kozeny"
-    clogging_threshold: Fraction | None = None
-    middle_band: Literal["threshold", "position"] = "threshold"
-    throat_overlap: Literal["exact", "two-plane"] = "exact"
-    profile_bin_mm: Positive = 0.25
-    walls: Literal["no-slip", "slip"] = "no-slip"

@@ -39,7 +39,7 @@ def thesis_damage(
         )
     limit = default_threshold if threshold is None else threshold
     if not 0.0 <= limit <= 1.0:
-        raise CaseError(f"analysis.threshold: {limit} is outside 0 to 1")
+        raise CaseError(f"analysis.clogging_threshold: {limit} is outside 0 to 1")
     porosity = occupancy.throat_porosity
     deposits = porosity >= limit if middle_band == "threshold" else _lines_the_wall(occupancy)
     kozeny = _clogged_factor(network, occupancy)
