@@ -14,7 +14,7 @@ from fdnet.case.names import (
     LawName,
     WallName,
 )
-from fdnet.case.parts import Finite, Fraction, Part, Positive
+from fdnet.case.values import Finite, Fraction, Part, Positive
 from fdnet.errors import CaseError
 
 
@@ -42,30 +42,47 @@ class AnalysisKeys(TypedDict, total=False):
 
 
 class AnalysisChoices(Part):
-    """How permeability is computed; the default laws are fdnet's most accurate pair.
+    """How permeability is computed; the default laws are fdnet's most accurate pair."""
 
-    Attributes:
-        sections: number of equal slabs across the flow; in Python also their edges (S+1,), m.
-        law: conductance law of clean throats, a key of `fdnet.LAWS`.
-        damage_law: law of throats with fines, a key of `fdnet.DAMAGE_LAWS`.
-        clogging_threshold: throat porosity below which the thesis's laws take a throat as clogged;
-            without a value the law's own (0.40 `thesis`, 0.36 `thesis-code`).
-        middle_band: how the thesis's laws decide between deposition and clogging: by the threshold
-            alone, or between porosities 0.36 and 0.80 by the position of the fines.
-        throat_overlap: volume of a fine inside a throat, exact or by the thesis's two planes.
-        profile_bin_mm: thickness of the bins of the depth profile, mm; None (Python only): the mean
-            radius of the grains.
-        walls: whether side walls hold the fluid (`no-slip`) or it slips along them (`slip`).
-    """
+    sections: Sections = Field(
+        8,
+        description="Number of equal slabs along the flow in `sections.csv`. In Python also the "
+        "edges (S+1,) of the slabs, m.",
+    )
+    law: LawName = Field(DEFAULT_LAW, description="Conductance of a clean throat.")
+    damage_law: DamageLawName = Field(
+        DEFAULT_DAMAGE_LAW,
+        description="Conductance of a throat with fines over that of the clean one.",
+    )
+    clogging_threshold: Fraction | None = Field(
+        None,
+        description="Throat porosity below which the thesis's damage laws take a throat as "
+        'clogged. When absent: 0.40 ("thesis") or 0.36 ("thesis-code").',
+    )
+    middle_band: Literal["threshold", "position"] = Field(
+        "threshold",
+        description="Rule of the thesis's damage laws for a throat porosity of 0.36 to 0.80: "
+        "by `clogging_threshold` alone, or by where the fines lie in the throat.",
+    )
+    throat_overlap: Literal["exact", "two-plane"] = Field(
+        "exact",
+        description="Volume of a fine inside a throat: exact, or by the thesis's two planes.",
+    )
+    profile_bin_mm: Positive | None = Field(
+        0.25,
+        description="Width of the depth bins in `profile.csv`. In Python also None, the mean "
+        "radius of the grains.",
+    )
+    walls: WallName = Field(
+        "no-slip",
+        description="Whether side walls hold the fluid or let it slip; known to the laws "
+        '"lubrication" and "side-kozeny".',
+    )
 
-    sections: Sections = 8
-    law: LawName = DEFAULT_LAW
-    damage_law: DamageLawName = DEFAULT_DAMAGE_LAW
-    clogging_threshold: Fraction | None = None
-    middle_band: Literal["threshold", "position"] = "threshold"
-    throat_overlap: Literal["exact", "two-plane"] = "exact"
-    profile_bin_mm: Positive | None = 0.25
-    walls: WallName = "no-slip"
+    @property
+    def profile_bin_m(self) -> float | None:
+        """Width of the depth bins, m; None stands for the mean radius of the grains."""
+        return None if self.profile_bin_mm is None else self.profile_bin_mm * 1e-3
 
     @classmethod
     def of_pack(cls, **keys: Any) -> "AnalysisChoices":

@@ -5,18 +5,16 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from fdnet.case.analysis import AnalysisChoices
-from fdnet.case.parts import (
+from fdnet.case.control import Run
+from fdnet.case.particles import Fines, Grains
+from fdnet.case.parts import Box, Drag
+from fdnet.case.values import (
     LEAST_SKIN,
     MOST_BINS,
     MOST_FINES,
     MOST_GRAINS,
     MOST_NEIGHBOUR_BINS,
     MOST_SLAB,
-    Box,
-    Drag,
-    Fines,
-    Grains,
-    Run,
 )
 
 

@@ -16,7 +16,7 @@ from fdnet.network.flow.flow import Flow
 from fdnet.network.flow.sections import Section, SlabK, make_profile, make_sections, reduction
 from fdnet.network.flow.slabs import inplace_permeability, slab_permeability, whole_permeability
 from fdnet.network.laws.damage import CLEAN, Damage
-from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
+from fdnet.network.laws.named import DAMAGE_LAWS, LAWS, damage_law
 from fdnet.network.network import Network
 from fdnet.network.specimen import Specimen, measure_specimen
 from fdnet.spheres.directions import Directions, periodic_axes
@@ -222,13 +222,12 @@ def _damage(
     if occupancy is None:
         return None
     with log.timed("conductance"):
-        return DAMAGE_LAWS[options.damage_law](
-            base.network,
-            occupancy,
-            base.conductance,
-            threshold=options.clogging_threshold,
+        law = damage_law(
+            options.damage_law,
+            clogging_threshold=options.clogging_threshold,
             middle_band=options.middle_band,
         )
+        return law(base.network, occupancy, base.conductance)
 
 
 def _slab_k(state: _State, edges: Array, log: _Log) -> SlabK:

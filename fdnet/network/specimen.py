@@ -71,8 +71,8 @@ def measure_specimen(
     if damaged is not None:
         with timed("occupancy"):
             occupancy = measure_occupancy(network, damaged.fines(), overlap=choices.throat_overlap)
-    bin_mm = choices.profile_bin_mm
-    bins = profile_edges(first.grain_radius if bin_mm is None else bin_mm * 1e-3, box)
+    width = choices.profile_bin_m
+    bins = profile_edges(first.grain_radius if width is None else width, box)
     cuts = np.unique(np.concatenate([edges, bins]))
     spheres = before if damaged is None else after.joined(damaged.fines())
     with timed("porosity"):

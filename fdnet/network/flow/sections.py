@@ -84,7 +84,7 @@ def profile_edges(bin_size: float, box: Array) -> Array:
     low, high = float(box[0, 0]), float(box[0, 1])
     if not bin_size > 0:
         raise CaseError(
-            f"analysis.profile_bin_mm: {bin_size} m is not above 0; give a bin thickness"
+            f"analysis.profile_bin_mm: {1e3 * bin_size:g} is not above 0; give a bin thickness"
         )
     return np.linspace(low, high, max(1, round((high - low) / bin_size)) + 1)
 

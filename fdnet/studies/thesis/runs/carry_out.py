@@ -9,9 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from fdnet.case.case import Case
-from fdnet.scales.cost import cost_of
 from fdnet.errors import CaseError, FdnetError
 from fdnet.run.pipeline import RunOptions, run_case
+from fdnet.scales.cost import cost_of
 from fdnet.scales.scales import scales_of
 from fdnet.studies.engine.runner import eta
 from fdnet.studies.thesis.runs.plan import Planned
@@ -20,7 +20,9 @@ from fdnet.studies.thesis.runs.state import State, read_state, state_of_run, wri
 Tell = Callable[[str], None]
 
 
-def carry_out(plan: Sequence[Planned], out: Path, runs: Path, *, jobs: int, tell: Tell) -> dict[Planned, str]:
+def carry_out(
+    plan: Sequence[Planned], out: Path, runs: Path, *, jobs: int, tell: Tell
+) -> dict[Planned, str]:
     """Run all that has no state in `out` yet, the cheapest first; returns what failed, with the reason.
 
     A run folder in `runs` that was cut is continued, and removed once its state is kept. Two runs whose invasions are
@@ -32,8 +34,12 @@ def carry_out(plan: Sequence[Planned], out: Path, runs: Path, *, jobs: int, tell
     done = [item for item in plan if find_state(out, item, cases[item]) is not None]
     waiting = sorted(set(plan) - set(done), key=lambda item: (costs[item], item.slug))
     first: dict[str, Planned] = {}
-    twins = {item: first.setdefault(cases[item].digest("invade"), item) for item in [*done, *waiting]}
-    failed = _run_all([item for item in waiting if twins[item] is item], costs, out, runs, jobs=jobs, tell=tell)
+    twins = {
+        item: first.setdefault(cases[item].digest("invade"), item) for item in [*done, *waiting]
+    }
+    failed = _run_all(
+        [item for item in waiting if twins[item] is item], costs, out, runs, jobs=jobs, tell=tell
+    )
     for item in waiting:
         if twins[item] is not item and twins[item] not in failed:
             _adopt(state_path(out, twins[item]), state_path(out, item), cases[item])
@@ -41,7 +47,13 @@ def carry_out(plan: Sequence[Planned], out: Path, runs: Path, *, jobs: int, tell
 
 
 def _run_all(
-    todo: Sequence[Planned], costs: dict[Planned, float], out: Path, runs: Path, *, jobs: int, tell: Tell
+    todo: Sequence[Planned],
+    costs: dict[Planned, float],
+    out: Path,
+    runs: Path,
+    *,
+    jobs: int,
+    tell: Tell,
 ) -> dict[Planned, str]:
     failed: dict[Planned, str] = {}
     left, done, start = sum(costs[item] for item in todo), 0.0, time.monotonic()
@@ -71,7 +83,9 @@ def run_one(item: Planned, out: Path, runs: Path) -> str:
     folder = runs / item.slug
     try:
         case = item.load()
-        options = RunOptions(out=folder, resume=folder.exists(), stages=("pack", "invade"), show_progress=False)
+        options = RunOptions(
+            out=folder, resume=folder.exists(), stages=("pack", "invade"), show_progress=False
+        )
         run_case(case, options)
         write_state(state_path(out, item), state_of_run(folder))
     except FdnetError as error:
@@ -95,7 +109,9 @@ def find_state(out: Path, item: Planned, case: Case) -> State | None:
         return None
     found = read_state(path)
     if found.case.digest("invade") != case.digest("invade"):
-        raise CaseError(f"{path}: is the state of another case than {item.id}; remove it to run the case anew")
+        raise CaseError(
+            f"{path}: is the state of another case than {item.id}; remove it to run the case anew"
+        )
     return replace(found, case=case)
 
 

@@ -6,12 +6,12 @@ import numpy as np
 
 from fdnet.atomic import write_bytes
 from fdnet.case.case import Case
-from fdnet.spheres.dump import read_frame
 from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.packing import write_pack_inputs
 from fdnet.dem.scene import box_of, snapshot_of
 from fdnet.errors import CaseError
 from fdnet.scales.scales import PACK_STAGES, scales_of
+from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Kind, Snapshot
 from fdnet.studies.thesis.runs.state import BROKEN, packed_bytes
 
@@ -26,14 +26,18 @@ def grow(case: Case, folder: Path, launch: Launch, *, count: int) -> tuple[Snaps
     write_pack_inputs(case, scales_of(case), folder, count=count, shown=SHOWN)
     run_deck(folder, "in.pack", launch)
     names = [*(f"grown_{stage}.dump" for stage in SHOWN), "pack.dump"]
-    return tuple(snapshot_of(read_frame(folder / "post" / name), case, time_s=0.0) for name in names)
+    return tuple(
+        snapshot_of(read_frame(folder / "post" / name), case, time_s=0.0) for name in names
+    )
 
 
 def write_growth(path: Path, stages: tuple[Snapshot, ...]) -> None:
     """Keep the stages in one file, single precision: x, y, z, radius m and velocity m/s of each grain."""
     tables = [np.column_stack([one.position, one.radius, one.velocity]) for one in stages]
     steps = np.array([one.step for one in stages])
-    write_bytes(path, packed_bytes({"grains": np.stack(tables).astype(np.float32), "steps": steps}))
+    write_bytes(
+        path, packed_bytes({"grains": np.stack(tables).astype(np.float32), "steps": steps})
+    )
 
 
 def read_growth(path: Path, case: Case) -> tuple[Snapshot, ...]:
@@ -42,7 +46,9 @@ def read_growth(path: Path, case: Case) -> tuple[Snapshot, ...]:
         with np.load(path) as file:
             tables, steps = file["grains"].astype(float), file["steps"]
     except BROKEN as error:
-        raise CaseError(f"{path}: holds no growth of a pack ({error}); run the study anew to write it") from error
+        raise CaseError(
+            f"{path}: holds no growth of a pack ({error}); run the study anew to write it"
+        ) from error
     return tuple(
         Snapshot(
             step=int(step),

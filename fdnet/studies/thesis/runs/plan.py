@@ -12,7 +12,9 @@ from fdnet.scales.scales import scales_of
 
 SPECIMENS = tuple(f"specimen{number}" for number in range(1, 9))
 VARIANTS = ("specimen1-7to8", "specimen1-1410", "specimen5-5to6", "table3")
-CHEAP = frozenset({"specimen1", "specimen2", "specimen4", "specimen5", "specimen1-7to8", "specimen1-1410"})
+CHEAP = frozenset(
+    {"specimen1", "specimen2", "specimen4", "specimen5", "specimen1-7to8", "specimen1-1410"}
+)
 """Run with SEEDS seeds; the others, of up to an hour each, with one (their trends come from the quick forms)."""
 SEEDS, QUICK_SEEDS, SCAN_SEEDS = 3, 5, 3
 FRICTIONS = (0.0, 0.1)
@@ -58,11 +60,15 @@ class Planned:
     @property
     def slug(self) -> str:
         """Name of its files."""
-        return "".join(c if c.isalnum() or c in ".=-" else "_" for c in self.id) + f"-seed{self.seed}"
+        return (
+            "".join(c if c.isalnum() or c in ".=-" else "_" for c in self.id) + f"-seed{self.seed}"
+        )
 
     def load(self) -> Case:
         """Its case. Raises CaseError when the case file is missing or wrong."""
-        return read_case(case_path(self.case), assignments=[f"seed={self.seed}", *self.settings, *self.beside])
+        return read_case(
+            case_path(self.case), assignments=[f"seed={self.seed}", *self.settings, *self.beside]
+        )
 
 
 def cases_folder() -> Path:
@@ -71,13 +77,19 @@ def cases_folder() -> Path:
     for folder in (package / "cases", package.parent / "cases"):
         if folder.is_dir():
             return folder
-    raise CaseError(f"{package.parent / 'cases'}: the shipped case files are missing; install fdnet again")
+    raise CaseError(
+        f"{package.parent / 'cases'}: the shipped case files are missing; install fdnet again"
+    )
 
 
 def case_path(name: str) -> Path:
     """The file of a shipped case; "quick-NAME" is the quick form of NAME."""
     quick = name.startswith(QUICK)
-    return cases_folder() / ("quick" if quick else "") / f"{name.removeprefix(QUICK) if quick else name}.toml"
+    return (
+        cases_folder()
+        / ("quick" if quick else "")
+        / f"{name.removeprefix(QUICK) if quick else name}.toml"
+    )
 
 
 def planned(*, quick: bool) -> list[Planned]:
@@ -90,7 +102,11 @@ def planned(*, quick: bool) -> list[Planned]:
         for name in (*SPECIMENS, *VARIANTS)
         for seed in range(1, (SEEDS if name in CHEAP else 1) + 1)
     ]
-    runs += [Planned(case=name, group="quick", seed=seed) for name in forms for seed in range(1, QUICK_SEEDS + 1)]
+    runs += [
+        Planned(case=name, group="quick", seed=seed)
+        for name in forms
+        for seed in range(1, QUICK_SEEDS + 1)
+    ]
     return [*runs, *_scans()]
 
 
@@ -103,7 +119,9 @@ def _scans() -> Iterator[Planned]:
         for item in _scan("drag", "drag.multiplier", [QUICK + name], MULTIPLIERS):
             stiffness = read_case(case_path(item.case)).run.stiffness_N_m
             assert isinstance(stiffness, float)
-            yield replace(item, beside=(f"run.stiffness_N_m={stiffness * max(1.0, item.value)!r}",))
+            yield replace(
+                item, beside=(f"run.stiffness_N_m={stiffness * max(1.0, item.value)!r}",)
+            )
     for name in (QUICK + "specimen5", QUICK + "specimen6"):
         case = read_case(case_path(name))
         assert case.fines is not None
@@ -112,20 +130,31 @@ def _scans() -> Iterator[Planned]:
             setting = f"fines.count={round(factor * case.fines.count)}"
             for seed in range(1, SCAN_SEEDS + 1):
                 beside = _longer(case, factor)
-                yield Planned(case=name, group="supply", seed=seed, settings=(setting,), beside=beside, value=factor)
+                yield Planned(
+                    case=name,
+                    group="supply",
+                    seed=seed,
+                    settings=(setting,),
+                    beside=beside,
+                    value=factor,
+                )
 
 
 def _longer(case: Case, factor: float) -> tuple[str, ...]:
     """A cap moved by what the slab's arrival takes longer."""
-    if case.run.cap_ms is None:
+    if case.run.cap_s is None:
         return ()
     scales = scales_of(case)
-    arrival = 1e3 * scales.slab_length / scales.upstream_velocity
-    return (f"run.cap_ms={case.run.cap_ms + (factor - 1) * arrival:.4g}",)
+    arrival = scales.slab_length / scales.upstream_velocity
+    return (f"run.cap_ms={1e3 * (case.run.cap_s + (factor - 1) * arrival):.4g}",)
 
 
-def _scan(group: str, key: str, cases: Sequence[str], values: Sequence[float]) -> Iterator[Planned]:
+def _scan(
+    group: str, key: str, cases: Sequence[str], values: Sequence[float]
+) -> Iterator[Planned]:
     for case in cases:
         for value in values:
             for seed in range(1, SCAN_SEEDS + 1):
-                yield Planned(case=case, group=group, seed=seed, settings=(f"{key}={value:g}",), value=value)
+                yield Planned(
+                    case=case, group=group, seed=seed, settings=(f"{key}={value:g}",), value=value
+                )

@@ -16,11 +16,11 @@ from fdnet.atomic import write_bytes
 from fdnet.case.case import Case
 from fdnet.case.file import case_from, read_case
 from fdnet.dem.checkpoint import read_history, state_at
-from fdnet.spheres.dump import read_frame
 from fdnet.dem.scene import box_of, snapshot_of
 from fdnet.errors import CaseError
 from fdnet.run.folder import CASE, read_record
 from fdnet.scales.scales import scales_of
+from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 
 ENDING = (
@@ -61,7 +61,9 @@ def state_of_run(folder: Path) -> State:
     case = read_case(folder / CASE)
     pack, invasion = read_record(folder, "pack"), read_record(folder, "invade")
     if pack is None or invasion is None:
-        raise CaseError(f"{folder}: holds no finished invasion; run it to its end first (--resume)")
+        raise CaseError(
+            f"{folder}: holds no finished invasion; run it to its end first (--resume)"
+        )
     scales, history = scales_of(case), read_history(folder / "invade")
     grains = snapshot_of(read_frame(folder / "pack" / "post" / "pack.dump"), case, time_s=0.0)
     last = history[-1]
@@ -69,8 +71,13 @@ def state_of_run(folder: Path) -> State:
         case=case,
         grains=grains,
         damaged=state_at(folder / "invade", last, case, scales, grains),
-        history=np.array([[r.step * scales.time_step, r.upstream, r.invaded, r.passed] for r in history]),
-        ending={name: invasion[name] for name in ("stop_reason", "seconds", "steps", "dt_s", "max_overlap")}
+        history=np.array(
+            [[r.step * scales.time_step, r.upstream, r.invaded, r.passed] for r in history]
+        ),
+        ending={
+            name: invasion[name]
+            for name in ("stop_reason", "seconds", "steps", "dt_s", "max_overlap")
+        }
         | {"supplied": invasion["supplied"], "passed": last.passed, "upstream": last.upstream}
         | {"pack_seconds": pack["seconds"], "warnings": invasion["warnings"]},
     )
@@ -78,10 +85,14 @@ def state_of_run(folder: Path) -> State:
 
 def write_state(path: Path, state: State) -> None:
     """Keep a state in one file of single precision (0.5 nm at 8 mm), compressed."""
-    text = json.dumps({"case": state.case.toml(), "ending": dict(state.ending), "step": state.damaged.step})
+    text = json.dumps(
+        {"case": state.case.toml(), "ending": dict(state.ending), "step": state.damaged.step}
+    )
     arrays = {"text": np.frombuffer(text.encode(), np.uint8), "history": state.history}
     for name, spheres in (("grains", state.grains), ("damaged", state.damaged)):
-        arrays[f"{name}_place"] = np.column_stack([spheres.position, spheres.radius]).astype(np.float32)
+        arrays[f"{name}_place"] = np.column_stack([spheres.position, spheres.radius]).astype(
+            np.float32
+        )
         arrays[f"{name}_kind"] = spheres.kind.astype(np.uint8)
         arrays[f"{name}_id"] = spheres.id.astype(np.uint32)
     write_bytes(path, packed_bytes(arrays))
@@ -104,15 +115,21 @@ def read_state(path: Path) -> State:
         return State(
             case=case,
             grains=_spheres(arrays, "grains", case, 0, 0.0),
-            damaged=_spheres(arrays, "damaged", case, told["step"], told["step"] * told["ending"]["dt_s"]),
+            damaged=_spheres(
+                arrays, "damaged", case, told["step"], told["step"] * told["ending"]["dt_s"]
+            ),
             history=arrays["history"],
             ending={name: told["ending"][name] for name in ENDING},
         )
     except BROKEN as error:
-        raise CaseError(f"{path}: is no state of an invasion ({error}); run the study anew to write it") from error
+        raise CaseError(
+            f"{path}: is no state of an invasion ({error}); run the study anew to write it"
+        ) from error
 
 
-def _spheres(arrays: Mapping[str, Array], name: str, case: Case, step: int, time_s: float) -> Snapshot:
+def _spheres(
+    arrays: Mapping[str, Array], name: str, case: Case, step: int, time_s: float
+) -> Snapshot:
     place = arrays[f"{name}_place"].astype(float)
     kind = arrays[f"{name}_kind"].astype(int)
     return Snapshot(
@@ -130,6 +147,6 @@ def _spheres(arrays: Mapping[str, Array], name: str, case: Case, step: int, time
 def _exact_radius(radius: Array, kind: Array, case: Case) -> Array:
     """Radii of a single size as the case gives them, in full precision."""
     for spheres, which in ((case.grains, Kind.GRAIN), (case.fines, Kind.FINE)):
-        if spheres is not None and not isinstance(spheres.radius_mm, tuple):
+        if spheres is not None and spheres.one_size:
             radius = np.where(kind == which, spheres.mean_radius_m, radius)
     return radius
