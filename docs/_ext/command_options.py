@@ -44,7 +44,7 @@ def usage_of(parser: argparse.ArgumentParser) -> str:
 
 
 def option_rows(parser: argparse.ArgumentParser) -> Iterator[tuple[str, str]]:
-    """Name and meaning, in Markdown, of every argument; raises LookupError for one without help."""
+    """Name and meaning of every argument, in Markdown; raises LookupError for one without help."""
     for action in parser._actions:
         if isinstance(action, argparse._HelpAction):
             continue
