@@ -13,7 +13,6 @@ from builders import TINY, tiny
 
 from fdnet.case.file import case_from, known_keys, read_case, set_keys
 from fdnet.errors import CaseError
-from fdnet.run.pipeline import _analysis_options
 from fdnet.studies.thesis.runs.carry_out import find_state, state_path
 from fdnet.studies.thesis.runs.plan import SPECIMENS, VARIANTS, planned
 
@@ -139,11 +138,9 @@ def test_stages_depend_only_on_their_own_keys():
 
 
 def test_analysis_choices_reach_the_analysis():
-    """What the two share by name is handed on; the default walls hold the fluid."""
+    """One class holds them, with the names of the keys; the default walls hold the fluid."""
     assert tiny().analysis.walls == "no-slip"
-    options = _analysis_options(
-        tiny("analysis.walls=slip", "analysis.sections=3", "analysis.law=thesis")
-    )
+    options = tiny("analysis.walls=slip", "analysis.sections=3", "analysis.law=thesis").analysis
     assert (options.walls, options.sections, options.law) == ("slip", 3, "thesis")
     assert "analysis.walls: 'sticky'" in problems(changed(analysis={"walls": "sticky"}))
 

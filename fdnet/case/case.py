@@ -13,10 +13,11 @@ from typing import Annotated, Any
 import tomli_w
 from pydantic import Field, model_validator
 
+from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.control import Run
 from fdnet.case.fluid import Fluid
 from fdnet.case.particles import Fines, Grains
-from fdnet.case.parts import AnalysisChoices, Box, Drag, Gravity
+from fdnet.case.parts import Box, Drag, Gravity
 from fdnet.case.rules import cross_problems
 from fdnet.case.values import Part
 
