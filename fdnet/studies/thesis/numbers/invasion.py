@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from fdnet.network.permeability import Analysis
+from fdnet.network.analysis import Analysis
 from fdnet.spheres.porosity import measure_porosity
 from fdnet.spheres.snapshot import Array
 from fdnet.studies.thesis.runs.state import State

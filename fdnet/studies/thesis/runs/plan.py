@@ -158,11 +158,11 @@ def _scans() -> Iterator[Planned]:
 
 def _longer(case: Case, factor: float) -> tuple[str, ...]:
     """The cap on the simulated time, moved by the longer arrival of a longer slab."""
-    if case.run.cap_ms is None:
+    if case.run.cap_s is None:
         return ()
     scales = scales_of(case)
-    arrival = 1e3 * scales.slab_length / scales.upstream_velocity
-    return (f"run.cap_ms={case.run.cap_ms + (factor - 1) * arrival:.4g}",)
+    arrival = scales.slab_length / scales.upstream_velocity
+    return (f"run.cap_ms={1e3 * (case.run.cap_s + (factor - 1) * arrival):.4g}",)
 
 
 def _scan(

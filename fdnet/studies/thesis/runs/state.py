@@ -162,6 +162,6 @@ def _spheres(
 def _exact_radius(radius: Array, kind: Array, case: Case) -> Array:
     """Radii of spheres of a single size, as the case gives them, in full precision."""
     for spheres, which in ((case.grains, Kind.GRAIN), (case.fines, Kind.FINE)):
-        if spheres is not None and not isinstance(spheres.radius_mm, tuple):
+        if spheres is not None and spheres.one_size:
             radius = np.where(kind == which, spheres.mean_radius_m, radius)
     return radius
