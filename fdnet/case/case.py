@@ -1,7 +1,7 @@
 """Case: what the specimen is. Validated once, at birth.
 
 A case holds no paths and no binary. `fdnet.case.file` reads one from TOML, `Case.toml()` writes it back with
-every default. Its tables are in `fdnet.case.particles` and `fdnet.case.parts`, what must hold
+every default. Its tables are in the modules next to this one, what must hold
 between them in `fdnet.case.rules`.
 """
 
@@ -13,8 +13,11 @@ from typing import Annotated, Any
 import tomli_w
 from pydantic import Field, model_validator
 
+from fdnet.case.analysis import AnalysisChoices
+from fdnet.case.control import Run
+from fdnet.case.fluid import Fluid
 from fdnet.case.particles import Fines, Grains
-from fdnet.case.parts import AnalysisChoices, Box, Drag, Fluid, Gravity, Run
+from fdnet.case.parts import Box, Drag, Gravity
 from fdnet.case.rules import cross_problems
 from fdnet.case.values import Part
 
@@ -52,15 +55,13 @@ class Case(Part):
 
     @property
     def size_m(self) -> tuple[float, float, float]:
-        """Box sides, m."""
-        x, y, z = self.box.size_mm
-        return x * 1e-3, y * 1e-3, z * 1e-3
+        """Side lengths of the box (x, y, z), m."""
+        return self.box.size_m
 
     @property
     def periodic(self) -> tuple[bool, bool, bool]:
         """Which directions are periodic; the flow direction never is."""
-        sideways = self.box.sides == "periodic"
-        return False, sideways, sideways
+        return self.box.periodic
 
     def data(self) -> dict[str, Any]:
         """All keys with a value, defaults written out (TOML has no null: keys without a value are left out)."""

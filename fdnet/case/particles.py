@@ -5,7 +5,15 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from fdnet.case.values import MAX_CONCENTRATION, Fraction, NonNegative, Part, Positive, Radius
+from fdnet.case.values import (
+    MAX_CONCENTRATION,
+    Fraction,
+    NonNegative,
+    Part,
+    Positive,
+    Radius,
+    scaled,
+)
 
 
 class Spheres(Part):
@@ -43,6 +51,11 @@ class Spheres(Part):
             else (self.radius_mm, self.radius_mm)
         )
         return pair[0] * 1e-3, pair[1] * 1e-3
+
+    @property
+    def one_size(self) -> bool:
+        """Whether all radii are equal."""
+        return not isinstance(self.radius_mm, tuple)
 
     @property
     def mean_radius_m(self) -> float:
@@ -128,3 +141,8 @@ class Fines(Spheres):
         "each part of the slab in when it is about to arrive. The suspension is the same; batches "
         "are much faster for a long slab.",
     )
+
+    @property
+    def slab_m(self) -> float | None:
+        """Length of the slab of suspension, m; None: it follows from the count."""
+        return scaled(self.slab_mm, 1e-3)
