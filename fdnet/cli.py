@@ -188,7 +188,7 @@ def _stages(text: str) -> tuple[str, ...]:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from fdnet.run.pipeline import RunOptions, run_case
+    from fdnet.run.pipeline import RunOptions, run_stages
 
     case = _case_of(options)
     out = options.out or Path("runs") / case.name
@@ -203,7 +203,7 @@ def _run(options: argparse.Namespace) -> int:
         show_progress=not options.quiet,
         command=options.command_line,
     )
-    summary = run_case(case, chosen)
+    summary = run_stages(case, chosen)
     if options.json:
         print(json.dumps(summary, indent=2))
     else:

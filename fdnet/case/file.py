@@ -125,10 +125,10 @@ def _toml_value(text: str) -> Any:
         return text
 
 
-def read_case(path: Path, *, assignments: list[str] | None = None) -> Case:
+def read_case(path: str | Path, *, assignments: list[str] | None = None) -> Case:
     """The case in the TOML file at `path`. Raises CaseError: unreadable file, bad TOML, any invalid parameter."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise CaseError(
             f"{path}: cannot be read as a case file: {error}; give the path of a TOML file"

@@ -60,22 +60,7 @@ class RunFolder:
 
     def manifest(self) -> dict[str, Any] | None:
         """The manifest of an analysed run, or None. Raises CaseError when it or what it lists is damaged."""
-        manifest = _read_record(self.path / MANIFEST)
-        missing = (
-            []
-            if manifest is None
-            else [
-                name
-                for stage in ("pack", "invade", "analyse")
-                for name in _expected(manifest, stage)
-                if not (self.path / name).exists()
-            ]
-        )
-        if missing:
-            raise CaseError(
-                f"{self.path}: {MANIFEST} says complete, but {missing[0]} is missing; start over with --force"
-            )
-        return manifest
+        return read_manifest(self.path)
 
     def holds(self, case: Case, stages: tuple[str, ...]) -> bool:
         """Whether every one of `stages` is done already. Raises CaseError as `manifest` and `record` do."""
@@ -246,6 +231,22 @@ def read_record(folder: Path, stage: str) -> dict[str, Any] | None:
     Raises CaseError when it cannot be understood.
     """
     return _read_record(folder / _RECORDS[stage])
+
+
+def read_manifest(folder: Path) -> dict[str, Any] | None:
+    """The manifest of the analysed run in `folder`, or None where there is none.
+
+    Raises CaseError when it cannot be read, or when a file that it lists is missing.
+    """
+    manifest = _read_record(folder / MANIFEST)
+    for stage in ("pack", "invade", "analyse") if manifest else ():
+        for name in _expected(manifest or {}, stage):
+            if not (folder / name).exists():
+                raise CaseError(
+                    f"{folder}: {MANIFEST} says complete, but {name} is missing; "
+                    "start over with --force"
+                )
+    return manifest
 
 
 def _read_record(path: Path) -> dict[str, Any] | None:

@@ -77,7 +77,7 @@ class _Story:
         return self.folder.path
 
 
-def run_case(case: Case, options: RunOptions) -> dict[str, Any]:
+def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
     """Run the stages asked for; returns the summary ({} when neither analysis nor report was asked for).
 
     A finished run is not repeated: its summary is returned. Raises the FdnetError of the stage that fails; what was
@@ -97,7 +97,7 @@ def run_case(case: Case, options: RunOptions) -> dict[str, Any]:
         story = _Story(case=case, scales=scales, folder=folder, options=options)
         if folder.manifest() is not None and folder.holds(case, options.stages):
             return _read_summary(folder)
-        return _run_stages(story)
+        return _carry_out(story)
     except CaseError as error:
         left = folder.discard()
         if left:
@@ -122,7 +122,7 @@ def _read_summary(folder: RunFolder) -> dict[str, Any]:
     return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
 
 
-def _run_stages(story: _Story) -> dict[str, Any]:
+def _carry_out(story: _Story) -> dict[str, Any]:
     stages = story.options.stages
     if story.folder.manifest() is not None:
         story.folder.clear(tuple(stage for stage in ("analyse", "report") if stage in stages))
