@@ -123,7 +123,8 @@ install_into_system() {
     quietly apt-get update -q ||
         say "apt-get update failed (above); going on with the package lists of before"
     quietly apt-get install -q -y --no-install-recommends "$@" ||
-        fail "apt-get install failed (above): check the network and /etc/apt, or install by hand: $*"
+        fail "apt-get install failed (above):" \
+            "check the network and /etc/apt, or install by hand: $*"
 }
 
 # Writes settings for an apt of our own: it uses the system's sources and its list of installed

@@ -23,7 +23,7 @@ NETWORK_LAYERS = [
     ["tessellation"],
     ["network"],
     ["fines", "flow"],
-    ["laws", "specimen"],
+    ["laws", "specimen", "analysis"],
     ["permeability"],
 ]
 STUDIES_LAYERS = [

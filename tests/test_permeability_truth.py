@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from fdnet.case.names import DAMAGE_LAW_NAMES, LAW_NAMES
 from fdnet.cli import main
 from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, LAWS
-from fdnet.permeability_command import DAMAGE_LAW_NAMES, LAW_NAMES
 
 DATA = Path(__file__).parent / "data" / "truth"
 OWN = Path(__file__).parents[1] / "docs" / "validation" / "truth_own.csv"

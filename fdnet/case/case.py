@@ -14,10 +14,11 @@ from typing import Annotated, Any, Self
 import tomli_w
 from pydantic import Field, model_validator
 
+from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.control import Run
 from fdnet.case.fluid import Fluid
 from fdnet.case.particles import Fines, Grains, Spheres
-from fdnet.case.parts import AnalysisChoices, Box, Drag, Gravity
+from fdnet.case.parts import Box, Drag, Gravity
 from fdnet.case.rules import cross_problems
 from fdnet.case.stages import STAGES, Stage
 from fdnet.case.values import Part
@@ -145,7 +146,9 @@ def case_type(data: Mapping[str, Any]) -> type[Case]:
 def with_fines(case: Case) -> InvasionCase:
     """The same case, known to have fines. Raises CaseError when it has none."""
     if not isinstance(case, InvasionCase):
-        raise CaseError(f"case {case.name}: has no table [fines], but an invasion needs one; add it")
+        raise CaseError(
+            f"case {case.name}: has no table [fines], but an invasion needs one; add it"
+        )
     return case
 
 

@@ -82,7 +82,9 @@ def _problem(item: dict[str, Any]) -> str:
         return f"{path}: unknown key (given {given!r}){hint}"
     if item["type"] == "missing":
         return f"{path}: missing, a value is needed"
-    message = item["msg"].replace("Input should be", "should be").replace("a valid tuple", "a list")
+    message = (
+        item["msg"].replace("Input should be", "should be").replace("a valid tuple", "a list")
+    )
     return f"{path}: {given!r} {message}"
 
 

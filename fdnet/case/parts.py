@@ -1,4 +1,4 @@
-"""Tables of a case file: [box], [drag], [gravity] and [analysis].
+"""Tables of a case file: [box], [drag] and [gravity].
 
 The keys carry the unit of the user; properties give the same values in SI for everything else.
 """
@@ -8,8 +8,6 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from fdnet.case.values import (
-    MOST_SECTIONS,
-    Fraction,
     NonNegative,
     Part,
     Positive,
@@ -91,42 +89,3 @@ class Gravity(Part):
     negligible_below: NonNegative = Field(
         1e-3, description='Ratio of weight to drag below which mode "auto" leaves gravity out.'
     )
-
-
-class AnalysisChoices(Part):
-    """How permeability is computed; the default laws are fdnet's most accurate pair."""
-
-    sections: Annotated[int, Field(ge=1, le=MOST_SECTIONS)] = Field(
-        8, description="Number of equal slabs along the flow in `sections.csv`."
-    )
-    law: Literal["thesis", "effective", "hydraulic", "series", "lubrication"] = Field(
-        "lubrication", description="Conductance of a clean throat."
-    )
-    damage_law: Literal["thesis", "thesis-code", "kozeny", "side-kozeny"] = Field(
-        "side-kozeny", description="Conductance of a throat with fines over that of the clean one."
-    )
-    clogging_threshold: Fraction | None = Field(
-        None,
-        description="Throat porosity below which the thesis's damage laws take a throat as "
-        'clogged. When absent: 0.40 ("thesis") or 0.36 ("thesis-code").',
-    )
-    middle_band: Literal["threshold", "position"] = Field(
-        "threshold",
-        description="Rule of the thesis's damage laws for a throat porosity of 0.36 to 0.80: "
-        "by `clogging_threshold` alone, or by where the fines lie in the throat.",
-    )
-    throat_overlap: Literal["exact", "two-plane"] = Field(
-        "exact",
-        description="Volume of a fine inside a throat: exact, or by the thesis's two planes.",
-    )
-    profile_bin_mm: Positive = Field(0.25, description="Width of the depth bins in `profile.csv`.")
-    walls: Literal["no-slip", "slip"] = Field(
-        "no-slip",
-        description="Whether side walls hold the fluid or let it slip; known to the laws "
-        '"lubrication" and "side-kozeny".',
-    )
-
-    @property
-    def profile_bin_m(self) -> float:
-        """Width of the depth bins, m."""
-        return self.profile_bin_mm * 1e-3

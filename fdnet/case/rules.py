@@ -5,9 +5,10 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.control import Run
 from fdnet.case.particles import Fines, Grains, Spheres
-from fdnet.case.parts import AnalysisChoices, Box, Drag, Gravity
+from fdnet.case.parts import Box, Drag, Gravity
 from fdnet.case.values import (
     LEAST_SKIN,
     MOST_BINS,
@@ -188,16 +189,24 @@ def _buoyancy(gravity: Gravity) -> Iterator[str]:
 def _end(run: Run) -> Iterator[str]:
     if run.duration_ms is not None and run.cap_ms is not None:
         yield (
-            f"run.cap_ms: {run.cap_ms} beside run.duration_ms {run.duration_ms}: "
+            f"run.cap_ms: {run.cap_ms} together with run.duration_ms {run.duration_ms}: "
             "give one of the two"
         )
 
 
+def _sections(analysis: AnalysisChoices) -> Iterator[str]:
+    if isinstance(analysis.sections, tuple):
+        yield f"analysis.sections: {analysis.sections}: a case gives the number of sections"
+
+
 def _profile_bins(box: Box, analysis: AnalysisChoices) -> Iterator[str]:
-    if box.size_mm[0] / analysis.profile_bin_mm > MOST_BINS:
+    thickness = analysis.profile_bin_mm
+    if thickness is None:
+        yield "analysis.profile_bin_mm: missing, a case gives the thickness of its bins"
+    elif box.size_mm[0] / thickness > MOST_BINS:
         yield (
-            f"analysis.profile_bin_mm: {analysis.profile_bin_mm:g} cuts {box.size_mm[0]:g} mm "
-            f"into more than {MOST_BINS} bins; expected at least {box.size_mm[0] / MOST_BINS:.3g}"
+            f"analysis.profile_bin_mm: {thickness:g} cuts {box.size_mm[0]:g} mm into more than "
+            f"{MOST_BINS} bins; expected at least {box.size_mm[0] / MOST_BINS:.3g}"
         )
 
 
@@ -207,9 +216,7 @@ RULES = (
     _rising("fines"),
     Rule(("grains.porosity", "grains.count"), _number_of_grains),
     Rule(("fines.count", "fines.slab_mm"), _number_of_fines),
-    Rule(
-        ("box.size_mm", "grains.radius_mm", "grains.porosity", "grains.count"), _room_for_grains
-    ),
+    Rule(("box.size_mm", "grains.radius_mm", "grains.porosity", "grains.count"), _room_for_grains),
     Rule(("box.size_mm", "box.sides", "grains.radius_mm"), _room_for_one_grain),
     Rule(("box.size_mm", *_SLAB_KEYS), _slab),
     Rule(("grains.radius_mm", "fines.radius_mm"), _gap_of_sizes),
@@ -221,6 +228,7 @@ RULES = (
     Rule(("drag.scheme", "drag.upstream"), _implicit),
     Rule(("gravity.mode", "gravity.acceleration_m_s2", "gravity.buoyancy"), _buoyancy),
     Rule(("run.duration_ms", "run.cap_ms"), _end),
+    Rule(("analysis.sections",), _sections),
     Rule(("box.size_mm", "analysis.profile_bin_mm"), _profile_bins),
 )
 """All rules, in the order in which their problems are reported."""

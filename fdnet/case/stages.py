@@ -4,3 +4,5 @@ from typing import Literal, get_args
 
 Stage = Literal["pack", "invade", "analyse", "report"]
 STAGES: tuple[Stage, ...] = get_args(Stage)
+LIGGGHTS_STAGES = STAGES[:2]
+"""The stages that LIGGGHTS carries out, each in a folder of its name."""

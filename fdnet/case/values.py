@@ -7,14 +7,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 MAX_CONCENTRATION = 0.30
 """Random sequential addition of spheres saturates near 0.38 (Torquato, Uche & Stillinger 2006)."""
 
-MOST_GRAINS, MOST_FINES, MOST_SLAB, MOST_BINS, MOST_SECTIONS = (
-    10_000_000,
-    10_000_000,
-    1000,
-    10_000,
-    1000,
-)
-"""Upper bounds: grains, fines, slab over box length, profile bins, sections."""
+MOST_GRAINS, MOST_FINES, MOST_SLAB, MOST_BINS = 10_000_000, 10_000_000, 1000, 10_000
+"""Upper bounds: grains, fines, slab over box length, profile bins."""
 
 LEAST_SKIN, MOST_NEIGHBOUR_BINS = 0.01, 10_000_000
 """Smallest skin over the smallest fine's radius, most bins of the neighbour search in the box."""

@@ -169,7 +169,11 @@ def step_of(path: Path) -> int:
 
 
 def readable_states(
-    folder: Path, history: Sequence[Checkpoint], case: InvasionCase, scales: InvasionScales, grains: Snapshot
+    folder: Path,
+    history: Sequence[Checkpoint],
+    case: InvasionCase,
+    scales: InvasionScales,
+    grains: Snapshot,
 ) -> Iterator[tuple[Checkpoint, Snapshot]]:
     """The states behind `history`, checked against its counts; earlier dumps that are missing or cut are passed over.
 

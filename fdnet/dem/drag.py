@@ -33,7 +33,9 @@ def _by_radius(scales: InvasionScales, slower: float) -> dict[str, Any]:
     return {"fluid_x": fluid, "hold_steps": scales.hold_steps if scales.hold_steps > 1 else 0}
 
 
-def _viscous(case: InvasionCase, scales: InvasionScales, coefficient: float, slower: float) -> dict[str, Any]:
+def _viscous(
+    case: InvasionCase, scales: InvasionScales, coefficient: float, slower: float
+) -> dict[str, Any]:
     """The same for one radius: the constant 6 pi mu M r u, less 6 pi mu M r (u - u_upstream) at x < 0, and damping."""
     damping = coefficient * case.fines.mean_radius_m
     return {

@@ -55,7 +55,9 @@ def write_invade_inputs(
     return deck
 
 
-def write_batches(case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path) -> Snapshot:
+def write_batches(
+    case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path
+) -> Snapshot:
     """Write supply/batch_N.data and .in, taken in before chunk N; returns the fines of the start."""
     batches, bounds = list(place_batches(case, scales, grains)), _bounds(case, scales, grains)
     shared = {
@@ -171,7 +173,9 @@ def _regions(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> di
     }
 
 
-def _gravity(case: InvasionCase, scales: InvasionScales) -> tuple[dict[str, Any] | None, list[LeftOut]]:
+def _gravity(
+    case: InvasionCase, scales: InvasionScales
+) -> tuple[dict[str, Any] | None, list[LeftOut]]:
     mode, vector = case.gravity.mode, case.gravity.acceleration_m_s2
     magnitude = math.hypot(*vector)
     if mode == "off" or magnitude == 0:

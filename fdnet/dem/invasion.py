@@ -61,7 +61,9 @@ class Invasion:
         return self.overlap.fraction
 
 
-def invade(case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path, launch: Launch) -> Invasion:
+def invade(
+    case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path, launch: Launch
+) -> Invasion:
     """Drive the fines in; continues from the last whole checkpoint when `folder` holds one.
 
     Raises LiggghtsError when a run fails or fines are lost, CaseError when the fines cannot be placed.
@@ -202,7 +204,9 @@ def _prepare(
     return deck
 
 
-def _ending(case: InvasionCase, scales: InvasionScales, history: tuple[Checkpoint, ...]) -> tuple[str, list[str]]:
+def _ending(
+    case: InvasionCase, scales: InvasionScales, history: tuple[Checkpoint, ...]
+) -> tuple[str, list[str]]:
     """stop_reason and warnings. An empty slab decides nothing about plugging, so it is its own reason."""
     last = history[-1]
     waiting = last.upstream - last.removed_upstream

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.case.case import Case, InvasionCase
+from fdnet.case.stages import LIGGGHTS_STAGES
 from fdnet.dem.invade_deck import render_invade
 from fdnet.dem.packing import write_pack_inputs
 from fdnet.dem.scene import box_of
@@ -22,11 +23,13 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
 
     Raises CaseError when a deck is there already.
     """
-    decks = {stage: out / stage / f"in.{stage}" for stage in case.stages if stage in DECK_STAGES}
+    scales = scales_of(case)
+    decks = {
+        stage: out / stage / f"in.{stage}" for stage in case.stages if stage in LIGGGHTS_STAGES
+    }
     there = [path for path in decks.values() if path.exists()]
     if there:
         raise CaseError(f"{there[0]}: is there already; give another --out (nothing was changed)")
-    scales = scales_of(case)
     for path in decks.values():
         path.parent.mkdir(parents=True, exist_ok=True)
     folder = decks["pack"].parent

@@ -82,7 +82,13 @@ def slab_end(case: InvasionCase, grains: Snapshot) -> float:
 
 
 def _moving(
-    case: InvasionCase, scales: InvasionScales, grains: Snapshot, position: Array, radius: Array, *, first: int
+    case: InvasionCase,
+    scales: InvasionScales,
+    grains: Snapshot,
+    position: Array,
+    radius: Array,
+    *,
+    first: int,
 ) -> Snapshot:
     velocity = np.zeros((len(radius), 3))
     velocity[:, 0] = scales.upstream_velocity
@@ -135,7 +141,9 @@ def batches_of(case: InvasionCase, scales: InvasionScales) -> Batches:
     return Batches(counts=tuple(int(count) for count in counts), length=length, travel=travel)
 
 
-def place_batches(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> Iterator[Snapshot]:
+def place_batches(
+    case: InvasionCase, scales: InvasionScales, grains: Snapshot
+) -> Iterator[Snapshot]:
     """The slab batch by batch, each where the fluid has carried it when it enters; ids run on through all of them.
 
     The first batches do not depend on how many follow.
@@ -149,7 +157,9 @@ def place_batches(case: InvasionCase, scales: InvasionScales, grains: Snapshot) 
         first += len(radius)
 
 
-def _draw_batches(case: InvasionCase, scales: InvasionScales, *, end: float) -> Iterator[tuple[Array, Array]]:
+def _draw_batches(
+    case: InvasionCase, scales: InvasionScales, *, end: float
+) -> Iterator[tuple[Array, Array]]:
     """Places (n, 3) in the slab and radii (n,) m of each batch; each clears the one before, that next to it."""
     batches, before = batches_of(case, scales), (np.empty((0, 3)), np.empty(0))
     for number, count in enumerate(batches.counts):

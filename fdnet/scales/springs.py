@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from fdnet.case.case import Case
 from fdnet.case.particles import Spheres
 
-
 PAIRS = (
     ("grain", "grain"),
     ("grain", "wall"),

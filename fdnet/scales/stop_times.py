@@ -25,7 +25,9 @@ class StopTimes:
     chunk: float
 
 
-def stop_times(case: InvasionCase, slab: Slab, *, interstitial: float, upstream: float) -> StopTimes:
+def stop_times(
+    case: InvasionCase, slab: Slab, *, interstitial: float, upstream: float
+) -> StopTimes:
     """The times that the case gives, or those that follow from the velocities, m/s.
 
     In a chunk the fluid passes about one grain diameter. A given duration is cut into equal

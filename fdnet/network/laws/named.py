@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from functools import partial
 
+from fdnet.case.names import DEFAULT_DAMAGE_LAW, DEFAULT_LAW
 from fdnet.errors import CaseError
 from fdnet.network.laws.conductance import (
     Law,
@@ -16,6 +17,8 @@ from fdnet.network.laws.damage import DamageLaw
 from fdnet.network.laws.kozeny_damage import kozeny_damage, side_kozeny_damage
 from fdnet.network.laws.thesis_damage import CODE_THRESHOLD, TEXT_THRESHOLD, thesis_damage
 
+__all__ = ["DAMAGE_LAWS", "DEFAULT_DAMAGE_LAW", "DEFAULT_LAW", "LAWS"]
+
 LAWS: Mapping[str, Law] = {
     "thesis": thesis_law,
     "effective": effective_law,
@@ -24,7 +27,6 @@ LAWS: Mapping[str, Law] = {
     "lubrication": lubrication_law,
 }
 """Conductance laws of clean throats, each a function of a Network that returns (T,) m3."""
-DEFAULT_LAW = "lubrication"
 
 _THESIS_THRESHOLDS = {"thesis": TEXT_THRESHOLD, "thesis-code": CODE_THRESHOLD}
 
@@ -35,7 +37,6 @@ DAMAGE_LAWS: Mapping[str, DamageLaw] = {
     "side-kozeny": side_kozeny_damage,
 }
 """Laws that lower the clean conductance of throats with fines, with their own options."""
-DEFAULT_DAMAGE_LAW = "side-kozeny"
 
 
 def damage_law(

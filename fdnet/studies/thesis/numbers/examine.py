@@ -3,8 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from fdnet.network.analysis import Analysis
 from fdnet.network.laws.named import DEFAULT_DAMAGE_LAW, DEFAULT_LAW
-from fdnet.network.permeability import Analysis, AnalysisOptions, compare
+from fdnet.network.permeability import compare
 from fdnet.studies.thesis.runs.state import State
 
 THESIS_PAIR, DEFAULT_PAIR = ("thesis", "thesis"), (DEFAULT_LAW, DEFAULT_DAMAGE_LAW)
@@ -36,13 +37,7 @@ def examine(name: str, state: State) -> Examined:
 
     Raises NetworkError on degenerate geometry, FlowError on a solve that fails its checks.
     """
-    chosen = state.case.analysis
-    options = AnalysisOptions(
-        sections=chosen.sections,
-        walls=chosen.walls,
-        overlap=chosen.throat_overlap,
-        profile_bin=chosen.profile_bin_m,
-    )
+    options = state.case.analysis
     pairs = (THESIS_PAIR, DEFAULT_PAIR)
     found = compare(
         state.grains, state.damaged, periodic=state.case.periodic, options=options, laws=pairs

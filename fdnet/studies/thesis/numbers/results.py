@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from fdnet.errors import CaseError
+from fdnet.network.analysis import Analysis
 from fdnet.network.flow.sections import reduction
-from fdnet.network.permeability import Analysis
 from fdnet.spheres.porosity import measure_porosity
 from fdnet.spheres.snapshot import Array
 from fdnet.studies.engine.csv_rows import parsed, read_csv, write_csv

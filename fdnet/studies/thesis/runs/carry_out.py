@@ -8,9 +8,10 @@ from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from pathlib import Path
 
-from fdnet.case.case import Case
+from fdnet.case.case import InvasionCase
 from fdnet.errors import CaseError, FdnetError
-from fdnet.run.pipeline import RunOptions, run_case
+from fdnet.run.pipeline import run_case
+from fdnet.run.session import RunOptions
 from fdnet.scales.cost import cost_of
 from fdnet.scales.scales import scales_of
 from fdnet.studies.engine.runner import eta
@@ -99,7 +100,7 @@ def state_path(out: Path, item: Planned) -> Path:
     return out / f"{item.slug}.npz"
 
 
-def find_state(out: Path, item: Planned, case: Case) -> State | None:
+def find_state(out: Path, item: Planned, case: InvasionCase) -> State | None:
     """The kept state of a run, to be examined as the case now asks; None when there is none.
 
     Raises CaseError when it is broken or the state of another invasion.
@@ -115,10 +116,10 @@ def find_state(out: Path, item: Planned, case: Case) -> State | None:
     return replace(found, case=case)
 
 
-def _adopt(source: Path, target: Path, case: Case) -> None:
+def _adopt(source: Path, target: Path, case: InvasionCase) -> None:
     """The same invasion under another name."""
     write_state(target, replace(read_state(source), case=case))
 
 
-def _expected(case: Case) -> float:
+def _expected(case: InvasionCase) -> float:
     return cost_of(case, scales_of(case)).invade_seconds

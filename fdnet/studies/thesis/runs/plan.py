@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 
-from fdnet.case.case import Case
+from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import read_case
 from fdnet.errors import CaseError
 from fdnet.scales.scales import scales_of
@@ -64,11 +64,10 @@ class Planned:
             "".join(c if c.isalnum() or c in ".=-" else "_" for c in self.id) + f"-seed{self.seed}"
         )
 
-    def load(self) -> Case:
+    def load(self) -> InvasionCase:
         """Its case. Raises CaseError when the case file is missing or wrong."""
-        return read_case(
-            case_path(self.case), assignments=[f"seed={self.seed}", *self.settings, *self.beside]
-        )
+        settings = [f"seed={self.seed}", *self.settings, *self.beside]
+        return with_fines(read_case(case_path(self.case), assignments=settings))
 
 
 def cases_folder() -> Path:
@@ -123,11 +122,10 @@ def _scans() -> Iterator[Planned]:
                 item, beside=(f"run.stiffness_N_m={stiffness * max(1.0, item.value)!r}",)
             )
     for name in (QUICK + "specimen5", QUICK + "specimen6"):
-        case = read_case(case_path(name))
-        assert case.fines is not None
-        assert case.fines.count is not None
+        case = with_fines(read_case(case_path(name)))
+        count = scales_of(case).supplied_count
         for factor in SUPPLIES:
-            setting = f"fines.count={round(factor * case.fines.count)}"
+            setting = f"fines.count={round(factor * count)}"
             for seed in range(1, SCAN_SEEDS + 1):
                 beside = _longer(case, factor)
                 yield Planned(
@@ -140,7 +138,7 @@ def _scans() -> Iterator[Planned]:
                 )
 
 
-def _longer(case: Case, factor: float) -> tuple[str, ...]:
+def _longer(case: InvasionCase, factor: float) -> tuple[str, ...]:
     """A cap moved by what the slab's arrival takes longer."""
     if case.run.cap_s is None:
         return ()
