@@ -21,6 +21,7 @@ extensions = [
     "case_keys",
     "command_options",
     "folder_links",
+    "formulas",
     "shell_cells",
 ]
 exclude_patterns = ["_build", "_ext", "**.ipynb_checkpoints"]
@@ -32,7 +33,7 @@ nitpick_ignore_regex = [
 ]
 
 myst_heading_anchors = 4
-myst_enable_extensions = ["deflist", "colon_fence", "attrs_block"]
+myst_enable_extensions = ["attrs_block", "colon_fence", "deflist", "dollarmath"]
 
 nb_execution_mode = os.environ.get("FDNET_DOCS_EXECUTE", "force")
 nb_execution_in_temp = True
@@ -51,6 +52,7 @@ copybutton_prompt_text = r"\$ "
 copybutton_prompt_is_regexp = True
 copybutton_exclude = ".linenos, .gp, .go"
 
+html_math_renderer = "mathml"
 html_theme = "pydata_sphinx_theme"
 html_title = "fdnet"
 html_static_path = ["_static"]

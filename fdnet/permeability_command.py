@@ -71,7 +71,7 @@ def _count(text: str) -> int:
 def run(options: argparse.Namespace) -> int:
     """Analyse the file and print the result. Raises CaseError for bad input (nothing is written)."""
     from fdnet.network.laws.named import DEFAULT_DAMAGE_LAW, DEFAULT_LAW
-    from fdnet.network.tessellation.delaunay import check_lengths
+    from fdnet.network.tessellation.placed_grains import check_lengths
 
     periodic = _directions(options.periodic)
     if options.csv and not options.csv.parent.is_dir():

@@ -35,10 +35,9 @@ STUDIES_LAYERS = [
 THESIS_LAYERS = [
     ["runs"],
     ["numbers"],
-    ["compare"],
-    ["figures"],
-    ["findings"],
-    ["command"],
+    ["collection", "compare", "figures"],
+    ["outputs"],
+    ["command", "page"],
 ]
 ROOMS = {
     "fdnet": LAYERS,

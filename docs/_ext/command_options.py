@@ -44,7 +44,7 @@ def usage_of(parser: argparse.ArgumentParser) -> str:
 
 
 def option_rows(parser: argparse.ArgumentParser) -> Iterator[tuple[str, str]]:
-    """Name and meaning, in Markdown, of every argument; raises LookupError for one without help."""
+    """Name and meaning of every argument, in Markdown; raises LookupError for one without help."""
     for action in parser._actions:
         if isinstance(action, argparse._HelpAction):
             continue
@@ -56,7 +56,8 @@ def option_rows(parser: argparse.ArgumentParser) -> Iterator[tuple[str, str]]:
 def _name(action: argparse.Action) -> str:
     if not action.option_strings:
         return f"`{action.metavar or action.dest}`"
-    value = action.metavar or ("{" + ",".join(action.choices) + "}" if action.choices else "")
+    choices = "{" + ",".join(action.choices) + "}" if action.choices else ""
+    value = action.metavar or choices
     if not value and action.nargs != 0:
         value = action.dest.upper()
     return f"`{' '.join([action.option_strings[0], str(value)]).strip()}`"

@@ -6,7 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from fdnet.case.case import Case
+from fdnet.case.case import Case, InvasionCase
 from fdnet.errors import CaseError
 from fdnet.network.network import Network, build_network
 from fdnet.run.finished_text import html_lines, text_lines
@@ -75,7 +75,7 @@ class FinishedRun:
         whole = self.path / "history.csv"
         if whole.exists():
             return read_table(whole, ["time_s"])
-        if self.case.fines is None:
+        if not isinstance(self.case, InvasionCase):
             return empty_table(["time_s", *HISTORY_COLUMNS])
         table = read_table(self.path / "invade" / "history.csv", HISTORY_COLUMNS)
         table.insert(0, "time_s", table["step"] * self.manifest["invade"]["dt_s"])

@@ -10,12 +10,12 @@ from typing import Any
 
 from fdnet.atomic import write_text
 from fdnet.case.case import Case
+from fdnet.case.stages import LIGGGHTS_STAGES, STAGES
 from fdnet.errors import CaseError
 
-STAGES = ("pack", "invade", "analyse", "report")
 RECORD_FORMAT = 1
 MANIFEST, CASE, LOCK, UNFINISHED = "manifest.json", "case.toml", ".lock", ".unfinished"
-_RECORDS = {"pack": "pack/stage.json", "invade": "invade/stage.json"}
+_RECORDS: dict[str, str] = {stage: f"{stage}/stage.json" for stage in LIGGGHTS_STAGES}
 _OUTPUTS = {
     "pack": ("pack",),
     "invade": ("invade",),
@@ -67,7 +67,7 @@ class RunFolder:
         manifest = self.manifest()
         if manifest is not None:
             return set(stages) <= set(manifest["stages"])
-        needed = [stage for stage in stages if stage != "invade" or case.fines]
+        needed = [stage for stage in stages if stage in case.stages]
         return set(needed) <= set(_RECORDS) and all(
             self.record(stage) is not None for stage in needed
         )
@@ -174,14 +174,15 @@ def _refuse_foreign(path: Path) -> None:
 
 
 def _refuse_gap(path: Path, case: Case, stages: tuple[str, ...]) -> None:
-    needed = ["pack"] * (stages != ("pack",)) + ["invade"] * (
-        bool(case.fines) and bool({"analyse", "report"} & set(stages))
-    )
-    for stage in needed:
-        if stage not in stages and not (path / _RECORDS[stage]).exists():
-            what = "pack" if stage == "pack" else "invasion"
+    """A stage needs the finished ones before it that run LIGGGHTS."""
+    analysed = bool({"analyse", "report"} & set(stages))
+    needed = {"pack": stages != ("pack",), "invade": "invade" in case.stages and analysed}
+    for stage, what in (("pack", "pack"), ("invade", "invasion")):
+        missing = stage not in stages and not (path / _RECORDS[stage]).exists()
+        if needed[stage] and missing:
             raise CaseError(
-                f"{path}: no finished {what} here; run the stage {stage} first (--stages {stage},...)"
+                f"{path}: no finished {what} here; run the stage {stage} first "
+                f"(--stages {stage},...)"
             )
 
 

@@ -84,7 +84,8 @@ def run_case(
         >>> print(run)  # doctest: +ELLIPSIS
         fdnet run quick ...
     """
-    from fdnet.run.pipeline import RunOptions, run_stages
+    from fdnet.run.pipeline import run_stages
+    from fdnet.run.session import RunOptions
 
     given = case if isinstance(case, Case) else read_case(Path(case))
     folder = Path("runs") / given.name if out is None else Path(out)

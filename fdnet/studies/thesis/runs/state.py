@@ -1,4 +1,7 @@
-"""The state an invasion ended in, small enough to keep: all spheres, the case, and how it ended."""
+"""The state at the end of an invasion: all spheres, the case, and how it ended.
+
+A state is small enough to be kept with the project.
+"""
 
 import json
 import tomllib
@@ -13,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fdnet.atomic import write_bytes
-from fdnet.case.case import Case
+from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import case_from, read_case
 from fdnet.dem.checkpoint import read_history, state_at
 from fdnet.dem.scene import box_of, snapshot_of
@@ -37,19 +40,25 @@ ENDING = (
 )
 
 BROKEN = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error)
-"""What reading a damaged npz raises."""
+"""The errors that reading a damaged npz raises."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class State:
-    """`grains` as packed, `damaged` the grains and all remaining fines at the end (those upstream too).
+    """A specimen before and after its invasion.
 
-    `history` (C, 4) columns time s, upstream, invaded, passed at each checkpoint. `ending` holds the keys of ENDING:
-    `supplied`, `passed`, `upstream` fines, `stop_reason`, `seconds` of the invasion and `pack_seconds`, `steps` of
-    `dt_s`, `max_overlap` over the smaller diameter, `warnings`.
+    Attributes:
+        case: the case of the run.
+        grains: the grains as packed.
+        damaged: the grains and all remaining fines at the end, those upstream too.
+        history: (C, 4) time in s and numbers of fines upstream, invaded and passed, one row a
+            checkpoint.
+        ending: by the keys of ENDING: numbers of fines supplied, passed and upstream;
+            `stop_reason`; computing times `seconds` of the invasion and `pack_seconds`; number of
+            `steps` and their length `dt_s`; `max_overlap` over the smaller diameter; `warnings`.
     """
 
-    case: Case
+    case: InvasionCase
     grains: Snapshot
     damaged: Snapshot
     history: Array
@@ -57,8 +66,11 @@ class State:
 
 
 def state_of_run(folder: Path) -> State:
-    """The end of a finished invasion in a run folder. Raises CaseError when there is none, DumpError on a cut dump."""
-    case = read_case(folder / CASE)
+    """The end of a finished invasion in a run folder.
+
+    Raises CaseError when the folder holds none, DumpError when a dump is cut.
+    """
+    case = with_fines(read_case(folder / CASE))
     pack, invasion = read_record(folder, "pack"), read_record(folder, "invade")
     if pack is None or invasion is None:
         raise CaseError(
@@ -84,7 +96,7 @@ def state_of_run(folder: Path) -> State:
 
 
 def write_state(path: Path, state: State) -> None:
-    """Keep a state in one file of single precision (0.5 nm at 8 mm), compressed."""
+    """Keep a state in one compressed file of single precision (0.5 nm at 8 mm)."""
     text = json.dumps(
         {"case": state.case.toml(), "ending": dict(state.ending), "step": state.damaged.step}
     )
@@ -106,20 +118,23 @@ def packed_bytes(arrays: Mapping[str, Array]) -> bytes:
 
 
 def read_state(path: Path) -> State:
-    """A state kept by `write_state`; velocities are not kept (0). Raises CaseError when the file is no state."""
+    """Read a state that `write_state` kept; velocities are not kept and are 0.
+
+    Raises CaseError when the file is no state.
+    """
     try:
         with np.load(path) as file:
             arrays = dict(file)
-        told = json.loads(arrays["text"].tobytes())
-        case = case_from(tomllib.loads(told["case"]), source=str(path))
+        text = json.loads(arrays["text"].tobytes())
+        case = with_fines(case_from(tomllib.loads(text["case"]), source=str(path)))
         return State(
             case=case,
             grains=_spheres(arrays, "grains", case, 0, 0.0),
             damaged=_spheres(
-                arrays, "damaged", case, told["step"], told["step"] * told["ending"]["dt_s"]
+                arrays, "damaged", case, text["step"], text["step"] * text["ending"]["dt_s"]
             ),
             history=arrays["history"],
-            ending={name: told["ending"][name] for name in ENDING},
+            ending={name: text["ending"][name] for name in ENDING},
         )
     except BROKEN as error:
         raise CaseError(
@@ -128,7 +143,7 @@ def read_state(path: Path) -> State:
 
 
 def _spheres(
-    arrays: Mapping[str, Array], name: str, case: Case, step: int, time_s: float
+    arrays: Mapping[str, Array], name: str, case: InvasionCase, step: int, time_s: float
 ) -> Snapshot:
     place = arrays[f"{name}_place"].astype(float)
     kind = arrays[f"{name}_kind"].astype(int)
@@ -144,9 +159,9 @@ def _spheres(
     )
 
 
-def _exact_radius(radius: Array, kind: Array, case: Case) -> Array:
-    """Radii of a single size as the case gives them, in full precision."""
+def _exact_radius(radius: Array, kind: Array, case: InvasionCase) -> Array:
+    """Radii of spheres of a single size, as the case gives them, in full precision."""
     for spheres, which in ((case.grains, Kind.GRAIN), (case.fines, Kind.FINE)):
-        if spheres is not None and spheres.one_size:
+        if spheres.one_size:
             radius = np.where(kind == which, spheres.mean_radius_m, radius)
     return radius
