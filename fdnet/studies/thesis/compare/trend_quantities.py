@@ -184,9 +184,9 @@ def _responses(rows: Sequence[ResultRow], run: str, response: Response) -> tuple
 def _borrowing(values: tuple[float, ...], quick: tuple[float, ...], *, grows: bool) -> Sample:
     """A sample that can borrow the spread of the quick form.
 
-    The spread of a quick form is larger than that of a specimen 6 times as wide, for means over a
-    cross-section scatter as one over the square root of its area. So it is borrowed unscaled.
-    What grows with the specimen keeps at least its relative spread.
+    The spread of a quick form is larger than that of a specimen with 6 times its cross-section,
+    for means over a cross-section scatter as one over the square root of its area. So it is
+    borrowed unscaled. What grows with the specimen keeps at least its relative spread.
     """
     widened = 1.0
     if grows and values and quick and np.mean(quick) > 0:

@@ -1,9 +1,9 @@
 """Whether the thesis's trends hold, at full scale and in the quick forms.
 
 Every comparison has a 95 % interval, Welch's over seeds. A specimen of fewer than three seeds
-borrows the spread of its quick form's seeds, unscaled. This is cautious, for the quick form is a
-sixth as wide and scatters more. Of n comparisons about n / 40 would come out on each side of 0 by
-chance; a trend holds only if all its comparisons do.
+borrows the spread of its quick form's seeds, unscaled. This is cautious, for the quick form has a
+sixth of the cross-section and scatters more. Of n comparisons about n / 40 would come out on each
+side of 0 by chance; a trend holds only if all its comparisons do.
 """
 
 import math
