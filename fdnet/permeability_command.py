@@ -71,7 +71,7 @@ def _count(text: str) -> int:
 def run(options: argparse.Namespace) -> int:
     """Analyse the file and print the result. Raises CaseError for bad input (nothing is written)."""
     from fdnet.network.laws.named import DEFAULT_DAMAGE_LAW, DEFAULT_LAW
-    from fdnet.network.tessellation.delaunay import check_lengths
+    from fdnet.network.tessellation.placed_grains import check_lengths
 
     periodic = _directions(options.periodic)
     if options.csv and not options.csv.parent.is_dir():
@@ -106,10 +106,11 @@ def read_snapshot(
     """The spheres of the file as a Snapshot in SI, and notes. Raises CaseError for bad input."""
     import numpy as np
 
-    from fdnet.spheres.csv_file import read_spheres
+    from fdnet.spheres.readers import read_spheres
     from fdnet.spheres.snapshot import Kind, resting
 
-    position, radius, kind = read_spheres(options.spheres, units=options.units)
+    given = read_spheres(options.spheres, units=options.units)
+    position, radius, kind = given.position, given.radius, given.kind
     grains = kind == Kind.GRAIN
     if np.count_nonzero(grains) < 4:
         raise CaseError(

@@ -15,7 +15,7 @@ from fdnet.network.laws.lubrication import TIP, WIDENING, half_resistances, summ
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import LENGTH_FLOOR, Network
 from fdnet.network.tessellation import delaunay
-from fdnet.scales.scales import carman_kozeny
+from fdnet.scales.velocity import carman_kozeny
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 from fdnet.studies.network.law_models import (
     PAIRS,

@@ -48,8 +48,9 @@ ROOMS = {
 DOORS = {
     "jinja2": {"dem/deck", "report/html", "studies/dem"},
     "subprocess": {"dem/liggghts", "report/vtk"},
-    "pandas": {"spheres/dump", "spheres/csv_file", "report/tables"},
-    "pyvista": {"report/vtk", "report/picture"},
+    "pandas": {"spheres/dump", "spheres/csv_file", "report/tables", "report/read_tables"},
+    "pyvista": {"report/vtk", "report/picture", "report/meshes", "spheres/vtk_file"},
+    "openpnm": {"report/openpnm"},
     "matplotlib": {
         "report/figures",
         "report/side_view",

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.spheres.csv_file import read_spheres
+from fdnet.spheres.readers import read_spheres
 from fdnet.spheres.snapshot import Array, Snapshot, resting
 
 MM = 1e-3
@@ -41,8 +41,9 @@ def read_pack(path: Path) -> tuple[Snapshot, float]:
     found = re.match(r"# periodic cube, edge ([0-9.]+) mm", path.read_text())
     if not found:
         raise CaseError(f"{path}:1: expected '# periodic cube, edge NUMBER mm'")
-    position, radius, kind = read_spheres(path, units="mm")
-    return snapshot(position / MM, radius / MM, float(found[1]), kind), float(found[1])
+    edge = float(found[1])
+    spheres = read_spheres(path, units="mm")
+    return snapshot(spheres.position / MM, spheres.radius / MM, edge, spheres.kind), edge
 
 
 def snapshot(position: Array, radius: Array, edge: float, kind: Array) -> Snapshot:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from fdnet.network import geometry
-from fdnet.network.tessellation.pores import solid_in_tetrahedra
+from fdnet.network.geometry import solid_in_tetrahedra
 from fdnet.spheres.snapshot import Array
 from fdnet.studies.thesis.numbers.examine import Examined
 from fdnet.studies.thesis.numbers.pore_sizes import PoreSizes
