@@ -25,10 +25,12 @@ NETWORK_LAYERS = [
     ["permeability"],
 ]
 STUDIES_LAYERS = [
-    ["engine", "stokes", "truth"],
-    ["dem", "thesis"],
+    ["engine", "stokes", "fuzz"],
+    ["truth"],
+    ["accuracy", "benchmark", "dem", "thesis"],
     ["network"],
     ["command"],
+    ["pages"],
 ]
 THESIS_LAYERS = [
     ["runs"],
@@ -46,12 +48,13 @@ ROOMS = {
 }
 DOORS = {
     "jinja2": {"dem/deck", "report/html", "studies/dem"},
-    "subprocess": {"dem/liggghts", "report/vtk"},
+    "subprocess": {"dem/liggghts", "report/vtk", "studies/benchmark"},
     "pandas": {"spheres/dump", "spheres/csv_file", "report/tables"},
     "pyvista": {"report/vtk", "report/picture"},
     "matplotlib": {
         "report/figures",
         "report/side_view",
+        "studies/accuracy/figure",
         "studies/engine/draw",
         "studies/thesis/figures/canvas",
     },
@@ -60,7 +63,7 @@ DOORS = {
     "pymetis": {"network/flow/solver"},
     "pyamg": {"network/flow/solver", "studies/network/solver_peers"},
     "pydantic": {"case"},
-    "tomli_w": {"case/case"},
+    "tomli_w": {"case/case", "studies/fuzz/mutations"},
     "rich": {"run/progress"},
 }
 

@@ -13,15 +13,9 @@ from toy_study import toy
 from fdnet.cli import main
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.studies.command import STUDIES, run_study, study_named
-from fdnet.studies.engine.judge import (
-    Level,
-    against_reference,
-    knee,
-    knee_sentence,
-    levels,
-    order,
-    profile_distance,
-)
+from fdnet.studies.engine.error_rows import against_reference, profile_distance
+from fdnet.studies.engine.knee import knee, knee_sentence
+from fdnet.studies.engine.levels import Level, levels, order
 from fdnet.studies.engine.runner import POINTS, run_points
 from fdnet.studies.engine.study import DONE, Measured, Panel, Point, Row
 from fdnet.studies.engine.table import read_rows

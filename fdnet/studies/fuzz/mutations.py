@@ -10,7 +10,7 @@ import tomli_w
 
 Mutation = Callable[[Random, bytes], bytes]
 
-VALUES = (
+VALUES: tuple[Any, ...] = (
     0,
     -1,
     1,
@@ -43,7 +43,7 @@ VALUES += (
     [1.0, 2.0],
 )
 VALUES += ([0.3, 0.2], [1.0, 1.0, 1.0], [[1.0]], {}, {"a": 1}, [0.1] * 20)
-NUMBERS = (
+NUMBERS: tuple[str, ...] = (
     "nan",
     "inf",
     "-inf",
