@@ -7,12 +7,10 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+from fdnet.case.names import DAMAGE_LAW_NAMES, LAW_NAMES, MOST_SECTIONS, WALL_NAMES
 from fdnet.errors import CaseError
 
-LAW_NAMES = ("thesis", "effective", "hydraulic", "series", "lubrication")
-WALL_NAMES = ("no-slip", "slip")
-MOST_SECTIONS = 1000
-DAMAGE_LAW_NAMES = ("thesis", "thesis-code", "kozeny", "side-kozeny")
+PROFILE_BINS = 32
 _METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 
 
@@ -73,7 +71,7 @@ def _count(text: str) -> int:
 def run(options: argparse.Namespace) -> int:
     """Analyse the file and print the result. Raises CaseError for bad input (nothing is written)."""
     from fdnet.network.laws.named import DEFAULT_DAMAGE_LAW, DEFAULT_LAW
-    from fdnet.network.tessellation.delaunay import check_lengths
+    from fdnet.network.tessellation.placed_grains import check_lengths
 
     periodic = _directions(options.periodic)
     if options.csv and not options.csv.parent.is_dir():
@@ -179,11 +177,15 @@ def _measure(
     notes: list[str],
 ) -> list[dict[str, Any]]:
     """What each pair of laws gives; the seconds of the first hold what all of them share."""
-    from fdnet.network.permeability import AnalysisOptions, compare
+    from fdnet.case.analysis import AnalysisChoices
+    from fdnet.network.permeability import compare
 
     damaged = spheres if len(spheres.fines()) else None
-    profile_bin = (spheres.box[0, 1] - spheres.box[0, 0]) / 32
-    options = AnalysisOptions(sections=given.sections, walls=given.walls, profile_bin=profile_bin)
+    options = AnalysisChoices.of_pack(
+        sections=given.sections,
+        walls=given.walls,
+        profile_bin_mm=1e3 * (spheres.box[0, 1] - spheres.box[0, 0]) / PROFILE_BINS,
+    )
     results, start = [], time.perf_counter()
     for result in compare(
         spheres.grains(), damaged, periodic=periodic, options=options, laws=laws

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# From a fresh clone to a first damaged formation: set-up, a small case, its summary.
-# Options are handed to `fdnet run`. A finished run is not repeated; --force repeats it.
+# From a fresh clone to a first result: sets fdnet up, runs a small case and prints its summary.
+# Options are passed on to `fdnet run`. A finished run is not repeated unless --force is given.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Set-up, lint, types, all tests. Options are handed to pytest: bash scripts/test.sh -k network
+# Sets fdnet up, then runs the linter, the type checker and all tests.
+# Options are passed on to pytest, for example: bash scripts/test.sh -k network
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 

@@ -17,15 +17,16 @@ from string import Template
 from fdnet.scales.scales import scales_of
 from fdnet.studies.engine.bands import Sample, band
 from fdnet.studies.engine.markdown import figure, markdown_table, with_band
+from fdnet.studies.thesis.collection import RESULTS
 from fdnet.studies.thesis.compare.tables import thesis_tables
 from fdnet.studies.thesis.compare.trend_quantities import known, runs_of
 from fdnet.studies.thesis.compare.trend_table import caveats, trends_table
 from fdnet.studies.thesis.compare.trends import compare_trends
-from fdnet.studies.thesis.findings import CAPTIONS, DEPOSITION, RESULTS, STATISTICS, TETRAHEDRA
 from fdnet.studies.thesis.numbers.examine import DEFAULT_PAIR
 from fdnet.studies.thesis.numbers.results import ResultRow, read_results
 from fdnet.studies.thesis.numbers.statistics import ALONE, CUT, WHOLE
 from fdnet.studies.thesis.numbers.values import thesis_of
+from fdnet.studies.thesis.outputs import CAPTIONS, DEPOSITION, STATISTICS, TETRAHEDRA
 from fdnet.studies.thesis.runs.plan import (
     REASONS,
     SCAN_SEEDS,

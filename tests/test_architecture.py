@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from fdnet.case.file import known_keys
+
 LAYERS = [
     ["errors", "atomic"],
     ["spheres", "case"],
@@ -21,7 +23,7 @@ NETWORK_LAYERS = [
     ["tessellation"],
     ["network"],
     ["fines", "flow"],
-    ["laws", "specimen"],
+    ["laws", "specimen", "analysis"],
     ["permeability"],
 ]
 STUDIES_LAYERS = [
@@ -35,10 +37,9 @@ STUDIES_LAYERS = [
 THESIS_LAYERS = [
     ["runs"],
     ["numbers"],
-    ["compare"],
-    ["figures"],
-    ["findings"],
-    ["command"],
+    ["collection", "compare", "figures"],
+    ["outputs"],
+    ["command", "page"],
 ]
 ROOMS = {
     "fdnet": LAYERS,
@@ -137,6 +138,26 @@ def test_the_network_half_never_imports_the_dem_half(root):
             assert not any(
                 name.startswith(("fdnet.dem", "fdnet.report")) for name in imported(tree)
             ), module
+
+
+FIELD_UNITS = ("_mm", "_cP", "_MPa", "_ms")
+NO_KEYS = {"fdnet/studies/dem/economies.py": {"duration_ms"}}
+"""Attributes that share the name of a case's key but are something else, by file: a study's form."""
+
+
+def test_the_units_of_a_case_file_stay_inside_the_case(root):
+    """Everything beyond `fdnet/case` reads a case in SI."""
+    keys = {key.rsplit(".")[-1] for key in known_keys() if key.endswith(FIELD_UNITS)}
+    assert len(keys) > 10
+    for path in [*(root / "fdnet").rglob("*.py"), *(root / "scripts").glob("*.py")]:
+        name = path.relative_to(root).as_posix()
+        if name.startswith("fdnet/case/"):
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Attribute) and node.attr in keys - NO_KEYS.get(name, set()):
+                raise AssertionError(
+                    f"{name}:{node.lineno} reads {node.attr}; take its SI property"
+                )
 
 
 @pytest.mark.parametrize("limit", [300])

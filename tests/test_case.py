@@ -1,7 +1,10 @@
 """Cases: what is accepted, and that every problem is named at once."""
 
 import copy
+import csv
 import datetime
+import hashlib
+import math
 import tomllib
 from pathlib import Path
 
@@ -10,8 +13,8 @@ from builders import TINY, tiny
 
 from fdnet.case.file import case_from, known_keys, read_case, set_keys
 from fdnet.errors import CaseError
-from fdnet.run.pipeline import _analysis_options
-from fdnet.studies.thesis.runs.plan import SPECIMENS, VARIANTS
+from fdnet.studies.thesis.runs.carry_out import find_state, state_path
+from fdnet.studies.thesis.runs.plan import SPECIMENS, VARIANTS, planned
 
 
 def problems(data: dict) -> str:
@@ -135,11 +138,9 @@ def test_stages_depend_only_on_their_own_keys():
 
 
 def test_analysis_choices_reach_the_analysis():
-    """What the two share by name is handed on; the default walls hold the fluid."""
+    """One class holds them, with the names of the keys; the default walls hold the fluid."""
     assert tiny().analysis.walls == "no-slip"
-    options = _analysis_options(
-        tiny("analysis.walls=slip", "analysis.sections=3", "analysis.law=thesis")
-    )
+    options = tiny("analysis.walls=slip", "analysis.sections=3", "analysis.law=thesis").analysis
     assert (options.walls, options.sections, options.law) == ("slip", 3, "thesis")
     assert "analysis.walls: 'sticky'" in problems(changed(analysis={"walls": "sticky"}))
 
@@ -204,6 +205,54 @@ def test_shipped_cases_are_valid_short_and_named_as_their_files(root: Path):
     for name, path in [*full.items(), *((f"quick-{name}", path) for name, path in quick.items())]:
         assert read_case(path).name == name
         assert len(path.read_text().splitlines()) < 50
+
+
+def test_shipped_cases_keep_their_digests_and_their_text(root: Path):
+    """Any other digest would orphan the run folders and stored states that were made from them."""
+    with (root / "tests/data/case_digests.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    shipped = {p.relative_to(root / "cases") for p in (root / "cases").rglob("*.toml")}
+    assert shipped == {Path(f"{row['case']}.toml") for row in rows}
+    for row in rows:
+        case = read_case(root / "cases" / f"{row['case']}.toml")
+        text = hashlib.sha256(case.toml().encode()).hexdigest()[:16]
+        assert row == {
+            "case": row["case"],
+            **{stage: case.digest(stage) for stage in ("pack", "invade", "analyse")},
+            "text": text,
+        }
+
+
+def test_stored_states_still_belong_to_their_cases(root: Path):
+    """`find_state` raises when a state belongs to another case than its run asks for."""
+    states = root / "docs/thesis/states"
+    stored = [item for item in planned(quick=False) if state_path(states, item).exists()]
+    assert len(stored) == len(list(states.glob("*-seed*.npz"))) > 20
+    for item in stored:
+        assert find_state(states, item, item.load()) is not None
+
+
+def test_values_in_si_are_those_of_the_keys():
+    case = tiny(
+        "box.sides=periodic",
+        "fines={radius_mm=0.05, slab_mm=0.7}",
+        "fluid.darcy_length_mm=3.3",
+        "run={cap_ms=0.3, plug_time_ms=0.2, checkpoint_ms=0.1, skin_mm=0.04, neighbour_bin_mm=0.2}",
+    )
+    assert case.size_m == case.box.size_m == pytest.approx((3e-3, 1.6e-3, 1.6e-3))
+    assert case.periodic == (False, True, True)
+    assert case.grains.radius_range_m == pytest.approx((2.5e-4, 2.5e-4))
+    assert case.fines.slab_m == pytest.approx(7e-4)
+    assert case.fluid.viscosity_Pa_s == pytest.approx(0.05)
+    assert case.fluid.stokes_coefficient_Pa_s == pytest.approx(6 * math.pi * 0.05)
+    assert case.fluid.darcy_length_m == pytest.approx(3.3e-3)
+    assert case.fluid.darcy_velocity(1e-11, 7e-3) == pytest.approx(1e-11 / 0.05 * 3.5e6 / 7e-3)
+    assert case.analysis.profile_bin_m == pytest.approx(2.5e-4)
+    run = case.run
+    assert (run.cap_s, run.plug_time_s, run.checkpoint_s) == pytest.approx((3e-4, 2e-4, 1e-4))
+    assert (run.skin_m, run.neighbour_bin_m) == pytest.approx((4e-5, 2e-4))
+    assert tiny().run.duration_s is tiny().fines.slab_m is tiny().fluid.darcy_length_m is None
+    assert tiny("run.duration_ms=2.0").run.duration_s == pytest.approx(2e-3)
 
 
 def test_a_quick_form_differs_from_its_specimen_only_in_what_it_gives_up(root: Path):

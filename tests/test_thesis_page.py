@@ -4,9 +4,10 @@ import sys
 
 import pytest
 
-from fdnet.studies.thesis.findings import CAPTIONS, RESULTS
+from fdnet.studies.thesis.collection import RESULTS
 from fdnet.studies.thesis.numbers.examine import examine
 from fdnet.studies.thesis.numbers.results import read_results, result_rows
+from fdnet.studies.thesis.outputs import CAPTIONS
 from fdnet.studies.thesis.runs.carry_out import state_path
 from fdnet.studies.thesis.runs.plan import CHEAP, SEEDS, SPECIMENS, VARIANTS, Planned, planned
 from fdnet.studies.thesis.runs.state import read_state

@@ -1,7 +1,8 @@
 """Case: what the specimen is. Validated once, at birth.
 
 A case holds no paths and no binary. `fdnet.case.file` reads one from TOML, `Case.toml()` writes it back with
-every default. Its tables are in `fdnet.case.parts`, what must hold between them in `fdnet.case.rules`.
+every default. Its tables are in the modules next to this one, what must hold
+between them in `fdnet.case.rules`.
 """
 
 import hashlib
@@ -12,8 +13,13 @@ from typing import Annotated, Any
 import tomli_w
 from pydantic import Field, model_validator
 
-from fdnet.case.parts import AnalysisChoices, Box, Drag, Fines, Fluid, Grains, Gravity, Part, Run
+from fdnet.case.analysis import AnalysisChoices
+from fdnet.case.control import Run
+from fdnet.case.fluid import Fluid
+from fdnet.case.particles import Fines, Grains
+from fdnet.case.parts import Box, Drag, Gravity
 from fdnet.case.rules import cross_problems
+from fdnet.case.values import Part
 
 POLICIES = ("max_hours", "max_overlap", "on_overlap")
 """Keys of [run] that say whether a run may go on, not what it computes."""
@@ -22,8 +28,13 @@ POLICIES = ("max_hours", "max_overlap", "on_overlap")
 class Case(Part):
     """One specimen. Without `fines` the pack stays intact and no invasion is run."""
 
-    name: Annotated[str, Field(min_length=1, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")]
-    seed: Annotated[int, Field(ge=0, lt=2**31)] = 1
+    name: Annotated[str, Field(min_length=1, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")] = Field(
+        description="Name of the case: letters, digits, dot, underscore and hyphen. It also names "
+        "the run folder."
+    )
+    seed: Annotated[int, Field(ge=0, lt=2**31)] = Field(
+        1, description="Seed of all random numbers. The same case and seed give the same result."
+    )
     box: Box
     grains: Grains
     fines: Fines | None = None
@@ -44,15 +55,13 @@ class Case(Part):
 
     @property
     def size_m(self) -> tuple[float, float, float]:
-        """Box sides, m."""
-        x, y, z = self.box.size_mm
-        return x * 1e-3, y * 1e-3, z * 1e-3
+        """Side lengths of the box (x, y, z), m."""
+        return self.box.size_m
 
     @property
     def periodic(self) -> tuple[bool, bool, bool]:
         """Which directions are periodic; the flow direction never is."""
-        sideways = self.box.sides == "periodic"
-        return False, sideways, sideways
+        return self.box.periodic
 
     def data(self) -> dict[str, Any]:
         """All keys with a value, defaults written out (TOML has no null: keys without a value are left out)."""

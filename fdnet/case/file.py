@@ -10,8 +10,8 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from fdnet.case.case import Case
-from fdnet.case.parts import Part
 from fdnet.case.rules import cross_problems
+from fdnet.case.values import Part
 from fdnet.errors import CaseError
 
 

@@ -4,18 +4,17 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from fdnet.case.parts import (
+from fdnet.case.analysis import AnalysisChoices
+from fdnet.case.control import Run
+from fdnet.case.particles import Fines, Grains
+from fdnet.case.parts import Box, Drag
+from fdnet.case.values import (
     LEAST_SKIN,
     MOST_BINS,
     MOST_FINES,
     MOST_GRAINS,
     MOST_NEIGHBOUR_BINS,
     MOST_SLAB,
-    Box,
-    Drag,
-    Fines,
-    Grains,
-    Run,
 )
 
 
@@ -78,11 +77,21 @@ def _choice_problems(parts: Mapping[str, Any]) -> Iterator[str]:
             )
     if run and run.duration_ms is not None and run.cap_ms is not None:
         yield f"run.cap_ms: {run.cap_ms} beside run.duration_ms {run.duration_ms}: give one of the two"
-    if box and analysis and box.size_mm[0] / analysis.profile_bin_mm > MOST_BINS:
+    if analysis:
+        yield from _analysis_problems(analysis, box)
+
+
+def _analysis_problems(analysis: AnalysisChoices, box: Box | None) -> Iterator[str]:
+    """Edges of sections and bins without a thickness are for Python, not for a case."""
+    if isinstance(analysis.sections, tuple):
+        yield f"analysis.sections: {analysis.sections}: a case gives the number of sections"
+    thickness = analysis.profile_bin_mm
+    if thickness is None:
+        yield "analysis.profile_bin_mm: missing, a case gives the thickness of its bins"
+    elif box and box.size_mm[0] / thickness > MOST_BINS:
         yield (
-            f"analysis.profile_bin_mm: {analysis.profile_bin_mm:g} cuts {box.size_mm[0]:g} mm into more than "
-            f"{MOST_BINS} bins; "
-            f"expected at least {box.size_mm[0] / MOST_BINS:.3g}"
+            f"analysis.profile_bin_mm: {thickness:g} cuts {box.size_mm[0]:g} mm into more than "
+            f"{MOST_BINS} bins; expected at least {box.size_mm[0] / MOST_BINS:.3g}"
         )
 
 

@@ -41,7 +41,7 @@ def chunks_of(case: Case, scales: Scales) -> int:
     else enough to reach the cap.
     """
     chunks = scales.cap_time / (scales.checkpoint_steps * scales.time_step)
-    return max(1, round(chunks) if case.run.duration_ms is not None else math.ceil(chunks - 1e-9))
+    return max(1, round(chunks) if case.run.duration_s is not None else math.ceil(chunks - 1e-9))
 
 
 def quiet_chunks(scales: Scales) -> int:

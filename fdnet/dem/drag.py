@@ -1,6 +1,5 @@
 """Stokes drag in the invasion deck: what each scheme of `drag.scheme` puts into `_drag.in.j2`."""
 
-import math
 from typing import Any
 
 from fdnet.case.case import Case
@@ -13,7 +12,7 @@ BELOW_ZERO = -5e-324
 
 def drag_variables(case: Case, scales: Scales) -> dict[str, Any]:
     """Variables of the drag block: the scheme and, as text, the numbers that it needs."""
-    coefficient = 6 * math.pi * case.fluid.viscosity_cP * 1e-3 * case.drag.multiplier
+    coefficient = case.fluid.stokes_coefficient_Pa_s * case.drag.multiplier
     slower = scales.interstitial_velocity - scales.upstream_velocity
     own = (
         _viscous(case, scales, coefficient, slower)

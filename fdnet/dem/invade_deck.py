@@ -118,9 +118,7 @@ def render_invade(
         | {
             "resume": {"restart": f"post/invade_{resume.step}.restart"} if resume else None,
             "skin": number(_skin(case)),
-            "neighbour_bin": number(case.run.neighbour_bin_mm * 1e-3)
-            if case.run.neighbour_bin_mm
-            else "",
+            "neighbour_bin": number(case.run.neighbour_bin_m) if case.run.neighbour_bin_m else "",
             "contacts": contact_variables(case, scales, "invade", friction=friction),
             "time_step": number(scales.time_step),
             "walls": wall_variables(case, "invade", friction=wall_friction),
@@ -141,7 +139,7 @@ def render_invade(
             "supply": SUPPLY,
             "chunks": chunks_of(case, scales),
             "chunk_steps": scales.checkpoint_steps,
-            "stop_when_plugged": case.run.duration_ms is None,
+            "stop_when_plugged": case.run.duration_s is None,
             "dump_columns": COLUMNS,
             "dump_format": FORMAT,
         },
@@ -152,7 +150,7 @@ def render_invade(
 def _skin(case: Case) -> float:
     """The neighbour skin, m: given, or the smallest fine's radius (0.3 to 0.8 of its diameter is fastest, measured)."""
     assert case.fines is not None
-    return case.fines.radius_range_m[0] if case.run.skin_mm is None else case.run.skin_mm * 1e-3
+    return case.fines.radius_range_m[0] if case.run.skin_m is None else case.run.skin_m
 
 
 def _start(resume: Checkpoint | None) -> dict[str, int]:

@@ -168,7 +168,7 @@ def _over(case: Case, scales: Scales, last: Checkpoint | None) -> bool:
     if last is None:
         return False
     return (
-        case.run.duration_ms is None and quiet_enough(case, scales, last)
+        case.run.duration_s is None and quiet_enough(case, scales, last)
     ) or last.chunk >= chunks_of(case, scales)
 
 
@@ -207,7 +207,7 @@ def _ending(case: Case, scales: Scales, history: tuple[Checkpoint, ...]) -> tupl
     last = history[-1]
     waiting = last.upstream - last.removed_upstream
     warnings = []
-    if case.run.duration_ms is not None:
+    if case.run.duration_s is not None:
         reason = "duration"
     elif quiet_enough(case, scales, last):
         reason = "plugged" if waiting > 0 else "supply_exhausted"

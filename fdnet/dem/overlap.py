@@ -29,11 +29,7 @@ class Deepest:
 
 def is_watched(case: Case) -> bool:
     """Whether the deck can watch: LIGGGHTS reduces overlaps in metres over all pairs, of grains too."""
-    return (
-        case.grains.motion == "fixed"
-        and case.fines is not None
-        and not isinstance(case.fines.radius_mm, tuple)
-    )
+    return case.grains.motion == "fixed" and case.fines is not None and case.fines.one_size
 
 
 def watch_variables(case: Case, scales: Scales) -> dict[str, Any] | None:

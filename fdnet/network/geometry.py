@@ -127,12 +127,15 @@ def power_centre(corner: Array, radius: Array) -> tuple[Array, Array]:
     return corner[..., 0, :] + offset, dot(offset, offset) - first[..., 0] ** 2
 
 
-def contains(corner: Array, point: Array, *, hair: float = 1e-9) -> Array:
-    """True (...) where `point` (..., 3) lies in the tetrahedron (..., 4, 3), its faces included within `hair`."""
+def contains(corner: Array, point: Array, *, tolerance: float = 1e-9) -> Array:
+    """True (...) where `point` (..., 3) lies in the tetrahedron (..., 4, 3) or on its faces.
+
+    A barycentric coordinate may be negative by `tolerance`.
+    """
     side = np.swapaxes(corner[..., 1:, :] - corner[..., :1, :], -1, -2)
     share = _solve(side, (point - corner[..., 0, :])[..., None])[..., 0]
     with np.errstate(invalid="ignore"):
-        return np.all(share >= -hair, axis=-1) & (share.sum(axis=-1) <= 1.0 + hair)
+        return np.all(share >= -tolerance, axis=-1) & (share.sum(axis=-1) <= 1.0 + tolerance)
 
 
 def flat(triangle: Array) -> Array:
@@ -214,3 +217,19 @@ def cap_volume(radius: Array, height: Array) -> Array:
     """Volume of a spherical cap, m3; `height` outside [0, 2 radius] is taken as its nearer end."""
     height = np.clip(height, 0.0, 2.0 * radius)
     return np.pi * height**2 * (3.0 * radius - height) / 3.0
+
+
+def solid_in_tetrahedra(corner: Array, radius: Array) -> tuple[Array, Array]:
+    """Volume (P,) m3 and surface (P,) m2 of the spheres on the corners within each tetrahedron.
+
+    `corner` (P, 4, 3) m, `radius` (P, 4) m. Sphere wedges by solid angle, less the overlap of each
+    pair by dihedral angle: exact over a whole tessellation, and in one tetrahedron as long as no
+    sphere reaches through the opposite face and no three overlap.
+    """
+    angle = np.abs(solid_angles(corner))
+    first, second = radius[:, EDGES[:, 0]], radius[:, EDGES[:, 1]]
+    apart = np.linalg.norm(corner[:, EDGES[:, 1]] - corner[:, EDGES[:, 0]], axis=-1)
+    turn = dihedral_angles(corner) / (2.0 * np.pi)
+    shared, hidden = lens(first, second, apart)
+    volume = np.sum(angle * radius**3, axis=1) / 3.0 - np.sum(turn * shared, axis=1)
+    return volume, np.sum(angle * radius**2, axis=1) - np.sum(turn * hidden, axis=1)

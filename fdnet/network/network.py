@@ -1,55 +1,68 @@
-"""The network of pores and throats of a grain pack: one pore per tetrahedron, one throat per shared facet."""
+"""The network of a grain pack: one pore in each tetrahedron, one throat per shared facet."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from fdnet.errors import NetworkError
-from fdnet.network.tessellation.delaunay import Tetrahedra, check_lengths
-from fdnet.network.tessellation.facets import (
-    Facets,
-    Polyhedra,
-    facet_vertices,
-    make_polyhedra,
-    tessellate,
-)
-from fdnet.network.tessellation.pierced import pierced_facets
-from fdnet.network.tessellation.pores import Centres, pore_centres, pore_solids
-from fdnet.network.tessellation.throats import (
-    LENGTH_FLOOR,
-    throat_lengths,
-    throat_sections,
-    throat_shares,
-    without_end_faces,
-)
-from fdnet.network.tessellation.walls import onto_walls, reaching
+from fdnet.network.tessellation.placed_grains import PlacedGrains, place_grains
+from fdnet.network.tessellation.polyhedra import join_polyhedra
+from fdnet.network.tessellation.pores import Pores, measure_pores
+from fdnet.network.tessellation.tessellation import Tessellation, tessellate
+from fdnet.network.tessellation.throats import LENGTH_FLOOR, Throats, measure_throats
 from fdnet.spheres.snapshot import Array, Snapshot
 
 __all__ = ["LENGTH_FLOOR", "WALLS", "Network", "build_network"]
 
 WALLS = ("slip", "no-slip")
+"""What the side walls do to the fluid: let it slip along them, or hold it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Network:
-    """Pores (P) and throats (T) of a pack of grains; lengths m, areas m2, volumes m3. x is the flow axis.
+    """Pores (P) and throats (T) of a pack of grains, SI units; x is the axis of the flow.
 
-    `box` (3, 2); `periodic` (3,): the other faces are mirror planes, at the sides with `walls` "slip" or "no-slip".
-    `grain_radius` mean; `area` the box's cross-section. `image_grain` (M,) index, `image_position` (M, 3),
-    `image_radius` (M,) of the grains and their images; `pore_images` (P, 4), `throat_images` (T, 3) which of them are
-    at the corners, `pore_wrap` (P, 3) periods by which these lie beyond the place of the pore.
-    A pore cut by mirrored faces lies on them and describes the whole mirrored tetrahedron; `pore_share` (P,) is
-    the part inside (1/2 for each such face, else 1), `throat_share` (T,) that of a throat's section.
-    `pore_position` (P, 3) centre of the sphere touching the four grains, the centroid where that is outside (Shi
-    2011, section 3.1.2); `pore_radius` of that sphere (0 where grains close it); `pore_power_centre` (P, 3) vertex of
-    the power tessellation, the circumcentre for equal grains; `pore_tetra_volume`, `pore_volume` (void),
-    `pore_wall_surface` (P,); `pore_group` (P,) equal for pores of one power centre, which are parts of one
-    polyhedron (a lattice's cell, a prism cut by a face) split at will: one place, one pressure.
-    `throat_pores` (T, 2); `throat_shift` (T, 3) periods from the second pore's position to its place beside the first;
-    `throat_heights` (T, 2) distances of the power centres from the facet, positive on their own side;
-    `throat_radius` inscribed; `throat_area` open; `throat_radius_effective` = sqrt(area / pi); `throat_length` between
-    the pore positions (T,). `counts`: what was closed, floored, dropped or replaced.
+    The grains and their images beyond the faces of the box are the M points on which the
+    tetrahedra stand. A pore that mirrored faces cut lies on these faces and describes the whole
+    tetrahedron, the mirrored part included.
+
+    Attributes:
+        box: (3, 2) m, lower and upper bound of the specimen.
+        periodic: whether the sides x, y and z are periodic; the other faces are mirror planes.
+        walls: "slip" or "no-slip": what the y and z faces that are not periodic do to the fluid.
+        grain_radius: m, mean.
+        area: m2, cross-section of the box.
+        image_grain: (M,) index of the grain.
+        image_position: (M, 3) m.
+        image_radius: (M,) m.
+        pore_images: (P, 4) images at the corners of the tetrahedron.
+        pore_wrap: (P, 3) whole periods by which these images lie beyond the place of the pore.
+        pore_position: (P, 3) m, centre of the sphere that touches the four grains; the centroid
+            where that centre is outside the tetrahedron (Shi 2011, section 3.1.2).
+        pore_radius: (P,) m, radius of that sphere; 0 where the grains close the pore.
+        pore_power_centre: (P, 3) m, vertex of the power tessellation, for equal grains the
+            circumcentre.
+        pore_tetra_volume: (P,) m3, volume of the tetrahedron.
+        pore_volume: (P,) m3, void in the tetrahedron.
+        pore_wall_surface: (P,) m2, grain surface in the tetrahedron.
+        pore_group: (P,) number of the polyhedron; pores of one power centre are parts of one
+            polyhedron (the cell of a lattice, a prism cut by a face) which the tessellation
+            splits arbitrarily, so they have one place and one pressure.
+        pore_share: (P,) part of the tetrahedron inside the box, 1/2 for each face that cuts it.
+        throat_pores: (T, 2) indices of the two pores that a throat joins.
+        throat_shift: (T, 3) whole periods from the position of the second pore to its place next
+            to the first.
+        throat_images: (T, 3) images at the corners of the facet.
+        throat_share: (T,) part of the section inside the box, 1/2 for each side wall in which
+            both pores lie.
+        throat_heights: (T, 2) m, distances of the two power centres from the facet, positive on
+            their own side of it.
+        throat_radius: (T,) m, radius of the inscribed circle; 0 where grains close the facet.
+        throat_radius_effective: (T,) m, radius of the circle of equal area, sqrt(area / pi).
+        throat_area: (T,) m2, open area of the facet.
+        throat_length: (T,) m, between the positions of the pores, at least 1e-3 mean grain radii.
+        counts: how many grains, pores and throats were closed, shortened, left out or replaced.
     """
 
     box: Array
@@ -83,12 +96,12 @@ class Network:
 
     @property
     def pore_grains(self) -> Array:
-        """Index (P, 4) of the grains at the corners."""
+        """Indices (P, 4) of the grains at the corners."""
         return self.image_grain[self.pore_images]
 
     @property
     def pore_corner(self) -> Array:
-        """Corners (P, 4, 3) m about the pore's position, images included."""
+        """Corners (P, 4, 3) m of the tetrahedron at the place of the pore."""
         return (
             self.image_position[self.pore_images]
             - (self.pore_wrap * np.ptp(self.box, axis=1))[:, None]
@@ -96,28 +109,28 @@ class Network:
 
     @property
     def pore_corner_radius(self) -> Array:
-        """Grain radii (P, 4) m at the corners."""
+        """Radii (P, 4) m of the grains at the corners."""
         return self.image_radius[self.pore_images]
 
     @property
     def throat_grains(self) -> Array:
-        """Index (T, 3) of the grains at the facet's corners."""
+        """Indices (T, 3) of the grains at the corners of the facet."""
         return self.image_grain[self.throat_images]
 
     @property
     def throat_corner(self) -> Array:
-        """Corners (T, 3, 3) m of the facet beside the first pore, images included."""
+        """Corners (T, 3, 3) m of the facet at the place of the first pore."""
         wrap = self.pore_wrap[self.throat_pores[:, 0]] * np.ptp(self.box, axis=1)
         return self.image_position[self.throat_images] - wrap[:, None]
 
     @property
     def throat_corner_radius(self) -> Array:
-        """Grain radii (T, 3) m at the facet's corners."""
+        """Radii (T, 3) m of the grains at the corners of the facet."""
         return self.image_radius[self.throat_images]
 
     @property
     def throat_ends(self) -> Array:
-        """Places (T, 2, 3) m of the first pore and of the second beside it."""
+        """Places (T, 2, 3) m of the first pore and of the second next to it."""
         ends = self.pore_position[self.throat_pores]
         ends[:, 1] += self.throat_shift * np.ptp(self.box, axis=1)
         return ends
@@ -126,121 +139,78 @@ class Network:
 def build_network(
     grains: Snapshot, *, periodic: tuple[bool, bool, bool], walls: str = "slip"
 ) -> Network:
-    """Network of `grains` alone (Shi 2011, section 3.2.1); unequal radii: of their power tessellation.
+    """The network of pores and throats between grains (Shi 2011, section 3.2.1).
 
-    Periodic sides join. The others are mirror planes: with `walls` "slip" the specimen is one half, fourth or eighth of
-    the periodic one that its mirror images make up; with "no-slip" the y and z faces also hold the fluid, for laws that
-    know it (`lubrication`). Grains that do not reach into the box are left out and counted. Raises NetworkError on
-    unknown walls, impossible lengths, too few, coincident or coplanar grains, facets without partner, or no throat.
+    Periodic sides join. The other faces are mirror planes: with `walls` "slip" the specimen is one
+    half, fourth or eighth of the periodic specimen that its mirror images make up; with "no-slip"
+    the y and z faces also hold the fluid, for the laws that account for it (`lubrication`). Unequal
+    grains are tessellated by their power tessellation. Grains that do not reach into the box are
+    left out and counted.
+
+    Args:
+        grains: the spheres that carry the skeleton; fines are not part of the network.
+        periodic: whether the sides x, y and z are periodic.
+        walls: "slip" or "no-slip".
+
+    Raises:
+        NetworkError: unknown walls, impossible lengths, too few, coincident or coplanar grains,
+            facets without partner, or no throat.
     """
     if walls not in WALLS:
         raise NetworkError(f"walls: {walls!r} is not known; choose one of {list(WALLS)}")
-    periodic = (bool(periodic[0]), bool(periodic[1]), bool(periodic[2]))
-    check_lengths(grains, periodic)
-    kept = reaching(grains, periodic)
-    if len(kept) < 4:
-        raise NetworkError(
-            f"tessellation: {len(kept)} of {len(grains)} grains reach into the box; a tetrahedron needs at least 4, "
-            "give more grains or mend the box"
-        )
-    given, scale = grains, float(grains.radius[kept].mean())
-    grains, beyond = onto_walls(grains.where(kept), periodic)
-    tetrahedra, facets = tessellate(grains, periodic=periodic)
-    polyhedra = make_polyhedra(tetrahedra, facets, grains.box, scale)
-    if not len(facets.pore):
-        what = f"no throat joins two pores of these {len(grains)} grains; the box is too narrow for its side walls"
-        raise NetworkError(f"tessellation: {what}, give more grains or periodic sides")
-    centres = pore_centres(tetrahedra, polyhedra, grains.box, periodic)
+    sides = (bool(periodic[0]), bool(periodic[1]), bool(periodic[2]))
+    placed = place_grains(grains, periodic=sides)
+    tessellation = tessellate(placed)
+    polyhedra = join_polyhedra(tessellation)
+    pores = measure_pores(tessellation, polyhedra)
+    throats = measure_throats(tessellation, polyhedra, pores)
     counts = {
-        "grains_outside_box": len(given) - len(kept),
-        "grains_centred_beyond_walls": beyond,
-        "grains_hidden": tetrahedra.hidden,
-        "centre_is_centroid": centres.centroids,
-        "throats_unmatched": facets.unmatched,
+        "grains_outside_box": len(grains) - len(placed.index),
+        "grains_centred_beyond_walls": placed.beyond,
+        "grains_hidden": tessellation.tetrahedra.hidden,
+        **pores.counts,
+        **throats.counts,
     }
-    pores, pore_counts = _pores(tetrahedra, polyhedra, centres, grains.box)
-    throats, throat_counts = _throats(tetrahedra, (facets, polyhedra), centres, grains.box, scale)
-    found = {
-        **pores,
-        **throats,
-        "image_grain": kept[tetrahedra.images.owner],
-        "image_position": tetrahedra.images.position,
-        "image_radius": tetrahedra.image_radius,
-    }
-    for value in found.values():
-        value.setflags(write=False)
-    size = np.ptp(grains.box, axis=1)
-    return Network(
-        box=grains.box,
-        periodic=periodic,
-        grain_radius=scale,
-        area=float(size[1] * size[2]),
-        counts={**counts, **pore_counts, **throat_counts},
-        walls=walls,
-        **found,
+    network = _assembled(placed, tessellation, pores, throats)
+    return replace(network, walls=walls, counts=counts)
+
+
+def _assembled(
+    placed: PlacedGrains, tessellation: Tessellation, pores: Pores, throats: Throats
+) -> Network:
+    """The network of these parts, its arrays read-only."""
+    points = tessellation.tetrahedra.points
+    network = Network(
+        box=tessellation.box,
+        periodic=tessellation.periodic,
+        grain_radius=tessellation.scale,
+        area=float(tessellation.size[1] * tessellation.size[2]),
+        image_grain=placed.index[points.owner],
+        image_position=points.position,
+        image_radius=points.radius,
+        pore_images=pores.vertex,
+        pore_wrap=pores.wrap,
+        pore_position=pores.position,
+        pore_radius=pores.radius,
+        pore_power_centre=pores.power_centre,
+        pore_tetra_volume=pores.volume,
+        pore_volume=pores.void,
+        pore_wall_surface=pores.wall_surface,
+        pore_group=pores.group,
+        pore_share=pores.share,
+        throat_pores=throats.pores,
+        throat_shift=throats.shift,
+        throat_images=throats.vertex,
+        throat_share=throats.share,
+        throat_heights=throats.heights,
+        throat_radius=throats.radius,
+        throat_radius_effective=np.sqrt(throats.area / np.pi),
+        throat_area=throats.area,
+        throat_length=throats.length,
+        counts={},
     )
-
-
-def _pores(
-    tetrahedra: Tetrahedra, polyhedra: Polyhedra, centres: Centres, box: Array
-) -> tuple[dict[str, Array], dict[str, int]]:
-    volume, void, surface = pore_solids(tetrahedra)
-    cut = polyhedra.wall != 0
-    found = {
-        "pore_images": tetrahedra.vertex,
-        "pore_wrap": centres.wrap,
-        "pore_position": centres.position,
-        "pore_radius": np.nan_to_num(np.maximum(centres.radius, 0.0), nan=0.0),
-        "pore_power_centre": polyhedra.centre - centres.wrap * np.ptp(box, axis=1),
-        "pore_tetra_volume": volume,
-        "pore_volume": void,
-        "pore_wall_surface": surface,
-        "pore_group": polyhedra.group,
-        "pore_share": 0.5 ** cut.sum(axis=1),
-    }
-    speck = 1e-9 * float(tetrahedra.image_radius.mean()) ** 3
-    counts = {
-        "pores_closed": int(np.sum(found["pore_radius"] == 0)),
-        "slivers": int(np.sum(tetrahedra.flat)),
-        "cospherical_groups": int(np.sum(np.bincount(polyhedra.group) > 1)),
-        "pores_at_end_faces": int(np.sum(cut[:, 0])),
-        "pores_at_side_walls": int(np.sum(cut[:, 1:].any(axis=1))),
-        "void_negative": int(np.sum(void < -speck)),
-    }
-    return found, counts
-
-
-def _throats(
-    tetrahedra: Tetrahedra,
-    shared: tuple[Facets, Polyhedra],
-    centres: Centres,
-    box: Array,
-    scale: float,
-) -> tuple[dict[str, Array], dict[str, int]]:
-    polyhedra = shared[1]
-    facets, kept = without_end_faces(*shared)
-    one, two = facets.pore.T
-    shift = (centres.wrap[two] + facets.shift - centres.wrap[one]).astype(np.int16)
-    length = throat_lengths(centres.position, facets.pore, shift * np.ptp(box, axis=1))
-    radius, area, counts = throat_sections(tetrahedra, facets)
-    found = {
-        "throat_pores": facets.pore,
-        "throat_shift": shift,
-        "throat_images": facet_vertices(tetrahedra, facets, slice(None)),
-        "throat_share": throat_shares(facets, polyhedra),
-        "throat_heights": polyhedra.heights[kept],
-        "throat_radius": radius,
-        "throat_area": area,
-        "throat_radius_effective": np.sqrt(area / np.pi),
-        "throat_length": np.maximum(length, LENGTH_FLOOR * scale),
-    }
-    counts = {
-        **counts,
-        "throats_pierced": int(
-            np.sum(pierced_facets(tetrahedra, facets, radius > 0, np.ptp(box, axis=1)))
-        ),
-        "throats_short": int(np.sum(length < LENGTH_FLOOR * scale)),
-        "throats_in_polyhedra": int(np.sum(polyhedra.group[one] == polyhedra.group[two])),
-        "throats_in_end_faces_dropped": int(np.sum(~kept)),
-    }
-    return found, counts
+    for field in fields(network):
+        value = getattr(network, field.name)
+        if isinstance(value, np.ndarray):
+            value.setflags(write=False)
+    return network

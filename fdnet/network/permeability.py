@@ -1,89 +1,28 @@
 """Permeability of a pack before and after fines: the whole network analysis of one specimen."""
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from dataclasses import dataclass, field
+from itertools import pairwise, product
+from typing import Unpack
 
 import numpy as np
 
-from fdnet.errors import CaseError
+from fdnet.case.analysis import AnalysisChoices, AnalysisKeys
+from fdnet.network.analysis import Analysis
 from fdnet.network.fines.occupancy import Occupancy
 from fdnet.network.flow.flow import Flow
-from fdnet.network.flow.sections import (
-    Profile,
-    Section,
-    SlabK,
-    make_profile,
-    make_sections,
-    reduction,
-)
+from fdnet.network.flow.sections import Section, SlabK, make_profile, make_sections, reduction
 from fdnet.network.flow.slabs import inplace_permeability, slab_permeability, whole_permeability
 from fdnet.network.laws.damage import CLEAN, Damage
-from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, LAWS
-from fdnet.network.network import WALLS, Network
+from fdnet.network.laws.named import DAMAGE_LAWS, LAWS, damage_law
+from fdnet.network.network import Network
 from fdnet.network.specimen import Specimen, measure_specimen
+from fdnet.spheres.directions import Directions, periodic_axes
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
-__all__ = ["Analysis", "AnalysisOptions", "Profile", "Section", "analyse", "compare"]
-
 STAGES = ("tessellate", "occupancy", "conductance", "solve", "porosity")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AnalysisOptions:
-    """Choices of an analysis: `sections` count or edges (m), laws by name, `threshold` of the thesis law (None: the
-    law's own), `middle_band` "threshold" or "position", `overlap` "exact" or "two-plane", `profile_bin` m; `walls`
-    "no-slip" or "slip", what side walls do to the fluid."""
-
-    sections: int | Sequence[float] = 1
-    law: str = DEFAULT_LAW
-    damage_law: str = DEFAULT_DAMAGE_LAW
-    threshold: float | None = None
-    middle_band: str = "threshold"
-    overlap: str = "exact"
-    profile_bin: float | None = None
-    walls: str = "no-slip"
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Analysis:
-    """Everything the report writes; SI units.
-
-    `network` and all that goes by pore or throat (occupancy, conductances, flows) are of the final grain positions;
-    when the grains moved, `k_initial` and the sections' initial values are of the first positions, `k_moved` is
-    `network` without fines and `flow_initial` its flow. `solver` holds the worst of all solves.
-    """
-
-    network: Network
-    occupancy: Occupancy | None
-    law: str
-    damage_law: str
-    conductance_initial: Array
-    conductance_damaged: Array
-    law_used: Array
-    flow_initial: Flow
-    flow_damaged: Flow
-    k_initial: float
-    k_damaged: float
-    k_moved: float | None
-    k_reduction: float | None
-    porosity_initial: float
-    porosity_initial_error: float
-    porosity_initial_sum: float
-    porosity_damaged: float
-    sections: tuple[Section, ...]
-    profile: Profile
-    invaded_count: int
-    invaded_volume: float
-    invasion_depth: float
-    invasion_depth_p95: float
-    cake_thickness: float
-    solver: Mapping[str, str | float | None]
-    counts: Mapping[str, int]
-    warnings: tuple[str, ...]
-    seconds: Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -111,54 +50,113 @@ class _Log:
 
 
 def analyse(
-    initial: Snapshot,
-    damaged: Snapshot | None,
+    spheres: Snapshot,
+    damaged: Snapshot | None = None,
     *,
-    periodic: tuple[bool, bool, bool],
-    options: AnalysisOptions,
+    periodic: Directions = "",
+    options: AnalysisChoices | None = None,
+    **choices: Unpack[AnalysisKeys],
 ) -> Analysis:
-    """Permeability of the grains of `initial`, and with the fines of `damaged` (grains, moved or not, and all fines).
+    """Permeability of a pack of grains along x, without and with the fines in it.
 
-    `damaged` None: an intact pack. Raises CaseError on unknown laws or wrong section edges, NetworkError on grains that
-    differ between the two and on degenerate geometry, FlowError on a solve that fails its checks; no open path is k = 0
-    with the reason in `warnings`.
+    Args:
+        spheres: grains and fines, m. When `damaged` is given, its grains before the invasion.
+        damaged: the same grains, moved or not, and all fines. Without it, `spheres` holds the fines,
+            or there are none.
+        periodic: sides that repeat, letters such as "yz" or three truth values (x, y, z). The
+            other sides of the box are walls; along x they are the inlet and the outlet.
+        options: choices of the analysis, for example `case.analysis`. Without it: one section,
+            profile bins of a mean grain radius, fdnet's default laws.
+        choices: single choices by name, in place of those of `options`: `sections` (a count, or
+            edges in m), `law`, `damage_law`, `clogging_threshold`, `middle_band`,
+            `throat_overlap`, `profile_bin_mm`, `walls`.
+
+    Returns:
+        Permeabilities (m2), porosities, sections, profile, network and flows. No open path is no
+        error: the permeability is 0 and `warnings` gives the reason.
+
+    Raises:
+        CaseError: a choice is unknown or outside its range; the message names its key.
+        NetworkError: the geometry is degenerate, or the grains of the two snapshots differ.
+        FlowError: the solve fails its checks.
+
+    Examples:
+        A simple cubic lattice of touching spheres, diameter 1 mm (k = 0.00252 d^2, Zick and Homsy
+        1982):
+
+        >>> import fdnet, numpy as np
+        >>> lattice = 1e-3 * (np.indices((3, 3, 3)).reshape(3, -1).T + 0.5)
+        >>> spheres = fdnet.Snapshot.from_arrays(lattice, 0.5e-3)
+        >>> result = fdnet.analyse(spheres, periodic="xyz")
+        >>> print(f"{result.k_initial:.2g} m2, porosity {result.porosity_initial:.3f}")
+        2.5e-09 m2, porosity 0.476
     """
-    pair = (options.law, options.damage_law)
-    return next(compare(initial, damaged, periodic=periodic, options=options, laws=[pair]))
+    chosen = _chosen(options, choices)
+    pair = (chosen.law, chosen.damage_law)
+    return next(compare(spheres, damaged, periodic=periodic, options=chosen, laws=[pair]))
 
 
 def compare(
-    initial: Snapshot,
-    damaged: Snapshot | None,
+    spheres: Snapshot,
+    damaged: Snapshot | None = None,
     *,
-    periodic: tuple[bool, bool, bool],
-    options: AnalysisOptions,
-    laws: Sequence[tuple[str, str]],
+    periodic: Directions = "",
+    laws: Sequence[tuple[str, str]] | None = None,
+    options: AnalysisChoices | None = None,
+    **choices: Unpack[AnalysisKeys],
 ) -> Iterator[Analysis]:
-    """The same as `analyse` for each pair of (law, damage law) in `laws`; what does not depend on them (tessellation,
-    occupancy, porosity) is measured once, the clean pack solved once for each law. Seconds are of what each added."""
-    chosen = [replace(options, law=law, damage_law=damage_law) for law, damage_law in laws]
-    for one in chosen:
-        _check_names(one)
+    """The same pack under several pairs of laws; otherwise as `analyse`.
+
+    What does not depend on the laws (tessellation, occupancy, porosity) is measured once, and the
+    clean pack is solved once for each conductance law.
+
+    Args:
+        spheres: grains and fines, m, as for `analyse`.
+        damaged: as for `analyse`.
+        periodic: sides that repeat, as for `analyse`.
+        laws: pairs (law, damage law). Without it every law with every damage law, or with the
+            chosen one where there are no fines.
+        options: choices of the analysis, as for `analyse`.
+        choices: single choices by name, as for `analyse`.
+
+    Yields:
+        One `Analysis` (permeabilities in m2) for each pair, in their order; its `seconds` are
+        those that this pair added.
+
+    Raises:
+        CaseError, NetworkError, FlowError: as `analyse`.
+
+    Examples:
+        >>> import fdnet, numpy as np
+        >>> lattice = 1e-3 * (np.indices((3, 3, 3)).reshape(3, -1).T + 0.5)
+        >>> spheres = fdnet.Snapshot.from_arrays(lattice, 0.5e-3)
+        >>> pairs = [("thesis", "thesis"), ("lubrication", "side-kozeny")]
+        >>> for result in fdnet.compare(spheres, periodic="xyz", laws=pairs):
+        ...     print(f"{result.law}: {result.k_initial:.1e} m2")
+        thesis: 1.8e-09 m2
+        lubrication: 2.5e-09 m2
+    """
+    base, around = _chosen(options, choices), periodic_axes(periodic)
+    if damaged is None and len(spheres.fines()):
+        damaged = spheres
+    if laws is None:
+        rules = DAMAGE_LAWS if damaged is not None else [base.damage_law]
+        laws = list(product(LAWS, rules))
+    chosen = [base.changed(law=law, damage_law=damage_law) for law, damage_law in laws]
     log = _Log()
-    specimen = measure_specimen(
-        initial,
-        damaged,
-        periodic=periodic,
-        walls=options.walls,
-        sections=options.sections,
-        profile_bin=options.profile_bin,
-        overlap=options.overlap,
-        timed=log.timed,
-    )
+    specimen = measure_specimen(spheres, damaged, periodic=around, choices=base, timed=log.timed)
     clean: dict[str, tuple[_State, SlabK]] = {}
     for one in chosen:
         yield _analysis(specimen, one, clean, log)
         log = _Log()
 
 
+def _chosen(options: AnalysisChoices | None, choices: AnalysisKeys) -> AnalysisChoices:
+    return AnalysisChoices.of_pack(**choices) if options is None else options.changed(**choices)
+
+
 def _analysis(
-    specimen: Specimen, options: AnalysisOptions, known: dict[str, tuple[_State, SlabK]], log: _Log
+    specimen: Specimen, options: AnalysisChoices, known: dict[str, tuple[_State, SlabK]], log: _Log
 ) -> Analysis:
     if options.law not in known:
         state = _clean_state(specimen.first, options, log)
@@ -206,19 +204,7 @@ def _analysis(
     )
 
 
-def _check_names(options: AnalysisOptions) -> None:
-    for key, value, known in (
-        ("law", options.law, LAWS),
-        ("damage_law", options.damage_law, DAMAGE_LAWS),
-        ("walls", options.walls, WALLS),
-    ):
-        if value not in known:
-            raise CaseError(
-                f"analysis.{key}: {value!r} is not known; choose one of {sorted(known)}"
-            )
-
-
-def _clean_state(network: Network, options: AnalysisOptions, log: _Log) -> _State:
+def _clean_state(network: Network, options: AnalysisChoices, log: _Log) -> _State:
     with log.timed("conductance"):
         conductance = LAWS[options.law](network)
     return _state(network, frozen(conductance), log)
@@ -231,18 +217,17 @@ def _state(network: Network, conductance: Array, log: _Log) -> _State:
 
 
 def _damage(
-    base: _State, occupancy: Occupancy | None, options: AnalysisOptions, log: _Log
+    base: _State, occupancy: Occupancy | None, options: AnalysisChoices, log: _Log
 ) -> Damage | None:
     if occupancy is None:
         return None
     with log.timed("conductance"):
-        return DAMAGE_LAWS[options.damage_law](
-            base.network,
-            occupancy,
-            base.conductance,
-            threshold=options.threshold,
+        law = damage_law(
+            options.damage_law,
+            clogging_threshold=options.clogging_threshold,
             middle_band=options.middle_band,
         )
+        return law(base.network, occupancy, base.conductance)
 
 
 def _slab_k(state: _State, edges: Array, log: _Log) -> SlabK:

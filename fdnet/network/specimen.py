@@ -1,11 +1,12 @@
 """What a specimen is, before any law: its network, where its fines sit, its porosity by depth."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
 import numpy as np
 
+from fdnet.case.analysis import AnalysisChoices
 from fdnet.errors import NetworkError
 from fdnet.network.fines.invaded import Invaded, measure_invaded
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
@@ -15,13 +16,24 @@ from fdnet.spheres.porosity import Porosity, measure_porosity
 from fdnet.spheres.snapshot import Array, Snapshot
 
 MOVED = 1e-9
+"""Smallest displacement of a grain that counts as a move, m."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Specimen:
-    """`first` the network of the grains as they were, `network` of where they ended, the same unless they `moved`;
-    `occupancy` of `network` by the fines, None without; `edges` (S+1,) of the sections and `bins` (B+1,) of the
-    profile, m; `porosity` before and after; `depth` (F,) m of the fines centred in the box; `invaded`."""
+    """The parts of an analysis that depend on no law, in SI units.
+
+    Attributes:
+        first: network of the grains as they were.
+        network: network of the grains where they ended, the same one unless they moved.
+        moved: whether any grain moved by more than 1 nm.
+        occupancy: what the fines fill of `network`; None without fines.
+        edges: (S+1,) edges of the sections, m.
+        bins: (B+1,) edges of the profile's bins, m.
+        porosity: porosity before and after, by depth.
+        depth: (F,) depth of the fines centred in the box, m.
+        invaded: number, volume and depths of these fines, and the cake.
+    """
 
     first: Network
     network: Network
@@ -39,27 +51,28 @@ def measure_specimen(
     damaged: Snapshot | None,
     *,
     periodic: tuple[bool, bool, bool],
-    walls: str,
-    sections: int | Sequence[float],
-    profile_bin: float | None,
-    overlap: str,
+    choices: AnalysisChoices,
     timed: Callable[[str], AbstractContextManager[None]],
 ) -> Specimen:
-    """The specimen of `initial` grains and, unless None, the grains and fines of `damaged`. `timed` takes the name of
-    the stage that its block belongs to. Raises NetworkError, CaseError as `analyse` does."""
+    """The specimen of the grains of `initial` and, unless it is None, of all spheres of `damaged`.
+
+    `timed` takes the name of the stage that its block belongs to. Raises NetworkError and CaseError
+    as `analyse` does.
+    """
     before = initial.grains()
     after = before if damaged is None else _same_grains(before, damaged.grains())
     box = before.box
-    edges = section_edges(sections, box)
+    edges = section_edges(choices.sections, box)
     with timed("tessellate"):
-        first = build_network(before, periodic=periodic, walls=walls)
+        first = build_network(before, periodic=periodic, walls=choices.walls)
         moved = _displaced(before, after, periodic)
-        network = build_network(after, periodic=periodic, walls=walls) if moved else first
+        network = build_network(after, periodic=periodic, walls=choices.walls) if moved else first
     occupancy = None
     if damaged is not None:
         with timed("occupancy"):
-            occupancy = measure_occupancy(network, damaged.fines(), overlap=overlap)
-    bins = profile_edges(first.grain_radius if profile_bin is None else profile_bin, box)
+            occupancy = measure_occupancy(network, damaged.fines(), overlap=choices.throat_overlap)
+    width = choices.profile_bin_m
+    bins = profile_edges(first.grain_radius if width is None else width, box)
     cuts = np.unique(np.concatenate([edges, bins]))
     spheres = before if damaged is None else after.joined(damaged.fines())
     with timed("porosity"):

@@ -13,7 +13,7 @@ from fdnet.report.side_view import fill_side_view
 from fdnet.spheres.snapshot import Array, Snapshot
 
 if TYPE_CHECKING:
-    from fdnet.network.permeability import Analysis
+    from fdnet.network.analysis import Analysis
 
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#7F7F7F"
 MM, MICRON = 1e3, 1e6

@@ -16,7 +16,7 @@ from fdnet.spheres.snapshot import Array
 if TYPE_CHECKING:
     import pandas as pd
 
-    from fdnet.network.permeability import Analysis
+    from fdnet.network.analysis import Analysis
 
 __all__ = [
     "read_spheres",

@@ -16,7 +16,7 @@ from fdnet.report.tables import blocked_throats, pore_porosity
 from fdnet.spheres.snapshot import Array, Snapshot
 
 if TYPE_CHECKING:
-    from fdnet.network.permeability import Analysis
+    from fdnet.network.analysis import Analysis
 
 PNG_START, PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND"
 LAW_CODES = {"clean": 0, "deposition": 1, "clogging": 2, "blocked": 3, "kozeny": 4}

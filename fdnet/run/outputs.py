@@ -5,7 +5,7 @@ from pathlib import Path
 
 from fdnet.case.case import Case
 from fdnet.dem.checkpoint import Checkpoint, readable_states
-from fdnet.network.permeability import Analysis
+from fdnet.network.analysis import Analysis
 from fdnet.scales.scales import Scales
 from fdnet.spheres.snapshot import Snapshot
 

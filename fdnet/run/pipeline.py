@@ -16,7 +16,7 @@ from fdnet.dem.packing import make_pack
 from fdnet.dem.scene import snapshot_of
 from fdnet.dem.supply import refuse_crowded_supply
 from fdnet.errors import CaseError
-from fdnet.network.permeability import AnalysisOptions, analyse
+from fdnet.network.permeability import analyse
 from fdnet.run.folder import STAGES, RunFolder, open_folder
 from fdnet.run.outputs import Results, draw_figures, write_paraview, write_tables
 from fdnet.run.progress import Progress
@@ -214,9 +214,7 @@ def _analyse_and_report(story: _Story) -> dict[str, Any]:
         state_at(path / "invade", history[-1], case, story.scales, grains) if history else None
     )
     with story.timed("analyse"):
-        analysis = analyse(
-            grains, damaged, periodic=case.periodic, options=_analysis_options(case)
-        )
+        analysis = analyse(grains, damaged, periodic=case.periodic, options=case.analysis)
         results = Results(
             path=path,
             case=case,
@@ -234,20 +232,6 @@ def _analyse_and_report(story: _Story) -> dict[str, Any]:
             write_paraview(results)
             figures, notes = draw_figures(results)
     return _write_summary(story, results, figures, notes)
-
-
-def _analysis_options(case: Case) -> AnalysisOptions:
-    chosen = case.analysis
-    return AnalysisOptions(
-        sections=chosen.sections,
-        law=chosen.law,
-        damage_law=chosen.damage_law,
-        threshold=chosen.clogging_threshold,
-        middle_band=chosen.middle_band,
-        overlap=chosen.throat_overlap,
-        profile_bin=chosen.profile_bin_mm * 1e-3,
-        walls=chosen.walls,
-    )
 
 
 def _write_summary(

@@ -4,7 +4,7 @@ from typing import Any
 
 from fdnet.case.case import Case
 from fdnet.dem.checkpoint import Checkpoint
-from fdnet.network.permeability import Analysis
+from fdnet.network.analysis import Analysis
 from fdnet.report.tables import section_rows
 
 

@@ -46,7 +46,7 @@ def cost_of(case: Case, scales: Scales) -> Cost:
     if case.fines is None:
         return Cost(pack_seconds=pack, invade_seconds=0.0, steps=0.0)
     expected = scales.cap_time
-    if case.run.duration_ms is None:
+    if case.run.duration_s is None:
         passage = case.size_m[0] / scales.interstitial_velocity
         expected = min(
             expected, scales.slab_length / scales.upstream_velocity + passage + scales.plug_time

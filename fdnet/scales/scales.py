@@ -138,12 +138,8 @@ def target_porosity(case: Case) -> float:
 def _velocities(case: Case, porosity: float, permeability: float) -> tuple[float, float]:
     if case.fluid.velocity_m_s is not None:
         return case.fluid.velocity_m_s * porosity, case.fluid.velocity_m_s
-    length = (
-        case.size_m[0] if case.fluid.darcy_length_mm is None else case.fluid.darcy_length_mm * 1e-3
-    )
-    darcy = (
-        permeability / (case.fluid.viscosity_cP * 1e-3) * case.fluid.overbalance_MPa * 1e6 / length
-    )
+    given = case.fluid.darcy_length_m
+    darcy = case.fluid.darcy_velocity(permeability, case.size_m[0] if given is None else given)
     return darcy, darcy / porosity
 
 
@@ -152,7 +148,7 @@ def _fine_scales(
 ) -> dict[str, Any]:
     if case.fines is None:
         return dict(_NO_FINES)
-    fines, viscosity = case.fines, case.fluid.viscosity_cP * 1e-3
+    fines, viscosity = case.fines, case.fluid.viscosity_Pa_s
     low, high = fines.radius_range_m
     tau = tuple(
         relaxation_time(r, fines.density_kg_m3, viscosity, case.drag.multiplier)
@@ -217,7 +213,7 @@ def _gravity_over_drag(case: Case, velocity: float) -> float:
     assert case.fines is not None
     excess = abs(case.fines.density_kg_m3 - case.fluid.density_kg_m3 * case.gravity.buoyancy)
     weight = math.hypot(*case.gravity.acceleration_m_s2) * excess
-    viscosity = case.fluid.viscosity_cP * 1e-3
+    viscosity = case.fluid.viscosity_Pa_s
     return (
         2
         * case.fines.radius_range_m[1] ** 2
@@ -234,8 +230,8 @@ def _supply(case: Case) -> tuple[int, float]:
     least = 2 * fines.radius_range_m[1]
     if fines.count is not None:
         return fines.count, max(fines.count * volume / (fines.concentration * area), least)
-    assert fines.slab_mm is not None
-    slab = max(fines.slab_mm * 1e-3, least)
+    assert fines.slab_m is not None
+    slab = max(fines.slab_m, least)
     return max(1, round(fines.concentration * area * slab / volume)), slab
 
 
@@ -256,24 +252,20 @@ def _times(
     """
     passage = 2 * case.grains.mean_radius_m / velocity
     plug = max(4 * passage, ARRIVALS * arrival_time(case, upstream))
-    if case.run.plug_time_ms is not None:
-        plug = case.run.plug_time_ms * 1e-3
+    if case.run.plug_time_s is not None:
+        plug = case.run.plug_time_s
     cap = 3 * slab / upstream + 4 * plug + 2 * case.size_m[0] / velocity
-    given = case.run.duration_ms or case.run.cap_ms
-    cap = cap if given is None else given * 1e-3
-    chunk = min(
-        min(passage, plug / 4)
-        if case.run.checkpoint_ms is None
-        else case.run.checkpoint_ms * 1e-3,
-        cap,
-    )
-    return plug, cap, chunk if case.run.duration_ms is None else cap / math.ceil(cap / chunk)
+    given = case.run.duration_s or case.run.cap_s
+    cap = cap if given is None else given
+    asked = case.run.checkpoint_s
+    chunk = min(min(passage, plug / 4) if asked is None else asked, cap)
+    return plug, cap, chunk if case.run.duration_s is None else cap / math.ceil(cap / chunk)
 
 
 def _chunk_steps(case: Case, chunk: float, refresh: float) -> int:
     """Drag refreshes in a chunk: rounded where a duration must be met, else up."""
     refreshes = chunk / refresh
-    return max(1, math.ceil(refreshes) if case.run.duration_ms is None else round(refreshes))
+    return max(1, math.ceil(refreshes) if case.run.duration_s is None else round(refreshes))
 
 
 def _warnings(case: Case, fine: dict[str, Any]) -> list[str]:

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from fdnet.case.case import Case
-from fdnet.case.parts import Spheres
+from fdnet.case.particles import Spheres
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,7 +3,7 @@
 import math
 
 from fdnet.case.case import Case
-from fdnet.case.parts import CONTACT_STEP_LIMIT
+from fdnet.case.values import CONTACT_STEP_LIMIT
 from fdnet.errors import CaseError
 from fdnet.scales.springs import Contact
 

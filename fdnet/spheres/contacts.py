@@ -19,6 +19,8 @@ def touching_pairs(
     period = np.where(periodic, spheres.box[:, 1] - spheres.box[:, 0], 0.0)
     position = spheres.position - spheres.box[:, 0]
     position = np.where(period > 0, np.mod(position, np.where(period > 0, period, 1.0)), position)
+    # rounding may leave a wrapped place at the period itself, which the search tree refuses
+    position = np.where((period > 0) & (position >= period), 0.0, position)
     small = radius <= 0.5 * radius.max()
     groups = [group for group in (np.flatnonzero(small), np.flatnonzero(~small)) if len(group)]
     trees = [cKDTree(position[group], boxsize=period) for group in groups]

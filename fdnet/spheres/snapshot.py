@@ -1,4 +1,4 @@
-"""All spheres of a specimen at one step. SI units."""
+"""All spheres of a specimen at one step, in SI units."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 from fdnet.errors import CaseError
+from fdnet.spheres.arrays import Array, frozen
+from fdnet.spheres.directions import axis_number
 
-Array = np.ndarray[Any, np.dtype[Any]]
+__all__ = ["KIND_NAMES", "Array", "Kind", "Snapshot", "frozen", "resting"]
 
 
 class Kind(IntEnum):
@@ -18,20 +20,40 @@ class Kind(IntEnum):
     FINE = 2
 
 
-def frozen(values: Any, dtype: Any = None) -> Array:
-    """A read-only array of its own over `values`."""
-    array = np.array(values, dtype=dtype)
-    array.setflags(write=False)
-    return array
+KIND_NAMES = {"grain": Kind.GRAIN, "fine": Kind.FINE}
+"""How files and users name the kinds."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Snapshot:
-    """N spheres at one step.
+    """N spheres at one step, grains and fines; the arrays are read-only.
 
-    `box` (3, 2) lower and upper bound of the specimen, m (x = 0 is the formation face);
-    `id` (N,) int64, `kind` (N,) int64 of `Kind`, `position` (N, 3) m, `radius` (N,) m,
-    `velocity` (N, 3) m/s. Raises CaseError when shapes disagree or values are not finite.
+    Attributes:
+        step: time step of the simulation, 0 for spheres that come from no simulation.
+        time_s: time, s.
+        box: (3, 2) lower and upper bound of the specimen along x, y, z, m; the formation face is
+            the lower bound of x.
+        id: (N,) int64 number of each sphere.
+        kind: (N,) int64 of `Kind`, 1 a grain, 2 a fine.
+        position: (N, 3) centres, m.
+        radius: (N,) m.
+        velocity: (N, 3) m/s.
+
+    Raises CaseError when shapes disagree, values are not finite, or a kind is neither grain nor
+    fine.
+
+    Examples:
+        Four grains of 0.25 mm and a fine of 50 um between them:
+
+        >>> import fdnet
+        >>> places = [[0, 0, 0], [5e-4, 0, 0], [0, 5e-4, 0], [0, 0, 5e-4], [1.6e-4] * 3]
+        >>> radii = [2.5e-4] * 4 + [5e-5]
+        >>> kinds = ["grain"] * 4 + ["fine"]
+        >>> spheres = fdnet.Snapshot.from_arrays(places, radii, kind=kinds)
+        >>> spheres
+        Snapshot(4 grains, 1 fine, step 0, box 1 x 1 x 1 mm)
+        >>> spheres.fines().radius.tolist()
+        [5e-05]
     """
 
     step: int
@@ -57,7 +79,8 @@ class Snapshot:
             value = frozen(getattr(self, name), np.int64 if name in ("id", "kind") else np.float64)
             if value.shape != shape:
                 raise CaseError(
-                    f"snapshot at step {self.step}: {name} has shape {value.shape}, expected {shape}"
+                    f"snapshot at step {self.step}: {name} has shape {value.shape}, "
+                    f"expected {shape}"
                 )
             if not np.all(np.isfinite(value)):
                 raise CaseError(
@@ -68,8 +91,64 @@ class Snapshot:
     def __len__(self) -> int:
         return len(self.id)
 
+    def __repr__(self) -> str:
+        fines = int(np.sum(self.kind == Kind.FINE))
+        size = " x ".join(f"{1e3 * side:.4g}" for side in np.ptp(self.box, axis=1))
+        grains, fine = _counted(len(self) - fines, "grain"), _counted(fines, "fine")
+        return f"Snapshot({grains}, {fine}, step {self.step}, box {size} mm)"
+
+    @classmethod
+    def from_arrays(
+        cls,
+        position: Any,
+        radius: Any,
+        *,
+        box: Any = None,
+        kind: Any = Kind.GRAIN,
+    ) -> "Snapshot":
+        """Spheres at rest from plain arrays, at step 0 and numbered from 1.
+
+        Args:
+            position: (N, 3) centres, m.
+            radius: (N,) radii, m, or one for all.
+            box: (3, 2) lower and upper bounds of the specimen, or the six numbers
+                x0, x1, y0, y1, z0, z1, m. Without it, the box around all grains.
+            kind: "grain" or "fine", a `Kind`, or (N,) of either.
+
+        Raises:
+            CaseError: shapes disagree, a value is not finite, a radius is not above 0, a kind is
+                unknown, or there is neither a box nor a grain.
+        """
+        place = np.asarray(position, dtype=float)
+        if place.ndim != 2 or place.shape[1] != 3:
+            raise CaseError(f"position has shape {place.shape}, expected (N, 3)")
+        count = len(place)
+        radii, kinds = _for_each(radius, count, "radius"), _for_each(_kinds(kind), count, "kind")
+        if np.any(~(radii > 0)):
+            raise CaseError(f"radius holds {radii[~(radii > 0)][0]}, expected numbers above 0, m")
+        bounds = _box_around(place, radii, kinds) if box is None else _checked_box(box)
+        return resting(place, radii, bounds, kinds)
+
+    def turned(self, axis: str) -> "Snapshot":
+        """The same spheres with `axis` ("x", "y" or "z") as the new x, moved so that x starts at 0.
+
+        The order of the axes stays cyclic: the new x, y, z are `axis` and the two that follow it.
+        """
+        turn = [(axis_number(axis) + k) % 3 for k in range(3)]
+        start = np.array([self.box[turn[0], 0], 0.0, 0.0])
+        return Snapshot(
+            step=self.step,
+            time_s=self.time_s,
+            box=self.box[turn] - start[:, None],
+            id=self.id,
+            kind=self.kind,
+            position=self.position[:, turn] - start,
+            radius=self.radius,
+            velocity=self.velocity[:, turn],
+        )
+
     def where(self, mask: Array) -> "Snapshot":
-        """The spheres for which `mask` (N,) is true."""
+        """The spheres for which `mask` (N,) is true, or those of the indices `mask`."""
         return Snapshot(
             step=self.step,
             time_s=self.time_s,
@@ -106,7 +185,10 @@ class Snapshot:
 def resting(
     position: Array, radius: Array | float, box: Array, kind: Array | int = Kind.GRAIN
 ) -> Snapshot:
-    """Spheres at rest at `position` (N, 3) m, step 0, numbered from 1; `radius` m and `kind` of each or of all."""
+    """Spheres at rest at `position` (N, 3) m, at step 0 and numbered from 1, unchecked.
+
+    `radius` m and `kind` are of each sphere or of all; `box` (3, 2) m.
+    """
     count = len(position)
     return Snapshot(
         step=0,
@@ -118,3 +200,50 @@ def resting(
         radius=np.broadcast_to(radius, count),
         velocity=np.zeros((count, 3)),
     )
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def _for_each(values: Any, count: int, name: str) -> Array:
+    array = np.asarray(values)
+    if array.shape not in ((), (count,)):
+        raise CaseError(f"{name} has shape {array.shape}, expected one value or ({count},)")
+    return np.broadcast_to(array, count)
+
+
+def _kinds(kind: Any) -> Array:
+    """Kinds as numbers, from names or numbers. Raises CaseError on one that is neither."""
+    names = np.asarray(kind, dtype=object)
+    flat = [KIND_NAMES.get(one, one) for one in names.ravel()]
+    for one in flat:
+        if one not in (Kind.GRAIN, Kind.FINE):
+            raise CaseError(f"kind holds {one!r}, expected grain or fine (1 or 2)")
+    return np.array(flat, dtype=np.int64).reshape(names.shape)
+
+
+def _checked_box(box: Any) -> Array:
+    """(3, 2) bounds. Raises CaseError unless they are six finite numbers, the lower ones first."""
+    try:
+        bounds = np.asarray(box, dtype=float)
+    except (TypeError, ValueError):
+        bounds = np.empty(0)
+    if (
+        bounds.shape not in ((3, 2), (6,))
+        or not np.all(np.isfinite(bounds))
+        or np.any(np.diff(bounds.reshape(3, 2)) <= 0)
+    ):
+        raise CaseError(
+            f"box: {box!r}, expected six numbers x0,x1,y0,y1,z0,z1 with each lower bound below "
+            "the upper"
+        )
+    return bounds.reshape(3, 2)
+
+
+def _box_around(position: Array, radius: Array, kind: Array) -> Array:
+    grains = kind == Kind.GRAIN
+    if not grains.any():
+        raise CaseError("box: missing, and there is no grain to take it from; give the box")
+    place, reach = position[grains], radius[grains, None]
+    return np.column_stack([np.min(place - reach, axis=0), np.max(place + reach, axis=0)])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fdnet.errors import CaseError
-from fdnet.network.laws.named import DAMAGE_LAWS
+from fdnet.network.laws.named import DAMAGE_LAWS, damage_law
 from tests.network.networks import chain
 
 R, L = 0.1, 1.0
@@ -32,7 +32,7 @@ def occupancy(porosity, *, fine=0.02, distance=0.9, blocked=None, solid=0.0, sur
 
 def damaged(law, state, **options):
     count = len(state.throat_porosity)
-    return DAMAGE_LAWS[law](chain(count), state, np.full(count, CLEAN), **options)
+    return damage_law(law, **options)(chain(count), state, np.full(count, CLEAN))
 
 
 def carman_kozeny(porosity, fine):
@@ -66,8 +66,8 @@ def test_thresholds_of_text_and_code_and_by_choice():
     state = occupancy([0.38])
     assert damaged("thesis", state).law_used[0] == "clogging"
     assert damaged("thesis-code", state).law_used[0] == "deposition"
-    assert damaged("thesis", state, threshold=0.3).law_used[0] == "deposition"
-    assert damaged("thesis-code", state, threshold=0.5).law_used[0] == "clogging"
+    assert damaged("thesis", state, clogging_threshold=0.3).law_used[0] == "deposition"
+    assert damaged("thesis-code", state, clogging_threshold=0.5).law_used[0] == "clogging"
 
 
 def test_middle_band_is_decided_by_where_the_fines_lie():
@@ -106,7 +106,16 @@ def test_kozeny_closes_a_filled_pore_and_counts_it():
     assert found.law_used.tolist() == ["blocked", "clean"]
 
 
-@pytest.mark.parametrize("options", [{"threshold": 1.2}, {"middle_band": "guess"}])
+@pytest.mark.parametrize("options", [{"clogging_threshold": 1.2}, {"middle_band": "guess"}])
 def test_options_out_of_range_are_refused(options):
     with pytest.raises(CaseError, match=next(iter(options))):
         damaged("thesis", occupancy([0.5]), **options)
+
+
+def test_an_unknown_law_is_refused_with_the_known_ones():
+    with pytest.raises(CaseError, match=r"analysis.damage_law: 'guess'.*side-kozeny.*thesis-code"):
+        damage_law("guess")
+
+
+def test_the_kozeny_laws_have_no_options():
+    assert damage_law("kozeny", clogging_threshold=0.3) is DAMAGE_LAWS["kozeny"]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fdnet.network import geometry
-from fdnet.network.tessellation.pores import solid_in_tetrahedra
+from fdnet.network.geometry import solid_in_tetrahedra
 
 TOUCHING = np.array(
     [[0, 0, 0], [2, 0, 0], [1, np.sqrt(3), 0], [1, 1 / np.sqrt(3), 2 * np.sqrt(2 / 3)]]

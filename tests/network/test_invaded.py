@@ -49,3 +49,9 @@ def test_contact_reaches_across_a_periodic_side():
     fines = [[0.05, 0.05, 2], [-0.10, 3.92, 2]]  # 0.13 apart across the side y
     assert cake(fines, periodic=(False, True, True)).cake_thickness == pytest.approx(0.2)
     assert cake(fines).cake_thickness == 0.0
+
+
+def test_a_fine_a_rounding_below_a_periodic_side_is_wrapped():
+    """Its place modulo the period is rounded to the period itself."""
+    fines = [[0.05, -1e-20, 2], [-0.10, 0.13, 2]]
+    assert cake(fines, periodic=(False, True, True)).cake_thickness == pytest.approx(0.2)

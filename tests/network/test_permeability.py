@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from fdnet.case.analysis import AnalysisChoices
 from fdnet.errors import CaseError, NetworkError
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
-from fdnet.network.permeability import AnalysisOptions, analyse
+from fdnet.network.permeability import analyse
 from fdnet.spheres.snapshot import Kind, Snapshot
 from tests.network.packs import random_pack, simple_cubic, snapshot, with_fines
 
@@ -14,7 +15,7 @@ PAIRS = [("thesis", "thesis"), ("series", "kozeny")]
 
 
 def options(pair=PAIRS[1], **more):
-    return AnalysisOptions(law=pair[0], damage_law=pair[1], **more)
+    return AnalysisChoices.of_pack(law=pair[0], damage_law=pair[1], **more)
 
 
 def rebuilt(pack, position=None, *, scale=1.0, order=None, box=None):
@@ -244,12 +245,12 @@ def test_solver_reports_the_worst_of_all_solves(pack):
         {"sections": [0.0, 1.0]},
         {"sections": []},
         {"sections": 0},
-        {"profile_bin": 0.0},
+        {"profile_bin_mm": 0.0},
     ],
 )
 def test_wrong_choices_are_refused(pack, wrong):
     with pytest.raises(CaseError, match=next(iter(wrong))):
-        analyse(pack.grains(), None, periodic=ALL, options=AnalysisOptions(**wrong))
+        analyse(pack.grains(), None, periodic=ALL, options=AnalysisChoices.of_pack(**wrong))
 
 
 def test_another_pack_after_the_invasion_is_refused(pack):

@@ -5,6 +5,7 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
+from fdnet.case.analysis import AnalysisChoices
 from fdnet.errors import CaseError, NetworkError
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.laws.cross_section import uneven_flux
@@ -13,7 +14,7 @@ from fdnet.network.laws.named import LAWS
 from fdnet.network.laws.wall_cross_section import wall_cuts, wall_flux
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import build_network
-from fdnet.network.permeability import AnalysisOptions, analyse
+from fdnet.network.permeability import analyse
 from tests.network.packs import random_pack, simple_cubic, snapshot, with_fines
 
 NONE = (False,) * 3
@@ -188,14 +189,16 @@ def test_unknown_walls_are_refused():
     with pytest.raises(NetworkError, match=r"'sticky'.*slip"):
         build_network(random_pack(60), periodic=NONE, walls="sticky")
     with pytest.raises(CaseError, match=r"analysis.walls: 'sticky'.*slip"):
-        analyse(random_pack(60), None, periodic=NONE, options=AnalysisOptions(walls="sticky"))
+        analyse(
+            random_pack(60), None, periodic=NONE, options=AnalysisChoices.of_pack(walls="sticky")
+        )
 
 
 def test_an_analysis_holds_the_fluid_at_the_walls_unless_told_otherwise():
     pack = random_pack(100, 0.5, periodic=False)
     found = {
         options.walls: analyse(pack, None, periodic=NONE, options=options).k_initial
-        for options in (AnalysisOptions(), AnalysisOptions(walls="slip"))
+        for options in (AnalysisChoices.of_pack(), AnalysisChoices.of_pack(walls="slip"))
     }
     assert found == pytest.approx(
         {walls: permeability(pack, walls) for walls in ("slip", "no-slip")}, rel=1e-9
@@ -204,5 +207,5 @@ def test_an_analysis_holds_the_fluid_at_the_walls_unless_told_otherwise():
 
 def test_fines_beside_walls_that_hold_the_fluid_leave_less_of_it():
     pack = with_fines(random_pack(60, 0.5, periodic=False), 150, 0.2)
-    found = analyse(pack.grains(), pack, periodic=NONE, options=AnalysisOptions())
+    found = analyse(pack.grains(), pack, periodic=NONE, options=AnalysisChoices.of_pack())
     assert 0.0 < found.k_damaged < found.k_initial

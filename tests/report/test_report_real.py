@@ -8,7 +8,8 @@ import pytest
 import pyvista as pv
 from report_demo import BOX, demo_damaged, demo_grains
 
-from fdnet.network.permeability import AnalysisOptions, analyse
+from fdnet.case.analysis import AnalysisChoices
+from fdnet.network.permeability import analyse
 from fdnet.report import figures, tables, vtk
 from fdnet.report.html import ReportParts, write_report
 from fdnet.spheres.snapshot import Kind, Snapshot
@@ -31,7 +32,9 @@ def analysis_of(sides="walls", *, damaged=True, moved=False):
             radius=after.radius,
             velocity=after.velocity,
         )
-    options = AnalysisOptions(sections=4, law="thesis", damage_law="thesis", profile_bin=0.2e-3)
+    options = AnalysisChoices.of_pack(
+        sections=4, law="thesis", damage_law="thesis", profile_bin_mm=0.2
+    )
     return analyse(
         demo_grains(), after if damaged else None, periodic=SIDES[sides], options=options
     )

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from fdnet.case.analysis import AnalysisChoices
 from fdnet.errors import NetworkError
+from fdnet.network.analysis import Analysis
 from fdnet.network.network import build_network
-from fdnet.network.permeability import Analysis, AnalysisOptions, analyse
+from fdnet.network.permeability import analyse
 from fdnet.spheres.porosity import measure_porosity
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 from tests.network.packs import face_centred, random_pack, simple_cubic, snapshot, with_fines
@@ -22,7 +24,9 @@ def measure(
     laws: tuple[str, str] = ("lubrication", "side-kozeny"),
     sections: int = 1,
 ) -> Analysis:
-    options = AnalysisOptions(law=laws[0], damage_law=laws[1], sections=sections, walls="slip")
+    options = AnalysisChoices.of_pack(
+        law=laws[0], damage_law=laws[1], sections=sections, walls="slip"
+    )
     return analyse(grains, damaged, periodic=periodic, options=options)
 
 

@@ -13,11 +13,12 @@ from builders import TINY
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
+from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.case import Case
 from fdnet.case.file import case_from, known_keys, set_keys
 from fdnet.errors import CaseError, DumpError, FdnetError
 from fdnet.network.flow.flow import solve_flow
-from fdnet.network.permeability import AnalysisOptions, analyse
+from fdnet.network.permeability import analyse
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.dump import COLUMNS, parse_dump
 from fdnet.spheres.snapshot import Kind, Snapshot
@@ -141,7 +142,7 @@ def analysed(
     periodic: tuple[bool, bool, bool],
     sections: int = 3,
 ) -> Any:
-    options = AnalysisOptions(sections=sections, walls="slip")
+    options = AnalysisChoices.of_pack(sections=sections, walls="slip")
     return analyse(grains, damaged, periodic=periodic, options=options)
 
 

@@ -10,13 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 
 from fdnet.spheres.snapshot import Kind, resting
-from fdnet.studies.thesis.figures.canvas import (
-    DISTANCE_CLASSES,
-    ScanRow,
-    Sources,
-    Tables,
-    few_colours,
-)
+from fdnet.studies.thesis.figures.canvas import few_colours
 from fdnet.studies.thesis.figures.deposition import distances, tetrahedra
 from fdnet.studies.thesis.figures.depth import (
     compared_fraction,
@@ -24,43 +18,59 @@ from fdnet.studies.thesis.figures.depth import (
     porosity_reduction,
     total_reduction,
 )
-from fdnet.studies.thesis.figures.draw_all import draw_all
+from fdnet.studies.thesis.figures.draw_all import draw_all, filled_in
 from fdnet.studies.thesis.figures.drawings import FIGURES
-from fdnet.studies.thesis.figures.marks import ThesisMarks, Told, percent, said
 from fdnet.studies.thesis.figures.packs import fines_by_size, growth, middle_slab, pack
 from fdnet.studies.thesis.figures.permeability import compared_permeability, permeability, ratios
-from fdnet.studies.thesis.figures.scans import invasion_depth, over_seeds
-from fdnet.studies.thesis.figures.sections import (
+from fdnet.studies.thesis.figures.pores_and_throats import (
     contents,
     density,
     sizes,
     throat_porosity,
     throats_by_depth,
 )
-from fdnet.studies.thesis.figures.tables import distances_found, scan_row, tetrahedra_counted
-from fdnet.studies.thesis.figures.thesis_marks import thesis_marks
+from fdnet.studies.thesis.figures.scans import invasion_depth, over_seeds
+from fdnet.studies.thesis.figures.sources import NO_NUMBERS, Sources
+from fdnet.studies.thesis.figures.tables import (
+    POROSITY_CLASSES,
+    FigureTables,
+    ScanRow,
+    distances_by_class,
+    scan_row,
+    tetrahedra_counted,
+)
 from fdnet.studies.thesis.numbers.examine import examine
-from fdnet.studies.thesis.numbers.first_section import first_section
+from fdnet.studies.thesis.numbers.first_millimetre import first_millimetre
 from fdnet.studies.thesis.numbers.results import result_rows
-from fdnet.studies.thesis.numbers.section_sizes import section_sizes, share_within
-from fdnet.studies.thesis.numbers.values import thesis_values
+from fdnet.studies.thesis.numbers.values import (
+    DepositionClaim,
+    Statistic,
+    ThesisSpecimen,
+    percent,
+    thesis_values,
+)
+from fdnet.studies.thesis.numbers.whole_pores import share_within, whole_pores
 from fdnet.studies.thesis.runs.state import ENDING, State
 
 FINE = 0.04e-3
 DEPTHS = {1: [0.5] * 3 + [1.0], 2: [0.5] * 2 + [1.0, 1.5]}
 """mm, of the invaded fines by seed; they lie in the holes between eight grains."""
 HOLES = [(0.55, 0.55), (1.05, 0.55), (0.55, 1.05), (1.05, 1.05)]
-MARKS = ThesisMarks(
-    porosity_loss=0.01,
-    depth_mm=2.0,
-    count=704,
+NUMBERS = ThesisSpecimen(
+    id="1",
+    porosity=0.01,
+    damaged_porosity=(0.0,),
+    invaded_depth_mm=2.0,
+    invaded_count=704,
     fraction_first_bin=0.7,
     fraction_beyond_0p5mm=0.05,
     face_porosity_loss=0.05,
-    reductions=(0.25, 0.04),
+    section_reduction=(0.25, 0.04),
     size_classes_mm=((0.02, 0.03), (0.035, 0.05)),
-    statistics=(Told(quantity="throat radius", value=0.3, between=(0.0, 0.05)),),
-    deposition={"below 0.4": Told(quantity="axis", value=0.5)},
+    statistics=(
+        Statistic(specimen="1", quantity="throat radius", value=0.3, between=(0.0, 0.05)),
+    ),
+    deposition=(DepositionClaim(throat_porosity=(0.0, 0.4), nearer="axis", value=0.5),),
 )
 
 
@@ -97,8 +107,8 @@ def sources(*seeds, specimens=("specimen1",), **tables):
     runs = [run(seed) for seed in seeds or (1,)]
     return Sources(
         examined=dict.fromkeys(specimens, runs),
-        thesis=dict.fromkeys(specimens, MARKS),
-        tables=Tables(**tables),
+        thesis=dict.fromkeys(specimens, NUMBERS),
+        tables=FigureTables(**tables),
     )
 
 
@@ -194,7 +204,7 @@ def test_compared_permeability_has_a_panel_for_each_pair_of_laws():
 
 
 def test_the_first_section_holds_whole_pores_and_their_throats():
-    cut = section_sizes(run(1))
+    cut = whole_pores(run(1))
     network = run(1).thesis.network
     assert len(cut.pore_radius) == np.sum(
         (network.pore_position[:, 0] < 1e-3) & (network.pore_share == 1)
@@ -207,7 +217,7 @@ def test_the_first_section_holds_whole_pores_and_their_throats():
 
 def test_sizes_are_densities_of_all():
     figure = drawn(sizes, sources(), specimen="specimen1")
-    cut = section_sizes(run(1))
+    cut = whole_pores(run(1))
     heights, edges, _ = labelled(figure.axes[0], f"{len(cut.throat_radius)} throats").get_data()
     within = share_within(cut.throat_radius, 0.0, edges[-1])
     assert np.sum(heights * np.diff(edges)) == pytest.approx(within, abs=0.01)
@@ -221,7 +231,7 @@ def test_density_counts_what_lies_outside_in_the_whole():
 
 
 def test_throats_are_closed_empty_filled_or_blocked():
-    cut = section_sizes(run(1))
+    cut = whole_pores(run(1))
     found = contents(cut)
     assert sum(found.values()) == pytest.approx(1.0)
     assert found["with fines"] == pytest.approx(np.mean((cut.throat_fines > 0) & ~cut.blocked))
@@ -232,7 +242,7 @@ def test_throats_are_closed_empty_filled_or_blocked():
 
 def test_a_blocked_throat_is_not_among_those_with_fines():
     cut = replace(
-        section_sizes(run(1)),
+        whole_pores(run(1)),
         throat_radius=np.array([0.0, 0.1, 0.1, 0.1, 0.1]),
         throat_fines=np.array([0, 0, 1, 2, 0]),
         blocked=np.array([False, False, False, True, True]),
@@ -242,7 +252,7 @@ def test_a_blocked_throat_is_not_among_those_with_fines():
 
 def test_throats_by_depth_count_each_once():
     axes = drawn(throats_by_depth, sources(), specimen="specimen1").axes[0]
-    count = len(section_sizes(run(1)).throat_radius)
+    count = len(whole_pores(run(1)).throat_radius)
     assert labelled(axes, f"all throats, {count}").get_data().values.sum() == count
 
 
@@ -307,7 +317,7 @@ def test_distances_are_shares_by_place():
     found = sources(
         distances={"below 0.4": np.array([0.2, 0.45, 0.75, 1.5])}, specimens=("specimen5",)
     )
-    axes = drawn(distances, found, kind="below 0.4").axes[0]
+    axes = drawn(distances, found, porosity="below 0.4").axes[0]
     assert sum(bar.get_height() for bar in axes.patches) == pytest.approx(1.0)
     labels = [one.get_label() for one in axes.containers]
     assert labels == [
@@ -327,11 +337,11 @@ def test_tetrahedra_stand_side_by_side():
 
 def test_all_that_is_there_is_drawn_and_what_is_missing_named(tmp_path):
     rows = [scan(1, 1.0, 1.0), scan(2, 1.0, 2.0)]
-    tables = Tables(
-        drag=rows, friction=rows, supply=rows, distances={DISTANCE_CLASSES[0]: np.array([0.3])}
+    tables = FigureTables(
+        drag=rows, friction=rows, supply=rows, distances={"below 0.4": np.array([0.3])}
     )
     found = draw_all(
-        {"specimen1": [run(1), run(2)]}, tmp_path, thesis={"specimen1": MARKS}, tables=tables
+        {"specimen1": [run(1), run(2)]}, tmp_path, thesis={"specimen1": NUMBERS}, tables=tables
     )
     assert [one.name for one in found] == list(FIGURES)
     by_name = {one.name: one for one in found}
@@ -351,7 +361,7 @@ def test_all_that_is_there_is_drawn_and_what_is_missing_named(tmp_path):
     assert caption.startswith("Thesis Figure 15, specimen 1:")
     assert "about 70% in its first bin" in caption
     assert (
-        "Thesis: throat radius 0 to 0.05 mm about 30 %."
+        "Thesis: throat radius 0 to 0.05 mm: about 30 %."
         in by_name["figure_42_sizes_specimen1.png"].caption
     )
 
@@ -372,7 +382,7 @@ def test_a_growing_pack_shows_the_velocities_of_each_state():
         for speed in (2.0, 5.0, 0.0)
     ]
     figure = Figure()
-    growth(figure, Sources(examined={}, tables=Tables(growth=stages)))
+    growth(figure, Sources(examined={}, tables=FigureTables(growth=stages)))
     for axes, speed in zip(figure.axes, (2.0, 5.0, 0.0), strict=True):
         (arrows,) = [one for one in axes.collections if isinstance(one, Quiver)]
         assert np.allclose(arrows.U, 0.6 * speed)
@@ -381,38 +391,36 @@ def test_a_growing_pack_shows_the_velocities_of_each_state():
 
 
 def test_sentences_without_their_number_are_left_out():
-    assert said("{specimen1.reductions[1]:g} there", {"specimen1": MARKS}) == "0.04 there"
-    assert said("{specimen1.reductions[5]:g} there", {"specimen1": MARKS}) == ""
-    assert said("{specimen2.depth_mm:g} mm", {"specimen1": MARKS}) == ""
-    assert said("{specimen1.depth_mm:g} mm", {"specimen1": ThesisMarks()}) == ""
+    assert filled_in("{specimen1.reductions[1]:g} there", {"specimen1": NUMBERS}) == "0.04 there"
+    assert filled_in("{specimen1.reductions[5]:g} there", {"specimen1": NUMBERS}) == ""
+    assert filled_in("{specimen2.invaded_depth_mm:g} mm", {"specimen1": NUMBERS}) == ""
+    assert filled_in("{specimen1.invaded_depth_mm:g} mm", {"specimen1": NO_NUMBERS}) == ""
 
 
-def test_the_values_file_becomes_marks_by_specimen():
-    marks = thesis_marks(thesis_values())
-    assert set(marks) == {"table3", *(f"specimen{number}" for number in range(1, 9))}
-    assert marks["specimen5"].porosity_loss == pytest.approx(0.08)
-    assert marks["specimen5"].reductions[0] == 0.32
-    assert marks["specimen8"].reductions == (0.25,)
-    assert [told.quantity for told in marks["specimen5"].deposition.values()] == [
-        "axis",
-        "wall",
-        "wall",
-    ]
-    assert list(marks["specimen5"].deposition) == list(DISTANCE_CLASSES)
-    assert marks["specimen7"].size_classes_mm == ((0.025, 0.03), (0.045, 0.05))
-    assert marks["specimen1"].depth_mm == 4.0
-    (share,) = [told for told in marks["specimen1"].statistics if told.quantity == "throat length"]
+def test_the_values_file_gives_each_specimen_its_numbers():
+    numbers = thesis_values().by_case
+    assert set(numbers) == {"table3", *(f"specimen{number}" for number in range(1, 9))}
+    assert numbers["specimen5"].porosity_loss == pytest.approx(0.08)
+    assert numbers["specimen5"].reductions[0] == 0.32
+    assert numbers["specimen8"].reductions == (0.25,)
+    claims = numbers["specimen5"].deposition
+    assert [one.nearer for one in claims] == ["axis", "wall", "wall"]
+    assert [one.throat_porosity for one in claims] == list(POROSITY_CLASSES.values())
+    assert not numbers["specimen1"].deposition
+    assert numbers["specimen7"].size_classes_mm == ((0.025, 0.03), (0.045, 0.05))
+    assert numbers["specimen1"].invaded_depth_mm == 4.0
+    (share,) = [one for one in numbers["specimen1"].statistics if one.quantity == "throat length"]
     assert (share.between, share.words) == ((0.2, 0.6), "about 80 %")
 
 
 def test_tables_are_filled_from_what_is_examined():
     assert tetrahedra_counted({"specimen1": [run(1)], "specimen2": []})["specimen1"][0] > 0
-    found = distances_found([run(1), run(2)])
-    assert list(found) == list(DISTANCE_CLASSES)
-    sections = [first_section(run(seed), whole=True) for seed in (1, 2)]
+    found = distances_by_class([run(1), run(2)])
+    assert list(found) == list(POROSITY_CLASSES)
+    sections = [first_millimetre(run(seed), whole=True) for seed in (1, 2)]
     pairs = [np.sum(section.throat_weight[section.occupancy.pair_throat]) for section in sections]
     assert sum(len(one) for one in found.values()) == sum(pairs) > 0
-    assert distances_found([]) == {}
+    assert distances_by_class([]) == {}
 
 
 def test_a_scan_s_row_is_a_result():

@@ -17,19 +17,17 @@ from scipy.spatial import Delaunay
 from fdnet.dem.scene import box_of
 from fdnet.errors import CaseError
 from fdnet.spheres.snapshot import Kind, resting
-from fdnet.studies.thesis.numbers.counts import count_tetrahedra, tetrahedra, write_counts
 from fdnet.studies.thesis.numbers.deposition import deposition, wilson_interval, write_deposition
 from fdnet.studies.thesis.numbers.examine import DEFAULT_PAIR, THESIS_PAIR, Examined, examine
-from fdnet.studies.thesis.numbers.first_section import first_section
+from fdnet.studies.thesis.numbers.first_millimetre import first_millimetre
+from fdnet.studies.thesis.numbers.grains_alone import sizes_of_grains_alone
+from fdnet.studies.thesis.numbers.invasion import deep_near_wall, porosity_loss
 from fdnet.studies.thesis.numbers.results import (
     COLUMNS,
-    deep_near_wall,
-    porosity_loss,
     read_results,
     result_rows,
     write_results,
 )
-from fdnet.studies.thesis.numbers.sizes import sizes_of_grains_alone
 from fdnet.studies.thesis.numbers.statistics import (
     POROSITY,
     SINGLES,
@@ -40,6 +38,7 @@ from fdnet.studies.thesis.numbers.statistics import (
     within,
     write_statistics,
 )
+from fdnet.studies.thesis.numbers.tetrahedra import count_tetrahedra, tetrahedra, write_tetrahedra
 from fdnet.studies.thesis.numbers.values import (
     ThesisSpecimen,
     specimen_number,
@@ -115,12 +114,14 @@ def test_every_number_told_has_its_source():
         "grain_radius_mm",
         "sources",
         "senses",
+        "statistics",
+        "deposition",
     }
     for one in values.specimens.values():
         told = {
             field.name
             for field in fields(ThesisSpecimen)
-            if getattr(one, field.name) not in (None, {})
+            if getattr(one, field.name) not in (None, {}, ())
         } - plain
         assert told == set(one.sources), one.id
         assert set(one.senses) <= told
@@ -251,7 +252,7 @@ def test_more_sections_than_columns_are_refused(lattice):
 
 
 def test_sizes_of_the_lattice(lattice):
-    section = first_section(lattice, whole=True)
+    section = first_millimetre(lattice, whole=True)
     # 16 cells; their faces across y and z, and those towards the second layer, at 0.85 mm
     assert section.throat_weight.sum() == 2 * (32 + 16)
     assert np.sum(section.pore_weight * section.network.pore_volume) == pytest.approx(
@@ -327,13 +328,13 @@ def test_a_pore_whose_sphere_is_centred_outside_has_no_radius(lattice):
 
 def test_parts_cut_by_the_face_fill_the_section(lattice):
     """The layer at the face is 0.35 mm deep, of which the mirrored half does not count."""
-    section = first_section(lattice, whole=False)
+    section = first_millimetre(lattice, whole=False)
     filled = np.sum(section.pore_weight * section.network.pore_tetra_volume)
     assert filled == pytest.approx((0.35 + A) * 4.0 * MM**3)
 
 
 def test_fines_in_throats_and_bodies(lattice):
-    section = first_section(lattice, whole=True)
+    section = first_millimetre(lattice, whole=True)
     inside = {"A": ball(0.05), "B": ball(THIN), "D": 3 * ball(WIDE)}
     tube = pi * TUBE**2 * A
     assert measure(section, "throats with fines", None)[0] == pytest.approx(8 / 96)
@@ -450,7 +451,7 @@ def test_tetrahedra_of_the_first_millimetre(lattice, tmp_path):
     )
     assert count.ratio == 4
     assert (
-        write_counts(tmp_path / "counts.csv", [count])
+        write_tetrahedra(tmp_path / "counts.csv", [count])
         .read_text()
         .endswith("specimen5-5to6,1,4,1,4,1,4\n")
     )

@@ -109,15 +109,15 @@ def test_a_folder_without_a_finished_invasion_has_no_state(finished, tmp_path):
 
 @pytest.mark.liggghts
 def test_runs_are_done_once_twins_shared_and_failures_told(binary, tmp_path, monkeypatch):
-    said: list[str] = []
+    lines: list[str] = []
     same = small("quick-table3", "fines.radius_mm=[0.025,0.05]"), small("quick-specimen7")
     bad = small("quick-specimen5", "fines.concentration=0.29", "run.max_hours=1e-9")
     failed = runs.carry_out(
-        [*same, bad], tmp_path / "out", tmp_path / "runs", jobs=1, tell=said.append
+        [*same, bad], tmp_path / "out", tmp_path / "runs", jobs=1, report=lines.append
     )
     assert list(failed) == [bad]
     assert "run.max_hours" in failed[bad]
-    assert len(said) == 2
+    assert len(lines) == 2
     states = [read_state(runs.state_path(tmp_path / "out", item)) for item in same]
     assert [state.case.name for state in states] == ["quick-table3", "quick-specimen7"]
     assert np.array_equal(states[0].damaged.position, states[1].damaged.position)
@@ -125,7 +125,8 @@ def test_runs_are_done_once_twins_shared_and_failures_told(binary, tmp_path, mon
     monkeypatch.setattr(runs, "_run_all", lambda todo, *_, **__: dict.fromkeys(todo, "ran"))
     runs.state_path(tmp_path / "out", same[0]).unlink()
     assert (
-        runs.carry_out(same, tmp_path / "out", tmp_path / "runs", jobs=1, tell=said.append) == {}
+        runs.carry_out(same, tmp_path / "out", tmp_path / "runs", jobs=1, report=lines.append)
+        == {}
     )
     assert read_state(runs.state_path(tmp_path / "out", same[0])).case.name == "quick-table3"
 
@@ -137,7 +138,7 @@ def test_a_state_of_another_case_is_refused(finished, tmp_path):
         runs.state_path(tmp_path, item), replace(state_of_run(finished), case=small(seed=2).load())
     )
     with pytest.raises(CaseError, match="is the state of another case"):
-        runs.carry_out([item], tmp_path, tmp_path / "runs", jobs=1, tell=print)
+        runs.carry_out([item], tmp_path, tmp_path / "runs", jobs=1, report=print)
 
 
 @pytest.mark.liggghts

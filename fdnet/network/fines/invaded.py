@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
-from fdnet.spheres.images import make_images
-from fdnet.spheres.snapshot import Array, Kind, Snapshot
+from fdnet.spheres.contacts import touching_pairs
+from fdnet.spheres.snapshot import Kind, Snapshot
 
 CONTACT_GAP = 0.01
 
@@ -52,7 +51,8 @@ def _cake_thickness(spheres: Snapshot, fines: Snapshot, periodic: Sequence[bool]
     reach = float(np.max(spheres.radius)) * (2.0 + 4.0 * CONTACT_GAP)
     everything = spheres.where(spheres.position[:, 0] < low + reach)
     upstream = (everything.position[:, 0] < low) & (everything.kind == Kind.FINE)
-    pair = _contacts(everything, upstream, (False, bool(periodic[1]), bool(periodic[2])))
+    around = (False, bool(periodic[1]), bool(periodic[2]))
+    pair, _ = touching_pairs(everything, around, gap=CONTACT_GAP)
     # all spheres of the pack are one group: tie them to an extra node
     count = len(everything)
     pack = np.flatnonzero(~upstream)
@@ -65,27 +65,3 @@ def _cake_thickness(spheres: Snapshot, fines: Snapshot, periodic: Sequence[bool]
     cake = upstream & (group[:-1] == group[-1])
     front = everything.position[cake, 0] - everything.radius[cake]
     return float(max(low - front.min(initial=low), 0.0))
-
-
-def _contacts(spheres: Snapshot, upstream: Array, periodic: tuple[bool, ...]) -> Array:
-    """Pairs (K, 2) in contact of which the first is upstream."""
-    largest = float(spheres.radius[upstream].max()) * (1.0 + 2.0 * CONTACT_GAP)
-    margin = np.where(periodic, largest + float(spheres.radius.max()), np.nan)
-    images = make_images(spheres.position, spheres.box, periodic=periodic, margin=margin, hair=0.0)
-    fine = spheres.kind[images.owner] == Kind.FINE
-    found = []
-    source = np.flatnonzero(upstream[images.owner] & np.all(images.shift == 0, axis=1))
-    tree = cKDTree(images.position[source])
-    # fines and grains are searched apart: their reaches differ by much
-    for group in (np.flatnonzero(fine), np.flatnonzero(~fine)):
-        if not len(group):
-            continue
-        reach = largest + float(spheres.radius[images.owner[group]].max())
-        near = tree.sparse_distance_matrix(
-            cKDTree(images.position[group]), reach, output_type="coo_matrix"
-        )
-        first, second = images.owner[source[near.row]], images.owner[group[near.col]]
-        radius = spheres.radius[first], spheres.radius[second]
-        touching = near.data <= radius[0] + radius[1] + CONTACT_GAP * 2.0 * np.minimum(*radius)
-        found.append(np.stack([first, second], axis=1)[touching])
-    return np.concatenate(found)

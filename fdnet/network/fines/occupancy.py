@@ -67,7 +67,7 @@ def measure_occupancy(
     """
     if isinstance(overlap, str) and overlap not in OVERLAPS:
         raise CaseError(
-            f"analysis.overlap: {overlap!r} is not known; choose one of {sorted(OVERLAPS)}"
+            f"analysis.throat_overlap: {overlap!r} is not known; choose one of {sorted(OVERLAPS)}"
         )
     _refuse_wide(network, fines)
     throat, fine, pairs = _pairs(network, fines)

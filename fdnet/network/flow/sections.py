@@ -83,7 +83,9 @@ def profile_edges(bin_size: float, box: Array) -> Array:
     """Edges (B+1,) m of equal bins as near to `bin_size` m as fill the box. Raises CaseError on a bin not above 0."""
     low, high = float(box[0, 0]), float(box[0, 1])
     if not bin_size > 0:
-        raise CaseError(f"analysis.profile_bin: {bin_size} m is not above 0; give a bin thickness")
+        raise CaseError(
+            f"analysis.profile_bin_mm: {1e3 * bin_size:g} is not above 0; give a bin thickness"
+        )
     return np.linspace(low, high, max(1, round((high - low) / bin_size)) + 1)
 
 

@@ -30,12 +30,4 @@ class Damage:
 class DamageLaw(Protocol):
     """A damage law: clean conductance (T,) in, Damage out."""
 
-    def __call__(
-        self,
-        network: Network,
-        occupancy: Occupancy,
-        clean: Array,
-        *,
-        threshold: float | None = None,
-        middle_band: str = "threshold",
-    ) -> Damage: ...
+    def __call__(self, network: Network, occupancy: Occupancy, clean: Array) -> Damage: ...

@@ -12,21 +12,13 @@ from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array, frozen
 
 
-def kozeny_damage(
-    network: Network,
-    occupancy: Occupancy,
-    clean: Array,
-    *,
-    threshold: float | None = None,
-    middle_band: str = "threshold",
-) -> Damage:
+def kozeny_damage(network: Network, occupancy: Occupancy, clean: Array) -> Damage:
     """Local Kozeny factor per pore, (1 - v)^3 / (1 + a)^2, harmonic mean of a throat's two pores on its conductance.
 
     v = volume of fines / void, a = surface of fines / wall, in the tetrahedron (k ~ porosity^3 / surface^2, Kozeny
     1927, Carman 1937); pores of one `pore_group` are taken together. A pore whose fines fill it (v >= 1) is closed and
-    counted. `threshold` and `middle_band` play no part here.
+    counted.
     """
-    del threshold, middle_band
     deposit = _pore_deposit(network, occupancy)
     taken, filled = deposit.taken, deposit.filled
     factor = np.where(filled, 0.0, _kozeny(deposit.volume, deposit.surface))
@@ -38,14 +30,7 @@ def kozeny_damage(
     )
 
 
-def side_kozeny_damage(
-    network: Network,
-    occupancy: Occupancy,
-    clean: Array,
-    *,
-    threshold: float | None = None,
-    middle_band: str = "threshold",
-) -> Damage:
+def side_kozeny_damage(network: Network, occupancy: Occupancy, clean: Array) -> Damage:
     """Local Kozeny factor per side of a throat, (1 - s v)^3 / (1 + a)^2, on that side's share of the resistance.
 
     The sides are the pyramids from the facet to the power centres; their clean resistances R are those of
@@ -56,9 +41,8 @@ def side_kozeny_damage(
     the layer's thickness over that radius, at most 1: a film takes up the slow part of the void only, a bed and fines
     as large as the tube all of it. Nothing is fitted. Fines deeper inside a grain than their radius make no layer
     (`layers_within_grains`, t = 0) and count by their surface alone. A side or pore whose fines fill it (v >= 1) is
-    closed and counted. `threshold` and `middle_band` play no part here.
+    closed and counted.
     """
-    del threshold, middle_band
     pore = _pore_deposit(network, occupancy)
     ends = network.throat_pores
     void, wall = side_voids(network)

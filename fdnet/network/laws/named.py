@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from functools import partial
 
+from fdnet.case.names import DEFAULT_DAMAGE_LAW, DEFAULT_LAW
+from fdnet.errors import CaseError
 from fdnet.network.laws.conductance import (
     Law,
     effective_law,
@@ -13,7 +15,9 @@ from fdnet.network.laws.conductance import (
 )
 from fdnet.network.laws.damage import DamageLaw
 from fdnet.network.laws.kozeny_damage import kozeny_damage, side_kozeny_damage
-from fdnet.network.laws.thesis_damage import CODE_THRESHOLD, thesis_damage
+from fdnet.network.laws.thesis_damage import CODE_THRESHOLD, TEXT_THRESHOLD, thesis_damage
+
+__all__ = ["DAMAGE_LAWS", "DEFAULT_DAMAGE_LAW", "DEFAULT_LAW", "LAWS"]
 
 LAWS: Mapping[str, Law] = {
     "thesis": thesis_law,
@@ -23,13 +27,35 @@ LAWS: Mapping[str, Law] = {
     "lubrication": lubrication_law,
 }
 """Conductance laws of clean throats, each a function of a Network that returns (T,) m3."""
-DEFAULT_LAW = "lubrication"
+
+_THESIS_THRESHOLDS = {"thesis": TEXT_THRESHOLD, "thesis-code": CODE_THRESHOLD}
 
 DAMAGE_LAWS: Mapping[str, DamageLaw] = {
     "thesis": thesis_damage,
-    "thesis-code": partial(thesis_damage, default_threshold=CODE_THRESHOLD),
+    "thesis-code": partial(thesis_damage, clogging_threshold=CODE_THRESHOLD),
     "kozeny": kozeny_damage,
     "side-kozeny": side_kozeny_damage,
 }
-"""Laws that lower the clean conductance of throats with fines."""
-DEFAULT_DAMAGE_LAW = "side-kozeny"
+"""Laws that lower the clean conductance of throats with fines, with their own options."""
+
+
+def damage_law(
+    name: str, *, clogging_threshold: float | None = None, middle_band: str = "threshold"
+) -> DamageLaw:
+    """The damage law of this name, made with the options that it has.
+
+    `clogging_threshold` (None: the law's own) and `middle_band` are options of the two thesis laws
+    alone, see `thesis_damage`; the Kozeny laws have none. Raises CaseError on an unknown name.
+    """
+    if name not in DAMAGE_LAWS:
+        raise CaseError(
+            f"analysis.damage_law: {name!r} is not known; choose one of {sorted(DAMAGE_LAWS)}"
+        )
+    if name not in _THESIS_THRESHOLDS:
+        return DAMAGE_LAWS[name]
+    own = _THESIS_THRESHOLDS[name]
+    return partial(
+        thesis_damage,
+        clogging_threshold=own if clogging_threshold is None else clogging_threshold,
+        middle_band=middle_band,
+    )

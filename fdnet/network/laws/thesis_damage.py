@@ -20,13 +20,12 @@ def thesis_damage(
     occupancy: Occupancy,
     clean: Array,
     *,
-    threshold: float | None = None,
+    clogging_threshold: float = TEXT_THRESHOLD,
     middle_band: str = "threshold",
-    default_threshold: float = TEXT_THRESHOLD,
 ) -> Damage:
     """Two-scale rule of Shi 2011, section 3.2.4, on the throat porosity phi in the inscribed cylinder.
 
-    No fines: clean. A fine covers a section: 0. phi at or above `threshold` (0.40 in the text, 0.36 in appendix B):
+    No fines: clean. A fine covers a section: 0. phi at or above `clogging_threshold` (0.40 in the text, 0.36 in appendix B):
     surface deposition, factor phi^2 (r_e = r_i sqrt(phi)). Below: clogging, Carman-Kozeny
     k = phi^3 D^2 / (72 * 2.5 (1 - phi)^2) over the cylinder's section; a factor above 1 is capped and counted.
     `middle_band` "position": between 0.36 and 0.80 deposition where the fines' mean distance from the axis is at
@@ -37,11 +36,17 @@ def thesis_damage(
         raise CaseError(
             f"analysis.middle_band: {middle_band!r} is not known; choose one of {MIDDLE_BANDS}"
         )
-    limit = default_threshold if threshold is None else threshold
-    if not 0.0 <= limit <= 1.0:
-        raise CaseError(f"analysis.threshold: {limit} is outside 0 to 1")
+    if not 0.0 <= clogging_threshold <= 1.0:
+        raise CaseError(
+            f"analysis.clogging_threshold: {clogging_threshold} is outside 0 to 1; "
+            "give the throat porosity below which fines clog a throat"
+        )
     porosity = occupancy.throat_porosity
-    deposits = porosity >= limit if middle_band == "threshold" else _lines_the_wall(occupancy)
+    deposits = (
+        porosity >= clogging_threshold
+        if middle_band == "threshold"
+        else _lines_the_wall(occupancy)
+    )
     kozeny = _clogged_factor(network, occupancy)
     law = np.where(deposits, DEPOSITION, CLOGGING).astype("<U10")
     law[occupancy.throat_fines == 0] = CLEAN

@@ -24,7 +24,7 @@ from fdnet.network import network as tessellation
 from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, LAWS
-from fdnet.network.permeability import AnalysisOptions, analyse
+from fdnet.network.permeability import analyse
 from fdnet.spheres.porosity import measure_porosity
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
 from fdnet.studies.truth import packs
@@ -197,9 +197,7 @@ def pack_result(path: Path, folder: Path) -> dict[str, Any]:
     pack, _ = read_pack(path)
     leave_spheres(folder, pack)
     fines = pack if len(pack.fines()) else None
-    analysis = analyse(
-        pack.grains(), fines, periodic=(True, True, True), options=AnalysisOptions()
-    )
+    analysis = analyse(pack.grains(), fines, periodic=(True, True, True))
     counts = {
         "grains": len(pack.grains()),
         "fines": len(pack.fines()),

@@ -18,7 +18,7 @@ from fdnet.dem.invasion import Invasion, invade
 from fdnet.dem.liggghts import Binary, Launch, Run, find_binary, run_deck
 from fdnet.dem.packing import make_pack
 from fdnet.dem.scene import box_of, snapshot_of
-from fdnet.network.permeability import AnalysisOptions, analyse
+from fdnet.network.permeability import analyse
 from fdnet.scales.scales import relaxation_time, scales_of
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
@@ -143,7 +143,8 @@ def invasion_observed(case: Case, grains: Snapshot, result: Invasion) -> dict[st
         grains,
         result.damaged,
         periodic=case.periodic,
-        options=AnalysisOptions(sections=case.analysis.sections, walls=case.analysis.walls),
+        sections=case.analysis.sections,
+        walls=case.analysis.walls,
     )
     first = analysis.sections[0]
     return {

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from fdnet.network.permeability import AnalysisOptions, analyse
+from fdnet.network.permeability import analyse
 from fdnet.studies.dem.runs import grains_of, invasion_run, slab_case
 from fdnet.studies.engine.error_rows import against_reference
 from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study, Value
@@ -89,9 +89,7 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
     )
     case = slab_case(point.seed, *assignments)
     if what == INTACT:
-        found = analyse(
-            grains_of(case, work), None, periodic=case.periodic, options=AnalysisOptions()
-        )
+        found = analyse(grains_of(case, work), None, periodic=case.periodic)
         return {"porosity_initial": found.porosity_initial, "k_initial": found.k_initial}
     run = invasion_run(case, work, point.slug)
     return run | {"count_per_mm2": run["count_first"] / (width * height)}

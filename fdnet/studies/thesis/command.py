@@ -1,4 +1,4 @@
-"""`fdnet study thesis`: run or resume what is planned, then write tables and figures."""
+"""`fdnet study thesis`: run or continue the planned runs, then write tables and figures."""
 
 import shutil
 import sys
@@ -8,9 +8,10 @@ from pathlib import Path
 
 from fdnet.dem.liggghts import Launch, find_binary
 from fdnet.errors import CaseError, LiggghtsError
+from fdnet.studies.thesis.collection import collect
 from fdnet.studies.thesis.compare.trend_table import trends_table
-from fdnet.studies.thesis.findings import collect, write_findings
-from fdnet.studies.thesis.runs.carry_out import Tell, carry_out
+from fdnet.studies.thesis.outputs import write_outputs
+from fdnet.studies.thesis.runs.carry_out import Report, carry_out
 from fdnet.studies.thesis.runs.growth import GROWTH, grow, write_growth
 from fdnet.studies.thesis.runs.plan import Planned, planned
 
@@ -19,7 +20,16 @@ STATES = "states"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThesisOptions:
-    """`out` gets the results, its folder STATES the states; `runs` the run folders while they are needed."""
+    """Options of the study.
+
+    Attributes:
+        out: folder of the tables and figures; its folder STATES holds the states.
+        runs: folder of the run folders while they are needed.
+        quick: run the quick forms only.
+        jobs: number of runs at the same time.
+        redraw: run nothing, and make tables and figures from the kept states.
+        show: report the progress on stderr.
+    """
 
     out: Path
     runs: Path
@@ -30,41 +40,52 @@ class ThesisOptions:
 
 
 def run_thesis(options: ThesisOptions) -> str:
-    """Run or continue the study, write its tables and figures into `out`; returns the trends as text.
+    """Run or continue the study and write its tables and figures; returns the trends as text.
 
-    Raises LiggghtsError when runs failed, after the results of all others are written; CaseError when there is nothing
-    to draw.
+    Raises LiggghtsError when runs failed, after the results of all others are written, and
+    CaseError when there is nothing to draw.
     """
-    plan, states, tell = planned(quick=options.quick), options.out / STATES, _teller(options.show)
-    failed = {} if options.redraw else _run(plan, options, states, tell)
-    findings = collect(plan, options.out, states, tell=tell)
-    if not findings.rows:
+    plan, states = planned(quick=options.quick), options.out / STATES
+    report = _reporter(options.show)
+    failed = {} if options.redraw else _run(plan, options, states, report)
+    results = collect(plan, options.out, states, report=report)
+    if not results.rows:
         raise CaseError(
-            f"{options.out}: holds no state and no results of this study; leave out --redraw to run it"
+            f"{options.out}: the folder holds no state and no results of this study; leave out "
+            "--redraw to run it"
         )
-    comparisons = write_findings(findings, plan, options.out, states)
+    comparisons = write_outputs(results, plan, options.out, states)
     if failed:
         lines = "; ".join(f"{item.id} seed {item.seed}: {why}" for item, why in failed.items())
         raise LiggghtsError(
             f"{len(failed)} of {len(plan)} runs failed, run the study again to continue: {lines}"
         )
     text = trends_table(comparisons)
-    if findings.missing:
-        text += f"\n\n{len(findings.missing)} of {len(plan)} runs are missing: leave out --redraw to run them"
+    if results.missing:
+        text += (
+            f"\n\n{len(results.missing)} of {len(plan)} runs are missing; leave out --redraw to "
+            "run them"
+        )
     return text
 
 
 def _run(
-    plan: Sequence[Planned], options: ThesisOptions, states: Path, tell: Tell
+    plan: Sequence[Planned], options: ThesisOptions, states: Path, report: Report
 ) -> dict[Planned, str]:
     binary = find_binary()
     if not options.quick and not (states / GROWTH).exists():
         keep_growth(states / GROWTH, options.runs / "growth", Launch(binary=binary))
-    return carry_out(plan, states, options.runs, jobs=options.jobs, tell=tell)
+    return carry_out(plan, states, options.runs, jobs=options.jobs, report=report)
 
 
 def keep_growth(path: Path, folder: Path, launch: Launch) -> None:
-    """Pack the thesis's 1,410 grains (Figure 9) once more, its states on the way kept at `path`."""
+    """Pack the thesis's 1,410 grains (Figure 9) once more, and keep stages of the growth.
+
+    Args:
+        path: file of the stages.
+        folder: run folder, removed at the end.
+        launch: how LIGGGHTS is started.
+    """
     case = Planned(case="specimen1-1410", group="variant").load()
     assert case.grains.count is not None
     shutil.rmtree(folder, ignore_errors=True)
@@ -73,9 +94,9 @@ def keep_growth(path: Path, folder: Path, launch: Launch) -> None:
     shutil.rmtree(folder)
 
 
-def _teller(show: bool) -> Tell:
-    def tell(line: str) -> None:
+def _reporter(show: bool) -> Report:
+    def report(line: str) -> None:
         if show:
             print(f"thesis: {line}", file=sys.stderr, flush=True)
 
-    return tell
+    return report

@@ -1,18 +1,21 @@
-"""Where fines lie in the throats, and how many tetrahedra they would add (the thesis's Figures 33-35, 56, 57)."""
+"""Figures 33 to 35, 56 and 57: where fines lie in throats, and the tetrahedra that they add."""
 
 from typing import Any
 
 import numpy as np
 
-from fdnet.studies.thesis.figures.canvas import BLUE, GREY, ORANGE, Sources, titled
-from fdnet.studies.thesis.figures.marks import percent
+from fdnet.studies.engine.palette import BLUE, GREY, ORANGE
+from fdnet.studies.thesis.figures.canvas import titled
+from fdnet.studies.thesis.figures.sources import Sources
+from fdnet.studies.thesis.figures.tables import POROSITY_CLASSES
+from fdnet.studies.thesis.numbers.values import percent
 
 FARTHEST, STEP = 2.0, 0.1
 
 
-def distances(figure: Any, sources: Sources, *, kind: str) -> None:
-    """Shares of the fines in throats of one class of porosity by distance from the axis over the throat's radius."""
-    values = np.asarray(sources.tables.distances[kind], float)
+def distances(figure: Any, sources: Sources, *, porosity: str) -> None:
+    """Shares of the fines in throats of one class of porosity, by distance from the axis."""
+    values = np.asarray(sources.tables.distances[porosity], float)
     edges = np.linspace(0.0, FARTHEST, round(FARTHEST / STEP) + 1)
     count = max(len(values), 1)
     share = np.histogram(values, edges)[0] / count
@@ -37,10 +40,10 @@ def distances(figure: Any, sources: Sources, *, kind: str) -> None:
             label=words,
         )
     beyond = float(np.mean(values > FARTHEST))
-    head = f"throat porosity {kind}: {len(values)} fines in throats"
-    told = sources.marks("specimen5").deposition.get(kind)
+    head = f"throat porosity {porosity}: {len(values)} fines in throats"
+    claim = sources.numbers("specimen5").deposition_in(POROSITY_CLASSES[porosity])
     lines = [f"{head}, {percent(beyond)} farther out" if beyond else head]
-    lines += [] if told is None else [f"thesis: {told.words} nearer the {told.quantity}"]
+    lines += [] if claim is None else [f"thesis: {claim.words}"]
     axes.set_title("\n".join(lines), fontsize=9.5, loc="left")
     axes.axvline(1.0, color="black", linewidth=1.2, linestyle="--")
     axes.annotate(
@@ -61,7 +64,7 @@ def distances(figure: Any, sources: Sources, *, kind: str) -> None:
 
 
 def tetrahedra(figure: Any, sources: Sources) -> None:
-    """Tetrahedra of the first millimetre with all spheres and with the grains alone, by specimen."""
+    """Tetrahedra of the first millimetre, of all spheres and of the grains alone."""
     axes = figure.add_subplot()
     names = sorted(sources.tables.tetrahedra)
     places = np.arange(len(names), dtype=float)

@@ -1,4 +1,4 @@
-"""Invaded fines and lost porosity along depth (the thesis's Figures 15-20, 22, 66-68, 70, 71)."""
+"""Figures 15 to 20, 22, 66 to 68, 70 and 71: invaded fines and lost porosity along depth."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -6,29 +6,27 @@ from typing import Any
 import numpy as np
 
 from fdnet.spheres.snapshot import Array
+from fdnet.studies.engine.palette import BLUE, GREY, ORANGE
 from fdnet.studies.thesis.figures.canvas import (
-    BLUE,
     DEPTH_LABEL,
-    GREY,
     MM,
-    ORANGE,
     SPECIMEN_COLOURS,
     THESIS,
-    Sources,
     bars,
     seeds,
     sized,
     steps,
 )
-from fdnet.studies.thesis.figures.marks import percent
+from fdnet.studies.thesis.figures.sources import Sources
 from fdnet.studies.thesis.numbers.examine import Examined
-from fdnet.studies.thesis.numbers.results import FIRST, SHALLOW, invaded_depth, porosity_loss
+from fdnet.studies.thesis.numbers.invasion import FIRST, SHALLOW, invaded_depth, porosity_loss
+from fdnet.studies.thesis.numbers.values import percent
 
 BIN_MM = 0.25
 
 
 def fraction_by_depth(run: Examined) -> tuple[Array, Array]:
-    """Edges (B+1,) mm of bins of 0.25 mm, and the share (B,) of the invaded fines in each, by number."""
+    """Edges (B+1,) mm of bins of 0.25 mm, and the share (B,) of the invaded fines in each."""
     length = float(np.ptp(run.state.damaged.box[0])) * MM
     edges = np.linspace(0.0, length, max(1, round(length / BIN_MM)) + 1)
     depth = invaded_depth(run.state) * MM
@@ -36,45 +34,47 @@ def fraction_by_depth(run: Examined) -> tuple[Array, Array]:
 
 
 def lost_by_depth(run: Examined) -> tuple[Array, Array]:
-    """Edges (B+1,) mm of the profile, and the porosity (B,) lost to the fines."""
+    """Edges (B+1,) mm of the profile's bins, and the porosity (B,) lost to the fines in each."""
     profile = run.thesis.profile
     return profile.edges * MM, profile.porosity_initial - profile.porosity_damaged
 
 
 def invaded_fraction(figure: Any, sources: Sources, *, specimen: str) -> None:
-    """Share of the invaded fines in bins of 0.25 mm, with what the thesis says of its own."""
-    runs, marks = sources.examined[specimen], sources.marks(specimen)
+    """Share of the invaded fines in bins of 0.25 mm, with the thesis's numbers."""
+    runs, thesis = sources.examined[specimen], sources.numbers(specimen)
     axes = figure.add_subplot()
     edges, rows = fraction_by_depth(runs[0])[0], [fraction_by_depth(run)[1] for run in runs]
     count = np.mean([run.thesis.invaded_count for run in runs])
-    told = "" if marks.count is None else f" (thesis {marks.count})"
-    bars(axes, edges, rows, colour=ORANGE, label=f"{count:.0f} invaded fines{told}{seeds(runs)}")
-    if marks.fraction_first_bin is not None:
+    compared = "" if thesis.invaded_count is None else f" (thesis {thesis.invaded_count})"
+    bars(
+        axes, edges, rows, colour=ORANGE, label=f"{count:.0f} invaded fines{compared}{seeds(runs)}"
+    )
+    if thesis.fraction_first_bin is not None:
         label = (
-            f"thesis, its first bin (width not given): about {percent(marks.fraction_first_bin)}"
+            f"thesis, its first bin (width not given): about {percent(thesis.fraction_first_bin)}"
         )
         axes.plot(
-            [edges[:2].mean()], [marks.fraction_first_bin], linestyle="", label=label, **THESIS
+            [edges[:2].mean()], [thesis.fraction_first_bin], linestyle="", label=label, **THESIS
         )
-    _deepest(axes, runs, marks.depth_mm)
+    _deepest(axes, runs, thesis.invaded_depth_mm)
     beyond = np.mean(
         [
             np.mean(invaded_depth(run.state) > SHALLOW) if run.thesis.invaded_count else 0.0
             for run in runs
         ]
     )
-    told = (
+    compared = (
         ""
-        if marks.fraction_beyond_0p5mm is None
-        else f" (thesis: below {percent(marks.fraction_beyond_0p5mm)})"
+        if thesis.fraction_beyond_0p5mm is None
+        else f" (thesis: below {percent(thesis.fraction_beyond_0p5mm)})"
     )
-    axes.plot([], [], " ", label=f"deeper than {SHALLOW * MM:g} mm: {percent(beyond)}{told}")
+    axes.plot([], [], " ", label=f"deeper than {SHALLOW * MM:g} mm: {percent(beyond)}{compared}")
     axes.set(
         xlabel=DEPTH_LABEL,
         ylabel=f"share of the invaded fines per {BIN_MM} mm (–)",
         xlim=edges[[0, -1]],
     )
-    axes.set_ylim(0, 1.1 * max(np.max(rows), marks.fraction_first_bin or 0.0, 0.01))
+    axes.set_ylim(0, 1.1 * max(np.max(rows), thesis.fraction_first_bin or 0.0, 0.01))
     axes.legend(loc="upper right", fontsize=9.5)
 
 
@@ -100,8 +100,8 @@ def _deepest(axes: Any, runs: Sequence[Examined], thesis: float | None) -> None:
 
 
 def porosity_reduction(figure: Any, sources: Sources, *, specimen: str) -> None:
-    """Porosity lost in bins of 0.25 mm, with the thesis's loss at the face and in all."""
-    runs, marks = sources.examined[specimen], sources.marks(specimen)
+    """Porosity lost in bins of 0.25 mm, with the thesis's losses at the face and in the whole."""
+    runs, thesis = sources.examined[specimen], sources.numbers(specimen)
     axes = figure.add_subplot()
     edges, rows = lost_by_depth(runs[0])[0], [lost_by_depth(run)[1] for run in runs]
     bars(
@@ -117,20 +117,22 @@ def porosity_reduction(figure: Any, sources: Sources, *, specimen: str) -> None:
     axes.axhline(
         whole, color=BLUE, linestyle="--", linewidth=1.5, label=f"whole specimen {whole:.4f}"
     )
-    if marks.face_porosity_loss is not None:
-        label = f"thesis, at the face: about {marks.face_porosity_loss:g}"
+    if thesis.face_porosity_loss is not None:
+        label = f"thesis, at the face: about {thesis.face_porosity_loss:g}"
         axes.plot(
             [0],
-            [marks.face_porosity_loss],
+            [thesis.face_porosity_loss],
             linestyle="",
             clip_on=False,
             zorder=5,
             label=label,
             **THESIS,
         )
-    if marks.porosity_loss is not None:
-        label = f"thesis, initial less damaged: {marks.porosity_loss:.2g}"
-        axes.axhline(marks.porosity_loss, color="black", linestyle=":", linewidth=1.5, label=label)
+    if thesis.porosity_loss is not None:
+        label = f"thesis, initial less damaged: {thesis.porosity_loss:.2g}"
+        axes.axhline(
+            thesis.porosity_loss, color="black", linestyle=":", linewidth=1.5, label=label
+        )
     axes.axhline(0, color=GREY, linewidth=0.8)
     axes.set(
         xlabel=DEPTH_LABEL, ylabel="porosity reduction, intact − damaged (–)", xlim=edges[[0, -1]]
@@ -173,7 +175,7 @@ def _compared(figure: Any, sources: Sources, specimens: Sequence[str], measure: 
 
 
 def total_reduction(figure: Any, sources: Sources, *, specimens: Sequence[str]) -> None:
-    """Porosity lost in the whole specimen and in its first millimetre, by fine size, beside the thesis's."""
+    """Porosity lost in the whole specimen and its first millimetre, with the thesis's loss."""
     axes = figure.add_subplot()
     places = np.arange(len(specimens), dtype=float)
     whole = [
@@ -202,10 +204,10 @@ def total_reduction(figure: Any, sources: Sources, *, specimens: Sequence[str]) 
             color="black",
             linewidth=1,
         )
-    told = [sources.marks(name).porosity_loss for name in specimens]
-    known = [place for place, one in zip(places, told, strict=True) if one is not None]
+    losses = [sources.numbers(name).porosity_loss for name in specimens]
+    known = [place for place, one in zip(places, losses, strict=True) if one is not None]
     if known:
-        heights = [one for one in told if one is not None]
+        heights = [one for one in losses if one is not None]
         axes.plot(
             known, heights, linestyle="", label="thesis, initial less damaged porosity", **THESIS
         )

@@ -1,18 +1,28 @@
-"""All figures of the thesis that there is something to draw from, into one folder."""
+"""Draw every figure of the thesis for which the sources are there."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fdnet.studies.thesis.figures.canvas import Sources, Tables, canvas
-from fdnet.studies.thesis.figures.drawings import FIGURES, Drawing
-from fdnet.studies.thesis.figures.marks import ThesisMarks, said
+from fdnet.studies.thesis.figures.canvas import canvas
+from fdnet.studies.thesis.figures.drawing import Drawing
+from fdnet.studies.thesis.figures.drawings import FIGURES
+from fdnet.studies.thesis.figures.sources import Sources
+from fdnet.studies.thesis.figures.tables import POROSITY_CLASSES, FigureTables
 from fdnet.studies.thesis.numbers.examine import Examined
+from fdnet.studies.thesis.numbers.values import ThesisSpecimen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawn:
-    """A figure made at `path`, or left out (None) because of what is `missing`."""
+    """A figure that was drawn, or that was left out.
+
+    Attributes:
+        name: its file name.
+        path: where it was drawn; None when it was left out.
+        caption: the text under it.
+        missing: the sources that it lacks.
+    """
 
     name: str
     path: Path | None
@@ -24,22 +34,36 @@ def draw_all(
     examined: Mapping[str, Sequence[Examined]],
     folder: str | Path,
     *,
-    thesis: Mapping[str, ThesisMarks] | None = None,
-    tables: Tables | None = None,
+    thesis: Mapping[str, ThesisSpecimen] | None = None,
+    tables: FigureTables | None = None,
 ) -> list[Drawn]:
-    """Draw what there is into `folder` (made if missing), in the thesis's order; what is missing is named.
+    """Draw the figures in the thesis's order.
 
-    `examined` runs, one a seed, by specimen ("specimen1"); `thesis` its numbers by specimen ("table3" too); `tables`
-    of other studies.
+    Args:
+        examined: examined runs by specimen ("specimen1"), one a seed.
+        folder: where the figures go; it is made when missing.
+        thesis: the thesis's numbers by specimen, and "table3"; left out of the figures when None.
+        tables: tables of scans, tetrahedra, distances and the growth of a pack.
     """
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
-    sources = Sources(examined=examined, thesis=thesis or {}, tables=tables or Tables())
+    sources = Sources(examined=examined, thesis=thesis or {}, tables=tables or FigureTables())
     return [_drawn(name, drawing, sources, target) for name, drawing in FIGURES.items()]
 
 
+def filled_in(sentence: str, thesis: Mapping[str, ThesisSpecimen]) -> str:
+    """A sentence with its numbers of the thesis, such as "{specimen1.porosity_loss:g}".
+
+    Returns an empty string when the thesis has no such number.
+    """
+    try:
+        return sentence.format(**thesis)
+    except (KeyError, IndexError, TypeError):
+        return ""
+
+
 def _drawn(name: str, drawing: Drawing, sources: Sources, folder: Path) -> Drawn:
-    caption = " ".join([drawing.caption, *_told(drawing, sources)])
+    caption = " ".join([drawing.caption, *_thesis_sentences(drawing, sources)])
     missing = tuple(_missing(drawing, sources))
     if missing:
         return Drawn(name=name, path=None, caption=caption, missing=missing)
@@ -48,17 +72,17 @@ def _drawn(name: str, drawing: Drawing, sources: Sources, folder: Path) -> Drawn
     return Drawn(name=name, path=folder / name, caption=caption)
 
 
-def _told(drawing: Drawing, sources: Sources) -> Iterator[str]:
-    """What the thesis says of the figure, as far as it is known."""
-    yield from filter(None, (said(sentence, sources.thesis) for sentence in drawing.thesis))
+def _thesis_sentences(drawing: Drawing, sources: Sources) -> Iterator[str]:
+    """The thesis's numbers on what the figure shows, as far as they are known."""
+    yield from filter(None, (filled_in(one, sources.thesis) for one in drawing.thesis))
     for specimen in drawing.specimens[:1]:
-        for one in sources.marks(specimen).statistics:
+        for one in sources.numbers(specimen).statistics:
             if one.quantity in drawing.quantities:
-                yield f"Thesis: {one.what} {one.words}."
+                yield f"Thesis: {one.subject}: {one.words}."
     if drawing.table == "distances" and drawing.key is not None:
-        near = sources.marks("specimen5").deposition.get(drawing.key)
-        if near is not None:
-            yield f"Thesis: {near.words} nearer the {near.quantity}."
+        claim = sources.numbers("specimen5").deposition_in(POROSITY_CLASSES[drawing.key])
+        if claim is not None:
+            yield f"Thesis: {claim.words}."
 
 
 def _missing(drawing: Drawing, sources: Sources) -> Iterator[str]:
@@ -66,8 +90,8 @@ def _missing(drawing: Drawing, sources: Sources) -> Iterator[str]:
         if not sources.examined.get(specimen):
             yield specimen
     if drawing.table is not None:
-        found = getattr(sources.tables, drawing.table)
+        table = getattr(sources.tables, drawing.table)
         if drawing.key is not None:
-            found = found.get(drawing.key, ())
-        if not len(found):
+            table = table.get(drawing.key, ())
+        if not len(table):
             yield " ".join(filter(None, (drawing.table, drawing.key)))

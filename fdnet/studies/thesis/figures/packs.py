@@ -1,21 +1,13 @@
-"""Pictures of packs and of fines in them (the thesis's Figures 9, 13 and 21), seen from the side."""
+"""Figures 9, 13, 21, 73 and 74: packs, and the fines in them, seen from the side."""
 
 from typing import Any
 
 import numpy as np
 
 from fdnet.spheres.snapshot import Array, Snapshot
-from fdnet.studies.thesis.figures.canvas import (
-    BLACK,
-    BLUE,
-    GREY,
-    MM,
-    ORANGE,
-    Sources,
-    circles,
-    sized,
-    titled,
-)
+from fdnet.studies.engine.palette import BLACK, BLUE, GREY, ORANGE
+from fdnet.studies.thesis.figures.canvas import MM, circles, sized, titled
+from fdnet.studies.thesis.figures.sources import Sources
 
 LIGHT, DARK = 0.93, 0.62
 TONES = 12
@@ -27,7 +19,7 @@ CLASS_COLOURS = (BLACK, ORANGE)
 
 
 def pack(figure: Any, sources: Sources, *, specimen: str) -> None:
-    """All grains, the near ones before the far ones."""
+    """All grains; near ones cover far ones."""
     run = sources.examined[specimen][0]
     axes = _view(figure, run.state.grains, start=0.0)
     _grains(axes, run.state.grains)
@@ -35,8 +27,10 @@ def pack(figure: Any, sources: Sources, *, specimen: str) -> None:
 
 
 def growth(figure: Any, sources: Sources) -> None:
-    """A slab through the middle of a growing pack, with the velocities of its grains as arrows, each state its own
-    scale."""
+    """A slab through the middle of a growing pack, with the velocities of its grains as arrows.
+
+    Each state has its own scale of the arrows.
+    """
     stages = sources.tables.growth
     figure.set_size_inches(7.2, 10.2)
     words = (
@@ -44,7 +38,7 @@ def growth(figure: Any, sources: Sources) -> None:
         "grown to their size, before they relax",
         "at rest",
     )
-    for axes, spheres, said in zip(figure.subplots(len(stages), 1), stages, words, strict=True):
+    for axes, spheres, state in zip(figure.subplots(len(stages), 1), stages, words, strict=True):
         slab = middle_slab(spheres)
         _frame(axes, slab, start=0.0)
         _grains(axes, slab)
@@ -52,11 +46,11 @@ def growth(figure: Any, sources: Sources) -> None:
         arrows: Any = {"color": FINE, "width": 0.0025, "angles": "xy"}
         axes.quiver(x, z, slab.velocity[:, 0], slab.velocity[:, 2], **arrows)
         fastest = float(np.linalg.norm(spheres.velocity, axis=1).max())
-        axes.set_title(f"{said}; fastest grain {fastest:.2g} m/s", fontsize=11, loc="left")
+        axes.set_title(f"{state}; fastest grain {fastest:.2g} m/s", fontsize=11, loc="left")
 
 
 def invaded_pack(figure: Any, sources: Sources, *, specimen: str) -> None:
-    """A slab one grain thick through the middle, cut open towards us: grains grey, fines coloured, cake included."""
+    """A slab one grain thick through the middle: grains grey, fines and cake coloured."""
     run = sources.examined[specimen][0]
     slab = middle_slab(run.state.damaged)
     fines = slab.fines()
@@ -70,22 +64,19 @@ def invaded_pack(figure: Any, sources: Sources, *, specimen: str) -> None:
     widths = np.where(grain, 0.5, 0.25)
     style: Any = {"facecolors": colours, "edgecolors": edges, "linewidths": widths}
     circles(axes, spheres.position[:, ::2] * MM, spheres.radius * MM, **style)
-    axes.set_title(
-        f"{sized(run, specimen)}, {run.thesis.invaded_count} invaded; the slab holds {_inside(slab)} of them",
-        fontsize=11,
-        loc="left",
-    )
+    counts = f"{run.thesis.invaded_count} invaded; the slab holds {_inside(slab)} of them"
+    axes.set_title(f"{sized(run, specimen)}, {counts}", fontsize=11, loc="left")
 
 
 def middle_slab(spheres: Snapshot) -> Snapshot:
-    """Spheres centred less than the largest grain's diameter behind the plane through the middle, across y."""
+    """Spheres centred less than the largest grain diameter behind the middle plane, along y."""
     behind = spheres.position[:, 1] - spheres.box[1].mean()
     return spheres.where((behind >= 0) & (behind < 2 * spheres.grains().radius.max()))
 
 
 def fines_by_size(figure: Any, sources: Sources, *, specimen: str) -> None:
-    """The invaded fines alone, the large and the small ones coloured; below, how many of each by depth."""
-    run, marks = sources.examined[specimen][0], sources.marks(specimen)
+    """The invaded fines, large and small ones coloured; below, their number by depth."""
+    run, thesis = sources.examined[specimen][0], sources.numbers(specimen)
     fines = run.state.damaged.fines()
     low, high = fines.box[0]
     fines = fines.where((fines.position[:, 0] >= low) & (fines.position[:, 0] < high))
@@ -95,7 +86,7 @@ def fines_by_size(figure: Any, sources: Sources, *, specimen: str) -> None:
     radius = fines.radius * MM
     circles(above, fines.position[:, ::2] * MM, radius, facecolors="#E4E4E4", edgecolors="none")
     edges = np.linspace(0.0, (high - low) * MM, max(1, round((high - low) * MM / DEPTH_STEP)) + 1)
-    classes = sorted(marks.size_classes_mm)
+    classes = sorted(thesis.size_classes_mm)
     kind = np.full(len(fines), -1)
     for index, (least, most) in enumerate(classes):
         kind[(radius >= least) & (radius <= most)] = index
@@ -143,7 +134,7 @@ def _grains(axes: Any, grains: Snapshot) -> None:
 
 
 def _greys(spheres: Snapshot) -> Array:
-    """Colours (N, 4), the lighter the nearer to us."""
+    """Colours (N, 4); nearer spheres are lighter."""
     y = spheres.position[:, 1]
     near = (y.max() - y) / max(float(np.ptp(y)), 1e-12)
     tone = DARK + (LIGHT - DARK) * np.round(near * (TONES - 1)) / (TONES - 1)

@@ -1,25 +1,24 @@
-"""Damaged over intact permeability of 1 mm sections along depth (the thesis's Figures 49, 58, 65, 69, 72)."""
+"""Figures 49, 58, 65, 69 and 72: damaged over intact permeability of sections of 1 mm."""
 
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from fdnet.network.permeability import Analysis
+from fdnet.network.analysis import Analysis
 from fdnet.spheres.snapshot import Array
+from fdnet.studies.engine.palette import BLUE, GREEN
 from fdnet.studies.thesis.figures.canvas import (
-    BLUE,
     DEPTH_LABEL,
-    GREEN,
     MM,
     SPECIMEN_COLOURS,
     SPECIMEN_MARKERS,
     THESIS,
-    Sources,
     seeds,
     sized,
     steps,
 )
+from fdnet.studies.thesis.figures.sources import Sources
 from fdnet.studies.thesis.numbers.examine import DEFAULT_PAIR, THESIS_PAIR
 
 LAWS = ((THESIS_PAIR, "the thesis's laws", BLUE), (DEFAULT_PAIR, "fdnet's default laws", GREEN))
@@ -32,7 +31,10 @@ def section_edges(analysis: Analysis) -> Array:
 
 
 def ratios(analysis: Analysis, *, inplace: bool) -> Array:
-    """k/k0 (S,) of the sections cut out, or in place by the whole specimen's pressures; NaN where k0 is 0."""
+    """k/k0 (S,) of the sections; nan where k0 is 0.
+
+    In place they have the pressures of the whole specimen; otherwise they are cut out of it.
+    """
     pairs = [
         (s.k_damaged_inplace, s.k_initial_inplace) if inplace else (s.k_damaged, s.k_initial)
         for s in analysis.sections
@@ -41,18 +43,22 @@ def ratios(analysis: Analysis, *, inplace: bool) -> Array:
 
 
 def permeability(figure: Any, sources: Sources, *, specimen: str) -> None:
-    """One specimen: cut out and in place, by both pairs of laws, with the thesis's sections."""
-    runs, marks = sources.examined[specimen], sources.marks(specimen)
+    """One specimen's sections, cut out and in place, by both pairs of laws and in the thesis."""
+    runs, thesis = sources.examined[specimen], sources.numbers(specimen)
     axes = figure.add_subplot()
     edges = section_edges(runs[0].thesis)
     for pair, name, colour in LAWS:
         for inplace, line, place in ((False, "-", "cut out"), (True, (0, (2, 1.5)), "in place")):
             rows = [ratios(run.analyses[pair], inplace=inplace) for run in runs]
             steps(axes, edges, rows, colour=colour, line=line, label=f"{name}, section {place}")
-    if marks.reductions:
-        told = 1.0 - np.array(marks.reductions)
+    if thesis.reductions:
+        given = 1.0 - np.array(thesis.reductions)
         axes.plot(
-            np.arange(len(told)) + 0.5, told, linestyle="", label="thesis, 1 mm sections", **THESIS
+            np.arange(len(given)) + 0.5,
+            given,
+            linestyle="",
+            label="thesis, 1 mm sections",
+            **THESIS,
         )
     axes.set(xlabel=DEPTH_LABEL, ylabel=RATIO_LABEL, xlim=edges[[0, -1]], ylim=(0, 1.05))
     axes.set_title(f"{sized(runs[0], specimen)}{seeds(runs)}", fontsize=11, loc="left")
@@ -105,6 +111,6 @@ def _compare(axes: Any, sources: Sources, specimens: Sequence[str], pair: tuple[
 
 def _mark(axes: Any, sources: Sources, specimens: Sequence[str]) -> None:
     for name in specimens:
-        told = 1.0 - np.array(sources.marks(name).reductions)
+        given = 1.0 - np.array(sources.numbers(name).reductions)
         style = {**THESIS, "color": SPECIMEN_COLOURS[name]}
-        axes.plot(np.arange(len(told)) + 0.5, told, linestyle="", zorder=5, **style)
+        axes.plot(np.arange(len(given)) + 0.5, given, linestyle="", zorder=5, **style)

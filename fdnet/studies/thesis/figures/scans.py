@@ -1,4 +1,4 @@
-"""What scans of the drag, the fines' friction and their supply give (the thesis's Figure 14, and its open choices)."""
+"""Scans of the drag (Figure 14), and of what the thesis leaves open: friction and supply."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -6,17 +6,10 @@ from typing import Any
 import numpy as np
 
 from fdnet.spheres.snapshot import Array
-from fdnet.studies.thesis.figures.canvas import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    THESIS,
-    ScanRow,
-    Sources,
-    own_style,
-    seeds,
-    titled,
-)
+from fdnet.studies.engine.palette import BLUE, GREEN, ORANGE
+from fdnet.studies.thesis.figures.canvas import THESIS, own_style, seeds, titled
+from fdnet.studies.thesis.figures.sources import Sources
+from fdnet.studies.thesis.figures.tables import ScanRow
 from fdnet.studies.thesis.numbers.values import TABLE3, specimen_number
 
 AS_TABLE3 = (TABLE3, "7")
@@ -24,14 +17,14 @@ AS_TABLE3 = (TABLE3, "7")
 
 
 def over_seeds(rows: Sequence[ScanRow], name: str) -> tuple[Array, Array]:
-    """Values (V,) scanned, ascending, and (V, 3) mean, least and largest over the seeds of the rows' `name`."""
+    """Scanned values (V,), ascending, and mean, least and largest (V, 3) of a field over seeds."""
     values = np.array(sorted({row.value for row in rows}))
-    found = [[getattr(row, name) for row in rows if row.value == value] for value in values]
-    return values, np.array([[np.mean(one), min(one), max(one)] for one in found]).reshape(-1, 3)
+    groups = [[getattr(row, name) for row in rows if row.value == value] for value in values]
+    return values, np.array([[np.mean(one), min(one), max(one)] for one in groups]).reshape(-1, 3)
 
 
 def invasion_depth(figure: Any, sources: Sources) -> None:
-    """Deepest fine, depth of 95 % and mean depth against the drag multiplier; a panel a specimen."""
+    """Depths of the invaded fines against the drag multiplier, one panel a specimen."""
     rows = sources.tables.drag
     specimens = sorted({row.specimen for row in rows})
     figure.set_size_inches(max(7.2, 3.6 * len(specimens)), 4.4)
@@ -40,7 +33,7 @@ def invasion_depth(figure: Any, sources: Sources) -> None:
         _depths(
             axes,
             [row for row in rows if row.specimen == specimen],
-            sources.marks("table3").depth_mm,
+            sources.numbers("table3").invaded_depth_mm,
         )
         axes.set_title(titled(specimen), fontsize=11, loc="left")
     panels[0].set_ylabel("depth of the invaded fines (mm)")
@@ -62,16 +55,16 @@ def invasion_depth(figure: Any, sources: Sources) -> None:
     )
 
 
-def _depths(axes: Any, rows: Sequence[ScanRow], told: float | None) -> None:
+def _depths(axes: Any, rows: Sequence[ScanRow], table3_mm: float | None) -> None:
     for name, words, style in (
         ("depth_max_mm", "deepest fine", {"color": ORANGE, "marker": "^"}),
         ("depth_p95_mm", "95 % lie shallower", {"color": BLUE, "marker": "o"}),
         ("depth_mean_mm", "mean depth", {"color": GREEN, "marker": "s"}),
     ):
         _curve(axes, rows, name, words, style)
-    if told is not None and specimen_number(rows[0].specimen) in AS_TABLE3:
-        label = f"thesis, Table 3, nominal drag: {told:g} mm"
-        axes.plot([1.0], [told], linestyle="", zorder=5, label=label, **THESIS)
+    if table3_mm is not None and specimen_number(rows[0].specimen) in AS_TABLE3:
+        label = f"thesis, Table 3, nominal drag: {table3_mm:g} mm"
+        axes.plot([1.0], [table3_mm], linestyle="", zorder=5, label=label, **THESIS)
     ticks = sorted({row.value for row in rows})
     axes.set(xscale="log", xlabel="multiplier of Stokes's drag (–)")
     axes.minorticks_off()
@@ -82,32 +75,32 @@ def _depths(axes: Any, rows: Sequence[ScanRow], told: float | None) -> None:
 def _curve(
     axes: Any, rows: Sequence[ScanRow], name: str, label: str, style: dict[str, Any]
 ) -> None:
-    values, found = over_seeds(rows, name)
-    axes.plot(values, found[:, 0], label=label, **style)
+    values, ranges = over_seeds(rows, name)
+    axes.plot(values, ranges[:, 0], label=label, **style)
     axes.fill_between(
-        values, found[:, 1], found[:, 2], color=style["color"], alpha=0.2, linewidth=0
+        values, ranges[:, 1], ranges[:, 2], color=style["color"], alpha=0.2, linewidth=0
     )
 
 
 def friction(figure: Any, sources: Sources) -> None:
-    """Against the friction of the fines."""
+    """First millimetre and depth against the friction of the fines."""
     _scan(figure, sources, sources.tables.friction, "friction of the fines (–)")
 
 
 def supply(figure: Any, sources: Sources) -> None:
-    """Against the fines supplied over those of the case."""
+    """First millimetre and depth against the number of fines supplied."""
     _scan(figure, sources, sources.tables.supply, "fines supplied / those of the case (–)")
 
 
 def _scan(figure: Any, sources: Sources, rows: Sequence[ScanRow], label: str) -> None:
-    """Three panels: the first millimetre's count and lost porosity, and the depth of 95 %; a curve a specimen."""
+    """Count and lost porosity of the first millimetre, and depth; one curve a specimen."""
     figure.set_size_inches(10.8, 4.2)
     panels = (
         ("count_first_mm", "fines in the first 1 mm (–)", "count_first_mm"),
         ("porosity_loss_first_mm", "porosity lost in the first 1 mm (–)", None),
         ("depth_p95_mm", "depth, 95 % lie shallower (mm)", None),
     )
-    for axes, (name, words, told) in zip(figure.subplots(1, 3), panels, strict=True):
+    for axes, (name, words, given) in zip(figure.subplots(1, 3), panels, strict=True):
         for specimen in sorted({row.specimen for row in rows}):
             style = own_style(specimen)
             _curve(
@@ -117,7 +110,7 @@ def _scan(figure: Any, sources: Sources, rows: Sequence[ScanRow], label: str) ->
                 titled(specimen),
                 style,
             )
-            mark = None if told is None else getattr(sources.marks(specimen), told)
+            mark = None if given is None else getattr(sources.numbers(specimen), given)
             if mark is not None:
                 axes.axhline(
                     mark, color=style["color"], linestyle=":", label=f"thesis, {titled(specimen)}"

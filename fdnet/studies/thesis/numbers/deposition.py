@@ -1,8 +1,10 @@
-"""Where fines sit in the throats of the first section, which decides between the two laws (Shi 2011, Figures 56, 57).
+"""Where fines sit in the throats of the first section (Shi 2011, Figures 56 and 57).
 
-The distance of a fine's centre from the throat's axis over the throat's radius, for every fine that fills some of the
-throat's cylinder: below 1/2 it is nearer the axis, above nearer the wall, above 1 its centre is outside. Note that an
-even spread over the section has 3/4 of its centres nearer the wall.
+The thesis chooses between its two damage laws by it. The measure is the distance of a fine's
+centre from the throat's axis over the throat's radius, for every fine that fills some of the
+throat's cylinder. Below 1/2 the fine is nearer the axis, above 1/2 nearer the wall, and above 1
+its centre is outside of the throat. Fines spread evenly over the cross-section have 3/4 of their
+centres nearer the wall.
 """
 
 import math
@@ -16,26 +18,44 @@ from fdnet.network.laws.damage import CLOGGING, DEPOSITION
 from fdnet.spheres.snapshot import Array
 from fdnet.studies.engine.csv_rows import write_flat
 from fdnet.studies.thesis.numbers.examine import Examined
-from fdnet.studies.thesis.numbers.first_section import FirstSection, first_section
+from fdnet.studies.thesis.numbers.first_millimetre import FirstMillimetre, first_millimetre
 from fdnet.studies.thesis.numbers.statistics import share, within
-from fdnet.studies.thesis.numbers.values import DepositionTold, specimen_number, thesis_values
+from fdnet.studies.thesis.numbers.values import DepositionClaim, specimen_number, thesis_values
 
 HALFWAY, WALL = 0.5, 1.0
 Z_95 = 1.959963984540054
-TOLD_OF = "5"
+DEPOSITION_SPECIMEN = "5"
 """The specimen Figures 56 and 57 are of."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DepositionRow:
-    """Fines of the throats of porosity [`low`, `high`), 0 taking in those below and 1 those at it.
+    """Fines in the throats of one class of porosity; each field is a column of deposition.csv.
 
-    `throats` with fines and `fines` in them (a fine once in each throat; a throat cut by a face by its part inside);
-    shares by number and by the volume in the throat: nearer the axis, nearer the wall, centred beyond it. `law` is
-    "deposition" where most, of the two latter together, are nearer the wall, else "clogging", empty without fines (the
-    thesis's rule: an even spread, 3/4 of it nearer the wall, is deposition by it);
-    `wall_low`, `wall_high` the 95 % interval of their share, and `decided` when it leaves out 1/2. It takes the fines
-    as independent, which those of one throat are not quite. `thesis`: its share `nearer` the axis or the wall.
+    Attributes:
+        id: name of the run.
+        seed: seed of the run.
+        low: lowest porosity of the class; 0 also takes in throats below it.
+        high: porosity below which the class ends; 1 also takes in throats at it.
+        whole: whether only whole throats count, as in `FirstMillimetre`.
+        throats: number of throats with fines; one cut by a face counts by its part inside.
+        fines: number of fines in them; a fine counts once in each throat it reaches.
+        nearer_axis: share of the fines nearer the axis, by number.
+        nearer_wall: share centred within the throat and nearer the wall, by number.
+        beyond_wall: share centred outside of the throat, by number.
+        nearer_axis_volume: as `nearer_axis`, by the volume in the throat.
+        nearer_wall_volume: as `nearer_wall`, by volume.
+        beyond_wall_volume: as `beyond_wall`, by volume.
+        wall_low: low end of the 95 % interval of `nearer_wall` + `beyond_wall`. It takes the fines
+            as independent, which fines of one throat are not quite.
+        wall_high: high end of that interval.
+        law: the thesis's rule: "deposition" where that sum is above 1/2, else "clogging"; empty
+            without fines.
+        decided: whether the interval leaves out 1/2.
+        nearer: "axis" or "wall", what the thesis's share is of; empty without one.
+        thesis: the thesis's share; nan without one.
+        sense: "about", "at least" and the like, of the thesis's share.
+        source: figure or section of the thesis.
     """
 
     id: str
@@ -63,8 +83,14 @@ class DepositionRow:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ThroatFines:
-    """Fines in throats (K,): `distance` from the axis over the radius, `volume` m3 in the throat, `weight` of the
-    throat, `throat` index."""
+    """K pairs of a fine and a throat that it reaches into.
+
+    Attributes:
+        distance: (K,) distance of the fine's centre from the axis over the throat's radius.
+        volume: (K,) m3, volume of the fine within the throat.
+        weight: (K,) weight of the throat.
+        throat: (K,) index of the throat.
+    """
 
     distance: Array
     volume: Array
@@ -73,17 +99,17 @@ class ThroatFines:
 
 
 def deposition(examined: Examined, *, whole: bool = True) -> list[DepositionRow]:
-    """One row for each class of throat porosity; `whole` as in `first_section`."""
-    section = first_section(examined, whole=whole)
+    """One row for each class of throat porosity; `whole` as in `FirstMillimetre`."""
+    section = first_millimetre(examined, whole=whole)
     number = specimen_number(examined.id)
     return [
-        _row(examined, section, told, compare=number == TOLD_OF)
-        for told in thesis_values().deposition
+        _row(examined, section, claim, compare=number == DEPOSITION_SPECIMEN)
+        for claim in thesis_values().deposition
     ]
 
 
-def fines_in_class(section: FirstSection, between: tuple[float, float]) -> ThroatFines:
-    """The fines of the section's throats of porosity [low, high), as Figures 56 and 57 plot them."""
+def fines_in_class(section: FirstMillimetre, between: tuple[float, float]) -> ThroatFines:
+    """The fines in the section's throats of porosity [low, high), as in Figures 56 and 57."""
     occupancy = section.occupancy
     chosen = within(occupancy.throat_porosity, between) & (section.throat_weight > 0)
     use = chosen[occupancy.pair_throat]
@@ -97,33 +123,30 @@ def fines_in_class(section: FirstSection, between: tuple[float, float]) -> Throa
 
 
 def wilson_interval(part: float, total: float) -> tuple[float, float]:
-    """95 % interval of the share `part` / `total` of a binomial (Wilson 1927, J. Am. Stat. Assoc. 22, 209); nan
-    without trials."""
+    """The 95 % interval of a binomial share `part` / `total`; nan without trials.
+
+    Source: Wilson 1927, J. Am. Stat. Assoc. 22, 209.
+    """
     if total <= 0:
         return math.nan, math.nan
     square = Z_95**2 / total
-    share, spread = (
-        part / total,
-        Z_95 * math.sqrt(part * (total - part) / total + 0.25 * Z_95**2) / total,
-    )
-    return (share + 0.5 * square - spread) / (1.0 + square), (share + 0.5 * square + spread) / (
-        1.0 + square
-    )
+    share = part / total
+    spread = Z_95 * math.sqrt(part * (total - part) / total + 0.25 * Z_95**2) / total
+    low, high = share + 0.5 * square - spread, share + 0.5 * square + spread
+    return low / (1.0 + square), high / (1.0 + square)
 
 
 def write_deposition(path: Path, rows: Sequence[DepositionRow]) -> Path:
-    """One line for each run and class."""
+    """Write deposition.csv, one line for each run and class."""
     return write_flat(path, DepositionRow, rows)
 
 
 def _row(
-    examined: Examined, section: FirstSection, told: DepositionTold, *, compare: bool
+    examined: Examined, section: FirstMillimetre, claim: DepositionClaim, *, compare: bool
 ) -> DepositionRow:
-    fines = fines_in_class(section, told.throat_porosity)
-    by_number, by_volume = (
-        _shares(fines.distance, fines.weight),
-        _shares(fines.distance, fines.weight * fines.volume),
-    )
+    fines = fines_in_class(section, claim.throat_porosity)
+    by_number = _shares(fines.distance, fines.weight)
+    by_volume = _shares(fines.distance, fines.weight * fines.volume)
     total = float(np.sum(fines.weight))
     wall = 1.0 - by_number[0]
     interval = wilson_interval(wall * total, total)
@@ -131,8 +154,8 @@ def _row(
     return DepositionRow(
         id=examined.id,
         seed=examined.seed,
-        low=told.throat_porosity[0],
-        high=told.throat_porosity[1],
+        low=claim.throat_porosity[0],
+        high=claim.throat_porosity[1],
         whole=section.whole,
         throats=float(np.sum(section.throat_weight[np.unique(fines.throat)])),
         fines=total,
@@ -146,14 +169,14 @@ def _row(
         wall_high=interval[1],
         law=law,
         decided=interval[0] > HALFWAY or interval[1] < HALFWAY,
-        nearer=told.nearer if compare else "",
-        thesis=told.value if compare else math.nan,
-        sense=told.sense if compare else "",
-        source=told.source,
+        nearer=claim.nearer if compare else "",
+        thesis=claim.value if compare else math.nan,
+        sense=claim.sense if compare else "",
+        source=claim.source,
     )
 
 
 def _shares(distance: Array, weight: Array) -> tuple[float, float, float]:
-    """Nearer the axis, nearer the wall, beyond it."""
+    """Shares nearer the axis, nearer the wall, and centred beyond the wall."""
     axis, beyond = distance < HALFWAY, distance > WALL
     return share(axis, weight), share(~axis & ~beyond, weight), share(beyond, weight)

@@ -1,19 +1,34 @@
-"""One specimen of the thesis, examined under both pairs of laws: what tables, statistics and figures are made of."""
+"""The state of one run, analysed under both pairs of laws.
+
+Tables, statistics and figures are made from it.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from fdnet.network.analysis import Analysis
 from fdnet.network.laws.named import DEFAULT_DAMAGE_LAW, DEFAULT_LAW
-from fdnet.network.permeability import Analysis, AnalysisOptions, compare
+from fdnet.network.permeability import compare
 from fdnet.studies.thesis.runs.state import State
 
 THESIS_PAIR, DEFAULT_PAIR = ("thesis", "thesis"), (DEFAULT_LAW, DEFAULT_DAMAGE_LAW)
-"""(law, damage law): the thesis's own, with the threshold 0.40 of its text, and fdnet's most accurate."""
+"""Pairs (law, damage law).
+
+The thesis's own pair has the threshold 0.40 of its text; fdnet's default pair is its most
+accurate one.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Examined:
-    """`id` names the run ("specimen5", "specimen5 friction=0"); `analyses` by pair of laws."""
+    """One run and its analyses.
+
+    Attributes:
+        id: name of the run, such as "specimen5" or "specimen5 fines.friction=0".
+        seed: seed of the run.
+        state: the spheres at the end of the run.
+        analyses: porosity, permeability and fines by pair of laws.
+    """
 
     id: str
     seed: int
@@ -22,31 +37,28 @@ class Examined:
 
     @property
     def thesis(self) -> Analysis:
-        """By the thesis's laws."""
+        """The analysis by the thesis's laws."""
         return self.analyses[THESIS_PAIR]
 
     @property
     def default(self) -> Analysis:
-        """By fdnet's default laws."""
+        """The analysis by fdnet's default laws."""
         return self.analyses[DEFAULT_PAIR]
 
 
 def examine(name: str, state: State) -> Examined:
-    """The state's permeability, porosity and fines under both pairs of laws; sections and bins as its case asks.
+    """Analyse the state under both pairs of laws, with the sections and bins of its case.
 
     Raises NetworkError on degenerate geometry, FlowError on a solve that fails its checks.
     """
-    chosen = state.case.analysis
-    options = AnalysisOptions(
-        sections=chosen.sections,
-        walls=chosen.walls,
-        overlap=chosen.throat_overlap,
-        profile_bin=chosen.profile_bin_mm * 1e-3,
-    )
+    options = state.case.analysis
     pairs = (THESIS_PAIR, DEFAULT_PAIR)
-    found = compare(
+    analyses = compare(
         state.grains, state.damaged, periodic=state.case.periodic, options=options, laws=pairs
     )
     return Examined(
-        id=name, seed=state.case.seed, state=state, analyses=dict(zip(pairs, found, strict=True))
+        id=name,
+        seed=state.case.seed,
+        state=state,
+        analyses=dict(zip(pairs, analyses, strict=True)),
     )

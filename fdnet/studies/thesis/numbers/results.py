@@ -1,4 +1,4 @@
-"""results.csv: what each run came to under each pair of laws, the thesis's numbers beside it."""
+"""results.csv: the results of each run under each pair of laws, with the thesis's numbers."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -9,26 +9,31 @@ from typing import Any
 import numpy as np
 
 from fdnet.errors import CaseError
+from fdnet.network.analysis import Analysis
 from fdnet.network.flow.sections import reduction
-from fdnet.network.permeability import Analysis
-from fdnet.spheres.porosity import measure_porosity
-from fdnet.spheres.snapshot import Array
 from fdnet.studies.engine.csv_rows import parsed, read_csv, write_csv
 from fdnet.studies.thesis.numbers.examine import Examined
+from fdnet.studies.thesis.numbers.invasion import (
+    FIRST,
+    FIRST_BIN,
+    SHALLOW,
+    deep_near_wall,
+    invaded_depth,
+    porosity_loss,
+)
 from fdnet.studies.thesis.numbers.values import ThesisSpecimen, thesis_of
 from fdnet.studies.thesis.runs.plan import QUICK
 from fdnet.studies.thesis.runs.state import State
 
 SECTIONS = 8
-FIRST, FIRST_BIN, SHALLOW = 1e-3, 0.25e-3, 0.5e-3
-SPREAD = {
+SECTION_COLUMNS = {
     "k_reductions": "k_reduction",
     "k_reductions_inplace": "k_reduction_inplace",
     "thesis_k_reductions": "thesis_k_reduction",
 }
-"""Fields of SECTIONS values, and the name of their columns before `_1` to `_8`."""
+"""Fields of SECTIONS values, and the names of their columns before "_1" to "_8"."""
 
-TOLD = {
+THESIS_FIELDS = {
     "thesis_depth_mm": "invaded_depth_mm",
     "thesis_invaded_count": "invaded_count",
     "thesis_fraction_first_bin": "fraction_first_bin",
@@ -36,18 +41,57 @@ TOLD = {
     "thesis_face_porosity_loss": "face_porosity_loss",
     "thesis_count_first_mm": "count_first_mm",
 }
-"""Fields with one number of the thesis, and its name in `values.ThesisSpecimen`."""
+"""Fields with one number of the thesis, and the name of that number in `ThesisSpecimen`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResultRow:
-    """One run under one pair of laws; nan where there is no value. `digest` is its case's.
+    """One run under one pair of laws; nan where there is no value.
 
-    Porosity counts overlap once, `porosity_loss_first_mm` is its loss between x = 0 and 1 mm; fractions are of the
-    invaded fines by number, `fraction_deep_near_wall` of those beyond 1 mm, the ones less than a grain radius from a
-    side wall; `k_reduction` of the whole, `k_reductions` (8) of the slabs cut out, `k_reductions_inplace` (8) of the
-    slabs in the whole specimen; `time_ms` simulated, `seconds` and `pack_seconds` of the computer; `max_overlap` over
-    the smaller diameter. `thesis_*`: see `values.ThesisSpecimen`.
+    Porosity counts overlap once. Fractions of fines are by number. Reductions are 1 - k/k0.
+
+    Attributes:
+        id: name of the run.
+        seed: seed of the run.
+        digest: digest of its case.
+        law: name of the conductance law.
+        damage_law: name of the damage law.
+        porosity_initial: porosity of the specimen before the invasion.
+        porosity_damaged: porosity of the specimen after it.
+        porosity_loss_first_mm: porosity lost between the face and 1 mm.
+        invaded_count: fines centred in the specimen.
+        count_first_mm: fines centred in its first millimetre.
+        invasion_depth_mm: depth of the deepest fine.
+        invasion_depth_p95_mm: depth above which 95 % of the invaded fines lie.
+        mean_depth_mm: mean depth of the invaded fines.
+        fraction_first_0p25mm: share of the invaded fines in the first 0.25 mm.
+        fraction_first_mm: share in the first millimetre.
+        fraction_beyond_0p5mm: share deeper than 0.5 mm.
+        fraction_deep_near_wall: of the fines deeper than 1 mm, the share less than a mean grain
+            radius from a side wall.
+        k_reduction: reduction of the whole specimen.
+        k_reductions: (8,) reductions of the slabs of 1 mm, cut out of the specimen.
+        k_reductions_inplace: (8,) the same from the pressures of the whole specimen.
+        k_initial_m2: m2, permeability of the whole specimen before the invasion.
+        k_damaged_m2: m2, permeability after it.
+        throats: number of throats.
+        throats_blocked: number of throats that a fine blocks.
+        supplied_count: fines supplied.
+        passed_count: fines that left through the outlet.
+        cake_thickness_mm: thickness of the deposit upstream of the face.
+        stop_reason: why the run ended: "plugged", "supply_exhausted", "duration" or "cap".
+        time_ms: simulated time.
+        seconds: computing time of the invasion.
+        pack_seconds: computing time of the packing.
+        max_overlap: largest overlap over the smaller diameter.
+        thesis_damaged_porosity: see `ThesisSpecimen`, as for all that follow.
+        thesis_depth_mm: `invaded_depth_mm` there.
+        thesis_invaded_count: `invaded_count` there.
+        thesis_k_reductions: (8,) `reductions` there.
+        thesis_fraction_first_bin: `fraction_first_bin` there.
+        thesis_fraction_beyond_0p5mm: `fraction_beyond_0p5mm` there.
+        thesis_face_porosity_loss: `face_porosity_loss` there.
+        thesis_count_first_mm: `count_first_mm` there.
     """
 
     id: str
@@ -96,8 +140,8 @@ COLUMNS = tuple(
     column
     for one in fields(ResultRow)
     for column in (
-        [f"{SPREAD[one.name]}_{section}" for section in range(1, SECTIONS + 1)]
-        if one.name in SPREAD
+        [f"{SECTION_COLUMNS[one.name]}_{section}" for section in range(1, SECTIONS + 1)]
+        if one.name in SECTION_COLUMNS
         else [one.name]
     )
 )
@@ -109,7 +153,7 @@ def result_rows(examined: Examined) -> list[ResultRow]:
         **_porosities(examined.state, examined.thesis),
         **_invasion(examined.state, examined.thesis),
         **_ending(examined.state),
-        **_told(thesis_of(examined.id), counted=not examined.id.startswith(QUICK)),
+        **_thesis_numbers(thesis_of(examined.id), counted=not examined.id.startswith(QUICK)),
     }
     return [
         ResultRow(
@@ -124,57 +168,13 @@ def result_rows(examined: Examined) -> list[ResultRow]:
 
 
 def write_results(path: Path, rows: Sequence[ResultRow]) -> Path:
-    """The rows as CSV, COLUMNS, what is not known left empty."""
+    """Write the rows as CSV with the columns COLUMNS; unknown values are left empty."""
     return write_csv(path, COLUMNS, (list(_cells(row)) for row in rows))
 
 
 def read_results(path: Path) -> list[ResultRow]:
-    """The rows of such a CSV. Raises CaseError when it is not one."""
+    """The rows of a results.csv. Raises CaseError when its columns are others."""
     return [_row(dict(zip(COLUMNS, line, strict=True))) for line in read_csv(path, COLUMNS)]
-
-
-def invaded_depth(state: State) -> Array:
-    """Depth (F,) m of the fines centred in the specimen."""
-    low, high = state.damaged.box[0]
-    x = state.damaged.fines().position[:, 0]
-    return x[(x >= low) & (x < high)] - low
-
-
-def deep_near_wall(state: State) -> float:
-    """Share of the fines beyond 1 mm that are centred within a mean grain radius of a side wall; nan without either."""
-    fines, reach = state.damaged.fines(), state.case.grains.mean_radius_m
-    (low, high), *sides = state.damaged.box
-    deep = (fines.position[:, 0] >= low + FIRST) & (fines.position[:, 0] < high)
-    if any(state.case.periodic) or not deep.any():
-        return math.nan
-    to_wall = [
-        np.minimum(fines.position[deep, i] - a, b - fines.position[deep, i])
-        for i, (a, b) in enumerate(sides, 1)
-    ]
-    return float(np.mean(np.minimum(*to_wall) < reach))
-
-
-def porosity_loss(state: State, analysis: Analysis, depth: float) -> float:
-    """Loss of porosity between the face and `depth` m (the whole specimen when it is shorter): pooled from the
-    profile's bins or the sections where they have a cut there, else measured anew."""
-    low, high = state.damaged.box[0]
-    end = min(float(low) + depth, float(high))
-    profile, sections = analysis.profile, analysis.sections
-    cuts = np.array([sections[0].x_lo, *(one.x_hi for one in sections)])
-    losses = np.array([one.porosity_initial - one.porosity_damaged for one in sections])
-    for edges, loss in (
-        (profile.edges, profile.porosity_initial - profile.porosity_damaged),
-        (cuts, losses),
-    ):
-        count = int(np.argmin(np.abs(edges - end)))
-        if abs(edges[count] - end) <= 1e-9 * (high - low):
-            return float(np.average(loss[:count], weights=np.diff(edges)[:count]))
-    span = np.array([low, end])
-    before, after = (
-        measure_porosity(spheres, periodic=state.case.periodic, edges=span).profile[0]
-        for spheres in (state.grains, state.damaged)
-    )
-    return float(before - after)
 
 
 def _porosities(state: State, analysis: Analysis) -> dict[str, Any]:
@@ -219,7 +219,8 @@ def _permeabilities(run: str, analysis: Analysis) -> dict[str, Any]:
     sections = analysis.sections
     if len(sections) > SECTIONS:
         raise CaseError(
-            f"{run}: analysis.sections: {len(sections)} sections, results.csv has columns for {SECTIONS}"
+            f"{run}: analysis.sections: {len(sections)} sections, but results.csv has columns for "
+            f"{SECTIONS}; ask for at most {SECTIONS}"
         )
     inplace = [reduction(one.k_initial_inplace, one.k_damaged_inplace) for one in sections]
     return {
@@ -237,13 +238,13 @@ def _permeabilities(run: str, analysis: Analysis) -> dict[str, Any]:
     }
 
 
-def _told(thesis: ThesisSpecimen | None, *, counted: bool) -> dict[str, Any]:
-    """The thesis's numbers; counts only when `counted`, for specimens of its size."""
-    told: dict[str, Any] = {
+def _thesis_numbers(thesis: ThesisSpecimen | None, *, counted: bool) -> dict[str, Any]:
+    """The thesis's numbers; its counts only when `counted`, for specimens of its size."""
+    numbers: dict[str, Any] = {
         name: _known(getattr(thesis, field, None)) if counted or "count" not in name else math.nan
-        for name, field in TOLD.items()
+        for name, field in THESIS_FIELDS.items()
     }
-    return told | {
+    return numbers | {
         "thesis_damaged_porosity": thesis.damaged_porosity[0] if thesis else math.nan,
         "thesis_k_reductions": _filled(thesis.reductions if thesis else ()),
     }
@@ -254,21 +255,22 @@ def _known(value: float | None) -> float:
 
 
 def _filled(values: Sequence[float | None]) -> tuple[float, ...]:
-    """SECTIONS values, nan where there is none."""
+    """SECTIONS values, nan in place of those that are missing."""
     return tuple(_known(value) for value in [*values, *[None] * SECTIONS][:SECTIONS])
 
 
 def _cells(row: ResultRow) -> Iterator[object]:
     for one in fields(row):
         value = getattr(row, one.name)
-        yield from value if one.name in SPREAD else (value,)
+        yield from value if one.name in SECTION_COLUMNS else (value,)
 
 
 def _row(cells: dict[str, str]) -> ResultRow:
     values: dict[str, Any] = {}
     for one in fields(ResultRow):
-        if one.name in SPREAD:
-            names = [f"{SPREAD[one.name]}_{section}" for section in range(1, SECTIONS + 1)]
+        if one.name in SECTION_COLUMNS:
+            column = SECTION_COLUMNS[one.name]
+            names = [f"{column}_{section}" for section in range(1, SECTIONS + 1)]
             values[one.name] = tuple(parsed(cells[name], float) for name in names)
         else:
             values[one.name] = parsed(cells[one.name], one.type)

@@ -1,4 +1,7 @@
-"""What the thesis tells of pores and throats of the first section (Figures 42 to 63), measured here."""
+"""What the thesis reports of pores and throats of the first section, measured on our runs.
+
+The thesis's numbers are those of its Figures 42 to 63 (Shi 2011).
+"""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -10,8 +13,9 @@ import numpy as np
 from fdnet.spheres.snapshot import Array
 from fdnet.studies.engine.csv_rows import write_flat
 from fdnet.studies.thesis.numbers.examine import Examined
-from fdnet.studies.thesis.numbers.first_section import FirstSection, first_section
-from fdnet.studies.thesis.numbers.sizes import Sizes, sizes_of_grains_alone
+from fdnet.studies.thesis.numbers.first_millimetre import FirstMillimetre, first_millimetre
+from fdnet.studies.thesis.numbers.grains_alone import sizes_of_grains_alone
+from fdnet.studies.thesis.numbers.pore_sizes import PoreSizes
 from fdnet.studies.thesis.numbers.values import Statistic, specimen_number, thesis_values
 
 WHOLE = "pores of four grains, throats between two such"
@@ -21,8 +25,19 @@ ALONE = "tessellation of the section's grains alone, as the thesis"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StatisticRow:
-    """`ours` beside the `thesis`'s number (nan: it has none for this specimen) and its `sense`; nan where there is
-    nothing to measure it on. `note` tells which pores and throats were counted."""
+    """One quantity of one run; each field is a column of statistics.csv.
+
+    Attributes:
+        id: name of the run.
+        seed: seed of the run.
+        source: figure, table or section of the thesis; empty when it has no number.
+        quantity: what is measured, with its range.
+        ours: our value in `unit`; nan where there is nothing to measure it on.
+        thesis: the thesis's value in `unit`; nan when it has none for this specimen.
+        sense: "exact", "about", "at least" or "at most", of the thesis's value.
+        unit: unit of both values.
+        note: which pores and throats were counted.
+    """
 
     id: str
     seed: int
@@ -37,45 +52,67 @@ class StatisticRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Size:
-    """A size in `unit`: `values` of each pore or throat and their weights."""
+    """A size of each pore or throat.
+
+    Attributes:
+        unit: "mm" or "mm3".
+        values: gives the sizes in that unit and their weights.
+    """
 
     unit: str
-    values: Callable[[Sizes], tuple[Array, Array]]
+    values: Callable[[PoreSizes], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Single:
-    """A quantity of the section as one number in `unit`."""
+    """A quantity of the section as one number.
+
+    Attributes:
+        unit: unit of the number.
+        value: gives the number.
+    """
 
     unit: str
-    value: Callable[[FirstSection], float]
+    value: Callable[[FirstMillimetre], float]
 
 
 def statistics(examined: Examined) -> list[StatisticRow]:
-    """Every quantity the thesis has for any specimen, twice: over whole pores and over those cut by faces as well;
-    sizes also in the tessellation of the section's grains alone."""
+    """Every quantity that the thesis has for any specimen, measured in several ways.
+
+    Each is measured over whole pores, and over those cut by a face as well; sizes also in the
+    tessellation of the section's grains alone.
+    """
     rows = []
-    asked = dict.fromkeys((one.quantity, one.between) for one in thesis_values().statistics)
+    wanted = dict.fromkeys((one.quantity, one.between) for one in thesis_values().statistics)
     for section, note in (
-        (first_section(examined, whole=True), WHOLE),
-        (first_section(examined, whole=False), CUT),
+        (first_millimetre(examined, whole=True), WHOLE),
+        (first_millimetre(examined, whole=False), CUT),
     ):
-        for quantity, between in asked:
+        for quantity, between in wanted:
             rows.append(
                 _row(examined, (quantity, between), measure(section, quantity, between), note)
             )
     alone = sizes_of_grains_alone(examined)
-    for quantity, between in asked:
+    for quantity, between in wanted:
         if quantity in SIZES and between is not None:
-            found = share_of_sizes(alone, quantity, between), "share"
-            rows.append(_row(examined, (quantity, between), found, ALONE))
+            measured = share_of_sizes(alone, quantity, between), "share"
+            rows.append(_row(examined, (quantity, between), measured, ALONE))
     return rows
 
 
 def measure(
-    section: FirstSection, quantity: str, between: tuple[float, float] | None
+    section: FirstMillimetre, quantity: str, between: tuple[float, float] | None
 ) -> tuple[float, str]:
-    """The value and unit of `quantity`; with `between` the share of it in [low, high), sizes in mm, volumes in mm3."""
+    """The value of a quantity of the section, and its unit.
+
+    Args:
+        section: pores and throats of the first millimetre.
+        quantity: a name in SIZES or SINGLES, or POROSITY.
+        between: (low, high), mm or mm3, for the share of the quantity in [low, high).
+
+    Raises:
+        KeyError: the quantity is not known.
+    """
     if between is None:
         return SINGLES[quantity].value(section), SINGLES[quantity].unit
     if quantity in SIZES:
@@ -85,26 +122,30 @@ def measure(
     return share(within(section.occupancy.throat_porosity, between), _with_fines(section)), "share"
 
 
-def share_of_sizes(sizes: Sizes, quantity: str, between: tuple[float, float]) -> float:
-    """Share of one of SIZES in [low, high), mm or mm3."""
+def share_of_sizes(sizes: PoreSizes, quantity: str, between: tuple[float, float]) -> float:
+    """Share of one of SIZES in the range [low, high), mm or mm3."""
     values, weights = SIZES[quantity].values(sizes)
     return share(within(values, between), weights)
 
 
 def within(values: Array, between: tuple[float, float]) -> Array:
-    """True (N,) in [low, high); low 0 takes in what overlap puts below it, high 1 (a porosity's) what is at it."""
+    """Whether each value (N,) lies in [low, high).
+
+    A low end of 0 also takes in what overlap puts below it; a high end of 1, a porosity's, also
+    takes in what is at it.
+    """
     low, high = between[0] or -math.inf, between[1] if between[1] != 1.0 else math.inf
     return np.asarray((values >= low) & (values < high))
 
 
 def share(part: Array, weights: Array) -> float:
-    """Share of `part` (N,) true, by `weights` (N,); nan when they sum to nothing."""
+    """Share of the weights (N,) where `part` (N,) is true; nan when the weights sum to 0."""
     total = float(np.sum(weights))
     return float(np.sum(weights[part])) / total if total > 0 else math.nan
 
 
 def write_statistics(path: Path, rows: Sequence[StatisticRow]) -> Path:
-    """statistics.csv."""
+    """Write statistics.csv."""
     return write_flat(path, StatisticRow, rows)
 
 
@@ -117,36 +158,40 @@ def _label(quantity: str, between: tuple[float, float] | None) -> str:
 
 def _row(
     examined: Examined,
-    asked: tuple[str, tuple[float, float] | None],
-    found: tuple[float, str],
+    wanted: tuple[str, tuple[float, float] | None],
+    measured: tuple[float, str],
     note: str,
 ) -> StatisticRow:
-    told = _told(examined.id, *asked)
+    thesis = _thesis_number(examined.id, *wanted)
     return StatisticRow(
         id=examined.id,
         seed=examined.seed,
-        source=told.source if told else "",
-        quantity=_label(*asked),
-        ours=found[0],
-        thesis=told.value if told else math.nan,
-        sense=told.sense if told else "",
-        unit=found[1],
-        note=f"{note}; {told.note}" if told and told.note else note,
+        source=thesis.source if thesis else "",
+        quantity=_label(*wanted),
+        ours=measured[0],
+        thesis=thesis.value if thesis else math.nan,
+        sense=thesis.sense if thesis else "",
+        unit=measured[1],
+        note=f"{note}; {thesis.note}" if thesis and thesis.note else note,
     )
 
 
-def _told(run: str, quantity: str, between: tuple[float, float] | None) -> Statistic | None:
+def _thesis_number(
+    run: str, quantity: str, between: tuple[float, float] | None
+) -> Statistic | None:
     """The thesis's number for the run's specimen."""
-    asked = specimen_number(run), quantity, between
-    told = thesis_values().statistics
-    return next((one for one in told if (one.specimen, one.quantity, one.between) == asked), None)
+    wanted = specimen_number(run), quantity, between
+    for one in thesis_values().statistics:
+        if (one.specimen, one.quantity, one.between) == wanted:
+            return one
+    return None
 
 
-def _with_fines(section: FirstSection) -> Array:
+def _with_fines(section: FirstMillimetre) -> Array:
     return section.throat_weight * section.has_fines
 
 
-def _mean_porosity(section: FirstSection) -> float:
+def _mean_porosity(section: FirstMillimetre) -> float:
     weight = _with_fines(section)
     return (
         float(np.average(section.occupancy.throat_porosity, weights=weight))
@@ -155,28 +200,28 @@ def _mean_porosity(section: FirstSection) -> float:
     )
 
 
-def _fines_in_throats(section: FirstSection) -> float:
-    """mm3, a fine counted in every throat it reaches into (throats overlap)."""
+def _fines_in_throats(section: FirstMillimetre) -> float:
+    """Volume in mm3; a fine counts in every throat it reaches into, for throats overlap."""
     return 1e9 * float(np.sum(section.throat_weight * section.occupancy.throat_solid_volume))
 
 
-def _fines_in_bodies(section: FirstSection) -> float:
-    """mm3, each fine once: the bodies are the tetrahedra."""
+def _fines_in_bodies(section: FirstMillimetre) -> float:
+    """Volume in mm3; each fine counts once, for the pore bodies are the tetrahedra."""
     return 1e9 * float(np.sum(section.pore_weight * section.occupancy.pore_solid_volume))
 
 
-def _overall_throat_porosity(section: FirstSection) -> float:
+def _overall_throat_porosity(section: FirstMillimetre) -> float:
     tube = 1e9 * float(np.sum(section.throat_weight * section.tube))
     return 1.0 - _fines_in_throats(section) / tube if tube > 0 else math.nan
 
 
-def _overall_body_porosity(section: FirstSection) -> float:
-    """1 - fines / void; over whole tetrahedra it could not exceed the specimen's porosity, 0.40."""
+def _overall_body_porosity(section: FirstMillimetre) -> float:
+    """1 - fines / void; over whole tetrahedra it could not exceed the specimen's 0.40."""
     void = 1e9 * float(np.sum(section.pore_weight * section.network.pore_volume))
     return 1.0 - _fines_in_bodies(section) / void if void > 0 else math.nan
 
 
-def _throat_share(section: FirstSection) -> float:
+def _throat_share(section: FirstMillimetre) -> float:
     both = _fines_in_throats(section) + _fines_in_bodies(section)
     return _fines_in_throats(section) / both if both > 0 else math.nan
 

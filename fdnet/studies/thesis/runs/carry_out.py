@@ -1,4 +1,7 @@
-"""Runs what is planned, several side by side, and keeps the state each ended in; goes on where it was cut."""
+"""Run what is planned, several runs at the same time, and keep the state in which each ended.
+
+A run that was cut is continued.
+"""
 
 import multiprocessing as mp
 import shutil
@@ -9,22 +12,35 @@ from dataclasses import replace
 from pathlib import Path
 
 from fdnet.case.case import Case
-from fdnet.scales.cost import cost_of
 from fdnet.errors import CaseError, FdnetError
 from fdnet.run.pipeline import RunOptions, run_case
+from fdnet.scales.cost import cost_of
 from fdnet.scales.scales import scales_of
 from fdnet.studies.engine.runner import eta
 from fdnet.studies.thesis.runs.plan import Planned
 from fdnet.studies.thesis.runs.state import State, read_state, state_of_run, write_state
 
-Tell = Callable[[str], None]
+Report = Callable[[str], None]
+"""Takes a line on the progress."""
 
 
-def carry_out(plan: Sequence[Planned], out: Path, runs: Path, *, jobs: int, tell: Tell) -> dict[Planned, str]:
-    """Run all that has no state in `out` yet, the cheapest first; returns what failed, with the reason.
+def carry_out(
+    plan: Sequence[Planned], out: Path, runs: Path, *, jobs: int, report: Report
+) -> dict[Planned, str]:
+    """Run everything that has no state yet, the cheapest first.
 
-    A run folder in `runs` that was cut is continued, and removed once its state is kept. Two runs whose invasions are
-    the same (Table 3 and specimen 7) are run once.
+    A run folder that was cut is continued, and removed once its state is kept. Two runs with the
+    same invasion (Table 3 and specimen 7) are run once.
+
+    Args:
+        plan: the runs of the study.
+        out: folder of the states.
+        runs: folder of the run folders.
+        jobs: number of runs at the same time.
+        report: takes a line on the progress.
+
+    Returns:
+        The runs that failed, with the reason.
     """
     out.mkdir(parents=True, exist_ok=True)
     cases = {item: item.load() for item in plan}
@@ -32,8 +48,17 @@ def carry_out(plan: Sequence[Planned], out: Path, runs: Path, *, jobs: int, tell
     done = [item for item in plan if find_state(out, item, cases[item]) is not None]
     waiting = sorted(set(plan) - set(done), key=lambda item: (costs[item], item.slug))
     first: dict[str, Planned] = {}
-    twins = {item: first.setdefault(cases[item].digest("invade"), item) for item in [*done, *waiting]}
-    failed = _run_all([item for item in waiting if twins[item] is item], costs, out, runs, jobs=jobs, tell=tell)
+    twins = {
+        item: first.setdefault(cases[item].digest("invade"), item) for item in [*done, *waiting]
+    }
+    failed = _run_all(
+        [item for item in waiting if twins[item] is item],
+        costs,
+        out,
+        runs,
+        jobs=jobs,
+        report=report,
+    )
     for item in waiting:
         if twins[item] is not item and twins[item] not in failed:
             _adopt(state_path(out, twins[item]), state_path(out, item), cases[item])
@@ -41,7 +66,13 @@ def carry_out(plan: Sequence[Planned], out: Path, runs: Path, *, jobs: int, tell
 
 
 def _run_all(
-    todo: Sequence[Planned], costs: dict[Planned, float], out: Path, runs: Path, *, jobs: int, tell: Tell
+    todo: Sequence[Planned],
+    costs: dict[Planned, float],
+    out: Path,
+    runs: Path,
+    *,
+    jobs: int,
+    report: Report,
 ) -> dict[Planned, str]:
     failed: dict[Planned, str] = {}
     left, done, start = sum(costs[item] for item in todo), 0.0, time.monotonic()
@@ -54,12 +85,12 @@ def _run_all(
             if error:
                 failed[item] = error
             ahead = (time.monotonic() - start) * left / done if done else 0.0
-            tell(f"{item.id}, seed {item.seed}: {error or 'done'}{eta(ahead)}")
+            report(f"{item.id}, seed {item.seed}: {error or 'done'}{eta(ahead)}")
     return failed
 
 
 def _result(future: Future[str]) -> str:
-    """What a run says, or how its process failed: the others go on."""
+    """Why a run failed ("" when it did not), also when its process failed."""
     try:
         return future.result()
     except Exception as error:
@@ -67,11 +98,16 @@ def _result(future: Future[str]) -> str:
 
 
 def run_one(item: Planned, out: Path, runs: Path) -> str:
-    """Run or continue one; returns "" or why it failed. Its run folder stays when it failed."""
+    """Run or continue one run; returns "" or why it failed.
+
+    The run folder of a failed run stays.
+    """
     folder = runs / item.slug
     try:
         case = item.load()
-        options = RunOptions(out=folder, resume=folder.exists(), stages=("pack", "invade"), show_progress=False)
+        options = RunOptions(
+            out=folder, resume=folder.exists(), stages=("pack", "invade"), show_progress=False
+        )
         run_case(case, options)
         write_state(state_path(out, item), state_of_run(folder))
     except FdnetError as error:
@@ -81,26 +117,29 @@ def run_one(item: Planned, out: Path, runs: Path) -> str:
 
 
 def state_path(out: Path, item: Planned) -> Path:
-    """Where the state of a run is kept."""
+    """The file in which the state of a run is kept."""
     return out / f"{item.slug}.npz"
 
 
 def find_state(out: Path, item: Planned, case: Case) -> State | None:
-    """The kept state of a run, to be examined as the case now asks; None when there is none.
+    """The kept state of a run, with the analysis options of the given case.
 
-    Raises CaseError when it is broken or the state of another invasion.
+    Returns None when there is no such state. Raises CaseError when the state is broken or that of
+    another invasion.
     """
     path = state_path(out, item)
     if not path.exists():
         return None
-    found = read_state(path)
-    if found.case.digest("invade") != case.digest("invade"):
-        raise CaseError(f"{path}: is the state of another case than {item.id}; remove it to run the case anew")
-    return replace(found, case=case)
+    state = read_state(path)
+    if state.case.digest("invade") != case.digest("invade"):
+        raise CaseError(
+            f"{path}: is the state of another case than {item.id}; remove it to run the case anew"
+        )
+    return replace(state, case=case)
 
 
 def _adopt(source: Path, target: Path, case: Case) -> None:
-    """The same invasion under another name."""
+    """Keep the state of the same invasion under another name."""
     write_state(target, replace(read_state(source), case=case))
 
 

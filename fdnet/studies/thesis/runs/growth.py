@@ -1,4 +1,7 @@
-"""How a pack grows (Shi 2011, appendix A, Figures 73 and 74): its states on the way from small spheres to rest."""
+"""How a pack grows: stages between small spheres and the pack at rest.
+
+The thesis shows them in its appendix A (Shi 2011, Figures 73 and 74).
+"""
 
 from pathlib import Path
 
@@ -6,43 +9,58 @@ import numpy as np
 
 from fdnet.atomic import write_bytes
 from fdnet.case.case import Case
-from fdnet.spheres.dump import read_frame
 from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.packing import write_pack_inputs
 from fdnet.dem.scene import box_of, snapshot_of
 from fdnet.errors import CaseError
 from fdnet.scales.scales import PACK_STAGES, scales_of
+from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Kind, Snapshot
 from fdnet.studies.thesis.runs.state import BROKEN, packed_bytes
 
 GROWTH = "growth.npz"
 SHOWN = (1, PACK_STAGES)
-"""Stages shown beside the pack at rest: the first, and the last, when spheres have their size and overlap most."""
+"""Stages shown with the pack at rest: the first and the last.
+
+At the end of the last stage the spheres have their size and overlap most.
+"""
 
 
 def grow(case: Case, folder: Path, launch: Launch, *, count: int) -> tuple[Snapshot, ...]:
-    """The pack of `count` grains after the stages SHOWN and at rest. Raises LiggghtsError when the run fails."""
+    """The pack of `count` grains after the stages SHOWN, and at rest.
+
+    Raises LiggghtsError when the run fails.
+    """
     (folder / "post").mkdir(parents=True, exist_ok=True)
     write_pack_inputs(case, scales_of(case), folder, count=count, shown=SHOWN)
     run_deck(folder, "in.pack", launch)
     names = [*(f"grown_{stage}.dump" for stage in SHOWN), "pack.dump"]
-    return tuple(snapshot_of(read_frame(folder / "post" / name), case, time_s=0.0) for name in names)
+    return tuple(
+        snapshot_of(read_frame(folder / "post" / name), case, time_s=0.0) for name in names
+    )
 
 
 def write_growth(path: Path, stages: tuple[Snapshot, ...]) -> None:
-    """Keep the stages in one file, single precision: x, y, z, radius m and velocity m/s of each grain."""
+    """Keep the stages in one file in single precision.
+
+    Each grain has a row: x, y, z and radius in m, and the velocity in m/s.
+    """
     tables = [np.column_stack([one.position, one.radius, one.velocity]) for one in stages]
     steps = np.array([one.step for one in stages])
-    write_bytes(path, packed_bytes({"grains": np.stack(tables).astype(np.float32), "steps": steps}))
+    write_bytes(
+        path, packed_bytes({"grains": np.stack(tables).astype(np.float32), "steps": steps})
+    )
 
 
 def read_growth(path: Path, case: Case) -> tuple[Snapshot, ...]:
-    """The stages kept by `write_growth`. Raises CaseError when the file holds none."""
+    """The stages that `write_growth` kept. Raises CaseError when the file is broken."""
     try:
         with np.load(path) as file:
             tables, steps = file["grains"].astype(float), file["steps"]
     except BROKEN as error:
-        raise CaseError(f"{path}: holds no growth of a pack ({error}); run the study anew to write it") from error
+        raise CaseError(
+            f"{path}: holds no growth of a pack ({error}); run the study anew to write it"
+        ) from error
     return tuple(
         Snapshot(
             step=int(step),

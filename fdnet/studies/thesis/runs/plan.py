@@ -1,4 +1,4 @@
-"""Which runs the study of the thesis is made of."""
+"""The runs that make the study of the thesis."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -12,15 +12,23 @@ from fdnet.scales.scales import scales_of
 
 SPECIMENS = tuple(f"specimen{number}" for number in range(1, 9))
 VARIANTS = ("specimen1-7to8", "specimen1-1410", "specimen5-5to6", "table3")
-CHEAP = frozenset({"specimen1", "specimen2", "specimen4", "specimen5", "specimen1-7to8", "specimen1-1410"})
-"""Run with SEEDS seeds; the others, of up to an hour each, with one (their trends come from the quick forms)."""
+CHEAP = frozenset(
+    {"specimen1", "specimen2", "specimen4", "specimen5", "specimen1-7to8", "specimen1-1410"}
+)
+"""Cases that are run with SEEDS seeds.
+
+The others take up to an hour each and are run with one; their trends come from the quick forms.
+"""
 SEEDS, QUICK_SEEDS, SCAN_SEEDS = 3, 5, 3
 FRICTIONS = (0.0, 0.1)
-"""Friction of the fines beside the cases' own 0.55."""
+"""Frictions of the fines that are tried; the cases have 0.55."""
 MULTIPLIERS = (0.3, 3.0, 10.0)
-"""Drag multipliers beside 1; springs are stiffened with them, so that stronger drag does not press spheres together."""
+"""Drag multipliers that are tried; the cases have 1.
+
+Springs are stiffened with them, so that stronger drag does not press spheres together.
+"""
 SUPPLIES = (0.25, 0.5, 2.0)
-"""Fines supplied over those of the case."""
+"""Numbers of fines supplied that are tried, relative to that of the case."""
 REASONS = (
     "grains.motion=mobile",
     "run.stiffness_N_m=100.0",
@@ -28,60 +36,80 @@ REASONS = (
     "drag.multiplier=30",
     "box.sides=periodic",
 )
-"""What might let more fines into specimen 1: grains that give way, soft contacts, porosity counted as a plain sum of
-spheres (1,369 leave 0.30), drag, no walls."""
+"""Settings that might let more fines into specimen 1.
+
+They are mobile grains, soft contacts, a porosity counted as the plain sum of the spheres (1,369
+grains leave 0.30), strong drag, and no walls.
+"""
 BASE_VALUES = {"friction": 0.55, "drag": 1.0, "supply": 1.0}
-"""What the cases themselves have of each knob, by group."""
+"""The value of each scanned quantity in the cases themselves, by group."""
 QUICK = "quick-"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Planned:
-    """One run: a case file of `cases/` with other settings ("key=value") and seed.
+    """One run: a shipped case with a seed and with changed settings.
 
-    `beside` are settings that go with the others and are not told in the name. `group` is "specimen", "variant",
-    "quick", "reason" or what is scanned: "friction", "drag", "supply"; `value` that knob.
+    Attributes:
+        case: name of the case, with "quick-" before it for its quick form.
+        group: "specimen", "variant", "quick", "reason", or the quantity that is scanned:
+            "friction", "drag" or "supply".
+        seed: seed of the run.
+        settings: changed settings as "key=value", which stand in the run's name.
+        consequences: settings that follow from the others and do not stand in the name.
+        value: value of the scanned quantity; nan without one.
     """
 
     case: str
     group: str
     seed: int = 1
     settings: tuple[str, ...] = ()
-    beside: tuple[str, ...] = ()
+    consequences: tuple[str, ...] = ()
     value: float = float("nan")
 
     @property
     def id(self) -> str:
-        """Name of the run among all seeds."""
+        """Name of the run, the same for all seeds."""
         return " ".join([self.case, *self.settings])
 
     @property
     def slug(self) -> str:
-        """Name of its files."""
-        return "".join(c if c.isalnum() or c in ".=-" else "_" for c in self.id) + f"-seed{self.seed}"
+        """Name of the files of the run."""
+        return (
+            "".join(c if c.isalnum() or c in ".=-" else "_" for c in self.id) + f"-seed{self.seed}"
+        )
 
     def load(self) -> Case:
-        """Its case. Raises CaseError when the case file is missing or wrong."""
-        return read_case(case_path(self.case), assignments=[f"seed={self.seed}", *self.settings, *self.beside])
+        """Read its case. Raises CaseError when the case file is missing or wrong."""
+        return read_case(
+            case_path(self.case),
+            assignments=[f"seed={self.seed}", *self.settings, *self.consequences],
+        )
 
 
 def cases_folder() -> Path:
-    """Where the shipped cases are: inside an installed package, beside an editable one."""
+    """The folder of the shipped cases: in an installed package, or next to an editable one."""
     package = Path(str(files("fdnet")))
     for folder in (package / "cases", package.parent / "cases"):
         if folder.is_dir():
             return folder
-    raise CaseError(f"{package.parent / 'cases'}: the shipped case files are missing; install fdnet again")
+    raise CaseError(
+        f"{package.parent / 'cases'}: the shipped case files are missing; install fdnet again"
+    )
 
 
 def case_path(name: str) -> Path:
     """The file of a shipped case; "quick-NAME" is the quick form of NAME."""
     quick = name.startswith(QUICK)
-    return cases_folder() / ("quick" if quick else "") / f"{name.removeprefix(QUICK) if quick else name}.toml"
+    return (
+        cases_folder()
+        / ("quick" if quick else "")
+        / f"{name.removeprefix(QUICK) if quick else name}.toml"
+    )
 
 
 def planned(*, quick: bool) -> list[Planned]:
-    """All runs of the study, or one of each quick form."""
+    """All runs of the study, or with `quick` one run of each quick form."""
     forms = [QUICK + name for name in (*SPECIMENS, *VARIANTS)]
     if quick:
         return [Planned(case=name, group="quick") for name in forms]
@@ -90,7 +118,11 @@ def planned(*, quick: bool) -> list[Planned]:
         for name in (*SPECIMENS, *VARIANTS)
         for seed in range(1, (SEEDS if name in CHEAP else 1) + 1)
     ]
-    runs += [Planned(case=name, group="quick", seed=seed) for name in forms for seed in range(1, QUICK_SEEDS + 1)]
+    runs += [
+        Planned(case=name, group="quick", seed=seed)
+        for name in forms
+        for seed in range(1, QUICK_SEEDS + 1)
+    ]
     return [*runs, *_scans()]
 
 
@@ -103,7 +135,9 @@ def _scans() -> Iterator[Planned]:
         for item in _scan("drag", "drag.multiplier", [QUICK + name], MULTIPLIERS):
             stiffness = read_case(case_path(item.case)).run.stiffness_N_m
             assert isinstance(stiffness, float)
-            yield replace(item, beside=(f"run.stiffness_N_m={stiffness * max(1.0, item.value)!r}",))
+            yield replace(
+                item, consequences=(f"run.stiffness_N_m={stiffness * max(1.0, item.value)!r}",)
+            )
     for name in (QUICK + "specimen5", QUICK + "specimen6"):
         case = read_case(case_path(name))
         assert case.fines is not None
@@ -111,21 +145,32 @@ def _scans() -> Iterator[Planned]:
         for factor in SUPPLIES:
             setting = f"fines.count={round(factor * case.fines.count)}"
             for seed in range(1, SCAN_SEEDS + 1):
-                beside = _longer(case, factor)
-                yield Planned(case=name, group="supply", seed=seed, settings=(setting,), beside=beside, value=factor)
+                consequences = _longer(case, factor)
+                yield Planned(
+                    case=name,
+                    group="supply",
+                    seed=seed,
+                    settings=(setting,),
+                    consequences=consequences,
+                    value=factor,
+                )
 
 
 def _longer(case: Case, factor: float) -> tuple[str, ...]:
-    """A cap moved by what the slab's arrival takes longer."""
-    if case.run.cap_ms is None:
+    """The cap on the simulated time, moved by the longer arrival of a longer slab."""
+    if case.run.cap_s is None:
         return ()
     scales = scales_of(case)
-    arrival = 1e3 * scales.slab_length / scales.upstream_velocity
-    return (f"run.cap_ms={case.run.cap_ms + (factor - 1) * arrival:.4g}",)
+    arrival = scales.slab_length / scales.upstream_velocity
+    return (f"run.cap_ms={1e3 * (case.run.cap_s + (factor - 1) * arrival):.4g}",)
 
 
-def _scan(group: str, key: str, cases: Sequence[str], values: Sequence[float]) -> Iterator[Planned]:
+def _scan(
+    group: str, key: str, cases: Sequence[str], values: Sequence[float]
+) -> Iterator[Planned]:
     for case in cases:
         for value in values:
             for seed in range(1, SCAN_SEEDS + 1):
-                yield Planned(case=case, group=group, seed=seed, settings=(f"{key}={value:g}",), value=value)
+                yield Planned(
+                    case=case, group=group, seed=seed, settings=(f"{key}={value:g}",), value=value
+                )

@@ -1,4 +1,7 @@
-"""The state an invasion ended in, small enough to keep: all spheres, the case, and how it ended."""
+"""The state at the end of an invasion: all spheres, the case, and how it ended.
+
+A state is small enough to be kept with the project.
+"""
 
 import json
 import tomllib
@@ -16,11 +19,11 @@ from fdnet.atomic import write_bytes
 from fdnet.case.case import Case
 from fdnet.case.file import case_from, read_case
 from fdnet.dem.checkpoint import read_history, state_at
-from fdnet.spheres.dump import read_frame
 from fdnet.dem.scene import box_of, snapshot_of
 from fdnet.errors import CaseError
 from fdnet.run.folder import CASE, read_record
 from fdnet.scales.scales import scales_of
+from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 
 ENDING = (
@@ -37,16 +40,22 @@ ENDING = (
 )
 
 BROKEN = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error)
-"""What reading a damaged npz raises."""
+"""The errors that reading a damaged npz raises."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class State:
-    """`grains` as packed, `damaged` the grains and all remaining fines at the end (those upstream too).
+    """A specimen before and after its invasion.
 
-    `history` (C, 4) columns time s, upstream, invaded, passed at each checkpoint. `ending` holds the keys of ENDING:
-    `supplied`, `passed`, `upstream` fines, `stop_reason`, `seconds` of the invasion and `pack_seconds`, `steps` of
-    `dt_s`, `max_overlap` over the smaller diameter, `warnings`.
+    Attributes:
+        case: the case of the run.
+        grains: the grains as packed.
+        damaged: the grains and all remaining fines at the end, those upstream too.
+        history: (C, 4) time in s and numbers of fines upstream, invaded and passed, one row a
+            checkpoint.
+        ending: by the keys of ENDING: numbers of fines supplied, passed and upstream;
+            `stop_reason`; computing times `seconds` of the invasion and `pack_seconds`; number of
+            `steps` and their length `dt_s`; `max_overlap` over the smaller diameter; `warnings`.
     """
 
     case: Case
@@ -57,11 +66,16 @@ class State:
 
 
 def state_of_run(folder: Path) -> State:
-    """The end of a finished invasion in a run folder. Raises CaseError when there is none, DumpError on a cut dump."""
+    """The end of a finished invasion in a run folder.
+
+    Raises CaseError when the folder holds none, DumpError when a dump is cut.
+    """
     case = read_case(folder / CASE)
     pack, invasion = read_record(folder, "pack"), read_record(folder, "invade")
     if pack is None or invasion is None:
-        raise CaseError(f"{folder}: holds no finished invasion; run it to its end first (--resume)")
+        raise CaseError(
+            f"{folder}: holds no finished invasion; run it to its end first (--resume)"
+        )
     scales, history = scales_of(case), read_history(folder / "invade")
     grains = snapshot_of(read_frame(folder / "pack" / "post" / "pack.dump"), case, time_s=0.0)
     last = history[-1]
@@ -69,19 +83,28 @@ def state_of_run(folder: Path) -> State:
         case=case,
         grains=grains,
         damaged=state_at(folder / "invade", last, case, scales, grains),
-        history=np.array([[r.step * scales.time_step, r.upstream, r.invaded, r.passed] for r in history]),
-        ending={name: invasion[name] for name in ("stop_reason", "seconds", "steps", "dt_s", "max_overlap")}
+        history=np.array(
+            [[r.step * scales.time_step, r.upstream, r.invaded, r.passed] for r in history]
+        ),
+        ending={
+            name: invasion[name]
+            for name in ("stop_reason", "seconds", "steps", "dt_s", "max_overlap")
+        }
         | {"supplied": invasion["supplied"], "passed": last.passed, "upstream": last.upstream}
         | {"pack_seconds": pack["seconds"], "warnings": invasion["warnings"]},
     )
 
 
 def write_state(path: Path, state: State) -> None:
-    """Keep a state in one file of single precision (0.5 nm at 8 mm), compressed."""
-    text = json.dumps({"case": state.case.toml(), "ending": dict(state.ending), "step": state.damaged.step})
+    """Keep a state in one compressed file of single precision (0.5 nm at 8 mm)."""
+    text = json.dumps(
+        {"case": state.case.toml(), "ending": dict(state.ending), "step": state.damaged.step}
+    )
     arrays = {"text": np.frombuffer(text.encode(), np.uint8), "history": state.history}
     for name, spheres in (("grains", state.grains), ("damaged", state.damaged)):
-        arrays[f"{name}_place"] = np.column_stack([spheres.position, spheres.radius]).astype(np.float32)
+        arrays[f"{name}_place"] = np.column_stack([spheres.position, spheres.radius]).astype(
+            np.float32
+        )
         arrays[f"{name}_kind"] = spheres.kind.astype(np.uint8)
         arrays[f"{name}_id"] = spheres.id.astype(np.uint32)
     write_bytes(path, packed_bytes(arrays))
@@ -95,24 +118,33 @@ def packed_bytes(arrays: Mapping[str, Array]) -> bytes:
 
 
 def read_state(path: Path) -> State:
-    """A state kept by `write_state`; velocities are not kept (0). Raises CaseError when the file is no state."""
+    """Read a state that `write_state` kept; velocities are not kept and are 0.
+
+    Raises CaseError when the file is no state.
+    """
     try:
         with np.load(path) as file:
             arrays = dict(file)
-        told = json.loads(arrays["text"].tobytes())
-        case = case_from(tomllib.loads(told["case"]), source=str(path))
+        text = json.loads(arrays["text"].tobytes())
+        case = case_from(tomllib.loads(text["case"]), source=str(path))
         return State(
             case=case,
             grains=_spheres(arrays, "grains", case, 0, 0.0),
-            damaged=_spheres(arrays, "damaged", case, told["step"], told["step"] * told["ending"]["dt_s"]),
+            damaged=_spheres(
+                arrays, "damaged", case, text["step"], text["step"] * text["ending"]["dt_s"]
+            ),
             history=arrays["history"],
-            ending={name: told["ending"][name] for name in ENDING},
+            ending={name: text["ending"][name] for name in ENDING},
         )
     except BROKEN as error:
-        raise CaseError(f"{path}: is no state of an invasion ({error}); run the study anew to write it") from error
+        raise CaseError(
+            f"{path}: is no state of an invasion ({error}); run the study anew to write it"
+        ) from error
 
 
-def _spheres(arrays: Mapping[str, Array], name: str, case: Case, step: int, time_s: float) -> Snapshot:
+def _spheres(
+    arrays: Mapping[str, Array], name: str, case: Case, step: int, time_s: float
+) -> Snapshot:
     place = arrays[f"{name}_place"].astype(float)
     kind = arrays[f"{name}_kind"].astype(int)
     return Snapshot(
@@ -128,8 +160,8 @@ def _spheres(arrays: Mapping[str, Array], name: str, case: Case, step: int, time
 
 
 def _exact_radius(radius: Array, kind: Array, case: Case) -> Array:
-    """Radii of a single size as the case gives them, in full precision."""
+    """Radii of spheres of a single size, as the case gives them, in full precision."""
     for spheres, which in ((case.grains, Kind.GRAIN), (case.fines, Kind.FINE)):
-        if spheres is not None and not isinstance(spheres.radius_mm, tuple):
+        if spheres is not None and spheres.one_size:
             radius = np.where(kind == which, spheres.mean_radius_m, radius)
     return radius

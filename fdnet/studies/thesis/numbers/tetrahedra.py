@@ -1,4 +1,7 @@
-"""Tetrahedra of all spheres of the first section against those of its grains alone (Shi 2011, Figures 33 to 35)."""
+"""Tetrahedra of all spheres of the first section, and of its grains alone.
+
+Figures 33 to 35 of the thesis (Shi 2011) show them.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,14 +12,23 @@ import numpy as np
 from fdnet.spheres.snapshot import Array, Kind
 from fdnet.studies.engine.csv_rows import write_flat
 from fdnet.studies.thesis.numbers.examine import Examined
-from fdnet.studies.thesis.numbers.sizes import tessellated
+from fdnet.studies.thesis.numbers.grains_alone import delaunay_of
 from fdnet.studies.thesis.numbers.values import thesis_values
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TetrahedraCount:
-    """Delaunay tetrahedra of the `grains` and `fines` centred in the first section; `ratio` of all to those of the
-    grains alone."""
+    """Delaunay tetrahedra of the spheres centred in the first section of one run.
+
+    Attributes:
+        id: name of the run.
+        seed: seed of the run.
+        grains: number of grains.
+        fines: number of fines.
+        tetrahedra_all: tetrahedra of grains and fines together.
+        tetrahedra_grains: tetrahedra of the grains alone.
+        ratio: the former over the latter.
+    """
 
     id: str
     seed: int
@@ -28,7 +40,10 @@ class TetrahedraCount:
 
 
 def count_tetrahedra(examined: Examined) -> TetrahedraCount:
-    """Counted in the final positions; by centres only, as the thesis does, walls and periodic sides apart."""
+    """Count them in the final positions.
+
+    Only the centres count, as in the thesis; walls and periodic sides play no part.
+    """
     spheres = examined.state.damaged
     low, high = spheres.box[0]
     x = spheres.position[:, 0]
@@ -49,11 +64,11 @@ def count_tetrahedra(examined: Examined) -> TetrahedraCount:
 
 
 def tetrahedra(position: Array) -> int:
-    """How many Delaunay tetrahedra the points (N, 3) m have; 0 for fewer than four."""
-    found = tessellated(position)
-    return 0 if found is None else len(found[0])
+    """Number of Delaunay tetrahedra of the points (N, 3) m; 0 for fewer than four points."""
+    tessellation = delaunay_of(position)
+    return 0 if tessellation is None else len(tessellation[0])
 
 
-def write_counts(path: Path, counts: Sequence[TetrahedraCount]) -> Path:
-    """One line a run."""
+def write_tetrahedra(path: Path, counts: Sequence[TetrahedraCount]) -> Path:
+    """Write tetrahedra.csv, one line for each run."""
     return write_flat(path, TetrahedraCount, counts)

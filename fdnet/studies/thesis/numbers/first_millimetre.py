@@ -1,4 +1,7 @@
-"""The first millimetre of a specimen, which the thesis examines in detail (Shi 2011, section 3.3)."""
+"""The first millimetre of a specimen.
+
+The thesis examines it in detail (Shi 2011, section 3.3).
+"""
 
 from dataclasses import dataclass
 
@@ -9,17 +12,24 @@ from fdnet.network.fines.occupancy import Occupancy
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array
 from fdnet.studies.thesis.numbers.examine import Examined
-from fdnet.studies.thesis.numbers.sizes import Sizes
+from fdnet.studies.thesis.numbers.pore_sizes import PoreSizes
 from fdnet.studies.thesis.numbers.values import thesis_values
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class FirstSection:
-    """Pores (P) and throats (T) of the whole network with the weight each has here, 0 for those centred elsewhere.
+class FirstMillimetre:
+    """The P pores and T throats of the whole network, weighted for the first millimetre.
 
-    `whole`: only pores of four grains of the specimen and throats between two such count, 1 each. Else those cut by a
-    face count as well, each by the part inside (1/2, 1/4, 1/8): together they fill the section. Facets within one
-    polyhedron, split at will, are no throats.
+    Facets within one polyhedron, which may be split in several ways, are no throats.
+
+    Attributes:
+        network: the pores and throats of the whole specimen.
+        occupancy: what the fines fill in them.
+        pore_weight: (P,) 1 for a pore that counts whole, 0 for one centred elsewhere.
+        throat_weight: (T,) likewise for throats.
+        whole: True when only pores of four grains of the specimen, and throats between two such
+            pores, count. False when those cut by a face of the specimen count too, each by the
+            part inside (1/2, 1/4 or 1/8); together these fill the section.
     """
 
     network: Network
@@ -29,9 +39,9 @@ class FirstSection:
     whole: bool
 
     @property
-    def sizes(self) -> Sizes:
+    def sizes(self) -> PoreSizes:
         """Sizes of its pores and throats."""
-        return Sizes(
+        return PoreSizes(
             pore_radius=self.network.pore_radius,
             pore_volume=self.network.pore_volume,
             throat_radius=self.network.throat_radius,
@@ -43,22 +53,26 @@ class FirstSection:
 
     @property
     def tube(self) -> Array:
-        """Volume (T,) m3 of the throats' cylinders."""
+        """(T,) m3, volume of the throats' cylinders."""
         return np.pi * self.network.throat_radius**2 * self.network.throat_length
 
     @property
     def has_fines(self) -> Array:
-        """True (T,) for throats that a fine reaches into."""
+        """(T,) True for throats that a fine reaches into."""
         return self.occupancy.throat_fines > 0
 
 
-def first_section(examined: Examined, *, whole: bool) -> FirstSection:
-    """Those centred within 1 mm of the face; a throat's centre is midway between its pores. Raises CaseError on a
-    specimen without fines, whose occupancy was not measured."""
+def first_millimetre(examined: Examined, *, whole: bool) -> FirstMillimetre:
+    """The pores and throats centred within 1 mm of the formation face.
+
+    A throat's centre is midway between those of its pores. Raises CaseError on a specimen without
+    fines, whose occupancy was not measured.
+    """
     network, occupancy = examined.thesis.network, examined.thesis.occupancy
     if occupancy is None:
         raise CaseError(
-            f"{examined.id}: holds no fines, so what they fill was not measured; give an invaded specimen"
+            f"{examined.id}: the specimen holds no fines, so what they fill was not measured; "
+            "examine an invaded specimen"
         )
     end = network.box[0, 0] + 1e-3 * thesis_values().first_section_mm
     pore = network.pore_position[:, 0] < end
@@ -76,7 +90,7 @@ def first_section(examined: Examined, *, whole: bool) -> FirstSection:
             np.where(pore, network.pore_share, 0.0),
             np.where(throat, network.throat_share, 0.0),
         )
-    return FirstSection(
+    return FirstMillimetre(
         network=network,
         occupancy=occupancy,
         pore_weight=weights[0],

@@ -1,0 +1,152 @@
+"""The directive `case-keys`: a table of the keys of a case file, made from the models themselves.
+
+`{case-keys} grains` writes the keys of the table [grains]; without a name, the keys at the top.
+"""
+
+from collections.abc import Iterator
+from typing import Any, ClassVar, Literal, get_args, get_origin
+
+from docutils import nodes
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+from tables import table
+
+UNITS = {
+    "_kg_m3": "kg/m³",
+    "_m_s2": "m/s²",
+    "_N_m": "N/m",
+    "_m_s": "m/s",
+    "_MPa": "MPa",
+    "_cP": "cP",
+    "_mm": "mm",
+    "_ms": "ms",
+    "_hours": "h",
+    "_s": "s",
+}
+"""End of a key and the unit it stands for; the longer ends first."""
+SPACE = "\N{NO-BREAK SPACE}"
+
+
+class CaseKeys(SphinxDirective):
+    """The keys of one table of a case file, one row each."""
+
+    optional_arguments = 1
+    has_content = False
+    header: ClassVar = ("Key", "Unit", "Default", "Range", "Meaning")
+
+    def run(self) -> list[nodes.Node]:
+        part = self.arguments[0] if self.arguments else ""
+        rows = list(key_rows(part))
+        names = [f"{part}-{row[0].strip('`')}".strip("-") for row in rows]
+        return [table(self, self.header, rows, widths=(22, 8, 12, 18, 40), names=names)]
+
+
+def key_rows(part: str) -> Iterator[tuple[str, ...]]:
+    """Key, unit, default, range and meaning, in Markdown, of every key of the table `part`."""
+    from fdnet.case.case import Case
+
+    model = part_model(Case.model_fields[part].annotation) if part else Case
+    assert model is not None, part
+    for name, field in model.model_fields.items():
+        if part_model(field.annotation) is None:
+            key = f"{part}.{name}" if part else name
+            yield (
+                f"`{key}`",
+                unit_of(name),
+                _default(field),
+                _range(field),
+                field.description or "",
+            )
+
+
+def part_names() -> list[str]:
+    """The tables of a case file."""
+    from fdnet.case.case import Case
+
+    fields = Case.model_fields.items()
+    return [name for name, field in fields if part_model(field.annotation) is not None]
+
+
+def part_model(annotation: Any) -> type[BaseModel] | None:
+    """The model that a key's type names, None where the key holds a plain value."""
+    for kind in (annotation, *get_args(annotation)):
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            return kind
+    return None
+
+
+def unit_of(key: str) -> str:
+    """The unit in a key's name, a dash without one."""
+    return next((unit for end, unit in UNITS.items() if key.endswith(end)), "–")
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "**required**"
+    return "–" if field.default is None else f"`{_toml(field.default)}`"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, tuple):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float) and abs(value) >= 1e4:
+        return f"{value:g}".replace("e+", "e").replace("e0", "e")
+    return f'"{value}"' if isinstance(value, str) else str(value)
+
+
+def _range(field: FieldInfo) -> str:
+    parts = list(_ranges(field.annotation, [*field.metadata]))
+    return " or ".join(dict.fromkeys(parts))
+
+
+def _ranges(annotation: Any, metadata: list[Any]) -> Iterator[str]:
+    """What values a type takes; `metadata` are its bounds."""
+    arguments = get_args(annotation)
+    if get_origin(annotation) is Literal:
+        yield ", ".join(f"`{_toml(value)}`" for value in arguments)
+    elif get_origin(annotation) is tuple:
+        each = next(_ranges(arguments[0], metadata))
+        yield f"list of {len(arguments)}, each {each}"
+    elif hasattr(annotation, "__metadata__"):
+        yield from _ranges(annotation.__origin__, [*metadata, *annotation.__metadata__])
+    elif arguments:
+        for kind in arguments:
+            if kind is not type(None):
+                yield from _ranges(kind, metadata)
+    elif annotation is bool:
+        yield "`true`, `false`"
+    elif annotation is str:
+        yield "text"
+    else:
+        yield _bounds(metadata) or ("whole number" if annotation is int else "number")
+
+
+def _bounds(metadata: list[Any]) -> str:
+    """Bounds as signs; the range 1e-18 to 1e15, which stands for any positive number, is "> 0".
+
+    The sign is escaped, as a Markdown text that starts with it is a quotation.
+    """
+    bounds: dict[str, Any] = {}
+    for item in metadata:
+        for part in getattr(item, "metadata", [item]):
+            for name in ("gt", "ge", "lt", "le"):
+                if getattr(part, name, None) is not None:
+                    bounds[name] = getattr(part, name)
+    if (bounds.get("ge"), bounds.get("le")) == (1e-18, 1e15):
+        bounds = {"gt": 0}
+    signs = {"gt": "\\>", "ge": "≥", "lt": "<", "le": "≤"}
+    return ", ".join(f"{signs[name]}{SPACE}{_plain(value)}" for name, value in bounds.items())
+
+
+def _plain(value: float) -> str:
+    return "2³¹" if value == 2**31 else f"{value:g}"
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Make the directive known to Sphinx."""
+    app.add_directive("case-keys", CaseKeys)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

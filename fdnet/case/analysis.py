@@ -1,0 +1,121 @@
+"""How permeability is computed: the table [analysis] of a case, and the same choices without a case."""
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, TypedDict
+
+import numpy as np
+from pydantic import Discriminator, Field, Tag, ValidationError
+
+from fdnet.case.names import (
+    DEFAULT_DAMAGE_LAW,
+    DEFAULT_LAW,
+    MOST_SECTIONS,
+    DamageLawName,
+    LawName,
+    WallName,
+)
+from fdnet.case.values import Finite, Fraction, Part, Positive
+from fdnet.errors import CaseError
+
+
+def _count_or_edges(value: Any) -> str:
+    """A case file gives a count; only Python gives edges, as a tuple."""
+    return "[edges]" if isinstance(value, tuple) else "[count]"
+
+
+Count = Annotated[int, Field(ge=1, le=MOST_SECTIONS), Tag("[count]")]
+Edges = Annotated[tuple[Finite, ...], Tag("[edges]")]
+Sections = Annotated[Count | Edges, Discriminator(_count_or_edges)]
+
+
+class AnalysisKeys(TypedDict, total=False):
+    """The keywords of `AnalysisChoices.of_pack` and of `fdnet.analyse`; see `AnalysisChoices`."""
+
+    sections: int | Sequence[float]
+    law: str
+    damage_law: str
+    clogging_threshold: float | None
+    middle_band: str
+    throat_overlap: str
+    profile_bin_mm: float | None
+    walls: str
+
+
+class AnalysisChoices(Part):
+    """How permeability is computed; the default laws are fdnet's most accurate pair."""
+
+    sections: Sections = Field(
+        8,
+        description="Number of equal slabs along the flow in `sections.csv`. In Python also the "
+        "edges (S+1,) of the slabs, m.",
+    )
+    law: LawName = Field(DEFAULT_LAW, description="Conductance of a clean throat.")
+    damage_law: DamageLawName = Field(
+        DEFAULT_DAMAGE_LAW,
+        description="Conductance of a throat with fines over that of the clean one.",
+    )
+    clogging_threshold: Fraction | None = Field(
+        None,
+        description="Throat porosity below which the thesis's damage laws take a throat as "
+        'clogged. When absent: 0.40 ("thesis") or 0.36 ("thesis-code").',
+    )
+    middle_band: Literal["threshold", "position"] = Field(
+        "threshold",
+        description="Rule of the thesis's damage laws for a throat porosity of 0.36 to 0.80: "
+        "by `clogging_threshold` alone, or by where the fines lie in the throat.",
+    )
+    throat_overlap: Literal["exact", "two-plane"] = Field(
+        "exact",
+        description="Volume of a fine inside a throat: exact, or by the thesis's two planes.",
+    )
+    profile_bin_mm: Positive | None = Field(
+        0.25,
+        description="Width of the depth bins in `profile.csv`. In Python also None, the mean "
+        "radius of the grains.",
+    )
+    walls: WallName = Field(
+        "no-slip",
+        description="Whether side walls hold the fluid or let it slip; known to the laws "
+        '"lubrication" and "side-kozeny".',
+    )
+
+    @property
+    def profile_bin_m(self) -> float | None:
+        """Width of the depth bins, m; None stands for the mean radius of the grains."""
+        return None if self.profile_bin_mm is None else self.profile_bin_mm * 1e-3
+
+    @classmethod
+    def of_pack(cls, **keys: Any) -> "AnalysisChoices":
+        """Choices for spheres without a case: one section and bins of a mean grain radius, or as given.
+
+        `keys` are those of `AnalysisKeys`. Raises CaseError that names every key with a bad value.
+        """
+        given = {"sections": 1, "profile_bin_mm": None} | keys
+        given["sections"] = _plain_sections(given["sections"])
+        try:
+            return cls.model_validate(given)
+        except ValidationError as error:
+            raise CaseError("; ".join(map(_refusal, error.errors()))) from error
+
+    def changed(self, **keys: Any) -> "AnalysisChoices":
+        """The same choices with `keys` changed. Raises CaseError as `of_pack` does."""
+        return type(self).of_pack(**self.model_dump() | keys) if keys else self
+
+
+def _plain_sections(value: Any) -> Any:
+    if isinstance(value, np.integer):
+        return int(value)
+    if isinstance(value, list | tuple | np.ndarray):
+        return tuple(np.asarray(value, dtype=float).ravel().tolist())
+    return value
+
+
+def _refusal(item: Any) -> str:
+    key = str(item["loc"][0])
+    if item["type"] == "extra_forbidden":
+        known = ", ".join(AnalysisChoices.model_fields)
+        return f"analysis.{key}: unknown key; choose some of {known}"
+    what = (
+        item["msg"].replace("Input should be", "should be").replace("should be a valid", "is no")
+    )
+    return f"analysis.{key}: {item['input']!r} {what}"

@@ -1,0 +1,89 @@
+"""What the analysis of a specimen gives."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from fdnet.network.fines.occupancy import Occupancy
+from fdnet.network.flow.flow import Flow
+from fdnet.network.flow.sections import Profile, Section
+from fdnet.network.network import Network
+from fdnet.spheres.snapshot import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Analysis:
+    """Permeability, porosity and fines of a specimen before and after damage, in SI units.
+
+    P pores, T throats. "Damaged" is with the fines; without fines it equals "initial". When the
+    grains moved, `network` and every value by pore or throat are of their final positions, while
+    `k_initial` and the initial values of the sections are of their first positions.
+
+    Attributes:
+        network: pores and throats of the grains.
+        occupancy: what the fines fill of each pore and throat; None without fines.
+        law: name of the conductance law.
+        damage_law: name of the damage law.
+        conductance_initial: (T,) clean conductance of each throat, m3 (flux times viscosity over
+            pressure drop).
+        conductance_damaged: (T,) the same with fines, m3.
+        law_used: (T,) text, which rule of the damage law applied.
+        flow_initial: pressures and fluxes without fines.
+        flow_damaged: pressures and fluxes with fines.
+        k_initial: permeability without fines, m2.
+        k_damaged: permeability with fines, m2.
+        k_moved: permeability of the moved grains without fines, m2; None when no grain moved.
+        k_reduction: 1 - k_damaged / k_initial; None where k_initial is 0.
+        porosity_initial: porosity without fines, overlap of spheres counted once.
+        porosity_initial_error: standard error of `porosity_initial`.
+        porosity_initial_sum: porosity without fines from the plain sum of the spheres' volumes.
+        porosity_damaged: porosity with fines, overlap of spheres counted once.
+        sections: slabs across the flow, each with its own permeability and porosity.
+        profile: porosity and fines in finer bins of depth.
+        invaded_count: number of fines centred in the specimen.
+        invaded_volume: their volume, m3.
+        invasion_depth: depth of the deepest of them, m.
+        invasion_depth_p95: depth above which 95 % of them lie, m.
+        cake_thickness: thickness of the cake upstream of the formation face, m.
+        solver: method, residual and mass balance, the worst of all solves.
+        counts: how many pores, throats and spheres were closed, replaced or left out, by reason.
+        warnings: doubts about the result, in words.
+        seconds: run time of each step of the analysis, s.
+    """
+
+    network: Network
+    occupancy: Occupancy | None
+    law: str
+    damage_law: str
+    conductance_initial: Array
+    conductance_damaged: Array
+    law_used: Array
+    flow_initial: Flow
+    flow_damaged: Flow
+    k_initial: float
+    k_damaged: float
+    k_moved: float | None
+    k_reduction: float | None
+    porosity_initial: float
+    porosity_initial_error: float
+    porosity_initial_sum: float
+    porosity_damaged: float
+    sections: tuple[Section, ...]
+    profile: Profile
+    invaded_count: int
+    invaded_volume: float
+    invasion_depth: float
+    invasion_depth_p95: float
+    cake_thickness: float
+    solver: Mapping[str, str | float | None]
+    counts: Mapping[str, int]
+    warnings: tuple[str, ...]
+    seconds: Mapping[str, float]
+
+    def __repr__(self) -> str:
+        pores, throats = len(self.network.pore_radius), len(self.network.throat_radius)
+        return (
+            f"Analysis(k_initial={self.k_initial:.4g} m2, k_damaged={self.k_damaged:.4g} m2, "
+            f"porosity={self.porosity_initial:.4f} -> {self.porosity_damaged:.4f}, "
+            f"{pores} pores, {throats} throats, {len(self.sections)} sections, "
+            f"law={self.law}, damage_law={self.damage_law})"
+        )

@@ -1,0 +1,154 @@
+"""The grains that are tessellated: checked, and placed with their centres in the box."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fdnet.errors import NetworkError
+from fdnet.spheres.images import neighbour_tree
+from fdnet.spheres.snapshot import Array, Snapshot
+
+LENGTHS = (1e-60, 1e60)
+"""Shortest radius and longest length, m: the cubes of lengths beyond them are no double numbers."""
+COARSE = 1e-8
+"""Largest rounding of a coordinate, in mean grain radii: a tenth of the shake (`points.SHAKE`),
+which coarser coordinates could not hold."""
+COINCIDENT = 1e-3
+"""Grains nearer than this, in radii of the smallest grain, coincide."""
+ON_FACE_TOLERANCE = 1e-6
+"""A centre within this distance of a mirrored face, in mean grain radii, lies on the face."""
+INSET = 1e-4
+"""Depth inside the box, in mean grain radii, of grains that are placed on an x face."""
+ITERATIONS = 20
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PlacedGrains:
+    """The n grains that reach into the box, every centre inside it or on its mirrored faces.
+
+    Attributes:
+        grains: the n grains, their positions and radii as they are tessellated.
+        index: (n,) which of the given grains they are.
+        periodic: whether the sides x, y and z are periodic; the other faces are mirror planes.
+        scale: m, mean radius of these grains as given.
+        beyond: number of grains whose given centre lay beyond a mirrored face.
+    """
+
+    grains: Snapshot
+    index: Array
+    periodic: tuple[bool, bool, bool]
+    scale: float
+    beyond: int
+
+
+def place_grains(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> PlacedGrains:
+    """The grains that reach into the box, ready for the tessellation.
+
+    Raises NetworkError on impossible lengths (`check_lengths`), on fewer than four grains in the
+    box, and on coincident grains.
+    """
+    check_lengths(grains, periodic)
+    index = _reaching(grains, periodic)
+    if len(index) < 4:
+        raise NetworkError(
+            f"tessellation: {len(index)} of {len(grains)} grains reach into the box; a "
+            "tetrahedron needs at least 4, give more grains or mend the box"
+        )
+    inside = grains.where(index)
+    placed, beyond = onto_walls(inside, periodic)
+    _refuse_coincident(placed, periodic)
+    return PlacedGrains(
+        grains=placed,
+        index=index,
+        periodic=periodic,
+        scale=float(inside.radius.mean()),
+        beyond=beyond,
+    )
+
+
+def check_lengths(spheres: Snapshot, periodic: tuple[bool, ...]) -> None:
+    """Raise NetworkError on lengths that no tessellation can work with.
+
+    These are radii or box sides that are not positive, lengths whose cubes no double number holds,
+    and a box, or centres along its periodic sides, so far from the origin that their coordinates
+    are rounded by more than 1e-8 mean radii.
+    """
+    box, radius = spheres.box, spheres.radius
+    if np.any(radius <= 0):
+        raise NetworkError("tessellation: a grain radius is not positive; check the input lengths")
+    largest = max(float(np.max(np.abs(one))) for one in (box, radius, spheres.position))
+    if radius.min() < LENGTHS[0] or largest > LENGTHS[1]:
+        raise NetworkError(
+            f"tessellation: lengths from {radius.min():.3g} m (radius) to {largest:.3g} m, "
+            f"expected between {LENGTHS[0]:g} and {LENGTHS[1]:g} m; check the units"
+        )
+    around = spheres.position[:, np.array(periodic, bool)]
+    scale = float(radius.mean())
+    farthest = max(float(np.max(np.abs(box))), float(np.max(np.abs(around), initial=0.0)))
+    if np.spacing(farthest) > COARSE * scale:
+        raise NetworkError(
+            f"tessellation: coordinates up to {farthest:.3g} m are rounded by "
+            f"{np.spacing(farthest):.1g} m, more than {COARSE:g} of a radius of {scale:.3g} m; "
+            "move the specimen to the origin, check units and box"
+        )
+    if np.any(box[:, 1] <= box[:, 0]):
+        raise NetworkError("tessellation: a box side is not positive; check the input lengths")
+
+
+def _reaching(grains: Snapshot, periodic: tuple[bool, ...]) -> Array:
+    """Indices (n,) of the grains whose sphere reaches into the box."""
+    beyond = np.maximum(grains.box[:, 0] - grains.position, grains.position - grains.box[:, 1])
+    return np.flatnonzero(np.all((beyond < grains.radius[:, None]) | np.array(periodic), axis=1))
+
+
+def onto_walls(grains: Snapshot, periodic: tuple[bool, ...]) -> tuple[Snapshot, int]:
+    """Grains with every centre inside or on the mirrored faces, and how many were centred beyond.
+
+    Of a grain centred beyond a face only a cap is inside the box. A half sphere of the volume of
+    that cap, centred on the face, takes its place: the specimen stays its own mirror image and
+    keeps its void. A centre within `ON_FACE_TOLERANCE` of a face is put on the face. At the x
+    faces it is put 1e-4 mean radii inside instead, so that the facets between three such grains
+    are throats which end in pores on the face, where the pressure is held.
+    """
+    scale = float(grains.radius.mean())
+    tolerance = ON_FACE_TOLERANCE * scale
+    position, radius = grains.position.copy(), grains.radius.copy()
+    moved = np.zeros(len(grains), bool)
+    for axis in np.flatnonzero(~np.array(periodic)):
+        low, high = grains.box[axis]
+        beyond = np.maximum(low - position[:, axis], position[:, axis] - high)
+        outside = beyond > tolerance
+        height = np.where(outside, radius - beyond, radius)
+        # half sphere 2 pi r^3 / 3 against cap pi h^2 (3 R - h) / 3
+        depth = INSET * scale if axis == 0 else 0.0
+        radius = np.where(outside, _same_cap(radius, height, depth), radius)
+        near = beyond > -max(tolerance, depth)
+        middle = 0.5 * (low + high)
+        position[near, axis] = np.where(position[near, axis] < middle, low + depth, high - depth)
+        moved |= outside
+    return replace(grains, position=position, radius=radius), int(moved.sum())
+
+
+def _same_cap(radius: Array, height: Array, depth: float) -> Array:
+    """Radius (n,) m of the sphere whose part inside a face has the volume of a given cap.
+
+    The sphere is centred `depth` m inside the face; the cap has `height` (n,) m and belongs to a
+    sphere of `radius` (n,) m.
+    """
+    cap = 0.5 * height**2 * (3.0 * radius - height)
+    same = np.cbrt(cap)
+    for _ in range(ITERATIONS):
+        same = np.cbrt(np.maximum(cap - 1.5 * depth * same**2 + 0.5 * depth**3, 0.0))
+    return np.maximum(same, depth)
+
+
+def _refuse_coincident(grains: Snapshot, periodic: tuple[bool, ...]) -> None:
+    """Raise NetworkError on coincident grains."""
+    tree = neighbour_tree(grains.position, grains.box, periodic=periodic)
+    close = tree.query_pairs(COINCIDENT * float(grains.radius.min()), output_type="ndarray")
+    if len(close):
+        first, second = grains.id[close[0]]
+        raise NetworkError(
+            f"tessellation: grains {first} and {second} coincide at "
+            f"{grains.position[close[0, 0]]} m ({len(close)} such pairs); remove the doubles"
+        )

@@ -1,0 +1,106 @@
+"""The documentation site follows the code: import graph, case keys, options, links, run folder."""
+
+import re
+import sys
+from argparse import _HelpAction, _SubParsersAction
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "docs" / "_ext"))
+
+import import_graph  # noqa: E402
+
+PAGES = sorted(
+    path
+    for path in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
+    if "_build" not in path.parts
+)
+
+
+def test_the_import_graph_on_the_site_is_that_of_the_code(root):
+    """After a change of imports: `python docs/_ext/import_graph.py` writes table and picture."""
+    edges = import_graph.edges_of(root)
+    assert import_graph.read_csv(root / "docs" / "import_graph.csv") == edges
+    picture = (root / "docs" / "import_graph.svg").read_text()
+    assert import_graph.digest_of(edges) in picture
+    assert import_graph.counts_of(import_graph.nodes_of(root), edges) in picture
+
+
+def test_the_import_graph_stays_small(root):
+    nodes, edges = import_graph.nodes_of(root), import_graph.edges_of(root)
+    layers = 1 + max(import_graph.layers_of(nodes, edges).values())
+    assert len(nodes) <= 16
+    assert layers <= 9
+    assert len(edges) <= 60
+
+
+def test_a_cycle_of_imports_is_refused():
+    with pytest.raises(ValueError, match="cycle"):
+        import_graph.layers_of({"a", "b", "c"}, {("a", "b"), ("b", "c"), ("c", "b")})
+
+
+def test_layers_count_from_what_imports_nothing():
+    edges = {("c", "b"), ("b", "a"), ("c", "a")}
+    assert import_graph.layers_of({"a", "b", "c"}, edges) == {"a": 0, "b": 1, "c": 2}
+
+
+def test_every_key_of_a_case_has_a_meaning():
+    from fdnet.case.case import Case
+
+    def check(model, path):
+        for name, field in model.model_fields.items():
+            kinds = (field.annotation, *getattr(field.annotation, "__args__", ()))
+            parts = [kind for kind in kinds if hasattr(kind, "model_fields")]
+            for part in parts:
+                assert part.__doc__
+                check(part, [*path, name])
+            if not parts:
+                meaning = field.description or ""
+                assert len(meaning) > 10, ".".join([*path, name])
+                assert meaning.endswith("."), ".".join([*path, name])
+
+    check(Case, [])
+
+
+def test_the_case_reference_shows_every_table(root):
+    from fdnet.case.file import known_keys
+
+    page = (root / "docs" / "reference" / "case.md").read_text()
+    tables = {key.split(".")[0] for key in known_keys() if "." in key}
+    assert set(re.findall(r"^```\{case-keys\} (\w+)", page, re.M)) == tables
+
+
+def test_every_command_and_option_is_explained(root):
+    from fdnet.cli import _parser
+
+    parser = _parser()
+    commands = next(a for a in parser._actions if isinstance(a, _SubParsersAction)).choices
+    page = (root / "docs" / "reference" / "commands.md").read_text()
+    assert set(re.findall(r"^```\{command-options\} (\w+)", page, re.M)) == set(commands)
+    for name, command in commands.items():
+        for action in command._actions:
+            assert action.help or isinstance(action, _HelpAction), f"fdnet {name} {action.dest}"
+
+
+def anchors_of(path: Path) -> set[str]:
+    """Anchors of a Markdown file's headings, as the repository's browser and MyST make them."""
+    text = re.sub(r"^```.*?^```", "", path.read_text("utf-8"), flags=re.M | re.S)
+    headings = re.findall(r"^#+ +(.+?) *$", text, re.M)
+    plain = [re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", heading) for heading in headings]
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in plain}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_links_of_a_page_lead_somewhere_in_the_repository(page):
+    """Pages are read there as plain Markdown too; the built site is checked by scripts/docs.sh."""
+    text = re.sub(r"^```.*?^```|`[^`\n]*`", "", page.read_text("utf-8"), flags=re.M | re.S)
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if re.match(r"[a-z]+:", target):
+            continue
+        name, _, anchor = target.partition("#")
+        file = page.parent / name if name else page
+        assert file.exists(), f"{page.relative_to(ROOT)}: {target}"
+        if anchor and file.suffix == ".md":
+            assert anchor in anchors_of(file), f"{page.relative_to(ROOT)}: {target}"
