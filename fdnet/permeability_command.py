@@ -106,10 +106,11 @@ def read_snapshot(
     """The spheres of the file as a Snapshot in SI, and notes. Raises CaseError for bad input."""
     import numpy as np
 
-    from fdnet.spheres.csv_file import read_spheres
+    from fdnet.spheres.readers import read_spheres
     from fdnet.spheres.snapshot import Kind, resting
 
-    position, radius, kind = read_spheres(options.spheres, units=options.units)
+    given = read_spheres(options.spheres, units=options.units)
+    position, radius, kind = given.position, given.radius, given.kind
     grains = kind == Kind.GRAIN
     if np.count_nonzero(grains) < 4:
         raise CaseError(

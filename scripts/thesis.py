@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""docs/thesis.md from docs/thesis.md.in, and README.md's overview, from what `fdnet study thesis` left in docs/thesis.
+"""docs/thesis.md from docs/thesis.md.in and what `fdnet study thesis` left in docs/thesis.
 
     .venv/bin/python scripts/thesis.py [--docs docs]
 
@@ -94,7 +94,7 @@ def costs(rows: Rows) -> str:
 
 
 def overview(rows: Rows) -> str:
-    """The specimens in one table, for the README: counts, depth, porosity and the first section's permeability."""
+    """The specimens in one table: counts, depth, porosity and the first section's permeability."""
     header = [
         "specimen",
         "invaded",
@@ -123,14 +123,6 @@ def overview(rows: Rows) -> str:
             + [", ".join(dict.fromkeys(row.stop_reason for row in found))]
         )
     return markdown_table(header, lines)
-
-
-def readme(text: str, rows: Rows) -> str:
-    """README.md with the overview between its two marks."""
-    start, end = "<!-- thesis: written by scripts/thesis.py -->", "<!-- /thesis -->"
-    before, _, rest = text.partition(start)
-    assert end in rest, f"README.md: no {start} ... {end}"
-    return f"{before}{start}\n\n{overview(rows)}\n\n{end}{rest.partition(end)[2]}"
 
 
 def scan(rows: Rows, group: str) -> str:
@@ -214,6 +206,7 @@ def document(docs: Path) -> str:
     rows = read_results(thesis / RESULTS)
     comparisons = compare_trends(rows)
     parts = {
+        "overview": overview(rows),
         "costs": costs(rows),
         "tables": thesis_tables(rows),
         "trends": trends_table(comparisons),
@@ -267,10 +260,7 @@ def main() -> int:
     parser.add_argument("--docs", type=Path, default=ROOT / "docs", help="where to read and write")
     docs = parser.parse_args().docs
     (docs / "thesis.md").write_text(document(docs), encoding="utf-8")
-    page = docs.parent / "README.md"
-    rows = read_results(docs / "thesis" / RESULTS)
-    page.write_text(readme(page.read_text(encoding="utf-8"), rows), encoding="utf-8")
-    print(docs / "thesis.md", page)
+    print(docs / "thesis.md")
     return 0
 
 

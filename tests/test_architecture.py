@@ -50,8 +50,9 @@ ROOMS = {
 DOORS = {
     "jinja2": {"dem/deck", "report/html", "studies/dem"},
     "subprocess": {"dem/liggghts", "report/vtk", "studies/benchmark"},
-    "pandas": {"spheres/dump", "spheres/csv_file", "report/tables"},
-    "pyvista": {"report/vtk", "report/picture"},
+    "pandas": {"spheres/dump", "spheres/csv_file", "report/tables", "report/read_tables"},
+    "pyvista": {"report/vtk", "report/picture", "report/meshes", "spheres/vtk_file"},
+    "openpnm": {"report/openpnm", "studies/benchmark"},
     "matplotlib": {
         "report/figures",
         "report/side_view",

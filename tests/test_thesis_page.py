@@ -30,9 +30,8 @@ def test_the_page_is_written_from_the_committed_tables(root, thesis):
     assert (root / "docs/thesis.md").read_text(encoding="utf-8") == thesis.document(root / "docs")
 
 
-def test_the_readme_shows_the_same_overview(root, thesis, rows):
-    text = (root / "README.md").read_text(encoding="utf-8")
-    assert text == thesis.readme(text, rows)
+def test_the_page_shows_the_overview_of_the_eight_specimens(root, thesis, rows):
+    assert thesis.overview(rows) in (root / "docs/thesis.md").read_text(encoding="utf-8")
     assert thesis.overview(rows).count("\n") == 9
 
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fdnet.atomic import replacing, write_text
-from fdnet.spheres.csv_file import read_spheres, write_spheres
 from fdnet.spheres.snapshot import Array
 
 if TYPE_CHECKING:
@@ -19,13 +18,11 @@ if TYPE_CHECKING:
     from fdnet.network.analysis import Analysis
 
 __all__ = [
-    "read_spheres",
     "section_rows",
     "write_laws",
     "write_pores",
     "write_profile",
     "write_sections",
-    "write_spheres",
     "write_summary",
     "write_throats",
 ]

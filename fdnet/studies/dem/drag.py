@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fdnet.case.case import Case
+from fdnet.case.case import InvasionCase
 from fdnet.scales.scales import scales_of
 from fdnet.scales.time_step import HOLD_OVER_RELAXATION
 from fdnet.studies.dem.runs import (
@@ -105,7 +105,7 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
     )
 
 
-def _invasion_case(point: Point, form: Form) -> Case:
+def _invasion_case(point: Point, form: Form) -> InvasionCase:
     tau = scales_of(slab_case(point.seed, small=form.small)).relaxation_time[0]
     return slab_case(
         point.seed,

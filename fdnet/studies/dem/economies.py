@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.case.case import Case
+from fdnet.case.case import InvasionCase
 from fdnet.studies.dem.runs import OBSERVED, invasion_run, slab_case
 from fdnet.studies.engine.error_rows import against_reference
 from fdnet.studies.engine.levels import Level, levels, percent
@@ -114,7 +114,7 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
     return invasion_run(case_of(point), work, point.slug)
 
 
-def case_of(point: Point) -> Case:
+def case_of(point: Point) -> InvasionCase:
     """The plain case with an economy, or with all of them together."""
     size, series = str(point.settings["size"]), point.series
     form = FORMS[size, series]

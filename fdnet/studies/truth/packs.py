@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.spheres.csv_file import read_spheres
+from fdnet.spheres.readers import read_spheres
 from fdnet.spheres.snapshot import Array, Snapshot, resting
 
 MM = 1e-3
@@ -46,11 +46,11 @@ def read_pack(path: Path) -> tuple[Snapshot, float]:
     Raises:
         CaseError: the first line of the file does not give the edge.
     """
-    edge = re.match(r"# periodic cube, edge ([0-9.]+) mm", path.read_text())
-    if not edge:
+    first_line = re.match(r"# periodic cube, edge ([0-9.]+) mm", path.read_text())
+    if not first_line:
         raise CaseError(f"{path}:1: expected '# periodic cube, edge NUMBER mm'")
-    position, radius, kind = read_spheres(path, units="mm")
-    return snapshot(position / MM, radius / MM, float(edge[1]), kind), float(edge[1])
+    spheres, edge = read_spheres(path, units="mm"), float(first_line[1])
+    return snapshot(spheres.position / MM, spheres.radius / MM, edge, spheres.kind), edge
 
 
 def snapshot(position: Array, radius: Array, edge: float, kind: Array) -> Snapshot:
