@@ -2,6 +2,7 @@
 
 import ast
 import re
+import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,7 +23,6 @@ PRIVATE_WORDS = re.compile(
 PAGES_TO_DO = (
     "docs/accuracy.md",
     "docs/accuracy.md.in",
-    "docs/architecture.md",
     "docs/thesis.md",
     "docs/thesis.md.in",
     "docs/validation.md",
@@ -74,6 +74,29 @@ def test_what_counts_as_a_long_line_or_a_private_word():
     assert PRIVATE_WORDS.search("it is taken, and told; above, refused")
     assert PRIVATE_WORDS.search("a hair of 1e-7")
     assert not PRIVATE_WORDS.search("a hairpin; besides, it unfolded")
+
+
+def test_files_named_on_pages_exist(root):
+    """A name with a folder is that of one file; `name.py` alone may lie anywhere."""
+    folders = ("fdnet", "liggghts_templates", "scripts", "tests", "docs/_ext")
+    files = {path.name for folder in folders for path in (root / folder).rglob("*.*")}
+    missing = [
+        f"{page.relative_to(root)}: {name}"
+        for page in checked(root, pages(root), PAGES_TO_DO)
+        for name in re.findall(r"`([\w./-]+\.(?:py|sh|j2))`", page.read_text(encoding="utf-8"))
+        if not ((root / name).exists() if "/" in name else name in files)
+    ]
+    assert not missing, "\n".join(missing)
+
+
+def test_the_architecture_page_counts_the_imports(root):
+    sys.path.insert(0, str(root / "docs/_ext"))
+    import import_graph
+
+    nodes, edges = import_graph.nodes_of(root), import_graph.edges_of(root)
+    layers = 1 + max(import_graph.layers_of(nodes, edges).values())
+    page = (root / "docs/architecture.md").read_text(encoding="utf-8")
+    assert f"| now | {len(nodes)} | {layers} | {len(edges)} |" in page
 
 
 def test_the_readme_is_short(root):
