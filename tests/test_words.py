@@ -25,15 +25,27 @@ PAGES_TO_DO = (
     "docs/accuracy.md",
     "docs/accuracy.md.in",
     "docs/thesis.md",
-    "docs/thesis.md.in",
     "docs/validation.md",
     "docs/validation.md.in",
-    "docs/validation/",
 )
 """Pages that are still to be rewritten: nothing is checked in them. To be empty."""
 
-MODULES_TO_DO = ("fdnet/",)
-"""Parts of the package whose docstrings are still to be rewritten. To be empty."""
+MODULES_TO_DO = (
+    "fdnet/network/compiled.py",
+    "fdnet/network/flow/stiff.py",
+    "fdnet/report/html.py",
+    "fdnet/spheres/images.py",
+    "fdnet/spheres/porosity.py",
+    "fdnet/spheres/readers.py",
+    "fdnet/studies/command.py",
+    "fdnet/studies/dem/economies.py",
+    "fdnet/studies/dem/runs.py",
+    "fdnet/studies/engine/draw.py",
+    "fdnet/studies/engine/study.py",
+    "fdnet/studies/network/specimen_size.py",
+    "fdnet/studies/stokes/stokes.py",
+)
+"""Modules whose docstrings are still to be rewritten. To be empty."""
 
 
 def pages(root: Path) -> Iterator[Path]:
