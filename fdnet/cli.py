@@ -175,8 +175,8 @@ def _case_of(options: argparse.Namespace) -> Any:
 
 
 def _stages(text: str) -> tuple[str, ...]:
+    from fdnet.case.stages import STAGES
     from fdnet.errors import CaseError
-    from fdnet.run.folder import STAGES
 
     asked = [part.strip() for part in text.split(",") if part.strip()]
     unknown = [part for part in asked if part not in STAGES]
@@ -188,7 +188,8 @@ def _stages(text: str) -> tuple[str, ...]:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from fdnet.run.pipeline import RunOptions, run_case
+    from fdnet.run.pipeline import run_stages
+    from fdnet.run.session import RunOptions
 
     case = _case_of(options)
     out = options.out or Path("runs") / case.name
@@ -203,7 +204,7 @@ def _run(options: argparse.Namespace) -> int:
         show_progress=not options.quiet,
         command=options.command_line,
     )
-    summary = run_case(case, chosen)
+    summary = run_stages(case, chosen)
     if options.json:
         print(json.dumps(summary, indent=2))
     else:

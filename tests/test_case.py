@@ -11,8 +11,10 @@ from pathlib import Path
 import pytest
 from builders import TINY, tiny
 
+from fdnet.case.case import KEYS, Case, InvasionCase, with_fines
 from fdnet.case.file import case_from, known_keys, read_case, set_keys
 from fdnet.errors import CaseError
+from fdnet.scales.scales import InvasionScales, Scales, scales_of
 from fdnet.studies.thesis.runs.carry_out import find_state, state_path
 from fdnet.studies.thesis.runs.plan import SPECIMENS, VARIANTS, planned
 
@@ -99,6 +101,47 @@ def test_a_bad_value_is_named_with_its_path(part, values, expected):
 def test_a_bad_key_brings_no_false_problem_with_it(part, values):
     text = problems(changed(**{part: values}))
     assert "1 problem:" in text
+
+
+def test_problems_between_keys_are_listed_one_by_one_next_to_those_of_keys():
+    data = changed(fines={"radius_mm": 0.3}, drag={"field": "network"}, run={"cap_ms": True})
+    text = problems(data)
+    assert "3 problems: run.cap_ms: True" in text
+    assert " | fines.radius_mm: 0.3 is not below grains.radius_mm 0.25" in text
+    assert " | drag.field: 'network'" in text
+
+
+def test_a_bad_key_silences_only_the_rules_that_read_it():
+    """`grains.radius_mm` cannot be compared with anything, the two ways to supply fines can."""
+    text = problems(changed(grains={"radius_mm": -1.0}, fines={"radius_mm": 0.3, "slab_mm": 2.0}))
+    assert "grains.radius_mm: -1.0" in text
+    assert "not below" not in text
+    assert "give exactly one of the two" in text
+
+
+def test_a_case_without_fines_is_a_type_of_its_own():
+    bare = case_from({key: value for key, value in TINY.items() if key != "fines"})
+    assert type(bare) is Case
+    assert type(tiny()) is InvasionCase
+    assert isinstance(tiny(), Case)
+    assert bare.stages == ("pack", "analyse", "report")
+    assert tiny().stages == ("pack", "invade", "analyse", "report")
+    assert set(bare.spheres) == {"grain"}
+    assert set(tiny().spheres) == {"grain", "fine"}
+    assert type(scales_of(bare)) is Scales
+    assert type(scales_of(tiny())) is InvasionScales
+    assert bare.digest("pack") != tiny().digest("pack")
+    assert bare.same_specimen(bare.toml().encode())
+    assert not bare.same_specimen(tiny().toml().encode())
+    assert with_fines(tiny()) == tiny()
+    with pytest.raises(CaseError, match=r"tiny: has no table \[fines\]"):
+        with_fines(bare)
+
+
+def test_every_table_is_written():
+    assert set(KEYS) == set(InvasionCase.model_fields)
+    assert list(tiny().data()) == list(KEYS)
+    assert {"fines", "fines.radius_mm"} <= set(known_keys())
 
 
 def test_a_date_is_refused_like_any_other_value():

@@ -1,5 +1,6 @@
 """The documentation site follows the code: import graph, case keys, options, links, run folder."""
 
+import json
 import re
 import sys
 from argparse import _HelpAction, _SubParsersAction
@@ -104,3 +105,77 @@ def test_links_of_a_page_lead_somewhere_in_the_repository(page):
         assert file.exists(), f"{page.relative_to(ROOT)}: {target}"
         if anchor and file.suffix == ".md":
             assert anchor in anchors_of(file), f"{page.relative_to(ROOT)}: {target}"
+
+
+RUN_PAGE = ROOT / "docs" / "reference" / "run_folder.md"
+
+
+def names_under(heading: str, *, table: int = 0) -> list[str]:
+    """First cells of a table of the run-folder page, counted from its heading."""
+    section = RUN_PAGE.read_text().split(f"\n## {heading}\n")[1].split("\n## ")[0]
+    blocks = re.findall(r"^\|.*?(?=\n\n|\Z)", section, re.M | re.S)
+    return [
+        name for row in blocks[table].splitlines()[2:] for name in re.findall(r"^\| `(.*?)`", row)
+    ]
+
+
+@pytest.fixture(scope="module")
+def run_folder(tmp_path_factory):
+    """A finished run of the tiny case."""
+    from builders import tiny
+
+    from fdnet.run.pipeline import run_stages
+    from fdnet.run.session import RunOptions
+
+    folder = tmp_path_factory.mktemp("docs") / "run"
+    run_stages(tiny("run.cap_ms=0.35"), RunOptions(out=folder, show_progress=False))
+    return folder
+
+
+def header_of(path: Path) -> list[str]:
+    return path.read_text().split("\n", 1)[0].split(",")
+
+
+@pytest.mark.liggghts
+@pytest.mark.parametrize(
+    "table",
+    ["sections", "profile", "pores", "throats", "spheres_initial", "invade/history"],
+)
+def test_every_column_of_a_run_is_explained(run_folder, table):
+    assert header_of(run_folder / f"{table}.csv") == names_under(f"{table}.csv")
+
+
+@pytest.mark.liggghts
+def test_both_tables_of_spheres_have_the_same_columns(run_folder):
+    initial, damaged = (run_folder / f"spheres_{name}.csv" for name in ("initial", "damaged"))
+    assert header_of(initial) == header_of(damaged)
+
+
+@pytest.mark.liggghts
+def test_every_key_of_the_summary_is_explained(run_folder):
+    summary = json.loads((run_folder / "summary.json").read_text())
+    only_sometimes = {"k_moved_m2"}
+    assert set(summary) | only_sometimes == set(names_under("summary.json"))
+    counts = set(names_under("summary.json", table=1))
+    assert set(summary["network_counts"]) <= counts
+
+
+@pytest.mark.liggghts
+def test_every_file_of_a_run_is_explained(run_folder):
+    patterns = names_under("Files")
+    files = [path.relative_to(run_folder) for path in run_folder.rglob("*") if path.is_file()]
+    for file in files:
+        assert file.name == ".lock" or any(file.match(name) for name in patterns), file
+    for pattern in patterns:
+        assert any(file.match(pattern) for file in files), pattern
+
+
+@pytest.mark.liggghts
+def test_everything_in_the_paraview_files_is_explained(run_folder):
+    import pyvista as pv
+
+    network = pv.read(run_folder / "network.vtp")
+    stored = {*network.point_data.keys(), *network.cell_data.keys()}
+    assert stored == set(names_under("ParaView files"))
+    spheres = pv.read(run_folder / "spheres_damaged.vtp")
+    assert set(spheres.point_data.keys()) == set(names_under("ParaView files", table=1))

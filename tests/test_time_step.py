@@ -7,7 +7,8 @@ from builders import tiny
 
 from fdnet.case.case import Case
 from fdnet.errors import CaseError
-from fdnet.scales.scales import Scales, relaxation_time, scales_of
+from fdnet.scales.scales import InvasionScales, scales_of
+from fdnet.scales.time_step import relaxation_time
 
 FINE = 4 / 3 * math.pi * (0.05e-3) ** 3 * 2146
 FAST = "drag.multiplier=1e3"
@@ -80,7 +81,7 @@ def test_a_given_refresh_warns_above_a_tenth_of_tau_and_is_refused_above_tau():
 
 @pytest.mark.parametrize("factor", [0.01, 0.1, 0.2])
 def test_a_derived_step_keeps_both_bounds_without_a_warning(factor):
-    def derived(*assignments: str) -> Scales:
+    def derived(*assignments: str) -> InvasionScales:
         return scales_of(
             tiny(f"run.time_step_factor={factor}", "run.checkpoint_ms=0.1", *assignments)
         )

@@ -45,9 +45,9 @@ class CaseKeys(SphinxDirective):
 
 def key_rows(part: str) -> Iterator[tuple[str, ...]]:
     """Key, unit, default, range and meaning, in Markdown, of every key of the table `part`."""
-    from fdnet.case.case import Case
+    from fdnet.case.case import InvasionCase
 
-    model = part_model(Case.model_fields[part].annotation) if part else Case
+    model = part_model(InvasionCase.model_fields[part].annotation) if part else InvasionCase
     assert model is not None, part
     for name, field in model.model_fields.items():
         if part_model(field.annotation) is None:
@@ -63,10 +63,10 @@ def key_rows(part: str) -> Iterator[tuple[str, ...]]:
 
 def part_names() -> list[str]:
     """The tables of a case file."""
-    from fdnet.case.case import Case
+    from fdnet.case.case import KEYS, InvasionCase
 
-    fields = Case.model_fields.items()
-    return [name for name, field in fields if part_model(field.annotation) is not None]
+    fields = InvasionCase.model_fields
+    return [name for name in KEYS if part_model(fields[name].annotation) is not None]
 
 
 def part_model(annotation: Any) -> type[BaseModel] | None:

@@ -1,14 +1,15 @@
-"""Case: what the specimen is. Validated once, at birth.
+"""A case: what the specimen is. It is validated when it is made, and nothing changes it afterwards.
 
-A case holds no paths and no binary. `fdnet.case.file` reads one from TOML, `Case.toml()` writes it back with
-every default. Its tables are in the modules next to this one, what must hold
-between them in `fdnet.case.rules`.
+A case holds no paths and no binary. `fdnet.case.file` reads one from TOML, `Case.toml()` writes it
+back with every default. Its tables are in the modules next to this one, what must hold between
+them is in `fdnet.case.rules`.
 """
 
 import hashlib
 import json
 import tomllib
-from typing import Annotated, Any
+from collections.abc import Mapping
+from typing import Annotated, Any, Self
 
 import tomli_w
 from pydantic import Field, model_validator
@@ -16,17 +17,32 @@ from pydantic import Field, model_validator
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.control import Run
 from fdnet.case.fluid import Fluid
-from fdnet.case.particles import Fines, Grains
+from fdnet.case.particles import Fines, Grains, Spheres
 from fdnet.case.parts import Box, Drag, Gravity
 from fdnet.case.rules import cross_problems
+from fdnet.case.stages import STAGES, Stage
 from fdnet.case.values import Part
+from fdnet.errors import CaseError
 
 POLICIES = ("max_hours", "max_overlap", "on_overlap")
-"""Keys of [run] that say whether a run may go on, not what it computes."""
+"""Keys of [run] that decide whether a run may go on, not what it computes."""
+KEYS = (
+    "name",
+    "seed",
+    "box",
+    "grains",
+    "fines",
+    "fluid",
+    "drag",
+    "gravity",
+    "run",
+    "analysis",
+)
+"""Keys at the top of a case file, in the order in which they are written."""
 
 
 class Case(Part):
-    """One specimen. Without `fines` the pack stays intact and no invasion is run."""
+    """A pack of grains. Without fines it stays intact: it is made and analysed, not invaded."""
 
     name: Annotated[str, Field(min_length=1, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")] = Field(
         description="Name of the case: letters, digits, dot, underscore and hyphen. It also names "
@@ -37,7 +53,6 @@ class Case(Part):
     )
     box: Box
     grains: Grains
-    fines: Fines | None = None
     fluid: Fluid = Fluid()
     drag: Drag = Drag()
     gravity: Gravity = Gravity()
@@ -45,13 +60,21 @@ class Case(Part):
     analysis: AnalysisChoices = AnalysisChoices()
 
     @model_validator(mode="after")
-    def _parts_fit(self) -> "Case":
-        found = list(
-            cross_problems({name: getattr(self, name) for name in type(self).model_fields})
-        )
-        if found:
-            raise ValueError("; ".join(found))
+    def _tables_fit(self) -> Self:
+        problems = list(cross_problems(dict(self)))
+        if problems:
+            raise ValueError("; ".join(problems))
         return self
+
+    @property
+    def spheres(self) -> dict[str, Spheres]:
+        """The kinds of sphere by the name of their material in a deck."""
+        return {"grain": self.grains}
+
+    @property
+    def stages(self) -> tuple[Stage, ...]:
+        """The stages that a run of this case consists of."""
+        return tuple(stage for stage in STAGES if stage != "invade")
 
     @property
     def size_m(self) -> tuple[float, float, float]:
@@ -64,17 +87,19 @@ class Case(Part):
         return self.box.periodic
 
     def data(self) -> dict[str, Any]:
-        """All keys with a value, defaults written out (TOML has no null: keys without a value are left out)."""
-        return _without_none(self.model_dump(mode="json"))
+        """All keys that have a value, defaults written out (TOML knows no null)."""
+        data = self.model_dump(mode="json")
+        return _without_none({key: data[key] for key in KEYS if key in data})
 
     def toml(self) -> str:
-        """The full resolved case as TOML."""
+        """The case as TOML, with every default."""
         return tomli_w.dumps(self.data())
 
     def digest(self, stage: str = "analyse") -> str:
-        """Hash of what `stage` depends on: "pack" ignores fines, fluid and analysis, "invade" the analysis.
+        """Hash of what `stage` depends on.
 
-        No result depends on `POLICIES`, so no digest does.
+        "pack" ignores fines, fluid and analysis; "invade" ignores the analysis. No result depends
+        on `POLICIES`, so no digest does.
         """
         data = self.data()
         data["run"] = {key: value for key, value in data["run"].items() if key not in POLICIES}
@@ -83,7 +108,7 @@ class Case(Part):
             data.pop("name")
         if stage == "pack":
             data["grains"].pop("motion")
-            fines = self.fines.normal_stiffness_N_m if self.fines else None
+            fines = data.get("fines", {}).get("normal_stiffness_N_m")
             scaling = {"stiffness": self.run.stiffness_N_m, "fines_stiffness": fines}
             data = {key: data[key] for key in ("seed", "box", "grains")} | scaling
         return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
@@ -91,9 +116,40 @@ class Case(Part):
     def same_specimen(self, text: bytes) -> bool:
         """Whether a case.toml as `toml` wrote it is this case but for `POLICIES`."""
         try:
-            return Case.model_validate(tomllib.loads(text.decode())).digest() == self.digest()
+            data = tomllib.loads(text.decode())
+            return case_type(data).model_validate(data).digest() == self.digest()
         except ValueError:
             return False
+
+
+class InvasionCase(Case):
+    """A pack of grains and the fines that invade it."""
+
+    fines: Fines
+
+    @property
+    def spheres(self) -> dict[str, Spheres]:
+        """The kinds of sphere by the name of their material in a deck."""
+        return {"grain": self.grains, "fine": self.fines}
+
+    @property
+    def stages(self) -> tuple[Stage, ...]:
+        """The stages that a run of this case consists of: all."""
+        return STAGES
+
+
+def case_type(data: Mapping[str, Any]) -> type[Case]:
+    """The class that nested tables describe: a table of fines makes an invasion."""
+    return InvasionCase if "fines" in data else Case
+
+
+def with_fines(case: Case) -> InvasionCase:
+    """The same case, known to have fines. Raises CaseError when it has none."""
+    if not isinstance(case, InvasionCase):
+        raise CaseError(
+            f"case {case.name}: has no table [fines], but an invasion needs one; add it"
+        )
+    return case
 
 
 def _without_none(value: Any) -> Any:

@@ -1,79 +1,76 @@
-"""Case files: TOML in, a Case out, and every problem named at once."""
+"""Case files: a case is read from TOML, and all its problems are named at once."""
 
 import copy
 import difflib
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
+from pydantic.fields import FieldInfo
 
-from fdnet.case.case import Case
+from fdnet.case.case import Case, InvasionCase, case_type
 from fdnet.case.rules import cross_problems
 from fdnet.case.values import Part
 from fdnet.errors import CaseError
 
 
-def known_keys(model: type[BaseModel] = Case, prefix: str = "") -> Iterator[str]:
-    """Every dotted key a case file may hold."""
+def known_keys(model: type[Part] = InvasionCase, prefix: str = "") -> Iterator[str]:
+    """Every dotted key that a case file may hold."""
     for name, field in model.model_fields.items():
         yield prefix + name
-        part = _part_of(field.annotation)
-        if part is not None:
-            yield from known_keys(part, f"{prefix}{name}.")
+        table = _table_of(field)
+        if table is not None:
+            yield from known_keys(table, f"{prefix}{name}.")
 
 
 def case_from(data: Mapping[str, Any], *, source: str = "case") -> Case:
-    """A Case from nested tables.
+    """A case from nested tables; an InvasionCase when there is a table of fines.
 
-    Raises CaseError that lists every problem: dotted path, value given, what is allowed, nearest known key.
+    Raises CaseError that lists every problem: dotted key, value given, what is allowed, and for an
+    unknown key the nearest known one.
     """
-    problems = _schema_problems(Case, data)
-    parts = {
-        name: _usable_part(field.annotation, data[name])
-        for name, field in Case.model_fields.items()
-        if name in data
-    }
-    named = [problem.split(":")[0] for problem in problems]
-    problems += [
-        p
-        for p in cross_problems(parts)
-        if not any(p in q for q in problems) and not any(key in p for key in named)
-    ]
-    if problems:
-        raise CaseError(
-            f"{source}: {len(problems)} problem{'s' * (len(problems) > 1)}: "
-            + " | ".join(problems)
-        )
-    return Case.model_validate(data)
-
-
-def _usable_part(annotation: Any, data: Any) -> Part | None:
-    """The part without its bad keys, so that checks between parts still see its good ones; None if hopeless."""
-    model = _part_of(annotation)
-    if model is None or not isinstance(data, dict):
-        return None
+    model = case_type(data)
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        bad = {item["loc"][0] for item in error.errors() if item["loc"]}
-    rest = {key: value for key, value in data.items() if key not in bad}
-    return model.model_validate(rest) if not _schema_problems(model, rest) else None
+        problems = _problems(model, data, error)
+    plural = "s" if len(problems) > 1 else ""
+    raise CaseError(f"{source}: {len(problems)} problem{plural}: {' | '.join(problems)}")
 
 
-def _part_of(annotation: Any) -> type[Part] | None:
-    candidates = (annotation, *getattr(annotation, "__args__", ()))
-    return next((t for t in candidates if isinstance(t, type) and issubclass(t, Part)), None)
+def _problems(model: type[Case], data: Mapping[str, Any], error: ValidationError) -> list[str]:
+    """The problems of single keys, then those between the keys that are good."""
+    items = [item for item in error.errors() if item["type"] != "value_error"]
+    bad = {".".join(map(str, item["loc"][:2])) for item in items}
+    tables = {name: _good_keys(name, field, data, bad) for name, field in _tables_of(model)}
+    return [*dict.fromkeys(_problem(dict(item)) for item in items), *cross_problems(tables, bad)]
 
 
-def _schema_problems(model: type[BaseModel], data: Any) -> list[str]:
+def _good_keys(
+    name: str, field: FieldInfo, data: Mapping[str, Any], bad: Collection[str]
+) -> Part | None:
+    """A table without its bad keys; None where it is missing or cannot do without them."""
+    if name not in data:
+        return None if field.is_required() else field.default
+    table, values = _table_of(field), data[name]
+    if table is None or not isinstance(values, dict):
+        return None
+    good = {key: value for key, value in values.items() if f"{name}.{key}" not in bad}
     try:
-        model.model_validate(data)
-    except ValidationError as error:
-        lines = [_problem(dict(item)) for item in error.errors()]
-        return list(dict.fromkeys(lines))
-    return []
+        return table.model_validate(good)
+    except ValidationError:
+        return None
+
+
+def _tables_of(model: type[Part]) -> list[tuple[str, FieldInfo]]:
+    return [(name, field) for name, field in model.model_fields.items() if _table_of(field)]
+
+
+def _table_of(field: FieldInfo) -> type[Part] | None:
+    kind = field.annotation
+    return kind if isinstance(kind, type) and issubclass(kind, Part) else None
 
 
 def _problem(item: dict[str, Any]) -> str:
@@ -85,10 +82,9 @@ def _problem(item: dict[str, Any]) -> str:
         return f"{path}: unknown key (given {given!r}){hint}"
     if item["type"] == "missing":
         return f"{path}: missing, a value is needed"
-    message = item["msg"].removeprefix("Value error, ")
-    if item["type"] == "value_error":
-        return f"{path}: {message}" if path else message
-    message = message.replace("Input should be", "should be").replace("a valid tuple", "a list")
+    message = (
+        item["msg"].replace("Input should be", "should be").replace("a valid tuple", "a list")
+    )
     return f"{path}: {given!r} {message}"
 
 
@@ -97,9 +93,9 @@ def _is_union_tag(part: Any) -> bool:
 
 
 def set_keys(data: dict[str, Any], assignments: list[str]) -> dict[str, Any]:
-    """`data` with dotted `key=value` assignments put in; values are read as TOML, bare words as text.
+    """`data` with dotted `key=value` assignments put in.
 
-    Raises CaseError for a malformed assignment.
+    Values are read as TOML, bare words as text. Raises CaseError for a malformed assignment.
     """
     result = copy.deepcopy(data)
     for assignment in assignments:
@@ -107,7 +103,8 @@ def set_keys(data: dict[str, Any], assignments: list[str]) -> dict[str, Any]:
         names = key.strip().split(".")
         if not equals or not all(names):
             raise CaseError(
-                f"--set {assignment}: expected key=value with a dotted key, e.g. fines.radius_mm=0.05"
+                f"--set {assignment}: expected key=value with a dotted key, "
+                "e.g. fines.radius_mm=0.05"
             )
         table = result
         for name in names[:-1]:
@@ -125,10 +122,13 @@ def _toml_value(text: str) -> Any:
         return text
 
 
-def read_case(path: Path, *, assignments: list[str] | None = None) -> Case:
-    """The case in the TOML file at `path`. Raises CaseError: unreadable file, bad TOML, any invalid parameter."""
+def read_case(path: str | Path, *, assignments: list[str] | None = None) -> Case:
+    """The case in the TOML file at `path`, with dotted `assignments` ("key=value") put in.
+
+    Raises CaseError when the file cannot be read, is not TOML, or holds an invalid parameter.
+    """
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise CaseError(
             f"{path}: cannot be read as a case file: {error}; give the path of a TOML file"

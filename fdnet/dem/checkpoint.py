@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.case.case import Case
+from fdnet.case.case import InvasionCase
 from fdnet.dem.scene import snapshot_of
 from fdnet.dem.supply import batches_of
 from fdnet.errors import DumpError, LiggghtsError
-from fdnet.scales.scales import Scales, arrival_time
+from fdnet.scales.scales import InvasionScales
+from fdnet.scales.slab import arrival_time
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Kind, Snapshot
 
@@ -34,7 +35,7 @@ class Checkpoint:
     quiet: int
 
 
-def chunks_of(case: Case, scales: Scales) -> int:
+def chunks_of(case: InvasionCase, scales: InvasionScales) -> int:
     """Number of chunks of the whole run.
 
     With a duration the one that comes nearest to it, so that chunks rounded to whole steps never make one too many;
@@ -44,14 +45,14 @@ def chunks_of(case: Case, scales: Scales) -> int:
     return max(1, round(chunks) if case.run.duration_s is not None else math.ceil(chunks - 1e-9))
 
 
-def quiet_chunks(scales: Scales) -> int:
+def quiet_chunks(scales: InvasionScales) -> int:
     """Chunks without a crossing that make the plug time."""
     return max(
         1, math.ceil(scales.plug_time / (scales.checkpoint_steps * scales.time_step) - 1e-9)
     )
 
 
-def plug_allowance(case: Case, scales: Scales) -> int:
+def plug_allowance(case: InvasionCase, scales: InvasionScales) -> int:
     """Fines that may cross the face within the plug time though it counts as plugged: `run.plug_rate` of all that the
     undisturbed suspension would bring."""
     return math.floor(
@@ -59,7 +60,7 @@ def plug_allowance(case: Case, scales: Scales) -> int:
     )
 
 
-def empty_chunks(case: Case, scales: Scales) -> int:
+def empty_chunks(case: InvasionCase, scales: InvasionScales) -> int:
     """Chunks without a fine leaving once the slab is empty: twice the fluid's passage, at least the plug time."""
     passage = 2 * case.size_m[0] / scales.interstitial_velocity
     return max(
@@ -67,7 +68,7 @@ def empty_chunks(case: Case, scales: Scales) -> int:
     )
 
 
-def quiet_enough(case: Case, scales: Scales, row: Checkpoint) -> bool:
+def quiet_enough(case: InvasionCase, scales: InvasionScales, row: Checkpoint) -> bool:
     waiting = row.upstream - row.removed_upstream
     return row.quiet >= (quiet_chunks(scales) if waiting > 0 else empty_chunks(case, scales))
 
@@ -114,7 +115,7 @@ def _is_count(text: str) -> bool:
         return False
 
 
-def last_checkpoint(folder: Path, case: Case, grains: Snapshot) -> Checkpoint | None:
+def last_checkpoint(folder: Path, case: InvasionCase, grains: Snapshot) -> Checkpoint | None:
     """The newest checkpoint whose dump and restart are whole; None when there is none."""
     try:
         rows = read_history(folder)
@@ -139,7 +140,7 @@ def _whole(folder: Path, row: Checkpoint, grain_number: int) -> bool:
 
 
 def state_at(
-    folder: Path, row: Checkpoint, case: Case, scales: Scales, grains: Snapshot
+    folder: Path, row: Checkpoint, case: InvasionCase, scales: InvasionScales, grains: Snapshot
 ) -> Snapshot:
     """Grains and remaining fines at a checkpoint. Raises DumpError when its dump is missing or cut."""
     frame = read_frame(folder / "post" / f"invade_{row.step}.dump")
@@ -168,7 +169,11 @@ def step_of(path: Path) -> int:
 
 
 def readable_states(
-    folder: Path, history: Sequence[Checkpoint], case: Case, scales: Scales, grains: Snapshot
+    folder: Path,
+    history: Sequence[Checkpoint],
+    case: InvasionCase,
+    scales: InvasionScales,
+    grains: Snapshot,
 ) -> Iterator[tuple[Checkpoint, Snapshot]]:
     """The states behind `history`, checked against its counts; earlier dumps that are missing or cut are passed over.
 

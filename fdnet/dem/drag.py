@@ -2,15 +2,15 @@
 
 from typing import Any
 
-from fdnet.case.case import Case
+from fdnet.case.case import InvasionCase
 from fdnet.dem.deck import number
-from fdnet.scales.scales import Scales
+from fdnet.scales.scales import InvasionScales
 
 BELOW_ZERO = -5e-324
 """The largest number below 0: a region that ends here holds exactly x < 0."""
 
 
-def drag_variables(case: Case, scales: Scales) -> dict[str, Any]:
+def drag_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]:
     """Variables of the drag block: the scheme and, as text, the numbers that it needs."""
     coefficient = case.fluid.stokes_coefficient_Pa_s * case.drag.multiplier
     slower = scales.interstitial_velocity - scales.upstream_velocity
@@ -27,15 +27,16 @@ def drag_variables(case: Case, scales: Scales) -> dict[str, Any]:
     }
 
 
-def _by_radius(scales: Scales, slower: float) -> dict[str, Any]:
+def _by_radius(scales: InvasionScales, slower: float) -> dict[str, Any]:
     """F = 6 pi mu M r (u - v), for each fine by its own radius r."""
     fluid = f"(f_uf[1]-(x<0.0)*{number(slower)})" if slower else "f_uf[1]"
     return {"fluid_x": fluid, "hold_steps": scales.hold_steps if scales.hold_steps > 1 else 0}
 
 
-def _viscous(case: Case, scales: Scales, coefficient: float, slower: float) -> dict[str, Any]:
+def _viscous(
+    case: InvasionCase, scales: InvasionScales, coefficient: float, slower: float
+) -> dict[str, Any]:
     """The same for one radius: the constant 6 pi mu M r u, less 6 pi mu M r (u - u_upstream) at x < 0, and damping."""
-    assert case.fines is not None
     damping = coefficient * case.fines.mean_radius_m
     return {
         "damping": number(damping),

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fdnet.atomic import write_text
-from fdnet.case.case import Case
+from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, plug_allowance, quiet_chunks
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
 from fdnet.dem.drag import BELOW_ZERO, drag_variables
@@ -16,7 +16,7 @@ from fdnet.dem.overlap import is_watched, watch_variables
 from fdnet.dem.scene import contact_variables, header_variables, wall_variables, write_data
 from fdnet.dem.supply import AT_ONCE, batches_of, place_batches, place_fines, slab_end
 from fdnet.errors import CaseError
-from fdnet.scales.scales import Scales
+from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.contacts import touching_pairs
 from fdnet.spheres.dump import COLUMNS, FORMAT
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
@@ -26,10 +26,9 @@ SUPPLY = "supply"
 
 
 def write_invade_inputs(
-    case: Case, scales: Scales, grains: Snapshot, folder: Path, *, ranks: int = 1
+    case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path, *, ranks: int = 1
 ) -> Deck:
     """Write in.invade and invade.data (grains and the first fines) into `folder`, and the batches that follow."""
-    assert case.fines is not None
     batched = case.fines.supply == "batches"
     spheres = grains.joined(
         write_batches(case, scales, grains, folder)
@@ -56,9 +55,10 @@ def write_invade_inputs(
     return deck
 
 
-def write_batches(case: Case, scales: Scales, grains: Snapshot, folder: Path) -> Snapshot:
+def write_batches(
+    case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path
+) -> Snapshot:
     """Write supply/batch_N.data and .in, taken in before chunk N; returns the fines of the start."""
-    assert case.fines is not None
     batches, bounds = list(place_batches(case, scales, grains)), _bounds(case, scales, grains)
     shared = {
         "start_velocity": number(scales.upstream_velocity),
@@ -74,22 +74,20 @@ def write_batches(case: Case, scales: Scales, grains: Snapshot, folder: Path) ->
     return reduce(Snapshot.joined, batches[:AT_ONCE])
 
 
-def _feeding(case: Case, scales: Scales) -> dict[str, int] | None:
+def _feeding(case: InvasionCase, scales: InvasionScales) -> dict[str, int] | None:
     """First and last chunk that take in a batch; None when all fines are there from the start."""
     later = len(batches_of(case, scales).counts) - AT_ONCE
     return {"first": AT_ONCE, "last": AT_ONCE + later - 1} if later > 0 else None
 
 
-def _margin(case: Case, scales: Scales) -> float:
+def _margin(case: InvasionCase, scales: InvasionScales) -> float:
     """How far a fine could go in one chunk at twice the fluid's velocity, plus two diameters."""
-    assert case.fines is not None
     travel = 2 * scales.interstitial_velocity * scales.checkpoint_steps * scales.time_step
     return travel + 4 * case.fines.radius_range_m[1]
 
 
-def _bounds(case: Case, scales: Scales, grains: Snapshot) -> Array:
+def _bounds(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> Array:
     """The simulation box (3, 2): it extends past the outlet and upstream of the slab, where fines are removed."""
-    assert case.fines is not None
     start = slab_end(case, grains) - batches_of(case, scales).reach
     margin = _margin(case, scales)
     size = case.size_m
@@ -97,15 +95,14 @@ def _bounds(case: Case, scales: Scales, grains: Snapshot) -> Array:
 
 
 def render_invade(
-    case: Case,
-    scales: Scales,
+    case: InvasionCase,
+    scales: InvasionScales,
     grains: Snapshot,
     *,
     ranks: int = 1,
     resume: Checkpoint | None = None,
 ) -> Deck:
     """The invasion deck, fresh or continued from a checkpoint's restart."""
-    assert case.fines is not None
     mobile = case.grains.motion == "mobile"
     frictional = [c for name, c in scales.contacts.items() if "fine" in name or mobile]
     friction = any(c.friction > 0 for c in frictional)
@@ -147,9 +144,8 @@ def render_invade(
     return Deck(text=text, stage="invade", digest=case.digest("invade"), left_out=tuple(left_out))
 
 
-def _skin(case: Case) -> float:
+def _skin(case: InvasionCase) -> float:
     """The neighbour skin, m: given, or the smallest fine's radius (0.3 to 0.8 of its diameter is fastest, measured)."""
-    assert case.fines is not None
     return case.fines.radius_range_m[0] if case.run.skin_m is None else case.run.skin_m
 
 
@@ -165,7 +161,7 @@ def _start(resume: Checkpoint | None) -> dict[str, int]:
     }
 
 
-def _regions(case: Case, scales: Scales, grains: Snapshot) -> dict[str, str]:
+def _regions(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> dict[str, str]:
     bounds, length, margin = _bounds(case, scales, grains), case.size_m[0], _margin(case, scales)
     behind = bounds[0, 0] + margin
     sides = "INF INF INF INF"
@@ -177,7 +173,9 @@ def _regions(case: Case, scales: Scales, grains: Snapshot) -> dict[str, str]:
     }
 
 
-def _gravity(case: Case, scales: Scales) -> tuple[dict[str, Any] | None, list[LeftOut]]:
+def _gravity(
+    case: InvasionCase, scales: InvasionScales
+) -> tuple[dict[str, Any] | None, list[LeftOut]]:
     mode, vector = case.gravity.mode, case.gravity.acceleration_m_s2
     magnitude = math.hypot(*vector)
     if mode == "off" or magnitude == 0:
@@ -202,7 +200,7 @@ def _gravity(case: Case, scales: Scales) -> tuple[dict[str, Any] | None, list[Le
     }, []
 
 
-def _left_out(case: Case, *, friction: bool, ranks: int) -> list[LeftOut]:
+def _left_out(case: InvasionCase, *, friction: bool, ranks: int) -> list[LeftOut]:
     found = []
     if case.grains.motion == "fixed":
         found.append(LeftOut(what="contacts between grains, end planes", why="grains are fixed"))
@@ -217,7 +215,7 @@ def _left_out(case: Case, *, friction: bool, ranks: int) -> list[LeftOut]:
             else "fines are of unequal size"
         )
         found.append(LeftOut(what="overlap between checkpoints", why=why))
-    if case.fines is not None and case.fines.supply == "batches":
+    if case.fines.supply == "batches":
         found.append(
             LeftOut(
                 what="fines far upstream",

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fdnet.atomic import disk_is_full, write_text
-from fdnet.case.case import Case
+from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import (
     HISTORY,
     HISTORY_HEADER,
@@ -34,7 +34,7 @@ from fdnet.dem.overlap import (
 )
 from fdnet.dem.supply import batches_of
 from fdnet.errors import LiggghtsError
-from fdnet.scales.scales import Scales
+from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Snapshot
 
 
@@ -61,7 +61,9 @@ class Invasion:
         return self.overlap.fraction
 
 
-def invade(case: Case, scales: Scales, grains: Snapshot, folder: Path, launch: Launch) -> Invasion:
+def invade(
+    case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path, launch: Launch
+) -> Invasion:
     """Drive the fines in; continues from the last whole checkpoint when `folder` holds one.
 
     Raises LiggghtsError when a run fails or fines are lost, CaseError when the fines cannot be placed.
@@ -96,7 +98,7 @@ def invade(case: Case, scales: Scales, grains: Snapshot, folder: Path, launch: L
 
 
 def _drive(
-    case: Case, scales: Scales, grains: Snapshot, folder: Path, launch: Launch
+    case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path, launch: Launch
 ) -> tuple[Deck, Run | None]:
     """Run to the end of the invasion; no run when the last checkpoint was the end already."""
 
@@ -164,7 +166,7 @@ class _Keeper:
             self.follow(line)
 
 
-def _over(case: Case, scales: Scales, last: Checkpoint | None) -> bool:
+def _over(case: InvasionCase, scales: InvasionScales, last: Checkpoint | None) -> bool:
     if last is None:
         return False
     return (
@@ -173,8 +175,8 @@ def _over(case: Case, scales: Scales, last: Checkpoint | None) -> bool:
 
 
 def _prepare(
-    case: Case,
-    scales: Scales,
+    case: InvasionCase,
+    scales: InvasionScales,
     grains: Snapshot,
     folder: Path,
     *,
@@ -195,14 +197,16 @@ def _prepare(
     for path in (folder / "post").glob("invade_*"):
         if step_of(path) > last.step:
             path.unlink()
-    if case.fines is not None and case.fines.supply == "batches":
+    if case.fines.supply == "batches":
         write_batches(case, scales, grains, folder)
     deck = render_invade(case, scales, grains, ranks=ranks, resume=last)
     write_text(folder / "in.invade.resume", deck.text)
     return deck
 
 
-def _ending(case: Case, scales: Scales, history: tuple[Checkpoint, ...]) -> tuple[str, list[str]]:
+def _ending(
+    case: InvasionCase, scales: InvasionScales, history: tuple[Checkpoint, ...]
+) -> tuple[str, list[str]]:
     """stop_reason and warnings. An empty slab decides nothing about plugging, so it is its own reason."""
     last = history[-1]
     waiting = last.upstream - last.removed_upstream

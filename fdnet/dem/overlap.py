@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from fdnet.atomic import write_text
-from fdnet.case.case import Case
+from fdnet.case.case import Case, InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, readable_states
 from fdnet.dem.deck import number
 from fdnet.errors import LiggghtsError
-from fdnet.scales.scales import Scales
+from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.contacts import max_overlap
 from fdnet.spheres.snapshot import Snapshot
 
@@ -27,16 +27,15 @@ class Deepest:
     fraction: float
 
 
-def is_watched(case: Case) -> bool:
+def is_watched(case: InvasionCase) -> bool:
     """Whether the deck can watch: LIGGGHTS reduces overlaps in metres over all pairs, of grains too."""
-    return case.grains.motion == "fixed" and case.fines is not None and case.fines.one_size
+    return case.grains.motion == "fixed" and case.fines.one_size
 
 
-def watch_variables(case: Case, scales: Scales) -> dict[str, Any] | None:
+def watch_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any] | None:
     """Variables of `_overlap.in.j2`; None where the dumps alone must do."""
     if not is_watched(case):
         return None
-    assert case.fines is not None
     every = max(EVERY, scales.checkpoint_steps // MOST_ROWS)
     return {"every": every, "diameter": number(2 * case.fines.radius_range_m[1]), "file": WATCH}
 
@@ -80,8 +79,8 @@ def deepest_of(seen: Iterable[Deepest]) -> Deepest:
 
 
 def refuse_overlap(
-    case: Case,
-    scales: Scales,
+    case: InvasionCase,
+    scales: InvasionScales,
     grains: Snapshot,
     folder: Path,
     *,

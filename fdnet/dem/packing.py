@@ -22,15 +22,15 @@ from fdnet.dem.scene import (
     write_data,
 )
 from fdnet.errors import CaseError, LiggghtsError
-from fdnet.scales.scales import (
+from fdnet.scales.grain_pack import (
     PACK_RELAX_STEPS,
     PACK_STAGE_STEPS,
     PACK_STAGES,
     PACK_START,
     PACK_STEP,
-    Scales,
     grain_count,
 )
+from fdnet.scales.scales import Scales
 from fdnet.scales.springs import sphere_mass
 from fdnet.spheres.contacts import max_overlap
 from fdnet.spheres.dump import COLUMNS, FORMAT, read_frame
@@ -82,9 +82,9 @@ def make_pack(case: Case, scales: Scales, folder: Path, launch: Launch) -> Pack:
             }
         )
         _refuse_overlap(case, pack)
-        if case.grains.count is not None or _met(case, pack):
+        if case.grains.count is not None or _is_met(scales.porosity, pack):
             return _accept(folder, attempt, pack, tried)
-        counts.append(_next_count(case, tried))
+        counts.append(_next_count(case, scales.porosity, tried))
         shutil.rmtree(attempt)
 
 
@@ -101,15 +101,12 @@ def _refuse_overlap(case: Case, pack: Pack) -> None:
         )
 
 
-def _met(case: Case, pack: Pack) -> bool:
-    assert case.grains.porosity is not None
-    return abs(pack.porosity - case.grains.porosity) + pack.porosity_error <= POROSITY_TOLERANCE
+def _is_met(target: float, pack: Pack) -> bool:
+    return abs(pack.porosity - target) + pack.porosity_error <= POROSITY_TOLERANCE
 
 
-def _next_count(case: Case, tried: list[dict[str, Any]]) -> int:
+def _next_count(case: Case, target: float, tried: list[dict[str, Any]]) -> int:
     """Newton on the plain sum first, then the secant through the two nearest attempts."""
-    target = case.grains.porosity
-    assert target is not None
     grain = case.grains.mean_volume_m3 / math.prod(case.size_m)
     nearest = sorted(tried, key=lambda row: abs(row["porosity"] - target))
     slope = -grain

@@ -4,33 +4,40 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.case.case import Case
+from fdnet.case.case import Case, InvasionCase
+from fdnet.case.stages import LIGGGHTS_STAGES
 from fdnet.dem.invade_deck import render_invade
 from fdnet.dem.packing import write_pack_inputs
 from fdnet.dem.scene import box_of
 from fdnet.errors import CaseError
-from fdnet.scales.scales import grain_count, scales_of
+from fdnet.scales.grain_pack import grain_count
+from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Snapshot, resting
 
 
 def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
     """Write the decks of a case without LIGGGHTS: the pack with its data file, and the invasion.
 
-    The invasion's data file needs a finished pack, so `fdnet run` writes it; the deck is shown for grains that stand
-    beyond the face as those of a dense pack do. Raises CaseError when a deck is there already.
+    The data file of the invasion needs a finished pack, so `fdnet run` writes it. The deck of the
+    invasion is written for grains that stand out beyond the face as those of a dense pack do.
+
+    Raises CaseError when a deck is there already.
     """
     scales = scales_of(case)
-    decks = [out / "pack" / "in.pack"] + ([out / "invade" / "in.invade"] if case.fines else [])
-    there = [deck for deck in decks if deck.exists()]
+    decks = {
+        stage: out / stage / f"in.{stage}" for stage in case.stages if stage in LIGGGHTS_STAGES
+    }
+    there = [path for path in decks.values() if path.exists()]
     if there:
         raise CaseError(f"{there[0]}: is there already; give another --out (nothing was changed)")
-    for deck in decks:
-        deck.parent.mkdir(parents=True, exist_ok=True)
-    write_pack_inputs(case, scales, decks[0].parent, count=grain_count(case), ranks=ranks)
-    if case.fines:
-        grains = _expected_grains(case)
-        decks[1].write_text(render_invade(case, scales, grains, ranks=ranks).text)
-    return decks
+    for path in decks.values():
+        path.parent.mkdir(parents=True, exist_ok=True)
+    folder = decks["pack"].parent
+    write_pack_inputs(case, scales, folder, count=grain_count(case), ranks=ranks)
+    if isinstance(case, InvasionCase):
+        deck = render_invade(case, scales_of(case), _expected_grains(case), ranks=ranks)
+        decks["invade"].write_text(deck.text)
+    return list(decks.values())
 
 
 def _expected_grains(case: Case) -> Snapshot:

@@ -8,7 +8,8 @@ import numpy as np
 from fdnet.atomic import write_text
 from fdnet.case.case import Case
 from fdnet.dem.deck import LeftOut, number
-from fdnet.scales.scales import Contact, Scales
+from fdnet.scales.scales import Scales
+from fdnet.scales.springs import Contact
 from fdnet.spheres.dump import Frame
 from fdnet.spheres.snapshot import Array, Snapshot
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fdnet.case.case import Case
+from fdnet.case.case import InvasionCase
 from fdnet.errors import CaseError
-from fdnet.scales.scales import Scales
+from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 
 CLEARANCE = 1.02
@@ -37,12 +37,11 @@ def front_of(grains: Snapshot) -> float:
     return float(min(0.0, np.min(grains.position[:, 0] - grains.radius)))
 
 
-def refuse_crowded_supply(case: Case, scales: Scales) -> None:
+def refuse_crowded_supply(case: InvasionCase, scales: InvasionScales) -> None:
     """Raises CaseError when the slab cannot hold its fines, which does not depend on the grains.
 
     Tries it only where they might not fit: the draw takes seconds for a million fines.
     """
-    assert case.fines is not None
     if crowding(case) <= SURE_CROWDING:
         return
     if case.fines.supply == "slab":
@@ -51,13 +50,12 @@ def refuse_crowded_supply(case: Case, scales: Scales) -> None:
         list(_draw_batches(case, scales, end=0.0))
 
 
-def crowding(case: Case) -> float:
+def crowding(case: InvasionCase) -> float:
     """An eighth of the space shut to the centre of one of the largest fines, as a share: c for equal fines far apart.
 
     c <(R + r)^3> / (8 <r^3>) for radii r uniform up to R, over the section that centres can reach (a diameter less
     between walls); inf if there is none. Places up to 2 % of a radius sum apart are counted as free.
     """
-    assert case.fines is not None
     low, high = case.fines.radius_range_m
     shut = (
         (2 * high + low + high)
@@ -69,24 +67,28 @@ def crowding(case: Case) -> float:
     return case.fines.concentration * shut / math.prod(reach) if min(reach) > 0 else math.inf
 
 
-def place_fines(case: Case, scales: Scales, grains: Snapshot) -> Snapshot:
+def place_fines(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> Snapshot:
     """Fines (N) in the slab upstream of all grains, moving with the fluid.
 
     Raises CaseError when the slab cannot hold them without overlap.
     """
-    assert case.fines is not None
     position, radius = _draw(case, scales, end=slab_end(case, grains))
     return _moving(case, scales, grains, position, radius, first=int(grains.id.max()) + 1)
 
 
-def slab_end(case: Case, grains: Snapshot) -> float:
+def slab_end(case: InvasionCase, grains: Snapshot) -> float:
     """x (m) where the slab ends: a largest fine's diameter upstream of all grains."""
-    assert case.fines is not None
     return front_of(grains) - 2 * case.fines.radius_range_m[1]
 
 
 def _moving(
-    case: Case, scales: Scales, grains: Snapshot, position: Array, radius: Array, *, first: int
+    case: InvasionCase,
+    scales: InvasionScales,
+    grains: Snapshot,
+    position: Array,
+    radius: Array,
+    *,
+    first: int,
 ) -> Snapshot:
     velocity = np.zeros((len(radius), 3))
     velocity[:, 0] = scales.upstream_velocity
@@ -121,11 +123,10 @@ class Batches:
         return sum(self.counts[: chunk + AT_ONCE - 1])
 
 
-def batches_of(case: Case, scales: Scales) -> Batches:
+def batches_of(case: InvasionCase, scales: InvasionScales) -> Batches:
     """The batches of a case: equal lengths, the slab's fines shared out evenly. One holds all of a slab fed at once, or
     of so few fines that some batch would be empty. None is thinner than a fine, so that each need clear only the next.
     """
-    assert case.fines is not None
     travel = scales.upstream_velocity * scales.checkpoint_steps * scales.time_step
     apart = 1.01 * CLEARANCE * 2 * case.fines.radius_range_m[1]
     length = max(travel / (1 - case.fines.concentration / LOOSEST_CAKE), apart)
@@ -140,7 +141,9 @@ def batches_of(case: Case, scales: Scales) -> Batches:
     return Batches(counts=tuple(int(count) for count in counts), length=length, travel=travel)
 
 
-def place_batches(case: Case, scales: Scales, grains: Snapshot) -> Iterator[Snapshot]:
+def place_batches(
+    case: InvasionCase, scales: InvasionScales, grains: Snapshot
+) -> Iterator[Snapshot]:
     """The slab batch by batch, each where the fluid has carried it when it enters; ids run on through all of them.
 
     The first batches do not depend on how many follow.
@@ -154,9 +157,10 @@ def place_batches(case: Case, scales: Scales, grains: Snapshot) -> Iterator[Snap
         first += len(radius)
 
 
-def _draw_batches(case: Case, scales: Scales, *, end: float) -> Iterator[tuple[Array, Array]]:
+def _draw_batches(
+    case: InvasionCase, scales: InvasionScales, *, end: float
+) -> Iterator[tuple[Array, Array]]:
     """Places (n, 3) in the slab and radii (n,) m of each batch; each clears the one before, that next to it."""
-    assert case.fines is not None
     batches, before = batches_of(case, scales), (np.empty((0, 3)), np.empty(0))
     for number, count in enumerate(batches.counts):
         rng = np.random.default_rng([case.seed, 11, number])
@@ -167,16 +171,15 @@ def _draw_batches(case: Case, scales: Scales, *, end: float) -> Iterator[tuple[A
         yield before
 
 
-def _draw(case: Case, scales: Scales, *, end: float) -> tuple[Array, Array]:
+def _draw(case: InvasionCase, scales: InvasionScales, *, end: float) -> tuple[Array, Array]:
     """Places (N, 3) and radii (N,) m of the slab's fines; it ends at x = `end`."""
-    assert case.fines is not None
     rng = np.random.default_rng([case.seed, 11])
     radius = rng.uniform(*case.fines.radius_range_m, scales.supplied_count)
     return _add_sequentially(case, radius, (end - scales.slab_length, end), rng), radius
 
 
 def _add_sequentially(
-    case: Case,
+    case: InvasionCase,
     radius: Array,
     slab: tuple[float, float],
     rng: np.random.Generator,
@@ -212,7 +215,7 @@ def _add_sequentially(
         )
         waiting = waiting[~free]
     raise CaseError(
-        f"fines.concentration: {case.fines.concentration if case.fines else 0:g} leaves {len(waiting)} of "
+        f"fines.concentration: {case.fines.concentration:g} leaves {len(waiting)} of "
         f"{len(radius)} fines "
         f"without a place in a slab of {1e3 * size[0]:.3g} mm; lower it or lengthen fines.slab_mm"
     )

@@ -10,12 +10,12 @@ from typing import Any
 
 from fdnet.atomic import write_text
 from fdnet.case.case import Case
+from fdnet.case.stages import LIGGGHTS_STAGES, STAGES
 from fdnet.errors import CaseError
 
-STAGES = ("pack", "invade", "analyse", "report")
 RECORD_FORMAT = 1
 MANIFEST, CASE, LOCK, UNFINISHED = "manifest.json", "case.toml", ".lock", ".unfinished"
-_RECORDS = {"pack": "pack/stage.json", "invade": "invade/stage.json"}
+_RECORDS: dict[str, str] = {stage: f"{stage}/stage.json" for stage in LIGGGHTS_STAGES}
 _OUTPUTS = {
     "pack": ("pack",),
     "invade": ("invade",),
@@ -60,29 +60,14 @@ class RunFolder:
 
     def manifest(self) -> dict[str, Any] | None:
         """The manifest of an analysed run, or None. Raises CaseError when it or what it lists is damaged."""
-        manifest = _read_record(self.path / MANIFEST)
-        missing = (
-            []
-            if manifest is None
-            else [
-                name
-                for stage in ("pack", "invade", "analyse")
-                for name in _expected(manifest, stage)
-                if not (self.path / name).exists()
-            ]
-        )
-        if missing:
-            raise CaseError(
-                f"{self.path}: {MANIFEST} says complete, but {missing[0]} is missing; start over with --force"
-            )
-        return manifest
+        return read_manifest(self.path)
 
     def holds(self, case: Case, stages: tuple[str, ...]) -> bool:
         """Whether every one of `stages` is done already. Raises CaseError as `manifest` and `record` do."""
         manifest = self.manifest()
         if manifest is not None:
             return set(stages) <= set(manifest["stages"])
-        needed = [stage for stage in stages if stage != "invade" or case.fines]
+        needed = [stage for stage in stages if stage in case.stages]
         return set(needed) <= set(_RECORDS) and all(
             self.record(stage) is not None for stage in needed
         )
@@ -189,14 +174,15 @@ def _refuse_foreign(path: Path) -> None:
 
 
 def _refuse_gap(path: Path, case: Case, stages: tuple[str, ...]) -> None:
-    needed = ["pack"] * (stages != ("pack",)) + ["invade"] * (
-        bool(case.fines) and bool({"analyse", "report"} & set(stages))
-    )
-    for stage in needed:
-        if stage not in stages and not (path / _RECORDS[stage]).exists():
-            what = "pack" if stage == "pack" else "invasion"
+    """A stage needs the finished ones before it that run LIGGGHTS."""
+    analysed = bool({"analyse", "report"} & set(stages))
+    needed = {"pack": stages != ("pack",), "invade": "invade" in case.stages and analysed}
+    for stage, what in (("pack", "pack"), ("invade", "invasion")):
+        missing = stage not in stages and not (path / _RECORDS[stage]).exists()
+        if needed[stage] and missing:
             raise CaseError(
-                f"{path}: no finished {what} here; run the stage {stage} first (--stages {stage},...)"
+                f"{path}: no finished {what} here; run the stage {stage} first "
+                f"(--stages {stage},...)"
             )
 
 
@@ -246,6 +232,22 @@ def read_record(folder: Path, stage: str) -> dict[str, Any] | None:
     Raises CaseError when it cannot be understood.
     """
     return _read_record(folder / _RECORDS[stage])
+
+
+def read_manifest(folder: Path) -> dict[str, Any] | None:
+    """The manifest of the analysed run in `folder`, or None where there is none.
+
+    Raises CaseError when it cannot be read, or when a file that it lists is missing.
+    """
+    manifest = _read_record(folder / MANIFEST)
+    for stage in ("pack", "invade", "analyse") if manifest else ():
+        for name in _expected(manifest or {}, stage):
+            if not (folder / name).exists():
+                raise CaseError(
+                    f"{folder}: {MANIFEST} says complete, but {name} is missing; "
+                    "start over with --force"
+                )
+    return manifest
 
 
 def _read_record(path: Path) -> dict[str, Any] | None:

@@ -1,33 +1,59 @@
-"""What a run writes beside its summary: tables, figures, ParaView files."""
+"""What a run writes next to its summary: tables, figures, ParaView files."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
-from fdnet.case.case import Case
+from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, readable_states
 from fdnet.network.analysis import Analysis
-from fdnet.scales.scales import Scales
+from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Snapshot
 
 MOST_FRAMES = 24
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Invaded:
+    """A finished invasion.
+
+    Attributes:
+        case: what was run.
+        scales: of the case.
+        history: one row a checkpoint.
+        damaged: grains and all remaining fines at the end.
+    """
+
+    case: InvasionCase
+    scales: InvasionScales
+    history: tuple[Checkpoint, ...]
+    damaged: Snapshot
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Results:
-    """A run's results and where they go; `damaged` is None and `history` empty without fines."""
+    """The results of a run and where they go.
+
+    Attributes:
+        path: run folder.
+        grains: as packed.
+        invasion: None when the case has no fines.
+        analysis: permeability, porosity and fines of the specimen.
+    """
 
     path: Path
-    case: Case
-    scales: Scales
     grains: Snapshot
-    damaged: Snapshot | None
-    history: tuple[Checkpoint, ...]
+    invasion: Invaded | None
     analysis: Analysis
 
     @property
     def shown(self) -> Snapshot:
         """The specimen at the end: damaged, or the intact grains."""
-        return self.grains if self.damaged is None else self.damaged
+        return self.grains if self.invasion is None else self.invasion.damaged
+
+    @property
+    def history(self) -> tuple[Checkpoint, ...]:
+        """The checkpoints of the invasion; empty without one."""
+        return () if self.invasion is None else self.invasion.history
 
 
 def write_tables(results: Results) -> None:
@@ -55,42 +81,32 @@ def write_paraview(results: Results) -> None:
     vtk.write_pvd(
         path / "spheres.pvd", [(0.0, "spheres_initial.vtp"), (shown.time_s, "spheres_damaged.vtp")]
     )
-    if results.history:
-        _write_frames(results)
+    if results.invasion is not None:
+        _write_frames(path, results.grains, results.invasion)
 
 
-def _write_frames(results: Results) -> None:
-    """At most 24 evenly spaced states, the last always among them."""
+def _write_frames(path: Path, grains: Snapshot, invasion: Invaded) -> None:
+    """At most `MOST_FRAMES` evenly spaced states; the last is always among them."""
     from fdnet.report import vtk
 
-    stride = -(-len(results.history) // MOST_FRAMES)
-    (results.path / "frames").mkdir(exist_ok=True)
+    case, history = invasion.case, invasion.history
+    stride = -(-len(history) // MOST_FRAMES)
+    (path / "frames").mkdir(exist_ok=True)
     entries = []
-    chosen = results.history[::-1][::stride][::-1]
-    for row, state in readable_states(
-        results.path / "invade", chosen, results.case, results.scales, results.grains
-    ):
+    chosen = history[::-1][::stride][::-1]
+    for row, state in readable_states(path / "invade", chosen, case, invasion.scales, grains):
         name = f"frames/spheres_{row.step}.vtp"
-        vtk.write_spheres_vtp(
-            results.path / name, state if results.case.grains.motion == "mobile" else state.fines()
-        )
+        moving = state if case.grains.motion == "mobile" else state.fines()
+        vtk.write_spheres_vtp(path / name, moving)
         entries.append((state.time_s, name))
-    vtk.write_pvd(results.path / "invasion.pvd", entries)
+    vtk.write_pvd(path / "invasion.pvd", entries)
 
 
 def draw_figures(results: Results) -> tuple[list[tuple[Path, str]], list[str]]:
     """All figures with their captions, and why the 3-D picture is missing if it is."""
     from fdnet.report import figures, vtk
 
-    rows = [
-        {
-            "time_s": row.step * results.scales.time_step,
-            "upstream": row.upstream,
-            "invaded": row.invaded,
-            "passed": row.passed,
-        }
-        for row in results.history
-    ]
+    rows = [] if results.invasion is None else _history_rows(results.invasion)
     drawn = figures.draw_all(
         results.path / "figures", results.analysis, results.shown, rows or None
     )
@@ -101,3 +117,15 @@ def draw_figures(results: Results) -> tuple[list[tuple[Path, str]], list[str]]:
     if reason:
         return [(file, figures.CAPTIONS[file.stem]) for file in drawn], [reason]
     return [(file, figures.CAPTIONS[file.stem]) for file in (picture, *drawn)], []
+
+
+def _history_rows(invasion: Invaded) -> list[dict[str, float]]:
+    return [
+        {
+            "time_s": row.step * invasion.scales.time_step,
+            "upstream": row.upstream,
+            "invaded": row.invaded,
+            "passed": row.passed,
+        }
+        for row in invasion.history
+    ]

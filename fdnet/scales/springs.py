@@ -1,4 +1,4 @@
-"""Linear (Hooke) contacts of a case: springs in series, smaller friction, viscous damping, stable steps."""
+"""Linear (Hooke) contacts of a case: springs in series, smaller friction, viscous damping."""
 
 import math
 from dataclasses import dataclass
@@ -6,10 +6,29 @@ from dataclasses import dataclass
 from fdnet.case.case import Case
 from fdnet.case.particles import Spheres
 
+PAIRS = (
+    ("grain", "grain"),
+    ("grain", "wall"),
+    ("grain", "fine"),
+    ("fine", "fine"),
+    ("fine", "wall"),
+)
+"""Pairs of materials in contact."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contact:
-    """Linear contact of one pair of materials, as used: stiffness N/m, damping_rate 1/s, times s."""
+    """Linear contact of one pair of materials, as it is used.
+
+    Attributes:
+        pair: names of the two materials, such as "grain-fine".
+        normal_stiffness: N/m.
+        shear_stiffness: N/m.
+        friction: coefficient of sliding friction.
+        damping_rate: 1/s, viscous damping force over effective mass and velocity.
+        contact_time: s, half a period of the damped oscillation.
+        step_limit: s, sqrt(m/k) of the lighter sphere.
+    """
 
     pair: str
     normal_stiffness: float
@@ -31,33 +50,27 @@ def sphere_mass(radius: float, density: float) -> float:
 
 
 def mass_range(spheres: Spheres) -> tuple[float, float]:
+    """Mass of the smallest and of the largest sphere, kg."""
     low, high = spheres.radius_range_m
     return sphere_mass(low, spheres.density_kg_m3), sphere_mass(high, spheres.density_kg_m3)
 
 
 def _nominal(case: Case) -> dict[str, tuple[float, float, float]]:
-    """Per material: normal and shear stiffness, friction. The walls are of the grains' material."""
-    grains = case.grains
+    """Per material: normal and shear stiffness, friction. Walls are of the grains' material."""
     table = {
-        "grain": (grains.normal_stiffness_N_m, grains.shear_stiffness_N_m, grains.friction),
-        "wall": (grains.normal_stiffness_N_m, grains.shear_stiffness_N_m, case.box.wall_friction),
+        name: (spheres.normal_stiffness_N_m, spheres.shear_stiffness_N_m, spheres.friction)
+        for name, spheres in case.spheres.items()
     }
-    if case.fines:
-        table["fine"] = (
-            case.fines.normal_stiffness_N_m,
-            case.fines.shear_stiffness_N_m,
-            case.fines.friction,
-        )
-    return table
+    return table | {"wall": (*table["grain"][:2], case.box.wall_friction)}
 
 
 def _pairs(case: Case) -> list[tuple[str, str]]:
-    pairs = [("grain", "grain"), ("grain", "wall")]
-    return [*pairs, ("grain", "fine"), ("fine", "fine"), ("fine", "wall")] if case.fines else pairs
+    """Pairs of materials that may touch; walls do not touch each other."""
+    return [pair for pair in PAIRS if set(pair) <= {*case.spheres, "wall"}]
 
 
 def stiffness_factor(case: Case) -> float:
-    """What all contact stiffnesses are multiplied by: run.stiffness_N_m over the stiffest pair's nominal value."""
+    """Factor on all contact stiffnesses: run.stiffness_N_m over that of the stiffest pair."""
     if case.run.stiffness_N_m == "nominal":
         return 1.0
     nominal = _nominal(case)
@@ -67,6 +80,7 @@ def stiffness_factor(case: Case) -> float:
 
 
 def contacts_of(case: Case) -> dict[str, Contact]:
+    """The contact of each pair of materials of the case, by its name."""
     nominal, factor = _nominal(case), stiffness_factor(case)
     return {f"{a}-{b}": _contact(case, (a, b), nominal, factor) for a, b in _pairs(case)}
 
@@ -79,15 +93,10 @@ def _contact(
 ) -> Contact:
     first, second = pair
     normal = factor * series(nominal[first][0], nominal[second][0])
-    spheres = [case.grains if name == "grain" else case.fines for name in pair if name != "wall"]
-    damping = sum(s.damping_ratio for s in spheres if s) / len(spheres)
-    frequency = math.sqrt(
-        normal
-        / _effective_mass(
-            case, pair, grains_fixed="fine" in pair and case.grains.motion == "fixed"
-        )
-    )
-    small = case.fines if "fine" in pair and case.fines else case.grains
+    spheres = [case.spheres[name] for name in pair if name != "wall"]
+    damping = sum(one.damping_ratio for one in spheres) / len(spheres)
+    frequency = math.sqrt(normal / _effective_mass(case, pair))
+    lightest = case.spheres["fine" if "fine" in pair else "grain"]
     return Contact(
         pair=f"{first}-{second}",
         normal_stiffness=normal,
@@ -95,18 +104,18 @@ def _contact(
         friction=min(nominal[first][2], nominal[second][2]),
         damping_rate=2 * damping * frequency,
         contact_time=math.pi / (frequency * math.sqrt(1 - damping**2)),
-        step_limit=math.sqrt(mass_range(small)[0] / normal),
+        step_limit=math.sqrt(mass_range(lightest)[0] / normal),
     )
 
 
-def _effective_mass(case: Case, pair: tuple[str, str], *, grains_fixed: bool) -> float:
-    """m1 m2 / (m1 + m2) of a typical contact, kg; walls and fixed grains have infinite mass, in LIGGGHTS too."""
+def _effective_mass(case: Case, pair: tuple[str, str]) -> float:
+    """m1 m2 / (m1 + m2) of a typical contact, kg.
 
-    def inverse(name: str) -> float:
-        spheres = case.grains if name == "grain" else case.fines
-        if name == "wall" or (name == "grain" and grains_fixed):
-            return 0.0
-        assert spheres is not None
-        return 1 / sphere_mass(spheres.mean_radius_m, spheres.density_kg_m3)
+    Walls have infinite mass, and fixed grains too while fines invade; so it is in LIGGGHTS.
+    """
+    fixed = {"wall", "grain"} if "fine" in pair and case.grains.motion == "fixed" else {"wall"}
+    return 1 / sum(0.0 if name in fixed else _inverse_mass(case.spheres[name]) for name in pair)
 
-    return 1 / (inverse(pair[0]) + inverse(pair[1]))
+
+def _inverse_mass(spheres: Spheres) -> float:
+    return 1 / sphere_mass(spheres.mean_radius_m, spheres.density_kg_m3)

@@ -1,8 +1,32 @@
 """The scales of a case as rows: name, symbol, value, unit, formula, source."""
 
+from dataclasses import dataclass
+
 from fdnet.case.case import Case
 from fdnet.scales.cost import cost_of, memory_bytes
-from fdnet.scales.scales import Quantity, Scales, grain_count
+from fdnet.scales.grain_pack import grain_count
+from fdnet.scales.scales import InvasionScales, Scales
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantity:
+    """One row of the table of scales.
+
+    Attributes:
+        name: what it is, in words.
+        symbol: as in the formulas.
+        value: in `unit`.
+        unit: SI; "-" for a number without a unit.
+        formula: how it follows from the case.
+        source: author and year, or where it was measured.
+    """
+
+    name: str
+    symbol: str
+    value: float
+    unit: str
+    formula: str
+    source: str
 
 
 def _row(name: str, symbol: str, value: float, unit: str, formula: str, source: str) -> Quantity:
@@ -14,7 +38,7 @@ def _row(name: str, symbol: str, value: float, unit: str, formula: str, source: 
 def scale_rows(case: Case, scales: Scales) -> list[Quantity]:
     """Every scale of the case with its formula and source, in reading order."""
     rows = _flow_rows(case, scales)
-    if case.fines:
+    if isinstance(scales, InvasionScales):
         rows += _fine_rows(scales)
     rows += _contact_rows(scales)
     return rows + _cost_rows(case, scales)
@@ -39,7 +63,7 @@ def _flow_rows(case: Case, scales: Scales) -> list[Quantity]:
     ]
 
 
-def _fine_rows(scales: Scales) -> list[Quantity]:
+def _fine_rows(scales: InvasionScales) -> list[Quantity]:
     low, high = scales.relaxation_time
     sizes = [("smallest", low), ("largest", high)] if low != high else [("every", low)]
     rows = [
@@ -202,7 +226,7 @@ def _cost_rows(case: Case, scales: Scales) -> list[Quantity]:
             "measured",
         ),
     ]
-    if case.fines:
+    if isinstance(scales, InvasionScales):
         rows.append(
             _row(
                 "invasion run time, one core",

@@ -14,6 +14,16 @@ DRAG_WARNING, DRAG_LIMIT = 0.1, 1.0
 _ROUNDING = 1 + 1e-12
 
 
+def relaxation_time(
+    radius: float, density: float, viscosity: float, multiplier: float = 1.0
+) -> float:
+    """tau = m / (6 pi mu r M) = 2 r^2 rho / (9 mu M), s (Stokes 1851).
+
+    For a sphere of `radius` m and `density` kg/m3 in a liquid of `viscosity` Pa s.
+    """
+    return 2 * radius**2 * density / (9 * viscosity * multiplier)
+
+
 def contact_step(case: Case, contacts: dict[str, Contact]) -> float:
     """sqrt(m/k), s, of the lightest moving sphere and the stiffest of its contacts."""
     mobile = case.grains.motion == "mobile"

@@ -15,7 +15,8 @@ from fdnet.dem.drag import drag_variables
 from fdnet.dem.liggghts import Binary, Launch, run_deck
 from fdnet.dem.scene import contact_variables, write_data
 from fdnet.errors import CaseError
-from fdnet.scales.scales import Scales, relaxation_time, scales_of
+from fdnet.scales.scales import InvasionScales, scales_of
+from fdnet.scales.time_step import relaxation_time
 from fdnet.spheres.dump import COLUMNS, Frame, read_dump
 from fdnet.spheres.snapshot import Kind
 
@@ -25,7 +26,7 @@ SLOW = "fluid.velocity_m_s=0.02"
 TAU = relaxation_time(RADIUS, 2146, 0.05)
 
 
-def drag_text(case: Case, scales: Scales, resume: bool = False) -> str:
+def drag_text(case: Case, scales: InvasionScales, resume: bool = False) -> str:
     return render_text("_drag.in.j2", {"drag": drag_variables(case, scales), "resume": resume})
 
 
@@ -98,7 +99,7 @@ def test_what_a_scheme_cannot_do_is_refused(assignments, said):
 
 def drive(
     case: Case, binary: Binary, folder: Path, *, gap: float, steps: int, every: int
-) -> tuple[Scales, list[Frame]]:
+) -> tuple[InvasionScales, list[Frame]]:
     """One fine from rest, `gap` m off a fixed grain downstream of it, under the deck's own drag and contact lines."""
     folder.mkdir(parents=True)
     scales = scales_of(case)

@@ -11,7 +11,8 @@ from fdnet.dem.deck import number, render_text
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.scene import contact_variables, write_data
-from fdnet.scales.scales import relaxation_time, scales_of
+from fdnet.scales.scales import scales_of
+from fdnet.scales.time_step import relaxation_time
 from fdnet.spheres.contacts import max_overlap, touching_pairs
 from fdnet.spheres.dump import read_dump
 from fdnet.spheres.snapshot import Kind, Snapshot

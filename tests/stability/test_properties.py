@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from fdnet.case.analysis import AnalysisChoices
-from fdnet.case.case import Case
+from fdnet.case.case import Case, InvasionCase
 from fdnet.case.file import case_from, known_keys, set_keys
 from fdnet.errors import CaseError, DumpError, FdnetError
 from fdnet.network.flow.flow import solve_flow
@@ -82,7 +82,7 @@ def test_tables_make_a_case_or_a_case_error(data, changes):
         assert isinstance(case, Case)
 
 
-@given(st.dictionaries(st.sampled_from([*Case.model_fields, "x"]), ODD, max_size=6))
+@given(st.dictionaries(st.sampled_from([*InvasionCase.model_fields, "x"]), ODD, max_size=6))
 @settings(FIXED, max_examples=150)
 def test_nonsense_tables_are_refused(data):
     with pytest.raises(CaseError, match="problem"):

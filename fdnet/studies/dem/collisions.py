@@ -39,7 +39,6 @@ def collision_run(
     relative to their exact values.
     """
     case = slab_case(1, f"run.stiffness_N_m={stiffness!r}")
-    assert case.fines is not None
     contact = scales_of(case).contacts["fine-fine"]
     radius, density = case.fines.mean_radius_m, case.fines.density_kg_m3
     mass, zeta = sphere_mass(radius, density), case.fines.damping_ratio

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fdnet.atomic import write_text
-from fdnet.case.case import Case
+from fdnet.case.case import Case, InvasionCase, with_fines
 from fdnet.case.file import case_from, set_keys
 from fdnet.dem.checkpoint import HISTORY, HISTORY_HEADER, state_at
 from fdnet.dem.invade_deck import write_invade_inputs
@@ -19,7 +19,8 @@ from fdnet.dem.liggghts import Binary, Launch, Run, find_binary, run_deck
 from fdnet.dem.packing import make_pack
 from fdnet.dem.scene import box_of, snapshot_of
 from fdnet.network.permeability import analyse
-from fdnet.scales.scales import relaxation_time, scales_of
+from fdnet.scales.scales import scales_of
+from fdnet.scales.time_step import relaxation_time
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
 from fdnet.studies.engine.runner import child_core_seconds
@@ -56,14 +57,14 @@ def base_inputs() -> str:
     return slab_case(1).toml()
 
 
-def slab_case(seed: int, *assignments: str, small: bool = False) -> Case:
+def slab_case(seed: int, *assignments: str, small: bool = False) -> InvasionCase:
     """The studies' invasion with other settings ("key=value"); `small` is a fifth of it, for the quick forms."""
     data = {key: dict(value) if isinstance(value, dict) else value for key, value in SLAB.items()}
     if small:
         for part, values in _SMALL.items():
             data[part] |= values
         data["run"] = {"duration_ms": 0.5}
-    return case_from(set_keys(data, [f"seed={seed}", *assignments]))
+    return with_fines(case_from(set_keys(data, [f"seed={seed}", *assignments])))
 
 
 @cache
@@ -84,7 +85,7 @@ def grains_of(case: Case, work: Path) -> Snapshot:
     return snapshot_of(read_frame(folder / "post" / "pack.dump"), plain, time_s=0.0)
 
 
-def invasion_run(case: Case, work: Path, slug: str) -> dict[str, float]:
+def invasion_run(case: InvasionCase, work: Path, slug: str) -> dict[str, float]:
     """One invasion and what it left: counts, depths (m), profile, porosity, permeability, largest overlap, costs."""
     grains = grains_of(case, work)
     result, costs = _fresh(case, grains, work / slug)
@@ -92,7 +93,7 @@ def invasion_run(case: Case, work: Path, slug: str) -> dict[str, float]:
 
 
 def window_run(
-    case: Case, work: Path, slug: str, *, grid: tuple[int, ...] = ()
+    case: InvasionCase, work: Path, slug: str, *, grid: tuple[int, ...] = ()
 ) -> dict[str, float]:
     """One invasion without its permeability: counts and mean depth (m) of the fines inside, and costs.
 
@@ -106,7 +107,7 @@ def window_run(
 
 
 def _fresh(
-    case: Case, grains: Snapshot, folder: Path, grid: tuple[int, ...] = ()
+    case: InvasionCase, grains: Snapshot, folder: Path, grid: tuple[int, ...] = ()
 ) -> tuple[Invasion, dict[str, float]]:
     """An invasion and its costs. One that an earlier session left unfinished is begun anew, so that costs are whole."""
     shutil.rmtree(folder, ignore_errors=True)
@@ -120,7 +121,7 @@ def _fresh(
     }
 
 
-def _gridded(case: Case, grains: Snapshot, folder: Path, grid: tuple[int, ...]) -> Run:
+def _gridded(case: InvasionCase, grains: Snapshot, folder: Path, grid: tuple[int, ...]) -> Run:
     """The whole invasion under another processor grid than fdnet's, so that `invade` finds it done."""
     (folder / "post").mkdir(parents=True)
     ranks = math.prod(grid)
@@ -132,7 +133,7 @@ def _gridded(case: Case, grains: Snapshot, folder: Path, grid: tuple[int, ...]) 
     return run_deck(folder, "in.invade", Launch(binary=the_binary(), ranks=ranks))
 
 
-def invasion_observed(case: Case, grains: Snapshot, result: Invasion) -> dict[str, float]:
+def invasion_observed(case: InvasionCase, grains: Snapshot, result: Invasion) -> dict[str, float]:
     """Numbers of a finished invasion, SI; `bin_00`... are invaded fines by equal bins of depth.
 
     "grain_shift" is the root mean square way of the grains from where they were packed, over their radius.
@@ -163,7 +164,7 @@ def invasion_observed(case: Case, grains: Snapshot, result: Invasion) -> dict[st
     } | {f"bin_{number:02d}": float(count) for number, count in enumerate(bins)}
 
 
-def _depths(case: Case, result: Invasion) -> Array:
+def _depths(case: InvasionCase, result: Invasion) -> Array:
     depth = result.damaged.fines().position[:, 0]
     return depth[(depth >= 0) & (depth < case.size_m[0])]
 
@@ -214,7 +215,7 @@ def relaxation_run(
     return _relaxed(case, work / slug, terminal=gravity * tau, tau=tau)
 
 
-def _relaxed(case: Case, folder: Path, *, terminal: float, tau: float) -> dict[str, float]:
+def _relaxed(case: InvasionCase, folder: Path, *, terminal: float, tau: float) -> dict[str, float]:
     scales, far = scales_of(case), np.array([[3.5e-3, 1.4e-3, 1.4e-3]])
     lonely = resting(far, 2.5e-4, box_of(case), Kind.GRAIN)
     result, costs = _fresh(case, lonely, folder)

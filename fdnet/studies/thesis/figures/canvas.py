@@ -145,7 +145,6 @@ def own_style(name: str) -> dict[str, str]:
 
 def sized(run: Examined, name: str) -> str:
     """The specimen and the diameter of its fines in mm, for a title."""
-    assert run.state.case.fines is not None
     radii = sorted(set(run.state.case.fines.radius_range_m))
     across = "-".join(f"{2e3 * radius:.3g}" for radius in radii)
     return f"{titled(name)}: fines {across} mm across"

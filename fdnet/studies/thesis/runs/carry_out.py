@@ -11,9 +11,10 @@ from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from pathlib import Path
 
-from fdnet.case.case import Case
+from fdnet.case.case import InvasionCase
 from fdnet.errors import CaseError, FdnetError
-from fdnet.run.pipeline import RunOptions, run_case
+from fdnet.run.pipeline import run_stages
+from fdnet.run.session import RunOptions
 from fdnet.scales.cost import cost_of
 from fdnet.scales.scales import scales_of
 from fdnet.studies.engine.runner import eta
@@ -108,7 +109,7 @@ def run_one(item: Planned, out: Path, runs: Path) -> str:
         options = RunOptions(
             out=folder, resume=folder.exists(), stages=("pack", "invade"), show_progress=False
         )
-        run_case(case, options)
+        run_stages(case, options)
         write_state(state_path(out, item), state_of_run(folder))
     except FdnetError as error:
         return str(error)
@@ -121,7 +122,7 @@ def state_path(out: Path, item: Planned) -> Path:
     return out / f"{item.slug}.npz"
 
 
-def find_state(out: Path, item: Planned, case: Case) -> State | None:
+def find_state(out: Path, item: Planned, case: InvasionCase) -> State | None:
     """The kept state of a run, with the analysis options of the given case.
 
     Returns None when there is no such state. Raises CaseError when the state is broken or that of
@@ -138,10 +139,10 @@ def find_state(out: Path, item: Planned, case: Case) -> State | None:
     return replace(state, case=case)
 
 
-def _adopt(source: Path, target: Path, case: Case) -> None:
+def _adopt(source: Path, target: Path, case: InvasionCase) -> None:
     """Keep the state of the same invasion under another name."""
     write_state(target, replace(read_state(source), case=case))
 
 
-def _expected(case: Case) -> float:
+def _expected(case: InvasionCase) -> float:
     return cost_of(case, scales_of(case)).invade_seconds

@@ -13,7 +13,8 @@ from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.packing import write_pack_inputs
 from fdnet.dem.scene import box_of, snapshot_of
 from fdnet.errors import CaseError
-from fdnet.scales.scales import PACK_STAGES, scales_of
+from fdnet.scales.grain_pack import PACK_STAGES
+from fdnet.scales.scales import scales_of
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Kind, Snapshot
 from fdnet.studies.thesis.runs.state import BROKEN, packed_bytes

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 
-from fdnet.case.case import Case
+from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import read_case
 from fdnet.errors import CaseError
 from fdnet.scales.scales import scales_of
@@ -79,12 +79,10 @@ class Planned:
             "".join(c if c.isalnum() or c in ".=-" else "_" for c in self.id) + f"-seed{self.seed}"
         )
 
-    def load(self) -> Case:
+    def load(self) -> InvasionCase:
         """Read its case. Raises CaseError when the case file is missing or wrong."""
-        return read_case(
-            case_path(self.case),
-            assignments=[f"seed={self.seed}", *self.settings, *self.consequences],
-        )
+        settings = [f"seed={self.seed}", *self.settings, *self.consequences]
+        return with_fines(read_case(case_path(self.case), assignments=settings))
 
 
 def cases_folder() -> Path:
@@ -139,11 +137,10 @@ def _scans() -> Iterator[Planned]:
                 item, consequences=(f"run.stiffness_N_m={stiffness * max(1.0, item.value)!r}",)
             )
     for name in (QUICK + "specimen5", QUICK + "specimen6"):
-        case = read_case(case_path(name))
-        assert case.fines is not None
-        assert case.fines.count is not None
+        case = with_fines(read_case(case_path(name)))
+        count = scales_of(case).supplied_count
         for factor in SUPPLIES:
-            setting = f"fines.count={round(factor * case.fines.count)}"
+            setting = f"fines.count={round(factor * count)}"
             for seed in range(1, SCAN_SEEDS + 1):
                 consequences = _longer(case, factor)
                 yield Planned(
@@ -156,7 +153,7 @@ def _scans() -> Iterator[Planned]:
                 )
 
 
-def _longer(case: Case, factor: float) -> tuple[str, ...]:
+def _longer(case: InvasionCase, factor: float) -> tuple[str, ...]:
     """The cap on the simulated time, moved by the longer arrival of a longer slab."""
     if case.run.cap_s is None:
         return ()

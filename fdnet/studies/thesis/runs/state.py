@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fdnet.atomic import write_bytes
-from fdnet.case.case import Case
+from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import case_from, read_case
 from fdnet.dem.checkpoint import read_history, state_at
 from fdnet.dem.scene import box_of, snapshot_of
@@ -58,7 +58,7 @@ class State:
             `steps` and their length `dt_s`; `max_overlap` over the smaller diameter; `warnings`.
     """
 
-    case: Case
+    case: InvasionCase
     grains: Snapshot
     damaged: Snapshot
     history: Array
@@ -70,7 +70,7 @@ def state_of_run(folder: Path) -> State:
 
     Raises CaseError when the folder holds none, DumpError when a dump is cut.
     """
-    case = read_case(folder / CASE)
+    case = with_fines(read_case(folder / CASE))
     pack, invasion = read_record(folder, "pack"), read_record(folder, "invade")
     if pack is None or invasion is None:
         raise CaseError(
@@ -126,7 +126,7 @@ def read_state(path: Path) -> State:
         with np.load(path) as file:
             arrays = dict(file)
         text = json.loads(arrays["text"].tobytes())
-        case = case_from(tomllib.loads(text["case"]), source=str(path))
+        case = with_fines(case_from(tomllib.loads(text["case"]), source=str(path)))
         return State(
             case=case,
             grains=_spheres(arrays, "grains", case, 0, 0.0),
@@ -143,7 +143,7 @@ def read_state(path: Path) -> State:
 
 
 def _spheres(
-    arrays: Mapping[str, Array], name: str, case: Case, step: int, time_s: float
+    arrays: Mapping[str, Array], name: str, case: InvasionCase, step: int, time_s: float
 ) -> Snapshot:
     place = arrays[f"{name}_place"].astype(float)
     kind = arrays[f"{name}_kind"].astype(int)
@@ -159,9 +159,9 @@ def _spheres(
     )
 
 
-def _exact_radius(radius: Array, kind: Array, case: Case) -> Array:
+def _exact_radius(radius: Array, kind: Array, case: InvasionCase) -> Array:
     """Radii of spheres of a single size, as the case gives them, in full precision."""
     for spheres, which in ((case.grains, Kind.GRAIN), (case.fines, Kind.FINE)):
-        if spheres is not None and spheres.one_size:
+        if spheres.one_size:
             radius = np.where(kind == which, spheres.mean_radius_m, radius)
     return radius

@@ -1,0 +1,8 @@
+"""The stages of a run, in order."""
+
+from typing import Literal, get_args
+
+Stage = Literal["pack", "invade", "analyse", "report"]
+STAGES: tuple[Stage, ...] = get_args(Stage)
+LIGGGHTS_STAGES = STAGES[:2]
+"""The stages that LIGGGHTS carries out, each in a folder of its name."""

@@ -1,0 +1,66 @@
+"""How deep fines are pressed into grains, as predicted: by impact and by drag."""
+
+import math
+from dataclasses import dataclass
+
+from fdnet.case.case import InvasionCase
+from fdnet.errors import CaseError
+from fdnet.scales.springs import mass_range
+
+MOST_OVERLAP = 0.5
+"""Predicted overlap over a fine's diameter from which a case is refused: beyond it a fine could
+pass through a grain."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Overlaps:
+    """Predicted overlaps of a fine with a grain, over the diameter of the largest fine.
+
+    Attributes:
+        drag: by the drag of the fluid on a fine at rest, 6 pi mu M u / 2 k.
+        impact: by a fine that arrives with the fluid's velocity, u sqrt(m / k) / 2 r.
+    """
+
+    drag: float
+    impact: float
+
+
+def overlaps_of(case: InvasionCase, stiffness: float, velocity: float) -> Overlaps:
+    """The overlaps at a contact `stiffness` of N/m and a fluid `velocity` of m/s."""
+    impact = velocity * math.sqrt(mass_range(case.fines)[1] / stiffness)
+    return Overlaps(
+        impact=impact / (2 * case.fines.radius_range_m[1]),
+        drag=6
+        * math.pi
+        * case.fluid.viscosity_Pa_s
+        * case.drag.multiplier
+        * velocity
+        / (2 * stiffness),
+    )
+
+
+def refuse_deep_overlap(overlaps: Overlaps) -> None:
+    """Raises CaseError when drag or impact alone would press a fine half through a grain."""
+    remedies = {
+        "drag": "drag.multiplier, fluid.viscosity_cP or fluid.velocity_m_s",
+        "impact": "the velocity (fluid.velocity_m_s)",
+    }
+    for name, remedy in remedies.items():
+        overlap = getattr(overlaps, name)
+        if overlap > MOST_OVERLAP:
+            raise CaseError(
+                f"run.stiffness_N_m: {name} alone would press a fine {100 * overlap:.3g} % of its "
+                f"diameter into a grain (limit {100 * MOST_OVERLAP:.0f} %); raise it, or lower "
+                f"{remedy}"
+            )
+
+
+def overlap_warnings(case: InvasionCase, overlaps: Overlaps) -> list[str]:
+    """Overlaps above `run.max_overlap`, in words."""
+    return [
+        f"predicted overlap under {name} is {100 * getattr(overlaps, name):.2g} % of a fine's "
+        f"diameter (above run.max_overlap, {100 * case.run.max_overlap:.3g} %): raise "
+        "run.stiffness_N_m"
+        for name in ("impact", "drag")
+        if getattr(overlaps, name) > case.run.max_overlap
+    ]

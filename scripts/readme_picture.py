@@ -1,0 +1,89 @@
+"""Draws the picture of README.md from a finished run: a cut through the specimen above its k.
+
+.venv/bin/python scripts/readme_picture.py runs/quick docs/quick_answer.png
+"""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+DARCY = 9.869233e-13
+"""One darcy in m2."""
+MM = 1e3
+GRAIN, FINE, BEFORE, AFTER = "#D9D9D9", "#D55E00", "#7F7F7F", "#0072B2"
+
+
+def draw_cut(axes: Any, spheres: pd.DataFrame) -> None:
+    """Circles, in mm, in which the plane through the middle of the specimen cuts the spheres."""
+    from matplotlib.collections import EllipseCollection
+
+    grains = spheres[spheres.kind == "grain"]
+    middle = (grains.y_m.min() + grains.y_m.max()) / 2
+    squared = spheres.radius_m**2 - (spheres.y_m - middle) ** 2
+    for kind, colour in (("grain", GRAIN), ("fine", FINE)):
+        cut = spheres[(spheres.kind == kind) & (squared > 0)]
+        width = 2 * np.sqrt(squared[cut.index].to_numpy()) * MM
+        axes.add_collection(
+            EllipseCollection(
+                width,
+                width,
+                np.zeros(len(cut)),
+                units="xy",
+                offsets=cut[["x_m", "z_m"]].to_numpy() * MM,
+                offset_transform=axes.transData,
+                facecolor=colour,
+                edgecolor="black",
+                linewidth=0.3,
+            )
+        )
+    height = float((grains.z_m + grains.radius_m).max()) * MM
+    axes.set(aspect="equal", ylim=(0, height), yticks=[], ylabel=f"{height:.1f} mm")
+    axes.tick_params(axis="x", labelbottom=False)
+
+
+def draw_permeability(axes: Any, sections: pd.DataFrame) -> None:
+    """Permeability of each section before and after the invasion, in darcy, with its loss."""
+    edges = np.append(sections.x_lo_m, sections.x_hi_m.iloc[-1]) * MM
+    before, after = sections.k_initial_m2 / DARCY, sections.k_damaged_m2 / DARCY
+    axes.stairs(before, edges, color=BEFORE, linewidth=2, label="before", baseline=None)
+    axes.stairs(after, edges, color=AFTER, linewidth=2, label="after the invasion", baseline=None)
+    axes.stairs(before, edges, baseline=after, fill=True, color=FINE, alpha=0.25)
+    for row, low in zip(sections.itertuples(), after, strict=True):
+        text = f"\N{MINUS SIGN}{100 * row.k_reduction:.0f} %"
+        place = (row.x_lo_m + row.x_hi_m) / 2 * MM
+        axes.annotate(text, (place, low), (0, -14), textcoords="offset points", ha="center")
+    axes.set(
+        ylim=(0, None),
+        xlabel="depth from the formation face (mm)",
+        ylabel="permeability (darcy)",
+    )
+    axes.legend(loc="lower right", frameon=False)
+
+
+def main() -> int:
+    import matplotlib
+
+    matplotlib.use("agg")
+    import matplotlib.pyplot as plt
+
+    run, target = Path(sys.argv[1]), Path(sys.argv[2])
+    sections = pd.read_csv(run / "sections.csv")
+    figure, (upper, lower) = plt.subplots(
+        2, sharex=True, figsize=(6.6, 7.0), height_ratios=[1.6, 1], layout="constrained"
+    )
+    draw_cut(upper, pd.read_csv(run / "spheres_damaged.csv"))
+    draw_permeability(lower, sections)
+    lower.set_xlim(-0.3, sections.x_hi_m.iloc[-1] * MM)
+    for axes in (upper, lower):
+        axes.axvline(0, color="black", linestyle="--", linewidth=1)
+        axes.spines[["top", "right"]].set_visible(False)
+    upper.set_title("mud enters here \N{RIGHTWARDS ARROW}", loc="left", fontsize=10)
+    figure.savefig(target, dpi=110)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

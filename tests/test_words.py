@@ -1,0 +1,197 @@
+"""Pages and docstrings are plain English, and the README is short and true."""
+
+import ast
+import re
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from fdnet.case.file import case_from
+from fdnet.errors import CaseError
+from fdnet.run.finished import FinishedRun
+
+README_WORDS = 900
+LONGEST_LINE = 99
+
+PRIVATE_WORDS = re.compile(
+    r"\b(told|hair|eaten|speck|specks|beside|square way|way of the fluid)\b", re.IGNORECASE
+)
+"""Words that were used with a meaning of their own; a reader of the field does not know it."""
+
+PAGES_TO_DO = (
+    "docs/accuracy.md",
+    "docs/accuracy.md.in",
+    "docs/thesis.md",
+    "docs/thesis.md.in",
+    "docs/validation.md",
+    "docs/validation.md.in",
+    "docs/validation/",
+)
+"""Pages that are still to be rewritten: nothing is checked in them. To be empty."""
+
+MODULES_TO_DO = ("fdnet/",)
+"""Parts of the package whose docstrings are still to be rewritten. To be empty."""
+
+
+def pages(root: Path) -> Iterator[Path]:
+    """Every page that people read: Markdown and its sources, and the shipped cases."""
+    yield from (root / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md"))
+    yield root / ".github/pull_request_template.md"
+    for pattern in ("docs/**/*.md", "docs/**/*.md.in", "cases/**/*.toml"):
+        yield from sorted(root.glob(pattern))
+
+
+def checked(root: Path, paths: Iterator[Path], to_do: tuple[str, ...]) -> Iterator[Path]:
+    for path in paths:
+        name = path.relative_to(root).as_posix()
+        if not name.startswith(("docs/_build/", *to_do)):
+            yield path
+
+
+def docstrings(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and text of every string that stands alone in a module, on whatever it follows."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            text = node.value.value
+            yield node.lineno, text if isinstance(text, str) else ""
+
+
+def too_long(line: str) -> bool:
+    """Longer than allowed, and neither the row of a table nor a lone link or picture."""
+    row = line.lstrip().startswith("|")
+    link = re.fullmatch(r"\s*(- )?!?\[[^\]]*\]\([^)]*\)[.,;]?", line)
+    return len(line) > LONGEST_LINE and not row and not link
+
+
+def test_what_counts_as_a_long_line_or_a_private_word():
+    assert too_long("x" * 100)
+    assert not too_long("x" * 99)
+    assert not too_long("| " + "x" * 100 + " |")
+    assert not too_long("![" + "x" * 100 + "](a.png)")
+    assert too_long("See [this](a.md) " + "x" * 100)
+    assert PRIVATE_WORDS.search("it is taken, and told; above, refused")
+    assert PRIVATE_WORDS.search("a hair of 1e-7")
+    assert not PRIVATE_WORDS.search("a hairpin; besides, it unfolded")
+
+
+def test_files_named_on_pages_exist(root):
+    """A name with a folder is that of one file; `name.py` alone may lie anywhere."""
+    folders = ("fdnet", "liggghts_templates", "scripts", "tests", "docs/_ext")
+    files = {path.name for folder in folders for path in (root / folder).rglob("*.*")}
+    missing = [
+        f"{page.relative_to(root)}: {name}"
+        for page in checked(root, pages(root), PAGES_TO_DO)
+        for name in re.findall(r"`([\w./-]+\.(?:py|sh|j2))`", page.read_text(encoding="utf-8"))
+        if not ((root / name).exists() if "/" in name else name in files)
+    ]
+    assert not missing, "\n".join(missing)
+
+
+def test_the_architecture_page_counts_the_imports(root):
+    sys.path.insert(0, str(root / "docs/_ext"))
+    import import_graph
+
+    nodes, edges = import_graph.nodes_of(root), import_graph.edges_of(root)
+    layers = 1 + max(import_graph.layers_of(nodes, edges).values())
+    page = (root / "docs/architecture.md").read_text(encoding="utf-8")
+    assert f"| now | {len(nodes)} | {layers} | {len(edges)} |" in page
+
+
+def test_the_readme_is_short(root):
+    words = len((root / "README.md").read_text(encoding="utf-8").split())
+    assert words <= README_WORDS, f"README.md has {words} words"
+
+
+def test_lines_of_pages_fit_a_screen(root):
+    long = [
+        f"{path.relative_to(root)}:{number}: {len(line)} characters"
+        for path in checked(root, pages(root), PAGES_TO_DO)
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
+        if too_long(line)
+    ]
+    assert not long, "\n".join(long)
+
+
+def test_pages_have_no_private_words(root):
+    private = [
+        f"{path.relative_to(root)}:{number}: {line.strip()}"
+        for path in checked(root, pages(root), PAGES_TO_DO)
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
+        if PRIVATE_WORDS.search(line)
+    ]
+    assert not private, "\n".join(private)
+
+
+def test_docstrings_have_no_private_words(root):
+    private = [
+        f"{path.relative_to(root)}:{line}: {match[0]}"
+        for path in checked(root, iter(sorted((root / "fdnet").rglob("*.py"))), MODULES_TO_DO)
+        for line, text in docstrings(path)
+        for match in PRIVATE_WORDS.finditer(text)
+    ]
+    assert not private, "\n".join(private)
+
+
+@pytest.fixture(scope="module")
+def readme_case(root):
+    text = (root / "README.md").read_text(encoding="utf-8")
+    block = re.search(r"```toml\n(.*?)```", text, re.DOTALL)
+    assert block, "README.md shows no case"
+    return tomllib.loads(block[1])
+
+
+def test_the_case_of_the_readme_is_valid(readme_case):
+    assert case_from(readme_case).name == "my-sand"
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "name",
+        "box.size_mm",
+        "grains.radius_mm",
+        "grains.porosity",
+        "fines.radius_mm",
+        "fines.count",
+    ],
+)
+def test_the_readme_names_the_keys_that_must_be_given(readme_case, key):
+    """Each of them is refused when missing; without all the others the case is still valid."""
+    *section, last = key.split(".")
+    case = {
+        name: dict(part) if isinstance(part, dict) else part for name, part in readme_case.items()
+    }
+    del (case[section[0]] if section else case)[last]
+    with pytest.raises(CaseError, match=last):
+        case_from(case)
+
+
+def test_every_other_key_of_the_readme_has_a_default(readme_case):
+    case = {
+        "name": readme_case["name"],
+        "box": {"size_mm": readme_case["box"]["size_mm"]},
+        "grains": {name: readme_case["grains"][name] for name in ("radius_mm", "porosity")},
+        "fines": {name: readme_case["fines"][name] for name in ("radius_mm", "count")},
+    }
+    assert case_from(case)
+
+
+def test_the_python_of_the_readme_has_these_names(root):
+    import fdnet
+
+    text = (root / "README.md").read_text(encoding="utf-8")
+    attributes = set(re.findall(r"\brun\.([a-z_]+)\b(?!\.mm|\.py)", text))
+    assert {"sections", "summary", "spheres"} <= attributes
+    assert all(hasattr(FinishedRun, name) for name in attributes), attributes
+    assert all(hasattr(fdnet, name) for name in re.findall(r"\bfdnet\.([a-z_]+)\(", text))
+
+
+def test_the_citation_has_the_version_of_the_package(root):
+    package = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))
+    citation = (root / "CITATION.cff").read_text(encoding="utf-8")
+    assert (
+        re.search(r"^version: (.+)$", citation, re.MULTILINE)[1] == (package["project"]["version"])
+    )
