@@ -1,4 +1,7 @@
-"""What can go wrong, one class per stage; each message names what, where, what was expected, what to do."""
+"""What can go wrong, one class for each stage.
+
+Each message names what is wrong, where, what was expected and what to do.
+"""
 
 
 class FdnetError(Exception):
@@ -8,7 +11,7 @@ class FdnetError(Exception):
 
 
 class CaseError(FdnetError):
-    """A parameter is missing, unknown or outside its range, or the input or run folder cannot be used."""
+    """A parameter is missing, unknown or outside its range, or a file or folder cannot be used."""
 
     exit_code = 2
 

@@ -47,7 +47,7 @@ ROOMS = {
 }
 DOORS = {
     "jinja2": {"dem/deck", "report/html", "studies/dem"},
-    "subprocess": {"dem/liggghts", "report/vtk"},
+    "subprocess": {"dem/binary", "dem/liggghts", "report/vtk"},
     "pandas": {"spheres/dump", "spheres/csv_file", "report/tables"},
     "pyvista": {"report/vtk", "report/picture"},
     "matplotlib": {
