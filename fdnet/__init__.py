@@ -1,12 +1,83 @@
 """fdnet: formation damage from the grains up.
 
-    case = read_case(path)                       what the specimen is (TOML)
-    scales = scales_of(case)                     what follows in closed form
-    pack = make_pack(case, scales, ...)          LIGGGHTS: small spheres grown to a dense pack
-    invasion = invade(case, scales, ...)         LIGGGHTS: fines driven in under Stokes drag until plugged
-    analysis = analyse(grains, damaged, ...)     two-scale pore network: permeability before and after, by depth
-    run_case(case, options)                      all of it in a run folder, with tables, figures and a report
+    import fdnet
 
-Nouns: Case, Scales, Deck, Run, Snapshot, Network, Occupancy, Flow, Analysis. Each lives in the module of its stage;
-importing `fdnet` itself loads nothing heavy.
+    run = fdnet.run_case("cases/quick.toml")      the whole story of one specimen, in a run folder
+    run = fdnet.open_run("runs/quick")            the same run later: tables, spheres, network
+    spheres = fdnet.read_spheres("pack.csv", units="mm")
+    result = fdnet.analyse(spheres)               permeability without and with fines, m2
+
+`_HOME` below is the list of what is public: each name and the module that it comes from.
+Importing fdnet loads nothing heavy; a name is loaded when it is first used.
 """
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fdnet.case.case import Case as Case
+    from fdnet.case.file import read_case as read_case
+    from fdnet.errors import CaseError as CaseError
+    from fdnet.errors import DeckError as DeckError
+    from fdnet.errors import DumpError as DumpError
+    from fdnet.errors import FdnetError as FdnetError
+    from fdnet.errors import FlowError as FlowError
+    from fdnet.errors import LiggghtsError as LiggghtsError
+    from fdnet.errors import NetworkError as NetworkError
+    from fdnet.network.fines.occupancy import measure_occupancy as measure_occupancy
+    from fdnet.network.flow.flow import solve_flow as solve_flow
+    from fdnet.network.laws.named import DAMAGE_LAWS as DAMAGE_LAWS
+    from fdnet.network.laws.named import LAWS as LAWS
+    from fdnet.network.network import build_network as build_network
+    from fdnet.network.permeability import analyse as analyse
+    from fdnet.network.permeability import compare as compare
+    from fdnet.run.open_run import open_run as open_run
+    from fdnet.run.open_run import run_case as run_case
+    from fdnet.spheres.readers import read_spheres as read_spheres
+    from fdnet.spheres.snapshot import Snapshot as Snapshot
+
+    __version__: str
+
+_HOME = {
+    "Case": "fdnet.case.case",
+    "read_case": "fdnet.case.file",
+    "run_case": "fdnet.run.open_run",
+    "open_run": "fdnet.run.open_run",
+    "Snapshot": "fdnet.spheres.snapshot",
+    "read_spheres": "fdnet.spheres.readers",
+    "analyse": "fdnet.network.permeability",
+    "compare": "fdnet.network.permeability",
+    "build_network": "fdnet.network.network",
+    "measure_occupancy": "fdnet.network.fines.occupancy",
+    "solve_flow": "fdnet.network.flow.flow",
+    "LAWS": "fdnet.network.laws.named",
+    "DAMAGE_LAWS": "fdnet.network.laws.named",
+    "FdnetError": "fdnet.errors",
+    "CaseError": "fdnet.errors",
+    "DeckError": "fdnet.errors",
+    "LiggghtsError": "fdnet.errors",
+    "DumpError": "fdnet.errors",
+    "NetworkError": "fdnet.errors",
+    "FlowError": "fdnet.errors",
+}
+__all__ = ["__version__", *_HOME]  # noqa: PLE0604
+
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        """Load a public name at its first use, or find the version."""
+        if name == "__version__":
+            from importlib.metadata import version
+
+            value = version("fdnet")
+        elif name in _HOME:
+            value = getattr(import_module(_HOME[name]), name)
+        else:
+            raise AttributeError(f"module 'fdnet' has no attribute {name!r}")
+        globals()[name] = value
+        return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

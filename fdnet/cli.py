@@ -189,7 +189,7 @@ def _stages(text: str) -> tuple[str, ...]:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from fdnet.run.pipeline import run_case
+    from fdnet.run.pipeline import run_stages
     from fdnet.run.session import RunOptions
 
     case = _case_of(options)
@@ -205,7 +205,7 @@ def _run(options: argparse.Namespace) -> int:
         show_progress=not options.quiet,
         command=options.command_line,
     )
-    summary = run_case(case, chosen)
+    summary = run_stages(case, chosen)
     if options.json:
         print(json.dumps(summary, indent=2))
     else:

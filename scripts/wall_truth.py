@@ -1,145 +1,25 @@
 #!/usr/bin/env python3
-"""Walls that hold the fluid against resolved Stokes flow: random packs between plane side walls, periodic along x.
+"""Walls that hold the fluid against resolved Stokes flow: a table for docs/accuracy.md.
 
-    .venv/bin/python scripts/wall_truth.py --csv docs/validation/wall_truth.csv
-
-A wall is a sheet of small overlapping spheres in the periodic cell of the resolved flow, flat to 0.007 grain radii.
-Truth is extrapolated from two grids (2 to 4 minutes a pack); rows hold k over truth of the default law with walls that
-slip and that hold the fluid.
+.venv/bin/python scripts/wall_truth.py --csv docs/validation/wall_truth.csv
 """
 
 import argparse
-import csv
-import sys
-from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
+from fdnet.studies.accuracy.walls import wall_rows
+from fdnet.studies.engine.csv_rows import write_as_they_come
 
-from fdnet.network.flow.slabs import whole_permeability
-from fdnet.network.laws.named import DEFAULT_LAW, LAWS
-from fdnet.network.network import WALLS, build_network
-from fdnet.spheres.porosity import measure_porosity
-from fdnet.spheres.snapshot import Array, Snapshot, resting
-from fdnet.studies.stokes.stokes import extrapolate, solve_stokes
-
-CELL = 10.0
-SHEET = CELL / 48
-ROUNDS = 3000
-SETTLED = 2e-3
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Pack:
-    """`count` grains of radius 1 (spread +- `spread`) between walls across `sides`, `cells` (y, z) the sizes of the
-    periodic cell of the resolved flow over CELL."""
-
-    name: str
-    count: int
-    sides: tuple[int, ...]
-    cells: tuple[float, float] = (1.0, 1.0)
-    spread: float = 0.0
-
-
-PACKS = (
-    Pack(name="wide", count=128, sides=(1,)),
-    Pack(name="narrow", count=57, sides=(1,), cells=(0.5, 1.0)),
-    Pack(name="duct", count=115, sides=(1, 2)),
-    Pack(name="radii 1:2", count=118, sides=(1,), spread=1 / 3),
-    Pack(name="loose", count=105, sides=(1,)),
+parser = argparse.ArgumentParser(
+    description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
 )
-
-
-def relaxed(pack: Pack, seed: int) -> Snapshot:
-    """Random pack pushed apart until overlaps are below SETTLED, m = grain radii."""
-    rng = np.random.default_rng(seed)
-    radius = 1.0 + pack.spread * (2.0 * rng.random(pack.count) - 1.0)
-    size = CELL * np.array([1.0, *pack.cells])
-    walled = np.isin(range(3), pack.sides)
-    size = size - 2.0 * SHEET * walled
-    position = rng.random((pack.count, 3)) * size
-    for _ in range(ROUNDS):
-        apart = position[:, None] - position
-        apart -= np.where(walled, 0.0, size * np.round(apart / size))
-        distance = np.linalg.norm(apart, axis=2) + np.eye(pack.count)
-        overlap = np.maximum(radius[:, None] + radius - distance, 0.0) * (1.0 - np.eye(pack.count))
-        push = np.sum((overlap / distance)[:, :, None] * apart, axis=1)
-        moved = position + 0.5 * push
-        position = np.where(
-            walled, np.clip(moved, radius[:, None], size - radius[:, None]), moved % size
-        )
-        if np.abs(push).max() < SETTLED:
-            break
-    return spheres(position, radius, size)
-
-
-def spheres(position: Array, radius: Array, size: Array) -> Snapshot:
-    """Grains in a box of `size` (3,) at the origin."""
-    return resting(position, radius, np.stack([np.zeros(3), size], axis=1))
-
-
-def with_sheets(pack: Pack, grains: Snapshot) -> Snapshot:
-    """The grains and a sheet of spheres beyond the high wall of every walled side, in the periodic cell."""
-    size = CELL * np.array([1.0, *pack.cells])
-    position, radius = [grains.position], [grains.radius]
-    for side in pack.sides:
-        steps = [np.arange(0.0, edge - 1e-9, SHEET / 2) for edge in size]
-        steps[side] = np.array([size[side] - SHEET])
-        sheet = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3)
-        position.append(sheet)
-        radius.append(np.full(len(sheet), SHEET))
-    return spheres(np.concatenate(position), np.concatenate(radius), size)
-
-
-def row(pack: Pack, seed: int, grids: list[int]) -> dict[str, object]:
-    """k of the resolved flow through the open box, in grain radii squared, and of the network over it."""
-    grains = relaxed(pack, seed)
-    resolved = with_sheets(pack, grains)
-    flows = [solve_stokes(resolved, cells=cells, axis=0) for cells in grids]
-    truth = extrapolate(*flows)
-    share = np.prod(np.ptp(grains.box[1:], axis=1)) / np.prod(np.ptp(resolved.box[1:], axis=1))
-    periodic = (True, 1 not in pack.sides, 2 not in pack.sides)
-    found: dict[str, object] = {
-        "pack": pack.name,
-        "grains": pack.count,
-        "seed": seed,
-        "walls": " ".join("xyz"[side] for side in pack.sides),
-        "width_diameters": min(np.ptp(grains.box, axis=1)[list(pack.sides)]) / 2.0,
-        "porosity": measure_porosity(grains, periodic=periodic).mean,
-        **{f"k_{flow.cells}": flow.k / share for flow in flows},
-        "k_truth": truth.k / share,
-        "truth_error": truth.relative_error,
-    }
-    for walls in WALLS:
-        network = build_network(grains, periodic=periodic, walls=walls)
-        k = whole_permeability(network, LAWS[DEFAULT_LAW](network))[0]
-        found[f"{walls.replace('-', '_')}_over_truth"] = k / (truth.k / share)
-    return found
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--csv", type=Path, required=True)
-    parser.add_argument(
-        "--grids", type=int, nargs=2, default=[72, 96], help="cells along x, the second finer"
-    )
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
-    with given.csv.open("w", newline="") as out:
-        for number, pack in enumerate(PACKS):
-            found = row(pack, given.seed, given.grids)
-            writer = csv.DictWriter(out, list(found), lineterminator="\n")
-            if number == 0:
-                writer.writeheader()
-            writer.writerow(
-                {k: f"{v:.6g}" if isinstance(v, float) else v for k, v in found.items()}
-            )
-            out.flush()
-            print(found, flush=True)
-    return 0
-
+parser.add_argument("--csv", type=Path, required=True)
+parser.add_argument(
+    "--grids", type=int, nargs=2, default=[72, 96], help="cells along x, the second finer"
+)
+parser.add_argument("--seed", type=int, default=1)
 
 if __name__ == "__main__":
-    sys.exit(main())
+    given = parser.parse_args()
+    for row in write_as_they_come(given.csv, wall_rows(given.seed, given.grids)):
+        print(row, flush=True)

@@ -27,10 +27,12 @@ NETWORK_LAYERS = [
     ["permeability"],
 ]
 STUDIES_LAYERS = [
-    ["engine", "stokes", "truth"],
-    ["dem", "thesis"],
+    ["engine", "stokes", "fuzz"],
+    ["truth"],
+    ["accuracy", "benchmark", "dem", "thesis"],
     ["network"],
     ["command"],
+    ["pages"],
 ]
 THESIS_LAYERS = [
     ["runs"],
@@ -47,12 +49,14 @@ ROOMS = {
 }
 DOORS = {
     "jinja2": {"dem/deck", "report/html", "studies/dem"},
-    "subprocess": {"dem/binary", "dem/liggghts", "report/vtk"},
-    "pandas": {"spheres/dump", "spheres/csv_file", "report/tables"},
-    "pyvista": {"report/vtk", "report/picture"},
+    "subprocess": {"dem/binary", "dem/liggghts", "report/vtk", "studies/benchmark"},
+    "pandas": {"spheres/dump", "spheres/csv_file", "report/tables", "report/read_tables"},
+    "pyvista": {"report/vtk", "report/picture", "report/meshes", "spheres/vtk_file"},
+    "openpnm": {"report/openpnm", "studies/benchmark"},
     "matplotlib": {
         "report/figures",
         "report/side_view",
+        "studies/accuracy/figure",
         "studies/engine/draw",
         "studies/thesis/figures/canvas",
     },
@@ -61,7 +65,7 @@ DOORS = {
     "pymetis": {"network/flow/solver"},
     "pyamg": {"network/flow/solver", "studies/network/solver_peers"},
     "pydantic": {"case"},
-    "tomli_w": {"case/case"},
+    "tomli_w": {"case/case", "studies/fuzz/mutations"},
     "rich": {"run/progress"},
 }
 

@@ -2,24 +2,18 @@
 
 import json
 import sys
-from importlib import import_module
 
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-
-@pytest.fixture
-def scripts(root, monkeypatch):
-    monkeypatch.setattr(sys, "path", [str(root / "scripts"), *sys.path])
-    monkeypatch.setenv("PYTHONPATH", str(root))
-    return import_module("benchmark_network"), import_module("benchmark_fdnet")
+from fdnet.studies.benchmark import network, steps
 
 
-def test_packs_are_tiles_with_fines_on_the_grains(scripts):
+def test_packs_are_tiles_with_fines_on_the_grains():
     rng = np.random.default_rng(1)
-    grains = scripts[1].tiled(1000, rng)
-    fines = scripts[1].seated(grains, 500, rng)
+    grains = steps.tiled(1000, rng)
+    fines = steps.seated(grains, 500, rng)
     size, radius = grains.box[:, 1], grains.radius[0]
     assert len(grains) == 1080
     assert len(fines) == 500
@@ -28,8 +22,8 @@ def test_packs_are_tiles_with_fines_on_the_grains(scripts):
     assert nearest == pytest.approx(np.full(500, 1.1 * radius), rel=2e-4)
 
 
-def test_a_child_ends_ok_or_failed_or_over_time(scripts):
-    run = scripts[0].child
+def test_a_child_ends_ok_or_failed_or_over_time():
+    run = network.child
     assert run([sys.executable, "-c", "print('noise'); print('RESULT {\"k\": 2}')"], 60) == {
         "status": "ok",
         "k": 2,
@@ -42,19 +36,20 @@ def test_a_child_ends_ok_or_failed_or_over_time(scripts):
     assert asleep == {"status": "stopped after 1 s by the clock"}
 
 
-def test_growth_is_the_exponent_of_the_time(scripts):
+def test_growth_is_the_exponent_of_the_time():
     rows = [
         {"tool": "t", "case": "tiled", "step": "s", "grains": n, "cpu_s": 3e-9 * n**1.5}
         for n in (1000, 10_000, 90_000)
     ]
     rows[0]["cpu_s"] = 1.0
-    scripts[0].set_growth(rows)
+    network.set_growth(rows)
     assert "growth" not in rows[0]
     assert [row["growth"] for row in rows[1:]] == pytest.approx([1.5, 1.5])
 
 
-def test_small_run_of_all_steps(scripts, tmp_path):
-    rows = {row["step"]: row for row in scripts[0].fdnet_rows(80, 50, tmp_path, 300)}
+def test_small_run_of_all_steps(tmp_path, root, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(root))
+    rows = {row["step"]: row for row in network.fdnet_rows(80, 50, tmp_path, 300)}
     assert {
         "tessellate",
         "geometry",

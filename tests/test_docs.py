@@ -124,10 +124,11 @@ def run_folder(tmp_path_factory):
     """A finished run of the tiny case."""
     from builders import tiny
 
-    from fdnet.run.pipeline import RunOptions, run_case
+    from fdnet.run.pipeline import run_stages
+    from fdnet.run.session import RunOptions
 
     folder = tmp_path_factory.mktemp("docs") / "run"
-    run_case(tiny("run.cap_ms=0.35"), RunOptions(out=folder, show_progress=False))
+    run_stages(tiny("run.cap_ms=0.35"), RunOptions(out=folder, show_progress=False))
     return folder
 
 

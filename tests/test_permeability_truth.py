@@ -3,19 +3,15 @@
 import csv
 import json
 import math
-from pathlib import Path
 
 import pytest
 
 from fdnet.case.names import DAMAGE_LAW_NAMES, LAW_NAMES
 from fdnet.cli import main
 from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, LAWS
+from fdnet.studies.truth.packs import DATA, truth_tables
 
-DATA = Path(__file__).parent / "data" / "truth"
-OWN = Path(__file__).parents[1] / "docs" / "validation" / "truth_own.csv"
-ROWS = [
-    row for path in (DATA / "truth.csv", OWN) for row in csv.DictReader(path.open()) if row["file"]
-]
+ROWS = [row for path in truth_tables() for row in csv.DictReader(path.open()) if row["file"]]
 TRUTH = {f"{row['case']}-{row['axis']}": row for row in ROWS if (DATA / row["file"]).exists()}
 INTACT = [name for name, row in TRUTH.items() if not row["k_over_k0"]]
 FILLED = [name for name, row in TRUTH.items() if row["k_over_k0"]]

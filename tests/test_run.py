@@ -16,7 +16,7 @@ import pytest
 from builders import tiny
 
 from fdnet.errors import CaseError
-from fdnet.run.pipeline import RunOptions, run_case
+from fdnet.run.pipeline import RunOptions, run_stages
 
 pytestmark = pytest.mark.liggghts
 SHORT = ("run.cap_ms=0.35",)
@@ -449,7 +449,7 @@ def test_a_folder_that_cannot_be_cleared_does_not_hide_the_refusal(tmp_path, mon
         CaseError,
         match=r"needs grains that overlap .*; .*run could not be cleared \(Device or res",
     ):
-        run_case(tiny(TOO_DENSE), RunOptions(out=tmp_path / "run", show_progress=False))
+        run_stages(tiny(TOO_DENSE), RunOptions(out=tmp_path / "run", show_progress=False))
 
 
 def test_a_missing_binary_ends_with_3_before_anything_is_written(tmp_path):

@@ -1,25 +1,14 @@
 """docs/validation.md says what its tables say."""
 
-import sys
-
 import pytest
 
 from fdnet.studies.command import STUDIES, study_named
 from fdnet.studies.engine.table import read_rows, study_text
+from fdnet.studies.pages.validation import document, evidence
 
 
-@pytest.fixture(scope="module")
-def validation(root):
-    sys.path.insert(0, str(root / "scripts"))
-    import validation
-
-    return validation
-
-
-def test_the_page_is_written_from_the_committed_tables(root, validation):
-    assert (root / "docs/validation.md").read_text(encoding="utf-8") == validation.document(
-        root / "docs"
-    )
+def test_the_page_is_written_from_the_committed_tables(root):
+    assert (root / "docs/validation.md").read_text(encoding="utf-8") == document(root / "docs")
 
 
 @pytest.mark.parametrize("name", list(STUDIES))
@@ -30,8 +19,6 @@ def test_every_study_has_its_table_text_and_figure(root, name):
     assert (folder / f"{name}.png").stat().st_size > 50_000
 
 
-def test_evidence_becomes_links(validation):
-    found = validation.evidence(
-        "as told tests/dem/test_a.py::test_it_holds; tests/test_b.py::test_c"
-    )
+def test_evidence_becomes_links():
+    found = evidence("as told tests/dem/test_a.py::test_it_holds; tests/test_b.py::test_c")
     assert found == "as told ([it_holds](../tests/dem/test_a.py)); ([c](../tests/test_b.py))"

@@ -122,13 +122,13 @@ def _toml_value(text: str) -> Any:
         return text
 
 
-def read_case(path: Path, *, assignments: list[str] | None = None) -> Case:
+def read_case(path: str | Path, *, assignments: list[str] | None = None) -> Case:
     """The case in the TOML file at `path`, with dotted `assignments` ("key=value") put in.
 
     Raises CaseError when the file cannot be read, is not TOML, or holds an invalid parameter.
     """
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise CaseError(
             f"{path}: cannot be read as a case file: {error}; give the path of a TOML file"

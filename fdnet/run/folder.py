@@ -69,21 +69,8 @@ class RunFolder:
         write_json(self.path / _RECORDS[stage], record)
 
     def manifest(self) -> dict[str, Any] | None:
-        """The manifest of an analysed run, or None.
-
-        Raises CaseError when it cannot be understood or when a file that it implies is missing.
-        """
-        manifest = _read_record(self.path / MANIFEST)
-        if manifest is None:
-            return None
-        expected = (n for stage in STAGES[:3] for n in _expected(manifest, stage))
-        missing = next((name for name in expected if not (self.path / name).exists()), None)
-        if missing is not None:
-            raise CaseError(
-                f"{self.path}: the run is complete by its {MANIFEST}, but {missing} is missing; "
-                "start over with --force"
-            )
-        return manifest
+        """The manifest of the run, or None. Raises CaseError as `read_manifest` does."""
+        return read_manifest(self.path)
 
     def holds(self, case: Case, stages: tuple[str, ...]) -> bool:
         """Whether all of `stages` are done. Raises CaseError as `manifest` and `record` do."""
@@ -266,6 +253,24 @@ def read_record(folder: Path, stage: str) -> dict[str, Any] | None:
     Raises CaseError when it cannot be understood.
     """
     return _read_record(folder / _RECORDS[stage])
+
+
+def read_manifest(folder: Path) -> dict[str, Any] | None:
+    """The manifest of the analysed run in `folder`, or None.
+
+    Raises CaseError when it cannot be understood, or when a file that it implies is missing.
+    """
+    manifest = _read_record(folder / MANIFEST)
+    if manifest is None:
+        return None
+    expected = (name for stage in STAGES[:3] for name in _expected(manifest, stage))
+    missing = next((name for name in expected if not (folder / name).exists()), None)
+    if missing is not None:
+        raise CaseError(
+            f"{folder}: the run is complete by its {MANIFEST}, but {missing} is missing; start "
+            "over with --force"
+        )
+    return manifest
 
 
 def _read_record(path: Path) -> dict[str, Any] | None:

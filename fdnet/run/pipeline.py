@@ -25,7 +25,7 @@ from fdnet.scales.scales import scales_of
 from fdnet.scales.table import scale_rows
 
 
-def run_case(case: Case, options: RunOptions) -> dict[str, Any]:
+def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
     """Run the stages asked for; returns the summary.
 
     The summary is {} when neither analysis nor report was asked for. A finished run is not
@@ -42,7 +42,7 @@ def run_case(case: Case, options: RunOptions) -> dict[str, Any]:
         session = Session(case=case, scales=scales_of(case), folder=folder, options=options)
         if folder.manifest() is not None and folder.holds(case, options.stages):
             return _read_summary(folder)
-        return _run_stages(session)
+        return _carry_out(session)
     except CaseError as error:
         left = folder.discard()
         if left:
@@ -74,7 +74,7 @@ def _read_summary(folder: RunFolder) -> dict[str, Any]:
     return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
 
 
-def _run_stages(session: Session) -> dict[str, Any]:
+def _carry_out(session: Session) -> dict[str, Any]:
     stages = session.options.stages
     if session.folder.manifest() is not None:
         session.folder.clear(tuple(stage for stage in ("analyse", "report") if stage in stages))

@@ -11,10 +11,9 @@ import numpy as np
 
 from fdnet.atomic import replacing
 from fdnet.errors import CaseError
-from fdnet.spheres.snapshot import Array, Kind, Snapshot, frozen
+from fdnet.spheres.rows import UNITS, SphereRows, metres_per
+from fdnet.spheres.snapshot import KIND_NAMES, Kind, Snapshot, frozen
 
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
-KIND_NAMES = {"grain": Kind.GRAIN, "fine": Kind.FINE}
 PLAIN = ("x", "y", "z", "radius")
 METRES = ("x_m", "y_m", "z_m", "radius_m")
 OPTIONAL = ("kind", "id")
@@ -38,17 +37,17 @@ def write_spheres(path: str | Path, snapshot: Snapshot) -> Path:
     return Path(path)
 
 
-def read_spheres(path: str | Path, *, units: str | None = None) -> tuple[Array, Array, Array]:
-    """Read a sphere table: position (N, 3) m, radius (N,) m, kind (N,) int64 of `Kind`.
+def read_csv(path: str | Path, *, units: str | None = None) -> SphereRows:
+    """The spheres of a CSV table, in metres.
 
     Columns, in any order: `x,y,z,radius[,kind][,id]` in `units` (one of `UNITS`), or
-    `x_m,y_m,z_m,radius_m[,kind][,id]`, where `units` must be None. `kind` is grain or fine (grain when
-    there is no such column), `id` is ignored. Blank lines and lines starting with `#` are skipped.
-    Raises CaseError naming file, line, what was found and what was expected.
+    `x_m,y_m,z_m,radius_m[,kind][,id]`, where `units` must be None. `kind` is grain or fine. Blank
+    lines and lines that start with `#` are skipped. Raises CaseError that names the file, the line,
+    what it holds and what was expected.
     """
     source = Path(path)
-    if units is not None and units not in UNITS:
-        raise CaseError(f"units {units!r}: expected one of {', '.join(UNITS)}")
+    if units is not None:
+        metres_per(units)
     lines = _Lines(source)
     reader = csv.reader(lines, strict=True)
     try:
@@ -59,7 +58,14 @@ def read_spheres(path: str | Path, *, units: str | None = None) -> tuple[Array, 
     if not rows:
         raise CaseError(f"{source}: no spheres after the header; expected at least one row")
     values = np.array([row[:4] for row in rows])
-    return frozen(values[:, :3]), frozen(values[:, 3]), frozen([row[4] for row in rows], np.int64)
+    return SphereRows(
+        source=str(source),
+        scale=header.scale,
+        position=frozen(values[:, :3]),
+        radius=frozen(values[:, 3]),
+        kind=None if header.kind is None else frozen([row[4] for row in rows], np.int64),
+        id=None if header.id is None else frozen([row[5] for row in rows], np.int64),
+    )
 
 
 class _Lines:
@@ -89,12 +95,22 @@ class _Lines:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Header:
-    """Where each wanted column stands: `numbers` x, y, z, radius; `kind` or None; `scale` to metres."""
+    """Where each column stands.
+
+    Attributes:
+        width: number of columns.
+        names: names of the columns x, y, z, radius.
+        numbers: places of these four.
+        kind: place of the column kind; None without one.
+        id: place of the column id; None without one.
+        scale: metres in the unit of the four columns.
+    """
 
     width: int
     names: tuple[str, ...]
     numbers: tuple[int, ...]
     kind: int | None
+    id: int | None
     scale: float
 
 
@@ -119,6 +135,7 @@ def _header(fields: list[str] | None, where: str, units: str | None) -> _Header:
         names=wanted,
         numbers=tuple(names.index(name) for name in wanted),
         kind=names.index("kind") if "kind" in names else None,
+        id=names.index("id") if "id" in names else None,
         scale=UNITS[units or "m"],
     )
 
@@ -139,7 +156,9 @@ def _refuse_columns(names: tuple[str, ...], wanted: tuple[str, ...], where: str)
             raise CaseError(f"{where}: column {name!r} occurs twice; {expected}")
 
 
-def _row(fields: list[str], header: _Header, where: str) -> tuple[float, float, float, float, int]:
+def _row(
+    fields: list[str], header: _Header, where: str
+) -> tuple[float, float, float, float, int, int]:
     if len(fields) != header.width:
         raise CaseError(f"{where}: {len(fields)} values, expected {header.width} as in the header")
     x, y, z, radius = (
@@ -150,7 +169,14 @@ def _row(fields: list[str], header: _Header, where: str) -> tuple[float, float, 
         given = fields[header.numbers[3]].strip()
         raise CaseError(f"{where}: {header.names[3]} is {given}, expected a number above 0")
     kind = Kind.GRAIN if header.kind is None else _kind(fields[header.kind], where)
-    return x, y, z, radius, int(kind)
+    number = 0 if header.id is None else _id(fields[header.id], where)
+    return x, y, z, radius, int(kind), number
+
+
+def _id(text: str, where: str) -> int:
+    if not text.strip().isdecimal():
+        raise CaseError(f"{where}: id is {text.strip()!r}, expected a whole number, 0 or more")
+    return int(text)
 
 
 def _number(text: str, name: str, where: str) -> float:

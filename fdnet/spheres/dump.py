@@ -15,7 +15,7 @@ from fdnet.spheres.snapshot import Array, frozen
 
 COLUMNS = "id type x y z vx vy vz radius"
 FORMAT = "%d %d %.17g %.17g %.17g %.9g %.9g %.9g %.17g"
-_EXACT: dict[str, Any] = (
+EXACT: dict[str, Any] = (
     {"float_precision": "round_trip"} if int(pd.__version__.split(".")[0]) < 3 else {}
 )
 """From pandas 3 on, exact numbers are the default and the option is deprecated."""
@@ -180,7 +180,7 @@ def _table(body: bytes, columns: tuple[str, ...]) -> Array | None:
             index_col=False,
             on_bad_lines="error",
             skip_blank_lines=False,
-            **_EXACT,
+            **EXACT,
         )
     except (ValueError, pd.errors.ParserError):
         return None

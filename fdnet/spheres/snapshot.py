@@ -126,7 +126,7 @@ class Snapshot:
         radii, kinds = _for_each(radius, count, "radius"), _for_each(_kinds(kind), count, "kind")
         if np.any(~(radii > 0)):
             raise CaseError(f"radius holds {radii[~(radii > 0)][0]}, expected numbers above 0, m")
-        bounds = _box_around(place, radii, kinds) if box is None else _checked_box(box)
+        bounds = grain_box(place, radii, kinds) if box is None else checked_box(box)
         return resting(place, radii, bounds, kinds)
 
     def turned(self, axis: str) -> "Snapshot":
@@ -223,7 +223,7 @@ def _kinds(kind: Any) -> Array:
     return np.array(flat, dtype=np.int64).reshape(names.shape)
 
 
-def _checked_box(box: Any) -> Array:
+def checked_box(box: Any) -> Array:
     """(3, 2) bounds. Raises CaseError unless they are six finite numbers, the lower ones first."""
     try:
         bounds = np.asarray(box, dtype=float)
@@ -241,9 +241,10 @@ def _checked_box(box: Any) -> Array:
     return bounds.reshape(3, 2)
 
 
-def _box_around(position: Array, radius: Array, kind: Array) -> Array:
+def grain_box(position: Array, radius: Array, kind: Array) -> Array:
+    """(3, 2) box around all grains, m. Raises CaseError where there is no grain."""
     grains = kind == Kind.GRAIN
     if not grains.any():
         raise CaseError("box: missing, and there is no grain to take it from; give the box")
-    place, reach = position[grains], radius[grains, None]
+    place, reach = position[grains], radius[grains][:, None]
     return np.column_stack([np.min(place - reach, axis=0), np.max(place + reach, axis=0)])

@@ -112,9 +112,9 @@ def test_a_begun_invasion_is_not_tried_out_again(tmp_path, monkeypatch):
     ):
         history.write_text(text)
         with pytest.raises(CaseError, match=said):
-            pipeline.run_case(tiny(), options)
+            pipeline.run_stages(tiny(), options)
     with pytest.raises(CaseError, match="crowded"):
-        pipeline.run_case(tiny(), replace(options, force=True))
+        pipeline.run_stages(tiny(), replace(options, force=True))
 
 
 def refuse_all(*_):

@@ -5,17 +5,18 @@ import pytest
 
 from fdnet.network.network import build_network
 from fdnet.network.tessellation.pierced import STEPS
-from fdnet.spheres.csv_file import read_spheres
 from fdnet.spheres.porosity import measure_porosity
+from fdnet.spheres.readers import read_spheres
 from tests.network.packs import body_centred, face_centred, random_pack, simple_cubic, snapshot
 
 ALL = (True,) * 3
 
 
 def truth_pack(root, name):
-    path = root / "tests" / "data" / "truth" / f"{name}.csv"
+    path = root / "fdnet/studies/truth/data" / f"{name}.csv"
     edge = float(path.read_text().split("edge ")[1].split()[0])
-    position, radius, _ = read_spheres(path, units="mm")
+    spheres = read_spheres(path, units="mm")
+    position, radius = spheres.position, spheres.radius
     return snapshot(position * 1e3, radius * 1e3, [[0, edge]] * 3)
 
 

@@ -5,8 +5,15 @@ import pytest
 from report_demo import demo_damaged, snapshot_of
 
 from fdnet.errors import CaseError
-from fdnet.spheres.csv_file import read_spheres, write_spheres
+from fdnet.spheres.csv_file import read_csv, write_spheres
 from fdnet.spheres.snapshot import Kind
+
+
+def columns(path, **units):
+    """Position, radius and kind; without a column kind all are grains."""
+    rows = read_csv(path, **units)
+    kind = np.full(len(rows.radius), Kind.GRAIN) if rows.kind is None else rows.kind
+    return rows.position, rows.radius, kind
 
 
 def csv_of(folder, text, *, encoding="utf-8"):
@@ -17,7 +24,7 @@ def csv_of(folder, text, *, encoding="utf-8"):
 
 def test_a_written_table_reads_back_to_the_same_doubles(tmp_path):
     snapshot = demo_damaged()
-    position, radius, kind = read_spheres(write_spheres(tmp_path / "s.csv", snapshot))
+    position, radius, kind = columns(write_spheres(tmp_path / "s.csv", snapshot))
     assert np.array_equal(position, snapshot.position)
     assert np.array_equal(radius, snapshot.radius)
     assert np.array_equal(kind, snapshot.kind)
@@ -27,7 +34,7 @@ def test_spheres_a_hair_off_a_section_edge_stay_on_their_side(tmp_path):
     edge = 0.003
     depth = np.array([np.nextafter(edge, 0), edge, np.nextafter(edge, 1), -5e-324, 0.0])
     fines = snapshot_of(np.column_stack([depth, depth * 0, depth * 0]), 1e-5, Kind.FINE)
-    position, _, _ = read_spheres(write_spheres(tmp_path / "s.csv", fines))
+    position, _, _ = columns(write_spheres(tmp_path / "s.csv", fines))
     assert (position[:, 0] >= edge).tolist() == [False, True, True, False, False]
     assert (position[:, 0] >= 0).tolist() == [True, True, True, False, True]
 
@@ -37,7 +44,7 @@ def test_spheres_a_hair_off_a_section_edge_stay_on_their_side(tmp_path):
 )
 def test_plain_columns_are_in_the_given_unit(tmp_path, units, metres):
     path = csv_of(tmp_path, "x,y,z,radius\n1,2,-3,4e0\n")
-    position, radius, kind = read_spheres(path, units=units)
+    position, radius, kind = columns(path, units=units)
     assert position[0] == pytest.approx([metres, 2 * metres, -3 * metres], rel=1e-15)
     assert radius[0] == pytest.approx(4 * metres, rel=1e-15)
     assert kind.tolist() == [Kind.GRAIN]
@@ -48,7 +55,7 @@ def test_comments_blank_lines_bom_crlf_quotes_and_column_order_are_fine(tmp_path
         tmp_path,
         '\ufeff# pack\r\n\r\n"kind", radius_m ,z_m,y_m,x_m\r\n# more\r\n"fine",4,3,2,1\r\n grain,8,7,6,5',
     )
-    position, radius, kind = read_spheres(path)
+    position, radius, kind = columns(path)
     assert position.tolist() == [[1, 2, 3], [5, 6, 7]]
     assert radius.tolist() == [4, 8]
     assert kind.tolist() == [Kind.FINE, Kind.GRAIN]
@@ -88,7 +95,7 @@ def test_every_malformed_table_is_refused_with_file_and_line(tmp_path, name):
     text, message = BROKEN[name]
     path = csv_of(tmp_path, text)
     with pytest.raises(CaseError) as caught:
-        read_spheres(path, units="mm")
+        read_csv(path, units="mm")
     assert str(caught.value).startswith(str(path))
     assert message in str(caught.value)
 
@@ -104,13 +111,13 @@ def test_every_malformed_table_is_refused_with_file_and_line(tmp_path, name):
 def test_units_are_given_exactly_when_the_columns_have_none(tmp_path, header, units, message):
     path = csv_of(tmp_path, header + "\n1,2,3,4\n")
     with pytest.raises(CaseError, match=message):
-        read_spheres(path, units=units)
+        read_csv(path, units=units)
 
 
 def test_what_is_no_text_file_is_refused(tmp_path):
     with pytest.raises(CaseError, match="No such file"):
-        read_spheres(tmp_path / "none.csv", units="m")
+        read_csv(tmp_path / "none.csv", units="m")
     with pytest.raises(CaseError, match="irectory"):
-        read_spheres(tmp_path, units="m")
+        read_csv(tmp_path, units="m")
     with pytest.raises(CaseError, match="not UTF-8 text"):
-        read_spheres(csv_of(tmp_path, "x,y,z,radius\n1,2,3,4 µm", encoding="latin-1"), units="m")
+        read_csv(csv_of(tmp_path, "x,y,z,radius\n1,2,3,4 µm", encoding="latin-1"), units="m")

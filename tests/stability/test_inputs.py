@@ -2,8 +2,8 @@
 
 import json
 import math
-import sys
 from pathlib import Path
+from random import Random
 
 import numpy as np
 import pytest
@@ -13,11 +13,8 @@ from fdnet.errors import CaseError, DumpError
 from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.network import build_network
 from fdnet.spheres.dump import parse_dump
+from fdnet.studies.fuzz import fuzz, targets
 from tests.network.packs import random_pack, simple_cubic, snapshot
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "scripts"))
-
-import fuzz
 
 HOSTILE = ["nan", "NaN", "inf", "-inf", "1e400", "-1e999", "", "1,5", "0x10", "1_0", "none"]
 
@@ -157,7 +154,7 @@ def test_no_fines_are_no_fault_of_occupancy():
 @pytest.mark.parametrize("seed", [11, 12])
 def test_some_hundred_mutated_inputs_make_no_fault(root, seed):
     """The quick form of scripts/fuzz.py; its record of more than 10,000 is docs/validation/fuzz.json."""
-    record = fuzz.fuzz(root, seed=seed, indices=range(300), limit=20.0)
+    record = fuzz.fuzz(root, main, seed=seed, indices=range(300), limit=20.0)
     assert record["faults"] == []
     assert len(record["kinds"]) == 9
     assert all(sum(outcomes.values()) > 10 for outcomes in record["kinds"].values())
@@ -167,12 +164,12 @@ def test_the_fuzz_knows_a_fault_when_it_meets_one(tmp_path):
     """Deliberate breaks: a traceback, a hang, a warning, a file left behind, an impossible number."""
 
     def outcome(judge, limit: float = 5.0) -> str:
-        return fuzz.outcome(fuzz.Target((b"",), {}, judge), b"", fuzz.Random(1), limit)
+        return fuzz.outcome(targets.Target((b"",), {}, judge), b"", Random(1), limit)
 
-    def left(_: bytes, folder: Path, __: fuzz.Random) -> str:
+    def left(_: bytes, folder: Path, __: Random) -> str:
         (folder / "decks").mkdir()
         (folder / "decks" / "in.pack").write_text("half")
-        return fuzz.judge_case(b"name = ", folder, fuzz.Random(1))
+        return targets.judge_case(b"name = ", folder, Random(1), command=main)
 
     def endless(*_: object) -> str:
         while True:
@@ -183,14 +180,14 @@ def test_the_fuzz_knows_a_fault_when_it_meets_one(tmp_path):
     assert "not done within" in outcome(endless, 0.2)
     assert "in.pack was written" in outcome(left)
     good = '{"k_initial_m2": 1, "k_damaged_m2": 0.5, "porosity_initial": 0.4, "porosity_damaged": 0.3, "sections": []}'
-    assert fuzz._numbers(good) == "accepted"
+    assert targets.judge_numbers(good) == "accepted"
     for bad in (
         good.replace("0.5", "1.5"),
         good.replace("0.4", "1.1"),
         good.replace("0.4", "NaN"),
         good[:-1],
     ):
-        assert fuzz._numbers(bad).startswith("fault")
+        assert targets.judge_numbers(bad).startswith("fault")
 
 
 def test_the_committed_record_is_of_ten_thousand_inputs_without_fault(root):

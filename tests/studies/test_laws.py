@@ -6,12 +6,12 @@ import pytest
 
 from fdnet.cli import main
 from fdnet.network.laws.named import DEFAULT_LAW, LAWS
+from fdnet.studies.accuracy.measurement import DEFAULT, PAIRS, RESOLVED
 from fdnet.studies.command import run_study
 from fdnet.studies.engine.table import read_rows
 from fdnet.studies.network import laws
-from fdnet.studies.network.law_models import PAIRS, RESOLVED
 from fdnet.studies.truth import packs
-from fdnet.studies.truth.truth import EQUAL, LATTICE
+from fdnet.studies.truth.cases import EQUAL, LATTICE
 
 FIFTH = "fines of 1/5"
 
@@ -48,11 +48,11 @@ def test_every_damage_law_has_the_error_the_document_tells(rows, root):
     with (root / "docs" / "validation" / "accuracy_damage.csv").open(newline="") as file:
         told = next(row for row in csv.DictReader(file) if row["case"] == laws.DAMAGED)
     found = errors(rows, FIFTH, "k/k0")
-    names = [*(" + ".join(pair) for pair in PAIRS), RESOLVED]
+    names = [*PAIRS, RESOLVED]
     assert {name: 1 + found[name] for name in names} == {
         name: pytest.approx(float(told[name]), abs=2e-4) for name in names
     }
-    assert abs(found[laws.DEFAULT]) < 0.12 < found["thesis + thesis"]
+    assert abs(found[DEFAULT]) < 0.12 < found["thesis + thesis"]
 
 
 def test_resolved_flow_converges_from_above_and_two_grids_are_nearer(rows):
@@ -67,13 +67,13 @@ def test_truth_brings_its_own_uncertainty(rows):
     assert {row.error_uncertainty for row in rows if row.series == EQUAL} == {own}
 
 
-def test_an_installed_fdnet_refuses_for_want_of_the_packs(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(packs, "PROJECT", tmp_path)
+def test_an_incomplete_installation_refuses_for_want_of_the_packs(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(packs, "DATA", tmp_path / "data")
     laws.cases.cache_clear()
     out = tmp_path / "out"
     try:
         assert main(["study", "laws", "--quick", "--out", str(out)]) == 2
     finally:
         laws.cases.cache_clear()
-    assert "tests/data/truth is not there" in capsys.readouterr().err
+    assert "data is not there; it holds the packs" in capsys.readouterr().err
     assert not out.exists()

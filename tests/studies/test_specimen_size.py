@@ -3,7 +3,7 @@
 import pytest
 
 from fdnet.studies.command import run_study
-from fdnet.studies.engine.judge import levels
+from fdnet.studies.engine.levels import levels
 from fdnet.studies.engine.table import read_rows
 from fdnet.studies.network.specimen_size import INTACT, INVADED, NAMED, PERIODIC, STUDY
 

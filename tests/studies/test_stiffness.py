@@ -11,7 +11,7 @@ from fdnet.studies.dem.closed import deepest_overlap_of, restitution_of
 from fdnet.studies.dem.collisions import SPEED
 from fdnet.studies.dem.runs import slab_case
 from fdnet.studies.dem.stiffness import COLLISION, LONG, NOMINAL, STUDY
-from fdnet.studies.engine.judge import levels
+from fdnet.studies.engine.levels import levels
 from fdnet.studies.engine.table import read_rows
 
 pytestmark = pytest.mark.liggghts

@@ -14,6 +14,7 @@ from fdnet.studies.stokes import stokes
 from fdnet.studies.stokes.green import build_green
 from fdnet.studies.stokes.stokes import extrapolate, solve_stokes
 from fdnet.studies.stokes.walls import find_walls
+from fdnet.studies.truth.packs import DATA, OWN_TRUTH
 
 SC = [[0.31, 0.17, 0.43]]
 BCC = [[0.1, 0.2, 0.3], [0.6, 0.7, 0.8]]
@@ -213,12 +214,11 @@ def test_swallowed_and_doubled_spheres_change_nothing():
     assert ks[0] == pytest.approx(ks[1], rel=1e-4)
 
 
-def test_stored_truth_lies_below_a_coarse_grid_by_its_error(root):
-    data = root / "docs" / "validation" / "truth_own.csv"
-    with data.open(newline="") as file:
+def test_stored_truth_lies_below_a_coarse_grid_by_its_error():
+    with (DATA / OWN_TRUTH).open(newline="") as file:
         truth = next(row for row in csv.DictReader(file) if row["case"] == "packH_40_eps40")
     table = np.genfromtxt(
-        root / "tests" / "data" / "truth" / truth["file"],
+        DATA / truth["file"],
         delimiter=",",
         skip_header=2,
         usecols=range(4),

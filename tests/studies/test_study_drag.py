@@ -7,7 +7,7 @@ import pytest
 
 from fdnet.studies.command import run_study
 from fdnet.studies.dem.drag import EVERY, HELD, HOLDING, IMPLICIT, OTHER, STUDY, VISCOUS
-from fdnet.studies.engine.judge import levels
+from fdnet.studies.engine.levels import levels
 from fdnet.studies.engine.table import read_rows
 
 pytestmark = pytest.mark.liggghts

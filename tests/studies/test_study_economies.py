@@ -28,7 +28,7 @@ from fdnet.studies.dem.economies import (
     summary,
 )
 from fdnet.studies.dem.runs import OBSERVED
-from fdnet.studies.engine.judge import levels
+from fdnet.studies.engine.levels import levels
 from fdnet.studies.engine.study import DONE, Measured, Point
 from fdnet.studies.engine.table import read_rows
 

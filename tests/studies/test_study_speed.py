@@ -22,7 +22,7 @@ from fdnet.studies.dem.speed import (
     measure,
     window_of,
 )
-from fdnet.studies.engine.judge import levels
+from fdnet.studies.engine.levels import levels
 from fdnet.studies.engine.study import Point
 from fdnet.studies.engine.table import read_rows
 

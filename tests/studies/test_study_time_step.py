@@ -5,7 +5,7 @@ import pytest
 
 from fdnet.studies.command import run_study
 from fdnet.studies.dem.time_step import COLLISION, DRAG, ENERGY, INVASION, STUDY
-from fdnet.studies.engine.judge import levels, order
+from fdnet.studies.engine.levels import levels, order
 from fdnet.studies.engine.table import read_rows
 
 pytestmark = pytest.mark.liggghts

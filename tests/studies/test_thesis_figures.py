@@ -70,7 +70,9 @@ NUMBERS = ThesisSpecimen(
     statistics=(
         Statistic(specimen="1", quantity="throat radius", value=0.3, between=(0.0, 0.05)),
     ),
-    deposition=(DepositionClaim(throat_porosity=(0.0, 0.4), nearer="axis", value=0.5),),
+    deposition=(
+        DepositionClaim(throat_porosity=(0.0, 0.4), nearer="axis", value=0.5, sense="about"),
+    ),
 )
 
 

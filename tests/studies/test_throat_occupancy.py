@@ -66,9 +66,7 @@ def test_the_reference_has_the_closed_forms():
     )
 
 
-def test_without_the_project_the_packs_are_missed_by_name(monkeypatch, tmp_path):
-    monkeypatch.setattr(packs, "PROJECT", tmp_path)
-    with pytest.raises(
-        packs.CaseError, match=r"tests/data/truth is not there.*run it from a checkout"
-    ):
+def test_packs_that_are_not_there_are_missed_by_name(monkeypatch, tmp_path):
+    monkeypatch.setattr(packs, "DATA", tmp_path / "data")
+    with pytest.raises(packs.CaseError, match=r"data is not there.*install fdnet again"):
         packs.truth_folder()

@@ -1,12 +1,12 @@
 """The packs of the Stokes truth: made again from their seeds, porosity as stated, table from grids."""
 
-import sys
-from importlib import import_module
-
 import numpy as np
 import pytest
 
 from fdnet.spheres.porosity import measure_porosity
+from fdnet.studies.truth.grids import make, tabulated
+from fdnet.studies.truth.made_packs import touching_three
+from fdnet.studies.truth.packs import DATA, read_pack
 
 STATED = {
     "packE_80_eps30": 0.30,
@@ -19,15 +19,9 @@ STATED = {
 }
 
 
-@pytest.fixture
-def scripts(root, monkeypatch):
-    monkeypatch.setattr(sys, "path", [str(root / "scripts"), *sys.path])
-    return import_module("stokes_truth"), import_module("truth_packs")
-
-
 @pytest.mark.parametrize("name", STATED)
-def test_porosity_as_stated(scripts, root, name):
-    pack, edge = scripts[1].read_pack(root / "tests" / "data" / "truth" / f"{name}.csv")
+def test_porosity_as_stated(name):
+    pack, edge = read_pack(DATA / f"{name}.csv")
     assert measure_porosity(pack, periodic=(True,) * 3).mean == pytest.approx(
         STATED[name], abs=0.001
     )
@@ -35,24 +29,21 @@ def test_porosity_as_stated(scripts, root, name):
     assert len(pack.fines()) == 0 or np.all(pack.fines().radius == pytest.approx(1e-4))
 
 
-def test_a_pack_is_made_again_from_its_seed(scripts, root, tmp_path):
-    scripts[0].make(["packF_80_eps45"], tmp_path)
-    made, stored = (
-        scripts[1].read_pack(folder / "packF_80_eps45.csv")[0]
-        for folder in (tmp_path, root / "tests" / "data" / "truth")
-    )
+def test_a_pack_is_made_again_from_its_seed(tmp_path):
+    make(["packF_80_eps45"], tmp_path)
+    made, stored = (read_pack(folder / "packF_80_eps45.csv")[0] for folder in (tmp_path, DATA))
     np.testing.assert_allclose(made.position, stored.position, atol=1e-8)
 
 
-def test_seats_touch_three(scripts):
+def test_seats_touch_three():
     corner = np.array([[0.0, 0.0, 0.0], [1.0, 0.1, 0.0], [0.3, 0.9, 0.2]])
     reach = np.array([0.7, 0.8, 0.6])
-    place = scripts[1].touching_three(corner, reach, np.random.default_rng(2))
+    place = touching_three(corner, reach, np.random.default_rng(2))
     np.testing.assert_allclose(np.linalg.norm(corner - place, axis=1), reach, rtol=1e-12)
-    assert scripts[1].touching_three(corner, 0.3 * reach, np.random.default_rng(2)) is None
+    assert touching_three(corner, 0.3 * reach, np.random.default_rng(2)) is None
 
 
-def test_the_table_takes_the_two_finest_grids(scripts):
+def test_the_table_takes_the_two_finest_grids():
     def row(case: str, cells: int, k: float) -> dict[str, str]:
         values = {
             "case": case,
@@ -67,7 +58,7 @@ def test_the_table_takes_the_two_finest_grids(scripts):
     exact = {"packH_40_eps40": 2.0, "packH_r5_d13": 0.5}
     rows = [row(case, n, k + 7.0 / n**2) for case, k in exact.items() for n in (96, 144)]
     rows.append(row("packH_40_eps40", 12, 99.0))
-    table = {entry["case"]: entry for entry in scripts[0].tabulated(rows)}
+    table = {entry["case"]: entry for entry in tabulated(rows)}
     assert float(table["packH_40_eps40"]["k_mm2"]) == pytest.approx(2.0, rel=1e-5)
     assert float(table["packH_r5_d13"]["k_over_k0"]) == pytest.approx(0.25, rel=1e-3)
     assert table["packH_r5_d13"]["source"].endswith("N=96+144")

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from fdnet.errors import FlowError
-from fdnet.studies.engine.judge import against_exact
+from fdnet.studies.engine.error_rows import against_exact
 from fdnet.studies.engine.study import Panel, Point, Study
 
 
@@ -45,7 +45,6 @@ def toy(**changes) -> Study:
         "judge": judge,
         "panels": (Panel(quantity="integral", title="integral of x²"),),
         "defaults": {"midpoint": 8.0},
-        "remarks": "The rule is of second order.",
         "isolated": False,
     }
     return Study(**(parts | changes))

@@ -49,15 +49,21 @@ class Flow:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Links:
-    """Links (K): `ends` (K, 2) pores or INLET, OUTLET; `throat` (K,) the throat it is (part of)."""
+class Links:
+    """K conductances between pores and the two planes.
+
+    Attributes:
+        ends: (K, 2) number of the pores' group (`Network.pore_group`), or INLET, or OUTLET.
+        conductance: (K,) m3 (flux times viscosity over pressure drop).
+        throat: (K,) index of the throat that the link is, or is a part of.
+    """
 
     ends: Array
     conductance: Array
     throat: Array
 
-    def where(self, kept: Array) -> "_Links":
-        return _Links(
+    def where(self, kept: Array) -> "Links":
+        return Links(
             ends=self.ends[kept], conductance=self.conductance[kept], throat=self.throat[kept]
         )
 
@@ -75,13 +81,12 @@ def solve_flow(
     if span is None and network.periodic[0]:
         return _solve_period(network, conductance)
     low, high = (float(network.box[0, 0]), float(network.box[0, 1])) if span is None else span
-    node, first = network.pore_group, np.unique(network.pore_group, return_index=True)[1]
-    state = _beside_planes(network, network.pore_position[first, 0], low, high)
+    node, state = network.pore_group, _group_state(network, low, high)
     links = _cut_links(network, conductance, low, high)
     free = _tied_to_both(links, state)
     pressure = np.where(state == INLET, 1.0, np.where(state == OUTLET, 0.0, np.nan))
     isolated = int(np.sum(((state == BETWEEN) & ~free)[node]))
-    live = np.all((links.ends < 0) | free[links.ends], axis=1)
+    live = _live(links, free)
     if not live.any():
         reason = f"no open path from x = {low:g} m to x = {high:g} m"
         return _no_flow(pressure[node], len(conductance), isolated, reason)
@@ -107,6 +112,30 @@ def solve_flow(
     )
 
 
+def open_links(network: Network, conductance: Array) -> Links:
+    """The links that carry flow from the inlet to the outlet face, for throat `conductance` (T,) m3.
+
+    They are what `solve_flow` solves where x is not periodic. Raises FlowError on a conductance that
+    is negative or not finite.
+    """
+    _check(conductance, len(network.throat_pores))
+    low, high = float(network.box[0, 0]), float(network.box[0, 1])
+    links = _cut_links(network, conductance * network.throat_share, low, high)
+    free = _tied_to_both(links, _group_state(network, low, high))
+    return links.where(_live(links, free))
+
+
+def _live(links: Links, free: Array) -> Array:
+    """True (K,) where every end of a link is a plane or a pore that is tied to both planes."""
+    return np.all((links.ends < 0) | free[links.ends], axis=1)
+
+
+def _group_state(network: Network, low: float, high: float) -> Array:
+    """INLET, OUTLET or BETWEEN for each group of pores."""
+    first = np.unique(network.pore_group, return_index=True)[1]
+    return _beside_planes(network, network.pore_position[first, 0], low, high)
+
+
 def _check(conductance: Array, count: int) -> None:
     if conductance.shape != (count,):
         raise FlowError(
@@ -126,7 +155,7 @@ def _beside_planes(network: Network, x: Array, low: float, high: float) -> Array
     return np.where(x <= low + hair, INLET, np.where(x >= high - hair, OUTLET, BETWEEN))
 
 
-def _cut_links(network: Network, conductance: Array, low: float, high: float) -> _Links:
+def _cut_links(network: Network, conductance: Array, low: float, high: float) -> Links:
     """Throats with a part between the planes; those crossing a plane are shortened to it, to 1e-3 at the least."""
     turned = np.flatnonzero(network.throat_shift[:, 0] != 0)
     throat = np.concatenate([np.arange(len(conductance)), turned])
@@ -145,14 +174,14 @@ def _cut_links(network: Network, conductance: Array, low: float, high: float) ->
     inside, whole = np.diff(np.clip(x, low, high), axis=1)[:, 0], np.diff(x, axis=1)[:, 0]
     cut = np.any(side != BETWEEN, axis=1)
     share = np.divide(inside, whole, out=np.ones(len(x)), where=cut)
-    return _Links(
+    return Links(
         ends=np.where(side == BETWEEN, network.pore_group[network.throat_pores[throat]], side),
         throat=throat,
         conductance=conductance[throat] / np.maximum(share, SHORTEST_SHARE),
     )
 
 
-def _tied_to_both(links: _Links, state: Array) -> Array:
+def _tied_to_both(links: Links, state: Array) -> Array:
     """True (P,) for pores between the planes whose group of open links touches both planes."""
     inner = links.ends[np.all(links.ends >= 0, axis=1)]
     count = len(state)
@@ -167,7 +196,7 @@ def _tied_to_both(links: _Links, state: Array) -> Array:
     return free
 
 
-def _solve(links: _Links, free: Array) -> Balance:
+def _solve(links: Links, free: Array) -> Balance:
     """Balance of the `free` pores, in their order after node 0, which is both planes."""
     node = np.where(links.ends < 0, 0, np.cumsum(free)[links.ends])
     jump = 1.0 * (links.ends[:, 0] == INLET) - 1.0 * (links.ends[:, 1] == INLET)
@@ -179,7 +208,7 @@ def _apart(inflow: float, other: float) -> float:
     return abs(inflow - other) / inflow if inflow > 0 else np.inf
 
 
-def _through(links: _Links, flux: Array, plane: int) -> float:
+def _through(links: Links, flux: Array, plane: int) -> float:
     """Flux out of the plane into the pores."""
     return float(np.sum(flux[links.ends[:, 0] == plane]) - np.sum(flux[links.ends[:, 1] == plane]))
 

@@ -16,7 +16,7 @@ from fdnet.studies.dem.runs import (
     slab_case,
     window_run,
 )
-from fdnet.studies.engine.judge import against_reference, profile_distance, sizes
+from fdnet.studies.engine.error_rows import against_reference, profile_distance, sizes
 from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study, Value
 
 EVERY, HELD, IMPLICIT, VISCOUS = "every_step", "held", "implicit", "viscous"
@@ -174,23 +174,6 @@ def _is_every_step(run: Measured) -> bool:
     return run.point.value == EVERY
 
 
-_REMARKS = """
-- In whole invasions no scheme's error falls with its cost. Contacts are chaotic: `viscous`, which gives the very
-  numbers of `every_step` while contacts are few (20,000 fines, first 0.1 ms), leaves them within 2 ms, and what is then
-  left between any two schemes is chance of the size of these bands. At this stiffness holding for up to 1 tau is not
-  told from `every_step` in counts, porosity or k, although a falling fine's velocity is then off by a third: the
-  deposit, not the flight, decides.
-- Of the 32 means of the full form three stand out of their 95 % bands, where chance would give one or two; one is the
-  mean depth of drag held for 0.05 tau, while neither shorter nor longer holding shows it. Eight seeds cannot tell.
-- `viscous` is the best buy where fines have one size: equal to `every_step` at the same step, without a knob, and the
-  cheapest of all (the more so the more fines are in flight), by 6 to 12 %. The default stays `held` for 0.05 tau, the
-  cheapest that serves every case: ranges of radii, and a fluid velocity that differs from fine to fine.
-- `implicit` is of second order and bounded at any step, but bounded is not accurate: above 1 tau its error is of order
-  one. It loses the forward half of drag in the first step of every `run`, which makes it first order and worse than the
-  explicit schemes where runs are as short as tau/4; the chunks of these invasions are 4 tau long, sixteen times that.
-"""
-
-
 STUDY = Study(
     name="drag",
     title="Drag schemes",
@@ -226,5 +209,4 @@ STUDY = Study(
         ),
     ),
     defaults=dict.fromkeys((HELD, HOLDING, WINDOW_HOLDING), HOLD_OVER_RELAXATION),
-    remarks=_REMARKS,
 )

@@ -8,7 +8,8 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase
 from fdnet.studies.dem.runs import OBSERVED, invasion_run, slab_case
-from fdnet.studies.engine.judge import Level, against_reference, levels, percent
+from fdnet.studies.engine.error_rows import against_reference
+from fdnet.studies.engine.levels import Level, levels, percent
 from fdnet.studies.engine.study import DONE, Measured, Panel, Point, Row, Study, Value
 
 EQUAL, LONG, UNEQUAL = "equal fines", "long supply", "unequal fines"
@@ -213,24 +214,6 @@ _WORDS: Mapping[str, str] = {
     "porosity_loss": "porosity lost",
     "k_ratio_first": "k/k0 of the first millimetre",
 }
-_REMARKS = """
-Speed-ups are ratios of core seconds, the cores shared throughout. By their bands no error is told from chance: packs
-scatter by 8 to 9 % in counts, and seeds are not paired, for batches draw another suspension than the slab does.
-
-- **Batches** buy what is not there: a tenth with a supply of six batches, most of it at the cake before the end, five
-  times with a supply for eight times the run. The thesis's cases, slabs of 3 to 10 batches that have all arrived well
-  before the end, are nearer the first kind.
-- **The step** of 0.2 sqrt(m/k) buys 1.9.
-- **Softer springs** buy less than the root of the stiffness, and of all economies theirs is the largest difference in
-  fines inside, growing as springs soften: +5 % at 3e3 N/m, +10 % at 1e3. The bands of 12 % are those of packs: of the
-  same pack and fines every seed takes more, 3 to 6 % and 10 to 11 %. At full scale, while the suspension arrived
-  undisturbed (three chunks), specimen 3 took 17,446 fines at 1e4 N/m, 18,667 at 2e3 and 17,625 at 1e3, specimen 6 took
-  25,833 at 1e4 and 26,417 at 3e3: 1 to 7 %, one seed each.
-- **Drag** that is `viscous` (equal fines) or `held` (unequal ones) buys a third; `implicit` no more than `held`.
-- **All together** buy about the product of the parts, 2.4, with a long supply 14.
-
-The long supply is stopped while most of it is still upstream.
-"""
 STUDY = Study(
     name="economies",
     title="Economies of full-scale invasions",
@@ -249,5 +232,4 @@ STUDY = Study(
     ),
     defaults=dict.fromkeys((EQUAL, UNEQUAL), HELD),
     summary=summary,
-    remarks=_REMARKS,
 )

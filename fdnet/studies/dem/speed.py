@@ -12,7 +12,7 @@ from fdnet.studies.dem.runs import (
     slab_case,
     window_run,
 )
-from fdnet.studies.engine.judge import against_reference, profile_distance, sizes
+from fdnet.studies.engine.error_rows import against_reference, profile_distance, sizes
 from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study, Value
 
 MOTION, STILL = "grains", "mobile grains, no flow"
@@ -134,22 +134,6 @@ def _windows_panel(settings: Sequence[str], fines: int, *, cost: str = "core_s")
     return Panel(quantity="mean_depth", title=title, series=series, cost=cost)
 
 
-_REMARKS = """
-- Skin, bins and ranks change only the order of sums. While contacts are few (20,000 fines, first 0.1 ms) nothing is
-  left of that; after 0.5 ms with 2,000 fines chaos has made it as much as these errors, of 2 % at most, which do not
-  fall with cost. So they are chosen by run time alone. Two seeds a setting, one for the ranks: bands say little here.
-- The skin's optimum is flat around a fine's radius, fdnet's own; a tenth of it, and four times it, take from half as
-  long again to two and a half times as long. LIGGGHTS's own bins are the fastest at both numbers of fines.
-- Grains that move are another model, not a finer one: the fines push them (root mean square way, the pack's own drift
-  without flow beside it), the face gives way and more fines get in. The error of fixed grains is therefore not chaos
-  and no other setting removes it.
-- Ranks were run on two idle cores: two of them, cut across the sides, take 0.63 of the clock of one; cut along the flow
-  they gain nothing with few fines, for most fines crowd at the face. On the same cores with a load of 7 to 9 they took
-  four to eleven times the clock of one, for ranks wait for each other: MPI is for idle cores alone. All other costs are
-  core seconds, measured on cores shared with other work.
-"""
-
-
 STUDY = Study(
     name="speed",
     title="Run-time settings",
@@ -174,5 +158,4 @@ STUDY = Study(
     ),
     defaults={MOTION: FIXED}
     | {window_of(name, n): _OWN[name] for name in (SKIN, BIN, RANKS) for n in (FEW, MANY)},
-    remarks=_REMARKS,
 )

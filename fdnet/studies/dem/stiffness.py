@@ -7,7 +7,7 @@ from fdnet.case.case import Run as RunControl
 from fdnet.errors import CaseError
 from fdnet.studies.dem.collisions import collision_run
 from fdnet.studies.dem.runs import BINS, base_inputs, invasion_run, slab_case
-from fdnet.studies.engine.judge import against_reference, profile_distance, sizes
+from fdnet.studies.engine.error_rows import against_reference, profile_distance, sizes
 from fdnet.studies.engine.study import DONE, Measured, Panel, Point, Row, Study, Value, ladder
 
 COLLISION, LONG, COARSE, SHORT = (
@@ -116,20 +116,6 @@ def _reference_value(runs: Sequence[Measured]) -> float:
     return max(value for value, count in seeds.items() if count == most)
 
 
-_REMARKS = """
-Invasions are held against the mean of 1e6 N/m (six seeds), the first 0.2 ms against 1e8 N/m; 2 ms at the nominal
-stiffness would take some four and a half core hours, the first 0.2 ms were run there.
-
-- **Overlap** is the one error that goes on falling with cost: as the root of the stiffness, like that of one collision,
-  which was run to the nominal 94.3e9 N/m. Restitution is the time step's error alone.
-- **What counts for damage** (fines inside, porosity lost, k/k0) is wrong by 7 to 28 % at 1e2 and 3e2 N/m, with a sign
-  that depends on the fine: small ones are lost through the outlet, large ones squeezed into throats that rigid ones do
-  not pass. From 1e3 N/m (0.10 mm) and 1e4 N/m (0.16 mm, a third of a grain) on nothing is told from chance
-  but the mean depth of the large fines, 4 ± 3 % too deep at 1e4 N/m.
-- **There the error stops falling**: seeds scatter by 2 to 3 % in counts and by 15 % in k/k0 of the first millimetre of
-  so small a specimen, and every stiffness draws another sample, for contacts make paths chaotic. A hundred times the
-  stiffness is ten times the time; the same time in ten seeds narrows the band by three.
-"""
 _DEFAULT = RunControl().stiffness_N_m
 STUDY = Study(
     name="stiffness",
@@ -161,5 +147,4 @@ STUDY = Study(
         Panel(quantity="restitution_error", title="restitution of two fines", cost="steps"),
     ),
     defaults={name: _DEFAULT for name in (COLLISION, *_SETTINGS) if isinstance(_DEFAULT, float)},
-    remarks=_REMARKS,
 )

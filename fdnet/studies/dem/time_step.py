@@ -6,7 +6,7 @@ from pathlib import Path
 from fdnet.case.case import Run as RunControl
 from fdnet.studies.dem.collisions import collision_run, energy_run
 from fdnet.studies.dem.runs import OBSERVED, base_inputs, invasion_run, relaxation_run, slab_case
-from fdnet.studies.engine.judge import against_reference, sizes
+from fdnet.studies.engine.error_rows import against_reference, sizes
 from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study, Value, ladder
 
 COLLISION, ENERGY, INVASION, DRAG = "collision", "undamped pack", "invasion", "drag relaxation"
@@ -125,8 +125,4 @@ STUDY = Study(
         Panel(quantity="k_ratio_first", title="invasion: k/k0 of the first millimetre"),
     ),
     defaults={COLLISION: _FACTOR, ENERGY: _FACTOR, INVASION: _FACTOR},
-    remarks="""Collisions converge in first order, for LIGGGHTS damps with the velocity of half a step ago; the energy
-of an undamped pack in second order up to 0.4, it grows from 0.5 on, and above 0.6 grains are thrown out (fdnet refuses
-steps above 0.2). In whole invasions no error of the step is seen from 0.2 down: contacts make the fines' paths chaotic,
-so any change of the step draws another sample, and the difference does not fall with cost.""",
 )

@@ -1,6 +1,7 @@
 """Means over seeds, their 95 % bands, and whether two of them differ."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,15 +9,20 @@ from scipy.stats import t as student
 
 CONFIDENCE = 0.95
 FEWEST = 3
-"""Runs that a spread is taken from; fewer say too little of it."""
+"""The spread of a sample is taken from at least so many runs; fewer say too little of it."""
 ROUNDING = 1e-9
-"""What counts as no difference: relative, among values of one sample."""
+"""Relative differences within a sample below this one count as none."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sample:
-    """`values` (R,) of one quantity, one a seed. When they are fewer than FEWEST their spread is that of `lent` (L,),
-    values of the quick form, times `widened`."""
+    """Values of one quantity, one of each seed.
+
+    Attributes:
+        values: (R,) the values themselves.
+        lent: (L,) values of the quick form, whose spread stands in where R is below `FEWEST`.
+        widened: factor on the spread of `lent`.
+    """
 
     values: tuple[float, ...]
     lent: tuple[float, ...] = ()
@@ -29,7 +35,7 @@ class Sample:
 
     @property
     def spread_of(self) -> str:
-        """Whose spread is used: "seeds", "quick form" or "" when none is known."""
+        """Where the spread comes from: "seeds", "quick form", or "" when none is known."""
         if not self.values:
             return ""
         if len(self.values) >= FEWEST:
@@ -38,7 +44,7 @@ class Sample:
 
     @property
     def error(self) -> tuple[float, int]:
-        """Variance of the mean, and its degrees of freedom; (nan, 0) when the spread is not known."""
+        """Variance of the mean and its degrees of freedom; (nan, 0) without a known spread."""
         if not self.spread_of:
             return math.nan, 0
         own = self.spread_of == "seeds"
@@ -50,7 +56,13 @@ class Sample:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Band:
-    """`mean` and its 95 % band [low, high], nan where the spread is not known."""
+    """A mean and its 95 % band.
+
+    Attributes:
+        mean: the mean.
+        low: lower end of the band; nan where the spread is not known.
+        high: upper end of the band; nan where the spread is not known.
+    """
 
     mean: float
     low: float
@@ -72,11 +84,25 @@ def band(sample: Sample) -> Band:
 
 
 def difference(one: Sample, other: Sample) -> Band:
-    """Mean of `one` less that of `other`, with Welch's band: spreads need not be equal, nor the runs paired.
+    """Mean of `one` less that of `other`, with the band of Welch (1947).
 
-    Degrees of freedom by Welch and Satterthwaite, (a + b)^2 / (a^2 / n_a + b^2 / n_b) for variances a, b of the means.
+    Spreads need not be equal, nor the runs paired. For variances a and b of the two means, with
+    n_a and n_b degrees of freedom, those of the difference are (a + b)^2 / (a^2/n_a + b^2/n_b).
     """
     return _band(one.mean - other.mean, [one.error, other.error])
+
+
+def half_width(values: Sequence[float]) -> float:
+    """Half of Student's 95 % band of the mean of `values`; 0 of a single value."""
+    count = len(values)
+    if count < 2:
+        return 0.0
+    return float(_quantile(count - 1) * np.std(values, ddof=1) / math.sqrt(count))
+
+
+def _quantile(freedom: float) -> float:
+    """Student's t that the 95 % band reaches, for so many degrees of freedom."""
+    return float(student.ppf(0.5 + CONFIDENCE / 2, freedom))
 
 
 def _band(mean: float, errors: list[tuple[float, int]]) -> Band:
@@ -85,5 +111,5 @@ def _band(mean: float, errors: list[tuple[float, int]]) -> Band:
         # no scatter at all, or (nan) none known
         return Band(mean=mean, low=mean - variance, high=mean + variance)
     freedom = 1 / sum((error / variance) ** 2 / count for error, count in errors if error > 0)
-    half = float(student.ppf(0.5 + CONFIDENCE / 2, freedom)) * math.sqrt(variance)
+    half = _quantile(freedom) * math.sqrt(variance)
     return Band(mean=mean, low=mean - half, high=mean + half)

@@ -1,9 +1,9 @@
-"""Tables as CSV: floats with 9 digits, what is not known left empty."""
+"""Tables as CSV files: the only place where the studies write and read them."""
 
 import csv
 import io
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,9 +14,12 @@ from fdnet.errors import CaseError
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
+DIGITS = 9
+"""Significant digits of a number unless a writer is given others."""
+
 
 def write_csv(path: Path, columns: Sequence[str], lines: Iterable[Sequence[object]]) -> Path:
-    """A header of `columns` and one line each of `lines`."""
+    """A header of `columns` and one line each of `lines`; None and nan become empty cells."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
@@ -31,17 +34,66 @@ def write_flat(
     return write_csv(path, [one.name for one in fields(kind)], [astuple(row) for row in rows])
 
 
+def write_named(
+    path: Path,
+    rows: Sequence[Mapping[str, object]],
+    *,
+    columns: Sequence[str] = (),
+    digits: int = 6,
+) -> Path:
+    """Rows by column name, whole or not at all; nan is written as such.
+
+    Args:
+        path: the file, whose folder is made.
+        rows: values by column; what a row lacks is left empty.
+        columns: names and order of the columns; those of the first row if not given.
+        digits: significant digits of numbers.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    names = list(columns) or list(rows[0])
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows([_named_cell(row.get(name), digits) for name in names] for row in rows)
+    return write_text(path, text.getvalue())
+
+
+def write_as_they_come(
+    path: Path, rows: Iterable[Mapping[str, object]], *, digits: int = 6
+) -> Iterator[Mapping[str, object]]:
+    """Writes each row as soon as it is computed, for tables that take hours; yields it again."""
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        for number, row in enumerate(rows):
+            if number == 0:
+                writer.writerow(row)
+            writer.writerow([_named_cell(value, digits) for value in row.values()])
+            file.flush()
+            yield row
+
+
 def read_csv(path: Path, columns: Sequence[str]) -> list[list[str]]:
-    """The lines below the header. Raises CaseError when the file has other columns."""
+    """The lines below the header.
+
+    Raises:
+        CaseError: the file has other columns.
+    """
     with path.open(newline="", encoding="utf-8") as file:
         reader = csv.reader(file)
         header = next(reader, [])
         lines = list(reader)
     if header != list(columns) or any(len(line) != len(header) for line in lines):
         raise CaseError(
-            f"{path}: columns {header}, expected {list(columns)} in every line; run the study anew"
+            f"{path}: columns {header}, expected {list(columns)} in every line; "
+            "run the study again to write the file anew"
         )
     return lines
+
+
+def read_named(path: Path) -> list[dict[str, str]]:
+    """The rows of a file by column name."""
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
 
 
 def parsed(text: str, kind: Any) -> Any:
@@ -51,5 +103,11 @@ def parsed(text: str, kind: Any) -> Any:
 
 def _cell(value: object) -> object:
     if isinstance(value, float):
-        return "" if math.isnan(value) else f"{value:.9g}"
+        return "" if math.isnan(value) else f"{value:.{DIGITS}g}"
+    return "" if value is None else value
+
+
+def _named_cell(value: object, digits: int) -> object:
+    if isinstance(value, float):
+        return f"{value:.{digits}g}"
     return "" if value is None else value

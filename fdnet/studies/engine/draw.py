@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from fdnet.atomic import replacing
-from fdnet.studies.engine.judge import Level, levels
+from fdnet.studies.engine.levels import Level, levels
 from fdnet.studies.engine.palette import CURVES
 from fdnet.studies.engine.study import Panel, Row, Study, shown
 

@@ -114,7 +114,6 @@ class Study:
     judge: Callable[[Sequence[Measured]], Sequence[Row]]
     panels: tuple[Panel, ...]
     defaults: Mapping[str, Value] = field(default_factory=dict)
-    remarks: str = ""
     summary: Callable[[Sequence[Row]], str] | None = None
     isolated: bool | Callable[[Point], bool] = True
     inputs: Callable[[], str] = str

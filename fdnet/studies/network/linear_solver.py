@@ -232,41 +232,6 @@ def _cost_panel(quantity: str, decades: float, title: str) -> Panel:
     )
 
 
-REMARKS = """
-Networks: pack H tiled and shaken by 2 % of a radius, between planes across x, law `lubrication` (whose conductances
-span 6 decades of their own), each divided by a factor log-uniform over so many decades more. Sizes are nominal
-(really 189, 757, 1,771, 2,782, 3,969, 8,520, 29,973, 95,995, 954,508 pores). Up to 200 pores errors are against
-elimination in 80 digits, three draws each; beyond, against fdnet's own fluxes, whose residual is then the
-uncertainty. The tolerance is the norm of the residual over that of the source; cost is set-up and solve, core
-seconds. Left out as teaching nothing new: methods at sizes above those where they already failed or took over ten
-times the others' time, 4 and 12 decades at 30,000 and a million pores.
-
-- **fdnet's own choice was never wrong**: worst throat 4e-11 of the inflow in all small networks, imbalances below
-  6e-10 of it in all sizes and spreads. It pays for that with finding stiff groups and with a second sweep: 1.3 to 4
-  times the time of a bare direct solve at 200 pores, 1.7 (intact) to 6 times (16 decades, where that answer is
-  useless) a bare multigrid to 1e-8 at 100,000. A million pores take 6 (intact), 10 (8 decades) and 22 core seconds
-  (16), 0.85 GB in all.
-- **The norm of the residual says little**: at 1e-8 the worst throat of 200 pores is off by 3e-6 to 4e-2 of the
-  inflow, the more the wider the spread, and from 3,000 pores at 16 decades the imbalances add up to more than the
-  inflow. With multigrid every factor of 100 costs four steps, some 20 % of the time, and brings a factor of 100:
-  there is no knee before rounding. So fdnet stops by the sum of imbalances over the inflow, which bounds the inflow's
-  error.
-- **Where the error does not fall with cost**: direct solves hold pressures to rounding, so a throat's flux to
-  rounding times its conductance over the critical one: 1e-12 (intact), 1e-8 (16 decades) at 200 pores, imbalances of
-  1e-5 at 100,000, which fdnet's check would refuse. No tolerance mends that; contracting stiff groups does, to 1e-11
-  and less, and is the reason for `stiff.py`. Iterative methods end at the same floor.
-- **CG with Jacobi** needs 1,500 steps at 100,000 intact pores and more than 20,000 from 8 decades on; **smoothed
-  aggregation** 94 and 884, and does not end within 1,000 from 12 decades on (3,000 pores and more). Where they do
-  end, the inflow itself can be off by a factor (3.6: CG with Jacobi, 3,000 pores, 16 decades). **spsolve** is the
-  fastest below 2,000 pores and grows as n^2.4 beyond 9,000.
-- **fdnet's constants.** Direct and multigrid (with the whole chain around them) break even at 1,800 pores (intact, 8
-  decades) to 4,000 (16 decades); at 3,000 either is within a fifth of the other, so direct up to 3,000 (5,000 before:
-  up to 1.4 times slower). Scaled to a unit diagonal, multigrid takes 135 steps for 12 at 100,000 pores. A direct
-  solve there adds 0.48 GB where fdnet's estimate, 55 n^1.41, says 0.58. At a million pores it was stopped after 300 s
-  by the clock, on a machine whose two cores others used too; by its growth (n^1.6) it would take 150 core seconds
-  and, by the estimate, 15 GB.
-"""
-
 STUDY = Study(
     name="linear-solver",
     title="Solve of the pore network",
@@ -299,7 +264,6 @@ STUDY = Study(
         for pores in (SMALL, 1_000, 3_000, 10_000, 30_000, 100_000, 1_000_000)
         for decades in DECADES
     },
-    remarks=REMARKS,
     isolated=lambda point: float(point.settings["pores"]) > IN_PROCESS,
     seconds=300.0,
 )

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from fdnet.network.permeability import analyse
 from fdnet.studies.dem.runs import grains_of, invasion_run, slab_case
-from fdnet.studies.engine.judge import against_reference
+from fdnet.studies.engine.error_rows import against_reference
 from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study, Value
 
 PERIODIC, WALLS = "periodic sides", "walls at the sides"
@@ -115,16 +115,6 @@ def judge(measured: Sequence[Measured]) -> list[Row]:
     return rows
 
 
-_REMARKS = """
-With periodic sides the error of one run falls with the number of grains, roughly as its root. With walls it does not:
-a wall's layer is a fixed share of a given face, so a walled specimen is biased against the bulk however many seeds are
-averaged, and more so in what fines do than in the intact k. More seeds narrow the bands, only a wider face or periodic
-sides remove the bias. Damage needs larger specimens than permeability: k/k0 hangs on a few layers at the face.
-
-What a quick case is worth: of the damage it says what specimen 5 says, whose walls leave k/k0 of the first millimetre
-some 40 to 60 % above the bulk's as well, with twice the scatter of the 1,272 grains; its intact k is 23 % below the
-bulk's, specimen 5's 11 %, for more of it is wall.
-"""
 STUDY = Study(
     name="specimen-size",
     title="Specimen size and seed",
@@ -161,5 +151,4 @@ STUDY = Study(
             label="mean |relative error|",
         ),
     ),
-    remarks=_REMARKS,
 )

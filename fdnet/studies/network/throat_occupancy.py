@@ -14,9 +14,9 @@ from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.laws.named import LAWS
 from fdnet.network.laws.thesis_damage import TEXT_THRESHOLD, thesis_damage
 from fdnet.spheres.snapshot import Array
+from fdnet.studies.accuracy.measurement import network_of, permeability
 from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study, row_of
 from fdnet.studies.engine.timing import least_time
-from fdnet.studies.network.law_models import network_of, permeability
 from fdnet.studies.truth.packs import read_pack, truth_folder
 
 TWO_PLANE = "two-plane"
@@ -196,26 +196,6 @@ def _beside(run: Measured, name: str, exact: float) -> Row:
     )
 
 
-REMARKS = """
-`a` is the fine's radius, `r` the throat's; labels are Gauss points, of `two-plane` the ratio a/r; cost is per 1e5
-pairs, in packs that of the whole occupancy. The reference is adaptive quadrature to 1e-12 of r³, between the planes
-where the sections change.
-
-- **Quadrature.** The error falls by more than a hundred per doubling of the points, whatever the size ratio, the
-  place and the ends, down to the reference's own rounding. It falls steeply to 6 points and then as a power: what is
-  left (median at 10 points 1e-9 and less) comes from spheres centred near the wall, |d - r| from 0.01 to 0.15 r,
-  whose section goes from a whole disc, or none, to about half of one within a short way of the pole. fdnet's 10
-  points: 1.3e-7 of the sphere at the worst, 1e-8 in k/k0. Six would do for k; they would save 4 % of the time of an
-  occupancy, so the default stays.
-- **Two planes** (the thesis): no knob brings its error down; it is 0.5 to 25 % of the sphere at the worst and low in
-  the sum (0.05 % for fines of a twentieth of the throat, 20 % for fines as large as the throat): the cap at the
-  tangent plane takes too much, the one at the chord too little, and nothing in their mean can be refined. It saves 4
-  to 16 times the time of the volumes, 15 % of an occupancy.
-- **In k/k0.** Where throats keep more than 0.40 of their section the two planes cost 2 to 4 %, far below the law's
-  own error (2 to 6 times k/k0). Where the threshold is crossed it decides: at 20 points 61 instead of 222 throats
-  clog, and k/k0 is 0.176 instead of 0.081. Blocking does not use the volumes and is the same.
-"""
-
 STUDY = Study(
     name="throat-occupancy",
     title="Volume of a fine in a throat's cylinder",
@@ -251,6 +231,5 @@ STUDY = Study(
     defaults=dict.fromkeys(
         [*(f"a/r = {ratio:g}" for ratio in RATIOS), *PACKS], float(GAUSS_POINTS)
     ),
-    remarks=REMARKS,
     isolated=False,
 )

@@ -1,4 +1,4 @@
-"""Periodic packs of known permeability, as the project keeps them, and packs tiled from them."""
+"""Periodic packs of known permeability, which come with fdnet, and packs tiled from them."""
 
 import re
 from pathlib import Path
@@ -6,47 +6,55 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.spheres.csv_file import read_spheres
+from fdnet.spheres.readers import read_spheres
 from fdnet.spheres.snapshot import Array, Snapshot, resting
 
 MM = 1e-3
 RADIUS = 0.5
 """Grain radius of the packs, mm."""
-PROJECT = Path(__file__).resolve().parents[2]
-PACKS, OWN_TRUTH = Path("tests/data/truth"), Path("docs/validation/truth_own.csv")
+DATA = Path(__file__).with_name("data")
+SHARED_TRUTH, OWN_TRUTH, OWN_GRIDS = "truth.csv", "own_truth.csv", "own_grids.csv"
+LARGE_FINES_TRUTH = "large_fines_truth.csv"
 
 
 def truth_folder() -> Path:
-    """Folder of the packs. Raises CaseError where fdnet runs without the project around it."""
-    return _in_project(PACKS)
+    """Folder of the packs and of the tables of their permeabilities.
+
+    Raises:
+        CaseError: the folder is missing, so the installation is not complete.
+    """
+    if not DATA.exists():
+        raise CaseError(
+            f"study: {DATA} is not there; it holds the packs of known permeability that come with "
+            "fdnet, which this study reads: install fdnet again"
+        )
+    return DATA
 
 
 def truth_tables() -> list[Path]:
-    """The tables of their permeabilities: the shared one and fdnet's own. Raises CaseError without the project."""
-    return [truth_folder() / "truth.csv", _in_project(OWN_TRUTH)]
+    """The tables of the permeabilities: the shared one and fdnet's own.
 
-
-def _in_project(path: Path) -> Path:
-    found = PROJECT / path
-    if not found.exists():
-        raise CaseError(
-            f"study: {found} is not there; this study reads the packs of the Stokes truth, which are part of the "
-            "project and not of an installed fdnet: run it from a checkout (pip install -e .)"
-        )
-    return found
+    Raises:
+        CaseError: the folder of the packs is missing.
+    """
+    return [truth_folder() / SHARED_TRUTH, truth_folder() / OWN_TRUTH]
 
 
 def read_pack(path: Path) -> tuple[Snapshot, float]:
-    """A pack file and its edge (mm). Raises CaseError when its first line does not give the edge."""
-    found = re.match(r"# periodic cube, edge ([0-9.]+) mm", path.read_text())
-    if not found:
+    """A pack file and the edge of its periodic cube, mm.
+
+    Raises:
+        CaseError: the first line of the file does not give the edge.
+    """
+    first_line = re.match(r"# periodic cube, edge ([0-9.]+) mm", path.read_text())
+    if not first_line:
         raise CaseError(f"{path}:1: expected '# periodic cube, edge NUMBER mm'")
-    position, radius, kind = read_spheres(path, units="mm")
-    return snapshot(position / MM, radius / MM, float(found[1]), kind), float(found[1])
+    spheres, edge = read_spheres(path, units="mm"), float(first_line[1])
+    return snapshot(spheres.position / MM, spheres.radius / MM, edge, spheres.kind), edge
 
 
 def snapshot(position: Array, radius: Array, edge: float, kind: Array) -> Snapshot:
-    """Spheres of a periodic cube, lengths in mm."""
+    """Spheres of a periodic cube, given in mm: `position` (N, 3), `radius` (N,), its `edge`."""
     return resting(position * MM, radius * MM, np.array([[0.0, edge * MM]] * 3), kind)
 
 

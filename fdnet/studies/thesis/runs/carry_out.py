@@ -13,7 +13,7 @@ from pathlib import Path
 
 from fdnet.case.case import InvasionCase
 from fdnet.errors import CaseError, FdnetError
-from fdnet.run.pipeline import run_case
+from fdnet.run.pipeline import run_stages
 from fdnet.run.session import RunOptions
 from fdnet.scales.cost import cost_of
 from fdnet.scales.scales import scales_of
@@ -109,7 +109,7 @@ def run_one(item: Planned, out: Path, runs: Path) -> str:
         options = RunOptions(
             out=folder, resume=folder.exists(), stages=("pack", "invade"), show_progress=False
         )
-        run_case(case, options)
+        run_stages(case, options)
         write_state(state_path(out, item), state_of_run(folder))
     except FdnetError as error:
         return str(error)

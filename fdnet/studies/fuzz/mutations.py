@@ -1,4 +1,4 @@
-"""Broken case files, dumps and sphere tables, made from good ones; every change is drawn from the given generator."""
+"""Broken case files, dumps and sphere tables, made from good ones by a random generator."""
 
 import copy
 import tomllib
@@ -10,7 +10,7 @@ import tomli_w
 
 Mutation = Callable[[Random, bytes], bytes]
 
-VALUES = (
+VALUES: tuple[Any, ...] = (
     0,
     -1,
     1,
@@ -43,7 +43,7 @@ VALUES += (
     [1.0, 2.0],
 )
 VALUES += ([0.3, 0.2], [1.0, 1.0, 1.0], [[1.0]], {}, {"a": 1}, [0.1] * 20)
-NUMBERS = (
+NUMBERS: tuple[str, ...] = (
     "nan",
     "inf",
     "-inf",
@@ -111,7 +111,7 @@ def change_bytes(rng: Random, data: bytes) -> bytes:
 
 
 def change_structure(rng: Random, data: bytes) -> bytes:
-    """Tables and keys of TOML dropped, renamed, doubled elsewhere, nested or made into another kind of value."""
+    """Tables and keys of TOML dropped, renamed, copied, nested or given another kind of value."""
     tables = tomllib.loads(data.decode())
     for _ in range(rng.choice((1, 1, 2, 3))):
         table = rng.choice([tables, *(one for one in tables.values() if isinstance(one, dict))])
@@ -135,7 +135,7 @@ def change_structure(rng: Random, data: bytes) -> bytes:
 
 
 def change_values(rng: Random, data: bytes) -> bytes:
-    """One to four values of TOML replaced by hostile ones, or numbers scaled by up to six decades."""
+    """One to four values of TOML replaced by hostile ones, or scaled by up to six decades."""
     tables = tomllib.loads(data.decode())
     for _ in range(rng.choice((1, 1, 2, 4))):
         table = rng.choice([one for one in _tables(tables) if one])
@@ -174,7 +174,7 @@ def change_dump_rows(rng: Random, data: bytes) -> bytes:
 
 
 def change_dump_headers(rng: Random, data: bytes) -> bytes:
-    """A line of a dump's headers replaced, dropped, doubled or its numbers exchanged for hostile ones."""
+    """A line of a dump's headers replaced, dropped, doubled, or given hostile numbers."""
     lines = data.split(b"\n")
     heads = [
         at for at, line in enumerate(lines) if line.startswith(b"ITEM") or line.count(b" ") < 3
@@ -221,9 +221,11 @@ def change_sphere_rows(rng: Random, data: bytes) -> bytes:
 
 
 def change_geometry(rng: Random, data: bytes) -> bytes:
-    """Spheres brought together, far away, into one plane or line, in a lattice, swollen, shrunk or made fines."""
+    """Spheres moved together, far away, into a plane, a line or a lattice, or given another size
+    or kind."""
     head, *lines = data.decode().splitlines()
-    rows = [[float(cell) for cell in line.split(",")[:4]] + [line.split(",")[4]] for line in lines]
+    cells = [line.split(",") for line in lines]
+    rows: list[list[Any]] = [[*map(float, one[:4]), one[4]] for one in cells]
     for _ in range(rng.choice((1, 1, 2, 3))):
         some = rng.sample(rows, rng.choice((1, 2, len(rows) // 2, len(rows))))
         axis, factor = rng.randrange(3), 10.0 ** rng.uniform(-8, 8)

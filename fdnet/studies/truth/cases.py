@@ -1,14 +1,15 @@
-"""The cases of known permeability: packs with their truth, what they belong to, and what was known of them when."""
+"""The cases of known permeability: each pack with its truth, its group, and who knew it when."""
 
 import csv
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from fdnet.spheres.snapshot import Kind, Snapshot
-from fdnet.studies.truth.packs import MM, RADIUS, read_pack, snapshot
+from fdnet.studies.truth.packs import MM, RADIUS, read_pack, snapshot, truth_folder
 
 EQUAL, UNEQUAL, LATTICE, LOOSE = (
     "random, equal grains",
@@ -17,35 +18,23 @@ EQUAL, UNEQUAL, LATTICE, LOOSE = (
     "loose lattices",
 )
 LOOSE_SOLIDS = (0.45, 0.343, 0.216)
-# intact packs looked at before the law was chosen, by its author's account
-SEEN = {
-    "A_200_eps40",
-    "B_200_eps36",
-    "C_80_eps40",
-    "E_80_eps30",
-    "F_80_eps45",
-    "G_100_radii12_eps38",
-}
-SEEN |= {"H_40_eps40", "I_80_eps45", "SC_touching", "BCC_touching", "FCC_touching"}
-SEEN_DAMAGED = {
-    "C_r10_d2",
-    "C_r10_d5",
-    "C_r10_d8",
-    "C_r5_d2",
-    "C_r5_d5",
-    "C_r5_d8",
-    "C_r5_half",
-    "C_r5_half y",
-}
-SEEN_DAMAGED |= {"E_r5_d4", "F_r5_d10", "H_r5_d13", "H_r5_d20", "H_r5_half"}
-# truth that was not in the table yet when the law was committed (85c004e intact, ebff107 damaged)
-LATER = {"N_100_radii13_eps40", "H_r5_d17", "H_r5_d1", "H_r10_d10"}
+"""Volume fractions of the grains in the loose lattices, which are made in code."""
+YES, NO, LATER = "yes", "no", "later"
+KNOWN_BEFORE = "known_before.csv"
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Case:
-    """A periodic pack with the flow along its x axis: `k` m2 with relative `error`, and `ratio` = k / k intact where it
-    holds fines."""
+    """A periodic pack of known permeability, with the flow along its x axis.
+
+    Attributes:
+        name: letter of the pack and what it holds, then the axis of the flow unless it is x.
+        group: `EQUAL`, `UNEQUAL`, `LATTICE` or `LOOSE`.
+        pack: grains, and fines if there are any.
+        k: permeability, m2.
+        error: relative error of `k` as estimated from the grids of the resolved flow.
+        ratio: `k` over the permeability of the grains alone; None without fines.
+    """
 
     name: str
     group: str
@@ -55,19 +44,27 @@ class Case:
     ratio: float | None
 
     @property
-    def known(self) -> str:
-        """Whether its truth was looked at before the law was chosen: yes; no; later: solved after the law was
-        committed; empty for loose lattices, which play no part in that count."""
-        if self.group == LOOSE:
-            return ""
-        if self.name in LATER:
-            return "later"
-        return "yes" if self.name in (SEEN if self.ratio is None else SEEN_DAMAGED) else "no"
+    def known_before(self) -> str:
+        """Whether the author of the laws had looked at this truth before choosing them.
+
+        "yes"; "no"; "later" where the truth was solved after the law had been committed; "" for
+        loose lattices, which are not counted. Packs that the table does not name: "no".
+        """
+        return "" if self.group == LOOSE else _known_before().get(self.name, NO)
+
+
+@cache
+def _known_before() -> dict[str, str]:
+    return {row["case"]: row["known_before"] for row in _rows(truth_folder() / KNOWN_BEFORE)}
 
 
 def read_cases(tables: list[Path], folders: list[Path]) -> tuple[list[Case], list[str]]:
-    """Cases of the truth tables whose pack lies in one of `folders`, loose lattices made in code; and the files that
-    rows name but no folder holds."""
+    """The cases of truth tables, and the pack files that no folder holds.
+
+    Args:
+        tables: files with the columns of `truth.csv`; the first row of a name counts.
+        folders: where the pack files may lie. Loose lattices have no file and are made in code.
+    """
     cases: dict[str, Case] = {}
     missing = []
     for row in (row for table in tables for row in _rows(table)):
@@ -129,11 +126,11 @@ def simple_cubic(solid: float, repeat: int = 3) -> Snapshot:
 
 
 def turned(pack: Snapshot, axis: int) -> Snapshot:
-    """The pack with `axis` as x (a rotation)."""
+    """The pack rotated so that `axis` (0, 1 or 2) becomes x."""
     order = np.roll(np.arange(3), -axis)
     return replace(pack, position=pack.position[:, order], box=pack.box[order])
 
 
 def all_grains(pack: Snapshot) -> Snapshot:
-    """The same spheres, fines taken as grains."""
+    """The same spheres, all of them of the kind grain."""
     return replace(pack, kind=np.full(len(pack), Kind.GRAIN))

@@ -1,8 +1,9 @@
-"""Run by benchmark_network.py inside Yade (`yade -j1 -n -x`): its pore-scale flow engine on given spheres.
+"""A program to run inside Yade (`yade -j1 -n -x`): its pore-scale flow engine on given spheres.
 
-The environment names the spheres (BENCHMARK_SPHERES, an .npz) and the boundary (BENCHMARK_SIDES, periodic or box).
-Prints one line `RESULT {json}`: seconds (CPU, wall) of the first step (tessellation, conductances, factorisation and
-solve), k, cells, peak memory. Making the bodies is not part of the time.
+`fdnet.studies.benchmark.network` runs it. The environment names the spheres (BENCHMARK_SPHERES, an
+.npz file) and the boundary (BENCHMARK_SIDES, periodic or box). It prints one line `RESULT {json}`:
+seconds (CPU, wall) of the first step (tessellation, conductances, factorisation and solve), k,
+cells, peak memory. Making the bodies is not part of the time.
 """
 
 import json
@@ -30,7 +31,8 @@ O.materials.append(FrictMat())
 if os.environ["BENCHMARK_SIDES"] == "periodic":
     O.periodic = True
     O.cell.hSize = Matrix3(size[0], 0, 0, 0, size[1], 0, 0, 0, size[2])
-    # spheres nearer than this to a side are copied across; less than two diameters breaks its periodicity
+    # spheres nearer than this to a side are copied across;
+    # less than two diameters breaks its periodicity
     reach = 4.0 * float(radius.max())
     sides = {
         "wallIds": [-1] * 6,

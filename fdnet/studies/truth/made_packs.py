@@ -1,4 +1,7 @@
-"""Packs for the Stokes truth, made in code: grains relaxed from overlap, fines seated one by one and relaxed."""
+"""Packs for the Stokes truth, made in code from their seeds.
+
+Grains are placed at random and relaxed from overlap; fines are seated one by one and relaxed.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -35,15 +38,30 @@ PACKS: dict[str, dict[str, Any]] = {
     "packH_r5_d1": {"seed": 406, "intact": "packH_40_eps40", "lost": 0.005},
     "packH_r10_d10": {"seed": 407, "intact": "packH_40_eps40", "lost": 0.10, "fine": 0.05},
 }
-"""`ratio`: radii uniform between 1 and `ratio`, mean 0.5 mm; `push`: see `relaxed`; `lost`: porosity taken by fines of
-radius `fine` (0.1 mm), all of them in the first `layer` of the edge along x (all of it)."""
+"""The packs by name, each with its seed.
+
+Packs of grains have a number of `grains` and a `porosity`; radii are uniform between 1 and `ratio`
+(1 if not given) times the smallest, with a mean of 0.5 mm. Deposits name the `intact` pack and the
+porosity `lost` to fines of radius `fine` (0.1 mm if not given), all of them in the first `layer` of
+the edge along x (all of it if not given). `push` is explained in `relaxed`.
+"""
 
 
 def relaxed(
     radius: Array, edge: float, position: Array, *, fixed: int = 0, push: float = 1.0
 ) -> Array:
-    """Push overlapping spheres apart until no overlap exceeds 1e-5 mm, or 1500 times; the first `fixed`
-    stay where they are. Each time a pair is moved apart by `push` of its overlap. Returns positions in the cell."""
+    """Overlapping spheres pushed apart until no overlap exceeds 1e-5 mm, or 1500 times.
+
+    Args:
+        radius: (N,) mm.
+        edge: edge of the periodic cube, mm.
+        position: (N, 3) mm, changed in place.
+        fixed: so many spheres, the first ones, stay where they are.
+        push: share of its overlap by which a pair is moved apart each time.
+
+    Returns:
+        Positions (N, 3) mm within the cube.
+    """
     moves = np.arange(len(radius)) >= fixed
     for _ in range(1500):
         pairs = cKDTree(position % edge, boxsize=edge).query_pairs(
@@ -57,14 +75,17 @@ def relaxed(
         if not np.any(overlap[pushed] > 1e-5):
             break
         share = moves[pairs[pushed]] / moves[pairs[pushed]].sum(axis=1, keepdims=True)
-        way = push * (overlap / distance)[pushed, None] * apart[pushed]
-        np.add.at(position, pairs[pushed, 0], share[:, :1] * way)
-        np.add.at(position, pairs[pushed, 1], -share[:, 1:] * way)
+        move = push * (overlap / distance)[pushed, None] * apart[pushed]
+        np.add.at(position, pairs[pushed, 0], share[:, :1] * move)
+        np.add.at(position, pairs[pushed, 1], -share[:, 1:] * move)
     return position % edge
 
 
 def made_grains(name: str) -> tuple[Snapshot, float]:
-    """Grains relaxed from random places; the edge is set for the stated porosity, overlap counted once."""
+    """Grains relaxed from random places, and the edge of their cube, mm.
+
+    The edge is set so that the porosity, overlap counted once, is the stated one.
+    """
     wish = PACKS[name]
     rng = np.random.default_rng(wish["seed"])
     radius = 1.0 + (wish.get("ratio", 1.0) - 1.0) * rng.random(wish["grains"])
@@ -85,11 +106,12 @@ def made_grains(name: str) -> tuple[Snapshot, float]:
 
 
 def made_deposit(wish: dict[str, Any], folder: Path) -> tuple[Snapshot, float]:
-    """The intact pack of `wish`, as in PACKS, with fines and its edge (mm).
+    """The intact pack that `wish` names (as in `PACKS`) with its fines, and its edge, mm.
 
-    First they are placed one by one without overlap, a share of 0.3 bridging (touching three spheres, fines among
-    them), the others uniform over the grains' surface. After REFUSALS refusals in a row the rest is put at random into
-    the void and all fines are relaxed from overlap, the grains fixed.
+    The fines are placed one by one without overlap: a share of 0.3 of them touches three spheres
+    (fines may be among these), the others lie uniformly over the surface of the grains. After
+    `REFUSALS` refusals in a row the remaining fines are put at random into the void, and all fines
+    are relaxed from overlap while the grains stay fixed.
     """
     rng = np.random.default_rng(wish["seed"])
     grains, edge = read_pack(folder / f"{wish['intact']}.csv")
@@ -120,7 +142,7 @@ def made_deposit(wish: dict[str, Any], folder: Path) -> tuple[Snapshot, float]:
 
 
 def gaps(centre: Array, position: Array, radius: Array, edge: float, fine: float) -> Array:
-    """Free distance between a fine of radius `fine` at `centre` and every sphere."""
+    """Free distances (N,) mm from a fine of radius `fine` at `centre` to every sphere."""
     apart = position - centre
     apart -= edge * np.round(apart / edge)
     return np.linalg.norm(apart, axis=1) - radius - fine
@@ -129,10 +151,11 @@ def gaps(centre: Array, position: Array, radius: Array, edge: float, fine: float
 def seat(
     position: Array, radius: Array, grains: int, edge: float, fine: float, rng: np.random.Generator
 ) -> Array | None:
-    """A place for a fine: on a grain, or touching it and the two other spheres nearest there; None if there is none."""
+    """A place (3,) mm for a fine: on a grain, or in contact with that grain and the two spheres
+    nearest to the place; None when no such place exists."""
     grain = rng.integers(grains)
-    way = rng.normal(size=3)
-    centre = position[grain] + (radius[grain] + fine) * way / np.linalg.norm(way)
+    direction = rng.normal(size=3)
+    centre = position[grain] + (radius[grain] + fine) * direction / np.linalg.norm(direction)
     if rng.random() > BRIDGE_SHARE:
         return centre
     others = np.argsort(gaps(centre, position, radius, edge, fine))
@@ -162,7 +185,7 @@ def touching_three(corner: Array, reach: Array, rng: np.random.Generator) -> Arr
 
 
 def write_pack(path: Path, pack: Snapshot, edge: float, note: str) -> None:
-    """A pack file in mm with 7 significant digits."""
+    """Writes a pack file in mm with 7 significant digits; `note` stands in its first line."""
     names = {Kind.GRAIN: "grain", Kind.FINE: "fine"}
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w") as file:

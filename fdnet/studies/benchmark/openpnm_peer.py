@@ -1,8 +1,9 @@
-"""Run by benchmark_network.py under a Python that has OpenPNM: solves a network of given conductances there.
+"""A program for a Python that has OpenPNM: it solves a network of given conductances there.
 
-    python peer_openpnm.py NETWORK.npz {direct|cg}
+    python openpnm_peer.py NETWORK.npz {direct|cg}
 
-Prints one line `RESULT {json}`: seconds (CPU, wall), inflow, peak memory. Building the network is part of the time.
+`fdnet.studies.benchmark.network` runs it. It prints one line `RESULT {json}`: seconds (CPU, wall),
+inflow, peak memory. Building the network is part of the time.
 """
 
 import json
@@ -32,6 +33,7 @@ def solve(data: dict[str, np.ndarray], solver: object) -> float:
 
 
 def main() -> None:
+    """Solves the network of the command line."""
     data = dict(np.load(sys.argv[1]))
     solver = (
         openpnm.solvers.ScipyCG(tol=1e-10)

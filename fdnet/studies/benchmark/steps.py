@@ -1,9 +1,11 @@
-"""Run by benchmark_network.py: fdnet's network half on one pack, step by step, in this process.
+"""fdnet's network half on one pack, step by step, in this process.
 
-    benchmark_fdnet.py GRAINS FINES FOLDER      a tiled pack; spheres and networks for the peers go to FOLDER
-    benchmark_fdnet.py --pack PACK.csv FOLDER   k of a truth pack, periodic all round
+`fdnet.studies.benchmark.network` runs it as a program:
 
-Prints one line `RESULT {json}`.
+    steps.py GRAINS FINES FOLDER      a tiled pack; spheres and networks for the peers go to FOLDER
+    steps.py --pack PACK.csv FOLDER   k of a truth pack, periodic all round
+
+It prints one line `RESULT {json}`.
 """
 
 import json
@@ -26,9 +28,9 @@ from fdnet.network.permeability import analyse
 from fdnet.spheres.porosity import measure_porosity
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
 from fdnet.studies.truth import packs
-from fdnet.studies.truth.packs import read_pack, shaken
+from fdnet.studies.truth.packs import read_pack, shaken, truth_folder
 
-TILE = Path(__file__).resolve().parent.parent / "tests" / "data" / "truth" / "packH_40_eps40.csv"
+TILE = "packH_40_eps40.csv"
 SHAKE = 0.02
 FINE = 0.1
 SIDES = (False, True, True)
@@ -37,8 +39,8 @@ MOST_GRAINS_STIFF = 200_000
 
 
 def tiled(grains: int, rng: np.random.Generator) -> Snapshot:
-    """About `grains` grains: the tile repeated, every grain shaken by up to 2 % of its radius each way."""
-    pack, _ = read_pack(TILE)
+    """About `grains` grains: the tile repeated, each grain moved by up to 2 % of its radius."""
+    pack, _ = read_pack(truth_folder() / TILE)
     across = max(round((grains / len(pack)) ** (1 / 3)), 1)
     times = np.array([max(round(grains / len(pack) / across**2), 1), across, across])
     return shaken(packs.tiled(pack, times), SHAKE, rng)
@@ -52,14 +54,15 @@ def seated(grains: Snapshot, count: int, rng: np.random.Generator) -> Snapshot:
         FINE * float(grains.radius.max()),
     )
     tree = cKDTree(np.minimum(grains.position, size * (1 - 1e-15)), boxsize=size)
-    found = np.zeros((0, 3))
-    while len(found) < count:
-        host = rng.integers(len(grains), size=2 * (count - len(found)) + 10)
-        way = rng.normal(size=(len(host), 3))
-        place = grains.position[host] + (big + small) * way / np.linalg.norm(way, axis=1)[:, None]
+    centres = np.zeros((0, 3))
+    while len(centres) < count:
+        host = rng.integers(len(grains), size=2 * (count - len(centres)) + 10)
+        normal = rng.normal(size=(len(host), 3))
+        normal = (big + small) * normal / np.linalg.norm(normal, axis=1)[:, None]
+        place = grains.position[host] + normal
         place = np.minimum(place % size, size * (1 - 1e-15))
-        found = np.concatenate([found, place[tree.query(place)[0] > big + 0.999 * small]])
-    return resting(found[:count], small, grains.box, Kind.FINE)
+        centres = np.concatenate([centres, place[tree.query(place)[0] > big + 0.999 * small]])
+    return resting(centres[:count], small, grains.box, Kind.FINE)
 
 
 class Clock:
@@ -69,15 +72,15 @@ class Clock:
         self.steps: dict[str, dict[str, float]] = {}
 
     def timed(self, step: str, work: Callable[[], Any]) -> Any:
-        """The result of `work`; its CPU and wall seconds are added to `step`, its peak memory held."""
+        """The result of `work`; its seconds are added to `step`, and its peak memory is kept."""
         _forget_peak()
         cpu, wall = time.process_time(), time.perf_counter()
-        found = work()
+        result = work()
         values = self.steps.setdefault(step, {"cpu_s": 0.0, "wall_s": 0.0, "peak_MB": 0.0})
         values["cpu_s"] += time.process_time() - cpu
         values["wall_s"] += time.perf_counter() - wall
         values["peak_MB"] = max(values["peak_MB"], _peak())
-        return found
+        return result
 
     def total(self, names: list[str]) -> dict[str, float]:
         """Sum of the seconds and largest peak of the steps `names`."""
@@ -142,16 +145,17 @@ def run_steps(
 def leave(
     folder: Path, network: tessellation.Network, states: dict[str, Array], inflow: dict[str, float]
 ) -> None:
+    """Networks of the given conductances and their inflow, in `folder` for the peers."""
     x, (low, high) = network.pore_position[:, 0], network.box[0]
-    hair = 1e-9 * (high - low)
+    tolerance = 1e-9 * (high - low)
     for state, conductance in states.items():
         np.savez(
             folder / f"{state}.npz",
             pairs=network.throat_pores,
             position=network.pore_position,
             conductance=conductance * network.throat_share * 1e9,
-            inlet=x <= low + hair,
-            outlet=x >= high - hair,
+            inlet=x <= low + tolerance,
+            outlet=x >= high - tolerance,
         )
     (folder / "inflow.json").write_text(
         json.dumps({state: 1e9 * value for state, value in inflow.items()})
@@ -159,6 +163,7 @@ def leave(
 
 
 def leave_spheres(folder: Path, pack: Snapshot) -> None:
+    """Spheres in mm, in `folder` for the peers."""
     np.savez(
         folder / "spheres.npz",
         position=pack.position * 1e3,
@@ -168,6 +173,7 @@ def leave_spheres(folder: Path, pack: Snapshot) -> None:
 
 
 def tiled_result(wanted: int, fine_count: int, folder: Path) -> dict[str, Any]:
+    """Seconds and memory of every step on a tiled pack."""
     rng = np.random.default_rng(1)
     small = tiled(40, rng)
     run_steps(small, seated(small, 100, rng))  # compiles and loads
@@ -187,16 +193,17 @@ def tiled_result(wanted: int, fine_count: int, folder: Path) -> dict[str, Any]:
 
 
 def pack_result(path: Path, folder: Path) -> dict[str, Any]:
+    """k (mm2) of one truth pack by the default laws."""
     pack, _ = read_pack(path)
     leave_spheres(folder, pack)
     fines = pack if len(pack.fines()) else None
-    found = analyse(pack.grains(), fines, periodic=(True, True, True))
+    analysis = analyse(pack.grains(), fines, periodic=(True, True, True))
     counts = {
         "grains": len(pack.grains()),
         "fines": len(pack.fines()),
-        "pores": len(found.network.pore_share),
+        "pores": len(analysis.network.pore_share),
     }
-    return {"k": found.k_damaged * 1e6, **counts}
+    return {"k": analysis.k_damaged * 1e6, **counts}
 
 
 def main() -> None:

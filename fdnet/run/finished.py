@@ -1,0 +1,161 @@
+"""A finished run as an object: its numbers, tables, spheres, network and meshes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from fdnet.case.case import Case, InvasionCase
+from fdnet.errors import CaseError
+from fdnet.network.network import Network, build_network
+from fdnet.run.finished_text import html_lines, text_lines
+from fdnet.spheres.arrays import Array
+from fdnet.spheres.snapshot import Snapshot
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+State = Literal["initial", "damaged"]
+"""Without the fines, or with them."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FinishedRun:
+    """A finished run. Tables are read when they are first used and checked against the summary.
+
+    Attributes:
+        path: the run folder.
+        case: the case with every default written out.
+        manifest: what made the run: versions, digests, commands, seeds, seconds of each stage.
+
+    `print(run)` shows the result in mD and m2, mm and percent.
+    """
+
+    path: Path
+    case: Case
+    manifest: Mapping[str, Any]
+
+    @cached_property
+    def summary(self) -> Mapping[str, Any]:
+        """The numbers of summary.json, SI; a length is in m, a permeability in m2."""
+        from fdnet.report.read_tables import read_summary
+
+        return read_summary(self.path / "summary.json")
+
+    @cached_property
+    def sections(self) -> "pd.DataFrame":
+        """One row for each slab along the flow: edges (m), porosities, permeabilities (m2), fines."""
+        return self._table("sections", len(self.summary["sections"]))
+
+    @cached_property
+    def profile(self) -> "pd.DataFrame":
+        """One row for each bin of depth: edges (m), porosities, share of the invaded fines."""
+        return self._table("profile", None)
+
+    @cached_property
+    def pores(self) -> "pd.DataFrame":
+        """One row for each pore: centre (m), radius (m), volume (m3), fines, pressures."""
+        return self._table("pores", self.summary["pores"])
+
+    @cached_property
+    def throats(self) -> "pd.DataFrame":
+        """One row for each throat: its pores, radius (m), conductances and fluxes (m3), law used."""
+        return self._table("throats", self.summary["throats"])
+
+    @cached_property
+    def history(self) -> "pd.DataFrame":
+        """The invasion over time, one row for each checkpoint, `time_s` of the simulation first.
+
+        It comes from history.csv of the run folder where there is one, else from
+        invade/history.csv. A run without fines has no history: the table then has no rows.
+        """
+        from fdnet.report.read_tables import HISTORY_COLUMNS, empty_table, read_table
+
+        whole = self.path / "history.csv"
+        if whole.exists():
+            return read_table(whole, ["time_s"])
+        if not isinstance(self.case, InvasionCase):
+            return empty_table(["time_s", *HISTORY_COLUMNS])
+        table = read_table(self.path / "invade" / "history.csv", HISTORY_COLUMNS)
+        table.insert(0, "time_s", table["step"] * self.manifest["invade"]["dt_s"])
+        return table
+
+    def spheres(self, state: State = "damaged") -> Snapshot:
+        """Grains and fines at the end of the run ("damaged"), or the grains alone before ("initial").
+
+        They are read from spheres_damaged.csv or spheres_initial.csv; the box is that of the case,
+        m. Fines upstream of the formation face (x < 0) are among the damaged ones.
+        """
+        from fdnet.spheres.readers import read_spheres
+
+        _check_state(state)
+        size = self.case.size_m
+        path = self.path / f"spheres_{state}.csv"
+        return read_spheres(path, box=[(0.0, side) for side in size])
+
+    def network(self) -> Network:
+        """The pore network of the grains where they ended, built anew from spheres_damaged.csv.
+
+        Its pores and throats are in the order of `pores` and `throats`. It is the network that the
+        run used: the file holds every digit of the spheres.
+        """
+        return build_network(
+            self.spheres().grains(), periodic=self.case.periodic, walls=self.case.analysis.walls
+        )
+
+    def conductance(self, state: State = "damaged") -> Array:
+        """(T,) conductance of each throat, m3 (flux times viscosity over pressure drop)."""
+        _check_state(state)
+        return self.throats[f"conductance_{state}_m3"].to_numpy()
+
+    def to_openpnm(self, state: State = "damaged") -> Any:
+        """The network with its conductances as an OpenPNM network, SI units.
+
+        See `fdnet.report.openpnm.to_openpnm`; the viscosity is that of the case's fluid. Raises
+        CaseError where OpenPNM is not installed.
+        """
+        from fdnet.report.openpnm import to_openpnm
+
+        return to_openpnm(
+            self.network(), self.conductance(state), viscosity=self.case.fluid.viscosity_Pa_s
+        )
+
+    def network_mesh(self) -> Any:
+        """The network as a pyvista mesh, m: throats as lines, with pressures and conductances.
+
+        It is read from network.vtp, which the stage "report" writes.
+        """
+        from fdnet.report.meshes import read_mesh
+
+        return read_mesh(self.path / "network.vtp")
+
+    def sphere_mesh(self, state: State = "damaged") -> Any:
+        """The spheres as a pyvista mesh of balls, m, with `kind` (1 grain, 2 fine) to colour them.
+
+        They are read from spheres_damaged.vtp or spheres_initial.vtp, which the stage "report"
+        writes.
+        """
+        from fdnet.report.meshes import read_balls
+
+        _check_state(state)
+        return read_balls(self.path / f"spheres_{state}.vtp")
+
+    def _table(self, name: str, rows: int | None) -> "pd.DataFrame":
+        from fdnet.report.read_tables import COLUMNS, read_table
+
+        return read_table(self.path / f"{name}.csv", COLUMNS[name], rows=rows)
+
+    def __str__(self) -> str:
+        return "\n".join(text_lines(self.path, self.summary))
+
+    def __repr__(self) -> str:
+        return f"FinishedRun({self.case.name!r}, {str(self.path)!r})"
+
+    def _repr_html_(self) -> str:
+        return "\n".join(html_lines(self.path, self.summary))
+
+
+def _check_state(state: str) -> None:
+    if state not in ("initial", "damaged"):
+        raise CaseError(f"state: {state!r}, expected 'initial' (no fines) or 'damaged'")

@@ -1,0 +1,88 @@
+"""What the laws make of a periodic pack: the one place that measures laws against Stokes truth."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
+from fdnet.network.flow.slabs import whole_permeability
+from fdnet.network.laws.conductance import lubrication_law
+from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, LAWS
+from fdnet.network.network import Network, build_network
+from fdnet.spheres.snapshot import Array, Snapshot
+from fdnet.studies.truth.cases import all_grains
+
+PERIODIC = (True, True, True)
+DEFAULT = f"{DEFAULT_LAW} + {DEFAULT_DAMAGE_LAW}"
+PAIRS = (
+    "thesis + thesis",
+    "thesis + thesis-code",
+    "lubrication + kozeny",
+    "lubrication + side-kozeny",
+)
+"""The pairs of a conductance law and a damage law that are compared."""
+RESOLVED = "all spheres as grains"
+"""The network of grains and fines alike, at the scale of the fines; it has no damage law."""
+RESOLVED_LIMIT = 2000
+"""Spheres above which that network is left out."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Loss:
+    """Permeabilities of one pack before and after its fines.
+
+    Attributes:
+        intact: m2, without the fines, by conductance law.
+        damaged: m2, with the fines, by pair of laws or `RESOLVED`.
+    """
+
+    intact: Mapping[str, float]
+    damaged: Mapping[str, float]
+
+    def ratio(self, name: str) -> float:
+        """k/k0 of a pair of laws or of `RESOLVED`."""
+        return self.damaged[name] / self.intact[law_of(name)]
+
+
+def network_of(pack: Snapshot) -> Network:
+    """The network of the grains of a periodic pack."""
+    return build_network(pack.grains(), periodic=PERIODIC)
+
+
+def permeability(network: Network, conductance: Array) -> float:
+    """k (m2) along x of a network with `conductance` (T,) m3."""
+    return whole_permeability(network, conductance)[0]
+
+
+def law_of(name: str) -> str:
+    """The conductance law of a pair of laws; of `RESOLVED` the default one."""
+    return DEFAULT_LAW if name == RESOLVED else name.split(" + ", maxsplit=1)[0]
+
+
+def by_law(network: Network, law: str) -> float:
+    """k (m2) of the grains by a conductance law."""
+    return permeability(network, LAWS[law](network))
+
+
+def by_pair(network: Network, occupancy: Occupancy, pair: str) -> float:
+    """k (m2) with fines by a pair of laws."""
+    law, damage_law = pair.split(" + ")
+    damaged = DAMAGE_LAWS[damage_law](network, occupancy, LAWS[law](network))
+    return permeability(network, damaged.conductance)
+
+
+def resolved(pack: Snapshot) -> float:
+    """k (m2) with grains and fines tessellated alike; nan above `RESOLVED_LIMIT` spheres."""
+    if len(pack) > RESOLVED_LIMIT:
+        return float("nan")
+    network = network_of(all_grains(pack))
+    return permeability(network, lubrication_law(network))
+
+
+def measure_loss(pack: Snapshot, network: Network, *, whole: bool = True) -> Loss:
+    """Permeabilities of a pack by all `PAIRS`, and by `RESOLVED` if `whole`."""
+    occupancy = measure_occupancy(network, pack.fines())
+    damaged = {pair: by_pair(network, occupancy, pair) for pair in PAIRS}
+    return Loss(
+        intact={law: by_law(network, law) for law in dict.fromkeys(map(law_of, PAIRS))},
+        damaged=damaged | ({RESOLVED: resolved(pack)} if whole else {}),
+    )

@@ -1,0 +1,81 @@
+"""docs/validation.md from docs/validation.md.in and the committed tables of the studies."""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from string import Template
+
+from fdnet.atomic import write_text
+from fdnet.studies.command import STUDIES, study_named
+from fdnet.studies.engine.csv_rows import read_named
+from fdnet.studies.engine.draw import draw_study
+from fdnet.studies.engine.markdown import bullets, markdown_table, wrapped
+from fdnet.studies.engine.study import Row, Study
+from fdnet.studies.engine.table import knee_lines, missing_lines, read_rows, study_text
+
+
+def document(docs: Path) -> str:
+    """The text of the page.
+
+    Raises:
+        FileNotFoundError: the table of a study is missing.
+    """
+    validation = docs / "validation"
+    parts = {
+        name.replace("-", "_"): study_part(
+            study_named(name), read_rows(validation / f"{name}.csv")
+        )
+        for name in STUDIES
+    }
+    parts["stability_table"] = stability_table(validation / "stability.csv")
+    template = Template((docs / "validation.md.in").read_text(encoding="utf-8"))
+    return wrapped(template.substitute(parts))
+
+
+def study_part(study: Study, rows: Sequence[Row]) -> str:
+    """Summary or knees of one study, what was not done, and what it cost, as Markdown."""
+    parts = [study.summary(rows)] if study.summary else []
+    if knees := knee_lines(study, rows):
+        parts.append(bullets(knees))
+    if missing := missing_lines(rows):
+        parts.append(f"Not done:\n\n{bullets(missing)}")
+    seconds = {row.run: row.wall_s for row in rows}
+    parts.append(
+        f"{len(seconds)} runs, {sum(seconds.values()) / 3600:.2g} h. "
+        f"Tables: [{study.name}.md](validation/{study.name}.md), "
+        f"rows: `validation/{study.name}.csv`."
+    )
+    return "\n\n".join(parts)
+
+
+def stability_table(path: Path) -> str:
+    """The hard cases, one row each, as Markdown."""
+    return markdown_table(
+        ["case", "what happened", "evidence"],
+        [
+            [row["case"], row["what_happened"], evidence(row["evidence"])]
+            for row in read_named(path)
+        ],
+    )
+
+
+def evidence(text: str) -> str:
+    """The text with each test as a link to its file, which has the test's name."""
+    return re.sub(
+        r"tests/(\S+\.py)::(\w+)",
+        lambda m: f"([{m[2].removeprefix('test_')}](../tests/{m[1]}))",
+        text,
+    )
+
+
+def write_page(docs: Path) -> Path:
+    """Writes the page and returns its path."""
+    return write_text(docs / "validation.md", document(docs))
+
+
+def redraw(validation: Path) -> None:
+    """Figure and text of every study from its committed table."""
+    for name in STUDIES:
+        study, rows = study_named(name), read_rows(validation / f"{name}.csv")
+        draw_study(study, rows, validation / f"{name}.png")
+        write_text(validation / f"{name}.md", study_text(study, rows))
