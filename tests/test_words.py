@@ -23,8 +23,6 @@ PRIVATE_WORDS = re.compile(
 PAGES_TO_DO = (
     "docs/accuracy.md",
     "docs/accuracy.md.in",
-    "docs/thesis.md",
-    "docs/thesis.md.in",
     "docs/validation.md",
     "docs/validation.md.in",
     "docs/validation/",
