@@ -57,13 +57,31 @@ class Occupancy:
 def measure_occupancy(
     network: Network, fines: Snapshot, *, overlap: str | Callable[[Pairs], Array] = "exact"
 ) -> Occupancy:
-    """Occupancy of `network` by `fines`; `overlap` "exact" or "two-plane" (the thesis) for fines in throats, or a
-    function that gives their volumes (K,) m3.
+    """What `fines` fill of each pore and throat of `network`.
 
-    Throats see the fines whose sphere reaches into the box, pores those centred in it; both see the mirror images of
-    the latter across faces that are not periodic, where pores and throats cut by the face are whole. Fines centred
-    outside are counted (`fines_outside_box`). Raises CaseError on an unknown `overlap`, NetworkError on a fine wider
-    than a periodic side.
+    Throats hold the fines whose sphere reaches into the box, pores those centred in it. Both also
+    hold the mirror images of the latter across faces that are not periodic, where pores and throats
+    cut by the face are whole. Fines centred outside are counted (`fines_outside_box`).
+
+    Args:
+        network: the pores and throats of the grains.
+        fines: the small spheres alone, m.
+        overlap: volume of a fine in a throat, "exact" or "two-plane" (the thesis), or a function
+            that gives the volumes (K,) m3 of fine-throat pairs.
+
+    Raises:
+        CaseError: `overlap` is unknown.
+        NetworkError: a fine is wider than a periodic side.
+
+    Examples:
+        >>> import fdnet, numpy as np
+        >>> lattice = 1e-3 * (np.indices((3, 3, 3)).reshape(3, -1).T + 0.5)
+        >>> grains = fdnet.Snapshot.from_arrays(lattice, 0.5e-3)
+        >>> network = fdnet.build_network(grains, periodic="yz")
+        >>> fine = fdnet.Snapshot.from_arrays([[1e-3] * 3], 5e-5, box=grains.box, kind="fine")
+        >>> occupancy = fdnet.measure_occupancy(network, fine)
+        >>> print(f"{1e18 * occupancy.pore_solid_volume.sum():.0f} um3 of fines in the pores")
+        523599 um3 of fines in the pores
     """
     if isinstance(overlap, str) and overlap not in OVERLAPS:
         raise CaseError(
