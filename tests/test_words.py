@@ -24,7 +24,6 @@ PRIVATE_WORDS = re.compile(
 PAGES_TO_DO = (
     "docs/accuracy.md",
     "docs/accuracy.md.in",
-    "docs/thesis.md",
     "docs/validation.md",
     "docs/validation.md.in",
 )
