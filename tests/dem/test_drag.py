@@ -10,9 +10,10 @@ from builders import resting_spheres, tiny
 
 from fdnet.case.case import Case
 from fdnet.case.file import case_from
+from fdnet.dem.binary import Binary
 from fdnet.dem.deck import number, render_text
 from fdnet.dem.drag import drag_variables
-from fdnet.dem.liggghts import Binary, Launch, run_deck
+from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.scene import contact_variables, write_data
 from fdnet.errors import CaseError
 from fdnet.scales.scales import InvasionScales, scales_of
