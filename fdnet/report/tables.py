@@ -61,7 +61,10 @@ def write_sections(path: str | Path, analysis: "Analysis") -> Path:
 
 
 def write_laws(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> Path:
-    """One row per pair of laws: law, damage_law, k_initial_m2, k_damaged_m2, k_reduction, porosities."""
+    """One row for each pair of laws: their names, permeabilities (m2) and porosities.
+
+    Where the three directions were asked for, also `k_x_m2`, `k_x_damaged_m2` and so on.
+    """
     names = (
         "law",
         "damage_law",
@@ -70,8 +73,11 @@ def write_laws(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> Path:
         "k_reduction",
         "porosity_initial",
         "porosity_damaged",
+        *(f"k_{axis}_m2" for axis in "xyz"),
+        *(f"k_{axis}_damaged_m2" for axis in "xyz"),
     )
-    return _write(path, _frame({name: [row[name] for row in rows] for name in names}))
+    kept = [name for name in names if name in rows[0]]
+    return _write(path, _frame({name: [row[name] for row in rows] for name in kept}))
 
 
 def write_profile(path: str | Path, analysis: "Analysis") -> Path:

@@ -1,6 +1,7 @@
 """A run from Python: carried out, or opened again."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from fdnet.case.case import Case
@@ -61,45 +62,33 @@ def run_case(
         out: the run folder. Without it "runs/NAME", by the name of the case.
         resume: continue an unfinished run in `out`.
         force: replace what is in `out`.
-        stages: some of "pack", "invade", "analyse", "report"; "analyse" or "report" is among them.
+        stages: some of "pack", "invade", "analyse", "report", one of the last two among them.
         ranks: number of MPI processes of LIGGGHTS.
-        liggghts: path of the LIGGGHTS program. Without it the one that the set-up installed.
-        timeout: longest run time of LIGGGHTS, s; an unfinished run can be resumed.
+        liggghts: path of the LIGGGHTS program, if not the one that the set-up installed.
+        timeout: longest run time of LIGGGHTS, s.
         progress: whether to show the progress on the terminal.
 
     Returns:
-        The finished run, as `open_run` gives it; its lengths are in m, permeabilities in m2.
+        The finished run, as `open_run` gives it; lengths in m, permeabilities in m2.
 
     Raises:
         CaseError: the case, `out` or `stages` cannot be used.
-        LiggghtsError: LIGGGHTS is missing or failed. What was written stays; `resume` continues.
-        NetworkError: the geometry is degenerate.
-        FlowError: a solve fails its checks.
+        LiggghtsError: LIGGGHTS is missing or failed; `resume` continues from what was written.
 
     Examples:
         >>> import fdnet
         >>> run = fdnet.run_case("cases/quick.toml", "runs/quick")
         >>> run.summary["case"], run.summary["invaded_count"] > 0
         ('quick', True)
-        >>> print(run)  # doctest: +ELLIPSIS
-        fdnet run quick ...
     """
     from fdnet.run.pipeline import run_stages
     from fdnet.run.session import RunOptions
 
     given = case if isinstance(case, Case) else read_case(Path(case))
     folder = Path("runs") / given.name if out is None else Path(out)
-    options = RunOptions(
-        out=folder,
-        ranks=ranks,
-        resume=resume,
-        force=force,
-        stages=_checked_stages(stages),
-        liggghts=liggghts,
-        timeout=timeout,
-        show_progress=progress,
-        command="fdnet.run_case",
-    )
+    options = RunOptions(out=folder, ranks=ranks, resume=resume, force=force)
+    options = replace(options, stages=_checked_stages(stages), command="fdnet.run_case")
+    options = replace(options, liggghts=liggghts, timeout=timeout, show_progress=progress)
     run_stages(given, options)
     return open_run(folder)
 

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from fdnet.errors import CaseError
 from fdnet.network.fines.cylinder import Pairs, covers_section, exact_volume, two_plane_volume
-from fdnet.network.fines.deposit import mirrored_images
+from fdnet.network.fines.fine_images import mirrored_images
 from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.geometry import disc_lens_area
 from fdnet.network.network import build_network

@@ -1,4 +1,4 @@
-"""Where the fines ended: how many invaded, how deep, and the cake before the formation face (x = 0)."""
+"""Where the fines ended: how many invaded, how deep, and the cake before the formation face."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,12 +11,20 @@ from fdnet.spheres.contacts import touching_pairs
 from fdnet.spheres.snapshot import Kind, Snapshot
 
 CONTACT_GAP = 0.01
+"""Spheres this far apart, in diameters of the smaller one, touch."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Invaded:
-    """Fines centred in the box: `count`, `volume` m3 (whole spheres), `depth` m of the deepest, `depth_p95` m above
-    which 95 % of them lie (0 without); `cake_thickness` m upstream of x = 0."""
+    """Fines centred in the box, and the cake. The formation face is the low x face, x = 0.
+
+    Attributes:
+        count: number of these fines.
+        volume: m3, of whole spheres.
+        depth: m, of the deepest; 0 without fines.
+        depth_p95: m, above which 95 % of them lie; 0 without fines.
+        cake_thickness: m, of the fines upstream of the face that touch the pack.
+    """
 
     count: int
     volume: float
@@ -26,7 +34,10 @@ class Invaded:
 
 
 def measure_invaded(spheres: Snapshot, *, periodic: Sequence[bool]) -> Invaded:
-    """Invasion by the fines of `spheres`; depth is measured from the low x face of the box."""
+    """Invasion by the fines of `spheres`; depth is measured from the low x face of the box.
+
+    `periodic` says whether the sides x, y and z are periodic.
+    """
     fines = spheres.fines()
     low, high = spheres.box[0]
     within = (fines.position[:, 0] >= low) & (fines.position[:, 0] < high)
@@ -41,9 +52,10 @@ def measure_invaded(spheres: Snapshot, *, periodic: Sequence[bool]) -> Invaded:
 
 
 def _cake_thickness(spheres: Snapshot, fines: Snapshot, periodic: Sequence[bool]) -> float:
-    """How far upstream of the face the fines reach that touch the pack, directly or through other fines.
+    """How far upstream of the face, m, fines reach that touch the pack, maybe by other fines.
 
-    Contact: gap at most 1 % of the smaller diameter. The pack: grains, and fines centred inside the box.
+    Contact is a gap of at most 1 % of the smaller diameter. The pack is the grains and the fines
+    centred inside the box.
     """
     low = float(spheres.box[0, 0])
     if not np.any(fines.position[:, 0] < low):
@@ -56,10 +68,8 @@ def _cake_thickness(spheres: Snapshot, fines: Snapshot, periodic: Sequence[bool]
     # all spheres of the pack are one group: tie them to an extra node
     count = len(everything)
     pack = np.flatnonzero(~upstream)
-    rows, columns = (
-        np.concatenate([pair[:, 0], pack]),
-        np.concatenate([pair[:, 1], np.full(len(pack), count)]),
-    )
+    rows = np.concatenate([pair[:, 0], pack])
+    columns = np.concatenate([pair[:, 1], np.full(len(pack), count)])
     graph = sparse.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(count + 1, count + 1))
     _, group = connected_components(graph, directed=False)
     cake = upstream & (group[:-1] == group[-1])

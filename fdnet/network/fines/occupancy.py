@@ -1,4 +1,4 @@
-"""What fines take up of each throat and pore. They never change the network itself (Shi 2011, section 3.2.1)."""
+"""What fines take up of each throat and pore. They never change the network itself."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -6,32 +6,43 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.errors import CaseError, NetworkError
-from fdnet.network.fines.cells import points_in_boxes
-from fdnet.network.fines.cylinder import OVERLAPS, Pairs, covers_section, place_by_axis
-from fdnet.network.fines.deposit import (
-    centred_inside,
-    deposit_in_pores,
-    deposit_on_sides,
-    mirrored_images,
-)
+from fdnet.network.fines.cylinder import OVERLAPS, Pairs
+from fdnet.network.fines.deposit import deposit_in_pores, deposit_on_sides
+from fdnet.network.fines.fine_images import centred_inside
+from fdnet.network.fines.in_throats import FinesInThroats, fines_in_throats
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Occupancy:
-    """Fines in throats (T), pores (P) and fine-throat pairs (K); SI units.
+    """Fines in throats (T) and pores (P), and pairs (K) of a throat and a fine in it; SI units.
 
-    A throat here is the cylinder of its inscribed radius between its two pore positions (Shi 2011, section 3.2.2).
-    `throat_solid_volume` m3; `throat_porosity` = 1 - solid / cylinder (negative where fines overlap, 1 where the
-    radius is 0); `throat_fine_radius` mean radius m of the fines in it (0 without); `throat_fines` how many;
-    `blocked` one fine covers a whole cross-section. `pore_solid_volume` m3, `pore_solid_surface` m2 in the
-    tetrahedron; `pore_porosity` = (void - fines) / tetrahedron; of the fines in it, by volume, the mean
-    `pore_fine_volume` m3 of a whole fine, and `pore_layer` m, the thickness of the layer they make on the grains.
-    `side_solid_volume` m3 and `side_solid_surface` m2 (T, 2) in the pyramids from the facet to the power centres of
-    the first and second pore. `pair_throat`, `pair_fine` (K,) indices,
-    `pair_distance` (K,) distance of the fine's centre from the axis over the throat radius, `pair_radius` (K,) m,
-    `pair_volume` (K,) m3 of the fine in the throat.
+    A throat here is the cylinder of its inscribed radius between the positions of its two pores
+    (Shi 2011, section 3.2.2). A side of a throat is the pyramid from its facet to the power centre
+    of the first or second pore.
+
+    Attributes:
+        throat_solid_volume: (T,) m3, fines in the cylinder.
+        throat_porosity: (T,) 1 - solid / cylinder; negative where fines overlap, 1 where the
+            radius of the throat is 0.
+        throat_fine_radius: (T,) m, mean radius of the fines in it; 0 without fines.
+        throat_fines: (T,) number of fines in it.
+        blocked: (T,) whether one fine covers a whole cross-section.
+        pore_solid_volume: (P,) m3, fines in the tetrahedron.
+        pore_solid_surface: (P,) m2, surface of the fines in the tetrahedron.
+        pore_porosity: (P,) (void - fines) / tetrahedron.
+        pore_fine_volume: (P,) m3, mean volume of a whole fine, weighted by the volume in the pore.
+        pore_layer: (P,) m, thickness of the layer that the fines make on the grains, weighted so.
+        side_solid_volume: (T, 2) m3, fines in the two sides of the throat.
+        side_solid_surface: (T, 2) m2, surface of the fines in the two sides.
+        pair_throat: (K,) index of the throat.
+        pair_fine: (K,) index of the fine.
+        pair_distance: (K,) distance of the centre of the fine from the axis over the radius of
+            the throat.
+        pair_radius: (K,) m, radius of the fine.
+        pair_volume: (K,) m3 of the fine in the throat.
+        counts: how many fines lie outside the box, how many porosities are negative.
     """
 
     throat_solid_volume: Array
@@ -57,126 +68,101 @@ class Occupancy:
 def measure_occupancy(
     network: Network, fines: Snapshot, *, overlap: str | Callable[[Pairs], Array] = "exact"
 ) -> Occupancy:
-    """Occupancy of `network` by `fines`; `overlap` "exact" or "two-plane" (the thesis) for fines in throats, or a
-    function that gives their volumes (K,) m3.
+    """What `fines` fill of the throats and pores of a network (Shi 2011, section 3.2).
 
-    Throats see the fines whose sphere reaches into the box, pores those centred in it; both see the mirror images of
-    the latter across faces that are not periodic, where pores and throats cut by the face are whole. Fines centred
-    outside are counted (`fines_outside_box`). Raises CaseError on an unknown `overlap`, NetworkError on a fine wider
-    than a periodic side.
+    Throats see the fines whose sphere reaches into the box, pores those centred in it. Both also
+    see the mirror images of the latter across faces that are not periodic, where the pores and
+    throats that the face cuts are whole. Fines centred outside are counted (`fines_outside_box`).
+
+    Args:
+        network: pores and throats of the grains.
+        fines: the small spheres, m.
+        overlap: volume of a fine in a throat: "exact", "two-plane" (the thesis), or a function of
+            `Pairs` that returns the volumes (K,) m3.
+
+    Raises:
+        CaseError: `overlap` is unknown.
+        NetworkError: a fine is wider than a periodic side.
+
+    Examples:
+        >>> import fdnet, numpy as np
+        >>> lattice = 1e-3 * (np.indices((3, 3, 3)).reshape(3, -1).T + 0.5)
+        >>> grains = fdnet.Snapshot.from_arrays(lattice, 0.5e-3)
+        >>> network = fdnet.build_network(grains, periodic="yz")
+        >>> fine = fdnet.Snapshot.from_arrays([[1e-3] * 3], 5e-5, box=grains.box, kind="fine")
+        >>> occupancy = fdnet.measure_occupancy(network, fine)
+        >>> print(f"{1e18 * occupancy.pore_solid_volume.sum():.0f} um3 of fines in the pores")
+        523599 um3 of fines in the pores
     """
     if isinstance(overlap, str) and overlap not in OVERLAPS:
         raise CaseError(
             f"analysis.throat_overlap: {overlap!r} is not known; choose one of {sorted(OVERLAPS)}"
         )
     _refuse_wide(network, fines)
-    throat, fine, pairs = _pairs(network, fines)
-    inside = OVERLAPS[overlap](pairs) if isinstance(overlap, str) else overlap(pairs)
-    blocked = np.zeros(len(network.throat_radius), bool)
-    blocked[throat[covers_section(pairs)]] = True
-    use = inside > 0
-    throat, fine, pairs, inside = throat[use], fine[use], pairs.where(use), inside[use]
-    solid, surface, fine_volume, layer = deposit_in_pores(network, fines)
-    side_solid, side_surface = deposit_on_sides(network, fines)
-    throats = _throat_sums(network, throat, pairs, inside)
-    pore_porosity = ratio(network.pore_volume - solid, network.pore_tetra_volume)
+    inside = centred_inside(network, fines.position)
+    throats = fines_in_throats(network, fines, overlap)
+    fields = _throat_fields(network, throats) | _pore_fields(network, fines.where(inside))
     counts = {
-        "fines_outside_box": int(np.sum(~centred_inside(network, fines.position))),
-        "throat_porosity_negative": int(np.sum(throats["throat_porosity"] < 0)),
-        "pore_porosity_negative": int(np.sum((solid > 0) & (solid > network.pore_volume))),
+        "fines_outside_box": int(np.sum(~inside)),
+        "throat_porosity_negative": int(np.sum(fields["throat_porosity"] < 0)),
+        "pore_porosity_negative": _overfilled(network, fields["pore_solid_volume"]),
     }
-    found = {
-        **throats,
-        "blocked": blocked,
-        "pore_solid_volume": solid,
-        "pore_solid_surface": surface,
-        "pore_porosity": pore_porosity,
-        "pore_fine_volume": fine_volume,
-        "pore_layer": layer,
-        "side_solid_volume": side_solid,
-        "side_solid_surface": side_surface,
-        "pair_throat": throat,
-        "pair_fine": fine,
-        "pair_radius": pairs.sphere,
-        "pair_distance": pairs.offset / pairs.tube,
-        "pair_volume": inside,
-    }
-    return Occupancy(counts=counts, **{name: frozen(value) for name, value in found.items()})
+    return Occupancy(counts=counts, **{name: frozen(value) for name, value in fields.items()})
 
 
 def _refuse_wide(network: Network, fines: Snapshot) -> None:
+    """Raise NetworkError on fines that would meet their own image across a periodic side."""
     side = np.where(network.periodic, np.ptp(network.box, axis=1), np.inf)
     wide = np.flatnonzero(2.0 * fines.radius > side.min())
     if len(wide):
         raise NetworkError(
-            f"occupancy: fine {fines.id[wide[0]]} of radius {fines.radius[wide[0]]:.3g} m meets its own image across "
-            f"the periodic side {'xyz'[int(np.argmin(side))]} of {side.min():.3g} m ({len(wide)} such fines); check "
-            "units and box"
+            f"occupancy: fine {fines.id[wide[0]]} of radius {fines.radius[wide[0]]:.3g} m meets "
+            f"its own image across the periodic side {'xyz'[int(np.argmin(side))]} of "
+            f"{side.min():.3g} m ({len(wide)} such fines); check units and box"
         )
 
 
-def _throat_sums(network: Network, throat: Array, pairs: Pairs, inside: Array) -> dict[str, Array]:
-    count = len(network.throat_radius)
-    solid = np.bincount(throat, weights=inside, minlength=count)
-    number = np.bincount(throat, minlength=count)
+def _throat_fields(network: Network, throats: FinesInThroats) -> dict[str, Array]:
+    """The fields by throat and by pair."""
+    count, pairs = len(network.throat_radius), throats.pairs
+    solid = np.bincount(throats.throat, weights=throats.volume, minlength=count)
+    number = np.bincount(throats.throat, minlength=count)
+    radii = np.bincount(throats.throat, weights=pairs.sphere, minlength=count)
     tube = np.pi * network.throat_radius**2 * network.throat_length
     return {
         "throat_solid_volume": solid,
         "throat_porosity": 1.0 - ratio(solid, tube),
         "throat_fines": number,
-        "throat_fine_radius": ratio(
-            np.bincount(throat, weights=pairs.sphere, minlength=count), number
-        ),
+        "throat_fine_radius": ratio(radii, number),
+        "blocked": throats.blocked,
+        "pair_throat": throats.throat,
+        "pair_fine": throats.fine,
+        "pair_radius": pairs.sphere,
+        "pair_distance": pairs.offset / pairs.tube,
+        "pair_volume": throats.volume,
     }
+
+
+def _pore_fields(network: Network, inside: Snapshot) -> dict[str, Array]:
+    """The fields by pore and by side of a throat, from the fines centred in the box."""
+    solid, surface, fine_volume, layer = deposit_in_pores(network, inside)
+    side_solid, side_surface = deposit_on_sides(network, inside)
+    return {
+        "pore_solid_volume": solid,
+        "pore_solid_surface": surface,
+        "pore_porosity": ratio(network.pore_volume - solid, network.pore_tetra_volume),
+        "pore_fine_volume": fine_volume,
+        "pore_layer": layer,
+        "side_solid_volume": side_solid,
+        "side_solid_surface": side_surface,
+    }
+
+
+def _overfilled(network: Network, solid: Array) -> int:
+    """Number of pores with more fines, `solid` (P,) m3, than void."""
+    return int(np.sum((solid > 0) & (solid > network.pore_volume)))
 
 
 def ratio(top: Array, bottom: Array) -> Array:
     """top / bottom, 0 where `bottom` is not positive."""
     return np.divide(top, bottom, out=np.zeros(np.shape(top)), where=np.asarray(bottom) > 0)
-
-
-def _pairs(network: Network, fines: Snapshot) -> tuple[Array, Array, Pairs]:
-    """Throat and fine (K,) of the pairs that touch, with their relative places."""
-    index = np.flatnonzero(_reaching_in(network, fines))
-    throat = np.flatnonzero(network.throat_radius > 0)
-    ends = network.throat_ends[throat]
-    if not len(index) or not len(throat):
-        return (
-            throat[:0],
-            index[:0],
-            Pairs(**dict.fromkeys(("sphere", "offset", "depth", "tube", "length"), np.zeros(0))),
-        )
-    low, high = ends.min(axis=1), ends.max(axis=1)
-    largest = float(fines.radius[index].max())
-    # a throat shorter than the shortest allowed reaches beyond its ends
-    beyond = network.throat_length[throat] - np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    reach = (network.throat_radius[throat] + np.maximum(beyond, 0.0) + largest)[:, None]
-    low, high = low - reach, high + reach
-    position, owner = mirrored_images(
-        network, fines.position[index], low.min(axis=0), high.max(axis=0), 0.0
-    )
-    row, image = points_in_boxes(position, low, high)
-    offset, depth = place_by_axis(ends[:, 0], ends[:, 1], row, position, image)
-    throat, fine = throat[row], index[owner[image]]
-    return _touching(network, throat, fine, (fines.radius[fine], offset, depth))
-
-
-def _reaching_in(network: Network, fines: Snapshot) -> Array:
-    """True (N,) for fines whose sphere reaches into the box along the axes that are not periodic."""
-    low, high = network.box.T
-    reach = fines.radius[:, None]
-    return np.all(
-        ((fines.position + reach > low) & (fines.position - reach < high))
-        | np.array(network.periodic),
-        axis=1,
-    )
-
-
-def _touching(
-    network: Network, throat: Array, fine: Array, place: tuple[Array, Array, Array]
-) -> tuple[Array, Array, Pairs]:
-    sphere, offset, depth = place
-    tube, length = network.throat_radius[throat], network.throat_length[throat]
-    use = (offset < sphere + tube) & (depth > -sphere) & (depth < length + sphere)
-    pairs = Pairs(sphere=sphere, offset=offset, depth=depth, tube=tube, length=length).where(use)
-    return throat[use], fine[use], pairs

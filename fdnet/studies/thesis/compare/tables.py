@@ -1,7 +1,8 @@
-"""Tables 3 to 11 of the thesis with our numbers beside its own, as markdown.
+"""Tables 3 to 11 of the thesis with our numbers next to its own, as Markdown.
 
-Ours are means over seeds with their 95 % band where there are three or more; porosity, its losses and reductions of
-permeability in per cent, as the thesis tells them, and as points of porosity.
+Our numbers are means over seeds, with their 95 % band where there are three seeds or more.
+Porosity and reductions of permeability are in per cent, as in the thesis; losses of porosity are
+in points of per cent.
 """
 
 from collections import Counter
@@ -16,7 +17,7 @@ from fdnet.studies.thesis.compare.table_properties import (
     OURS_ONLY,
     PROPERTIES,
     RUNS,
-    told_number,
+    thesis_number,
 )
 from fdnet.studies.thesis.compare.trend_quantities import known, runs_of
 from fdnet.studies.thesis.numbers.examine import DEFAULT_PAIR, THESIS_PAIR
@@ -29,8 +30,15 @@ LAWS: Mapping[str, tuple[str, str]] = {"thesis's laws": THESIS_PAIR, "fdnet's la
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
-    """One table of the thesis and the `runs` beside it: "settings" one line a run, "properties" one column a run,
-    "sections" one line a section."""
+    """One table of the thesis, and the runs that are compared with it.
+
+    Attributes:
+        number: its number in the thesis, such as "Table 4".
+        title: its subject.
+        form: "settings" with one line a run, "properties" with one column a run, "sections" or
+            "first section" with the permeability of sections.
+        runs: the runs.
+    """
 
     number: str
     title: str
@@ -88,30 +96,30 @@ TABLES = (
 
 
 def thesis_tables(rows: Sequence[ResultRow]) -> str:
-    """All of them, each under its title."""
+    """All tables, each under its title."""
     return "\n\n".join(
         f"**{table.number}: {table.title}**\n\n{table_of(table, rows)}" for table in TABLES
     )
 
 
 def table_of(table: Table, rows: Sequence[ResultRow]) -> str:
-    """One table as markdown."""
+    """One table as Markdown."""
     return FORMS[table.form](table, rows)
 
 
 def _settings(table: Table, rows: Sequence[ResultRow]) -> str:
-    """Two columns each, the thesis's and ours; sizes and initial porosity as told."""
-    told = [one for one in PROPERTIES if one.name in IN_SETTINGS]
+    """One line a run; each property has a column of the thesis and one of ours."""
+    properties = [one for one in PROPERTIES if one.name in IN_SETTINGS]
     header = ["run", "fine diameter, mm"]
-    for one in told:
+    for one in properties:
         header += [one.name] if one.name in OURS_ONLY else [f"{one.name}, thesis", "ours"]
     lines = []
     for run in table.runs:
         thesis = _thesis(run)
         line = [run, _diameter(thesis)]
-        for one in told:
+        for one in properties:
             ours = _ours(rows, run, one.ours, scale=one.scale)
-            line += [ours] if one.name in OURS_ONLY else [one.told(thesis), ours]
+            line += [ours] if one.name in OURS_ONLY else [one.thesis(thesis), ours]
         lines.append([*line, *_runs(rows, run)])
     return markdown_table([*header, RUNS, ENDED], lines)
 
@@ -125,7 +133,7 @@ def _properties(table: Table, rows: Sequence[ResultRow]) -> str:
         lines.append(
             [
                 one.name,
-                one.told(thesis),
+                one.thesis(thesis),
                 *(_ours(rows, run, one.ours, scale=one.scale) for run in table.runs),
             ]
         )
@@ -138,14 +146,18 @@ def _properties(table: Table, rows: Sequence[ResultRow]) -> str:
 
 
 def _sections(table: Table, rows: Sequence[ResultRow]) -> str:
-    """Cut-out sections of all runs under the thesis's laws; of the first run also under fdnet's, and in place."""
+    """Reduction of permeability by section.
+
+    Sections of all runs are cut out and under the thesis's laws; those of the first run are also
+    in place, and under fdnet's laws.
+    """
     first, *variants = table.runs
     columns: list[tuple[str, str, tuple[str, str], str]] = []
     for name, laws in LAWS.items():
         columns.append((f"{first}, {name}", first, laws, "k_reductions"))
         columns.append((f"{first}, {name}, in place", first, laws, "k_reductions_inplace"))
     columns += [(f"{run}, thesis's laws", run, THESIS_PAIR, "k_reductions") for run in variants]
-    told = _thesis(first).section_reduction or ()
+    given = _thesis(first).section_reduction or ()
     lines = []
     for section in range(SECTIONS):
         cells = [
@@ -155,7 +167,7 @@ def _sections(table: Table, rows: Sequence[ResultRow]) -> str:
         lines.append(
             [
                 f"{section}–{section + 1}",
-                as_told(100 * told[section]) if section < len(told) else NONE,
+                as_told(100 * given[section]) if section < len(given) else NONE,
                 *cells,
             ]
         )
@@ -170,7 +182,10 @@ def _section(field: str, at: int) -> Callable[[ResultRow], float]:
 
 
 def _first_section(table: Table, rows: Sequence[ResultRow]) -> str:
-    """Reduction of the first section, cut out and in place, and of the whole specimen, under both pairs of laws."""
+    """Reduction of permeability of the first section and of the whole specimen, by both pairs.
+
+    The first section is cut out, and in place in the whole specimen.
+    """
     parts: dict[str, Callable[[ResultRow], float]] = {
         "first section": lambda row: row.k_reductions[0],
         "in place": lambda row: row.k_reductions_inplace[0],
@@ -184,11 +199,11 @@ def _first_section(table: Table, rows: Sequence[ResultRow]) -> str:
     lines = []
     for run in table.runs:
         thesis = _thesis(run)
-        told = told_number(thesis, "first_section_reduction", 100)
+        given = thesis_number(thesis, "first_section_reduction", 100)
         if thesis.section_reduction is not None:
-            told = as_told(100 * thesis.section_reduction[0])
+            given = as_told(100 * thesis.section_reduction[0])
         cells = [_ours(rows, run, value, laws=laws) for _, value, laws in columns]
-        lines.append([run, told, *cells, _runs(rows, run)[0]])
+        lines.append([run, given, *cells, _runs(rows, run)[0]])
     return markdown_table(
         ["run", "thesis, first section, %", *(name for name, *_ in columns), RUNS], lines
     )
@@ -216,13 +231,16 @@ def _ours(
     laws: tuple[str, str] = THESIS_PAIR,
     scale: float = 100.0,
 ) -> str:
-    """Mean over the runs of that name, in per cent unless another scale is asked for; its band from three runs on."""
+    """Mean of a value over the runs of that name, with its band from three runs on.
+
+    The value is given in per cent unless another scale is set.
+    """
     values = known([scale * value(row) for row in runs_of(rows, run, laws)])
     return with_band(band(Sample(values=values)))
 
 
 def _runs(rows: Sequence[ResultRow], run: str) -> tuple[str, str]:
-    """How many there are and how they ended, with how many each way when not all alike."""
+    """How many runs there are and how they ended, with numbers when they ended differently."""
     count = Counter(row.stop_reason.replace("_", " ") for row in runs_of(rows, run))
     words = [
         word if len(count) == 1 else f"{word} ({times})" for word, times in sorted(count.items())
@@ -235,14 +253,14 @@ def _range(ends: tuple[float, float] | None, scale: float = 1.0) -> str:
 
 
 def _diameter(thesis: ThesisSpecimen) -> str:
-    """As diameters throughout, though some tables give radii."""
+    """Diameter of the fines in mm; some tables of the thesis give radii."""
     if thesis.fine_diameter_mm is not None:
         return as_told(thesis.fine_diameter_mm)
     return _range(thesis.fine_radius_mm, 2.0)
 
 
 def _radius(run: str) -> str:
-    """Of our fines: Table 4's size, in the variants named by a range the radii of the tables that give one."""
+    """Radius of our fines in mm: that of Table 4, or the range of radii in a run's name."""
     thesis = _thesis(run)
     if thesis.fine_diameter_mm is None or "to" in run:
         return _range(thesis.fine_radius_mm)

@@ -1,4 +1,4 @@
-"""The seven trends of the thesis's chapter 4 (and Figure 14), each as the comparisons that it claims."""
+"""The seven trends of the thesis's chapter 4 and Figure 14, and the comparisons they claim."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
@@ -9,7 +9,8 @@ from fdnet.studies.thesis.runs.plan import SPECIMENS
 
 TRENDS = (
     "finer fines go deeper; fines of 1/3 of the grain size stop at the face",
-    "fines below 1/5 of the grain size reduce porosity by about the same amount whatever their size",
+    "fines below 1/5 of the grain size reduce porosity by about the same amount whatever their "
+    "size",
     "finer fines impair permeability more, at the face and deep in the pack",
     "a spread of fine sizes gives a more even impairment than one size",
     "impairment is largest in the first millimetre",
@@ -17,21 +18,32 @@ TRENDS = (
     "larger drag: deeper invasion",
 )
 MORE, ALIKE, ABOVE = "more", "alike", "above"
-"""`one` has more than `other`; as much within MARGIN of the larger; more than `bound`."""
+"""`one` has more than `other`, or as much within MARGIN of the larger, or more than `bound`."""
 MARGIN = 0.20
-"""Of the larger of two losses of porosity: what still is "about the same amount". The thesis's own are within 13 %."""
+"""Largest difference of two losses of porosity that counts as "about the same amount".
+
+It is a share of the larger; the losses in the thesis itself are within 13 %.
+"""
 BY_SIZE = (SPECIMENS[0:3], SPECIMENS[3:6])
-"""From coarse to fine, at porosity 0.30 and 0.40."""
+"""Specimens from coarse to fine, at porosity 0.30 and at 0.40."""
 SPREAD = SPECIMENS[6]
-"""At porosity 0.30, its fines between those of specimens 2 and 3."""
+"""The specimen with a spread of fine sizes, between those of specimens 2 and 3."""
 SMALL = ((SPECIMENS[1], SPECIMENS[2], SPREAD), SPECIMENS[4:6])
-"""Fines of 1/5 of the grain size and below."""
+"""Specimens with fines of 1/5 of the grain size and below, at porosity 0.30 and at 0.40."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
-    """`quantity` of the runs `one` is MORE than, or ALIKE, that of `other`, or ABOVE `bound`. Names of specimens; the
-    quick forms are held to the same."""
+    """One comparison that a trend claims, at full scale and in the quick forms.
+
+    Attributes:
+        trend: number of the trend, from 1.
+        sense: MORE, ALIKE or ABOVE.
+        quantity: what is compared, a name of QUANTITIES or RESPONSES.
+        one: the specimen that has more.
+        other: the specimen that it is compared with; empty for a bound.
+        bound: the value that it is compared with for ABOVE.
+    """
 
     trend: int
     sense: str
@@ -42,7 +54,7 @@ class Claim:
 
 
 def claims(scanned: Collection[str] = SPECIMENS) -> list[Claim]:
-    """All comparisons; those of the drag for the specimens `scanned`."""
+    """All comparisons; those of the drag are for the specimens `scanned`."""
     drag = [
         Claim(trend=7, sense=ABOVE, quantity=quantity, one=one)
         for quantity in RESPONSES
@@ -69,12 +81,15 @@ def _depth() -> Iterator[Claim]:
 
 
 def share_at_the_face() -> float:
-    """What "stop at the face" means, %: the share that the thesis has in the first millimetre of its specimen 1."""
-    told = thesis_of(SPECIMENS[0])
-    assert told is not None
-    assert told.count_first_mm is not None
-    assert told.invaded_count is not None
-    return 100 * told.count_first_mm / told.invaded_count
+    """The share of fines that "stop at the face", in per cent.
+
+    It is the share in the first millimetre of the thesis's specimen 1.
+    """
+    thesis = thesis_of(SPECIMENS[0])
+    assert thesis is not None
+    assert thesis.count_first_mm is not None
+    assert thesis.invaded_count is not None
+    return 100 * thesis.count_first_mm / thesis.invaded_count
 
 
 def _alike() -> Iterator[Claim]:
@@ -91,7 +106,7 @@ def _impairment() -> Iterator[Claim]:
 
 
 def _even() -> Iterator[Claim]:
-    """More even: a smaller share of the reduction in the first section."""
+    """A more even impairment has a smaller share of the reduction in the first section."""
     for one in BY_SIZE[0]:
         yield Claim(
             trend=4,
@@ -124,7 +139,7 @@ def _porosity() -> Iterator[Claim]:
 
 
 def _finer(trend: int, quantity: str) -> Iterator[Claim]:
-    """Each size against the next coarser, and the finest against the coarsest."""
+    """Each size is compared with the next coarser, and the finest with the coarsest."""
     for coarse, middle, fine in BY_SIZE:
         for one, other in ((middle, coarse), (fine, middle), (fine, coarse)):
             yield Claim(trend=trend, sense=MORE, quantity=quantity, one=one, other=other)

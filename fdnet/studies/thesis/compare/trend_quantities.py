@@ -1,4 +1,4 @@
-"""What the trends compare: quantities of one run, and values of several runs by seed."""
+"""The quantities that the trends compare, and their values over seeds."""
 
 import math
 import re
@@ -14,14 +14,22 @@ from fdnet.studies.thesis.numbers.results import ResultRow
 from fdnet.studies.thesis.runs.plan import QUICK
 
 DEEP = slice(1, 4)
-"""Sections 2 to 4, between 1 and 4 mm: as deep as the quick forms go."""
+"""Sections 2 to 4, between 1 and 4 mm; the quick forms end there."""
 _DRAG = re.compile(r"(\S+) drag\.multiplier=(\S+)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quantity:
-    """`value` of a run, in `unit`. `by_law`: it depends on the pair of laws. `grows`: larger specimens have more of it,
-    so that a spread lent by a quick form is scaled up with the mean. `deep`: cut short when fines pass through."""
+    """A quantity of one run.
+
+    Attributes:
+        unit: its unit.
+        value: gives it from a result row.
+        by_law: whether it depends on the pair of laws.
+        grows: whether larger specimens have more of it. Then a spread that is borrowed from a
+            quick form is scaled up with the mean.
+        deep: whether it is too small when fines pass through the specimen.
+    """
 
     unit: str
     value: Callable[[ResultRow], float]
@@ -31,12 +39,15 @@ class Quantity:
 
 
 def beyond_the_others(row: ResultRow) -> float:
-    """Reduction of the first section less the largest of any other, %."""
+    """Reduction of the first section less the largest of any other, in per cent."""
     return 100 * (row.k_reductions[0] - max(known(row.k_reductions[1:]), default=math.nan))
 
 
 def first_share(row: ResultRow) -> float:
-    """Share of the first section in the sum of the reductions of sections 1 to 4, %; nan when nothing is reduced."""
+    """Share of the first section in the sum of the reductions of sections 1 to 4, in per cent.
+
+    It is nan when nothing is reduced.
+    """
     total = row.k_reductions[0] + float(np.nansum(row.k_reductions[DEEP]))
     return 100 * row.k_reductions[0] / total if total > 0 else math.nan
 
@@ -73,7 +84,13 @@ QUANTITIES: Mapping[str, Quantity] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Response:
-    """What becomes of `quantity`, one of QUANTITIES, as the drag grows: `of` multipliers and values, in `unit`."""
+    """How a quantity changes with the drag.
+
+    Attributes:
+        quantity: the name of the quantity in QUANTITIES.
+        unit: unit of the response.
+        of: gives the response from multipliers of the drag and values of the quantity.
+    """
 
     quantity: str
     unit: str
@@ -81,7 +98,10 @@ class Response:
 
 
 def slope_per_decade(multipliers: Sequence[float], values: Sequence[float]) -> float:
-    """Least-squares slope of `values` over the decimal logarithm of the drag; nan for fewer than three runs."""
+    """Least-squares slope of the values over the decimal logarithm of the drag multiplier.
+
+    It is nan for fewer than three runs.
+    """
     if len(values) < 3:
         return math.nan
     x = np.log10(multipliers)
@@ -111,63 +131,69 @@ RESPONSES: Mapping[str, Response] = {
 def runs_of(
     rows: Sequence[ResultRow], run: str, laws: tuple[str, str] = THESIS_PAIR
 ) -> list[ResultRow]:
-    """The rows of one id under one pair of laws, by seed."""
-    found = {row.seed: row for row in rows if row.id == run and (row.law, row.damage_law) == laws}
-    return [found[seed] for seed in sorted(found)]
+    """The rows of one run under one pair of laws, in the order of the seeds."""
+    by_seed = {
+        row.seed: row for row in rows if row.id == run and (row.law, row.damage_law) == laws
+    }
+    return [by_seed[seed] for seed in sorted(by_seed)]
 
 
 def sample_of(
     rows: Sequence[ResultRow], run: str, quantity: Quantity, laws: tuple[str, str] = THESIS_PAIR
 ) -> Sample:
-    """Values of `quantity` of one id; a specimen's with those of its quick form lent."""
+    """Values of a quantity over the seeds of a run; its quick form lends its spread."""
     values = known([quantity.value(row) for row in runs_of(rows, run, laws)])
-    lent = (
+    quick = (
         ()
         if run.startswith(QUICK)
         else known([quantity.value(row) for row in runs_of(rows, QUICK + run, laws)])
     )
-    return _lent(values, lent, grows=quantity.grows)
+    return _borrowing(values, quick, grows=quantity.grows)
 
 
 def multipliers_of(
     rows: Sequence[ResultRow], run: str
 ) -> dict[int, list[tuple[float, ResultRow]]]:
-    """By seed, the drag multipliers of one case and its runs, in order; the case itself is 1."""
-    found: dict[int, dict[float, ResultRow]] = {}
+    """By seed, the multipliers of the drag in order and their runs; the case itself has 1."""
+    by_seed: dict[int, dict[float, ResultRow]] = {}
     for row in rows:
         scanned = _DRAG.fullmatch(row.id)
         name, multiplier = (scanned[1], float(scanned[2])) if scanned else (row.id, 1.0)
         if name == run and (row.law, row.damage_law) == THESIS_PAIR:
-            found.setdefault(row.seed, {})[multiplier] = row
-    return {seed: sorted(runs.items()) for seed, runs in sorted(found.items())}
+            by_seed.setdefault(row.seed, {})[multiplier] = row
+    return {seed: sorted(runs.items()) for seed, runs in sorted(by_seed.items())}
 
 
 def drag_sample(rows: Sequence[ResultRow], run: str, response: Response) -> Sample:
-    """`response` of one case, a value a seed: each seed keeps its own pack."""
+    """The response of one case over its seeds; each seed has a pack of its own."""
     quick = () if run.startswith(QUICK) else _responses(rows, QUICK + run, response)
-    return _lent(_responses(rows, run, response), quick, grows=False)
+    return _borrowing(_responses(rows, run, response), quick, grows=False)
 
 
 def _responses(rows: Sequence[ResultRow], run: str, response: Response) -> tuple[float, ...]:
     value = QUANTITIES[response.quantity].value
-    found = []
+    responses = []
     for pairs in multipliers_of(rows, run).values():
         drawn = [
             (multiplier, value(row)) for multiplier, row in pairs if not math.isnan(value(row))
         ]
-        found.append(response.of([x for x, _ in drawn], [y for _, y in drawn]))
-    return known(found)
+        responses.append(response.of([x for x, _ in drawn], [y for _, y in drawn]))
+    return known(responses)
 
 
-def _lent(values: tuple[float, ...], lent: tuple[float, ...], *, grows: bool) -> Sample:
-    """Unscaled, the spread of a quick form is more than that of a specimen 6 times as wide (means over a cross section
-    scatter as one over the square root of its area); what grows with the specimen keeps at least its relative one."""
+def _borrowing(values: tuple[float, ...], quick: tuple[float, ...], *, grows: bool) -> Sample:
+    """A sample that can borrow the spread of the quick form.
+
+    The spread of a quick form is larger than that of a specimen with 6 times its cross-section,
+    for means over a cross-section scatter as one over the square root of its area. So it is
+    borrowed unscaled. What grows with the specimen keeps at least its relative spread.
+    """
     widened = 1.0
-    if grows and values and lent and np.mean(lent) > 0:
-        widened = max(1.0, float(np.mean(values) / np.mean(lent)))
-    return Sample(values=values, lent=lent, widened=widened)
+    if grows and values and quick and np.mean(quick) > 0:
+        widened = max(1.0, float(np.mean(values) / np.mean(quick)))
+    return Sample(values=values, lent=quick, widened=widened)
 
 
 def known(values: Sequence[float]) -> tuple[float, ...]:
-    """Those that are not nan."""
+    """The values that are not nan."""
     return tuple(value for value in values if not math.isnan(value))

@@ -1,4 +1,4 @@
-"""The seven trends in one table, a line each: verdicts and numbers."""
+"""The seven trends in one table, with verdicts and numbers."""
 
 import math
 from collections import Counter
@@ -19,14 +19,18 @@ from fdnet.studies.thesis.numbers.examine import DEFAULT_PAIR, THESIS_PAIR
 from fdnet.studies.thesis.runs.plan import QUICK
 
 IN_PART, NO_RUNS = "holds in part", "no runs"
-LENT = "*"
+BORROWED = "*"
+"""Marks a difference with a spread that is borrowed from quick forms."""
 _MARK = {HOLDS: "", FAILS: " (no)", UNDECIDED: " (open)"}
 
 
 def trends_table(comparisons: Sequence[Comparison]) -> str:
-    """One line a trend: the verdict at full scale and in the quick forms by the thesis's laws, at full scale by
-    fdnet's, and the differences, at full scale where there are any, with half of their 95 % intervals; LENT marks
-    those with a spread lent by quick forms."""
+    """One line for each trend.
+
+    The columns are the verdict at full scale and in the quick forms by the thesis's laws, the
+    verdict at full scale by fdnet's laws, and the differences with half of their 95 % intervals.
+    The differences are those at full scale where there are any.
+    """
     header = (
         "trend",
         "full scale",
@@ -40,7 +44,7 @@ def trends_table(comparisons: Sequence[Comparison]) -> str:
 
 
 def caveats(comparisons: Sequence[Comparison], scale: str = FULL_SCALE) -> list[str]:
-    """What weakens the comparisons of that scale, each told once."""
+    """What weakens the comparisons of that scale; each remark stands once."""
     notes = [
         note for one in comparisons if one.scale == scale for note in one.note.split("; ") if note
     ]
@@ -48,7 +52,10 @@ def caveats(comparisons: Sequence[Comparison], scale: str = FULL_SCALE) -> list[
 
 
 def verdict_of(comparisons: Sequence[Comparison]) -> str:
-    """Of several comparisons: what all say, or how many say what. Those of no runs count as not decided."""
+    """The common verdict of several comparisons, or the number of each verdict.
+
+    Comparisons without runs count as not decided.
+    """
     if all(one.runs_one == 0 for one in comparisons):
         return NO_RUNS
     count = Counter(one.verdict for one in comparisons)
@@ -58,7 +65,8 @@ def verdict_of(comparisons: Sequence[Comparison]) -> str:
     if not count[HOLDS]:
         return f"{FAILS} ({count[FAILS]} of {len(comparisons)}; {count[UNDECIDED]} not decided)"
     rest = [(count[FAILS], "not"), (count[UNDECIDED], "not decided")]
-    return f"{IN_PART} ({count[HOLDS]} of {len(comparisons)}; {', '.join(f'{n} {word}' for n, word in rest if n)})"
+    others = ", ".join(f"{number} {word}" for number, word in rest if number)
+    return f"{IN_PART} ({count[HOLDS]} of {len(comparisons)}; {others})"
 
 
 def _line(number: int, text: str, comparisons: Sequence[Comparison]) -> list[str]:
@@ -69,10 +77,16 @@ def _line(number: int, text: str, comparisons: Sequence[Comparison]) -> list[str
     by_thesis = [one for one in full if one.laws in ("", ", ".join(THESIS_PAIR))]
     by_default = [one for one in full if one.laws in ("", ", ".join(DEFAULT_PAIR))]
     quick = [one for one in quick if one.laws in ("", ", ".join(THESIS_PAIR))]
-    told = _with_runs(by_thesis) or _with_runs(quick)
+    measured = _with_runs(by_thesis) or _with_runs(quick)
     same = not any(one.laws for one in trend)
     other = "the same" if same else verdict_of(by_default)
-    return [f"{number}. {text}", verdict_of(by_thesis), verdict_of(quick), other, _numbers(told)]
+    return [
+        f"{number}. {text}",
+        verdict_of(by_thesis),
+        verdict_of(quick),
+        other,
+        _numbers(measured),
+    ]
 
 
 def _with_runs(comparisons: Sequence[Comparison]) -> list[Comparison]:
@@ -80,7 +94,10 @@ def _with_runs(comparisons: Sequence[Comparison]) -> list[Comparison]:
 
 
 def _numbers(comparisons: Sequence[Comparison]) -> str:
-    """By quantity: which specimens, the difference, half of its interval; marked when it does not hold or is open."""
+    """The differences by quantity, with half of their intervals.
+
+    A mark stands where the comparison does not hold or is not decided.
+    """
     parts = []
     for quantity in dict.fromkeys(one.quantity for one in comparisons):
         same = [one for one in comparisons if one.quantity == quantity]
@@ -90,14 +107,14 @@ def _numbers(comparisons: Sequence[Comparison]) -> str:
 
 
 def _difference(one: Comparison) -> str:
-    found = Band(mean=one.difference, low=one.low, high=one.high)
+    interval = Band(mean=one.difference, low=one.low, high=one.high)
     names = " − ".join(_short(name) for name in (one.one, one.other) if name)
     if one.sense == ABOVE and one.other_value:
         names += f" − {figure(one.other_value, digits=2)} {one.unit}"
-    text = f"{names}: {figure(found.mean, digits=2)} ± {figure(found.half_width, digits=2)}"
-    lent = LENT if "quick form" in one.spread else ""
+    text = f"{names}: {figure(interval.mean, digits=2)} ± {figure(interval.half_width, digits=2)}"
+    borrowed = BORROWED if "quick form" in one.spread else ""
     margin = "" if math.isnan(one.margin) else f", within {figure(one.margin, digits=2)}?"
-    return text + lent + margin + _MARK[one.verdict]
+    return text + borrowed + margin + _MARK[one.verdict]
 
 
 def _short(run: str) -> str:

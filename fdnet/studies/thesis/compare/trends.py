@@ -1,8 +1,9 @@
-"""Whether the thesis's trends hold: every comparison with its 95 % interval, at full scale and in the quick forms.
+"""Whether the thesis's trends hold, at full scale and in the quick forms.
 
-The interval is Welch's over seeds. A specimen of fewer than three seeds borrows the spread of its quick form's seeds,
-unscaled, which is the cautious choice: the quick form is a sixth as wide. Of n comparisons about n / 40 would come out
-on each side of 0 by chance; a trend holds only if all do.
+Every comparison has a 95 % interval, Welch's over seeds. A specimen of fewer than three seeds
+borrows the spread of its quick form's seeds, unscaled. This is cautious, for the quick form has a
+sixth of the cross-section and scatters more. Of n comparisons about n / 40 would come out on each
+side of 0 by chance; a trend holds only if all its comparisons do.
 """
 
 import math
@@ -29,17 +30,38 @@ from fdnet.studies.thesis.runs.plan import QUICK, SPECIMENS
 FULL_SCALE, QUICK_FORMS = "full scale", "quick forms"
 HOLDS, FAILS, UNDECIDED = "holds", "does not hold", "not decided"
 OVERLAP = 0.05
-"""Largest overlap over a diameter from which it is told: squeezed fines pass where others would not."""
+"""Overlap over a diameter above which a remark is made, for squeezed fines pass narrow throats."""
 PASSED = 0.05
-"""Share passed through from which the depth of those inside says too little: the depth of 95 % is beyond the end."""
+"""Share of fines passed through above which a remark is made.
+
+The depth of the fines inside is then too small a measure of how deep they went.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """One comparison of one trend. `laws` is "law, damage law" or "" when they do not matter.
+    """One comparison of one trend; each field is a column of trends.csv.
 
-    `difference` in [low, high] is the mean of `one` less that of `other` (or less the bound `other_value`); its sense
-    "more", "alike" (within `margin`) or "above". `runs_one`, `runs_other` count seeds; `spread` tells whose they vary.
+    Attributes:
+        trend: number of the trend, from 1.
+        scale: FULL_SCALE or QUICK_FORMS.
+        laws: "law, damage law"; empty when the laws do not matter.
+        quantity: what is compared.
+        unit: unit of all its values.
+        sense: what is claimed: "more", "alike" (within `margin`) or "above".
+        one: the run that has more.
+        other: the run that it is compared with; empty for a bound.
+        one_value: mean over the seeds of `one`.
+        other_value: mean over the seeds of `other`, or the bound.
+        difference: `one_value` less `other_value`.
+        low: low end of the 95 % interval of the difference; nan when it is not known.
+        high: high end of that interval.
+        margin: largest difference that counts as alike; nan for another sense.
+        verdict: HOLDS, FAILS or UNDECIDED.
+        runs_one: number of seeds of `one`.
+        runs_other: number of seeds of `other`.
+        spread: whose spread the interval is from, "seeds" or "quick form".
+        note: what weakens the comparison.
     """
 
     trend: int
@@ -64,34 +86,43 @@ class Comparison:
 
 
 def compare_trends(rows: Sequence[ResultRow]) -> list[Comparison]:
-    """All comparisons, by trend; those whose runs are missing are not decided, and their note says so."""
-    found = []
+    """All comparisons in the order of the trends.
+
+    Those whose runs are missing are not decided, and their note names the runs.
+    """
+    comparisons = []
     for scale, prefix in ((FULL_SCALE, ""), (QUICK_FORMS, QUICK)):
         for claim in claims([name for name in SPECIMENS if _scanned(rows, prefix + name)]):
             pairs = (THESIS_PAIR, DEFAULT_PAIR) if _quantity(claim).by_law else (THESIS_PAIR,)
-            found += [_compared(rows, claim, scale, prefix, laws=laws) for laws in pairs]
-    return sorted(found, key=lambda one: one.trend)
+            comparisons += [_compared(rows, claim, scale, prefix, laws=laws) for laws in pairs]
+    return sorted(comparisons, key=lambda one: one.trend)
 
 
 def write_trends(path: Path, comparisons: Sequence[Comparison]) -> Path:
-    """The comparisons as CSV."""
+    """Write the comparisons as trends.csv."""
     return write_flat(path, Comparison, comparisons)
 
 
-def verdict(sense: str, found: Band, margin: float = 0.0) -> str:
-    """What the interval says: that a difference is above 0 (or within the margin), that it is not, or neither.
+def verdict(sense: str, gap: Band, margin: float = 0.0) -> str:
+    """What the 95 % interval of a difference decides.
 
-    A difference of none, without scatter, does not decide which is more.
+    Args:
+        sense: MORE, ALIKE or ABOVE.
+        gap: the difference and its interval.
+        margin: largest difference that counts as alike.
+
+    Returns:
+        HOLDS, FAILS or UNDECIDED. A difference of 0 without scatter does not decide which is more.
     """
-    if math.isnan(found.low) or math.isnan(found.high) or math.isnan(margin):
+    if math.isnan(gap.low) or math.isnan(gap.high) or math.isnan(margin):
         return UNDECIDED
     if sense == ALIKE:
-        if -margin <= found.low and found.high <= margin:
+        if -margin <= gap.low and gap.high <= margin:
             return HOLDS
-        return FAILS if found.low > margin or found.high < -margin else UNDECIDED
-    if found.low > ROUNDING:
+        return FAILS if gap.low > margin or gap.high < -margin else UNDECIDED
+    if gap.low > ROUNDING:
         return HOLDS
-    return FAILS if found.high < -ROUNDING else UNDECIDED
+    return FAILS if gap.high < -ROUNDING else UNDECIDED
 
 
 def _compared(
@@ -99,7 +130,7 @@ def _compared(
 ) -> Comparison:
     names = [prefix + name for name in (claim.one, claim.other) if name]
     samples = [_sample(rows, name, claim.quantity, laws) for name in names]
-    found = difference(*samples) if claim.other else band(samples[0]).less(claim.bound)
+    gap = difference(*samples) if claim.other else band(samples[0]).less(claim.bound)
     values = [sample.mean for sample in samples] if claim.other else [samples[0].mean, claim.bound]
     margin = MARGIN * max(values) if claim.sense == ALIKE else math.nan
     return Comparison(
@@ -113,11 +144,11 @@ def _compared(
         other=names[1] if claim.other else "",
         one_value=values[0],
         other_value=values[1],
-        difference=found.mean,
-        low=found.low,
-        high=found.high,
+        difference=gap.mean,
+        low=gap.low,
+        high=gap.high,
         margin=margin,
-        verdict=verdict(claim.sense, found, margin if claim.sense == ALIKE else 0.0),
+        verdict=verdict(claim.sense, gap, margin if claim.sense == ALIKE else 0.0),
         runs_one=len(samples[0].values),
         runs_other=len(samples[1].values) if claim.other else 0,
         spread="; ".join(
@@ -152,7 +183,7 @@ def _scanned(rows: Sequence[ResultRow], run: str) -> bool:
 
 
 def _note(rows: Sequence[ResultRow], names: Sequence[str], claim: Claim) -> str:
-    """What weakens the comparison: runs that are missing, that did not plug, whose fines passed through."""
+    """What weakens the comparison: missing runs, runs that did not plug, fines that passed."""
     if claim.quantity in RESPONSES:
         scans = multipliers_of(rows, names[0]).values()
         names = list(dict.fromkeys(row.id for runs in scans for _, row in runs))

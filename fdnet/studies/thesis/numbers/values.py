@@ -65,14 +65,14 @@ class DepositionClaim:
         source: figure or section of the thesis.
         nearer: "axis" or "wall"; empty where the thesis gives no share.
         value: share of the fines that lie nearer the axis or the wall; nan where none is given.
-        sense: "exact", "about", "at least" or "at most".
+        sense: "exact", "about", "at least" or "at most"; empty where none is given.
     """
 
     throat_porosity: tuple[float, float]
     source: str = ""
     nearer: str = ""
     value: float = math.nan
-    sense: str = "about"
+    sense: str = ""
 
     @property
     def words(self) -> str:

@@ -1,4 +1,4 @@
-"""Points in given boxes, found by sorting the points into cubic cells."""
+"""Points in given boxes, by sorting the points into cubic cells."""
 
 import numpy as np
 
@@ -7,8 +7,16 @@ from fdnet.spheres.snapshot import Array
 
 
 def points_in_boxes(point: Array, low: Array, high: Array) -> tuple[Array, Array]:
-    """Index of the box and of the point (K,), in order of the boxes, for all `point` (N, 3) with
-    `low` <= point <= `high` (M, 3), m."""
+    """All pairs of a box and a point in it, in the order of the boxes.
+
+    Args:
+        point: (N, 3) m.
+        low: (M, 3) m, low corners of the boxes.
+        high: (M, 3) m, high corners; points on the faces of a box are in it.
+
+    Returns:
+        Index of the box (K,) and of the point (K,).
+    """
     if not len(point) or not len(low):
         return np.zeros(0, np.intp), np.zeros(0, np.intp)
     start = point.min(axis=0)
@@ -23,44 +31,40 @@ def points_in_boxes(point: Array, low: Array, high: Array) -> tuple[Array, Array
     placed = point[order]
     count = _search(grid, placed, low, high, np.zeros(0, np.intp))
     box = np.repeat(np.arange(len(low)), count)
-    found = np.empty(len(box), np.intp)
-    _search(grid, placed, low, high, found)
-    return box, order[found]
+    inside = np.empty(len(box), np.intp)
+    _search(grid, placed, low, high, inside)
+    return box, order[inside]
 
 
 @compiled
 def _search(
-    grid: tuple[Array, float, Array, Array], point: Array, low: Array, high: Array, found: Array
+    grid: tuple[Array, float, Array, Array], point: Array, low: Array, high: Array, inside: Array
 ) -> Array:
-    """Number of points (M,) in each box; writes their indices to `found` where that has room."""
+    """Number of points (M,) in each box; writes their indices to `inside` where that has room.
+
+    `grid` holds the low corner (3,) m, the edge m of a cell, the number of cells (3,) along each
+    axis, and for each cell the index of its first point, with the number of points at the end.
+    """
     start, edge, shape, first = grid
     count = np.zeros(len(low), np.intp)
     cell = np.empty((3, 2), np.intp)
     total = 0
     for box in range(len(low)):
-        x, y, z, u, v, w = (
-            low[box, 0],
-            low[box, 1],
-            low[box, 2],
-            high[box, 0],
-            high[box, 1],
-            high[box, 2],
-        )
+        x, y, z = low[box, 0], low[box, 1], low[box, 2]
+        u, v, w = high[box, 0], high[box, 1], high[box, 2]
         for axis in range(3):
-            cell[axis, 0] = int(
-                min(max((low[box, axis] - start[axis]) / edge, 0.0), float(shape[axis]))
-            )
-            cell[axis, 1] = int(
-                min(max((high[box, axis] - start[axis]) / edge + 1.0, 0.0), float(shape[axis]))
-            )
+            lower = (low[box, axis] - start[axis]) / edge
+            upper = (high[box, axis] - start[axis]) / edge + 1.0
+            cell[axis, 0] = int(min(max(lower, 0.0), float(shape[axis])))
+            cell[axis, 1] = int(min(max(upper, 0.0), float(shape[axis])))
         before = total
         for i in range(cell[0, 0], cell[0, 1]):
             for j in range(cell[1, 0], cell[1, 1]):
                 row = (i * shape[1] + j) * shape[2]
                 for k in range(first[row + cell[2, 0]], first[row + max(cell[2, 1], cell[2, 0])]):
                     if x <= point[k, 0] <= u and y <= point[k, 1] <= v and z <= point[k, 2] <= w:
-                        if total < len(found):
-                            found[total] = k
+                        if total < len(inside):
+                            inside[total] = k
                         total += 1
         count[box] = total - before
     return count

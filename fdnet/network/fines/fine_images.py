@@ -1,0 +1,36 @@
+"""Images of fines: shifted across the periodic sides, mirrored across the other faces."""
+
+import numpy as np
+
+from fdnet.network.network import Network
+from fdnet.spheres.images import make_images
+from fdnet.spheres.snapshot import Array, Snapshot
+
+
+def centred_inside(network: Network, position: Array) -> Array:
+    """True (N,) for `position` (N, 3) m within the box along the axes that are not periodic."""
+    low, high = network.box.T
+    return np.all(((position >= low) & (position < high)) | np.array(network.periodic), axis=1)
+
+
+def reaching_inside(network: Network, fines: Snapshot) -> Array:
+    """True (N,) for fines whose sphere reaches into the box along axes that are not periodic."""
+    low, high = network.box.T
+    reach = fines.radius[:, None]
+    inside = (fines.position + reach > low) & (fines.position - reach < high)
+    return np.all(inside | np.array(network.periodic), axis=1)
+
+
+def mirrored_images(
+    network: Network, position: Array, low: Array, high: Array, largest: float
+) -> tuple[Array, Array]:
+    """Places (M, 3) m and owners (M,) of all images, periodic or mirrored, near a region.
+
+    The region is [`low`, `high`] (3,) m, widened by `largest` m. A centre (`position`, (N, 3) m) on
+    or beyond a face that is not periodic has no mirror image there.
+    """
+    margin = (
+        np.maximum(np.maximum(network.box[:, 0] - low, high - network.box[:, 1]), 0.0) + largest
+    )
+    images = make_images(position, network.box, periodic=network.periodic, margin=margin, hair=0.0)
+    return images.position, images.owner

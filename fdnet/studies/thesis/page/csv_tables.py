@@ -1,0 +1,107 @@
+"""Tables and figures of the page on the thesis that are made from the study's CSV files."""
+
+import csv
+import textwrap
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from fdnet.studies.engine.markdown import NONE, figure, markdown_table
+from fdnet.studies.thesis.numbers.statistics import ALONE, CUT, WHOLE
+from fdnet.studies.thesis.runs.plan import SPECIMENS
+
+WIDTH = 98
+DEPOSITION_COLUMNS = {
+    "id": "run",
+    "low": "throat porosity from",
+    "high": "to",
+    "throats": "throats with fines",
+    "fines": "fines",
+    "nearer_axis": "nearer the axis",
+    "nearer_wall": "nearer the wall",
+    "beyond_wall": "beyond the wall",
+    "wall_low": "wall and beyond, 95 % from",
+    "wall_high": "to",
+    "law": "law by the thesis's rule",
+    "decided": "decided",
+}
+TETRAHEDRA_COLUMNS = {
+    "id": "run",
+    "grains": "grains",
+    "fines": "fines",
+    "tetrahedra_all": "tetrahedra of all spheres",
+    "tetrahedra_grains": "of the grains alone",
+    "ratio": "ratio",
+}
+READINGS = {WHOLE: "whole pores", CUT: "and cut ones", ALONE: "the section alone"}
+
+
+def deposition_table(path: Path) -> str:
+    """Where the fines sit in the throats, of the specimens' first seed."""
+    return _table(path, DEPOSITION_COLUMNS)
+
+
+def tetrahedra_table(path: Path) -> str:
+    """Tetrahedra with and without the fines, of the specimens' first seed."""
+    return _table(path, TETRAHEDRA_COLUMNS)
+
+
+def statistics_table(path: Path) -> str:
+    """The thesis's numbers on the first section, with ours by each reading of what belongs to it.
+
+    The rows are those of the specimens' first seed for which the thesis has a number.
+    """
+    by_quantity: dict[tuple[str, ...], dict[str, str]] = {}
+    for row in _rows(path, _first_seed):
+        if row["thesis"]:
+            thesis = f"{row['sense']} {_cell(row['thesis'])}"
+            key = (row["id"], row["source"], row["quantity"], thesis)
+            by_quantity.setdefault(key, {})[row["note"].split("; ")[0]] = _cell(row["ours"])
+    lines = [
+        [*key, *(ours.get(reading, NONE) for reading in READINGS)]
+        for key, ours in by_quantity.items()
+    ]
+    header = ["run", "where in the thesis", "quantity", "thesis", *READINGS.values()]
+    return markdown_table(header, lines)
+
+
+def figures(path: Path) -> str:
+    """Every figure with its caption, from captions.csv."""
+    rows = _rows(path)
+    drawn = [_figure(row["figure"], row["caption"]) for row in rows if not row["missing"]]
+    left = [f"{row['figure']} (needs {row['missing']})" for row in rows if row["missing"]]
+    if left:
+        drawn.append(textwrap.fill("Not drawn: " + ", ".join(left) + ".", WIDTH))
+    return "\n\n".join(drawn)
+
+
+def _figure(name: str, caption: str) -> str:
+    """An image with its caption below; the alternative text is the caption's head."""
+    head = caption.split(":", maxsplit=1)[0]
+    return f"![{head}](thesis/{name})\n\n" + textwrap.fill(f"*{caption}*", WIDTH)
+
+
+def _table(path: Path, columns: Mapping[str, str]) -> str:
+    """The specimens' first seed in a CSV as Markdown, with other names for its columns."""
+    lines = [[_cell(row[name]) for name in columns] for row in _rows(path, _first_seed)]
+    return markdown_table(list(columns.values()), lines)
+
+
+def _first_seed(row: Mapping[str, str]) -> bool:
+    return row["seed"] == "1" and row["id"] in SPECIMENS
+
+
+def _rows(
+    path: Path, keep: Callable[[Mapping[str, str]], bool] = lambda _: True
+) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return [row for row in csv.DictReader(file) if keep(row)]
+
+
+def _cell(text: str) -> str:
+    """A number with three digits, a word as it is, and a dash for an empty cell."""
+    if text in ("True", "False"):
+        return "yes" if text == "True" else "no"
+    try:
+        return figure(float(text)) if text else NONE
+    except ValueError:
+        return text
