@@ -1,4 +1,7 @@
-"""What can go wrong, one class per stage; each message names what, where, what was expected, what to do."""
+"""What can go wrong, one class for each stage.
+
+Each message names what is wrong, where, what was expected and what to do.
+"""
 
 
 class FdnetError(Exception):

@@ -1,4 +1,4 @@
-"""A case: what the specimen is. It is validated when it is made, and nothing changes it afterwards.
+"""A case: what the specimen is. It is validated when it is made and never changes.
 
 A case holds no paths and no binary. `fdnet.case.file` reads one from TOML, `Case.toml()` writes it
 back with every default. Its tables are in the modules next to this one, what must hold between
