@@ -1,7 +1,8 @@
-"""The `fdnet` command: run, render, permeability, study. Thin: it reads arguments, calls the package, prints.
+"""The `fdnet` command: run, render, permeability, study.
 
-Exit codes: 0 done, 2 bad input (nothing written), 3 LIGGGHTS missing or failed, 4 degenerate geometry or an unconverged
-solve, 130 stopped by the user.
+It reads the arguments, calls the package and prints. Exit codes: 0 done, 2 bad input (nothing
+written), 3 LIGGGHTS missing or failed, 4 degenerate geometry or an unconverged solve, 130 stopped
+by the user.
 """
 
 import argparse
@@ -13,6 +14,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
+from fdnet.case.stages import STAGES
 from fdnet.errors import FdnetError
 
 _STOPPED = 130
@@ -41,7 +43,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return error.exit_code
     except KeyboardInterrupt:
         print(
-            "fdnet: stopped; what was written is kept, repeat the command to go on (a run: with --resume)",
+            "fdnet: stopped; what was written is kept, repeat the command to go on "
+            "(a run: with --resume)",
             file=sys.stderr,
         )
         return _STOPPED
@@ -55,9 +58,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.debug:
             raise
         print(
-            f"fdnet: {error.filename or 'system'}: {error.strerror or error}; free space or mend permissions, "
-            "then repeat the "
-            "command (a run: with --resume)",
+            f"fdnet: {error.filename or 'system'}: {error.strerror or error}; free space or mend "
+            "permissions, then repeat the command (a run: with --resume)",
             file=sys.stderr,
         )
         return 2
@@ -120,10 +122,10 @@ def _add_run(commands: Any, common: argparse.ArgumentParser) -> None:
     _add_case(run)
     run.add_argument("--out", type=Path, help="run folder (default runs/NAME)")
     run.add_argument("--resume", action="store_true", help="continue an unfinished run")
-    run.add_argument("--force", action="store_true", help="replace what is there")
+    run.add_argument("--force", action="store_true", help="replace an earlier run")
     run.add_argument(
         "--stages",
-        default="pack,invade,analyse,report",
+        default=",".join(STAGES),
         help="comma-separated (default: all four)",
     )
     run.add_argument("--json", action="store_true", help="print summary.json on standard output")
@@ -175,16 +177,15 @@ def _case_of(options: argparse.Namespace) -> Any:
 
 
 def _stages(text: str) -> tuple[str, ...]:
-    from fdnet.case.stages import STAGES
     from fdnet.errors import CaseError
 
-    asked = [part.strip() for part in text.split(",") if part.strip()]
-    unknown = [part for part in asked if part not in STAGES]
-    if unknown or not asked:
+    names = [part.strip() for part in text.split(",") if part.strip()]
+    unknown = [name for name in names if name not in STAGES]
+    if unknown or not names:
         raise CaseError(
             f"--stages: {text!r} has {unknown or 'nothing'}, expected some of {','.join(STAGES)}"
         )
-    return tuple(stage for stage in STAGES if stage in asked)
+    return tuple(stage for stage in STAGES if stage in names)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -215,7 +216,9 @@ def _run(options: argparse.Namespace) -> int:
 def _print_summary(summary: dict[str, Any], out: Path) -> None:
     from fdnet.run.summary_text import summary_lines
 
-    for line in summary_lines(summary) if summary else ["done (no analysis was asked for)"]:
+    for line in (
+        summary_lines(summary) if summary else ["done (the analysis was not among the stages)"]
+    ):
         print(line)
     print(f"run folder: {out}")
 
@@ -231,7 +234,8 @@ def _render(options: argparse.Namespace) -> int:
     decks = render_decks(case, options.out, ranks=options.np)
     for row in scale_rows(case, scales):
         print(
-            f"{row.name:<36} {row.symbol:<11} {row.value:>12.4g} {row.unit:<5} {row.formula:<40} {row.source}"
+            f"{row.name:<36} {row.symbol:<11} {row.value:>12.4g} {row.unit:<5} "
+            f"{row.formula:<40} {row.source}"
         )
     for warning in filter(None, [*scales.warnings, over_limit(case, scales)]):
         print(f"warning: {warning}")

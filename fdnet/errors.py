@@ -1,41 +1,104 @@
-"""What can go wrong, one class per stage; each message names what, where, what was expected, what to do."""
+"""What can go wrong, one class for each stage.
+
+Each message names what is wrong, where, what was expected and what to do.
+"""
 
 
 class FdnetError(Exception):
-    """Anything fdnet refuses; `exit_code` is what the command line ends with."""
+    """Anything that fdnet refuses; the other errors are kinds of it.
+
+    `exit_code` is the exit code of the command line.
+
+    Examples:
+        >>> import fdnet
+        >>> try:
+        ...     fdnet.open_run("no/such/folder")
+        ... except fdnet.FdnetError as error:
+        ...     print(error)
+        no/such/folder: does not exist; give the folder of a finished fdnet run
+    """
 
     exit_code = 2
 
 
 class CaseError(FdnetError):
-    """A parameter is missing, unknown or outside its range, or the input or run folder cannot be used."""
+    """A parameter is missing, unknown or out of range, or an input or run folder cannot be used.
+
+    Examples:
+        >>> import fdnet
+        >>> fdnet.Snapshot.from_arrays([[0, 0, 0]], -1.0)
+        Traceback (most recent call last):
+            ...
+        fdnet.errors.CaseError: radius holds -1.0, expected numbers above 0, m
+    """
 
     exit_code = 2
 
 
 class DeckError(FdnetError):
-    """A template or variable is missing, or a variable is offered but never used."""
+    """A template or variable is missing, or a variable is offered but never used.
+
+    Examples:
+        >>> import fdnet
+        >>> fdnet.DeckError.exit_code
+        2
+    """
 
     exit_code = 2
 
 
 class LiggghtsError(FdnetError):
-    """LIGGGHTS cannot start, failed, or did not really finish."""
+    """LIGGGHTS cannot start, failed, or did not really finish.
+
+    Examples:
+        >>> import fdnet
+        >>> fdnet.run_case("cases/quick.toml", "runs/other", liggghts="/no/such/program")
+        Traceback (most recent call last):
+            ...
+        fdnet.errors.LiggghtsError: ...
+    """
 
     exit_code = 3
 
 
 class DumpError(LiggghtsError):
-    """A dump is malformed or truncated; the message carries path, line and step."""
+    """A dump is malformed or cut; the message carries path, line and step.
+
+    Examples:
+        >>> import fdnet, pathlib
+        >>> _ = pathlib.Path("cut.dump").write_text("ITEM: TIMESTEP\\n")
+        >>> fdnet.read_spheres("cut.dump")
+        Traceback (most recent call last):
+            ...
+        fdnet.errors.DumpError: cut.dump:2: ...
+    """
 
 
 class NetworkError(FdnetError):
-    """Degenerate geometry: no tetrahedra, coincident grains, empty inlet or outlet set."""
+    """The geometry is degenerate: no tetrahedra, coincident grains, no inlet or no outlet.
+
+    Examples:
+        >>> import fdnet
+        >>> fdnet.build_network(fdnet.Snapshot.from_arrays([[0, 0, 0], [1, 0, 0]], 0.5))
+        Traceback (most recent call last):
+            ...
+        fdnet.errors.NetworkError: tessellation: 2 of 2 grains reach into the box; ...
+    """
 
     exit_code = 4
 
 
 class FlowError(FdnetError):
-    """A conductance is not finite or negative, or the solve did not converge."""
+    """A conductance is not finite or negative, or the solve did not converge.
+
+    Examples:
+        >>> import fdnet, numpy as np
+        >>> places = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]]
+        >>> network = fdnet.build_network(fdnet.Snapshot.from_arrays(places, 0.5))
+        >>> fdnet.solve_flow(network, np.full(len(network.throat_radius), -1.0))
+        Traceback (most recent call last):
+            ...
+        fdnet.errors.FlowError: throat 0: conductance -1.0 m3 is not finite or negative ...
+    """
 
     exit_code = 4

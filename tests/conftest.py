@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from fdnet.dem.liggghts import Binary, find_binary
+from fdnet.dem.binary import Binary, find_binary
 
 sys.path.insert(0, str(Path(__file__).parent))
 ROOT = Path(__file__).resolve().parents[1]

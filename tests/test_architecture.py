@@ -49,7 +49,7 @@ ROOMS = {
 }
 DOORS = {
     "jinja2": {"dem/deck", "report/html", "studies/dem"},
-    "subprocess": {"dem/liggghts", "report/vtk", "studies/benchmark"},
+    "subprocess": {"dem/binary", "dem/liggghts", "report/vtk", "studies/benchmark"},
     "pandas": {"spheres/dump", "spheres/csv_file", "report/tables", "report/read_tables"},
     "pyvista": {"report/vtk", "report/picture", "report/meshes", "spheres/vtk_file"},
     "openpnm": {"report/openpnm", "studies/benchmark"},

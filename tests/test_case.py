@@ -163,7 +163,7 @@ def test_toml_comes_back_as_the_same_case():
 
 
 def test_the_neighbour_search_belongs_to_the_invasion():
-    """It changes the order of sums, so a finished invasion with another one is another invasion; the pack is not."""
+    """It changes the order of sums, so another search is another invasion, but the same pack."""
     for setting in ("run.skin_mm=0.04", "run.neighbour_bin_mm=0.2"):
         assert tiny(setting).digest("pack") == tiny().digest("pack")
         assert tiny(setting).digest("invade") != tiny().digest("invade")
@@ -280,7 +280,9 @@ def test_values_in_si_are_those_of_the_keys():
         "box.sides=periodic",
         "fines={radius_mm=0.05, slab_mm=0.7}",
         "fluid.darcy_length_mm=3.3",
-        "run={cap_ms=0.3, plug_time_ms=0.2, checkpoint_ms=0.1, skin_mm=0.04, neighbour_bin_mm=0.2}",
+        "run={cap_ms=0.3, plug_time_ms=0.2, checkpoint_ms=0.1}",
+        "run.skin_mm=0.04",
+        "run.neighbour_bin_mm=0.2",
     )
     assert case.size_m == case.box.size_m == pytest.approx((3e-3, 1.6e-3, 1.6e-3))
     assert case.periodic == (False, True, True)

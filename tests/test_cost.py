@@ -1,4 +1,4 @@
-"""The expected cost of a run, and the refusal of one that would take longer than `run.max_hours`."""
+"""The expected cost of a run, and the refusal of one longer than `run.max_hours`."""
 
 import subprocess
 import sys

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from fdnet.cli import main
+from fdnet.spheres.readers import read_spheres
 
 
 def cubic(path: Path, cells: int = 4, *, radius: float = 0.5, extra: str = "") -> str:
@@ -215,3 +216,117 @@ def test_columns_of_the_table_stand_below_their_names(tmp_path, capsys):
         "--compare-laws",
     )
     assert len({len(line) for line in out.splitlines()[1:]}) == 1
+
+
+def damaged(path: Path) -> tuple[str, str]:
+    """The lattice with fines of 0.1 in half of its voids, without kinds; returns box and limit."""
+    places = np.indices((2, 4, 4)).reshape(3, -1).T + 1.0
+    return cubic(path, extra="".join(f"{x},{y},{z},0.1\n" for x, y, z in places)), "0.3"
+
+
+def test_three_axes_at_once_are_the_three_one_by_one(tmp_path, capsys):
+    box, limit = damaged(tmp_path / "s.csv")
+    given = [tmp_path / "s.csv", "--units", "mm", "--box", box, "--periodic", "yz"]
+    given += ["--fines-below", limit, "--json"]
+    _, out, _ = answer(capsys, *given, "--axis", "all")
+    whole = json.loads(out)
+    for axis in "xyz":
+        alone = json.loads(answer(capsys, *given, "--axis", axis)[1])
+        assert whole[f"k_{axis}_m2"] == alone["k_initial_m2"]
+        assert whole[f"k_{axis}_damaged_m2"] == alone["k_damaged_m2"]
+        assert alone["k_damaged_m2"] < alone["k_initial_m2"]
+    assert whole["k_initial_m2"] == whole["k_x_m2"] != whole["k_y_m2"]
+    assert whole["k_damaged_m2"] == whole["k_x_damaged_m2"]
+
+
+def test_three_axes_as_a_table_and_as_csv(tmp_path, capsys):
+    box, limit = damaged(tmp_path / "s.csv")
+    given = [tmp_path / "s.csv", "--units", "mm", "--box", box, "--axis", "all"]
+    given += ["--fines-below", limit, "--csv", tmp_path / "laws.csv"]
+    code, out, err = answer(capsys, *given, "--compare-laws", "--sections", "2")
+    assert code == 0, err
+    table = out.split("sections")[0].splitlines()[1:]
+    assert len(table) == 1 + 3 * 20
+    assert len({len(line) for line in table}) == 1
+    header, *rows = (tmp_path / "laws.csv").read_text().splitlines()
+    assert header.endswith("k_x_m2,k_y_m2,k_z_m2,k_x_damaged_m2,k_y_damaged_m2,k_z_damaged_m2")
+    assert len(rows) == 20
+
+
+def test_every_format_gives_the_same_answer(tmp_path, capsys):
+    """CSV with a limit, CSV with kinds, dump and VTK of the same spheres, to the last digit."""
+    from fdnet.report.vtk import write_spheres_vtp
+    from fdnet.spheres.csv_file import write_spheres
+    from tests.spheres.test_readers import dump_text
+
+    box, limit = damaged(tmp_path / "s.csv")
+    bounds = [float(part) for part in box.split(",")]
+    spheres = read_spheres(tmp_path / "s.csv", units="mm", box=bounds, fines_below=float(limit))
+    write_spheres(tmp_path / "kinds.csv", spheres)
+    write_spheres_vtp(tmp_path / "s.vtp", spheres)
+    (tmp_path / "s.dump").write_text(dump_text(spheres))
+    metres = ["--box", ",".join(f"{1e-3 * value!r}" for value in bounds)]
+    answers = []
+    for file, *more in (
+        ("s.csv", "--units", "mm", "--box", box, "--fines-below", limit),
+        ("kinds.csv", *metres),
+        ("s.vtp", *metres),
+        ("s.dump",),
+        ("s.dump", "--types", "1=grain,2=fine"),
+        ("s.dump", "--fines-below", "3e-4"),
+    ):
+        code, out, err = answer(capsys, tmp_path / file, "--periodic", "yz", "--json", *more)
+        assert code == 0, err
+        answers.append(json.loads(out))
+    assert {result["k_damaged_m2"] for result in answers} == {answers[0]["k_damaged_m2"]}
+    assert answers[0]["k_damaged_m2"] < answers[0]["k_initial_m2"]
+
+
+def test_what_the_answer_rests_on_is_in_it(tmp_path, capsys):
+    box, limit = damaged(tmp_path / "s.csv")
+    given = [tmp_path / "s.csv", "--units", "mm", "--box", box, "--json"]
+    plain = json.loads(answer(capsys, *given)[1])
+    assert any("all its spheres are grains" in text for text in plain["assumptions"])
+    assert any("walls that hold the fluid" in text for text in plain["assumptions"])
+    chosen = json.loads(
+        answer(
+            capsys, *given, "--fines-below", limit, "--damage-law", "kozeny", "--walls", "slip"
+        )[1]
+    )
+    assert chosen["damage_law_used"] == "kozeny"
+    assert any("let the fluid slip" in text for text in chosen["assumptions"])
+    assert not any("damage law is fdnet's default" in text for text in chosen["assumptions"])
+    default = json.loads(answer(capsys, *given, "--fines-below", limit)[1])
+    assert default["damage_law_used"] == default["damage_law"] == "side-kozeny"
+    assert any("damage law is fdnet's default" in text for text in default["assumptions"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["--types", "1:grain"], "--types: '1:grain', expected TYPE=KIND"),
+        (["--types", "1=grain,1=fine"], "names a type twice"),
+        (["--types", "1=sand"], "'sand', expected grain or fine"),
+        (["--types", "1=grain"], "has no types"),
+        (["--fines-below", "0"], "expected a radius above 0"),
+        (["--fines-below", "9"], "makes every sphere"),
+        (["--fines-below", "0.1", "--types", "1=grain"], "give one of the two"),
+    ],
+)
+def test_bad_choices_of_kinds_end_with_2(tmp_path, capsys, arguments, expected):
+    cubic(tmp_path / "sc.csv")
+    code, out, err = answer(capsys, tmp_path / "sc.csv", "--units", "mm", *arguments)
+    assert (code, out) == (2, "")
+    assert expected in err
+    assert len(err.strip().splitlines()) == 1
+
+
+def test_a_dump_of_fines_alone_says_what_to_do(tmp_path, capsys):
+    from tests.spheres.test_readers import dump_text
+
+    damaged(tmp_path / "s.csv")
+    spheres = read_spheres(tmp_path / "s.csv", units="mm", fines_below=0.3)
+    (tmp_path / "s.dump").write_text(dump_text(spheres.fines()))
+    code, _, err = answer(capsys, tmp_path / "s.dump")
+    assert code == 2
+    assert "0 grains, expected at least 4" in err

@@ -1,4 +1,4 @@
-"""Whole runs through the command line and the real binary: the output contract, killing and resuming, refusals."""
+"""Whole runs by command line and real binary: output contract, killing, resuming, refusals."""
 
 import errno
 import hashlib
@@ -280,7 +280,7 @@ def test_the_time_limit_holds_for_packing_too(finished, tmp_path):
 
 
 def test_an_overlap_past_its_limit_stops_the_run_if_asked_and_is_told(finished, tmp_path):
-    """Tiny's fines overlap by some 5 %: exit 3 with the state kept; --resume with another policy completes it."""
+    """Tiny's fines overlap by some 5 %: exit 3, state kept; --resume with a policy ends it."""
     _, case, summary = finished
     out = tmp_path / "run"
     told = [
@@ -330,7 +330,8 @@ def test_a_stage_without_its_forerunner_is_refused(tmp_path):
 def kill_when(command: list[str], ready, sign: int) -> int:
     """Start a run, send `sign` as soon as `ready()` is true; returns the exit code.
 
-    A shell that runs the tests in the background makes its children ignore SIGINT, so its default is set again.
+    A shell that runs the tests in the background makes its children ignore SIGINT, so its default
+    is set again.
     """
     process = subprocess.Popen(
         [sys.executable, "-m", "fdnet.cli", *command],
@@ -465,7 +466,8 @@ def test_a_failing_binary_ends_with_3_and_keeps_what_was_written(finished, tmp_p
     _, case, _ = finished
     fake = tmp_path / "liggghts"
     fake.write_text(
-        '#!/bin/sh\necho "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0)"\necho "ERROR: played"\nexit 1\n'
+        '#!/bin/sh\necho "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0)"\n'
+        'echo "ERROR: played"\nexit 1\n'
     )
     fake.chmod(0o755)
     failed = fdnet("run", case, "--out", tmp_path / "run", "--liggghts", fake)
@@ -591,7 +593,10 @@ def test_run_case_script_equals_fdnet_run(finished, root):
 def test_help_is_quick_to_import():
     """The heavy libraries are imported only by the commands that need them."""
     heavy = ("numpy", "pandas", "pyvista", "scipy")
-    code = f"import sys, fdnet.cli; fdnet.cli._parser(); print([m for m in {heavy} if m in sys.modules])"
+    code = (
+        "import sys, fdnet.cli; fdnet.cli._parser(); "
+        f"print([m for m in {heavy} if m in sys.modules])"
+    )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False
     )

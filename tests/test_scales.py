@@ -132,7 +132,7 @@ def test_drag_that_presses_contacts_shut_is_refused():
 
 
 def test_an_inviscid_fluid_is_refused_for_its_speed_and_works_with_a_given_one():
-    """Darcy's law makes 1e-12 cP a speed of 1e14 m/s; with 1 m/s given the fines fly free, nearly without drag."""
+    """Darcy's law makes 1e-12 cP a speed of 1e14 m/s; at a given 1 m/s the fines fly freely."""
     with pytest.raises(CaseError, match=r"impact alone would press a fine .* lower the velocity"):
         scales_of(tiny("fluid.viscosity_cP=1e-12"))
     scales = scales_of(tiny("fluid.viscosity_cP=1e-12", "fluid.velocity_m_s=1.0"))
@@ -194,7 +194,7 @@ def test_a_duration_is_met_by_whole_chunks(stiffness, duration_ms):
     ("cap_ms", "expected"), [(0.05, 1), (0.09, 1), (0.12, 2), (0.18, 2), (0.2, 3)]
 )
 def test_a_cap_is_reached_by_whole_chunks(cap_ms, expected):
-    """The least number of chunks of 0.09 ms that does not end before the cap; 0.12 ms is nearer to one than to two."""
+    """The least number of chunks of 0.09 ms that does not end before the cap, also for 0.12 ms."""
     case = tiny(f"run.cap_ms={cap_ms}", "run.checkpoint_ms=0.09", "fluid.velocity_m_s=5.0")
     scales = scales_of(case)
     chunk = scales.checkpoint_steps * scales.time_step
@@ -204,8 +204,10 @@ def test_a_cap_is_reached_by_whole_chunks(cap_ms, expected):
 
 @pytest.mark.parametrize(("motion", "heavy"), [("fixed", 0.0), ("mobile", 1.0)])
 def test_damping_takes_the_mass_of_what_moves(motion, heavy):
-    """A frozen grain is infinitely heavy, in LIGGGHTS too: rate = 2 zeta sqrt(k / m), 1/m = 1/m_fine + 1/m_grain if
-    the grain moves."""
+    """A frozen grain is infinitely heavy, in LIGGGHTS too.
+
+    The rate is 2 zeta sqrt(k / m), with 1/m = 1/m_fine + 1/m_grain if the grain moves.
+    """
     contact = scales_of(
         tiny("fines.radius_mm=0.2", "fines.count=60", f"grains.motion={motion}")
     ).contacts["grain-fine"]

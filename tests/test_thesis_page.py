@@ -89,7 +89,8 @@ def test_the_overview_holds_the_results(root, rows):
             "by fdnet's laws, %": values(rows, run, first_loss, "lubrication"),
         }
         for name, seeds in expected.items():
-            assert float(line[name].split(" ± ")[0]) == pytest.approx(seeds.mean(), rel=6e-3), name
+            shown = float(line[name].split(" ± ")[0])
+            assert shown == pytest.approx(seeds.mean(), rel=6e-3), name
             assert ("±" in line[name]) == (len(seeds) >= 3)
         lost = 100 * (thesis.porosity - thesis.damaged_porosity[0])
         assert float(line["thesis, whole, points"]) == pytest.approx(lost)
@@ -189,10 +190,10 @@ def test_scans_hold_the_results(rows, prose):
 
 
 def test_every_specimen_and_variant_has_rows_of_all_its_seeds(rows):
-    found = {(row.id, row.seed, row.law) for row in rows}
+    there = {(row.id, row.seed, row.law) for row in rows}
     for name in (*SPECIMENS, *VARIANTS):
         for seed in range(1, (SEEDS if name in CHEAP else 1) + 1):
-            assert {(name, seed, "thesis"), (name, seed, "lubrication")} <= found
+            assert {(name, seed, "thesis"), (name, seed, "lubrication")} <= there
     assert {row.id for row in rows} <= {item.id for item in planned(quick=False)}
 
 

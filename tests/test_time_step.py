@@ -17,7 +17,7 @@ SLOW = "fluid.velocity_m_s=0.005"
 
 
 def bound() -> float:
-    """sqrt(m/k) of a fine against the stiffest thing it meets, a grain or wall: 1e4 N/m x 37.77 / 47.15."""
+    """sqrt(m/k) of a fine against a grain or wall, of 1e4 N/m x 37.77 / 47.15."""
     return math.sqrt(FINE / (1e4 * (94.3 * 63 / (94.3 + 63)) / 47.15))
 
 
@@ -97,7 +97,7 @@ def test_a_derived_step_keeps_both_bounds_without_a_warning(factor):
 
 
 def test_drag_is_never_held_longer_than_a_chunk():
-    """A nearly inviscid fluid has a relaxation time of hours; the counts are still wanted every grain diameter."""
+    """A nearly inviscid fluid has tau of hours; counts are still wanted every grain diameter."""
     case = tiny("fluid.viscosity_cP=1e-9", "fluid.velocity_m_s=1.0")
     scales = scales_of(case)
     assert scales.relaxation_time[0] > 1.0

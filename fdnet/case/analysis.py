@@ -1,4 +1,4 @@
-"""How permeability is computed: the table [analysis] of a case, and the same choices without a case."""
+"""How permeability is computed: the table [analysis] of a case, or the same without one."""
 
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, TypedDict
@@ -86,7 +86,7 @@ class AnalysisChoices(Part):
 
     @classmethod
     def of_pack(cls, **keys: Any) -> "AnalysisChoices":
-        """Choices for spheres without a case: one section and bins of a mean grain radius, or as given.
+        """Choices without a case: one section and bins of a mean grain radius, or as given.
 
         `keys` are those of `AnalysisKeys`. Raises CaseError that names every key with a bad value.
         """

@@ -1,4 +1,4 @@
-"""A case: what the specimen is. It is validated when it is made, and nothing changes it afterwards.
+"""A case: what the specimen is. It is validated when it is made and never changes.
 
 A case holds no paths and no binary. `fdnet.case.file` reads one from TOML, `Case.toml()` writes it
 back with every default. Its tables are in the modules next to this one, what must hold between
@@ -42,7 +42,19 @@ KEYS = (
 
 
 class Case(Part):
-    """A pack of grains. Without fines it stays intact: it is made and analysed, not invaded."""
+    """A pack of grains. Without fines it stays intact: it is made and analysed, not invaded.
+
+    The keys carry the unit of the user, as in a case file: `radius_mm`, `viscosity_cP`. Properties
+    such as `size_m` give the same in SI.
+
+    Examples:
+        >>> import fdnet
+        >>> case = fdnet.read_case("cases/quick.toml")
+        >>> isinstance(case, fdnet.Case), case.grains.radius_mm
+        (True, 0.25)
+        >>> case.digest() == fdnet.read_case("cases/quick.toml").digest()
+        True
+    """
 
     name: Annotated[str, Field(min_length=1, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")] = Field(
         description="Name of the case: letters, digits, dot, underscore and hyphen. It also names "

@@ -1,4 +1,4 @@
-"""Names of the laws and walls that a case, the command line and Python know, and bounds they share.
+"""Names of the laws and walls that a case, the command line and Python share, and their bounds.
 
 This module imports nothing heavy, so that `fdnet --help` answers at once.
 """

@@ -96,7 +96,9 @@ def _room_for_one_grain(box: Box, grains: Grains) -> Iterator[str]:
         least = diameter * (2.0 if imaged else 1.0)
         if side < least:
             why = "a grain would meet its own image" if imaged else "a grain does not fit"
-            yield f"box.size_mm: side {axis} is {side:g} mm, expected at least {least:g} mm ({why})"
+            yield (
+                f"box.size_mm: side {axis} is {side:g} mm, expected at least {least:g} mm ({why})"
+            )
 
 
 def _slab(box: Box, fines: Fines) -> Iterator[str]:

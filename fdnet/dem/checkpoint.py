@@ -1,4 +1,4 @@
-"""Checkpoints of an invasion: the counts after each chunk of steps, and the state on disk behind them."""
+"""Checkpoints of an invasion: the counts after each chunk of steps, and their states on disk."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -22,8 +22,18 @@ HISTORY_HEADER = "chunk,step,upstream,invaded,passed,removed_upstream,most_cross
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Checkpoint:
-    """Counts after one chunk. `upstream` includes `removed_upstream`; `most_crossed` is the most crossings when the
-    clock of the stop rule last began anew, `quiet` chunks ago."""
+    """Numbers of fines after one chunk of steps.
+
+    Attributes:
+        chunk: number of the chunk, from 1.
+        step: last step of the chunk.
+        upstream: fines upstream of the face, with those that were removed there.
+        invaded: fines inside the specimen.
+        passed: fines that have left through the outlet.
+        removed_upstream: fines that bounced out upstream and were removed.
+        most_crossed: crossings when the clock of the stop rule last started.
+        quiet: chunks since then.
+    """
 
     chunk: int
     step: int
@@ -38,8 +48,8 @@ class Checkpoint:
 def chunks_of(case: InvasionCase, scales: InvasionScales) -> int:
     """Number of chunks of the whole run.
 
-    With a duration the one that comes nearest to it, so that chunks rounded to whole steps never make one too many;
-    else enough to reach the cap.
+    With a duration it is the number that comes nearest to it, so that chunks rounded to whole
+    steps never make one too many. Otherwise it is enough to reach the cap.
     """
     chunks = scales.cap_time / (scales.checkpoint_steps * scales.time_step)
     return max(1, round(chunks) if case.run.duration_s is not None else math.ceil(chunks - 1e-9))
@@ -53,15 +63,20 @@ def quiet_chunks(scales: InvasionScales) -> int:
 
 
 def plug_allowance(case: InvasionCase, scales: InvasionScales) -> int:
-    """Fines that may cross the face within the plug time though it counts as plugged: `run.plug_rate` of all that the
-    undisturbed suspension would bring."""
+    """Fines that may cross the face within the plug time while it counts as plugged.
+
+    They are `run.plug_rate` of those that the undisturbed suspension would bring.
+    """
     return math.floor(
         case.run.plug_rate * scales.plug_time / arrival_time(case, scales.upstream_velocity)
     )
 
 
 def empty_chunks(case: InvasionCase, scales: InvasionScales) -> int:
-    """Chunks without a fine leaving once the slab is empty: twice the fluid's passage, at least the plug time."""
+    """Chunks without a fine that leaves which end an invasion once the slab is empty.
+
+    They take twice the passage of the fluid through the specimen, at least the plug time.
+    """
     passage = 2 * case.size_m[0] / scales.interstitial_velocity
     return max(
         quiet_chunks(scales), math.ceil(passage / (scales.checkpoint_steps * scales.time_step))
@@ -69,32 +84,32 @@ def empty_chunks(case: InvasionCase, scales: InvasionScales) -> int:
 
 
 def quiet_enough(case: InvasionCase, scales: InvasionScales, row: Checkpoint) -> bool:
+    """Whether the stop rule holds at this checkpoint."""
     waiting = row.upstream - row.removed_upstream
     return row.quiet >= (quiet_chunks(scales) if waiting > 0 else empty_chunks(case, scales))
 
 
 def csv_row(row: Checkpoint) -> str:
+    """The checkpoint as a line of history.csv."""
     return ",".join(str(getattr(row, name)) for name in HISTORY_HEADER.split(","))
 
 
 def read_history(folder: Path) -> tuple[Checkpoint, ...]:
-    """All checkpoints of history.csv but an unfinished last line. Raises LiggghtsError if there are none."""
+    """All checkpoints of history.csv, without an unfinished last line.
+
+    Raises LiggghtsError when it holds none.
+    """
     try:
         text = (folder / HISTORY).read_text(errors="replace")
     except OSError:
         text = ""
-    rows = []
-    for line in text[: text.rfind("\n") + 1].splitlines()[1:]:
-        parts = line.split(",")
-        if len(parts) == len(HISTORY_HEADER.split(",")) and all(_is_count(p) for p in parts):
-            rows.append(
-                Checkpoint(
-                    **{
-                        n: int(float(p))
-                        for n, p in zip(HISTORY_HEADER.split(","), parts, strict=True)
-                    }
-                )
-            )
+    names = HISTORY_HEADER.split(",")
+    lines = [line.split(",") for line in text[: text.rfind("\n") + 1].splitlines()[1:]]
+    rows = [
+        Checkpoint(**{name: int(float(count)) for name, count in zip(names, line, strict=True)})
+        for line in lines
+        if len(line) == len(names) and all(_is_count(count) for count in line)
+    ]
     if not rows:
         raise LiggghtsError(
             f"{folder / HISTORY}: no checkpoint recorded; see {folder}/screen.txt, run again"
@@ -116,7 +131,7 @@ def _is_count(text: str) -> bool:
 
 
 def last_checkpoint(folder: Path, case: InvasionCase, grains: Snapshot) -> Checkpoint | None:
-    """The newest checkpoint whose dump and restart are whole; None when there is none."""
+    """The newest checkpoint whose dump and restart are complete; None without one."""
     try:
         rows = read_history(folder)
     except LiggghtsError:
@@ -142,29 +157,36 @@ def _whole(folder: Path, row: Checkpoint, grain_number: int) -> bool:
 def state_at(
     folder: Path, row: Checkpoint, case: InvasionCase, scales: InvasionScales, grains: Snapshot
 ) -> Snapshot:
-    """Grains and remaining fines at a checkpoint. Raises DumpError when its dump is missing or cut."""
+    """Grains and remaining fines at a checkpoint.
+
+    Raises DumpError when its dump is missing or cut.
+    """
     frame = read_frame(folder / "post" / f"invade_{row.step}.dump")
     moved = snapshot_of(frame, case, time_s=row.step * scales.time_step)
     return moved if case.grains.motion == "mobile" else grains.joined(moved)
 
 
 def check_counts(folder: Path, row: Checkpoint, damaged: Snapshot, supplied: int) -> None:
+    """Raises LiggghtsError when a state does not hold the fines that its checkpoint counts."""
     fines, length = damaged.fines(), damaged.box[0, 1]
     inside = int(np.count_nonzero((fines.position[:, 0] >= 0) & (fines.position[:, 0] < length)))
     upstream = int(np.count_nonzero(fines.position[:, 0] < 0))
     if inside != row.invaded or upstream != row.upstream - row.removed_upstream:
         raise LiggghtsError(
-            f"{folder}/post/invade_{row.step}.dump: {inside} fines inside and {upstream} upstream, expected "
-            f"{row.invaded} and {row.upstream - row.removed_upstream} as in {HISTORY}"
+            f"{folder}/post/invade_{row.step}.dump: {inside} fines inside and {upstream} "
+            f"upstream, expected {row.invaded} and {row.upstream - row.removed_upstream} as in "
+            f"{HISTORY}"
         )
     if row.upstream + row.invaded + row.passed != supplied:
         raise LiggghtsError(
-            f"{folder / HISTORY}: step {row.step}: upstream {row.upstream} + invaded {row.invaded} + passed "
-            f"{row.passed} is not the {supplied} supplied: fines were lost; lower run.time_step_factor"
+            f"{folder / HISTORY}: step {row.step}: upstream {row.upstream} + invaded "
+            f"{row.invaded} + passed {row.passed} is not the {supplied} supplied: fines were "
+            "lost; lower run.time_step_factor"
         )
 
 
 def step_of(path: Path) -> int:
+    """The step in the name of a dump or restart."""
     return int(path.stem.rsplit("_", 1)[1])
 
 
@@ -175,9 +197,10 @@ def readable_states(
     scales: InvasionScales,
     grains: Snapshot,
 ) -> Iterator[tuple[Checkpoint, Snapshot]]:
-    """The states behind `history`, checked against its counts; earlier dumps that are missing or cut are passed over.
+    """The states of the checkpoints in `history`, checked against its counts.
 
-    Raises DumpError when the last one is, LiggghtsError when counts disagree.
+    Dumps that are missing or cut are passed over, except the last one, which raises DumpError.
+    Raises LiggghtsError when counts disagree.
     """
     batches = batches_of(case, scales)
     for row in history:

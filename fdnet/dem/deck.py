@@ -14,7 +14,12 @@ from fdnet.errors import DeckError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LeftOut:
-    """What a deck does without, and why."""
+    """Something that a deck does without.
+
+    Attributes:
+        what: is left out.
+        why: it is not needed.
+    """
 
     what: str
     why: str
@@ -25,7 +30,14 @@ class LeftOut:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Deck:
-    """A rendered deck: its text, stage, the digest of the case behind it, and what it leaves out."""
+    """A rendered deck.
+
+    Attributes:
+        text: LIGGGHTS input.
+        stage: "pack" or "invade".
+        digest: of what the stage depends on in its case.
+        left_out: what a general deck would have and this one does without.
+    """
 
     text: str
     stage: str

@@ -28,7 +28,10 @@ def drag_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]
 
 
 def _by_radius(scales: InvasionScales, slower: float) -> dict[str, Any]:
-    """F = 6 pi mu M r (u - v), for each fine by its own radius r."""
+    """F = 6 pi mu M r (u - v), for each fine by its own radius r.
+
+    mu is the viscosity, M the multiplier, u the fluid's and v the fine's velocity.
+    """
     fluid = f"(f_uf[1]-(x<0.0)*{number(slower)})" if slower else "f_uf[1]"
     return {"fluid_x": fluid, "hold_steps": scales.hold_steps if scales.hold_steps > 1 else 0}
 
@@ -36,7 +39,10 @@ def _by_radius(scales: InvasionScales, slower: float) -> dict[str, Any]:
 def _viscous(
     case: InvasionCase, scales: InvasionScales, coefficient: float, slower: float
 ) -> dict[str, Any]:
-    """The same for one radius: the constant 6 pi mu M r u, less 6 pi mu M r (u - u_upstream) at x < 0, and damping."""
+    """The same force for fines of one radius, as a constant force and viscous damping.
+
+    The constant force is 6 pi mu M r u, at x < 0 with the fluid's velocity upstream.
+    """
     damping = coefficient * case.fines.mean_radius_m
     return {
         "damping": number(damping),

@@ -28,7 +28,10 @@ SUPPLY = "supply"
 def write_invade_inputs(
     case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path, *, ranks: int = 1
 ) -> Deck:
-    """Write in.invade and invade.data (grains and the first fines) into `folder`, and the batches that follow."""
+    """Write in.invade, invade.data (grains and the first fines) and the batches that follow.
+
+    Raises CaseError when the slab cannot hold its fines.
+    """
     batched = case.fines.supply == "batches"
     spheres = grains.joined(
         write_batches(case, scales, grains, folder)
@@ -38,7 +41,8 @@ def write_invade_inputs(
     pairs, _ = touching_pairs(spheres, case.periodic)
     if np.any(spheres.kind[pairs] == Kind.FINE):
         raise CaseError(
-            "fines: a fine would start in contact; this is an fdnet fault, please report the case and seed"
+            "fines: a fine would start in contact; this is an fdnet fault, please report the case "
+            "and seed"
         )
     density = np.where(
         spheres.kind == Kind.GRAIN, case.grains.density_kg_m3, case.fines.density_kg_m3
@@ -58,7 +62,10 @@ def write_invade_inputs(
 def write_batches(
     case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path
 ) -> Snapshot:
-    """Write supply/batch_N.data and .in, taken in before chunk N; returns the fines of the start."""
+    """Write supply/batch_N.data and .in, which are read before chunk N.
+
+    Returns the fines that are there from the start.
+    """
     batches, bounds = list(place_batches(case, scales, grains)), _bounds(case, scales, grains)
     shared = {
         "start_velocity": number(scales.upstream_velocity),
@@ -87,7 +94,10 @@ def _margin(case: InvasionCase, scales: InvasionScales) -> float:
 
 
 def _bounds(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> Array:
-    """The simulation box (3, 2): it extends past the outlet and upstream of the slab, where fines are removed."""
+    """The simulation box (3, 2) m.
+
+    It extends beyond the outlet and upstream of the slab, where fines are removed.
+    """
     start = slab_end(case, grains) - batches_of(case, scales).reach
     margin = _margin(case, scales)
     size = case.size_m
@@ -145,7 +155,10 @@ def render_invade(
 
 
 def _skin(case: InvasionCase) -> float:
-    """The neighbour skin, m: given, or the smallest fine's radius (0.3 to 0.8 of its diameter is fastest, measured)."""
+    """The neighbour skin, m: given, or the radius of the smallest fine.
+
+    A skin of 0.3 to 0.8 of its diameter was measured to be fastest.
+    """
     return case.fines.radius_range_m[0] if case.run.skin_m is None else case.run.skin_m
 
 
@@ -184,7 +197,8 @@ def _gravity(
         return None, [
             LeftOut(
                 what="gravity and buoyancy",
-                why=f"gravity is {scales.gravity_over_drag:.1e} of the drag, below {case.gravity.negligible_below:g}",
+                why=f"gravity is {scales.gravity_over_drag:.1e} of the drag, below "
+                f"{case.gravity.negligible_below:g}",
             )
         ]
     pull = {
@@ -201,27 +215,29 @@ def _gravity(
 
 
 def _left_out(case: InvasionCase, *, friction: bool, ranks: int) -> list[LeftOut]:
-    found = []
+    left_out = []
     if case.grains.motion == "fixed":
-        found.append(LeftOut(what="contacts between grains, end planes", why="grains are fixed"))
+        left_out.append(
+            LeftOut(what="contacts between grains, end planes", why="grains are fixed")
+        )
     if not friction:
-        found.append(LeftOut(what="tangential history", why="no pair has friction"))
+        left_out.append(LeftOut(what="tangential history", why="no pair has friction"))
     if case.box.sides == "periodic":
-        found.append(LeftOut(what="side walls", why="sides are periodic"))
+        left_out.append(LeftOut(what="side walls", why="sides are periodic"))
     if not is_watched(case):
         why = (
             "pairs of grains overlap too"
             if case.grains.motion == "mobile"
             else "fines are of unequal size"
         )
-        found.append(LeftOut(what="overlap between checkpoints", why=why))
+        left_out.append(LeftOut(what="overlap between checkpoints", why=why))
     if case.fines.supply == "batches":
-        found.append(
+        left_out.append(
             LeftOut(
                 what="fines far upstream",
                 why="they come in batches, each when it is about to arrive",
             )
         )
     if ranks == 1:
-        found.append(LeftOut(what="MPI processor grid", why="one rank"))
-    return found
+        left_out.append(LeftOut(what="MPI processor grid", why="one rank"))
+    return left_out

@@ -1,4 +1,7 @@
-"""The invasion: fines driven into the pack until plugged, with a checkpoint after every chunk of steps."""
+"""The invasion: fines are driven into the pack until it is plugged.
+
+A checkpoint after every chunk of steps lets a cut run go on.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -22,7 +25,7 @@ from fdnet.dem.checkpoint import (
 )
 from fdnet.dem.deck import Deck, LeftOut
 from fdnet.dem.invade_deck import render_invade, write_batches, write_invade_inputs
-from fdnet.dem.liggghts import SCREEN, Launch, Run, run_deck
+from fdnet.dem.liggghts import Launch, Run, run_deck
 from fdnet.dem.overlap import (
     WATCH,
     Deepest,
@@ -33,6 +36,7 @@ from fdnet.dem.overlap import (
     refuse_overlap,
 )
 from fdnet.dem.supply import batches_of
+from fdnet.dem.verdict import SCREEN
 from fdnet.errors import LiggghtsError
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Snapshot
@@ -40,9 +44,18 @@ from fdnet.spheres.snapshot import Snapshot
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Invasion:
-    """A finished invasion: the last state (grains and fines, fines upstream included) and how it ended.
+    """A finished invasion.
 
-    `supplied` fines took part: all, or those of the batches that had come.
+    Attributes:
+        damaged: grains and remaining fines at the end, those upstream too.
+        history: one row a checkpoint.
+        stop_reason: "plugged", "supply_exhausted", "duration" or "cap".
+        supplied: number of fines that took part: all, or those of the batches that had come.
+        overlap: largest overlap of a fine with any sphere.
+        step_s: s, time step.
+        left_out: what the deck does without.
+        warnings: doubts about how it ended, one sentence each.
+        runs: executions of LIGGGHTS; empty when an earlier session had come to the end.
     """
 
     damaged: Snapshot
@@ -64,25 +77,26 @@ class Invasion:
 def invade(
     case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path, launch: Launch
 ) -> Invasion:
-    """Drive the fines in; continues from the last whole checkpoint when `folder` holds one.
+    """Drive the fines in; continues from the last complete checkpoint when `folder` holds one.
 
-    Raises LiggghtsError when a run fails or fines are lost, CaseError when the fines cannot be placed.
+    Raises LiggghtsError when a run fails or fines are lost, CaseError when the fines cannot be
+    placed.
     """
     (folder / "post").mkdir(parents=True, exist_ok=True)
-    anew = has_history(folder) and last_checkpoint(folder, case, grains) is None
+    restarted = has_history(folder) and last_checkpoint(folder, case, grains) is None
     deck, run = _drive(case, scales, grains, folder, launch)
     history = read_history(folder)
     overlaps, damaged = [], grains
     for _, damaged in readable_states(folder, history, case, scales, grains):
         overlaps.append(overlap_in(case, damaged))
     reason, warnings = _ending(case, scales, history)
-    if anew:
-        warnings.append("no checkpoint of the cut invasion could be used, it was begun anew")
+    if restarted:
+        warnings.append("no checkpoint of the cut invasion could be used, it was started over")
     if len(overlaps) < len(history):
         lost = len(history) - len(overlaps)
         warnings.append(
-            f"{lost} of {len(history)} checkpoint dumps cannot be read: they are missing from the largest overlap "
-            "and from invasion.pvd"
+            f"{lost} of {len(history)} checkpoint dumps cannot be read: they are missing from the "
+            "largest overlap and from invasion.pvd"
         )
     return Invasion(
         damaged=damaged,
@@ -108,7 +122,8 @@ def _drive(
         rows = [row for row in read_history(folder) if row.step == step]
         if not rows:
             raise LiggghtsError(
-                f"{folder / HISTORY}: no row for the checkpoint at step {step}; continue with --resume"
+                f"{folder / HISTORY}: no row for the checkpoint at step {step}; continue with "
+                "--resume"
             )
         refuse_overlap(case, scales, grains, folder, history=rows[-1:], last=rows[-1])
 
@@ -132,8 +147,8 @@ def _run(folder: Path, last: Checkpoint | None, launch: Launch) -> Run | None:
     try:
         return run_deck(folder, "in.invade" if last is None else "in.invade.resume", launch)
     except LiggghtsError:
-        said = (folder / SCREEN).read_text(encoding="utf-8", errors="replace")
-        if last is None or "FDNET restoring" not in said or "FDNET restored" in said:
+        screen = (folder / SCREEN).read_text(encoding="utf-8", errors="replace")
+        if last is None or "FDNET restoring" not in screen or "FDNET restored" in screen:
             raise
         restart = folder / "post" / f"invade_{last.step}.restart"
         restart.rename(restart.with_suffix(".unreadable"))
@@ -141,10 +156,11 @@ def _run(folder: Path, last: Checkpoint | None, launch: Launch) -> Run | None:
 
 
 class _Keeper:
-    """Follows the screen: at each checkpoint keeps the two newest restarts, stops a run that writes to a full disk or
-    fails `check` (which is given the step); passes every line on.
+    """Follows the screen of a run and passes every line on.
 
-    LIGGGHTS goes on after a failed write and ends with 0; older restarts are removed only while there is room.
+    At each checkpoint it keeps the two newest restarts, and stops a run that writes to a full disk
+    or fails `check`, which is called with the step. LIGGGHTS itself goes on after a failed write
+    and ends with exit code 0. Older restarts are removed only while there is room on the disk.
     """
 
     def __init__(
@@ -156,7 +172,8 @@ class _Keeper:
         if line.startswith("FDNET checkpoint"):
             if disk_is_full(self.folder):
                 raise LiggghtsError(
-                    f"{self.folder}: the disk is full, LIGGGHTS was stopped; make room and continue with --resume"
+                    f"{self.folder}: the disk is full, LIGGGHTS was stopped; make room and "
+                    "continue with --resume"
                 )
             files = sorted((self.folder / "post").glob("invade_*.restart"), key=step_of)
             for old in files[:-2]:
@@ -167,6 +184,7 @@ class _Keeper:
 
 
 def _over(case: InvasionCase, scales: InvasionScales, last: Checkpoint | None) -> bool:
+    """Whether the last checkpoint is the end of the invasion."""
     if last is None:
         return False
     return (
@@ -183,6 +201,7 @@ def _prepare(
     ranks: int,
     last: Checkpoint | None,
 ) -> Deck:
+    """Write the inputs of a start, or of a restart from `last` with later files removed."""
     if last is None:
         for stale in [folder / HISTORY, folder / WATCH, *(folder / "post").glob("invade_*")]:
             stale.unlink(missing_ok=True)
@@ -207,7 +226,10 @@ def _prepare(
 def _ending(
     case: InvasionCase, scales: InvasionScales, history: tuple[Checkpoint, ...]
 ) -> tuple[str, list[str]]:
-    """stop_reason and warnings. An empty slab decides nothing about plugging, so it is its own reason."""
+    """The stop reason, and warnings.
+
+    An empty slab decides nothing about plugging, so it is a reason of its own.
+    """
     last = history[-1]
     waiting = last.upstream - last.removed_upstream
     warnings = []
@@ -218,17 +240,19 @@ def _ending(
     else:
         reason = "cap"
         warnings.append(
-            f"invasion stopped at its cap of {1e3 * scales.cap_time:.3g} ms before the stop rule held: raise run.cap_ms"
+            f"invasion stopped at its cap of {1e3 * scales.cap_time:.3g} ms before the stop rule "
+            "held: raise run.cap_ms"
         )
     if waiting == 0:
         warnings.append(
-            "no fine is left upstream: the end was decided by an empty slab, raise fines.count or fines.slab_mm"
+            "no fine is left upstream: the end was decided by an empty slab, raise fines.count or "
+            "fines.slab_mm"
         )
     before = history[-min(len(history), quiet_chunks(scales) + 1)]
     if reason == "plugged" and last.passed > before.passed:
         warnings.append(
-            f"the face was plugged, but {last.passed - before.passed} fines still left through the outlet meanwhile: "
-            "raise run.plug_time_ms to follow them"
+            f"the face was plugged, but {last.passed - before.passed} fines still left through "
+            "the outlet meanwhile: raise run.plug_time_ms to follow them"
         )
     if last.removed_upstream:
         warnings.append(f"{last.removed_upstream} fines bounced out upstream and were removed")

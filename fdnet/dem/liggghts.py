@@ -1,11 +1,9 @@
-"""The LIGGGHTS binary: found, started, followed, stopped, and judged. Exit code 0 alone proves nothing."""
+"""Runs of LIGGGHTS: started, followed, stopped, and only accepted when they really finished."""
 
 import contextlib
 import ctypes
 import fcntl
 import os
-import re
-import shutil
 import signal
 import subprocess
 import time
@@ -13,56 +11,25 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from fdnet.atomic import disk_is_full
+from fdnet.dem.binary import Binary
+from fdnet.dem.verdict import SCREEN, verify
 from fdnet.errors import LiggghtsError
 
-END_MARK = "DECK_DONE"
-SCREEN, LOG = "screen.txt", "log.liggghts"
-KNOWN_VERSION = "3.8.0"
 LOCK_PATIENCE = 20.0
 """Seconds to wait for processes of an earlier run to end."""
 _STOP_SIGNALS = {signal.SIGINT, signal.SIGTERM}
-_PROJECT = Path(__file__).resolve().parents[2]
-_BAD_LINE = re.compile(
-    r"^(ERROR|Lost atoms)|Signal: |Segmentation fault|Forced restart written|No space left"
-)
-_NAN = re.compile(r"(?i)(?:^|\s)[-+]?(?:nan|inf)(?:\s|$)")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Binary:
-    """A LIGGGHTS that answers: its path and version, and the MPI launcher that belongs to it (None: serial only)."""
-
-    path: Path
-    version: str
-    launcher: Path | None
-
-    def command(self, deck: str, ranks: int) -> list[str]:
-        """The command line for a deck in the current folder.
-
-        Raises LiggghtsError when several ranks are asked for and there is no launcher.
-        """
-        base = [str(self.path), "-in", deck, "-log", LOG]
-        stdbuf = shutil.which("stdbuf")
-        if ranks == 1:
-            return ([stdbuf, "-oL"] if stdbuf else []) + base
-        if self.launcher is None:
-            raise LiggghtsError(
-                f"--np {ranks}: no mpirun beside {self.path} or on PATH; install openmpi-bin or use --np 1"
-            )
-        return [
-            str(self.launcher),
-            "--allow-run-as-root",
-            "--oversubscribe",
-            "-np",
-            str(ranks),
-            *base,
-        ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Launch:
-    """How to run decks: the binary, MPI ranks, a time limit per deck (s), and who gets each new line of the screen."""
+    """How to run decks.
+
+    Attributes:
+        binary: LIGGGHTS.
+        ranks: MPI ranks.
+        timeout: s, time limit of one deck; None: no limit.
+        follow: is called with each new line that LIGGGHTS prints.
+    """
 
     binary: Binary
     ranks: int = 1
@@ -72,7 +39,15 @@ class Launch:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
-    """One finished, verified execution. Exists only if complete."""
+    """One run that really finished; there is none of a run that did not.
+
+    Attributes:
+        directory: folder that it ran in.
+        command: command line.
+        version: of LIGGGHTS.
+        seconds: s, from start to end.
+        ranks: MPI ranks.
+    """
 
     directory: Path
     command: tuple[str, ...]
@@ -81,57 +56,11 @@ class Run:
     ranks: int
 
 
-def find_binary(option: str | None = None) -> Binary:
-    """LIGGGHTS from `option`, $FDNET_LIGGGHTS, PATH or the project's .prefix, in that order.
-
-    Raises LiggghtsError when there is none, or when it does not answer like LIGGGHTS.
-    """
-    asked = option or os.environ.get("FDNET_LIGGGHTS")
-    places = [asked] if asked else ["liggghts", str(_PROJECT / ".prefix" / "bin" / "liggghts")]
-    found = next((hit for hit in map(shutil.which, places) if hit), None)
-    if found is None:
-        raise LiggghtsError(
-            f"LIGGGHTS not found (looked for {', '.join(places)}); run scripts/setup.sh, install the "
-            "Debian package liggghts, or give its path with --liggghts"
-        )
-    path = Path(found).absolute()
-    beside = path.parent / "mpirun"
-    launcher = (
-        str(beside) if beside.exists() else (shutil.which("mpirun") or shutil.which("orterun"))
-    )
-    return Binary(path=path, version=_version(path), launcher=Path(launcher) if launcher else None)
-
-
-def _version(path: Path) -> str:
-    try:
-        answer = subprocess.run(
-            [str(path), "-h", "-log", "none"],
-            capture_output=True,
-            timeout=60,
-            check=False,
-            stdin=subprocess.DEVNULL,
-            cwd="/tmp",
-        )
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise LiggghtsError(
-            f"{path}: cannot be started: {error}; check the file or run scripts/setup.sh"
-        ) from error
-    text = (answer.stdout + answer.stderr).decode("utf-8", "replace")
-    match = re.search(r"Version LIGGGHTS[-A-Z]*\s+([0-9.]+)", text)
-    if not match:
-        first = text.strip().splitlines()[:1]
-        raise LiggghtsError(
-            f"{path}: does not answer like LIGGGHTS (exit {answer.returncode}, {first}); expected "
-            f"version {KNOWN_VERSION}, run scripts/setup.sh"
-        )
-    return match.group(1)
-
-
 def run_deck(folder: Path, deck: str, launch: Launch) -> Run:
     """Run `folder/deck` to its end mark.
 
-    Raises LiggghtsError with the evidence when the run did not really finish. On KeyboardInterrupt the run is
-    stopped and what it wrote is kept.
+    Raises LiggghtsError with the evidence when the run did not really finish. On KeyboardInterrupt
+    the run is stopped and what it wrote is kept.
     """
     if not (folder / deck).is_file():
         raise LiggghtsError(f"{folder / deck}: deck not found; render it first")
@@ -160,7 +89,7 @@ def run_deck(folder: Path, deck: str, launch: Launch) -> Run:
         except BaseException:
             _stop(process)
             raise
-    _verify(folder, deck, process.returncode)
+    verify(folder, deck, process.returncode)
     seconds = time.monotonic() - start
     return Run(
         directory=folder,
@@ -173,19 +102,19 @@ def run_deck(folder: Path, deck: str, launch: Launch) -> Run:
 
 @contextlib.contextmanager
 def _only_writer(folder: Path) -> Iterator[int]:
-    """A lock on the stage's folder that LIGGGHTS inherits: it holds until the last process there has ended.
+    """A lock on the folder of a stage that LIGGGHTS inherits.
 
-    Open MPI's daemon of a serial run outlives it by a moment, so a taken lock is waited for.
+    It holds until the last process that inherited it has ended. Open MPI's daemon of a serial run
+    outlives it by a moment, so this waits for a lock that is taken.
     """
-    lock, deadline = (
-        os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644),
-        time.monotonic() + LOCK_PATIENCE,
-    )
+    lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
+    deadline = time.monotonic() + LOCK_PATIENCE
     try:
         while not _locked(lock):
             if time.monotonic() > deadline:
                 raise LiggghtsError(
-                    f"{folder}: a LIGGGHTS of an earlier run is still writing here; wait until it ends"
+                    f"{folder}: a LIGGGHTS of an earlier run is still writing here; "
+                    "wait until it ends"
                 )
             time.sleep(0.05)
         yield lock
@@ -210,19 +139,21 @@ def _environment() -> dict[str, str]:
 
 
 def _prepare_child(ranks: int, mask: set[int]) -> Callable[[], None]:
-    """The child is ended by the kernel when fdnet dies, so that no orphan writes into a resumed run.
+    """What the child does before it becomes LIGGGHTS.
 
-    `mask` are the signals blocked before the start: while it lasts, SIGINT and SIGTERM wait, for an exception raised
-    inside the fork is swallowed by Python and the run would go on.
+    It asks the kernel to end it when fdnet dies, so that no orphan writes into a resumed run. Then
+    it restores `mask`, the signals that were blocked before the start. While the child is being
+    started SIGINT and SIGTERM wait: Python would swallow an exception that is raised inside the
+    fork, and the run would go on.
     """
     libc = ctypes.CDLL(None, use_errno=True)
     last = signal.SIGKILL if ranks == 1 else signal.SIGTERM
 
-    def ask() -> None:
+    def prepare() -> None:
         libc.prctl(1, last, 0, 0, 0)
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
-    return ask
+    return prepare
 
 
 def _wait(
@@ -231,72 +162,35 @@ def _wait(
     follow: Callable[[str], None] | None,
     deadline: float | None,
 ) -> None:
+    """Wait until the process has ended, with each line of its screen given to `follow`.
+
+    A line without its end is read again later. Raises LiggghtsError after `deadline`, s.
+    """
     with screen.open("r", encoding="utf-8", errors="replace") as lines:
         while True:
-            code, partial = process.poll(), lines.tell()
+            code, line_start = process.poll(), lines.tell()
             for line in iter(lines.readline, ""):
                 if not line.endswith("\n") and code is None:
-                    lines.seek(partial)
+                    lines.seek(line_start)
                     break
-                partial = lines.tell()
+                line_start = lines.tell()
                 if follow:
                     follow(line.rstrip("\n"))
             if code is not None:
                 return
             if deadline is not None and time.monotonic() > deadline:
                 raise LiggghtsError(
-                    f"{screen.parent}: LIGGGHTS did not end within its time limit and was stopped; "
-                    "raise --timeout and continue with --resume"
+                    f"{screen.parent}: LIGGGHTS did not end within its time limit and was "
+                    "stopped; raise --timeout and continue with --resume"
                 )
             time.sleep(0.05)
 
 
 def _stop(process: subprocess.Popen) -> None:
+    """End the process and its children, first gently."""
     for end, patience in ((signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0)):
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, end)
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(patience)
             return
-
-
-def _verify(folder: Path, deck: str, code: int) -> None:
-    text = (folder / SCREEN).read_text(encoding="utf-8", errors="replace")
-    lines = text.splitlines()
-    bad = [line.strip() for line in lines if _BAD_LINE.search(line)]
-    where = f"{folder / deck}"
-    if code == 0 and not bad and any(line.strip() == END_MARK for line in lines):
-        numbers = [
-            line
-            for line in lines
-            if _NAN.search(line) and not line.lstrip().startswith(("#", "print", "fix"))
-        ]
-        if numbers:
-            raise LiggghtsError(
-                f"{where}: not-a-number in the output ({numbers[0].strip()[:80]!r}); "
-                "lower run.time_step_factor and start over with --force or another --out"
-            )
-        return
-    evidence = (
-        bad[0] if bad else (f"the last line is {lines[-1].strip()!r}" if lines else "no output")
-    )
-    if disk_is_full(folder):
-        evidence = f"the disk is full ({evidence})"
-    state = f"ended by signal {-code}" if code < 0 else f"exit {code}"
-    finished = "" if bad else f", no {END_MARK} line"
-    raise LiggghtsError(
-        f"{where}: LIGGGHTS failed ({state}{finished}): {evidence[:200]}; see {folder / SCREEN}; {_advice(bad)}"
-    )
-
-
-def _advice(bad: list[str]) -> str:
-    """What helps: another case for what would happen again, --resume for what came from outside."""
-    if any("Lost atoms" in line for line in bad):
-        return (
-            "spheres were thrown out: lower run.time_step_factor or drag.multiplier, or raise "
-            "run.stiffness_N_m, and start over "
-            "with --force or another --out"
-        )
-    if any(line.startswith("ERROR") and "No space" not in line for line in bad):
-        return "the same deck would fail again: mend the case and start over with --force or another --out"
-    return "mend the cause and continue with --resume"

@@ -1,4 +1,7 @@
-"""The overlap of fines, watched while an invasion runs: by the deck every some steps, from the dump at checkpoints."""
+"""The overlap of fines, watched while an invasion runs.
+
+The deck measures it every few steps, and the dumps of the checkpoints give it as well.
+"""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -16,19 +19,29 @@ from fdnet.spheres.snapshot import Snapshot
 
 WATCH = "overlap.csv"
 EVERY, MOST_ROWS = 50, 200
-"""Steps between two looks (each costs about a fifth of a step with contacts), and most of them in a chunk."""
+"""Steps between two measurements by the deck, and most measurements in a chunk. Each costs about a
+fifth of a step with contacts."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Deepest:
-    """The largest overlap of a fine with any sphere over the smaller diameter, and the step at which it was seen."""
+    """The largest overlap of a fine with any sphere.
+
+    Attributes:
+        step: when it was measured.
+        fraction: over the smaller diameter.
+    """
 
     step: int
     fraction: float
 
 
 def is_watched(case: InvasionCase) -> bool:
-    """Whether the deck can watch: LIGGGHTS reduces overlaps in metres over all pairs, of grains too."""
+    """Whether the deck can watch the overlap of fines.
+
+    LIGGGHTS takes the largest overlap, in m, of all pairs. So grains must not touch each other,
+    and fines must have one diameter.
+    """
     return case.grains.motion == "fixed" and case.fines.one_size
 
 
@@ -41,7 +54,10 @@ def watch_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any
 
 
 def read_watch(folder: Path) -> Iterator[Deepest]:
-    """What the deck saw; nothing where it did not watch. A half-written last line and titles are no rows."""
+    """What the deck measured; nothing where it did not watch.
+
+    A half-written last line and the titles are passed over.
+    """
     try:
         text = (folder / WATCH).read_text(errors="replace")
     except OSError:
@@ -60,7 +76,7 @@ def _number(text: str) -> float:
 
 
 def cut_watch(folder: Path, last_step: int) -> None:
-    """Forget what was seen after `last_step`, from which the run goes on."""
+    """Remove what was measured after `last_step`, from which the run goes on."""
     if (folder / WATCH).exists():
         rows = [
             f"{row.step},{row.fraction!r}\n" for row in read_watch(folder) if row.step <= last_step
@@ -69,12 +85,12 @@ def cut_watch(folder: Path, last_step: int) -> None:
 
 
 def overlap_in(case: Case, state: Snapshot) -> Deepest:
-    """The same from a state on disk."""
+    """The largest overlap of a fine in a state."""
     return Deepest(step=state.step, fraction=max_overlap(state, case.periodic, only_fines=True))
 
 
 def deepest_of(seen: Iterable[Deepest]) -> Deepest:
-    """The largest, the first of them if several; step 0 and 0.0 where nothing was seen."""
+    """The largest of several, the first one among equals; step 0 and 0.0 if there is none."""
     return max(seen, key=lambda row: row.fraction, default=Deepest(step=0, fraction=0.0))
 
 
@@ -87,27 +103,29 @@ def refuse_overlap(
     history: Sequence[Checkpoint],
     last: Checkpoint,
 ) -> None:
-    """Raises LiggghtsError when `run.on_overlap` is "stop" and a fine overlapped too much up to checkpoint `last`.
+    """Raises LiggghtsError when a fine overlapped too much and `run.on_overlap` is "stop".
 
-    Looks at what the deck saw and at the dumps of `history`. Everything up to the checkpoint stays on disk.
+    It looks at what the deck measured up to the checkpoint `last`, and at the dumps of `history`.
+    Everything up to the checkpoint stays on disk.
     """
     if case.run.on_overlap != "stop":
         return
-    seen = [found for found in read_watch(folder) if found.step <= last.step]
+    seen = [row for row in read_watch(folder) if row.step <= last.step]
     for _, state in readable_states(folder, history, case, scales, grains):
         seen.append(overlap_in(case, state))
     deepest = deepest_of(seen)
     if deepest.fraction > case.run.max_overlap:
         raise LiggghtsError(
-            f"{folder}: {overlap_text(case, deepest)}; stopped at checkpoint {last.chunk} (step {last.step}) as "
-            "run.on_overlap = 'stop' asks; raise run.stiffness_N_m and start over with --force, or go on from here "
-            "with --resume --set run.on_overlap=warn (or a larger run.max_overlap)"
+            f"{folder}: {overlap_text(case, deepest)}; stopped at checkpoint {last.chunk} (step "
+            f"{last.step}) because of run.on_overlap = 'stop'; raise run.stiffness_N_m and start "
+            "over with --force, or go on from here with --resume --set run.on_overlap=warn (or a "
+            "larger run.max_overlap)"
         )
 
 
 def overlap_text(case: Case, deepest: Deepest) -> str:
-    """The finding in words."""
+    """The overlap and its limit, in words."""
     return (
-        f"a fine overlapped by {100 * deepest.fraction:.3g} % of the smaller diameter at step {deepest.step} "
-        f"(limit run.max_overlap, {100 * case.run.max_overlap:.3g} %)"
+        f"a fine overlapped by {100 * deepest.fraction:.3g} % of the smaller diameter at step "
+        f"{deepest.step} (limit run.max_overlap, {100 * case.run.max_overlap:.3g} %)"
     )

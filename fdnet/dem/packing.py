@@ -1,4 +1,7 @@
-"""The dense grain pack: small spheres at random, grown in stages, relaxed to rest (thesis, appendix A)."""
+"""The dense pack of grains (thesis, appendix A).
+
+Small spheres are put at random, grown in stages, and relaxed until they are at rest.
+"""
 
 import json
 import math
@@ -38,16 +41,35 @@ from fdnet.spheres.porosity import measure_porosity
 from fdnet.spheres.snapshot import Array, Snapshot, resting
 
 POROSITY_TOLERANCE = 0.003
+"""Accepted difference to the porosity of the case."""
 ATTEMPTS = 8
+"""Most packs with different numbers of grains that are tried."""
 RELAX_RUN_STEPS = 2500
+"""Steps between two tests for rest."""
 REST_RUNS = 4 * PACK_RELAX_STEPS // RELAX_RUN_STEPS
+"""Most tests for rest."""
 MOST_CREEP = 1e-5
-"""Root mean square speed in grain diameters per sqrt(m/k) up to which a pack that goes on creeping is taken."""
+"""Root-mean-square speed, in grain diameters per sqrt(m/k), up to which a creeping pack is
+accepted."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pack:
-    """A pack at rest, or nearly (`creep`, m/s): its grains, porosity with standard error, and how it was reached."""
+    """A pack at rest, or nearly.
+
+    Attributes:
+        grains: as packed.
+        porosity: overlaps counted once.
+        porosity_error: standard error of `porosity`.
+        porosity_sum: porosity by the plain sum of the spheres' volumes.
+        max_overlap: largest overlap of two grains over the smaller diameter.
+        steps: of the last attempt.
+        step_s: s, time step.
+        attempts: one row for each number of grains that was tried.
+        left_out: what the deck does without.
+        run: the execution of LIGGGHTS that made it.
+        creep: m/s, root-mean-square speed of grains that never came to rest; 0 for a pack at rest.
+    """
 
     grains: Snapshot
     porosity: float
@@ -63,9 +85,10 @@ class Pack:
 
 
 def make_pack(case: Case, scales: Scales, folder: Path, launch: Launch) -> Pack:
-    """Pack until the porosity (overlap counted once) is within 0.003 of the target, by adjusting the count.
+    """Pack with different numbers of grains until the porosity is within 0.003 of the target.
 
-    Raises CaseError when the porosity cannot be reached, LiggghtsError when a run fails or does not come to rest.
+    Raises CaseError when the porosity cannot be reached, LiggghtsError when a run fails or does
+    not come to rest.
     """
     folder.mkdir(parents=True, exist_ok=True)
     counts, tried = [grain_count(case)], []
@@ -90,14 +113,12 @@ def make_pack(case: Case, scales: Scales, folder: Path, launch: Launch) -> Pack:
 
 def _refuse_overlap(case: Case, pack: Pack) -> None:
     if pack.max_overlap > case.grains.max_overlap:
-        asked = (
-            f"grains.porosity: {case.grains.porosity}"
-            if case.grains.count is None
-            else f"grains.count: {case.grains.count}"
-        )
+        key = "grains.porosity" if case.grains.count is None else "grains.count"
+        value = case.grains.porosity if case.grains.count is None else case.grains.count
         raise CaseError(
-            f"{asked} needs grains that overlap by {100 * pack.max_overlap:.1f} % of a diameter (limit "
-            f"grains.max_overlap {case.grains.max_overlap:g}); take a looser pack or raise the limit"
+            f"{key}: {value} needs grains that overlap by {100 * pack.max_overlap:.1f} % of a "
+            f"diameter (limit grains.max_overlap {case.grains.max_overlap:g}); take a looser pack "
+            "or raise the limit"
         )
 
 
@@ -106,7 +127,11 @@ def _is_met(target: float, pack: Pack) -> bool:
 
 
 def _next_count(case: Case, target: float, tried: list[dict[str, Any]]) -> int:
-    """Newton on the plain sum first, then the secant through the two nearest attempts."""
+    """The number of grains to try next.
+
+    First one step of Newton's method on the plain sum of volumes, then the secant through the two
+    attempts that are nearest to the target.
+    """
     grain = case.grains.mean_volume_m3 / math.prod(case.size_m)
     nearest = sorted(tried, key=lambda row: abs(row["porosity"] - target))
     slope = -grain
@@ -124,9 +149,9 @@ def _next_count(case: Case, target: float, tried: list[dict[str, Any]]) -> int:
     ]
     if not around or len(tried) >= ATTEMPTS:
         raise CaseError(
-            f"grains.porosity: {target} not met within {POROSITY_TOLERANCE} after {len(tried)} packs, nearest "
-            f"{nearest[0]['porosity']:.4f} with {nearest[0]['grains']} grains (one grain is {grain:.4f}); use a "
-            "larger box, another seed, or give grains.count"
+            f"grains.porosity: {target} not met within {POROSITY_TOLERANCE} after {len(tried)} "
+            f"packs, nearest {nearest[0]['porosity']:.4f} with {nearest[0]['grains']} grains (one "
+            f"grain is {grain:.4f}); use a larger box, another seed, or give grains.count"
         )
     return around[0]
 
@@ -173,16 +198,18 @@ def _attempt(case: Case, scales: Scales, folder: Path, launch: Launch, *, count:
 
 
 def _creep(case: Case, scales: Scales, folder: Path, grains: Snapshot) -> float:
-    """Root mean square speed, m/s, of grains that never came to rest: soft modes of a pack that is barely jammed.
+    """Root-mean-square speed, m/s, of grains that never came to rest.
 
-    Raises LiggghtsError above MOST_CREEP grain diameters per sqrt(m/k).
+    A pack that is barely jammed has such soft modes. Raises LiggghtsError above `MOST_CREEP` grain
+    diameters per sqrt(m/k).
     """
     speed = float(np.sqrt(np.mean(np.sum(grains.velocity**2, axis=1))))
     natural = 2 * case.grains.mean_radius_m * PACK_STEP / scales.pack_step
     if speed > MOST_CREEP * natural:
         raise LiggghtsError(
-            f"{folder}: the pack did not come to rest in {REST_RUNS * RELAX_RUN_STEPS} steps, its grains still move at "
-            f"{speed:.3g} m/s (limit {MOST_CREEP * natural:.3g}); take another seed or porosity"
+            f"{folder}: the pack did not come to rest in {REST_RUNS * RELAX_RUN_STEPS} steps, its "
+            f"grains still move at {speed:.3g} m/s (limit {MOST_CREEP * natural:.3g}); take "
+            "another seed or porosity"
         )
     return speed
 
@@ -195,8 +222,8 @@ def _run(case: Case, folder: Path, count: int, launch: Launch) -> Run:
             raise
         key = "grains.porosity" if case.grains.count is None else "grains.count"
         raise CaseError(
-            f"{key}: {count} grains needs more room than the box has, some were pushed out of it while growing; "
-            "raise the porosity, lower the count or enlarge the box"
+            f"{key}: {count} grains needs more room than the box has, some were pushed out of it "
+            "while growing; raise the porosity, lower the count or enlarge the box"
         ) from error
 
 
@@ -209,7 +236,10 @@ def write_pack_inputs(
     ranks: int = 1,
     shown: tuple[int, ...] = (),
 ) -> Deck:
-    """Write in.pack and pack.data (random small spheres) into `folder`; see `render_pack`."""
+    """Write in.pack and pack.data, `count` small spheres at random, into `folder`.
+
+    For `shown` see `render_pack`.
+    """
     deck = render_pack(case, scales, count=count, ranks=ranks, shown=shown)
     (folder / "in.pack").write_text(deck.text)
     radii = draw_radii(case, count)
@@ -231,7 +261,10 @@ def write_pack_inputs(
 
 
 def draw_radii(case: Case, count: int) -> Array:
-    """`count` radii (N,) m, uniform by number; the last closes the target's plain sum as far as it can."""
+    """`count` radii (N,) m, uniform by number.
+
+    The last one is chosen so that the sum of volumes comes as near to the expected one as it can.
+    """
     low, high = case.grains.radius_range_m
     radii = np.random.default_rng([case.seed, 7]).uniform(low, high, count)
     if low < high and count > 1:
@@ -243,9 +276,10 @@ def draw_radii(case: Case, count: int) -> Array:
 def render_pack(
     case: Case, scales: Scales, *, count: int, ranks: int = 1, shown: tuple[int, ...] = ()
 ) -> Deck:
-    """The packing deck: soft frictionless springs, viscous damping, growth in separate runs, rest test.
+    """The packing deck: soft springs without friction, viscous damping, growth, test for rest.
 
-    After the stages `shown` (1 to PACK_STAGES) it also dumps to post/grown_STAGE.dump.
+    After the stages of growth in `shown` (1 to `PACK_STAGES`) it also dumps to
+    post/grown_STAGE.dump.
     """
     stiffness = scales.contacts["grain-grain"].normal_stiffness
     low, high = case.grains.radius_range_m

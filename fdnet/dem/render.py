@@ -41,7 +41,7 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
 
 
 def _expected_grains(case: Case) -> Snapshot:
-    """One grain that stands beyond the face as far as those of a dense pack do: only its reach matters."""
+    """One grain that stands out beyond the face as those of a dense pack do; only that matters."""
     radius = case.grains.radius_range_m[1]
     box = box_of(case)
     return resting(np.array([[0.7 * radius, *(box[1:, 1] / 2)]]), radius, box)

@@ -19,7 +19,10 @@ _MATERIALS = {"pack": ("grain", "wall"), "invade": ("grain", "fine", "wall")}
 def header_variables(
     case: Case, stage: str, left_out: list[LeftOut], ranks: int
 ) -> dict[str, Any]:
-    """Variables of `_header.in.j2`; several ranks never cut the flow direction (fines crowd at the face)."""
+    """Variables of `_header.in.j2`.
+
+    Several ranks never cut the box across the flow, because the fines crowd at the face.
+    """
     sideways = "p p" if case.box.sides == "periodic" else "f f"
     return {
         "stage": stage,
@@ -67,7 +70,7 @@ def _contact(scales: Scales, first: str, second: str) -> Contact:
 
 
 def wall_variables(case: Case, stage: str, *, friction: bool) -> list[dict[str, Any]]:
-    """Planes at the sides; at both ends too for grains that move (fines pass freely)."""
+    """Planes at the sides, and at both ends for grains that move; fines pass the ends freely."""
     size, material = case.size_m, len(_MATERIALS[stage])
     ends_hold = "all" if stage == "pack" else ("grains" if case.grains.motion == "mobile" else "")
     sides_hold = (
@@ -99,7 +102,11 @@ def _wall(name: str, group: str, material: int, position: float, friction: bool)
 def write_data(
     path: Path, spheres: Snapshot, *, bounds: Array, density: Array, types: int
 ) -> None:
-    """The spheres (N) as a LIGGGHTS data file; `bounds` (3, 2) m of the simulation box, `density` (N,) kg/m3."""
+    """Write the spheres (N) as a LIGGGHTS data file.
+
+    `bounds` (3, 2) m are those of the simulation box, `density` (N,) is in kg/m3, `types` is the
+    number of atom types.
+    """
     lines = ["spheres", "", f"{len(spheres)} atoms", f"{types} atom types", ""]
     lines += [
         f"{number(low)} {number(high)} {axis}lo {axis}hi"
@@ -117,11 +124,15 @@ def write_data(
 
 
 def box_of(case: Case) -> Array:
+    """Corners (3, 2) m of the specimen's box."""
     return np.column_stack([np.zeros(3), case.size_m])
 
 
 def snapshot_of(frame: Frame, case: Case, *, time_s: float) -> Snapshot:
-    """A dump frame as a Snapshot in the specimen's box; positions across a periodic side are wrapped into it."""
+    """A frame of a dump as a Snapshot in the specimen's box.
+
+    Positions beyond a periodic side are moved into the box.
+    """
     position = np.column_stack([frame.column(c) for c in "xyz"])
     for axis, periodic in enumerate(case.periodic):
         if periodic:

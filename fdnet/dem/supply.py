@@ -1,9 +1,10 @@
 """The slab of fines upstream of the face: random, at the given concentration, touching nothing.
 
-Fed in batches (`fines.supply`) it is cut across the flow; a batch enters the simulation at the start of a chunk, where
-the fluid would have carried it by then. The length of a batch is what the suspension moves in a chunk against a cake
-that grows towards it, h = c (u t + h) / phi with phi = LOOSEST_CAKE, so that with one batch in hand no cake overtakes
-any.
+With `fines.supply` = "batches" the slab is cut across the flow. A batch enters the simulation at
+the start of a chunk, where the fluid would have carried it by then. The length of a batch is what
+the suspension moves in a chunk of time t against a cake that grows towards it, to a thickness
+h = c (u t + h) / phi with the concentration c, the velocity u and phi = `LOOSEST_CAKE`. So no cake
+overtakes a batch as long as one more batch is present than needed.
 """
 
 import math
@@ -22,25 +23,28 @@ CLEARANCE = 1.02
 """Fines start at least this many radius sums apart."""
 _ROUNDS = 400
 LOOSEST_CAKE = 0.5
-"""Volume fraction of the loosest cake that batches leave room for; random loose packing has 0.55 (Onoda & Liniger
-1990)."""
+"""Volume fraction of the loosest cake that batches leave room for. Random loose packing has 0.55
+(Onoda & Liniger 1990)."""
 AT_ONCE = 2
-"""Batches there from the start: the one that arrives in the first chunk, and one in hand."""
+"""Batches present from the start: the one that arrives in the first chunk, and the next."""
 SURE_CROWDING = 0.2
-"""Up to this `crowding` every fine finds a place: random sequential addition of equal spheres saturates at 0.38 (Talbot
-et al. 1991), and none of 8,465 draws at 0.2 failed (docs/physics.md, section 3).
+"""Up to this `crowding` every fine gets a place. Random sequential addition of equal spheres
+saturates at 0.38 (Talbot et al. 1991), and none of 8,465 draws at 0.2 failed (docs/physics.md).
 """
 
 
 def front_of(grains: Snapshot) -> float:
-    """x (m) below which there is no grain: grain surfaces stand up to 0.07 mm beyond the face of a dense pack."""
+    """x (m) below which no grain reaches, at most 0.
+
+    Surfaces of grains stand up to 0.07 mm beyond the face of a dense pack.
+    """
     return float(min(0.0, np.min(grains.position[:, 0] - grains.radius)))
 
 
 def refuse_crowded_supply(case: InvasionCase, scales: InvasionScales) -> None:
-    """Raises CaseError when the slab cannot hold its fines, which does not depend on the grains.
+    """Raises CaseError when the slab cannot hold its fines, whatever the grains.
 
-    Tries it only where they might not fit: the draw takes seconds for a million fines.
+    The fines are drawn only where they might not fit, since that takes seconds for a million.
     """
     if crowding(case) <= SURE_CROWDING:
         return
@@ -51,10 +55,12 @@ def refuse_crowded_supply(case: InvasionCase, scales: InvasionScales) -> None:
 
 
 def crowding(case: InvasionCase) -> float:
-    """An eighth of the space shut to the centre of one of the largest fines, as a share: c for equal fines far apart.
+    """How crowded the slab is: the concentration c for equal fines, more for unequal ones.
 
-    c <(R + r)^3> / (8 <r^3>) for radii r uniform up to R, over the section that centres can reach (a diameter less
-    between walls); inf if there is none. Places up to 2 % of a radius sum apart are counted as free.
+    It is an eighth of the share of space that is closed to the centre of a largest fine,
+    c <(R + r)^3> / (8 <r^3>) for radii r uniform up to R, over the share of the cross-section that
+    centres can reach (a diameter less between walls); inf when that is nothing. The `CLEARANCE`
+    between fines is not counted.
     """
     low, high = case.fines.radius_range_m
     shut = (
@@ -77,7 +83,7 @@ def place_fines(case: InvasionCase, scales: InvasionScales, grains: Snapshot) ->
 
 
 def slab_end(case: InvasionCase, grains: Snapshot) -> float:
-    """x (m) where the slab ends: a largest fine's diameter upstream of all grains."""
+    """x (m) where the slab ends: one diameter of the largest fine upstream of all grains."""
     return front_of(grains) - 2 * case.fines.radius_range_m[1]
 
 
@@ -106,7 +112,13 @@ def _moving(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Batches:
-    """How a slab is cut: `counts` of fines, `length` m of each batch, `travel` m of the suspension in a chunk."""
+    """How a slab is cut.
+
+    Attributes:
+        counts: number of fines in each batch.
+        length: m, of each batch along the flow.
+        travel: m, that the suspension moves in a chunk.
+    """
 
     counts: tuple[int, ...]
     length: float
@@ -114,7 +126,7 @@ class Batches:
 
     @property
     def reach(self) -> float:
-        """How far upstream of the slab's end a fine is when it enters the simulation, at most, m."""
+        """Largest distance, m, of a fine to the slab's end when it enters the simulation."""
         later = max(0, len(self.counts) - AT_ONCE)
         return min(AT_ONCE, len(self.counts)) * self.length + later * (self.length - self.travel)
 
@@ -124,8 +136,10 @@ class Batches:
 
 
 def batches_of(case: InvasionCase, scales: InvasionScales) -> Batches:
-    """The batches of a case: equal lengths, the slab's fines shared out evenly. One holds all of a slab fed at once, or
-    of so few fines that some batch would be empty. None is thinner than a fine, so that each need clear only the next.
+    """The batches of a case: of equal length, with the slab's fines shared out evenly.
+
+    A slab that is fed at once is one batch, and so is one of so few fines that some batch would be
+    empty. No batch is thinner than a fine, so that each must clear only the one next to it.
     """
     travel = scales.upstream_velocity * scales.checkpoint_steps * scales.time_step
     apart = 1.01 * CLEARANCE * 2 * case.fines.radius_range_m[1]
@@ -144,9 +158,9 @@ def batches_of(case: InvasionCase, scales: InvasionScales) -> Batches:
 def place_batches(
     case: InvasionCase, scales: InvasionScales, grains: Snapshot
 ) -> Iterator[Snapshot]:
-    """The slab batch by batch, each where the fluid has carried it when it enters; ids run on through all of them.
+    """The slab batch by batch, each where the fluid has carried it when it enters.
 
-    The first batches do not depend on how many follow.
+    The ids are numbered through all batches. A batch does not depend on how many follow.
     """
     travel, first = batches_of(case, scales).travel, int(grains.id.max()) + 1
     for number, (position, radius) in enumerate(
@@ -160,14 +174,14 @@ def place_batches(
 def _draw_batches(
     case: InvasionCase, scales: InvasionScales, *, end: float
 ) -> Iterator[tuple[Array, Array]]:
-    """Places (n, 3) in the slab and radii (n,) m of each batch; each clears the one before, that next to it."""
+    """Places (n, 3) m in the slab and radii (n,) m of each batch, clear of the one before."""
     batches, before = batches_of(case, scales), (np.empty((0, 3)), np.empty(0))
     for number, count in enumerate(batches.counts):
         rng = np.random.default_rng([case.seed, 11, number])
         radius = rng.uniform(*case.fines.radius_range_m, count)
         high = end - number * batches.length
         low = max(high - batches.length, end - scales.slab_length)
-        before = (_add_sequentially(case, radius, (low, high), rng, there=before), radius)
+        before = (_add_sequentially(case, radius, (low, high), rng, others=before), radius)
         yield before
 
 
@@ -183,20 +197,21 @@ def _add_sequentially(
     radius: Array,
     slab: tuple[float, float],
     rng: np.random.Generator,
-    there: tuple[Array, Array] = (np.empty((0, 3)), np.empty(0)),
+    others: tuple[Array, Array] = (np.empty((0, 3)), np.empty(0)),
 ) -> Array:
-    """Random sequential addition, largest first, in rounds: of two that overlap the later one is drawn again.
+    """Places (N, 3) m by random sequential addition, largest first, between the x of `slab`, m.
 
-    `there` are places (M, 3) and radii (M,) m of spheres to keep clear of.
+    It goes in rounds: of two fines that overlap the later one is drawn again. `others` are places
+    (M, 3) and radii (M,) m of spheres to keep clear of. Raises CaseError after `_ROUNDS` rounds.
     """
     size = np.array([slab[1] - slab[0], *case.size_m[1:]])
     period = np.where(case.periodic, size, 0.0)
     order = np.argsort(-radius, kind="stable")
     corner = np.array([slab[0], 0.0, 0.0])
-    placed = there[0] - corner
+    placed = others[0] - corner
     position = np.empty((len(radius), 3))
     waiting = order
-    done = there[1]
+    done = others[1]
     for _ in range(_ROUNDS):
         if not len(waiting):
             return position + corner
@@ -216,13 +231,17 @@ def _add_sequentially(
         waiting = waiting[~free]
     raise CaseError(
         f"fines.concentration: {case.fines.concentration:g} leaves {len(waiting)} of "
-        f"{len(radius)} fines "
-        f"without a place in a slab of {1e3 * size[0]:.3g} mm; lower it or lengthen fines.slab_mm"
+        f"{len(radius)} fines without a place in a slab of {1e3 * size[0]:.3g} mm; lower it or "
+        "lengthen fines.slab_mm"
     )
 
 
 def _free(points: Array, radius: Array, placed: int, period: Array) -> Array:
-    """For each newly drawn sphere (index >= placed): does it clear all placed ones and all drawn before it?"""
+    """Whether each newly drawn sphere clears all others: (N - placed,) truth values.
+
+    `points` (N, 3) m and `radius` (N,) m hold the `placed` spheres first, which all stay, and then
+    the drawn ones. Of two drawn ones that overlap the first stays.
+    """
     tree = cKDTree(points, boxsize=period)
     pairs = tree.query_pairs(2 * CLEARANCE * radius.max(), output_type="ndarray")
     gap = points[pairs[:, 0]] - points[pairs[:, 1]]

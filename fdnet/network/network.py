@@ -11,6 +11,7 @@ from fdnet.network.tessellation.polyhedra import join_polyhedra
 from fdnet.network.tessellation.pores import Pores, measure_pores
 from fdnet.network.tessellation.tessellation import Tessellation, tessellate
 from fdnet.network.tessellation.throats import LENGTH_FLOOR, Throats, measure_throats
+from fdnet.spheres.directions import Directions, periodic_axes
 from fdnet.spheres.snapshot import Array, Snapshot
 
 __all__ = ["LENGTH_FLOOR", "WALLS", "Network", "build_network"]
@@ -136,9 +137,7 @@ class Network:
         return ends
 
 
-def build_network(
-    grains: Snapshot, *, periodic: tuple[bool, bool, bool], walls: str = "slip"
-) -> Network:
+def build_network(grains: Snapshot, *, periodic: Directions = "", walls: str = "slip") -> Network:
     """The network of pores and throats between grains (Shi 2011, section 3.2.1).
 
     Periodic sides join. The other faces are mirror planes: with `walls` "slip" the specimen is one
@@ -148,17 +147,25 @@ def build_network(
     box are left out and counted.
 
     Args:
-        grains: the spheres that carry the skeleton; fines are not part of the network.
-        periodic: whether the sides x, y and z are periodic.
+        grains: the spheres that carry the skeleton, m; fines are not part of the network.
+        periodic: the sides that are periodic, letters such as "yz" or three truth values.
         walls: "slip" or "no-slip".
 
     Raises:
         NetworkError: unknown walls, impossible lengths, too few, coincident or coplanar grains,
             facets without partner, or no throat.
+
+    Examples:
+        >>> import fdnet, numpy as np
+        >>> lattice = 1e-3 * (np.indices((3, 3, 3)).reshape(3, -1).T + 0.5)
+        >>> grains = fdnet.Snapshot.from_arrays(lattice, 0.5e-3)
+        >>> network = fdnet.build_network(grains, periodic="yz")
+        >>> print(f"widest pore {1e3 * network.pore_radius.max():.3f} mm")
+        widest pore 0.366 mm
     """
     if walls not in WALLS:
         raise NetworkError(f"walls: {walls!r} is not known; choose one of {list(WALLS)}")
-    sides = (bool(periodic[0]), bool(periodic[1]), bool(periodic[2]))
+    sides = periodic_axes(periodic)
     placed = place_grains(grains, periodic=sides)
     tessellation = tessellate(placed)
     polyhedra = join_polyhedra(tessellation)

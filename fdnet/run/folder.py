@@ -43,7 +43,14 @@ _OUTPUTS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunFolder:
-    """A folder this process holds the lock of; `was_empty` before, `made` with these folders, innermost first."""
+    """A run folder whose lock this process holds.
+
+    Attributes:
+        path: of the folder.
+        lock: descriptor of the locked file.
+        was_empty: whether it was empty, or not there, before.
+        made: folders that were made for it, innermost first.
+    """
 
     path: Path
     lock: int
@@ -51,19 +58,22 @@ class RunFolder:
     made: tuple[Path, ...]
 
     def record(self, stage: str) -> dict[str, Any] | None:
-        """What a finished stage (pack, invade) left behind, or None. Raises CaseError when it cannot be understood."""
+        """The record of a finished stage ("pack", "invade"), or None.
+
+        Raises CaseError when it cannot be understood.
+        """
         return read_record(self.path, stage)
 
     def finish(self, stage: str, record: dict[str, Any]) -> None:
-        """Mark a stage as done; the record's presence means whole."""
+        """Mark a stage as done: its record is only there when the stage is complete."""
         write_json(self.path / _RECORDS[stage], record)
 
     def manifest(self) -> dict[str, Any] | None:
-        """The manifest of an analysed run, or None. Raises CaseError when it or what it lists is damaged."""
+        """The manifest of the run, or None. Raises CaseError as `read_manifest` does."""
         return read_manifest(self.path)
 
     def holds(self, case: Case, stages: tuple[str, ...]) -> bool:
-        """Whether every one of `stages` is done already. Raises CaseError as `manifest` and `record` do."""
+        """Whether all of `stages` are done. Raises CaseError as `manifest` and `record` do."""
         manifest = self.manifest()
         if manifest is not None:
             return set(stages) <= set(manifest["stages"])
@@ -73,19 +83,22 @@ class RunFolder:
         )
 
     def complete(self, manifest: dict[str, Any] | None) -> None:
-        """End this session well; a manifest (None: not analysed yet) makes the run complete."""
+        """End this session; a manifest makes the run complete (None: it is not analysed yet)."""
         if manifest is not None:
             write_json(self.path / MANIFEST, {"format": RECORD_FORMAT} | manifest)
         (self.path / UNFINISHED).unlink(missing_ok=True)
 
     def clear(self, stages: tuple[str, ...]) -> None:
-        """Remove the outputs of these stages; the manifest goes first, so a half-cleared run is never complete."""
+        """Remove the outputs of these stages.
+
+        The manifest goes first, so that a half-cleared run is never complete.
+        """
         (self.path / MANIFEST).unlink(missing_ok=True)
         for name in (name for stage in stages for name in _OUTPUTS[stage]):
             _remove(self.path / name)
 
     def discard(self) -> str:
-        """Bad input leaves nothing behind: a new folder is as before, unless a stage was finished in it.
+        """Clear a folder that was new, unless a stage was finished in it.
 
         Returns what could not be cleared, in words; "" when all could.
         """
@@ -126,11 +139,13 @@ def _expected(manifest: dict[str, Any], stage: str) -> tuple[str, ...]:
 def open_folder(
     path: Path, case: Case, *, stages: tuple[str, ...], resume: bool, force: bool
 ) -> RunFolder:
-    """Lock the folder for this case, making it if need be, and write case.toml if anything is left to run.
+    """Lock the folder for this case; it is made if need be.
 
-    Raises CaseError, with nothing changed, when a stage asked for lacks its forerunner, when another run is writing
-    there, when the folder holds another case or an unfinished run and neither resume nor force was asked for, or when
-    it holds something that is not a run.
+    case.toml is written when anything is left to run.
+
+    Raises CaseError, with nothing changed, when one of `stages` lacks the stage before it, when
+    another run is writing there, when the folder holds another case or an unfinished run and
+    neither `resume` nor `force` is set, or when it holds something that is not a run.
     """
     _refuse_foreign(path)
     _refuse_gap(path, case, stages)
@@ -169,7 +184,8 @@ def _refuse_foreign(path: Path) -> None:
     ours = any((path / name).exists() for name in (LOCK, MANIFEST, *_RECORDS.values()))
     if path.is_dir() and not ours and any(path.iterdir()):
         raise CaseError(
-            f"{path}: is not empty and holds no fdnet run; give another --out (nothing was changed)"
+            f"{path}: is not empty and holds no fdnet run; give another --out (nothing was "
+            "changed)"
         )
 
 
@@ -194,11 +210,13 @@ def _admit(
         _force(folder, case, stages)
     elif written.exists() and not case.same_specimen(written.read_bytes()):
         raise CaseError(
-            f"{folder.path}: holds a run of another case (see {written}); give another --out, or --force to replace it"
+            f"{folder.path}: holds a run of another case (see {written}); give another --out, or "
+            "--force to replace it"
         )
     elif (folder.path / UNFINISHED).exists() and not resume:
         raise CaseError(
-            f"{folder.path}: holds an unfinished run; continue it with --resume or start over with --force"
+            f"{folder.path}: holds an unfinished run; continue it with --resume or start over "
+            "with --force"
         )
     if force or folder.manifest() is None:
         write_text(folder.path / UNFINISHED, " ".join(stages) + "\n")
@@ -207,7 +225,10 @@ def _admit(
 
 
 def _force(folder: RunFolder, case: Case, stages: tuple[str, ...]) -> None:
-    """Clear the stages asked for and every later one. Refused when a kept earlier one belongs to another case."""
+    """Clear these stages and every later one.
+
+    Raises CaseError when an earlier one, which is kept, belongs to another case.
+    """
     first = min(STAGES.index(stage) for stage in stages)
     for stage in _RECORDS:
         if STAGES.index(stage) >= first:
@@ -215,8 +236,8 @@ def _force(folder: RunFolder, case: Case, stages: tuple[str, ...]) -> None:
         record = folder.record(stage)
         if record is not None and record["digest"] != case.digest(stage):
             raise CaseError(
-                f"{folder.path / stage}: belongs to another case; add {stage} to --stages, or give another --out "
-                "(nothing was changed)"
+                f"{folder.path / stage}: belongs to another case; add {stage} to --stages, or "
+                "give another --out (nothing was changed)"
             )
     folder.clear(STAGES[first:])
 
@@ -227,7 +248,7 @@ def write_json(path: Path, value: Any) -> None:
 
 
 def read_record(folder: Path, stage: str) -> dict[str, Any] | None:
-    """What a finished stage (pack, invade) of the run in `folder` left behind, or None.
+    """The record of a finished stage ("pack", "invade") of the run in `folder`, or None.
 
     Raises CaseError when it cannot be understood.
     """
@@ -235,18 +256,20 @@ def read_record(folder: Path, stage: str) -> dict[str, Any] | None:
 
 
 def read_manifest(folder: Path) -> dict[str, Any] | None:
-    """The manifest of the analysed run in `folder`, or None where there is none.
+    """The manifest of the analysed run in `folder`, or None.
 
-    Raises CaseError when it cannot be read, or when a file that it lists is missing.
+    Raises CaseError when it cannot be understood, or when a file that it implies is missing.
     """
     manifest = _read_record(folder / MANIFEST)
-    for stage in ("pack", "invade", "analyse") if manifest else ():
-        for name in _expected(manifest or {}, stage):
-            if not (folder / name).exists():
-                raise CaseError(
-                    f"{folder}: {MANIFEST} says complete, but {name} is missing; "
-                    "start over with --force"
-                )
+    if manifest is None:
+        return None
+    expected = (name for stage in STAGES[:3] for name in _expected(manifest, stage))
+    missing = next((name for name in expected if not (folder / name).exists()), None)
+    if missing is not None:
+        raise CaseError(
+            f"{folder}: the run is complete by its {MANIFEST}, but {missing} is missing; start "
+            "over with --force"
+        )
     return manifest
 
 
@@ -259,6 +282,7 @@ def _read_record(path: Path) -> dict[str, Any] | None:
         raise CaseError(f"{path}: cannot be read ({error}); start over with --force") from error
     if not isinstance(record, dict) or record.get("format") != RECORD_FORMAT:
         raise CaseError(
-            f"{path}: is no record of this fdnet (format {RECORD_FORMAT} expected); start over with --force"
+            f"{path}: is no record of this fdnet (format {RECORD_FORMAT} expected); start over "
+            "with --force"
         )
     return record

@@ -9,8 +9,8 @@ from typing import Any
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.stages import LIGGGHTS_STAGES, STAGES
+from fdnet.dem.binary import find_binary
 from fdnet.dem.checkpoint import has_history
-from fdnet.dem.liggghts import find_binary
 from fdnet.dem.supply import refuse_crowded_supply
 from fdnet.errors import CaseError
 from fdnet.network.permeability import analyse

@@ -1,4 +1,4 @@
-"""Progress of a LIGGGHTS run: a live bar on a terminal, a plain line every few seconds elsewhere."""
+"""Progress of a run of LIGGGHTS: a live bar on a terminal, elsewhere a line every few seconds."""
 
 import re
 import sys
@@ -12,7 +12,7 @@ _QUIET_SECONDS = 5.0
 
 
 class Progress:
-    """Follows the screen of a run. `expected` is the number of steps the stage is expected to take (an estimate)."""
+    """Follows the screen of a run; a stage is `expected` to take about that many steps."""
 
     def __init__(self, stage: str, expected: int, *, show: bool = True) -> None:
         self.stage, self.expected, self.show = stage, max(1, expected), show

@@ -1,4 +1,4 @@
-"""What stages leave behind for later ones, for resuming and for the manifest."""
+"""Records of finished stages, for later stages, for resuming and for the manifest."""
 
 import hashlib
 import platform
@@ -7,8 +7,9 @@ from importlib import metadata
 from typing import Any
 
 from fdnet.case.case import Case
+from fdnet.dem.binary import KNOWN_VERSION
 from fdnet.dem.invasion import Invasion
-from fdnet.dem.liggghts import KNOWN_VERSION, Run
+from fdnet.dem.liggghts import Run
 from fdnet.dem.overlap import Deepest, overlap_text
 from fdnet.dem.packing import Pack
 from fdnet.run.folder import RECORD_FORMAT
@@ -84,42 +85,50 @@ def run_record(run: Run) -> dict[str, Any]:
 def record_warnings(
     case: Case, pack: dict[str, Any], invasion: dict[str, Any] | None
 ) -> list[str]:
-    """Doubts about the DEM runs: another LIGGGHTS than fdnet was measured with, large overlaps, how it ended."""
-    version = pack["runs"][0]["version"]
-    found = (
-        []
-        if version == KNOWN_VERSION
-        else [f"LIGGGHTS {version}: fdnet was measured and tested with {KNOWN_VERSION}"]
-    )
-    if pack["max_overlap"] > OVERLAP_WARNING:
-        found.append(
-            f"grains overlap by up to {100 * pack['max_overlap']:.1f} % of a diameter: the pack is denser than "
-            "rigid spheres get"
-        )
-    if pack.get("creep_m_s"):
-        found.append(
-            f"the pack is barely jammed and still creeps, at {pack['creep_m_s']:.2g} m/s; it is taken as it is"
-        )
-    if abs(pack["porosity"] - pack["porosity_assumed"]) > POROSITY_WARNING:
-        found.append(
-            f"the fluid's velocity follows from a porosity of {pack['porosity_assumed']:.3f} (plain sum of "
-            "grains.count), the pack "
-            f"has {pack['porosity']:.3f}: give fluid.velocity_m_s"
-        )
+    """Doubts about the DEM runs, from the records of their stages.
+
+    They are another LIGGGHTS than fdnet was measured with, large overlaps, and how the runs ended.
+    """
     if invasion is None:
-        return found
+        return _pack_warnings(pack)
     deepest = Deepest(
         step=invasion.get("max_overlap_step", invasion["steps"]), fraction=invasion["max_overlap"]
     )
-    if deepest.fraction > case.run.max_overlap:
-        found.append(f"{overlap_text(case, deepest)}: raise run.stiffness_N_m")
-    return [*invasion["warnings"], *found]
+    too_deep = deepest.fraction > case.run.max_overlap
+    overlap = [f"{overlap_text(case, deepest)}: raise run.stiffness_N_m"] if too_deep else []
+    return [*invasion["warnings"], *_pack_warnings(pack), *overlap]
+
+
+def _pack_warnings(pack: dict[str, Any]) -> list[str]:
+    warnings, version = [], pack["runs"][0]["version"]
+    if version != KNOWN_VERSION:
+        warnings.append(f"LIGGGHTS {version}: fdnet was measured and tested with {KNOWN_VERSION}")
+    if pack["max_overlap"] > OVERLAP_WARNING:
+        warnings.append(
+            f"grains overlap by up to {100 * pack['max_overlap']:.1f} % of a diameter: the pack "
+            "is denser than rigid spheres get"
+        )
+    if pack.get("creep_m_s"):
+        warnings.append(
+            f"the pack is barely jammed and still creeps, at {pack['creep_m_s']:.2g} m/s; it is "
+            "used as it is"
+        )
+    if abs(pack["porosity"] - pack["porosity_assumed"]) > POROSITY_WARNING:
+        warnings.append(
+            "the fluid's velocity follows from a porosity of "
+            f"{pack['porosity_assumed']:.3f} (plain sum of grains.count), the pack has "
+            f"{pack['porosity']:.3f}: give fluid.velocity_m_s"
+        )
+    return warnings
 
 
 def stage_seconds(
     pack: dict[str, Any], invasion: dict[str, Any] | None, own: dict[str, float]
 ) -> dict[str, float]:
-    """Seconds per stage, and how many of them LIGGGHTS took (of the session that finished each stage)."""
+    """Seconds of each stage, and those of them that LIGGGHTS took.
+
+    They are those of the session that finished the stage; `own` are those of this session.
+    """
     runs = pack["runs"] + (invasion["runs"] if invasion else [])
     return {
         "pack": pack["seconds"],
@@ -133,11 +142,12 @@ def stage_seconds(
 
 def versions(pack: dict[str, Any] | None) -> dict[str, str]:
     """Versions of everything that shaped the run."""
-    found = {}
+    packages = {}
     for name in _PACKAGES:
         try:
-            found[name] = metadata.version(name)
+            packages[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
-            found[name] = "not installed as a package"
+            packages[name] = "not installed as a package"
     liggghts = {"liggghts": pack["runs"][0]["version"]} if pack else {}
-    return {**found, "python": sys.version.split()[0], **liggghts, "system": platform.platform()}
+    python, system = sys.version.split()[0], platform.platform()
+    return {**packages, "python": python, **liggghts, "system": system}

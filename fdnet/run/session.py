@@ -8,7 +8,8 @@ from pathlib import Path
 
 from fdnet.case.case import Case
 from fdnet.case.stages import STAGES
-from fdnet.dem.liggghts import Binary, Launch, find_binary
+from fdnet.dem.binary import Binary, find_binary
+from fdnet.dem.liggghts import Launch
 from fdnet.run.folder import RunFolder
 from fdnet.run.progress import Progress
 from fdnet.scales.scales import Scales

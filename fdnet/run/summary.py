@@ -18,7 +18,11 @@ def summarise(
     seconds: dict[str, float],
     warnings: list[str],
 ) -> dict[str, Any]:
-    """The mapping of summary.json (output contract); `pack` and `invasion` are the records of their stages."""
+    """The mapping of summary.json.
+
+    `pack` and `invasion` are the records of their stages, `last` is the last checkpoint; the two
+    of the invasion are None without fines.
+    """
     result = {
         "case": case.name,
         "seed": case.seed,
@@ -89,10 +93,7 @@ def _network(analysis: Analysis) -> dict[str, Any]:
 
 
 def _left_out(pack: dict[str, Any], invasion: dict[str, Any] | None) -> list[str]:
-    found = [f"pack: {item}" for item in pack["left_out"]]
-    found += (
-        [f"invade: {item}" for item in invasion["left_out"]]
-        if invasion
-        else ["invade: the whole invasion (no fines in the case)"]
-    )
-    return found
+    left_out = [f"pack: {item}" for item in pack["left_out"]]
+    if invasion is None:
+        return [*left_out, "invade: the whole invasion (no fines in the case)"]
+    return left_out + [f"invade: {item}" for item in invasion["left_out"]]

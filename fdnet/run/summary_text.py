@@ -5,21 +5,7 @@ from typing import Any
 
 def summary_lines(summary: dict[str, Any]) -> list[str]:
     """Headline numbers, the table of sections, warnings."""
-    lines = [
-        f"case {summary['case']}, seed {summary['seed']}, laws {summary['law']} / {summary['damage_law']}",
-        f"porosity      {summary['porosity_initial']:.4f} -> {summary['porosity_damaged']:.4f}",
-        f"permeability  {summary['k_initial_m2']:.4g} -> {summary['k_damaged_m2']:.4g} m2  (reduction "
-        f"{_share(summary['k_reduction'])})",
-        f"fines         {summary['invaded_count']} invaded, {summary['passed_count']} passed, "
-        f"{summary['upstream_count']} upstream of "
-        f"{summary['supplied_count']} supplied; stopped: {summary['stop_reason'] or 'no invasion'}",
-        f"depth         deepest {1e3 * summary['invasion_depth_m']:.2f} mm, 95 % above "
-        f"{1e3 * summary['invasion_depth_p95_m']:.2f} mm, "
-        f"cake {1e3 * summary['cake_thickness_m']:.2f} mm",
-        "",
-        f"{'depth mm':>11} {'porosity':>8} {'damaged':>8} {'k m2':>10} {'damaged':>10} {'loss':>7} "
-        f"{'in place':>8} {'fines':>6}",
-    ]
+    lines = _headline(summary)
     lines += [_section(row) for row in summary["sections"]]
     seconds = summary["seconds"]
     outside = (
@@ -29,6 +15,26 @@ def summary_lines(summary: dict[str, Any]) -> list[str]:
     return lines + [f"warning: {warning}" for warning in summary["warnings"]]
 
 
+def _headline(summary: dict[str, Any]) -> list[str]:
+    stopped = summary["stop_reason"] or "no invasion"
+    depth, depth_p95 = 1e3 * summary["invasion_depth_m"], 1e3 * summary["invasion_depth_p95_m"]
+    return [
+        f"case {summary['case']}, seed {summary['seed']}, laws {summary['law']} / "
+        f"{summary['damage_law']}",
+        f"porosity      {summary['porosity_initial']:.4f} -> {summary['porosity_damaged']:.4f}",
+        f"permeability  {summary['k_initial_m2']:.4g} -> {summary['k_damaged_m2']:.4g} m2  "
+        f"(reduction {_share(summary['k_reduction'])})",
+        f"fines         {summary['invaded_count']} invaded, {summary['passed_count']} passed, "
+        f"{summary['upstream_count']} upstream of {summary['supplied_count']} supplied; "
+        f"stopped: {stopped}",
+        f"depth         deepest {depth:.2f} mm, 95 % above {depth_p95:.2f} mm, "
+        f"cake {1e3 * summary['cake_thickness_m']:.2f} mm",
+        "",
+        f"{'depth mm':>11} {'porosity':>8} {'damaged':>8} {'k m2':>10} {'damaged':>10} "
+        f"{'loss':>7} {'in place':>8} {'fines':>6}",
+    ]
+
+
 def _section(row: dict[str, Any]) -> str:
     inplace = (
         1 - row["k_damaged_inplace_m2"] / row["k_initial_inplace_m2"]
@@ -36,11 +42,10 @@ def _section(row: dict[str, Any]) -> str:
         else None
     )
     return (
-        f"{1e3 * row['x_lo_m']:>5.2f}-{1e3 * row['x_hi_m']:<5.2f} {row['porosity_initial']:>8.4f} "
-        f"{row['porosity_damaged']:>8.4f} "
-        f"{row['k_initial_m2']:>10.3g} {row['k_damaged_m2']:>10.3g} {_share(row['k_reduction']):>7} "
-        f"{_share(inplace):>8} "
-        f"{row['fines_count']:>6}"
+        f"{1e3 * row['x_lo_m']:>5.2f}-{1e3 * row['x_hi_m']:<5.2f} "
+        f"{row['porosity_initial']:>8.4f} {row['porosity_damaged']:>8.4f} "
+        f"{row['k_initial_m2']:>10.3g} {row['k_damaged_m2']:>10.3g} "
+        f"{_share(row['k_reduction']):>7} {_share(inplace):>8} {row['fines_count']:>6}"
     )
 
 

@@ -64,6 +64,15 @@ def _flow_rows(case: Case, scales: Scales) -> list[Quantity]:
 
 
 def _fine_rows(scales: InvasionScales) -> list[Quantity]:
+    return [
+        *_drag_rows(scales),
+        *_ratio_rows(scales),
+        *_supply_rows(scales),
+        *_time_rows(scales),
+    ]
+
+
+def _drag_rows(scales: InvasionScales) -> list[Quantity]:
     low, high = scales.relaxation_time
     sizes = [("smallest", low), ("largest", high)] if low != high else [("every", low)]
     rows = [
@@ -87,6 +96,11 @@ def _fine_rows(scales: InvasionScales) -> list[Quantity]:
             "below 1 stable, 0.1 exact enough",
             "measured, docs/physics.md",
         ),
+    ]
+
+
+def _ratio_rows(scales: InvasionScales) -> list[Quantity]:
+    return [
         _row(
             "particle Reynolds number",
             "Re",
@@ -127,6 +141,11 @@ def _fine_rows(scales: InvasionScales) -> list[Quantity]:
             "6 pi mu M u / 2k",
             "linear spring",
         ),
+    ]
+
+
+def _supply_rows(scales: InvasionScales) -> list[Quantity]:
+    return [
         _row("fines supplied", "n", scales.supplied_count, "-", "c A l / v", "slab of suspension"),
         _row("slab length", "l", scales.slab_length, "m", "n v / (c A)", "slab of suspension"),
         _row(
@@ -137,6 +156,11 @@ def _fine_rows(scales: InvasionScales) -> list[Quantity]:
             "l / u",
             "kinematics",
         ),
+    ]
+
+
+def _time_rows(scales: InvasionScales) -> list[Quantity]:
+    return [
         _row(
             "plug time",
             "t_p",

@@ -11,7 +11,7 @@ import pandas as pd
 
 from fdnet.atomic import disk_is_full
 from fdnet.errors import DumpError
-from fdnet.spheres.snapshot import Array, frozen
+from fdnet.spheres.arrays import Array, frozen, one_line
 
 COLUMNS = "id type x y z vx vy vz radius"
 FORMAT = "%d %d %.17g %.17g %.17g %.9g %.9g %.9g %.17g"
@@ -19,17 +19,29 @@ EXACT: dict[str, Any] = (
     {"float_precision": "round_trip"} if int(pd.__version__.split(".")[0]) < 3 else {}
 )
 """From pandas 3 on, exact numbers are the default and the option is deprecated."""
+_UNITS, _TIME = b"ITEM: UNITS\n", b"ITEM: TIME\n"
 _ITEMS = (b"ITEM: TIMESTEP", b"ITEM: NUMBER OF ATOMS", b"ITEM: BOX BOUNDS", b"ITEM: ATOMS")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Frame:
-    """One dump frame: `columns` names, `rows` (N, C) float64 sorted by id where there is one, `box` (3, 2)."""
+    """One frame of a dump, in the units of the dump.
+
+    Attributes:
+        step: time step of the simulation.
+        box: (3, 2) bounds of the simulation box.
+        columns: names of the C columns.
+        rows: (N, C) values, sorted by the column id where there is one.
+        units: name of the units that the dump gives ("si", "lj"), empty where it gives none.
+    """
 
     step: int
     box: Array
     columns: tuple[str, ...]
     rows: Array
+    units: str = ""
+
+    __repr__ = one_line
 
     def column(self, name: str) -> Array:
         """The values (N,) of one column. Raises DumpError when the dump has no such column."""
@@ -41,7 +53,10 @@ class Frame:
 
 
 def read_dump(path: Path) -> list[Frame]:
-    """All frames of a dump file; raises DumpError naming path, line and step where it is malformed or cut."""
+    """All frames of a dump file.
+
+    Raises DumpError that names path, line and step where it is malformed or cut.
+    """
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -79,6 +94,7 @@ class _Reader:
     def __init__(self, data: bytes, source: str) -> None:
         self.data, self.source, self.position, self.line = data, source, 0, 1
         self.step: int | None = None
+        self.units = ""
 
     def fail(self, what: str, line: int | None = None) -> DumpError:
         step = "" if self.step is None else f" step {self.step}:"
@@ -117,18 +133,35 @@ class _Reader:
 
     def frame(self) -> Frame:
         self.step = None
+        self.skip_optional()
         self.item(_ITEMS[0])
         self.step = self.whole("step")
         self.item(_ITEMS[1])
         count = self.whole("number of atoms")
-        self.item(_ITEMS[2])
+        if b"xy" in self.item(_ITEMS[2]):
+            raise self.fail(
+                "the box is slanted (triclinic), expected one along the axes; dump an orthogonal box",
+                self.line - 1,
+            )
         box = [self.bounds() for _ in range(3)]
         columns = tuple(self.item(_ITEMS[3]).decode("ascii", "replace").split())
         if not columns:
             raise self.fail("ITEM: ATOMS names no columns", self.line - 1)
         return Frame(
-            step=self.step, box=frozen(box, float), columns=columns, rows=self.rows(count, columns)
+            step=self.step,
+            box=frozen(box, float),
+            columns=columns,
+            rows=self.rows(count, columns),
+            units=self.units,
         )
+
+    def skip_optional(self) -> None:
+        """Read what LAMMPS may write before the step: the units, and the time, which is not used."""
+        for item in (_UNITS, _TIME):
+            if self.data.startswith(item, self.position):
+                self.take()
+                text = self.take().decode("ascii", "replace").strip()
+                self.units = text if item == _UNITS else self.units
 
     def bounds(self) -> list[float]:
         line, text = self.line, self.take()
@@ -143,7 +176,7 @@ class _Reader:
         return [low, high]
 
     def rows(self, count: int, columns: tuple[str, ...]) -> Array:
-        end = self.data.find(_ITEMS[0], self.position)
+        end = self.data.find(b"ITEM: ", self.position)
         end = len(self.data) if end < 0 else end
         body, first = self.data[self.position : end], self.line
         found = body.count(b"\n")

@@ -12,6 +12,8 @@ from fdnet.spheres.rows import SphereRows, metres_per
 PLACES = (("x", "y", "z"), ("xu", "yu", "zu"))
 SCALED = ("xs", "ys", "zs")
 """Columns of the centres: as they are, unwrapped across periods, or in parts of the box."""
+DUMP_UNITS = {"si": 1.0, "cgs": 1e-2, "micro": 1e-6}
+"""Metres in the unit of length of the unit systems that a dump may name."""
 
 
 def read_dump_spheres(
@@ -20,12 +22,13 @@ def read_dump_spheres(
     """The spheres of one frame of a dump, in metres: the last frame, or the one of `step`.
 
     Columns: type, x y z (or xu yu zu, or xs ys zs in parts of the box), radius or diameter, and id
-    if there is one. `units` is the unit of length of the dump, m without it. Raises DumpError where
-    the file is malformed or cut, CaseError where `step` or a column is missing.
+    if there is one. `units` is the unit of length of the dump. Without it the unit is that of the
+    dump's own unit system, or m where it names none. Raises DumpError where
+    the file is malformed or cut, CaseError where `step`, a column or the unit is missing.
     """
-    scale = 1.0 if units is None else metres_per(units)
     frames = read_dump(path)
     frame = _chosen(frames, path, step)
+    scale = _scale(frame, path) if units is None else metres_per(units)
     radius = _radius(frame, path)
     bad = np.flatnonzero(~(radius > 0))
     if len(bad):
@@ -33,7 +36,8 @@ def read_dump_spheres(
             f"{path}: step {frame.step}: row {bad[0] + 1} by id has the radius {radius[bad[0]]:g}, "
             "expected a number above 0"
         )
-    notes = [f"The lengths of {path} are in m."] if units is None else []
+    assumed = units is None and not frame.units
+    notes = [f"The lengths of {path} are in m."] if assumed else []
     if len(frames) > 1 and step is None:
         notes.append(f"The last of {len(frames)} frames of {path} was used, step {frame.step}.")
     return SphereRows(
@@ -60,6 +64,15 @@ def _chosen(frames: list[Frame], path: Path, step: int | None) -> Frame:
     if not len(chosen[-1].rows):
         raise CaseError(f"{path}: step {chosen[-1].step} holds no spheres; choose another step")
     return chosen[-1]
+
+
+def _scale(frame: Frame, path: Path) -> float:
+    if frame.units and frame.units not in DUMP_UNITS:
+        raise CaseError(
+            f"{path}: its units are {frame.units!r}, which fdnet cannot convert to m; give the unit "
+            "of length of the file (units)"
+        )
+    return DUMP_UNITS.get(frame.units, 1.0)
 
 
 def _position(frame: Frame, path: Path) -> Array:

@@ -52,7 +52,7 @@ def read_spheres(
     Args:
         path: the file.
         units: unit of its lengths: "m", "cm", "mm" or "um". CSV columns without a unit need it; a
-            dump or VTK file is in m without it.
+            dump or VTK file is in m without it, unless the dump names its units.
         box: (3, 2) bounds of the specimen, or x0, x1, y0, y1, z0, z1, in the unit of the file.
             Without it the box of the dump, or the box around all grains.
         fines_below: spheres of a smaller radius are fines, in the unit of the file.

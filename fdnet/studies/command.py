@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fdnet.atomic import write_text
-from fdnet.dem.liggghts import find_binary
+from fdnet.dem.binary import find_binary
 from fdnet.errors import CaseError
 from fdnet.studies.engine.study import Study
 

@@ -1,4 +1,4 @@
-"""Fines fed in batches: the same suspension as in one slab, in simulation only when it is about to arrive."""
+"""Fines fed in batches: the suspension of one slab, each part present once it is due."""
 
 import numpy as np
 import pytest
@@ -59,8 +59,11 @@ def test_batches_make_up_the_slab(radius, sides):
 
 @pytest.mark.parametrize("concentration", [0.05, 0.1, 0.2])
 def test_a_batch_enters_before_it_could_meet_the_cake(concentration):
-    """At the end of the chunk before it enters no fine of it has come nearer than the loosest cake is thick, h with
-    phi h = c (u t + h): all fines that the suspension and the front's own way have brought."""
+    """A batch enters while its place is still clear of the loosest cake.
+
+    The cake is h thick, phi h = c (u t + h): all fines that the suspension and the front's own
+    advance have brought.
+    """
     case = tiny(*BATCHED, f"fines.concentration={concentration}")
     scales, grains = scales_of(case), one_grain(case)
     end, batches = slab_end(case, grains), batches_of(case, scales)
@@ -84,7 +87,7 @@ def test_supplied_counts_the_batches_that_have_come():
 
 
 def test_thin_chunks_make_no_batch_thinner_than_a_fine():
-    """Else batches that are not neighbours could overlap, which each is drawn without regard to."""
+    """Otherwise batches that are not neighbours could overlap: each is drawn clear of the last."""
     case = tiny("fines.supply=batches", "run.checkpoint_ms=0.0005")
     scales, grains = scales_of(case), one_grain(case)
     assert batches_of(case, scales).travel < 0.2 * 2 * 0.05e-3
@@ -158,7 +161,7 @@ def test_a_batched_invasion_accounts_for_every_fine_and_resumes(binary, tmp_path
 
 @pytest.mark.liggghts
 def test_free_fines_are_where_the_fluid_has_carried_them(binary, tmp_path):
-    """No grain in the way: after some chunks every fine has moved u t from its place in the suspension."""
+    """Without a grain, after some chunks every fine has moved u t from its place in the slab."""
     case = tiny(*BATCHED, "drag.scheme=viscous", "run.cap_ms=0.06")
     scales = scales_of(case)
     far = resting_spheres([[2.9e-3, 0.25e-3, 0.25e-3]], 1e-5, box_of(case), kind=Kind.GRAIN)

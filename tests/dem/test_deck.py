@@ -1,4 +1,4 @@
-"""Decks by meaning: the command is there, the left-out one is not, and variables offered and used agree."""
+"""Decks by meaning: commands are there or left out, and variables offered and used agree."""
 
 import math
 import re

@@ -10,9 +10,10 @@ from builders import resting_spheres, tiny
 
 from fdnet.case.case import Case
 from fdnet.case.file import case_from
+from fdnet.dem.binary import Binary
 from fdnet.dem.deck import number, render_text
 from fdnet.dem.drag import drag_variables
-from fdnet.dem.liggghts import Binary, Launch, run_deck
+from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.scene import contact_variables, write_data
 from fdnet.errors import CaseError
 from fdnet.scales.scales import InvasionScales, scales_of
@@ -52,7 +53,7 @@ def test_each_scheme_has_its_own_lines_and_no_others():
 
 
 def test_the_viscous_split_is_stokes_drag_of_one_radius():
-    """6 pi mu M r and 6 pi mu M r u; upstream, with the Darcy velocity, less by 6 pi mu M r (u - q)."""
+    """6 pi mu M r and 6 pi mu M r u; upstream less by 6 pi mu M r (u - q), q Darcy's velocity."""
     case = drag_case("drag.scheme=viscous", "drag.multiplier=3.0", "drag.upstream=darcy")
     scales = scales_of(case)
     text, damping = drag_text(case, scales), 6 * math.pi * 0.05 * 3 * RADIUS
@@ -100,7 +101,7 @@ def test_what_a_scheme_cannot_do_is_refused(assignments, said):
 def drive(
     case: Case, binary: Binary, folder: Path, *, gap: float, steps: int, every: int
 ) -> tuple[InvasionScales, list[Frame]]:
-    """One fine from rest, `gap` m off a fixed grain downstream of it, under the deck's own drag and contact lines."""
+    """One fine from rest, `gap` m upstream of a fixed grain, under the deck's forces."""
     folder.mkdir(parents=True)
     scales = scales_of(case)
     box = np.column_stack([np.zeros(3), case.size_m])
@@ -143,7 +144,7 @@ def speeds(frames: list[Frame]) -> np.ndarray:
 
 
 def relaxation_error(scheme: str, step: float, binary: Binary, folder: Path) -> float:
-    """Largest error over u of v(t) = u (1 - exp(-t / tau)) in two relaxation times, tested every 0.2 tau."""
+    """Largest error of v(t) = u (1 - exp(-t / tau)) over u in 2 tau, tested every 0.2 tau."""
     every = round(0.2 * TAU / step)
     held = ["drag.refresh_steps=1"] if scheme == "held" else []
     case = drag_case(
@@ -158,7 +159,7 @@ def relaxation_error(scheme: str, step: float, binary: Binary, folder: Path) -> 
 @pytest.mark.liggghts
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_fine_relaxes_to_the_fluid_as_stokes_has_it(binary, tmp_path, scheme):
-    """v = u (1 - exp(-t / tau)); every scheme is of first order in dt, and within 0.5 dt / tau of it."""
+    """v = u (1 - exp(-t / tau)); every scheme is of first order in dt, within 0.5 dt / tau."""
     errors = [
         relaxation_error(scheme, TAU * part, binary, tmp_path / str(part))
         for part in (0.01, 0.005)
@@ -183,7 +184,9 @@ def test_the_viscous_split_moves_a_fine_as_drag_at_every_step_does(binary, tmp_p
 @pytest.mark.liggghts
 @pytest.mark.parametrize("ratio", [0.1, 1.0, 10.0, 100.0])
 def test_implicit_drag_is_bounded_at_any_step(binary, tmp_path, ratio):
-    """Half a step of drag forward, half backward: u - v shrinks by q = (2 - k) / (2 + k) a step, k = dt / tau.
+    """Half a step of drag forward, half backward.
+
+    So u - v shrinks by q = (2 - k) / (2 + k) a step, k = dt / tau.
 
     |q| < 1 for every k. The first half step has no drag yet: u - v_n = u q^n / (1 - k / 2).
     """

@@ -1,4 +1,4 @@
-"""Invasions by the real binary: every fine is accounted for, and a cut run goes on as if never cut."""
+"""Invasions by the real binary: every fine is counted, a cut run goes on as if never cut."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -65,7 +65,7 @@ def test_a_slab_that_cannot_hold_the_fines_is_an_error(packed):
 @pytest.mark.parametrize("sides", ["walls", "periodic"])
 @pytest.mark.parametrize("length", [1, 20])
 def test_every_fine_finds_a_place_up_to_the_sure_crowding(monkeypatch, radius_mm, sides, length):
-    """Drawn just above the limit, slabs of 1 and 20 diameters; below the limit nothing is drawn beforehand."""
+    """Slabs of 1 and 20 diameters, just above the limit; below it nothing is drawn beforehand."""
     high = float(radius_mm.strip("[]").rsplit(",", 1)[-1])
     case = tiny(
         f"box.sides={sides}", f"fines={{radius_mm={radius_mm}, slab_mm={2 * high * length}}}"
@@ -101,7 +101,7 @@ def test_crowding_of_unequal_fines_by_quadrature():
 
 
 def test_a_begun_invasion_is_not_tried_out_again(tmp_path, monkeypatch):
-    """Its supply has found its places: a folder with a checkpoint goes to the next question, which is its own."""
+    """Its fines are placed already: a folder with a checkpoint is not refused for its supply."""
     monkeypatch.setattr(pipeline, "refuse_crowded_supply", refuse_all)
     (tmp_path / "run" / "invade").mkdir(parents=True)
     history = tmp_path / "run" / "invade" / "history.csv"
@@ -150,7 +150,7 @@ def test_supplied_is_invaded_passed_and_upstream_at_every_checkpoint(
 
 
 def test_fines_of_one_micrometre_invade(binary, packed, tmp_path):
-    """A size ratio of 1/250 and steps of 0.1 ns: all are accounted for, and move with the fluid."""
+    """A size ratio of 1/250 and steps of 0.1 ns: all are counted, and move with the fluid."""
     case = tiny("fines={radius_mm=0.001, count=20}", "run={duration_ms=0.02}")
     scales = scales_of(case)
     result = invade(case, scales, packed["walls"], tmp_path, Launch(binary=binary))
@@ -170,7 +170,7 @@ def test_fines_of_one_micrometre_invade(binary, packed, tmp_path):
     ],
 )
 def test_the_neighbour_search_changes_time_not_motion(binary, packed, tmp_path, assignment):
-    """Up to the order of sums: before chaos has had time to grow, positions agree to a millionth of a fine."""
+    """It changes the order of sums: before chaos grows, positions agree to 1e-6 of a fine."""
     ends = []
     for name, extra in (("own", [assignment]), ("default", [])):
         case = tiny("run.duration_ms=0.04", *extra)
@@ -313,7 +313,7 @@ def test_history_with_a_half_written_line(tmp_path: Path):
 
 
 def test_a_trickle_may_count_as_plugged(binary, packed, tmp_path):
-    """With a share of the inflow allowed the end comes at the first plug time with no more crossings than that."""
+    """With `plug_rate` the end comes at the first plug time with no more crossings than that."""
     case = tiny(
         "fines.count=900",
         "run.checkpoint_ms=0.01",

@@ -1,4 +1,4 @@
-"""Every way a LIGGGHTS run can fail, played by a ten-line fake; exit code 0 alone proves nothing."""
+"""All kinds of failure of a run of LIGGGHTS, played by a fake of ten lines."""
 
 import os
 import signal
@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from fdnet.dem import liggghts
-from fdnet.dem.liggghts import Binary, Launch, find_binary, run_deck
+from fdnet.dem.binary import Binary, find_binary
+from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.errors import LiggghtsError
 
 FAKE = """#!/bin/sh
@@ -87,8 +88,10 @@ def test_the_run_dies_with_its_parent(fake, tmp_path):
     (tmp_path / "mode").write_text("hang")
     code = textwrap.dedent(f"""
         from pathlib import Path
-        from fdnet.dem.liggghts import Launch, find_binary, run_deck
-        run_deck(Path({str(tmp_path)!r}), "in.deck", Launch(binary=find_binary({str(fake.path)!r})))
+        from fdnet.dem.binary import find_binary
+        from fdnet.dem.liggghts import Launch, run_deck
+        launch = Launch(binary=find_binary({str(fake.path)!r}))
+        run_deck(Path({str(tmp_path)!r}), "in.deck", launch)
     """)
     parent = subprocess.Popen([sys.executable, "-c", code], start_new_session=True)
     screen = tmp_path / "screen.txt"
@@ -107,7 +110,7 @@ def test_the_run_dies_with_its_parent(fake, tmp_path):
 
 
 def test_a_folder_where_liggghts_still_writes_is_refused(fake, tmp_path, monkeypatch):
-    """The lock is LIGGGHTS's own: it outlives a killed parent, also under MPI, where ranks take a moment to end."""
+    """LIGGGHTS holds the lock itself: it outlives a killed parent; MPI ranks take time to end."""
     monkeypatch.setattr(liggghts, "LOCK_PATIENCE", 0.3)
     command = ["sh", "-c", f"exec 9>{tmp_path}/.lock; flock 9; sleep 30 9>&9"]
     orphan = subprocess.Popen(command, start_new_session=True)

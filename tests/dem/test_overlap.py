@@ -1,4 +1,4 @@
-"""The overlap of fines while an invasion runs: measured right, the motion untouched, told or stopping the run."""
+"""The overlap of fines in an invasion: it is measured right, changes no motion, warns or stops."""
 
 import math
 from contextlib import nullcontext
@@ -108,7 +108,8 @@ def test_the_deck_sees_the_overlap_of_an_impact(binary, tmp_path):
     text += render_text(
         "_contacts.in.j2", {"contacts": contacts, "time_step": number(scales.time_step / 5)}
     )
-    text += f"group fines type 2\nfix integ fines nve/sphere\nvelocity fines set {speed} 0 0 units box\n"
+    text += "group fines type 2\nfix integ fines nve/sphere\n"
+    text += f"velocity fines set {speed} 0 0 units box\n"
     text += render_text(
         "_overlap.in.j2", {"overlap": watch_variables(case, scales) | {"every": 2}}
     )

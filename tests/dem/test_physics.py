@@ -28,7 +28,7 @@ def snapshot(case: Case, position: list, kind: Kind, radius: float, first: int =
 
 @pytest.mark.parametrize("scheme", ["every_step", "held", "implicit", "viscous"])
 def test_gravity_buoyancy_and_drag_relax_to_the_terminal_velocity(binary, tmp_path, scheme):
-    """v_z(t) = v_T (1 - exp(-t / tau)), v_T = 2 r^2 (rho - rho_f) g / (9 mu) (Stokes 1851), for one free fine."""
+    """v_z(t) = v_T (1 - exp(-t / tau)), v_T = 2 r^2 (rho - rho_f) g / (9 mu) (Stokes 1851)."""
     g = -2.0e4
     case = tiny(
         "fines.count=1",
@@ -84,8 +84,10 @@ def collide(case: Case, speed: float, binary, folder) -> tuple[float, float]:
     text += "read_data two.data\nneighbor 5e-5 bin\nneigh_modify delay 0\n"
     text += render_text("_contacts.in.j2", {"contacts": contacts, "time_step": number(step)})
     text += (
-        f"fix integ all nve/sphere\ngroup a id 1\ngroup b id 2\nvelocity a set {speed / 2} 0 0 units box\n"
-        f"velocity b set {-speed / 2} 0 0 units box\ndump d all custom 20 d.dump id type x y z vx vy vz radius\n"
+        "fix integ all nve/sphere\ngroup a id 1\ngroup b id 2\n"
+        f"velocity a set {speed / 2} 0 0 units box\n"
+        f"velocity b set {-speed / 2} 0 0 units box\n"
+        "dump d all custom 20 d.dump id type x y z vx vy vz radius\n"
         'dump_modify d sort id format "%d %d %.17g %.17g %.17g %.17g %.17g %.17g %.17g"\n'
         f'run {round((6e-7 / (speed / 1.0) + 4e-6) / step)}\nprint "DECK_DONE"\n'
     )
@@ -100,8 +102,12 @@ def collide(case: Case, speed: float, binary, folder) -> tuple[float, float]:
 
 
 def test_collision_has_the_spring_and_the_restitution_of_the_case(binary, tmp_path):
-    """Undamped overlap v sqrt(m_eff/k); e of a damped linear contact released at zero force (limitForce on),
-    exp(-zeta/s (pi - atan2(2 s zeta, 2 zeta^2 - 1)))) with s = sqrt(1 - zeta^2) (Schwager & Poeschel 2007, eq. 20)."""
+    """The overlap without damping is v sqrt(m_eff/k); with damping the restitution e is known.
+
+    Of a linear contact that is released at zero force (limitForce on) it is
+    e = exp(-zeta/s (pi - atan2(2 s zeta, 2 zeta^2 - 1))), s = sqrt(1 - zeta^2) (Schwager &
+    Poeschel 2007, eq. 20).
+    """
     case = tiny("fines.damping_ratio=0.0", "grains.damping_ratio=0.0")
     mass = 4 / 3 * math.pi * (0.05e-3) ** 3 * 2146 / 2
     stiffness = scales_of(case).contacts["fine-fine"].normal_stiffness

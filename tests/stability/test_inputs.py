@@ -73,7 +73,7 @@ def test_radii_beyond_reason_are_refused(tmp_path, capsys, radius):
 def test_a_stray_sphere_is_left_out_unless_a_period_would_have_to_bring_it_back(
     tmp_path, capsys, place, periodic, code
 ):
-    """1e25 periods away no digit of its place is left; beside a wall it is outside the box, counted, and told."""
+    """1e25 periods away no digit of its place is left; next to a wall it is counted as outside."""
     table(tmp_path / "s.csv", x=place)
     options = ["--units", "mm", "--box", "0,4,0,4,0,4", "--periodic", periodic, "--json"]
     found, out, err = permeability(capsys, tmp_path / "s.csv", *options)
@@ -122,7 +122,7 @@ def test_a_snapshot_holds_no_number_that_is_none(name, value):
 
 
 def test_a_pack_whose_paths_are_all_closed_is_an_answer_at_the_command_line(tmp_path, capsys):
-    """Radius 0.72 spacings closes every triangle of a cubic lattice (circumradius 0.707): k = 0, exit code 0."""
+    """A radius of 0.72 spacings closes every triangle of a cubic lattice (0.707): k = 0."""
     place = np.indices((4, 4, 4)).reshape(3, -1).T + 0.5
     rows = "".join(f"{x},{y},{z},0.72\n" for x, y, z in place)
     (tmp_path / "s.csv").write_text("x,y,z,radius\n" + rows)
@@ -153,7 +153,7 @@ def test_no_fines_are_no_fault_of_occupancy():
 
 @pytest.mark.parametrize("seed", [11, 12])
 def test_some_hundred_mutated_inputs_make_no_fault(root, seed):
-    """The quick form of scripts/fuzz.py; its record of more than 10,000 is docs/validation/fuzz.json."""
+    """The quick form of scripts/fuzz.py, whose long record is docs/validation/fuzz.json."""
     record = fuzz.fuzz(root, main, seed=seed, indices=range(300), limit=20.0)
     assert record["faults"] == []
     assert len(record["kinds"]) == 9
@@ -161,7 +161,7 @@ def test_some_hundred_mutated_inputs_make_no_fault(root, seed):
 
 
 def test_the_fuzz_knows_a_fault_when_it_meets_one(tmp_path):
-    """Deliberate breaks: a traceback, a hang, a warning, a file left behind, an impossible number."""
+    """Deliberate breaks: a traceback, a hang, a warning, a file that stays, a wrong number."""
 
     def outcome(judge, limit: float = 5.0) -> str:
         return fuzz.outcome(targets.Target((b"",), {}, judge), b"", Random(1), limit)
@@ -179,7 +179,10 @@ def test_the_fuzz_knows_a_fault_when_it_meets_one(tmp_path):
     assert "RuntimeWarning" in outcome(lambda *_: str(np.float64(1.0) / np.float64(0.0)))
     assert "not done within" in outcome(endless, 0.2)
     assert "in.pack was written" in outcome(left)
-    good = '{"k_initial_m2": 1, "k_damaged_m2": 0.5, "porosity_initial": 0.4, "porosity_damaged": 0.3, "sections": []}'
+    good = (
+        '{"k_initial_m2": 1, "k_damaged_m2": 0.5, "porosity_initial": 0.4, '
+        '"porosity_damaged": 0.3, "sections": []}'
+    )
     assert targets.judge_numbers(good) == "accepted"
     for bad in (
         good.replace("0.5", "1.5"),

@@ -1,4 +1,4 @@
-"""Extreme whole runs on the real binary: counts that add up, k and porosity within their bounds, or one clear error."""
+"""Extreme whole runs on the real binary: right counts and bounds, or one clear error."""
 
 import contextlib
 import copy
@@ -43,10 +43,11 @@ def run(folder: Path, *assignments: str, without: str = "") -> tuple[int, dict[s
 
 
 def check_bounds(folder: Path, summary: dict[str, Any]) -> None:
-    """What holds for every run: fines are conserved, they add their own solid at most (those upstream up to half of
-    it), never raise k, and numbers are finite."""
+    """What holds for every run: fines are conserved and never raise k, and numbers are finite.
+
+    They add at most their own volume of solid, those upstream up to half of it.
+    """
     case = read_case(folder / "case.toml")
-    assert case.fines is not None
     counts = [summary[f"{name}_count"] for name in ("invaded", "passed", "upstream")]
     assert sum(counts) == summary["supplied_count"]
     assert (
@@ -135,7 +136,7 @@ def test_no_fines_leave_the_pack_as_it_is(tmp_path):
 
 
 def test_fines_larger_than_every_throat_stay_at_the_face(tmp_path):
-    """Circles between three touching grains of 0.25 mm are of 0.04 mm: fines of 0.2 mm cannot pass."""
+    """Circles between three touching grains of 0.25 mm have 0.04 mm: 0.2 mm cannot pass."""
     code, summary, err = run(tmp_path, "fines.radius_mm=0.2", "fines.count=30", "run.cap_ms=0.35")
     assert code == 0, err
     check_bounds(tmp_path, summary)
@@ -196,7 +197,7 @@ def test_a_supply_that_finds_no_place_leaves_no_folder(tmp_path):
 def closed_system(
     case: Case, fines: Snapshot, binary, folder: Path, *, factor: float, steps: int
 ) -> list[Frame]:
-    """Fines in a periodic box with the deck's own contact lines and nothing else; frames of the whole run."""
+    """Fines in a periodic box with the deck's own contacts and nothing else; frames of the run."""
     scales = scales_of(case)
     contacts = contact_variables(case, scales, "invade", friction=False)
     density = np.full(len(fines), case.fines.density_kg_m3)
@@ -225,7 +226,7 @@ def closed_system(
 
 
 def undamped() -> Case:
-    """Grains and fines of one material, so that LIGGGHTS's compulsory type 1 is like the others; no damping."""
+    """Grains and fines of one material without damping: LIGGGHTS's type 1 is like the others."""
     same = [
         "normal_stiffness_N_m=63e9",
         "shear_stiffness_N_m=26e9",
@@ -264,9 +265,12 @@ def energy(frame: Frame, stiffness: float, mass: float) -> float:
 
 @pytest.mark.parametrize("factor", [0.1, 0.2])
 def test_an_undamped_closed_system_gains_no_energy(binary, tmp_path, factor):
-    """Velocity Verlet on linear springs: energy off by (w dt)^2 / 8 of what a contact holds at most, w^2 = 2 k / m;
-    what changes hands at the start and end of each contact adds up like a random walk. Stated bound: 1 % (factor 0.1),
-    2 % (factor 0.2) over 40,000 steps; momentum to the rounding of its sums."""
+    """Velocity Verlet on linear springs keeps energy to (w dt)^2 / 8 of what a contact holds.
+
+    w^2 = 2 k / m. The errors at the start and end of each contact add up like a random walk.
+    Stated bound over 40,000 steps: 1 % (factor 0.1), 2 % (factor 0.2). Momentum is kept to the
+    rounding of sums.
+    """
     case = undamped()
     frames = closed_system(
         case, gas(4, 0.6e-3, 1.0), binary, tmp_path, factor=factor, steps=40_000

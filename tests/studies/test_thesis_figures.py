@@ -1,4 +1,7 @@
-"""The thesis's figures: what is drawn, not how it looks. Two runs of a jittered lattice with fines put by hand."""
+"""The figures of the thesis: what they show, not how they look.
+
+The sources are two runs of a jittered lattice with fines placed by hand.
+"""
 
 from dataclasses import replace
 from functools import cache
@@ -114,9 +117,9 @@ def sources(*seeds, specimens=("specimen1",), **tables):
     )
 
 
-def drawn(draw, found, **which):
+def drawn(draw, given, **which):
     figure = Figure(layout="constrained")
-    draw(figure, found, **which)
+    draw(figure, given, **which)
     figure.draw_without_rendering()
     return figure
 
@@ -149,8 +152,8 @@ def test_several_seeds_show_their_mean_and_range():
 
 
 def test_curves_of_several_seeds_have_a_band():
-    found = sources(1, 2, specimens=("specimen3", "specimen6"))
-    axes = drawn(compared_fraction, found, specimens=("specimen3", "specimen6")).axes[0]
+    given = sources(1, 2, specimens=("specimen3", "specimen6"))
+    axes = drawn(compared_fraction, given, specimens=("specimen3", "specimen6")).axes[0]
     band = axes.collections[0].get_paths()[0].vertices
     assert band[:, 1].max() == pytest.approx(0.75)
     assert labelled(
@@ -170,8 +173,8 @@ def test_the_lost_porosity_is_the_fines_volume_over_the_box():
 
 
 def test_the_total_loss_stands_beside_that_of_the_first_millimetre():
-    found = sources(1, 2, specimens=("specimen1", "specimen3"))
-    axes = drawn(total_reduction, found, specimens=("specimen1", "specimen3")).axes[0]
+    given = sources(1, 2, specimens=("specimen1", "specimen3"))
+    axes = drawn(total_reduction, given, specimens=("specimen1", "specimen3")).axes[0]
     whole, first = axes.containers
     fine = 4 / 3 * np.pi * 0.04**3 / 1.6**2
     assert [bar.get_height() for bar in whole] == pytest.approx([4 * fine / 3] * 2, rel=0.05)
@@ -181,13 +184,13 @@ def test_the_total_loss_stands_beside_that_of_the_first_millimetre():
 
 
 def test_permeability_stands_beside_the_thesis_s_sections():
-    found = run(1)
+    examined = run(1)
     axes = drawn(permeability, sources(), specimen="specimen1").axes[0]
-    wanted = [s.k_damaged / s.k_initial for s in found.thesis.sections]
+    wanted = [s.k_damaged / s.k_initial for s in examined.thesis.sections]
     assert labelled(axes, "the thesis's laws, section cut out").get_data().values == pytest.approx(
         wanted
     )
-    wanted = [s.k_damaged_inplace / s.k_initial_inplace for s in found.default.sections]
+    wanted = [s.k_damaged_inplace / s.k_initial_inplace for s in examined.default.sections]
     assert labelled(
         axes, "fdnet's default laws, section in place"
     ).get_data().values == pytest.approx(wanted)
@@ -234,11 +237,11 @@ def test_density_counts_what_lies_outside_in_the_whole():
 
 def test_throats_are_closed_empty_filled_or_blocked():
     cut = whole_pores(run(1))
-    found = contents(cut)
-    assert sum(found.values()) == pytest.approx(1.0)
-    assert found["with fines"] == pytest.approx(np.mean((cut.throat_fines > 0) & ~cut.blocked))
+    shares = contents(cut)
+    assert sum(shares.values()) == pytest.approx(1.0)
+    assert shares["with fines"] == pytest.approx(np.mean((cut.throat_fines > 0) & ~cut.blocked))
     left, right = drawn(throat_porosity, sources(), specimen="specimen1").axes
-    assert [bar.get_height() for bar in left.patches] == pytest.approx(list(found.values()))
+    assert [bar.get_height() for bar in left.patches] == pytest.approx(list(shares.values()))
     assert right.patches[0].get_data().values.sum() * 0.05 == pytest.approx(1.0)
 
 
@@ -297,9 +300,9 @@ def scan(seed, value, depth, specimen="quick-specimen7"):
 
 def test_the_drag_figure_shows_the_mean_and_range_over_seeds():
     rows = [scan(1, 10.0, 2.0), scan(2, 10.0, 4.0), scan(1, 1.0, 1.0)]
-    values, found = over_seeds(rows, "depth_p95_mm")
+    values, ranges = over_seeds(rows, "depth_p95_mm")
     assert values == pytest.approx([1.0, 10.0])
-    assert found == pytest.approx(np.array([[1.0, 1.0, 1.0], [3.0, 2.0, 4.0]]))
+    assert ranges == pytest.approx(np.array([[1.0, 1.0, 1.0], [3.0, 2.0, 4.0]]))
     axes = drawn(invasion_depth, sources(drag=rows, specimens=("table3",))).axes[0]
     assert list(labelled(axes, "deepest fine").get_ydata()) == pytest.approx([2.0, 6.0])
     assert axes.get_xscale() == "log"
@@ -316,10 +319,10 @@ def test_table_3_stands_beside_its_own_fines_alone():
 
 
 def test_distances_are_shares_by_place():
-    found = sources(
+    given = sources(
         distances={"below 0.4": np.array([0.2, 0.45, 0.75, 1.5])}, specimens=("specimen5",)
     )
-    axes = drawn(distances, found, porosity="below 0.4").axes[0]
+    axes = drawn(distances, given, porosity="below 0.4").axes[0]
     assert sum(bar.get_height() for bar in axes.patches) == pytest.approx(1.0)
     labels = [one.get_label() for one in axes.containers]
     assert labels == [
@@ -342,12 +345,12 @@ def test_all_that_is_there_is_drawn_and_what_is_missing_named(tmp_path):
     tables = FigureTables(
         drag=rows, friction=rows, supply=rows, distances={"below 0.4": np.array([0.3])}
     )
-    found = draw_all(
+    figures = draw_all(
         {"specimen1": [run(1), run(2)]}, tmp_path, thesis={"specimen1": NUMBERS}, tables=tables
     )
-    assert [one.name for one in found] == list(FIGURES)
-    by_name = {one.name: one for one in found}
-    for one in found:
+    assert [one.name for one in figures] == list(FIGURES)
+    by_name = {one.name: one for one in figures}
+    for one in figures:
         assert (one.path is None) == bool(one.missing)
         if one.path is not None:
             assert one.path.stat().st_size < 150_000
@@ -417,20 +420,20 @@ def test_the_values_file_gives_each_specimen_its_numbers():
 
 def test_tables_are_filled_from_what_is_examined():
     assert tetrahedra_counted({"specimen1": [run(1)], "specimen2": []})["specimen1"][0] > 0
-    found = distances_by_class([run(1), run(2)])
-    assert list(found) == list(POROSITY_CLASSES)
+    by_class = distances_by_class([run(1), run(2)])
+    assert list(by_class) == list(POROSITY_CLASSES)
     sections = [first_millimetre(run(seed), whole=True) for seed in (1, 2)]
     pairs = [np.sum(section.throat_weight[section.occupancy.pair_throat]) for section in sections]
-    assert sum(len(one) for one in found.values()) == sum(pairs) > 0
+    assert sum(len(one) for one in by_class.values()) == sum(pairs) > 0
     assert distances_by_class([]) == {}
 
 
 def test_a_scan_s_row_is_a_result():
     row = result_rows(run(2))[0]
-    found = scan_row("specimen5", 0.3, row)
-    assert (found.seed, found.value, found.count_first_mm) == (2, 0.3, row.count_first_mm)
-    assert (found.depth_mean_mm, found.depth_max_mm) == pytest.approx((0.875, 1.5))
-    assert found.depth_p95_mm == row.invasion_depth_p95_mm
+    scanned = scan_row("specimen5", 0.3, row)
+    assert (scanned.seed, scanned.value, scanned.count_first_mm) == (2, 0.3, row.count_first_mm)
+    assert (scanned.depth_mean_mm, scanned.depth_max_mm) == pytest.approx((0.875, 1.5))
+    assert scanned.depth_p95_mm == row.invasion_depth_p95_mm
 
 
 def test_percent():

@@ -1,8 +1,9 @@
-"""The thesis's numbers beside ours, on a simple cubic lattice with fines put by hand.
+"""The thesis's numbers and ours, on a simple cubic lattice with fines placed by hand.
 
-Cells of edge A with grains of radius R = A/2 at their corners: each is one pore of radius (sqrt(3)/2 - 1/2) A, each
-square face two throats (its triangles) on one axis, of length A and radius (1/sqrt(2) - 1/2) A. Layers of cells whole
-within the specimen are centred at 0.6, 1.1 and 1.6 mm; those at the ends are cut by the faces.
+Cells of edge A have grains of radius R = A/2 at their corners. Each cell is one pore of radius
+(sqrt(3)/2 - 1/2) A. Each square face is two throats (its triangles) on one axis, of length A and
+radius (1/sqrt(2) - 1/2) A. Layers of whole cells are centred at 0.6, 1.1 and 1.6 mm; the faces of
+the specimen cut the layers at the ends.
 """
 
 from dataclasses import fields, replace
@@ -51,7 +52,8 @@ MM = 1e-3
 A, R = 0.5, 0.25
 TUBE = (1 / sqrt(2) - 0.5) * A
 WIDE, THIN = 0.1, 0.02
-FINES = [  # x, y, z, radius mm: all midway between two cells, on the axis of the face's throats or beside it
+# x, y, z, radius in mm; all lie midway between two cells, some on the axis of the face's throats
+FINES = [
     [0.6, 0.0, 0.25, 0.05],
     [0.6, 0.5 + 0.5, 0.25 + 0.08, THIN],
     [0.6 + 0.11, 0.5, 0.75, THIN],
@@ -118,18 +120,18 @@ def test_every_number_told_has_its_source():
         "deposition",
     }
     for one in values.specimens.values():
-        told = {
+        given = {
             field.name
             for field in fields(ThesisSpecimen)
             if getattr(one, field.name) not in (None, {}, ())
         } - plain
-        assert told == set(one.sources), one.id
-        assert set(one.senses) <= told
-    for told in (*values.statistics, *(one for one in values.deposition if one.nearer)):
-        assert told.source.startswith(("Figure", "Table", "section"))
-        assert told.sense in ("exact", "about", "at least", "at most")
-    for told in values.statistics:
-        assert told.quantity in (SINGLES if told.between is None else {*SIZES, POROSITY})
+        assert given == set(one.sources), one.id
+        assert set(one.senses) <= given
+    for number in (*values.statistics, *(one for one in values.deposition if one.nearer)):
+        assert number.source.startswith(("Figure", "Table", "section"))
+        assert number.sense in ("exact", "about", "at least", "at most")
+    for number in values.statistics:
+        assert number.quantity in (SINGLES if number.between is None else {*SIZES, POROSITY})
 
 
 def test_tables_8_and_10_are_read_by_section():
@@ -185,7 +187,10 @@ def test_fines_are_counted_by_depth(lattice):
 
 
 def test_deep_fines_near_a_wall():
-    """Of four beyond 1 mm two lie within 0.25 mm of a side; one at the face and one beyond the outlet do not count."""
+    """Of four beyond 1 mm two lie within 0.25 mm of a side.
+
+    One at the face and one beyond the outlet do not count.
+    """
     case = tiny("grains.radius_mm=0.25")
     x, y, z = (
         [1.2, 1.4, 1.6, 2.9, 0.1, 3.1],
@@ -220,9 +225,9 @@ def test_results_survive_their_file(lattice, tmp_path):
         *result_rows(lattice),
         *result_rows(Examined(**_parts(lattice) | {"id": "other", "seed": 7})),
     ]
-    found = read_results(write_results(tmp_path / "results.csv", rows))
-    assert [row.id for row in found] == ["specimen5-5to6"] * 2 + ["other"] * 2
-    for one, other in zip(rows, found, strict=True):
+    again = read_results(write_results(tmp_path / "results.csv", rows))
+    assert [row.id for row in again] == ["specimen5-5to6"] * 2 + ["other"] * 2
+    for one, other in zip(rows, again, strict=True):
         for field in fields(one):
             before, after = getattr(one, field.name), getattr(other, field.name)
             assert type(after) is type(before), field.name
@@ -230,7 +235,7 @@ def test_results_survive_their_file(lattice, tmp_path):
                 assert after == before
             else:
                 assert after == pytest.approx(before, rel=1e-8, nan_ok=True), field.name
-    assert np.isnan(found[2].thesis_depth_mm)
+    assert np.isnan(again[2].thesis_depth_mm)
     header = (tmp_path / "results.csv").read_text().splitlines()[0].split(",")
     assert header == list(COLUMNS)
     assert header[18:34] == [f"k_reduction_{s}" for s in range(1, 9)] + [
@@ -267,8 +272,11 @@ def test_sizes_of_the_lattice(lattice):
 
 
 def test_sizes_of_the_grains_alone(lattice):
-    """A regular tetrahedron of touching grains and a fifth grain mirrored in one of its facets: two pores of radius
-    (sqrt(3/2) - 1) R, centred sqrt(2/3) R / 2 off the facet they share, of inscribed radius (2/sqrt(3) - 1) R."""
+    """A regular tetrahedron of touching grains, and a fifth grain mirrored in one of its facets.
+
+    They are two pores of radius (sqrt(3/2) - 1) R, centred sqrt(2/3) R / 2 off the facet that they
+    share, whose inscribed radius is (2/sqrt(3) - 1) R.
+    """
     corner = R * np.array([[1, 1 / sqrt(3), 0], [-1, 1 / sqrt(3), 0], [0, -2 / sqrt(3), 0]])
     tips = R * np.array([[0, 0, sqrt(8 / 3)], [0, 0, -sqrt(8 / 3)], [8, 0, 0], [9, 1, 0]])
     box = lattice.state.grains.box
@@ -370,11 +378,13 @@ def test_fines_in_throats_and_bodies(lattice):
 
 def test_statistics_name_the_figure_of_their_own_specimen_only(lattice, tmp_path):
     rows = statistics(lattice)
-    told = [row for row in rows if row.source]
+    compared = [row for row in rows if row.source]
     mine = [one for one in thesis_values().statistics if one.specimen == "5"]
     # sizes in three ways, the rest in two
-    assert len(told) == 2 * len(mine) + sum(one.quantity in SIZES for one in mine)
-    assert {(row.source, row.thesis) for row in told} == {(one.source, one.value) for one in mine}
+    assert len(compared) == 2 * len(mine) + sum(one.quantity in SIZES for one in mine)
+    assert {(row.source, row.thesis) for row in compared} == {
+        (one.source, one.value) for one in mine
+    }
     assert all(np.isnan(row.thesis) and not row.sense for row in rows if not row.source)
     lines = write_statistics(tmp_path / "statistics.csv", rows).read_text().splitlines()
     assert lines[0] == "id,seed,source,quantity,ours,thesis,sense,unit,note"

@@ -1,4 +1,7 @@
-"""The thesis study's runs: states kept whole, a cut run continued, a wrong state refused, every quick form through."""
+"""The runs of the study of the thesis.
+
+States are kept whole, a cut run is continued, a wrong state is refused, every quick form ends.
+"""
 
 import json
 import shutil
@@ -78,16 +81,16 @@ def test_a_state_keeps_spheres_to_a_nanometre_and_the_ending(finished, tmp_path)
 
 def test_a_state_is_examined_as_the_run_was(finished, tmp_path):
     write_state(tmp_path / "a.npz", state_of_run(finished))
-    found = examine("quick-specimen5", read_state(tmp_path / "a.npz"))
+    run = examine("quick-specimen5", read_state(tmp_path / "a.npz"))
     summary = json.loads((finished / "summary.json").read_text())
     assert (
-        (found.thesis.law, found.thesis.damage_law)
+        (run.thesis.law, run.thesis.damage_law)
         == THESIS_PAIR
         == (summary["law"], summary["damage_law"])
     )
-    assert (found.default.law, found.default.damage_law) == DEFAULT_PAIR
-    assert found.thesis.k_damaged == pytest.approx(summary["k_damaged_m2"], rel=1e-5)
-    assert found.thesis.invaded_count == summary["invaded_count"]
+    assert (run.default.law, run.default.damage_law) == DEFAULT_PAIR
+    assert run.thesis.k_damaged == pytest.approx(summary["k_damaged_m2"], rel=1e-5)
+    assert run.thesis.invaded_count == summary["invaded_count"]
 
 
 def test_a_broken_state_is_refused(finished, tmp_path):
@@ -189,7 +192,7 @@ def test_the_plan_names_every_run_once_with_its_seeds():
 
 @pytest.mark.liggghts
 def test_the_quick_study_runs_every_form_to_its_end(binary, tmp_path, capsys):
-    """All quick forms through the command: counts hold, tables and figures are there; redrawing runs nothing."""
+    """The command runs all quick forms and writes tables and figures; redrawing runs nothing."""
     out, runs_folder = tmp_path / "out", tmp_path / "runs"
     command = [
         "study",
@@ -231,7 +234,7 @@ def test_the_quick_study_runs_every_form_to_its_end(binary, tmp_path, capsys):
 
 @pytest.mark.liggghts
 def test_the_growth_of_a_pack_is_kept(binary, tmp_path):
-    """Radii rise from 0.6 to 1 in 30 equal stages; forces are highest when grown, velocities lowest at rest."""
+    """Radii rise from 0.6 to 1 in 30 equal stages; velocities are lowest at rest."""
     case = small().load()
     stages = grow(case, tmp_path / "grown", Launch(binary=binary), count=26)
     write_growth(tmp_path / "growth.npz", stages)

@@ -1,6 +1,7 @@
 """Trends and tables of the thesis on rows made up so that every difference is known.
 
-Student's t at 97.5 %: 12.706 (1 degree of freedom), 4.3027 (2), 2.7764 (4), 2.3060 (8), from any table.
+Student's t at 97.5 % is 12.706 for 1 degree of freedom, 4.3027 for 2, 2.7764 for 4 and 2.3060 for
+8 (any table).
 """
 
 import csv
@@ -107,7 +108,7 @@ def around(mean: float, scatter: float) -> list[float]:
     return [mean + scatter * one for one in SCATTER]
 
 
-def found(
+def comparison(
     comparisons: list[Comparison], *, quantity: str, one: str, other: str = "", laws: str = ""
 ) -> Comparison:
     match = [
@@ -127,7 +128,7 @@ def test_band_of_a_mean():
 
 
 def test_welch_of_equal_spreads_is_students():
-    """Variance 2.5 and five runs each: the error of the difference is 1, of 8 degrees of freedom."""
+    """Variance 2.5 and five runs each give an error of 1 with 8 degrees of freedom."""
     one, other = Sample(values=(3.0, 4.0, 5.0, 6.0, 7.0)), Sample(values=(1.0, 2.0, 3.0, 4.0, 5.0))
     gap = difference(one, other)
     assert (gap.mean, gap.low, gap.high) == pytest.approx((2, 2 - T8, 2 + T8), rel=1e-4)
@@ -139,21 +140,24 @@ def test_welch_against_a_sample_without_scatter_keeps_the_others_freedom():
 
 
 def test_welch_of_unequal_spreads():
-    """Variances of the means 1/3 and 4/3: (5/3)^2 / ((1/3)^2 / 2 + (4/3)^2 / 2) = 50/17 degrees of freedom, t 3.214."""
+    """Variances of the means are 1/3 and 4/3.
+
+    Degrees of freedom are (5/3)^2 / ((1/3)^2 / 2 + (4/3)^2 / 2) = 50/17, and t is 3.214.
+    """
     gap = difference(Sample(values=tuple(around(5, 1))), Sample(values=tuple(around(0, 2))))
     assert gap.half_width == pytest.approx(3.214 * sqrt(5 / 3), rel=2e-3)
 
 
 def test_a_single_run_borrows_the_spread_of_the_quick_form():
-    lent = (1.0, 2.0, 3.0, 4.0, 5.0)
-    single = Sample(values=(9.0,), lent=lent)
+    quick = (1.0, 2.0, 3.0, 4.0, 5.0)
+    single = Sample(values=(9.0,), lent=quick)
     assert (single.spread_of, single.mean) == ("quick form", 9)
     assert band(single).half_width == pytest.approx(T4 * sqrt(2.5), rel=1e-4)
-    assert band(Sample(values=(9.0,), lent=lent, widened=2.0)).half_width == pytest.approx(
+    assert band(Sample(values=(9.0,), lent=quick, widened=2.0)).half_width == pytest.approx(
         2 * T4 * sqrt(2.5), rel=1e-4
     )
-    assert Sample(values=tuple(around(1, 1)), lent=lent).spread_of == "seeds"
-    assert Sample(values=(), lent=lent).spread_of == ""
+    assert Sample(values=tuple(around(1, 1)), lent=quick).spread_of == "seeds"
+    assert Sample(values=(), lent=quick).spread_of == ""
 
 
 def test_what_grows_with_the_specimen_keeps_at_least_its_relative_spread():
@@ -168,7 +172,7 @@ def test_what_grows_with_the_specimen_keeps_at_least_its_relative_spread():
 
 
 @pytest.mark.parametrize(
-    ("sense", "low", "high", "said"),
+    ("sense", "low", "high", "expected"),
     [
         (MORE, 0.1, 2.0, HOLDS),
         (MORE, -0.1, 2.0, UNDECIDED),
@@ -185,19 +189,22 @@ def test_what_grows_with_the_specimen_keeps_at_least_its_relative_spread():
         (MORE, nan, nan, UNDECIDED),
     ],
 )
-def test_verdicts(sense, low, high, said):
-    assert verdict(sense, Band(mean=(low + high) / 2, low=low, high=high), margin=0.5) == said
+def test_verdicts(sense, low, high, expected):
+    assert verdict(sense, Band(mean=(low + high) / 2, low=low, high=high), margin=0.5) == expected
 
 
 def test_finer_fines_go_deeper_when_they_do():
-    """Means 1, 2, 1.1 mm, standard deviation 0.1 over three seeds: 2 - 1 is 1 +- 0.23, 3 - 1 is 0.1 +- 0.23."""
+    """Means 1, 2 and 1.1 mm, standard deviation 0.1 over three seeds.
+
+    The difference 2 - 1 is 1 +- 0.23, and 3 - 1 is 0.1 +- 0.23.
+    """
     rows = [
         *rows_of("specimen1", "mean_depth_mm", around(1, 0.1)),
         *rows_of("specimen2", "mean_depth_mm", around(2, 0.1)),
         *rows_of("specimen3", "mean_depth_mm", around(1.1, 0.1)),
     ]
     result = [one for one in compare_trends(rows) if one.scale == FULL_SCALE]
-    deeper = found(result, quantity="mean depth", one="specimen2", other="specimen1")
+    deeper = comparison(result, quantity="mean depth", one="specimen2", other="specimen1")
     assert deeper.difference == pytest.approx(1)
     assert deeper.high - deeper.difference == pytest.approx(T4 * sqrt(2 * 0.01 / 3), rel=1e-4)
     assert (deeper.verdict, deeper.runs_one, deeper.runs_other, deeper.spread) == (
@@ -207,32 +214,38 @@ def test_finer_fines_go_deeper_when_they_do():
         "seeds",
     )
     assert (
-        found(result, quantity="mean depth", one="specimen3", other="specimen2").verdict == FAILS
+        comparison(result, quantity="mean depth", one="specimen3", other="specimen2").verdict
+        == FAILS
     )
     assert (
-        found(result, quantity="mean depth", one="specimen3", other="specimen1").verdict
+        comparison(result, quantity="mean depth", one="specimen3", other="specimen1").verdict
         == UNDECIDED
     )
-    missing = found(result, quantity="mean depth", one="specimen5", other="specimen4")
+    missing = comparison(result, quantity="mean depth", one="specimen5", other="specimen4")
     assert (missing.verdict, missing.runs_one) == (UNDECIDED, 0)
     assert missing.note == "no run of specimen5; no run of specimen4"
 
 
 def test_a_full_scale_difference_of_single_runs_is_taken_as_it_is():
     rows = [row("specimen2", mean_depth_mm=2.0), row("specimen3", mean_depth_mm=5.0)]
-    alone = found(compare_trends(rows), quantity="mean depth", one="specimen3", other="specimen2")
+    alone = comparison(
+        compare_trends(rows), quantity="mean depth", one="specimen3", other="specimen2"
+    )
     assert (alone.difference, alone.verdict, alone.spread) == (3, UNDECIDED, "")
     for name in ("quick-specimen2", "quick-specimen3"):
         rows += rows_of(name, "mean_depth_mm", around(4, 0.5))
     result = compare_trends(rows)
-    lent = found(result, quantity="mean depth", one="specimen3", other="specimen2")
-    # specimen 3 is deeper than its quick form: its spread is widened by 5 / 4; variances of single runs, not of means
+    borrowed = comparison(result, quantity="mean depth", one="specimen3", other="specimen2")
+    # Specimen 3 is deeper than its quick form, so its spread is widened by 5 / 4.
+    # The variances are those of single runs, not of means.
     error = sqrt(0.25 * (1 + (5 / 4) ** 2))
     freedom = (1 + (5 / 4) ** 2) ** 2 / ((1 + (5 / 4) ** 4) / 2)
     assert 3 < freedom < 4
-    assert 2.776 * error < (lent.high - lent.low) / 2 < 3.182 * error
-    assert (lent.difference, lent.spread) == (3, "quick form")
-    quick = found(result, quantity="mean depth", one="quick-specimen3", other="quick-specimen2")
+    assert 2.776 * error < (borrowed.high - borrowed.low) / 2 < 3.182 * error
+    assert (borrowed.difference, borrowed.spread) == (3, "quick form")
+    quick = comparison(
+        result, quantity="mean depth", one="quick-specimen3", other="quick-specimen2"
+    )
     assert (quick.scale, quick.difference, quick.verdict) == (QUICK_FORMS, 0, UNDECIDED)
 
 
@@ -259,13 +272,13 @@ def test_alike_is_within_a_fifth_of_the_larger():
     for run, loss in (("specimen2", 0.050), ("specimen3", 0.045), ("specimen7", 0.035)):
         rows += rows_of(run, "porosity_damaged", around(0.30 - loss, 1e-4))
     result = [one for one in compare_trends(rows) if one.scale == FULL_SCALE]
-    alike = found(result, quantity="porosity loss", one="specimen2", other="specimen3")
+    alike = comparison(result, quantity="porosity loss", one="specimen2", other="specimen3")
     assert (alike.margin, alike.difference, alike.verdict) == (
         pytest.approx(1.0),
         pytest.approx(0.5),
         HOLDS,
     )
-    apart = found(result, quantity="porosity loss", one="specimen2", other="specimen7")
+    apart = comparison(result, quantity="porosity loss", one="specimen2", other="specimen7")
     assert (apart.difference, apart.verdict) == (pytest.approx(1.5), FAILS)
 
 
@@ -293,7 +306,7 @@ def test_permeability_is_judged_under_each_pair_of_laws():
     result = compare_trends(rows)
     asked = {"quantity": "k reduction in the first mm", "one": "specimen2", "other": "specimen1"}
     by_thesis, by_default = (
-        found(result, **asked, laws=laws[0]) for laws in (THESIS_PAIR, DEFAULT_PAIR)
+        comparison(result, **asked, laws=laws[0]) for laws in (THESIS_PAIR, DEFAULT_PAIR)
     )
     assert (by_thesis.verdict, by_thesis.difference) == (HOLDS, pytest.approx(10))
     assert (by_default.verdict, by_default.difference) == (FAILS, pytest.approx(-10))
@@ -326,7 +339,7 @@ def scan(run: str, slope: float, seeds: int = 3) -> list[ResultRow]:
 
 
 def test_drag_response_keeps_to_each_pack():
-    """Depths of the seeds are 1, 2, 3 mm apart, the slopes 0.49, 0.50, 0.51: only the slopes count."""
+    """Depths of the seeds are 1, 2, 3 mm apart, slopes 0.49, 0.50, 0.51; only slopes count."""
     rows = [
         *scan("quick-specimen5", 0.5),
         *scan("quick-specimen7", -0.5),
@@ -340,13 +353,13 @@ def test_drag_response_keeps_to_each_pack():
         (QUICK_FORMS, "quick-specimen5"),
         (QUICK_FORMS, "quick-specimen7"),
     }
-    slope = found(result, quantity="mean depth per decade of drag", one="quick-specimen5")
+    slope = comparison(result, quantity="mean depth per decade of drag", one="quick-specimen5")
     assert (slope.difference, slope.runs_one, slope.verdict) == (pytest.approx(0.5), 3, HOLDS)
     assert slope.high - slope.difference == pytest.approx(T2 * 0.01 / sqrt(3), rel=1e-3)
     rank = "rank correlation of mean depth with drag"
-    assert found(result, quantity=rank, one="quick-specimen5").difference == pytest.approx(1)
-    assert found(result, quantity=rank, one="quick-specimen7").verdict == FAILS
-    still = found(result, quantity="depth of 95 % per decade of drag", one="quick-specimen5")
+    assert comparison(result, quantity=rank, one="quick-specimen5").difference == pytest.approx(1)
+    assert comparison(result, quantity=rank, one="quick-specimen7").verdict == FAILS
+    still = comparison(result, quantity="depth of 95 % per decade of drag", one="quick-specimen5")
     assert (still.difference, still.verdict) == (pytest.approx(0, abs=1e-12), UNDECIDED)
 
 
@@ -356,21 +369,24 @@ def test_notes_tell_what_weakens_a_comparison(tmp_path):
         row("specimen6", stop_reason="supply_exhausted", invaded_count=900, passed_count=100),
     ]
     result = compare_trends(rows)
-    note = found(result, quantity="mean depth", one="specimen6", other="specimen5").note
+    note = comparison(result, quantity="mean depth", one="specimen6", other="specimen5").note
     assert note == (
-        "specimen6 ended by supply_exhausted; 10% of the fines passed through specimen6, so they went deeper still"
+        "specimen6 ended by supply_exhausted; "
+        "10% of the fines passed through specimen6, so they went deeper still"
     )
-    assert found(
+    assert comparison(
         result, quantity="porosity loss", one="specimen5", other="specimen6"
     ).note.startswith("specimen6 end")
     assert (
         "passed"
-        not in found(result, quantity="porosity loss", one="specimen5", other="specimen6").note
+        not in comparison(
+            result, quantity="porosity loss", one="specimen5", other="specimen6"
+        ).note
     )
-    told = caveats(result)
-    assert "no run of specimen1" in told
-    assert len(told) == len(set(told))
-    assert not any("quick" in one for one in told)
+    remarks = caveats(result)
+    assert "no run of specimen1" in remarks
+    assert len(remarks) == len(set(remarks))
+    assert not any("quick" in one for one in remarks)
     lines = list(csv.DictReader(write_trends(tmp_path / "trends.csv", result).open()))
     assert len(lines) == len(result)
     assert {one["trend"] for one in lines} == set("123456")
@@ -398,7 +414,7 @@ def test_the_table_of_trends_tells_the_numbers():
 
 def test_verdict_of_several():
     result = compare_trends(rows_of("specimen1", "mean_depth_mm", around(1, 0.1)))
-    one = found(result, quantity="mean depth", one="specimen2", other="specimen1")
+    one = comparison(result, quantity="mean depth", one="specimen2", other="specimen1")
     made = {
         name: {**_fields(one), "verdict": name, "runs_one": 3}
         for name in (HOLDS, FAILS, UNDECIDED)

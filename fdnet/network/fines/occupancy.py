@@ -83,6 +83,16 @@ def measure_occupancy(
     Raises:
         CaseError: `overlap` is unknown.
         NetworkError: a fine is wider than a periodic side.
+
+    Examples:
+        >>> import fdnet, numpy as np
+        >>> lattice = 1e-3 * (np.indices((3, 3, 3)).reshape(3, -1).T + 0.5)
+        >>> grains = fdnet.Snapshot.from_arrays(lattice, 0.5e-3)
+        >>> network = fdnet.build_network(grains, periodic="yz")
+        >>> fine = fdnet.Snapshot.from_arrays([[1e-3] * 3], 5e-5, box=grains.box, kind="fine")
+        >>> occupancy = fdnet.measure_occupancy(network, fine)
+        >>> print(f"{1e18 * occupancy.pore_solid_volume.sum():.0f} um3 of fines in the pores")
+        523599 um3 of fines in the pores
     """
     if isinstance(overlap, str) and overlap not in OVERLAPS:
         raise CaseError(

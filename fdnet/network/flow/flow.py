@@ -33,8 +33,8 @@ class Flow:
     `pore_pressure` (P,) 1 at the inlet plane, 0 at the outlet plane, NaN where cut off; `throat_flux` (T,) m3 from
     the first to the second pore; `inflow` m3 = Q mu / dp; `residual` sum of the pores' imbalances over the inflow
     (a bound for the inflow's relative error);
-    `mass_balance` |in - out| / in, None without flow (x periodic: the flux across the period against the
-    energy spent, which is flux times the drop of 1);
+    `mass_balance` difference of inflow and outflow over the inflow, None without flow (x periodic:
+    the flux across the period against the energy spent, which is flux times the drop of 1);
     `isolated_pores` not tied to both planes; `reason` why the inflow is 0, else empty.
     """
 
@@ -71,10 +71,31 @@ class Links:
 def solve_flow(
     network: Network, conductance: Array, *, span: tuple[float, float] | None = None
 ) -> Flow:
-    """Flow for throat `conductance` (T,) m3, through the whole box or the cut-out slab `span` = (low, high) m.
+    """Steady flow along x through the network, by the mass balance of each pore.
 
-    No open path is not an error: inflow 0 with its reason. Raises FlowError on a conductance that is negative or not
-    finite, and when residual, mass balance or pressure bounds are off by more than 1e-6.
+    Args:
+        network: the pores and throats.
+        conductance: (T,) conductance of each throat, m3 (flux times viscosity over pressure drop).
+        span: bounds (low, high) of a slab that is cut out and solved alone, m; the whole box
+            without it.
+
+    Returns:
+        Pressures over the pressure drop and fluxes (m3). No open path is no error: the inflow is 0
+        and `reason` says why.
+
+    Raises:
+        FlowError: a conductance is negative or not finite, or the residual, the mass balance or the
+            bounds of the pressure are off by more than 1e-6.
+
+    Examples:
+        >>> import fdnet, numpy as np
+        >>> lattice = 1e-3 * (np.indices((3, 3, 3)).reshape(3, -1).T + 0.5)
+        >>> grains = fdnet.Snapshot.from_arrays(lattice, 0.5e-3)
+        >>> network = fdnet.build_network(grains, periodic="yz")
+        >>> flow = fdnet.solve_flow(network, fdnet.LAWS["lubrication"](network))
+        >>> length, area = 3e-3, 9e-6
+        >>> print(f"k = {flow.inflow * length / area:.2g} m2")
+        k = 2.5e-09 m2
     """
     _check(conductance, len(network.throat_pores))
     conductance = conductance * network.throat_share

@@ -26,7 +26,13 @@ LAWS: Mapping[str, Law] = {
     "series": series_law,
     "lubrication": lubrication_law,
 }
-"""Conductance laws of clean throats: functions of a Network that return conductances (T,) m3."""
+"""Conductance laws of clean throats by name: functions of a network that return (T,) m3.
+
+Examples:
+    >>> import fdnet
+    >>> sorted(fdnet.LAWS)
+    ['effective', 'hydraulic', 'lubrication', 'series', 'thesis']
+"""
 
 _THESIS_THRESHOLDS = {"thesis": TEXT_THRESHOLD, "thesis-code": CODE_THRESHOLD}
 
@@ -36,7 +42,13 @@ DAMAGE_LAWS: Mapping[str, DamageLaw] = {
     "kozeny": kozeny_damage,
     "side-kozeny": side_kozeny_damage,
 }
-"""Laws that lower the clean conductance of throats with fines, with their own options."""
+"""Damage laws by name: functions that lower the clean conductance (T,) m3 of throats with fines.
+
+Examples:
+    >>> import fdnet
+    >>> sorted(fdnet.DAMAGE_LAWS)
+    ['kozeny', 'side-kozeny', 'thesis', 'thesis-code']
+"""
 
 
 def damage_law(

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from fdnet.case.file import case_from
-from fdnet.dem.liggghts import Launch, find_binary
+from fdnet.dem.binary import find_binary
+from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
 from fdnet.network.flow.flow import Flow
 from fdnet.network.flow.slabs import plane_pressures, slab_permeability, whole_permeability

@@ -12,10 +12,11 @@ import numpy as np
 from fdnet.atomic import write_text
 from fdnet.case.case import Case, InvasionCase, with_fines
 from fdnet.case.file import case_from, set_keys
+from fdnet.dem.binary import Binary, find_binary
 from fdnet.dem.checkpoint import HISTORY, HISTORY_HEADER, state_at
 from fdnet.dem.invade_deck import write_invade_inputs
 from fdnet.dem.invasion import Invasion, invade
-from fdnet.dem.liggghts import Binary, Launch, Run, find_binary, run_deck
+from fdnet.dem.liggghts import Launch, Run, run_deck
 from fdnet.dem.packing import make_pack
 from fdnet.dem.scene import box_of, snapshot_of
 from fdnet.network.permeability import analyse

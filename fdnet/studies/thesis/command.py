@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fdnet.dem.liggghts import Launch, find_binary
+from fdnet.dem.binary import find_binary
+from fdnet.dem.liggghts import Launch
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.studies.thesis.collection import collect
 from fdnet.studies.thesis.compare.trend_table import trends_table

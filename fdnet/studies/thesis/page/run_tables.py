@@ -101,7 +101,6 @@ def _overview_line(rows: Rows, run: str) -> list[str]:
 def _diameter(run: str) -> str:
     """Diameter of the case's fines in mm."""
     fines = Planned(case=run, group="").load().fines
-    assert fines is not None
     return "–".join(f"{2e3 * radius:.3g}" for radius in sorted(set(fines.radius_range_m)))
 
 

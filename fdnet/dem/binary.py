@@ -1,0 +1,104 @@
+"""The LIGGGHTS binary: where it is, which version it has, and how it is called."""
+
+import os
+import re
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+from fdnet.errors import LiggghtsError
+
+KNOWN_VERSION = "3.8.0"
+"""The version that fdnet was measured and tested with."""
+LOG = "log.liggghts"
+_PROJECT = Path(__file__).resolve().parents[2]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Binary:
+    """A LIGGGHTS that answers.
+
+    Attributes:
+        path: of the binary.
+        version: as it prints it.
+        launcher: the mpirun that belongs to it; None: one rank only.
+    """
+
+    path: Path
+    version: str
+    launcher: Path | None
+
+    def command(self, deck: str, ranks: int) -> list[str]:
+        """The command line for a deck in the current folder.
+
+        Raises LiggghtsError for several ranks without a launcher.
+        """
+        base = [str(self.path), "-in", deck, "-log", LOG]
+        stdbuf = shutil.which("stdbuf")
+        if ranks == 1:
+            return ([stdbuf, "-oL"] if stdbuf else []) + base
+        if self.launcher is None:
+            raise LiggghtsError(
+                f"--np {ranks}: no mpirun next to {self.path} or on PATH; install openmpi-bin or "
+                "use --np 1"
+            )
+        return [
+            str(self.launcher),
+            "--allow-run-as-root",
+            "--oversubscribe",
+            "-np",
+            str(ranks),
+            *base,
+        ]
+
+
+def find_binary(option: str | None = None) -> Binary:
+    """LIGGGHTS from `option`, $FDNET_LIGGGHTS, PATH or the project's .prefix, in that order.
+
+    Raises LiggghtsError when there is none, or when it does not answer like LIGGGHTS.
+    """
+    given = option or os.environ.get("FDNET_LIGGGHTS")
+    places = [given] if given else ["liggghts", str(_PROJECT / ".prefix" / "bin" / "liggghts")]
+    hit = next(filter(None, map(shutil.which, places)), None)
+    if hit is None:
+        raise LiggghtsError(
+            f"LIGGGHTS not found (looked for {', '.join(places)}); run scripts/setup.sh, install "
+            "the Debian package liggghts, or give its path with --liggghts"
+        )
+    path = Path(hit).absolute()
+    return Binary(path=path, version=_version(path), launcher=_launcher(path))
+
+
+def _launcher(binary: Path) -> Path | None:
+    """The mpirun in the folder of the binary, which was built with it, or one on PATH."""
+    own = binary.parent / "mpirun"
+    if own.exists():
+        return own
+    hit = shutil.which("mpirun") or shutil.which("orterun")
+    return Path(hit) if hit else None
+
+
+def _version(path: Path) -> str:
+    try:
+        answer = subprocess.run(
+            [str(path), "-h", "-log", "none"],
+            capture_output=True,
+            timeout=60,
+            check=False,
+            stdin=subprocess.DEVNULL,
+            cwd="/tmp",
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise LiggghtsError(
+            f"{path}: cannot be started: {error}; check the file or run scripts/setup.sh"
+        ) from error
+    text = (answer.stdout + answer.stderr).decode("utf-8", "replace")
+    match = re.search(r"Version LIGGGHTS[-A-Z]*\s+([0-9.]+)", text)
+    if not match:
+        first = text.strip().splitlines()[:1]
+        raise LiggghtsError(
+            f"{path}: does not answer like LIGGGHTS (exit {answer.returncode}, {first}); expected "
+            f"version {KNOWN_VERSION}, run scripts/setup.sh"
+        )
+    return match.group(1)
