@@ -34,8 +34,8 @@ class Flow:
     `pore_pressure` (P,) 1 at the inlet plane, 0 at the outlet plane, NaN where cut off; `throat_flux` (T,) m3 from
     the first to the second pore; `inflow` m3 = Q mu / dp; `residual` sum of the pores' imbalances over the inflow
     (a bound for the inflow's relative error);
-    `mass_balance` |in - out| / in, None without flow (x periodic: the flux across the period against the
-    energy spent, which is flux times the drop of 1);
+    `mass_balance` difference of inflow and outflow over the inflow, None without flow (x periodic:
+    the flux across the period against the energy spent, which is flux times the drop of 1);
     `isolated_pores` not tied to both planes; `reason` why the inflow is 0, else empty.
     """
 
