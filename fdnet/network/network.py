@@ -95,6 +95,14 @@ class Network:
     counts: Mapping[str, int]
     walls: str = "slip"
 
+    def __repr__(self) -> str:
+        size = " x ".join(f"{1e3 * side:.4g}" for side in np.ptp(self.box, axis=1))
+        sides = "".join(axis for axis, on in zip("xyz", self.periodic, strict=True) if on)
+        return (
+            f"Network({len(self.pore_radius)} pores, {len(self.throat_radius)} throats, "
+            f"box {size} mm, periodic {sides or 'nowhere'}, walls {self.walls})"
+        )
+
     @property
     def pore_grains(self) -> Array:
         """Indices (P, 4) of the grains at the corners."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from fdnet.network import geometry
 from fdnet.network.compiled import compiled
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
 GAUSS_POINTS = 10
@@ -31,6 +32,8 @@ class Pairs:
     depth: Array
     tube: Array
     length: Array
+
+    __repr__ = one_line
 
     def where(self, mask: Array) -> "Pairs":
         """The pairs for which `mask` (K,) is true."""

@@ -6,6 +6,7 @@ from typing import Protocol
 
 from fdnet.network.fines.occupancy import Occupancy
 from fdnet.network.network import Network
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
 CLEAN, DEPOSITION, CLOGGING, BLOCKED, KOZENY = (
@@ -30,6 +31,8 @@ class Damage:
     conductance: Array
     law_used: Array
     counts: Mapping[str, int]
+
+    __repr__ = one_line
 
 
 class DamageLaw(Protocol):

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fdnet.errors import NetworkError
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.images import neighbour_tree
 from fdnet.spheres.snapshot import Array, Snapshot
 
@@ -39,6 +40,8 @@ class PlacedGrains:
     periodic: tuple[bool, bool, bool]
     scale: float
     beyond: int
+
+    __repr__ = one_line
 
 
 def place_grains(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> PlacedGrains:
