@@ -17,6 +17,7 @@ from fdnet.errors import FlowError
 from fdnet.network.flow.stiff import Balance, balance_links
 from fdnet.network.flow.winding import winding_groups
 from fdnet.network.network import Network
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, frozen
 
 TOLERANCE = 1e-6
@@ -47,6 +48,8 @@ class Flow:
     isolated_pores: int
     reason: str
 
+    __repr__ = one_line
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Links:
@@ -61,6 +64,8 @@ class Links:
     ends: Array
     conductance: Array
     throat: Array
+
+    __repr__ = one_line
 
     def where(self, kept: Array) -> "Links":
         return Links(
