@@ -13,8 +13,13 @@ from fdnet.case.analysis import AnalysisChoices, AnalysisKeys
 from fdnet.network.analysis import Analysis
 from fdnet.network.fines.occupancy import Occupancy
 from fdnet.network.flow.flow import Flow
-from fdnet.network.flow.sections import Section, SlabK, make_profile, make_sections, reduction
-from fdnet.network.flow.slabs import inplace_permeability, slab_permeability, whole_permeability
+from fdnet.network.flow.sections import Section, make_profile, make_sections, reduction
+from fdnet.network.flow.slabs import (
+    SlabK,
+    inplace_permeability,
+    slab_permeability,
+    whole_permeability,
+)
 from fdnet.network.laws.damage import CLEAN, Damage
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS, damage_law
 from fdnet.network.network import Network
