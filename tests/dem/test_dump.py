@@ -63,7 +63,7 @@ def test_empty_frame():
         ("ITEM: TIMESTEP\n12\nITEM: NUMBER OF", "the file ends in the middle of a line"),
         ("ITEM: TIMESTEP\n12\n", "the file ends before ITEM: NUMBER OF ATOMS"),
         ("ITEM: TIMESTEP\nx\nITEM: NUMBER OF ATOMS\n", "step is b'x'"),
-        ("hello\n", "found b'hello', expected 'ITEM: TIMESTEP'"),
+        ("hello\n", "b'hello', expected 'ITEM: TIMESTEP'"),
         (frame(0, ["1 1 1 "]).replace("0 2", "0"), "box bounds b'0', expected two numbers"),
         (
             frame(0, ["1 1 1 "]).replace("\n1\nITEM: BOX", "\n-4\nITEM: BOX"),
@@ -85,7 +85,7 @@ def test_missing_file_and_wrong_number_of_frames(tmp_path: Path):
 
 
 def test_missing_column():
-    with pytest.raises(DumpError, match="no column radius, found id type x"):
+    with pytest.raises(DumpError, match="no column radius among id type x"):
         parse(frame(0, ["1 1 1 "]))[0].column("radius")
 
 
