@@ -27,7 +27,6 @@ from fdnet.studies.truth.cases import (
     LOOSE_SOLIDS,
     all_grains,
     read_cases,
-    turned,
 )
 from fdnet.studies.truth.packs import DATA
 from tests.network.packs import face_centred
@@ -64,7 +63,7 @@ def test_loose_lattices_have_their_volume_fraction(cases):
 
 def test_turned_packs_have_the_axis_as_x(cases):
     pack = cases["C_r5_d2"].pack
-    rotated = turned(pack, 1)
+    rotated = pack.turned("y")
     assert np.array_equal(rotated.position[:, 0], pack.position[:, 1])
     assert np.ptp(rotated.box, axis=1) == pytest.approx(np.roll(np.ptp(pack.box, axis=1), -1))
     # turned, not mirrored: the signed volume of four spheres stays

@@ -12,6 +12,7 @@ from fdnet.network.fines.invaded import Invaded, measure_invaded
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.flow.sections import profile_edges, section_edges
 from fdnet.network.network import Network, build_network
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.porosity import Porosity, measure_porosity
 from fdnet.spheres.snapshot import Array, Snapshot
 
@@ -44,6 +45,8 @@ class Specimen:
     porosity: tuple[Porosity, Porosity]
     depth: Array
     invaded: Invaded
+
+    __repr__ = one_line
 
 
 def measure_specimen(

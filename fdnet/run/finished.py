@@ -45,22 +45,22 @@ class FinishedRun:
 
     @cached_property
     def sections(self) -> "pd.DataFrame":
-        """One row for each slab along the flow: edges (m), porosities, permeabilities (m2), fines."""
+        """One row for each slab along the flow, with edges (m), porosities, k (m2) and fines."""
         return self._table("sections", len(self.summary["sections"]))
 
     @cached_property
     def profile(self) -> "pd.DataFrame":
-        """One row for each bin of depth: edges (m), porosities, share of the invaded fines."""
+        """One row for each bin of depth, with edges (m), porosities, share of the invaded fines."""
         return self._table("profile", None)
 
     @cached_property
     def pores(self) -> "pd.DataFrame":
-        """One row for each pore: centre (m), radius (m), volume (m3), fines, pressures."""
+        """One row for each pore, with centre (m), radius (m), volume (m3), fines, pressures."""
         return self._table("pores", self.summary["pores"])
 
     @cached_property
     def throats(self) -> "pd.DataFrame":
-        """One row for each throat: its pores, radius (m), conductances and fluxes (m3), law used."""
+        """One row for each throat, with pores, radius (m), conductances and fluxes (m3), law."""
         return self._table("throats", self.summary["throats"])
 
     @cached_property

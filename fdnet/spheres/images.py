@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
 INSIDE, MIRROR_LOW, MIRROR_HIGH, ON_FACE = 0, 1, 2, 3
@@ -22,6 +23,8 @@ class Images:
     position: Array
     shift: Array
     mirror: Array
+
+    __repr__ = one_line
 
 
 def wrapped(position: Array, box: Array, periodic: tuple[bool, ...]) -> Array:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.errors import CaseError
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
 LATTICES = 8
@@ -33,6 +34,8 @@ class Porosity:
     edges: Array
     profile: Array
     sum: float
+
+    __repr__ = one_line
 
 
 def measure_porosity(

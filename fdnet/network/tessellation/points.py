@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.network.tessellation.placed_grains import ON_FACE_TOLERANCE
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.images import label, make_images, packed_shift
 from fdnet.spheres.snapshot import Array, Snapshot
 
@@ -47,6 +48,8 @@ class Points:
     scaled: Array
     name: Array
     key: Array
+
+    __repr__ = one_line
 
 
 def make_points(grains: Snapshot, *, periodic: tuple[bool, ...], margin: Array) -> Points:

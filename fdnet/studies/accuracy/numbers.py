@@ -167,9 +167,12 @@ def _walls(validation: Path) -> dict[str, str]:
     truth = read_named(validation / "wall_truth.csv")
     wide = [row for row in walled if float(row["width_diameters"]) > 0.9 * FAR]
     excess = {
-        kind: [(float(row[f"k_over_inner_{kind}"]) - 1) * float(row["width_diameters"]) for row in wide]
+        kind: [
+            (float(row[f"k_over_inner_{kind}"]) - 1) * float(row["width_diameters"])
+            for row in wide
+        ]
         for kind in ("slip", "no_slip")
-    }  # fmt: skip
+    }
     return {
         "walled_porosity": f"{float(walled[0]['porosity']):.2f}",
         "inner_kozeny": f"{float(walled[-1]['inner_over_carman_kozeny']):.2f}",

@@ -8,7 +8,7 @@ from fdnet.studies.engine.bands import ROUNDING, Band
 
 NONE = "–"
 WIDTH = 99
-_UNBREAKABLE = re.compile(r"!?\[[^\]]*\]\([^)]*\)\S*|\S*`[^`]*`\S*|\S+")
+_UNBREAKABLE = re.compile(r"!?\[[^\]]*\]\([^)]*\)\S*|(?:[^\s`]*`[^`]*`)+[^\s`]*|\S+")
 _MARKER = re.compile(r"(\s*)([-*+]|\d+\.)\s+")
 _STARTS_BLOCK = re.compile(r"([-*+=#]+|\d+[.)])$|[|><]")
 _FENCES = ("```", "$$", ":::")

@@ -12,6 +12,8 @@ from fdnet.studies.engine.draw import draw_study
 from fdnet.studies.engine.markdown import bullets, markdown_table, wrapped
 from fdnet.studies.engine.study import Row, Study
 from fdnet.studies.engine.table import knee_lines, missing_lines, read_rows, study_text
+from fdnet.studies.pages.invasion_numbers import invasion_numbers
+from fdnet.studies.pages.network_numbers import network_numbers
 
 
 def document(docs: Path) -> str:
@@ -27,6 +29,7 @@ def document(docs: Path) -> str:
         )
         for name in STUDIES
     }
+    parts |= invasion_numbers(validation) | network_numbers(validation)
     parts["stability_table"] = stability_table(validation / "stability.csv")
     template = Template((docs / "validation.md.in").read_text(encoding="utf-8"))
     return wrapped(template.substitute(parts))

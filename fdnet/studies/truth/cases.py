@@ -87,7 +87,7 @@ def _stored(row: dict[str, str], folders: list[Path]) -> Case | None:
     )
     if path is None:
         return None
-    pack = turned(read_pack(path)[0], "xyz".index(row["axis"]))
+    pack = read_pack(path)[0].turned(row["axis"])
     lattice = path.stem.startswith("lattice_")
     name = row["case"] if lattice else path.stem.removeprefix("pack")
     spread = np.ptp(pack.grains().radius) > 1e-3 * pack.grains().radius.mean()
@@ -123,12 +123,6 @@ def simple_cubic(solid: float, repeat: int = 3) -> Snapshot:
     return snapshot(
         place * edge, np.full(repeat**3, RADIUS), repeat * edge, np.full(repeat**3, Kind.GRAIN)
     )
-
-
-def turned(pack: Snapshot, axis: int) -> Snapshot:
-    """The pack rotated so that `axis` (0, 1 or 2) becomes x."""
-    order = np.roll(np.arange(3), -axis)
-    return replace(pack, position=pack.position[:, order], box=pack.box[order])
 
 
 def all_grains(pack: Snapshot) -> Snapshot:

@@ -1,0 +1,283 @@
+"""The numbers in the prose on the studies of the network, each from the table of its study."""
+
+import math
+import re
+from collections.abc import Iterable
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from fdnet.network.laws.named import DEFAULT_LAW
+from fdnet.studies.accuracy.measurement import DEFAULT, PAIRS, RESOLVED
+from fdnet.studies.engine.csv_rows import read_named
+from fdnet.studies.engine.study import DONE
+from fdnet.studies.network import laws, linear_solver, solver_peers, throat_occupancy
+from fdnet.studies.pages.lookup import (
+    Lookup,
+    between,
+    lookup,
+    percent,
+    percents,
+    rounded_up,
+    significant,
+)
+from fdnet.studies.truth.cases import LOOSE
+
+TUBES = tuple(f"a/r = {ratio:g}" for ratio in throat_occupancy.RATIOS)
+WHERE = ("inside", "ends")
+FEW_PORES = linear_solver.SMALL
+OWN_SERIES = re.compile(rf"{solver_peers.FDNET}, \d")
+
+
+def network_numbers(validation: Path) -> dict[str, str]:
+    """Every number by its name in docs/validation.md.in."""
+    return {
+        **_throat_occupancy(lookup(validation, "throat-occupancy"), validation),
+        **_laws(lookup(validation, "laws"), validation),
+        **_linear_solver(lookup(validation, "linear-solver")),
+    }
+
+
+def _throat_occupancy(table: Lookup, validation: Path) -> dict[str, str]:
+    planes, own = throat_occupancy.TWO_PLANE, 10.0
+    (fifth, tenth, clogging), files = throat_occupancy.PACKS, [*throat_occupancy.PACKS.values()]
+    worst = {
+        n: [table.error(tube, f"largest, {where}", n) for tube in TUBES for where in WHERE]
+        for n in (4.0, 8.0, 10.0, 16.0)
+    }
+    doubling = [
+        few / many
+        for low, high in ((4.0, 8.0), (8.0, 16.0))
+        for few, many in zip(worst[low], worst[high], strict=True)
+    ]
+    volumes = [
+        table.cost(tube, "largest, inside", own) / table.cost(planes, "largest, inside", ratio)
+        for tube, ratio in zip(TUBES, throat_occupancy.RATIOS, strict=True)
+    ]
+    k = {name: table.levels(name, "k/k0, thesis") for name in throat_occupancy.PACKS}
+    cost = {name: {level.value: level.cost for level in k[name]} for name in k}
+    two_planes = table.levels(planes, "largest, inside")
+    thesis = {
+        row["case"]: float(row[PAIRS[0]]) for row in read_named(validation / "accuracy_damage.csv")
+    }
+    exact = _exact_of(table, clogging)
+    return {
+        "doubling": f"{math.floor(min(doubling) / 100) * 100:.0f}",
+        "ten_points": significant(max(worst[own])),
+        "ten_points_k": significant(
+            max(table.level(name, "k/k0, thesis", own).size for name in k), 1
+        ),
+        "six_points_k": significant(
+            max(table.level(name, "k/k0, thesis", 6.0).size for name in k), 1
+        ),
+        "six_points_save": percents(1 - cost[name][6.0] / cost[name][own] for name in cost),
+        "planes_worst": between((100 * level.size for level in two_planes), 2),
+        "planes_low": f"{100 * table.level(planes, 'bias of the sum, inside', 0.05).size:.2f}",
+        "planes_low_large": percent(table.error(planes, "bias of the sum, inside", 1.0)),
+        "planes_gain": between(volumes),
+        "planes_save": percents(1 - cost[name][planes] / cost[name][own] for name in cost),
+        "planes_k": percents(table.error(name, "k/k0, thesis", planes) for name in (fifth, tenth)),
+        "thesis_k": between(thesis[file.removeprefix("pack")] for file in files[:2]),
+        "planes_clogged": f"{table.observed(clogging, 'throats below 0.40', planes):.0f}",
+        "exact_clogged": f"{exact['throats below 0.40']:.0f}",
+        "planes_clogged_k": f"{table.observed(clogging, 'k/k0, thesis', planes):.3f}",
+        "exact_clogged_k": f"{exact['k/k0, thesis']:.3f}",
+    }
+
+
+def _exact_of(table: Lookup, pack: str) -> dict[str, float]:
+    """What exact volumes give in a pack, from what ten points give and their error."""
+    values = {}
+    for name in ("throats below 0.40", "k/k0, thesis"):
+        (row,) = table.runs(pack, name, 10.0)
+        values[name] = row.observed / (1.0 + row.error)
+    return values
+
+
+def _laws(table: Lookup, validation: Path) -> dict[str, str]:
+    intact, damaged = (f"{pack}: networks" for pack in (laws.INTACT, laws.DAMAGED))
+    one, two = laws.GRID, laws.TWO_GRIDS
+    times = [level.cost for level in table.levels(intact, "k")]
+    errors = [level.size for level in table.levels(intact, "k")]
+    own = table.cost(intact, "k", DEFAULT_LAW)
+    with_fines = table.cost(damaged, "k", DEFAULT)
+    fifth, tenth = laws.FINES["_r5_"], laws.FINES["_r10_"]
+    size = laws.SIZE.format("k/k0")
+    thesis = [
+        1 + row.error
+        for name in PAIRS[:2]
+        for series in (fifth, tenth)
+        for row in table.runs(series, "k/k0", name)
+    ]
+    cost = {level.value: level.cost for level in table.levels(fifth, size)}
+    groups = laws.GROUPS[:3]
+    left = [table.error(group, laws.SIZE.format("k"), DEFAULT_LAW) for group in groups]
+    loose = [row.error for row in table.runs(LOOSE, "k", DEFAULT_LAW)]
+
+    def grid(pack: str, series: str, cells: float, network: float) -> tuple[str, str]:
+        level = table.level(f"{pack}: {series}", "k", cells)
+        return percent(level.error, 0 if level.size > 0.02 else 1), significant(
+            level.cost / network
+        )
+
+    numbers = {
+        "law_times": f"{max(times) / min(times):.1f}",
+        "law_errors": f"{max(errors) / min(errors):.0f}",
+        "law_left": percents(left, 1),
+        "law_loose": percent(max(map(abs, loose))),
+        "thesis_damage": between(thesis),
+        "side_kozeny": percents(table.error(series, size, DEFAULT) for series in (fifth, tenth)),
+        "resolved_times": f"{cost[RESOLVED] / cost[DEFAULT]:.0f}",
+        "resolved_error": _tenths(table, fifth, size, RESOLVED),
+        "kozeny_error": _tenths(table, fifth, size, DEFAULT),
+    }
+    for name, (pack, series, cells, network) in {
+        "one_64": (laws.INTACT, one, 64.0, own),
+        "two_48": (laws.INTACT, two, 48.0, own),
+        "two_72": (laws.INTACT, two, 72.0, own),
+        "fines_64": (laws.DAMAGED, one, 64.0, with_fines),
+        "fines_72": (laws.DAMAGED, two, 72.0, with_fines),
+    }.items():
+        numbers[f"{name}_error"], numbers[f"{name}_times"] = grid(pack, series, cells, network)
+    return numbers
+
+
+def _tenths(table: Lookup, series: str, quantity: str, value: str) -> str:
+    level = table.level(series, quantity, value)
+    return f"{percent(level.size, 1)} ± {percent(level.half_width, 1)}"
+
+
+def _linear_solver(table: Lookup) -> dict[str, str]:
+    names = linear_solver.series_of
+    fdnet, bare = solver_peers.FDNET, solver_peers.DIRECT
+    spreads, large = linear_solver.DECADES, 100_000
+    own = [row for row in table.rows if OWN_SERIES.match(row.series) and row.status == DONE]
+    small = [row for row in own if f" {FEW_PORES} pores" in row.series]
+    sizes = {float(row.value) for row in table.rows if row.quantity == linear_solver.CORE}
+    tight = [
+        row.error
+        for method in (solver_peers.RUGE_STUBEN, solver_peers.AGGREGATION, solver_peers.JACOBI)
+        for spread in spreads
+        for row in table.runs(names(method, FEW_PORES, spread), "worst throat", 1e-8)
+    ]
+    return {
+        "nominal_sizes": ", ".join(f"{pores:,.0f}" for pores in sorted(sizes)),
+        "own_throat": significant(_most(small, "worst throat")),
+        "own_residual": rounded_up(_most(own, "residual")),
+        "own_small": between(
+            table.cost(names(fdnet, FEW_PORES, d), "residual", "own")
+            / table.cost(names(bare, FEW_PORES, d), "residual", "own")
+            for d in spreads
+        ),
+        "own_large": between(
+            table.cost(names(fdnet, large, d), "residual", "own")
+            / table.cost(names(solver_peers.RUGE_STUBEN, large, d), "residual", 1e-8)
+            for d in spreads
+        ),
+        "million": ", ".join(
+            f"{table.cost(names(fdnet, 1_000_000, d), 'residual', 'own'):.0f}"
+            for d in (0.0, 8.0, 16.0)
+        ),
+        "million_memory": f"{_largest_memory(table, fdnet):.2f}",
+        "tight_throat": between(tight, 1),
+        **_solver_steps(table),
+        **_solver_limits(table),
+    }
+
+
+def _most(rows: Iterable, quantity: str) -> float:
+    return max(row.error for row in rows if row.quantity == quantity)
+
+
+def _largest_memory(table: Lookup, method: str) -> float:
+    """GB at the largest size, the most over the spreads."""
+    name = linear_solver.MEMORY
+    rows = [
+        row for d in linear_solver.DECADES for row in table.runs(f"{method}, {d:g} decades", name)
+    ]
+    largest = max(float(row.value) for row in rows)
+    return max(row.observed for row in rows if row.value == largest) / 1e3
+
+
+def _solver_steps(table: Lookup) -> dict[str, str]:
+    names, multigrid = linear_solver.series_of, solver_peers.RUGE_STUBEN
+    series = names(multigrid, 100_000, 8.0)
+    by_tolerance = {row.value: row for row in table.runs(series, "residual")}
+    tolerances = sorted(by_tolerance, reverse=True)
+    pairs = list(pairwise(tolerances))
+    steps = [by_tolerance[b].steps - by_tolerance[a].steps for a, b in pairs]
+    times = [by_tolerance[b].core_s / by_tolerance[a].core_s - 1 for a, b in pairs]
+    jacobi, aggregation = solver_peers.JACOBI, solver_peers.AGGREGATION
+    unit = table.runs(names(solver_peers.UNIT_DIAGONAL, 100_000, 0.0), "residual")[0]
+    plain = table.runs(names(multigrid, 100_000, 0.0), "residual")[0]
+    off = {
+        (pores, spread): table.error(names(jacobi, pores, spread), "inflow", 1e-8)
+        for pores, spread in ((3_000, 16.0), (10_000, 16.0))
+    }
+    return {
+        "steps_each": between(steps, 1),
+        "steps_time": percents(times),
+        "jacobi_steps": f"{table.runs(names(jacobi, 100_000, 0.0), 'residual')[0].steps:,.0f}",
+        "aggregation_steps": " and ".join(
+            f"{table.runs(names(aggregation, 100_000, d), 'residual')[0].steps:.0f}"
+            for d in (0.0, 8.0)
+        ),
+        "jacobi_off": between((1 + error for error in off.values()), 2),
+        "unit_steps": f"{unit.steps:.0f}",
+        "plain_steps": f"{plain.steps:.0f}",
+    }
+
+
+def _solver_limits(table: Lookup) -> dict[str, str]:
+    names, bare = linear_solver.series_of, solver_peers.DIRECT
+
+    def direct_throat(spread: float) -> str:
+        rows = [
+            row.error
+            for method in (bare, solver_peers.SPSOLVE)
+            for row in table.runs(names(method, FEW_PORES, spread), "worst throat")
+        ]
+        return significant(max(rows), 1)
+
+    def ratio(pores: int) -> str:
+        return between(
+            table.cost(names(solver_peers.FDNET_DIRECT, pores, d), "residual", "own")
+            / table.cost(names(solver_peers.FDNET_MULTIGRID, pores, d), "residual", "own")
+            for d in (0.0, 8.0, 16.0)
+        )
+
+    spsolve = _costs(table, f"{solver_peers.SPSOLVE}, 0 decades")
+    direct = _costs(table, f"{bare}, 0 decades")
+    (n, seconds), power = direct[-1], _growth(direct)
+    million = max(float(row.value) for row in table.rows if row.quantity == "core seconds")
+    memory = table.runs(f"{bare}, 0 decades", linear_solver.MEMORY)[-1].observed
+    without = table.runs(f"{solver_peers.JACOBI}, 0 decades", linear_solver.MEMORY)[-1].observed
+    return {
+        "direct_throat": direct_throat(0.0),
+        "direct_throat_wide": direct_throat(16.0),
+        "direct_residual": significant(
+            table.runs(names(bare, 100_000, 16.0), "residual")[0].error, 1
+        ),
+        "spsolve_growth": f"{_growth(spsolve):.1f}",
+        "direct_1000": ratio(1_000),
+        "direct_3000": ratio(3_000),
+        "direct_5000": ratio(5_000),
+        "direct_memory": f"{(memory - without) / 1e3:.2f}",
+        "direct_estimate": f"{55 * n**1.41 / 1e9:.2f}",
+        "direct_growth": f"{power:.1f}",
+        "direct_million": significant(seconds * (million / n) ** power),
+        "direct_million_memory": f"{55 * million**1.41 / 1e9:.0f}",
+    }
+
+
+def _costs(table: Lookup, series: str) -> list[tuple[float, float]]:
+    """Pores and core seconds of a method."""
+    rows = table.runs(series, linear_solver.CORE)
+    return [(float(row.value), row.observed) for row in rows if not np.isnan(row.observed)]
+
+
+def _growth(costs: list[tuple[float, float]]) -> float:
+    """Exponent of the time in the pores, between the two largest sizes."""
+    (small, quick), (large, slow) = costs[-2:]
+    return math.log(slow / quick) / math.log(large / small)
