@@ -150,9 +150,9 @@ def build_network(grains: Snapshot, *, periodic: Directions = "", walls: str = "
 
     Periodic sides join. The other faces are mirror planes: with `walls` "slip" the specimen is one
     half, fourth or eighth of the periodic specimen that its mirror images make up; with "no-slip"
-    the y and z faces also hold the fluid, for the laws that account for it (`lubrication`). Unequal
-    grains are tessellated by their power tessellation. Grains that do not reach into the box are
-    left out and counted.
+    the y and z faces also hold the fluid, for the laws that account for it (`lubrication`).
+    Unequal grains are tessellated by their power tessellation. Grains that do not reach into the
+    box are left out and counted.
 
     Args:
         grains: the spheres that carry the skeleton, m; fines are not part of the network.

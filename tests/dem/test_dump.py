@@ -44,7 +44,7 @@ def test_empty_frame():
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         (
             frame(4000, ["1 1 0.5 "], count=3),
@@ -71,8 +71,8 @@ def test_empty_frame():
         ),
     ],
 )
-def test_broken_files_are_named_by_line_and_step(text, said):
-    with pytest.raises(DumpError, match=said):
+def test_broken_files_are_named_by_line_and_step(text, message):
+    with pytest.raises(DumpError, match=message):
         parse(text)
 
 

@@ -10,7 +10,7 @@ from fdnet.spheres.images import neighbour_tree
 from fdnet.spheres.snapshot import Array, Snapshot
 
 LENGTHS = (1e-60, 1e60)
-"""Shortest radius and longest length, m: the cubes of lengths beyond them are no double numbers."""
+"""Shortest radius and longest length, m; no double number holds the cubes of lengths beyond."""
 COARSE = 1e-8
 """Largest rounding of a coordinate, in mean grain radii: a tenth of the shake (`points.SHAKE`),
 which coarser coordinates could not hold."""
