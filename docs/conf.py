@@ -25,12 +25,9 @@ extensions = [
     "shell_cells",
 ]
 exclude_patterns = ["_build", "_ext", "**.ipynb_checkpoints"]
-smartquotes = False
+smartquotes_action = "D"  # dashes alone, quotation marks stay straight
 nitpicky = True
-nitpick_ignore_regex = [
-    ("py:.*", r"(numpy|np|pandas|pd|pyvista|pathlib|collections|typing)\..*"),
-    ("py:class", r"(Array|Path|optional|Any|Mapping|Sequence)"),
-]
+nitpick_ignore_regex = [("py:class", r".*")]  # types in signatures, of ours and of others
 
 myst_heading_anchors = 4
 myst_enable_extensions = ["attrs_block", "colon_fence", "deflist", "dollarmath"]
@@ -39,9 +36,10 @@ nb_execution_mode = os.environ.get("FDNET_DOCS_EXECUTE", "force")
 nb_execution_in_temp = True
 nb_execution_raise_on_error = True
 nb_execution_timeout = 300
-nb_merge_streams = True
 
 autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented_params"
+autodoc_class_signature = "separated"
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
 napoleon_google_docstring = True

@@ -32,6 +32,6 @@ if [ "$(cat .venv/.fdnet-docs 2>/dev/null)" != "$stamp" ]; then
 fi
 rm -rf docs/_build
 PATH="$PWD/.venv/bin:$PATH" FDNET_DOCS_EXECUTE="$execute" \
-    .venv/bin/python -m sphinx -b html -W --keep-going -q docs docs/_build/html
+    .venv/bin/python -m sphinx -j 2 -b html -W --keep-going -q docs docs/_build/html
 .venv/bin/python docs/_ext/check_links.py docs/_build/html
 echo "docs: docs/_build/html/index.html"

@@ -1,4 +1,4 @@
-"""The door for Python: one list of public names, each explained, each with an example that runs."""
+"""The door for Python: public names, each explained and with an example that runs."""
 
 import ast
 import doctest
@@ -7,10 +7,12 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import fields, is_dataclass
 from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 from builders import tiny
 
@@ -141,3 +143,43 @@ def test_examples_run(name, workplace, monkeypatch):
 def test_examples_of_a_run(workplace, monkeypatch):
     for name in NEED_A_RUN:
         run_example(name, workplace, monkeypatch)
+
+
+def array_owners() -> list[type]:
+    """Every data class of spheres and networks with a field that is an array, but private ones."""
+    package = Path(str(fdnet.__file__)).parent
+    owners = {}
+    for path in sorted([*package.glob("network/**/*.py"), *package.glob("spheres/*.py")]):
+        name = ".".join(["fdnet", *path.relative_to(package).with_suffix("").parts])
+        if "Array" not in path.read_text() or path.name == "__init__.py":
+            continue
+        for value in vars(import_module(name)).values():
+            if not (inspect.isclass(value) and is_dataclass(value)):
+                continue
+            types = " ".join(str(field.type) for field in fields(value))
+            if value.__module__ == name and value.__name__[0] != "_" and "ndarray" in types:
+                owners[value.__qualname__] = value
+    return list(owners.values())
+
+
+def test_owners_of_arrays_print_on_one_line():
+    """The representation that `dataclass` makes prints whole arrays."""
+    owners = array_owners()
+    assert {"Snapshot", "Network", "Occupancy", "Flow", "Analysis"} <= {
+        owner.__name__ for owner in owners
+    }
+    made = [owner for owner in owners if hasattr(owner.__repr__, "__wrapped__")]
+    assert not made
+
+
+def test_what_prints_is_short():
+    lattice = 1e-3 * (np.indices((3, 3, 3)).reshape(3, -1).T + 0.5)
+    spheres = fdnet.Snapshot.from_arrays(lattice, 0.5e-3)
+    result = fdnet.analyse(spheres, periodic="yz", sections=2)
+    for owner in (spheres, result, result.network, result.flow_initial, result.profile):
+        text = repr(owner)
+        assert "\n" not in text
+        assert len(text) < 700, text
+        assert text.startswith(type(owner).__name__)
+    assert "27 grains, 0 fines" in repr(spheres)
+    assert f"{result.k_initial:.4g} m2" in repr(result)

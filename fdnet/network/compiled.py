@@ -1,8 +1,9 @@
 """numba's compiler with a cache that follows the sources.
 
-numba keeps compiled functions beside their own file and does not notice when a function they call changes in another
-module. Here the cache lies in a folder named after a digest of all sources of this package, so a changed file is never
-answered by old code; it also works where the package's own folder cannot be written. NUMBA_CACHE_DIR, when set, wins.
+numba keeps compiled functions next to their own file and does not notice when a function that they
+call changes in another module. Here the cache lies in a folder named after a digest of all sources
+of this package, so old code never runs for a changed file. It also works where the folder of the
+package cannot be written. NUMBA_CACHE_DIR, when set, is used instead.
 """
 
 import contextlib
@@ -19,7 +20,7 @@ __all__ = ["compiled"]
 
 
 def cache_folder(sources: Path, root: Path) -> Path:
-    """Folder below `root` for the code compiled from all modules in `sources`."""
+    """Folder below `root` for the code that is compiled from all modules in `sources`."""
     digest = hashlib.sha256()
     for path in sorted(sources.rglob("*.py")):
         digest.update(str(path.relative_to(sources)).encode() + b"\0" + path.read_bytes())
@@ -27,6 +28,7 @@ def cache_folder(sources: Path, root: Path) -> Path:
 
 
 def _writable_root() -> Path:
+    """The cache folder of the user, or one of our own where that cannot be written."""
     wanted = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "fdnet"
     try:
         wanted.mkdir(parents=True, exist_ok=True)
@@ -37,16 +39,21 @@ def _writable_root() -> Path:
 
 
 def _own_folder(wanted: Path) -> Path:
-    """`wanted`, closed to others, or a new one where somebody else made it: cached code is run as it is found."""
+    """`wanted`, closed to others, or a new folder where somebody else made it.
+
+    Cached code is run without a check, so nobody else may write it.
+    """
     with contextlib.suppress(OSError):
         wanted.mkdir(mode=0o700, exist_ok=True)
-        told = wanted.lstat()
-        if stat.S_ISDIR(told.st_mode) and told.st_uid == os.getuid() and not told.st_mode & 0o022:
+        status = wanted.lstat()
+        ours = stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid()
+        if ours and not status.st_mode & 0o022:
             return wanted
     return Path(tempfile.mkdtemp(prefix="fdnet-"))
 
 
 if not config.CACHE_DIR:  # type: ignore[attr-defined]
-    config.CACHE_DIR = str(cache_folder(Path(__file__).parent, _writable_root()))  # type: ignore[attr-defined]
+    _folder = cache_folder(Path(__file__).parent, _writable_root())
+    config.CACHE_DIR = str(_folder)  # type: ignore[attr-defined]
 
 compiled = numba.njit(cache=True)

@@ -1,8 +1,11 @@
-"""Tetrahedra, triangles and the spheres on their corners. Arrays carry any leading shape; lengths in m.
+"""Tetrahedra, triangles and the spheres on their corners.
 
-Sources: solid angle, van Oosterom and Strackee 1983 (IEEE Trans. Biomed. Eng. 30, 125, eq. 8); circle and sphere
-touching given ones, Apollonius' problem solved by subtracting the sphere equations; lens of two spheres, the sum of
-two caps pi h^2 (3 r - h) / 3.
+Lengths are in m. Arrays may have any leading shape, written "...": a function that takes
+tetrahedra (..., 4, 3) takes one of shape (4, 3) as well as P of shape (P, 4, 3).
+
+Sources: solid angle, van Oosterom and Strackee 1983 (IEEE Trans. Biomed. Eng. 30, 125, eq. 8);
+circle and sphere touching given ones, Apollonius' problem solved by subtracting the sphere
+equations; lens of two spheres, the sum of two caps pi h^2 (3 r - h) / 3.
 """
 
 from collections.abc import Iterator
@@ -12,17 +15,23 @@ import numpy as np
 from fdnet.spheres.snapshot import Array
 
 EDGES = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
+"""(6, 2) corners at the ends of the edges of a tetrahedron."""
 FACETS = np.array([(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)])
+"""(4, 3) corners of the facet opposite each corner of a tetrahedron."""
 SIDES = np.array([(0, 1), (1, 2), (2, 0)])
+"""(3, 2) corners at the ends of the sides of a triangle."""
 
 
 def slices(count: int, size: int = 100_000) -> Iterator[slice]:
-    """Consecutive slices of at most `size` that cover range(count): whole-pack arrays are worked off by these."""
+    """Consecutive slices of at most `size` that cover range(count).
+
+    Arrays of a whole pack are worked off slice by slice, which bounds the memory.
+    """
     return (slice(start, min(start + size, count)) for start in range(0, count, size))
 
 
 def cross(left: Array, right: Array) -> Array:
-    """Vector product (..., 3)."""
+    """Vector product (..., 3) of vectors (..., 3)."""
     (a, b, c), (d, e, f) = ((one[..., 0], one[..., 1], one[..., 2]) for one in (left, right))
     return np.stack([b * f - c * e, c * d - a * f, a * e - b * d], axis=-1)
 
@@ -33,13 +42,19 @@ def dot(left: Array, right: Array) -> Array:
 
 
 def signed_volume(corner: Array) -> Array:
-    """Volume of tetrahedra (..., 4, 3), m3, positive when corner 3 sees corners 0, 1, 2 turn clockwise."""
+    """Volume (...) m3 of tetrahedra (..., 4, 3).
+
+    It is positive when corners 0, 1, 2 turn clockwise as seen from corner 3.
+    """
     side = corner[..., 1:, :] - corner[..., :1, :]
     return dot(side[..., 0, :], cross(side[..., 1, :], side[..., 2, :])) / 6.0
 
 
 def solid_angles(corner: Array) -> Array:
-    """Signed solid angle (..., 4), sr, at each corner of tetrahedra (..., 4, 3); sign of the volume."""
+    """Solid angle (..., 4) sr at each corner of tetrahedra (..., 4, 3), signed as the volume.
+
+    Van Oosterom and Strackee 1983, eq. 8.
+    """
     return np.stack(
         [_solid_angle(np.roll(corner, -k, axis=-2)) * (-1.0) ** k for k in range(4)], axis=-1
     )
@@ -54,31 +69,37 @@ def _solid_angle(corner: Array) -> Array:
 
 
 def dihedral_angles(corner: Array) -> Array:
-    """Angle (..., 6), rad, between the two faces at each of EDGES of tetrahedra (..., 4, 3)."""
-    found = []
+    """Angle (..., 6) rad between the two faces at each of EDGES of tetrahedra (..., 4, 3)."""
+    angles = []
     for first, second in EDGES:
         other = [k for k in range(4) if k not in (first, second)]
         axis = corner[..., second, :] - corner[..., first, :]
         left, right = (cross(axis, corner[..., k, :] - corner[..., first, :]) for k in other)
         along = np.linalg.norm(cross(left, right), axis=-1)
-        found.append(np.arctan2(along, dot(left, right)))
-    return np.stack(found, axis=-1)
+        angles.append(np.arctan2(along, dot(left, right)))
+    return np.stack(angles, axis=-1)
 
 
 def touching_sphere(corner: Array, radius: Array) -> tuple[Array, Array]:
-    """Centre (..., 3) and radius (...) of the sphere touching four spheres from outside; NaN where there is none.
+    """Centre (..., 3) m and radius (...) m of the sphere that touches four spheres from outside.
 
-    Subtracting |x - p_i|^2 = (s + r_i)^2 pairwise leaves x = A + B s, then one quadratic for s.
+    `corner` (..., 4, 3) are the centres p_i of the four, `radius` (..., 4) their radii r_i. The
+    result is NaN where there is no such sphere. Subtracting |x - p_i|^2 = (s + r_i)^2 pairwise
+    leaves x = A + B s for the centre x and the radius s, then one quadratic equation for s.
     """
     return _touching(corner, radius)
 
 
 def touching_circle(triangle: Array, radius: Array) -> Array:
-    """Radius (...) of the circle touching three discs from outside in the plane of `triangle` (..., 3, 3), or NaN."""
+    """Radius (...) m of the circle that touches three discs from outside; NaN where there is none.
+
+    The discs of `radius` (..., 3) sit on the corners of `triangle` (..., 3, 3), in its plane.
+    """
     return _touching(flat(triangle), radius)[1]
 
 
 def _touching(corner: Array, radius: Array) -> tuple[Array, Array]:
+    """Centre (..., n) and radius (...) of the ball that touches n + 1 balls, n = 2 or 3."""
     side = corner[..., 1:, :] - corner[..., :1, :]
     first = radius[..., 0]
     apart = radius[..., 1:] - first[..., None]
@@ -89,14 +110,17 @@ def _touching(corner: Array, radius: Array) -> tuple[Array, Array]:
     half = first - np.sum(a * b, axis=-1)
     rest = np.sum(a**2, axis=-1) - first**2
     with np.errstate(invalid="ignore", divide="ignore"):
-        # root of square s^2 - 2 half s + rest = 0 in the form that stays finite where square vanishes
-        found = rest / (half + np.sqrt(half**2 - square * rest))
-        found = np.where(found > -np.min(radius, axis=-1), found, np.nan)
-    return corner[..., 0, :] + a + b * found[..., None], found
+        # root of square s^2 - 2 half s + rest = 0, in the form that is finite where square is 0
+        touching = rest / (half + np.sqrt(half**2 - square * rest))
+        touching = np.where(touching > -np.min(radius, axis=-1), touching, np.nan)
+    return corner[..., 0, :] + a + b * touching[..., None], touching
 
 
 def _solve(matrix: Array, right: Array) -> Array:
-    """Solve (..., n, n) systems for (..., n, m), n = 2 or 3, by Cramer's rule; NaN where singular."""
+    """Solution (..., n, m) of systems (..., n, n) with right sides (..., n, m), n = 2 or 3.
+
+    Cramer's rule; NaN where a system is singular.
+    """
     rows = [matrix[..., k, :] for k in range(matrix.shape[-1])]
     if len(rows) == 2:
         (a, b), (c, d) = ((row[..., 0], row[..., 1]) for row in rows)
@@ -115,10 +139,13 @@ def _solve(matrix: Array, right: Array) -> Array:
 
 
 def power_centre(corner: Array, radius: Array) -> tuple[Array, Array]:
-    """Point (..., n) of equal power to the n + 1 spheres at `corner` (..., n + 1, n), and that power |x - p|^2 - r^2.
+    """Point (..., n) of equal power to n + 1 spheres, and that power (...) m2.
 
-    n = 3: the vertex of the power tessellation; n = 2: the radical centre of three discs; for equal radii the
-    circumcentre. NaN where the corners lie in one plane (line). Aurenhammer 1987 (SIAM J. Comput. 16, 78).
+    The power of a point x to a sphere of centre p and radius r is |x - p|^2 - r^2. The spheres
+    have the centres `corner` (..., n + 1, n) and the radii `radius` (..., n + 1). For n = 3 the
+    point is a vertex of the power tessellation, for n = 2 the radical centre of three discs, for
+    equal radii the circumcentre. NaN where the corners lie in one plane (line). Aurenhammer 1987
+    (SIAM J. Comput. 16, 78).
     """
     side = corner[..., 1:, :] - corner[..., :1, :]
     first = radius[..., :1]
@@ -150,26 +177,27 @@ def flat(triangle: Array) -> Array:
 
 
 def triangle_area(triangle: Array) -> Array:
-    """Area (...) of triangles (..., 3, 3), m2."""
+    """Area (...) m2 of triangles (..., 3, 3)."""
     ab, ac = triangle[..., 1, :] - triangle[..., 0, :], triangle[..., 2, :] - triangle[..., 0, :]
     return 0.5 * np.linalg.norm(cross(ab, ac), axis=-1)
 
 
 def triangle_angles(triangle: Array) -> Array:
-    """Angle (..., 3), rad, at each corner of triangles (..., 3, 3)."""
-    found = []
+    """Angle (..., 3) rad at each corner of triangles (..., 3, 3)."""
+    angles = []
     for k in range(3):
         left = triangle[..., (k + 1) % 3, :] - triangle[..., k, :]
         right = triangle[..., (k + 2) % 3, :] - triangle[..., k, :]
         across = np.linalg.norm(cross(left, right), axis=-1)
-        found.append(np.arctan2(across, dot(left, right)))
-    return np.stack(found, axis=-1)
+        angles.append(np.arctan2(across, dot(left, right)))
+    return np.stack(angles, axis=-1)
 
 
 def open_area(triangle: Array, radius: Array) -> Array:
-    """Area (...) of triangles (..., 3, 3) outside the discs of `radius` (..., 3) on their corners; may be negative.
+    """Area (...) m2 of triangles (..., 3, 3) outside discs of `radius` (..., 3) on the corners.
 
-    Triangle - sectors + half the lens of each overlapping pair (counted once). Shi 2011, section 3.1.2.
+    Triangle less the sectors, plus half the lens of each overlapping pair, which is so counted
+    once (Shi 2011, section 3.1.2). It is negative where discs cover more than the triangle.
     """
     sectors = 0.5 * np.sum(triangle_angles(triangle) * radius**2, axis=-1)
     ends = triangle[..., SIDES, :]
@@ -179,25 +207,28 @@ def open_area(triangle: Array, radius: Array) -> Array:
 
 
 def disc_lens_area(first: Array, second: Array, apart: Array) -> Array:
-    """Area common to two discs whose centres are `apart`, m2."""
+    """Area (...) m2 common to discs of radius `first` and `second`, centres `apart` (...) m."""
     first, second, apart = np.broadcast_arrays(first, second, apart)
     small = np.pi * np.minimum(first, second) ** 2
-    found = np.where(apart <= np.abs(first - second), small, 0.0)
+    area = np.where(apart <= np.abs(first - second), small, 0.0)
     cross = (apart > np.abs(first - second)) & (apart < first + second)
     a, b, d = first[cross], second[cross], apart[cross]
     to_chord = (d**2 + a**2 - b**2) / (2.0 * d)
     chord = np.sqrt(np.maximum(a**2 - to_chord**2, 0.0))
-    found[cross] = (
+    area[cross] = (
         a**2 * np.arctan2(chord, to_chord)
         - to_chord * chord
         + b**2 * np.arctan2(chord, d - to_chord)
         - (d - to_chord) * chord
     )
-    return found
+    return area
 
 
 def cap_heights(first: Array, second: Array, apart: Array) -> tuple[Array, Array]:
-    """Heights (...) of the two caps that make up the lens of two spheres; zero where they do not overlap."""
+    """Heights (...) m of the two caps that make up the lens of two spheres; 0 without overlap.
+
+    `first` and `second` (...) m are the radii, `apart` (...) m is the distance of the centres.
+    """
     to_plane = (apart**2 + first**2 - second**2) / (2.0 * apart)
     overlap = apart < first + second
     return (
@@ -207,14 +238,18 @@ def cap_heights(first: Array, second: Array, apart: Array) -> tuple[Array, Array
 
 
 def lens(first: Array, second: Array, apart: Array) -> tuple[Array, Array]:
-    """Volume m3 and surface m2 (of both) of what two spheres share; zero where they do not overlap."""
+    """Volume (...) m3 that two spheres share, and the surface (...) m2 of both in it.
+
+    Both are 0 without overlap. `first` and `second` (...) m are the radii, `apart` (...) m is the
+    distance of the centres.
+    """
     caps = cap_heights(first, second, apart)
     volume = cap_volume(first, caps[0]) + cap_volume(second, caps[1])
     return volume, 2.0 * np.pi * (first * caps[0] + second * caps[1])
 
 
 def cap_volume(radius: Array, height: Array) -> Array:
-    """Volume of a spherical cap, m3; `height` outside [0, 2 radius] is taken as its nearer end."""
+    """Volume (...) m3 of a spherical cap of `height` m, which is clipped to [0, 2 radius]."""
     height = np.clip(height, 0.0, 2.0 * radius)
     return np.pi * height**2 * (3.0 * radius - height) / 3.0
 

@@ -95,6 +95,14 @@ class Network:
     counts: Mapping[str, int]
     walls: str = "slip"
 
+    def __repr__(self) -> str:
+        size = " x ".join(f"{1e3 * side:.4g}" for side in np.ptp(self.box, axis=1))
+        sides = "".join(axis for axis, on in zip("xyz", self.periodic, strict=True) if on)
+        return (
+            f"Network({len(self.pore_radius)} pores, {len(self.throat_radius)} throats, "
+            f"box {size} mm, periodic {sides or 'nowhere'}, walls {self.walls})"
+        )
+
     @property
     def pore_grains(self) -> Array:
         """Indices (P, 4) of the grains at the corners."""
@@ -142,9 +150,9 @@ def build_network(grains: Snapshot, *, periodic: Directions = "", walls: str = "
 
     Periodic sides join. The other faces are mirror planes: with `walls` "slip" the specimen is one
     half, fourth or eighth of the periodic specimen that its mirror images make up; with "no-slip"
-    the y and z faces also hold the fluid, for the laws that account for it (`lubrication`). Unequal
-    grains are tessellated by their power tessellation. Grains that do not reach into the box are
-    left out and counted.
+    the y and z faces also hold the fluid, for the laws that account for it (`lubrication`).
+    Unequal grains are tessellated by their power tessellation. Grains that do not reach into the
+    box are left out and counted.
 
     Args:
         grains: the spheres that carry the skeleton, m; fines are not part of the network.

@@ -12,6 +12,7 @@ from fdnet.network.fines.invaded import Invaded, measure_invaded
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.flow.sections import profile_edges, section_edges
 from fdnet.network.network import Network, build_network
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.porosity import Porosity, measure_porosity
 from fdnet.spheres.snapshot import Array, Snapshot
 
@@ -45,6 +46,8 @@ class Specimen:
     depth: Array
     invaded: Invaded
 
+    __repr__ = one_line
+
 
 def measure_specimen(
     initial: Snapshot,
@@ -56,8 +59,8 @@ def measure_specimen(
 ) -> Specimen:
     """The specimen of the grains of `initial` and, unless it is None, of all spheres of `damaged`.
 
-    `timed` takes the name of the stage that its block belongs to. Raises NetworkError and CaseError
-    as `analyse` does.
+    `timed` takes the name of the stage that its block belongs to. Raises NetworkError and
+    CaseError as `analyse` does.
     """
     before = initial.grains()
     after = before if damaged is None else _same_grains(before, damaged.grains())

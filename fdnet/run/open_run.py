@@ -18,7 +18,7 @@ def open_run(path: str | Path) -> FinishedRun:
         path: the run folder, for example "runs/quick".
 
     Returns:
-        The run: `summary` (mapping), `sections`, `profile`, `pores`, `throats` and `history`
+        The run, with `summary` (mapping), `sections`, `profile`, `pores`, `throats` and `history`
         (pandas, units in the column names, SI), `spheres()`, `network()`, `to_openpnm()`,
         `network_mesh()`, `sphere_mesh()`. It prints itself in mD and m2, mm and percent.
 

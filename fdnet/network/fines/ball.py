@@ -1,18 +1,25 @@
-"""The piece of a ball inside a tetrahedron: volume and surface in closed form, for any place of the two.
+"""The piece of a ball inside a tetrahedron: volume and surface in closed form.
 
-The tetrahedron is the signed sum of the cones from the ball's centre to its facets, each cone the signed sum over the
-facet's edges of the cones to the triangles (foot of the centre on the facet, edge). In units of the ball's radius, d
-the distance of the facet, h that of the edge from the foot, t the place along the edge from its foot, all signed, a
-cone holds of the sphere the directions that leave the ball before the facet:
+The two may lie anywhere. The tetrahedron is the signed sum of the cones from the centre of the
+ball to its facets. Each cone is the signed sum, over the edges of its facet, of the cones to the
+triangles between the edge and the foot of the centre on the facet.
 
-    integral of (1 - cos theta) d phi  less the same within the facet's disc
-        = c phi(t) - arctan(t d / (h sqrt(t^2 + h^2 + d^2))),   phi = arctan(t / h),   tan phi = t / h,
+Lengths are in units of the radius of the ball: d is the distance of the facet from the centre, h
+the distance of the edge from the foot, t the place along the edge from the point nearest to the
+foot; all are signed. phi = arctan(t / h) is the angle about the foot. The part of the sphere in a
+cone is made of the directions that leave the ball before they reach the facet:
 
-taken between the ends of each part of the edge outside the disc of radius sqrt(1 - d^2); c = d where the facet's plane
-cuts the ball, 1 where the ball lies inside of it (outside of it, the piece is empty). With
-cos theta = d / sqrt(d^2 + h^2 / cos^2 phi) the second term is its integral. Volume: a third of that surface, and d/3
-times the area of triangle and disc (divergence theorem; the same decomposition by facets and edges: Strobl, Formella
-and Poeschel 2016, J. Comput. Phys. 311, 158).
+    integral of (1 - cos theta) d phi  less the same within the disc of the facet
+        = c phi(t) - arctan(t d / (h sqrt(t^2 + h^2 + d^2))),
+
+taken between the ends of each part of the edge outside the disc of radius sqrt(1 - d^2). Here
+c = d where the plane of the facet cuts the ball, and c = 1 where the ball lies inside of it
+(outside of it the piece is empty). With cos theta = d / sqrt(d^2 + h^2 / cos^2 phi) the second
+term is the integral of cos theta.
+
+The volume is a third of that surface, plus d / 3 times the area common to triangle and disc
+(divergence theorem). Strobl, Formella and Poeschel 2016 (J. Comput. Phys. 311, 158) decompose by
+facets and edges too.
 """
 
 from math import atan2, copysign, pi, sqrt
@@ -23,22 +30,27 @@ from fdnet.network.compiled import compiled
 from fdnet.spheres.snapshot import Array
 
 ROUNDING = 1e-13
+"""A piece of less volume, in cubes of the radius, is rounding."""
 OTHERS = np.array([(1, 2, 3), (2, 3, 0), (3, 0, 1), (0, 1, 2)])
-
+"""(4, 3) corners of the facet opposite each corner."""
 
 Vector = tuple[float, float, float]
 
 
 @compiled
 def fill_pieces(
-    corner: Array, pairs: tuple[Array, Array], balls: tuple[Array, Array, Array], found: Array
+    corner: Array, pairs: tuple[Array, Array], balls: tuple[Array, Array, Array], filled: Array
 ) -> None:
-    """Add to `found` (P, 2 + W) the volume m3 and surface m2 of the pieces of balls inside the tetrahedra `corner`
-    (P, 4, 3) m, and the volume times each of the balls' values.
+    """Add up the pieces of balls inside tetrahedra.
 
-    `pairs` tetrahedron and ball (K,), which may be apart; `balls` centre (N, 3) m, radius (N,) m, value (N, W).
+    Pieces below 1e-13 cubes of the radius are rounding and left out.
 
-    Pieces below 1e-13 of the whole ball are rounding and left out.
+    Args:
+        corner: (P, 4, 3) m, corners of the tetrahedra.
+        pairs: index of the tetrahedron and of the ball (K,), which may be apart.
+        balls: centre (N, 3) m, radius (N,) m and values (N, W).
+        filled: (P, 2 + W), to which the volume m3 of the pieces, their surface m2 and the volume
+            times each value are added.
     """
     pore, ball = pairs
     centre, radius, value = balls
@@ -60,10 +72,10 @@ def fill_pieces(
                 place[c, axis] = (corner[p, c, axis] - centre[b, axis]) / radius[b]
         inside, area = _piece(place, normal, depth, cuts)
         if inside > ROUNDING:
-            found[p, 0] += inside * radius[b] ** 3
-            found[p, 1] += area * radius[b] ** 2
+            filled[p, 0] += inside * radius[b] ** 3
+            filled[p, 1] += area * radius[b] ** 2
             for w in range(value.shape[1]):
-                found[p, 2 + w] += inside * radius[b] ** 3 * value[b, w]
+                filled[p, 2 + w] += inside * radius[b] ** 3 * value[b, w]
 
 
 @compiled
@@ -98,8 +110,12 @@ def _facet_normals(corner: Array, normal: Array) -> None:
 
 @compiled
 def _piece(place: Array, normal: Array, depth: Array, cuts: int) -> tuple[float, float]:
-    """Volume and surface of the unit ball about the origin inside the tetrahedron on `place` (4, 3): the whole ball,
-    a cap, or the sum over facets and edges."""
+    """Volume and surface of the unit ball about the origin inside a tetrahedron.
+
+    `place` (4, 3) are its corners, `normal` (4, 3) the inward normals of its facets, `depth` (4,)
+    the distances of the facets and `cuts` the number of facets that cut the ball: the piece is the
+    whole ball, a cap, or the sum over facets and edges.
+    """
     if cuts == 0:
         return 4.0 / 3.0 * pi, 4.0 * pi
     if cuts == 1:
@@ -129,9 +145,10 @@ def _piece(place: Array, normal: Array, depth: Array, cuts: int) -> tuple[float,
 
 @compiled
 def _edge(depth: float, height: float, start: float, end: float) -> tuple[float, float]:
-    """Area of triangle (foot, edge) within the disc, and solid angle of the triangle outside it; start < end.
+    """Area of the triangle (foot, edge) within the disc, and solid angle of the part outside it.
 
-    The sign of the area is that of `height`, of the angle that of `depth` times `height`.
+    The facet lies at `depth`, the edge at `height` from the foot, from `start` to `end` > `start`.
+    The area has the sign of `height`, the solid angle that of `depth` times `height`.
     """
     disc = 1.0 - depth**2
     if disc <= 0.0:
@@ -151,7 +168,7 @@ def _edge(depth: float, height: float, start: float, end: float) -> tuple[float,
 def _shadow(
     weight: float, depth: float, height: float, start: float, end: float
 ) -> tuple[float, float]:
-    """Solid angle over the part of an edge from `start` to `end`, and the angle this part turns about the foot."""
+    """Solid angle over the part of an edge from `start` to `end`, and its angle about the foot."""
     if start == end:
         return 0.0, 0.0
     side, away = copysign(1.0, height), abs(height)

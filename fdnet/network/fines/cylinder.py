@@ -1,8 +1,4 @@
-"""Volume of spheres inside a cylinder with flat ends: exact, and as the thesis averages two cut caps.
-
-K sphere-cylinder pairs: `sphere` (K,) radius, `offset` (K,) distance of the centre from the axis, `depth` (K,) place of
-the centre along the axis, `tube` (K,) radius, `length` (K,) of the cylinder, which spans depth 0 to length. Lengths m.
-"""
+"""Volume of spheres inside cylinders with flat ends: exact, and as the thesis estimates it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,20 +8,32 @@ import numpy as np
 
 from fdnet.network import geometry
 from fdnet.network.compiled import compiled
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
 GAUSS_POINTS = 10
+"""Points of the Gauss-Legendre rule of `exact_volume`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Pairs:
-    """Sphere-cylinder pairs, all (K,) m."""
+    """K pairs of a sphere and a cylinder, which spans depth 0 to its length.
+
+    Attributes:
+        sphere: (K,) m, radius of the sphere.
+        offset: (K,) m, distance of the centre of the sphere from the axis.
+        depth: (K,) m, place of the centre along the axis.
+        tube: (K,) m, radius of the cylinder.
+        length: (K,) m, of the cylinder.
+    """
 
     sphere: Array
     offset: Array
     depth: Array
     tube: Array
     length: Array
+
+    __repr__ = one_line
 
     def where(self, mask: Array) -> "Pairs":
         """The pairs for which `mask` (K,) is true."""
@@ -39,11 +47,12 @@ class Pairs:
 
 
 def exact_volume(pairs: Pairs, *, points: int = GAUSS_POINTS) -> Array:
-    """Volume (K,) m3 common to sphere and cylinder: discs of the sphere cut by the tube, integrated along the axis.
+    """Volume (K,) m3 common to sphere and cylinder.
 
-    In closed form where the disc lies within the tube or covers it; between these, where they cross, Gauss-Legendre of
-    `points` in the angle phi with place = middle + half sin(phi), which smooths the ends. Error below 1e-6
-    of the sphere (study throat-occupancy).
+    Discs of the sphere, cut by the tube, are integrated along the axis: in closed form where the
+    disc lies within the tube or covers it; where they cross, by a Gauss-Legendre rule of `points`
+    points in the angle phi with place = middle + half sin(phi), which smooths the ends. The error
+    is below 1e-6 of the sphere (study throat-occupancy).
     """
     volume = np.zeros(len(pairs.sphere))
     node, weights = np.polynomial.legendre.leggauss(points)
@@ -70,11 +79,11 @@ def _fill_volumes(
             continue
         covers = sqrt(max(a**2 - (r + d) ** 2, 0.0))
         crosses = sqrt(max(a**2 - (r - d) ** 2, 0.0))
-        found = pi * r**2 * max(min(high, covers) - max(low, -covers), 0.0)
+        total = pi * r**2 * max(min(high, covers) - max(low, -covers), 0.0)
         if r > d:
-            found += _segment(a, low, min(high, -crosses)) + _segment(a, max(low, crosses), high)
-        found += _crossing(a, d, r, max(low, -crosses), min(high, -covers), rule)
-        volume[k] = found + _crossing(a, d, r, max(low, covers), min(high, crosses), rule)
+            total += _segment(a, low, min(high, -crosses)) + _segment(a, max(low, crosses), high)
+        total += _crossing(a, d, r, max(low, -crosses), min(high, -covers), rule)
+        volume[k] = total + _crossing(a, d, r, max(low, covers), min(high, crosses), rule)
 
 
 @compiled
@@ -104,9 +113,10 @@ def _crossing(
 def place_by_axis(
     start: Array, end: Array, throat: Array, point: Array, image: Array
 ) -> tuple[Array, Array]:
-    """Distance (K,) m of `point[image]` from the axis `start[throat]` to `end[throat]` and place (K,) m along it.
+    """Distance (K,) m of points from the axes of throats, and their place (K,) m along the axis.
 
-    A throat between two pores at one place has the direction x.
+    The point `point[image]` goes with the axis from `start[throat]` to `end[throat]`. A throat
+    between two pores at one place has the direction x.
     """
     offset, depth = np.empty(len(throat)), np.empty(len(throat))
     for k in range(len(throat)):
@@ -125,11 +135,13 @@ def place_by_axis(
 
 
 def two_plane_volume(pairs: Pairs) -> Array:
-    """Volume (K,) m3 as Shi 2011 estimates it (section 3.2.2): mean of the two caps cut by the planes across the
-    highest and the lowest point of the intersection curve.
+    """Volume (K,) m3 common to sphere and cylinder, as Shi 2011 estimates it (section 3.2.2).
 
-    Read as: the plane tangent to the tube, and the plane of the chord through the crossings of the two circles in
-    the section at the sphere's centre. The ends, of which the thesis says nothing, take off their zone's share.
+    It is the mean of the two caps that are cut off by the planes through the highest and the
+    lowest point of the intersection curve. These are read as the plane tangent to the tube, and
+    the plane of the chord through the crossings of the two circles in the section at the centre of
+    the sphere. The thesis does not mention the ends; they take off the share of the sphere beyond
+    them.
     """
     apart = np.maximum(pairs.offset, 1e-12 * pairs.tube)
     chord = (pairs.offset**2 + pairs.tube**2 - pairs.sphere**2) / (2.0 * apart)
@@ -149,7 +161,7 @@ def two_plane_volume(pairs: Pairs) -> Array:
 
 
 def covers_section(pairs: Pairs) -> Array:
-    """True (K,) where the sphere covers a whole cross-section of the cylinder (Shi 2011, figure 39)."""
+    """True (K,) where the sphere covers a whole section of the cylinder (Shi 2011, figure 39)."""
     nearest = np.clip(pairs.depth, 0.0, pairs.length) - pairs.depth
     square = pairs.sphere**2 - nearest**2
     return (
@@ -163,3 +175,4 @@ OVERLAPS: dict[str, Callable[[Pairs], Array]] = {
     "exact": exact_volume,
     "two-plane": two_plane_volume,
 }
+"""Estimates of the common volume by their names in a case."""

@@ -26,11 +26,13 @@ def mirrored_images(
 ) -> tuple[Array, Array]:
     """Places (M, 3) m and owners (M,) of all images, periodic or mirrored, near a region.
 
-    The region is [`low`, `high`] (3,) m, widened by `largest` m. A centre (`position`, (N, 3) m) on
-    or beyond a face that is not periodic has no mirror image there.
+    The region is [`low`, `high`] (3,) m, widened by `largest` m. A centre (`position`, (N, 3) m)
+    on or beyond a face that is not periodic has no mirror image there.
     """
     margin = (
         np.maximum(np.maximum(network.box[:, 0] - low, high - network.box[:, 1]), 0.0) + largest
     )
-    images = make_images(position, network.box, periodic=network.periodic, margin=margin, hair=0.0)
+    images = make_images(
+        position, network.box, periodic=network.periodic, margin=margin, tolerance=0.0
+    )
     return images.position, images.owner

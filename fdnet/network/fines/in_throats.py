@@ -9,6 +9,7 @@ from fdnet.network.fines.cylinder import OVERLAPS, Pairs, covers_section, place_
 from fdnet.network.fines.fine_images import mirrored_images, reaching_inside
 from fdnet.network.fines.point_search import points_in_boxes
 from fdnet.network.network import Network
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, Snapshot
 
 
@@ -29,6 +30,8 @@ class FinesInThroats:
     pairs: Pairs
     volume: Array
     blocked: Array
+
+    __repr__ = one_line
 
 
 def fines_in_throats(

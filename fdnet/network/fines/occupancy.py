@@ -64,6 +64,14 @@ class Occupancy:
     pair_volume: Array
     counts: Mapping[str, int]
 
+    def __repr__(self) -> str:
+        return (
+            f"Occupancy({int(np.sum(self.throat_fines > 0))} of {len(self.throat_fines)} throats "
+            f"with fines, {int(np.sum(self.blocked))} blocked, "
+            f"{float(np.sum(self.pore_solid_volume)):.4g} m3 of fines in "
+            f"{int(np.sum(self.pore_solid_volume > 0))} of {len(self.pore_solid_volume)} pores)"
+        )
+
 
 def measure_occupancy(
     network: Network, fines: Snapshot, *, overlap: str | Callable[[Pairs], Array] = "exact"

@@ -17,6 +17,7 @@ from fdnet.errors import FlowError
 from fdnet.network.flow.stiff import Balance, balance_links
 from fdnet.network.flow.winding import winding_groups
 from fdnet.network.network import Network
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, frozen
 
 TOLERANCE = 1e-6
@@ -33,8 +34,8 @@ class Flow:
     `pore_pressure` (P,) 1 at the inlet plane, 0 at the outlet plane, NaN where cut off; `throat_flux` (T,) m3 from
     the first to the second pore; `inflow` m3 = Q mu / dp; `residual` sum of the pores' imbalances over the inflow
     (a bound for the inflow's relative error);
-    `mass_balance` |in - out| / in, None without flow (x periodic: the flux across the period against the
-    energy spent, which is flux times the drop of 1);
+    `mass_balance` difference of inflow and outflow over the inflow, None without flow (x periodic:
+    the flux across the period against the energy spent, which is flux times the drop of 1);
     `isolated_pores` not tied to both planes; `reason` why the inflow is 0, else empty.
     """
 
@@ -46,6 +47,8 @@ class Flow:
     inflow: float
     isolated_pores: int
     reason: str
+
+    __repr__ = one_line
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -61,6 +64,8 @@ class Links:
     ends: Array
     conductance: Array
     throat: Array
+
+    __repr__ = one_line
 
     def where(self, kept: Array) -> "Links":
         return Links(

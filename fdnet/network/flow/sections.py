@@ -7,6 +7,7 @@ import numpy as np
 
 from fdnet.errors import CaseError
 from fdnet.network.flow.flow import Flow
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.porosity import Porosity
 from fdnet.spheres.snapshot import Array, frozen
 
@@ -44,6 +45,8 @@ class Profile:
     porosity_damaged: Array
     fines_fraction: Array
 
+    __repr__ = one_line
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SlabK:
@@ -53,6 +56,8 @@ class SlabK:
     cut_out: Array
     inplace: Array
     flows: tuple[Flow, ...]
+
+    __repr__ = one_line
 
 
 def section_edges(sections: int | Sequence[float], box: Array) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 
 from fdnet.network.flow.solver import Balances
 from fdnet.network.flow.winding import groups, heights, winding_groups
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
 CONTRASTS = (1e8, 1e6, 1e10)
@@ -29,6 +30,8 @@ class Balance:
     flux: Array
     defect: float
     method: str
+
+    __repr__ = one_line
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

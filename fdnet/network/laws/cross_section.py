@@ -1,11 +1,17 @@
-"""Flow along the axis through one plane section of a throat: a triangle with a disc of each grain on its corners.
+"""Flow along the axis through one plane section of a throat.
 
-Every disc holds the fluid between its rim and the line midway to the next rim; these shares are cut into wedges
-(`wedge`). Equal discs: six right-angled wedges about the circumcentre, in closed form. Unequal ones: the line midway
-between two rims is a hyperbola, d(t) = (a^2 - e^2) / (2 (a cos t + e)) with e the difference of the radii and a the
-distance of the centres, and the shares meet in the centre of the inscribed circle; rays by Gauss points, the shear
-between rays by the ratio of the wedge of the same angle and half gap. Where no circle touches all three (one disc in
-the shadow of the others), each disc keeps what its rays see of the triangle before a line midway or the opposite side.
+The section is a triangle with a disc of each grain on its corners. Every disc slows the fluid
+between its rim and the line midway to the next rim; these shares are cut into wedges (`wedge`).
+
+Equal discs: six right-angled wedges about the circumcentre, in closed form.
+
+Unequal discs: the line midway between two rims is a hyperbola. From the centre of a disc it lies
+at the distance d(t) = (a^2 - e^2) / (2 (a cos t + e)) on the ray at the angle t from the line
+between the centres, with the difference e of the radii and the distance a of the centres. The
+shares meet in the centre of the inscribed circle. The flux on rays is summed by Gauss points, and
+the shear between rays is that of the wedge of the same angle and half gap. Where no circle touches
+all three discs (one disc lies in the shadow of the others), each disc keeps what its rays see of
+the triangle before a line midway or the opposite side.
 """
 
 import numpy as np
@@ -20,9 +26,12 @@ FINE_POINTS, FINE_WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 @compiled
 def wedges(base: Array) -> Array:
-    """Half edge, tangent and angle of the six wedges (3, 3) of a triangle `base` (3, 2) with equal discs, two of each;
-    an angle is negative where the circumcentre lies beyond that edge."""
-    found = np.empty((3, 3))
+    """Half edge m, tangent and angle rad of the six wedges of a triangle `base` (3, 2) m.
+
+    Discs are equal, so there are two wedges of each row of the result (3, 3). An angle is negative
+    where the circumcentre lies beyond that edge.
+    """
+    rows = np.empty((3, 3))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         ex, ey = base[j, 0] - base[i, 0], base[j, 1] - base[i, 1]
@@ -30,14 +39,16 @@ def wedges(base: Array) -> Array:
         gx, gy = base[k, 0] - base[j, 0], base[k, 1] - base[j, 1]
         # the angle at the far corner is that at the centre over half the edge
         slope = (fx * gx + fy * gy) / abs(ex * fy - ey * fx)
-        found[i] = 0.5 * np.hypot(ex, ey), slope, np.arctan(slope)
-    return found
+        rows[i] = 0.5 * np.hypot(ex, ey), slope, np.arctan(slope)
+    return rows
 
 
 @compiled
 def even_flux(wedge: Array, disc: float, table: Array) -> float:
-    """Flux (m4) of laplacian(w) = -1 through the section of `wedges` with three discs of radius `disc`; not positive
-    where the sum of signed wedges fails."""
+    """Flux m4 of laplacian(w) = -1 through the section of `wedges` with discs of radius `disc` m.
+
+    It is not positive where the sum of the signed wedges fails.
+    """
     total = 0.0
     for i in range(3):
         half, slope, angle = wedge[i]
@@ -49,17 +60,20 @@ def even_flux(wedge: Array, disc: float, table: Array) -> float:
 
 @compiled
 def uneven_flux(base: Array, disc: Array, table: Array) -> float:
-    """Flux (m4) through the open part of a triangle `base` (3, 2), its first corner at the origin and the second on the
-    x axis, with discs of radius `disc` (3,). 0 where closed."""
-    found = _uneven(base, disc, table)
-    if not found > 0.0:
-        found = _shadowed(base, disc, table)
-    return found
+    """Flux m4 of laplacian(w) = -1 through a triangle `base` (3, 2) m with unequal discs.
+
+    The first corner is the origin, the second lies on the x axis; `disc` (3,) m are the radii. The
+    flux is 0 where the discs close the triangle.
+    """
+    flux = _uneven(base, disc, table)
+    if not flux > 0.0:
+        flux = _shadowed(base, disc, table)
+    return flux
 
 
 @compiled
 def _inscribed(base: Array, disc: Array) -> tuple[float, float, float]:
-    """Centre and radius of the circle touching three discs from outside; NaN radius where there is none."""
+    """Centre and radius m of the circle that touches three discs; NaN where there is none."""
     a, px, py = base[1, 0], base[2, 0], base[2, 1]
     r0, r1, r2 = disc[0], disc[1], disc[2]
     ax = 0.5 * (a * a + r0 * r0 - r1 * r1) / a
@@ -83,7 +97,10 @@ def _inscribed(base: Array, disc: Array) -> tuple[float, float, float]:
 
 @compiled
 def ray(reach: float, disc: float) -> float:
-    """Flux (m4) per angle between a disc's rim and the distance `reach` from its centre, without shear between rays."""
+    """Flux m4 per angle on a ray from the rim of a disc to the distance `reach` m from its centre.
+
+    Shear between neighbouring rays is neglected; `disc` m is the radius of the disc.
+    """
     if reach <= disc:
         return 0.0
     d2, r2 = reach * reach, disc * disc
@@ -92,14 +109,18 @@ def ray(reach: float, disc: float) -> float:
 
 @compiled
 def midway(apart: float, wider: float, turn: float) -> float:
-    """Distance from a disc's centre, at the angle `turn` from the line to another's, of the line midway between their
-    rims: centres `apart`, the other's radius `wider` by so much. Infinite where the ray never meets it."""
+    """Distance m from the centre of a disc to the line midway between its rim and that of another.
+
+    The ray has the angle `turn` rad from the line between the centres, which are `apart` m; the
+    radius of the other disc is larger by `wider` m. Infinite where the ray never meets the line.
+    """
     below = apart * np.cos(turn) + wider
     return max(0.5 * (apart * apart - wider * wider) / below, 0.0) if below > 0.0 else np.inf
 
 
 @compiled
 def _uneven(base: Array, disc: Array, table: Array) -> float:
+    """The flux where a circle touches all three discs, else 0."""
     cx, cy, radius = _inscribed(base, disc)
     if np.isnan(radius):
         return 0.0
@@ -121,7 +142,8 @@ def _uneven(base: Array, disc: Array, table: Array) -> float:
             if half <= 0.0 or a * np.cos(angle) + apart <= 0.0:
                 return 0.0
             flux = 0.0
-            for point, weight in zip(POINTS, WEIGHTS):  # noqa: B905 - numba knows no strict zip
+            # numba knows no strict zip
+            for point, weight in zip(POINTS, WEIGHTS):  # noqa: B905
                 turn = 0.5 * angle * (1.0 + point)
                 flux += weight * 0.5 * angle * ray(midway(a, apart, turn), disc[i])
             total += flux * shear_ratio(abs(angle), disc[i] / half, table)
@@ -130,6 +152,7 @@ def _uneven(base: Array, disc: Array, table: Array) -> float:
 
 @compiled
 def _shadowed(base: Array, disc: Array, table: Array) -> float:
+    """The flux where one disc lies in the shadow of the others."""
     total = 0.0
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -142,7 +165,8 @@ def _shadowed(base: Array, disc: Array, table: Array) -> float:
         height = twice / across
         foot = np.arctan2(-(jx * (kx - jx) + jy * (ky - jy)) / across, height)
         flux, nearest = 0.0, np.inf
-        for point, weight in zip(FINE_POINTS, FINE_WEIGHTS):  # noqa: B905 - numba knows no strict zip
+        # numba knows no strict zip
+        for point, weight in zip(FINE_POINTS, FINE_WEIGHTS):  # noqa: B905
             turn = 0.5 * opening * (1.0 + point)
             reach = height / max(np.cos(turn - foot), 1e-3)
             reach = min(

@@ -13,11 +13,13 @@ from fdnet.spheres.snapshot import Array, frozen
 
 
 def kozeny_damage(network: Network, occupancy: Occupancy, clean: Array) -> Damage:
-    """Local Kozeny factor per pore, (1 - v)^3 / (1 + a)^2, harmonic mean of a throat's two pores on its conductance.
+    """Local Kozeny factor of each pore: f = (1 - v)^3 / (1 + a)^2.
 
-    v = volume of fines / void, a = surface of fines / wall, in the tetrahedron (k ~ porosity^3 / surface^2, Kozeny
-    1927, Carman 1937); pores of one `pore_group` are taken together. A pore whose fines fill it (v >= 1) is closed and
-    counted.
+    In the tetrahedron of the pore, v is the volume of the fines over the void, and a the surface
+    of the fines over that of the grains (k is proportional to porosity^3 / surface^2: Kozeny 1927,
+    Carman 1937). The conductance of a throat is multiplied by the harmonic mean of the factors of
+    its two pores. Pores of one `pore_group` are taken together. A pore that its fines fill (v >=
+    1) is closed and counted.
     """
     deposit = _pore_deposit(network, occupancy)
     taken, filled = deposit.taken, deposit.filled
@@ -31,17 +33,25 @@ def kozeny_damage(network: Network, occupancy: Occupancy, clean: Array) -> Damag
 
 
 def side_kozeny_damage(network: Network, occupancy: Occupancy, clean: Array) -> Damage:
-    """Local Kozeny factor per side of a throat, (1 - s v)^3 / (1 + a)^2, on that side's share of the resistance.
+    """Local Kozeny factor of each side of a throat: f = (1 - s v)^3 / (1 + a)^2.
 
-    The sides are the pyramids from the facet to the power centres; their clean resistances R are those of
-    `half_resistances`, so the throat keeps (R1 + R2) / (R1 / f1 + R2 / f2) of its clean conductance. v and a as in
-    `kozeny_damage`, taken in the side where a fine is much smaller than a quarter of the pore's void and in the whole
-    pore where it is larger: weight 1 / (1 + (4 V_fine / void)^2) on the side. s = 1 - (1 - t)^2 is the share of a
-    round tube's section (radius twice the pack's hydraulic radius, void / wall) within the fines' layer on its wall, t
-    the layer's thickness over that radius, at most 1: a film takes up the slow part of the void only, a bed and fines
-    as large as the tube all of it. Nothing is fitted. Fines deeper inside a grain than their radius make no layer
-    (`layers_within_grains`, t = 0) and count by their surface alone. A side or pore whose fines fill it (v >= 1) is
-    closed and counted.
+    The sides are the pyramids from the facet to the power centres. Their clean resistances are R1
+    and R2 (`half_resistances`), so the throat keeps (R1 + R2) / (R1 / f1 + R2 / f2) of its clean
+    conductance. Nothing is fitted.
+
+    v and a are volume and surface of the fines over those of void and grains, as in
+    `kozeny_damage`. They are taken in the side where a fine is much smaller than a quarter of the
+    void of the pore, and in the whole pore where it is larger: the weight of the side is
+    1 / (1 + (4 V_fine / void)^2), with the volume V_fine of a fine.
+
+    s = 1 - (1 - t)^2 is the share of the section of a round tube that lies within the layer of
+    fines on its wall. The radius of the tube is twice the hydraulic radius of the pack (void over
+    grain surface); t is the thickness of the layer over that radius, at most 1. A film takes up
+    only the slow part of the void; a bed, and fines as large as the tube, take up all of it. Fines
+    deeper inside a grain than their radius make no layer (`layers_within_grains`, t = 0) and count
+    by their surface alone.
+
+    A side or pore that its fines fill (v >= 1) is closed and counted.
     """
     pore = _pore_deposit(network, occupancy)
     ends = network.throat_pores
@@ -68,14 +78,23 @@ def side_kozeny_damage(network: Network, occupancy: Occupancy, clean: Array) -> 
 
 
 def _law_used(taken: Array, kept: Array) -> Array:
-    """Names (T,): clean without fines, blocked where nothing is `kept`, else kozeny."""
+    """Rule (T,) that applied: clean without fines, blocked if nothing is `kept`, else kozeny."""
     return frozen(np.where(~taken, CLEAN, np.where(kept == 0, BLOCKED, KOZENY)).astype("<U10"))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _PoreDeposit:
-    """Per pore (P,), pores of one group together: fines' `volume` over void and `surface` over wall (0 where filled),
-    `void` m3, mean volume of a `fine` m3, `layer` m thick on the wall, whether `taken` and whether `filled`."""
+    """Fines of each pore (P); pores of one group are taken together.
+
+    Attributes:
+        volume: (P,) volume of the fines over the void; 0 where filled.
+        surface: (P,) surface of the fines over that of the grains; 0 where filled.
+        void: (P,) m3.
+        fine: (P,) m3, mean volume of a fine.
+        layer: (P,) m, thickness of the layer of fines on the grains.
+        taken: (P,) whether the pore holds fines.
+        filled: (P,) whether the fines fill it.
+    """
 
     volume: Array
     surface: Array
@@ -87,6 +106,7 @@ class _PoreDeposit:
 
 
 def _pore_deposit(network: Network, occupancy: Occupancy) -> _PoreDeposit:
+    """Sums over the pores of each group."""
     group = network.pore_group
     solid = occupancy.pore_solid_volume
     held, surface, void, wall, fine, layer = (
@@ -115,15 +135,20 @@ def _pore_deposit(network: Network, occupancy: Occupancy) -> _PoreDeposit:
 
 
 def _kozeny(volume: Array, surface: Array, share: Array | float = 1.0) -> Array:
+    """Factor (1 - s v)^3 / (1 + a)^2 of relative volume v, surface a and share s."""
     return (1.0 - share * volume) ** 3 / (1.0 + surface) ** 2
 
 
 def _hydraulic_radius(network: Network) -> float:
+    """Void over grain surface of the pack, m."""
     return float(np.sum(np.maximum(network.pore_volume, 0.0)) / np.sum(network.pore_wall_surface))
 
 
 def _kept(resistance: Array, factor: Array) -> Array:
-    """Share (T,) of the conductance left of two resistances (T, 2) in series, each divided by its factor (T, 2)."""
+    """Share (T,) of the conductance that two resistances (T, 2) in series keep.
+
+    Each resistance is divided by its factor (T, 2).
+    """
     resistance = np.where(np.isfinite(resistance), resistance, 0.0)
     shut = np.any((factor == 0) & (resistance > 0), axis=1)
     raised = np.sum(resistance / np.where(factor > 0, factor, 1.0), axis=1)

@@ -1,18 +1,20 @@
-"""Resistance of throats by extended lubrication theory: no fitted constant.
+"""Resistance of throats by extended lubrication theory, without a fitted constant.
 
-Along the normal of its facet a throat is a tube of slowly varying section. The section at height z carries the flux
-M(z) per pressure gradient over viscosity (`section`), as much as a round tube of radius a = (8 M / pi)^(1/4). Where the
-tube widens, the fluid also shears sideways: to second order in the slope of a periodic round tube the resistance is
-integral of 8 / (pi a^4) (1 + 4/3 a'^2) dz (lubrication theory to second order, Sisavath, Jing and Zimmerman 2001,
-Phys. Fluids 13, 2762; rederived in docs/physics_network.md). Beyond small slopes that overshoots; with the same
-expansion and the right scaling for an orifice,
+Along the normal of its facet a throat is a tube of slowly varying section. The section at height z
+carries the flux M(z) per pressure gradient over viscosity (`cross_section`), as much as a round
+tube of radius a = (8 M / pi)^(1/4). Where the tube widens, the fluid also shears sideways. To
+second order in the slope a' = da/dz of a periodic round tube the resistance is the integral of 8 /
+(pi a^4) (1 + 4/3 a'^2) dz (Sisavath, Jing and Zimmerman 2001, Phys. Fluids 13, 2762; rederived in
+docs/physics_network.md). Beyond small slopes that is too large. The resistance used here has the
+same expansion and scales as an orifice does where the slope is large:
 
-    dR = 8 / (pi a^4) sqrt(dz^2 + 8/3 da^2),
+    dR = 8 / (pi a^4) sqrt(dz^2 + 8/3 da^2).
 
-within 7.5 % of the exact flow through every hyperboloid from a long tube to Sampson's orifice (Happel and Brenner
-1965, section 4-29).
+It is within 7.5 % of the exact flow through every hyperboloid from a long tube to Sampson's
+orifice (Happel and Brenner 1965, section 4-29).
 
-Side walls that hold the fluid (`Network.walls` "no-slip"): the sections they cut are those of `wall_section`.
+Where side walls hold the fluid (`Network.walls` "no-slip"), the sections that they cut are those
+of `wall_cross_section`.
 """
 
 import numpy as np
@@ -26,24 +28,31 @@ from fdnet.network.network import LENGTH_FLOOR, Network
 from fdnet.spheres.snapshot import Array
 
 WIDENING = 8.0 / 3.0
+"""Factor of da^2 in the resistance above."""
 STEPS = 8
+"""Steps in height between the facet and a power centre."""
 TIP = 1e-2
+"""Smallest radius of the disc that a grain shows in a section, in radii of the grain."""
 EQUAL = 1e-9
+"""Radii that differ by at most this share are equal."""
 
 
 def half_resistances(network: Network, *, widening: float = WIDENING) -> Array:
-    """Resistance (T, 2), 1/m3 (viscosity factored out), of each throat from its facet to the power centre on either
-    side; `widening` is the factor on da^2 above. A throat with both centres on one side of its facet is a resistance on
-    that side alone. Infinite where closed. Heights whose sum is below 1e-3 mean grain radii are taken as that."""
+    """Resistance (T, 2) 1/m3 of each throat from its facet to the power centre on either side.
+
+    Viscosity is factored out. A throat with both centres on one side of its facet is a resistance
+    on that side alone. A closed throat has an infinite one. Heights whose sum is below 1e-3 mean
+    grain radii are taken as that. `widening` is the factor of da^2 in the formula of this module.
+    """
     corner = geometry.flat(network.throat_corner)
     radius = np.ascontiguousarray(network.throat_corner_radius)
     heights = np.ascontiguousarray(network.throat_heights)
     floor = LENGTH_FLOOR * network.grain_radius
-    found = _halves(
+    resistance = _halves(
         corner, radius, heights, wall_cuts(network), (floor, float(widening)), ratio_table()
     )
-    found[network.throat_radius <= 0] = np.inf
-    return found
+    resistance[network.throat_radius <= 0] = np.inf
+    return resistance
 
 
 @compiled
@@ -57,7 +66,7 @@ def _halves(
 ) -> Array:
     order, place, part = cuts
     floor, widening = given
-    found = np.zeros((len(corner), 2))
+    resistance = np.zeros((len(corner), 2))
     for t in range(len(corner)):
         low, high = -heights[t, 0], heights[t, 1]
         high = max(high, low + floor)
@@ -65,21 +74,21 @@ def _halves(
         wedge = wedges(corner[t]) if even else np.empty((0, 3))
         wall = (order[t], place[t], part[t])
         if low < 0.0 and high > 0.0:
-            found[t, 0] = _resistance(
+            resistance[t, 0] = _resistance(
                 corner[t], radius[t], wedge, wall, (0.0, -low, widening), table
             )
-            found[t, 1] = _resistance(
+            resistance[t, 1] = _resistance(
                 corner[t], radius[t], wedge, wall, (0.0, high, widening), table
             )
         elif low >= 0.0:
-            found[t, 1] = _resistance(
+            resistance[t, 1] = _resistance(
                 corner[t], radius[t], wedge, wall, (low, high, widening), table
             )
         else:
-            found[t, 0] = _resistance(
+            resistance[t, 0] = _resistance(
                 corner[t], radius[t], wedge, wall, (-high, -low, widening), table
             )
-    return found
+    return resistance
 
 
 @compiled
@@ -91,7 +100,10 @@ def _resistance(
     span: tuple[float, float, float],
     table: Array,
 ) -> float:
-    """Integral of dR between two heights: 1/a linear within a step, extrapolated from STEPS and STEPS / 2 steps."""
+    """Integral of dR between two heights, 1/m3.
+
+    1/a is linear within a step; the integral is extrapolated from STEPS and STEPS / 2 steps.
+    """
     low, high, widening = span
     step = (high - low) / STEPS
     narrow = np.empty(STEPS + 1)
@@ -119,7 +131,10 @@ def _slipping_flux(base: Array, disc: Array, wedge: Array, table: Array) -> floa
 
 @compiled
 def summed(narrow: Array, step: float, every: int, widening: float) -> float:
-    """Resistance, 1/m3, of sections of 1/a = `narrow` (K,), `step` m apart, by every `every`-th of them: sum of dR."""
+    """Resistance 1/m3 between sections of 1/a = `narrow` (K,) 1/m that lie `step` m apart.
+
+    It is the sum of dR over the intervals between every `every`-th of them.
+    """
     total = 0.0
     for k in range(every, len(narrow), every):
         a, b = narrow[k - every], narrow[k]

@@ -56,8 +56,14 @@ def damage_law(
 ) -> DamageLaw:
     """The damage law of this name, made with the options that it has.
 
-    `clogging_threshold` (None: the law's own) and `middle_band` are options of the two thesis laws
-    alone, see `thesis_damage`; the Kozeny laws have none. Raises CaseError on an unknown name.
+    Args:
+        name: a key of `DAMAGE_LAWS`.
+        clogging_threshold: throat porosity below which the thesis laws take a throat as clogged;
+            None for the threshold of the law. The Kozeny laws have no such option.
+        middle_band: see `thesis_damage`. The Kozeny laws have no such option.
+
+    Raises:
+        CaseError: the name is unknown.
     """
     if name not in DAMAGE_LAWS:
         raise CaseError(

@@ -1,7 +1,8 @@
-"""The two sides of a throat: the pyramids from its facet to the power centres, their void and their wall.
+"""The two sides of a throat, pyramids from its facet to the power centres: void and grain surface.
 
-Heights are signed, and so are void and wall: where a power centre lies behind the facet the pyramid counts as taken
-off. Sources as in `geometry`; overlap of two grains is counted once, by the pyramid's share of the dihedral angle.
+Heights are signed, and so are void and surface: where a power centre lies behind the facet, the
+pyramid is subtracted. The overlap of two grains is counted once, by the share of the pyramid in
+the dihedral angle. Sources as in `geometry`.
 """
 
 import numpy as np
@@ -12,7 +13,7 @@ from fdnet.spheres.snapshot import Array
 
 
 def side_voids(network: Network) -> tuple[Array, Array]:
-    """Void (T, 2) m3 and grain surface (T, 2) m2 of the pyramids towards the first and the second pore."""
+    """Void (T, 2) m3 and grain surface (T, 2) m2 of the sides of the first and second pore."""
     corner, radius = network.throat_corner, network.throat_corner_radius
     base = geometry.flat(corner)
     middle = geometry.power_centre(base, radius)[0]
@@ -30,8 +31,11 @@ def side_voids(network: Network) -> tuple[Array, Array]:
 
 
 def _foot_angles(base: Array, middle: Array, height: Array) -> Array:
-    """Signed solid angle (T, 3) at the facet's corners of the pyramid to the point `height` above its `middle`, the
-    centre of equal power to its three discs."""
+    """Signed solid angles (T, 3) sr of a pyramid at the corners `base` (T, 3, 2) m of its facet.
+
+    The apex lies `height` (T,) m above the `middle` (T, 2) m of the facet, the point of equal
+    power to its three discs.
+    """
     apex = np.concatenate([middle, height[:, None]], axis=1)[:, None]
     raised = np.concatenate(
         [np.concatenate([base, np.zeros((*base.shape[:2], 1))], axis=2), apex], axis=1
@@ -42,7 +46,7 @@ def _foot_angles(base: Array, middle: Array, height: Array) -> Array:
 def _hidden_by_pairs(
     heights: Array, base: Array, middle: Array, radius: Array
 ) -> tuple[Array, Array]:
-    """Volume and surface (T, 2) of grain pairs' overlap within either pyramid, by its signed dihedral angles."""
+    """Volume (T, 2) m3 and surface (T, 2) m2 of the overlap of grain pairs in either pyramid."""
     volume, surface = np.zeros((len(base), 2)), np.zeros((len(base), 2))
     for first, second in geometry.SIDES:
         along = base[:, second] - base[:, first]

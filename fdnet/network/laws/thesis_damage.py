@@ -1,4 +1,4 @@
-"""The thesis's damage law: surface deposition, clogging and blocking of the throat's cylinder (Shi 2011, 3.2.4)."""
+"""The damage law of the thesis: fines line, clog or block the cylinder of a throat (Shi 2011)."""
 
 import numpy as np
 
@@ -10,8 +10,11 @@ from fdnet.spheres.snapshot import Array, frozen
 
 TORTUOSITY = 2.5
 TEXT_THRESHOLD, CODE_THRESHOLD = 0.40, 0.36
+"""Throat porosity below which fines clog: in the text of the thesis, and in its appendix B."""
 BAND = (0.36, 0.80)
+"""Throat porosities between which the places of the fines may decide."""
 UNIFORM_DISTANCE = 2.0 / 3.0
+"""Mean distance from the axis, over the radius, of an even spread of fines."""
 MIDDLE_BANDS = ("threshold", "position")
 
 
@@ -23,14 +26,29 @@ def thesis_damage(
     clogging_threshold: float = TEXT_THRESHOLD,
     middle_band: str = "threshold",
 ) -> Damage:
-    """Two-scale rule of Shi 2011, section 3.2.4, on the throat porosity phi in the inscribed cylinder.
+    """Two-scale rule by the throat porosity phi in the inscribed cylinder (Shi 2011, 3.2.4).
 
-    No fines: clean. A fine covers a section: 0. phi at or above `clogging_threshold` (0.40 in the text, 0.36 in appendix B):
-    surface deposition, factor phi^2 (r_e = r_i sqrt(phi)). Below: clogging, Carman-Kozeny
-    k = phi^3 D^2 / (72 * 2.5 (1 - phi)^2) over the cylinder's section; a factor above 1 is capped and counted.
-    `middle_band` "position": between 0.36 and 0.80 deposition where the fines' mean distance from the axis is at
-    least 2/3 of the radius (what an even spread has), else clogging. On another base law the same factor applies;
-    a throat of inscribed radius 0 is closed in every law. Raises CaseError on values out of range.
+    - Without fines the throat stays clean. Where one fine covers a whole section it is blocked.
+    - phi at or above `clogging_threshold`: surface deposition. The fines narrow the radius r to
+      r sqrt(phi), so the conductance is multiplied by phi^2.
+    - phi below: clogging. The fines of mean diameter D make a bed of Carman-Kozeny permeability
+      k = phi^3 D^2 / (72 * 2.5 (1 - phi)^2) over the section of the cylinder. A factor above 1 is
+      capped and counted.
+
+    On another conductance law the same factor applies. A throat of inscribed radius 0 is closed in
+    every law.
+
+    Args:
+        network: pores and throats.
+        occupancy: what the fines fill of them.
+        clean: (T,) m3, conductance without fines.
+        clogging_threshold: 0.40 in the text of the thesis, 0.36 in its appendix B.
+        middle_band: "threshold", or "position": between 0.36 and 0.80 deposition where the mean
+            distance of the fines from the axis is at least 2/3 of the radius, which is that of an
+            even spread, else clogging.
+
+    Raises:
+        CaseError: an option is unknown or out of range.
     """
     if middle_band not in MIDDLE_BANDS:
         raise CaseError(
@@ -64,7 +82,7 @@ def thesis_damage(
 
 
 def _clogged_factor(network: Network, occupancy: Occupancy) -> Array:
-    """Carman-Kozeny conductance of the filled cylinder over Hagen-Poiseuille of the clean one: 8 k / r^2."""
+    """Factor (T,) of a clogged throat: 8 k / r^2, Carman-Kozeny over Hagen-Poiseuille."""
     porosity = np.clip(occupancy.throat_porosity, 0.0, None)
     filled = 1.0 - porosity
     use = (filled > 0) & (network.throat_radius > 0)
@@ -75,6 +93,7 @@ def _clogged_factor(network: Network, occupancy: Occupancy) -> Array:
 
 
 def _lines_the_wall(occupancy: Occupancy) -> Array:
+    """True (T,) where the fines line the wall, by porosity and mean distance from the axis."""
     count = len(occupancy.throat_porosity)
     distance = np.bincount(occupancy.pair_throat, weights=occupancy.pair_distance, minlength=count)
     mean = distance / np.maximum(occupancy.throat_fines, 1)

@@ -1,13 +1,17 @@
-"""Flow along the axis through the section of a throat that a side wall cuts, where the wall holds the fluid.
+"""Flow along the axis through a section of a throat that a side wall cuts and holds still.
 
-The throat's facet holds a grain i, its mirror image across the wall, and a grain j or its image: the plane is normal to
-the wall, and inside the box every section parallel to it is the trapezoid between the centres of two discs and their
-feet on the wall. Discs and wall share the fluid as in `section`: the line midway between the rims of i and j is a
-hyperbola, the one midway between the rim of i (radius rho, H above the wall) and the wall a parabola: on the ray at
-angle t from the wall's normal at the distance (H + rho) / (1 + cos t), and (x^2 + H^2 - rho^2) / (2 (H + rho)) above
-the wall at the distance x from the foot of i. They meet in the centre of the circle that touches discs and wall. The
-wall's own share is a plane film, flux y^3 / 3 per length. Where that centre lies outside the trapezoid, every ray still
-ends at the nearest of these lines or of the trapezoid's sides, so no share is negative and none is missing.
+The facet of the throat has a grain i, its mirror image across the wall, and a grain j or its image
+as corners. Its plane is normal to the wall, and inside the box every section parallel to it is the
+trapezoid between the centres of two discs and their feet on the wall.
+
+Discs and wall share the fluid as in `cross_section`. The line midway between the rims of i and j
+is a hyperbola. The line midway between the rim of i (radius rho, centre H above the wall) and the
+wall is a parabola: on the ray at the angle t from the normal of the wall it lies at the distance
+(H + rho) / (1 + cos t) from the centre; at the distance x from the foot of i its height above the
+wall is (x^2 + H^2 - rho^2) / (2 (H + rho)). The lines meet in the centre of the circle that touches
+discs and wall. The share of the wall is a plane film, with the flux y^3 / 3 per length for a film
+of thickness y. Where that centre lies outside the trapezoid, every ray still ends at the nearest of
+these lines or of the sides of the trapezoid, so no share is negative and none is missing.
 """
 
 import numpy as np
@@ -26,16 +30,23 @@ from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array
 
 NARROWED = 0.25
-HAIR = 1e-9
+"""Part of the slipping flux that a throat carries where two walls cut it."""
+TOLERANCE = 1e-9
+"""Lengths up to this many mean grain radii are 0, and sines up to this are taken as this."""
 
 
 def wall_cuts(network: Network) -> tuple[Array, Array, Array]:
-    """How walls that hold the fluid cut each throat: `order` (T, 2) which corners are i and j, -1 where no wall or not
-    one alone does; `place` (T, 3) m, heights of i and j above the wall and their distance along it; `part` (T,) by
-    which the half-section (order >= 0) or the slipping section counts as the flux of the whole throat.
+    """How walls that hold the fluid cut each throat.
 
-    A trapezoid is two triangles, each with share 1/2, so each carries the half-section; a triangle with j on the wall
-    is alone and carries two. What two walls cut carries a quarter of the slipping flux: so does a narrow gap.
+    A trapezoid is two triangles, each with share 1/2, so each carries the half-section; a triangle
+    with j on the wall is alone and carries two. A throat that two walls cut carries a quarter of
+    the slipping flux, as a narrow gap does.
+
+    Returns:
+        order: (T, 2) which corners of the facet are i and j; -1 where not exactly one wall cuts
+        it. place: (T, 3) m, heights of i and j above the wall, and their distance along it. part:
+        (T,) factor from the flux of the half-section (order >= 0), or of the slipping
+            section, to the flux of the whole throat.
     """
     count = len(network.throat_share)
     order, place, part = np.full((count, 2), -1), np.zeros((count, 3)), np.ones(count)
@@ -44,7 +55,7 @@ def wall_cuts(network: Network) -> tuple[Array, Array, Array]:
         return order, place, part
     part[cut] = NARROWED
     single = cut[network.throat_share[cut] == 0.5]
-    corner, hair = network.throat_corner[single], HAIR * network.grain_radius
+    corner, tolerance = network.throat_corner[single], TOLERANCE * network.grain_radius
     own = network.throat_grains[single]
     sides = [axis for axis in (1, 2) if not network.periodic[axis]]
     for i, image, j in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
@@ -53,8 +64,8 @@ def wall_cuts(network: Network) -> tuple[Array, Array, Array]:
             rest = np.delete(apart, axis, axis=1)
             pair = (
                 (own[:, i] == own[:, image])
-                & np.all(np.abs(rest) <= hair, axis=1)
-                & (np.abs(apart[:, axis]) > hair)
+                & np.all(np.abs(rest) <= tolerance, axis=1)
+                & (np.abs(apart[:, axis]) > tolerance)
             )
             t = single[pair]
             across = corner[pair, j] - 0.5 * (corner[pair, i] + corner[pair, image])
@@ -62,14 +73,16 @@ def wall_cuts(network: Network) -> tuple[Array, Array, Array]:
             order[t] = i, j
             place[t, 0], place[t, 1] = 0.5 * np.abs(apart[pair, axis]), height
             place[t, 2] = np.linalg.norm(np.delete(across, axis, axis=1), axis=1)
-            part[t] = np.where(height <= hair, 2.0, 1.0)
+            part[t] = np.where(height <= tolerance, 2.0, 1.0)
     return order, place, part
 
 
 @compiled
 def wall_flux(place: Array, first: float, second: float, table: Array) -> float:
-    """Flux (m4) of laplacian(w) = -1 between the wall and discs of radius `first` and `second`; `place` (3,) m their
-    heights above the wall and distance along it."""
+    """Flux m4 of laplacian(w) = -1 between the wall and discs of radius `first` and `second` m.
+
+    `place` (3,) m are the heights of their centres above the wall and their distance along it.
+    """
     along, above = _meeting(place, first, second)
     total = 0.0
     for i in range(2):
@@ -97,8 +110,11 @@ def wall_flux(place: Array, first: float, second: float, table: Array) -> float:
 
 @compiled
 def _meeting(place: Array, first: float, second: float) -> tuple[float, float]:
-    """Where the two parabolas meet, along the wall from the foot of the first disc and above it: the centre of the
-    circle that touches both discs and the wall. Midway along the wall where they do not."""
+    """Where the two parabolas meet: m along the wall from the first foot, and m above the wall.
+
+    That is the centre of the circle that touches both discs and the wall. Where the parabolas do
+    not meet, it is the place midway along the wall.
+    """
     one, two = place[0] + first, place[1] + second
     near, far = place[0] ** 2 - first**2, place[1] ** 2 - second**2
     middle = one * place[2]
@@ -113,14 +129,21 @@ def _meeting(place: Array, first: float, second: float) -> tuple[float, float]:
 def _share(
     across: tuple[float, float, float], disc: float, other: float, low: float, high: float
 ) -> float:
-    """What a disc's rays at angles `low` to `high` from the wall's normal see before the nearest line midway or the
-    trapezoid's far side; `across` its height, the other's and their distance along the wall."""
+    """Flux m4 on the rays of a disc at angles `low` to `high` rad from the normal of the wall.
+
+    A ray ends at the nearest line midway, or at the far side of the trapezoid. `disc` and `other`
+    m are the radii; `across` m is the height of the disc, that of the other, and their distance
+    along the wall.
+    """
     apart = np.hypot(across[2], across[0] - across[1])
     edge = np.arctan2(across[2], across[0] - across[1])
     flux = 0.0
-    for point, weight in zip(POINTS, WEIGHTS):  # noqa: B905 - numba knows no strict zip
+    # numba knows no strict zip
+    for point, weight in zip(POINTS, WEIGHTS):  # noqa: B905
         turn = low + 0.5 * (high - low) * (1.0 + point)
-        reach = min((across[0] + disc) / (1.0 + np.cos(turn)), across[2] / max(np.sin(turn), HAIR))
+        reach = min(
+            (across[0] + disc) / (1.0 + np.cos(turn)), across[2] / max(np.sin(turn), TOLERANCE)
+        )
         reach = min(reach, midway(apart, other - disc, edge - turn))
         flux += weight * 0.5 * (high - low) * ray(reach, disc)
     return flux
@@ -128,9 +151,10 @@ def _share(
 
 @compiled
 def _film(place: Array, first: float, second: float, low: float, high: float) -> float:
-    """The wall's share between two distances from the foot of the first disc."""
+    """Share of the wall, m4, between the distances `low` and `high` m from the first foot."""
     flux = 0.0
-    for point, weight in zip(FINE_POINTS, FINE_WEIGHTS):  # noqa: B905 - numba knows no strict zip
+    # numba knows no strict zip
+    for point, weight in zip(FINE_POINTS, FINE_WEIGHTS):  # noqa: B905
         x = low + 0.5 * (high - low) * (1.0 + point)
         one = (x**2 + place[0] ** 2 - first**2) / (2.0 * (place[0] + first))
         two = ((place[2] - x) ** 2 + place[1] ** 2 - second**2) / (2.0 * (place[1] + second))

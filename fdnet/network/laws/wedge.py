@@ -1,12 +1,15 @@
-"""Axial flow through one right-angled wedge of a throat's section: half of a disc's share on one edge.
+"""Flow along the axis through one right-angled wedge of the section of a throat.
 
-The wedge has its tip at the disc's centre, one side of length h along the edge to the neighbour's side of the gap, the
-far side perpendicular to it, and the angle phi at the tip. The disc (radius rho) holds the fluid still; the straight
-sides carry no shear. The flux of laplacian(w) = -1 over h^4 depends on phi and x = rho / h alone.
+The wedge is half of the share that a disc has on one edge of the section. Its tip is the centre of
+the disc, with the angle phi. One side, of length h, lies along the edge and ends in the middle of
+the gap to the next disc; the far side is perpendicular to it. The disc, of radius rho, holds the
+fluid still; the straight sides carry no shear. The speed w solves laplacian(w) = -1, and its flux
+over h^4 depends on phi and x = rho / h alone.
 
-`ray_flux` neglects shear between neighbouring rays: on each ray the annulus of Happel (1959) with its free surface at
-the far side, an upper bound. `exact_flux` is the series of Sparrow and Loeffler (1959, AIChE J. 5, 325), least squares
-on the far side. Their ratio varies slowly; `ratio_table` reads it from wedge.csv, which
+`ray_flux` neglects the shear between neighbouring rays from the tip: on each ray the flow is that
+in the annulus of Happel (1959) whose free surface is at the far side. It is an upper bound.
+`exact_flux` is the series of Sparrow and Loeffler (1959, AIChE J. 5, 325), fitted to the far side
+by least squares. Their ratio varies slowly; `ratio_table` reads it from wedge.csv, which
 `python -m fdnet.network.laws.wedge` writes anew.
 """
 
@@ -20,16 +23,21 @@ from fdnet.spheres.snapshot import Array
 
 TABLE = Path(__file__).with_name("wedge.csv")
 STEEPEST = np.radians(84.0)
+"""Largest angle of the table, rad."""
 ANGLES = np.linspace(0.0, STEEPEST, 43)
 DISCS = np.linspace(0.0, 1.0, 21)
 THINNEST = 0.02
+"""Smallest disc, rho / h, for which the ratio is computed."""
 
 
 @compiled
 def ray_flux(angle: float, slope: float, disc: float) -> float:
-    """Flux over h^4 of a wedge of `angle` with tangent `slope`, `disc` = rho / h; a disc beyond the side (overlap)
-    leaves the rays open that leave it. Closed form of the integral of
-    (4 d^4 ln(d / rho) - 3 d^4 + 4 d^2 rho^2 - rho^4) / 16 over the angle, d = h / cos(angle)."""
+    """Flux over h^4 of a wedge of `angle` rad with the tangent `slope`, for `disc` = rho / h.
+
+    Closed form of the integral of (4 d^4 ln(d / rho) - 3 d^4 + 4 d^2 rho^2 - rho^4) / 16 over the
+    angle, with d = h / cos(angle). A disc that overlaps the next one (rho > h) leaves only the
+    rays open that leave it before the far side.
+    """
     whole = _antiderivative(angle, slope, disc)
     if disc <= 1.0:
         return whole
@@ -52,7 +60,7 @@ def _antiderivative(angle: float, slope: float, disc: float) -> float:
 
 @compiled
 def shear_ratio(angle: float, disc: float, table: Array) -> float:
-    """exact_flux / ray_flux, bilinear in `table`; steeper wedges than the table's take its last row."""
+    """exact_flux / ray_flux, bilinear in `table`; steeper wedges take its last row."""
     rows, columns = table.shape
     row = min(angle / STEEPEST, 1.0) * (rows - 1)
     column = min(disc, 1.0) * (columns - 1)
@@ -70,7 +78,11 @@ def ratio_table() -> Array:
 
 
 def exact_flux(angle: float, disc: float, *, terms: int = 24, points: int = 300) -> float:
-    """Flux over h^4 for 0 < angle < pi / 2, 0 < disc <= 1; good to 1e-4 up to 60 degrees, 1e-2 at 80."""
+    """Flux over h^4 for 0 < angle < pi / 2 and 0 < disc <= 1.
+
+    The relative error is 1e-4 up to 60 degrees and 1e-2 at 80. `terms` is the number of terms of
+    the series, `points` that of the points on the far side.
+    """
     place = 0.5 * (1.0 - np.cos(np.pi * (np.arange(points) + 0.5) / points))
     height = place * np.tan(angle)
     reach, turn = np.hypot(1.0, height), np.arctan2(height, 1.0)
@@ -108,7 +120,7 @@ def _total(
 
 
 def make_table() -> Array:
-    """The ratios of `ratio_table`, computed; 1 for a wedge without width."""
+    """The ratios of `ratio_table`, computed; the ratio of a wedge of angle 0 is 1."""
     table = np.ones((len(ANGLES), len(DISCS)))
     for i, angle in enumerate(ANGLES[1:], start=1):
         for j, disc in enumerate(np.maximum(DISCS, THINNEST)):

@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull, Delaunay, QhullError
 from fdnet.errors import NetworkError
 from fdnet.network import geometry
 from fdnet.network.tessellation.points import Points, make_points
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.images import INSIDE
 from fdnet.spheres.snapshot import Array, Snapshot
 
@@ -47,6 +48,8 @@ class Tetrahedra:
     flat: Array
     margin: Array
     hidden: int
+
+    __repr__ = one_line
 
 
 def make_tetrahedra(

@@ -6,6 +6,7 @@ import numpy as np
 
 from fdnet.network import geometry
 from fdnet.network.tessellation.delaunay import SAME_CENTRE, Tetrahedra
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.images import packed_shift
 from fdnet.spheres.snapshot import Array
 
@@ -27,6 +28,8 @@ class Facets:
     shift: Array
     vertex: Array
     unmatched: int
+
+    __repr__ = one_line
 
     def where(self, mask: Array) -> "Facets":
         """The facets for which `mask` (T,) is true."""

@@ -5,11 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fdnet.errors import NetworkError
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.images import neighbour_tree
 from fdnet.spheres.snapshot import Array, Snapshot
 
 LENGTHS = (1e-60, 1e60)
-"""Shortest radius and longest length, m: the cubes of lengths beyond them are no double numbers."""
+"""Shortest radius and longest length, m; no double number holds the cubes of lengths beyond."""
 COARSE = 1e-8
 """Largest rounding of a coordinate, in mean grain radii: a tenth of the shake (`points.SHAKE`),
 which coarser coordinates could not hold."""
@@ -39,6 +40,8 @@ class PlacedGrains:
     periodic: tuple[bool, bool, bool]
     scale: float
     beyond: int
+
+    __repr__ = one_line
 
 
 def place_grains(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> PlacedGrains:

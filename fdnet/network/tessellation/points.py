@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.network.tessellation.placed_grains import ON_FACE_TOLERANCE
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.images import label, make_images, packed_shift
 from fdnet.spheres.snapshot import Array, Snapshot
 
@@ -48,6 +49,8 @@ class Points:
     name: Array
     key: Array
 
+    __repr__ = one_line
+
 
 def make_points(grains: Snapshot, *, periodic: tuple[bool, ...], margin: Array) -> Points:
     """All images of `grains` within `margin` (3,) m of the box."""
@@ -57,7 +60,7 @@ def make_points(grains: Snapshot, *, periodic: tuple[bool, ...], margin: Array) 
         grains.box,
         periodic=periodic,
         margin=margin,
-        hair=ON_FACE_TOLERANCE * scale,
+        tolerance=ON_FACE_TOLERANCE * scale,
     )
     name = label(images)
     key = name.astype(np.int64) * 2**30 + packed_shift(images.shift)

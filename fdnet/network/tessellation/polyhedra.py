@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from fdnet.network import geometry
 from fdnet.network.tessellation.delaunay import SAME_CENTRE
 from fdnet.network.tessellation.tessellation import Tessellation
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.images import INSIDE, MIRROR_LOW, ON_FACE
 from fdnet.spheres.snapshot import Array
 
@@ -31,6 +32,8 @@ class Polyhedra:
     heights: Array
     group: Array
     wall: Array
+
+    __repr__ = one_line
 
 
 def join_polyhedra(tessellation: Tessellation) -> Polyhedra:

@@ -8,6 +8,7 @@ from fdnet.network import geometry
 from fdnet.network.tessellation.delaunay import Tetrahedra
 from fdnet.network.tessellation.polyhedra import Polyhedra
 from fdnet.network.tessellation.tessellation import Tessellation
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
 INSIDE_TOLERANCE = 1e-5
@@ -45,6 +46,8 @@ class Pores:
     group: Array
     share: Array
     counts: dict[str, int]
+
+    __repr__ = one_line
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

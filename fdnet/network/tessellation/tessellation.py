@@ -8,6 +8,7 @@ from fdnet.errors import NetworkError
 from fdnet.network.tessellation.delaunay import Tetrahedra, make_tetrahedra
 from fdnet.network.tessellation.facets import Facets, share_facets
 from fdnet.network.tessellation.placed_grains import PlacedGrains
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
 FIRST_MARGIN = 3.5
@@ -41,6 +42,8 @@ class Tessellation:
     size: Array
     periodic: tuple[bool, bool, bool]
     scale: float
+
+    __repr__ = one_line
 
 
 def tessellate(placed: PlacedGrains) -> Tessellation:

@@ -11,6 +11,7 @@ from fdnet.network.tessellation.points import Points
 from fdnet.network.tessellation.polyhedra import Polyhedra
 from fdnet.network.tessellation.pores import Pores
 from fdnet.network.tessellation.tessellation import Tessellation
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
 LENGTH_FLOOR = 1e-3
@@ -45,6 +46,8 @@ class Throats:
     area: Array
     length: Array
     counts: dict[str, int]
+
+    __repr__ = one_line
 
 
 def measure_throats(tessellation: Tessellation, polyhedra: Polyhedra, pores: Pores) -> Throats:
