@@ -25,7 +25,7 @@ extensions = [
     "shell_cells",
 ]
 exclude_patterns = ["_build", "_ext", "**.ipynb_checkpoints"]
-smartquotes = False
+smartquotes_action = "D"  # dashes alone, quotation marks stay straight
 nitpicky = True
 nitpick_ignore_regex = [("py:class", r".*")]  # types in signatures, of ours and of others
 
@@ -38,6 +38,8 @@ nb_execution_raise_on_error = True
 nb_execution_timeout = 300
 
 autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented_params"
+autodoc_class_signature = "separated"
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
 napoleon_google_docstring = True

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 import sys
 from argparse import _HelpAction, _SubParsersAction
 from pathlib import Path
@@ -105,6 +106,68 @@ def test_links_of_a_page_lead_somewhere_in_the_repository(page):
         assert file.exists(), f"{page.relative_to(ROOT)}: {target}"
         if anchor and file.suffix == ".md":
             assert anchor in anchors_of(file), f"{page.relative_to(ROOT)}: {target}"
+
+
+def fences(page: Path, language: str) -> list[str]:
+    """Code blocks of a page in this language; cells that start with `%%bash` are shell."""
+    blocks = re.findall(r"^```([^\n`]*)\n(.*?)^```", page.read_text("utf-8"), re.M | re.S)
+    chosen = []
+    for name, text in blocks:
+        cell = name.startswith("{code-cell}")
+        kind = "python" if cell else name
+        if cell and text.startswith("%%bash\n"):
+            kind = "bash"
+        if kind == language:
+            chosen.append(text)
+    return chosen
+
+
+def fdnet_commands(page: Path) -> list[list[str]]:
+    """Arguments of every `fdnet ...` on a page, up to a pipe or redirection."""
+    text = "\n".join([*fences(page, "bash"), *fences(page, "")])
+    lines = re.sub(r"\bSEED\b", "1", text.replace("\\\n", " ")).splitlines()
+    plain = [re.sub(r"(^|\s)#.*", "", line) for line in lines]
+    matches = [re.search(r"(?:^|[\s/])fdnet (.*?)(?:[|>;]|$)", line) for line in plain]
+    return [shlex.split(match[1]) for match in matches if match]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_command_on_a_page_is_one_that_fdnet_takes(page):
+    from fdnet.cli import _parser
+
+    for arguments in fdnet_commands(page):
+        try:
+            _parser().parse_args(arguments)
+        except SystemExit as error:
+            pytest.fail(f"fdnet {shlex.join(arguments)}: exit {error.code}")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_name_of_fdnet_in_python_on_a_page_is_public(page):
+    import fdnet
+
+    for text in fences(page, "python"):
+        for name in re.findall(r"\bfdnet\.(\w+)\b(?!\.toml)", re.sub(r"from fdnet\S+", "", text)):
+            assert name in fdnet.__all__, f"{page.relative_to(ROOT)}: fdnet.{name}"
+
+
+def test_every_public_name_has_its_place_in_the_reference_of_the_api(root):
+    import fdnet
+
+    text = "".join(path.read_text() for path in (root / "docs" / "api").glob("*.md"))
+    for name in fdnet.__all__:
+        assert name == "__version__" or re.search(rf"fdnet\.{name}\b", text), name
+
+
+def test_broken_links_of_a_site_are_named(tmp_path):
+    import check_links
+
+    (tmp_path / "a.html").write_text('<p id="here"></p><a href="b.html#there">b</a>')
+    (tmp_path / "b.html").write_text('<a href="a.html#here">a</a><img src="gone.png">')
+    problems = sorted(check_links.broken_links(tmp_path))
+    assert len(problems) == 2
+    assert problems[0].startswith("a.html: b.html#there")
+    assert problems[1].startswith("b.html: gone.png")
 
 
 RUN_PAGE = ROOT / "docs" / "reference" / "run_folder.md"

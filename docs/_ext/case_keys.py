@@ -39,7 +39,7 @@ class CaseKeys(SphinxDirective):
     def run(self) -> list[nodes.Node]:
         part = self.arguments[0] if self.arguments else ""
         rows = list(key_rows(part))
-        names = [f"{part}-{row[0].strip('`')}".strip("-") for row in rows]
+        names = [row[0].strip("`") for row in rows]
         return [table(self, self.header, rows, widths=(22, 8, 12, 18, 40), names=names)]
 
 
@@ -59,14 +59,6 @@ def key_rows(part: str) -> Iterator[tuple[str, ...]]:
                 _range(field),
                 field.description or "",
             )
-
-
-def part_names() -> list[str]:
-    """The tables of a case file."""
-    from fdnet.case.case import KEYS, InvasionCase
-
-    fields = InvasionCase.model_fields
-    return [name for name in KEYS if part_model(fields[name].annotation) is not None]
 
 
 def part_model(annotation: Any) -> type[BaseModel] | None:

@@ -15,8 +15,8 @@ def to_openpnm(network: Network, conductance: Array, *, viscosity: float) -> Any
 
     fdnet holds the pressure on the two faces of the box. A throat that a face cuts therefore ends
     in a pore of its own on that face, with the conductance of the part inside. Pores of one
-    `pore_group` have one pressure and are one pore. Pores and throats that no flow reaches are left
-    out.
+    `pore_group` have one pressure and are one pore. Pores and throats that no flow reaches are
+    left out.
 
     Args:
         network: the pore network; its box is not periodic along x.
