@@ -112,7 +112,10 @@ def _count(text: str) -> int:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Analyse the file and print the result. Raises CaseError for bad input; nothing is written."""
+    """Analyse the file and print the result.
+
+    Raises CaseError for bad input; nothing is written then.
+    """
     from fdnet.network.tessellation.placed_grains import check_lengths
 
     periodic = _directions(options.periodic)
@@ -156,8 +159,8 @@ def _read(options: argparse.Namespace, periodic: tuple[bool, bool, bool]) -> "Sp
     grains = len(given.spheres.grains())
     if grains < 4:
         raise CaseError(
-            f"{options.spheres}: {grains} grains, expected at least 4 for a tetrahedron; if grains "
-            "and fines were taken for each other, use --fines-below or --types"
+            f"{options.spheres}: {grains} grains, expected at least 4 for a tetrahedron; if "
+            "grains and fines were taken for each other, use --fines-below or --types"
         )
     if given.around_grains and any(periodic):
         raise CaseError(

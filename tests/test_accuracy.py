@@ -1,4 +1,4 @@
-"""The accuracy study: its truth, its laws on two packs, its statistics, its tables and its page."""
+"""The accuracy study: its truth, laws on two packs, statistics, tables and page."""
 
 import csv
 import math
@@ -87,7 +87,7 @@ def test_goal_adds_truths_error_above_two_percent_only():
 
 
 def test_laws_on_two_packs(cases):
-    """The default within its goals on SC and on pack C with fines; all spheres as grains near it."""
+    """The default is within its goals on SC and on pack C with fines."""
     intact = intact_row(cases["SC_touching"])
     assert set(LAWS) < set(intact)
     assert intact["lubrication"] == pytest.approx(1.0, abs=0.01)
@@ -106,7 +106,7 @@ def test_too_many_spheres_are_not_resolved_and_shown_as_such(cases, monkeypatch)
 
 
 def test_round_sections_are_those_of_the_law_without_corners():
-    """In FCC the facets are far from round: their area overrates them about twice; loosely spaced discs do not."""
+    """In FCC the facets are far from round: by their area they conduct about twice as much."""
     network = network_of(face_centred(2))
     flux = [permeability(network, law(network)) for law in (section_by_area, lubrication_law)]
     assert 1.8 < flux[0] / flux[1] < 2.3

@@ -1,4 +1,4 @@
-"""The door for Python: one list of public names, each explained, each with an example that runs."""
+"""The door for Python: public names, each explained and with an example that runs."""
 
 import ast
 import doctest

@@ -267,7 +267,7 @@ def test_shipped_cases_keep_their_digests_and_their_text(root: Path):
 
 
 def test_stored_states_still_belong_to_their_cases(root: Path):
-    """`find_state` raises when a state belongs to another case than its run asks for."""
+    """`find_state` raises when a state belongs to another case than that of its run."""
     states = root / "docs/thesis/states"
     stored = [item for item in planned(quick=False) if state_path(states, item).exists()]
     assert len(stored) == len(list(states.glob("*-seed*.npz"))) > 20

@@ -58,7 +58,7 @@ def test_only_the_stages_to_run_count():
 
 
 @pytest.mark.parametrize(
-    ("assignments", "said"),
+    ("assignments", "message"),
     [
         (
             ["run.stiffness_N_m=nominal"],
@@ -72,9 +72,9 @@ def test_only_the_stages_to_run_count():
         (["fines.count=1", "run.duration_ms=1e-4"], "most of it packing 66 grains"),
     ],
 )
-def test_the_refusal_names_what_makes_the_run_long(assignments, said):
+def test_the_refusal_names_what_makes_the_run_long(assignments, message):
     case = tiny("run.max_hours=1e-6", "run.checkpoint_ms=0.001", *assignments)
-    with pytest.raises(CaseError, match=said):
+    with pytest.raises(CaseError, match=message):
         refuse_long(case, scales_of(case), pack=True, invade=True)
 
 

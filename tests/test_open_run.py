@@ -1,4 +1,4 @@
-"""A finished run as an object: its tables, spheres, network and hand-overs, and what is refused."""
+"""A finished run as an object: tables, spheres, network, hand-over, and what is refused."""
 
 import json
 import shutil

@@ -1,11 +1,28 @@
-"""The wheel carries the templates: installed elsewhere it renders a deck."""
+"""The wheel carries everything: installed elsewhere it renders a deck and runs a case."""
 
 import os
 import subprocess
 import sys
+from pathlib import Path
+
+import pytest
+from builders import tiny
+
+SMOKE = """
+import sys, fdnet
+fast = [name for name in ("numpy", "pandas", "scipy") if name in sys.modules]
+case = fdnet.read_case(sys.argv[1])
+run = fdnet.run_case(case, "run", liggghts=sys.argv[2])
+spheres = fdnet.read_spheres("run/spheres_damaged.csv", box=[(0, side) for side in case.size_m])
+again = fdnet.analyse(spheres, options=case.analysis)
+print(fdnet.__file__, fast, run.sections.shape[0], again.k_damaged / run.summary["k_damaged_m2"])
+"""
 
 
-def test_a_wheel_installed_elsewhere_renders_a_deck(root, tmp_path):
+@pytest.fixture(scope="module")
+def installed(root, tmp_path_factory) -> Path:
+    """A folder outside of the project with the wheel installed in it."""
+    tmp_path = tmp_path_factory.mktemp("wheel")
     build = [
         sys.executable,
         "-m",
@@ -38,11 +55,19 @@ def test_a_wheel_installed_elsewhere_renders_a_deck(root, tmp_path):
         check=True,
         capture_output=True,
     )
+    return target
+
+
+def away(target: Path) -> dict[str, str]:
+    """An environment in which Python finds fdnet in `target` first."""
+    return os.environ | {"PYTHONPATH": str(target)}
+
+
+def test_a_wheel_installed_elsewhere_renders_a_deck(installed, root, tmp_path):
     code = (
         "import fdnet, liggghts_templates, sys; from fdnet.cli import main; "
         "print(fdnet.__file__, liggghts_templates.__file__); sys.exit(main())"
     )
-    environment = os.environ | {"PYTHONPATH": str(target)}
     done = subprocess.run(
         [
             sys.executable,
@@ -57,10 +82,30 @@ def test_a_wheel_installed_elsewhere_renders_a_deck(root, tmp_path):
         text=True,
         check=False,
         cwd=tmp_path,
-        env=environment,
+        env=away(installed),
     )
     assert done.returncode == 0, done.stderr
-    assert all(path.startswith(str(target)) for path in done.stdout.splitlines()[0].split())
+    assert all(path.startswith(str(installed)) for path in done.stdout.splitlines()[0].split())
     assert "fix drag fines addforce" in (tmp_path / "decks" / "invade" / "in.invade").read_text()
-    assert (target / "fdnet" / "report" / "report.html.j2").exists()
-    assert (target / "fdnet" / "cases" / "quick" / "specimen1.toml").exists()
+    assert (installed / "fdnet" / "report" / "report.html.j2").exists()
+    assert (installed / "fdnet" / "cases" / "quick" / "specimen1.toml").exists()
+    assert (installed / "fdnet" / "py.typed").exists()
+
+
+@pytest.mark.liggghts
+def test_a_wheel_installed_elsewhere_runs_a_case(installed, binary, tmp_path):
+    """The whole story and the analysis of its spheres; nothing is of the project."""
+    (tmp_path / "tiny.toml").write_text(tiny("run.cap_ms=0.2").toml())
+    done = subprocess.run(
+        [sys.executable, "-c", SMOKE, str(tmp_path / "tiny.toml"), str(binary.path)],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+        env=away(installed),
+    )
+    assert done.returncode == 0, done.stderr
+    file, fast, rows, ratio = done.stdout.split()
+    assert file.startswith(str(installed))
+    assert (fast, rows) == ("[]", "3")
+    assert float(ratio) == 1.0

@@ -29,7 +29,7 @@ def answer(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int,
 
 
 def test_units_axes_and_fully_periodic_lattice(tmp_path, capsys):
-    """SC touching: k = 0.00252 d^2 (Zick & Homsy 1982, K = 42.1); the series law is within 10 %."""
+    """Simple cubic, touching: k = 0.00252 d^2 (Zick and Homsy 1982); the law is within 10 %."""
     box = cubic(tmp_path / "sc.csv")
     values = {}
     for units, axis in (("mm", "x"), ("mm", "z"), ("um", "y")):
@@ -69,7 +69,7 @@ def test_units_axes_and_fully_periodic_lattice(tmp_path, capsys):
 
 
 def test_walls_hold_the_fluid_unless_they_slip(tmp_path, capsys):
-    """A lattice between walls that slip is the endless lattice; holding the fluid they leave less."""
+    """A lattice between slipping walls is the endless lattice; no-slip walls leave less."""
     box = cubic(tmp_path / "sc.csv")
     k = {}
     for walls in ("", "--walls=slip", "--walls=no-slip", "--periodic=yz"):
@@ -169,7 +169,10 @@ def test_too_few_grains_and_missing_file(tmp_path, capsys):
 
 
 def test_a_pack_without_an_open_path_is_an_answer(tmp_path, capsys):
-    """Spheres of 0.72 spacings close every triangle of the lattice (circumradius 0.707) but leave voids: k = 0."""
+    """Spheres of 0.72 spacings close every triangle of the lattice and leave voids: k = 0.
+
+    The circumradius of a triangle is 0.707 spacings.
+    """
     box = cubic(tmp_path / "sc.csv", radius=0.72)
     code, out, err = answer(
         capsys, tmp_path / "sc.csv", "--units", "mm", "--box", box, "--periodic", "xyz", "--json"

@@ -41,7 +41,7 @@ def run(capsys: pytest.CaptureFixture[str], name: str, *more: str) -> dict:
 
 @pytest.mark.parametrize("name", INTACT)
 def test_intact_packs_and_lattices_within_2_percent(capsys, name):
-    """Porosity 0.30 (overlapping) to 0.45, radii 1:1 to 1:3, SC, BCC and FCC; no constant is fitted."""
+    """Porosity 0.30 (overlapping) to 0.45, radii 1:1 to 1:3, SC, BCC, FCC; nothing is fitted."""
     assert run(capsys, name)["k_initial_m2"] == pytest.approx(
         float(TRUTH[name]["k_mm2"]) * 1e-6, rel=0.02 + error(name)
     )
@@ -49,7 +49,7 @@ def test_intact_packs_and_lattices_within_2_percent(capsys, name):
 
 @pytest.mark.parametrize("name", FILLED)
 def test_loss_by_fines_within_10_percent(capsys, name):
-    """k/k0 from 0.89 down to 0.0175, fines 1/5 and 1/10, even and in layers across and along the flow."""
+    """k/k0 from 0.89 down to 0.0175, fines 1/5 and 1/10, even and in layers."""
     found = run(capsys, name)
     assert 1 - found["k_reduction"] == pytest.approx(
         float(TRUTH[name]["k_over_k0"]), rel=0.10 + error(name)

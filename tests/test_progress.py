@@ -1,4 +1,4 @@
-"""Progress says the step, the invaded count and the time left."""
+"""Progress shows the step, the invaded count and the time left."""
 
 from fdnet.run.progress import Progress
 
@@ -10,10 +10,10 @@ def test_lines_of_a_run_become_progress(capsys, monkeypatch):
         progress("      100     1369   1.5e-07     0.21")
         progress("noise 1 2 3")
         progress("FDNET checkpoint 1 300 10 20 3")
-    said = capsys.readouterr().err
-    assert "step 300 of ~1000" in said
-    assert "invaded 20" in said
-    assert "left" in said
+    shown = capsys.readouterr().err
+    assert "step 300 of ~1000" in shown
+    assert "invaded 20" in shown
+    assert "left" in shown
 
 
 def test_quiet_says_nothing(capsys):

@@ -279,16 +279,16 @@ def test_the_time_limit_holds_for_packing_too(finished, tmp_path):
     assert time.monotonic() - start < 30
 
 
-def test_an_overlap_past_its_limit_stops_the_run_if_asked_and_is_told(finished, tmp_path):
+def test_an_overlap_past_its_limit_stops_the_run_when_asked_and_is_reported(finished, tmp_path):
     """Tiny's fines overlap by some 5 %: exit 3, state kept; --resume with a policy ends it."""
     _, case, summary = finished
     out = tmp_path / "run"
-    told = [
+    lines = [
         warning
         for warning in summary["warnings"]
         if "run.max_overlap" in warning and "at step" in warning
     ]
-    assert len(told) == 1
+    assert len(lines) == 1
     command = ["run", case, "--out", out, "--stages", "pack,invade,analyse", "--json"]
     for extra in ([], ["--resume"]):
         stopped = fdnet(*command, "--set", "run.on_overlap=stop", *extra)
@@ -318,10 +318,10 @@ def test_stages_one_after_the_other_equal_all_at_once(finished, tmp_path):
 
 def test_a_stage_without_its_forerunner_is_refused(tmp_path):
     case = write_case(tmp_path)
-    for stage, said in (("invade", "no finished pack"), ("analyse", "no finished pack")):
+    for stage, message in (("invade", "no finished pack"), ("analyse", "no finished pack")):
         refused = fdnet("run", case, "--out", tmp_path / stage, "--stages", stage)
         assert refused.returncode == 2
-        assert said in refused.stderr
+        assert message in refused.stderr
     refused = fdnet("run", case, "--out", tmp_path / "x", "--stages", "bake")
     assert refused.returncode == 2
     assert not (tmp_path / "x").exists()

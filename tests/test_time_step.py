@@ -25,7 +25,7 @@ def tau(multiplier: float = 1.0) -> float:
     return relaxation_time(0.05e-3, 2146, 0.05, multiplier)
 
 
-def said(case: Case) -> str:
+def warnings_of(case: Case) -> str:
     return " | ".join(scales_of(case).warnings)
 
 
@@ -47,9 +47,9 @@ def test_the_contact_bound_holds_for_every_scheme(scheme):
 def test_explicit_drag_warns_above_a_tenth_of_tau_and_is_refused_above_tau(scheme):
     short = tau(1e3)
     for part in (0.0999, 0.1):
-        assert "drag is held" not in said(explicit(part * short, scheme))
+        assert "drag is held" not in warnings_of(explicit(part * short, scheme))
     for part in (0.1001, 0.9999, 1.0):
-        assert "drag is held" in said(explicit(part * short, scheme))
+        assert "drag is held" in warnings_of(explicit(part * short, scheme))
     with pytest.raises(
         CaseError, match=r"above the drag relaxation time .* drag\.scheme = 'implicit'"
     ):
@@ -59,9 +59,9 @@ def test_explicit_drag_warns_above_a_tenth_of_tau_and_is_refused_above_tau(schem
 def test_implicit_drag_has_no_such_bound_but_tells_what_it_does_not_resolve():
     short = tau(1e3)
     for part in (0.1001, 1.0):
-        assert "implicit drag" not in said(explicit(part * short, "implicit"))
-    assert "turns into 0.33 of it" in said(explicit(1.0001 * short, "implicit"))
-    assert "turns into -0.2 of it" in said(explicit(3 * short, "implicit"))
+        assert "implicit drag" not in warnings_of(explicit(part * short, "implicit"))
+    assert "turns into 0.33 of it" in warnings_of(explicit(1.0001 * short, "implicit"))
+    assert "turns into -0.2 of it" in warnings_of(explicit(3 * short, "implicit"))
 
 
 def refreshed(count: int, step: float) -> Case:
@@ -71,9 +71,9 @@ def refreshed(count: int, step: float) -> Case:
 def test_a_given_refresh_warns_above_a_tenth_of_tau_and_is_refused_above_tau():
     step = tau() / 1000
     for count in (99, 100):
-        assert "drag is held" not in said(refreshed(count, step))
+        assert "drag is held" not in warnings_of(refreshed(count, step))
     for count in (101, 999, 1000):
-        assert "drag is held for" in said(refreshed(count, step))
+        assert "drag is held for" in warnings_of(refreshed(count, step))
         assert scales_of(refreshed(count, step)).hold_steps == count
     with pytest.raises(CaseError, match="at most 1000 steps are stable"):
         scales_of(refreshed(1001, step))

@@ -10,11 +10,16 @@ from typing import Unpack
 import numpy as np
 
 from fdnet.case.analysis import AnalysisChoices, AnalysisKeys
-from fdnet.network.analysis import Analysis
+from fdnet.network.analysis import Analysis, worst_solve
 from fdnet.network.fines.occupancy import Occupancy
 from fdnet.network.flow.flow import Flow
-from fdnet.network.flow.sections import Section, SlabK, make_profile, make_sections, reduction
-from fdnet.network.flow.slabs import inplace_permeability, slab_permeability, whole_permeability
+from fdnet.network.flow.sections import Section, make_profile, make_sections, reduction
+from fdnet.network.flow.slabs import (
+    SlabK,
+    inplace_permeability,
+    slab_permeability,
+    whole_permeability,
+)
 from fdnet.network.laws.damage import CLEAN, Damage
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS, damage_law
 from fdnet.network.network import Network
@@ -37,7 +42,7 @@ class _State:
 
 @dataclass(slots=True)
 class _Log:
-    """Seconds per stage, and what to tell the user."""
+    """Seconds of each stage, and warnings for the user."""
 
     seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
     warnings: list[str] = field(default_factory=list)
@@ -61,8 +66,8 @@ def analyse(
 
     Args:
         spheres: grains and fines, m. When `damaged` is given, its grains before the invasion.
-        damaged: the same grains, moved or not, and all fines. Without it, `spheres` holds the fines,
-            or there are none.
+        damaged: the same grains, moved or not, and all fines. Without it, `spheres` holds the
+            fines, or there are none.
         periodic: sides that repeat, letters such as "yz" or three truth values (x, y, z). The
             other sides of the box are walls; along x they are the inlet and the outlet.
         options: choices of the analysis, for example `case.analysis`. Without it: one section,
@@ -197,7 +202,7 @@ def _analysis(
         invasion_depth=invaded.depth,
         invasion_depth_p95=invaded.depth_p95,
         cake_thickness=invaded.cake_thickness,
-        solver=_worst([clean.flow, base.flow, final.flow, *clean_slabs.flows, *slabs.flows]),
+        solver=worst_solve([clean.flow, base.flow, final.flow, *clean_slabs.flows, *slabs.flows]),
         counts=_counts(base, specimen.occupancy, damage, final.flow),
         warnings=tuple(log.warnings),
         seconds=log.seconds,
@@ -262,8 +267,8 @@ def _warn(
     thin = [one.section for one in sections if one.x_hi - one.x_lo < 2.0 * network.grain_radius]
     if thin:
         log.warnings.append(
-            f"sections {thin} are thinner than a grain diameter ({2 * network.grain_radius:.3g} m): "
-            "their k is of single throats"
+            f"sections {thin} are thinner than a grain diameter "
+            f"({2 * network.grain_radius:.3g} m): their k is of single throats"
         )
     if network.counts["grains_outside_box"]:
         log.warnings.append(
@@ -280,25 +285,16 @@ def _warn(
         )
 
 
-def _worst(flows: list[Flow]) -> dict[str, str | float | None]:
-    balances = [flow.mass_balance for flow in flows if flow.mass_balance is not None]
-    return {
-        "method": flows[0].method,
-        "residual": max(flow.residual for flow in flows),
-        "mass_balance": max(balances) if balances else None,
-    }
-
-
 def _counts(
     base: _State, occupancy: Occupancy | None, damage: Damage | None, flow: Flow
 ) -> dict[str, int]:
-    found = dict(base.network.counts) | {
+    counts = dict(base.network.counts) | {
         "throats_not_conducting": int(np.sum(base.conductance == 0))
     }
     if occupancy is not None and damage is not None:
-        found |= {
+        counts |= {
             **occupancy.counts,
             **damage.counts,
             "throats_blocked": int(occupancy.blocked.sum()),
         }
-    return found | {"isolated_pores": flow.isolated_pores}
+    return counts | {"isolated_pores": flow.isolated_pores}

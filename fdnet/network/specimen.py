@@ -59,8 +59,8 @@ def measure_specimen(
 ) -> Specimen:
     """The specimen of the grains of `initial` and, unless it is None, of all spheres of `damaged`.
 
-    `timed` takes the name of the stage that its block belongs to. Raises NetworkError and CaseError
-    as `analyse` does.
+    `timed` takes the name of the stage that its block belongs to. Raises NetworkError and
+    CaseError as `analyse` does.
     """
     before = initial.grains()
     after = before if damaged is None else _same_grains(before, damaged.grains())

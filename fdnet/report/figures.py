@@ -1,4 +1,7 @@
-"""PNG figures of one specimen; depth is x, from the formation face. Colours after Okabe and Ito (2008)."""
+"""PNG figures of one specimen; depth is x, from the formation face.
+
+The colours are those of Okabe and Ito (2008), which colour-blind readers can tell apart.
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -31,18 +34,22 @@ STYLE: Any = {
 }
 
 CAPTIONS = {
-    "spheres_3d": "The specimen from the front and upstream: the grains of the far half (grey) and the fines, coloured "
-    "by radius, or by depth where they are of one size. The fluid enters at x = 0.",
-    "side_view": "Section x-z through the middle of the specimen: every circle is the true cut through a sphere.",
-    "porosity_reduction": "Porosity lost to the fines against depth: difference of the intact and the damaged "
-    "porosity, in fine bins and per section.",
+    "spheres_3d": "The specimen from the front and upstream: the grains of the far half (grey) "
+    "and the fines, coloured by radius, or by depth where they are of one size. The fluid enters "
+    "at x = 0.",
+    "side_view": "Section x-z through the middle of the specimen: every circle is the true cut "
+    "through a sphere.",
+    "porosity_reduction": "Porosity lost to the fines against depth: difference of the intact and "
+    "the damaged porosity, in fine bins and per section.",
     "invaded_fraction": "Share of the invaded fines, by number, against depth.",
-    "permeability_ratio": "Damaged over intact permeability of each section, cut out with its own network and in "
-    "place from the pressures of the whole specimen.",
-    "porosity_profile": "Porosity before and after the invasion against depth, overlap counted once.",
-    "size_distributions": "Inscribed radii of throats and pores between the grains alone, by number; the band is the "
-    "range of the fines' radii.",
-    "invasion_history": "Fines inside the specimen, passed through it and still upstream, against time.",
+    "permeability_ratio": "Damaged over intact permeability of each section, cut out with its own "
+    "network and in place from the pressures of the whole specimen.",
+    "porosity_profile": "Porosity before and after the invasion against depth, overlap counted "
+    "once.",
+    "size_distributions": "Inscribed radii of throats and pores between the grains alone, by "
+    "number; the band is the range of the fines' radii.",
+    "invasion_history": "Fines inside the specimen, passed through it and still upstream, against "
+    "time.",
 }
 
 
@@ -52,11 +59,12 @@ def draw_all(
     snapshot: Snapshot | None = None,
     history: Sequence[Mapping[str, float]] | None = None,
 ) -> list[Path]:
-    """Draw every figure that has data into `folder` (made if missing); returns the paths in report order.
+    """Draw every figure that has data into `folder`; return the paths in the order of the report.
 
-    `snapshot` is what the side view shows: the damaged specimen, or the grains alone; without one there is no side
-    view. Figures of damage are left out for an intact pack. `history` rows hold time_s, invaded, passed,
-    upstream. `CAPTIONS` says under each file's stem what it shows.
+    The folder is made if it is missing. `snapshot` is what the side view shows, the damaged
+    specimen or the grains alone; without one there is no side view. Figures of damage are left out
+    for an intact pack. `history` rows hold time_s, invaded, passed and upstream. `CAPTIONS`
+    explains each figure under the stem of its file.
     """
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)

@@ -40,10 +40,14 @@ SECTION_COLUMNS = (  # key, heading, unit, factor to that unit
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ReportParts:
-    """What the page shows beside the summary; everything may be left empty.
+    """What the page shows next to the summary; everything may be left empty.
 
-    `figures` (path, caption); `case_text` the resolved case as TOML; `scales` rows with name, symbol, value,
-    unit, formula, source (objects or mappings); `versions` by program; `commands` as typed.
+    Attributes:
+        figures: path and caption of each figure.
+        case_text: the resolved case as TOML.
+        scales: rows with name, symbol, value, unit, formula and source (objects or mappings).
+        versions: version of each program.
+        commands: the command lines as they were typed.
     """
 
     figures: Sequence[tuple[Path, str]] = ()
@@ -54,7 +58,9 @@ class ReportParts:
 
 
 def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportParts) -> Path:
-    """Write the page atomically. `summary` is the mapping of summary.json; keys it lacks show as a dash.
+    """Write the page, whole or not at all.
+
+    `summary` is the mapping of summary.json; keys that it lacks show as a dash.
 
     Raises CaseError for a figure that cannot be read.
     """
@@ -122,7 +128,10 @@ def headline(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
 
 
 def quantity(value: Any, unit: str = "") -> str:
-    """A number as a reader wants it: 4 digits, powers of ten written out, `unit` behind; a dash for None or NaN."""
+    """A number for a reader: 4 digits, powers of ten written out, `unit` behind it.
+
+    None and NaN become a dash.
+    """
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return DASH
     if isinstance(value, bool | str):
@@ -178,5 +187,6 @@ def _data_uri(path: Path) -> str:
         return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")
     except OSError as error:
         raise CaseError(
-            f"{path}: figure for the report cannot be read ({error.strerror}); draw it again with --stages report"
+            f"{path}: figure for the report cannot be read ({error.strerror}); draw it again "
+            "with --stages report"
         ) from error

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.network.flow.flow import INLET, OUTLET, Links, open_links
+from fdnet.network.flow.links import INLET, OUTLET, Links, open_links
 from fdnet.network.network import Network
 from fdnet.spheres.arrays import Array
 
@@ -15,8 +15,8 @@ def to_openpnm(network: Network, conductance: Array, *, viscosity: float) -> Any
 
     fdnet holds the pressure on the two faces of the box. A throat that a face cuts therefore ends
     in a pore of its own on that face, with the conductance of the part inside. Pores of one
-    `pore_group` have one pressure and are one pore. Pores and throats that no flow reaches are left
-    out.
+    `pore_group` have one pressure and are one pore. Pores and throats that no flow reaches are
+    left out.
 
     Args:
         network: the pore network; its box is not periodic along x.

@@ -1,6 +1,7 @@
-"""The 3-D picture of a sphere file. Runs as a process of its own (see vtk.render_spheres_png), for OpenGL may kill it.
+"""The 3-D picture of a sphere file, drawn in a process of its own, which OpenGL may end.
 
-Usage: python -m fdnet.report.picture SPHERES.vtp --box=x0,x1,y0,y1,z0,z1 PICTURE.png     bounds in m
+Usage: python -m fdnet.report.picture SPHERES.vtp --box=x0,x1,y0,y1,z0,z1 PICTURE.png
+The bounds are in m. See `fdnet.report.vtk.render_spheres_png`.
 """
 
 import sys
@@ -20,7 +21,7 @@ FACE_COLOUR = "#0072B2"
 
 
 def render(source: str, box: Array, target: str) -> None:
-    """Draw `source` into `target`: the grains of the far half grey, the fines in colour, axes in mm.
+    """Draw `source` into `target`: grains of the far half grey, fines in colour, axes in mm.
 
     Fines further upstream than `UPSTREAM_SHOWN` of the length stay out of the picture.
     """
@@ -148,7 +149,10 @@ def _add_frame(plotter: Any, bounds: Array) -> None:
 
 
 def _look(plotter: Any, bounds: Array) -> None:
-    """From the front, a little from upstream and above; the projected box fills the window left of the scalar bar."""
+    """Look from the front, a little from upstream and above.
+
+    The projected box fills the window left of the scalar bar.
+    """
     toward = np.array([-1.1, -1.9, 0.9]) / np.linalg.norm([-1.1, -1.9, 0.9])
     right = np.cross([0.0, 0.0, 1.0], toward)
     right /= np.linalg.norm(right)

@@ -11,9 +11,11 @@ GRAIN_FACE, GRAIN_EDGE, FINE_FACE = "#D9D9D9", "#8C8C8C", "#D55E00"
 
 
 def cut_circles(spheres: Snapshot, plane: float) -> tuple[Array, Array, Array]:
-    """Where the plane y = `plane` cuts N spheres: index (M,), centre (M, 2) x and z in m, circle radius (M,) m.
+    """The circles in which the plane y = `plane` m cuts the spheres.
 
-    A sphere of radius r at distance d < r from the plane is cut in a circle of radius sqrt(r^2 - d^2).
+    Returns the index of the sphere (M,), the centre (M, 2) along x and z, m, and the radius (M,),
+    m. A sphere of radius r at distance d < r from the plane is cut in a circle of radius
+    sqrt(r^2 - d^2).
     """
     squared = spheres.radius**2 - (spheres.position[:, 1] - plane) ** 2
     index = np.flatnonzero(squared > 0)
@@ -21,7 +23,10 @@ def cut_circles(spheres: Snapshot, plane: float) -> tuple[Array, Array, Array]:
 
 
 def fill_side_view(figure: Any, *, snapshot: Snapshot) -> None:
-    """Draw grains (grey) and fines (by radius) cut at mid-width, to scale, with the formation face marked."""
+    """Draw grains (grey) and fines (by radius) cut at mid-width, to scale.
+
+    The formation face is marked.
+    """
     axes = figure.add_subplot()
     plane = float(snapshot.box[1].mean())
     grains, fines = snapshot.grains(), snapshot.fines()

@@ -1,4 +1,4 @@
-"""CSV tables and summary.json of a run folder (contract: units in the column names, SI, `%.9g`)."""
+"""CSV tables and summary.json of a run folder: SI, units in the column names, nine digits."""
 
 import json
 import math
@@ -52,7 +52,7 @@ def section_rows(analysis: "Analysis") -> list[dict[str, Any]]:
 
 
 def write_sections(path: str | Path, analysis: "Analysis") -> Path:
-    """One row per section; k_reduction is empty where the intact k is 0. Edges at full precision."""
+    """One row for each section, edges at full precision; k_reduction is empty where k is 0."""
     rows = [
         row | {edge: repr(float(row[edge])) for edge in ("x_lo_m", "x_hi_m")}
         for row in section_rows(analysis)
@@ -81,7 +81,10 @@ def write_laws(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> Path:
 
 
 def write_profile(path: str | Path, analysis: "Analysis") -> Path:
-    """One row per depth bin; porosity_reduction is the difference initial - damaged (Shi 2011, Figure 16)."""
+    """One row for each bin of depth.
+
+    porosity_reduction is the difference initial - damaged (Shi 2011, Figure 16).
+    """
     profile = analysis.profile
     edges = [repr(float(x)) for x in profile.edges]
     return _write(
@@ -102,11 +105,12 @@ def write_profile(path: str | Path, analysis: "Analysis") -> Path:
 
 
 def write_pores(path: str | Path, analysis: "Analysis") -> Path:
-    """One row per pore, numbered from 0 as in `throat_conns_*`; `pore_share` is the part inside the specimen,
-    `porosity` the void left by grains and fines over the volume of the tetrahedron.
+    """One row for each pore, numbered from 0 as in `throat_conns_*`.
 
-    Pressures are over the pressure drop (1 at the inlet plane, 0 at the outlet plane), empty where a pore is
-    cut off. `initial` is without fines, on the final grain positions where grains moved.
+    `pore_share` is the part inside the specimen, `porosity` the void that grains and fines leave
+    over the volume of the tetrahedron. Pressures are over the pressure drop (1 at the inlet plane,
+    0 at the outlet plane), empty where a pore is cut off. `initial` is without fines, at the final
+    positions of the grains where they moved.
     """
     network, occupancy = analysis.network, analysis.occupancy
     count = len(network.pore_radius)
@@ -128,12 +132,13 @@ def write_pores(path: str | Path, analysis: "Analysis") -> Path:
 
 
 def write_throats(path: str | Path, analysis: "Analysis") -> Path:
-    """One row per throat between two pores (`throat_conns_*`, rows of pores.csv; negative: beyond a face).
+    """One row for each throat between two pores.
 
-    `throat_shift_*` is how many periods the second pore is away. Conductances are times viscosity (m3), fluxes
-    times viscosity over the pressure drop (m3), positive from `throat_conns_0` to `throat_conns_1`. Conductances are of
-    the whole throat, fluxes of the part inside the specimen, `throat_share`.
-    `initial` is without fines, on the final grain positions where grains moved.
+    `throat_conns_*` are rows of pores.csv (negative: beyond a face), `throat_shift_*` the number
+    of periods to the second pore. Conductances are times viscosity (m3) and of the whole throat.
+    Fluxes are times viscosity over the pressure drop (m3), of the part inside the specimen
+    (`throat_share`), positive from `throat_conns_0` to `throat_conns_1`. `initial` is without
+    fines, at the final positions of the grains where they moved.
     """
     network, occupancy = analysis.network, analysis.occupancy
     count = len(network.throat_radius)
@@ -166,8 +171,8 @@ def write_throats(path: str | Path, analysis: "Analysis") -> Path:
 def plain_json(mapping: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
     """`mapping` as plain values and as JSON text.
 
-    JSON knows no NaN or infinity: each becomes null and a line in `warnings` names it. Raises TypeError
-    for values that are no numbers, texts, lists or mappings.
+    JSON has no NaN or infinity: each becomes null and a line in `warnings` names it. Raises
+    TypeError for values that are no numbers, texts, lists or mappings.
     """
     refused: list[str] = []
     plain = _plain(mapping, "", refused)
@@ -191,7 +196,7 @@ def blocked_throats(analysis: "Analysis") -> Array:
 
 
 def pore_porosity(analysis: "Analysis") -> Array:
-    """(P,) void left by grains and fines over the tetrahedron's volume; 0 for a tetrahedron of no volume."""
+    """(P,) void that grains and fines leave over the tetrahedron's volume; 0 where it is flat."""
     if analysis.occupancy is not None:
         return analysis.occupancy.pore_porosity
     void, whole = analysis.network.pore_volume, analysis.network.pore_tetra_volume

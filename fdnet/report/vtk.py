@@ -25,10 +25,11 @@ LAW_CODES = {"clean": 0, "deposition": 1, "clogging": 2, "blocked": 3, "kozeny":
 def write_network_vtp(path: str | Path, analysis: "Analysis") -> Path:
     """The pore network: pores as points, throats as lines.
 
-    Points 0 .. P-1 are the pores; further ones (`end` 1) are where a throat leaves the network at a face or goes
-    to a periodic image, so that no line crosses the whole box. Cell data: throat geometry, porosity,
-    conductances (times viscosity, m3), fluxes (times viscosity over the pressure drop, m3), blocked, law_used
-    as in `LAW_CODES`. Point data: pressure over the pressure drop, radius, volume.
+    Points 0 .. P-1 are the pores. Further points (`end` 1) are where a throat leaves the network
+    at a face or goes to a periodic image, so that no line crosses the whole box. Cell data:
+    geometry and porosity of the throats, conductances (times viscosity, m3), fluxes (times
+    viscosity over the pressure drop, m3), blocked, law_used as in `LAW_CODES`. Point data:
+    pressure over the pressure drop, radius, volume.
     """
     import pyvista as pv
 
@@ -55,7 +56,10 @@ def write_spheres_vtp(path: str | Path, snapshot: Snapshot) -> Path:
 
 
 def write_pvd(path: str | Path, entries: Sequence[tuple[float, str | Path]]) -> Path:
-    """A ParaView collection of (time in s, file); files are named relative to the folder of `path`."""
+    """A ParaView collection of (time in s, file).
+
+    The files are named relative to the folder of `path`.
+    """
     folder = Path(path).resolve().parent
     rows = "".join(
         f'    <DataSet timestep={quoteattr(repr(float(time)))} part="0" '
@@ -72,10 +76,11 @@ def write_pvd(path: str | Path, entries: Sequence[tuple[float, str | Path]]) -> 
 def render_spheres_png(
     path: str | Path, spheres_vtp: str | Path, box: Array, *, seconds: float = 120.0
 ) -> str:
-    """Draw the 3-D view of `spheres_vtp` into `path` in a child process; returns "" or why there is no picture.
+    """Draw the 3-D view of `spheres_vtp` into `path` in a child process.
 
-    `box` (3, 2) m. Without usable OpenGL, VTK kills its process with no Python error; here that costs the
-    picture only. Nothing is raised and `path` is replaced only by a complete picture.
+    Returns "" or the reason why there is no picture; nothing is raised, and only a complete
+    picture replaces `path`. `box` is (3, 2) m. Without usable OpenGL, VTK ends its process with no
+    Python error; in a child process that costs the picture alone.
     """
     try:
         with replacing(path) as part:
@@ -98,7 +103,7 @@ def render_spheres_png(
 
 
 def _command(spheres_vtp: str | Path, box: Array) -> list[str]:
-    """The child's command line, with the software OpenGL of the local prefix where the set-up made one."""
+    """The child's command line, with the software OpenGL that the set-up may have installed."""
     bounds = ",".join(repr(float(value)) for value in np.asarray(box).ravel())
     libraries = Path(__file__).resolve().parents[2] / ".prefix" / "bin" / "with-libraries"
     wrapper = [str(libraries)] if os.access(libraries, os.X_OK) else []
@@ -125,11 +130,11 @@ class _NoPictureError(OSError):
 def _refuse_failure(done: "subprocess.CompletedProcess[str]", part: Path) -> None:
     """Raise _NoPictureError, with the reason, unless the child ended well and left a whole PNG."""
     if done.returncode:
-        said = [line.strip() for line in (done.stderr or "").splitlines() if line.strip()]
+        printed = [line.strip() for line in (done.stderr or "").splitlines() if line.strip()]
         how = (
             f"signal {-done.returncode}" if done.returncode < 0 else f"exit code {done.returncode}"
         )
-        why = said[-1][:200] if said else "no usable OpenGL?"
+        why = printed[-1][:200] if printed else "no usable OpenGL?"
         raise _NoPictureError(f"the drawing process ended with {how}; {why}")
     picture = part.read_bytes() if part.is_file() else b""
     if not (picture.startswith(PNG_START) and PNG_END in picture[-12:]):
@@ -144,8 +149,14 @@ def _save(path: str | Path, mesh: Any) -> Path:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Drawing:
-    """Points (P+E, 3), pores first; lines (T, 2) into them. For the extra ends (E,): `source` the pore each is an
-    image of (-1, -2: beyond the inlet, outlet face) and `periods` along x it is away from it."""
+    """The network as points and lines, with E extra ends for P pores and T throats.
+
+    Attributes:
+        points: (P+E, 3) m, pores first.
+        lines: (T, 2) indices of points.
+        source: (E,) pore that the end is an image of; -1 and -2 beyond the inlet and outlet face.
+        periods: (E,) number of periods along x between the end and that pore.
+    """
 
     points: Array
     lines: Array
@@ -191,7 +202,7 @@ def _throat_data(analysis: "Analysis") -> dict[str, Array]:
 
 
 def _pore_data(analysis: "Analysis", drawing: _Drawing) -> dict[str, Array]:
-    """Per point; the extra ends carry their pore's values, or those of their face, and no volume."""
+    """Values of each point; an extra end has those of its pore or its face, and no volume."""
     network, count = analysis.network, len(analysis.network.pore_radius)
     source, none = drawing.source, np.zeros(len(drawing.source))
     porosity = pore_porosity(analysis)
@@ -217,7 +228,7 @@ def _pore_data(analysis: "Analysis", drawing: _Drawing) -> dict[str, Array]:
 
 
 def _of_ends(values: Array, source: Array, faces: tuple[float, float]) -> Array:
-    """For extra ends (E,) the value of the pore they are images of, or the inlet's or outlet's of `faces`."""
+    """Value (E,) of the pore that each extra end is an image of, or of its face in `faces`."""
     ends = np.where(source == -1, *faces)
     ends[source >= 0] = np.asarray(values)[source[source >= 0]]
     return ends

@@ -45,12 +45,12 @@ class FinishedRun:
 
     @cached_property
     def sections(self) -> "pd.DataFrame":
-        """One row for each slab along the flow, with edges (m), porosities, k (m2) and fines."""
+        """One row for each slab along the flow, with edges (m), porosity, k (m2) and fines."""
         return self._table("sections", len(self.summary["sections"]))
 
     @cached_property
     def profile(self) -> "pd.DataFrame":
-        """One row for each bin of depth, with edges (m), porosities, share of the invaded fines."""
+        """One row for each bin of depth, with edges (m), porosities and share of the fines."""
         return self._table("profile", None)
 
     @cached_property
@@ -82,10 +82,11 @@ class FinishedRun:
         return table
 
     def spheres(self, state: State = "damaged") -> Snapshot:
-        """Grains and fines at the end of the run ("damaged"), or the grains alone before ("initial").
+        """Grains and fines at the end of the run, or the grains alone before it.
 
-        They are read from spheres_damaged.csv or spheres_initial.csv; the box is that of the case,
-        m. Fines upstream of the formation face (x < 0) are among the damaged ones.
+        `state` is "damaged" or "initial". The spheres are read from spheres_damaged.csv or
+        spheres_initial.csv; the box is that of the case, m. Fines upstream of the formation face
+        (x < 0) are among the damaged ones.
         """
         from fdnet.spheres.readers import read_spheres
 

@@ -9,9 +9,10 @@ from fdnet.spheres.snapshot import Array, Kind, Snapshot
 def touching_pairs(
     spheres: Snapshot, periodic: tuple[bool, bool, bool], *, gap: float = 0.0
 ) -> tuple[Array, Array]:
-    """Pairs (K, 2) of spheres nearer than `gap` smaller diameters, and their overlaps (K,) m (negative: a gap).
+    """Pairs (K, 2) of spheres that touch, and their overlaps (K,) m; a negative one is a gap.
 
-    Spheres are searched in two classes of size, so that a few large ones do not widen the search of all.
+    Two spheres touch when they are nearer than `gap` times the smaller diameter. Spheres are
+    searched in two classes of size, so that a few large ones do not widen the search of all.
     """
     radius = spheres.radius
     if len(radius) == 0:
@@ -24,13 +25,13 @@ def touching_pairs(
     small = radius <= 0.5 * radius.max()
     groups = [group for group in (np.flatnonzero(small), np.flatnonzero(~small)) if len(group)]
     trees = [cKDTree(position[group], boxsize=period) for group in groups]
-    found = [
+    touching = [
         _pairs((trees[i], trees[j]), (groups[i], groups[j]), radius, gap)
         for i in range(len(groups))
         for j in range(i, len(groups))
     ]
-    return np.concatenate([pairs for pairs, _ in found]), np.concatenate(
-        [overlap for _, overlap in found]
+    return np.concatenate([pairs for pairs, _ in touching]), np.concatenate(
+        [overlap for _, overlap in touching]
     )
 
 

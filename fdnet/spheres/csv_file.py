@@ -22,8 +22,8 @@ OPTIONAL = ("kind", "id")
 def write_spheres(path: str | Path, snapshot: Snapshot) -> Path:
     """Write x_m, y_m, z_m, radius_m, kind, id; one row per sphere, atomically.
 
-    Coordinates are the shortest decimals that read back to the same double (`repr`), so that a count by
-    `lo <= x < hi` is the same from the file as from memory.
+    Coordinates are the shortest decimals that read back to the same number (`repr`), so that a
+    count by `lo <= x < hi` is the same from the file as from memory.
     """
     import pandas as pd
 
@@ -42,8 +42,8 @@ def read_csv(path: str | Path, *, units: str | None = None) -> SphereRows:
 
     Columns, in any order: `x,y,z,radius[,kind][,id]` in `units` (one of `UNITS`), or
     `x_m,y_m,z_m,radius_m[,kind][,id]`, where `units` must be None. `kind` is grain or fine. Blank
-    lines and lines that start with `#` are skipped. Raises CaseError that names the file, the line,
-    what it holds and what was expected.
+    lines and lines that start with `#` are skipped. Raises CaseError that names the file, the
+    line, what it holds and what was expected.
     """
     source = Path(path)
     if units is not None:

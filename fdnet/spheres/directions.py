@@ -24,7 +24,8 @@ def periodic_axes(periodic: Directions) -> tuple[bool, bool, bool]:
     values = tuple(periodic)
     if len(values) != 3 or not all(isinstance(value, bool | np.bool_) for value in values):
         raise CaseError(
-            f"periodic: {periodic!r}, expected letters such as 'yz', or three truth values (x, y, z)"
+            f"periodic: {periodic!r}, expected letters such as 'yz', or three truth values for x, "
+            "y, z"
         )
     return bool(values[0]), bool(values[1]), bool(values[2])
 

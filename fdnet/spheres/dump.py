@@ -13,6 +13,7 @@ from fdnet.atomic import disk_is_full
 from fdnet.errors import DumpError
 from fdnet.spheres.arrays import Array, frozen, one_line
 
+CUT = "The run was cut; continue it with --resume."
 COLUMNS = "id type x y z vx vy vz radius"
 FORMAT = "%d %d %.17g %.17g %.17g %.9g %.9g %.9g %.17g"
 EXACT: dict[str, Any] = (
@@ -47,7 +48,7 @@ class Frame:
         """The values (N,) of one column. Raises DumpError when the dump has no such column."""
         if name not in self.columns:
             raise DumpError(
-                f"dump at step {self.step}: no column {name}, found {' '.join(self.columns)}"
+                f"dump at step {self.step}: no column {name} among {' '.join(self.columns)}"
             )
         return self.rows[:, self.columns.index(name)]
 
@@ -71,9 +72,7 @@ def read_frame(path: Path) -> Frame:
     try:
         frames = read_dump(path)
         if len(frames) != 1:
-            raise DumpError(
-                f"{path}: {len(frames)} frames, expected one. The run was cut; continue it with --resume."
-            )
+            raise DumpError(f"{path}: {len(frames)} frames, expected one. {CUT}")
     except DumpError as error:
         if path.parent.exists() and disk_is_full(path.parent):
             raise DumpError(f"{error} Make room first: the disk is full.") from error
@@ -103,9 +102,7 @@ class _Reader:
     def take(self) -> bytes:
         end = self.data.find(b"\n", self.position)
         if end < 0:
-            raise self.fail(
-                "the file ends in the middle of a line. The run was cut; continue it with --resume."
-            )
+            raise self.fail(f"the file ends in the middle of a line. {CUT}")
         text = self.data[self.position : end]
         self.position, self.line = end + 1, self.line + 1
         return text
@@ -113,12 +110,10 @@ class _Reader:
     def item(self, expected: bytes) -> bytes:
         line = self.line
         if self.position >= len(self.data):
-            raise self.fail(
-                f"the file ends before {expected.decode()}. The run was cut; continue it with --resume."
-            )
+            raise self.fail(f"the file ends before {expected.decode()}. {CUT}")
         text = self.take()
         if not text.startswith(expected):
-            raise self.fail(f"found {text[:60]!r}, expected {expected.decode()!r}", line)
+            raise self.fail(f"{text[:60]!r}, expected {expected.decode()!r}", line)
         return text[len(expected) :]
 
     def whole(self, what: str) -> int:
@@ -140,7 +135,7 @@ class _Reader:
         count = self.whole("number of atoms")
         if b"xy" in self.item(_ITEMS[2]):
             raise self.fail(
-                "the box is slanted (triclinic), expected one along the axes; dump an orthogonal box",
+                "the box is slanted (triclinic), expected sides along the axes",
                 self.line - 1,
             )
         box = [self.bounds() for _ in range(3)]
@@ -156,7 +151,7 @@ class _Reader:
         )
 
     def skip_optional(self) -> None:
-        """Read what LAMMPS may write before the step: the units, and the time, which is not used."""
+        """Read what LAMMPS may write before the step: the units and the time (not used)."""
         for item in (_UNITS, _TIME):
             if self.data.startswith(item, self.position):
                 self.take()
@@ -179,14 +174,14 @@ class _Reader:
         end = self.data.find(b"ITEM: ", self.position)
         end = len(self.data) if end < 0 else end
         body, first = self.data[self.position : end], self.line
-        found = body.count(b"\n")
-        if found != count or (body and not body.endswith(b"\n")):
+        complete = body.count(b"\n")
+        if complete != count or (body and not body.endswith(b"\n")):
             what = "then the file ends" if end == len(self.data) else "then the next frame begins"
             raise self.fail(
-                f"{found} of {count} rows, {what}. The run was cut; continue it with --resume.",
-                first + found,
+                f"{complete} of {count} rows, {what}. {CUT}",
+                first + complete,
             )
-        self.position, self.line = end, first + found
+        self.position, self.line = end, first + complete
         table = _table(body, columns) if count else np.empty((0, len(columns)))
         if table is None:
             raise self.fail(*_bad_row(body, columns, first))

@@ -33,8 +33,8 @@ def read_dump_spheres(
     bad = np.flatnonzero(~(radius > 0))
     if len(bad):
         raise CaseError(
-            f"{path}: step {frame.step}: row {bad[0] + 1} by id has the radius {radius[bad[0]]:g}, "
-            "expected a number above 0"
+            f"{path}: step {frame.step}: row {bad[0] + 1} by id has the radius "
+            f"{radius[bad[0]]:g}, expected a number above 0"
         )
     assumed = units is None and not frame.units
     notes = [f"The lengths of {path} are in m."] if assumed else []
@@ -69,8 +69,8 @@ def _chosen(frames: list[Frame], path: Path, step: int | None) -> Frame:
 def _scale(frame: Frame, path: Path) -> float:
     if frame.units and frame.units not in DUMP_UNITS:
         raise CaseError(
-            f"{path}: its units are {frame.units!r}, which fdnet cannot convert to m; give the unit "
-            "of length of the file (units)"
+            f"{path}: its units are {frame.units!r}, which fdnet cannot convert to m; give the "
+            "unit of length of the file (units)"
         )
     return DUMP_UNITS.get(frame.units, 1.0)
 

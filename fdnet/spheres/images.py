@@ -1,4 +1,7 @@
-"""Images of spheres beyond the faces of a box: shifted across periodic sides, mirrored across the others."""
+"""Images of spheres beyond the faces of a box.
+
+They are shifted across periodic sides and mirrored across the others.
+"""
 
 from dataclasses import dataclass
 
@@ -15,8 +18,12 @@ INSIDE, MIRROR_LOW, MIRROR_HIGH, ON_FACE = 0, 1, 2, 3
 class Images:
     """M images, the spheres themselves among them.
 
-    `owner` (M,) index of the sphere; `position` (M, 3) m; `shift` (M, 3) periods; `mirror` (M, 3) INSIDE,
-    MIRROR_LOW, MIRROR_HIGH or ON_FACE (centre on or beyond a face: it has no mirror image across that axis).
+    Attributes:
+        owner: (M,) index of the sphere.
+        position: (M, 3) centres, m.
+        shift: (M, 3) number of periods along each axis.
+        mirror: (M, 3) INSIDE, MIRROR_LOW or MIRROR_HIGH along each axis; ON_FACE for a centre on
+            or beyond a face, which has no mirror image across that axis.
     """
 
     owner: Array
@@ -44,11 +51,12 @@ def neighbour_tree(position: Array, box: Array, *, periodic: tuple[bool, ...]) -
 
 
 def make_images(
-    position: Array, box: Array, *, periodic: tuple[bool, ...], margin: Array, hair: float
+    position: Array, box: Array, *, periodic: tuple[bool, ...], margin: Array, tolerance: float
 ) -> Images:
-    """All images of `position` (N, 3) within `margin` (3,) m of the box; NaN margin: no images along that axis.
+    """All images of the centres `position` (N, 3) m within `margin` (3,) m of the box.
 
-    A centre within `hair` m of a non-periodic face, or beyond it, gets no mirror image there.
+    A margin of NaN makes no images along that axis. A centre within `tolerance` m of a
+    non-periodic face, or beyond it, gets no mirror image there.
     """
     count = len(position)
     owner, shift, mirror = (
@@ -61,14 +69,16 @@ def make_images(
         if np.isnan(margin[axis]):
             continue
         make = _shifted if periodic[axis] else _mirrored
-        pick, place, steps, codes = make(position[:, axis], box[axis], float(margin[axis]), hair)
+        pick, place, steps, codes = make(
+            position[:, axis], box[axis], float(margin[axis]), tolerance
+        )
         owner, position, shift, mirror = owner[pick], position[pick], shift[pick], mirror[pick]
         position[:, axis], shift[:, axis], mirror[:, axis] = place, steps, codes
     return Images(owner=owner, position=position, shift=shift, mirror=mirror)
 
 
 def _shifted(
-    x: Array, bounds: Array, margin: float, hair: float
+    x: Array, bounds: Array, margin: float, tolerance: float
 ) -> tuple[Array, Array, Array, Array]:
     low, high = bounds
     reach = int(np.ceil(margin / (high - low)))
@@ -80,13 +90,13 @@ def _shifted(
 
 
 def _mirrored(
-    x: Array, bounds: Array, margin: float, hair: float
+    x: Array, bounds: Array, margin: float, tolerance: float
 ) -> tuple[Array, Array, Array, Array]:
     low, high = bounds
-    own = np.where((x <= low + hair) | (x >= high - hair), ON_FACE, INSIDE)
+    own = np.where((x <= low + tolerance) | (x >= high - tolerance), ON_FACE, INSIDE)
     # a centre on one face has an image as far beyond the other when the margin is the whole side
-    lower = np.flatnonzero((x > low + hair) & (x < low + margin + hair))
-    upper = np.flatnonzero((x < high - hair) & (x > high - margin - hair))
+    lower = np.flatnonzero((x > low + tolerance) & (x < low + margin + tolerance))
+    upper = np.flatnonzero((x < high - tolerance) & (x > high - margin - tolerance))
     pick = np.concatenate([np.arange(len(x)), lower, upper])
     place = np.concatenate([x, 2 * low - x[lower], 2 * high - x[upper]])
     codes = np.concatenate(
@@ -96,7 +106,7 @@ def _mirrored(
 
 
 def label(images: Images) -> Array:
-    """One integer (M,) per sphere and mirror combination; images that differ by whole periods share it."""
+    """One integer (M,) for each sphere and its mirrors; images whole periods apart share it."""
     mirror = np.where(images.mirror == ON_FACE, INSIDE, images.mirror)
     return images.owner * 27 + mirror @ np.array([9, 3, 1])
 

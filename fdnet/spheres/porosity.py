@@ -1,9 +1,10 @@
-"""Porosity of a set of spheres in a box: overlap counted once, spheres clipped to the box, by depth.
+"""Porosity of spheres in a box, by depth: overlap counted once, spheres clipped to the box.
 
-Method: chords. Straight lines along x stand on a regular (y, z) lattice; on each line the union of the
-spheres' chords is exact. Several lattices with random shifts give the mean and its standard error
-(random shifts: Cranley and Patterson 1976, SIAM J. Numer. Anal. 13, 904; spread over the cell as a Latin
-square, McKay et al. 1979, so the error told is on the safe side).
+The method is that of chords. Straight lines along x stand on a regular (y, z) lattice; on each
+line the union of the spheres' chords is exact. Several lattices with random shifts give the mean
+and its standard error (Cranley and Patterson 1976, SIAM J. Numer. Anal. 13, 904). The shifts are
+spread over the cell as a Latin square (McKay et al. 1979), so the reported error is on the safe
+side.
 """
 
 from collections.abc import Sequence
@@ -25,8 +26,13 @@ ROUNDING = 1e-9
 class Porosity:
     """Porosity of a box of spheres, all values between 0 and 1.
 
-    `mean`, `standard_error` overlap counted once; `edges` (B+1,) m and `profile` (B,) the same by depth;
-    `sum` plain: 1 - sum of the whole volumes of the spheres centred in the box / box volume.
+    Attributes:
+        mean: porosity with the overlap of spheres counted once.
+        standard_error: standard error of `mean`.
+        edges: (B+1,) edges of the bins of depth, m.
+        profile: (B,) porosity of each bin, overlap counted once.
+        sum: porosity from the plain sum, 1 - volumes of the spheres centred in the box / its
+            volume.
     """
 
     mean: float
@@ -45,10 +51,16 @@ def measure_porosity(
     edges: Array | None = None,
     lines: int = LINES_PER_LATTICE,
 ) -> Porosity:
-    """Porosity of `spheres` in their box, by depth bins `edges` (B+1,) m along x (default: one bin, the box).
+    """Porosity of spheres in their box, as a whole and by depth.
 
-    `periodic` (3,): sides across which spheres reach round; across the others they are clipped.
-    `lines`: chords per lattice (8 lattices). Raises CaseError when `edges` do not ascend within the box.
+    Args:
+        spheres: the spheres, m.
+        periodic: (3,) sides across which spheres reach round; across the others they are clipped.
+        edges: (B+1,) edges of the bins along x, m; one bin, the box, without them.
+        lines: number of chords in each of the 8 lattices.
+
+    Raises:
+        CaseError: `edges` do not ascend within the box.
     """
     low, high = spheres.box.T
     bins = _checked_edges(edges, float(low[0]), float(high[0]))
@@ -60,15 +72,15 @@ def measure_porosity(
     void = 1.0 - (filled[:, -1] - filled[:, 0]) / (high[0] - low[0])
     at_bins = filled.mean(axis=0)[np.searchsorted(cuts, bins)]
     return Porosity(
-        mean=float(_without_hair(void.mean())),
+        mean=float(_without_rounding(void.mean())),
         standard_error=float(void.std(ddof=1) / np.sqrt(LATTICES)),
         edges=frozen(bins),
-        profile=frozen(_without_hair(1.0 - np.diff(at_bins) / np.diff(bins))),
+        profile=frozen(_without_rounding(1.0 - np.diff(at_bins) / np.diff(bins))),
         sum=_plain_sum(spheres, periodic),
     )
 
 
-def _without_hair(value: Array) -> Array:
+def _without_rounding(value: Array) -> Array:
     """`value`, but 0 or 1 where it is beyond them by the rounding of the sums alone."""
     bounded = np.clip(value, 0.0, 1.0)
     return np.where(np.abs(value - bounded) < ROUNDING, bounded, value)
@@ -76,16 +88,16 @@ def _without_hair(value: Array) -> Array:
 
 def _checked_edges(edges: Array | None, low: float, high: float) -> Array:
     bins = np.array([low, high]) if edges is None else np.asarray(edges, dtype=float)
-    hair = 1e-9 * (high - low)
+    tolerance = 1e-9 * (high - low)
     if (
         len(bins) < 2
         or np.any(np.diff(bins) <= 0)
-        or bins[0] < low - hair
-        or bins[-1] > high + hair
+        or bins[0] < low - tolerance
+        or bins[-1] > high + tolerance
     ):
         raise CaseError(
-            f"porosity bins: edges {bins.tolist()} do not ascend within the box [{low:g}, {high:g}] m; "
-            "give ascending depths inside the box"
+            f"porosity bins: edges {bins.tolist()} do not ascend within the box "
+            f"[{low:g}, {high:g}] m; give ascending depths inside the box"
         )
     return np.clip(bins, low, high)
 
@@ -107,7 +119,7 @@ def _plain_sum(spheres: Snapshot, periodic: Sequence[bool]) -> float:
 def _filled_below(
     spheres: Snapshot, cuts: Array, shift: Array, lines: int, periodic: tuple[bool, ...]
 ) -> Array:
-    """Mean solid length per line between the first and each of `cuts` (C,), on one shifted lattice."""
+    """Mean solid length of a line from the first to each of `cuts` (C,), on one lattice."""
     size = spheres.box[1:, 1] - spheres.box[1:, 0]
     count = np.maximum(1, np.round(np.sqrt(lines * size / size[::-1]))).astype(int)
     sphere, line, half = _crossings(spheres, count, shift, periodic)

@@ -140,7 +140,10 @@ def _is_dump(path: Path) -> bool:
 def _kinds(
     rows: SphereRows, fines_below: float | None, types: Mapping[int, str] | None
 ) -> tuple[Array, list[str]]:
-    """Kind (N,) of each sphere, and what was assumed. Raises CaseError on contradicting choices."""
+    """Kind (N,) of each sphere, and what was assumed.
+
+    Raises CaseError on choices that contradict each other.
+    """
     count = len(rows.radius)
     if fines_below is not None:
         return _by_radius(rows, fines_below, types), []
@@ -169,8 +172,8 @@ def _by_radius(rows: SphereRows, limit: float, types: Mapping[int, str] | None) 
     if not np.any(kind == Kind.GRAIN):
         largest = rows.radius.max() / rows.scale
         raise CaseError(
-            f"fines_below: {limit:g} makes every sphere of {rows.source} a fine; the largest radius "
-            f"is {largest:g} in its unit"
+            f"fines_below: {limit:g} makes every sphere of {rows.source} a fine; the largest "
+            f"radius is {largest:g} in its unit"
         )
     return kind
 

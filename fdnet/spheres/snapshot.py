@@ -130,9 +130,10 @@ class Snapshot:
         return resting(place, radii, bounds, kinds)
 
     def turned(self, axis: str) -> "Snapshot":
-        """The same spheres with `axis` ("x", "y" or "z") as the new x, moved so that x starts at 0.
+        """The same spheres with `axis` ("x", "y" or "z") as the new x.
 
-        The order of the axes stays cyclic: the new x, y, z are `axis` and the two that follow it.
+        They are moved so that the box starts at x = 0. The order of the axes stays cyclic: the new
+        x, y, z are `axis` and the two that follow it.
         """
         turn = [(axis_number(axis) + k) % 3 for k in range(3)]
         start = np.array([self.box[turn[0], 0], 0.0, 0.0])
@@ -169,7 +170,7 @@ class Snapshot:
         return self.where(self.kind == Kind.FINE)
 
     def joined(self, other: "Snapshot") -> "Snapshot":
-        """This snapshot's spheres followed by those of `other`, at the step and time of `other`."""
+        """These spheres followed by those of `other`, at the step and time of `other`."""
         return Snapshot(
             step=other.step,
             time_s=other.time_s,

@@ -17,25 +17,27 @@ STUDIES: Mapping[str, str] = {
     "time-step": "time step over sqrt(m/k) and over the drag relaxation time",
     "drag": "drag at every step, held, implicit, viscous",
     "speed": "mobile grains, neighbour skin and bins, MPI ranks",
-    "throat-occupancy": "what the thesis's two planes and quadrature make of a fine's volume in a throat",
-    "linear-solver": "method and tolerance of the network's solve, by size and spread of conductance",
+    "throat-occupancy": "volume of a fine in a throat: the thesis's two planes or quadrature",
+    "linear-solver": "method and tolerance of the network's solve, by size and conductances",
     "laws": "conductance and damage laws, and coarse resolved flow, against Stokes truth",
-    "specimen-size": "number of grains and seed: how large a specimen must be, and what a small one is worth",
-    "economies": "what makes full-scale invasions affordable: each economy with its error and its speed-up",
+    "specimen-size": "number of grains and seed: how large a specimen must be",
+    "economies": "settings that make full-scale invasions affordable: error and speed-up of each",
 }
-"""Name of each study and what it asks; the module has the same name with underscores."""
+"""Name of each study and its question; the module has the same name with underscores."""
 
 OF_NETWORK = ("throat-occupancy", "linear-solver", "laws", "specimen-size")
 """The studies of the network half; the others are of the invasion."""
 
 THESIS = "thesis"
-"""The study beside them, of runs and figures rather than of error against run time."""
+"""A further study, of runs and figures rather than of error against run time."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of `fdnet study`."""
     parser.add_argument(
-        "name", metavar="NAME", help=f"one of {', '.join(STUDIES)}; 'list' says what each asks"
+        "name",
+        metavar="NAME",
+        help=f"one of {', '.join(STUDIES)}; 'list' prints the question of each",
     )
     parser.add_argument("--quick", action="store_true", help="the reduced form, below 30 s")
     parser.add_argument(
@@ -43,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--silent", action="store_true", help="no progress")
     thesis = parser.add_argument_group(
-        "only for 'thesis', all specimens of the thesis beside its numbers"
+        "only for 'thesis', all specimens of the thesis next to its numbers"
     )
     thesis.add_argument("--jobs", type=int, default=1, help="runs side by side (default 1)")
     thesis.add_argument(
@@ -57,11 +59,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run one study; returns the exit code. Raises CaseError on an unknown name or a folder that is not the study's."""
+    """Runs one study and returns the exit code.
+
+    Raises:
+        CaseError: the name is not known, or the folder belongs to something else.
+    """
     if options.name == "list":
-        for name, asks in STUDIES.items():
-            print(f"{name:<18} {asks}")
-        print(f"{THESIS:<18} all specimens of the thesis at full scale, beside its numbers")
+        for name, question in STUDIES.items():
+            print(f"{name:<18} {question}")
+        print(f"{THESIS:<18} all specimens of the thesis at full scale, next to its numbers")
         return 0
     if options.name == THESIS:
         return _run_thesis(options)
@@ -69,9 +75,8 @@ def run(options: argparse.Namespace) -> int:
     out = options.out or Path("studies") / (f"{study.name}-quick" if options.quick else study.name)
     text = run_study(study, out, quick=options.quick, show=not options.silent)
     print(text)
-    print(
-        f"table:  {out / study.name}.csv\nfigure: {out / study.name}.png\ntext:   {out / study.name}.md"
-    )
+    for name, ending in (("table", "csv"), ("figure", "png"), ("text", "md")):
+        print(f"{name + ':':<8}{out / study.name}.{ending}")
     return 0
 
 
@@ -95,7 +100,11 @@ def _run_thesis(options: argparse.Namespace) -> int:
 
 
 def study_named(name: str) -> Study:
-    """The study of that name. Raises CaseError when there is none."""
+    """The study of that name.
+
+    Raises:
+        CaseError: there is none.
+    """
     if name not in STUDIES:
         raise CaseError(f"study: {name!r} is not known, expected one of {', '.join(STUDIES)}")
     module: Any = import_module(_module(name))
@@ -108,21 +117,23 @@ def _module(name: str) -> str:
 
 
 def run_study(study: Study, out: Path, *, quick: bool, show: bool = False) -> str:
-    """Run or continue, then write NAME.csv, NAME.png and NAME.md into `out`; returns the text.
+    """Runs or continues a study, writes NAME.csv, NAME.png and NAME.md to `out`, returns the text.
 
-    Raises LiggghtsError when the study needs a LIGGGHTS that is not there, CaseError when `out` is not this study's.
+    Raises:
+        LiggghtsError: the study needs LIGGGHTS, which is not there.
+        CaseError: `out` belongs to something else.
     """
     from fdnet.studies.engine.draw import draw_study
     from fdnet.studies.engine.runner import run_points
     from fdnet.studies.engine.table import study_text, write_rows
 
-    def tell(line: str) -> None:
+    def report(line: str) -> None:
         if show:
             print(f"{study.name}: {line}", file=sys.stderr, flush=True)
 
     if study.needs_liggghts:
         find_binary()
-    rows = study.judge(run_points(study, out, quick=quick, tell=tell))
+    rows = study.judge(run_points(study, out, quick=quick, report=report))
     text = study_text(study, rows)
     write_rows(rows, out / f"{study.name}.csv")
     draw_study(study, rows, out / f"{study.name}.png")

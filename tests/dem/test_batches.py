@@ -34,12 +34,12 @@ def test_batches_make_up_the_slab(radius, sides):
         *BATCHED, f"fines.radius_mm={radius}", f"box.sides={sides}", "fines.concentration=0.15"
     )
     scales, grains = scales_of(case), one_grain(case)
-    found = list(in_the_slab(case, scales, grains))
+    placed = list(in_the_slab(case, scales, grains))
     end, batches = slab_end(case, grains), batches_of(case, scales)
-    assert len(found) == len(batches.counts) > 4
-    ids = np.concatenate([fines.id for fines, _ in found])
+    assert len(placed) == len(batches.counts) > 4
+    ids = np.concatenate([fines.id for fines, _ in placed])
     assert np.array_equal(ids, np.arange(2, 902))
-    for number, (fines, place) in enumerate(found):
+    for number, (fines, place) in enumerate(placed):
         assert len(fines) == batches.counts[number]
         assert np.all(place[:, 0] <= end - number * batches.length)
         assert np.all(
@@ -47,8 +47,8 @@ def test_batches_make_up_the_slab(radius, sides):
             >= max(end - (number + 1) * batches.length, end - scales.slab_length) - 1e-18
         )
     place, radii = (
-        np.concatenate([p for _, p in found]),
-        np.concatenate([f.radius for f, _ in found]),
+        np.concatenate([p for _, p in placed]),
+        np.concatenate([f.radius for f, _ in placed]),
     )
     gap = place[:, None] - place
     for axis, size in enumerate(case.size_m):

@@ -90,7 +90,7 @@ def test_held_drag_stores_and_every_step_does_not():
     assert not has(invade_text("drag.scheme=every_step"), "store/state")
 
 
-def test_gravity_is_left_out_when_negligible_and_told():
+def test_gravity_is_left_out_when_negligible_and_reported():
     text = invade_text()
     assert not has(text, "gravity|buoyancy")
     assert "# left out: gravity and buoyancy (gravity is" in text

@@ -77,7 +77,7 @@ def test_implicit_drag_gives_every_fine_its_own_coefficient():
 
 
 @pytest.mark.parametrize(
-    ("assignments", "said"),
+    ("assignments", "message"),
     [
         (["drag.scheme=viscous", "fines.radius_mm=[0.04, 0.06]"], "needs fines of one size"),
         (["drag.scheme=implicit", "drag.upstream=darcy"], "keeps one a fine"),
@@ -92,8 +92,8 @@ def test_implicit_drag_gives_every_fine_its_own_coefficient():
         (["drag.scheme=explicit"], "drag.scheme: 'explicit'"),
     ],
 )
-def test_what_a_scheme_cannot_do_is_refused(assignments, said):
-    with pytest.raises(CaseError, match=said):
+def test_what_a_scheme_cannot_do_is_refused(assignments, message):
+    with pytest.raises(CaseError, match=message):
         tiny(*assignments)
     assert case_from(tiny().data()) == tiny()
 

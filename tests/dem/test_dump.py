@@ -44,7 +44,7 @@ def test_empty_frame():
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         (
             frame(4000, ["1 1 0.5 "], count=3),
@@ -63,7 +63,7 @@ def test_empty_frame():
         ("ITEM: TIMESTEP\n12\nITEM: NUMBER OF", "the file ends in the middle of a line"),
         ("ITEM: TIMESTEP\n12\n", "the file ends before ITEM: NUMBER OF ATOMS"),
         ("ITEM: TIMESTEP\nx\nITEM: NUMBER OF ATOMS\n", "step is b'x'"),
-        ("hello\n", "found b'hello', expected 'ITEM: TIMESTEP'"),
+        ("hello\n", "b'hello', expected 'ITEM: TIMESTEP'"),
         (frame(0, ["1 1 1 "]).replace("0 2", "0"), "box bounds b'0', expected two numbers"),
         (
             frame(0, ["1 1 1 "]).replace("\n1\nITEM: BOX", "\n-4\nITEM: BOX"),
@@ -71,8 +71,8 @@ def test_empty_frame():
         ),
     ],
 )
-def test_broken_files_are_named_by_line_and_step(text, said):
-    with pytest.raises(DumpError, match=said):
+def test_broken_files_are_named_by_line_and_step(text, message):
+    with pytest.raises(DumpError, match=message):
         parse(text)
 
 
@@ -85,7 +85,7 @@ def test_missing_file_and_wrong_number_of_frames(tmp_path: Path):
 
 
 def test_missing_column():
-    with pytest.raises(DumpError, match="no column radius, found id type x"):
+    with pytest.raises(DumpError, match="no column radius among id type x"):
         parse(frame(0, ["1 1 1 "]))[0].column("radius")
 
 

@@ -106,12 +106,12 @@ def test_a_begun_invasion_is_not_tried_out_again(tmp_path, monkeypatch):
     (tmp_path / "run" / "invade").mkdir(parents=True)
     history = tmp_path / "run" / "invade" / "history.csv"
     options = pipeline.RunOptions(out=tmp_path / "run", show_progress=False)
-    for text, said in (
+    for text, message in (
         (HISTORY_HEADER + "\n", "crowded"),
         (HISTORY_HEADER + "\n1,2,3,4,5,6,7,8\n", "holds no fdnet run"),
     ):
         history.write_text(text)
-        with pytest.raises(CaseError, match=said):
+        with pytest.raises(CaseError, match=message):
             pipeline.run_stages(tiny(), options)
     with pytest.raises(CaseError, match="crowded"):
         pipeline.run_stages(tiny(), replace(options, force=True))

@@ -59,7 +59,7 @@ def test_a_whole_run_is_a_run(fake, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("mode", "said"),
+    ("mode", "message"),
     [
         ("exit1", r"exit 1\): ERROR: Unknown command: nonsense"),
         ("error0", r"exit 0\): ERROR on proc 0: Cannot open file"),
@@ -71,8 +71,8 @@ def test_a_whole_run_is_a_run(fake, tmp_path):
         ("segv", "signal 11"),
     ],
 )
-def test_failures_are_told_with_their_evidence(fake, tmp_path, mode, said):
-    with pytest.raises(LiggghtsError, match=said):
+def test_failures_are_reported_with_their_evidence(fake, tmp_path, mode, message):
+    with pytest.raises(LiggghtsError, match=message):
         run(fake, tmp_path, mode)
 
 
@@ -144,7 +144,7 @@ def test_missing_binary_deck_and_strangers(fake, tmp_path, monkeypatch):
 
 @pytest.mark.liggghts
 def test_the_real_binary_fails_as_the_fake_does(binary, tmp_path):
-    for text, said in (
+    for text, message in (
         ("nonsense\n", "Unknown command"),
         ("units si\nread_data none.data\n", "Cannot open file"),
         ("units si\n", "no DECK_DONE"),
@@ -152,7 +152,7 @@ def test_the_real_binary_fails_as_the_fake_does(binary, tmp_path):
         ("quit\n", "exit 1"),
     ):
         (tmp_path / "in.bad").write_text(text)
-        with pytest.raises(LiggghtsError, match=said):
+        with pytest.raises(LiggghtsError, match=message):
             run_deck(tmp_path, "in.bad", Launch(binary=binary))
 
 

@@ -71,11 +71,12 @@ def test_count_overrides_porosity(binary, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("porosity", "said"), [(0.12, "pushed out of it"), (0.27, "0.27 needs grains that overlap by")]
+    ("porosity", "message"),
+    [(0.12, "pushed out of it"), (0.27, "0.27 needs grains that overlap by")],
 )
-def test_unreachable_porosity_is_an_error(binary, tmp_path, porosity, said):
+def test_unreachable_porosity_is_an_error(binary, tmp_path, porosity, message):
     case = tiny(f"grains={{radius_mm=0.25, porosity={porosity}, max_overlap=0.08}}")
-    with pytest.raises(CaseError, match=said):
+    with pytest.raises(CaseError, match=message):
         make_pack(case, scales_of(case), tmp_path, Launch(binary=binary))
 
 

@@ -1,6 +1,7 @@
-"""A stand-in specimen for the report's tests: 200 random grains in 4 x 2 x 2 mm, 800 fines thinning with depth.
+"""A made-up specimen for the report's tests.
 
-The attributes are those of fdnet.network's classes, the physics only plausible: nothing here checks physics.
+It has 200 random grains in 4 x 2 x 2 mm and 800 fines that thin out with depth. The attributes are
+those of the classes of fdnet.network; the physics is only plausible, and nothing here checks it.
 """
 
 from functools import cache

@@ -1,4 +1,4 @@
-"""Every door of the report on a real analysis of the stand-in specimen, and the tables against each other."""
+"""The whole report of a real analysis, and its tables against each other."""
 
 from functools import cache
 

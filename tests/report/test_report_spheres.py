@@ -53,7 +53,8 @@ def test_plain_columns_are_in_the_given_unit(tmp_path, units, metres):
 def test_comments_blank_lines_bom_crlf_quotes_and_column_order_are_fine(tmp_path):
     path = csv_of(
         tmp_path,
-        '\ufeff# pack\r\n\r\n"kind", radius_m ,z_m,y_m,x_m\r\n# more\r\n"fine",4,3,2,1\r\n grain,8,7,6,5',
+        '\ufeff# pack\r\n\r\n"kind", radius_m ,z_m,y_m,x_m\r\n# more\r\n'
+        '"fine",4,3,2,1\r\n grain,8,7,6,5',
     )
     position, radius, kind = columns(path)
     assert position.tolist() == [[1, 2, 3], [5, 6, 7]]

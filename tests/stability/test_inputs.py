@@ -24,8 +24,8 @@ def permeability(capsys, path: Path, *options: str) -> tuple[int, str, str]:
         code = main(["permeability", str(path), *options])
     except SystemExit as stop:
         code = int(stop.code or 0)
-    said = capsys.readouterr()
-    return code, said.out, said.err
+    printed = capsys.readouterr()
+    return code, printed.out, printed.err
 
 
 def table(path: Path, **swap: str) -> None:
@@ -76,8 +76,8 @@ def test_a_stray_sphere_is_left_out_unless_a_period_would_have_to_bring_it_back(
     """1e25 periods away no digit of its place is left; next to a wall it is counted as outside."""
     table(tmp_path / "s.csv", x=place)
     options = ["--units", "mm", "--box", "0,4,0,4,0,4", "--periodic", periodic, "--json"]
-    found, out, err = permeability(capsys, tmp_path / "s.csv", *options)
-    assert found == code, err
+    ended, out, err = permeability(capsys, tmp_path / "s.csv", *options)
+    assert ended == code, err
     if code == 0:
         assert any("1 grains lie outside the box" in one for one in json.loads(out)["warnings"])
 
@@ -137,18 +137,18 @@ def test_a_pack_whose_paths_are_all_closed_is_an_answer_at_the_command_line(tmp_
         "xyz",
         "--json",
     )
-    told = json.loads(out)
+    result = json.loads(out)
     assert code == 0
-    assert told["k_initial_m2"] == told["k_damaged_m2"] == 0
-    assert told["k_reduction"] is None
-    assert any("k_initial = 0: no open path" in one for one in told["warnings"])
+    assert result["k_initial_m2"] == result["k_damaged_m2"] == 0
+    assert result["k_reduction"] is None
+    assert any("k_initial = 0: no open path" in one for one in result["warnings"])
 
 
 def test_no_fines_are_no_fault_of_occupancy():
     pack = simple_cubic()
-    found = measure_occupancy(build_network(pack, periodic=(True,) * 3), pack.fines())
-    assert not found.blocked.any()
-    assert found.pore_solid_volume.sum() == 0
+    occupancy = measure_occupancy(build_network(pack, periodic=(True,) * 3), pack.fines())
+    assert not occupancy.blocked.any()
+    assert occupancy.pore_solid_volume.sum() == 0
 
 
 @pytest.mark.parametrize("seed", [11, 12])

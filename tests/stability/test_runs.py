@@ -146,7 +146,7 @@ def test_fines_larger_than_every_throat_stay_at_the_face(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("assignments", "said"),
+    ("assignments", "message"),
     [
         (
             ["box.size_mm=[0.4, 2.5, 2.5]", "grains.count=20"],
@@ -169,10 +169,10 @@ def test_fines_larger_than_every_throat_stay_at_the_face(tmp_path):
         (["fines.radius_mm=0.25"], "not below grains.radius_mm"),
     ],
 )
-def test_what_cannot_be_is_refused_before_anything_is_written(tmp_path, assignments, said):
+def test_what_cannot_be_is_refused_before_anything_is_written(tmp_path, assignments, message):
     code, _, err = run(tmp_path, *assignments)
     assert code == 2
-    assert said in err
+    assert message in err
     assert len(err.strip().splitlines()) == 1
     assert not (tmp_path / "run").exists()
 
@@ -277,11 +277,11 @@ def test_an_undamped_closed_system_gains_no_energy(binary, tmp_path, factor):
     )
     stiffness = scales_of(case).contacts["fine-fine"].normal_stiffness
     mass = 4 / 3 * math.pi * RADIUS**3 * 2146.0
-    found = np.array([energy(frame, stiffness, mass) for frame in frames])
+    energies = np.array([energy(frame, stiffness, mass) for frame in frames])
     assert len(frames) == 101
     turned = frames[-1].column("vx") - frames[0].column("vx")
     assert np.mean(np.abs(turned) > 0.1) > 0.9  # nearly all have collided
-    assert np.max(np.abs(found / found[0] - 1.0)) < 0.1 * factor
+    assert np.max(np.abs(energies / energies[0] - 1.0)) < 0.1 * factor
     for name in ("vx", "vy", "vz"):
         drift = [abs(float(np.sum(frame.column(name)))) for frame in frames]
         assert max(drift) < 1e-10 * np.sum(np.abs(frames[0].column(name)))

@@ -1,4 +1,4 @@
-"""The study of laws: errors within what accuracy.md states of them, and resolved flow that converges."""
+"""The study of laws: errors as accuracy.md states them, and resolved flow that converges."""
 
 import csv
 
@@ -36,23 +36,23 @@ def test_the_default_law_is_within_its_stated_span(rows):
 
 
 @pytest.mark.parametrize(("group", "file_case"), [(EQUAL, "H_40_eps40"), (LATTICE, "SC_touching")])
-def test_every_law_has_the_error_the_document_tells(rows, root, group, file_case):
+def test_every_law_has_the_error_of_the_page(rows, root, group, file_case):
     with (root / "docs" / "validation" / "accuracy_intact.csv").open(newline="") as file:
-        told = next(row for row in csv.DictReader(file) if row["case"] == file_case)
+        known = next(row for row in csv.DictReader(file) if row["case"] == file_case)
     assert {law: 1 + off for law, off in errors(rows, group).items()} == {
-        law: pytest.approx(float(told[law]), abs=2e-5) for law in LAWS
+        law: pytest.approx(float(known[law]), abs=2e-5) for law in LAWS
     }
 
 
-def test_every_damage_law_has_the_error_the_document_tells(rows, root):
+def test_every_damage_law_has_the_error_of_the_page(rows, root):
     with (root / "docs" / "validation" / "accuracy_damage.csv").open(newline="") as file:
-        told = next(row for row in csv.DictReader(file) if row["case"] == laws.DAMAGED)
-    found = errors(rows, FIFTH, "k/k0")
+        known = next(row for row in csv.DictReader(file) if row["case"] == laws.DAMAGED)
+    of_fifth = errors(rows, FIFTH, "k/k0")
     names = [*PAIRS, RESOLVED]
-    assert {name: 1 + found[name] for name in names} == {
-        name: pytest.approx(float(told[name]), abs=2e-4) for name in names
+    assert {name: 1 + of_fifth[name] for name in names} == {
+        name: pytest.approx(float(known[name]), abs=2e-4) for name in names
     }
-    assert abs(found[DEFAULT]) < 0.12 < found["thesis + thesis"]
+    assert abs(of_fifth[DEFAULT]) < 0.12 < of_fifth["thesis + thesis"]
 
 
 def test_resolved_flow_converges_from_above_and_two_grids_are_nearer(rows):

@@ -1,4 +1,4 @@
-"""The study of solvers: exact answers, bounds by the tolerance and the residual, and what is refused."""
+"""The study of solvers: exact answers, bounds by tolerance and residual, refusals."""
 
 import math
 
@@ -43,7 +43,7 @@ def errors(rows, method, decades, quantity, pores=200):
 
 
 def circuit_of_links(seed: int, decades: float) -> tuple[Circuit, np.ndarray]:
-    """The random network of the exact tests as a circuit, and its fluxes by rational arithmetic."""
+    """The random network of the exact tests as a circuit, and its exact fluxes."""
     ends, conductance, jump = random_links(seed, decades=decades, period=False)
     pores = int(ends.max())
     node = np.where(ends == 0, np.where(jump != 0, pores, pores + 1)[:, None], ends - 1)
@@ -69,7 +69,7 @@ def test_fdnets_own_choice_is_right_in_every_throat(rows, decades):
 
 @pytest.mark.parametrize(("decades", "bound"), [(0, 1e-10), (8, 1e-9), (16, 1e-6)])
 def test_direct_methods_lose_digits_with_the_spread_alone(rows, decades, bound):
-    """Unscaled pressures hold a throat's flux to eps times its conductance over the critical one."""
+    """They hold a throat's flux to eps times its conductance over the critical one."""
     for method in (DIRECT, SPSOLVE):
         assert errors(rows, method, decades, "worst throat")[OWN] < bound
         assert abs(errors(rows, method, decades, "inflow")[OWN]) < bound
@@ -81,12 +81,15 @@ def test_errors_follow_the_tolerance_and_stay_below_the_residual(rows, method, d
     inflow, residual = (errors(rows, method, decades, name) for name in ("inflow", "residual"))
     worst = errors(rows, method, decades, "worst throat")
     assert worst[1e-4] > 100 * worst[1e-8] > 1e4 * worst[1e-12] > 0
-    # both over the inflow as found
+    # both over the inflow of the solve
     assert all(abs(off) / (1 + off) <= residual[value] for value, off in inflow.items())
 
 
 def test_the_norm_of_the_residual_says_little_about_the_worst_throat(rows):
-    """1e-8 of the source's norm leaves 1e-6 of the inflow and more: why fdnet stops by the sum of imbalances."""
+    """1e-8 of the source's norm leaves 1e-6 of the inflow and more.
+
+    This is why fdnet stops by the sum of imbalances.
+    """
     assert all(
         errors(rows, JACOBI, decades, "worst throat")[1e-8] > 1e-6 for decades in (0, 8, 16)
     )

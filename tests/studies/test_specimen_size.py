@@ -24,7 +24,7 @@ def test_what_one_pack_is_off_by_falls_with_its_grains(rows):
 
 
 def test_packs_of_equal_count_meet_the_porosity_of_their_grains(rows):
-    """Periodic sides at 0.40: nothing overlaps, so porosity is 1 - n v / V but for the two end walls."""
+    """At 0.40 nothing overlaps, so porosity is 1 - n v / V apart from the two end walls."""
     for row in rows:
         if row.quantity == "porosity_initial":
             assert row.observed == pytest.approx(0.40, abs=0.01)

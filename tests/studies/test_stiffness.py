@@ -25,7 +25,7 @@ def rows(tmp_path_factory):
 
 
 def test_overlap_falls_as_the_root_of_the_stiffness_up_to_the_nominal_value(rows):
-    """v sqrt(m_eff / k) exp(...) of a damped spring, at 1e2, 1e4 and 94.3e9 N/m; 2 % for a step of 0.1 sqrt(m/k)."""
+    """v sqrt(m_eff / k) exp(...) of a damped spring; 2 % for a step of 0.1 sqrt(m/k)."""
     found = {
         level.value: level.error for level in levels(rows, COLLISION, "overlap_over_diameter")
     }
@@ -52,13 +52,14 @@ def test_invasions_overlap_less_when_stiffer_and_every_quantity_is_there(rows):
     assert [level.value for level in found] == [1e2, 1e3, 1e4]
     assert found[0].error > 3 * found[1].error > 3 * found[2].error > 0
     assert {row.quantity for row in rows if row.series == LONG} == {
-        "invaded", "mean_depth", "porosity_loss", "porosity_loss_first", "k_ratio", "k_ratio_first", "max_overlap",
+        "invaded", "mean_depth", "porosity_loss", "porosity_loss_first", "k_ratio",
+        "k_ratio_first", "max_overlap",
         "profile",
     }  # fmt: skip
 
 
 def test_closed_forms_of_a_damped_contact():
-    """Undamped: e = 1 and v / w. At zeta 0.2: the equation of motion integrated by scipy to zero force."""
+    """Undamped: e = 1 and v / w. At zeta 0.2: the equation of motion integrated by scipy."""
     from scipy.integrate import solve_ivp
 
     assert restitution_of(0.0) == pytest.approx(1.0)

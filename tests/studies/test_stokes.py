@@ -1,4 +1,5 @@
-"""The Stokes oracle: Zick and Homsy's arrays, order of convergence, a direct solve, invariances, necks, refusals."""
+"""The Stokes oracle: Zick and Homsy's arrays, order of convergence, a direct solve, invariances,
+necks, refusals."""
 
 import csv
 from itertools import product
@@ -45,7 +46,10 @@ def lattice_radius(lattice: list, solid: float) -> float:
 
 
 def literature(solid: float, drag: float, radius: float) -> float:
-    """k from the drag factor K, F = 6 pi mu R K U (Zick and Homsy 1982, J. Fluid Mech. 115, 13, table 2)."""
+    """k from the drag factor K, F = 6 pi mu R K U.
+
+    Zick and Homsy 1982, J. Fluid Mech. 115, 13, table 2.
+    """
     return 2.0 * radius**2 / (9.0 * solid * drag)
 
 
@@ -104,7 +108,10 @@ def test_green_solves_the_discrete_stokes_equations():
 
 
 def direct_tensor(pack: Snapshot, cells: int) -> Array:
-    """K (3, 3) by one sparse LU of velocities and pressures on the whole grid: no Fourier transform, no iteration."""
+    """K (3, 3) by one sparse LU of velocities and pressures on the whole grid.
+
+    It has no Fourier transform and no iteration.
+    """
     shape, spacing = stokes._grid(pack.box, cells)
     size = int(np.prod(shape))
     index = np.arange(size).reshape(shape)
@@ -195,7 +202,10 @@ def test_turning_scaling_tiling_and_shifting_by_a_cell_change_nothing():
 
 
 def test_necks_between_overlapping_spheres_do_not_leak():
-    """Spheres buried in the necks of a percolating solid close any inner path; they must change nothing."""
+    """Spheres buried in the necks of a percolating solid close any inner path.
+
+    They must change nothing.
+    """
     radius = 0.58
     middle = np.array([[0.5, 0.5, 0.5]])
     neck = np.array([[0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [0.5, 0.5, 0.0]])

@@ -1,4 +1,4 @@
-"""The study of drag schemes in its quick form, on the real binary: orders, bounds, refusals, equal physics."""
+"""The study of drag in its quick form, on the real binary: orders, bounds, equal physics."""
 
 import math
 
@@ -39,7 +39,7 @@ def test_explicit_schemes_converge_in_first_order_and_implicit_in_second(rows):
 
 
 def test_errors_at_one_tau_are_those_of_the_schemes_closed_forms(rows):
-    """After n = tau/h intervals h: ((2-h)/(2+h))^n implicit, (1-h)^n else (within O(h) of it), against exp(-1)."""
+    """After n = tau/h intervals h: ((2-h)/(2+h))^n implicit, (1-h)^n else, against exp(-1)."""
     for interval in (0.2, 0.1, 0.05):
         n = round(1 / interval)
         implicit, explicit = ((2 - interval) / (2 + interval)) ** n, (1 - interval) ** n

@@ -1,4 +1,4 @@
-"""The study of economies in its quick form, on the real binary: the answers agree within chance, only costs differ."""
+"""The study of economies in its quick form, on the real binary: only the costs differ."""
 
 import math
 import re
@@ -51,7 +51,8 @@ def observed(rows, quantity, value, series=EQUAL) -> list[float]:
 def measured(value, seed, invaded, core_s) -> Measured:
     point = Point(series=EQUAL, knob="economy", value=value, seed=seed)
     return Measured(
-        point=point, status=DONE, observed=dict.fromkeys(OBSERVED, invaded), wall_s=1.0, core_s=core_s,
+        point=point, status=DONE, observed=dict.fromkeys(OBSERVED, invaded), wall_s=1.0,
+        core_s=core_s,
         steps=math.nan, peak_memory_bytes=math.nan,
     )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""The study of run-time settings in its quick form, on the real binary: they change nothing but the run time."""
+"""The study of run-time settings in its quick form, on the real binary: only the time differs."""
 
 import re
 

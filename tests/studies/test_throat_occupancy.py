@@ -1,4 +1,4 @@
-"""Volume of a sphere in a cylinder: quadrature converges to the reference, two planes have the bias known of them."""
+"""Volume of a sphere in a cylinder: quadrature converges, two planes have their known bias."""
 
 import numpy as np
 import pytest
@@ -49,7 +49,7 @@ def test_in_a_deposit_the_default_is_converged_and_two_planes_lose_less_than_the
 
 
 def test_the_reference_has_the_closed_forms():
-    """Whole sphere; napkin ring and its complement; half of it at an end; a sphere that swallows the tube."""
+    """Whole sphere; napkin ring; half of it at an end; a sphere that holds the tube."""
     rows = [
         [0.3, 0.5, 5, 1, 10],
         [2.0, 0.0, 5, 1, 10],

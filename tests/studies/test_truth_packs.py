@@ -1,4 +1,4 @@
-"""The packs of the Stokes truth: made again from their seeds, porosity as stated, table from grids."""
+"""The packs of the Stokes truth: made again from their seeds, porosity, table from grids."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A study small enough to follow: midpoint sums of x^2, whose error is known, and points that go wrong."""
+"""A small study: midpoint sums of x^2, whose error is known, and points that go wrong."""
 
 from pathlib import Path
 

@@ -32,5 +32,7 @@ def mirrored_images(
     margin = (
         np.maximum(np.maximum(network.box[:, 0] - low, high - network.box[:, 1]), 0.0) + largest
     )
-    images = make_images(position, network.box, periodic=network.periodic, margin=margin, hair=0.0)
+    images = make_images(
+        position, network.box, periodic=network.periodic, margin=margin, tolerance=0.0
+    )
     return images.position, images.owner

@@ -60,7 +60,7 @@ def make_points(grains: Snapshot, *, periodic: tuple[bool, ...], margin: Array) 
         grains.box,
         periodic=periodic,
         margin=margin,
-        hair=ON_FACE_TOLERANCE * scale,
+        tolerance=ON_FACE_TOLERANCE * scale,
     )
     name = label(images)
     key = name.astype(np.int64) * 2**30 + packed_shift(images.shift)

@@ -50,7 +50,9 @@ def solved(
 def with_neighbours(pack: Snapshot, periodic: tuple[bool, bool, bool]) -> Snapshot:
     """A periodic pack and those of its images that reach in across sides that become walls."""
     margin = np.where(periodic, np.nan, float(pack.radius.max()))
-    images = make_images(pack.position, pack.box, periodic=(True,) * 3, margin=margin, hair=0.0)
+    images = make_images(
+        pack.position, pack.box, periodic=(True,) * 3, margin=margin, tolerance=0.0
+    )
     return resting(images.position, pack.radius[images.owner], pack.box, pack.kind[images.owner])
 
 

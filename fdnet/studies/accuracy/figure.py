@@ -25,7 +25,7 @@ RULE_STYLES = ((RED, "v"), (SALMON, "1"), (PALE_BLUE, "s"), (NEARLY_BLACK, "o"),
 
 
 def draw_accuracy(intact: Sequence[Row], damage: Sequence[Row], path: Path) -> None:
-    """Left: model over truth by case without fines. Right: k/k0 of the model over that of truth."""
+    """Left: model over truth by case without fines. Right: k/k0 of the model against truth."""
     import matplotlib as mpl
 
     mpl.use("Agg")

@@ -1,13 +1,13 @@
 """Time and peak memory of the network half against size, next to OpenPNM and Yade's flow engine.
 
-Packs: pack H (40 grains, porosity 0.40) tiled, each grain moved by up to 2 % of its radius; fines of
-a tenth of the radius at random on the grains (they may overlap each other). Sides are periodic, the
-flow goes between planes across x. Every size and tool has a process of its own with a time limit;
-imports, compiled kernels and file reading come before the clock starts. Peak memory is that of the
-process during the step. OpenPNM solves the same networks: intact; stiff, that is with conductances
-spread over 12 decades; and clogged, with a tenth of the throats closed as well. Yade tessellates
-the same grains, periodic and in a box of walls, and treats fines like grains. The case `specimen`
-is 1400 grains with 200,000 fines. Truth is resolved Stokes flow.
+Packs: pack H (40 grains, porosity 0.40) tiled, each grain moved by up to 2 % of its radius; fines
+of a tenth of the radius at random on the grains (they may overlap each other). Sides are periodic,
+and the flow goes between planes across x. Every size and tool has a process of its own with a time
+limit; imports, compiled kernels and file reading come before the clock starts. Peak memory is that
+of the process during the step. OpenPNM solves the same networks: intact; stiff, that is with
+conductances spread over 12 decades; and clogged, with a tenth of the throats closed as well. Yade
+tessellates the same grains, periodic and in a box of walls, and treats fines like grains. The case
+`specimen` is 1400 grains with 200,000 fines. Truth is resolved Stokes flow.
 """
 
 import json

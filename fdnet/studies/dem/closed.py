@@ -1,4 +1,7 @@
-"""Closed systems: spheres without fluid or gravity, with a case's own contacts; their energy and momentum are known."""
+"""Closed systems: spheres with a case's contacts, without fluid or gravity.
+
+Their energy and momentum are known.
+"""
 
 import math
 from dataclasses import dataclass
@@ -28,7 +31,14 @@ _EXACT = "%d %d " + " ".join(["%.17g"] * 7)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Watch:
-    """How long to follow a closed system: `steps` of `step` s, looked at every `every` steps, then `rest` unseen."""
+    """How long to follow a closed system.
+
+    Attributes:
+        step: time step, s.
+        steps: steps that are observed.
+        every: steps from one observation to the next.
+        rest: further steps, which are not observed.
+    """
 
     step: float
     steps: int
@@ -39,7 +49,17 @@ class Watch:
 def closed_run(
     case: Case, start: Snapshot, density: float, watch: Watch, folder: Path
 ) -> list[Snapshot]:
-    """The spheres (N) at every look, the start included; contacts without friction, walls around grains and fines."""
+    """The spheres at every observation, the start included.
+
+    Contacts are without friction, and walls enclose grains and fines.
+
+    Args:
+        case: whose contacts count.
+        start: the spheres with their velocities.
+        density: of all spheres, kg/m3.
+        watch: how long to follow them.
+        folder: of the LIGGGHTS run.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     scales = scales_of(case)
     write_data(
@@ -97,7 +117,7 @@ def _masses(spheres: Snapshot, density: float) -> Array:
 
 
 def spring_energy(spheres: Snapshot, scales: Scales) -> float:
-    """Sum of k delta^2 / 2 over touching grains and over grains that touch one of the six walls, J."""
+    """Sum of k delta^2 / 2, J, over grains in contact with each other or with one of six walls."""
     assert np.all(spheres.kind == Kind.GRAIN)
     _, overlap = touching_pairs(spheres, (False, False, False))
     below = spheres.radius[:, None] - (spheres.position - spheres.box[:, 0])
@@ -108,9 +128,10 @@ def spring_energy(spheres: Snapshot, scales: Scales) -> float:
 
 
 def restitution_of(damping_ratio: float) -> float:
-    """e of a damped linear contact released at zero force, exp(-z/s (pi - atan2(2 s z, 1 - 2 z^2))), s^2 = 1 - z^2.
+    """Coefficient of restitution of a damped linear contact that ends at zero force.
 
-    Schwager & Poeschel 2007, eq. 20, for z below 1/sqrt(2).
+    exp(-z/s (pi - atan2(2 s z, 1 - 2 z^2))) with s^2 = 1 - z^2, for a damping ratio z below
+    1/sqrt(2) (Schwager and Poeschel 2007, eq. 20).
     """
     s = math.sqrt(1 - damping_ratio**2)
     return math.exp(
@@ -121,7 +142,10 @@ def restitution_of(damping_ratio: float) -> float:
 
 
 def deepest_overlap_of(damping_ratio: float, speed: float, stiffness: float, mass: float) -> float:
-    """Largest overlap of that contact, v / w exp(-z/s atan(s/z)), w = sqrt(k/m); v / w without damping, m."""
+    """Largest overlap of that contact, m: v / w exp(-z/s atan(s/z)) with w = sqrt(k/m).
+
+    Without damping it is v / w. `speed` in m/s, `stiffness` in N/m, `mass` in kg.
+    """
     frequency = math.sqrt(stiffness / mass)
     if damping_ratio == 0:
         return speed / frequency

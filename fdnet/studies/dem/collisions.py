@@ -1,4 +1,7 @@
-"""Two fines head on, and a shaken pack without damping: what a contact stiffness and a time step cost in accuracy."""
+"""Two fines that collide head on, and a pack in motion without damping.
+
+They show what a contact stiffness and a time step cost in accuracy.
+"""
 
 import math
 from dataclasses import replace
@@ -23,20 +26,25 @@ from fdnet.studies.engine.runner import child_core_seconds
 
 SPEED = 5.0
 """Closing speed of the two fines, m/s: about the fluid's velocity in the studies' invasion."""
-
-
 _CONTACT_SPAN = 7.0
-"""Steps observed, in units of sqrt(m/k) of a fine: two steps' approach, contact (pi / sqrt 2 of it) and parting."""
+"""Time that is observed, in sqrt(m/k) of a fine: approach, contact (pi / sqrt 2), and parting."""
 
 
 def collision_run(
     work: Path, slug: str, *, stiffness: float, factor: float, phase: float, span: float
 ) -> dict[str, float]:
-    """One collision, observed after every step: errors against the closed forms, overlap over diameter, momentum.
+    """One collision, observed after every step, against the closed forms.
 
-    `factor` is the step over sqrt(m/k) of the fine, `phase` (0 to 1) where within a step the fines meet, `span` the
-    time the run goes on in all, s, so that its cost is one of equal time. "overlap_error" and "restitution_error" are
-    relative to their exact values.
+    Args:
+        work: folder of the runs.
+        slug: name of this run's folder.
+        stiffness: of the contact, N/m.
+        factor: time step over sqrt(m/k) of the fine.
+        phase: where within a step the fines meet, 0 to 1.
+        span: duration of the run, s, so that all costs are for the same duration.
+
+    Returns:
+        Overlap over the diameter, restitution, relative errors of both, momentum, costs.
     """
     case = slab_case(1, f"run.stiffness_N_m={stiffness!r}")
     contact = scales_of(case).contacts["fine-fine"]
@@ -66,7 +74,10 @@ def collision_run(
 
 
 def _facing(radius: float, *, gap: float) -> Snapshot:
-    """Two fines on one line closing at SPEED, and a grain out of their way, since LIGGGHTS wants an atom of type 1."""
+    """Two fines on one line that close at `SPEED`, and a grain elsewhere.
+
+    LIGGGHTS needs an atom of type 1, hence the grain.
+    """
     half, size = 0.5 * (2 * radius + gap), 40 * radius
     middle = 0.5 * size
     place = np.array(
@@ -83,10 +94,19 @@ def _facing(radius: float, *, gap: float) -> Snapshot:
 def energy_run(
     work: Path, slug: str, *, factor: float, seed: int, spans: float
 ) -> dict[str, float]:
-    """A pack at porosity 0.30 without damping, between walls, its grains thrown at random: the worst drift of energy.
+    """A pack at porosity 0.30 between walls, without damping, its grains with random velocities.
 
-    `factor` is the step over sqrt(m/k) of a grain; it is followed for `spans` sqrt(m/k). "energy_drift" is the largest
-    |E - E0| / E0 seen, "energy_gain" the largest (E - E0) / E0, E being kinetic plus spring energy.
+    E is the sum of kinetic and spring energy; it should stay E0.
+
+    Args:
+        work: folder of the runs.
+        slug: name of this run's folder.
+        factor: time step over sqrt(m/k) of a grain.
+        seed: of the velocities.
+        spans: duration of the run, sqrt(m/k).
+
+    Returns:
+        "energy_drift", the largest |E - E0| / E0; "energy_gain", the largest (E - E0) / E0; costs.
     """
     pack = ("grains.count=90", "box.size_mm=[2.0,2.0,2.1]")
     case = slab_case(seed, *pack, "grains.damping_ratio=0.0", "grains.motion=mobile")

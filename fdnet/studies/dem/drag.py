@@ -1,4 +1,4 @@
-"""Drag: four schemes against the exact relaxation of one fine, and in whole invasions against drag at every step."""
+"""Drag: four schemes against the exact relaxation of one fine, and in whole invasions."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -28,9 +28,15 @@ WINDOW_HOLDING, WINDOW_OTHER = "20,000 fines, held", "20,000 fines, not held"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Form:
-    """An invasion: stiffness N/m, steps a relaxation time (about 0.1 sqrt(m/k)), duration in chunks of 4 tau.
+    """An invasion; tau is the relaxation time of a fine.
 
-    Both numbers of steps are multiples of those for which drag is held, so that all schemes run the same steps.
+    Attributes:
+        stiffness: of the contacts, N/m.
+        steps_per_tau: time steps in one tau (a step is about 0.1 sqrt(m/k)); a multiple of the
+            steps for which drag is held, so that all schemes run the same steps.
+        chunks: duration, in units of 4 tau.
+        keys: further settings, "key=value".
+        small: whether the specimen is the small one of the quick forms.
     """
 
     stiffness: float
@@ -47,27 +53,30 @@ FORMS: Mapping[str, Form] = {
 }
 """Whole invasions are run at 1e3 N/m, so that many seeds fit into some minutes."""
 _LOOKS = (1.0, 0.5, 2.0)
-"""Times, in tau, at which a falling fine is looked at; the quick form takes the first alone."""
+"""Times, in tau, at which a falling fine is observed; the quick form takes the first alone."""
 _SPANS = 3.0
 
 
 def points(quick: bool) -> list[Point]:
-    """Falling fines, the interval from long to short; then invasions, seed by seed, so that load meets all alike."""
+    """Falling fines from long to short intervals, then invasions.
+
+    Invasions go seed by seed, so that the load of the machine is the same for all schemes.
+    """
     if quick:
-        found = [
+        chosen = [
             point for scheme in SCHEMES for point in _falls(scheme, (0.2, 0.1, 0.05), looks=1)
         ]
-        found += _falls(IMPLICIT, (10.0,), looks=1) + _falls(EVERY, (2.0,), looks=1)
-        return found + _invasions((0.05, 1.0), seeds=2, form="small")
+        chosen += _falls(IMPLICIT, (10.0,), looks=1) + _falls(EVERY, (2.0,), looks=1)
+        return chosen + _invasions((0.05, 1.0), seeds=2, form="small")
     common = (2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002)
-    found = [
+    chosen = [
         point for scheme in (EVERY, HELD, VISCOUS) for point in _falls(scheme, common, looks=3)
     ]
-    found += _falls(IMPLICIT, (100.0, 30.0, 10.0, 5.0, *common), looks=3)
-    found += _falls(RESTARTED, (0.05, 0.02, 0.01, 0.005, 0.002), looks=0)
+    chosen += _falls(IMPLICIT, (100.0, 30.0, 10.0, 5.0, *common), looks=3)
+    chosen += _falls(RESTARTED, (0.05, 0.02, 0.01, 0.005, 0.002), looks=0)
     held = (1.0, 0.5, 0.2, 0.1, HOLD_OVER_RELAXATION, 0.02)
     return (
-        found + _invasions(held, seeds=8, form="whole") + _invasions(held, seeds=2, form="window")
+        chosen + _invasions(held, seeds=8, form="whole") + _invasions(held, seeds=2, form="window")
     )
 
 
@@ -126,12 +135,15 @@ def _scheme_keys(value: Value, steps_per_tau: int) -> tuple[str, ...]:
 
 
 def _fall(series: str, interval: float, looks: int, work: Path, slug: str) -> dict[str, float]:
-    """Largest error of a falling fine at the looks, each a run of its own; "steps" are evaluations of drag in 3 tau."""
+    """Largest error of a falling fine at the observations, each of which is a run of its own.
+
+    "steps" are evaluations of drag in 3 tau.
+    """
     if not looks:
-        found = relaxation_run(
+        run = relaxation_run(
             work, slug, f"drag.scheme={IMPLICIT}", over_tau=interval, spans=_SPANS
         )
-        return found | {"steps": _SPANS / interval}
+        return run | {"steps": _SPANS / interval}
     counts = {max(least, round(time / interval)) for least, time in enumerate(_LOOKS[:looks], 1)}
     runs = [
         relaxation_run(
@@ -152,7 +164,10 @@ def _fall(series: str, interval: float, looks: int, work: Path, slug: str) -> di
 
 
 def judge(measured: Sequence[Measured]) -> list[Row]:
-    """Falling fines against v_T (1 - exp(-t/tau)); invasions against drag at every step, seed by seed."""
+    """Falling fines against v_T (1 - exp(-t/tau)), invasions against drag at every step.
+
+    Invasions are compared seed by seed.
+    """
     falls = [run for run in measured if "looks" in run.point.settings]
     windows = [run for run in measured if run.point.settings.get("form") == "window"]
     invasions = [run for run in measured if run not in falls and run not in windows]

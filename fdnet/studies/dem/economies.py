@@ -1,4 +1,4 @@
-"""Economies: what each setting that makes full-scale invasions affordable costs in accuracy and buys in run time."""
+"""Economies: what each setting that makes full-scale invasions affordable costs and saves."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,6 +10,7 @@ from fdnet.case.case import InvasionCase
 from fdnet.studies.dem.runs import OBSERVED, invasion_run, slab_case
 from fdnet.studies.engine.error_rows import against_reference
 from fdnet.studies.engine.levels import Level, levels, percent
+from fdnet.studies.engine.markdown import markdown_table
 from fdnet.studies.engine.study import DONE, Measured, Panel, Point, Row, Study, Value
 
 EQUAL, LONG, UNEQUAL = "equal fines", "long supply", "unequal fines"
@@ -45,7 +46,10 @@ _TOGETHER: Mapping[str, tuple[str, ...]] = {
     LONG: (BATCHES, STEP, VISCOUS),
     UNEQUAL: (BATCHES, STEP, HELD),
 }
-"""What "all" stands for: what the thesis's cases use beside their stiffness, specimens 1 to 6, and 7 and 8."""
+"""The economies that "all" stands for: those of the thesis's cases, apart from their stiffness.
+
+Equal fines are those of specimens 1 to 6, unequal ones those of 7 and 8.
+"""
 _FINES: Mapping[str, Mapping[str, str]] = {
     EQUAL: {},
     LONG: {},
@@ -55,10 +59,17 @@ _FINES: Mapping[str, Mapping[str, str]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Form:
-    """Invasions by so many fines for `duration_ms`, each of the economies tried with so many seeds.
+    """Invasions for one series.
 
-    The supply goes on arriving for most of that time; the long one for eight times as long, as where a case supplies
-    many more fines than its stop rule turns out to need.
+    The supply arrives for most of the duration. The long supply would arrive for eight times the
+    duration, as where a case supplies many more fines than its stop rule turns out to need.
+
+    Attributes:
+        fines: number of fines that are supplied.
+        duration_ms: duration of the invasion, ms.
+        tried: the economies.
+        seeds: number of seeds of each.
+        keys: further settings.
     """
 
     fines: int
@@ -97,7 +108,10 @@ FORMS: Mapping[tuple[str, str], Form] = {
 
 
 def points(quick: bool) -> list[Point]:
-    """Invasions seed by seed, the economies in turn, so that what else the machine does meets all of them alike."""
+    """Invasions seed by seed, the economies in turn.
+
+    So the load of the machine is the same for all of them.
+    """
     size = "small" if quick else "whole"
     forms = {series: FORMS[size, series] for series in SERIES}
     return [
@@ -139,7 +153,10 @@ def inputs() -> str:
 
 
 def judge(measured: Sequence[Measured]) -> list[Row]:
-    """Errors from the mean of the plain runs: other fines are drawn for batches, so seeds are not paired."""
+    """Errors from the mean of the plain runs.
+
+    Other fines are drawn for batches, so seeds are not paired.
+    """
     rows = []
     for series in SERIES:
         runs = [run for run in measured if run.point.series == series]
@@ -169,7 +186,7 @@ def speed_ups(rows: Sequence[Row], series: str) -> dict[Value, list[float]]:
 
 
 def summary(rows: Sequence[Row]) -> str:
-    """A table of every economy, Markdown: speed-up with its scatter, and each error with its band."""
+    """A table of every economy: its speed-up with scatter, and each error with its band."""
     heads = (
         "economy",
         "runs",
@@ -177,21 +194,17 @@ def summary(rows: Sequence[Row]) -> str:
         "speed-up (sd over seeds)",
         *(_WORDS[name] for name in OBSERVED),
     )
-    lines = [_line(heads), "|---" * len(heads) + "|"]
+    lines = []
     for series in SERIES:
         by_quantity = {
             name: {level.value: level for level in levels(rows, series, name)} for name in OBSERVED
         }
         for value, ratios in speed_ups(rows, series).items():
-            found = [by_quantity[name][value] for name in OBSERVED]
+            errors = [by_quantity[name][value] for name in OBSERVED]
             speed = "1" if value == PLAIN else _ratio(ratios)
-            cells = (f"{series}, {value}", str(found[0].runs), f"{found[0].cost:.3g}", speed)
-            lines.append(_line((*cells, *(_error(level) for level in found))))
-    return "\n".join(lines)
-
-
-def _line(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
+            cells = (f"{series}, {value}", str(errors[0].runs), f"{errors[0].cost:.3g}", speed)
+            lines.append((*cells, *(_error(level) for level in errors)))
+    return markdown_table(heads, lines)
 
 
 def _ratio(ratios: Sequence[float]) -> str:

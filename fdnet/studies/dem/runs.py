@@ -1,4 +1,7 @@
-"""What the studies of the DEM half run: small invasions and single fines, by fdnet's own decks and the real binary."""
+"""What the studies of the DEM half run: small invasions and single fines.
+
+They use fdnet's own decks and the real LIGGGHTS.
+"""
 
 import math
 import re
@@ -36,14 +39,16 @@ SLAB: dict[str, Any] = {
     "run": {"duration_ms": 2.0},
     "analysis": {"sections": 4},
 }
-"""The invasion of the studies: 300 fixed grains at porosity 0.40, 1,000 fines of 0.10 mm, 2 ms, the velocity (5.4 m/s)
-of thesis specimen 5. A given duration, so that every run follows the same span of time; drag without an error of its
-own (study of drag)."""
+"""The invasion of the studies: 300 fixed grains at porosity 0.40, 1,000 fines of 0.10 mm, 2 ms.
+
+The velocity (5.4 m/s) is that of the thesis's specimen 5. The duration is given, so that every run
+follows the same span of time. Drag has no error of its own (see the study of drag).
+"""
 PROFILE_BINS = 16
 """Equal bins of depth over the specimen in which invaded fines are counted."""
 BINS = tuple(f"bin_{number:02d}" for number in range(PROFILE_BINS))
 OBSERVED = ("invaded", "mean_depth", "porosity_loss", "k_ratio_first")
-"""What is asked of an invasion in most studies."""
+"""The results of an invasion that most studies compare."""
 HELD_STEPS = 20
 """Steps for which held drag is held in relaxation_run."""
 _SMALL: dict[str, Any] = {
@@ -54,12 +59,18 @@ _SMALL: dict[str, Any] = {
 
 
 def base_inputs() -> str:
-    """What all invasions of the studies start from, as text: whose numbers a record holds."""
+    """The case that all invasions of the studies start from, as text.
+
+    A record of points is continued only with the same case.
+    """
     return slab_case(1).toml()
 
 
 def slab_case(seed: int, *assignments: str, small: bool = False) -> InvasionCase:
-    """The studies' invasion with other settings ("key=value"); `small` is a fifth of it, for the quick forms."""
+    """The studies' invasion with other settings, "key=value".
+
+    `small` is a fifth of it, for the quick forms.
+    """
     data = {key: dict(value) if isinstance(value, dict) else value for key, value in SLAB.items()}
     if small:
         for part, values in _SMALL.items():
@@ -75,9 +86,10 @@ def the_binary() -> Binary:
 
 
 def grains_of(case: Case, work: Path) -> Snapshot:
-    """The case's grains, packed at the default stiffness once for all points that share seed, box and grains.
+    """The case's grains, packed once for all points that share seed, box and grains.
 
-    Fixed grains only: their place does not depend on the stiffness (docs/physics.md).
+    They are packed at the default stiffness. This holds for fixed grains only, whose place does
+    not depend on the stiffness (docs/physics.md).
     """
     plain = case.model_copy(update={"run": type(case.run)()})
     folder = work / f"pack-{plain.digest('pack')}"
@@ -87,7 +99,7 @@ def grains_of(case: Case, work: Path) -> Snapshot:
 
 
 def invasion_run(case: InvasionCase, work: Path, slug: str) -> dict[str, float]:
-    """One invasion and what it left: counts, depths (m), profile, porosity, permeability, largest overlap, costs."""
+    """One invasion: counts, depths (m), profile, porosity, k, largest overlap, costs."""
     grains = grains_of(case, work)
     result, costs = _fresh(case, grains, work / slug)
     return invasion_observed(case, grains, result) | costs
@@ -96,7 +108,7 @@ def invasion_run(case: InvasionCase, work: Path, slug: str) -> dict[str, float]:
 def window_run(
     case: InvasionCase, work: Path, slug: str, *, grid: tuple[int, ...] = ()
 ) -> dict[str, float]:
-    """One invasion without its permeability: counts and mean depth (m) of the fines inside, and costs.
+    """One invasion without its permeability: count and mean depth (m) of the fines, and costs.
 
     `grid` runs it on as many MPI ranks, cut in x, y and z as it says.
     """
@@ -110,7 +122,10 @@ def window_run(
 def _fresh(
     case: InvasionCase, grains: Snapshot, folder: Path, grid: tuple[int, ...] = ()
 ) -> tuple[Invasion, dict[str, float]]:
-    """An invasion and its costs. One that an earlier session left unfinished is begun anew, so that costs are whole."""
+    """An invasion and its costs.
+
+    One that an earlier session left unfinished starts anew, so that its costs are complete.
+    """
     shutil.rmtree(folder, ignore_errors=True)
     scales, launch, before = scales_of(case), Launch(binary=the_binary()), child_core_seconds()
     runs = [_gridded(case, grains, folder, grid)] if grid else []
@@ -123,7 +138,7 @@ def _fresh(
 
 
 def _gridded(case: InvasionCase, grains: Snapshot, folder: Path, grid: tuple[int, ...]) -> Run:
-    """The whole invasion under another processor grid than fdnet's, so that `invade` finds it done."""
+    """The whole invasion under another processor grid than fdnet's; `invade` then reads it."""
     (folder / "post").mkdir(parents=True)
     ranks = math.prod(grid)
     deck = write_invade_inputs(case, scales_of(case), grains, folder, ranks=ranks).text
@@ -137,7 +152,8 @@ def _gridded(case: InvasionCase, grains: Snapshot, folder: Path, grid: tuple[int
 def invasion_observed(case: InvasionCase, grains: Snapshot, result: Invasion) -> dict[str, float]:
     """Numbers of a finished invasion, SI; `bin_00`... are invaded fines by equal bins of depth.
 
-    "grain_shift" is the root mean square way of the grains from where they were packed, over their radius.
+    "grain_shift" is the root-mean-square displacement of the grains since they were packed, over
+    their radius.
     """
     last, depth = result.history[-1], _depths(case, result)
     bins = np.histogram(depth, PROFILE_BINS, (0.0, case.size_m[0]))[0]
@@ -187,11 +203,19 @@ def relaxation_run(
     spans: float = 3.0,
     looks: int | None = None,
 ) -> dict[str, float]:
-    """One free fine falling into its terminal velocity: largest error of v_z over `spans` relaxation times.
+    """Largest error of the velocity of one free fine that falls, over its terminal velocity v_T.
 
-    v_z(t) = v_T (1 - exp(-t / tau)) (Stokes 1851), observed `looks` times (every quarter of tau if not given), each the
-    end of a `run` of its own; the step is `over_tau` tau, or the drag is held that long where the scheme is "held" (the
-    step is then a twentieth of it). Errors are over v_T.
+    The exact velocity is v_T (1 - exp(-t / tau)) with the relaxation time tau (Stokes 1851).
+
+    Args:
+        work: folder of the runs.
+        slug: name of this run's folder.
+        assignments: further settings, "key=value".
+        over_tau: time step over tau; where the scheme is "held", the time for which drag is held
+            over tau (the step is then a twentieth of it).
+        spans: duration, tau.
+        looks: number of observations, each the end of a `run` of its own; one every quarter of
+            tau if not given.
     """
     radius, density, viscosity = 0.05e-3, 2146.0, 0.05
     tau = relaxation_time(radius, density, viscosity)

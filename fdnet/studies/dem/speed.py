@@ -1,4 +1,4 @@
-"""What should change the run time alone: grains that move or not, neighbour skin, neighbour bins, MPI ranks."""
+"""Settings that should change the run time alone: motion of grains, skin, bins, MPI ranks."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -19,7 +19,10 @@ MOTION, STILL = "grains", "mobile grains, no flow"
 FIXED, MOBILE = "fixed", "mobile"
 SKIN, BIN, RANKS = "skin over fine's radius", "bin over grain's radius", "ranks, processor grid"
 OWN_SKIN, OWN_BIN, ONE_RANK = 1.0, 1.1, "1 rank"
-"""fdnet's own: a fine's radius; half the longest cut-off, 2 R + skin, which is LIGGGHTS's own; one rank."""
+"""fdnet's own values: a fine's radius; half the longest cut-off (2 R + skin); one rank.
+
+Half the longest cut-off is LIGGGHTS's own choice of bins.
+"""
 MOTION_STIFFNESS = 1e3
 FEW, MANY = 2000, 20_000
 _GRIDS: Mapping[str, tuple[int, ...]] = {
@@ -33,23 +36,24 @@ _OWN: Mapping[str, Value] = {MOTION: FIXED, SKIN: OWN_SKIN, BIN: OWN_BIN, RANKS:
 
 
 def points(quick: bool) -> list[Point]:
-    """Invasions with fixed and mobile grains, then short windows of an invasion; ranks last (they want both cores).
+    """Invasions with fixed and mobile grains, then short windows of an invasion.
 
-    Values alternate fastest, so that what else the machine does meets all of them alike.
+    Ranks come last, because they need both cores. Values alternate fastest, so that the load of
+    the machine is the same for all of them.
     """
     if quick:
-        found = _motion(2, "small") + _windows(SKIN, (0.25, OWN_SKIN, 4.0), 200, 1)
+        chosen = _motion(2, "small") + _windows(SKIN, (0.25, OWN_SKIN, 4.0), 200, 1)
         return (
-            found
+            chosen
             + _windows(BIN, (OWN_BIN, 4.0), 200, 1)
             + _windows(RANKS, (ONE_RANK, "1 x 2 x 1"), 200, 1)
         )
-    found = _motion(6, "whole")
+    chosen = _motion(6, "whole")
     for fines in (FEW, MANY):
-        found += _windows(SKIN, (0.1, 0.25, 0.5, OWN_SKIN, 2.0, 4.0), fines, 2)
-        found += _windows(BIN, (0.5, OWN_BIN, 2.0, 4.0), fines, 2)
+        chosen += _windows(SKIN, (0.1, 0.25, 0.5, OWN_SKIN, 2.0, 4.0), fines, 2)
+        chosen += _windows(BIN, (0.5, OWN_BIN, 2.0, 4.0), fines, 2)
     return (
-        found
+        chosen
         + _windows(RANKS, (ONE_RANK, *_GRIDS), FEW, 1)
         + _windows(RANKS, (ONE_RANK, *_GRIDS), MANY, 1)
     )
@@ -149,7 +153,9 @@ STUDY = Study(
         Panel(quantity="profile", title="depth profile", label="distance over mean depth"),
         Panel(quantity="k_ratio_first", title="k/k0 of the first millimetre"),
         Panel(
-            quantity="grain_shift", title="way of the grains", label="root mean square over radius"
+            quantity="grain_shift",
+            title="root-mean-square displacement of the grains",
+            label="displacement over radius",
         ),
         _windows_panel((SKIN, BIN), FEW),
         _windows_panel((SKIN, BIN), MANY),

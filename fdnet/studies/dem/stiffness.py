@@ -1,4 +1,4 @@
-"""Contact stiffness: what springs softer than the nominal ones change in collisions and in whole invasions."""
+"""Contact stiffness: what soft springs change in collisions and in whole invasions."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -35,23 +35,23 @@ _SPAN = 1e-5
 
 
 def points(quick: bool) -> list[Point]:
-    """Collisions to the nominal value; invasions to 1e7, the first 0.2 ms of them too; cheapest first."""
+    """Collisions up to the nominal value, invasions up to 1e7 N/m; cheapest first."""
     if quick:
         return _ladder(COLLISION, (1e2, 1e4, NOMINAL), 1) + _ladder(
             LONG, (1e2, 1e3, 1e4), 2, size="small"
         )
     softer = (1e2, 3e2, 1e3, 3e3, 1e4, 3e4, 1e5)
-    found = _ladder(COLLISION, (1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, NOMINAL), 1)
-    found += (
+    chosen = _ladder(COLLISION, (1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, NOMINAL), 1)
+    chosen += (
         _ladder(LONG, softer, 6)
         + _ladder(COARSE, softer, 6)
         + _ladder(SHORT, (1e2, 1e3, 1e4, 1e5), 3)
     )
-    found += (
+    chosen += (
         _ladder(LONG, (1e6,), 6) + _ladder(COARSE, (1e6,), 6) + _ladder(SHORT, (1e6, 1e7, 1e8), 3)
     )
     return (
-        found
+        chosen
         + _ladder(COARSE, (1e7,), 3)
         + _ladder(LONG, (1e7,), 3)
         + _ladder(SHORT, (1e9, 1e10), 2)
@@ -79,7 +79,7 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
 
 
 def judge(measured: Sequence[Measured]) -> list[Row]:
-    """Collisions against rigid spheres and the exact restitution; invasions against the stiffest of their series."""
+    """Collisions against rigid spheres and exact restitution, invasions against stiff springs."""
     collisions = [run for run in measured if run.point.series == COLLISION]
     rows = sizes(collisions, "overlap_over_diameter")
     rows += sizes(collisions, "restitution_error")
@@ -102,7 +102,7 @@ def _invasion_rows(runs: Sequence[Measured]) -> list[Row]:
 
 
 def _reference_value(runs: Sequence[Measured]) -> float:
-    """The stiffest value that was run with the most seeds: its mean is the best known."""
+    """The stiffest value among those with the most seeds: its mean is the best known."""
     seeds: dict[float, int] = {}
     for run in runs:
         if run.status == DONE:

@@ -1,4 +1,4 @@
-"""Time step: over sqrt(m/k) in collisions, in an undamped pack and in whole invasions, over tau in Stokes drag."""
+"""Time step: over sqrt(m/k) in contacts, over the relaxation time tau in Stokes drag."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -18,18 +18,18 @@ _INVASION_STIFFNESS = 1e3
 def points(quick: bool) -> list[Point]:
     """Steps from coarse to fine. Packs and invasions have seeds."""
     if quick:
-        found = _ladder(COLLISION, (0.4, 0.2, 0.1, 0.05), 1) + _ladder(
+        chosen = _ladder(COLLISION, (0.4, 0.2, 0.1, 0.05), 1) + _ladder(
             ENERGY, (0.4, 0.2, 0.1, 0.05), 1
         )
         return (
-            found
+            chosen
             + _ladder(DRAG, (0.2, 0.1, 0.05, 0.025), 1)
             + _ladder(INVASION, (0.2, 0.1, 0.05), 2, size="small")
         )
-    found = _ladder(COLLISION, (0.8, 0.4, 0.2, 0.1, 0.05, 0.025, 0.0125, 0.00625), 1)
-    found += _ladder(ENERGY, (1.2, 0.8, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.05, 0.025, 0.0125), 3)
-    found += _ladder(DRAG, (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002), 1)
-    return found + _ladder(INVASION, (0.2, 0.14, 0.1, 0.07, 0.05, 0.025, 0.0125), 6)
+    chosen = _ladder(COLLISION, (0.8, 0.4, 0.2, 0.1, 0.05, 0.025, 0.0125, 0.00625), 1)
+    chosen += _ladder(ENERGY, (1.2, 0.8, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.05, 0.025, 0.0125), 3)
+    chosen += _ladder(DRAG, (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002), 1)
+    return chosen + _ladder(INVASION, (0.2, 0.14, 0.1, 0.07, 0.05, 0.025, 0.0125), 6)
 
 
 def _ladder(series: str, values: Sequence[float], seeds: int, size: str = "whole") -> list[Point]:

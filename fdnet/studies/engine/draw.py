@@ -1,4 +1,4 @@
-"""The figure of a study: error against run time, log-log, with bands over seeds and fdnet's default marked."""
+"""The figure of a study: error against run time, with bands over seeds and fdnet's default."""
 
 import math
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from fdnet.studies.engine.study import Panel, Row, Study, shown
 
 MARKERS = "osD^vP<X"
 TURN = 0.75
-"""Share of the run times' range beyond which words stand to the left of their markers."""
+"""Share of the range of run times beyond which names stand to the left of their markers."""
 NEAR = 1.25
 _WIDTH, _HEIGHT = 6.2, 4.6
 _COST_LABELS = {
@@ -24,7 +24,7 @@ _COST_LABELS = {
 
 
 def draw_study(study: Study, rows: Sequence[Row], path: Path) -> None:
-    """One axes a panel that has rows, in rows of up to three."""
+    """Draws one axes for each panel that has rows, up to three side by side."""
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -62,21 +62,23 @@ def _draw_panel(axes: Any, study: Study, panel: Panel, rows: Sequence[Row]) -> N
         name: levels(rows, name, panel.quantity, cost=panel.cost)
         for name in series_of(panel, rows)
     }
-    floor = _floor([level for found in shown_levels.values() for level in found])
-    costs = [level.cost for found in shown_levels.values() for level in found if level.cost > 0]
+    floor = _floor([level for of_series in shown_levels.values() for level in of_series])
+    costs = [
+        level.cost for of_series in shown_levels.values() for level in of_series if level.cost > 0
+    ]
     turn = min(costs, default=1.0) * (max(costs, default=1.0) / min(costs, default=1.0)) ** TURN
-    for index, (name, found) in enumerate(shown_levels.items()):
-        if found:
+    for index, (name, of_series) in enumerate(shown_levels.items()):
+        if of_series:
             _draw_series(
                 axes,
                 name.removesuffix(panel.common),
-                found,
+                of_series,
                 study.defaults.get(name),
                 index,
                 floor,
             )
             if panel.cost != "value":
-                _label(axes, found, index, floor, turn)
+                _label(axes, of_series, index, floor, turn)
     axes.set(xscale="log", yscale="log")
     axes.set_xlabel(
         panel.knob if panel.cost == "value" else _COST_LABELS.get(panel.cost, panel.cost)
@@ -94,10 +96,10 @@ def _draw_panel(axes: Any, study: Study, panel: Panel, rows: Sequence[Row]) -> N
         axes.legend([*once.values()], [*once], fontsize=8, framealpha=0.9)
 
 
-def _floor(found: Sequence[Level]) -> float:
-    """Where errors of 0 are drawn: below the smallest error, or well within the bands if there is none."""
-    sizes = [level.size for level in found if level.size > 0]
-    bands = [level.half_width for level in found if level.half_width > 0]
+def _floor(of_series: Sequence[Level]) -> float:
+    """Where errors of 0 are drawn: below the smallest error, or well within the bands."""
+    sizes = [level.size for level in of_series if level.size > 0]
+    bands = [level.half_width for level in of_series if level.half_width > 0]
     return 0.5 * min(sizes) if sizes else 0.1 * min(bands, default=1e-15)
 
 
@@ -121,23 +123,23 @@ def _plain_ticks(axes: Any) -> None:
 
 
 def _draw_series(
-    axes: Any, name: str, found: Sequence[Level], default: Any, index: int, floor: float
+    axes: Any, name: str, of_series: Sequence[Level], default: Any, index: int, floor: float
 ) -> None:
     colour, marker = CURVES[index % len(CURVES)], MARKERS[index % len(MARKERS)]
-    cost = [level.cost for level in found]
-    size = [max(level.size, floor) for level in found]
-    low = [max(level.size - level.half_width, 0.3 * floor) for level in found]
-    high = [max(level.size + level.half_width, floor) for level in found]
-    # what has a name and no number has no place on a line
-    places = zip(found, cost, size, strict=True)
+    cost = [level.cost for level in of_series]
+    size = [max(level.size, floor) for level in of_series]
+    low = [max(level.size - level.half_width, 0.3 * floor) for level in of_series]
+    high = [max(level.size + level.half_width, floor) for level in of_series]
+    # values that are names and not numbers are not joined by a line
+    places = zip(of_series, cost, size, strict=True)
     line = sorted(
         (level.value, c, s) for level, c, s in places if not isinstance(level.value, str)
     )
     axes.plot([c for _, c, _ in line], [s for *_, s in line], "-", color=colour, lw=1.0, alpha=0.6)
-    for level, x, bottom, top in zip(found, cost, low, high, strict=True):
+    for level, x, bottom, top in zip(of_series, cost, low, high, strict=True):
         if level.half_width > 0:
             axes.vlines(x, bottom, top, color=colour, lw=2.5, alpha=0.3)
-    zero = [level.size == 0 for level in found]
+    zero = [level.size == 0 for level in of_series]
     axes.plot(
         [c for c, z in zip(cost, zero, strict=True) if not z],
         [s for s, z in zip(size, zero, strict=True) if not z],
@@ -157,7 +159,7 @@ def _draw_series(
             ms=8,
             label="reference, or no error",
         )
-    for level, x, y in zip(found, cost, size, strict=True):
+    for level, x, y in zip(of_series, cost, size, strict=True):
         if level.value == default:
             axes.plot(
                 [x],
@@ -172,11 +174,15 @@ def _draw_series(
             )
 
 
-def _label(axes: Any, found: Sequence[Level], index: int, floor: float, turn: float) -> None:
-    """The knob's values beside their markers: below where an earlier marker is near, words to the left from `turn`."""
-    for number, level in enumerate(found):
+def _label(axes: Any, of_series: Sequence[Level], index: int, floor: float, turn: float) -> None:
+    """The values of the knob next to their markers.
+
+    They stand below the marker where an earlier marker is near, and names stand to its left from
+    the cost `turn` on.
+    """
+    for number, level in enumerate(of_series):
         left = isinstance(level.value, str) and level.cost > turn
-        below = any(_near(level, other) for other in found[:number])
+        below = any(_near(level, other) for other in of_series[:number])
         axes.annotate(
             shown(level.value),
             (level.cost, max(level.size, floor)),

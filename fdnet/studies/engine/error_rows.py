@@ -59,9 +59,8 @@ def against_reference(
 ) -> list[Row]:
     """Errors of every run against the mean of the reference runs, relative to that mean.
 
-    The uncertainty of an error is the scatter of the errors among the seeds of its value; of a
-    reference run, the scatter about the reference's own mean. Differences that are rounding of
-    sums are 0.
+    The uncertainty of an error is the scatter of the errors among the seeds of its value.
+    Differences that are rounding of sums are 0.
 
     Args:
         measured: the runs.
@@ -92,24 +91,19 @@ def against_reference(
     scatter = _scatter(done, errors)
     widest = max((s for s in scatter.values() if not math.isnan(s)), default=NAN)
     band = 0.0 if paired else half_width(list(base.values())) / size
-    rows = []
-    for run in measured:
+
+    def row(run: Measured) -> Row:
         if id(run) not in errors:
-            rows.append(row_of(run, name, error=NAN, uncertainty=NAN))
-            continue
+            return row_of(run, name, error=NAN, uncertainty=NAN)
         own, value = scatter[_level_of(run)], errors[id(run)]
-        own_band, role = (0.0, "reference") if reference(run) else (band, "")
-        rows.append(
-            row_of(
-                run,
-                name,
-                error=abs(value) if magnitude else value,
-                uncertainty=widest if math.isnan(own) else own,
-                band=0.0 if magnitude else own_band,
-                role="" if magnitude else role,
-            )
-        )
-    return rows
+        uncertainty = widest if math.isnan(own) else own
+        if magnitude:
+            return row_of(run, name, error=abs(value), uncertainty=uncertainty)
+        if reference(run):
+            return row_of(run, name, error=value, uncertainty=uncertainty, role="reference")
+        return row_of(run, name, error=value, uncertainty=uncertainty, band=band)
+
+    return [row(run) for run in measured]
 
 
 def profile_distance(

@@ -1,4 +1,4 @@
-"""Runs the points of a study, each kept as soon as it is done, and goes on where an earlier session was cut."""
+"""Runs the points of a study, keeps each when it is done, and continues an earlier session."""
 
 import contextlib
 import ctypes
@@ -27,13 +27,21 @@ Measure = Callable[[Point, Path], Mapping[str, float]]
 
 
 def run_points(
-    study: Study, out: Path, *, quick: bool, tell: Callable[[str], None] = lambda _: None
+    study: Study, out: Path, *, quick: bool, report: Callable[[str], None] = lambda _: None
 ) -> list[Measured]:
-    """All points of the study's form, measured; those recorded in `out` by an earlier session are not run again,
-    unless they failed.
+    """All points of the study's form, measured.
 
-    `tell` gets a line after each point, with an estimate of the time left. Raises CaseError when `out` holds something
-    else. A point that is refused, fails or exceeds its limits is recorded with that status.
+    Points that an earlier session recorded in `out` are not run again unless they failed. A point
+    that is refused, fails or exceeds its limits is recorded with that status.
+
+    Args:
+        study: what to run.
+        out: folder of the record.
+        quick: the reduced form.
+        report: gets a line after each point, with an estimate of the time left.
+
+    Raises:
+        CaseError: `out` holds something else, or another session writes there.
     """
     points = study.points(quick)
     keys = [point.key for point in points]
@@ -44,7 +52,7 @@ def run_points(
         "inputs": _digest(study.inputs()),
     }
     with _Record(out, owner) as record:
-        return _run_all(study, points, record, quick=quick, tell=tell)
+        return _run_all(study, points, record, quick=quick, report=report)
 
 
 def _digest(text: str) -> str:
@@ -57,19 +65,20 @@ def _run_all(
     record: "_Record",
     *,
     quick: bool,
-    tell: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> list[Measured]:
     known, work = record.known(points), record.path.parent / WORK
     todo = [point for point in points if point.key not in known]
     if len(known):
-        tell(f"{len(known)} of {len(points)} points are there already")
+        report(f"{len(known)} of {len(points)} points are there already")
     start = time.monotonic()
     for number, point in enumerate(todo, 1):
         known[point.key] = measured = _measure(study, point, work, quick=quick)
         record.add(measured)
         left = (time.monotonic() - start) / number * (len(todo) - number)
-        tell(
-            f"{len(known)} of {len(points)}: {point.key}: {measured.status}, {measured.wall_s:.1f} s{eta(left)}"
+        report(
+            f"{len(known)} of {len(points)}: {point.key}: "
+            f"{measured.status}, {measured.wall_s:.1f} s{eta(left)}"
         )
     shutil.rmtree(work, ignore_errors=True)
     return [known[point.key] for point in points]
@@ -85,7 +94,7 @@ def eta(seconds: float) -> str:
 
 
 class _Record:
-    """The file of measured points: a first line that says whose they are, then one line a point."""
+    """The file of measured points: a first line that names the study, then one line a point."""
 
     def __init__(self, out: Path, owner: Mapping[str, str]) -> None:
         self.path, self.owner = out / POINTS, dict(owner)
@@ -95,7 +104,8 @@ class _Record:
             )
         if out.exists() and any(out.iterdir()) and not self.path.exists():
             raise CaseError(
-                f"{out}: holds no fdnet study (no {POINTS}); give an empty or new folder with --out"
+                f"{out}: holds no fdnet study (no {POINTS}); "
+                "give an empty or new folder with --out"
             )
         out.mkdir(parents=True, exist_ok=True)
         self.lock = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o644)
@@ -116,15 +126,17 @@ class _Record:
         os.close(self.lock)
 
     def known(self, points: Sequence[Point]) -> dict[str, Measured]:
-        """Recorded points by key; an unfinished last line is cut off, points not asked for stay there, failed ones are
-        left to be run again."""
+        """Recorded points by key, without those that failed and are to be run again.
+
+        An unfinished last line is cut off; records of other points stay in the file.
+        """
         text = self.path.read_text(encoding="utf-8", errors="replace")
         whole = text[: text.rfind("\n") + 1]
         lines = [self._line(number, line) for number, line in enumerate(whole.splitlines(), 1)]
         if not lines or lines[0] != self.owner:
-            found = lines[0] if lines else "nothing"
+            owner = lines[0] if lines else "nothing"
             raise CaseError(
-                f"{self.path}: belongs to {found}, expected {self.owner}; give another --out"
+                f"{self.path}: belongs to {owner}, expected {self.owner}; give another --out"
             )
         if whole != text:
             self.path.write_text(whole, encoding="utf-8")
@@ -137,14 +149,15 @@ class _Record:
 
     def _line(self, number: int, text: str) -> dict:
         try:
-            found = json.loads(text)
+            line = json.loads(text)
         except ValueError:
-            found = None
-        if not isinstance(found, dict) or (number > 1 and not {"key", "status"} <= set(found)):
+            line = None
+        if not isinstance(line, dict) or (number > 1 and not {"key", "status"} <= set(line)):
             raise CaseError(
-                f"{self.path}:{number}: is no record of a point; remove the line, or give another --out"
+                f"{self.path}:{number}: is no record of a point; "
+                "remove the line, or give another --out"
             )
-        return found
+        return line
 
     def add(self, measured: Measured) -> None:
         fields = asdict(measured)
@@ -192,7 +205,10 @@ def _measure(study: Study, point: Point, work: Path, *, quick: bool) -> Measured
 def _child(
     measure: Measure, point: Point, work: Path, limits: tuple[float, float], sender: Connection
 ) -> None:
-    """Measures in a process of its own: memory limited, ended with its parent, deaf to Ctrl-C (the parent hears it)."""
+    """Measures in a process of its own.
+
+    Its memory is limited, it ends with its parent, and it ignores Ctrl-C, which its parent heeds.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     ctypes.CDLL(None).prctl(1, signal.SIGKILL, 0, 0, 0)
     seconds, most = limits
@@ -204,30 +220,33 @@ def _child(
 
 
 def _attempt(measure: Measure, point: Point, work: Path) -> Measured:
-    """One measurement with its costs; what fdnet refuses is a status, what is a fault of the study is raised."""
+    """One measurement with its costs.
+
+    What fdnet refuses becomes a status; a fault of the study itself is raised.
+    """
     forget_peak()
     wall, core = time.monotonic(), core_seconds()
     try:
-        found = dict(measure(point, work))
+        observed = dict(measure(point, work))
         status = DONE
     except FdnetError as error:
-        found, status = {}, _why(error, work)
+        observed, status = {}, _why(error, work)
     except MemoryError:
-        found, status = {}, OVER_MEMORY
+        observed, status = {}, OVER_MEMORY
     costs = {
         "wall_s": time.monotonic() - wall,
         "core_s": core_seconds() - core,
         "steps": NAN,
         "peak_memory_bytes": peak_memory(),
     }
-    costs |= {name: found.pop(name) for name in COSTS if name in found}
-    return Measured(point=point, status=status, observed=found, **costs)
+    costs |= {name: observed.pop(name) for name in COSTS if name in observed}
+    return Measured(point=point, status=status, observed=observed, **costs)
 
 
 def _why(error: FdnetError, work: Path) -> str:
-    """What fdnet refused or how LIGGGHTS failed, without the advice and without the folder it happened in."""
-    said = " ".join(str(error).split()).replace(f"{work}/", "").split("; ")[0]
-    return f"{FAILED if isinstance(error, LiggghtsError) else 'refused'}: {said}"
+    """What fdnet refused or how LIGGGHTS failed, without the advice and without the folder."""
+    message = " ".join(str(error).split()).replace(f"{work}/", "").split("; ")[0]
+    return f"{FAILED if isinstance(error, LiggghtsError) else 'refused'}: {message}"
 
 
 def _nothing(point: Point, status: str, wall: float) -> Measured:
@@ -255,7 +274,7 @@ def child_core_seconds() -> float:
 
 
 def forget_peak() -> None:
-    """Lets `peak_memory` of this process begin again from what it holds now, where the system (Linux) can do that."""
+    """Restarts `peak_memory` of this process from what it holds now, where the system can."""
     with contextlib.suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5")
 
@@ -263,11 +282,11 @@ def forget_peak() -> None:
 def peak_memory() -> float:
     """Largest resident memory so far, bytes, of this process or of one child.
 
-    Its own as the kernel counts it since the start of the program: getrusage also holds what the process had as a copy
-    of its parent.
+    The memory of this process is counted by the kernel since the start of the program, because
+    getrusage also counts what the process had as a copy of its parent.
     """
-    told = Path("/proc/self/status")
-    lines = told.read_text().splitlines() if told.exists() else []
+    status = Path("/proc/self/status")
+    lines = status.read_text().splitlines() if status.exists() else []
     own = next((float(line.split()[1]) for line in lines if line.startswith("VmHWM")), 0.0)
     own = own or resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return 1024.0 * max(own, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)

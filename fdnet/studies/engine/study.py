@@ -1,4 +1,4 @@
-"""What a study is: points to run, what one of them measures, and the rows that say error against run time."""
+"""What a study is: points to run, what one of them measures, and rows of errors and costs."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -6,13 +6,21 @@ from pathlib import Path
 
 Value = float | str
 COSTS = ("wall_s", "core_s", "steps", "peak_memory_bytes")
-"""Keys of what a measurement returns that are costs, not observations; those it leaves out are measured around it."""
+"""Keys of a measurement that are costs, not observations; costs that it lacks are measured."""
 DONE = "done"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Point:
-    """One run: the curve it belongs to, the knob with its value, the seed, and whatever else tells it apart."""
+    """One run of a study.
+
+    Attributes:
+        series: the curve that it belongs to.
+        knob: name of what is varied.
+        value: value of the knob.
+        seed: of the pack and the fines.
+        settings: whatever else distinguishes it from other points.
+    """
 
     series: str
     knob: str
@@ -36,9 +44,16 @@ class Point:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measured:
-    """What one point gave. `status` is "done" or why there is nothing: refused, failed, over time, over memory.
+    """What one point gave.
 
-    `steps` and `peak_memory_bytes` are nan where they have no meaning.
+    Attributes:
+        point: the point.
+        status: "done", or why there is no result: refused, failed, over time, over memory.
+        observed: observations by name.
+        wall_s: seconds by the clock.
+        core_s: CPU seconds.
+        steps: number of steps; nan where it has no meaning.
+        peak_memory_bytes: largest memory; nan where it has no meaning.
     """
 
     point: Point
@@ -52,10 +67,26 @@ class Measured:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """One line of the table: the error of one quantity of one run, with the error's own (one sigma) uncertainty.
+    """One line of the table: the error of one quantity of one run.
 
-    `reference_band` is the 95 % half-width of the mean the error is taken from, 0 where it is exact or the same seed's;
-    `role` is "reference" for the runs that are that mean themselves; `run` is the point's key.
+    Attributes:
+        series: the curve.
+        knob: name of what is varied.
+        value: value of the knob.
+        seed: of the run.
+        quantity: name of what was observed.
+        observed: its value.
+        error: difference from the reference, over the reference or another scale.
+        error_uncertainty: one standard deviation of the error.
+        reference_band: half of the 95 % band of the mean that the error is taken from; 0 where
+            that is exact or of the same seed.
+        wall_s: seconds by the clock.
+        core_s: CPU seconds.
+        steps: number of steps, nan where it has no meaning.
+        peak_memory_mb: largest memory, MB, nan where it has no meaning.
+        status: "done", or why there is no result.
+        role: "reference" for the runs that the error is taken from.
+        run: key of the point.
     """
 
     series: str
@@ -78,10 +109,16 @@ class Row:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Panel:
-    """One axes of the figure: a quantity's error against cost for some series (all that have it when empty).
+    """One axes of the figure: the error of a quantity against cost.
 
-    `cost` is a column of the rows: a cost, or "value", the knob itself, called `knob` there; `common` is what all its
-    series' names end in, left out of the legend.
+    Attributes:
+        quantity: name of what was observed.
+        title: of the axes.
+        series: the curves; all that have the quantity when empty.
+        label: of the error's axis.
+        cost: column of the rows that is the cost, or "value" for the knob itself.
+        common: ending of all series' names, which the legend leaves out.
+        knob: label of the cost's axis where the cost is "value".
     """
 
     quantity: str
@@ -97,13 +134,24 @@ class Panel:
 class Study:
     """A study of error against run time.
 
-    `points(quick)` lists what to run, cheapest first. `measure(point, work)` runs one and returns its observations
-    and, under the names in COSTS, costs of its own; `work` is a folder all points share (packs made once).
-    `judge(measured)` turns all of them into rows. `defaults` gives fdnet's own value of the knob by series, `remarks`
-    what the numbers cannot say, `summary(rows)` what is told of the rows in place of knees (Markdown). Points of the
-    full form run in a process of their own, limited to `seconds` and `bytes`, unless not `isolated` (or, a function,
-    not for that point); those of the quick form all in one. `inputs()` names whatever else decides the numbers (a base
-    case), so that a study is not continued with another.
+    Attributes:
+        name: of the study and its files.
+        title: of its page.
+        knob_label: what is varied, in words.
+        points: the points of the quick (True) or the full form, cheapest first.
+        measure: runs one point and returns its observations and, under the names in `COSTS`, its
+            costs; the folder is shared by all points (packs are made once).
+        judge: turns all measurements into rows.
+        panels: of the figure.
+        defaults: fdnet's own value of the knob, by series.
+        summary: Markdown that takes the place of the knees; None for knees.
+        isolated: whether a point of the full form runs in a process of its own; those of the
+            quick form all run in one.
+        inputs: text of whatever else decides the numbers (a base case), so that a study is not
+            continued with another.
+        needs_liggghts: whether LIGGGHTS must be there.
+        seconds: limit of an isolated point.
+        bytes: memory limit of an isolated point.
     """
 
     name: str

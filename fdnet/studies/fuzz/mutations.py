@@ -151,7 +151,7 @@ def _tables(tables: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def change_dump_rows(rng: Random, data: bytes) -> bytes:
-    """Rows of a dump dropped, doubled, exchanged, or a value or a separator in one of them replaced."""
+    """Rows of a dump dropped, doubled or exchanged, or a value or a separator replaced."""
     lines = data.split(b"\n")
     rows = [at for at, line in enumerate(lines) if line[:1].isdigit() and line.count(b" ") > 3]
     for _ in range(rng.choice((1, 1, 2, 4))):

@@ -1,6 +1,7 @@
 """Networks of pores between two planes for the study of solvers, and their exact answer.
 
-Nodes 0 to count - 1 are pores, node `count` the inlet plane (pressure 1), node `count` + 1 the outlet plane (0).
+Nodes 0 to count - 1 are pores, node `count` is the inlet plane (pressure 1) and node `count` + 1
+is the outlet plane (pressure 0).
 """
 
 import decimal
@@ -23,7 +24,13 @@ DIGITS = 80
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Circuit:
-    """Links `ends` (K, 2) of `conductance` (K,) between `count` pores and the two planes."""
+    """Links between pores and the two planes.
+
+    Attributes:
+        ends: (K, 2) nodes that a link joins.
+        conductance: (K,) of the links, in any one unit.
+        count: number of pores.
+    """
 
     ends: Array
     conductance: Array
@@ -55,8 +62,12 @@ class Circuit:
 
 
 def circuit_of(pores: int, decades: float, seed: int, work: Path) -> Circuit:
-    """About `pores` pores: a pack of the Stokes truth tiled and shaken by 2 % of a radius, periodic across the flow,
-    law `lubrication`, each conductance divided by a factor log-uniform over `decades`. Networks are kept in `work`."""
+    """A circuit of about `pores` pores, periodic across the flow, by the law `lubrication`.
+
+    A pack of the Stokes truth is tiled and each grain moved by up to 2 % of its radius. Each
+    conductance is divided by a factor that is log-uniform over `decades`, drawn with `seed`.
+    Networks are kept in `work`.
+    """
     stored = work / f"network_{pores}.npz"
     if not stored.exists():
         _store(stored, intact_circuit(pores))
@@ -75,7 +86,10 @@ def _store(path: Path, circuit: Circuit) -> None:
 
 
 def intact_circuit(pores: int) -> Circuit:
-    """The network of the tiled pack without what no open throat ties to a plane; conductances over their median."""
+    """The network of the tiled pack, conductances over their median.
+
+    Pores that no open path joins to a plane are left out.
+    """
     pack = read_pack(truth_folder() / f"{TILE}.csv")[0]
     tiles = pores / PORES_PER_GRAIN / len(pack)
     across = max(round(tiles ** (1.0 / 3.0)), 1)
@@ -83,10 +97,10 @@ def intact_circuit(pores: int) -> Circuit:
     grains = shaken(tiled(pack, times), SHAKE, np.random.default_rng(0))
     network = build_network(grains, periodic=(False, True, True))
     x, (low, high) = network.pore_position[:, 0], network.box[0]
-    hair = 1e-9 * (high - low)
+    tolerance = 1e-9 * (high - low)
     total = len(x)
     node = np.where(
-        x <= low + hair, total, np.where(x >= high - hair, total + 1, network.pore_group)
+        x <= low + tolerance, total, np.where(x >= high - tolerance, total + 1, network.pore_group)
     )
     conductance = LAWS[LAW](network) * network.throat_share
     ends = node[network.throat_pores]
@@ -104,9 +118,13 @@ def intact_circuit(pores: int) -> Circuit:
 
 
 def exact_fluxes(circuit: Circuit) -> Array:
-    """Fluxes (K,) in 80 digits: pores are taken out one by one, the one with the fewest neighbours first, each star
-    replaced by the mesh of conductances g_i g_j / sum(g) (Rosen 1924), which only adds and so loses no digits; then
-    put back in reverse order, each at the mean of its neighbours' pressures."""
+    """Fluxes (K,), computed in 80 digits.
+
+    Pores are taken out one by one, the one with the fewest neighbours first. The star of its links
+    is replaced by the mesh of conductances g_i g_j / sum(g) (Rosen 1924), which only adds and so
+    loses no digits. Then the pores are put back in reverse order, each at the mean of its
+    neighbours' pressures.
+    """
     with decimal.localcontext(prec=DIGITS):
         mesh: list[dict[int, Decimal]] = [{} for _ in range(circuit.count + 2)]
         given = [Decimal(float(value)) for value in circuit.conductance]
@@ -128,8 +146,8 @@ def exact_fluxes(circuit: Circuit) -> Array:
 def _eliminated(
     mesh: list[dict[int, Decimal]], count: int
 ) -> list[tuple[int, dict[int, Decimal]]]:
-    """Each pore with its neighbours at the time it went."""
-    left, found = set(range(count)), []
+    """Each pore with its neighbours at the time it was taken out."""
+    left, order = set(range(count)), []
     while left:
         node = min(left, key=lambda one: len(mesh[one]))
         left.remove(node)
@@ -139,5 +157,5 @@ def _eliminated(
             del mesh[a][node]
             for b, h in star[at + 1 :]:
                 mesh[a][b] = mesh[b][a] = mesh[a].get(b, Decimal(0)) + g * h / total
-        found.append((node, mesh[node]))
-    return found
+        order.append((node, mesh[node]))
+    return order

@@ -1,4 +1,4 @@
-"""Conductance and damage laws against Stokes truth, and resolved flow on coarse grids, which costs more."""
+"""Conductance and damage laws against Stokes truth, and resolved flow on coarse grids."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -45,7 +45,7 @@ def cases() -> dict[str, Case]:
 
 
 def points(quick: bool) -> list[Point]:
-    """Every law on every pack, then resolved flow on one pack without and with fines, coarse grids first."""
+    """Every law on every pack, then resolved flow on one pack, coarse grids first."""
     chosen = [case for case in cases().values() if not quick or case.name in QUICK]
     return [*(point for case in chosen for point in _law_points(case)), *_grid_points(quick)]
 

@@ -1,4 +1,4 @@
-"""Method and tolerance of the network's solve: error against run time over sizes and spreads of conductance."""
+"""Method and tolerance of the network's solve, by size and spread of the conductances."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -41,8 +41,11 @@ SEEDS = 3
 
 
 def points(quick: bool) -> list[Point]:
-    """Small networks with every method and tolerance, then sizes; fdnet's own first, as the others' reference."""
-    found = list(
+    """Small networks with every method and tolerance, then sizes; fdnet's own method first.
+
+    It is the reference of the others.
+    """
+    chosen = list(
         _small(
             1 if quick else SEEDS,
             (0.0, 8.0, 16.0) if quick else DECADES,
@@ -50,8 +53,8 @@ def points(quick: bool) -> list[Point]:
         )
     )
     if quick:
-        return [*found, *(_point(method, 1_000, 8.0) for method in (FDNET, DIRECT, RUGE_STUBEN))]
-    return [*found, *_sizes()]
+        return [*chosen, *(_point(method, 1_000, 8.0) for method in (FDNET, DIRECT, RUGE_STUBEN))]
+    return [*chosen, *_sizes()]
 
 
 def _small(seeds: int, decades: Sequence[float], tolerances: Sequence[float]) -> Iterator[Point]:
@@ -125,7 +128,7 @@ def measure(point: Point, work: Path) -> dict[str, float]:
     solved, costs = _timed(method, circuit, tolerance)
     flux = solved.flux
     inflow = circuit.inflow(flux)
-    found = {
+    observed = {
         "pores": float(circuit.count),
         "inflow": inflow,
         "residual": circuit.imbalance(flux) / inflow,
@@ -133,16 +136,16 @@ def measure(point: Point, work: Path) -> dict[str, float]:
     }
     known = work / f"fluxes_{pores}_{decades:g}_{point.seed}.npy"
     if pores <= SMALL:
-        found |= _against(circuit, flux, _exact(pores, float(decades), point.seed, work))
+        observed |= _against(circuit, flux, _exact(pores, float(decades), point.seed, work))
     elif method == FDNET:
         np.save(known, flux)
     elif known.exists():
-        found |= _against(circuit, flux, np.load(known))
-    return found | costs | {"steps": solved.steps}
+        observed |= _against(circuit, flux, np.load(known))
+    return observed | costs | {"steps": solved.steps}
 
 
 def _timed(method: str, circuit: Circuit, tolerance: float) -> tuple[Solved, dict[str, float]]:
-    """The solve with its core seconds (the least of three where it is quick) and peak memory (in its own process)."""
+    """The solve with its core seconds, the least of three where it is quick, and peak memory."""
     forget_peak()
     solved, seconds = least_time(lambda: solve_by(method, circuit, tolerance))
     memory = peak_memory() if circuit.count > IN_PROCESS else float("nan")
@@ -165,8 +168,11 @@ def _exact(pores: int, decades: float, seed: int, work: Path) -> Array:
 
 
 def judge(measured: Sequence[Measured]) -> list[Row]:
-    """Relative errors of the inflow, of the worst throat (over the inflow), residual and mass balance; and by size
-    what the solves to the usual tolerance cost."""
+    """Relative errors of the inflow, the worst throat, the residual and the mass balance.
+
+    The last three are over the inflow. Further rows hold the costs of solves to the usual
+    tolerance, by size.
+    """
     rows = [row for run in measured for row in _error_rows(run)]
     done = [run for run in measured if run.status == DONE and run.point.seed == 0]
     usual = [run for run in done if run.point.value in (OWN, TOLERANCE)]
@@ -182,13 +188,16 @@ def _error_rows(run: Measured) -> Iterator[Row]:
     if run.status != DONE:
         yield row_of(run, QUANTITIES[0], error=nan, uncertainty=nan)
         return
-    sure = run.observed.get("residual, reference", nan)
+    uncertainty = run.observed.get("residual, reference", nan)
     truth = run.observed.get("inflow, reference", nan)
     errors = dict(run.observed) | {"inflow": run.observed["inflow"] / truth - 1.0}
     for name in QUANTITIES:
         if name in errors:
             yield row_of(
-                run, name, error=errors[name], uncertainty=sure if name in QUANTITIES[:2] else 0.0
+                run,
+                name,
+                error=errors[name],
+                uncertainty=uncertainty if name in QUANTITIES[:2] else 0.0,
             )
 
 

@@ -1,4 +1,4 @@
-"""The ways a network of pores can be solved: fdnet's own, its parts each on its own, and what else there is."""
+"""Methods to solve a network of pores: fdnet's own, its parts one by one, and others."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ FDNET_DIRECT, FDNET_MULTIGRID = "fdnet, direct", "fdnet, multigrid"
 RUGE_STUBEN, UNIT_DIAGONAL = "CG + Ruge-Stuben", "CG + Ruge-Stuben, unit diagonal"
 JACOBI, AGGREGATION = "CG + Jacobi", "CG + smoothed aggregation"
 ITERATIVE = {RUGE_STUBEN: 1_000, UNIT_DIAGONAL: 1_000, AGGREGATION: 1_000, JACOBI: 20_000}
-"""The iterative methods and the most steps each is given."""
+"""The iterative methods and the most steps of each."""
 OWN_CHOICES: dict[str, int | None] = {FDNET: None, FDNET_DIRECT: 1_000_000_000, FDNET_MULTIGRID: 0}
 """Pores up to which fdnet solves directly: as it chooses, always, never."""
 METHODS = (*OWN_CHOICES, DIRECT, SPSOLVE, *ITERATIVE)
@@ -30,16 +30,24 @@ Precondition = Callable[[Array], Array]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Solved:
-    """Fluxes (K,) of the circuit's links and the steps taken (nan for direct methods)."""
+    """A solved circuit.
+
+    Attributes:
+        flux: (K,) of the links, from the first to the second end.
+        steps: that an iterative method took; nan for direct methods.
+    """
 
     flux: Array
     steps: float
 
 
 def solve_by(method: str, circuit: Circuit, tolerance: float) -> Solved:
-    """Solve with one of METHODS; `tolerance` of the iterative ones is the norm of the residual over the source's.
+    """The circuit solved by one of `METHODS`.
 
-    Raises FlowError where steps run out, the system is singular, or fdnet's own check refuses the result.
+    Iterative methods stop when the norm of the residual is `tolerance` times that of the source.
+
+    Raises:
+        FlowError: the steps run out, the system is singular, or fdnet's check refuses the result.
     """
     if method in OWN_CHOICES:
         return _own(circuit, OWN_CHOICES[method])
@@ -62,12 +70,12 @@ def _own(circuit: Circuit, direct_up_to: int | None) -> Solved:
     jump = 1.0 * (circuit.ends[:, 0] == circuit.count) - 1.0 * (
         circuit.ends[:, 1] == circuit.count
     )
-    found = balance_links(
+    balance = balance_links(
         node, circuit.conductance, jump, circuit.count + 1, direct_up_to=direct_up_to
     )
-    if found.defect > TOLERANCE:
-        raise FlowError(f"fdnet: residual {found.defect:.2g}, expected <= {TOLERANCE:g}")
-    return Solved(flux=found.flux, steps=float("nan"))
+    if balance.defect > TOLERANCE:
+        raise FlowError(f"fdnet: residual {balance.defect:.2g}, expected <= {TOLERANCE:g}")
+    return Solved(flux=balance.flux, steps=float("nan"))
 
 
 def _system(circuit: Circuit) -> tuple[sparse.csr_matrix, Array]:
@@ -77,9 +85,9 @@ def _system(circuit: Circuit) -> tuple[sparse.csr_matrix, Array]:
     for side in (0, 1):
         own, other = circuit.ends[:, side], circuit.ends[:, 1 - side]
         for plane, sums in ((circuit.count, (tied, source)), (circuit.count + 1, (tied,))):
-            beside = (other == plane) & (own < circuit.count)
+            next_to = (other == plane) & (own < circuit.count)
             for total in sums:
-                np.add.at(total, own[beside], circuit.conductance[beside] / unit)
+                np.add.at(total, own[next_to], circuit.conductance[next_to] / unit)
     inner = np.all(circuit.ends < circuit.count, axis=1)
     return laplacian(circuit.ends[inner], circuit.conductance[inner] / unit, tied), source
 

@@ -1,4 +1,4 @@
-"""Specimen size and seed: how porosity, permeability and damage converge with the number of grains."""
+"""Specimen size and seed: how k, porosity and damage converge with the number of grains."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,7 +15,7 @@ NAMED: Mapping[str, tuple[str, int]] = {
     "quick case": ("4.0,2.4,2.4", 211),
     "specimen 5": ("8.0,4.0,4.0", 1173),
 }
-"""Boxes in use, mm, and their grains at porosity 0.40: what a quick case is worth beside the real one."""
+"""Boxes in use, mm, and their grains at porosity 0.40: a quick case next to a real one."""
 _BOXES = {f"invaded, {name}" for name in NAMED}
 _SIDES = {PERIODIC: "periodic", WALLS: "walls"}
 _GRAIN_MM3 = 4 / 3 * 3.141592653589793 * 0.25**3
@@ -29,15 +29,14 @@ _QUANTITIES = {
 
 
 def points(quick: bool) -> list[Point]:
-    """Cubes for the intact pack, slabs of equal length and growing face for the invasion, then the boxes in use."""
+    """Cubes for the intact pack, slabs of equal length for the invasion, then the boxes in use."""
     if quick:
-        found = [*_cubes((1.25, 1.75, 2.5), 4, PERIODIC), *_faces((1.25, 1.75), 3, PERIODIC)]
-        return found
-    found = []
+        return [*_cubes((1.25, 1.75, 2.5), 4, PERIODIC), *_faces((1.25, 1.75), 3, PERIODIC)]
+    chosen = []
     for sides in (PERIODIC, WALLS):
-        found += _cubes((1.25, 1.5, 2.0, 2.5, 3.0, 4.0), 10, sides) + _cubes((5.5, 8.0), 5, sides)
-        found += _faces((1.25, 1.6, 2.4, 3.4), 10, sides) + _faces((4.8, 6.8), 6, sides)
-    return found + [
+        chosen += _cubes((1.25, 1.5, 2.0, 2.5, 3.0, 4.0), 10, sides) + _cubes((5.5, 8.0), 5, sides)
+        chosen += _faces((1.25, 1.6, 2.4, 3.4), 10, sides) + _faces((4.8, 6.8), 6, sides)
+    return chosen + [
         Point(
             series=f"{INVADED}, {name}",
             knob="grains",
@@ -89,14 +88,17 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
     )
     case = slab_case(point.seed, *assignments)
     if what == INTACT:
-        found = analyse(grains_of(case, work), None, periodic=case.periodic)
-        return {"porosity_initial": found.porosity_initial, "k_initial": found.k_initial}
+        intact = analyse(grains_of(case, work), None, periodic=case.periodic)
+        return {"porosity_initial": intact.porosity_initial, "k_initial": intact.k_initial}
     run = invasion_run(case, work, point.slug)
     return run | {"count_per_mm2": run["count_first"] / (width * height)}
 
 
 def judge(measured: Sequence[Measured]) -> list[Row]:
-    """Everything against the mean of the largest periodic specimens: bias of the mean, and what one run is off by."""
+    """Everything against the mean of the largest periodic specimens.
+
+    Rows hold the bias of the mean, and by how much one run is off.
+    """
     rows = []
     for what, names in _QUANTITIES.items():
         runs = [

@@ -1,4 +1,4 @@
-"""How much of a fine lies in a throat's cylinder: the thesis's two planes against quadrature, and what it does to k."""
+"""How much of a fine lies in a throat's cylinder: two planes or quadrature, and k with each."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -67,22 +67,25 @@ def _in_a_tube(point: Point) -> dict[str, float]:
     ratio = float(point.value if capped else point.series.removeprefix("a/r = "))
     volume = two_plane_volume if capped else partial(exact_volume, points=int(point.value))
     ball = 4.0 / 3.0 * math.pi * ratio**3
-    found: dict[str, float] = {}
+    errors: dict[str, float] = {}
     for where, pairs, exact in zip(
         ("inside", "ends"), sample(ratio), _references(ratio), strict=True
     ):
         off = (volume(pairs) - exact) / ball
-        found |= {
+        errors |= {
             f"largest, {where}": float(np.abs(off).max()),
             f"rms, {where}": float(np.sqrt(np.mean(off**2))),
         }
-        found[f"bias of the sum, {where}"] = float(off.sum() / (exact.sum() / ball))
-    return found | {"core_s": _seconds(volume, ratio)}
+        errors[f"bias of the sum, {where}"] = float(off.sum() / (exact.sum() / ball))
+    return errors | {"core_s": _seconds(volume, ratio)}
 
 
 def sample(ratio: float, count: int = PLACES) -> tuple[Pairs, Pairs]:
-    """Spheres of `ratio` tube radii with centres uniform where they touch the tube: far from its ends, and at the ends
-    of tubes 0.2 to 4 radii long, among them shorter ones than the sphere."""
+    """Spheres of `ratio` tube radii with centres uniform where they touch the tube.
+
+    The first ones are far from the ends of the tube, the second ones at the ends of tubes 0.2 to 4
+    radii long, some of which are shorter than the sphere.
+    """
     rng = np.random.default_rng(17)
     offset = (1.0 + ratio) * np.sqrt((np.arange(count) + rng.random(count)) / count)
     length = rng.permutation(np.linspace(SHORTEST, LONGEST, count))
@@ -104,8 +107,11 @@ def _references(ratio: float) -> tuple[Array, Array]:
 
 
 def reference_volume(pairs: Pairs) -> Array:
-    """Volume (K,) common to sphere and cylinder by adaptive quadrature between the planes where the sections change
-    from one closed form to another."""
+    """Volume (K,) common to sphere and cylinder, by adaptive quadrature.
+
+    The quadrature goes between the planes where the sections change from one closed form to
+    another.
+    """
     rows = zip(pairs.sphere, pairs.offset, pairs.depth, pairs.tube, pairs.length, strict=True)
     return np.array([_reference(*map(float, row)) for row in rows])
 
@@ -124,8 +130,10 @@ def _reference(sphere: float, offset: float, depth: float, tube: float, length: 
 
 
 def _section(sphere: float, offset: float, tube: float, place: float) -> float:
-    """Area common to the tube and the sphere's disc at `place`: two circular segments (Weisstein, Circle-Circle
-    Intersection, eq. 14)."""
+    """Area common to the tube and the sphere's disc at `place`: two circular segments.
+
+    Weisstein, Circle-Circle Intersection, eq. 14.
+    """
     disc = math.sqrt(max(sphere**2 - place**2, 0.0))
     if offset >= disc + tube:
         return 0.0
@@ -136,7 +144,7 @@ def _section(sphere: float, offset: float, tube: float, place: float) -> float:
 
 
 def _segment(radius: float, height: float) -> float:
-    """Area a chord at `height` from the centre cuts off a circle."""
+    """Area that a chord at `height` from the centre cuts off a circle."""
     share = min(max(height / radius, -1.0), 1.0)
     return radius**2 * math.acos(share) - height * math.sqrt(max(radius**2 - height**2, 0.0))
 
@@ -148,7 +156,7 @@ def _seconds(volume: Callable[[Pairs], Array], ratio: float) -> float:
 
 
 def _in_a_pack(point: Point) -> dict[str, float]:
-    """Mean throat porosity where fines are, blocked and clogged throats and k/k0 of the thesis's laws."""
+    """Mean throat porosity where there are fines, throats that clog, and k/k0 of the thesis."""
     pack = read_pack(truth_folder() / f"{PACKS[point.series]}.csv")[0]
     volume = (
         two_plane_volume
@@ -185,12 +193,12 @@ def judge(measured: Sequence[Measured]) -> list[Row]:
         for name in OCCUPANCY if runs else ():
             exact = next(run.observed[name] for run in runs if run.point.value == PACK_POINTS[-1])
             rows += [
-                _beside(run, name, exact) for run in runs if run.point.value != PACK_POINTS[-1]
+                _against(run, name, exact) for run in runs if run.point.value != PACK_POINTS[-1]
             ]
     return rows
 
 
-def _beside(run: Measured, name: str, exact: float) -> Row:
+def _against(run: Measured, name: str, exact: float) -> Row:
     return row_of(
         run, name, error=(run.observed[name] - exact) / (abs(exact) or 1.0), uncertainty=0.0
     )

@@ -1,13 +1,15 @@
 """Flow of point forces in a periodic box on a staggered (MAC) grid, spacing and viscosity 1.
 
-The discrete Stokes equations, -Laplace(u) + grad(p) = f and div(u) = 0 with the 7-point Laplacian, are diagonal under
-the Fourier transform: with g_d = 1 - exp(-i k_d), the symbol of the backward difference, and lambda = sum |g_d|^2,
+The discrete Stokes equations, -Laplace(u) + grad(p) = f and div(u) = 0 with the 7-point Laplacian,
+are diagonal under the Fourier transform. With g_d = 1 - exp(-i k_d), the symbol of the backward
+difference, and lambda = sum |g_d|^2, the velocity is
 
     u_d = (f_d - g_d sum_e(conj(g_e) f_e) / lambda) / lambda,        mean velocity 0
 
-(Hasimoto 1959, J. Fluid Mech. 5, 317, with the differences of Harlow and Welch 1965, Phys. Fluids 8, 2182). The result
-is free of divergence in every cell to rounding. Transforms are in single precision: against double, k moves by 3e-6
-(docs/stokes.md) at half the time and memory.
+(Hasimoto 1959, J. Fluid Mech. 5, 317, with the differences of Harlow and Welch 1965, Phys. Fluids
+8, 2182). The result is free of divergence in every cell to rounding. Transforms are in single
+precision: compared with double precision, k changes by 3e-6 (docs/stokes.md), at half the time and
+memory.
 """
 
 from dataclasses import dataclass
@@ -20,7 +22,13 @@ from fdnet.spheres.snapshot import Array, frozen
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Green:
-    """Symbols of one grid: `difference` three arrays (complex), `inverse_laplace` (n0, n1, n2 // 2 + 1)."""
+    """Symbols of one grid under the Fourier transform.
+
+    Attributes:
+        shape: (3,) cells of the grid, n0, n1, n2.
+        difference: symbol g_d of the backward difference along each axis, complex.
+        inverse_laplace: (n0, n1, n2 // 2 + 1), 1 / lambda.
+    """
 
     shape: tuple[int, int, int]
     difference: tuple[Array, Array, Array]

@@ -1,13 +1,16 @@
 """Which nodes of a staggered periodic grid hold a wall, and how far the walls stand from them.
 
-Lengths here are in grid spacings. Component d of the velocity lives at (i, j, k) + 1/2 across the other two axes.
+Lengths are in grid spacings. Component d of the velocity has its nodes at (i, j, k) + 1/2 across
+the other two axes.
 
-* A node inside a sphere, less than one spacing below that sphere's own surface, carries the condition u = 0. Every
-  sphere keeps its whole shell, also where it lies in another sphere, so the neck between overlapping spheres is
-  closed by its own lens of nodes and nothing leaks from solid to solid.
-* A node in the fluid with a neighbour in the solid, the wall standing at a fraction t of the spacing, feels the wall
-  there: (0 - u) / t replaces (u_neighbour - u) (Shortley and Weller 1938, in the symmetric form of Gibou et al. 2002,
-  J. Comput. Phys. 176, 205). Against the plain grid that is the extra drag (1/t - 1) u.
+* A node inside a sphere, less than one spacing below that sphere's own surface, carries the
+  condition u = 0. Every sphere keeps its whole shell, also where it lies in another sphere, so the
+  neck between overlapping spheres is closed by its own lens of nodes and nothing leaks from solid
+  to solid.
+* A node in the fluid with a neighbour in the solid, the wall at a fraction t of the spacing, feels
+  the wall there: (0 - u) / t replaces (u_neighbour - u) (Shortley and Weller 1938, in the
+  symmetric form of Gibou et al. 2002, J. Comput. Phys. 176, 205). Compared with the plain grid,
+  that is the extra drag (1/t - 1) u.
 """
 
 from dataclasses import dataclass
@@ -24,8 +27,10 @@ LEAST_DRAG = 1e-6
 class Walls:
     """M nodes of one velocity component that carry a force.
 
-    `node` (M,) flat index in the grid; `slack` (M,) velocity per force at the node, spacing and viscosity 1: 0 where
-    u = 0 is imposed, 1 / sum(1/t - 1) at fluid nodes next to a wall.
+    Attributes:
+        node: (M,) flat index in the grid.
+        slack: (M,) velocity per force at the node, for spacing and viscosity 1: 0 where u = 0 is
+            imposed, 1 / sum(1/t - 1) at fluid nodes next to a wall.
     """
 
     node: Array
@@ -35,7 +40,7 @@ class Walls:
 def find_walls(
     centre: Array, radius: Array, shape: tuple[int, int, int], *, component: int
 ) -> Walls:
-    """Walls of spheres at `centre` (S, 3) with `radius` (S,), in spacings, for one velocity component."""
+    """Walls of spheres at `centre` (S, 3) with `radius` (S,), for one velocity component."""
     stagger = np.full(3, 0.5)
     stagger[component] = 0.0
     shell, solid = np.zeros(shape, bool), np.zeros(shape, bool)
@@ -51,7 +56,7 @@ def find_walls(
 
 
 def _stamp(point: Array, r: float, shell: Array, solid: Array, reach: Array) -> None:
-    """Mark the nodes of one sphere and shorten the free reach of the fluid nodes around it, in place."""
+    """Marks the nodes of one sphere and shortens the reach of the fluid nodes around it."""
     axes = [np.arange(np.floor(c - r - 1.0), np.ceil(c + r + 1.0) + 1.0) for c in point]
     apart = [axis - c for axis, c in zip(axes, point, strict=True)]
     square = apart[0][:, None, None] ** 2 + apart[1][:, None] ** 2 + apart[2] ** 2
@@ -71,7 +76,7 @@ def _stamp(point: Array, r: float, shell: Array, solid: Array, reach: Array) -> 
 
 
 def _shorten(reach: Array, node: Array, ahead: Array, power: Array) -> None:
-    """Least distance along one direction to the sphere with its centre `ahead` (K,) and of `power` (K,)."""
+    """Least distance along one direction to the sphere whose centre is `ahead` (K,)."""
     hit = (power > 0.0) & (ahead > 0.0) & (ahead**2 > power)
     distance = ahead[hit] - np.sqrt(ahead[hit] ** 2 - power[hit])
     np.minimum.at(reach, node[hit], distance.astype(np.float32))

@@ -42,8 +42,8 @@ PACKS: dict[str, dict[str, Any]] = {
 
 Packs of grains have a number of `grains` and a `porosity`; radii are uniform between 1 and `ratio`
 (1 if not given) times the smallest, with a mean of 0.5 mm. Deposits name the `intact` pack and the
-porosity `lost` to fines of radius `fine` (0.1 mm if not given), all of them in the first `layer` of
-the edge along x (all of it if not given). `push` is explained in `relaxed`.
+porosity `lost` to fines of radius `fine` (0.1 mm if not given), all of them in the first `layer`
+of the edge along x (all of it if not given). `push` is explained in `relaxed`.
 """
 
 
