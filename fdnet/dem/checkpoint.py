@@ -15,7 +15,7 @@ from fdnet.errors import DumpError, LiggghtsError
 from fdnet.scales.scales import InvasionScales
 from fdnet.scales.slab import arrival_time
 from fdnet.spheres.dump import read_frame
-from fdnet.spheres.snapshot import Kind, Snapshot
+from fdnet.spheres.snapshot import Snapshot
 
 HISTORY = "history.csv"
 HISTORY_HEADER = "chunk,step,upstream,invaded,passed,removed_upstream,most_crossed,quiet"
@@ -171,8 +171,8 @@ def readable_states(
 ) -> Iterator[tuple[Checkpoint, Snapshot]]:
     """The states of the checkpoints in `history`, checked against its counts.
 
-    Dumps that are missing, cut or changed are passed over, except the last one, which raises DumpError.
-    Raises LiggghtsError when counts disagree.
+    Dumps that are missing, cut or changed are passed over, except the last one, which raises
+    DumpError. Raises LiggghtsError when counts disagree.
     """
     batches = batches_of(case, scales)
     for row in history:

@@ -61,9 +61,8 @@ def read_record(folder: Path, step: int) -> CheckpointRecord | None:
     except (OSError, ValueError, TypeError, RecursionError):
         return None
     texts = (record.case, record.row, record.overlap, record.dump, record.restart)
-    if type(record.ranks) is not int or not all(isinstance(text, str) for text in texts):
-        return None
-    return record
+    sound = type(record.ranks) is int and all(isinstance(text, str) for text in texts)
+    return record if sound and record.row.split(",")[1:2] == [str(step)] else None
 
 
 def dump_is_changed(folder: Path, step: int) -> bool:

@@ -190,26 +190,26 @@ class _Keeper:
                 f"{self.folder}: the disk is full, LIGGGHTS was stopped; make room and "
                 "continue with --resume"
             )
-        row = self._row(step)
-        overlaps = self.watch.upto(step)
-        write_record(self.folder, row, self.case, ranks=self.ranks, overlaps=overlaps)
-        files = [
-            (of, path)
-            for of, path in checkpoint_files(self.folder)
-            if path.suffix == ".restart" and of <= step
-        ]
-        for _, old in sorted(files)[:-2]:
-            old.unlink(missing_ok=True)
-        refuse_overlap(self.case, self.scales, self.grains, self.folder, history=[row], last=row)
-
-    def _row(self, step: int) -> Checkpoint:
         rows = [row for row in read_history(self.folder) if row.step == step]
-        if not rows:
+        overlaps = self.watch.upto(step)
+        if rows:
+            write_record(self.folder, rows[-1], self.case, ranks=self.ranks, overlaps=overlaps)
+        elif self.case.run.on_overlap == "stop":
             raise LiggghtsError(
                 f"{self.folder / HISTORY}: no row for the checkpoint at step {step}; continue "
                 "with --resume"
             )
-        return rows[-1]
+        restarts = [
+            (at, path)
+            for at, path in checkpoint_files(self.folder)
+            if path.suffix == ".restart" and at <= step
+        ]
+        for _, old in sorted(restarts)[:-2]:
+            old.unlink(missing_ok=True)
+        for row in rows[-1:]:
+            refuse_overlap(
+                self.case, self.scales, self.grains, self.folder, history=[row], last=row
+            )
 
 
 def _over(case: InvasionCase, scales: InvasionScales, last: Checkpoint | None) -> bool:
