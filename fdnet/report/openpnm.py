@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.network.flow.flow import INLET, OUTLET, Links, open_links
+from fdnet.network.flow.links import INLET, OUTLET, Links, open_links
 from fdnet.network.network import Network
 from fdnet.spheres.arrays import Array
 

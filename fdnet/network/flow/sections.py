@@ -1,4 +1,4 @@
-"""Permeability, porosity and fines by depth: sections (slabs with their own k) and a finer profile."""
+"""Permeability, porosity and fines by depth: sections with their own k, and a finer profile."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,20 +6,36 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.network.flow.flow import Flow
+from fdnet.network.flow.slabs import SlabK
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.porosity import Porosity
 from fdnet.spheres.snapshot import Array, frozen
 
+FACE_TOLERANCE = 1e-6
+"""Given edges may miss the faces of the box by this share of its length."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """Slab [x_lo, x_hi) m across the flow; k m2.
+    """A slab [x_lo, x_hi) across the flow, before and after the fines. Permeabilities are in m2.
 
-    `k_initial`, `k_damaged` of the slab cut out, pressure held on its two planes (Shi 2011, section 3.3.1);
-    `k_initial_inplace`, `k_damaged_inplace` from the pressures of the whole specimen, in series they make up the
-    whole; `k_reduction` = 1 - k_damaged / k_initial, None where k_initial is 0. Porosities overlap counted once;
-    `fines_count` fines centred in the slab, `fines_fraction` of all invaded.
+    "Cut out" is the slab alone, with the pressure held on its two planes (Shi 2011, section
+    3.3.1). "In place" is the slab under the pressures of the whole specimen; in series these
+    values make up the permeability of the whole.
+
+    Attributes:
+        section: number of the slab, from 1 at the low x face.
+        x_lo: m, lower bound.
+        x_hi: m, upper bound.
+        porosity_initial: without fines, overlap of spheres counted once.
+        porosity_damaged: with fines, overlap of spheres counted once.
+        k_initial: m2, cut out, without fines.
+        k_damaged: m2, cut out, with fines.
+        k_reduction: 1 - k_damaged / k_initial; None where k_initial is 0.
+        k_initial_inplace: m2, in place, without fines.
+        k_damaged_inplace: m2, in place, with fines.
+        fines_count: number of fines centred in the slab.
+        fines_fraction: these as a share of all invaded fines.
     """
 
     section: int
@@ -38,7 +54,14 @@ class Section:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Profile:
-    """Finer bins: `edges` (B+1,) m, porosities (B,), `fines_fraction` (B,) of all invaded."""
+    """Porosity and fines in B finer bins of depth.
+
+    Attributes:
+        edges: (B+1,) m.
+        porosity_initial: (B,) without fines.
+        porosity_damaged: (B,) with fines.
+        fines_fraction: (B,) share of all invaded fines.
+    """
 
     edges: Array
     porosity_initial: Array
@@ -48,20 +71,12 @@ class Profile:
     __repr__ = one_line
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class SlabK:
-    """k (S,) m2 of the slabs of one state: `cut_out` on its own, `inplace` from the whole specimen's pressures; `flows`
-    through those cut out."""
-
-    cut_out: Array
-    inplace: Array
-    flows: tuple[Flow, ...]
-
-    __repr__ = one_line
-
-
 def section_edges(sections: int | Sequence[float], box: Array) -> Array:
-    """Edges (S+1,) m of equal slabs, or the given ones. Raises CaseError unless they ascend from face to face."""
+    """Edges (S+1,) m of the sections.
+
+    `sections` is a count of equal slabs, or the edges m themselves; `box` (3, 2) m. Raises
+    CaseError unless the edges ascend from face to face.
+    """
     low, high = float(box[0, 0]), float(box[0, 1])
     if isinstance(sections, int | np.integer):
         if sections < 1:
@@ -70,12 +85,12 @@ def section_edges(sections: int | Sequence[float], box: Array) -> Array:
             )
         return np.linspace(low, high, int(sections) + 1)
     edges = np.array(sections, dtype=float)
-    hair = 1e-6 * (high - low)
+    tolerance = FACE_TOLERANCE * (high - low)
     if (
         len(edges) < 2
         or np.any(np.diff(edges) <= 0)
-        or abs(edges[0] - low) > hair
-        or abs(edges[-1] - high) > hair
+        or abs(edges[0] - low) > tolerance
+        or abs(edges[-1] - high) > tolerance
     ):
         raise CaseError(
             f"analysis.sections: edges {edges.tolist()} do not ascend from {low:g} to {high:g} m"
@@ -85,7 +100,10 @@ def section_edges(sections: int | Sequence[float], box: Array) -> Array:
 
 
 def profile_edges(bin_size: float, box: Array) -> Array:
-    """Edges (B+1,) m of equal bins as near to `bin_size` m as fill the box. Raises CaseError on a bin not above 0."""
+    """Edges (B+1,) m of equal bins that fill the box, as near to `bin_size` m as possible.
+
+    `box` (3, 2) m. Raises CaseError on a bin that is not above 0.
+    """
     low, high = float(box[0, 0]), float(box[0, 1])
     if not bin_size > 0:
         raise CaseError(
@@ -97,7 +115,11 @@ def profile_edges(bin_size: float, box: Array) -> Array:
 def make_sections(
     edges: Array, porosity: tuple[Porosity, Porosity], k: tuple[SlabK, SlabK], depth: Array
 ) -> tuple[Section, ...]:
-    """Sections between `edges` (S+1,) from the states before and after, `depth` (F,) x of the invaded fines."""
+    """Sections between `edges` (S+1,) m from the states before and after.
+
+    `porosity` and `k` hold the porosity and the slab permeabilities of the two states; `depth`
+    (F,) m are the places of the invaded fines along x.
+    """
     count = np.histogram(depth, edges)[0]
     share = count / max(len(depth), 1)
     before, after = (pooled(one, edges) for one in porosity)
@@ -121,7 +143,10 @@ def make_sections(
 
 
 def make_profile(edges: Array, porosity: tuple[Porosity, Porosity], depth: Array) -> Profile:
-    """Profile between `edges` (B+1,) of porosity before and after, and of the invaded fines at `depth` (F,)."""
+    """Profile between `edges` (B+1,) m of the porosity before and after, and of the fines.
+
+    `depth` (F,) m are the places of the invaded fines along x.
+    """
     before, after = (frozen(pooled(one, edges)) for one in porosity)
     share = np.histogram(depth, edges)[0] / max(len(depth), 1)
     return Profile(
@@ -133,7 +158,10 @@ def make_profile(edges: Array, porosity: tuple[Porosity, Porosity], depth: Array
 
 
 def pooled(porosity: Porosity, edges: Array) -> Array:
-    """The porosity profile, measured on finer cuts, averaged between `edges`, which are among the cuts."""
+    """Porosity (S,) between `edges` (S+1,) m, averaged from the finer profile of `porosity`.
+
+    The edges must be among those of the profile.
+    """
     first, end = (
         np.searchsorted(porosity.edges, edges[:-1]),
         np.searchsorted(porosity.edges, edges[-1]),

@@ -1,4 +1,7 @@
-"""Mass balances of a network of links (symmetric, positive definite): direct, or multigrid for larger ones."""
+"""Mass balances of a network of links: a direct solver, and multigrid for larger networks.
+
+The systems are symmetric and positive definite.
+"""
 
 import os
 from collections.abc import Callable
@@ -15,23 +18,36 @@ from fdnet.spheres.snapshot import Array
 
 DIRECT, MULTIGRID = "splu, METIS nested dissection", "CG, Ruge-Stuben AMG"
 DIRECT_UP_TO = 3_000
+"""Number of nodes up to which the direct solver is used."""
 DIRECT_BYTES, DIRECT_GROWTH = 55.0, 1.41
+"""Factor and exponent of the memory of the direct solver, see `direct_memory`."""
 MEMORY_CAP = 8e9
+"""Most memory, bytes, that a direct solve may take."""
 MEMORY_SHARE = 0.8
+"""Most memory that a direct solve may take, as a share of what is free."""
 CG_TOLERANCE, CG_STEPS = 1e-7, 100
+"""Norm of the residual over that of the source, and number of steps, of conjugate gradients."""
 STRENGTH = 0.5
+"""Strength of connection in the coarsening of multigrid."""
 
 Solve = Callable[[Array, float], Array]
 
 
 class Balances:
-    """The system sum of g (p_i - p_j) + tied_i p_i = source_i, kept for many sources; `method` says how it was solved.
+    """The system sum_j g_ij (p_i - p_j) + tied_i p_i = source_i, kept for many sources.
 
-    `pair` (K, 2) nodes, `conductance` (K,) > 0, `tied` (n,) conductance to nodes of pressure 0. Up to 3,000 nodes
-    (`direct_up_to`) direct. Beyond: conjugate gradients with Ruge-Stuben multigrid (Ruge and Stuben 1987; second pass,
-    strength 0.5) on the system as it stands, whose near-kernel is the constant that the interpolation assumes (scaled
-    to a unit diagonal it needs several times the steps). Where these do not converge: direct, as long as its estimated
-    memory fits. What the choices cost: study linear-solver.
+    Up to 3,000 nodes (`direct_up_to`) it is solved directly. Larger systems are solved by
+    conjugate gradients with Ruge-Stuben multigrid (Ruge and Stuben 1987; second pass, strength
+    0.5). Multigrid works on the system as it stands, whose near-kernel is the constant that the
+    interpolation assumes; scaled to a unit diagonal it needs several times the steps. Where it
+    does not converge, the direct solver is used as long as its estimated memory fits. The study
+    linear-solver shows what these choices cost.
+
+    Args:
+        pair: (K, 2) nodes that the links join.
+        conductance: (K,) above 0.
+        tied: (n,) conductance to nodes of pressure 0.
+        direct_up_to: number of nodes up to which the direct solver is used; None for 3,000.
     """
 
     def __init__(
@@ -44,11 +60,16 @@ class Balances:
 
     @property
     def method(self) -> str:
+        """How the system is solved."""
         return DIRECT if self._direct else MULTIGRID
 
     def solve(self, source: Array, *, imbalance: float | None = None) -> Array:
-        """Pressures (n,) for `source` (n,), iterated until the imbalances add up to no more than `imbalance` (None:
-        their norm to 1e-7 of the source's). Raises FlowError when the system is singular or too large to be solved."""
+        """Pressures (n,) for `source` (n,).
+
+        Multigrid iterates until the imbalances add up to no more than `imbalance`, or without it
+        until their norm is 1e-7 of that of the source. Raises FlowError when the system is
+        singular or too large to be solved.
+        """
         if not len(source):
             return np.zeros(0)
         if self._solve is None:
@@ -57,28 +78,35 @@ class Balances:
         within = CG_TOLERANCE * float(np.linalg.norm(source))
         if imbalance is not None:
             within = imbalance / self._unit / np.sqrt(len(source))
-        found = self._solve(source, within)
-        if not self._direct and not np.all(np.isfinite(found)):
+        pressure = self._solve(source, within)
+        if not self._direct and not np.all(np.isfinite(pressure)):
             _check_memory(len(source))
             self._direct, self._solve = True, direct(self._matrix)
-            found = self._solve(source, within)
-        return found
+            pressure = self._solve(source, within)
+        return pressure
 
 
 def laplacian(pair: Array, conductance: Array, tied: Array) -> sparse.csr_matrix:
-    """The matrix; links from a node to itself and links between the same nodes add up."""
+    """The matrix (n, n) of `Balances`.
+
+    Links between the same nodes add up; a link from a node to itself has no effect.
+    """
     count = len(tied)
     other = pair[:, 0] != pair[:, 1]
     first, second = pair[other].T
     upper = sparse.coo_matrix((conductance[other], (first, second)), shape=(count, count))
-    beside = (upper + upper.T).tocsr()
-    diagonal = tied + np.asarray(beside.sum(axis=1)).ravel()
-    return (sparse.diags(diagonal) - beside).tocsr()
+    links = (upper + upper.T).tocsr()
+    diagonal = tied + np.asarray(links.sum(axis=1)).ravel()
+    return (sparse.diags(diagonal) - links).tocsr()
 
 
 def direct(matrix: sparse.csr_matrix) -> Solve:
-    """Unit-diagonal scaling, METIS nested dissection (Karypis and Kumar 1998), SuperLU in symmetric mode, one step of
-    iterative refinement. Raises FlowError when the system is singular."""
+    """Direct solver of the system `matrix` (n, n).
+
+    The matrix is scaled to a unit diagonal, ordered by METIS nested dissection (Karypis and Kumar
+    1998) and factored by SuperLU in symmetric mode; a solution takes one step of iterative
+    refinement. Raises FlowError when the system is singular.
+    """
     count = matrix.shape[0]
     diagonal = matrix.diagonal()
     if np.any(diagonal <= 0):
@@ -101,28 +129,33 @@ def direct(matrix: sparse.csr_matrix) -> Solve:
         ) from error
 
     def solve(source: Array, _: float) -> Array:
-        found = np.zeros(count)
+        scaled_pressure = np.zeros(count)
         for _ in range(2):
-            found[order] += factor.solve((source * scale - scaled @ found)[order])
-        return found * scale
+            missing = source * scale - scaled @ scaled_pressure
+            scaled_pressure[order] += factor.solve(missing[order])
+        return scaled_pressure * scale
 
     return solve
 
 
 def _order(matrix: sparse.csr_matrix) -> Array:
-    beside = matrix.copy()
-    beside.setdiag(0.0)
-    beside.eliminate_zeros()
-    if beside.nnz == 0:
-        return np.arange(beside.shape[0])
-    adjacency = pymetis.CSRAdjacency(beside.indptr, beside.indices)
+    """Order (n,) of the nodes by nested dissection."""
+    links = matrix.copy()
+    links.setdiag(0.0)
+    links.eliminate_zeros()
+    if links.nnz == 0:
+        return np.arange(links.shape[0])
+    adjacency = pymetis.CSRAdjacency(links.indptr, links.indices)
     return np.asarray(pymetis.nested_dissection(adjacency=adjacency)[0])
 
 
 def multigrid(matrix: sparse.csr_matrix) -> Solve:
-    """Conjugate gradients with a symmetric Ruge-Stuben V-cycle; NaN where 100 steps do not reach the given norm of the
-    residual. Thousands of pores without a link (a thin slab, a clogged pack) stay on the coarsest level, which
-    therefore is solved as the sparse system it is."""
+    """Conjugate gradients with a symmetric Ruge-Stuben V-cycle as the preconditioner.
+
+    The solution is NaN where 100 steps do not reach the given norm of the residual. Thousands of
+    pores without a link (in a thin slab, or a clogged pack) stay on the coarsest level, which is
+    therefore solved as a sparse system.
+    """
     cycle = ruge_stuben(matrix)
 
     def solve(source: Array, within: float) -> Array:
@@ -132,7 +165,7 @@ def multigrid(matrix: sparse.csr_matrix) -> Solve:
 
 
 def ruge_stuben(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
-    """One symmetric V-cycle of classical multigrid (Ruge and Stuben 1987), as a preconditioner."""
+    """One symmetric V-cycle of classical multigrid (Ruge and Stuben 1987) as a preconditioner."""
     levels = pyamg.ruge_stuben_solver(
         matrix,
         strength=("classical", {"theta": STRENGTH}),
@@ -153,21 +186,22 @@ def conjugate_gradients(
     within: float,
     steps: int | None = None,
 ) -> Array:
-    """Solution (n,) to a norm `within` of the residual (Hestenes and Stiefel 1952), NaN after `steps` (100) without.
+    """Solution (n,) whose residual has at most the norm `within` (Hestenes and Stiefel 1952).
 
-    Dot products without BLAS, whose threads would change the last digits and wait for each other.
+    It is NaN when `steps` steps (None: 100) do not suffice. Dot products are taken without BLAS,
+    whose threads would change the last digits and wait for each other.
     """
-    found, missing = np.zeros(len(source)), source.copy()
+    solution, missing = np.zeros(len(source)), source.copy()
     along, before = np.zeros(len(source)), 1.0
     for _ in range(steps or CG_STEPS):
         if np.sqrt(_dot(missing, missing)) <= within:
-            return found
+            return solution
         better = precondition(missing)
         gain = _dot(missing, better)
         along = better + (gain / before) * along
         turned = matrix @ along
         step = gain / _dot(along, turned)
-        found += step * along
+        solution += step * along
         missing -= step * turned
         before = gain
     return np.full(len(source), np.nan)
@@ -178,24 +212,29 @@ def _dot(one: Array, other: Array) -> float:
 
 
 def direct_memory(count: int) -> float:
-    """Bytes a direct solve of `count` pores takes: 55 n^1.41, measured on packs of 1e4 to 3e5 pores."""
+    """Bytes that a direct solve of n = `count` pores takes: 55 n^1.41.
+
+    Measured on packs of 1e4 to 3e5 pores.
+    """
     return DIRECT_BYTES * count**DIRECT_GROWTH
 
 
 def _check_memory(count: int) -> None:
+    """Raise FlowError when a direct solve of `count` pores would not fit into memory."""
     wanted, limit = direct_memory(count), min(MEMORY_CAP, MEMORY_SHARE * _free_memory())
     if wanted > limit:
         raise FlowError(
             f"solve of {count} pores: multigrid did not converge in {CG_STEPS} steps and a direct "
-            f"solve would take some {wanted / 1e9:.1f} GB of {limit / 1e9:.1f} GB; analyse a shorter specimen"
+            f"solve would take some {wanted / 1e9:.1f} GB of {limit / 1e9:.1f} GB; analyse a "
+            "shorter specimen"
         )
 
 
 def _free_memory() -> float:
-    """Bytes available now; infinite where the system does not say."""
-    told = Path("/proc/meminfo")
-    if told.exists():
-        rows = dict(row.split(":") for row in told.read_text().splitlines())
+    """Bytes that are free now; infinite where the system does not report it."""
+    report = Path("/proc/meminfo")
+    if report.exists():
+        rows = dict(row.split(":") for row in report.read_text().splitlines())
         return 1024.0 * float(rows["MemAvailable"].split()[0])
     try:
         return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))

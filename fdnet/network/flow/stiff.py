@@ -1,9 +1,12 @@
 """Pressures and fluxes of links whose conductances differ by any number of decades.
 
-A link (a, b) carries g (p_a - p_b + jump), jumps being whole numbers; node 0 and the first node of every further group
-have pressure 0. Links far more conductive than the way round that their nodes have (their critical conductance: the
-weakest link of the best closed way with a jump) show no pressure difference that a number could hold. Their nodes are
-contracted into one; their fluxes follow from the balance within the contracted group, where the same is done again.
+A link between the nodes a and b carries the flux g (p_a - p_b + jump); jumps are whole numbers.
+Node 0 and the first node of every further group have the pressure 0.
+
+The critical conductance of a node is that of the weakest link in the best closed loop with a jump
+through it. Links far more conductive than that are stiff: their pressure difference is smaller
+than a number can hold. Their nodes are contracted into one, and their fluxes follow from the
+balance within the contracted group, where the same is done again.
 """
 
 from dataclasses import dataclass
@@ -16,15 +19,25 @@ from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
 CONTRASTS = (1e8, 1e6, 1e10)
+"""Ratios of conductance between levels of stiffness, in the order in which they are tried."""
 STEP = 10.0
+"""Factor within which the critical conductance is determined."""
 SETTLED = 1e-9
+"""A balance of less defect is accepted."""
 MOST_SWEEPS = 30
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Balance:
-    """`pressure` (n,), `flux` (K,) from first to second end; `defect` sum of what the nodes' balances and the links'
-    own laws are off by, over the throughput: a bound for the relative error of the throughput; `method`."""
+    """Pressures of n nodes and fluxes of K links.
+
+    Attributes:
+        pressure: (n,) over the unit of the jumps.
+        flux: (K,) from the first to the second end, in units of conductance times jump.
+        defect: sum of the imbalances of the nodes and of the errors of the links' own equations,
+            over the throughput; it bounds the relative error of the throughput.
+        method: how the system was solved.
+    """
 
     pressure: Array
     flux: Array
@@ -36,7 +49,14 @@ class Balance:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Stage:
-    """The links (indices `links`) of one level, between nodes contracted to `label` (n,)."""
+    """The links of one level of stiffness; the nodes that higher levels join are one node.
+
+    Attributes:
+        links: (L,) indices of the links.
+        label: (n,) number of the contracted node of each node.
+        free: (m,) whether the pressure of each contracted node is unknown; else it is 0.
+        balances: the system of equations of the free nodes.
+    """
 
     links: Array
     label: Array
@@ -47,19 +67,26 @@ class _Stage:
 def balance_links(
     ends: Array, conductance: Array, jump: Array, count: int, *, direct_up_to: int | None = None
 ) -> Balance:
-    """Balance of all `count` nodes, every one of them in a group that winds.
+    """Balance of all nodes, every one of which must be in a group that winds.
 
-    `ends` (K, 2), `conductance` (K,) > 0, `jump` (K,). Solved with a contrast of 1e8 between the levels of stiffness;
-    where links of like conductance fall on both sides of that border and the sweeps do not settle, with another. The
-    best is returned, its `defect` for the caller to judge. `direct_up_to` nodes: see `Balances`.
+    The levels of stiffness differ by a contrast of 1e8. Where links of like conductance fall on
+    both sides of that border and the sweeps do not settle, another contrast is tried. The best
+    balance is returned, and the caller judges its `defect`.
+
+    Args:
+        ends: (K, 2) nodes that the links join.
+        conductance: (K,) above 0.
+        jump: (K,) of the links.
+        count: number of nodes.
+        direct_up_to: number of nodes up to which a direct solver is used, see `Balances`.
     """
-    found = []
+    tried = []
     for contrast in CONTRASTS:
         level = stiffness(ends, conductance, jump, count, contrast=contrast)
-        found.append(_balance(ends, conductance, jump, (level, count), direct_up_to))
-        if found[-1].defect <= SETTLED or not level.any():
+        tried.append(_balance(ends, conductance, jump, (level, count), direct_up_to))
+        if tried[-1].defect <= SETTLED or not level.any():
             break
-    return min(found, key=lambda one: one.defect)
+    return min(tried, key=lambda one: one.defect)
 
 
 def _balance(
@@ -69,9 +96,12 @@ def _balance(
     levels: tuple[Array, int],
     direct_up_to: int | None,
 ) -> Balance:
-    """Level by level, then again with what is left over: the imbalances, and the pressure differences within the
-    contracted groups, which the links beside them had not seen. Fluxes add up by increments, never as differences of
-    nearly equal pressures. `levels`: that of each link (K,), and the number of nodes."""
+    """Balance level by level, repeated for what is left over.
+
+    Left over are the imbalances, and the pressure differences within the contracted groups, which
+    the links next to them did not see. Fluxes add up by increments, never as differences of nearly
+    equal pressures. `levels` holds the level (K,) of each link and the number of nodes.
+    """
     level, count = levels
     stiff = level > 0
     height = (
@@ -80,7 +110,7 @@ def _balance(
         else np.zeros(count)
     )
     drive = jump + _difference(height, ends)
-    level = _with_those_beside(ends, level, count)
+    level = _with_inner_links(ends, level, count)
     parts = [_contracted(ends, level, at, count) for at in range(int(level.max(initial=0)) + 1)]
     stages = [_stage(ends, conductance, part, direct_up_to) for part in parts]
     pressure, flux, defect, allowed = height, np.zeros(len(ends)), np.inf, None
@@ -104,12 +134,13 @@ def _balance(
 def stiffness(
     ends: Array, conductance: Array, jump: Array, count: int, *, contrast: float = CONTRASTS[0]
 ) -> Array:
-    """Level (K,) of each link: 0 up to `contrast` times the critical conductance of its nodes, 1 up to its square, and
-    so on.
+    """Level (K,) of stiffness of each link.
 
-    A node's critical conductance is the greatest at which the links as good or better still join it to a closed way
-    with a jump (Ambegaokar, Halperin and Langer 1971), found within a factor of 10. No more than a few times that,
-    per unit of drive, flows through the node, so a link of level 1 takes some 1 / contrast of the drive at most.
+    It is 0 up to `contrast` times the critical conductance of the nodes, 1 up to its square times
+    that, and so on. The critical conductance of a node is the greatest at which the links that are
+    as good or better still join it to a closed loop with a jump (Ambegaokar, Halperin and Langer
+    1971); it is determined within a factor of 10. No more than a few times that flows through the
+    node per unit of drive, so a link of level 1 takes at most some 1 / contrast of the drive.
     """
     level = np.zeros(len(ends), int)
     lowest, highest = float(conductance.min(initial=1.0)), float(conductance.max(initial=1.0))
@@ -127,8 +158,8 @@ def stiffness(
     return np.maximum(np.ceil(np.log(ratio) / np.log(contrast)).astype(int) - 1, 0)
 
 
-def _with_those_beside(ends: Array, level: Array, count: int) -> Array:
-    """The levels (K,), where a link between nodes that higher levels contract into one is raised to these."""
+def _with_inner_links(ends: Array, level: Array, count: int) -> Array:
+    """The levels (K,), raised for links between nodes that higher levels contract into one."""
     level = level.copy()
     for at in range(int(level.max(initial=0))):
         label = groups(ends[level > at], count)
@@ -137,13 +168,14 @@ def _with_those_beside(ends: Array, level: Array, count: int) -> Array:
 
 
 def _contracted(ends: Array, level: Array, at: int, count: int) -> tuple[Array, Array]:
-    """The links of level `at`, and the nodes' labels where all higher levels are contracted."""
+    """Links of level `at`, and labels (n,) of the nodes with all higher levels contracted."""
     return np.flatnonzero(level == at), groups(ends[level > at], count)
 
 
 def _stage(
     ends: Array, conductance: Array, contracted: tuple[Array, Array], direct_up_to: int | None
 ) -> _Stage:
+    """The stage of links and labels as `_contracted` gives them."""
     links, label = contracted
     pair, size = label[ends[links]], int(label.max(initial=-1)) + 1
     free = np.ones(size, bool)
@@ -166,18 +198,21 @@ def _sweep(
     drive: Array,
     state: tuple[Array, float | None],
 ) -> tuple[Array, Array, Array]:
-    """Increments of pressure (n,) and flux (K,) for what drives the links and what the nodes lack, and the drive
-    (K,) that the levels within have since set up for the links above. `state` is the net flux (n,) out of each node
-    and the sum of imbalances that may stay."""
+    """Increments of pressure (n,) and flux (K,), and the drive (K,) left for the next sweep.
+
+    The increments balance what drives the links, `drive` (K,), and what the nodes lack. The drive
+    that is left is what the lower stages have since set up for the stiffer links. `state` holds
+    the net flux (n,) out of each node, and the sum of imbalances that may stay.
+    """
     net, allowed = state
     flux, late, steps = np.zeros(len(ends)), np.zeros(len(ends)), []
     for stage in stages:
         own, pushed = conductance[stage.links], drive[stage.links]
         net = net + _net(ends[stage.links], own * pushed, len(net))
         lack = np.bincount(stage.label, weights=-net, minlength=len(stage.free))
-        found = np.zeros(len(stage.free))
-        found[stage.free] = stage.balances.solve(lack[stage.free], imbalance=allowed)
-        steps.append(found[stage.label])
+        pressure = np.zeros(len(stage.free))
+        pressure[stage.free] = stage.balances.solve(lack[stage.free], imbalance=allowed)
+        steps.append(pressure[stage.label])
         gain = own * _difference(steps[-1], ends[stage.links])
         net = net + _net(ends[stage.links], gain, len(net))
         flux[stage.links] = gain + own * pushed
@@ -188,6 +223,7 @@ def _sweep(
 
 
 def _difference(pressure: Array, ends: Array) -> Array:
+    """Pressure difference (K,) along each link."""
     return pressure[ends[:, 0]] - pressure[ends[:, 1]]
 
 
@@ -199,5 +235,6 @@ def _net(ends: Array, flux: Array, count: int) -> Array:
 
 
 def _defect(net: Array, late: Array, throughput: float) -> float:
+    """Imbalances of nodes `net` (n,) and of links `late` (K,) over the throughput."""
     off = float(np.abs(net).sum() + np.abs(late).sum())
     return off / throughput if throughput > 0 else np.inf

@@ -1,7 +1,10 @@
-"""Which groups of links lead round: from plane to plane, or once around the period.
+"""Which groups of links carry flow: from plane to plane, or once around the period.
 
-A link (a, b) carries g (p_a - p_b + jump). Planes are one node of pressure 0; a link from the inlet plane has jump 1.
-A group whose jumps can be taken up by the pressures alone carries nothing; one that has a closed way with a jump winds.
+A link between the nodes a and b carries the flux g (p_a - p_b + jump), with its conductance g and
+the pressures p. The two planes are one node of pressure 0, and a link from the inlet plane has the
+jump 1. Where x is periodic, a link across the period has a jump. A group of links is said to wind
+when it has a closed loop whose jumps do not add up to 0. A group that does not wind carries
+nothing: pressures can be chosen that cancel all its jumps.
 """
 
 import numpy as np
@@ -12,7 +15,10 @@ from fdnet.spheres.snapshot import Array
 
 
 def groups(ends: Array, count: int) -> Array:
-    """Group (n,) of each node, numbered in the order of the nodes, by links `ends` (K, 2)."""
+    """Number (n,) of the connected group of each of `count` nodes, in the order of the nodes.
+
+    `ends` (K, 2) are the nodes that the links join.
+    """
     graph = sparse.coo_matrix(
         (np.ones(len(ends), np.int8), (ends[:, 0], ends[:, 1])), shape=(count, count)
     )
@@ -20,10 +26,10 @@ def groups(ends: Array, count: int) -> Array:
 
 
 def heights(ends: Array, jump: Array, group: Array) -> Array:
-    """Pressures (n,) that take up the jump of every link of a spanning forest: height_b = height_a + jump.
+    """Pressures (n,) that cancel the jump of every link of a spanning forest: p_b = p_a + jump.
 
-    The forest is found breadth first in the graph of nodes and links, both as vertices, from the first node of each
-    `group` (n,), so that parallel links stay apart.
+    The forest is made breadth first from the first node of each `group` (n,), in a graph whose
+    vertices are the nodes and the links, so that parallel links remain distinct.
     """
     count, links = len(group), len(ends)
     root = count + links
@@ -49,7 +55,7 @@ def heights(ends: Array, jump: Array, group: Array) -> Array:
 
 
 def winding_groups(ends: Array, jump: Array, count: int) -> tuple[Array, Array]:
-    """Group (n,) of each node, and whether its group winds (n,)."""
+    """Connected group (n,) of each of `count` nodes, and whether that group winds (n,)."""
     group = groups(ends, count)
     height = heights(ends, jump, group)
     left = jump + height[ends[:, 0]] - height[ends[:, 1]]

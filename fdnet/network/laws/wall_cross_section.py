@@ -8,10 +8,10 @@ Discs and wall share the fluid as in `cross_section`. The line midway between th
 is a hyperbola. The line midway between the rim of i (radius rho, centre H above the wall) and the
 wall is a parabola: on the ray at the angle t from the normal of the wall it lies at the distance
 (H + rho) / (1 + cos t) from the centre; at the distance x from the foot of i its height above the
-wall is (x^2 + H^2 - rho^2) / (2 (H + rho)). The lines meet in the centre of the circle that touches
-discs and wall. The share of the wall is a plane film, with the flux y^3 / 3 per length for a film
-of thickness y. Where that centre lies outside the trapezoid, every ray still ends at the nearest of
-these lines or of the sides of the trapezoid, so no share is negative and none is missing.
+wall is (x^2 + H^2 - rho^2) / (2 (H + rho)). The lines meet in the centre of the circle that
+touches discs and wall. The share of the wall is a plane film, with the flux y^3 / 3 per length for
+a film of thickness y. Where that centre lies outside the trapezoid, every ray still ends at the
+nearest of these lines or of the sides of the trapezoid: no share is negative, none is missing.
 """
 
 import numpy as np
