@@ -1,6 +1,6 @@
 """What the analysis of a specimen gives."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from fdnet.network.fines.occupancy import Occupancy
@@ -87,3 +87,13 @@ class Analysis:
             f"{pores} pores, {throats} throats, {len(self.sections)} sections, "
             f"law={self.law}, damage_law={self.damage_law})"
         )
+
+
+def worst_solve(flows: Sequence[Flow]) -> dict[str, str | float | None]:
+    """Method of the first solve, and the worst residual and mass balance of all."""
+    balances = [flow.mass_balance for flow in flows if flow.mass_balance is not None]
+    return {
+        "method": flows[0].method,
+        "residual": max(flow.residual for flow in flows),
+        "mass_balance": max(balances) if balances else None,
+    }

@@ -10,7 +10,7 @@ from typing import Unpack
 import numpy as np
 
 from fdnet.case.analysis import AnalysisChoices, AnalysisKeys
-from fdnet.network.analysis import Analysis
+from fdnet.network.analysis import Analysis, worst_solve
 from fdnet.network.fines.occupancy import Occupancy
 from fdnet.network.flow.flow import Flow
 from fdnet.network.flow.sections import Section, make_profile, make_sections, reduction
@@ -202,7 +202,7 @@ def _analysis(
         invasion_depth=invaded.depth,
         invasion_depth_p95=invaded.depth_p95,
         cake_thickness=invaded.cake_thickness,
-        solver=_worst([clean.flow, base.flow, final.flow, *clean_slabs.flows, *slabs.flows]),
+        solver=worst_solve([clean.flow, base.flow, final.flow, *clean_slabs.flows, *slabs.flows]),
         counts=_counts(base, specimen.occupancy, damage, final.flow),
         warnings=tuple(log.warnings),
         seconds=log.seconds,
@@ -283,15 +283,6 @@ def _warn(
             f"none of the {occupancy.counts['fines_outside_box']} fines is centred in the box: "
             "no pore holds any; check the box if some should"
         )
-
-
-def _worst(flows: list[Flow]) -> dict[str, str | float | None]:
-    balances = [flow.mass_balance for flow in flows if flow.mass_balance is not None]
-    return {
-        "method": flows[0].method,
-        "residual": max(flow.residual for flow in flows),
-        "mass_balance": max(balances) if balances else None,
-    }
 
 
 def _counts(
