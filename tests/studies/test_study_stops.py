@@ -50,7 +50,8 @@ def stop(command: list[str], ready: Callable[[], bool], sign: int, **given) -> t
     deadline = time.monotonic() + 60
     while process.poll() is None and not ready() and time.monotonic() < deadline:
         time.sleep(0.01)
-    assert process.poll() is None and ready(), process.communicate()[1]
+    assert process.poll() is None, process.communicate()[1]
+    assert ready()
     process.send_signal(sign)
     deadline = time.monotonic() + WITHIN_S
     while alive(mark) and time.monotonic() < deadline:
