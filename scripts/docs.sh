@@ -31,7 +31,10 @@ if [ "$(cat .venv/.fdnet-docs 2>/dev/null)" != "$stamp" ]; then
     printf '%s\n' "$stamp" >.venv/.fdnet-docs
 fi
 rm -rf docs/_build
-PATH="$PWD/.venv/bin:$PATH" FDNET_DOCS_EXECUTE="$execute" \
-    .venv/bin/python -m sphinx -j 2 -b html -W --keep-going -q docs docs/_build/html
+export PATH="$PWD/.venv/bin:$PATH" FDNET_DOCS_EXECUTE="$execute"
+export IPYTHONDIR="$PWD/docs/_build/ipython" JUPYTER_RUNTIME_DIR="$PWD/docs/_build/jupyter"
+# What is left out of the messages: that the tutorials' Python listens on this machine unencrypted.
+.venv/bin/python -m sphinx -j 2 -b html -W --keep-going -q docs docs/_build/html \
+    2> >(grep -v 'IPKernelApp.*without encryption' >&2)
 .venv/bin/python docs/_ext/check_links.py docs/_build/html
 echo "docs: docs/_build/html/index.html"
