@@ -4,9 +4,8 @@
     .venv/bin/python scripts/stokes_truth.py make
     .venv/bin/python scripts/stokes_truth.py solve PACK.csv --cells 128 192 --axis x
 
-`make [NAME ...]` writes packs from their seeds to --packs. `solve` runs pack files (x, y, z,
-radius, kind in mm, the periodic edge in the first line) grid by grid. Every finished grid is one
-row of --grids and is not run again; --csv is written anew after each. Method: docs/stokes.md.
+`make [NAME ...]` writes packs from their seeds. `solve` runs pack files grid by grid: a finished
+grid is a row of --grids and is not run again. Method and checks: docs/stokes.md.
 """
 
 import argparse
@@ -40,8 +39,6 @@ if __name__ == "__main__":
     if given.pop("verb") == "make":
         make(given["names"], given["packs"])
     else:
-        files = given.pop("files")
-        for path in files:
-            solve(
-                path, Solve(**given, command=shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]))
-            )
+        command = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
+        for path in given.pop("files"):
+            solve(path, Solve(**given, command=command))

@@ -17,6 +17,7 @@ from fdnet.spheres.porosity import Porosity, measure_porosity
 from fdnet.spheres.snapshot import Array, Snapshot
 
 MOVED = 1e-9
+"""A grain that is displaced by more than this, m, has moved."""
 """Smallest displacement of a grain that counts as a move, m."""
 
 
@@ -112,6 +113,7 @@ def _same_grains(before: Snapshot, after: Snapshot) -> Snapshot:
 
 
 def _displaced(before: Snapshot, after: Snapshot, periodic: tuple[bool, bool, bool]) -> bool:
+    """Whether any grain moved; whole periods do not count."""
     size = before.box[:, 1] - before.box[:, 0]
     shift = after.position - before.position
     shift = shift - np.where(periodic, np.round(shift / size) * size, 0.0)

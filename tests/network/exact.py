@@ -45,9 +45,10 @@ def exact_balance(ends: Array, conductance: Array, jump: Array, count: int) -> t
 def random_links(
     seed: int, *, decades: float, period: bool, count: int = 16
 ) -> tuple[Array, Array, Array]:
-    """Links of a random tree with as many more between random nodes, conductances log-uniform over `decades`.
+    """Links of a random tree, and as many more between random nodes.
 
-    Planes: node 0 is both, a third of its links come from the inlet plane. Period: jumps of -1, 0 or 1 on some links.
+    Conductances are log-uniform over `decades`. Between planes, node 0 is both planes and a third
+    of its links come from the inlet plane. With a period, some links have jumps of -1, 0 or 1.
     """
     rng = np.random.default_rng(seed)
     tree = [(int(rng.integers(node)), node) for node in range(1, count)]

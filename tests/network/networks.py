@@ -9,7 +9,10 @@ from fdnet.spheres.snapshot import Array, frozen
 def network_of(
     position: Array, pairs: Array, box: Array, *, radius: float = 0.1, **given: object
 ) -> Network:
-    """Pores at `position` (P, 3) joined by throats `pairs` (T, 2), not periodic; `given` fields replace the zeros."""
+    """Pores at `position` (P, 3) joined by throats `pairs` (T, 2), not periodic.
+
+    The fields of `given` replace the zeros.
+    """
     position, pairs = np.asarray(position, float), np.asarray(pairs, int)
     pores, throats = len(position), len(pairs)
     ends = position[pairs]
@@ -62,7 +65,10 @@ def chain(count: int, *, step: float = 1.0) -> Network:
 
 
 def random_network(count: int = 30, *, seed: int = 3) -> tuple[Network, Array]:
-    """Random pores with three links each and log-uniform conductances over six decades; some pores on the faces."""
+    """Random pores with three links each, and log-uniform conductances over six decades.
+
+    Some pores lie on the faces.
+    """
     rng = np.random.default_rng(seed)
     position = rng.random((count, 3))
     position[:4, 0], position[4:8, 0] = 0.0, 1.0

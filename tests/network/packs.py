@@ -1,4 +1,4 @@
-"""Packs made in code: lattices with known porosity, random packs without and with fines (lengths in m)."""
+"""Packs made in code: lattices of known porosity, random packs, fines (lengths in m)."""
 
 from functools import cache
 
@@ -50,7 +50,7 @@ def random_pack(
     spread: float = 0.0,
     aspect: float = 1.0,
 ) -> Snapshot:
-    """Random pack of radius about 1 relaxed from overlap; box aspect x : y : z = aspect : 1 : 1."""
+    """Random pack of radii about 1, relaxed from overlap, in a box of aspect : 1 : 1."""
     rng = np.random.default_rng(seed)
     radius = 1.0 + spread * (2.0 * rng.random(count) - 1.0)
     edge = (4.0 / 3.0 * np.pi * np.sum(radius**3) / solid / aspect) ** (1.0 / 3.0)
@@ -81,11 +81,14 @@ def _push(position: Array, radius: Array, size: Array, periodic: bool) -> Array:
 
 
 def with_fines(grains: Snapshot, count: int, radius: float, *, seed: int = 5) -> Snapshot:
-    """`grains` and `count` fines set on the grain surfaces at random, away from other grains, x inside the box."""
+    """`grains` and `count` fines at random on their surfaces, away from other grains.
+
+    The fines are centred in the box.
+    """
     rng = np.random.default_rng(seed)
     size = grains.box[:, 1] - grains.box[:, 0]
-    found: list[Array] = []
-    while len(found) < count:
+    places: list[Array] = []
+    while len(places) < count:
         host = rng.integers(len(grains))
         normal = rng.normal(size=3)
         place = grains.position[host] + normal / np.linalg.norm(normal) * (
@@ -95,6 +98,6 @@ def with_fines(grains: Snapshot, count: int, radius: float, *, seed: int = 5) ->
         apart = grains.position - place
         apart -= size * np.round(apart / size)
         if np.all(np.linalg.norm(apart, axis=1) >= grains.radius + 0.999 * radius):
-            found.append(place)
-    fines = snapshot(np.array(found), radius, grains.box, Kind.FINE)
+            places.append(place)
+    fines = snapshot(np.array(places), radius, grains.box, Kind.FINE)
     return grains.joined(fines)

@@ -1,4 +1,7 @@
-"""Pieces of balls in tetrahedra: closed forms, and the `overlap` package (another decomposition) everywhere else."""
+"""Pieces of balls in tetrahedra: closed forms, and elsewhere the `overlap` package.
+
+That package uses another decomposition.
+"""
 
 import numpy as np
 import pytest
@@ -11,11 +14,11 @@ CORNER = np.array([[0, 0, 0], [50, 0, 0], [0, 50, 0], [0, 0, 50.0]])
 
 
 def piece(corner, centre, radius=1.0):
-    found, one = np.zeros((1, 3)), np.zeros(1, np.intp)
+    filled, one = np.zeros((1, 3)), np.zeros(1, np.intp)
     balls = (np.array([centre], float), np.array([float(radius)]), np.array([[7.0]]))
-    fill_pieces(np.array([corner], float), (one, one), balls, found)
-    assert found[0, 2] == 7.0 * found[0, 0]
-    return found[0, 0], found[0, 1]
+    fill_pieces(np.array([corner], float), (one, one), balls, filled)
+    assert filled[0, 2] == 7.0 * filled[0, 0]
+    return filled[0, 0], filled[0, 1]
 
 
 def oriented(corner):

@@ -29,8 +29,8 @@ def zick_homsy(solid, drag):
 
 @pytest.mark.parametrize(("law", "ratio"), [("series", 1.07), ("hydraulic", 0.97)])
 def test_touching_simple_cubic_against_stokes(law, ratio):
-    found = permeability(simple_cubic(), law) / zick_homsy(np.pi / 6, 42.1)
-    assert found == pytest.approx(
+    measured = permeability(simple_cubic(), law) / zick_homsy(np.pi / 6, 42.1)
+    assert measured == pytest.approx(
         ratio, abs=0.015
     )  # ratios measured apart, by another code of these rules
 
@@ -40,14 +40,14 @@ def test_touching_simple_cubic_against_stokes(law, ratio):
     [("series", 1.00), ("hydraulic", 1.02), ("thesis", 0.27), ("effective", 1.04)],
 )
 def test_touching_body_centred_against_stokes(law, ratio):
-    found = permeability(body_centred(), law) / zick_homsy(np.pi * np.sqrt(3) / 8, 162.9)
-    assert found == pytest.approx(ratio, abs=0.015)
+    measured = permeability(body_centred(), law) / zick_homsy(np.pi * np.sqrt(3) / 8, 162.9)
+    assert measured == pytest.approx(ratio, abs=0.015)
 
 
 @pytest.mark.parametrize(("law", "ratio"), [("series", 1.38), ("hydraulic", 0.92)])
 def test_touching_face_centred_against_stokes(law, ratio):
-    found = permeability(face_centred(), law) / zick_homsy(np.pi / np.sqrt(18), 435.0)
-    assert found == pytest.approx(ratio, abs=0.015)
+    measured = permeability(face_centred(), law) / zick_homsy(np.pi / np.sqrt(18), 435.0)
+    assert measured == pytest.approx(ratio, abs=0.015)
 
 
 @pytest.mark.parametrize(("solid", "drag", "ratio"), [(0.343, 15.4, 1.97), (0.45, 28.1, 1.36)])
@@ -101,7 +101,7 @@ def test_closed_throats_conduct_nothing_in_any_law(law):
 
 @pytest.mark.parametrize("spread", [0.0, 0.33])
 def test_pyramids_to_the_power_centres_take_up_every_grain_once(spread):
-    """Their solid angles at a grain add up to 4 pi, so their apexes are the same points for all facets."""
+    """Their solid angles at a grain add up to 4 pi, so all facets have the same apexes."""
     pack = random_pack(80, spread=spread)
     network = build_network(pack, periodic=ALL)
     base = geometry.flat(network.throat_corner)

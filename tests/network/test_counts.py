@@ -27,7 +27,7 @@ def pierced_by_all(network, pack):
         * pack.box[:, 1]
     )
     images, radius = (pack.position[:, None] + steps).reshape(-1, 3), np.repeat(pack.radius, 125)
-    found = 0
+    pierced = 0
     for corner, own, gap in zip(
         network.throat_corner, network.throat_corner_radius, network.throat_radius, strict=True
     ):
@@ -38,8 +38,8 @@ def pierced_by_all(network, pack):
         covered = np.any(
             np.linalg.norm(point[:, None] - images[near], axis=2) < radius[near], axis=1
         )
-        found += bool(gap > 0 and np.any(free & covered))
-    return found
+        pierced += bool(gap > 0 and np.any(free & covered))
+    return pierced
 
 
 @pytest.mark.parametrize("spread", [0.0, 0.9])

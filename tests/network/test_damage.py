@@ -41,7 +41,7 @@ def carman_kozeny(porosity, fine):
 
 
 def test_thesis_law_by_throat_porosity():
-    found = damaged("thesis", occupancy([1.0, 0.8, 0.4, 0.39, 0.2, -0.1]))
+    damage = damaged("thesis", occupancy([1.0, 0.8, 0.4, 0.39, 0.2, -0.1]))
     expected = [
         CLEAN,
         CLEAN * 0.64,
@@ -50,8 +50,8 @@ def test_thesis_law_by_throat_porosity():
         carman_kozeny(0.2, 0.02),
         0.0,
     ]
-    assert found.conductance == pytest.approx(expected, rel=1e-12, abs=1e-18)
-    assert found.law_used.tolist() == [
+    assert damage.conductance == pytest.approx(expected, rel=1e-12, abs=1e-18)
+    assert damage.law_used.tolist() == [
         "clean",
         "deposition",
         "deposition",
@@ -59,7 +59,7 @@ def test_thesis_law_by_throat_porosity():
         "clogging",
         "clogging",
     ]
-    assert found.counts["throats_filled"] == 1
+    assert damage.counts["throats_filled"] == 1
 
 
 def test_thresholds_of_text_and_code_and_by_choice():
@@ -79,31 +79,31 @@ def test_middle_band_is_decided_by_where_the_fines_lie():
 
 
 def test_blocked_throat_is_closed_whatever_its_porosity():
-    found = damaged("thesis", occupancy([0.9, 0.9], blocked=[True, False]))
-    assert found.conductance == pytest.approx([0.0, CLEAN * 0.81])
-    assert found.law_used[0] == "blocked"
+    damage = damaged("thesis", occupancy([0.9, 0.9], blocked=[True, False]))
+    assert damage.conductance == pytest.approx([0.0, CLEAN * 0.81])
+    assert damage.law_used[0] == "blocked"
 
 
 def test_clogging_never_exceeds_the_clean_throat():
-    found = damaged("thesis", occupancy([0.39], fine=1.0))
+    damage = damaged("thesis", occupancy([0.39], fine=1.0))
     assert carman_kozeny(0.39, 1.0) > CLEAN
-    assert found.conductance[0] == CLEAN
-    assert found.counts["capped"] == 1
+    assert damage.conductance[0] == CLEAN
+    assert damage.counts["capped"] == 1
 
 
 def test_kozeny_is_the_harmonic_mean_of_two_pores():
     state = occupancy([1.0], solid=np.array([0.2, 0.0]), surface=np.array([0.5, 0.0]))
     factor = 0.8**3 / 1.5**2
-    found = damaged("kozeny", state)
-    assert found.conductance[0] == pytest.approx(CLEAN * 2 * factor / (1 + factor))
-    assert found.law_used[0] == "kozeny"
+    damage = damaged("kozeny", state)
+    assert damage.conductance[0] == pytest.approx(CLEAN * 2 * factor / (1 + factor))
+    assert damage.law_used[0] == "kozeny"
 
 
 def test_kozeny_closes_a_filled_pore_and_counts_it():
-    found = damaged("kozeny", occupancy([1.0, 1.0], solid=np.array([1.0, 0.0, 0.0]), surface=0.1))
-    assert found.conductance == pytest.approx([0.0, CLEAN])
-    assert found.counts["pores_filled"] == 1
-    assert found.law_used.tolist() == ["blocked", "clean"]
+    damage = damaged("kozeny", occupancy([1.0, 1.0], solid=np.array([1.0, 0.0, 0.0]), surface=0.1))
+    assert damage.conductance == pytest.approx([0.0, CLEAN])
+    assert damage.counts["pores_filled"] == 1
+    assert damage.law_used.tolist() == ["blocked", "clean"]
 
 
 @pytest.mark.parametrize("options", [{"clogging_threshold": 1.2}, {"middle_band": "guess"}])

@@ -1,4 +1,4 @@
-"""Flow through networks small enough to know the answer, and the same answer another way."""
+"""Flow through networks small enough to know the answer, and by a second method."""
 
 import numpy as np
 import pytest
@@ -117,14 +117,14 @@ def test_slab_of_a_period_is_the_slab_of_the_middle_copy(law, span):
     one = build_network(pack, periodic=(True,) * 3)
     three = build_network(three_in_a_row(pack), periodic=(False, True, True))
     low, high = np.array(span) * edge
-    found = solve_flow(one, LAWS[law](one), span=(low, high)).inflow
-    assert found == pytest.approx(
+    inflow = solve_flow(one, LAWS[law](one), span=(low, high)).inflow
+    assert inflow == pytest.approx(
         solve_flow(three, LAWS[law](three), span=(low + edge, high + edge)).inflow, rel=1e-5
     )
 
 
 def test_period_of_a_pack_is_the_limit_of_many_periods_between_planes():
-    """Three copies in a row between pressure planes: the middle one takes what the period takes."""
+    """Of three copies in a row between pressure planes the middle one takes the period's flow."""
     pack = random_pack(50)
     edge = pack.box[0, 1]
     one = build_network(pack, periodic=(True,) * 3)
@@ -146,7 +146,10 @@ def test_period_without_a_way_round_is_zero():
 
 @pytest.mark.parametrize(("turns", "inflow"), [((1, 1), 0.0), ((1, 0), 0.5)])
 def test_period_across_and_back_is_no_way_round(turns, inflow):
-    """Two throats of 1 in parallel that both cross the x face close no way; if one does not, they are in series."""
+    """Two throats of 1 in parallel that both cross the x face close no loop.
+
+    If one of them does not cross it, they are in series.
+    """
     shift = np.array([[turn, 0, 0] for turn in turns])
     network = network_of(
         [[0.2, 0, 0], [0.8, 0, 0]],
@@ -162,13 +165,13 @@ def test_period_across_and_back_is_no_way_round(turns, inflow):
 
 
 def test_slab_without_a_path_has_no_k_though_its_neighbours_do():
-    """The middle throat of three is closed: the whole is 0, so are all slabs that hold it, in place and cut out."""
+    """The middle throat of three is closed, so the whole and all slabs that hold it have k = 0."""
     network, g = chain(3), np.array([1.0, 0.0, 1.0])
-    found = [
+    k = [
         slab_permeability(network, g, span)[0]
         for span in ((0.0, 0.9), (0.9, 2.1), (1.2, 1.8), (2.1, 3.0))
     ]
-    assert found == pytest.approx([1.0, 0.0, 0.0, 1.0])
+    assert k == pytest.approx([1.0, 0.0, 0.0, 1.0])
     assert inplace_permeability(
         network, solve_flow(network, g), np.array([0.0, 0.9, 3.0])
     ).tolist() == [0.0, 0.0]

@@ -39,10 +39,10 @@ def test_touching_sphere_of_unequal_spheres_touches_each():
     rng = np.random.default_rng(2)
     radius = rng.uniform(0.6, 1.0, (50, 4))
     corner = TOUCHING * 1.3 + rng.normal(0, 0.1, (50, 4, 3))
-    centre, found = geometry.touching_sphere(corner, radius)
+    centre, touching = geometry.touching_sphere(corner, radius)
     gap = np.linalg.norm(corner - centre[:, None], axis=2) - radius
-    assert gap == pytest.approx(np.repeat(found[:, None], 4, axis=1), abs=1e-10)
-    assert np.all(found > 0)
+    assert gap == pytest.approx(np.repeat(touching[:, None], 4, axis=1), abs=1e-10)
+    assert np.all(touching > 0)
 
 
 def test_no_sphere_touches_where_discs_cover_the_gap():
@@ -66,10 +66,8 @@ def test_lens_of_discs_against_a_fine_grid():
     ):
         x, y = np.meshgrid(np.linspace(-1, 1.7, 1351), np.linspace(-1, 1, 1001))
         both = (x**2 + y**2 < first**2) & ((x - apart) ** 2 + y**2 < second**2)
-        found = geometry.disc_lens_area(np.array([first]), np.array([second]), np.array([apart]))[
-            0
-        ]
-        assert found == pytest.approx(both.sum() * 0.002**2, abs=2e-3)
+        area = geometry.disc_lens_area(np.array([first]), np.array([second]), np.array([apart]))[0]
+        assert area == pytest.approx(both.sum() * 0.002**2, abs=2e-3)
 
 
 def test_overlapping_pair_is_counted_once_in_the_tetrahedron():
@@ -79,10 +77,10 @@ def test_overlapping_pair_is_counted_once_in_the_tetrahedron():
     share = rng.dirichlet(np.ones(4), 400_000)
     point = share @ TOUCHING
     solid = np.any(np.linalg.norm(point[:, None] - TOUCHING, axis=2) < radius, axis=1).mean()
-    found = solid_in_tetrahedra(TOUCHING[None], radius[None])[0][0] / abs(
+    share = solid_in_tetrahedra(TOUCHING[None], radius[None])[0][0] / abs(
         geometry.signed_volume(TOUCHING)
     )
-    assert found == pytest.approx(solid, abs=4 * np.sqrt(0.25 / 400_000))
+    assert share == pytest.approx(solid, abs=4 * np.sqrt(0.25 / 400_000))
 
 
 def test_open_area_between_overlapping_discs_against_a_fine_grid():

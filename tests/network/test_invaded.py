@@ -25,10 +25,10 @@ def cake(fines, *, periodic=(False,) * 3):
 
 def test_chain_of_fines_on_a_grain_is_the_cake():
     """Three fines in a row from the grain's front at x = 0; a fourth apart from them."""
-    found = cake([[-0.1, 2, 2], [-0.3, 2, 2], [-0.5, 2, 2], [-0.75, 2, 2]])
-    assert found.cake_thickness == pytest.approx(0.6)
-    assert found.count == 0
-    assert found.depth == found.depth_p95 == 0.0
+    invaded = cake([[-0.1, 2, 2], [-0.3, 2, 2], [-0.5, 2, 2], [-0.75, 2, 2]])
+    assert invaded.cake_thickness == pytest.approx(0.6)
+    assert invaded.count == 0
+    assert invaded.depth == invaded.depth_p95 == 0.0
 
 
 @pytest.mark.parametrize(("gap", "thickness"), [(0.0019, 0.4019), (0.0021, 0.2)])

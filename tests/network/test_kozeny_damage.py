@@ -50,14 +50,14 @@ def even_state(network, *, volume, surface, layer=1e3, fine=0.0):
 
 def factor(network, state):
     clean = LAWS["lubrication"](network)
-    found = DAMAGE_LAWS["side-kozeny"](network, state, clean)
-    return found, found.conductance / clean
+    damage = DAMAGE_LAWS["side-kozeny"](network, state, clean)
+    return damage, damage.conductance / clean
 
 
 def test_no_fines_leave_everything_as_it_is(network):
-    found, kept = factor(network, even_state(network, volume=0.0, surface=0.0))
+    damage, kept = factor(network, even_state(network, volume=0.0, surface=0.0))
     assert kept == pytest.approx(1.0, abs=1e-14)
-    assert set(found.law_used) == {"clean"}
+    assert set(damage.law_used) == {"clean"}
 
 
 def test_an_even_bed_gives_the_kozeny_factor_everywhere(network):
@@ -78,9 +78,9 @@ def test_fines_inside_grains_never_raise_a_conductance(network, pack, law):
     grains = pack.grains()
     fines = snapshot(grains.position, 0.1, pack.box, Kind.FINE)
     clean = LAWS["lubrication"](network)
-    found = DAMAGE_LAWS[law](network, measure_occupancy(network, fines), clean)
-    assert np.all(found.conductance <= clean * (1.0 + 1e-12))
-    assert law != "side-kozeny" or found.counts["layers_within_grains"] > 100
+    damage = DAMAGE_LAWS[law](network, measure_occupancy(network, fines), clean)
+    assert np.all(damage.conductance <= clean * (1.0 + 1e-12))
+    assert law != "side-kozeny" or damage.counts["layers_within_grains"] > 100
 
 
 def test_fines_larger_than_a_pore_count_by_the_whole_pore(network):
@@ -91,10 +91,10 @@ def test_fines_larger_than_a_pore_count_by_the_whole_pore(network):
 
 
 def test_filled_pores_are_closed_and_counted(network):
-    found, kept = factor(network, even_state(network, volume=1.0, surface=1.0))
+    damage, kept = factor(network, even_state(network, volume=1.0, surface=1.0))
     assert not kept.any()
-    assert found.counts["pores_filled"] == len(network.pore_volume)
-    assert set(found.law_used) == {"blocked"}
+    assert damage.counts["pores_filled"] == len(network.pore_volume)
+    assert set(damage.law_used) == {"blocked"}
 
 
 def test_resistances_in_series_are_raised_side_by_side():
@@ -215,7 +215,7 @@ def test_a_side_filled_by_its_fines_closes_the_throat_though_its_pore_is_open(ne
     state = even_state(network, volume=0.3, surface=1.0)
     throat = int(np.argmax(network.throat_heights.min(axis=1)))
     state.side_solid_volume[throat, 0] = 1.01 * side_voids(network)[0][throat, 0]
-    found, kept = factor(network, state)
+    damage, kept = factor(network, state)
     assert kept[throat] == 0
     assert np.sum(kept == 0) == 1
-    assert (found.counts["pores_filled"], found.counts["sides_filled"]) == (0, 1)
+    assert (damage.counts["pores_filled"], damage.counts["sides_filled"]) == (0, 1)

@@ -1,4 +1,4 @@
-"""Resistance by extended lubrication theory: exact hyperboloids, sections by symmetry, lattices and packs."""
+"""Resistance by lubrication theory: exact hyperboloids, symmetry, lattices and packs."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,10 @@ from fdnet.network.laws.wedge import ratio_table
     ("opening", "bound"), [(0.99, 1e-3), (0.9, 2e-3), (0.7, 0.015), (0.3, 0.05), (0.03, 0.08)]
 )
 def test_tube_rule_against_the_exact_hyperboloid(opening: float, bound: float) -> None:
-    """Exact: 3 / (c^3 (1 - q)^2 (1 + 2 q)), focal distance c = 1, q = cosine of the asymptote's angle to the plane."""
+    """Exact: 3 / (c^3 (1 - q)^2 (1 + 2 q)) with the focal distance c = 1.
+
+    q is the cosine of the angle between the asymptote and the plane.
+    """
     neck = np.sqrt(1.0 - opening**2)
     z = np.sinh(np.linspace(0.0, 12.0, 6001)) * opening
     narrow = 1.0 / (neck * np.sqrt(1.0 + (z / opening) ** 2))
@@ -55,7 +58,7 @@ def test_unequal_rule_with_equal_discs_is_the_equal_rule(side: tuple[float, floa
 
 
 def test_a_disc_in_the_shadow_of_two_still_leaves_a_flux() -> None:
-    """A small disc close to the line between two large ones: the signed wedges add up to less than nothing."""
+    """A small disc near the line between two large ones: the signed wedges add up to below 0."""
     base, disc = (
         np.array([[0.0, 0.0], [3.0, 0.0], [1.608, 0.2306]]),
         np.array([1.2458, 1.2458, 0.1584]),

@@ -58,8 +58,8 @@ def test_sphere_in_cylinder_against_random_points(row):
 
 def test_centred_sphere_wider_than_the_tube_is_the_napkin_ring():
     """Tube through the centre: 4/3 pi (a^3 - (a^2 - r^2)^1.5)."""
-    found = exact_volume(pairs_of([2.0, 0.0, 5.0, 1.0, 10.0]))[0]
-    assert found == pytest.approx(4 / 3 * np.pi * (8 - 3**1.5), rel=1e-14)
+    volume = exact_volume(pairs_of([2.0, 0.0, 5.0, 1.0, 10.0]))[0]
+    assert volume == pytest.approx(4 / 3 * np.pi * (8 - 3**1.5), rel=1e-14)
 
 
 def test_volume_within_a_millionth_of_adaptive_quadrature():
@@ -80,8 +80,8 @@ def test_volume_within_a_millionth_of_adaptive_quadrature():
             return float(disc_lens_area(np.sqrt(max(sphere**2 - z**2, 0.0)), 1.0, offset))
 
         expected = sum(quad(section, *piece, epsabs=1e-12)[0] for piece in pairwise(edges))
-        found = exact_volume(pairs_of([sphere, offset, depth, 1.0, length]))[0]
-        assert found == pytest.approx(expected, abs=1e-6 * 4 / 3 * np.pi * sphere**3)
+        volume = exact_volume(pairs_of([sphere, offset, depth, 1.0, length]))[0]
+        assert volume == pytest.approx(expected, abs=1e-6 * 4 / 3 * np.pi * sphere**3)
 
 
 @pytest.mark.parametrize(
@@ -132,12 +132,12 @@ def test_blocking_needs_a_whole_section_covered(row, covers):
 def test_throat_porosity_of_one_fine_in_a_tube():
     network = chain(3)
     fine = snapshot([[1.5, 0.5, 0.5]], 0.05, network.box, Kind.FINE)
-    found = measure_occupancy(network, fine)
-    assert found.throat_porosity == pytest.approx([1, 1 - 4 / 3 * 0.05**3 / 0.1**2, 1])
-    assert found.throat_fines.tolist() == [0, 1, 0]
-    assert found.throat_fine_radius == pytest.approx([0, 0.05, 0])
-    assert found.pair_distance == pytest.approx([0])
-    assert not found.blocked.any()
+    occupancy = measure_occupancy(network, fine)
+    assert occupancy.throat_porosity == pytest.approx([1, 1 - 4 / 3 * 0.05**3 / 0.1**2, 1])
+    assert occupancy.throat_fines.tolist() == [0, 1, 0]
+    assert occupancy.throat_fine_radius == pytest.approx([0, 0.05, 0])
+    assert occupancy.pair_distance == pytest.approx([0])
+    assert not occupancy.blocked.any()
 
 
 def test_fine_before_the_face_blocks_the_throat_it_reaches_into():
@@ -149,9 +149,11 @@ def test_fine_before_the_face_blocks_the_throat_it_reaches_into():
 def test_fines_fill_the_pores_with_their_whole_volume_and_surface():
     pack = with_fines(random_pack(60), 300, 0.2)
     network = build_network(pack.grains(), periodic=ALL)
-    found = measure_occupancy(network, pack.fines())
-    assert found.pore_solid_volume.sum() == pytest.approx(300 * 4 / 3 * np.pi * 0.2**3, rel=1e-9)
-    assert found.pore_solid_surface.sum() == pytest.approx(300 * 4 * np.pi * 0.2**2, rel=1e-7)
+    occupancy = measure_occupancy(network, pack.fines())
+    assert occupancy.pore_solid_volume.sum() == pytest.approx(
+        300 * 4 / 3 * np.pi * 0.2**3, rel=1e-9
+    )
+    assert occupancy.pore_solid_surface.sum() == pytest.approx(300 * 4 * np.pi * 0.2**2, rel=1e-7)
 
 
 def test_fine_in_one_pore_against_random_points():
@@ -160,32 +162,34 @@ def test_fine_in_one_pore_against_random_points():
     pore = int(np.argmax(network.pore_volume))
     corner = network.pore_corner[pore]
     place = corner.mean(axis=0) + np.array([0.3, 0.1, 0.0])
-    found = measure_occupancy(
+    volumes = measure_occupancy(
         network, snapshot([place], 0.7, pack.box, Kind.FINE)
     ).pore_solid_volume[pore]
     share = np.random.default_rng(1).dirichlet(np.ones(4), 500_000)
     inside = np.linalg.norm(share @ corner - place, axis=1) < 0.7
     expected = inside.mean() * network.pore_tetra_volume[pore]
-    assert found == pytest.approx(expected, rel=4 / np.sqrt(inside.sum()))
+    assert volumes == pytest.approx(expected, rel=4 / np.sqrt(inside.sum()))
 
 
 @pytest.mark.parametrize("periodic", [(False, True, True), (True, False, True), NONE])
 def test_fines_of_a_walled_pack_count_once_with_their_mirror_images(periodic):
     pack = with_fines(random_pack(60), 200, 0.2)
     network = build_network(pack.grains(), periodic=periodic)
-    found = measure_occupancy(network, pack.fines())
-    assert np.sum(network.pore_share * found.pore_solid_volume) == pytest.approx(
+    occupancy = measure_occupancy(network, pack.fines())
+    assert np.sum(network.pore_share * occupancy.pore_solid_volume) == pytest.approx(
         200 * 4 / 3 * np.pi * 0.2**3, rel=1e-9
     )
 
 
 def test_a_throat_between_pores_at_one_place_is_a_disc_across_x():
     network = replace(chain(1), pore_position=np.full((2, 3), 0.5), throat_length=np.array([1e-3]))
-    found = measure_occupancy(network, snapshot([[0.49, 0.52, 0.5]], 0.05, network.box, Kind.FINE))
-    assert found.throat_solid_volume == pytest.approx(
+    occupancy = measure_occupancy(
+        network, snapshot([[0.49, 0.52, 0.5]], 0.05, network.box, Kind.FINE)
+    )
+    assert occupancy.throat_solid_volume == pytest.approx(
         [np.pi * (0.05**2 - 0.01**2) * 1e-3], rel=0.02
     )
-    assert found.pair_distance == pytest.approx([0.2])
+    assert occupancy.pair_distance == pytest.approx([0.2])
 
 
 @pytest.mark.parametrize("walls", [[0], [1], [1, 2], [0, 1, 2]])
@@ -195,7 +199,7 @@ def test_walls_mirror_the_fines_as_a_doubled_periodic_pack_has_them(walls):
     position = box[:, 0] + rng.random((200, 3)) * (box[:, 1] - box[:, 0])
     network = replace(chain(1), box=box, periodic=tuple(axis not in walls for axis in range(3)))
     low, high = box[:, 0] - 1.5, box[:, 1] + 1.2
-    found, owner = mirrored_images(network, position, low, high, 0.3)
+    images, owner = mirrored_images(network, position, low, high, 0.3)
     doubled, period = position, box[:, 1] - box[:, 0]
     for axis in walls:
         flipped = np.where(np.arange(3) == axis, 2 * box[axis, 1] - doubled, doubled)
@@ -207,7 +211,7 @@ def test_walls_mirror_the_fines_as_a_doubled_periodic_pack_has_them(walls):
     expected = (doubled + steps * period).reshape(-1, 3)
     counted = [
         places[np.all((places >= low - 0.3) & (places <= high + 0.3), axis=1)]
-        for places in (found, expected)
+        for places in (images, expected)
     ]
     assert len(counted[0]) == len(counted[1]) > 300
     assert cKDTree(counted[0]).query(counted[1])[0].max() < 1e-12
@@ -249,9 +253,9 @@ def test_throat_volumes_are_those_of_every_pair_taken_alone():
             axis=1,
         )
         expected[throat] = exact_volume(pairs_of(rows)).sum()
-    found = measure_occupancy(network, fines).throat_solid_volume
-    assert found == pytest.approx(expected, rel=1e-9, abs=1e-12)
-    assert (found > 0).sum() > 20
+    volumes = measure_occupancy(network, fines).throat_solid_volume
+    assert volumes == pytest.approx(expected, rel=1e-9, abs=1e-12)
+    assert (volumes > 0).sum() > 20
 
 
 def test_unknown_overlap_is_refused():

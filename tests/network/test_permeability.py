@@ -44,8 +44,8 @@ def walled():
 
 
 def both(pack, periodic, pair):
-    found = analyse(pack.grains(), pack, periodic=periodic, options=options(pair))
-    return np.array([found.k_initial, found.k_damaged])
+    analysis = analyse(pack.grains(), pack, periodic=periodic, options=options(pair))
+    return np.array([analysis.k_initial, analysis.k_damaged])
 
 
 @pytest.mark.parametrize("periodic", [ALL, FLOW_X, WALLED])
@@ -96,11 +96,11 @@ def test_shifting_a_periodic_pack_leaves_k(pack):
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("damage_law", ["thesis", "thesis-code", "kozeny"])
 def test_fines_never_raise_k(pack, law, damage_law):
-    found = analyse(pack.grains(), pack, periodic=FLOW_X, options=options((law, damage_law)))
-    assert 0 < found.k_damaged < found.k_initial
-    assert np.all(found.conductance_damaged <= found.conductance_initial)
-    assert found.k_reduction == pytest.approx(1 - found.k_damaged / found.k_initial)
-    assert found.porosity_damaged < found.porosity_initial
+    analysis = analyse(pack.grains(), pack, periodic=FLOW_X, options=options((law, damage_law)))
+    assert 0 < analysis.k_damaged < analysis.k_initial
+    assert np.all(analysis.conductance_damaged <= analysis.conductance_initial)
+    assert analysis.k_reduction == pytest.approx(1 - analysis.k_damaged / analysis.k_initial)
+    assert analysis.porosity_damaged < analysis.porosity_initial
 
 
 def test_more_fines_lower_k_with_the_default_law(pack):
@@ -127,12 +127,12 @@ def test_inplace_sections_recombine_in_series(pack, periodic, sections):
     wanted = (
         sections if sections == 5 else [0.0, 0.13 * length, 0.2 * length, 0.71 * length, length]
     )
-    found = analyse(pack.grains(), pack, periodic=periodic, options=options(sections=wanted))
+    analysis = analyse(pack.grains(), pack, periodic=periodic, options=options(sections=wanted))
     for k, name in (
-        (found.k_initial, "k_initial_inplace"),
-        (found.k_damaged, "k_damaged_inplace"),
+        (analysis.k_initial, "k_initial_inplace"),
+        (analysis.k_damaged, "k_damaged_inplace"),
     ):
-        resistance = [(one.x_hi - one.x_lo) / getattr(one, name) for one in found.sections]
+        resistance = [(one.x_hi - one.x_lo) / getattr(one, name) for one in analysis.sections]
         assert length / sum(resistance) == pytest.approx(k, rel=1e-9)
         assert min(resistance) > 0
 
@@ -154,30 +154,30 @@ def test_inplace_sections_of_a_period_move_with_the_pack(pack):
 
 
 def test_one_section_is_the_whole_specimen(pack):
-    found = analyse(pack.grains(), pack, periodic=FLOW_X, options=options())
-    (section,) = found.sections
-    assert section.k_initial == pytest.approx(found.k_initial)
-    assert section.k_damaged_inplace == pytest.approx(found.k_damaged)
-    assert section.porosity_initial == pytest.approx(found.porosity_initial)
-    assert section.fines_count == found.invaded_count == 400
+    analysis = analyse(pack.grains(), pack, periodic=FLOW_X, options=options())
+    (section,) = analysis.sections
+    assert section.k_initial == pytest.approx(analysis.k_initial)
+    assert section.k_damaged_inplace == pytest.approx(analysis.k_damaged)
+    assert section.porosity_initial == pytest.approx(analysis.porosity_initial)
+    assert section.fines_count == analysis.invaded_count == 400
 
 
 def test_damage_shows_in_the_section_that_holds_the_fines(pack):
     grains, fines, length = pack.grains(), pack.fines(), pack.box[0, 1]
     near = fines.where(fines.position[:, 0] < 0.2 * length)
-    found = analyse(grains, grains.joined(near), periodic=FLOW_X, options=options(sections=4))
-    reduction = [one.k_reduction for one in found.sections]
+    analysis = analyse(grains, grains.joined(near), periodic=FLOW_X, options=options(sections=4))
+    reduction = [one.k_reduction for one in analysis.sections]
     assert reduction[0] > 0.1
     assert reduction[2] == reduction[3] == 0.0
-    assert [one.fines_fraction for one in found.sections] == [1.0, 0, 0, 0]
-    assert found.profile.fines_fraction.sum() == pytest.approx(1.0)
-    assert found.invasion_depth == near.position[:, 0].max()
-    assert found.invasion_depth_p95 == pytest.approx(np.quantile(near.position[:, 0], 0.95))
-    assert found.invaded_volume == pytest.approx(len(near) * 4 / 3 * np.pi * 0.15**3)
+    assert [one.fines_fraction for one in analysis.sections] == [1.0, 0, 0, 0]
+    assert analysis.profile.fines_fraction.sum() == pytest.approx(1.0)
+    assert analysis.invasion_depth == near.position[:, 0].max()
+    assert analysis.invasion_depth_p95 == pytest.approx(np.quantile(near.position[:, 0], 0.95))
+    assert analysis.invaded_volume == pytest.approx(len(near) * 4 / 3 * np.pi * 0.15**3)
 
 
 def test_face_sealed_by_fines_is_zero_with_a_warning():
-    """One fine in each throat of a lattice's first layer, wide enough to cover it (thesis rule)."""
+    """One fine in each throat of the first layer of a lattice covers it (rule of the thesis)."""
     grains = simple_cubic(4)
     network = analyse(grains, None, periodic=FLOW_X, options=options(("thesis", "thesis"))).network
     first = network.throat_ends.mean(axis=1)
@@ -186,14 +186,14 @@ def test_face_sealed_by_fines_is_zero_with_a_warning():
     ]
     spheres = grains.joined(snapshot(cork, 0.9, grains.box, Kind.FINE))
     spheres = rebuilt(spheres)
-    found = analyse(
+    analysis = analyse(
         grains, spheres, periodic=FLOW_X, options=options(("thesis", "thesis"), sections=2)
     )
-    assert found.k_damaged == 0.0
-    assert found.k_reduction == 1.0
-    assert any("no open path" in one for one in found.warnings)
-    assert found.sections[0].k_damaged_inplace == 0.0
-    assert found.sections[0].k_damaged == 0.0
+    assert analysis.k_damaged == 0.0
+    assert analysis.k_reduction == 1.0
+    assert any("no open path" in one for one in analysis.warnings)
+    assert analysis.sections[0].k_damaged_inplace == 0.0
+    assert analysis.sections[0].k_damaged == 0.0
 
 
 def test_moved_grains_make_a_second_network(pack):
@@ -204,18 +204,18 @@ def test_moved_grains_make_a_second_network(pack):
         pack.position
         + 0.02 * rng.normal(size=pack.position.shape) * (pack.kind == Kind.GRAIN)[:, None],
     )
-    found = analyse(grains, shifted, periodic=ALL, options=options())
-    assert found.k_moved == pytest.approx(
+    analysis = analyse(grains, shifted, periodic=ALL, options=options())
+    assert analysis.k_moved == pytest.approx(
         analyse(shifted.grains(), None, periodic=ALL, options=options()).k_initial, rel=1e-9
     )
-    assert found.k_initial == pytest.approx(
+    assert analysis.k_initial == pytest.approx(
         analyse(grains, None, periodic=ALL, options=options()).k_initial, rel=1e-9
     )
-    assert found.k_damaged < found.k_moved != found.k_initial
+    assert analysis.k_damaged < analysis.k_moved != analysis.k_initial
     assert (
-        len(found.conductance_initial)
-        == len(found.network.throat_radius)
-        == len(found.flow_initial.throat_flux)
+        len(analysis.conductance_initial)
+        == len(analysis.network.throat_radius)
+        == len(analysis.flow_initial.throat_flux)
     )
 
 
@@ -231,10 +231,10 @@ def test_grains_in_another_order_or_wrapped_have_not_moved(pack):
 
 
 def test_solver_reports_the_worst_of_all_solves(pack):
-    found = analyse(pack.grains(), pack, periodic=WALLED, options=options(sections=3))
-    assert 0 < found.solver["mass_balance"] < 1e-6
-    assert found.solver["mass_balance"] >= found.flow_initial.mass_balance
-    assert set(found.seconds) == {"tessellate", "occupancy", "conductance", "solve", "porosity"}
+    analysis = analyse(pack.grains(), pack, periodic=WALLED, options=options(sections=3))
+    assert 0 < analysis.solver["mass_balance"] < 1e-6
+    assert analysis.solver["mass_balance"] >= analysis.flow_initial.mass_balance
+    assert set(analysis.seconds) == {"tessellate", "occupancy", "conductance", "solve", "porosity"}
 
 
 @pytest.mark.parametrize(
@@ -266,15 +266,17 @@ def test_laws_named_by_the_contract_exist():
 
 def test_fines_all_outside_the_box_are_told_of(pack):
     away = snapshot([[-1.0, 1.0, 1.0]], 0.1, pack.box, Kind.FINE)
-    found = analyse(
+    analysis = analyse(
         pack.grains(), pack.grains().joined(away), periodic=(False, True, True), options=options()
     )
-    assert found.k_damaged == found.k_initial
+    assert analysis.k_damaged == analysis.k_initial
     assert any(
-        "none of the 1 fines is centred in the box" in warning for warning in found.warnings
+        "none of the 1 fines is centred in the box" in warning for warning in analysis.warnings
     )
 
 
 def test_throats_that_do_not_conduct_are_counted(pack):
-    found = analyse(pack.grains(), None, periodic=ALL, options=options(("thesis", "thesis")))
-    assert found.counts["throats_not_conducting"] == int(np.sum(found.network.throat_radius == 0))
+    analysis = analyse(pack.grains(), None, periodic=ALL, options=options(("thesis", "thesis")))
+    assert analysis.counts["throats_not_conducting"] == int(
+        np.sum(analysis.network.throat_radius == 0)
+    )

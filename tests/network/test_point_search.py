@@ -12,9 +12,9 @@ def test_every_point_in_every_box_once(stretch):
     point = rng.random((300, 3)) * stretch
     low = (rng.random((50, 3)) * 1.6 - 0.3) * stretch
     high = low + rng.random((50, 3)) * np.array(stretch) * 0.6
-    box, found = points_in_boxes(point, low, high)
+    box, index = points_in_boxes(point, low, high)
     every = np.all((point >= low[:, None]) & (point <= high[:, None]), axis=2)
-    assert sorted(zip(box, found, strict=True)) == [tuple(pair) for pair in np.argwhere(every)]
+    assert sorted(zip(box, index, strict=True)) == [tuple(pair) for pair in np.argwhere(every)]
     assert np.all(np.diff(box) >= 0)
 
 

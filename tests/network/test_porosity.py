@@ -15,10 +15,10 @@ BOX = np.array([[0.0, 2.0]] * 3)
     ("pack", "expected"), [(simple_cubic(), 1 - np.pi / 6), (face_centred(), 0.259520)]
 )
 def test_lattices_have_their_known_porosity(pack, expected):
-    found = measure_porosity(pack, periodic=(True,) * 3)
-    assert found.mean == pytest.approx(expected, abs=2e-4)
-    assert abs(found.mean - expected) < 6 * found.standard_error + 1e-6
-    assert found.sum == pytest.approx(expected, abs=1e-6)
+    porosity = measure_porosity(pack, periodic=(True,) * 3)
+    assert porosity.mean == pytest.approx(expected, abs=2e-4)
+    assert abs(porosity.mean - expected) < 6 * porosity.standard_error + 1e-6
+    assert porosity.sum == pytest.approx(expected, abs=1e-6)
 
 
 def test_overlap_counts_once():
@@ -27,9 +27,9 @@ def test_overlap_counts_once():
     pair = snapshot([[0.75, 1, 1], [1.25, 1, 1]], radius, BOX)
     lens = np.pi * (2 * radius - apart) ** 2 * (apart**2 + 4 * apart * radius) / (12 * apart)
     union = 2 * 4 / 3 * np.pi * radius**3 - lens
-    found = measure_porosity(pair, periodic=(False,) * 3)
-    assert found.mean == pytest.approx(1 - union / 8, abs=6e-5)
-    assert found.sum == pytest.approx(1 - 2 * 4 / 3 * np.pi * radius**3 / 8)
+    porosity = measure_porosity(pair, periodic=(False,) * 3)
+    assert porosity.mean == pytest.approx(1 - union / 8, abs=6e-5)
+    assert porosity.sum == pytest.approx(1 - 2 * 4 / 3 * np.pi * radius**3 / 8)
 
 
 def test_walls_clip_and_periodic_sides_reach_round():
@@ -51,15 +51,15 @@ def test_bins_of_one_sphere_are_its_spherical_segments():
     edges = np.array([0.0, 0.5, 0.9, 1.3, 2.0])
     height = np.clip(edges - 0.3, 0, 1.4)
     cap = np.pi * height**2 * (3 * 0.7 - height) / 3
-    found = measure_porosity(ball, periodic=(False,) * 3, edges=edges)
-    assert found.profile == pytest.approx(1 - np.diff(cap) / (4 * np.diff(edges)), abs=1e-4)
+    porosity = measure_porosity(ball, periodic=(False,) * 3, edges=edges)
+    assert porosity.profile == pytest.approx(1 - np.diff(cap) / (4 * np.diff(edges)), abs=1e-4)
 
 
 def test_bins_average_to_the_mean():
     pack = random_pack(40)
     edges = np.linspace(0, pack.box[0, 1], 8)
-    found = measure_porosity(pack, periodic=(True,) * 3, edges=edges)
-    assert found.profile.mean() == pytest.approx(found.mean, abs=1e-12)
+    porosity = measure_porosity(pack, periodic=(True,) * 3, edges=edges)
+    assert porosity.profile.mean() == pytest.approx(porosity.mean, abs=1e-12)
 
 
 def test_empty_box_is_all_void_and_wrong_edges_are_refused():
@@ -70,7 +70,7 @@ def test_empty_box_is_all_void_and_wrong_edges_are_refused():
 
 
 def test_pooling_averages_between_edges_that_leave_out_both_ends():
-    """Cuts 0, 1, 3, 4, 6 with porosities 0.1, 0.4, 0.7, 0.2: between 1 and 4 (0.4 x 2 + 0.7 x 1) / 3."""
+    """Cuts 0, 1, 3, 4, 6 with 0.1, 0.4, 0.7, 0.2: between 1 and 4 (0.4 x 2 + 0.7 x 1) / 3."""
     fine = Porosity(
         mean=0.0,
         standard_error=0.0,
@@ -86,5 +86,7 @@ def test_pooling_averages_between_edges_that_leave_out_both_ends():
 @pytest.mark.parametrize("radius", [0.3, 0.42, 0.48])
 def test_a_sphere_nearly_as_wide_as_its_period_is_whole(radius):
     sphere = snapshot(np.array([[0.9, 0.05, 0.97]]), radius, np.array([[0.0, 1.0]] * 3))
-    found = measure_porosity(sphere, periodic=(True,) * 3)
-    assert abs(found.mean - (1 - 4 / 3 * np.pi * radius**3)) < 6 * found.standard_error + 1e-6
+    porosity = measure_porosity(sphere, periodic=(True,) * 3)
+    assert (
+        abs(porosity.mean - (1 - 4 / 3 * np.pi * radius**3)) < 6 * porosity.standard_error + 1e-6
+    )

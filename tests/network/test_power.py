@@ -20,7 +20,7 @@ def test_equal_radii_make_the_network_of_delaunay(monkeypatch, periodic):
     plain = build_network(pack, periodic=periodic)
     monkeypatch.setattr(delaunay, "EQUAL_SPREAD", -1.0)
     power = build_network(pack, periodic=periodic)
-    # prisms cut by a wall may split another way
+    # prisms cut by a wall may be split otherwise
     for name in ("pore_volume", "throat_radius", "throat_heights") if all(periodic) else ():
         one, two = (np.sort(getattr(network, name).ravel()) for network in (plain, power))
         assert one == pytest.approx(two, abs=1e-6)
@@ -31,8 +31,11 @@ def test_equal_radii_make_the_network_of_delaunay(monkeypatch, periodic):
 
 
 def test_power_centres_of_a_body_centred_lattice_of_two_sizes():
-    """Tetrahedron of the corners (0,0,0), (a,0,0) and the centres (a,a,+-a)/2: its power centre is (a/2, y, 0) with
-    y^2 - R1^2 = (y - a/2)^2 - R2^2 + (a/2)^2 - (a/2)^2, equal powers |x - p|^2 - r^2."""
+    """The power centre is (a/2, y, 0) with y^2 - R1^2 = (y - a/2)^2 - R2^2.
+
+    The tetrahedron has the corners (0,0,0), (a,0,0) and the centres (a,a,+-a)/2; the powers
+    |x - p|^2 - r^2 are equal.
+    """
     edge, corner, centre = 2.0, 1.0, 0.7
     steps = (
         np.stack(np.meshgrid(*[np.arange(3)] * 3, indexing="ij"), axis=-1).reshape(-1, 3) * edge
@@ -56,10 +59,10 @@ def test_power_centres_of_a_body_centred_lattice_of_two_sizes():
 
 def test_radical_centre_of_three_discs_on_paper():
     """Discs of radius 1, 1, 2 at (0,0), (4,0), (0,4): lines x = 2 and y = (16 + 1 - 4) / 8."""
-    found, power = geometry.power_centre(
+    centre, power = geometry.power_centre(
         np.array([[0.0, 0], [4, 0], [0, 4]]), np.array([1.0, 1, 2])
     )
-    assert found == pytest.approx([2, 13 / 8])
+    assert centre == pytest.approx([2, 13 / 8])
     assert power == pytest.approx(4 + (13 / 8) ** 2 - 1)
 
 

@@ -56,14 +56,17 @@ def test_multigrid_and_direct_agree_on_a_pack(monkeypatch, periodic, decades):
 
 @pytest.mark.parametrize("pairs", [0, 3000])
 def test_multigrid_solves_pores_without_neighbours(pairs):
-    """A thin slab: pores, or pairs of pores, tied to the planes alone; nothing to coarsen. In seconds: a dense solve
-    of the coarsest level would take minutes and gigabytes."""
+    """A thin slab has pores, or pairs of pores, that are tied to the planes alone.
+
+    There is nothing to coarsen. It takes seconds, where a dense solve of the coarsest level would
+    take minutes and gigabytes.
+    """
     count, tied = 6000, np.linspace(1.0, 2.0, 6000)
     pair = np.arange(2 * pairs).reshape(-1, 2)
     balances = Balances(pair, np.ones(pairs), tied)
-    found = balances.solve(tied)
+    pressure = balances.solve(tied)
     assert balances.method == MULTIGRID
-    assert found == pytest.approx(np.ones(count))
+    assert pressure == pytest.approx(np.ones(count))
 
 
 def test_direct_takes_over_where_multigrid_does_not_converge(monkeypatch):
@@ -71,10 +74,10 @@ def test_direct_takes_over_where_multigrid_does_not_converge(monkeypatch):
     monkeypatch.setattr(solver, "CG_STEPS", 1)
     pair, g, tied, source = links()
     balances = Balances(pair, g, tied)
-    found = balances.solve(source, imbalance=1e-9)
+    pressure = balances.solve(source, imbalance=1e-9)
     assert balances.method == DIRECT
     monkeypatch.setattr(solver, "DIRECT_UP_TO", 10_000)
-    assert found == pytest.approx(Balances(pair, g, tied).solve(source))
+    assert pressure == pytest.approx(Balances(pair, g, tied).solve(source))
 
 
 def test_a_system_that_neither_converges_nor_fits_is_refused(monkeypatch):

@@ -17,7 +17,7 @@ NODES = 16
 @pytest.mark.parametrize("period", [False, True])
 @pytest.mark.parametrize(("decades", "within"), [(6, 1e-9), (12, 1e-8), (16, 1e-8), (20, 1e-6)])
 def test_fluxes_against_rational_arithmetic(decades, within, period):
-    """The goal is 1e-6 over 12 decades and 1e-3 over 16; every throat's flux, over the throughput."""
+    """The error of every flux, over the throughput: 1e-6 over 12 decades, 1e-3 over 16."""
     solved = 0
     for seed in range(25):
         ends, g, jump = random_links(seed, decades=decades, period=period)
@@ -25,11 +25,11 @@ def test_fluxes_against_rational_arithmetic(decades, within, period):
             continue
         solved += 1
         throughput, flux = exact_balance(ends, g, jump, NODES)
-        found = balance_links(ends, g, jump, NODES)
-        assert found.flux @ jump == pytest.approx(throughput, rel=within)
-        assert found.flux == pytest.approx(flux, abs=within * throughput)
-        net = np.bincount(ends[:, 0], found.flux, NODES) - np.bincount(
-            ends[:, 1], found.flux, NODES
+        balance = balance_links(ends, g, jump, NODES)
+        assert balance.flux @ jump == pytest.approx(throughput, rel=within)
+        assert balance.flux == pytest.approx(flux, abs=within * throughput)
+        net = np.bincount(ends[:, 0], balance.flux, NODES) - np.bincount(
+            ends[:, 1], balance.flux, NODES
         )
         assert np.abs(net[1:]).max() <= 1e-6 * throughput
     assert solved > 15
@@ -51,7 +51,10 @@ def test_conductances_falling_by_decades_along_a_chain():
 
 
 def test_flux_divides_within_a_contracted_group():
-    """Two ways in parallel within a group 1e12 times stiffer than its ends: as their conductances, 1 to 3."""
+    """Two parallel paths in a group 1e12 times stiffer than its ends share as 1 to 3.
+
+    That is the ratio of their conductances.
+    """
     position = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]
     network = network_of(position, [(0, 1), (1, 2), (1, 2), (2, 3)], [[0, 3], [0, 1], [0, 1]])
     flow = solve_flow(network, np.array([1.0, 1e12, 3e12, 1.0]))
@@ -59,7 +62,7 @@ def test_flux_divides_within_a_contracted_group():
 
 
 def test_a_pore_group_hanging_on_threads_takes_a_pressure_within_bounds():
-    """Two pores joined by 1, tied to the flow by 1e-18: their pressure is that of the pore they hang on."""
+    """Two pores joined by 1 and tied to the flow by 1e-18 have the pressure of their neighbour."""
     position = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0], [1, 2, 0]]
     network = network_of(position, [(0, 1), (1, 2), (1, 3), (3, 4)], [[0, 2], [0, 3], [0, 1]])
     flow = solve_flow(network, np.array([1.0, 1.0, 1e-18, 1.0]))
@@ -85,10 +88,13 @@ def test_heights_take_up_the_jumps_of_a_forest():
     [([0, 0, 0, 1, -1], False), ([1, 0, -1, 0, 0], False), ([1, 1, 1, 0, 0], True)],
 )
 def test_only_a_closed_way_with_a_jump_winds(jumps, winds):
-    """A triangle 0-1-2 and two pores joined to it: a jump there and back is no way round; three turns are."""
+    """A triangle 0-1-2 and two pores joined to it.
+
+    A jump there and back closes no loop; three turns do.
+    """
     ends = np.array([(0, 1), (1, 2), (2, 0), (2, 3), (3, 4)])
-    group, found = winding_groups(ends, np.array(jumps, float), 5)
-    assert found.all() == found.any() == winds
+    group, winding = winding_groups(ends, np.array(jumps, float), 5)
+    assert winding.all() == winding.any() == winds
     assert len(set(group)) == 1
 
 
@@ -97,12 +103,15 @@ def test_parallel_links_with_unlike_jumps_wind():
 
 
 def test_links_in_parallel_on_both_sides_of_the_contrast_settle(monkeypatch):
-    """A group contracted by 1.5e8 takes the 0.9e8 beside it along; otherwise each sweep gains a factor of 0.6 only."""
+    """A group contracted by 1.5e8 includes the link of 0.9e8 in parallel.
+
+    Otherwise each sweep gains a factor of only 0.6.
+    """
     monkeypatch.setattr(stiff, "CONTRASTS", (1e8,))
     ends, jump = np.array([(0, 1), (1, 2), (1, 2), (2, 0)]), np.array([1.0, 0.0, 0.0, 0.0])
-    found = balance_links(ends, np.array([1.0, 1.5e8, 0.9e8, 1.0]), jump, 3)
-    assert found.defect < 1e-8
-    assert found.flux == pytest.approx([0.5, 0.5 * 1.5 / 2.4, 0.5 * 0.9 / 2.4, 0.5], abs=1e-7)
+    balance = balance_links(ends, np.array([1.0, 1.5e8, 0.9e8, 1.0]), jump, 3)
+    assert balance.defect < 1e-8
+    assert balance.flux == pytest.approx([0.5, 0.5 * 1.5 / 2.4, 0.5 * 0.9 / 2.4, 0.5], abs=1e-7)
 
 
 def test_what_does_not_settle_is_refused(monkeypatch):

@@ -89,7 +89,7 @@ def test_throat_ends_are_its_pores_up_to_whole_periods():
     assert network.throat_ends == pytest.approx(place, abs=1e-9)
     assert np.all(network.pore_position >= 0)
     assert np.all(network.pore_position < size)
-    # the two places are those beside the facet, not an image of them elsewhere
+    # the two places are those next to the facet, not an image of them elsewhere
     away = np.linalg.norm(
         network.throat_ends - network.throat_corner.mean(axis=1)[:, None], axis=2
     )

@@ -1,4 +1,7 @@
-"""Faces that are not periodic are mirror planes: the specimen is part of the periodic pack its images make up."""
+"""Faces that are not periodic are mirror planes.
+
+The specimen is a part of the periodic pack that its images make up.
+"""
 
 import numpy as np
 import pytest
@@ -42,7 +45,7 @@ def permeabilities(pack, periodic):
 
 
 PACKS = {
-    "beside walls": lambda: random_pack(100, 0.5, periodic=False),
+    "next to walls": lambda: random_pack(100, 0.5, periodic=False),
     "cut by walls": lambda: random_pack(100),
     "radii 1:2": lambda: random_pack(100, spread=0.33),
     "simple cubic": simple_cubic,
@@ -59,13 +62,13 @@ def test_walled_pack_conducts_as_the_periodic_pack_of_its_mirror_images(pack, ax
 
 def test_sections_of_a_walled_pack_are_those_of_its_doubled_pack():
     pack = random_pack(100, 0.5, periodic=False)
-    found = []
+    in_place = []
     for one, periodic in ((pack, NONE), (doubled(pack, (1, 2)), (False, True, True))):
         network = build_network(one, periodic=periodic)
         flow = solve_flow(network, LAWS["series"](network))
-        found.append(inplace_permeability(network, flow, np.linspace(0, pack.box[0, 1], 5)))
-    assert found[0] == pytest.approx(
-        found[1], rel=1e-4
+        in_place.append(inplace_permeability(network, flow, np.linspace(0, pack.box[0, 1], 5)))
+    assert in_place[0] == pytest.approx(
+        in_place[1], rel=1e-4
     )  # stubs inside polyhedra differ by the split
 
 
@@ -121,22 +124,25 @@ CELLS = {
     [((True, False, True), 1e-6), ((True, False, False), 1e-6), (NONE, 5e-4)],
 )
 def test_lattice_between_its_own_mirror_planes_conducts_as_the_periodic_one(cell, periodic, error):
-    """Grains centred on the walls are their own images; those on the x faces are moved in by 1e-4 radii."""
+    """Grains centred on walls are their own images; on x faces they are moved in by 1e-4 radii."""
     places, edge = CELLS[cell]
     steps = np.stack(np.meshgrid(*[np.arange(4)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
     position = (steps + np.array(places)).reshape(-1, 3) * edge
-    found = []
+    measured = []
     for sides in (ALL, periodic):
         last = 3 * edge + np.where(sides, -1e-9, 1e-9)
         pack = snapshot(position[np.all(position <= last, axis=1)], 1.0, [[0, 3 * edge]] * 3)
-        found.append(permeabilities(pack, sides))
-    assert found[1] == pytest.approx(found[0], rel=error)
+        measured.append(permeabilities(pack, sides))
+    assert measured[1] == pytest.approx(measured[0], rel=error)
 
 
 @pytest.mark.parametrize(("seed", "count"), [(2, 12), (4, 19)])
 @pytest.mark.parametrize("periodic", [ALL, (False, True, True), (True, False, True)])
 def test_few_grains_in_a_wide_box_still_tile_it(seed, count, periodic):
-    """Voids as wide as the box: the first images are not enough, which shows only in facets without partner."""
+    """Voids as wide as the box: the first images are too few.
+
+    That shows only in facets without partner.
+    """
     pack = random_pack(count, 0.2, seed=seed, spread=0.3, aspect=0.6)
     network = build_network(pack, periodic=periodic)
     box = np.prod(np.ptp(pack.box, axis=1))
@@ -145,19 +151,19 @@ def test_few_grains_in_a_wide_box_still_tile_it(seed, count, periodic):
 
 
 def test_fines_at_a_wall_fill_the_throats_in_it_with_their_images():
-    """The doubled pack with doubled fines has the same porosity in every throat that lies in the wall."""
+    """With doubled fines the doubled pack has the same porosity in all throats in the wall."""
     pack = with_fines(random_pack(60, 0.5, periodic=False), 150, 0.2)
     grains, fines = pack.grains(), pack.fines()
     both = doubled(grains, (1,))
     image = fines.position * [1, -1, 1] + [0, 2 * pack.box[1, 1], 0]
     more = snapshot(np.vstack([fines.position, image]), 0.2, both.box, Kind.FINE)
-    found = []
+    solids = []
     for one, of_it, periodic in ((grains, fines, (True, False, True)), (both, more, ALL)):
         network = build_network(one, periodic=periodic)
         solid = measure_occupancy(network, of_it).throat_solid_volume
         walls = network.throat_ends[:, :, 1] / pack.box[1, 1]
-        found.append(solid[np.all(np.abs(walls - np.round(walls)) < 1e-9, axis=1)].sum())
-    assert found[0] > 0.1
-    assert found[0] == pytest.approx(
-        found[1], rel=1e-4
+        solids.append(solid[np.all(np.abs(walls - np.round(walls)) < 1e-9, axis=1)].sum())
+    assert solids[0] > 0.1
+    assert solids[0] == pytest.approx(
+        solids[1], rel=1e-4
     )  # stubs inside polyhedra differ by the split

@@ -1,4 +1,4 @@
-"""Flow through a wedge of a section: closed form against quadrature, series against a grid, table against series."""
+"""Flow through a wedge: closed form against quadrature, series against a grid and the table."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_a_disc_that_fills_the_wedge_leaves_nothing() -> None:
 
 
 def grid_flux(angle: float, disc: float, cells: int) -> float:
-    """Bilinear finite elements in polar coordinates stretched so that the far side is a grid line."""
+    """Bilinear finite elements in polar coordinates; the far side is a grid line."""
     s, dt = (np.arange(cells + 1)) / cells, angle / cells
     rows, columns, values = [], [], []
 

@@ -1,4 +1,7 @@
-"""Hard networks: conductances over many decades, blocked sections, one way, islands; against exact arithmetic."""
+"""Hard networks against exact arithmetic.
+
+Conductances over many decades, blocked sections, a single path, islands.
+"""
 
 import numpy as np
 import pytest
@@ -99,8 +102,8 @@ def test_a_section_with_all_throats_blocked_leaves_k_0_there_and_k_elsewhere():
     assert solve_flow(network, g, span=(0.4 * length, 0.6 * length)).inflow == 0
 
 
-def one_way(network: Network, conductance: Array) -> list[int]:
-    """Throats of a way with the fewest of them from face to face, found by breadth."""
+def shortest_path(network: Network, conductance: Array) -> list[int]:
+    """Throats of a shortest path from face to face, by a breadth-first search."""
     x, length = network.pore_position[:, 0], network.box[0, 1]
     came: dict[int, tuple[int, int]] = {int(pore): (-1, -1) for pore in np.flatnonzero(x <= 0)}
     edge = list(came)
@@ -110,34 +113,34 @@ def one_way(network: Network, conductance: Array) -> list[int]:
     while edge:
         pore = edge.pop(0)
         if x[pore] >= length:
-            way = []
+            path = []
             while came[pore][1] >= 0:
-                way.append(came[pore][1])
+                path.append(came[pore][1])
                 pore = came[pore][0]
-            return way
+            return path
         for throat in links[pore]:
             other = int(network.throat_pores[throat].sum() - pore)
             inner = network.pore_group[other] != network.pore_group[pore]
             if other not in came and conductance[throat] > 0 and inner:
                 came[other] = (pore, int(throat))
                 edge.append(other)
-    raise AssertionError("no way")
+    raise AssertionError("no path")
 
 
 @pytest.mark.parametrize("decades", [0.0, 16.0])
 def test_a_single_open_way_is_its_throats_in_series(decades):
     """1/g = sum of 1/g_i, the same flux through each, nothing elsewhere."""
     network, clean = pack_network()
-    way = one_way(network, clean)
-    assert len(way) > 3
+    path = shortest_path(network, clean)
+    assert len(path) > 3
     g = np.zeros(len(clean))
-    g[way] = clean[way] * 10.0 ** np.random.default_rng(0).uniform(0, decades, len(way))
+    g[path] = clean[path] * 10.0 ** np.random.default_rng(0).uniform(0, decades, len(path))
     flow = solve_flow(network, g)
     assert flow.inflow == pytest.approx(
-        1.0 / np.sum(1.0 / (g * network.throat_share)[way]), rel=1e-9
+        1.0 / np.sum(1.0 / (g * network.throat_share)[path]), rel=1e-9
     )
-    assert np.abs(flow.throat_flux[way]) == pytest.approx(flow.inflow, rel=1e-9)
-    assert np.count_nonzero(flow.throat_flux) == len(way)
+    assert np.abs(flow.throat_flux[path]) == pytest.approx(flow.inflow, rel=1e-9)
+    assert np.count_nonzero(flow.throat_flux) == len(path)
 
 
 def test_islands_are_counted_and_change_nothing():

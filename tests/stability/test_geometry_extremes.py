@@ -1,4 +1,4 @@
-"""Hard geometries: the right answer by symmetry, closed form or another way, or one clear refusal."""
+"""Hard geometries: the answer by symmetry, closed form or a second method, or a refusal."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ def cubic_pores(repeat: int = 3) -> Array:
 
 
 def hexagonal(repeat: int = 2) -> Snapshot:
-    """Hexagonal close packing of unit spheres in an orthorhombic cell 2 x 2 sqrt(3) x 4 sqrt(2/3)."""
+    """Hexagonal close packing of unit spheres in a cell of 2 x 2 sqrt(3) x 4 sqrt(2/3)."""
     cell = np.array([[0, 0, 0], [0.5, 0.5, 0], [0.5, 1 / 6, 0.5], [0, 2 / 3, 0.5]])
     edge = np.array([2.0, 2.0 * np.sqrt(3.0), 4.0 * np.sqrt(2.0 / 3.0)])
     steps = np.stack(np.meshgrid(*[np.arange(repeat)] * 3, indexing="ij"), axis=-1).reshape(
@@ -67,7 +67,10 @@ def shaken(pack: Snapshot, size: float) -> Snapshot:
 @pytest.mark.parametrize("name", LATTICES)
 @pytest.mark.parametrize("periodic", [ALL, SIDES, NONE])
 def test_lattice_does_not_feel_a_shake_of_1e_12(name, periodic):
-    """Cospherical sets split at will: the clean flow keeps no trace (docs: 1e-7), the void is the closed form."""
+    """How cospherical sets are split leaves no trace in the clean flow (docs: 1e-7).
+
+    The void is that of the closed form.
+    """
     pack, porosity = LATTICES[name]
     still, moved = (measure(one, periodic=periodic) for one in (pack, shaken(pack, 1e-12)))
     assert moved.k_initial == pytest.approx(still.k_initial, rel=1e-6)
@@ -83,15 +86,18 @@ def test_damage_of_a_lattice_depends_on_the_split_by_less_than_documented(name):
     filled = with_fines(pack, 150, 0.1)
     fines = filled.fines()
     moved = shaken(pack, 1e-12)
-    found = [measure(grains, grains.joined(fines), ALL) for grains in (pack, moved)]
-    assert found[1].k_damaged == pytest.approx(found[0].k_damaged, rel=4e-3)
-    assert found[0].k_damaged < found[0].k_initial
+    analyses = [measure(grains, grains.joined(fines), ALL) for grains in (pack, moved)]
+    assert analyses[1].k_damaged == pytest.approx(analyses[0].k_damaged, rel=4e-3)
+    assert analyses[0].k_damaged < analyses[0].k_initial
 
 
 @pytest.mark.parametrize("size", [1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3])
 @pytest.mark.parametrize("name", LATTICES)
 def test_slivers_of_every_thickness_leave_k_continuous(name, size):
-    """A shake moves k by no more than a few times its size (cubic law: 3 times each gap's relative change)."""
+    """A shake moves k by no more than a few times its size.
+
+    By the cubic law it is 3 times the relative change of each gap.
+    """
     pack, porosity = LATTICES[name]
     still, moved = measure(pack, periodic=ALL), measure(shaken(pack, size), periodic=ALL)
     assert moved.k_initial == pytest.approx(still.k_initial, rel=1e-5 + 100 * size)
@@ -130,8 +136,8 @@ def test_a_box_thinner_than_a_grain_between_planes_of_symmetry_is_the_lattice(ax
     thin[axis, 1] = 1.0
     kept = centred.position[centred.position[:, axis] < 0.5]
     periodic = tuple(side != axis and side > 0 for side in range(3))
-    found = measure(snapshot(kept, 1.0, thin), periodic=periodic)
-    assert found.k_initial == pytest.approx(measure(lattice, periodic=ALL).k_initial, rel=1e-3)
+    analysis = measure(snapshot(kept, 1.0, thin), periodic=periodic)
+    assert analysis.k_initial == pytest.approx(measure(lattice, periodic=ALL).k_initial, rel=1e-3)
 
 
 @pytest.mark.parametrize("thickness", [0.3, 0.05, 1e-3])
@@ -140,13 +146,13 @@ def test_a_slice_of_a_grain_has_a_k_or_is_refused(thickness):
     box = pack.box.copy()
     box[0] = [1.0, 1.0 + thickness]
     try:
-        found = measure(snapshot(pack.position, 1.0, box))
+        analysis = measure(snapshot(pack.position, 1.0, box))
     except NetworkError as error:
         said = str(error)
         assert "grains" in said
     else:
-        assert 0 <= found.k_initial < 1.0
-        assert 0 <= found.porosity_initial <= 1
+        assert 0 <= analysis.k_initial < 1.0
+        assert 0 <= analysis.porosity_initial <= 1
 
 
 @pytest.mark.parametrize("thickness", [3e-3, 1e-5])
@@ -168,39 +174,45 @@ def test_one_huge_grain_in_a_periodic_box_is_refused_at_once():
 
 @pytest.mark.parametrize("ratio", [2, 5, 10, 20, 40])
 def test_fines_of_every_size_ratio_are_all_seen_and_lower_k(ratio):
-    """Pieces of the fines in the pores add up to the fines; the drop of porosity is their volume over the box's."""
+    """Pieces of the fines in the pores add up to the fines.
+
+    The drop of porosity is their volume over that of the box.
+    """
     pack = random_pack(60, 0.5)
     radius = 1.0 / ratio
     filled = with_fines(pack, min(20 * ratio, 500), radius)
-    found = measure(pack, filled, ALL)
+    analysis = measure(pack, filled, ALL)
     count = len(filled.fines())
     solid = 4 / 3 * np.pi * radius**3 * count
-    assert found.occupancy is not None
-    assert found.occupancy.pore_solid_volume.sum() == pytest.approx(solid, rel=1e-9)
-    assert 0 < found.k_damaged < found.k_initial
-    wanted = found.porosity_initial - solid / np.prod(np.ptp(pack.box, axis=1))
+    assert analysis.occupancy is not None
+    assert analysis.occupancy.pore_solid_volume.sum() == pytest.approx(solid, rel=1e-9)
+    assert 0 < analysis.k_damaged < analysis.k_initial
+    wanted = analysis.porosity_initial - solid / np.prod(np.ptp(pack.box, axis=1))
     overlapped = 0.3 * (
-        found.porosity_initial - wanted
+        analysis.porosity_initial - wanted
     )  # fines may overlap each other, not grains
-    assert wanted - 1e-3 <= found.porosity_damaged <= wanted + overlapped + 1e-3
+    assert wanted - 1e-3 <= analysis.porosity_damaged <= wanted + overlapped + 1e-3
 
 
 def test_swelling_grains_close_throat_by_throat_until_no_path_is_left():
-    """k falls from size to size and ends at 0 with its reason, never below; the void is the chords' all the way."""
+    """k falls from size to size and ends at 0 with its reason, never below.
+
+    The void is that of the chords at every size.
+    """
     pack = random_pack(60)
     k, closed = [], []
     for swell in (1.0, 1.1, 1.2, 1.3, 1.5, 2.0):
-        found = measure(snapshot(pack.position, swell, pack.box), periodic=ALL)
-        k.append(found.k_initial)
-        closed.append(found.network.counts["throats_closed"])
-        assert (found.k_initial == 0) == any(
-            "k_initial = 0: no open path" in one for one in found.warnings
+        analysis = measure(snapshot(pack.position, swell, pack.box), periodic=ALL)
+        k.append(analysis.k_initial)
+        closed.append(analysis.network.counts["throats_closed"])
+        assert (analysis.k_initial == 0) == any(
+            "k_initial = 0: no open path" in one for one in analysis.warnings
         )
     assert k == sorted(k, reverse=True)
     assert closed == sorted(closed)
     assert k[0] > 0
     assert k[-1] == 0
-    assert found.porosity_initial < 1e-3
+    assert analysis.porosity_initial < 1e-3
 
 
 def test_radii_one_to_four_keep_the_void_and_the_invariances():
@@ -210,61 +222,69 @@ def test_radii_one_to_four_keep_the_void_and_the_invariances():
     chords = measure_porosity(pack, periodic=ALL, lines=20_000)
     void = network.pore_volume.sum() / np.prod(np.ptp(pack.box, axis=1))
     assert void == pytest.approx(chords.mean, abs=5 * chords.standard_error + 1e-3)
-    found = measure(pack, periodic=ALL)
+    analysis = measure(pack, periodic=ALL)
     mirrored = snapshot(pack.box[:, 1] - pack.position, pack.radius, pack.box)
     small = snapshot(1e-4 * pack.position, 1e-4 * pack.radius, 1e-4 * pack.box)
-    assert measure(mirrored, periodic=ALL).k_initial == pytest.approx(found.k_initial, rel=1e-6)
+    assert measure(mirrored, periodic=ALL).k_initial == pytest.approx(analysis.k_initial, rel=1e-6)
     assert measure(small, periodic=ALL).k_initial == pytest.approx(
-        1e-8 * found.k_initial, rel=1e-6
+        1e-8 * analysis.k_initial, rel=1e-6
     )
 
 
 def test_no_fines_change_nothing():
     pack = random_pack(60)
-    found = measure(pack, pack, ALL)
-    assert found.k_damaged == found.k_initial
-    assert found.porosity_damaged == found.porosity_initial
+    analysis = measure(pack, pack, ALL)
+    assert analysis.k_damaged == analysis.k_initial
+    assert analysis.porosity_damaged == analysis.porosity_initial
 
 
 def test_one_fine_in_one_pore_lowers_k_by_less_than_closing_that_pore():
-    """Rayleigh: lowering conductances lowers k; closing the throats of all pores the fine reaches lowers it further."""
+    """Rayleigh: lower conductances lower k.
+
+    Closing the throats of all pores that the fine reaches lowers it further.
+    """
     lattice = simple_cubic()
-    found = measure(lattice, joined(lattice, cubic_pores()[:1], 0.2), ALL)
+    analysis = measure(lattice, joined(lattice, cubic_pores()[:1], 0.2), ALL)
     closed = measure(
         lattice, joined(lattice, cubic_pores()[:1], 0.73), ALL, ("lubrication", "thesis")
     )
-    assert closed.k_damaged < found.k_damaged < found.k_initial
+    assert closed.k_damaged < analysis.k_damaged < analysis.k_initial
 
 
 @pytest.mark.parametrize(("radius", "open_path"), [(0.40, True), (0.43, False), (0.70, False)])
 def test_fines_larger_than_every_throat_close_a_lattice(radius, open_path):
-    """SC: throats of sqrt(2) - 1 = 0.4142 between cells; one fine at each cell's centre closes it by the thesis's rule
-    (a fine that covers a section blocks), a smaller one leaves a way."""
+    """In SC the throats between cells have the radius sqrt(2) - 1 = 0.4142.
+
+    A wider fine in the centre of each cell closes the lattice by the rule of the thesis (a
+    fine that covers a section blocks it); smaller fines leave a path.
+    """
     lattice = simple_cubic()
-    found = measure(lattice, joined(lattice, cubic_pores(), radius), ALL, ("thesis", "thesis"))
-    assert (found.k_damaged > 0) == open_path
-    assert any("k_damaged = 0: no open path" in one for one in found.warnings) != open_path
+    analysis = measure(lattice, joined(lattice, cubic_pores(), radius), ALL, ("thesis", "thesis"))
+    assert (analysis.k_damaged > 0) == open_path
+    assert any("k_damaged = 0: no open path" in one for one in analysis.warnings) != open_path
     if not open_path:
-        assert found.k_reduction == 1.0
-        assert found.occupancy is not None
-        assert found.occupancy.blocked.sum() > 0
+        assert analysis.k_reduction == 1.0
+        assert analysis.occupancy is not None
+        assert analysis.occupancy.blocked.sum() > 0
 
 
 @pytest.mark.parametrize("law", ["thesis", "thesis-code", "kozeny", "side-kozeny"])
 def test_fines_that_fill_the_pack_leave_no_k(law):
-    """More volume of (overlapping) fines than void: k = 0 or next to it, and told. Fines thrown at random leave
-    exp(-n v / V) of the void (Boolean model, Matheron 1975)."""
+    """With more volume of (overlapping) fines than void, k is 0 or nearly 0, and reported.
+
+    Fines at random places leave exp(-n v / V) of the void (Boolean model, Matheron 1975).
+    """
     pack = random_pack(40)
     rng = np.random.default_rng(1)
     fines = rng.random((4000, 3)) * pack.box[:, 1]
-    found = measure(pack, joined(pack, fines, 0.3), ALL, ("lubrication", law))
+    analysis = measure(pack, joined(pack, fines, 0.3), ALL, ("lubrication", law))
     left = np.exp(-4000 * 4 / 3 * np.pi * 0.3**3 / np.prod(pack.box[:, 1]))
-    assert found.porosity_damaged == pytest.approx(left * found.porosity_initial, rel=0.1)
-    assert found.k_damaged < 1e-3 * found.k_initial
+    assert analysis.porosity_damaged == pytest.approx(left * analysis.porosity_initial, rel=0.1)
+    assert analysis.k_damaged < 1e-3 * analysis.k_initial
     if "kozeny" in law:
-        assert found.k_damaged == 0
-        assert found.counts["pore_porosity_negative"] > 0
-        assert any("k_damaged = 0: no open path" in one for one in found.warnings)
+        assert analysis.k_damaged == 0
+        assert analysis.counts["pore_porosity_negative"] > 0
+        assert any("k_damaged = 0: no open path" in one for one in analysis.warnings)
 
 
 def test_a_fine_wider_than_a_periodic_side_is_refused_at_once():
@@ -295,7 +315,10 @@ def test_a_grain_and_its_image_in_one_place_are_refused():
 
 
 def test_grains_nearly_in_one_place_are_one_grain_to_the_flow():
-    """Two centres 2e-3 radii apart: porosity is that of their union, k that of one grain within the shift's effect."""
+    """Two centres 2e-3 radii apart: the porosity is that of their union.
+
+    k is that of one grain, within the effect of the shift.
+    """
     pack = random_pack(40)
     doubled = snapshot(
         np.vstack([pack.position, pack.position[:1] + np.array([2e-3, 0, 0])]), 1.0, pack.box

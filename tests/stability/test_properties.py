@@ -1,4 +1,4 @@
-"""Properties of random cases, packs, networks and dumps (hypothesis, the same examples every time)."""
+"""Properties of random cases, packs, networks and dumps (hypothesis, fixed examples)."""
 
 import copy
 import dataclasses
@@ -156,19 +156,25 @@ def analysed(
 )
 @settings(FIXED, max_examples=25)
 def test_random_packs_keep_every_promise(seed, count, solid, spread, fines, around):
-    """k finite and not negative, fines never raise it, fluxes balance, sections in place recombine in series."""
+    """k is finite and not negative, fines never raise it, fluxes balance.
+
+    Sections in place recombine in series.
+    """
     grains = random_pack.__wrapped__(count, solid, seed=seed, spread=spread, periodic=True)
     both = with_fines(grains, fines, 0.1, seed=seed % 1000) if fines else None
-    found = analysed(grains, both, around)
-    assert 0 <= found.k_damaged <= found.k_initial * (1 + 1e-12) < np.inf
-    assert 0 <= found.porosity_damaged <= found.porosity_initial <= 1
-    for flow, k in ((found.flow_initial, found.k_initial), (found.flow_damaged, found.k_damaged)):
+    analysis = analysed(grains, both, around)
+    assert 0 <= analysis.k_damaged <= analysis.k_initial * (1 + 1e-12) < np.inf
+    assert 0 <= analysis.porosity_damaged <= analysis.porosity_initial <= 1
+    for flow, k in (
+        (analysis.flow_initial, analysis.k_initial),
+        (analysis.flow_damaged, analysis.k_damaged),
+    ):
         assert (k > 0) == (not flow.reason)
         assert flow.residual <= 1e-6
         assert k == 0 or flow.mass_balance <= 1e-6
     for name in ("k_initial", "k_damaged"):
-        parts = [getattr(section, f"{name}_inplace") for section in found.sections]
-        whole = getattr(found, name)
+        parts = [getattr(section, f"{name}_inplace") for section in analysis.sections]
+        whole = getattr(analysis, name)
         series = len(parts) / sum(1 / part for part in parts) if all(parts) else 0.0
         assert series == pytest.approx(whole, rel=1e-6)
 
@@ -181,7 +187,7 @@ def test_random_packs_keep_every_promise(seed, count, solid, spread, fines, arou
 )
 @settings(FIXED, max_examples=15)
 def test_renumbering_mirror_turn_and_scale_leave_k(seed, spread, scale, flip):
-    """k scales with the square of length; y and z may be exchanged; order and mirror images do not matter."""
+    """k scales with the square of length; exchange of y and z, order and mirror do not matter."""
     grains = random_pack.__wrapped__(24, 0.55, seed=seed, spread=spread)
     factor, order = 10.0**scale, np.random.default_rng(seed).permutation(24)
     place = np.where(flip, grains.box[:, 1] - grains.position, grains.position)[order][
@@ -229,7 +235,8 @@ def frames(draw: st.DrawFn) -> tuple[bytes, list[np.ndarray]]:
             [one, draw(st.sampled_from(list(Kind))), *(draw(FINITE) for _ in range(7))]
             for one in ids
         ]
-        head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{len(rows)}\nITEM: BOX BOUNDS ff pp pp\n"
+        head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{len(rows)}\n"
+        head += "ITEM: BOX BOUNDS ff pp pp\n"
         head += f"-1 1\n0 0.5\n-3e-3 0\nITEM: ATOMS {COLUMNS} \n"
         text += head + "".join(
             f"{r[0]} {int(r[1])} " + " ".join(f"{v:.17g}" for v in r[2:]) + " \n" for r in rows

@@ -70,8 +70,7 @@ def solve_flow(
     Args:
         network: the pores and throats.
         conductance: (T,) conductance of each throat, m3 (flux times viscosity over pressure drop).
-        span: bounds (low, high) of a slab that is cut out and solved alone, m; the whole box
-            without it.
+        span: bounds (low, high) of a slab that is cut out, m; the whole box without it.
 
     Returns:
         Pressures over the pressure drop and fluxes (m3). No open path is no error: the inflow is 0
@@ -79,8 +78,7 @@ def solve_flow(
 
     Raises:
         FlowError: a conductance is negative or not finite, or the residual, the mass balance or
-            the
-            bounds of the pressure are off by more than 1e-6.
+            the bounds of the pressure are off by more than 1e-6.
 
     Examples:
         >>> import fdnet, numpy as np
@@ -88,14 +86,13 @@ def solve_flow(
         >>> grains = fdnet.Snapshot.from_arrays(lattice, 0.5e-3)
         >>> network = fdnet.build_network(grains, periodic="yz")
         >>> flow = fdnet.solve_flow(network, fdnet.LAWS["lubrication"](network))
-        >>> length, area = 3e-3, 9e-6
-        >>> print(f"k = {flow.inflow * length / area:.2g} m2")
+        >>> print(f"k = {flow.inflow * 3e-3 / 9e-6:.2g} m2")
         k = 2.5e-09 m2
     """
     check_conductance(conductance, len(network.throat_pores))
     if span is None and network.periodic[0]:
         return _solve_period(network, conductance * network.throat_share)
-    low, high = (float(network.box[0, 0]), float(network.box[0, 1])) if span is None else span
+    low, high = map(float, network.box[0] if span is None else span)
     links, place, free = links_between(network, conductance, (low, high))
     isolated = int(np.sum(((place == BETWEEN) & ~free)[network.pore_group]))
     pressure = np.where(place == INLET, 1.0, np.where(place == OUTLET, 0.0, np.nan))

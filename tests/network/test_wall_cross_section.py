@@ -1,4 +1,4 @@
-"""Side walls that hold the fluid: sections beside a wall against finite differences, and what they do to a pack."""
+"""Side walls that hold the fluid: sections against finite differences, and effect on packs."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,10 @@ NONE = (False,) * 3
 
 
 def resolved_flux(place, disc, cells=200):
-    """Flux of laplacian(w) = -1, w = 0 on the wall and on two discs, no shear on the trapezoid's other sides."""
+    """Flux of laplacian(w) = -1 in a trapezoid, by finite differences.
+
+    w = 0 on the wall and on two discs; the other sides carry no shear.
+    """
     step = place[2] / cells
     x, y = np.meshgrid(
         (np.arange(cells) + 0.5) * step, np.arange(step / 2, max(place[:2]), step), indexing="ij"
@@ -35,15 +38,15 @@ def resolved_flux(place, disc, cells=200):
     index = np.full(fluid.shape, -1)
     index[fluid] = np.arange(fluid.sum())
     own, rows, columns = np.zeros(fluid.sum()), [], []
-    for axis, way in ((0, 1), (0, -1), (1, 1), (1, -1)):
-        beside = np.roll(index, way, axis=axis)[fluid]
-        wall = 2.0 if (axis, way) == (1, 1) else 1.0
+    for axis, shift in ((0, 1), (0, -1), (1, 1), (1, -1)):
+        neighbour = np.roll(index, shift, axis=axis)[fluid]
+        wall = 2.0 if (axis, shift) == (1, 1) else 1.0
         near_wall = np.nonzero(fluid)[1] == 1
-        own += (beside >= 0) + np.roll(held, way, axis=axis)[fluid] * np.where(
+        own += (neighbour >= 0) + np.roll(held, shift, axis=axis)[fluid] * np.where(
             near_wall, wall, 1.0
         )
-        rows.append(np.flatnonzero(beside >= 0))
-        columns.append(beside[beside >= 0])
+        rows.append(np.flatnonzero(neighbour >= 0))
+        columns.append(neighbour[neighbour >= 0])
     row, column = np.concatenate(rows), np.concatenate(columns)
     count = len(own)
     system = coo_matrix((-np.ones(len(row)), (row, column)), shape=(count, count)).tolil()
@@ -73,21 +76,21 @@ def resolved_flux(place, disc, cells=200):
     ],
 )
 def test_half_section_against_finite_differences(place, disc):
-    found = wall_flux(np.array(place), *disc, ratio_table())
-    assert found == pytest.approx(resolved_flux(place, disc), rel=0.06)
+    flux = wall_flux(np.array(place), *disc, ratio_table())
+    assert flux == pytest.approx(resolved_flux(place, disc), rel=0.06)
 
 
 def test_two_thin_discs_far_apart_leave_a_channel_with_one_wall():
-    """Between the wall and the free line of centres, L >> H: L H^3 / 3 but for what the discs hold near them."""
+    """Between the wall and the free line of centres, L >> H: L H^3 / 3 except near the discs."""
     for along in (20.0, 30.0, 40.0):
-        found = wall_flux(np.array([1.0, 1.0, along]), 0.01, 0.01, ratio_table())
-        assert found == pytest.approx((along - 1.0) / 3.0, rel=0.05)
+        flux = wall_flux(np.array([1.0, 1.0, along]), 0.01, 0.01, ratio_table())
+        assert flux == pytest.approx((along - 1.0) / 3.0, rel=0.05)
 
 
 def test_centre_of_the_touching_circle_outside_still_leaves_a_flux():
     place, disc = (1.2, 2.8, 1.3), (1.0, 1.0)
-    found = wall_flux(np.array(place), *disc, ratio_table())
-    assert 0.5 * resolved_flux(place, disc) < found < resolved_flux(place, disc)
+    flux = wall_flux(np.array(place), *disc, ratio_table())
+    assert 0.5 * resolved_flux(place, disc) < flux < resolved_flux(place, disc)
 
 
 def test_swapping_the_discs_leaves_the_flux():
@@ -102,7 +105,7 @@ def test_overlapping_discs_leave_nothing():
 
 
 PACKS = {
-    "beside walls": lambda: random_pack(100, 0.5, periodic=False),
+    "next to walls": lambda: random_pack(100, 0.5, periodic=False),
     "cut by walls": lambda: random_pack(100),
     "radii 1:2": lambda: random_pack(100, spread=0.33),
     "simple cubic": lambda: simple_cubic(4),
@@ -164,18 +167,18 @@ def test_periodic_sides_and_other_laws_know_no_walls():
 
 
 def test_a_grain_centred_on_a_wall_has_one_triangle_for_the_whole_section():
-    """A row of grains on the wall and others above: lifting the row by a hair splits each triangle in two."""
+    """A row of grains on the wall and others above: a small lift splits each triangle in two."""
     pack = random_pack(60, 0.45, periodic=False)
-    found = []
+    measured = []
     for lift in (0.0, 1e-4):
         position = pack.position.copy()
         near = np.argsort(position[:, 1])[:4]
         position[near, 1] = lift
         moved = snapshot(position, 1.0, pack.box)
-        found.append(permeability(moved, "no-slip", (True, False, True)))
+        measured.append(permeability(moved, "no-slip", (True, False, True)))
         cuts = wall_cuts(build_network(moved, periodic=(True, False, True), walls="no-slip"))
         assert np.any(cuts[2] == 2.0) == (lift == 0.0)
-    assert found[0] == pytest.approx(found[1], rel=2e-2)
+    assert measured[0] == pytest.approx(measured[1], rel=2e-2)
 
 
 def test_half_resistances_are_those_of_the_law():
@@ -196,16 +199,16 @@ def test_unknown_walls_are_refused():
 
 def test_an_analysis_holds_the_fluid_at_the_walls_unless_told_otherwise():
     pack = random_pack(100, 0.5, periodic=False)
-    found = {
+    measured = {
         options.walls: analyse(pack, None, periodic=NONE, options=options).k_initial
         for options in (AnalysisChoices.of_pack(), AnalysisChoices.of_pack(walls="slip"))
     }
-    assert found == pytest.approx(
+    assert measured == pytest.approx(
         {walls: permeability(pack, walls) for walls in ("slip", "no-slip")}, rel=1e-9
     )
 
 
 def test_fines_beside_walls_that_hold_the_fluid_leave_less_of_it():
     pack = with_fines(random_pack(60, 0.5, periodic=False), 150, 0.2)
-    found = analyse(pack.grains(), pack, periodic=NONE, options=AnalysisChoices.of_pack())
-    assert 0.0 < found.k_damaged < found.k_initial
+    analysis = analyse(pack.grains(), pack, periodic=NONE, options=AnalysisChoices.of_pack())
+    assert 0.0 < analysis.k_damaged < analysis.k_initial
