@@ -3,7 +3,6 @@
 Each stage is kept when it is done and continued when it was cut.
 """
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ from fdnet.run.records import record_warnings, stage_seconds, versions
 from fdnet.run.session import RunOptions, Session
 from fdnet.run.summary import summarise
 from fdnet.scales.cost import refuse_long
+from fdnet.scales.grain_pack import grain_count
 from fdnet.scales.scales import scales_of
 from fdnet.scales.table import scale_rows
 
@@ -55,12 +55,23 @@ def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
 def _refuse(case: Case, options: RunOptions) -> None:
     """Raise, before anything is written, what would stop the run later."""
     needed = _stages_to_run(case, options)
+    _refuse_few_grains(case, options)
     refuse_long(case, scales_of(case), pack="pack" in needed, invade="invade" in needed)
     fresh = options.force or not has_history(options.out / "invade")
     if isinstance(case, InvasionCase) and "invade" in needed and fresh:
         refuse_crowded_supply(case, scales_of(case))
     if needed:
         find_binary(options.liggghts)
+
+
+def _refuse_few_grains(case: Case, options: RunOptions) -> None:
+    """Raise CaseError on fewer grains than one tetrahedron has, when they are to be analysed."""
+    count = grain_count(case)
+    if count < 4 and {"analyse", "report"} & set(options.stages):
+        raise CaseError(
+            f"grains: the case has {count} grains, expected at least 4 for a pore network; raise "
+            "grains.count or enlarge the box"
+        )
 
 
 def _stages_to_run(case: Case, options: RunOptions) -> list[str]:
@@ -70,8 +81,10 @@ def _stages_to_run(case: Case, options: RunOptions) -> list[str]:
 
 
 def _read_summary(folder: RunFolder) -> dict[str, Any]:
+    from fdnet.report.read_tables import read_summary
+
     path = folder.path / "summary.json"
-    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    return read_summary(path) if path.exists() else {}
 
 
 def _carry_out(session: Session) -> dict[str, Any]:
