@@ -8,11 +8,13 @@ import pytest
 from fdnet.case.file import known_keys
 
 LAYERS = [
-    ["errors", "atomic"],
+    ["errors"],
+    ["atomic", "paths"],
     ["spheres", "case"],
     ["scales", "network"],
     ["dem", "report"],
     ["run"],
+    ["permeability_options"],
     ["permeability_command", "studies"],
     ["cli"],
 ]
