@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.case.case import InvasionCase
+from fdnet.dem.digests import dump_is_changed
 from fdnet.dem.scene import snapshot_of
 from fdnet.dem.supply import batches_of
 from fdnet.errors import DumpError, LiggghtsError
 from fdnet.scales.scales import InvasionScales
 from fdnet.scales.slab import arrival_time
 from fdnet.spheres.dump import read_frame
-from fdnet.spheres.snapshot import Kind, Snapshot
+from fdnet.spheres.snapshot import Snapshot
 
 HISTORY = "history.csv"
 HISTORY_HEADER = "chunk,step,upstream,invaded,passed,removed_upstream,most_crossed,quiet"
@@ -130,30 +131,6 @@ def _is_count(text: str) -> bool:
         return False
 
 
-def last_checkpoint(folder: Path, case: InvasionCase, grains: Snapshot) -> Checkpoint | None:
-    """The newest checkpoint whose dump and restart are complete; None without one."""
-    try:
-        rows = read_history(folder)
-    except LiggghtsError:
-        return None
-    for row in reversed(rows):
-        if _whole(folder, row, len(grains)):
-            return row
-    return None
-
-
-def _whole(folder: Path, row: Checkpoint, grain_number: int) -> bool:
-    restart = folder / "post" / f"invade_{row.step}.restart"
-    try:
-        frame = read_frame(folder / "post" / f"invade_{row.step}.dump")
-        size = restart.stat().st_size
-    except (DumpError, OSError):
-        return False
-    fines = int(np.count_nonzero(frame.column("type") == Kind.FINE))
-    remaining = row.upstream - row.removed_upstream + row.invaded
-    return fines == remaining and size > 100 * (fines + grain_number)
-
-
 def state_at(
     folder: Path, row: Checkpoint, case: InvasionCase, scales: InvasionScales, grains: Snapshot
 ) -> Snapshot:
@@ -185,11 +162,6 @@ def check_counts(folder: Path, row: Checkpoint, damaged: Snapshot, supplied: int
         )
 
 
-def step_of(path: Path) -> int:
-    """The step in the name of a dump or restart."""
-    return int(path.stem.rsplit("_", 1)[1])
-
-
 def readable_states(
     folder: Path,
     history: Sequence[Checkpoint],
@@ -199,16 +171,25 @@ def readable_states(
 ) -> Iterator[tuple[Checkpoint, Snapshot]]:
     """The states of the checkpoints in `history`, checked against its counts.
 
-    Dumps that are missing or cut are passed over, except the last one, which raises DumpError.
-    Raises LiggghtsError when counts disagree.
+    Dumps that are missing, cut or changed are passed over, except the last one, which raises
+    DumpError. Raises LiggghtsError when counts disagree.
     """
     batches = batches_of(case, scales)
     for row in history:
         try:
             state = state_at(folder, row, case, scales, grains)
+            _refuse_changed_dump(folder, row)
         except DumpError:
             if row == history[-1]:
                 raise
             continue
         check_counts(folder, row, state, batches.supplied_at(row.chunk))
         yield row, state
+
+
+def _refuse_changed_dump(folder: Path, row: Checkpoint) -> None:
+    if dump_is_changed(folder, row.step):
+        raise DumpError(
+            f"{folder}/post/invade_{row.step}.dump: is not the dump that the run wrote; put it "
+            "back, or start over with --force"
+        )

@@ -24,6 +24,9 @@ from fdnet.spheres.snapshot import Array, Kind, Snapshot
 SUPPLY = "supply"
 """Folder of the batches, inside that of the invasion."""
 
+SCRATCH = "post/contacts.restart"
+"""File that a continued deck writes only to store the contacts with the spheres."""
+
 
 def write_invade_inputs(
     case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path, *, ranks: int = 1
@@ -123,7 +126,7 @@ def render_invade(
         "invade.in.j2",
         header_variables(case, "invade", left_out, ranks)
         | {
-            "resume": {"restart": f"post/invade_{resume.step}.restart"} if resume else None,
+            "resume": _restart(resume) if resume else None,
             "skin": number(_skin(case)),
             "neighbour_bin": number(case.run.neighbour_bin_m) if case.run.neighbour_bin_m else "",
             "contacts": contact_variables(case, scales, "invade", friction=friction),
@@ -160,6 +163,10 @@ def _skin(case: InvasionCase) -> float:
     A skin of 0.3 to 0.8 of its diameter was measured to be fastest.
     """
     return case.fines.radius_range_m[0] if case.run.skin_m is None else case.run.skin_m
+
+
+def _restart(resume: Checkpoint) -> dict[str, str]:
+    return {"restart": f"post/invade_{resume.step}.restart", "scratch": SCRATCH}
 
 
 def _start(resume: Checkpoint | None) -> dict[str, int]:

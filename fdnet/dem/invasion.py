@@ -3,7 +3,6 @@
 A checkpoint after every chunk of steps lets a cut run go on.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,16 +14,21 @@ from fdnet.dem.checkpoint import (
     Checkpoint,
     chunks_of,
     csv_row,
-    has_history,
-    last_checkpoint,
     quiet_chunks,
     quiet_enough,
     read_history,
     readable_states,
-    step_of,
+)
+from fdnet.dem.checkpoint_record import (
+    WatchReader,
+    last_checkpoint,
+    passed_over,
+    refuse_other_ranks,
+    write_record,
 )
 from fdnet.dem.deck import Deck, LeftOut
-from fdnet.dem.invade_deck import render_invade, write_batches, write_invade_inputs
+from fdnet.dem.digests import checkpoint_files
+from fdnet.dem.invade_deck import SCRATCH, render_invade, write_batches, write_invade_inputs
 from fdnet.dem.liggghts import Launch, Run, run_deck
 from fdnet.dem.overlap import (
     WATCH,
@@ -41,6 +45,8 @@ from fdnet.errors import LiggghtsError
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Snapshot
 
+_START_OF_SCREEN = 1 << 20
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Invasion:
@@ -55,6 +61,7 @@ class Invasion:
         step_s: s, time step.
         left_out: what the deck does without.
         warnings: doubts about how it ended, one sentence each.
+        ranks: MPI ranks of all executions of LIGGGHTS.
         runs: executions of LIGGGHTS; empty when an earlier session had come to the end.
     """
 
@@ -66,6 +73,7 @@ class Invasion:
     step_s: float
     left_out: tuple[LeftOut, ...]
     warnings: tuple[str, ...]
+    ranks: int
     runs: tuple[Run, ...]
 
     @property
@@ -80,18 +88,18 @@ def invade(
     """Drive the fines in; continues from the last complete checkpoint when `folder` holds one.
 
     Raises LiggghtsError when a run fails or fines are lost, CaseError when the fines cannot be
-    placed.
+    placed or the invasion was begun on another number of MPI ranks.
     """
     (folder / "post").mkdir(parents=True, exist_ok=True)
-    restarted = has_history(folder) and last_checkpoint(folder, case, grains) is None
+    refuse_other_ranks(folder, case, launch.ranks)
+    doubts = passed_over(folder, case, last_checkpoint(folder, case))
     deck, run = _drive(case, scales, grains, folder, launch)
     history = read_history(folder)
     overlaps, damaged = [], grains
     for _, damaged in readable_states(folder, history, case, scales, grains):
         overlaps.append(overlap_in(case, damaged))
     reason, warnings = _ending(case, scales, history)
-    if restarted:
-        warnings.append("no checkpoint of the cut invasion could be used, it was started over")
+    warnings += doubts
     if len(overlaps) < len(history):
         lost = len(history) - len(overlaps)
         warnings.append(
@@ -107,6 +115,7 @@ def invade(
         step_s=scales.time_step,
         left_out=deck.left_out,
         warnings=tuple(warnings),
+        ranks=launch.ranks,
         runs=(run,) if run else (),
     )
 
@@ -116,25 +125,15 @@ def _drive(
 ) -> tuple[Deck, Run | None]:
     """Run to the end of the invasion; no run when the last checkpoint was the end already."""
 
-    def check(step: int) -> None:
-        if case.run.on_overlap != "stop":
-            return
-        rows = [row for row in read_history(folder) if row.step == step]
-        if not rows:
-            raise LiggghtsError(
-                f"{folder / HISTORY}: no row for the checkpoint at step {step}; continue with "
-                "--resume"
-            )
-        refuse_overlap(case, scales, grains, folder, history=rows[-1:], last=rows[-1])
-
     while True:
-        last = last_checkpoint(folder, case, grains)
+        last = last_checkpoint(folder, case)
         deck = _prepare(case, scales, grains, folder, ranks=launch.ranks, last=last)
         if last is not None:
             refuse_overlap(case, scales, grains, folder, history=read_history(folder), last=last)
         if _over(case, scales, last):
             return deck, None
-        run = _run(folder, last, replace(launch, follow=_Keeper(folder, check, launch.follow)))
+        keeper = _Keeper(folder, case, scales, grains, launch=launch)
+        run = _run(folder, last, replace(launch, follow=keeper))
         if run is not None:
             return deck, run
 
@@ -147,40 +146,70 @@ def _run(folder: Path, last: Checkpoint | None, launch: Launch) -> Run | None:
     try:
         return run_deck(folder, "in.invade" if last is None else "in.invade.resume", launch)
     except LiggghtsError:
-        screen = (folder / SCREEN).read_text(encoding="utf-8", errors="replace")
-        if last is None or "FDNET restoring" not in screen or "FDNET restored" in screen:
+        with (folder / SCREEN).open("rb") as file:
+            screen = file.read(_START_OF_SCREEN)
+        if last is None or b"FDNET restoring" not in screen or b"FDNET restored" in screen:
             raise
         restart = folder / "post" / f"invade_{last.step}.restart"
         restart.rename(restart.with_suffix(".unreadable"))
         return None
+    finally:
+        (folder / SCRATCH).unlink(missing_ok=True)
 
 
 class _Keeper:
     """Follows the screen of a run and passes every line on.
 
-    At each checkpoint it keeps the two newest restarts, and stops a run that writes to a full disk
-    or fails `check`, which is called with the step. LIGGGHTS itself goes on after a failed write
-    and ends with exit code 0. Older restarts are removed only while there is room on the disk.
+    At each checkpoint it records what is whole now, keeps the two newest restarts, and stops a run
+    that writes to a full disk or whose fines overlap too much. LIGGGHTS itself goes on after a
+    failed write and ends with exit code 0. Older restarts are removed only while there is room on
+    the disk.
     """
 
     def __init__(
-        self, folder: Path, check: Callable[[int], None], follow: Callable[[str], None] | None
+        self,
+        folder: Path,
+        case: InvasionCase,
+        scales: InvasionScales,
+        grains: Snapshot,
+        *,
+        launch: Launch,
     ) -> None:
-        self.folder, self.check, self.follow = folder, check, follow
+        self.folder, self.case, self.scales, self.grains = folder, case, scales, grains
+        self.ranks, self.follow, self.watch = launch.ranks, launch.follow, WatchReader(folder)
 
     def __call__(self, line: str) -> None:
         if line.startswith("FDNET checkpoint"):
-            if disk_is_full(self.folder):
-                raise LiggghtsError(
-                    f"{self.folder}: the disk is full, LIGGGHTS was stopped; make room and "
-                    "continue with --resume"
-                )
-            files = sorted((self.folder / "post").glob("invade_*.restart"), key=step_of)
-            for old in files[:-2]:
-                old.unlink(missing_ok=True)
-            self.check(int(line.split()[3]))
+            self._keep(int(line.split()[3]))
         if self.follow:
             self.follow(line)
+
+    def _keep(self, step: int) -> None:
+        if disk_is_full(self.folder):
+            raise LiggghtsError(
+                f"{self.folder}: the disk is full, LIGGGHTS was stopped; make room and "
+                "continue with --resume"
+            )
+        rows = [row for row in read_history(self.folder) if row.step == step]
+        overlaps = self.watch.upto(step)
+        if rows:
+            write_record(self.folder, rows[-1], self.case, ranks=self.ranks, overlaps=overlaps)
+        elif self.case.run.on_overlap == "stop":
+            raise LiggghtsError(
+                f"{self.folder / HISTORY}: no row for the checkpoint at step {step}; continue "
+                "with --resume"
+            )
+        restarts = [
+            (at, path)
+            for at, path in checkpoint_files(self.folder)
+            if path.suffix == ".restart" and at <= step
+        ]
+        for _, old in sorted(restarts)[:-2]:
+            old.unlink(missing_ok=True)
+        for row in rows[-1:]:
+            refuse_overlap(
+                self.case, self.scales, self.grains, self.folder, history=[row], last=row
+            )
 
 
 def _over(case: InvasionCase, scales: InvasionScales, last: Checkpoint | None) -> bool:
@@ -203,7 +232,8 @@ def _prepare(
 ) -> Deck:
     """Write the inputs of a start, or of a restart from `last` with later files removed."""
     if last is None:
-        for stale in [folder / HISTORY, folder / WATCH, *(folder / "post").glob("invade_*")]:
+        old = (path for _, path in checkpoint_files(folder))
+        for stale in [folder / HISTORY, folder / WATCH, *old]:
             stale.unlink(missing_ok=True)
         deck = write_invade_inputs(case, scales, grains, folder, ranks=ranks)
         write_text(folder / HISTORY, HISTORY_HEADER + "\n")
@@ -213,8 +243,8 @@ def _prepare(
         folder / HISTORY, "\n".join([HISTORY_HEADER, *(csv_row(row) for row in rows)]) + "\n"
     )
     cut_watch(folder, last.step)
-    for path in (folder / "post").glob("invade_*"):
-        if step_of(path) > last.step:
+    for step, path in checkpoint_files(folder):
+        if step > last.step:
             path.unlink()
     if case.fines.supply == "batches":
         write_batches(case, scales, grains, folder)

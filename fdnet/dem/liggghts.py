@@ -17,6 +17,9 @@ from fdnet.errors import LiggghtsError
 
 LOCK_PATIENCE = 20.0
 """Seconds to wait for processes of an earlier run to end."""
+MOST_BYTES = 1 << 29
+"""Largest screen or log of a run; a checkpoint takes some 3 kB of either."""
+_PART, _LONGEST_LINE = 1 << 16, 1 << 20
 _STOP_SIGNALS = {signal.SIGINT, signal.SIGTERM}
 
 
@@ -164,26 +167,46 @@ def _wait(
 ) -> None:
     """Wait until the process has ended, with each line of its screen given to `follow`.
 
-    A line without its end is read again later. Raises LiggghtsError after `deadline`, s.
+    Raises LiggghtsError after `deadline`, s, and when the screen or the log is flooded.
     """
-    with screen.open("r", encoding="utf-8", errors="replace") as lines:
+    with screen.open("rb") as file:
+        rest = b""
         while True:
-            code, line_start = process.poll(), lines.tell()
-            for line in iter(lines.readline, ""):
-                if not line.endswith("\n") and code is None:
-                    lines.seek(line_start)
-                    break
-                line_start = lines.tell()
+            ended = process.poll() is not None
+            part = file.read(_PART)
+            *lines, rest = (rest + part).split(b"\n")
+            if ended and not part and rest:
+                lines, rest = [*lines, rest], b""
+            for line in lines:
+                _refuse_late(screen.parent, deadline)
                 if follow:
-                    follow(line.rstrip("\n"))
-            if code is not None:
-                return
-            if deadline is not None and time.monotonic() > deadline:
-                raise LiggghtsError(
-                    f"{screen.parent}: LIGGGHTS did not end within its time limit and was "
-                    "stopped; raise --timeout and continue with --resume"
-                )
-            time.sleep(0.05)
+                    follow(line.rstrip(b"\r").decode(errors="replace"))
+            _refuse_late(screen.parent, deadline)
+            _refuse_flood(screen.parent)
+            rest = rest[-_LONGEST_LINE:]
+            if not part:
+                if ended:
+                    return
+                time.sleep(0.05)
+
+
+def _refuse_late(folder: Path, deadline: float | None) -> None:
+    if deadline is not None and time.monotonic() > deadline:
+        raise LiggghtsError(
+            f"{folder}: LIGGGHTS did not end within its time limit and was stopped; raise "
+            "--timeout and continue with --resume"
+        )
+
+
+def _refuse_flood(folder: Path) -> None:
+    """Raises LiggghtsError when the screen or the log is larger than any sound run makes it."""
+    for path in (folder / SCREEN, folder / "log.liggghts"):
+        if path.exists() and path.stat().st_size > MOST_BYTES:
+            raise LiggghtsError(
+                f"{folder}: LIGGGHTS wrote more than {MOST_BYTES >> 20} MiB into {path.name} and "
+                "was stopped: it repeats a message without end; read the beginning of the file, "
+                "then mend the cause and continue with --resume"
+            )
 
 
 def _stop(process: subprocess.Popen) -> None:

@@ -18,6 +18,7 @@ from fdnet.spheres.contacts import max_overlap
 from fdnet.spheres.snapshot import Snapshot
 
 WATCH = "overlap.csv"
+_MOST_DIGITS = 19
 EVERY, MOST_ROWS = 50, 200
 """Steps between two measurements by the deck, and most measurements in a chunk. Each costs about a
 fifth of a step with contacts."""
@@ -62,9 +63,14 @@ def read_watch(folder: Path) -> Iterator[Deepest]:
         text = (folder / WATCH).read_text(errors="replace")
     except OSError:
         return
+    yield from watch_rows(text)
+
+
+def watch_rows(text: str) -> Iterator[Deepest]:
+    """The whole lines of overlap.csv; titles and other lines are passed over."""
     for line in text[: text.rfind("\n") + 1].splitlines():
         step, comma, fraction = line.partition(",")
-        if comma and step.isdecimal():
+        if comma and step.isdecimal() and len(step) < _MOST_DIGITS:
             yield Deepest(step=int(step), fraction=max(0.0, _number(fraction)))
 
 

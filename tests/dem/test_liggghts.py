@@ -31,6 +31,10 @@ forced) echo "Forced restart written"; echo DECK_DONE;;
 segv) kill -SEGV $$;;
 junk) printf '\\377\\376 junk\\n'; echo DECK_DONE;;
 hang) echo started; sleep 60;;
+slowly) printf "one line "; sleep 0.3; printf "in two parts\\n   100   20   1.5\\nDECK_DONE";;
+flood) while :; do echo "a line that comes again and again, for ever and ever"; done;;
+zeros) exec cat /dev/zero;;
+log) exec cat /dev/zero > log.liggghts;;
 esac
 """
 
@@ -163,3 +167,23 @@ def test_two_ranks_run(binary, tmp_path):
     if binary.launcher is None:
         pytest.skip("no mpirun on this machine")
     assert run_deck(tmp_path, "in.two", Launch(binary=binary, ranks=2)).ranks == 2
+
+
+@pytest.mark.parametrize("mode", ["flood", "zeros", "log"])
+def test_a_run_that_floods_its_screen_or_log_is_stopped(fake, tmp_path, monkeypatch, mode):
+    monkeypatch.setattr(liggghts, "MOST_BYTES", 1 << 20)
+    with pytest.raises(LiggghtsError, match=r"LIGGGHTS wrote more than 1 MiB into .*; "):
+        run(fake, tmp_path, mode, timeout=60.0)
+
+
+def test_the_clock_is_looked_at_while_the_screen_grows(fake, tmp_path):
+    start = time.monotonic()
+    with pytest.raises(LiggghtsError, match="did not end within its time limit"):
+        run(fake, tmp_path, "flood", timeout=0.5, follow=lambda line: time.sleep(0.01))
+    assert time.monotonic() - start < 10
+
+
+def test_lines_are_followed_whole(fake, tmp_path):
+    lines: list[str] = []
+    run(fake, tmp_path, "slowly", follow=lines.append)
+    assert lines[-3:] == ["one line in two parts", "   100   20   1.5", "DECK_DONE"]

@@ -1,23 +1,20 @@
 """Runs the points of a study, keeps each when it is done, and continues an earlier session."""
 
 import contextlib
-import ctypes
 import fcntl
 import hashlib
 import json
-import multiprocessing as mp
 import os
 import resource
 import shutil
-import signal
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Self
 
 from fdnet.errors import CaseError, FdnetError, LiggghtsError
+from fdnet.studies.engine.children import Send, end_children, start_child
 from fdnet.studies.engine.study import COSTS, DONE, Measured, Point, Study
 
 POINTS, WORK = "points.jsonl", "work"
@@ -177,46 +174,32 @@ def _measure(study: Study, point: Point, work: Path, *, quick: bool) -> Measured
     isolated = study.isolated(point) if callable(study.isolated) else study.isolated
     if quick or not isolated:
         return _attempt(study.measure, point, work)
-    context = mp.get_context("spawn")
-    receiver, sender = context.Pipe(duplex=False)
-    limits = (study.seconds, study.bytes)
-    process = context.Process(
-        target=_child, args=(study.measure, point, work, limits, sender), daemon=True
-    )
     start = time.monotonic()
-    process.start()
-    sender.close()
+    child = start_child(_limited_attempt, study.measure, point, work, (study.seconds, study.bytes))
     try:
-        receiver.recv()
+        child.answers.recv()
         start = time.monotonic()
-        answered = receiver.poll(study.seconds)
-        return (
-            receiver.recv() if answered else _nothing(point, OVER_TIME, time.monotonic() - start)
-        )
+        if child.answers.poll(study.seconds):
+            return child.answers.recv()
+        return _nothing(point, OVER_TIME, time.monotonic() - start)
     except EOFError:
-        process.join()
-        status = f"{FAILED}: its process ended with exit code {process.exitcode}"
+        child.process.join()
+        status = f"{FAILED}: its process ended with exit code {child.process.exitcode}"
         return _nothing(point, status, time.monotonic() - start)
     finally:
-        process.kill()
-        process.join()
+        end_children([child])
 
 
-def _child(
-    measure: Measure, point: Point, work: Path, limits: tuple[float, float], sender: Connection
+def _limited_attempt(
+    measure: Measure, point: Point, work: Path, limits: tuple[float, float], send: Send
 ) -> None:
-    """Measures in a process of its own.
-
-    Its memory is limited, it ends with its parent, and it ignores Ctrl-C, which its parent heeds.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    ctypes.CDLL(None).prctl(1, signal.SIGKILL, 0, 0, 0)
+    """Sends "ready", then the measurement; the memory of this process is limited."""
     seconds, most = limits
     resource.setrlimit(resource.RLIMIT_AS, (int(most), int(most)))
-    sender.send("ready")
+    send("ready")
     result = _attempt(measure, point, work)
     late = result.status == DONE and result.wall_s > seconds
-    sender.send(replace(result, status=OVER_TIME, observed={}) if late else result)
+    send(replace(result, status=OVER_TIME, observed={}) if late else result)
 
 
 def _attempt(measure: Measure, point: Point, work: Path) -> Measured:

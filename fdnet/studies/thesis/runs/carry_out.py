@@ -3,11 +3,10 @@
 A run that was cut is continued.
 """
 
-import multiprocessing as mp
 import shutil
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from fdnet.run.pipeline import run_stages
 from fdnet.run.session import RunOptions
 from fdnet.scales.cost import cost_of
 from fdnet.scales.scales import scales_of
+from fdnet.studies.engine.children import Send, answers_of
 from fdnet.studies.engine.runner import eta
 from fdnet.studies.thesis.runs.plan import Planned
 from fdnet.studies.thesis.runs.state import State, read_state, state_of_run, write_state
@@ -77,25 +77,24 @@ def _run_all(
 ) -> dict[Planned, str]:
     failed: dict[Planned, str] = {}
     left, done, start = sum(costs[item] for item in todo), 0.0, time.monotonic()
-    context = mp.get_context("spawn")
-    with ProcessPoolExecutor(max_workers=jobs, mp_context=context) as pool:
-        futures = {pool.submit(run_one, item, out, runs): item for item in todo}
-        for future in as_completed(futures):
-            item, error = futures[future], _result(future)
+    tasks = {item: (item, out, runs) for item in todo}
+    with closing(answers_of(_run_and_send, tasks, jobs=jobs)) as answers:
+        for item, error in answers:
             left, done = left - costs[item], done + costs[item]
             if error:
-                failed[item] = error
+                failed[item] = str(error)
             ahead = (time.monotonic() - start) * left / done if done else 0.0
             report(f"{item.id}, seed {item.seed}: {error or 'done'}{eta(ahead)}")
     return failed
 
 
-def _result(future: Future[str]) -> str:
-    """Why a run failed ("" when it did not), also when its process failed."""
+def _run_and_send(item: Planned, out: Path, runs: Path, send: Send) -> None:
+    """Send why the run failed ("" when it did not), also when fdnet itself is at fault."""
     try:
-        return future.result()
-    except Exception as error:
-        return f"{type(error).__name__}: {error}"
+        error = run_one(item, out, runs)
+    except Exception as fault:
+        error = f"{type(fault).__name__}: {fault}"
+    send(error)
 
 
 def run_one(item: Planned, out: Path, runs: Path) -> str:

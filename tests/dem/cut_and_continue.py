@@ -1,0 +1,78 @@
+"""Cut an invasion and continue it: is the result that of an uncut one, in every column?"""
+
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from builders import tiny
+
+from fdnet.case.case import InvasionCase
+from fdnet.dem.binary import Binary
+from fdnet.dem.invasion import Invasion, invade
+from fdnet.dem.liggghts import Launch
+from fdnet.scales.scales import scales_of
+from fdnet.spheres.snapshot import Snapshot
+
+SIDES, MOTIONS = ("walls", "periodic"), ("fixed", "mobile")
+SUPPLIES = ("slab", "batches")
+SCHEMES = ("every_step", "held", "implicit", "viscous")
+MATRIX = tuple(product(SIDES, MOTIONS, SUPPLIES, SCHEMES))
+"""All 32 cells: sides, motion of the grains, supply of the fines, scheme of the drag."""
+CUT_AT = 4
+"""Checkpoint at which the invasion is cut: batches still come then."""
+
+
+class StopError(Exception):
+    """Stands for any sudden end."""
+
+
+def cell_case(sides: str, motion: str, supply: str, scheme: str) -> InvasionCase:
+    """The small case of one cell: 4,000 fines in batches, 5 checkpoints."""
+    return tiny(
+        f"box.sides={sides}",
+        f"grains.motion={motion}",
+        f"fines.supply={supply}",
+        f"drag.scheme={scheme}",
+        "fines.count=4000",
+        "run.cap_ms=0.2",
+        "run.checkpoint_ms=0.04",
+    )
+
+
+def differences(
+    case: InvasionCase, grains: Snapshot, folder: Path, binary: Binary, *, ranks: int = 1
+) -> list[str]:
+    """What differs between the uncut and the continued invasion; empty when nothing does.
+
+    Both are run below `folder`. All counts of the history, and every column of the spheres at the
+    end, are compared bit for bit.
+    """
+    launch = Launch(binary=binary, ranks=ranks)
+    whole = invade(case, scales_of(case), grains, folder / "whole", launch)
+    again = cut_and_continue(case, grains, folder / "cut", launch)
+    columns = ("id", "kind", "position", "radius", "velocity")
+    different = [
+        name
+        for name in columns
+        if not np.array_equal(getattr(again.damaged, name), getattr(whole.damaged, name))
+    ]
+    if again.history != whole.history:
+        different.append("history")
+    return different
+
+
+def cut_and_continue(
+    case: InvasionCase, grains: Snapshot, folder: Path, launch: Launch
+) -> Invasion:
+    """The invasion, cut at checkpoint `CUT_AT` and continued."""
+
+    def stop(line: str) -> None:
+        if line.startswith(f"FDNET checkpoint {CUT_AT} "):
+            raise StopError
+
+    cut = Launch(binary=launch.binary, ranks=launch.ranks, follow=stop)
+    try:
+        invade(case, scales_of(case), grains, folder, cut)
+    except StopError:
+        return invade(case, scales_of(case), grains, folder, launch)
+    raise AssertionError(f"the invasion ended before checkpoint {CUT_AT}")
