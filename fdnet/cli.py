@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from fdnet.case.stages import STAGES
-from fdnet.errors import FdnetError
+from fdnet.errors import CaseError, FdnetError
+from fdnet.paths import path_option
 
 _STOPPED = 130
 
@@ -95,7 +96,7 @@ class _Version(argparse.Action):
 
 
 def _add_case(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("case", type=Path, metavar="CASE.toml", help="the case file")
+    parser.add_argument("case", type=path_option, metavar="CASE.toml", help="the case file")
     parser.add_argument("--seed", type=int, help="overrides the seed of the case")
     parser.add_argument(
         "--set",
@@ -125,7 +126,7 @@ def _add_run(commands: Any, common: argparse.ArgumentParser) -> None:
         "run", parents=[common], help="pack, invade, analyse and report one case"
     )
     _add_case(run)
-    run.add_argument("--out", type=Path, help="run folder (default runs/NAME)")
+    run.add_argument("--out", type=path_option, help="run folder (default runs/NAME)")
     run.add_argument("--resume", action="store_true", help="continue an unfinished run")
     run.add_argument("--force", action="store_true", help="replace an earlier run")
     run.add_argument(
@@ -150,12 +151,13 @@ def _add_render(commands: Any, common: argparse.ArgumentParser) -> None:
         "render", parents=[common], help="write the decks without LIGGGHTS and print the scales"
     )
     _add_case(render)
-    render.add_argument("--out", type=Path, required=True, help="folder for the decks")
+    render.add_argument("--out", type=path_option, required=True, help="folder for the decks")
     render.set_defaults(action=_render)
 
 
 def _add_permeability(commands: Any, common: argparse.ArgumentParser) -> None:
-    from fdnet.permeability_command import add_arguments, run
+    from fdnet.permeability_command import run
+    from fdnet.permeability_options import add_arguments
 
     command = commands.add_parser(
         "permeability", parents=[common], help="permeability of a CSV of spheres, without LIGGGHTS"
@@ -182,8 +184,6 @@ def _case_of(options: argparse.Namespace) -> Any:
 
 
 def _stages(text: str) -> tuple[str, ...]:
-    from fdnet.errors import CaseError
-
     names = [part.strip() for part in text.split(",") if part.strip()]
     unknown = [name for name in names if name not in STAGES]
     if unknown or not names:
@@ -230,12 +230,17 @@ def _print_summary(summary: dict[str, Any], out: Path) -> None:
 
 def _render(options: argparse.Namespace) -> int:
     from fdnet.dem.render import render_decks
+    from fdnet.run.mark import is_run_folder
     from fdnet.scales.cost import over_limit
     from fdnet.scales.scales import scales_of
     from fdnet.scales.table import scale_rows
 
     case = _case_of(options)
     scales = scales_of(case)
+    if is_run_folder(options.out):
+        raise CaseError(
+            f"{options.out}: is a run folder; give another --out (nothing was changed)"
+        )
     decks = render_decks(case, options.out, ranks=options.np)
     for row in scale_rows(case, scales):
         print(

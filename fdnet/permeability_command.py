@@ -1,11 +1,9 @@
 """`fdnet permeability`: the permeability of spheres in a file, without LIGGGHTS."""
 
 import argparse
-import math
 import time
 from collections.abc import Iterator
 from itertools import product
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fdnet.case.names import (
@@ -13,10 +11,15 @@ from fdnet.case.names import (
     DEFAULT_DAMAGE_LAW,
     DEFAULT_LAW,
     LAW_NAMES,
-    MOST_SECTIONS,
-    WALL_NAMES,
 )
 from fdnet.errors import CaseError
+from fdnet.permeability_options import (
+    ALL_AXES,
+    box_of,
+    directions_of,
+    table_file,
+    types_of,
+)
 
 if TYPE_CHECKING:
     from fdnet.network.analysis import Analysis
@@ -24,91 +27,7 @@ if TYPE_CHECKING:
     from fdnet.spheres.snapshot import Snapshot
 
 PROFILE_BINS = 32
-_UNITS = ("m", "cm", "mm", "um")
-_ALL = "all"
 _BOX_MISSING = "no --box given: the box around all grains was used"
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of the command."""
-    parser.add_argument(
-        "spheres",
-        type=Path,
-        metavar="SPHERES",
-        help="CSV (columns x,y,z,radius[,kind] or x_m,...,radius_m[,kind]), LIGGGHTS or LAMMPS "
-        "text dump (its last frame), .vtp or .vtu with point data radius or diameter",
-    )
-    _add_file_choices(parser)
-    parser.add_argument(
-        "--axis",
-        choices=("x", "y", "z", _ALL),
-        default="x",
-        help="flow direction; all: the three one after another (default x)",
-    )
-    parser.add_argument(
-        "--periodic",
-        default="",
-        metavar="DIRS",
-        help="periodic directions of the file, any of x, y, z together; others are walls",
-    )
-    parser.add_argument(
-        "--walls",
-        choices=WALL_NAMES,
-        default="no-slip",
-        help="side walls hold the fluid, or it slips along them: slip for spheres cut out of a "
-        "larger pack (default no-slip; known to the lubrication and side-kozeny laws)",
-    )
-    parser.add_argument(
-        "--sections", type=_count, default=1, metavar="N", help="slabs along the flow (default 1)"
-    )
-    parser.add_argument(
-        "--law", choices=LAW_NAMES, help=f"conductance law (default {DEFAULT_LAW})"
-    )
-    parser.add_argument(
-        "--damage-law",
-        choices=DAMAGE_LAW_NAMES,
-        help=f"damage law (default {DEFAULT_DAMAGE_LAW})",
-    )
-    parser.add_argument(
-        "--compare-laws", action="store_true", help="all laws with all damage laws as a table"
-    )
-    parser.add_argument(
-        "--csv", type=Path, metavar="FILE", help="write the laws, one row each, as CSV"
-    )
-    parser.add_argument("--json", action="store_true", help="print JSON")
-
-
-def _add_file_choices(parser: argparse.ArgumentParser) -> None:
-    """How the file is to be read."""
-    parser.add_argument(
-        "--units",
-        choices=_UNITS,
-        help="unit of length of the file, of --box and of --fines-below (not with x_m columns; "
-        "default for a dump or VTK file: m)",
-    )
-    parser.add_argument(
-        "--box",
-        metavar="x0,x1,y0,y1,z0,z1",
-        help="the specimen, in the unit of the file (default: the box of the dump, else the box "
-        "around all grains)",
-    )
-    parser.add_argument(
-        "--fines-below",
-        type=float,
-        metavar="RADIUS",
-        help="spheres of a smaller radius are fines, in the unit of the file",
-    )
-    parser.add_argument(
-        "--types",
-        metavar="TYPE=KIND,...",
-        help="which types of a dump are grains and which fines (default 1=grain,2=fine)",
-    )
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or not 1 <= int(text) <= MOST_SECTIONS:
-        raise argparse.ArgumentTypeError(f"{text!r}, expected 1 to {MOST_SECTIONS}")
-    return int(text)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -118,31 +37,21 @@ def run(options: argparse.Namespace) -> int:
     """
     from fdnet.network.tessellation.placed_grains import check_lengths
 
-    periodic = _directions(options.periodic)
-    if options.csv and not options.csv.parent.is_dir():
-        raise CaseError(f"--csv: {options.csv.parent} is not a folder; make it first")
+    periodic = directions_of(options.periodic)
+    table = None if options.csv is None else table_file(options.csv, options.spheres)
     given = _read(options, periodic)
     check_lengths(given.spheres, periodic)
-    axes = "xyz" if options.axis == _ALL else options.axis
+    axes = "xyz" if options.axis == ALL_AXES else options.axis
     by_axis = {axis: _along(axis, given, periodic, options) for axis in axes}
     results = by_axis[axes[0]]
-    if options.axis == _ALL:
+    if options.axis == ALL_AXES:
         results = [row | _by_axis(by_axis, number) for number, row in enumerate(results)]
-    if options.csv:
+    if table is not None:
         from fdnet.report.tables import write_laws
 
-        write_laws(options.csv, results)
+        write_laws(table, results)
     _print(results, options)
     return 0
-
-
-def _directions(text: str) -> tuple[bool, bool, bool]:
-    from fdnet.spheres.directions import periodic_axes
-
-    try:
-        return periodic_axes(text)
-    except CaseError as error:
-        raise CaseError(f"--{error}") from error
 
 
 def _read(options: argparse.Namespace, periodic: tuple[bool, bool, bool]) -> "SphereFile":
@@ -152,9 +61,9 @@ def _read(options: argparse.Namespace, periodic: tuple[bool, bool, bool]) -> "Sp
     given = read_sphere_file(
         options.spheres,
         units=options.units,
-        box=None if options.box is None else _box(options.box),
+        box=None if options.box is None else box_of(options.box),
         fines_below=options.fines_below,
-        types=None if options.types is None else _types(options.types),
+        types=None if options.types is None else types_of(options.types),
     )
     grains = len(given.spheres.grains())
     if grains < 4:
@@ -167,32 +76,6 @@ def _read(options: argparse.Namespace, periodic: tuple[bool, bool, bool]) -> "Sp
             "--box: missing, a periodic direction needs its length; give --box x0,x1,y0,y1,z0,z1"
         )
     return given
-
-
-def _box(text: str) -> list[float]:
-    try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError:
-        values = []
-    if (
-        len(values) != 6
-        or not all(map(math.isfinite, values))
-        or any(values[i] >= values[i + 1] for i in (0, 2, 4))
-    ):
-        raise CaseError(
-            f"--box: {text!r}, expected six numbers x0,x1,y0,y1,z0,z1 with each lower bound below "
-            "the upper"
-        )
-    return values
-
-
-def _types(text: str) -> dict[int, str]:
-    pairs = [part.partition("=") for part in text.split(",")]
-    if not all(number.strip().isdecimal() and name.strip() for number, _, name in pairs):
-        raise CaseError(f"--types: {text!r}, expected TYPE=KIND,..., for example 1=grain,2=fine")
-    if len({int(number) for number, _, _ in pairs}) < len(pairs):
-        raise CaseError(f"--types: {text!r} names a type twice")
-    return {int(number): name.strip() for number, _, name in pairs}
 
 
 def _along(

@@ -14,6 +14,7 @@ from fdnet.case.case import Case, InvasionCase, case_type
 from fdnet.case.rules import cross_problems
 from fdnet.case.values import Part
 from fdnet.errors import CaseError
+from fdnet.paths import expanded
 
 
 def known_keys(model: type[Part] = InvasionCase, prefix: str = "") -> Iterator[str]:
@@ -135,7 +136,7 @@ def read_case(path: str | Path, *, assignments: list[str] | None = None) -> Case
         3
     """
     try:
-        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        data = tomllib.loads(expanded(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise CaseError(
             f"{path}: cannot be read as a case file: {error}; give the path of a TOML file"

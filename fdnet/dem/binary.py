@@ -58,7 +58,7 @@ def find_binary(option: str | None = None) -> Binary:
 
     Raises LiggghtsError when there is none, or when it does not answer like LIGGGHTS.
     """
-    given = option or os.environ.get("FDNET_LIGGGHTS")
+    given = os.path.expanduser(option or os.environ.get("FDNET_LIGGGHTS") or "")
     places = [given] if given else ["liggghts", str(_PROJECT / ".prefix" / "bin" / "liggghts")]
     hit = next(filter(None, map(shutil.which, places)), None)
     if hit is None:

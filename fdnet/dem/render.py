@@ -1,5 +1,6 @@
 """Decks without LIGGGHTS."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from fdnet.dem.invade_deck import render_invade
 from fdnet.dem.packing import write_pack_inputs
 from fdnet.dem.scene import box_of
 from fdnet.errors import CaseError
+from fdnet.paths import expanded, refuse_tilde
 from fdnet.scales.grain_pack import grain_count
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Snapshot, resting
@@ -21,13 +23,15 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
     The data file of the invasion needs a finished pack, so `fdnet run` writes it. The deck of the
     invasion is written for grains that stand out beyond the face as those of a dense pack do.
 
-    Raises CaseError when a deck is there already.
+    Raises CaseError when a file that would be written is there already.
     """
-    scales = scales_of(case)
+    scales, out = scales_of(case), expanded(out)
+    refuse_tilde(out)
     decks = {
         stage: out / stage / f"in.{stage}" for stage in case.stages if stage in LIGGGHTS_STAGES
     }
-    there = [path for path in decks.values() if path.exists()]
+    files = (*decks.values(), out / "pack" / "pack.data")
+    there = [path for path in files if os.path.lexists(path)]
     if there:
         raise CaseError(f"{there[0]}: is there already; give another --out (nothing was changed)")
     for path in decks.values():

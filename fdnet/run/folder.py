@@ -1,44 +1,33 @@
 """A run folder: who may write into it, which stages are done, and when it is complete."""
 
 import fcntl
-import json
 import os
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fdnet.atomic import write_text
+from fdnet.atomic import remove_half_written, write_text
 from fdnet.case.case import Case
-from fdnet.case.stages import LIGGGHTS_STAGES, STAGES
+from fdnet.case.stages import STAGES
 from fdnet.errors import CaseError
+from fdnet.paths import refuse_tilde
+from fdnet.run.mark import (
+    CASE,
+    LOCK,
+    MANIFEST,
+    MARK,
+    RECORD_FORMAT,
+    RECORDS,
+    UNFINISHED,
+    is_run_folder,
+    is_unused,
+    mark_folder,
+)
+from fdnet.run.record_files import OUTPUTS, read_manifest, read_record, write_json
 
-RECORD_FORMAT = 1
-MANIFEST, CASE, LOCK, UNFINISHED = "manifest.json", "case.toml", ".lock", ".unfinished"
-_RECORDS: dict[str, str] = {stage: f"{stage}/stage.json" for stage in LIGGGHTS_STAGES}
-_OUTPUTS = {
-    "pack": ("pack",),
-    "invade": ("invade",),
-    "analyse": (
-        "spheres_initial.csv",
-        "spheres_damaged.csv",
-        "sections.csv",
-        "profile.csv",
-        "pores.csv",
-        "throats.csv",
-        "summary.json",
-    ),
-    "report": (
-        "figures",
-        "frames",
-        "network.vtp",
-        "spheres_initial.vtp",
-        "spheres_damaged.vtp",
-        "spheres.pvd",
-        "invasion.pvd",
-        "report.html",
-    ),
-}
+_OWN = (CASE, MANIFEST, UNFINISHED, LOCK, MARK)
+"""Files of fdnet that belong to no stage."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +55,7 @@ class RunFolder:
 
     def finish(self, stage: str, record: dict[str, Any]) -> None:
         """Mark a stage as done: its record is only there when the stage is complete."""
-        write_json(self.path / _RECORDS[stage], record)
+        write_json(self.path / RECORDS[stage], record)
 
     def manifest(self) -> dict[str, Any] | None:
         """The manifest of the run, or None. Raises CaseError as `read_manifest` does."""
@@ -78,7 +67,7 @@ class RunFolder:
         if manifest is not None:
             return set(stages) <= set(manifest["stages"])
         needed = [stage for stage in stages if stage in case.stages]
-        return set(needed) <= set(_RECORDS) and all(
+        return set(needed) <= set(RECORDS) and all(
             self.record(stage) is not None for stage in needed
         )
 
@@ -94,19 +83,20 @@ class RunFolder:
         The manifest goes first, so that a half-cleared run is never complete.
         """
         (self.path / MANIFEST).unlink(missing_ok=True)
-        for name in (name for stage in stages for name in _OUTPUTS[stage]):
+        for name in (name for stage in stages for name in OUTPUTS[stage]):
             _remove(self.path / name)
 
     def discard(self) -> str:
         """Clear a folder that was new, unless a stage was finished in it.
 
+        Only files that fdnet writes are removed; one that another program put there stays.
         Returns what could not be cleared, in words; "" when all could.
         """
-        if not self.was_empty or any((self.path / name).exists() for name in _RECORDS.values()):
+        if not self.was_empty or any((self.path / name).exists() for name in RECORDS.values()):
             return ""
         try:
-            for child in list(self.path.iterdir()):
-                _remove(child)
+            for name in (*(name for names in OUTPUTS.values() for name in names), *_OWN):
+                _remove(self.path / name)
             for folder in self.made:
                 if any(folder.iterdir()):
                     break
@@ -129,13 +119,6 @@ def _remove(path: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def _expected(manifest: dict[str, Any], stage: str) -> tuple[str, ...]:
-    """Files that must exist when `stage` is listed as done."""
-    if stage not in manifest["stages"] or (stage == "invade" and manifest["invade"] is None):
-        return ()
-    return (_RECORDS[stage],) if stage in _RECORDS else _OUTPUTS[stage]
-
-
 def open_folder(
     path: Path, case: Case, *, stages: tuple[str, ...], resume: bool, force: bool
 ) -> RunFolder:
@@ -150,7 +133,7 @@ def open_folder(
     _refuse_foreign(path)
     _refuse_gap(path, case, stages)
     made = tuple(folder for folder in (path, *path.parents) if not folder.exists())
-    was_empty = bool(made) or not any(path.iterdir())
+    was_empty = bool(made) or is_unused(path)
     try:
         path.mkdir(parents=True, exist_ok=True)
         lock = os.open(path / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
@@ -161,7 +144,11 @@ def open_folder(
     folder = RunFolder(path=path, lock=lock, was_empty=was_empty, made=made)
     try:
         _take_lock(folder)
+        if was_empty:
+            mark_folder(path)
+        remove_half_written(path)
         _admit(folder, case, stages, resume, force)
+        mark_folder(path)
     except BaseException:
         folder.close()
         raise
@@ -178,11 +165,14 @@ def _take_lock(folder: RunFolder) -> None:
 
 
 def _refuse_foreign(path: Path) -> None:
-    """A case.toml alone does not make a folder ours: it may be the user's."""
+    """Raise CaseError unless `path` is new, empty or a run folder.
+
+    Names alone do not make a folder ours: case.toml, manifest.json or pack may be the user's.
+    """
+    refuse_tilde(path)
     if path.exists() and not path.is_dir():
         raise CaseError(f"{path}: is a file, expected a folder for --out")
-    ours = any((path / name).exists() for name in (LOCK, MANIFEST, *_RECORDS.values()))
-    if path.is_dir() and not ours and any(path.iterdir()):
+    if path.is_dir() and not is_run_folder(path) and not is_unused(path):
         raise CaseError(
             f"{path}: is not empty and holds no fdnet run; give another --out (nothing was "
             "changed)"
@@ -194,7 +184,7 @@ def _refuse_gap(path: Path, case: Case, stages: tuple[str, ...]) -> None:
     analysed = bool({"analyse", "report"} & set(stages))
     needed = {"pack": stages != ("pack",), "invade": "invade" in case.stages and analysed}
     for stage, what in (("pack", "pack"), ("invade", "invasion")):
-        missing = stage not in stages and not (path / _RECORDS[stage]).exists()
+        missing = stage not in stages and not (path / RECORDS[stage]).exists()
         if needed[stage] and missing:
             raise CaseError(
                 f"{path}: no finished {what} here; run the stage {stage} first "
@@ -230,7 +220,7 @@ def _force(folder: RunFolder, case: Case, stages: tuple[str, ...]) -> None:
     Raises CaseError when an earlier one, which is kept, belongs to another case.
     """
     first = min(STAGES.index(stage) for stage in stages)
-    for stage in _RECORDS:
+    for stage in RECORDS:
         if STAGES.index(stage) >= first:
             continue
         record = folder.record(stage)
@@ -240,49 +230,3 @@ def _force(folder: RunFolder, case: Case, stages: tuple[str, ...]) -> None:
                 "give another --out (nothing was changed)"
             )
     folder.clear(STAGES[first:])
-
-
-def write_json(path: Path, value: Any) -> None:
-    """Write a mapping as JSON, whole or not at all."""
-    write_text(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
-
-
-def read_record(folder: Path, stage: str) -> dict[str, Any] | None:
-    """The record of a finished stage ("pack", "invade") of the run in `folder`, or None.
-
-    Raises CaseError when it cannot be understood.
-    """
-    return _read_record(folder / _RECORDS[stage])
-
-
-def read_manifest(folder: Path) -> dict[str, Any] | None:
-    """The manifest of the analysed run in `folder`, or None.
-
-    Raises CaseError when it cannot be understood, or when a file that it implies is missing.
-    """
-    manifest = _read_record(folder / MANIFEST)
-    if manifest is None:
-        return None
-    expected = (name for stage in STAGES[:3] for name in _expected(manifest, stage))
-    missing = next((name for name in expected if not (folder / name).exists()), None)
-    if missing is not None:
-        raise CaseError(
-            f"{folder}: the run is complete by its {MANIFEST}, but {missing} is missing; start "
-            "over with --force"
-        )
-    return manifest
-
-
-def _read_record(path: Path) -> dict[str, Any] | None:
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return None
-    except (OSError, ValueError) as error:
-        raise CaseError(f"{path}: cannot be read ({error}); start over with --force") from error
-    if not isinstance(record, dict) or record.get("format") != RECORD_FORMAT:
-        raise CaseError(
-            f"{path}: is no record of this fdnet (format {RECORD_FORMAT} expected); start over "
-            "with --force"
-        )
-    return record

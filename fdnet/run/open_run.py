@@ -7,8 +7,10 @@ from pathlib import Path
 from fdnet.case.case import Case
 from fdnet.case.file import read_case
 from fdnet.errors import CaseError
+from fdnet.paths import expanded
 from fdnet.run.finished import FinishedRun
-from fdnet.run.folder import CASE, LOCK, MANIFEST, STAGES, UNFINISHED, read_manifest
+from fdnet.run.folder import CASE, MANIFEST, STAGES, read_manifest
+from fdnet.run.mark import is_run_folder
 
 
 def open_run(path: str | Path) -> FinishedRun:
@@ -35,7 +37,7 @@ def open_run(path: str | Path) -> FinishedRun:
         ['section', 'x_lo_m', 'x_hi_m', 'porosity_initial', 'porosity_damaged']
         >>> axes = run.sections.plot(x="x_lo_m", y=["k_initial_m2", "k_damaged_m2"])
     """
-    folder = Path(path)
+    folder = expanded(path)
     _refuse_unfinished(folder)
     manifest = read_manifest(folder) or {}
     return FinishedRun(path=folder, case=read_case(folder / CASE), manifest=manifest)
@@ -84,8 +86,8 @@ def run_case(
     from fdnet.run.pipeline import run_stages
     from fdnet.run.session import RunOptions
 
-    given = case if isinstance(case, Case) else read_case(Path(case))
-    folder = Path("runs") / given.name if out is None else Path(out)
+    given = case if isinstance(case, Case) else read_case(case)
+    folder = Path("runs") / given.name if out is None else expanded(out)
     options = RunOptions(out=folder, ranks=ranks, resume=resume, force=force)
     options = replace(options, stages=_checked_stages(stages), command="fdnet.run_case")
     options = replace(options, liggghts=liggghts, timeout=timeout, show_progress=progress)
@@ -107,9 +109,10 @@ def _refuse_unfinished(folder: Path) -> None:
     if not folder.is_dir():
         what = "is a file" if folder.exists() else "does not exist"
         raise CaseError(f"{folder}: {what}; give the folder of a finished fdnet run")
-    if (folder / MANIFEST).exists():
+    ours = is_run_folder(folder)
+    if ours and (folder / MANIFEST).exists():
         return
-    if (folder / UNFINISHED).exists() or (folder / LOCK).exists():
+    if ours:
         raise CaseError(
             f"{folder}: holds an unfinished run; continue it with fdnet run CASE.toml "
             f"--out {folder} --resume, then open it"

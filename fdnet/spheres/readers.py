@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fdnet.errors import CaseError
+from fdnet.paths import expanded
 from fdnet.spheres.arrays import Array
 from fdnet.spheres.rows import SphereRows
 from fdnet.spheres.snapshot import KIND_NAMES, Kind, Snapshot, checked_box, grain_box
@@ -90,7 +91,7 @@ def read_sphere_file(
     step: int | None = None,
 ) -> SphereFile:
     """As `read_spheres`, with what was assumed."""
-    rows = _read_rows(Path(path), units, step)
+    rows = _read_rows(expanded(path), units, step)
     kind, notes = _kinds(rows, fines_below, types)
     bounds = rows.box if box is None else rows.scale * checked_box(box)
     around = bounds is None

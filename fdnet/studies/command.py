@@ -10,6 +10,7 @@ from typing import Any
 from fdnet.atomic import write_text
 from fdnet.dem.binary import find_binary
 from fdnet.errors import CaseError
+from fdnet.paths import path_option, refuse_tilde
 from fdnet.studies.engine.study import Study
 
 STUDIES: Mapping[str, str] = {
@@ -41,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--quick", action="store_true", help="the reduced form, below 30 s")
     parser.add_argument(
-        "--out", type=Path, help="folder for table, figure and text (default studies/NAME)"
+        "--out", type=path_option, help="folder for table, figure and text (default studies/NAME)"
     )
     parser.add_argument("--silent", action="store_true", help="no progress")
     thesis = parser.add_argument_group(
@@ -49,7 +50,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     thesis.add_argument("--jobs", type=int, default=1, help="runs side by side (default 1)")
     thesis.add_argument(
-        "--runs", type=Path, default=Path("runs/thesis"), help="run folders while they are needed"
+        "--runs",
+        type=path_option,
+        default=Path("runs/thesis"),
+        help="run folders while they are needed",
     )
     thesis.add_argument(
         "--redraw",
@@ -71,6 +75,7 @@ def run(options: argparse.Namespace) -> int:
         return 0
     if options.name == THESIS:
         return _run_thesis(options)
+    refuse_tilde(options.out or Path())
     study = study_named(options.name)
     out = options.out or Path("studies") / (f"{study.name}-quick" if options.quick else study.name)
     text = run_study(study, out, quick=options.quick, show=not options.silent)
@@ -83,6 +88,8 @@ def run(options: argparse.Namespace) -> int:
 def _run_thesis(options: argparse.Namespace) -> int:
     from fdnet.studies.thesis.command import ThesisOptions, run_thesis
 
+    refuse_tilde(options.runs)
+    refuse_tilde(options.out or Path())
     if options.jobs < 1:
         raise CaseError(f"--jobs: {options.jobs} runs side by side, expected at least 1")
     out = options.out or Path("studies/thesis-quick" if options.quick else "docs/thesis")

@@ -9,6 +9,7 @@ from pathlib import Path
 from fdnet.dem.binary import find_binary
 from fdnet.dem.liggghts import Launch
 from fdnet.errors import CaseError, LiggghtsError
+from fdnet.run.mark import is_run_folder, is_unused, mark_folder
 from fdnet.studies.thesis.collection import collect
 from fdnet.studies.thesis.compare.trend_table import trends_table
 from fdnet.studies.thesis.outputs import write_outputs
@@ -89,7 +90,14 @@ def keep_growth(path: Path, folder: Path, launch: Launch) -> None:
     """
     case = Planned(case="specimen1-1410", group="variant").load()
     assert case.grains.count is not None
+    if folder.exists() and not (folder.is_dir() and (is_run_folder(folder) or is_unused(folder))):
+        raise CaseError(
+            f"{folder}: holds files that fdnet did not write; give another --runs (nothing was "
+            "changed)"
+        )
     shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    mark_folder(folder)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_growth(path, grow(case, folder, launch, count=case.grains.count))
     shutil.rmtree(folder)
