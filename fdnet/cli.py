@@ -135,7 +135,12 @@ def _add_case(parser: argparse.ArgumentParser) -> None:
         help="overrides a key, e.g. fines.count=500",
     )
     parser.add_argument(
-        "--np", type=_ranks, default=1, metavar="N", help="MPI ranks for LIGGGHTS (default 1)"
+        "--np",
+        type=_ranks,
+        default=1,
+        metavar="N",
+        help="MPI ranks for LIGGGHTS (default 1); another number of ranks gives another pack from "
+        "the same seed, and a cut run is continued with the number it was begun with",
     )
 
 

@@ -29,7 +29,7 @@ NETWORK_LAYERS = [
     ["permeability"],
 ]
 STUDIES_LAYERS = [
-    ["engine", "stokes", "fuzz"],
+    ["engine", "stokes", "fuzz", "chaos"],
     ["truth"],
     ["accuracy", "benchmark", "dem", "thesis"],
     ["network"],
@@ -51,7 +51,13 @@ ROOMS = {
 }
 DOORS = {
     "jinja2": {"dem/deck", "report/html", "studies/dem"},
-    "subprocess": {"dem/binary", "dem/liggghts", "report/vtk", "studies/benchmark"},
+    "subprocess": {
+        "dem/binary",
+        "dem/liggghts",
+        "report/vtk",
+        "studies/benchmark",
+        "studies/chaos",
+    },
     "pandas": {"spheres/dump", "spheres/csv_file", "report/tables", "report/read_tables"},
     "pyvista": {"report/vtk", "report/picture", "report/meshes", "spheres/vtk_file"},
     "openpnm": {"report/openpnm", "studies/benchmark"},

@@ -13,8 +13,16 @@ from fdnet.dem.checkpoint import has_history
 from fdnet.dem.supply import refuse_crowded_supply
 from fdnet.errors import CaseError
 from fdnet.network.permeability import analyse
-from fdnet.run.dem_stages import invade_stage, invaded, pack_stage, packed_grains
+from fdnet.run.dem_stages import (
+    check_finished,
+    file_warnings,
+    invade_stage,
+    invaded,
+    pack_stage,
+    packed_grains,
+)
 from fdnet.run.folder import RunFolder, open_folder
+from fdnet.run.made_files import TABLES, digests_of
 from fdnet.run.outputs import Results, draw_figures, write_paraview, write_tables
 from fdnet.run.records import record_warnings, stage_seconds, versions
 from fdnet.run.session import RunOptions, Session
@@ -41,6 +49,7 @@ def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
     try:
         session = Session(case=case, scales=scales_of(case), folder=folder, options=options)
         if folder.manifest() is not None and folder.holds(case, options.stages):
+            check_finished(session)
             return _read_summary(folder)
         return _carry_out(session)
     except CaseError as error:
@@ -120,6 +129,7 @@ def _manifest(session: Session) -> dict[str, Any]:
         "command": session.options.command,
         "seconds": stage_seconds(pack, invasion, session.seconds),
         "versions": versions(pack),
+        "files": digests_of(session.path, [*TABLES, "pack/stage.json", "invade/stage.json"]),
         "pack": pack,
         "invade": invasion,
     }
@@ -161,7 +171,12 @@ def _write_summary(
         invasion=invasion,
         last=results.history[-1] if results.history else None,
         seconds=stage_seconds(pack, invasion, session.seconds),
-        warnings=[*scales.warnings, *record_warnings(case, pack, invasion), *notes],
+        warnings=[
+            *scales.warnings,
+            *record_warnings(case, pack, invasion),
+            *file_warnings(session),
+            *notes,
+        ],
     )
     summary = tables.write_summary(session.path / "summary.json", summary)
     if "report" in session.options.stages:

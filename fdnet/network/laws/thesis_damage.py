@@ -50,6 +50,32 @@ def thesis_damage(
     Raises:
         CaseError: an option is unknown or out of range.
     """
+    _check_options(clogging_threshold, middle_band)
+    porosity = occupancy.throat_porosity
+    lines_wall = (
+        porosity >= clogging_threshold
+        if middle_band == "threshold"
+        else _lines_the_wall(occupancy)
+    )
+    law = np.where(lines_wall, DEPOSITION, CLOGGING).astype("<U10")
+    law[occupancy.throat_fines == 0] = CLEAN
+    law[occupancy.blocked] = BLOCKED
+    factor = np.select(
+        [law == CLEAN, law == BLOCKED, law == DEPOSITION],
+        [1.0, 0.0, porosity**2],
+        _clogged_factor(network, occupancy),
+    )
+    counts = {
+        "capped": int(np.sum(factor > 1.0)),
+        "throats_filled": int(np.sum((porosity <= 0) & (law == CLOGGING))),
+    }
+    return Damage(
+        conductance=frozen(clean * np.minimum(factor, 1.0)), law_used=frozen(law), counts=counts
+    )
+
+
+def _check_options(clogging_threshold: float, middle_band: str) -> None:
+    """Raise CaseError on an unknown middle band and on a threshold outside 0 to 1."""
     if middle_band not in MIDDLE_BANDS:
         raise CaseError(
             f"analysis.middle_band: {middle_band!r} is not known; choose one of {MIDDLE_BANDS}"
@@ -59,26 +85,6 @@ def thesis_damage(
             f"analysis.clogging_threshold: {clogging_threshold} is outside 0 to 1; "
             "give the throat porosity below which fines clog a throat"
         )
-    porosity = occupancy.throat_porosity
-    deposits = (
-        porosity >= clogging_threshold
-        if middle_band == "threshold"
-        else _lines_the_wall(occupancy)
-    )
-    kozeny = _clogged_factor(network, occupancy)
-    law = np.where(deposits, DEPOSITION, CLOGGING).astype("<U10")
-    law[occupancy.throat_fines == 0] = CLEAN
-    law[occupancy.blocked] = BLOCKED
-    factor = np.select(
-        [law == CLEAN, law == BLOCKED, law == DEPOSITION], [1.0, 0.0, porosity**2], kozeny
-    )
-    counts = {
-        "capped": int(np.sum(factor > 1.0)),
-        "throats_filled": int(np.sum((porosity <= 0) & (law == CLOGGING))),
-    }
-    return Damage(
-        conductance=frozen(clean * np.minimum(factor, 1.0)), law_used=frozen(law), counts=counts
-    )
 
 
 def _clogged_factor(network: Network, occupancy: Occupancy) -> Array:

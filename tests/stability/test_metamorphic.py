@@ -1,0 +1,167 @@
+"""The same spheres written down in another way give the same permeability, by the command line.
+
+The bounds, and the reasons for them, stand in docs/reference/promises.md.
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fdnet.cli import main
+from fdnet.spheres.snapshot import Array, Kind, Snapshot
+from tests.network.packs import random_pack, with_fines
+
+INTACT = 3e-8
+"""Two descriptions without fines: the lubrication law's tables are interpolated."""
+PERIODIC = 3e-8
+"""The same with fines where no wall and no pressure plane is near."""
+AT_WALLS = 1e-4
+"""The same with fines at walls: a prism and its mirror image are split in one of many ways."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pack:
+    """Spheres as a file describes them.
+
+    Attributes:
+        place: (N, 3) centres.
+        radius: (N,) radii.
+        kind: (N,) Kind of each sphere.
+        box: (3, 2) lower and upper bounds.
+        periodic: names of the periodic directions.
+        axis: flow direction.
+        unit: unit of length.
+    """
+
+    place: Array
+    radius: Array
+    kind: Array
+    box: Array
+    periodic: str
+    axis: str = "x"
+    unit: str = "m"
+
+
+def pack_of(spheres: Snapshot, periodic: str) -> Pack:
+    return Pack(
+        place=spheres.position,
+        radius=spheres.radius,
+        kind=spheres.kind,
+        box=np.array(spheres.box),
+        periodic=periodic,
+    )
+
+
+def changed(pack: Pack, **parts: object) -> Pack:
+    fields = {name: getattr(pack, name) for name in Pack.__dataclass_fields__}
+    return Pack(**(fields | parts))
+
+
+def permuted(pack: Pack) -> Pack:
+    order = np.random.default_rng(4).permutation(len(pack.place))
+    return changed(pack, place=pack.place[order], radius=pack.radius[order], kind=pack.kind[order])
+
+
+def shifted(pack: Pack) -> Pack:
+    """By a third of each period."""
+    around = [name in pack.periodic for name in "xyz"]
+    length = np.ptp(pack.box, axis=1)
+    place = pack.box[:, 0] + (pack.place - pack.box[:, 0] + length / 3) % length
+    return changed(pack, place=np.where(around, place, pack.place))
+
+
+def mirrored(axis: int):
+    def change(pack: Pack) -> Pack:
+        place = pack.place.copy()
+        place[:, axis] = pack.box[axis].sum() - place[:, axis]
+        return changed(pack, place=place)
+
+    return change
+
+
+def turned(pack: Pack) -> Pack:
+    """The file's axes are named in another order, the flow is along what was x."""
+    order = [2, 0, 1]
+    periodic = "".join(
+        new for new, old in zip("xyz", order, strict=True) if "xyz"[old] in pack.periodic
+    )
+    return changed(
+        pack, place=pack.place[:, order], box=pack.box[order], periodic=periodic, axis="y"
+    )
+
+
+def doubled(pack: Pack) -> Pack:
+    """Two periods along y."""
+    step, box = np.array([0.0, np.ptp(pack.box[1]), 0.0]), pack.box.copy()
+    box[1, 1] += step[1]
+    return changed(
+        pack,
+        place=np.vstack([pack.place, pack.place + step]),
+        radius=np.tile(pack.radius, 2),
+        kind=np.tile(pack.kind, 2),
+        box=box,
+    )
+
+
+def in_millimetres(pack: Pack) -> Pack:
+    return changed(
+        pack, place=1e3 * pack.place, radius=1e3 * pack.radius, box=1e3 * pack.box, unit="mm"
+    )
+
+
+CHANGES = {
+    "permuted": permuted,
+    "shifted": shifted,
+    "mirrored in x": mirrored(0),
+    "mirrored in y": mirrored(1),
+    "turned": turned,
+    "doubled": doubled,
+    "in millimetres": in_millimetres,
+}
+
+
+def permeability(pack: Pack, folder: Path, capsys, *options: str) -> tuple[float, float]:
+    """k without and with fines, m2."""
+    path = folder / "spheres.csv"
+    names = np.where(pack.kind == Kind.GRAIN, "grain", "fine")
+    rows = zip(pack.place.tolist(), pack.radius.tolist(), names, strict=True)
+    lines = [f"{x!r},{y!r},{z!r},{radius!r},{name}" for (x, y, z), radius, name in rows]
+    path.write_text("\n".join(["x,y,z,radius,kind", *lines]) + "\n")
+    box = ",".join(repr(float(bound)) for bound in pack.box.ravel())
+    words = ["--units", pack.unit, "--periodic", pack.periodic, "--axis", pack.axis, "--json"]
+    code = main(["permeability", str(path), f"--box={box}", *words, *options])
+    printed = capsys.readouterr()
+    assert code == 0, printed.err
+    result = json.loads(printed.out)
+    return result["k_initial_m2"], result["k_damaged_m2"]
+
+
+def spheres(spread: float) -> Snapshot:
+    return with_fines(random_pack(40, 0.55, spread=spread), 120, 0.12)
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("spread", [0.0, 0.3])
+@pytest.mark.parametrize(("periodic", "with_walls"), [("xyz", PERIODIC), ("yz", AT_WALLS)])
+def test_another_description_of_the_same_pack_gives_its_permeability(
+    tmp_path, capsys, change, spread, periodic, with_walls
+):
+    pack = pack_of(spheres(spread), periodic)
+    intact, damaged = permeability(pack, tmp_path, capsys)
+    other_intact, other_damaged = permeability(CHANGES[change](pack), tmp_path, capsys)
+    assert damaged < intact
+    assert other_intact == pytest.approx(intact, rel=INTACT)
+    assert other_damaged == pytest.approx(damaged, rel=with_walls)
+
+
+def test_without_tables_the_mirror_image_agrees_to_rounding(tmp_path, capsys):
+    """The thesis's law has closed forms: what is left of INTACT then is rounding."""
+    pack = pack_of(spheres(0.3), "yz")
+    values = [
+        permeability(one, tmp_path, capsys, "--law", "thesis")[0]
+        for one in (pack, mirrored(0)(pack), mirrored(1)(pack))
+    ]
+    assert values[1:] == pytest.approx([values[0]] * 2, rel=1e-12)
