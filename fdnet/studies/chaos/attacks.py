@@ -35,6 +35,8 @@ AT_STAKE = (
     "invade/post/*",
 )
 """Files that are damaged: results, records, and what LIGGGHTS wrote."""
+MEMORY_BYTES = (300 << 20, 600 << 20, 1 << 30)
+"""Limits of memory. Below some 200 MB the import of numpy itself ends the process (OpenBLAS)."""
 UNREAD = (".lock", "screen.txt", "log.liggghts")
 """Files that nobody reads again."""
 FOREIGN = {
@@ -235,7 +237,7 @@ ATTACKS: Mapping[str, Attack] = {
     "swap": damage(swap),
     "file size": limit(resource.RLIMIT_FSIZE, (0, 1000, 8_000, 30_000, 100_000)),
     "handles": limit(resource.RLIMIT_NOFILE, (4, 6, 8, 12, 16, 24, 48)),
-    "memory": limit(resource.RLIMIT_AS, (100 << 20, 300 << 20, 600 << 20, 1 << 30)),
+    "memory": limit(resource.RLIMIT_AS, MEMORY_BYTES),
     "race": race,
     "foreign": foreign,
 }
