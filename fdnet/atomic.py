@@ -15,8 +15,10 @@ _PART = re.compile(r"\..+\.(\d+)\.part(\.[^.]*)?")
 
 
 def disk_is_full(folder: str | Path) -> bool:
-    """Less than 64 kB are free where `folder` is."""
-    return shutil.disk_usage(folder).free < _FULL_BYTES
+    """Less than 64 kB, or no further file, are free where `folder` is."""
+    inodes = os.statvfs(folder)
+    full = inodes.f_files > 0 and inodes.f_favail == 0
+    return full or shutil.disk_usage(folder).free < _FULL_BYTES
 
 
 def refuse_special(path: Path) -> None:
@@ -82,7 +84,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
 def write_text(path: str | Path, text: str) -> Path:
     """Write `text` as UTF-8 with `\\n` line ends, atomically; returns the path."""
     with replacing(path) as part:
-        part.write_text(text, encoding="utf-8", newline="\n")
+        part.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
     return Path(path)
 
 

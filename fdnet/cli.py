@@ -6,7 +6,9 @@ by the user.
 """
 
 import argparse
+import io
 import json
+import os
 import shlex
 import signal
 import sys
@@ -15,10 +17,12 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from fdnet.case.stages import STAGES
-from fdnet.errors import CaseError, FdnetError
+from fdnet.errors import CaseError, FdnetError, cure_of
 from fdnet.paths import path_option
 
 _STOPPED = 130
+_SIGNALS: list[int] = []
+"""Signals to stop that have arrived."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -30,25 +34,27 @@ class _Parser(argparse.ArgumentParser):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
+    _accept_any_character()
+    _SIGNALS.clear()
     given = list(sys.argv[1:] if arguments is None else arguments)
     options = _parser().parse_args(given)
     options.command_line = shlex.join(["fdnet", *given])
     if hasattr(signal, "SIGTERM"):
         signal.signal(signal.SIGTERM, _interrupt)
     try:
-        return options.action(options)
+        code = options.action(options)
+        sys.stdout.flush()
+        return code
+    except BrokenPipeError:  # the reader of what was printed last has gone; all work is done
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        return 0
     except FdnetError as error:
         if options.debug:
             raise
         print(f"fdnet: {_one_line(error)}", file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
-        print(
-            "fdnet: stopped; what was written is kept, repeat the command to go on "
-            "(a run: with --resume)",
-            file=sys.stderr,
-        )
-        return _STOPPED
+        return _stopped()
     except MemoryError as error:
         print(
             f"fdnet: not enough memory ({error}); supply fewer fines, or take a machine with more",
@@ -58,15 +64,38 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         if options.debug:
             raise
+        if _SIGNALS:
+            return _stopped()
         print(
-            f"fdnet: {error.filename or 'system'}: {error.strerror or error}; free space or mend "
-            "permissions, then repeat the command (a run: with --resume)",
+            f"fdnet: {error.filename or 'system'}: {error.strerror or error}; {cure_of(error)}, then repeat "
+            "the command (a run: with --resume)",
             file=sys.stderr,
         )
         return 2
+    except Exception:  # a library may turn the stop into an error of its own
+        if not _SIGNALS:
+            raise
+        return _stopped()
 
 
-def _interrupt(*_: Any) -> NoReturn:
+def _accept_any_character() -> None:
+    """Print a character that the terminal does not know as its number, rather than fail."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _stopped() -> int:
+    print(
+        "fdnet: stopped; what was written is kept, repeat the command to go on "
+        "(a run: with --resume)",
+        file=sys.stderr,
+    )
+    return _STOPPED
+
+
+def _interrupt(number: int, *_: Any) -> NoReturn:
+    _SIGNALS.append(number)
     raise KeyboardInterrupt
 
 
@@ -106,13 +135,18 @@ def _add_case(parser: argparse.ArgumentParser) -> None:
         help="overrides a key, e.g. fines.count=500",
     )
     parser.add_argument(
-        "--np", type=_ranks, default=1, metavar="N", help="MPI ranks for LIGGGHTS (default 1)"
+        "--np",
+        type=_ranks,
+        default=1,
+        metavar="N",
+        help="MPI ranks for LIGGGHTS (default 1); another number of ranks gives another pack from "
+        "the same seed, and a cut run is continued with the number it was begun with",
     )
 
 
 def _ranks(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r}, expected a number of ranks, 1 or more")
+    if not text.isdecimal() or len(text) > 9 or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text[:40]!r}, expected a number of ranks, 1 or more")
     return int(text)
 
 
@@ -190,7 +224,7 @@ def _stages(text: str) -> tuple[str, ...]:
 
 def _run(options: argparse.Namespace) -> int:
     from fdnet.run.pipeline import run_stages
-    from fdnet.run.session import RunOptions
+    from fdnet.run.session import RunOptions, cores
 
     case = _case_of(options)
     out = options.out or Path("runs") / case.name
@@ -205,12 +239,24 @@ def _run(options: argparse.Namespace) -> int:
         show_progress=not options.quiet,
         command=options.command_line,
     )
+    if options.np > cores():
+        _warn(
+            f"--np {options.np}: this machine has {cores()} cores, so the run will be slower than "
+            f"with --np {cores()}"
+        )
     summary = run_stages(case, chosen)
+    for text in summary.get("warnings", []):
+        if "3-D picture" in text or text.startswith("the drawing process"):
+            _warn(text)
     if options.json:
         print(json.dumps(summary, indent=2))
     else:
         _print_summary(summary, out)
     return 0
+
+
+def _warn(text: str) -> None:
+    print(f"fdnet: warning: {text}", file=sys.stderr, flush=True)
 
 
 def _print_summary(summary: dict[str, Any], out: Path) -> None:

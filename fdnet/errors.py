@@ -3,6 +3,8 @@
 Each message names what is wrong, where, what was expected and what to do.
 """
 
+import errno
+
 
 class FdnetError(Exception):
     """Anything that fdnet refuses; the other errors are kinds of it.
@@ -102,3 +104,17 @@ class FlowError(FdnetError):
     """
 
     exit_code = 4
+
+
+_CURES = {
+    errno.ENOSPC: "free space or files (inodes)",
+    errno.EDQUOT: "free space or files (inodes)",
+    errno.EMFILE: "raise the number of files that may be open (ulimit -n)",
+    errno.ENFILE: "wait until other programs have closed files",
+}
+"""What to do about an error of the system."""
+
+
+def cure_of(error: OSError) -> str:
+    """What a user can do about an error of the system."""
+    return _CURES.get(error.errno or 0, "free space or mend permissions")

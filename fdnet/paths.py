@@ -31,8 +31,17 @@ def path_option(text: str) -> Path:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
-def refuse_tilde(path: Path) -> None:
-    """Raise CaseError when a folder with the name `~` would have to be made for `path`."""
+def refuse_folder_name(path: Path) -> None:
+    """Raise CaseError when `path` is no folder that a run can be written to.
+
+    A folder with the name `~` is never made, and VTK takes no path that is not UTF-8.
+    """
+    try:
+        str(path.absolute()).encode("utf-8")
+    except UnicodeEncodeError as error:
+        raise CaseError(
+            f"{path}: the name of the folder is not UTF-8, which VTK needs; give another --out"
+        ) from error
     for folder in (path, *path.parents):
         if folder.name == "~" and not folder.exists():
             raise CaseError(

@@ -97,8 +97,8 @@ def _add_file_choices(parser: argparse.ArgumentParser) -> None:
 
 
 def _count(text: str) -> int:
-    if not text.isdecimal() or not 1 <= int(text) <= MOST_SECTIONS:
-        raise argparse.ArgumentTypeError(f"{text!r}, expected 1 to {MOST_SECTIONS}")
+    if not text.isdecimal() or len(text) > 18 or not 1 <= int(text) <= MOST_SECTIONS:
+        raise argparse.ArgumentTypeError(f"{text[:40]!r}, expected 1 to {MOST_SECTIONS}")
     return int(text)
 
 
@@ -157,7 +157,10 @@ def box_of(text: str) -> list[float]:
 
 def types_of(text: str) -> dict[int, str]:
     pairs = [part.partition("=") for part in text.split(",")]
-    if not all(number.strip().isdecimal() and name.strip() for number, _, name in pairs):
+    if not all(
+        number.strip().isdecimal() and len(number) < 10 and name.strip()
+        for number, _, name in pairs
+    ):
         raise CaseError(f"--types: {text!r}, expected TYPE=KIND,..., for example 1=grain,2=fine")
     if len({int(number) for number, _, _ in pairs}) < len(pairs):
         raise CaseError(f"--types: {text!r} names a type twice")

@@ -21,7 +21,7 @@ LAYERS = [
 """Rooms of the package from the bottom up; a room imports from lower lines only."""
 
 NETWORK_LAYERS = [
-    ["geometry", "compiled"],
+    ["geometry", "compiled", "validity"],
     ["tessellation"],
     ["network"],
     ["fines", "flow"],

@@ -33,12 +33,26 @@ def case_from(data: Mapping[str, Any], *, source: str = "case") -> Case:
     unknown key the nearest known one.
     """
     model = case_type(data)
+    for key in _long_numbers(data):
+        raise CaseError(f"{source}: {key}: holds a whole number of more than 18 digits")
     try:
         return model.model_validate(data)
     except ValidationError as error:
         problems = _problems(model, data, error)
     plural = "s" if len(problems) > 1 else ""
     raise CaseError(f"{source}: {len(problems)} problem{plural}: {' | '.join(problems)}")
+
+
+def _long_numbers(value: Any, key: str = "") -> Iterator[str]:
+    """Dotted keys of whole numbers that no double or 64-bit number holds."""
+    if isinstance(value, Mapping):
+        for name, one in value.items():
+            yield from _long_numbers(one, f"{key}.{name}" if key else str(name))
+    elif isinstance(value, list | tuple):
+        for one in value:
+            yield from _long_numbers(one, key)
+    elif isinstance(value, int) and abs(value) >= 10**18:
+        yield key
 
 
 def _problems(model: type[Case], data: Mapping[str, Any], error: ValidationError) -> list[str]:
@@ -93,6 +107,11 @@ def _is_union_tag(part: Any) -> bool:
     return isinstance(part, str) and ("[" in part or part in ("float", "int", "constrained-float"))
 
 
+_LONGEST_WORD = 1000
+_MOST_NAMES = 8
+"""Most parts of a dotted key; no key of a case has so many."""
+
+
 def set_keys(data: dict[str, Any], assignments: list[str]) -> dict[str, Any]:
     """`data` with dotted `key=value` assignments put in.
 
@@ -102,6 +121,11 @@ def set_keys(data: dict[str, Any], assignments: list[str]) -> dict[str, Any]:
     for assignment in assignments:
         key, equals, text = assignment.partition("=")
         names = key.strip().split(".")
+        if len(names) > _MOST_NAMES:
+            raise CaseError(
+                f"--set {assignment[:60]}...: the key has {len(names)} parts, expected at most "
+                f"{_MOST_NAMES}, e.g. fines.radius_mm=0.05"
+            )
         if not equals or not all(names):
             raise CaseError(
                 f"--set {assignment}: expected key=value with a dotted key, "
@@ -118,9 +142,14 @@ def set_keys(data: dict[str, Any], assignments: list[str]) -> dict[str, Any]:
 
 def _toml_value(text: str) -> Any:
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text
+        table = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        table = {"value": text}
+        if "\n" in text or len(text) > _LONGEST_WORD:
+            table = {}
+    if set(table) != {"value"}:
+        raise CaseError(f"--set: {text[:60]!r} is not one value; give each key a --set of its own")
+    return table["value"]
 
 
 def read_case(path: str | Path, *, assignments: list[str] | None = None) -> Case:
@@ -141,6 +170,11 @@ def read_case(path: str | Path, *, assignments: list[str] | None = None) -> Case
         raise CaseError(
             f"{path}: cannot be read as a case file: {error}; give the path of a TOML file"
         ) from error
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError as error:
+        raise CaseError(f"{path}: its tables or lists are nested too deeply for a case") from error
+    except ValueError as error:
         raise CaseError(f"{path}: not valid TOML: {error}") from error
-    return case_from(set_keys(data, assignments or []), source=str(path))
+    try:
+        return case_from(set_keys(data, assignments or []), source=str(path))
+    except RecursionError as error:
+        raise CaseError(f"{path}: its tables or lists are nested too deeply for a case") from error

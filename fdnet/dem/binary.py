@@ -2,6 +2,7 @@
 
 import os
 import re
+import resource
 import shutil
 import subprocess
 from dataclasses import dataclass
@@ -12,6 +13,8 @@ from fdnet.errors import LiggghtsError
 KNOWN_VERSION = "3.8.0"
 """The version that fdnet was measured and tested with."""
 LOG = "log.liggghts"
+FEWEST_HANDLES = 64
+"""Fewest open files with which LIGGGHTS and MPI start."""
 _PROJECT = Path(__file__).resolve().parents[2]
 
 
@@ -60,6 +63,7 @@ def find_binary(option: str | None = None) -> Binary:
     """
     given = os.path.expanduser(option or os.environ.get("FDNET_LIGGGHTS") or "")
     places = [given] if given else ["liggghts", str(_PROJECT / ".prefix" / "bin" / "liggghts")]
+    _refuse_surroundings()
     hit = next(filter(None, map(shutil.which, places)), None)
     if hit is None:
         raise LiggghtsError(
@@ -68,6 +72,22 @@ def find_binary(option: str | None = None) -> Binary:
         )
     path = Path(hit).absolute()
     return Binary(path=path, version=_version(path), launcher=_launcher(path))
+
+
+def _refuse_surroundings() -> None:
+    """Raise LiggghtsError on surroundings in which no LIGGGHTS can run, named by their cause."""
+    folder = os.environ.get("TMPDIR")
+    if folder and not (os.path.isdir(folder) and os.access(folder, os.W_OK | os.X_OK)):
+        raise LiggghtsError(
+            f"TMPDIR: {folder} is no folder that can be written to, and MPI needs one; set TMPDIR "
+            "to such a folder, or unset it"
+        )
+    handles = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    if 0 <= handles < FEWEST_HANDLES:
+        raise LiggghtsError(
+            f"ulimit -n: only {handles} files may be open at a time, expected at least "
+            f"{FEWEST_HANDLES}; raise the limit with ulimit -n {16 * FEWEST_HANDLES}"
+        )
 
 
 def _launcher(binary: Path) -> Path | None:
@@ -97,6 +117,11 @@ def _version(path: Path) -> str:
     match = re.search(r"Version LIGGGHTS[-A-Z]*\s+([0-9.]+)", text)
     if not match:
         first = text.strip().splitlines()[:1]
+        if answer.returncode in (126, 127):
+            raise LiggghtsError(
+                f"{path}: a program or library that it needs was not found ({first}); check PATH "
+                f"({os.environ.get('PATH', '')!r}) and the set-up"
+            )
         raise LiggghtsError(
             f"{path}: does not answer like LIGGGHTS (exit {answer.returncode}, {first}); expected "
             f"version {KNOWN_VERSION}, run scripts/setup.sh"

@@ -11,7 +11,7 @@ from fdnet.dem.invade_deck import render_invade
 from fdnet.dem.pack_deck import write_pack_inputs
 from fdnet.dem.scene import box_of
 from fdnet.errors import CaseError
-from fdnet.paths import expanded, refuse_tilde
+from fdnet.paths import expanded, refuse_folder_name
 from fdnet.scales.grain_pack import grain_count
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Snapshot, resting
@@ -26,7 +26,7 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
     Raises CaseError when a file that would be written is there already.
     """
     scales, out = scales_of(case), expanded(out)
-    refuse_tilde(out)
+    refuse_folder_name(out)
     decks = {
         stage: out / stage / f"in.{stage}" for stage in case.stages if stage in LIGGGHTS_STAGES
     }
@@ -40,7 +40,7 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
     write_pack_inputs(case, scales, folder, count=grain_count(case), ranks=ranks)
     if isinstance(case, InvasionCase):
         deck = render_invade(case, scales_of(case), _expected_grains(case), ranks=ranks)
-        decks["invade"].write_text(deck.text)
+        decks["invade"].write_text(deck.text, encoding="utf-8")
     return list(decks.values())
 
 

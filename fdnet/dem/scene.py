@@ -8,10 +8,11 @@ import numpy as np
 from fdnet.atomic import write_text
 from fdnet.case.case import Case
 from fdnet.dem.deck import LeftOut, number
+from fdnet.errors import DumpError
 from fdnet.scales.scales import Scales
 from fdnet.scales.springs import Contact
 from fdnet.spheres.dump import Frame
-from fdnet.spheres.snapshot import Array, Snapshot
+from fdnet.spheres.snapshot import Array, Kind, Snapshot
 
 _MATERIALS = {"pack": ("grain", "wall"), "invade": ("grain", "fine", "wall")}
 
@@ -128,12 +129,28 @@ def box_of(case: Case) -> Array:
     return np.column_stack([np.zeros(3), case.size_m])
 
 
+def _check_spheres(frame: Frame) -> None:
+    """Raise DumpError on a type that is neither grain nor fine, or a radius that is not above 0."""
+    for name, good, expected in (
+        ("type", np.isin(frame.column("type"), list(Kind)), "1 (grain) or 2 (fine)"),
+        ("radius", frame.column("radius") > 0, "a number above 0"),
+    ):
+        bad = np.flatnonzero(~good)
+        if len(bad):
+            raise DumpError(
+                f"dump at step {frame.step}: the sphere with id {frame.column('id')[bad[0]]:.0f} "
+                f"has {name} {frame.column(name)[bad[0]]:g}, expected {expected}; the file was "
+                "changed, start over with --force"
+            )
+
+
 def snapshot_of(frame: Frame, case: Case, *, time_s: float) -> Snapshot:
     """A frame of a dump as a Snapshot in the specimen's box.
 
     Positions beyond a periodic side are moved into the box.
     """
     position = np.column_stack([frame.column(c) for c in "xyz"])
+    _check_spheres(frame)
     for axis, periodic in enumerate(case.periodic):
         if periodic:
             position[:, axis] = np.mod(position[:, axis], case.size_m[axis])

@@ -9,12 +9,16 @@ package cannot be written. NUMBA_CACHE_DIR, when set, is used instead.
 import contextlib
 import hashlib
 import os
+import pickle
 import stat
+import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numba
 from numba.core import config
+from numba.core.caching import IndexDataCacheFile
 
 __all__ = ["compiled"]
 
@@ -56,4 +60,82 @@ if not config.CACHE_DIR:  # type: ignore[attr-defined]
     _folder = cache_folder(Path(__file__).parent, _writable_root())
     config.CACHE_DIR = str(_folder)  # type: ignore[attr-defined]
 
-compiled = numba.njit(cache=True)
+_said: set[str] = set()
+
+
+def _say_once(folder: str, what: str, error: Exception) -> None:
+    """Report a cache that fails, once a process: it costs seconds, no result depends on it."""
+    if what not in _said:
+        _said.add(what)
+        reason = str(error) or type(error).__name__
+        print(f"fdnet: {folder}: the cache of compiled code {what} ({reason})", file=sys.stderr)
+
+
+class _CheckedFile(IndexDataCacheFile):
+    """numba's files of one function, each sealed with a digest, since numba runs what it reads.
+
+    A bad file is left aside and made anew. Where nothing can be written the function is compiled
+    again in every process.
+    """
+
+    def load(self, key: Any) -> Any:
+        """The compiled code for a signature, or None."""
+        try:
+            return super().load(key)
+        except Exception as error:
+            _say_once(self._cache_path, "was bad and is made anew", error)
+            with contextlib.suppress(OSError):
+                os.replace(self._index_path, self._index_path + ".bad")
+            return None
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep the compiled code for a signature, if it can be written."""
+        try:
+            super().save(key, data)
+        except Exception as error:
+            _say_once(self._cache_path, "cannot be written and is done without", error)
+
+    def _load_index(self) -> Any:
+        with contextlib.suppress(FileNotFoundError), open(self._index_path, "rb") as file:
+            pickle.load(file)
+            self._opened(self._index_name, file.read())
+        return super()._load_index()
+
+    def _save_index(self, overloads: Any) -> None:
+        body = self._dump((self._source_stamp, overloads))
+        with self._open_for_write(self._index_path) as file:
+            pickle.dump(self._version, file, protocol=-1)
+            file.write(body + self._seal(self._index_name, body))
+
+    def _load_data(self, name: str) -> Any:
+        return pickle.loads(self._opened(name, Path(self._data_path(name)).read_bytes()))
+
+    def _save_data(self, name: str, data: Any) -> None:
+        body = self._dump(data)
+        with self._open_for_write(self._data_path(name)) as file:
+            file.write(body + self._seal(name, body))
+
+    def _opened(self, name: str, content: bytes) -> bytes:
+        size = hashlib.sha256().digest_size
+        body, seal = content[:-size], content[-size:]
+        if seal != self._seal(name, body):
+            raise ValueError(f"{name} is not as it was written")
+        return body
+
+    @staticmethod
+    def _seal(name: str, body: bytes) -> bytes:
+        return hashlib.sha256(name.encode() + b"\0" + body).digest()
+
+
+def compiled(function: Any) -> Any:
+    """The function, compiled by numba when it is first called, with its code kept on disk."""
+    try:
+        result: Any = numba.njit(cache=True)(function)
+        files = result._cache._cache_file
+        result._cache._cache_file = _CheckedFile(
+            files._cache_path, files._index_name.removesuffix(".nbi"), files._source_stamp
+        )
+    except (RuntimeError, OSError, AttributeError) as error:
+        _say_once(str(config.CACHE_DIR), "cannot be used", error)  # type: ignore[attr-defined]
+        return numba.njit(function)
+    return result

@@ -23,7 +23,7 @@ from fdnet.network.flow.slabs import (
 from fdnet.network.laws.damage import CLEAN, Damage
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS, damage_law
 from fdnet.network.network import Network
-from fdnet.network.specimen import Specimen, measure_specimen
+from fdnet.network.specimen import Specimen, measure_specimen, specimen_doubts
 from fdnet.spheres.directions import Directions, periodic_axes
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
@@ -176,6 +176,7 @@ def _analysis(
     )
     porosity, invaded = specimen.porosity, specimen.invaded
     _warn(log, (clean, final), sections, specimen.occupancy)
+    log.warnings += specimen_doubts(specimen, clean.k, options.walls)
     law_used = np.full(len(final.conductance), CLEAN) if damage is None else damage.law_used
     return Analysis(
         network=base.network,
@@ -238,8 +239,7 @@ def _damage(
 def _slab_k(state: _State, edges: Array, log: _Log) -> SlabK:
     network = state.network
     with log.timed("solve"):
-        if len(edges) == 2 and not network.periodic[0]:
-            # one slab is the whole box
+        if len(edges) == 2 and not network.periodic[0]:  # one slab is the whole box
             solved = [(state.k, state.flow)]
         else:
             solved = [

@@ -1,6 +1,6 @@
 """What a specimen is, before any law: its network, where its fines sit, its porosity by depth."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
@@ -12,6 +12,7 @@ from fdnet.network.fines.invaded import Invaded, measure_invaded
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.flow.sections import profile_edges, section_edges
 from fdnet.network.network import Network, build_network
+from fdnet.network.validity import doubts, fines_outside_sides, refuse_wide_fines
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.porosity import Porosity, measure_porosity
 from fdnet.spheres.snapshot import Array, Snapshot
@@ -35,6 +36,7 @@ class Specimen:
         porosity: porosity before and after, by depth.
         depth: (F,) depth of the fines centred in the box, m.
         invaded: number, volume and depths of these fines, and the cake.
+        outside_sides: number of fines centred beyond a side wall.
     """
 
     first: Network
@@ -46,6 +48,7 @@ class Specimen:
     porosity: tuple[Porosity, Porosity]
     depth: Array
     invaded: Invaded
+    outside_sides: int
 
     __repr__ = one_line
 
@@ -75,6 +78,7 @@ def measure_specimen(
     if damaged is not None:
         with timed("occupancy"):
             occupancy = measure_occupancy(network, damaged.fines(), overlap=choices.throat_overlap)
+        refuse_wide_fines(before, damaged.fines())
     width = choices.profile_bin_m
     bins = profile_edges(first.grain_radius if width is None else width, box)
     cuts = np.unique(np.concatenate([edges, bins]))
@@ -95,7 +99,25 @@ def measure_specimen(
         porosity=(clean, filled),
         depth=x[(x >= box[0, 0]) & (x < box[0, 1])],
         invaded=measure_invaded(spheres, periodic=periodic),
+        outside_sides=fines_outside_sides(spheres.fines(), periodic),
     )
+
+
+def specimen_doubts(specimen: Specimen, permeability: float, walls: str) -> Iterator[str]:
+    """Warnings on a specimen and its permeability without fines, m2."""
+    network = specimen.first
+    yield from doubts(
+        porosity=specimen.porosity[0].mean,
+        permeability=permeability,
+        box=network.box,
+        periodic=network.periodic,
+        walls=walls,
+    )
+    if specimen.outside_sides:
+        yield (
+            f"{specimen.outside_sides} fines are centred beyond the side walls of the box and "
+            "block nothing there: check the box, the units and the periodic directions"
+        )
 
 
 def _same_grains(before: Snapshot, after: Snapshot) -> Snapshot:

@@ -88,7 +88,7 @@ def read_summary(path: Path) -> dict[str, Any]:
         summary = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise _refusal(path, "is missing") from error
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise _refusal(path, f"cannot be read as JSON ({error})") from error
     if not isinstance(summary, dict) or "k_initial_m2" not in summary:
         raise _refusal(path, "is no summary of an fdnet run")

@@ -1,5 +1,6 @@
 """ParaView files (.vtp, .pvd) of one specimen, and the 3-D picture drawn in a child process."""
 
+import errno
 import os
 import subprocess
 import sys
@@ -11,7 +12,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from fdnet.atomic import replacing, write_text
+from fdnet.atomic import disk_is_full, replacing, write_text
 from fdnet.report.tables import blocked_throats, pore_porosity
 from fdnet.spheres.snapshot import Array, Snapshot
 
@@ -142,8 +143,16 @@ def _refuse_failure(done: "subprocess.CompletedProcess[str]", part: Path) -> Non
 
 
 def _save(path: str | Path, mesh: Any) -> Path:
+    """Write the mesh. Raises OSError where VTK wrote none; VTK itself prints nothing."""
+    import pyvista as pv
+
     with replacing(path) as part:
-        mesh.save(part)
+        with pv.vtk_verbosity("off"):
+            mesh.save(part)
+        if not part.exists() or not part.stat().st_size:
+            full = disk_is_full(part.parent)
+            code = errno.ENOSPC if full else errno.EIO
+            raise OSError(code, os.strerror(code), str(path))
     return Path(path)
 
 

@@ -1,14 +1,18 @@
 """The stages of a run that need LIGGGHTS: the pack and the invasion."""
 
+from pathlib import Path
+
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import read_history, state_at
+from fdnet.dem.digests import checkpoint_files
 from fdnet.dem.invasion import invade
 from fdnet.dem.packing import make_pack
 from fdnet.dem.scene import snapshot_of
 from fdnet.errors import CaseError
+from fdnet.run.made_files import ANALYSE_AGAIN, START_OVER, check_files
 from fdnet.run.outputs import Invaded
 from fdnet.run.progress import Progress
-from fdnet.run.records import invade_record, pack_record
+from fdnet.run.records import PACK_DUMP, invade_record, pack_record, ranks_of
 from fdnet.run.session import Session
 from fdnet.scales.grain_pack import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES
 from fdnet.scales.scales import InvasionScales, scales_of
@@ -25,7 +29,8 @@ def pack_stage(session: Session) -> None:
     progress = Progress("pack", expected, show=session.options.show_progress)
     with session.timed("pack"), progress:
         pack = make_pack(case, scales, session.path / "pack", session.launch(progress))
-    record = pack_record(case, pack, scales.porosity, session.seconds["pack"])
+    folder, seconds = session.path / "pack", session.seconds["pack"]
+    record = pack_record(case, pack, folder, assumed=scales.porosity, seconds=seconds)
     session.folder.finish("pack", record)
 
 
@@ -33,12 +38,27 @@ def invade_stage(session: Session, case: InvasionCase) -> None:
     """Drive the fines in, unless that is done. Raises what `invade` raises."""
     if _is_done(session, "invade"):
         return
-    scales, grains = scales_of(case), packed_grains(session)
+    scales, grains, folder = scales_of(case), packed_grains(session), session.path / "invade"
+    _refuse_mixed_ranks(session, folder)
     expected = _expected_steps(scales)
     progress = Progress("invade", expected, show=session.options.show_progress)
     with session.timed("invade"), progress:
-        result = invade(case, scales, grains, session.path / "invade", session.launch(progress))
-    session.folder.finish("invade", invade_record(case, result, session.seconds["invade"]))
+        result = invade(case, scales, grains, folder, session.launch(progress))
+    seconds = session.seconds["invade"]
+    record = invade_record(case, result, folder, seconds=seconds)
+    session.folder.finish("invade", record)
+
+
+def _refuse_mixed_ranks(session: Session, folder: Path) -> None:
+    """A run that was cut between pack and invasion goes on with the ranks that it began with."""
+    ranks, record = session.options.ranks, session.folder.record("pack")
+    begun = any(True for _ in checkpoint_files(folder))
+    made = None if record is None else ranks_of(record)
+    if session.options.resume and not begun and made not in (None, ranks):
+        raise CaseError(
+            f"{session.path}: this run was begun with --np {made}, and --np {ranks} would give "
+            f"another result; continue with --np {made}, or start over with --force"
+        )
 
 
 def _expected_steps(scales: InvasionScales) -> int:
@@ -55,18 +75,67 @@ def _is_done(session: Session, stage: str) -> bool:
             f"{session.path / stage}: belongs to another case; give another --out, or --force to "
             "replace it"
         )
+    if stage == "pack":
+        packed_grains(session)
+    else:
+        check_files(session.path / stage, record, START_OVER, may_lack=_is_dump)
     return True
 
 
+def _is_dump(name: str) -> bool:
+    return name.endswith(".dump")
+
+
 def packed_grains(session: Session) -> Snapshot:
-    """The grains of the finished pack."""
-    frame = read_frame(session.path / "pack" / "post" / "pack.dump")
+    """The grains of the finished pack.
+
+    Raises DumpError when the dump cannot be read, CaseError when it is not what the stage made.
+    """
+    frame = read_frame(session.path / "pack" / PACK_DUMP)
+    check_files(session.path / "pack", session.folder.record("pack") or {}, START_OVER)
     return snapshot_of(frame, session.case, time_s=0.0)
 
 
 def invaded(session: Session, case: InvasionCase, grains: Snapshot) -> Invaded:
-    """The finished invasion, as it is on disk."""
+    """The finished invasion, as it is on disk.
+
+    Raises CaseError when a file is not what the stage made, DumpError or LiggghtsError when one
+    cannot be read.
+    """
     folder, scales = session.path / "invade", scales_of(case)
+    record = session.folder.record("invade") or {}
+    check_files(folder, record, START_OVER, may_lack=_is_dump)
     history = read_history(folder)
     damaged = state_at(folder, history[-1], case, scales, grains)
     return Invaded(case=case, scales=scales, history=history, damaged=damaged)
+
+
+def file_warnings(session: Session) -> list[str]:
+    """What could not be checked, and dumps that are gone, one sentence each."""
+    warnings = []
+    for stage in ("pack", "invade"):
+        record = session.folder.record(stage) if stage in session.case.stages else None
+        if record is None:
+            continue
+        if "files" not in record:
+            warnings.append(
+                f"{stage}/stage.json holds no digests of files, as older versions wrote it: it "
+                "was not checked that the files are those that the stage made"
+            )
+        lost = [
+            name for name in record.get("files", {}) if not (session.path / stage / name).exists()
+        ]
+        if lost:
+            warnings.append(
+                f"{len(lost)} checkpoint dumps are gone, the first is {stage}/{lost[0]}: they are "
+                "missing from invasion.pvd"
+            )
+    return warnings
+
+
+def check_finished(session: Session) -> None:
+    """Raises CaseError when a file of the finished run is not what it wrote; dumps may be gone."""
+    check_files(session.path, session.folder.manifest() or {}, ANALYSE_AGAIN)
+    for stage in ("pack", "invade"):
+        record = session.folder.record(stage) or {}
+        check_files(session.path / stage, record, START_OVER, may_lack=_is_dump)

@@ -10,6 +10,7 @@ from fdnet.case.case import Case, InvasionCase
 from fdnet.errors import CaseError
 from fdnet.network.network import Network, build_network
 from fdnet.run.finished_text import html_lines, text_lines
+from fdnet.run.made_files import ANALYSE_AGAIN, START_OVER, check_one
 from fdnet.spheres.arrays import Array
 from fdnet.spheres.snapshot import Snapshot
 
@@ -41,7 +42,9 @@ class FinishedRun:
         """The numbers of summary.json, SI; a length is in m, a permeability in m2."""
         from fdnet.report.read_tables import read_summary
 
-        return read_summary(self.path / "summary.json")
+        summary = read_summary(self.path / "summary.json")
+        self._check("summary.json")
+        return summary
 
     @cached_property
     def sections(self) -> "pd.DataFrame":
@@ -78,6 +81,7 @@ class FinishedRun:
         if not isinstance(self.case, InvasionCase):
             return empty_table(["time_s", *HISTORY_COLUMNS])
         table = read_table(self.path / "invade" / "history.csv", HISTORY_COLUMNS)
+        check_one(self.path / "invade", self.manifest["invade"], "history.csv", START_OVER)
         table.insert(0, "time_s", table["step"] * self.manifest["invade"]["dt_s"])
         return table
 
@@ -93,7 +97,9 @@ class FinishedRun:
         _check_state(state)
         size = self.case.size_m
         path = self.path / f"spheres_{state}.csv"
-        return read_spheres(path, box=[(0.0, side) for side in size])
+        spheres = read_spheres(path, box=[(0.0, side) for side in size])
+        self._check(path.name)
+        return spheres
 
     def network(self) -> Network:
         """The pore network of the grains where they ended, built anew from spheres_damaged.csv.
@@ -145,7 +151,13 @@ class FinishedRun:
     def _table(self, name: str, rows: int | None) -> "pd.DataFrame":
         from fdnet.report.read_tables import COLUMNS, read_table
 
-        return read_table(self.path / f"{name}.csv", COLUMNS[name], rows=rows)
+        table = read_table(self.path / f"{name}.csv", COLUMNS[name], rows=rows)
+        self._check(f"{name}.csv")
+        return table
+
+    def _check(self, name: str) -> None:
+        """Raises CaseError when the file is not the one that the run wrote."""
+        check_one(self.path, self.manifest, name, ANALYSE_AGAIN)
 
     def __str__(self) -> str:
         return "\n".join(text_lines(self.path, self.summary))

@@ -11,7 +11,7 @@ from fdnet.atomic import remove_half_written, write_text
 from fdnet.case.case import Case
 from fdnet.case.stages import STAGES
 from fdnet.errors import CaseError
-from fdnet.paths import refuse_tilde
+from fdnet.paths import refuse_folder_name
 from fdnet.run.mark import (
     CASE,
     LOCK,
@@ -169,7 +169,7 @@ def _refuse_foreign(path: Path) -> None:
 
     Names alone do not make a folder ours: case.toml, manifest.json or pack may be the user's.
     """
-    refuse_tilde(path)
+    refuse_folder_name(path)
     if path.exists() and not path.is_dir():
         raise CaseError(f"{path}: is a file, expected a folder for --out")
     if path.is_dir() and not is_run_folder(path) and not is_unused(path):

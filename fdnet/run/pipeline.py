@@ -3,7 +3,6 @@
 Each stage is kept when it is done and continued when it was cut.
 """
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +13,22 @@ from fdnet.dem.checkpoint import has_history
 from fdnet.dem.supply import refuse_crowded_supply
 from fdnet.errors import CaseError
 from fdnet.network.permeability import analyse
-from fdnet.run.dem_stages import invade_stage, invaded, pack_stage, packed_grains
+from fdnet.run.dem_stages import (
+    check_finished,
+    file_warnings,
+    invade_stage,
+    invaded,
+    pack_stage,
+    packed_grains,
+)
 from fdnet.run.folder import RunFolder, open_folder
+from fdnet.run.made_files import TABLES, digests_of
 from fdnet.run.outputs import Results, draw_figures, write_paraview, write_tables
 from fdnet.run.records import record_warnings, stage_seconds, versions
 from fdnet.run.session import RunOptions, Session
 from fdnet.run.summary import summarise
 from fdnet.scales.cost import refuse_long
+from fdnet.scales.grain_pack import grain_count
 from fdnet.scales.scales import scales_of
 from fdnet.scales.table import scale_rows
 
@@ -41,6 +49,7 @@ def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
     try:
         session = Session(case=case, scales=scales_of(case), folder=folder, options=options)
         if folder.manifest() is not None and folder.holds(case, options.stages):
+            check_finished(session)
             return _read_summary(folder)
         return _carry_out(session)
     except CaseError as error:
@@ -55,12 +64,23 @@ def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
 def _refuse(case: Case, options: RunOptions) -> None:
     """Raise, before anything is written, what would stop the run later."""
     needed = _stages_to_run(case, options)
+    _refuse_few_grains(case, options)
     refuse_long(case, scales_of(case), pack="pack" in needed, invade="invade" in needed)
     fresh = options.force or not has_history(options.out / "invade")
     if isinstance(case, InvasionCase) and "invade" in needed and fresh:
         refuse_crowded_supply(case, scales_of(case))
     if needed:
         find_binary(options.liggghts)
+
+
+def _refuse_few_grains(case: Case, options: RunOptions) -> None:
+    """Raise CaseError on fewer grains than one tetrahedron has, when they are to be analysed."""
+    count = grain_count(case)
+    if count < 4 and {"analyse", "report"} & set(options.stages):
+        raise CaseError(
+            f"grains: the case has {count} grains, expected at least 4 for a pore network; raise "
+            "grains.count or enlarge the box"
+        )
 
 
 def _stages_to_run(case: Case, options: RunOptions) -> list[str]:
@@ -70,8 +90,10 @@ def _stages_to_run(case: Case, options: RunOptions) -> list[str]:
 
 
 def _read_summary(folder: RunFolder) -> dict[str, Any]:
+    from fdnet.report.read_tables import read_summary
+
     path = folder.path / "summary.json"
-    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    return read_summary(path) if path.exists() else {}
 
 
 def _carry_out(session: Session) -> dict[str, Any]:
@@ -107,6 +129,7 @@ def _manifest(session: Session) -> dict[str, Any]:
         "command": session.options.command,
         "seconds": stage_seconds(pack, invasion, session.seconds),
         "versions": versions(pack),
+        "files": digests_of(session.path, [*TABLES, "pack/stage.json", "invade/stage.json"]),
         "pack": pack,
         "invade": invasion,
     }
@@ -148,7 +171,12 @@ def _write_summary(
         invasion=invasion,
         last=results.history[-1] if results.history else None,
         seconds=stage_seconds(pack, invasion, session.seconds),
-        warnings=[*scales.warnings, *record_warnings(case, pack, invasion), *notes],
+        warnings=[
+            *scales.warnings,
+            *record_warnings(case, pack, invasion),
+            *file_warnings(session),
+            *notes,
+        ],
     )
     summary = tables.write_summary(session.path / "summary.json", summary)
     if "report" in session.options.stages:

@@ -88,7 +88,10 @@ class Progress:
         now = time.monotonic()
         if now - self.last >= _QUIET_SECONDS:
             self.last = now
-            print(f"{self.stage}: {self._text()}", file=sys.stderr, flush=True)
+            try:
+                print(f"{self.stage}: {self._text()}", file=sys.stderr, flush=True)
+            except BrokenPipeError:  # nobody reads the progress any more; the run goes on
+                self.show = False
 
 
 def _clock(seconds: float) -> str:

@@ -98,7 +98,12 @@ def _read_record(path: Path, shape: str) -> dict[str, Any] | None:
         record = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, RecursionError) as error:
+    except OSError as error:
+        raise CaseError(
+            f"{path}: cannot be read ({error.strerror}); mend that, then repeat the command with "
+            "--resume"
+        ) from error
+    except (ValueError, RecursionError) as error:
         raise CaseError(f"{path}: cannot be read ({error}); start over with --force") from error
     if not isinstance(record, dict) or record.get("format") != RECORD_FORMAT:
         raise CaseError(

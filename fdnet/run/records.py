@@ -4,16 +4,20 @@ import hashlib
 import platform
 import sys
 from importlib import metadata
+from pathlib import Path
 from typing import Any
 
 from fdnet.case.case import Case
 from fdnet.dem.binary import KNOWN_VERSION
+from fdnet.dem.checkpoint import HISTORY
 from fdnet.dem.invasion import Invasion
 from fdnet.dem.liggghts import Run
-from fdnet.dem.overlap import Deepest, overlap_text
+from fdnet.dem.overlap import WATCH, Deepest, overlap_text
 from fdnet.dem.packing import Pack
 from fdnet.run.folder import RECORD_FORMAT
+from fdnet.run.made_files import digests_of
 
+PACK_DUMP = "post/pack.dump"
 OVERLAP_WARNING, POROSITY_WARNING = 0.03, 0.02
 _PACKAGES = (
     "fdnet",
@@ -29,8 +33,10 @@ _PACKAGES = (
 )
 
 
-def pack_record(case: Case, pack: Pack, assumed: float, seconds: float) -> dict[str, Any]:
-    """pack/stage.json: how the pack was reached."""
+def pack_record(
+    case: Case, pack: Pack, folder: Path, *, assumed: float, seconds: float
+) -> dict[str, Any]:
+    """pack/stage.json: how the pack in `folder` was reached."""
     return {
         "format": RECORD_FORMAT,
         "digest": case.digest("pack"),
@@ -44,13 +50,16 @@ def pack_record(case: Case, pack: Pack, assumed: float, seconds: float) -> dict[
         "steps": pack.steps,
         "dt_s": pack.step_s,
         "attempts": list(pack.attempts),
+        "ranks": pack.run.ranks,
+        "files": digests_of(folder, [PACK_DUMP]),
         "runs": [run_record(pack.run)],
         "left_out": [str(item) for item in pack.left_out],
     }
 
 
-def invade_record(case: Case, result: Invasion, seconds: float) -> dict[str, Any]:
-    """invade/stage.json: how the invasion ended."""
+def invade_record(case: Case, result: Invasion, folder: Path, *, seconds: float) -> dict[str, Any]:
+    """invade/stage.json: how the invasion in `folder` ended."""
+    dumps = (f"post/invade_{row.step}.dump" for row in result.history)
     return {
         "format": RECORD_FORMAT,
         "digest": case.digest("invade"),
@@ -62,9 +71,17 @@ def invade_record(case: Case, result: Invasion, seconds: float) -> dict[str, Any
         "dt_s": result.step_s,
         "supplied": result.supplied,
         "warnings": list(result.warnings),
+        "ranks": result.ranks,
+        "files": digests_of(folder, [HISTORY, WATCH, *dumps]),
         "runs": [run_record(run) for run in result.runs],
         "left_out": [str(item) for item in result.left_out],
     }
+
+
+def ranks_of(record: dict[str, Any]) -> int | None:
+    """MPI ranks of a finished stage; None where an older version kept none."""
+    runs = record.get("runs") or [{}]
+    return record.get("ranks", runs[0].get("ranks"))
 
 
 def run_record(run: Run) -> dict[str, Any]:

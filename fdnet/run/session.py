@@ -1,5 +1,7 @@
 """One session of a run: what is run, where, and how long each stage took."""
 
+import math
+import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,6 +12,7 @@ from fdnet.case.case import Case
 from fdnet.case.stages import STAGES
 from fdnet.dem.binary import Binary, find_binary
 from fdnet.dem.liggghts import Launch
+from fdnet.errors import CaseError
 from fdnet.run.folder import RunFolder
 from fdnet.run.progress import Progress
 from fdnet.scales.scales import Scales
@@ -40,6 +43,29 @@ class RunOptions:
     timeout: float | None = None
     show_progress: bool = True
     command: str = ""
+
+    def __post_init__(self) -> None:
+        """Raise CaseError on a time limit or a number of ranks that means nothing."""
+        if self.timeout is not None and not 0 < self.timeout < math.inf:
+            raise CaseError(
+                f"timeout: {self.timeout}, expected a number of seconds above 0; leave it out for "
+                "no limit"
+            )
+        if not 1 <= self.ranks <= most_ranks():
+            raise CaseError(
+                f"ranks: {self.ranks}, expected 1 to {most_ranks()} on the {cores()} cores of "
+                "this machine"
+            )
+
+
+def cores() -> int:
+    """Number of processor cores that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def most_ranks() -> int:
+    """Largest number of MPI ranks that is accepted: more would only exhaust the machine."""
+    return max(256, 64 * cores())
 
 
 @dataclass(slots=True)

@@ -6,6 +6,7 @@ from fdnet.case.case import Case
 from fdnet.dem.checkpoint import Checkpoint
 from fdnet.network.analysis import Analysis
 from fdnet.report.tables import section_rows
+from fdnet.run.records import ranks_of
 
 
 def summarise(
@@ -37,6 +38,7 @@ def summarise(
         "solver": analysis.solver,
         "max_overlap_fraction": invasion["max_overlap"] if invasion else pack["max_overlap"],
         "grain_overlap_fraction": pack["max_overlap"],
+        "ranks": {"pack": ranks_of(pack), "invade": ranks_of(invasion) if invasion else None},
         "dem_steps": pack["steps"] + (invasion["steps"] if invasion else 0),
         "dem_dt_s": invasion["dt_s"] if invasion else pack["dt_s"],
         "seconds": seconds

@@ -174,8 +174,10 @@ def _row(
 
 
 def _id(text: str, where: str) -> int:
-    if not text.strip().isdecimal():
-        raise CaseError(f"{where}: id is {text.strip()!r}, expected a whole number, 0 or more")
+    if not text.strip().isdecimal() or len(text.strip()) > 18:
+        raise CaseError(
+            f"{where}: id is {text.strip()[:40]!r}, expected a whole number from 0 to 18 digits"
+        )
     return int(text)
 
 

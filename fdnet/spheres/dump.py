@@ -119,7 +119,7 @@ class _Reader:
     def whole(self, what: str) -> int:
         line, text = self.line, self.take()
         try:
-            value = int(text)
+            value = int(text) if len(text) < 19 else -1
         except ValueError:
             value = -1
         if value < 0:

@@ -12,6 +12,7 @@ from fdnet.spheres.rows import SphereRows, metres_per
 PLACES = (("x", "y", "z"), ("xu", "yu", "zu"))
 SCALED = ("xs", "ys", "zs")
 """Columns of the centres: as they are, unwrapped across periods, or in parts of the box."""
+_LARGEST_WHOLE = 2.0**53
 DUMP_UNITS = {"si": 1.0, "cgs": 1e-2, "micro": 1e-6}
 """Metres in the unit of length of the unit systems that a dump may name."""
 
@@ -103,8 +104,9 @@ def _whole(frame: Frame, name: str, path: Path) -> Array | None:
     if name not in frame.columns:
         return None
     values = frame.column(name)
-    if np.any(values != np.round(values)):
+    if np.any((values != np.round(values)) | (np.abs(values) > _LARGEST_WHOLE)):
         raise CaseError(
-            f"{path}: step {frame.step}: column {name} holds a number that is not whole"
+            f"{path}: step {frame.step}: column {name} holds a number that is not whole, or too "
+            "large"
         )
     return frozen(values, np.int64)

@@ -10,7 +10,7 @@ from typing import Any
 from fdnet.atomic import write_text
 from fdnet.dem.binary import find_binary
 from fdnet.errors import CaseError
-from fdnet.paths import path_option, refuse_tilde
+from fdnet.paths import path_option, refuse_folder_name
 from fdnet.studies.engine.study import Study
 
 STUDIES: Mapping[str, str] = {
@@ -75,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
         return 0
     if options.name == THESIS:
         return _run_thesis(options)
-    refuse_tilde(options.out or Path())
+    refuse_folder_name(options.out or Path())
     study = study_named(options.name)
     out = options.out or Path("studies") / (f"{study.name}-quick" if options.quick else study.name)
     text = run_study(study, out, quick=options.quick, show=not options.silent)
@@ -88,8 +88,8 @@ def run(options: argparse.Namespace) -> int:
 def _run_thesis(options: argparse.Namespace) -> int:
     from fdnet.studies.thesis.command import ThesisOptions, run_thesis
 
-    refuse_tilde(options.runs)
-    refuse_tilde(options.out or Path())
+    refuse_folder_name(options.runs)
+    refuse_folder_name(options.out or Path())
     if options.jobs < 1:
         raise CaseError(f"--jobs: {options.jobs} runs side by side, expected at least 1")
     out = options.out or Path("studies/thesis-quick" if options.quick else "docs/thesis")

@@ -1,9 +1,14 @@
 """Compiled code is kept apart for every state of the sources."""
 
+import os
+import subprocess
+import sys
 import tempfile
 
 import numba
+import pytest
 
+from fdnet.network import compiled as module
 from fdnet.network.compiled import _own_folder, cache_folder
 
 
@@ -32,3 +37,90 @@ def test_a_folder_that_others_may_have_filled_is_not_used(tmp_path, monkeypatch)
     (tmp_path / "link").symlink_to(own)
     for name in ("open", "link"):
         assert _own_folder(tmp_path / name) not in (tmp_path / name, own)
+
+
+SOURCE = """
+import sys
+from fdnet.network.fines import point_search
+from fdnet.network.compiled import compiled
+
+@compiled
+def twice(x):
+    return 2 * x
+
+print(twice(int(sys.argv[1])), twice.stats.cache_hits and 1 or 0)
+"""
+
+
+@pytest.fixture
+def cached(tmp_path):
+    """A program with one compiled function, run once: command and folder of its cache."""
+    (tmp_path / "program.py").write_text(SOURCE)
+    first = call(tmp_path)
+    assert (first.stdout.split(), first.stderr) == (["42", "0"], "")
+    second = call(tmp_path)
+    assert second.stdout.split() == ["42", "1"]
+    return tmp_path
+
+
+def call(folder):
+    environment = os.environ | {"XDG_CACHE_HOME": str(folder / "cache")}
+    environment.pop("NUMBA_CACHE_DIR", None)
+    command = [sys.executable, str(folder / "program.py"), "21"]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120)
+
+
+def flipped(content: bytes) -> bytes:
+    middle = len(content) * 2 // 3
+    return content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :]
+
+
+SPOILT = {
+    "empty": lambda content: b"",
+    "cut": lambda content: content[: len(content) // 2],
+    "zeros": lambda content: bytes(len(content)),
+    "one bit": flipped,
+}
+
+
+@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+@pytest.mark.parametrize("how", SPOILT)
+def test_a_bad_cache_is_left_aside_and_made_anew(cached, kind, how):
+    files = list(cached.rglob(f"program.twice*.{kind}"))
+    assert len(files) == 1
+    files[0].write_bytes(SPOILT[how](files[0].read_bytes()))
+    again = call(cached)
+    assert again.stdout.split() == ["42", "0"], again.stderr
+    assert again.stderr.count("\n") == 1
+    assert str(files[0].parent) in again.stderr
+    mended = call(cached)
+    assert (mended.stdout.split(), mended.stderr) == (["42", "1"], "")
+
+
+def test_a_cache_that_cannot_be_written_is_done_without(cached):
+    """A folder in the place of the index stands for a full disk: writing fails."""
+    for path in cached.rglob("program.twice*.nbi"):
+        path.unlink()
+        path.mkdir()
+        (path / "x").write_text("")
+        path.with_name(path.name + ".bad").write_text("")
+    again = call(cached)
+    assert again.stdout.split() == ["42", "0"], again.stderr
+    assert 1 <= again.stderr.count("\n") <= 2
+    assert "Traceback" not in again.stderr
+
+
+def test_a_full_disk_under_the_cache_is_reported_once(tmp_path, monkeypatch, capsys):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(module.IndexDataCacheFile, "_open_for_write", full)
+    module._said.clear()
+    file = module._CheckedFile(str(tmp_path), "name", "stamp")
+    for key in ("a", "b"):
+        file.save(key, 1)
+        assert file.load(key) is None
+    text = capsys.readouterr().err
+    assert text.count("\n") == 1
+    assert str(tmp_path) in text
+    assert "No space left" in text

@@ -1,0 +1,82 @@
+"""Digests of the files that a stage made, kept in its record and checked before they are used."""
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from fdnet.dem.digests import file_digest
+from fdnet.errors import CaseError
+
+TABLES = (
+    "spheres_initial.csv",
+    "spheres_damaged.csv",
+    "sections.csv",
+    "profile.csv",
+    "pores.csv",
+    "throats.csv",
+    "summary.json",
+)
+"""Files of the analysis whose digests are in the manifest."""
+START_OVER = "put the file back, or start over with --force"
+ANALYSE_AGAIN = "put the file back, or write it anew with --stages analyse,report --force"
+
+
+def digests_of(folder: Path, names: Iterable[str]) -> dict[str, str]:
+    """SHA-256 of the files `names` below `folder`; files that do not exist are left out."""
+    return {name: file_digest(folder / name) for name in names if (folder / name).is_file()}
+
+
+def check_files(
+    folder: Path,
+    record: Mapping[str, Any],
+    advice: str,
+    *,
+    may_lack: Callable[[str], bool] = lambda name: False,
+) -> list[str]:
+    """Compare files below `folder` with the digests in `record`.
+
+    Returns the names of missing files that `may_lack` allows. A record without digests, as older
+    versions wrote it, is not checked.
+
+    Raises CaseError that names the first file which is missing or is not what the stage made.
+    """
+    missing = []
+    for name, digest in _digests(folder, record).items():
+        if (folder / name).is_file() or not may_lack(name):
+            check_file(folder / name, digest, advice)
+        else:
+            missing.append(name)
+    return missing
+
+
+def check_one(folder: Path, record: Mapping[str, Any], name: str, advice: str) -> None:
+    """Compare one file below `folder` with its digest in `record`, where there is one."""
+    digest = _digests(folder, record).get(name)
+    if digest is not None:
+        check_file(folder / name, digest, advice)
+
+
+def check_file(path: Path, digest: str, advice: str) -> None:
+    """Raises CaseError when the file is missing or its SHA-256 is not `digest`."""
+    try:
+        same = file_digest(path) == digest
+    except OSError as error:
+        raise CaseError(f"{path}: cannot be read ({error.strerror}); {advice}") from error
+    if not same:
+        raise CaseError(
+            f"{path}: is not the file that the run wrote (its SHA-256 differs from the record); "
+            f"{advice}"
+        )
+
+
+def _digests(folder: Path, record: Mapping[str, Any]) -> dict[str, str]:
+    files = record.get("files", {})
+    sound = isinstance(files, dict) and all(
+        isinstance(text, str) for pair in files.items() for text in pair
+    )
+    if not sound:
+        raise CaseError(
+            f"{folder}: the digests of files in its record cannot be understood; start over with "
+            "--force"
+        )
+    return files
