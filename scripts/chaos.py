@@ -9,6 +9,7 @@ Attack INDEX of a seed is always the same. Ends with 1 when there were faults.
 
 import argparse
 import json
+import math
 import shlex
 import sys
 import tempfile
@@ -21,6 +22,8 @@ from fdnet.studies.chaos.soak import soak
 parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
 parser.add_argument("--attacks", type=int, default=24)
 parser.add_argument("--seed", type=int, default=1)
+parser.add_argument("--jobs", type=int, default=1, help="attacks at the same time (default 1)")
+parser.add_argument("--seconds", type=float, default=math.inf, help="begin no attack after this")
 parser.add_argument("--only", type=int, metavar="INDEX", help="this attack alone")
 parser.add_argument("--soak", type=int, metavar="N", help="N runs under random kills instead")
 parser.add_argument("--record", type=Path, metavar="FILE.json")
@@ -37,6 +40,8 @@ if __name__ == "__main__":
                 Path(place),
                 seed=given.seed,
                 indices=indices,
+                jobs=given.jobs,
+                seconds=given.seconds,
                 report=lambda line: print(line, file=sys.stderr, flush=True),
             )
         )

@@ -151,7 +151,7 @@ def test_the_network_half_never_imports_the_dem_half(root):
 
 FIELD_UNITS = ("_mm", "_cP", "_MPa", "_ms")
 NO_KEYS = {"fdnet/studies/dem/economies.py": {"duration_ms"}}
-"""Attributes that share the name of a case's key but are something else, by file: a study's form."""
+"""Attributes, by file, that share the name of a case's key but mean something else."""
 
 
 def test_the_units_of_a_case_file_stay_inside_the_case(root):

@@ -155,8 +155,8 @@ def _toml_value(text: str) -> Any:
 def read_case(path: str | Path, *, assignments: list[str] | None = None) -> Case:
     """The case in the TOML file at `path`, with dotted `assignments` ("key=value") put in.
 
-    Lengths in the file are in mm, as its keys say. Raises CaseError when the file cannot be read, is
-    not TOML, or holds an invalid parameter; the message lists every problem.
+    Lengths in the file are in mm, as its keys say. Raises CaseError when the file cannot be read,
+    is not TOML, or holds an invalid parameter; the message lists every problem.
 
     Examples:
         >>> import fdnet

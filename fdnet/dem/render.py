@@ -8,7 +8,7 @@ import numpy as np
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.stages import LIGGGHTS_STAGES
 from fdnet.dem.invade_deck import render_invade
-from fdnet.dem.packing import write_pack_inputs
+from fdnet.dem.pack_deck import write_pack_inputs
 from fdnet.dem.scene import box_of
 from fdnet.errors import CaseError
 from fdnet.paths import expanded, refuse_folder_name

@@ -124,7 +124,7 @@ def _problems(record: Mapping[str, Any], shape: str) -> Iterator[str]:
         elif not _is(record[key], expected):
             yield f"{key} is {str(record[key])[:40]!r}, expected {expected}"
         elif expected == _ROWS:
-            if not record[key]:
+            if not record[key] and shape != "invade":  # cut after its last checkpoint: no run
                 yield f"{key} is empty, expected at least one table"
             for row in record[key]:
                 yield from (f"{key}: {problem}" for problem in _problems(row, key))

@@ -35,6 +35,10 @@ AT_STAKE = (
     "invade/post/*",
 )
 """Files that are damaged: results, records, and what LIGGGHTS wrote."""
+MEMORY_BYTES = (300 << 20, 600 << 20, 1 << 30)
+"""Limits of memory. Below some 200 MB the import of numpy itself ends the process (OpenBLAS)."""
+UNREAD = (".lock", "screen.txt", "log.liggghts")
+"""Files that nobody reads again."""
 FOREIGN = {
     ".lock": "",
     "summary.json": "{}",
@@ -49,19 +53,23 @@ FOREIGN = {
 """Names that fdnet uses too, in a folder of somebody else."""
 
 
-def _files(out: Path) -> list[Path]:
-    return sorted(
-        path
+def _target(rng: Random, out: Path) -> Path:
+    """A file of the run that is not empty; each pattern of AT_STAKE has the same chance."""
+    groups = [
+        [
+            path
+            for path in sorted(out.glob(pattern))
+            if path.is_file() and path.stat().st_size and path.name not in UNREAD
+        ]
         for pattern in AT_STAKE
-        for path in out.glob(pattern)
-        if path.is_file() and path.name not in (".lock", "screen.txt", "log.liggghts")
-    )
+    ]
+    return rng.choice(rng.choice([group for group in groups if group]))
 
 
 def cut(rng: Random, path: Path, _: Path) -> None:
     """The file ends early."""
     data = path.read_bytes()
-    path.write_bytes(data[: rng.randrange(len(data) + 1) if data else 0])
+    path.write_bytes(data[: rng.randrange(len(data))])
 
 
 def zero(_: Random, path: Path, __: Path) -> None:
@@ -96,8 +104,7 @@ def damage(change: Callable[[Random, Path, Path], None]) -> Attack:
     def attack(rng: Random, place: Path, prepared: Prepared) -> str:
         which = rng.choice(("finished", "unfinished"))
         out = prepared.copy(which, place)
-        files = _files(out)
-        path, other = rng.choice(files), rng.choice(files)
+        path, other = _target(rng, out), _target(rng, out)
         change(rng, path, other)
         again = rng.choice(([], ["--force", "--stages", "analyse"]))
         options = ["--resume"] if which == "unfinished" else again
@@ -230,7 +237,7 @@ ATTACKS: Mapping[str, Attack] = {
     "swap": damage(swap),
     "file size": limit(resource.RLIMIT_FSIZE, (0, 1000, 8_000, 30_000, 100_000)),
     "handles": limit(resource.RLIMIT_NOFILE, (4, 6, 8, 12, 16, 24, 48)),
-    "memory": limit(resource.RLIMIT_AS, (100 << 20, 300 << 20, 600 << 20, 1 << 30)),
+    "memory": limit(resource.RLIMIT_AS, MEMORY_BYTES),
     "race": race,
     "foreign": foreign,
 }

@@ -3,10 +3,12 @@
 Anything else is a fault: a silent difference, a hang, a traceback, a lost file.
 """
 
+import math
 import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -35,6 +37,8 @@ def chaos(
     seed: int,
     indices: Iterable[int],
     kinds: Sequence[str] = tuple(ATTACKS),
+    jobs: int = 1,
+    seconds: float = math.inf,
     report: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Any]:
     """Attacks `indices` of a seed; returns the record.
@@ -44,6 +48,8 @@ def chaos(
         seed: of the attacks.
         indices: which attacks.
         kinds: names of the attacks, one after the other.
+        jobs: number of attacks at the same time.
+        seconds: s, no attack begins after this time; the record has the number of those done.
         report: takes a line for each fault.
 
     Returns:
@@ -53,13 +59,21 @@ def chaos(
     counts: Counter[tuple[str, str]] = Counter()
     faults: list[dict[str, Any]] = []
     start = time.perf_counter()
-    for index in indices:
-        kind, outcome = one_attack(prepared, seed, index, kinds)
-        counts[kind, outcome.partition(":")[0]] += 1
-        if outcome.startswith("fault"):
-            what = " ".join(outcome.split())[:400].replace(str(folder), "").removeprefix("fault: ")
-            faults.append({"index": index, "kind": kind, "what": what})
-            report(f"{index} {kind}: {what}")
+
+    def attack(index: int) -> tuple[int, str, str]:
+        if time.perf_counter() - start > seconds:
+            return index, "", ""
+        return index, *one_attack(prepared, seed, index, kinds)
+
+    with ThreadPoolExecutor(jobs) as pool:
+        for index, kind, outcome in pool.map(attack, indices):
+            if not kind:
+                continue
+            counts[kind, outcome.partition(":")[0]] += 1
+            if outcome.startswith("fault"):
+                what = " ".join(outcome.split())[:400].removeprefix("fault: ")
+                faults.append({"index": index, "kind": kind, "what": what})
+                report(f"{index} {kind}: {what}")
     by_kind: dict[str, dict[str, int]] = {}
     for (kind, outcome), count in sorted(counts.items()):
         by_kind.setdefault(kind, {})[outcome] = count
