@@ -16,7 +16,7 @@ from fdnet.studies.accuracy.results import Results, compute_results, read_result
 from fdnet.studies.accuracy.rows import RULES
 from fdnet.studies.engine.markdown import wrapped
 from fdnet.studies.truth.cases import EQUAL, LOOSE, read_cases
-from fdnet.studies.truth.packs import DATA, LARGE_FINES_TRUTH, INDEPENDENT_TRUTH
+from fdnet.studies.truth.packs import DATA, INDEPENDENT_TRUTH, LARGE_FINES_TRUTH
 
 
 def write_accuracy(
