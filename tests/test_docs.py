@@ -49,7 +49,7 @@ def test_layers_count_from_what_imports_nothing():
 
 
 def test_every_key_of_a_case_has_a_meaning():
-    from fdnet.case.case import Case
+    from fdnet.case.case import InvasionCase
 
     def check(model, path):
         for name, field in model.model_fields.items():
@@ -63,7 +63,7 @@ def test_every_key_of_a_case_has_a_meaning():
                 assert len(meaning) > 10, ".".join([*path, name])
                 assert meaning.endswith("."), ".".join([*path, name])
 
-    check(Case, [])
+    check(InvasionCase, [])
 
 
 def test_the_case_reference_shows_every_table(root):

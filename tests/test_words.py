@@ -1,6 +1,7 @@
 """Pages and docstrings are plain English, and the README is short and true."""
 
 import ast
+import csv
 import re
 import sys
 import tomllib
@@ -103,6 +104,30 @@ def test_the_architecture_page_counts_the_imports(root):
 def test_the_readme_is_short(root):
     words = len((root / "README.md").read_text(encoding="utf-8").split())
     assert words <= README_WORDS, f"README.md has {words} words"
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        "README.md",
+        "CHANGELOG.md",
+        "docs/accuracy.md",
+        "docs/physics_network.md",
+        "docs/start/first_answer.md",
+    ],
+)
+def test_the_accuracy_of_intact_packs_is_that_of_its_table(root, page):
+    """The worst error of the default law, and on how many packs and lattices, stand the same."""
+    with (root / "docs/validation/accuracy_intact.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    packs = [row for row in rows if row["group"].startswith("random")]
+    lattices = [row for row in rows if row["group"] == "touching lattices"]
+    worst = max(abs(float(row["lubrication"]) - 1) for row in [*packs, *lattices])
+    text = " ".join((root / page).read_text(encoding="utf-8").replace("*", "").split())
+    counted = (
+        rf"{len(packs)} cases of random packs and (on the )?{len(lattices)} touching lattices"
+    )
+    assert re.search(rf"within {100 * worst:.1f} %[^;]{{0,60}} on (all )?{counted}", text)
 
 
 def sources(root: Path) -> Iterator[Path]:
