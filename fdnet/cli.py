@@ -66,8 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if _SIGNALS:
             return _stopped()
         print(
-            f"fdnet: {error.filename or 'system'}: {error.strerror or error}; {cure_of(error)}, then repeat "
-            "the command (a run: with --resume)",
+            f"fdnet: {error.filename or 'system'}: {error.strerror or error}; {cure_of(error)}, "
+            "then repeat the command (a run: with --resume)",
             file=sys.stderr,
         )
         return 2
