@@ -7,8 +7,8 @@
     spheres = fdnet.read_spheres("pack.csv", units="mm")
     result = fdnet.analyse(spheres)               permeability without and with fines, m2
 
-`_HOME` below is the list of what is public: each name and the module that it comes from.
-Importing fdnet loads nothing heavy; a name is loaded when it is first used.
+`dir(fdnet)` lists what is public. Importing fdnet loads nothing heavy; a name is loaded when it is
+first used.
 """
 
 from importlib import import_module
@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fdnet.case.case import Case as Case
+    from fdnet.case.case import InvasionCase as InvasionCase
+    from fdnet.case.file import case_from as case_from
     from fdnet.case.file import read_case as read_case
     from fdnet.errors import CaseError as CaseError
     from fdnet.errors import DeckError as DeckError
@@ -38,8 +40,11 @@ if TYPE_CHECKING:
 
     __version__: str
 
+# Each public name, and the module that it comes from.
 _HOME = {
     "Case": "fdnet.case.case",
+    "InvasionCase": "fdnet.case.case",
+    "case_from": "fdnet.case.file",
     "read_case": "fdnet.case.file",
     "run_case": "fdnet.run.open_run",
     "open_run": "fdnet.run.open_run",
@@ -80,4 +85,5 @@ if not TYPE_CHECKING:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    """The public names."""
+    return sorted(__all__)

@@ -39,13 +39,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     options = _parser().parse_args(given)
     options.command_line = shlex.join(["fdnet", *given])
-    if hasattr(signal, "SIGTERM"):
-        signal.signal(signal.SIGTERM, _interrupt)
+    signal.signal(signal.SIGTERM, _interrupt)
     try:
         code = options.action(options)
         sys.stdout.flush()
         return code
-    except BrokenPipeError:  # the reader of what was printed last has gone; all work is done
+    except BrokenPipeError:  # the reader has gone; all work is done
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 0
     except FdnetError as error:
@@ -67,8 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if _SIGNALS:
             return _stopped()
         print(
-            f"fdnet: {error.filename or 'system'}: {error.strerror or error}; {cure_of(error)}, then repeat "
-            "the command (a run: with --resume)",
+            f"fdnet: {error.filename or 'system'}: {error.strerror or error}; {cure_of(error)}, "
+            "then repeat the command (a run: with --resume)",
             file=sys.stderr,
         )
         return 2

@@ -95,7 +95,7 @@ class AnalysisChoices(Part):
         try:
             return cls.model_validate(given)
         except ValidationError as error:
-            raise CaseError("; ".join(map(_refusal, error.errors()))) from error
+            raise CaseError("; ".join(map(_refusal, error.errors()))) from None
 
     def changed(self, **keys: Any) -> "AnalysisChoices":
         """The same choices with `keys` changed. Raises CaseError as `of_pack` does."""

@@ -47,6 +47,10 @@ class Case(Part):
     The keys carry the unit of the user, as in a case file: `radius_mm`, `viscosity_cP`. Properties
     such as `size_m` give the same in SI.
 
+    Make one with `fdnet.read_case` from a file, or with `fdnet.case_from` from nested tables: both
+    take a table of fines, and both raise CaseError that lists every problem. This class itself has
+    no key `fines` (see `InvasionCase`) and raises the error of pydantic.
+
     Examples:
         >>> import fdnet
         >>> case = fdnet.read_case("cases/quick.toml")
@@ -135,7 +139,17 @@ class Case(Part):
 
 
 class InvasionCase(Case):
-    """A pack of grains and the fines that invade it."""
+    """A pack of grains and the fines that invade it: a `Case` with the table `fines`.
+
+    The keys of the fines carry the unit of the user too: `fines.radius_mm` is in mm. Make one with
+    `fdnet.read_case` or `fdnet.case_from`.
+
+    Examples:
+        >>> import fdnet
+        >>> case = fdnet.read_case("cases/quick.toml", assignments=["fines.radius_mm=0.05"])
+        >>> isinstance(case, fdnet.InvasionCase), case.fines.radius_mm
+        (True, 0.05)
+    """
 
     fines: Fines
 

@@ -29,8 +29,28 @@ def known_keys(model: type[Part] = InvasionCase, prefix: str = "") -> Iterator[s
 def case_from(data: Mapping[str, Any], *, source: str = "case") -> Case:
     """A case from nested tables; an InvasionCase when there is a table of fines.
 
-    Raises CaseError that lists every problem: dotted key, value given, what is allowed, and for an
-    unknown key the nearest known one.
+    Args:
+        data: the tables and keys of a case file. Each key carries its unit: `radius_mm` is in mm.
+        source: how messages name these tables.
+
+    Returns:
+        The case, with the default of every key that `data` leaves out.
+
+    Raises:
+        CaseError: it lists every problem: dotted key, value given, what is allowed, and for an
+            unknown key the nearest known one.
+
+    Examples:
+        >>> import fdnet
+        >>> tables = fdnet.read_case("cases/quick.toml").data()
+        >>> tables["fines"]["radius_mm"] = 0.05
+        >>> case = fdnet.case_from(tables)
+        >>> isinstance(case, fdnet.InvasionCase), case.fines.radius_mm
+        (True, 0.05)
+        >>> fdnet.case_from(tables | {"fines": {"radius": 0.05}})
+        Traceback (most recent call last):
+        ...
+        fdnet.errors.CaseError: ...
     """
     model = case_type(data)
     for key in _long_numbers(data):
