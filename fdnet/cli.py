@@ -18,7 +18,7 @@ from typing import Any, NoReturn
 
 from fdnet.case.stages import STAGES
 from fdnet.errors import CaseError, FdnetError, cure_of
-from fdnet.paths import path_option
+from fdnet.files.paths import path_option
 
 _STOPPED = 130
 _SIGNALS: list[int] = []
@@ -184,8 +184,8 @@ def _add_render(commands: Any, common: argparse.ArgumentParser) -> None:
 
 
 def _add_permeability(commands: Any, common: argparse.ArgumentParser) -> None:
-    from fdnet.permeability_command import run
-    from fdnet.permeability_options import add_arguments
+    from fdnet.permeability.command import run
+    from fdnet.permeability.options import add_arguments
 
     command = commands.add_parser(
         "permeability", parents=[common], help="permeability of a CSV of spheres, without LIGGGHTS"

@@ -9,19 +9,18 @@ from fdnet.case.file import known_keys
 
 LAYERS = [
     ["errors"],
-    ["atomic", "paths"],
+    ["files"],
     ["spheres", "case"],
     ["scales", "network"],
     ["dem", "report"],
     ["run"],
-    ["permeability_options"],
-    ["permeability_command", "studies"],
+    ["permeability", "studies"],
     ["cli"],
 ]
 """Rooms of the package from the bottom up; a room imports from lower lines only."""
 
 NETWORK_LAYERS = [
-    ["geometry", "compiled", "validity"],
+    ["geometry", "compiled"],
     ["tessellation"],
     ["network"],
     ["fines", "flow"],

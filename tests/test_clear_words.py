@@ -205,7 +205,7 @@ def test_a_program_without_its_helpers_is_named(tmp_path):
 
 
 def test_a_disk_without_free_inodes_is_full(tmp_path, monkeypatch):
-    from fdnet import atomic
+    from fdnet.files import atomic
 
     class NoInodes:
         f_files, f_favail = 100, 0
@@ -253,7 +253,7 @@ def test_a_reader_that_has_gone_does_not_fail_the_command(tmp_path):
 def test_a_stop_that_a_library_turns_into_its_own_error_is_a_stop(capsys, monkeypatch, tmp_path):
     import signal
 
-    from fdnet import permeability_command
+    from fdnet.permeability import command as permeability_command
 
     def importing(_):
         try:
@@ -301,7 +301,7 @@ def test_porosities_that_were_not_validated_are_warned_of():
 
 
 def test_a_permeability_above_that_of_the_empty_duct_is_said_with_its_number():
-    from fdnet.network.validity import doubts, empty_duct_permeability
+    from fdnet.network.specimen.validity import doubts, empty_duct_permeability
 
     box = np.array([[0, 1.0], [0, 2.0], [0, 2.0]])
     square = empty_duct_permeability(box, (False, False, False))

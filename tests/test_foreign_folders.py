@@ -204,8 +204,8 @@ def test_the_table_of_laws_never_replaces_a_device_a_pipe_or_a_folder(tmp_path, 
 
 
 def test_no_file_is_replaced_where_a_device_or_a_folder_stands(tmp_path):
-    from fdnet.atomic import write_text
     from fdnet.errors import CaseError
+    from fdnet.files.atomic import write_text
 
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "folder").mkdir()

@@ -14,7 +14,7 @@ from fdnet.case.case import Case, InvasionCase, case_type
 from fdnet.case.rules import cross_problems
 from fdnet.case.values import Part
 from fdnet.errors import CaseError
-from fdnet.paths import expanded
+from fdnet.files.paths import expanded
 
 
 def known_keys(model: type[Part] = InvasionCase, prefix: str = "") -> Iterator[str]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from fdnet.atomic import write_text
+from fdnet.files.atomic import write_text
 
 _NAME = re.compile(r"invade_(\d{1,18})\.(dump|restart|unreadable|record)")
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.atomic import write_text
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, plug_allowance, quiet_chunks
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
@@ -16,6 +15,7 @@ from fdnet.dem.overlap import is_watched, watch_variables
 from fdnet.dem.scene import contact_variables, header_variables, wall_variables, write_data
 from fdnet.dem.supply import AT_ONCE, batches_of, place_batches, place_fines, slab_end
 from fdnet.errors import CaseError
+from fdnet.files.atomic import write_text
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.contacts import touching_pairs
 from fdnet.spheres.dump import COLUMNS, FORMAT

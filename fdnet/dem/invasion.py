@@ -6,7 +6,6 @@ A checkpoint after every chunk of steps lets a cut run go on.
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fdnet.atomic import disk_is_full, write_text
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import (
     HISTORY,
@@ -42,6 +41,7 @@ from fdnet.dem.overlap import (
 from fdnet.dem.supply import batches_of
 from fdnet.dem.verdict import SCREEN
 from fdnet.errors import LiggghtsError
+from fdnet.files.atomic import disk_is_full, write_text
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Snapshot
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fdnet.atomic import write_text
 from fdnet.case.case import Case, InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, readable_states
 from fdnet.dem.deck import number
 from fdnet.errors import LiggghtsError
+from fdnet.files.atomic import write_text
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.contacts import max_overlap
 from fdnet.spheres.snapshot import Snapshot

@@ -11,7 +11,7 @@ from fdnet.dem.invade_deck import render_invade
 from fdnet.dem.pack_deck import write_pack_inputs
 from fdnet.dem.scene import box_of
 from fdnet.errors import CaseError
-from fdnet.paths import expanded, refuse_folder_name
+from fdnet.files.paths import expanded, refuse_folder_name
 from fdnet.scales.grain_pack import grain_count
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Snapshot, resting

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.atomic import write_text
 from fdnet.case.case import Case
 from fdnet.dem.deck import LeftOut, number
 from fdnet.errors import DumpError
+from fdnet.files.atomic import write_text
 from fdnet.scales.scales import Scales
 from fdnet.scales.springs import Contact
 from fdnet.spheres.dump import Frame

@@ -4,8 +4,8 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fdnet.atomic import disk_is_full
 from fdnet.errors import LiggghtsError
+from fdnet.files.atomic import disk_is_full
 
 END_MARK = "DECK_DONE"
 """The last line that a deck prints."""

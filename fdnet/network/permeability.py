@@ -23,7 +23,7 @@ from fdnet.network.flow.slabs import (
 from fdnet.network.laws.damage import CLEAN, Damage
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS, damage_law
 from fdnet.network.network import Network
-from fdnet.network.specimen import Specimen, measure_specimen, specimen_doubts
+from fdnet.network.specimen.specimen import Specimen, measure_specimen, specimen_doubts
 from fdnet.spheres.directions import Directions, periodic_axes
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
 

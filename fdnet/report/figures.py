@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fdnet.atomic import replacing
+from fdnet.files.atomic import replacing
 from fdnet.report.side_view import fill_side_view
 from fdnet.spheres.snapshot import Array, Snapshot
 

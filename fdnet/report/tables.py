@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fdnet.atomic import replacing, write_text
+from fdnet.files.atomic import replacing, write_text
 from fdnet.spheres.snapshot import Array
 
 if TYPE_CHECKING:

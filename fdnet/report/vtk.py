@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from fdnet.atomic import disk_is_full, replacing, write_text
+from fdnet.files.atomic import disk_is_full, replacing, write_text
 from fdnet.report.tables import blocked_throats, pore_porosity
 from fdnet.spheres.snapshot import Array, Snapshot
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fdnet.atomic import remove_half_written, write_text
 from fdnet.case.case import Case
 from fdnet.case.stages import STAGES
 from fdnet.errors import CaseError
-from fdnet.paths import refuse_folder_name
+from fdnet.files.atomic import remove_half_written, write_text
+from fdnet.files.paths import refuse_folder_name
 from fdnet.run.mark import (
     CASE,
     LOCK,

@@ -5,8 +5,8 @@ import re
 from pathlib import Path
 from typing import Any
 
-from fdnet.atomic import write_text
 from fdnet.case.stages import LIGGGHTS_STAGES, STAGES
+from fdnet.files.atomic import write_text
 
 RECORD_FORMAT = 1
 MANIFEST, CASE, LOCK, UNFINISHED = "manifest.json", "case.toml", ".lock", ".unfinished"

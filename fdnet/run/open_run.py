@@ -7,7 +7,7 @@ from pathlib import Path
 from fdnet.case.case import Case
 from fdnet.case.file import read_case
 from fdnet.errors import CaseError
-from fdnet.paths import expanded
+from fdnet.files.paths import expanded
 from fdnet.run.finished import FinishedRun
 from fdnet.run.folder import CASE, MANIFEST, STAGES, read_manifest
 from fdnet.run.mark import is_run_folder

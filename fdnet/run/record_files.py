@@ -5,9 +5,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from fdnet.atomic import write_text
 from fdnet.case.stages import STAGES
 from fdnet.errors import CaseError
+from fdnet.files.atomic import write_text
 from fdnet.run.mark import MANIFEST, RECORD_FORMAT, RECORDS
 
 OUTPUTS = {

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.atomic import replacing
 from fdnet.errors import CaseError
+from fdnet.files.atomic import replacing
 from fdnet.spheres.rows import UNITS, SphereRows, metres_per
 from fdnet.spheres.snapshot import KIND_NAMES, Kind, Snapshot, frozen
 

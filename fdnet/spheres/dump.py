@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from fdnet.atomic import disk_is_full
 from fdnet.errors import DumpError
+from fdnet.files.atomic import disk_is_full
 from fdnet.spheres.arrays import Array, frozen, one_line
 
 CUT = "The run was cut; continue it with --resume."

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.paths import expanded
+from fdnet.files.paths import expanded
 from fdnet.spheres.arrays import Array
 from fdnet.spheres.rows import SphereRows
 from fdnet.spheres.snapshot import KIND_NAMES, Kind, Snapshot, checked_box, grain_box

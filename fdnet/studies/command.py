@@ -7,10 +7,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from fdnet.atomic import write_text
 from fdnet.dem.binary import find_binary
 from fdnet.errors import CaseError
-from fdnet.paths import path_option, refuse_folder_name
+from fdnet.files.atomic import write_text
+from fdnet.files.paths import path_option, refuse_folder_name
 from fdnet.studies.engine.study import Study
 
 STUDIES: Mapping[str, str] = {

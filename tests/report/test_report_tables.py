@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from report_demo import demo_analysis, demo_damaged
 
-from fdnet.atomic import replacing, write_text
+from fdnet.files.atomic import replacing, write_text
 from fdnet.report.tables import (
     section_rows,
     write_pores,

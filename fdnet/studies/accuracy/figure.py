@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.atomic import replacing
+from fdnet.files.atomic import replacing
 from fdnet.network.laws.named import LAWS
 from fdnet.studies.accuracy.goals import DAMAGE_GOAL, GOALS, Row
 from fdnet.studies.accuracy.rows import RULES

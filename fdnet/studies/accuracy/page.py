@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
-from fdnet.atomic import write_text
+from fdnet.files.atomic import write_text
 from fdnet.network.laws.named import DEFAULT_LAW
 from fdnet.studies.accuracy import boundary_tables, tables
 from fdnet.studies.accuracy.benchmark_tables import benchmark_tables

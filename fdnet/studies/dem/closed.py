@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.atomic import write_text
 from fdnet.case.case import Case
 from fdnet.dem.deck import number, render_text
 from fdnet.dem.liggghts import Launch, run_deck
@@ -20,6 +19,7 @@ from fdnet.dem.scene import (
     wall_variables,
     write_data,
 )
+from fdnet.files.atomic import write_text
 from fdnet.scales.scales import Scales, scales_of
 from fdnet.spheres.contacts import touching_pairs
 from fdnet.spheres.dump import COLUMNS, read_dump

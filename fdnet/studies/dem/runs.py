@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.atomic import write_text
 from fdnet.case.case import Case, InvasionCase, with_fines
 from fdnet.case.file import case_from, set_keys
 from fdnet.dem.binary import Binary, find_binary
@@ -22,6 +21,7 @@ from fdnet.dem.invasion import Invasion, invade
 from fdnet.dem.liggghts import Launch, Run, run_deck
 from fdnet.dem.packing import make_pack
 from fdnet.dem.scene import box_of, snapshot_of
+from fdnet.files.atomic import write_text
 from fdnet.network.permeability import analyse
 from fdnet.scales.scales import scales_of
 from fdnet.scales.time_step import relaxation_time

@@ -8,8 +8,8 @@ from dataclasses import astuple, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fdnet.atomic import write_text
 from fdnet.errors import CaseError
+from fdnet.files.atomic import write_text
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.atomic import replacing
+from fdnet.files.atomic import replacing
 from fdnet.report.figures import STYLE
 from fdnet.spheres.snapshot import Array
 from fdnet.studies.engine.palette import (

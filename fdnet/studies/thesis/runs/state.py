@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.atomic import write_bytes
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import case_from, read_case
 from fdnet.dem.checkpoint import read_history, state_at
 from fdnet.dem.scene import box_of, snapshot_of
 from fdnet.errors import CaseError
+from fdnet.files.atomic import write_bytes
 from fdnet.run.folder import CASE, read_record
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.dump import read_frame

@@ -13,7 +13,7 @@ from fdnet.case.names import (
     WALL_NAMES,
 )
 from fdnet.errors import CaseError
-from fdnet.paths import path_option
+from fdnet.files.paths import path_option
 
 UNITS = ("m", "cm", "mm", "um")
 ALL_AXES = "all"

@@ -12,7 +12,7 @@ from fdnet.network.fines.invaded import Invaded, measure_invaded
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.flow.sections import profile_edges, section_edges
 from fdnet.network.network import Network, build_network
-from fdnet.network.validity import doubts, fines_outside_sides, refuse_wide_fines
+from fdnet.network.specimen.validity import doubts, fines_outside_sides, refuse_wide_fines
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.porosity import Porosity, measure_porosity
 from fdnet.spheres.snapshot import Array, Snapshot

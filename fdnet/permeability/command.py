@@ -13,7 +13,7 @@ from fdnet.case.names import (
     LAW_NAMES,
 )
 from fdnet.errors import CaseError
-from fdnet.permeability_options import (
+from fdnet.permeability.options import (
     ALL_AXES,
     box_of,
     directions_of,
