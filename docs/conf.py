@@ -18,8 +18,6 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
-    "case_keys",
-    "command_options",
     "folder_links",
     "formulas",
     "shell_cells",

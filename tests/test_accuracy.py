@@ -40,11 +40,11 @@ def cases():
 
 
 def test_truth_is_read_with_its_class_and_what_is_missing_is_named(cases):
-    found, missing = read_cases([TRUTH], [DATA])
+    result, missing = read_cases([TRUTH], [DATA])
     rows = list(csv.DictReader(TRUTH.open()))
     named = {row["file"] for row in rows if row["file"]}
     assert set(missing) == {name for name in named if not (DATA / name).exists()}
-    assert len(found) == len([row for row in rows if row["file"]]) - len(missing) + len(
+    assert len(result) == len([row for row in rows if row["file"]]) - len(missing) + len(
         LOOSE_SOLIDS
     )
     assert cases["SC_touching"].group == LATTICE

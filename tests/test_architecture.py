@@ -94,16 +94,16 @@ def imported(tree: ast.Module) -> set[str]:
         if isinstance(test, ast.If) and "TYPE_CHECKING" in ast.dump(test.test)
         for node in ast.walk(test)
     }
-    found = set()
+    result = set()
     for node in ast.walk(tree):
         if id(node) in skipped:
             continue
         if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
+            result |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, "relative import"
-            found.add(node.module or "")
-    return found
+            result.add(node.module or "")
+    return result
 
 
 def room_of(name: str, package: str) -> str | None:

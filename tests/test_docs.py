@@ -1,6 +1,7 @@
 """The documentation site follows the code: import graph, case keys, options, links, run folder."""
 
 import json
+import math
 import re
 import shlex
 import sys
@@ -13,6 +14,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "docs" / "_ext"))
 
 import import_graph  # noqa: E402
+import reference_tables  # noqa: E402
 
 PAGES = sorted(
     path
@@ -71,7 +73,31 @@ def test_the_case_reference_shows_every_table(root):
 
     page = (root / "docs" / "reference" / "case.md").read_text()
     tables = {key.split(".")[0] for key in known_keys() if "." in key}
-    assert set(re.findall(r"^```\{case-keys\} (\w+)", page, re.M)) == tables
+    assert set(re.findall(r"^<!-- case-keys (\w+)", page, re.M)) == tables
+
+
+@pytest.mark.parametrize("page", reference_tables.PAGES)
+def test_the_tables_of_the_reference_are_those_of_the_code(root, page):
+    """After a change of a key or option: `python docs/_ext/reference_tables.py --write`."""
+    text = (root / page).read_text(encoding="utf-8")
+    assert "| Meaning |" in text
+    assert reference_tables.filled(text) == text
+
+
+def test_the_numbers_of_the_page_about_the_velocity(root):
+    from fdnet.case.file import read_case
+    from fdnet.scales.scales import scales_of
+
+    page = (root / "docs/how-to/choose_the_velocity.md").read_text(encoding="utf-8")
+    length_mm = 1e3 * 0.108 * math.log(100 / 0.108)
+    assert f"{length_mm:.0f} mm, and 3.5 MPa give {3.5e3 / length_mm:.1f} MPa/m" in page
+    for length in (4, 8, 738):
+        case = read_case(
+            root / "cases/quick.toml", assignments=[f"fluid.darcy_length_mm={length}"]
+        )
+        scales = scales_of(case)
+        row = f"{scales.interstitial_velocity:.3g} m/s | {scales.reynolds:.2g} |"
+        assert row in page, row
 
 
 def test_every_command_and_option_is_explained(root):
@@ -80,7 +106,7 @@ def test_every_command_and_option_is_explained(root):
     parser = _parser()
     commands = next(a for a in parser._actions if isinstance(a, _SubParsersAction)).choices
     page = (root / "docs" / "reference" / "commands.md").read_text()
-    assert set(re.findall(r"^```\{command-options\} (\w+)", page, re.M)) == set(commands)
+    assert set(re.findall(r"^<!-- command-options (\w+)", page, re.M)) == set(commands)
     for name, command in commands.items():
         for action in command._actions:
             assert action.help or isinstance(action, _HelpAction), f"fdnet {name} {action.dest}"

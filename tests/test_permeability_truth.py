@@ -50,20 +50,20 @@ def test_intact_packs_and_lattices_within_2_percent(capsys, name):
 @pytest.mark.parametrize("name", FILLED)
 def test_loss_by_fines_within_10_percent(capsys, name):
     """k/k0 from 0.89 down to 0.0175, fines 1/5 and 1/10, even and in layers."""
-    found = run(capsys, name)
-    assert 1 - found["k_reduction"] == pytest.approx(
+    result = run(capsys, name)
+    assert 1 - result["k_reduction"] == pytest.approx(
         float(TRUTH[name]["k_over_k0"]), rel=0.10 + error(name)
     )
-    assert found["porosity_damaged"] < found["porosity_initial"]
+    assert result["porosity_damaged"] < result["porosity_initial"]
 
 
 def test_root_mean_square_errors_are_within_the_goals(capsys):
     """Intact 3 %, loss by fines 5 %."""
     for names, key, goal in ((INTACT, "k_mm2", 0.03), (FILLED, "k_over_k0", 0.05)):
-        found = [run(capsys, name) for name in names]
+        result = [run(capsys, name) for name in names]
         model = [
             one["k_initial_m2"] * 1e6 if key == "k_mm2" else 1 - one["k_reduction"]
-            for one in found
+            for one in result
         ]
         logs = [
             math.log(value / float(TRUTH[name][key]))
@@ -79,10 +79,10 @@ def test_names_offered_are_the_laws_there_are():
 
 def test_compared_laws_give_what_each_gives_alone(capsys, tmp_path):
     table = tmp_path / "laws.csv"
-    found = run(capsys, "packC_r5_d2-x", "--compare-laws", "--sections", "2", "--csv", str(table))
-    pairs = {(one["law"], one["damage_law"]): one for one in found["laws"]}
+    result = run(capsys, "packC_r5_d2-x", "--compare-laws", "--sections", "2", "--csv", str(table))
+    pairs = {(one["law"], one["damage_law"]): one for one in result["laws"]}
     assert set(pairs) == {(law, damage) for law in LAWS for damage in DAMAGE_LAWS}
-    assert found["k_damaged_m2"] == pairs[DEFAULT_LAW, DEFAULT_DAMAGE_LAW]["k_damaged_m2"]
+    assert result["k_damaged_m2"] == pairs[DEFAULT_LAW, DEFAULT_DAMAGE_LAW]["k_damaged_m2"]
     alone = run(
         capsys, "packC_r5_d2-x", "--law", "thesis", "--damage-law", "thesis", "--sections", "2"
     )
@@ -111,14 +111,14 @@ def test_compared_laws_give_what_each_gives_alone(capsys, tmp_path):
 def test_sections_in_place_recombine_in_series(capsys, periodic, axis):
     """L / k = sum of dx / k over the sections, damaged and not, with walls and without."""
     more = ("--sections", "4", "--axis", axis, "--periodic", periodic)
-    found = run(capsys, "packC_r5_d2-x", *more)
+    result = run(capsys, "packC_r5_d2-x", *more)
     for name in ("initial", "damaged"):
-        rows = found["sections"]
+        rows = result["sections"]
         thickness = [row["x_hi_m"] - row["x_lo_m"] for row in rows]
         series = sum(
             dx / row[f"k_{name}_inplace_m2"] for dx, row in zip(thickness, rows, strict=True)
         )
-        assert sum(thickness) / series == pytest.approx(found[f"k_{name}_m2"], rel=1e-9)
+        assert sum(thickness) / series == pytest.approx(result[f"k_{name}_m2"], rel=1e-9)
 
 
 def test_sections_are_printed_with_their_units(capsys):

@@ -20,5 +20,5 @@ def test_every_study_has_its_table_text_and_figure(root, name):
 
 
 def test_evidence_becomes_links():
-    found = evidence("as told tests/dem/test_a.py::test_it_holds; tests/test_b.py::test_c")
-    assert found == "as told ([it_holds](../tests/dem/test_a.py)); ([c](../tests/test_b.py))"
+    result = evidence("as told tests/dem/test_a.py::test_it_holds; tests/test_b.py::test_c")
+    assert result == "as told ([it_holds](../tests/dem/test_a.py)); ([c](../tests/test_b.py))"

@@ -1,17 +1,10 @@
-"""The directive `case-keys`: a table of the keys of a case file, made from the models themselves.
-
-`{case-keys} grains` writes the keys of the table [grains]; without a name, the keys at the top.
-"""
+"""The keys of a case file as rows of a table, made from the models themselves."""
 
 from collections.abc import Iterator
-from typing import Any, ClassVar, Literal, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin
 
-from docutils import nodes
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
-from sphinx.application import Sphinx
-from sphinx.util.docutils import SphinxDirective
-from tables import table
 
 UNITS = {
     "_kg_m3": "kg/m³",
@@ -27,20 +20,6 @@ UNITS = {
 }
 """End of a key and the unit it stands for; the longer ends first."""
 SPACE = "\N{NO-BREAK SPACE}"
-
-
-class CaseKeys(SphinxDirective):
-    """The keys of one table of a case file, one row each."""
-
-    optional_arguments = 1
-    has_content = False
-    header: ClassVar = ("Key", "Unit", "Default", "Range", "Meaning")
-
-    def run(self) -> list[nodes.Node]:
-        part = self.arguments[0] if self.arguments else ""
-        rows = list(key_rows(part))
-        names = [row[0].strip("`") for row in rows]
-        return [table(self, self.header, rows, widths=(22, 8, 12, 18, 40), names=names)]
 
 
 def key_rows(part: str) -> Iterator[tuple[str, ...]]:
@@ -136,9 +115,3 @@ def _bounds(metadata: list[Any]) -> str:
 
 def _plain(value: float) -> str:
     return "2³¹" if value == 2**31 else f"{value:g}"
-
-
-def setup(app: Sphinx) -> dict[str, bool]:
-    """Make the directive known to Sphinx."""
-    app.add_directive("case-keys", CaseKeys)
-    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,30 +1,8 @@
-"""The directive `command-options NAME`: usage and options of `fdnet NAME`, from its own parser."""
+"""Usage and options of each command of fdnet as rows of a table, from its own parser."""
 
 import argparse
 import re
 from collections.abc import Iterator
-from typing import ClassVar
-
-from docutils import nodes
-from sphinx.application import Sphinx
-from sphinx.util.docutils import SphinxDirective
-from tables import table
-
-
-class CommandOptions(SphinxDirective):
-    """The usage line of one command and a table of its arguments."""
-
-    required_arguments = 1
-    has_content = False
-    header: ClassVar = ("Argument", "Meaning")
-
-    def run(self) -> list[nodes.Node]:
-        parser = commands()[self.arguments[0]]
-        usage = nodes.literal_block("", usage_of(parser), language="text")
-        rows = list(option_rows(parser))
-        names = [row[0].split("`")[1].split()[0].strip("-") for row in rows]
-        names = [f"{self.arguments[0]}-{name}" for name in names]
-        return [usage, table(self, self.header, rows, widths=(35, 65), names=names)]
 
 
 def commands() -> dict[str, argparse.ArgumentParser]:
@@ -66,9 +44,3 @@ def _name(action: argparse.Action) -> str:
 def _meaning(action: argparse.Action) -> str:
     text = re.sub(r"(?<![\w-])--[a-z-]+", r"`\g<0>`", str(action.help))
     return text[0].upper() + text[1:] + ("" if text.endswith(".") else ".")
-
-
-def setup(app: Sphinx) -> dict[str, bool]:
-    """Make the directive known to Sphinx."""
-    app.add_directive("command-options", CommandOptions)
-    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -72,7 +72,8 @@ def used_variables(template: str) -> set[str]:
 def _used(template: str) -> Iterator[str]:
     environment = _environment()
     try:
-        source, _, _ = environment.loader.get_source(environment, template)  # type: ignore[union-attr]
+        loader = environment.loader
+        source, _, _ = loader.get_source(environment, template)  # type: ignore[union-attr]
     except jinja2.TemplateNotFound as error:
         raise DeckError(
             f"liggghts_templates/{error.name}: template not found; reinstall fdnet"

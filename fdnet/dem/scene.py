@@ -130,7 +130,7 @@ def box_of(case: Case) -> Array:
 
 
 def _check_spheres(frame: Frame) -> None:
-    """Raise DumpError on a type that is neither grain nor fine, or a radius that is not above 0."""
+    """Raise DumpError on a type that is neither grain nor fine, or a radius not above 0."""
     for name, good, expected in (
         ("type", np.isin(frame.column("type"), list(Kind)), "1 (grain) or 2 (fine)"),
         ("radius", frame.column("radius") > 0, "a number above 0"),

@@ -145,7 +145,9 @@ class Network:
         return ends
 
 
-def build_network(grains: Snapshot, *, periodic: Directions = "", walls: str = "slip") -> Network:
+def build_network(
+    grains: Snapshot, *, periodic: Directions = "", walls: str = "no-slip"
+) -> Network:
     """The network of pores and throats between grains (Shi 2011, section 3.2.1).
 
     Periodic sides join. The other faces are mirror planes: with `walls` "slip" the specimen is one
@@ -157,7 +159,7 @@ def build_network(grains: Snapshot, *, periodic: Directions = "", walls: str = "
     Args:
         grains: the spheres that carry the skeleton, m; fines are not part of the network.
         periodic: the sides that are periodic, letters such as "yz" or three truth values.
-        walls: "slip" or "no-slip".
+        walls: "no-slip", the default as in `analyse`, or "slip".
 
     Raises:
         NetworkError: unknown walls, impossible lengths, too few, coincident or coplanar grains,

@@ -13,7 +13,7 @@ from fdnet.case.analysis import AnalysisChoices, AnalysisKeys, with_visible_choi
 from fdnet.network.analysis import Analysis, worst_solve
 from fdnet.network.fines.occupancy import Occupancy
 from fdnet.network.flow.flow import Flow
-from fdnet.network.flow.sections import Section, make_profile, make_sections, reduction
+from fdnet.network.flow.sections import Section, make_profile, make_sections, reduction, thin_slabs
 from fdnet.network.flow.slabs import (
     SlabK,
     inplace_permeability,
@@ -270,12 +270,7 @@ def _warn(log: _Log, states: tuple[_State, _State], sections: tuple[Section, ...
         if state.flow.reason:
             log.warnings.append(f"{name} = 0: {state.flow.reason}")
     network = states[0].network
-    thin = [one.section for one in sections if one.x_hi - one.x_lo < 2.0 * network.grain_radius]
-    if thin:
-        log.warnings.append(
-            f"sections {thin} are thinner than a grain diameter "
-            f"({2 * network.grain_radius:.3g} m): their k is of single throats"
-        )
+    log.warnings += thin_slabs(sections, 2.0 * network.grain_radius)
 
 
 def _counts(

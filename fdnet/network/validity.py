@@ -49,9 +49,9 @@ def doubts(
     low, high = VALIDATED_POROSITY
     if not low <= porosity <= high:
         yield (
-            f"the porosity without fines is {porosity:.3f}, outside {low:.2f} to {high:.2f}, where "
-            "fdnet was compared with resolved flow: the permeability may be wrong by more than "
-            "the documented error; check the box and the units, or use a resolved solver"
+            f"the porosity without fines is {porosity:.3f}, outside {low:.2f} to {high:.2f}, "
+            "where fdnet was compared with resolved flow: the permeability may be wrong by more "
+            "than the documented error; check the box and the units, or use a resolved solver"
         )
     empty = empty_duct_permeability(box, periodic) if walls == "no-slip" else np.inf
     if permeability > empty:

@@ -1,4 +1,4 @@
-"""Spheres from a file of any known format, grains and fines told apart."""
+"""Spheres from a file of any known format, with grains distinguished from fines."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

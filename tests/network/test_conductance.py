@@ -17,7 +17,7 @@ ALL = (True,) * 3
 
 
 def permeability(pack, law, periodic=ALL):
-    network = build_network(pack, periodic=periodic)
+    network = build_network(pack, periodic=periodic, walls="slip")
     flow = solve_flow(network, LAWS[law](network))
     return flow.inflow * (pack.box[0, 1] - pack.box[0, 0]) / network.area
 

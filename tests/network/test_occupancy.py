@@ -174,7 +174,7 @@ def test_fine_in_one_pore_against_random_points():
 @pytest.mark.parametrize("periodic", [(False, True, True), (True, False, True), NONE])
 def test_fines_of_a_walled_pack_count_once_with_their_mirror_images(periodic):
     pack = with_fines(random_pack(60), 200, 0.2)
-    network = build_network(pack.grains(), periodic=periodic)
+    network = build_network(pack.grains(), periodic=periodic, walls="slip")
     occupancy = measure_occupancy(network, pack.fines())
     assert np.sum(network.pore_share * occupancy.pore_solid_volume) == pytest.approx(
         200 * 4 / 3 * np.pi * 0.2**3, rel=1e-9

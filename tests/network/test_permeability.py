@@ -280,3 +280,17 @@ def test_throats_that_do_not_conduct_are_counted(pack):
     assert analysis.counts["throats_not_conducting"] == int(
         np.sum(analysis.network.throat_radius == 0)
     )
+
+
+def test_sections_of_one_grain_diameter_are_not_thin():
+    """Sections of 0.5 mm between rounded planes, and grains of 0.5 mm."""
+    lattice = (np.indices((8, 2, 2)).reshape(3, -1).T + 0.5) * 0.5e-3
+    spheres = Snapshot.from_arrays(lattice, 0.25e-3, box=[(0, 4e-3), (0, 1e-3), (0, 1e-3)])
+    texts = [
+        [one for one in analyse(spheres, sections=count).warnings if "thinner" in one]
+        for count in (8, 9)
+    ]
+    assert texts[0] == []
+    assert len(texts[1]) == 1
+    assert "the mean grain diameter (0.5 mm)" in texts[1][0]
+    assert texts[1][0].endswith("take fewer sections: analysis.sections = 8 or less")

@@ -23,7 +23,7 @@ ALL, NONE, SIDES = (True,) * 3, (False,) * 3, (False, True, True)
 )
 @pytest.mark.parametrize("periodic", [ALL, SIDES])
 def test_void_of_the_pores_is_the_known_porosity(pack, expected, periodic):
-    network = build_network(pack, periodic=periodic)
+    network = build_network(pack, periodic=periodic, walls="slip")
     void = np.sum(network.pore_share * network.pore_volume) / np.prod(pack.box[:, 1])
     if periodic == SIDES:
         # the mirrored faces cut the lattice, so the porosity comes from chords, a second method
@@ -64,7 +64,7 @@ def test_wall_surface_hides_the_caps_of_overlapping_pairs():
 @pytest.mark.parametrize("periodic", [ALL, SIDES, (True, False, True), NONE])
 def test_tetrahedra_tile_and_facets_pair(periodic):
     pack = random_pack(120, 0.5, periodic=False)
-    network = build_network(pack, periodic=periodic)
+    network = build_network(pack, periodic=periodic, walls="slip")
     assert network.counts["throats_unmatched"] == 0
     assert (
         network.throat_heights.sum(axis=1).min() > -1e-9
@@ -102,7 +102,7 @@ def test_throat_ends_are_its_pores_up_to_whole_periods():
 
 def test_pores_on_the_x_faces_lie_on_them():
     pack = random_pack(100, 0.5, periodic=False)
-    network = build_network(pack, periodic=SIDES)
+    network = build_network(pack, periodic=SIDES, walls="slip")
     on_face = network.pore_share < 1
     assert np.all(network.pore_share[on_face] == 0.5)
     assert set(network.pore_position[on_face, 0]) == {0.0, pack.box[0, 1]}
@@ -122,12 +122,12 @@ def test_two_grains_at_one_place_are_refused():
 
 def test_three_grains_are_refused():
     with pytest.raises(NetworkError, match="at least 4"):
-        build_network(snapshot(np.zeros((3, 3)), 0.1, [[0, 10]] * 3), periodic=NONE)
+        build_network(snapshot(np.zeros((3, 3)), 0.1, [[0, 10]] * 3), periodic=NONE, walls="slip")
 
 
 def test_one_layer_between_walls_is_a_stack_of_its_mirror_images():
     position = np.random.default_rng(0).random((9, 3)) * [8, 8, 0] + 1
-    network = build_network(snapshot(position, 0.1, [[0, 10]] * 3), periodic=NONE)
+    network = build_network(snapshot(position, 0.1, [[0, 10]] * 3), periodic=NONE, walls="slip")
     assert np.sum(network.pore_share * network.pore_tetra_volume) == pytest.approx(1000, rel=1e-12)
 
 
@@ -135,9 +135,9 @@ def test_grains_out_of_reach_are_left_out_and_counted():
     pack = random_pack(60, 0.5, periodic=False)
     position = np.vstack([[[-3.0, 1, 1]], pack.position])
     network = build_network(
-        snapshot(position, np.append(1.0, pack.radius), pack.box), periodic=NONE
+        snapshot(position, np.append(1.0, pack.radius), pack.box), periodic=NONE, walls="slip"
     )
-    alone = build_network(pack, periodic=NONE)
+    alone = build_network(pack, periodic=NONE, walls="slip")
     assert network.counts["grains_outside_box"] == 1
     assert np.array_equal(network.pore_grains, alone.pore_grains + 1)
     assert np.array_equal(network.throat_grains, alone.throat_grains + 1)

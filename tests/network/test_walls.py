@@ -37,7 +37,7 @@ def doubled(pack, axes):
 
 
 def permeabilities(pack, periodic):
-    network = build_network(pack, periodic=periodic)
+    network = build_network(pack, periodic=periodic, walls="slip")
     length = np.ptp(pack.box[0])
     return np.array(
         [solve_flow(network, law(network)).inflow * length / network.area for law in LAWS.values()]
@@ -64,7 +64,7 @@ def test_sections_of_a_walled_pack_are_those_of_its_doubled_pack():
     pack = random_pack(100, 0.5, periodic=False)
     in_place = []
     for one, periodic in ((pack, NONE), (doubled(pack, (1, 2)), (False, True, True))):
-        network = build_network(one, periodic=periodic)
+        network = build_network(one, periodic=periodic, walls="slip")
         flow = solve_flow(network, LAWS["series"](network))
         in_place.append(inplace_permeability(network, flow, np.linspace(0, pack.box[0, 1], 5)))
     assert in_place[0] == pytest.approx(
@@ -76,14 +76,14 @@ def test_sections_of_a_walled_pack_are_those_of_its_doubled_pack():
 def test_void_of_a_walled_box_is_its_porosity(pack):
     """One pair of walls: a grain cut by two of them overlaps three images in one place."""
     pack, periodic = PACKS[pack](), (True, False, True)
-    network = build_network(pack, periodic=periodic)
+    network = build_network(pack, periodic=periodic, walls="slip")
     porosity = measure_porosity(pack, periodic=periodic, lines=20_000)
     void = np.sum(network.pore_share * network.pore_volume) / np.prod(np.ptp(pack.box, axis=1))
     assert void == pytest.approx(porosity.mean, abs=5 * porosity.standard_error + 1e-5)
 
 
 def test_throats_in_a_wall_count_by_their_half():
-    network = build_network(simple_cubic(4), periodic=(True, False, True))
+    network = build_network(simple_cubic(4), periodic=(True, False, True), walls="slip")
     both = network.pore_share[network.throat_pores] < 1
     assert set(network.throat_share[both.all(axis=1)]) == {0.5}
     assert np.all(network.throat_share[~both.all(axis=1)] == 1)
@@ -101,7 +101,7 @@ def test_grain_centred_beyond_a_wall_becomes_a_half_sphere_of_its_cap():
     assert 2 / 3 * np.pi * moved.radius[changed] ** 3 == pytest.approx(
         np.pi * 0.6**2 * (3 - 0.6) / 3
     )
-    network = build_network(cut, periodic=NONE)
+    network = build_network(cut, periodic=NONE, walls="slip")
     assert network.counts["grains_centred_beyond_walls"] == 1
     assert network.grain_radius == 1.0
     porosity = measure_porosity(cut, periodic=NONE, lines=20_000)
@@ -144,7 +144,7 @@ def test_few_grains_in_a_wide_box_still_tile_it(seed, count, periodic):
     That shows only in facets without partner.
     """
     pack = random_pack(count, 0.2, seed=seed, spread=0.3, aspect=0.6)
-    network = build_network(pack, periodic=periodic)
+    network = build_network(pack, periodic=periodic, walls="slip")
     box = np.prod(np.ptp(pack.box, axis=1))
     assert network.counts["throats_unmatched"] == 0
     assert np.sum(network.pore_share * network.pore_tetra_volume) == pytest.approx(box, rel=1e-12)
@@ -159,7 +159,7 @@ def test_fines_at_a_wall_fill_the_throats_in_it_with_their_images():
     more = snapshot(np.vstack([fines.position, image]), 0.2, both.box, Kind.FINE)
     solids = []
     for one, of_it, periodic in ((grains, fines, (True, False, True)), (both, more, ALL)):
-        network = build_network(one, periodic=periodic)
+        network = build_network(one, periodic=periodic, walls="slip")
         solid = measure_occupancy(network, of_it).throat_solid_volume
         walls = network.throat_ends[:, :, 1] / pack.box[1, 1]
         solids.append(solid[np.all(np.abs(walls - np.round(walls)) < 1e-9, axis=1)].sum())

@@ -122,8 +122,8 @@ def demo_network(grains):
 def demo_occupancy(network, fines):
     middle = network.throat_ends.mean(axis=1)
     near = cKDTree(fines.position).query_ball_point(middle, 1.2 * network.throat_radius + 2e-5)
-    count = np.array([len(found) for found in near])
-    mean_radius = np.array([fines.radius[found].mean() if found else 0.0 for found in near])
+    count = np.array([len(indices) for indices in near])
+    mean_radius = np.array([fines.radius[indices].mean() if indices else 0.0 for indices in near])
     porosity = np.clip(1 - 0.18 * count, 0.05, 1.0)
     pore_porosity = np.clip(
         1

@@ -30,7 +30,7 @@ def test_a_written_table_reads_back_to_the_same_doubles(tmp_path):
     assert np.array_equal(kind, snapshot.kind)
 
 
-def test_spheres_a_hair_off_a_section_edge_stay_on_their_side(tmp_path):
+def test_spheres_just_off_a_section_edge_stay_on_their_side(tmp_path):
     edge = 0.003
     depth = np.array([np.nextafter(edge, 0), edge, np.nextafter(edge, 1), -5e-324, 0.0])
     fines = snapshot_of(np.column_stack([depth, depth * 0, depth * 0]), 1e-5, Kind.FINE)

@@ -78,7 +78,7 @@ def test_one_bad_conductance_among_many_is_refused_and_named(bad):
 
 
 def pack_network() -> tuple[Network, Array]:
-    network = build_network(random_pack(120), periodic=(False, True, True))
+    network = build_network(random_pack(120), periodic=(False, True, True), walls="slip")
     return network, LAWS["lubrication"](network)
 
 

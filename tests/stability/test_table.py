@@ -18,9 +18,9 @@ def test_every_row_of_the_stability_table_names_tests_that_exist(root):
     assert len({row["case"] for row in rows}) == len(rows)
     for row in rows:
         assert set(row) == {"case", "what_happened", "evidence"}, row
-        found = NODE.findall(row["evidence"])
-        assert found, row
-        for path, name in found:
+        nodes = NODE.findall(row["evidence"])
+        assert nodes, row
+        for path, name in nodes:
             tree = ast.parse((root / path).read_text(encoding="utf-8"))
             assert name in {
                 node.name for node in tree.body if isinstance(node, ast.FunctionDef)

@@ -60,7 +60,7 @@ def test_a_level_has_the_confidence_band_of_its_seeds():
         *(measured("poor", seed, q=q) for seed, q in enumerate((1.1, 1.2, 1.3))),
     ]
     rows = against_reference(runs, "q", lambda run: run.point.value == "good")
-    (band,) = [found for found in levels(rows, "s", "q") if found.value == "poor"]
+    (band,) = [result for result in levels(rows, "s", "q") if result.value == "poor"]
     # mean 0.2, s = 0.1, t(0.975, 2) = 4.3027
     assert band.error == pytest.approx(0.2)
     assert band.half_width == pytest.approx(4.302653 * 0.1 / math.sqrt(3), rel=1e-6)
@@ -73,9 +73,9 @@ def test_the_knee_is_the_cheapest_within_twice_the_best_bound():
         level(3, 4.0, 0.01, 0.02),
         level(4, 8.0, 0.012, 0.02),
     ]
-    found = knee(noisy)
-    assert found is not None
-    assert found.value == 2
+    result = knee(noisy)
+    assert result is not None
+    assert result.value == 2
     assert knee([]) is None
 
 
@@ -89,18 +89,18 @@ def test_errors_that_go_on_falling_have_no_knee():
 
 def test_neither_the_reference_nor_a_lucky_pair_of_seeds_is_a_knee():
     """Two seeds can cancel to an error of 0; the reference has none by construction."""
-    found = [
+    result = [
         Level(value="lucky", runs=2, cost=1.0, error=0.0, half_width=0.5),
         Level(value="single", runs=1, cost=1.5, error=0.0, half_width=0.0),
         Level(value="fair", runs=5, cost=2.0, error=0.02, half_width=0.02),
         Level(value="good", runs=5, cost=4.0, error=0.01, half_width=0.02),
         Level(value="truth", runs=5, cost=9.0, error=0.0, half_width=0.01, reference=True),
     ]
-    at = knee(found)
+    at = knee(result)
     assert at is not None
     assert at.value == "fair"
-    assert "errors from truth, which costs 9 s" in knee_sentence(found, default="good")
-    assert knee_sentence(found[:1], default=None) == "error lucky: +0 ± 50 % for 1 s"
+    assert "errors from truth, which costs 9 s" in knee_sentence(result, default="good")
+    assert knee_sentence(result[:1], default=None) == "error lucky: +0 ± 50 % for 1 s"
 
 
 def test_no_knee_is_taken_from_levels_without_bands():
@@ -129,7 +129,7 @@ def test_unpaired_levels_carry_the_band_of_their_reference():
             measured("good", 100 + seed, q=q) for seed, q in enumerate(rng.normal(1.0, 0.1, 5))
         ]
         rows = against_reference(runs, "q", lambda run: run.point.value == "good", paired=False)
-        poor = next(found for found in levels(rows, "s", "q") if found.value == "poor")
+        poor = next(result for result in levels(rows, "s", "q") if result.value == "poor")
         outside += poor.size > poor.half_width
     assert outside < 0.08 * 200
 

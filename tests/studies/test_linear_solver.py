@@ -30,9 +30,9 @@ from tests.network.exact import exact_balance, random_links
 def rows(tmp_path_factory):
     out = tmp_path_factory.mktemp("study") / "out"
     run_study(STUDY, out, quick=True)
-    found = read_rows(out / "linear-solver.csv")
-    assert {row.status for row in found} == {DONE}
-    return found
+    result = read_rows(out / "linear-solver.csv")
+    assert {row.status for row in result} == {DONE}
+    return result
 
 
 def errors(rows, method, decades, quantity, pores=200):

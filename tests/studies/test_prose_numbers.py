@@ -47,15 +47,15 @@ MEASURED_APART = {
 
 def literals(page: str) -> dict[str, set[str]]:
     """Numbers that stand in the prose of a page's source as they are, by section."""
-    found = {}
+    result = {}
     for number, part in enumerate(re.split(r"(?m)^## ", page)):
         title, _, body = part.partition("\n")
         body = re.sub(r"(?ms)^```.*?^```", "", body)
         body = re.sub(r"(?m)^\|.*$", "", body)
         body = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", body)
         body = re.sub(r"`[^`]*`|\$\w+", "", body)
-        found[title if number else ""] = set(NUMBER.findall(body))
-    return found
+        result[title if number else ""] = set(NUMBER.findall(body))
+    return result
 
 
 @pytest.mark.parametrize("page", list(SETTINGS))

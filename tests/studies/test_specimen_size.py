@@ -19,8 +19,8 @@ def rows(tmp_path_factory):
 
 def test_what_one_pack_is_off_by_falls_with_its_grains(rows):
     for name in ("one run's k_initial", "one run's porosity_initial"):
-        found = [level.error for level in levels(rows, f"{INTACT}, {PERIODIC}", name)]
-        assert found[0] > 2 * found[-1] > 0
+        result = [level.error for level in levels(rows, f"{INTACT}, {PERIODIC}", name)]
+        assert result[0] > 2 * result[-1] > 0
 
 
 def test_packs_of_equal_count_meet_the_porosity_of_their_grains(rows):
@@ -31,8 +31,8 @@ def test_packs_of_equal_count_meet_the_porosity_of_their_grains(rows):
 
 
 def test_every_seed_is_a_run_of_its_own(rows):
-    found = [row.observed for row in rows if row.quantity == "porosity_loss_first"]
-    assert len(set(found)) == len(found) == 6
+    result = [row.observed for row in rows if row.quantity == "porosity_loss_first"]
+    assert len(set(result)) == len(result) == 6
     assert {level.value for level in levels(rows, f"{INVADED}, {PERIODIC}", "k_ratio_first")} == {
         43.0,
         84.0,

@@ -26,7 +26,7 @@ def rows(tmp_path_factory):
 
 def test_overlap_falls_as_the_root_of_the_stiffness_up_to_the_nominal_value(rows):
     """v sqrt(m_eff / k) exp(...) of a damped spring; 2 % for a step of 0.1 sqrt(m/k)."""
-    found = {
+    result = {
         level.value: level.error for level in levels(rows, COLLISION, "overlap_over_diameter")
     }
     case = slab_case(1)
@@ -38,19 +38,19 @@ def test_overlap_falls_as_the_root_of_the_stiffness_up_to_the_nominal_value(rows
             .normal_stiffness
         )
         exact = deepest_overlap_of(case.fines.damping_ratio, SPEED, pair, mass / 2)
-        assert found[value] * 2 * case.fines.mean_radius_m == pytest.approx(exact, rel=0.025)
+        assert result[value] * 2 * case.fines.mean_radius_m == pytest.approx(exact, rel=0.025)
 
 
 def test_restitution_does_not_depend_on_the_stiffness(rows):
-    found = [level.error for level in levels(rows, COLLISION, "restitution_error")]
-    assert found == pytest.approx([found[0]] * 3, abs=1e-6)
-    assert abs(found[0]) < 0.01
+    result = [level.error for level in levels(rows, COLLISION, "restitution_error")]
+    assert result == pytest.approx([result[0]] * 3, abs=1e-6)
+    assert abs(result[0]) < 0.01
 
 
 def test_invasions_overlap_less_when_stiffer_and_every_quantity_is_there(rows):
-    found = levels(rows, LONG, "max_overlap")
-    assert [level.value for level in found] == [1e2, 1e3, 1e4]
-    assert found[0].error > 3 * found[1].error > 3 * found[2].error > 0
+    result = levels(rows, LONG, "max_overlap")
+    assert [level.value for level in result] == [1e2, 1e3, 1e4]
+    assert result[0].error > 3 * result[1].error > 3 * result[2].error > 0
     assert {row.quantity for row in rows if row.series == LONG} == {
         "invaded", "mean_depth", "porosity_loss", "porosity_loss_first", "k_ratio",
         "k_ratio_first", "max_overlap",
@@ -73,9 +73,9 @@ def test_closed_forms_of_a_damped_contact():
         return 2 * zeta * y[1] + y[0] if y[0] > 1e-9 or y[1] < 0 else 1.0
 
     released.terminal = True
-    found = solve_ivp(
+    result = solve_ivp(
         moving, (0, 10), [1e-12, 1.0], events=released, rtol=1e-10, atol=1e-12, max_step=0.01
     )
-    assert -found.y[1, -1] == pytest.approx(restitution_of(zeta), rel=1e-5)
-    assert max(found.y[0]) == pytest.approx(deepest_overlap_of(zeta, 1.0, 1.0, 1.0), rel=1e-4)
-    assert math.isclose(found.y[0].max(), max(found.y[0]))
+    assert -result.y[1, -1] == pytest.approx(restitution_of(zeta), rel=1e-5)
+    assert max(result.y[0]) == pytest.approx(deepest_overlap_of(zeta, 1.0, 1.0, 1.0), rel=1e-4)
+    assert math.isclose(result.y[0].max(), max(result.y[0]))

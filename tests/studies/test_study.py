@@ -39,8 +39,8 @@ def test_a_cut_study_goes_on_and_runs_no_point_twice(tmp_path):
     lines = record.read_text().splitlines(keepends=True)
     record.write_text("".join(lines[:2]) + lines[2][:20])
     seen = []
-    found = run_points(toy(measure=toy_study.measure), out, quick=True, report=seen.append)
-    assert [run.point.value for run in found] == [4.0, 8.0, 16.0]
+    result = run_points(toy(measure=toy_study.measure), out, quick=True, report=seen.append)
+    assert [run.point.value for run in result] == [4.0, 8.0, 16.0]
     assert seen[0] == "1 of 3 points are there already"
     assert len(seen) == 3
     assert len(record.read_text().splitlines()) == 4
@@ -87,8 +87,8 @@ def test_failed_points_are_run_again_and_refused_ones_are_not(tmp_path):
     lines[1] |= {"status": "failed: disk full", "observed": {}}
     lines[2] |= {"status": "refused: no", "observed": {}}
     record.write_text("".join(json.dumps(line) + "\n" for line in lines))
-    found = run_points(toy(), out, quick=True)
-    assert [run.status for run in found] == [DONE, "refused: no", DONE]
+    result = run_points(toy(), out, quick=True)
+    assert [run.status for run in result] == [DONE, "refused: no", DONE]
     assert [run.status for run in run_points(toy(), out, quick=True)] == [
         DONE,
         "refused: no",

@@ -28,9 +28,9 @@ def errors(rows, scheme) -> dict[float, float]:
 
 
 def order_in_interval(rows, scheme) -> float:
-    found = {value: error for value, error in errors(rows, scheme).items() if value <= 0.2}
-    assert list(found) == [0.2, 0.1, 0.05]
-    return float(np.polyfit(np.log(list(found)), np.log(list(found.values())), 1)[0])
+    result = {value: error for value, error in errors(rows, scheme).items() if value <= 0.2}
+    assert list(result) == [0.2, 0.1, 0.05]
+    return float(np.polyfit(np.log(list(result)), np.log(list(result.values())), 1)[0])
 
 
 def test_explicit_schemes_converge_in_first_order_and_implicit_in_second(rows):
@@ -53,8 +53,8 @@ def test_errors_at_one_tau_are_those_of_the_schemes_closed_forms(rows):
 def test_viscous_is_drag_at_every_step_to_rounding(rows):
     assert errors(rows, VISCOUS) == pytest.approx(errors(rows, EVERY), rel=1e-3)
     for quantity in ("invaded", "mean_depth", "porosity_loss", "k_ratio_first"):
-        (found,) = [row.error for row in levels(rows, OTHER, quantity) if row.value == VISCOUS]
-        assert abs(found) < 1e-6, quantity
+        (result,) = [row.error for row in levels(rows, OTHER, quantity) if row.value == VISCOUS]
+        assert abs(result) < 1e-6, quantity
 
 
 def test_implicit_drag_stays_bounded_at_ten_tau_where_explicit_is_refused(rows):
@@ -65,9 +65,9 @@ def test_implicit_drag_stays_bounded_at_ten_tau_where_explicit_is_refused(rows):
 
 
 def test_invasions_are_held_against_drag_at_every_step(rows):
-    found = {level.value: level.error for level in levels(rows, HOLDING, "invaded")}
-    assert found[EVERY] == 0.0
-    assert abs(found[0.05]) < 0.1
+    result = {level.value: level.error for level in levels(rows, HOLDING, "invaded")}
+    assert result[EVERY] == 0.0
+    assert abs(result[0.05]) < 0.1
     assert {row.quantity for row in rows if row.series == OTHER} == {
         "invaded", "mean_depth", "porosity_loss", "k_ratio_first", "profile",
     }  # fmt: skip

@@ -112,7 +112,7 @@ def test_an_economy_changes_its_own_keys_alone():
     together[UNEQUAL] = own[BATCHES] | own[STEP] | own[HELD]
     for point in {(point.series, point.value): point for point in STUDY.points(False)}.values():
         before = case_of(replace(plain[point.series], seed=point.seed)).data()
-        found = {
+        result = {
             (part, key, value)
             for part, keys in case_of(point).data().items()
             if isinstance(keys, dict)
@@ -122,7 +122,7 @@ def test_an_economy_changes_its_own_keys_alone():
         expected = (
             together[point.series] if point.value == ALL else own.get(str(point.value), set())
         )
-        assert found == expected, point.key
+        assert result == expected, point.key
 
 
 def test_the_thesis_cases_use_what_all_stands_for(root):
@@ -143,9 +143,9 @@ def test_economies_stay_within_the_bands_of_the_seeds(quick):
     rows, _ = quick
     for series in SERIES:
         for quantity in OBSERVED:
-            found = levels(rows, series, quantity)
-            assert len(found) > 1
-            assert all(level.size <= level.half_width for level in found), (series, quantity)
+            result = levels(rows, series, quantity)
+            assert len(result) > 1
+            assert all(level.size <= level.half_width for level in result), (series, quantity)
 
 
 @pytest.mark.liggghts

@@ -42,9 +42,9 @@ def rows(tmp_path_factory):
 )
 def test_run_time_settings_change_the_answer_by_rounding_alone(rows, setting, values):
     series = window_of(setting, 200)
-    found = levels(rows, series, "mean_depth")
-    assert [level.value for level in found] == values
-    assert all(level.size < 1e-6 for level in found)
+    result = levels(rows, series, "mean_depth")
+    assert [level.value for level in result] == values
+    assert all(level.size < 1e-6 for level in result)
     assert all(
         row.error == 0.0 for row in rows if row.series == series and row.quantity == "invaded"
     )
@@ -64,10 +64,10 @@ def test_a_pack_at_rest_stays_where_it_is_and_fines_move_it(rows):
 
 def test_mobile_grains_are_held_against_fixed_ones(rows):
     for quantity in ("invaded", "mean_depth", "porosity_loss", "k_ratio_first"):
-        found = {level.value: level for level in levels(rows, MOTION, quantity)}
-        assert set(found) == {FIXED, MOBILE}
-        assert abs(found[FIXED].error) < 1e-12
-        assert found[MOBILE].size < 0.3
+        result = {level.value: level for level in levels(rows, MOTION, quantity)}
+        assert set(result) == {FIXED, MOBILE}
+        assert abs(result[FIXED].error) < 1e-12
+        assert result[MOBILE].size < 0.3
     steps = {(row.seed, row.value): row.steps for row in rows if row.series == MOTION}
     assert len(set(steps.values())) == 1
 
@@ -80,10 +80,10 @@ def test_skin_bin_and_grid_reach_the_deck(tmp_path):
     }
     for (knob, value), line in wanted.items():
         point = Point(series=knob, knob=knob, value=value, seed=1, settings={"fines": 200.0})
-        found = measure(point, tmp_path)
+        result = measure(point, tmp_path)
         deck = (tmp_path / point.slug / "in.invade").read_text()
         assert re.findall(rf"(?m)^{re.escape(line)}$", deck) == [line], knob
-        assert found["core_s"] > 0
+        assert result["core_s"] > 0
 
 
 def test_the_full_form_compares_fdnets_own_value_in_every_series():

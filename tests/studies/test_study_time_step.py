@@ -19,29 +19,29 @@ def rows(tmp_path_factory):
 
 
 def test_a_damped_collision_converges_in_first_order(rows):
-    found = levels(rows, COLLISION, "restitution_error")
+    result = levels(rows, COLLISION, "restitution_error")
     slope = np.polyfit(
-        np.log([level.value for level in found]), np.log([level.size for level in found]), 1
+        np.log([level.value for level in result]), np.log([level.size for level in result]), 1
     )[0]
     assert slope == pytest.approx(1.1, abs=0.3)
-    assert next(level.size for level in found if level.value == 0.1) < 0.03
+    assert next(level.size for level in result if level.value == 0.1) < 0.03
 
 
 def test_energy_of_an_undamped_pack_converges_in_second_order(rows):
-    found = levels(rows, ENERGY, "energy_drift", cost="steps")
-    assert order(found) == pytest.approx(2.0, abs=0.3)
-    assert next(level.size for level in found if level.value == 0.1) < 1e-4
+    result = levels(rows, ENERGY, "energy_drift", cost="steps")
+    assert order(result) == pytest.approx(2.0, abs=0.3)
+    assert next(level.size for level in result if level.value == 0.1) < 1e-4
 
 
 def test_explicit_drag_converges_in_first_order(rows):
-    found = levels(rows, DRAG, "relaxation_error", cost="steps")
-    assert [level.value for level in found] == [0.2, 0.1, 0.05, 0.025]
-    assert found[-1].size < 0.55 * found[-2].size < 0.4 * found[-3].size
-    assert found[-1].size < 0.01
+    result = levels(rows, DRAG, "relaxation_error", cost="steps")
+    assert [level.value for level in result] == [0.2, 0.1, 0.05, 0.025]
+    assert result[-1].size < 0.55 * result[-2].size < 0.4 * result[-3].size
+    assert result[-1].size < 0.01
 
 
 def test_the_invasion_is_held_against_its_smallest_step(rows):
-    found = levels(rows, INVASION, "invaded")
-    assert [level.value for level in found] == [0.2, 0.1, 0.05]
-    assert found[-1].error == 0.0
-    assert all(level.size < 0.1 for level in found)
+    result = levels(rows, INVASION, "invaded")
+    assert [level.value for level in result] == [0.2, 0.1, 0.05]
+    assert result[-1].error == 0.0
+    assert all(level.size < 0.1 for level in result)

@@ -26,9 +26,9 @@ def errors(rows, series, quantity):
 @pytest.mark.parametrize("where", ["inside", "ends"])
 @pytest.mark.parametrize("ratio", ["0.2", "1"])
 def test_gauss_error_falls_a_hundredfold_per_doubling(rows, ratio, where):
-    found = errors(rows, f"a/r = {ratio}", f"largest, {where}")
-    assert found[4] > 100 * found[8] > 1e4 * found[16] > 0
-    assert found[GAUSS_POINTS] < 5e-7
+    result = errors(rows, f"a/r = {ratio}", f"largest, {where}")
+    assert result[4] > 100 * result[8] > 1e4 * result[16] > 0
+    assert result[GAUSS_POINTS] < 5e-7
 
 
 @pytest.mark.parametrize(("ratio", "bias"), [(0.2, -0.008), (1.0, -0.20)])
@@ -41,9 +41,9 @@ def test_two_planes_have_their_published_bias(rows, ratio, bias):
 
 
 def test_in_a_deposit_the_default_is_converged_and_two_planes_lose_less_than_the_law(rows):
-    found = errors(rows, "fines 1/5, 5 points", "k/k0, thesis")
-    assert abs(found[GAUSS_POINTS]) < 1e-7
-    assert 0.02 < found[TWO_PLANE] < 0.06
+    result = errors(rows, "fines 1/5, 5 points", "k/k0, thesis")
+    assert abs(result[GAUSS_POINTS]) < 1e-7
+    assert 0.02 < result[TWO_PLANE] < 0.06
     assert set(errors(rows, "fines 1/5, 5 points", "blocked").values()) == {0.0}
     assert errors(rows, "fines 1/5, 5 points", "throat porosity")[TWO_PLANE] > 0
 

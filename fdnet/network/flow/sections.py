@@ -1,6 +1,6 @@
 """Permeability, porosity and fines by depth: sections with their own k, and a finer profile."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,8 @@ from fdnet.spheres.snapshot import Array, frozen
 
 FACE_TOLERANCE = 1e-6
 """Given edges may miss the faces of the box by this share of its length."""
+DIAMETER_TOLERANCE = 1e-9
+"""A section that is thinner than a grain diameter by at most this share of it is not thin."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,6 +141,21 @@ def make_sections(
             fines_fraction=float(share[s]),
         )
         for s in range(len(edges) - 1)
+    )
+
+
+def thin_slabs(sections: Sequence[Section], diameter: float) -> Iterator[str]:
+    """A warning if sections are thinner than the mean `diameter` of the grains, m."""
+    least = diameter * (1.0 - DIAMETER_TOLERANCE)
+    thin = [one.section for one in sections if one.x_hi - one.x_lo < least]
+    if not thin:
+        return
+    count = int((sections[-1].x_hi - sections[0].x_lo) / least)
+    cure = f"take fewer sections: analysis.sections = {count} or less"
+    yield (
+        f"sections {thin} are thinner than the mean grain diameter ({1e3 * diameter:.3g} mm): the "
+        "permeability of each is that of single throats; "
+        + (cure if count else "take a specimen that is longer along x")
     )
 
 

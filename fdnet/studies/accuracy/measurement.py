@@ -45,7 +45,7 @@ class Loss:
 
 def network_of(pack: Snapshot) -> Network:
     """The network of the grains of a periodic pack."""
-    return build_network(pack.grains(), periodic=PERIODIC)
+    return build_network(pack.grains(), periodic=PERIODIC, walls="slip")
 
 
 def permeability(network: Network, conductance: Array) -> float:

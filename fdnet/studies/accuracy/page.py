@@ -16,7 +16,7 @@ from fdnet.studies.accuracy.results import Results, compute_results, read_result
 from fdnet.studies.accuracy.rows import RULES
 from fdnet.studies.engine.markdown import wrapped
 from fdnet.studies.truth.cases import EQUAL, LOOSE, read_cases
-from fdnet.studies.truth.packs import DATA, LARGE_FINES_TRUTH, SHARED_TRUTH
+from fdnet.studies.truth.packs import DATA, INDEPENDENT_TRUTH, LARGE_FINES_TRUTH
 
 
 def write_accuracy(
@@ -27,11 +27,11 @@ def write_accuracy(
     Args:
         docs: folder of the page; tables and figure go to its folder `validation`.
         benchmark: table of the network benchmark.
-        packs: folder of the packs and of the shared truth.
+        packs: folder of the packs and of the independent truth.
         more: further folders of packs.
         own: table of fdnet's own truth.
     """
-    cases, missing = read_cases([packs / SHARED_TRUTH, own], [packs, *more])
+    cases, missing = read_cases([packs / INDEPENDENT_TRUTH, own], [packs, *more])
     validation = docs / "validation"
     results = compute_results(cases, packs)
     write_results(results, validation)

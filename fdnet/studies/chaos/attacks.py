@@ -21,7 +21,10 @@ from fdnet.studies.chaos.runs import (
 )
 
 Attack = Callable[[Random, Path, Prepared], str]
-"""Takes the generator, an empty folder and the prepared runs; "ok", "refused", or raises FaultError."""
+"""Takes the generator, an empty folder and the prepared runs.
+
+Returns "ok" or "refused", or raises FaultError.
+"""
 
 AT_STAKE = (
     *TABLES,
@@ -125,7 +128,7 @@ def damage(change: Callable[[Random, Path, Path], None]) -> Attack:
 
 
 def _check_kept(out: Path, before: Mapping[str, str], *, everything: bool) -> None:
-    """Raises FaultError when the user's file, or any file of a run that was only read, is another."""
+    """Raises FaultError when the user's file, or a file of a run only read, has changed."""
     after = contents(out)
     names = [name for name in before if everything or name == NOTES]
     lost = [name for name in names if after.get(name) != before[name] and name != ".lock"]

@@ -13,7 +13,7 @@ MM = 1e-3
 RADIUS = 0.5
 """Grain radius of the packs, mm."""
 DATA = Path(__file__).with_name("data")
-SHARED_TRUTH, OWN_TRUTH, OWN_GRIDS = "truth.csv", "own_truth.csv", "own_grids.csv"
+INDEPENDENT_TRUTH, OWN_TRUTH, OWN_GRIDS = "truth.csv", "own_truth.csv", "own_grids.csv"
 LARGE_FINES_TRUTH = "large_fines_truth.csv"
 
 
@@ -32,12 +32,12 @@ def truth_folder() -> Path:
 
 
 def truth_tables() -> list[Path]:
-    """The tables of the permeabilities: the shared one and fdnet's own.
+    """The tables of the permeabilities: the independent one and fdnet's own.
 
     Raises:
         CaseError: the folder of the packs is missing.
     """
-    return [truth_folder() / SHARED_TRUTH, truth_folder() / OWN_TRUTH]
+    return [truth_folder() / INDEPENDENT_TRUTH, truth_folder() / OWN_TRUTH]
 
 
 def read_pack(path: Path) -> tuple[Snapshot, float]:

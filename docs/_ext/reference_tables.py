@@ -1,0 +1,57 @@
+"""The tables of the case reference and of the commands, written into their pages.
+
+    python docs/_ext/reference_tables.py --write    # after a change of a key or an option
+
+Each table stands between two comments, `<!-- case-keys grains -->` (or `command-options run`) and
+`<!-- end -->`. The pages are therefore whole where they are read as plain Markdown, too.
+"""
+
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from case_keys import key_rows
+from command_options import commands, option_rows, usage_of
+
+PAGES = ("docs/reference/case.md", "docs/reference/commands.md")
+BLOCK = re.compile(r"(<!-- (case-keys|command-options)(?: (\w+))? -->\n).*?(<!-- end -->)", re.S)
+
+
+def filled(page: str) -> str:
+    """The text of a page with the tables of the models and parsers between its comments."""
+    return BLOCK.sub(lambda block: f"{block[1]}\n{_content(block[2], block[3])}\n{block[4]}", page)
+
+
+def _content(kind: str, name: str | None) -> str:
+    if kind == "case-keys":
+        return _table(("Key", "Unit", "Default", "Range", "Meaning"), list(key_rows(name or "")))
+    parser = commands()[str(name)]
+    rows = _table(("Argument", "Meaning"), list(option_rows(parser)))
+    return f"```text\n{usage_of(parser)}\n```\n\n{rows}"
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [header, ["---"] * len(header), *rows]
+    cells = [[" ".join(cell.split()).replace("|", r"\|") for cell in line] for line in lines]
+    return "".join(f"| {' | '.join(line)} |\n" for line in cells)
+
+
+def main() -> int:
+    """Write the pages with `--write`; otherwise name those that are out of date, with code 1."""
+    root, code = Path(__file__).resolve().parents[2], 0
+    for name in PAGES:
+        page = root / name
+        text = page.read_text(encoding="utf-8")
+        if filled(text) == text:
+            continue
+        if "--write" in sys.argv[1:]:
+            page.write_text(filled(text), encoding="utf-8")
+        else:
+            code = 1
+            print(f"{name}: its tables are not those of the code", file=sys.stderr)
+    return code
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
