@@ -12,13 +12,14 @@ import os
 import shlex
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
 from fdnet.case.stages import STAGES
 from fdnet.errors import CaseError, FdnetError, cure_of
 from fdnet.files.paths import path_option
+from fdnet.permeability.options import joined_box
 
 _STOPPED = 130
 _SIGNALS: list[int] = []
@@ -37,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _accept_any_character()
     _SIGNALS.clear()
     given = list(sys.argv[1:] if arguments is None else arguments)
-    options = _parser().parse_args(given)
+    options = _parser().parse_args(joined_box(given))
     options.command_line = shlex.join(["fdnet", *given])
     signal.signal(signal.SIGTERM, _interrupt)
     try:
@@ -65,11 +66,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         if _SIGNALS:
             return _stopped()
-        print(
-            f"fdnet: {error.filename or 'system'}: {error.strerror or error}; {cure_of(error)}, "
-            "then repeat the command (a run: with --resume)",
-            file=sys.stderr,
-        )
+        where, what = error.filename or "system", error.strerror or error
+        advice = f"{cure_of(error)}, then repeat the command (a run: with --resume)"
+        print(f"fdnet: {where}: {what}; {advice}", file=sys.stderr)
         return 2
     except Exception:  # a library may turn the stop into an error of its own
         if not _SIGNALS:
@@ -188,7 +187,9 @@ def _add_permeability(commands: Any, common: argparse.ArgumentParser) -> None:
     from fdnet.permeability.options import add_arguments
 
     command = commands.add_parser(
-        "permeability", parents=[common], help="permeability of a CSV of spheres, without LIGGGHTS"
+        "permeability",
+        parents=[common],
+        help="permeability of a file of spheres, without LIGGGHTS",
     )
     add_arguments(command)
     command.set_defaults(action=run)
@@ -293,8 +294,6 @@ def _render(options: argparse.Namespace) -> int:
         print(f"deck: {deck}")
     return 0
 
-
-Action = Callable[[argparse.Namespace], int]
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -9,6 +10,20 @@ from fdnet.dem.binary import Binary, find_binary
 
 sys.path.insert(0, str(Path(__file__).parent))
 ROOT = Path(__file__).resolve().parents[1]
+
+_approx = pytest.approx
+
+
+def _approx_relative(expected: Any, rel: Any = None, abs: Any = None, nan_ok: bool = False) -> Any:
+    """pytest.approx whose relative tolerance stands alone.
+
+    pytest adds an absolute tolerance of 1e-12 to every relative one. A permeability of 1e-11 m2
+    or a flux in m3/s would then pass with any error.
+    """
+    return _approx(expected, rel, 0.0 if rel is not None and abs is None else abs, nan_ok)
+
+
+pytest.approx = _approx_relative
 
 
 @pytest.fixture(scope="session")

@@ -194,3 +194,29 @@ def test_what_prints_is_short():
         assert text.startswith(type(owner).__name__)
     assert "27 grains, 0 fines" in repr(spheres)
     assert f"{result.k_initial:.4g} m2" in repr(result)
+
+
+@pytest.mark.parametrize(
+    ("spheres", "periodic", "expected"),
+    [
+        ("x.csv", "", "spheres: 'x.csv' is a str, expected a Snapshot; read one with fdnet.read"),
+        (None, True, "periodic: True, expected letters such as 'yz', or three truth values"),
+    ],
+)
+def test_wrong_arguments_of_analyse_are_named(spheres, periodic, expected):
+    if spheres is None:
+        lattice = 1e-3 * (np.indices((3, 3, 3)).reshape(3, -1).T + 0.5)
+        spheres = fdnet.Snapshot.from_arrays(lattice, 0.5e-3)
+    with pytest.raises(fdnet.CaseError, match=re.escape(expected)):
+        fdnet.analyse(spheres, periodic=periodic)
+
+
+def test_only_public_names_are_listed():
+    assert sorted(fdnet.__all__) == dir(fdnet)
+
+
+def test_the_keywords_of_analyse_are_visible():
+    from fdnet.case.analysis import AnalysisKeys
+
+    for function in (fdnet.analyse, fdnet.compare):
+        assert set(AnalysisKeys.__annotations__) <= set(inspect.signature(function).parameters)

@@ -359,3 +359,29 @@ def test_a_dump_of_fines_alone_says_what_to_do(tmp_path, capsys):
     code, _, err = answer(capsys, tmp_path / "s.dump")
     assert code == 2
     assert "0 grains, expected at least 4" in err
+
+
+def test_a_box_with_a_negative_number_and_a_pack_without_fines(tmp_path, capsys):
+    """The lattice moved by -2: its box begins with a minus sign, after a space as after `=`."""
+    points = np.indices((4,) * 3).reshape(3, -1).T - 1.5
+    rows = "".join(f"{x},{y},{z},0.5\n" for x, y, z in points)
+    (tmp_path / "s.csv").write_text("x,y,z,radius\n" + rows)
+    box = ",".join(["-2,2"] * 3)
+    given = [tmp_path / "s.csv", "--units", "mm", "--periodic", "y"]
+    code, out, err = answer(capsys, *given, "--box", box)
+    assert code == 0, err
+    assert (code, out, err) == answer(capsys, *given, f"--box={box}")
+    assert "x: inlet and outlet; z: walls that hold the fluid; y: periodic" in out
+    assert "k mD" in out
+    assert "damage" not in out
+    assert "cross the side walls" not in out
+
+
+def test_spheres_that_cross_a_side_wall_are_reported(tmp_path, capsys):
+    cubic(tmp_path / "s.csv")
+    given = [tmp_path / "s.csv", "--units", "mm", "--box", "0,4,0.1,3.9,0,4", "--json"]
+    _, out, _ = answer(capsys, *given)
+    text = "32 of 64 spheres cross the side walls; if the pack is periodic give --periodic y"
+    assert text in json.loads(out)["warnings"]
+    _, out, _ = answer(capsys, *given, "--periodic", "y")
+    assert not any("cross the side" in one for one in json.loads(out)["warnings"])

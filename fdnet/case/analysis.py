@@ -1,7 +1,8 @@
 """How permeability is computed: the table [analysis] of a case, or the same without one."""
 
-from collections.abc import Sequence
-from typing import Annotated, Any, Literal, TypedDict
+import inspect
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any, Literal, TypedDict, TypeVar
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, ValidationError
@@ -23,6 +24,7 @@ def _count_or_edges(value: Any) -> str:
     return "[edges]" if isinstance(value, tuple) else "[count]"
 
 
+Function = TypeVar("Function", bound=Callable[..., Any])
 Count = Annotated[int, Field(ge=1, le=MOST_SECTIONS), Tag("[count]")]
 Edges = Annotated[tuple[Finite, ...], Tag("[edges]")]
 Sections = Annotated[Count | Edges, Discriminator(_count_or_edges)]
@@ -100,6 +102,24 @@ class AnalysisChoices(Part):
     def changed(self, **keys: Any) -> "AnalysisChoices":
         """The same choices with `keys` changed. Raises CaseError as `of_pack` does."""
         return type(self).of_pack(**self.model_dump() | keys) if keys else self
+
+
+def with_visible_choices(function: Function) -> Function:
+    """The function, whose `**choices: Unpack[AnalysisKeys]` is shown as the single keywords.
+
+    Their defaults are shown as they are without `options`.
+    """
+    shown = inspect.signature(function)
+    usual, kinds = AnalysisChoices.of_pack(), AnalysisKeys.__annotations__
+    plain = [one for one in shown.parameters.values() if one.kind is not one.VAR_KEYWORD]
+    single = [
+        inspect.Parameter(
+            name, inspect.Parameter.KEYWORD_ONLY, default=getattr(usual, name), annotation=kind
+        )
+        for name, kind in kinds.items()
+    ]
+    function.__dict__["__signature__"] = shown.replace(parameters=[*plain, *single])
+    return function
 
 
 def _plain_sections(value: Any) -> Any:

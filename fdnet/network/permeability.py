@@ -9,7 +9,7 @@ from typing import Unpack
 
 import numpy as np
 
-from fdnet.case.analysis import AnalysisChoices, AnalysisKeys
+from fdnet.case.analysis import AnalysisChoices, AnalysisKeys, with_visible_choices
 from fdnet.network.analysis import Analysis, worst_solve
 from fdnet.network.fines.occupancy import Occupancy
 from fdnet.network.flow.flow import Flow
@@ -23,7 +23,12 @@ from fdnet.network.flow.slabs import (
 from fdnet.network.laws.damage import CLEAN, Damage
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS, damage_law
 from fdnet.network.network import Network
-from fdnet.network.specimen.specimen import Specimen, measure_specimen, specimen_doubts
+from fdnet.network.specimen.specimen import (
+    Specimen,
+    measure_specimen,
+    require_snapshots,
+    specimen_doubts,
+)
 from fdnet.spheres.directions import Directions, periodic_axes
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
@@ -54,6 +59,7 @@ class _Log:
         self.seconds[stage] += time.perf_counter() - start
 
 
+@with_visible_choices
 def analyse(
     spheres: Snapshot,
     damaged: Snapshot | None = None,
@@ -74,14 +80,16 @@ def analyse(
             profile bins of a mean grain radius, fdnet's default laws.
         choices: single choices by name, in place of those of `options`: `sections` (a count, or
             edges in m), `law`, `damage_law`, `clogging_threshold`, `middle_band`,
-            `throat_overlap`, `profile_bin_mm`, `walls`.
+            `throat_overlap`, `profile_bin_mm`, `walls`. The defaults shown are those that hold
+            without `options`.
 
     Returns:
         Permeabilities (m2), porosities, sections, profile, network and flows. No open path is no
         error: the permeability is 0 and `warnings` gives the reason.
 
     Raises:
-        CaseError: a choice is unknown or outside its range; the message names its key.
+        CaseError: a choice is unknown or outside its range (the message names its key), or
+            `spheres` is no Snapshot.
         NetworkError: the geometry is degenerate, or the grains of the two snapshots differ.
         FlowError: the solve fails its checks.
 
@@ -95,12 +103,19 @@ def analyse(
         >>> result = fdnet.analyse(spheres, periodic="xyz")
         >>> print(f"{result.k_initial:.2g} m2, porosity {result.porosity_initial:.3f}")
         2.5e-09 m2, porosity 0.476
+
+        Flow along y: turn the spheres so that y becomes the new x; `periodic` turns with them.
+
+        >>> turned = fdnet.analyse(spheres.turned("y"), periodic="xyz")
+        >>> print(f"{turned.k_initial:.2g} m2")
+        2.5e-09 m2
     """
     chosen = _chosen(options, choices)
     pair = (chosen.law, chosen.damage_law)
     return next(compare(spheres, damaged, periodic=periodic, options=chosen, laws=[pair]))
 
 
+@with_visible_choices
 def compare(
     spheres: Snapshot,
     damaged: Snapshot | None = None,
@@ -141,6 +156,7 @@ def compare(
         thesis: 1.4e-09 m2
         lubrication: 2.5e-09 m2
     """
+    require_snapshots(spheres, damaged)
     base, around = _chosen(options, choices), periodic_axes(periodic)
     if damaged is None and len(spheres.fines()):
         damaged = spheres
@@ -175,7 +191,7 @@ def _analysis(
         specimen.edges, specimen.porosity, (clean_slabs, slabs), specimen.depth
     )
     porosity, invaded = specimen.porosity, specimen.invaded
-    _warn(log, (clean, final), sections, specimen.occupancy)
+    _warn(log, (clean, final), sections)
     log.warnings += specimen_doubts(specimen, clean.k, options.walls)
     law_used = np.full(len(final.conductance), CLEAN) if damage is None else damage.law_used
     return Analysis(
@@ -254,30 +270,12 @@ def _slab_k(state: _State, edges: Array, log: _Log) -> SlabK:
     )
 
 
-def _warn(
-    log: _Log,
-    states: tuple[_State, _State],
-    sections: tuple[Section, ...],
-    occupancy: Occupancy | None,
-) -> None:
+def _warn(log: _Log, states: tuple[_State, _State], sections: tuple[Section, ...]) -> None:
     for name, state in zip(("k_initial", "k_damaged"), states, strict=True):
         if state.flow.reason:
             log.warnings.append(f"{name} = 0: {state.flow.reason}")
     network = states[0].network
     log.warnings += thin_slabs(sections, 2.0 * network.grain_radius)
-    if network.counts["grains_outside_box"]:
-        log.warnings.append(
-            f"{network.counts['grains_outside_box']} grains lie outside the box and play no part"
-        )
-    if (
-        occupancy is not None
-        and occupancy.counts["fines_outside_box"]
-        and not occupancy.pore_solid_volume.any()
-    ):
-        log.warnings.append(
-            f"none of the {occupancy.counts['fines_outside_box']} fines is centred in the box: "
-            "no pore holds any; check the box if some should"
-        )
 
 
 def _counts(

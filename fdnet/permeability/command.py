@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from fdnet.spheres.snapshot import Snapshot
 
 PROFILE_BINS = 32
+_TOUCH = 1e-6
+"""A sphere that reaches across a wall by at most this part of its radius touches the wall."""
+_MANY = 0.1
+"""Part of all spheres above which those that cross the side walls are reported."""
 _BOX_MISSING = "no --box given: the box around all grains was used"
 
 
@@ -50,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
         from fdnet.report.tables import write_laws
 
         write_laws(table, results)
-    _print(results, options)
+    _print(results, options, sides=_sides(periodic, options), fines=len(given.spheres.fines()))
     return 0
 
 
@@ -88,6 +92,8 @@ def _along(
     spheres, first = given.spheres.turned(axis), "xyz".index(axis)
     around = (periodic[first], periodic[(first + 1) % 3], periodic[(first + 2) % 3])
     notes = [_BOX_MISSING] if given.around_grains else []
+    if options.walls == "no-slip":
+        notes += _crossing(given.spheres, periodic, axis)
     facts = [*given.assumptions, *_assumptions(spheres, periodic, options)]
     return [
         _row(result, seconds) | {"warnings": [*notes, *result.warnings], "assumptions": facts}
@@ -138,6 +144,42 @@ def _assumptions(
             yield f"The damage law is fdnet's default, {DEFAULT_DAMAGE_LAW}."
 
 
+def _crossing(spheres: "Snapshot", periodic: tuple[bool, bool, bool], axis: str) -> Iterator[str]:
+    """A warning where many spheres reach across the side walls, as those of a periodic pack do."""
+    import numpy as np
+
+    walls = np.array([not periodic[k] and "xyz"[k] != axis for k in range(3)])
+    reach = spheres.radius[:, None] * (1 - _TOUCH)
+    low, high = spheres.box.T
+    beyond = ((spheres.position - reach < low) | (spheres.position + reach > high)) & walls
+    count = int(np.sum(beyond.any(axis=1)))
+    if count > _MANY * len(spheres):
+        sides = "".join(
+            name
+            for name, crossed, repeats in zip("xyz", beyond.any(axis=0), periodic, strict=True)
+            if crossed or repeats
+        )
+        yield (
+            f"{count} of {len(spheres)} spheres cross the side walls; if the pack is periodic "
+            f"give --periodic {sides}"
+        )
+
+
+def _sides(periodic: tuple[bool, bool, bool], options: argparse.Namespace) -> str:
+    """What each side of the box is, on one line."""
+    what = "hold the fluid" if options.walls == "no-slip" else "let the fluid slip"
+    if options.axis == ALL_AXES:
+        across = [f"{name} periodic" for name, yes in zip("xyz", periodic, strict=True) if yes]
+        walls = f"the other sides: walls that {what}"
+        return "; ".join(["along each axis: inlet and outlet", *across, walls])
+    others = [(k, name) for k, name in enumerate("xyz") if name != options.axis]
+    walled = ", ".join(name for k, name in others if not periodic[k])
+    repeated = ", ".join(name for k, name in others if periodic[k])
+    parts = [f"{options.axis}: inlet and outlet"]
+    parts += [f"{walled}: walls that {what}"] if walled else []
+    return "; ".join([*parts, f"{repeated}: periodic"] if repeated else parts)
+
+
 def _row(result: "Analysis", seconds: float) -> dict[str, Any]:
     from fdnet.report.tables import section_rows
 
@@ -170,14 +212,17 @@ def _by_axis(by_axis: dict[str, list[dict[str, Any]]], number: int) -> dict[str,
     )
 
 
-def _print(results: list[dict[str, Any]], options: argparse.Namespace) -> None:
+def _print(
+    results: list[dict[str, Any]], options: argparse.Namespace, *, sides: str, fines: int
+) -> None:
     if options.json:
         from fdnet.report.tables import plain_json
 
         first = results[0]
         print(plain_json({**first, "laws": results} if options.compare_laws else first)[1])
         return
-    from fdnet.report.permeability_text import answer_lines
+    from fdnet.report.permeability_text import Given, answer_lines
 
-    for line in answer_lines(results, sections=options.sections > 1):
+    given = Given(sides=sides, sections=options.sections > 1, fines=fines > 0)
+    for line in answer_lines(results, given):
         print(line)

@@ -2,6 +2,7 @@
 
 import argparse
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 from fdnet.case.names import (
@@ -67,6 +68,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--csv", type=path_option, metavar="FILE", help="write the laws, one row each, as CSV"
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def joined_box(arguments: Sequence[str]) -> list[str]:
+    """The arguments with `--box -1,1,...` as `--box=-1,1,...`.
+
+    argparse takes a separate value that begins with a minus sign for an option.
+    """
+    result: list[str] = []
+    for argument in arguments:
+        if result and result[-1] == "--box" and argument[:1] == "-" and "," in argument:
+            result[-1] = f"--box={argument}"
+        else:
+            result.append(argument)
+    return result
 
 
 def _add_file_choices(parser: argparse.ArgumentParser) -> None:

@@ -1,67 +1,90 @@
 """The answer of `fdnet permeability` as lines for a terminal."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 Row = Mapping[str, Any]
+MILLIDARCY = 9.869233e-16
+"""One millidarcy, m2 (API RP 27, 1952)."""
 
 
-def answer_lines(results: Sequence[Row], *, sections: bool) -> Iterator[str]:
-    """The laws as a table, then the three axes and the sections where there are any, and warnings.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Given:
+    """What the user gave, as far as the text depends on it.
+
+    Attributes:
+        sides: what each side of the box is.
+        sections: whether sections are printed.
+        fines: whether there are fines; without them nothing is damaged.
+    """
+
+    sides: str
+    sections: bool
+    fines: bool
+
+
+def answer_lines(results: Sequence[Row], given: Given) -> Iterator[str]:
+    """The laws as a table, then the sections where there are any, and warnings.
 
     `results` has one row for each pair of laws, the chosen pair first.
     """
     first = results[0]
-    yield (
-        f"porosity {first['porosity_initial']:.5f} -> {first['porosity_damaged']:.5f}, "
-        f"{first['pores']} pores, {first['throats']} throats"
-    )
-    if "k_x_m2" in first:
-        yield from _axis_lines(results)
-    else:
-        yield from _law_lines(results)
-    if sections:
-        yield from _section_lines(first)
+    porosity = f"porosity {first['porosity_initial']:.5f}"
+    if given.fines:
+        porosity += f" -> {first['porosity_damaged']:.5f}"
+    yield f"{porosity}, {first['pores']} pores, {first['throats']} throats; {given.sides}"
+    yield from _law_lines(results, fines=given.fines)
+    if given.sections:
+        yield from _section_lines(first, fines=given.fines)
     for warning in first["warnings"]:
         yield f"warning: {warning}"
 
 
-def _law_lines(results: Sequence[Row]) -> Iterator[str]:
-    yield f"{'law':<11} {'damage law':<11} {'k m2':>12} {'k damaged m2':>13} {'k/k0':>8}"
-    for row in results:
-        yield (
-            f"{row['law']:<11} {row['damage_law']:<11} {row['k_initial_m2']:>12.5g} "
-            f"{row['k_damaged_m2']:>13.5g} {_ratio(row['k_initial_m2'], row['k_damaged_m2']):>8}"
-        )
-
-
-def _axis_lines(results: Sequence[Row]) -> Iterator[str]:
+def _law_lines(results: Sequence[Row], *, fines: bool) -> Iterator[str]:
+    """One line for each pair of laws, or for each of its axes."""
+    axes = "xyz" if "k_x_m2" in results[0] else ""
+    pairs = fines or len({row["damage_law"] for row in results}) > 1
     yield (
-        f"{'law':<11} {'damage law':<11} {'axis':<4} {'k m2':>12} {'k damaged m2':>13} {'k/k0':>8}"
+        f"{'law':<11} "
+        + (f"{'damage law':<11} " if pairs else "")
+        + ("axis " if axes else "")
+        + _names(fines=fines)
     )
     for row in results:
-        for axis in "xyz":
-            before, after = row[f"k_{axis}_m2"], row[f"k_{axis}_damaged_m2"]
-            yield (
-                f"{row['law']:<11} {row['damage_law']:<11} {axis:<4} {before:>12.5g} "
-                f"{after:>13.5g} {_ratio(before, after):>8}"
-            )
+        laws = f"{row['law']:<11} " + (f"{row['damage_law']:<11} " if pairs else "")
+        for axis in axes:
+            values = row[f"k_{axis}_m2"], row[f"k_{axis}_damaged_m2"]
+            yield f"{laws}{axis:<4} {_values(*values, fines=fines)}"
+        if not axes:
+            yield laws + _values(row["k_initial_m2"], row["k_damaged_m2"], fines=fines)
 
 
-def _section_lines(result: Row) -> Iterator[str]:
+def _section_lines(result: Row, *, fines: bool) -> Iterator[str]:
     where = " along x" if "k_x_m2" in result else ""
-    yield f"sections cut out{where}, {result['law']} and {result['damage_law']}:"
-    yield (
-        f"{'from m':>10} {'to m':>10} {'porosity':>9} {'damaged':>9} {'k m2':>12} "
-        f"{'k damaged m2':>13} {'k/k0':>8}"
-    )
+    laws = f"{result['law']} and {result['damage_law']}" if fines else result["law"]
+    yield f"sections cut out{where}, {laws}:"
+    damaged = f"{'damaged':>9} " if fines else ""
+    yield f"{'from m':>10} {'to m':>10} {'porosity':>9} {damaged}{_names(fines=fines)}"
     for row in result["sections"]:
-        before, after = row["k_initial_m2"], row["k_damaged_m2"]
+        damaged = f"{row['porosity_damaged']:>9.5f} " if fines else ""
         yield (
             f"{row['x_lo_m']:>10.4g} {row['x_hi_m']:>10.4g} {row['porosity_initial']:>9.5f} "
-            f"{row['porosity_damaged']:>9.5f} {before:>12.5g} {after:>13.5g} "
-            f"{_ratio(before, after):>8}"
+            + damaged
+            + _values(row["k_initial_m2"], row["k_damaged_m2"], fines=fines)
         )
+
+
+def _names(*, fines: bool) -> str:
+    damaged = f" {'k damaged m2':>13} {'k damaged mD':>13} {'k/k0':>8}" if fines else ""
+    return f"{'k m2':>12} {'k mD':>12}{damaged}"
+
+
+def _values(before: float, after: float, *, fines: bool) -> str:
+    text = f"{before:>12.5g} {before / MILLIDARCY:>12.5g}"
+    if not fines:
+        return text
+    return f"{text} {after:>13.5g} {after / MILLIDARCY:>13.5g} {_ratio(before, after):>8}"
 
 
 def _ratio(before: float, after: float) -> str:

@@ -127,8 +127,9 @@ def _header(fields: list[str] | None, where: str, units: str | None) -> _Header:
         )
     if wanted is PLAIN and units is None:
         raise CaseError(
-            f"{where}: the columns {','.join(PLAIN)} have no unit; give --units "
-            f"({', '.join(UNITS)}) or name them {','.join(METRES)}"
+            f"{where}: the columns {','.join(PLAIN)} have no unit; give --units mm "
+            f'on the command line, units="mm" in Python (one of {", ".join(UNITS)}), or name them '
+            f" {','.join(METRES)}"
         )
     return _Header(
         width=len(names),

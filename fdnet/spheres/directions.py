@@ -1,6 +1,6 @@
 """The axes x, y, z, given by letters or as three truth values."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -21,7 +21,7 @@ def periodic_axes(periodic: Directions) -> tuple[bool, bool, bool]:
                 f"periodic: {periodic!r}, expected any of x, y, z together, for example 'yz'"
             )
         return "x" in periodic, "y" in periodic, "z" in periodic
-    values = tuple(periodic)
+    values = tuple(periodic) if isinstance(periodic, Iterable) else ()
     if len(values) != 3 or not all(isinstance(value, bool | np.bool_) for value in values):
         raise CaseError(
             f"periodic: {periodic!r}, expected letters such as 'yz', or three truth values for x, "

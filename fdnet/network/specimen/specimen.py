@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.case.analysis import AnalysisChoices
-from fdnet.errors import NetworkError
+from fdnet.errors import CaseError, NetworkError
 from fdnet.network.fines.invaded import Invaded, measure_invaded
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.flow.sections import profile_edges, section_edges
@@ -103,9 +103,32 @@ def measure_specimen(
     )
 
 
+def require_snapshots(spheres: object, damaged: object) -> None:
+    """Raise CaseError unless `spheres` is a Snapshot, and `damaged` a Snapshot or None."""
+    for name, value in (("spheres", spheres), ("damaged", damaged)):
+        if not isinstance(value, Snapshot) and (name == "spheres" or value is not None):
+            text = repr(value)
+            raise CaseError(
+                f"{name}: {text if len(text) <= 60 else text[:60] + '...'} is a "
+                f"{type(value).__name__}, expected a Snapshot; read one with fdnet.read_spheres "
+                "from a file, or make one with fdnet.Snapshot.from_arrays"
+            )
+
+
 def specimen_doubts(specimen: Specimen, permeability: float, walls: str) -> Iterator[str]:
     """Warnings on a specimen and its permeability without fines, m2."""
-    network = specimen.first
+    network, occupancy = specimen.first, specimen.occupancy
+    if network.counts["grains_outside_box"]:
+        yield f"{network.counts['grains_outside_box']} grains lie outside the box and play no part"
+    if (
+        occupancy is not None
+        and occupancy.counts["fines_outside_box"]
+        and not occupancy.pore_solid_volume.any()
+    ):
+        yield (
+            f"none of the {occupancy.counts['fines_outside_box']} fines is centred in the box: "
+            "no pore holds any; check the box if some should"
+        )
     yield from doubts(
         porosity=specimen.porosity[0].mean,
         permeability=permeability,
