@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from fdnet.spheres.snapshot import Snapshot
 
 PROFILE_BINS = 32
-_TOUCH = 1e-6
-"""A sphere that reaches across a wall by at most this part of its radius touches the wall."""
+_TOUCH = 0.2
+"""How far a sphere, in its radii, may reach across a wall: grains that were pressed against it do."""
 _MANY = 0.1
 """Part of all spheres above which those that cross the side walls are reported."""
 _BOX_MISSING = "no --box given: the box around all grains was used"
