@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 PROFILE_BINS = 32
 _TOUCH = 0.2
-"""How far a sphere, in its radii, may reach across a wall: grains that were pressed against it do."""
+"""Part of its radius by which a sphere may reach across a wall: pressed grains do."""
 _MANY = 0.1
 """Part of all spheres above which those that cross the side walls are reported."""
 _BOX_MISSING = "no --box given: the box around all grains was used"
