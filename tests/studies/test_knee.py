@@ -83,8 +83,8 @@ def test_errors_that_go_on_falling_have_no_knee():
     exact = [level(1, 1.0, 0.5), level(2, 2.0, 0.25), level(3, 4.0, 0.125)]
     assert knee(exact) is None
     said = knee_sentence(exact, default=2)
-    assert said.startswith("no knee: the costliest is the best, 3: +12.5 %")
-    assert "cost^-1" in said
+    assert said.startswith("the error falls up to the costliest setting, 3 (error +12.5 %")
+    assert "as the cost to the power of -1" in said
 
 
 def test_neither_the_reference_nor_a_lucky_pair_of_seeds_is_a_knee():
@@ -99,8 +99,10 @@ def test_neither_the_reference_nor_a_lucky_pair_of_seeds_is_a_knee():
     at = knee(result)
     assert at is not None
     assert at.value == "fair"
-    assert "errors from truth, which costs 9 s" in knee_sentence(result, default="good")
-    assert knee_sentence(result[:1], default=None) == "error lucky: +0 ± 50 % for 1 s"
+    assert "errors are relative to truth, which costs 9 s" in knee_sentence(result, default="good")
+    assert knee_sentence(result[:1], default=None) == (
+        "only one setting was run: lucky (error +0 ± 50 %, 1 s)"
+    )
 
 
 def test_no_knee_is_taken_from_levels_without_bands():
@@ -109,14 +111,14 @@ def test_no_knee_is_taken_from_levels_without_bands():
     ]
     assert knee(pairs) is None
     assert knee_sentence(pairs, default=None).startswith(
-        "too few seeds for a knee; the costliest 4: +25 ± 10 %"
+        "too few seeds were run; the costliest setting is 4 (error +25 ± 10 %"
     )
     mixed = [
         *pairs,
         level(8, 8.0, 0.0),
         Level(value=3, runs=5, cost=3.0, error=0.3, half_width=0.1),
     ]
-    assert "only the costliest will do, 3:" in knee_sentence(mixed, default=None)
+    assert "only the costliest setting is good enough, 3 (" in knee_sentence(mixed, default=None)
 
 
 def test_unpaired_levels_carry_the_band_of_their_reference():

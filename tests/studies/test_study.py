@@ -26,8 +26,8 @@ def test_a_study_writes_its_table_figure_and_text(tmp_path):
     # the midpoint rule integrates x^2 with error -1/(12 n^2)
     assert [row.error for row in rows] == pytest.approx([-1 / (4 * n**2) for n in (4, 8, 16, 32)])
     assert order(levels(rows, "midpoint", "integral")) == pytest.approx(2.0)
-    assert "error falls as cost^-2" in " ".join(text.split())
-    assert "default 8" in text
+    assert "the error falls as the cost to the power of -2" in " ".join(text.split())
+    assert "the default is 8 (" in " ".join(text.split())
     assert (tmp_path / "out" / "toy.png").stat().st_size > 5000
     assert (tmp_path / "out" / "toy.md").read_text() == text
 

@@ -49,16 +49,18 @@ def knee_sentence(levels: Sequence[Level], *, default: Value | None, unit: str =
     own = [level for level in levels if not level.reference]
     if not own:
         return (
-            f"nothing but the reference, {shown(levels[0].value)}" if levels else "no run was done"
+            f"only the reference, {shown(levels[0].value)}, was run"
+            if levels
+            else "no run was done"
         )
     parts = [_knee_words(own, unit), *_order_words(own)]
     parts += [
-        f"default {_cost_words(level, unit)}"
+        f"the default is {_cost_words(level, unit)}"
         for level in levels
         if level.value == default and len(levels) > 1
     ]
     parts += [
-        f"errors from {shown(level.value)}, which costs {level.cost:.3g} {unit}"
+        f"errors are relative to {shown(level.value)}, which costs {level.cost:.3g} {unit}"
         for level in levels
         if level.reference
     ]
@@ -68,29 +70,32 @@ def knee_sentence(levels: Sequence[Level], *, default: Value | None, unit: str =
 def _knee_words(own: Sequence[Level], unit: str) -> str:
     least, most = min(own, key=lambda level: level.cost), max(own, key=lambda level: level.cost)
     if len(own) == 1:
-        return f"error {_cost_words(own[0], unit, named=isinstance(own[0].value, str))}"
+        return f"only one setting was run: {_cost_words(own[0], unit)}"
     if most.cost < ALIKE * least.cost:
         low, high = min(own, key=lambda level: level.size), max(own, key=lambda level: level.size)
         return (
-            f"all cost about the same ({least.cost:.3g} to {most.cost:.3g} {unit}); "
-            f"error {percent(low)} at {shown(low.value)} to {percent(high)} at {shown(high.value)}"
+            f"all settings cost about the same ({least.cost:.3g} to {most.cost:.3g} {unit}), "
+            f"and the error goes from {percent(low)} at {shown(low.value)} "
+            f"to {percent(high)} at {shown(high.value)}"
         )
     judged = _with_bands(own)
     if not judged:
-        return f"too few seeds for a knee; the costliest {_cost_words(most, unit)}"
+        return f"too few seeds were run; the costliest setting is {_cost_words(most, unit)}"
     at, last = knee(own), max(judged, key=lambda level: level.cost)
     if at is None:
-        return f"no knee: the costliest is the best, {_cost_words(last, unit)}"
+        return f"the error falls up to the costliest setting, {_cost_words(last, unit)}"
     if at is last:
-        return f"only the costliest will do, {_cost_words(last, unit)}"
-    return f"knee at {_cost_words(at, unit)}; the costliest {_cost_words(most, unit)}"
+        return f"only the costliest setting is good enough, {_cost_words(last, unit)}"
+    return (
+        f"the cheapest good setting is {_cost_words(at, unit)}; "
+        f"the costliest is {_cost_words(most, unit)}"
+    )
 
 
 def _order_words(own: Sequence[Level]) -> list[str]:
     power = order(own)
-    return [f"error falls as cost^-{power:.2g}"] if power > FALLS else []
+    return [f"the error falls as the cost to the power of -{power:.2g}"] if power > FALLS else []
 
 
-def _cost_words(level: Level, unit: str, *, named: bool = True) -> str:
-    name = f"{shown(level.value)}: " if named else ""
-    return f"{name}{percent(level)} for {level.cost:.3g} {unit}"
+def _cost_words(level: Level, unit: str) -> str:
+    return f"{shown(level.value)} (error {percent(level)}, {level.cost:.3g} {unit})"

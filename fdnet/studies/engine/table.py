@@ -14,6 +14,9 @@ from fdnet.studies.engine.study import DONE, Panel, Row, Study, shown
 
 COLUMNS = tuple(field.name for field in fields(Row))
 _TEXT = ("series", "knob", "quantity", "status", "role", "run")
+_KNEES = """The list names the cheapest good setting for each quantity and series, with its
+error and what it costs. A setting is good when its error, band included, is at most twice the
+least one."""
 _UNITS = {"peak_memory_mb": "MB", "steps": "steps"}
 
 
@@ -53,9 +56,10 @@ def study_text(study: Study, rows: Sequence[Row]) -> str:
     """
     parts = [f"# {study.title}"]
     if study.summary:
+        parts += [f"The table shows what each {study.knob_label} costs and saves."]
         parts.append(study.summary(rows))
     elif knees := knee_lines(study, rows):
-        parts.append(bullets(knees))
+        parts += [_KNEES, bullets(knees)]
     if missing := missing_lines(rows):
         parts.append(f"Not done:\n\n{bullets(missing)}")
     for panel in study.panels:
