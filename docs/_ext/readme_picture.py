@@ -1,8 +1,9 @@
 """Draws the picture of README.md from a finished run: a cut through the specimen above its k.
 
-.venv/bin/python scripts/readme_picture.py runs/quick docs/quick_answer.png
+.venv/bin/python docs/_ext/readme_picture.py runs/quick docs/quick_answer.png
 """
 
+import argparse
 import sys
 from pathlib import Path
 from typing import Any
@@ -69,7 +70,11 @@ def main() -> int:
     matplotlib.use("agg")
     import matplotlib.pyplot as plt
 
-    run, target = Path(sys.argv[1]), Path(sys.argv[2])
+    parser = argparse.ArgumentParser(description="The picture of README.md from a finished run.")
+    parser.add_argument("run", type=Path, help="the run folder")
+    parser.add_argument("target", type=Path, help="the PNG file to write")
+    given = parser.parse_args()
+    run, target = given.run, given.target
     sections = pd.read_csv(run / "sections.csv")
     figure, (upper, lower) = plt.subplots(
         2, sharex=True, figsize=(6.6, 7.0), height_ratios=[1.6, 1], layout="constrained"
