@@ -54,7 +54,7 @@ def case_from(data: Mapping[str, Any], *, source: str = "case") -> Case:
     """
     model = case_type(data)
     for key in _long_numbers(data):
-        raise CaseError(f"{source}: {key}: holds a whole number of more than 18 digits")
+        raise CaseError(f"{source}: 1 problem: {key}: holds a whole number of more than 18 digits")
     try:
         return model.model_validate(data)
     except ValidationError as error:

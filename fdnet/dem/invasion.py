@@ -132,7 +132,7 @@ def _drive(
             refuse_overlap(case, scales, grains, folder, history=read_history(folder), last=last)
         if _over(case, scales, last):
             return deck, None
-        keeper = _Keeper(folder, case, scales, grains, launch=launch)
+        keeper = CheckpointKeeper(folder, case, scales, grains, launch=launch)
         run = _run(folder, last, replace(launch, follow=keeper))
         if run is not None:
             return deck, run
@@ -157,7 +157,7 @@ def _run(folder: Path, last: Checkpoint | None, launch: Launch) -> Run | None:
         (folder / SCRATCH).unlink(missing_ok=True)
 
 
-class _Keeper:
+class CheckpointKeeper:
     """Follows the screen of a run and passes every line on.
 
     At each checkpoint it records what is whole now, keeps the two newest restarts, and stops a run

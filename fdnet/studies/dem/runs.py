@@ -6,6 +6,7 @@ They use fdnet's own decks and the real LIGGGHTS.
 import math
 import re
 import shutil
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from fdnet.case.file import case_from, set_keys
 from fdnet.dem.binary import Binary, find_binary
 from fdnet.dem.checkpoint import HISTORY, HISTORY_HEADER, state_at
 from fdnet.dem.invade_deck import write_invade_inputs
-from fdnet.dem.invasion import Invasion, invade
+from fdnet.dem.invasion import CheckpointKeeper, Invasion, invade
 from fdnet.dem.liggghts import Launch, Run, run_deck
 from fdnet.dem.packing import make_pack
 from fdnet.dem.scene import box_of, snapshot_of
@@ -127,8 +128,9 @@ def _fresh(
     One that an earlier session left unfinished starts anew, so that its costs are complete.
     """
     shutil.rmtree(folder, ignore_errors=True)
-    scales, launch, before = scales_of(case), Launch(binary=the_binary()), child_core_seconds()
-    runs = [_gridded(case, grains, folder, grid)] if grid else []
+    scales, before = scales_of(case), child_core_seconds()
+    launch = Launch(binary=the_binary(), ranks=math.prod(grid))
+    runs = [_gridded(case, grains, folder, grid, launch)] if grid else []
     result = invade(case, scales, grains, folder, launch)
     return result, {
         "steps": float(result.history[-1].step),
@@ -137,16 +139,19 @@ def _fresh(
     }
 
 
-def _gridded(case: InvasionCase, grains: Snapshot, folder: Path, grid: tuple[int, ...]) -> Run:
+def _gridded(
+    case: InvasionCase, grains: Snapshot, folder: Path, grid: tuple[int, ...], launch: Launch
+) -> Run:
     """The whole invasion under another processor grid than fdnet's; `invade` then reads it."""
     (folder / "post").mkdir(parents=True)
-    ranks = math.prod(grid)
-    deck = write_invade_inputs(case, scales_of(case), grains, folder, ranks=ranks).text
+    scales = scales_of(case)
+    deck = write_invade_inputs(case, scales, grains, folder, ranks=launch.ranks).text
     text, count = re.subn(r"(?m)^processors .*$", "processors " + " ".join(map(str, grid)), deck)
     assert count == 1, f"{count} lines of the deck begin with processors, expected 1"
     write_text(folder / "in.invade", text)
     write_text(folder / HISTORY, HISTORY_HEADER + "\n")
-    return run_deck(folder, "in.invade", Launch(binary=the_binary(), ranks=ranks))
+    keeper = CheckpointKeeper(folder, case, scales, grains, launch=launch)
+    return run_deck(folder, "in.invade", replace(launch, follow=keeper))
 
 
 def invasion_observed(case: InvasionCase, grains: Snapshot, result: Invasion) -> dict[str, float]:
