@@ -55,25 +55,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return error.exit_code
     except KeyboardInterrupt:
         return _stopped()
-    except MemoryError as error:
-        print(
-            f"fdnet: not enough memory ({error}); supply fewer fines, or take a machine with more",
-            file=sys.stderr,
-        )
-        return 2
-    except OSError as error:
-        if options.debug:
-            raise
-        if _SIGNALS:
+    except Exception as error:
+        if _SIGNALS:  # a library may turn the stop into an error of its own
             return _stopped()
-        where, what = error.filename or "system", error.strerror or error
-        advice = f"{cure_of(error)}, then repeat the command (a run: with --resume)"
-        print(f"fdnet: {where}: {what}; {advice}", file=sys.stderr)
-        return 2
-    except Exception:  # a library may turn the stop into an error of its own
-        if not _SIGNALS:
+        words = _words(error)
+        if options.debug or not words:
             raise
-        return _stopped()
+        print(f"fdnet: {words}", file=sys.stderr)
+        return 2
+
+
+def _words(error: Exception) -> str:
+    """What the system refused, in one line; "" for an error of another kind."""
+    if isinstance(error, MemoryError):
+        return f"not enough memory ({error}); supply fewer fines, or take a machine with more"
+    if isinstance(error, OSError):
+        where, what = error.filename or "system", error.strerror or error
+        return f"{where}: {what}; {cure_of(error)}, then repeat the command (a run: with --resume)"
+    if isinstance(error, ImportError):
+        return (
+            f"a library cannot be loaded ({_one_line(error)[:200]}); give fdnet more memory, or "
+            "install it again with scripts/setup.sh, then repeat the command (a run: with "
+            "--resume)"
+        )
+    return ""
 
 
 def _accept_any_character() -> None:
