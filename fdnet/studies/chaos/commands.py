@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fdnet.studies.chaos.nursery import Nursery, set_limits
+from fdnet.studies.chaos.nursery import PROGRAM, Nursery, set_limits
 
 LIMIT_S = 120.0
 """Seconds after which a command counts as hanging."""
@@ -97,7 +97,7 @@ def started(
             process = nursery.start(words, writer, limits or {})
             return Child(process, _once(lambda: nursery.poll(process)), reader)
         own = subprocess.Popen(
-            [sys.executable, "-m", "fdnet.cli", *words],
+            [sys.executable, "-m", PROGRAM, *words],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=writer,

@@ -17,9 +17,12 @@ import subprocess
 import sys
 import threading
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
 from typing import Any, NoReturn
 
+PROGRAM = "fdnet.cli"
+"""The module that `python -m` runs for a command."""
 _MOST_BYTES = 1 << 16
 _SHOWN = ("fdnet.report.figures", "fdnet.report.html", "fdnet.run.pipeline", "pyvista")
 """Modules that are imported once for all commands."""
@@ -91,9 +94,7 @@ def _serve(number: int) -> None:
 
 
 def _run(request: Mapping[str, Any], error: int) -> NoReturn:
-    """What a forked process does: the command, as `python -m fdnet.cli` would."""
-    from fdnet.cli import main
-
+    """What a forked process does: the command, as `python -m PROGRAM` would."""
     code: Any = 1
     try:
         os.setsid()
@@ -101,7 +102,7 @@ def _run(request: Mapping[str, Any], error: int) -> NoReturn:
         os.close(error)
         sys.stderr = os.fdopen(2, "w", buffering=1, closefd=False)
         set_limits({int(what): most for what, most in request["limits"]})
-        code = main(request["words"])
+        code = _program()(request["words"])
     except SystemExit as end:
         code = end.code
     except BaseException:
@@ -111,12 +112,14 @@ def _run(request: Mapping[str, Any], error: int) -> NoReturn:
         os._exit(code if isinstance(code, int) else code is not None)
 
 
+def _program() -> Callable[[Sequence[str]], int]:
+    """The function of the command line, which is in a room above this one."""
+    main: Callable[[Sequence[str]], int] = import_module(PROGRAM).main
+    return main
+
+
 if __name__ == "__main__":
-    from importlib import import_module
-
-    from fdnet.cli import main as _main
-
     for _name in _SHOWN:
         import_module(_name)
-    if _main(sys.argv[2:]) == 0:
+    if _program()(sys.argv[2:]) == 0:
         _serve(int(sys.argv[1]))

@@ -14,7 +14,7 @@ from fdnet.studies.chaos.commands import Ended, FaultError, wait_for
 from fdnet.studies.chaos.judge import check_report, finish, judge
 from fdnet.studies.chaos.runs import Prepared
 
-_WIDE = "size=256m,nr_inodes=0"
+_WIDE = "size=256m,nr_inodes=100000"
 _REPORT = ("--stages", "report")
 _KILLS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 _REPORT_S = 10.0
@@ -29,7 +29,7 @@ class SkipError(Exception):
 def small_disk(place: Path) -> Iterator[Callable[[str], str]]:
     """A disk of its own at `place`; raises SkipError where none may be mounted.
 
-    Gives a function that sets its limits: "size=BYTES,nr_inodes=NUMBER", 0 for none.
+    Gives a function that sets its limits: "size=BYTES,nr_inodes=NUMBER".
     """
     place.mkdir()
 
