@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from fdnet.case.stages import STAGES
-from fdnet.errors import CaseError, FdnetError, cure_of
+from fdnet.errors import CaseError, FdnetError, words_of
 from fdnet.files.paths import path_option
 from fdnet.permeability.options import joined_box
 
@@ -58,27 +58,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Exception as error:
         if _SIGNALS:  # a library may turn the stop into an error of its own
             return _stopped()
-        words = _words(error)
+        words = words_of(error)
         if options.debug or not words:
             raise
         print(f"fdnet: {words}", file=sys.stderr)
         return 2
-
-
-def _words(error: Exception) -> str:
-    """What the system refused, in one line; "" for an error of another kind."""
-    if isinstance(error, MemoryError):
-        return f"not enough memory ({error}); supply fewer fines, or take a machine with more"
-    if isinstance(error, OSError):
-        where, what = error.filename or "system", error.strerror or error
-        return f"{where}: {what}; {cure_of(error)}, then repeat the command (a run: with --resume)"
-    if isinstance(error, ImportError):
-        return (
-            f"a library cannot be loaded ({_one_line(error)[:200]}); give fdnet more memory, or "
-            "install it again with scripts/setup.sh, then repeat the command (a run: with "
-            "--resume)"
-        )
-    return ""
 
 
 def _accept_any_character() -> None:
