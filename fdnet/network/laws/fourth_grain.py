@@ -1,6 +1,6 @@
 """How much of the flow through a section a fourth grain leaves that reaches into it.
 
-Beside the three grains on its corners, the section of a throat may be entered by the fourth grain
+The section of a throat has three grains on its corners. It may also be entered by the fourth grain
 of the tetrahedron on that side: by a large grain behind a small one, or by the mirror image of a
 grain near a face. Among equal grains this does not happen.
 
