@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from fdnet.case.stages import STAGES
-from fdnet.errors import CaseError, FdnetError, cure_of
+from fdnet.errors import CaseError, FdnetError, words_of
 from fdnet.files.paths import path_option
 from fdnet.permeability.options import joined_box
 
@@ -55,25 +55,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return error.exit_code
     except KeyboardInterrupt:
         return _stopped()
-    except MemoryError as error:
-        print(
-            f"fdnet: not enough memory ({error}); supply fewer fines, or take a machine with more",
-            file=sys.stderr,
-        )
-        return 2
-    except OSError as error:
-        if options.debug:
-            raise
-        if _SIGNALS:
+    except Exception as error:
+        if _SIGNALS:  # a library may turn the stop into an error of its own
             return _stopped()
-        where, what = error.filename or "system", error.strerror or error
-        advice = f"{cure_of(error)}, then repeat the command (a run: with --resume)"
-        print(f"fdnet: {where}: {what}; {advice}", file=sys.stderr)
-        return 2
-    except Exception:  # a library may turn the stop into an error of its own
-        if not _SIGNALS:
+        words = words_of(error)
+        if options.debug or not words:
             raise
-        return _stopped()
+        print(f"fdnet: {words}", file=sys.stderr)
+        return 2
 
 
 def _accept_any_character() -> None:

@@ -118,3 +118,19 @@ _CURES = {
 def cure_of(error: OSError) -> str:
     """What a user can do about an error of the system."""
     return _CURES.get(error.errno or 0, "free space or mend permissions")
+
+
+def words_of(error: Exception) -> str:
+    """What the system refused, in one line; "" for an error of another kind."""
+    if isinstance(error, MemoryError):
+        return f"not enough memory ({error}); supply fewer fines, or take a machine with more"
+    if isinstance(error, OSError):
+        where, what = error.filename or "system", error.strerror or error
+        return f"{where}: {what}; {cure_of(error)}, then repeat the command (a run: with --resume)"
+    if isinstance(error, ImportError):
+        what = " ".join(str(error).split())[:200]
+        return (
+            f"a library cannot be loaded ({what}); give fdnet more memory, or install it again "
+            "with scripts/setup.sh, then repeat the command (a run: with --resume)"
+        )
+    return ""

@@ -12,6 +12,7 @@ of walls and of other tools are read from their files. Rows of the truth whose p
 import argparse
 from pathlib import Path
 
+from fdnet.files.paths import path_option
 from fdnet.studies.accuracy.page import write_accuracy
 from fdnet.studies.truth.packs import DATA, OWN_TRUTH
 
@@ -19,11 +20,13 @@ DOCS = Path(__file__).resolve().parents[1] / "docs"
 parser = argparse.ArgumentParser(
     description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
 )
-parser.add_argument("--packs", type=Path, default=DATA, help="packs and truth.csv")
-parser.add_argument("--more", type=Path, nargs="*", default=[], metavar="DIR", help="more packs")
-parser.add_argument("--own", type=Path, default=DATA / OWN_TRUTH, help="fdnet's own truth")
-parser.add_argument("--benchmark", type=Path, default=DOCS / "benchmark_network.csv")
-parser.add_argument("--docs", type=Path, default=DOCS, help="where to write")
+parser.add_argument("--packs", type=path_option, default=DATA, help="packs and truth.csv")
+parser.add_argument(
+    "--more", type=path_option, nargs="*", default=[], metavar="DIR", help="more packs"
+)
+parser.add_argument("--own", type=path_option, default=DATA / OWN_TRUTH, help="fdnet's own truth")
+parser.add_argument("--benchmark", type=path_option, default=DOCS / "benchmark_network.csv")
+parser.add_argument("--docs", type=path_option, default=DOCS, help="where to write")
 
 if __name__ == "__main__":
     print(write_accuracy(**vars(parser.parse_args())))

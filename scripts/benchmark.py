@@ -9,14 +9,15 @@ Every case is run anew in its own folder below --out.
 import argparse
 from pathlib import Path
 
+from fdnet.files.paths import path_option
 from fdnet.studies.benchmark.whole_runs import measure, show, write_table
 
 parser = argparse.ArgumentParser(
     description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
 )
-parser.add_argument("cases", type=Path, nargs="+", metavar="CASE.toml")
-parser.add_argument("--out", type=Path, default=Path("runs/benchmark"))
-parser.add_argument("--csv", type=Path, help="also write the table here")
+parser.add_argument("cases", type=path_option, nargs="+", metavar="CASE.toml")
+parser.add_argument("--out", type=path_option, default=Path("runs/benchmark"))
+parser.add_argument("--csv", type=path_option, help="also write the table here")
 
 if __name__ == "__main__":
     options = parser.parse_args()

@@ -8,8 +8,8 @@ A tool that is not installed is named and left out.
 """
 
 import argparse
-from pathlib import Path
 
+from fdnet.files.paths import path_option
 from fdnet.studies.benchmark.network import Options, measure, show_growth, write_table
 from fdnet.studies.truth.packs import DATA
 
@@ -24,9 +24,9 @@ parser.add_argument("--sizes", nargs="+", default=[1000, 10_000, 100_000], **num
 parser.add_argument("--fines", type=float, default=10.0, help="fines per grain (default 10)")
 parser.add_argument("--largest", help="also this size, without fines and by fdnet only", **number)
 parser.add_argument("--limit", type=float, default=600.0, help=LIMIT)
-parser.add_argument("--truth", type=Path, default=DATA, help="packs with truth")
+parser.add_argument("--truth", type=path_option, default=DATA, help="packs with truth")
 parser.add_argument("--openpnm-python", help="a Python that has OpenPNM")
-parser.add_argument("--csv", type=Path, help="also write the table here")
+parser.add_argument("--csv", type=path_option, help="also write the table here")
 
 if __name__ == "__main__":
     options = vars(parser.parse_args())

@@ -9,8 +9,8 @@ The tables of the page lie in docs/validation. `walled` makes its packs with LIG
 """
 
 import argparse
-from pathlib import Path
 
+from fdnet.files.paths import path_option
 from fdnet.studies.accuracy.boundaries import slab_rows, tiled_rows, walled_rows
 from fdnet.studies.engine.csv_rows import write_as_they_come
 
@@ -18,14 +18,14 @@ parser = argparse.ArgumentParser(
     description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
 )
 parser.add_argument("study", choices=["tiled", "slabs", "walled"])
-parser.add_argument("packs", nargs="*", type=Path)
+parser.add_argument("packs", nargs="*", type=path_option)
 parser.add_argument("--tiles", type=int, default=3, help="tiled up to so many times")
 parser.add_argument("--places", type=int, default=20, help="slabs of each thickness")
 parser.add_argument("--grains", nargs="+", type=int, default=[200, 1000, 3000, 10000])
 parser.add_argument("--rim", type=float, default=1.5, help="diameters left out at every side")
 parser.add_argument("--porosity", type=float, default=0.40, help="of the whole walled pack")
 parser.add_argument("--seed", type=int, default=1)
-parser.add_argument("--csv", type=Path, required=True)
+parser.add_argument("--csv", type=path_option, required=True)
 
 if __name__ == "__main__":
     given = parser.parse_args()

@@ -4,7 +4,8 @@
     python scripts/chaos.py --attacks 1000 --seed 1 --record docs/validation/chaos.json
     python scripts/chaos.py --soak 100
 
-Attack INDEX of a seed is always the same. Ends with 1 when there were faults.
+Attack INDEX of a seed is always the same. With --progress FILE a session that was cut goes on.
+Ends with 1 when there were faults.
 """
 
 import argparse
@@ -14,9 +15,11 @@ import shlex
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 from fdnet.cli import main
-from fdnet.studies.chaos.chaos import chaos
+from fdnet.files.paths import path_option
+from fdnet.studies.chaos.chaos import chaos, prepared_runs
 from fdnet.studies.chaos.soak import soak
 
 parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
@@ -26,24 +29,32 @@ parser.add_argument("--jobs", type=int, default=1, help="attacks at the same tim
 parser.add_argument("--seconds", type=float, default=math.inf, help="begin no attack after this")
 parser.add_argument("--only", type=int, metavar="INDEX", help="this attack alone")
 parser.add_argument("--soak", type=int, metavar="N", help="N runs under random kills instead")
-parser.add_argument("--record", type=Path, metavar="FILE.json")
+parser.add_argument("--record", type=path_option, metavar="FILE.json")
+parser.add_argument("--progress", type=path_option, metavar="FILE.jsonl", help="kept outcomes")
+
+
+def attack(given: argparse.Namespace, place: Path) -> dict[str, Any]:
+    """The attacks that were asked for."""
+    one = given.only
+    with prepared_runs(place) as prepared:
+        return chaos(
+            prepared,
+            seed=given.seed,
+            indices=range(given.attacks) if one is None else range(one, one + 1),
+            jobs=given.jobs,
+            seconds=given.seconds,
+            progress=given.progress,
+            report=lambda line: print(line, file=sys.stderr, flush=True),
+        )
+
 
 if __name__ == "__main__":
     given = parser.parse_args()
-    one = given.only
-    indices = range(given.attacks) if one is None else range(one, one + 1)
     with tempfile.TemporaryDirectory(prefix="fdnet-chaos-") as place:
         record = (
             soak(Path(place), main, runs=given.soak, seed=given.seed)
             if given.soak
-            else chaos(
-                Path(place),
-                seed=given.seed,
-                indices=indices,
-                jobs=given.jobs,
-                seconds=given.seconds,
-                report=lambda line: print(line, file=sys.stderr, flush=True),
-            )
+            else attack(given, Path(place))
         )
     command = shlex.join(["python", "scripts/chaos.py", *sys.argv[1:]])
     text = json.dumps({"command": command} | record, indent=1) + "\n"

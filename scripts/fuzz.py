@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 
 from fdnet.cli import main
+from fdnet.files.paths import path_option
 from fdnet.studies.fuzz.fuzz import fuzz
 
 MEMORY_BYTES = 6 << 30
@@ -21,8 +22,8 @@ parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
 parser.add_argument("--inputs", type=int, default=10_500)
 parser.add_argument("--seed", type=int, default=1)
 parser.add_argument("--only", type=int, metavar="INDEX", help="this input alone")
-parser.add_argument("--record", type=Path, metavar="FILE.json")
-parser.add_argument("--keep", type=Path, metavar="DIR", help="keep the inputs that made faults")
+parser.add_argument("--record", type=path_option, metavar="FILE.json")
+parser.add_argument("--keep", type=path_option, metavar="DIR", help="inputs that made faults")
 
 if __name__ == "__main__":
     given = parser.parse_args()

@@ -14,6 +14,7 @@ import shlex
 import sys
 from pathlib import Path
 
+from fdnet.files.paths import path_option
 from fdnet.studies.truth.grids import Solve, make, solve
 from fdnet.studies.truth.made_packs import PACKS
 from fdnet.studies.truth.packs import DATA, OWN_GRIDS, OWN_TRUTH
@@ -24,14 +25,14 @@ parser = argparse.ArgumentParser(
 verbs = parser.add_subparsers(dest="verb", required=True)
 maker = verbs.add_parser("make", help="write the packs")
 maker.add_argument("names", nargs="*", choices=[[], *PACKS], metavar="NAME")
-maker.add_argument("--packs", type=Path, default=DATA)
+maker.add_argument("--packs", type=path_option, default=DATA)
 solver = verbs.add_parser("solve", help="permeability of pack files")
-solver.add_argument("files", nargs="+", type=Path, metavar="FILE.csv")
+solver.add_argument("files", nargs="+", type=path_option, metavar="FILE.csv")
 solver.add_argument("--cells", nargs="+", type=int, default=[128, 192])
 solver.add_argument("--axis", choices="xyz", default="x")
 solver.add_argument("--tolerance", type=float, default=1e-4)
-solver.add_argument("--grids", type=Path, default=DATA / OWN_GRIDS)
-solver.add_argument("--csv", dest="table", type=Path, default=DATA / OWN_TRUTH)
+solver.add_argument("--grids", type=path_option, default=DATA / OWN_GRIDS)
+solver.add_argument("--csv", dest="table", type=path_option, default=DATA / OWN_TRUTH)
 
 if __name__ == "__main__":
     given = vars(parser.parse_args())

@@ -10,6 +10,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from fdnet.files.paths import path_option
 from fdnet.studies.thesis.page.document import write_page
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -20,7 +21,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--docs", type=Path, default=ROOT / "docs", help="where to read and write")
+    parser.add_argument(
+        "--docs", type=path_option, default=ROOT / "docs", help="where to read and write"
+    )
     print(write_page(parser.parse_args().docs))
     return 0
 

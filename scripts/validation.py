@@ -10,13 +10,14 @@ which are then copied to docs/validation; --redraw makes the last two anew from 
 import argparse
 from pathlib import Path
 
+from fdnet.files.paths import path_option
 from fdnet.studies.pages.validation import redraw, write_page
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 parser = argparse.ArgumentParser(
     description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
 )
-parser.add_argument("--docs", type=Path, default=DOCS, help="where to read and write")
+parser.add_argument("--docs", type=path_option, default=DOCS, help="where to read and write")
 parser.add_argument("--redraw", action="store_true", help="figures and texts of the studies too")
 
 if __name__ == "__main__":

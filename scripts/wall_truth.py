@@ -5,15 +5,15 @@
 """
 
 import argparse
-from pathlib import Path
 
+from fdnet.files.paths import path_option
 from fdnet.studies.accuracy.walls import wall_rows
 from fdnet.studies.engine.csv_rows import write_as_they_come
 
 parser = argparse.ArgumentParser(
     description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
 )
-parser.add_argument("--csv", type=Path, required=True)
+parser.add_argument("--csv", type=path_option, required=True)
 parser.add_argument(
     "--grids", type=int, nargs=2, default=[72, 96], help="cells along x, the second finer"
 )

@@ -250,6 +250,15 @@ def test_a_reader_that_has_gone_does_not_fail_the_command(tmp_path):
     assert done.stderr == ""
 
 
+def test_a_library_that_cannot_be_loaded_is_named(tmp_path, capsys, monkeypatch):
+    """As under a limit of memory, where the linker cannot map a library."""
+    table = tmp_path / "s.csv"
+    table.write_text(CUBE)
+    monkeypatch.setitem(sys.modules, "fdnet.spheres.readers", None)
+    arguments = ("permeability", table, "--units", "mm", "--box", "0,1,0,1,0,1")
+    assert "fdnet: a library cannot be loaded (" in refusal(capsys, *arguments)
+
+
 def test_a_stop_that_a_library_turns_into_its_own_error_is_a_stop(capsys, monkeypatch, tmp_path):
     import signal
 

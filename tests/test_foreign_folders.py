@@ -276,3 +276,9 @@ def test_no_folder_is_made_whose_name_is_a_tilde(tmp_path, case, capsys, monkeyp
     assert code == 2
     assert "home folder" in err
     assert not (tmp_path / "~").exists()
+
+
+def test_paths_given_to_the_scripts_may_begin_with_a_tilde(root):
+    """Options of the type Path would take the tilde as a folder of that name."""
+    for script in sorted((root / "scripts").glob("*.py")):
+        assert "type=Path" not in script.read_text(), script.name

@@ -9,7 +9,7 @@ import pytest
 from builders import tiny
 
 import fdnet
-from fdnet.errors import CaseError, FdnetError
+from fdnet.errors import CaseError, DumpError, FdnetError
 from fdnet.run.made_files import TABLES
 from fdnet.run.pipeline import run_stages
 from fdnet.run.session import RunOptions
@@ -48,16 +48,17 @@ def dump_without_a_row(path: Path) -> None:
 
 
 def dump_with_another_radius(path: Path) -> None:
+    """A dump that can be read; LIGGGHTS ends each row with a space."""
     lines = path.read_text().splitlines(keepends=True)
     words = lines[-1].split()
-    lines[-1] = " ".join([*words[:-1], repr(1.01 * float(words[-1]))]) + "\n"
+    lines[-1] = " ".join([*words[:-1], repr(1.01 * float(words[-1]))]) + " \n"
     path.write_text("".join(lines))
 
 
 def dump_with_a_moved_sphere(path: Path) -> None:
     lines = path.read_text().splitlines(keepends=True)
     words = lines[-1].split()
-    lines[-1] = " ".join([*words[:2], repr(float(words[2]) + 1e-6), *words[3:]]) + "\n"
+    lines[-1] = " ".join([*words[:2], repr(float(words[2]) + 1e-6), *words[3:]]) + " \n"
     path.write_text("".join(lines))
 
 
@@ -141,6 +142,18 @@ def test_a_folder_of_an_older_version_is_taken_with_a_warning(copied):
     summary = run_stages(CASE, options(copied, resume=True))
     assert sum("holds no digests of files" in text for text in summary["warnings"]) == 2
     assert summary["ranks"] == {"pack": 1, "invade": 1}
+
+
+def test_a_radius_changed_in_a_folder_of_an_older_version_is_refused(copied):
+    """Its record has no digests, but the case says which radii the grains have."""
+    (copied / "manifest.json").unlink()
+    path = copied / "pack" / "stage.json"
+    record = json.loads(path.read_text())
+    del record["files"]
+    path.write_text(json.dumps(record))
+    dump_with_another_radius(copied / "pack" / "post" / "pack.dump")
+    with pytest.raises(DumpError, match=r"pack\.dump: 1 of 66 grains have another radius"):
+        run_stages(CASE, options(copied, resume=True))
 
 
 def test_a_run_that_was_cut_after_its_pack_goes_on_with_its_ranks(copied):

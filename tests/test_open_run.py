@@ -264,6 +264,25 @@ def test_a_spoilt_summary_is_refused(copied):
         _ = fdnet.open_run(copied).summary
 
 
+def test_a_changed_mesh_is_refused_and_a_missing_one_is_not_needed(run, copied):
+    """A mesh that ParaView reads and saves again is another one."""
+    meshes = {
+        "network.vtp": FinishedRun.network_mesh,
+        "spheres_initial.vtp": lambda opened: opened.sphere_mesh("initial"),
+        "spheres_damaged.vtp": FinishedRun.sphere_mesh,
+    }
+    for name, read in meshes.items():
+        path = copied / name
+        path.write_bytes(path.read_bytes() + b"\n")
+        opened = fdnet.open_run(copied)
+        with pytest.raises(CaseError, match=rf"{name}: is not the file that the run wrote"):
+            read(opened)
+        with pytest.raises(CaseError, match=rf"{name}: is not the file that the run wrote"):
+            fdnet.run_case(run.case, copied)
+        path.unlink()
+    assert fdnet.run_case(run.case, copied).summary == run.summary
+
+
 def test_meshes_that_were_not_written_are_named(mobile, copied):
     with pytest.raises(CaseError, match=r"network.vtp: is missing; .*--stages report"):
         mobile.network_mesh()

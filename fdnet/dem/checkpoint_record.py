@@ -19,6 +19,10 @@ from fdnet.dem.digests import (
 )
 from fdnet.dem.overlap import WATCH, Deepest, read_watch, watch_rows
 from fdnet.errors import CaseError, LiggghtsError
+from fdnet.files.atomic import write_text
+
+DOUBTS = "doubts.txt"
+"""Warnings of the sessions that went on from an earlier checkpoint than they could."""
 
 
 def overlap_digest(rows: Sequence[Deepest]) -> str:
@@ -128,6 +132,20 @@ def passed_over(folder: Path, case: InvasionCase, last: Checkpoint | None) -> li
             f"{newest}): it went on from the checkpoint at step {last.step if last else 0}"
         ]
     return []
+
+
+def keep_doubts(folder: Path, doubts: Sequence[str]) -> None:
+    """Keep warnings on the invasion in `folder` until it is finished, in whichever session."""
+    if doubts:
+        text = "".join(f"{line}\n" for line in dict.fromkeys([*kept_doubts(folder), *doubts]))
+        write_text(folder / DOUBTS, text)
+
+
+def kept_doubts(folder: Path) -> list[str]:
+    """The warnings that this and earlier sessions kept."""
+    path = folder / DOUBTS
+    text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
+    return text.splitlines()
 
 
 def _has_rows(folder: Path) -> bool:

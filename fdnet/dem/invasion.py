@@ -20,6 +20,8 @@ from fdnet.dem.checkpoint import (
 )
 from fdnet.dem.checkpoint_record import (
     WatchReader,
+    keep_doubts,
+    kept_doubts,
     last_checkpoint,
     passed_over,
     refuse_other_ranks,
@@ -92,14 +94,13 @@ def invade(
     """
     (folder / "post").mkdir(parents=True, exist_ok=True)
     refuse_other_ranks(folder, case, launch.ranks)
-    doubts = passed_over(folder, case, last_checkpoint(folder, case))
     deck, run = _drive(case, scales, grains, folder, launch)
     history = read_history(folder)
     overlaps, damaged = [], grains
     for _, damaged in readable_states(folder, history, case, scales, grains):
         overlaps.append(overlap_in(case, damaged))
     reason, warnings = _ending(case, scales, history)
-    warnings += doubts
+    warnings += kept_doubts(folder)
     if len(overlaps) < len(history):
         lost = len(history) - len(overlaps)
         warnings.append(
@@ -127,6 +128,7 @@ def _drive(
 
     while True:
         last = last_checkpoint(folder, case)
+        keep_doubts(folder, passed_over(folder, case, last))
         deck = _prepare(case, scales, grains, folder, ranks=launch.ranks, last=last)
         if last is not None:
             refuse_overlap(case, scales, grains, folder, history=read_history(folder), last=last)

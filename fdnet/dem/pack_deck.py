@@ -14,6 +14,7 @@ from fdnet.dem.scene import (
     wall_variables,
     write_data,
 )
+from fdnet.errors import DumpError
 from fdnet.scales.grain_pack import (
     PACK_RELAX_STEPS,
     PACK_STAGE_STEPS,
@@ -23,10 +24,12 @@ from fdnet.scales.grain_pack import (
 from fdnet.scales.scales import Scales
 from fdnet.scales.springs import sphere_mass
 from fdnet.spheres.dump import COLUMNS, FORMAT
-from fdnet.spheres.snapshot import Array, resting
+from fdnet.spheres.snapshot import Array, Snapshot, resting
 
 RELAX_RUN_STEPS = 2500
 """Steps between two tests for rest."""
+RADIUS_TOLERANCE = 1e-9
+"""Largest relative difference by the rounding of the stages of growth."""
 REST_RUNS = 4 * PACK_RELAX_STEPS // RELAX_RUN_STEPS
 """Most tests for rest."""
 
@@ -75,6 +78,20 @@ def draw_radii(case: Case, count: int) -> Array:
         wanted = count * case.grains.mean_volume_m3 - 4 / 3 * math.pi * np.sum(radii[:-1] ** 3)
         radii[-1] = np.clip(np.cbrt(max(wanted, 0.0) * 3 / (4 * math.pi)), low, high)
     return radii
+
+
+def check_radii(grains: Snapshot, case: Case, path: Path) -> None:
+    """Raise DumpError unless the grains read from `path` have the radii that the case asks for."""
+    asked = draw_radii(case, len(grains))
+    wrong = np.flatnonzero(np.abs(grains.radius - asked) > RADIUS_TOLERANCE * asked)
+    if len(wrong):
+        first = wrong[0]
+        raise DumpError(
+            f"{path}: {len(wrong)} of {len(grains)} grains have another radius than the case asks "
+            f"for, the first (id {grains.id[first]:.0f}) {grains.radius[first]:.9g} m, expected "
+            f"{asked[first]:.9g} m; the file was changed, or it is the pack of another case: "
+            "start over with --force"
+        )
 
 
 def render_pack(

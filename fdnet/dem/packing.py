@@ -16,7 +16,7 @@ import numpy as np
 from fdnet.case.case import Case
 from fdnet.dem.deck import LeftOut
 from fdnet.dem.liggghts import Launch, Run, run_deck
-from fdnet.dem.pack_deck import RELAX_RUN_STEPS, REST_RUNS, write_pack_inputs
+from fdnet.dem.pack_deck import RELAX_RUN_STEPS, REST_RUNS, check_radii, write_pack_inputs
 from fdnet.dem.scene import (
     snapshot_of,
 )
@@ -168,6 +168,7 @@ def _attempt(case: Case, scales: Scales, folder: Path, launch: Launch, *, count:
         raise LiggghtsError(
             f"{folder}/post/pack.dump: {len(grains)} grains, expected {count}: some were lost"
         )
+    check_radii(grains, case, folder / "post" / "pack.dump")
     porosity = measure_porosity(grains, periodic=case.periodic)
     return Pack(
         grains=grains,

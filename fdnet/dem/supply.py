@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from fdnet.case.case import InvasionCase
 from fdnet.errors import CaseError
@@ -242,6 +241,8 @@ def _free(points: Array, radius: Array, placed: int, period: Array) -> Array:
     `points` (N, 3) m and `radius` (N,) m hold the `placed` spheres first, which all stay, and then
     the drawn ones. Of two drawn ones that overlap the first stays.
     """
+    from scipy.spatial import cKDTree
+
     tree = cKDTree(points, boxsize=period)
     pairs = tree.query_pairs(2 * CLEARANCE * radius.max(), output_type="ndarray")
     gap = points[pairs[:, 0]] - points[pairs[:, 1]]

@@ -3,12 +3,13 @@
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from fdnet.errors import CaseError
-from fdnet.spheres.dump import EXACT
+from fdnet.spheres.dump import exact_numbers
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _EDGES = ("x_lo_m", "x_hi_m", "porosity_initial", "porosity_damaged")
 COLUMNS: Mapping[str, tuple[str, ...]] = {
@@ -63,14 +64,16 @@ TEXT_COLUMNS = ("law_used",)
 _AGAIN = "write it anew with fdnet run CASE.toml --out {folder} --stages analyse,report --force"
 
 
-def read_table(path: Path, columns: Sequence[str], *, rows: int | None = None) -> pd.DataFrame:
+def read_table(path: Path, columns: Sequence[str], *, rows: int | None = None) -> "pd.DataFrame":
     """The CSV table at `path`, SI units as its column names say.
 
     Raises CaseError when it is missing or malformed, lacks one of `columns`, holds text where a
     number is expected, or has another number of rows than `rows`.
     """
+    import pandas as pd
+
     try:
-        table = pd.read_csv(path, **EXACT)
+        table = pd.read_csv(path, **exact_numbers())
     except FileNotFoundError as error:
         raise _refusal(path, "is missing") from error
     except (OSError, ValueError) as error:
@@ -86,8 +89,10 @@ def read_table(path: Path, columns: Sequence[str], *, rows: int | None = None) -
     return table
 
 
-def empty_table(columns: Sequence[str]) -> pd.DataFrame:
+def empty_table(columns: Sequence[str]) -> "pd.DataFrame":
     """A table of no rows."""
+    import pandas as pd
+
     return pd.DataFrame({name: pd.Series(dtype=float) for name in columns})
 
 

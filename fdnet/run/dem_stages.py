@@ -6,10 +6,11 @@ from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import read_history, state_at
 from fdnet.dem.digests import checkpoint_files
 from fdnet.dem.invasion import invade
+from fdnet.dem.pack_deck import check_radii
 from fdnet.dem.packing import make_pack
 from fdnet.dem.scene import snapshot_of
 from fdnet.errors import CaseError
-from fdnet.run.made_files import ANALYSE_AGAIN, START_OVER, check_files
+from fdnet.run.made_files import ANALYSE_AGAIN, MESHES, START_OVER, check_files
 from fdnet.run.outputs import Invaded
 from fdnet.run.progress import Progress
 from fdnet.run.records import PACK_DUMP, invade_record, pack_record, ranks_of
@@ -89,11 +90,14 @@ def _is_dump(name: str) -> bool:
 def packed_grains(session: Session) -> Snapshot:
     """The grains of the finished pack.
 
-    Raises DumpError when the dump cannot be read, CaseError when it is not what the stage made.
+    Raises DumpError when the dump cannot be read or holds other radii than the case asks for,
+    CaseError when it is not what the stage made.
     """
     frame = read_frame(session.path / "pack" / PACK_DUMP)
     check_files(session.path / "pack", session.folder.record("pack") or {}, START_OVER)
-    return snapshot_of(frame, session.case, time_s=0.0)
+    grains = snapshot_of(frame, session.case, time_s=0.0)
+    check_radii(grains, session.case, session.path / "pack" / PACK_DUMP)
+    return grains
 
 
 def invaded(session: Session, case: InvasionCase, grains: Snapshot) -> Invaded:
@@ -134,8 +138,16 @@ def file_warnings(session: Session) -> list[str]:
 
 
 def check_finished(session: Session) -> None:
-    """Raises CaseError when a file of the finished run is not what it wrote; dumps may be gone."""
-    check_files(session.path, session.folder.manifest() or {}, ANALYSE_AGAIN)
+    """Raises CaseError when a file of the finished run is not what it wrote.
+
+    Dumps and the meshes for ParaView may be gone.
+    """
+    manifest = session.folder.manifest() or {}
+    check_files(session.path, manifest, ANALYSE_AGAIN, may_lack=_is_mesh)
     for stage in ("pack", "invade"):
         record = session.folder.record(stage) or {}
         check_files(session.path / stage, record, START_OVER, may_lack=_is_dump)
+
+
+def _is_mesh(name: str) -> bool:
+    return name in MESHES

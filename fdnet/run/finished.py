@@ -1,6 +1,6 @@
 """A finished run as an object: its numbers, tables, spheres, network and meshes."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -147,7 +147,7 @@ class FinishedRun:
         """
         from fdnet.report.meshes import read_mesh
 
-        return read_mesh(self.path / "network.vtp")
+        return self._mesh("network.vtp", read_mesh)
 
     def sphere_mesh(self, state: State = "damaged") -> Any:
         """The spheres as a pyvista mesh of balls, m, with `kind` (1 grain, 2 fine) to colour them.
@@ -158,7 +158,7 @@ class FinishedRun:
         from fdnet.report.meshes import read_balls
 
         _check_state(state)
-        return read_balls(self.path / f"spheres_{state}.vtp")
+        return self._mesh(f"spheres_{state}.vtp", read_balls)
 
     def _table(self, name: str, rows: int | None) -> "pd.DataFrame":
         from fdnet.report.read_tables import COLUMNS, read_table
@@ -166,6 +166,11 @@ class FinishedRun:
         table = read_table(self.path / f"{name}.csv", COLUMNS[name], rows=rows)
         self._check(f"{name}.csv")
         return table
+
+    def _mesh(self, name: str, read: Callable[[Path], Any]) -> Any:
+        mesh = read(self.path / name)
+        self._check(name)
+        return mesh
 
     def _check(self, name: str) -> None:
         """Raises CaseError when the file is not the one that the run wrote."""

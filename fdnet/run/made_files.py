@@ -18,6 +18,8 @@ TABLES = (
     "summary.json",
 )
 """Files of the analysis whose digests are in the manifest."""
+MESHES = ("network.vtp", "spheres_initial.vtp", "spheres_damaged.vtp")
+"""Files of the report that an opened run reads; their digests are in the manifest too."""
 START_OVER = "put the file back, or start over with --force"
 ANALYSE_AGAIN = "put the file back, or write it anew with --stages analyse,report --force"
 

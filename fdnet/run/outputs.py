@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, readable_states
-from fdnet.network.analysis import Analysis
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Snapshot
+
+if TYPE_CHECKING:
+    from fdnet.network.analysis import Analysis
 
 MOST_FRAMES = 24
 
@@ -43,7 +46,7 @@ class Results:
     path: Path
     grains: Snapshot
     invasion: Invaded | None
-    analysis: Analysis
+    analysis: "Analysis"
 
     @property
     def shown(self) -> Snapshot:

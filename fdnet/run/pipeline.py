@@ -12,7 +12,6 @@ from fdnet.dem.binary import find_binary
 from fdnet.dem.checkpoint import has_history
 from fdnet.dem.supply import refuse_crowded_supply
 from fdnet.errors import CaseError
-from fdnet.network.permeability import analyse
 from fdnet.run.dem_stages import (
     check_finished,
     file_warnings,
@@ -22,7 +21,8 @@ from fdnet.run.dem_stages import (
     packed_grains,
 )
 from fdnet.run.folder import RunFolder, open_folder
-from fdnet.run.made_files import TABLES, digests_of
+from fdnet.run.made_files import MESHES, TABLES, digests_of
+from fdnet.run.mark import RECORDS
 from fdnet.run.outputs import Results, draw_figures, write_paraview, write_tables
 from fdnet.run.records import record_warnings, stage_seconds, versions
 from fdnet.run.session import RunOptions, Session
@@ -97,6 +97,8 @@ def _read_summary(folder: RunFolder) -> dict[str, Any]:
 
 
 def _carry_out(session: Session) -> dict[str, Any]:
+    import fdnet.network.permeability  # noqa: F401  a library that is missing is named first
+
     stages = session.options.stages
     if session.folder.manifest() is not None:
         session.folder.clear(tuple(stage for stage in ("analyse", "report") if stage in stages))
@@ -129,13 +131,15 @@ def _manifest(session: Session) -> dict[str, Any]:
         "command": session.options.command,
         "seconds": stage_seconds(pack, invasion, session.seconds),
         "versions": versions(pack),
-        "files": digests_of(session.path, [*TABLES, "pack/stage.json", "invade/stage.json"]),
+        "files": digests_of(session.path, [*TABLES, *MESHES, *RECORDS.values()]),
         "pack": pack,
         "invade": invasion,
     }
 
 
 def _analyse_and_report(session: Session) -> dict[str, Any]:
+    from fdnet.network.permeability import analyse
+
     case, grains = session.case, packed_grains(session)
     invasion = invaded(session, case, grains) if isinstance(case, InvasionCase) else None
     damaged = None if invasion is None else invasion.damaged

@@ -1,17 +1,19 @@
 """summary.json: the numbers a program reads."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fdnet.case.case import Case
 from fdnet.dem.checkpoint import Checkpoint
-from fdnet.network.analysis import Analysis
 from fdnet.report.tables import section_rows
 from fdnet.run.records import ranks_of
+
+if TYPE_CHECKING:
+    from fdnet.network.analysis import Analysis
 
 
 def summarise(
     case: Case,
-    analysis: Analysis,
+    analysis: "Analysis",
     *,
     pack: dict[str, Any],
     invasion: dict[str, Any] | None,
@@ -50,7 +52,7 @@ def summarise(
     return result
 
 
-def _porosities(analysis: Analysis) -> dict[str, Any]:
+def _porosities(analysis: "Analysis") -> dict[str, Any]:
     return {
         "porosity_initial": analysis.porosity_initial,
         "porosity_initial_error": analysis.porosity_initial_error,
@@ -59,7 +61,7 @@ def _porosities(analysis: Analysis) -> dict[str, Any]:
     }
 
 
-def _permeabilities(analysis: Analysis) -> dict[str, Any]:
+def _permeabilities(analysis: "Analysis") -> dict[str, Any]:
     moved = {} if analysis.k_moved is None else {"k_moved_m2": analysis.k_moved}
     return {
         "k_initial_m2": analysis.k_initial,
@@ -72,7 +74,7 @@ def _permeabilities(analysis: Analysis) -> dict[str, Any]:
 
 
 def _counts(
-    analysis: Analysis, last: Checkpoint | None, invasion: dict[str, Any] | None
+    analysis: "Analysis", last: Checkpoint | None, invasion: dict[str, Any] | None
 ) -> dict[str, Any]:
     passed, upstream = (last.passed, last.upstream) if last else (0, 0)
     return {
@@ -87,7 +89,7 @@ def _counts(
     }
 
 
-def _network(analysis: Analysis) -> dict[str, Any]:
+def _network(analysis: "Analysis") -> dict[str, Any]:
     blocked = 0 if analysis.occupancy is None else int(analysis.occupancy.blocked.sum())
     return {
         "pores": len(analysis.network.pore_radius),

@@ -1,9 +1,13 @@
 """Which spheres touch: pairs, overlaps, and the largest of them."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from scipy.spatial import cKDTree
 
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 
 def touching_pairs(
@@ -14,6 +18,8 @@ def touching_pairs(
     Two spheres touch when they are nearer than `gap` times the smaller diameter. Spheres are
     searched in two classes of size, so that a few large ones do not widen the search of all.
     """
+    from scipy.spatial import cKDTree
+
     radius = spheres.radius
     if len(radius) == 0:
         return np.empty((0, 2), int), np.empty(0)
@@ -36,7 +42,7 @@ def touching_pairs(
 
 
 def _pairs(
-    trees: tuple[cKDTree, cKDTree], groups: tuple[Array, Array], radius: Array, gap: float
+    trees: "tuple[cKDTree, cKDTree]", groups: tuple[Array, Array], radius: Array, gap: float
 ) -> tuple[Array, Array]:
     first, second = groups
     reach = radius[first].max() + radius[second].max()

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from fdnet.errors import DumpError
 from fdnet.files.atomic import disk_is_full
@@ -16,10 +15,6 @@ from fdnet.spheres.arrays import Array, frozen, one_line
 CUT = "The run was cut; continue it with --resume."
 COLUMNS = "id type x y z vx vy vz radius"
 FORMAT = "%d %d %.17g %.17g %.17g %.9g %.9g %.9g %.17g"
-EXACT: dict[str, Any] = (
-    {"float_precision": "round_trip"} if int(pd.__version__.split(".")[0]) < 3 else {}
-)
-"""From pandas 3 on, exact numbers are the default and the option is deprecated."""
 _UNITS, _TIME = b"ITEM: UNITS\n", b"ITEM: TIME\n"
 _ITEMS = (b"ITEM: TIMESTEP", b"ITEM: NUMBER OF ATOMS", b"ITEM: BOX BOUNDS", b"ITEM: ATOMS")
 
@@ -192,8 +187,17 @@ class _Reader:
         )
 
 
+def exact_numbers() -> dict[str, Any]:
+    """The option with which pandas reads every digit; from pandas 3 on that is the default."""
+    import pandas as pd
+
+    return {"float_precision": "round_trip"} if int(pd.__version__.split(".")[0]) < 3 else {}
+
+
 def _table(body: bytes, columns: tuple[str, ...]) -> Array | None:
     """The rows as numbers (N, C), or None when one is short, long, not a number or not finite."""
+    import pandas as pd
+
     trailing = ["trailing space"] if body[: body.index(b"\n")].endswith(b" ") else []
     try:
         table = pd.read_csv(
@@ -208,7 +212,7 @@ def _table(body: bytes, columns: tuple[str, ...]) -> Array | None:
             index_col=False,
             on_bad_lines="error",
             skip_blank_lines=False,
-            **EXACT,
+            **exact_numbers(),
         )
     except (ValueError, pd.errors.ParserError):
         return None

@@ -27,13 +27,15 @@ class StopError(Exception):
 
 
 def cell_case(sides: str, motion: str, supply: str, scheme: str) -> InvasionCase:
-    """The small case of one cell: 4,000 fines in batches, 5 checkpoints."""
+    """The small case of one cell: 15 grains, 1,500 fines in batches, 5 checkpoints."""
     return tiny(
         f"box.sides={sides}",
         f"grains.motion={motion}",
         f"fines.supply={supply}",
         f"drag.scheme={scheme}",
-        "fines.count=4000",
+        "box.size_mm=[1.6,1.0,1.0]",
+        "grains.count=15",
+        "fines.count=1500",
         "run.cap_ms=0.2",
         "run.checkpoint_ms=0.04",
     )

@@ -8,9 +8,10 @@ import pytest
 from builders import tiny
 
 from fdnet.dem.liggghts import Launch
+from fdnet.dem.pack_deck import check_radii, draw_radii
 from fdnet.dem.packing import _creep, make_pack
 from fdnet.dem.scene import box_of
-from fdnet.errors import CaseError, LiggghtsError
+from fdnet.errors import CaseError, DumpError, LiggghtsError
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import resting
 
@@ -51,6 +52,19 @@ def test_a_pack_that_creeps_is_taken_and_one_that_moves_is_refused(tmp_path):
         LiggghtsError, match="did not come to rest in 80000 steps, its grains still move at"
     ):
         _creep(case, scales, tmp_path, replace(still, velocity=1.01e-5 * natural * direction))
+
+
+def test_radii_that_the_case_does_not_ask_for_are_refused(tmp_path):
+    """Also where the porosity is the same, and where the radii are those of another seed."""
+    case = tiny("grains.radius_mm=[0.15,0.25]", "grains.count=50")
+    asked = draw_radii(case, 50)
+    grains = resting(np.random.default_rng(1).random((50, 3)) * 1e-3, asked, box_of(case))
+    check_radii(grains, case, tmp_path)
+    one = asked.copy()
+    one[7] *= 1 + 1e-8
+    for radius in (one, asked[::-1], draw_radii(tiny("seed=2"), 50), np.full(50, 0.2e-3)):
+        with pytest.raises(DumpError, match=r"of 50 grains have another radius than the case"):
+            check_radii(replace(grains, radius=radius), case, tmp_path)
 
 
 def test_a_range_of_radii(binary, tmp_path):

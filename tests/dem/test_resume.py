@@ -1,12 +1,13 @@
 """A cut invasion that is continued gives the numbers of an uncut one."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from builders import tiny
-from cut_and_continue import MATRIX, cell_case, differences
+from cut_and_continue import MATRIX, StopError, cell_case, differences
 
 from fdnet.dem.checkpoint_record import last_checkpoint
 from fdnet.dem.invasion import invade
@@ -99,6 +100,37 @@ def test_a_zeroed_restart_is_passed_over_with_a_warning(binary, cut, tmp_path):
     new = set(again.warnings) - set(whole.warnings)
     assert len(new) == 1
     assert f"went on from the checkpoint at step {whole.history[-2].step}" in new.pop()
+
+
+def test_the_warning_stays_when_the_continuing_session_is_killed_too(binary, cut, tmp_path):
+    case, grains, folder, whole = cut
+    shutil.copytree(folder, tmp_path / "cut")
+    zeros(tmp_path / "cut" / "post" / f"invade_{whole.history[-1].step}.restart")
+
+    def stop(line: str) -> None:
+        if line.startswith("FDNET checkpoint"):
+            raise StopError
+
+    launch = Launch(binary=binary, timeout=60.0)
+    with pytest.raises(StopError):
+        invade(case, scales_of(case), grains, tmp_path / "cut", replace(launch, follow=stop))
+    again = invade(case, scales_of(case), grains, tmp_path / "cut", launch)
+    assert again.history == whole.history
+    new = set(again.warnings) - set(whole.warnings)
+    assert [warning for warning in new if "went on from the checkpoint" in warning] == list(new)
+    assert len(new) == 1
+
+
+def test_notes_between_the_checkpoints_are_passed_over_and_kept(binary, cut, tmp_path):
+    case, grains, folder, whole = cut
+    shutil.copytree(folder, tmp_path / "cut")
+    post = tmp_path / "cut" / "post"
+    for name in ("invade_notes.txt", "invade_x.dump", "invade_1.dump.bak", "invade_.record"):
+        (post / name).write_text("mine")
+    again = invade(case, scales_of(case), grains, tmp_path / "cut", Launch(binary=binary))
+    assert again.history == whole.history
+    assert again.warnings == whole.warnings
+    assert (post / "invade_notes.txt").read_text() == "mine"
 
 
 @pytest.mark.parametrize("row", [1, 2])

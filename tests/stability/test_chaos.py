@@ -7,20 +7,32 @@ import pytest
 
 from fdnet.cli import main
 from fdnet.studies.chaos import chaos as suite
-from fdnet.studies.chaos.attacks import ATTACKS
-from fdnet.studies.chaos.chaos import chaos, one_attack
-from fdnet.studies.chaos.runs import Ended, FaultError, Prepared, differs, judge, prepare
+from fdnet.studies.chaos import commands
+from fdnet.studies.chaos.attacks import ATTACKS, ORDER
+from fdnet.studies.chaos.chaos import chaos, one_attack, prepared_runs
+from fdnet.studies.chaos.commands import Ended, FaultError
+from fdnet.studies.chaos.judge import check_report, differs, judge
 from fdnet.studies.chaos.soak import soak
 
 pytestmark = pytest.mark.liggghts
 
 
-def test_some_attacks_end_well_or_in_one_refusal(binary, tmp_path):
+@pytest.fixture(scope="module")
+def runs(binary, tmp_path_factory):
+    """The small runs that are attacked, on one rank and on two."""
+    with prepared_runs(tmp_path_factory.mktemp("chaos")) as prepared:
+        yield prepared
+
+
+def test_some_attacks_end_well_or_in_one_refusal(runs, tmp_path):
     """The short form of scripts/chaos.py, whose long record is docs/validation/chaos.json."""
-    record = chaos(tmp_path / "chaos", seed=3, indices=range(20), jobs=2)
+    kinds, progress = tuple(ATTACKS), tmp_path / "progress.jsonl"
+    record = chaos(runs, seed=3, indices=range(len(kinds)), kinds=kinds, progress=progress)
     assert record["faults"] == []
-    assert record["attacks"] == 20
+    assert record["attacks"] == len(kinds)
     assert set(record["kinds"]) == set(ATTACKS)
+    again = chaos({}, seed=3, indices=range(len(kinds)), kinds=kinds, progress=progress)
+    assert again == record
 
 
 def test_a_soak_of_two_runs_leaves_nothing(binary, tmp_path):
@@ -29,13 +41,9 @@ def test_a_soak_of_two_runs_leaves_nothing(binary, tmp_path):
     assert record["kills"] >= 1
 
 
-@pytest.fixture(scope="module")
-def prepared(binary, tmp_path_factory):
-    return prepare(tmp_path_factory.mktemp("chaos") / "prepared")
-
-
-def test_the_suite_knows_a_fault_when_it_meets_one(prepared, tmp_path, monkeypatch):
+def test_the_suite_knows_a_fault_when_it_meets_one(runs, tmp_path, monkeypatch):
     """Deliberate breaks: a changed value, a lost table, a traceback, two lines, a wrong code."""
+    prepared = runs[1]
     out = prepared.copy("finished", tmp_path)
     good = Ended(code=0, error="")
     assert judge(prepared, out, good) == "ok"
@@ -61,26 +69,39 @@ def test_the_suite_knows_a_fault_when_it_meets_one(prepared, tmp_path, monkeypat
         raise FaultError("lost: notes.txt")
 
     monkeypatch.setitem(suite.ATTACKS, "cut", lost)
-    assert one_attack(prepared, 1, 0, ["cut"]) == ("cut", "fault: lost: notes.txt")
+    outcome = one_attack(runs, 1, 0, ["cut"])
+    assert (outcome.kind, outcome.what, outcome.words) == ("cut", "fault", "lost: notes.txt")
+    with pytest.raises(FaultError, match="missing or cut"):
+        check_report(out)
 
 
-def test_an_attack_of_a_seed_is_always_the_same(prepared: Prepared, monkeypatch):
+def test_a_command_that_hangs_is_a_fault_and_is_ended(runs, tmp_path, monkeypatch):
+    monkeypatch.setattr(commands, "LIMIT_S", 0.05)
+    for fresh in (False, True):
+        child = runs[1].start(tmp_path / f"run_{fresh}", fresh=fresh)
+        with pytest.raises(FaultError, match="hang"):
+            commands.wait_for(child)
+        assert child.poll() is not None
+
+
+def test_an_attack_of_a_seed_is_always_the_same(runs, monkeypatch):
     drawn = []
 
-    def attack(rng, place: Path, _: Prepared) -> str:
+    def attack(rng, place: Path, _) -> str:
         drawn.append(rng.random())
         return "ok"
 
     monkeypatch.setitem(suite.ATTACKS, "cut", attack)
     for seed, index in ((1, 5), (1, 6), (2, 5), (1, 5)):
-        one_attack(prepared, seed, index, ["cut"])
+        one_attack(runs, seed, index, ["cut"])
     assert drawn[0] == drawn[3]
     assert len(set(drawn)) == 3
 
 
-def test_the_committed_record_names_its_command(root):
+def test_the_committed_record_is_without_fault(root):
     record = json.loads((root / "docs" / "validation" / "chaos.json").read_text())
     assert record["command"].startswith("python scripts/chaos.py --attacks 1000 --seed ")
     assert record["attacks"] == sum(sum(kind.values()) for kind in record["kinds"].values())
-    assert record["attacks"] >= 12
-    assert set(record["kinds"]) == set(ATTACKS)
+    assert record["attacks"] >= 400
+    assert record["faults"] == []
+    assert set(record["kinds"]) == set(ATTACKS) == set(ORDER)

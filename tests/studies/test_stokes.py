@@ -6,12 +6,11 @@ from itertools import product
 
 import numpy as np
 import pytest
-from scipy import sparse
-from scipy.sparse.linalg import splu
+from direct_stokes import direct_tensor
 
 from fdnet.errors import CaseError, FlowError
 from fdnet.spheres.snapshot import Array, Snapshot
-from fdnet.studies.stokes import stokes
+from fdnet.studies.stokes import forces, stokes
 from fdnet.studies.stokes.green import build_green
 from fdnet.studies.stokes.stokes import extrapolate, solve_stokes
 from fdnet.studies.stokes.walls import find_walls
@@ -107,52 +106,18 @@ def test_green_solves_the_discrete_stokes_equations():
     assert max(np.abs(part).max() for part in excess) > 0.1
 
 
-def direct_tensor(pack: Snapshot, cells: int) -> Array:
-    """K (3, 3) by one sparse LU of velocities and pressures on the whole grid.
-
-    It has no Fourier transform and no iteration.
-    """
+def tensor_of(pack: Snapshot, cells: int) -> Array:
+    """K (3, 3), m2, by the direct solve."""
     shape, spacing = stokes._grid(pack.box, cells)
-    size = int(np.prod(shape))
-    index = np.arange(size).reshape(shape)
-    shift = [
-        sparse.csr_matrix(
-            (np.ones(size), (index.ravel(), np.roll(index, -1, axis=d).ravel())), (size, size)
-        )
-        for d in range(3)
-    ]
-    one = sparse.identity(size)
-    laplace = sum(2.0 * one - s - s.T for s in shift)
-    blocks, right = [], []
-    for d in range(3):
-        walls = find_walls(
-            (pack.position - pack.box[:, 0]) / spacing, pack.radius / spacing, shape, component=d
-        )
-        drag = np.zeros(size)
-        drag[walls.node] = 1.0 / np.maximum(walls.slack, 1e-9)
-        blocks.append(
-            [laplace + sparse.diags(drag) if e == d else None for e in range(3)]
-            + [one - shift[d].T]
-        )
-        right.append([np.ones(size) if e == d else np.zeros(size) for e in range(3)])
-    blocks.append(
-        [(one - shift[d].T).T for d in range(3)]
-        + [sparse.diags(np.where(np.arange(size), 0.0, 1.0))]
-    )
-    solver = splu(sparse.bmat(blocks, format="csc"))
-    flows = [
-        solver.solve(np.concatenate([*(right[d][a] for d in range(3)), np.zeros(size)]))
-        for a in range(3)
-    ]
-    return (
-        np.array([flow[: 3 * size].reshape(3, size).mean(axis=1) for flow in flows]) * spacing**2
-    )
+    centre, radius = (pack.position - pack.box[:, 0]) / spacing, pack.radius / spacing
+    walls = [find_walls(centre, radius, shape, component=d) for d in range(3)]
+    return direct_tensor(shape, [(wall.node, wall.slack) for wall in walls]) * spacing**2
 
 
 def test_a_direct_solve_gives_the_same_tensor():
     rng = np.random.default_rng(5)
     pack = cell(rng.random((4, 3)) * [1.0, 0.8, 0.9], [0.2, 0.25, 0.3, 0.15], (1.0, 0.8, 0.9))
-    tensor = direct_tensor(pack, 10)
+    tensor = tensor_of(pack, 10)
     np.testing.assert_allclose(tensor, tensor.T, atol=1e-9 * tensor.max())
     for axis in range(3):
         free, held = (
@@ -249,7 +214,7 @@ def test_refusals(monkeypatch):
     flow = solve_stokes(cell(SC, 0.3), cells=10)
     with pytest.raises(CaseError, match="finer"):
         extrapolate(flow, flow)
-    monkeypatch.setattr(stokes, "ITERATIONS", 5)
+    monkeypatch.setattr(forces, "ITERATIONS", 5)
     with pytest.raises(FlowError, match="after 5 iterations"):
         solve_stokes(cell(SC, 0.4), cells=16)
 

@@ -111,6 +111,19 @@ def test_a_folder_without_a_finished_invasion_has_no_state(finished, tmp_path):
 
 
 @pytest.mark.liggghts
+@pytest.mark.parametrize("name", ["pack/post/pack.dump", "invade/history.csv", "last dump"])
+def test_a_run_with_a_changed_file_has_no_state(finished, tmp_path, name):
+    shutil.copytree(finished, tmp_path / "run")
+    path = tmp_path / "run" / name
+    if name == "last dump":
+        dumps = (tmp_path / "run" / "invade" / "post").glob("*.dump")
+        path = max(dumps, key=lambda dump: int(dump.stem.split("_")[1]))
+    text = path.read_text()
+    path.write_text(text[:-2] + ("1" if text[-2] != "1" else "2") + "\n")
+    with pytest.raises(CaseError, match=f"{path.name}: is not the file that the run wrote"):
+        state_of_run(tmp_path / "run")
+
+
 def test_runs_are_done_once_twins_shared_and_failures_told(binary, tmp_path, monkeypatch):
     lines: list[str] = []
     same = small("quick-table3", "fines.radius_mm=[0.025,0.05]"), small("quick-specimen7")

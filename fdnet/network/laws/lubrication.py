@@ -122,7 +122,7 @@ def _halves(
         high = max(high, low + floor)
         even = np.max(radius[t]) - np.min(radius[t]) <= EQUAL * radius[t, 0]
         even = even and np.max(flatness[t]) - np.min(flatness[t]) <= EQUAL
-        wedge = wedges(corner[t]) if even else np.empty((0, 3))
+        wedge = wedges(corner[t]) if even else np.empty((0, 7))
         wall = (order[t], place[t], part[t])
         grains = (radius[t], flatness[t])
         if low < 0.0 and high > 0.0:
@@ -176,7 +176,7 @@ def _resistance(
                 flux *= share_left(base, disc, beside[0], beside[1], np.sqrt(square), table)
         if not flux > 0.0:
             return np.inf
-        narrow[k] = (8.0 * flux / np.pi) ** -0.25
+        narrow[k] = 1.0 / np.sqrt(np.sqrt(8.0 * flux / np.pi))
     return (4.0 * summed(narrow, step, 1, widening) - summed(narrow, step, 2, widening)) / 3.0
 
 

@@ -6,15 +6,20 @@ The last session of each run is done in this process, whose handles and memory a
 import contextlib
 import io
 import os
+import shutil
 import signal
 import time
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from random import Random
+from types import FrameType
 from typing import Any
 
-from fdnet.studies.chaos.runs import STAGES, Prepared, differs, prepare, started, wait_for
+from fdnet.studies.chaos.attacks import FRESH
+from fdnet.studies.chaos.commands import LIMIT_S, FaultError, count_files, wait_for
+from fdnet.studies.chaos.judge import differs
+from fdnet.studies.chaos.runs import Prepared, nursery_in, prepare
 
 MARK = "FDNET_SOAK"
 """Name in the environment by which the processes of a soak are known."""
@@ -43,15 +48,18 @@ def soak(folder: Path, command: Command, *, runs: int, seed: int) -> dict[str, A
     handles, memory, kills = [], [], 0
     start = time.perf_counter()
     with _environment({MARK: mark, "TMPDIR": str(temporary)}):
-        prepared = prepare(folder / "prepared")
-        for number in range(runs):
-            out = folder / f"run_{number}"
-            kills += _killed(prepared, out, rng)
-            what = _finished(prepared, out, command)
-            if what:
-                faults.append({"index": number, "kind": "soak", "what": what})
-            handles.append(len(os.listdir("/proc/self/fd")))
-            memory.append(_memory_bytes())
+        with nursery_in(folder / "prepared") as nursery:
+            prepared = prepare(folder / "prepared", nursery)
+            for number in range(runs):
+                out = folder / f"run_{number}"
+                done, what = _one_run(prepared, out, rng, command)
+                kills += done
+                if what:
+                    faults.append({"index": number, "kind": "soak", "what": what})
+                else:
+                    shutil.rmtree(out)
+                handles.append(len(os.listdir("/proc/self/fd")))
+                memory.append(_memory_bytes())
         faults += [
             {"index": -1, "kind": "soak", "what": what}
             for what in _left(folder, temporary, mark, handles, memory)
@@ -78,29 +86,62 @@ def _environment(values: dict[str, str]) -> Any:
         os.environ.update(before)
 
 
-def _killed(prepared: Prepared, out: Path, rng: Random) -> int:
-    """Start the run and kill it at random moments, up to MOST_KILLS times; the number of kills."""
+def _one_run(prepared: Prepared, out: Path, rng: Random, command: Command) -> tuple[int, str]:
+    """Number of kills of a run, and what is wrong with it at its end, "" when nothing is."""
     kills = 0
+    try:
+        kills = _killed(prepared, out, rng)
+        return kills, _finished(prepared, out, command)
+    except FaultError as fault:
+        return kills, str(fault)
+
+
+def _killed(prepared: Prepared, out: Path, rng: Random) -> int:
+    """Start the run and kill it up to MOST_KILLS times, when it has written some of its files.
+
+    Returns the number of kills.
+    """
+    kills, files = 0, count_files(prepared.root / "finished")
     for _ in range(rng.randrange(1, MOST_KILLS + 1)):
         resume = ["--resume"] * (out / "case.toml").exists()
-        process = started(prepared.command(out, *resume))
-        time.sleep(rng.uniform(0.0, prepared.seconds))
-        process.send_signal(rng.choice((signal.SIGKILL, signal.SIGTERM)))
-        kills += wait_for(process).code != 0
+        child = prepared.start(out, *resume, fresh=rng.random() < FRESH)
+        child.let_write(out, rng.randrange(files))
+        child.send(rng.choice((signal.SIGKILL, signal.SIGTERM)))
+        kills += wait_for(child).code != 0
     return kills
 
 
 def _finished(prepared: Prepared, out: Path, command: Command) -> str:
     """End the run in this process; what is wrong with it, "" when nothing is."""
-    words = ["run", str(prepared.case), "--out", str(out), "--quiet", *STAGES]
     resume = ["--resume"] * (out / "case.toml").exists()
     screen, handler = io.StringIO(), signal.getsignal(signal.SIGTERM)
-    with contextlib.redirect_stdout(screen), contextlib.redirect_stderr(screen):
-        code = command([*words, *resume])
+    with (
+        _alarm(),
+        contextlib.redirect_stdout(screen),
+        contextlib.redirect_stderr(screen),
+    ):
+        code = command(prepared.words(out, *resume))
     signal.signal(signal.SIGTERM, handler)
     if code:
         return f"exit code {code}: {' '.join(screen.getvalue().split())[-300:]}"
     return differs(prepared, out)
+
+
+@contextlib.contextmanager
+def _alarm() -> Iterator[None]:
+    """Raise FaultError in the body when it takes longer than LIMIT_S."""
+
+    def ring(_: int, frame: FrameType | None) -> None:
+        place = "" if frame is None else f", in {frame.f_code.co_filename}:{frame.f_lineno}"
+        raise FaultError(f"hang: not done within {LIMIT_S:g} s{place}")
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, LIMIT_S)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def _left(

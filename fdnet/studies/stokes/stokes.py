@@ -15,26 +15,17 @@ square of the slip that is left at the walls. k is of second order in the spacin
 removes the leading term.
 """
 
-import logging
 import time
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fdnet.errors import CaseError, FlowError
 from fdnet.spheres.snapshot import Array, Snapshot
-from fdnet.studies.stokes.green import Green, build_green
-from fdnet.studies.stokes.walls import Walls, find_walls
+from fdnet.studies.stokes.forces import LARGEST_SLIP, Axes, Problem, minimise
+from fdnet.studies.stokes.green import Shape, build_green, build_mirrored_green
+from fdnet.studies.stokes.walls import find_walls
 
-LOG = logging.getLogger(__name__)
-OWN_RESPONSE = 2.0 / 3.0 * 0.252731
-"""Velocity of a node under a unit force on itself.
-
-It is 2/3 of the lattice Green's function at 0 (Watson 1939).
-"""
-ITERATIONS = 6000
-LARGEST_SLIP = 0.05
 EDGE_MISMATCH = 1e-6
 
 
@@ -98,19 +89,62 @@ def solve_stokes(
         CaseError: the edges are no multiples of the spacing, or there is no wall.
         FlowError: the iterations run out.
     """
-    start = time.monotonic()
-    shape, spacing = _grid(spheres.box, cells)
     if axis not in (0, 1, 2):
         raise CaseError(f"stokes: axis {axis!r}, expected 0, 1 or 2 (x, y or z)")
+    way = _Way(axis=axis, balanced=(0, 1, 2) if transverse else (axis,), mirrored=False)
+    return _solved(spheres, cells, way, tolerance)
+
+
+def solve_slab(
+    spheres: Snapshot, x_lo: float, x_hi: float, *, cells: int, tolerance: float = 1e-4
+) -> StokesFlow:
+    """Permeability along x of the slab from `x_lo` to `x_hi` (m) between planes of one pressure.
+
+    The slab and its mirror image make a periodic cell. Under a uniform force its planes of
+    symmetry have a constant pressure and no velocity along them, so half of the cell is solved.
+    The sides y and z of `spheres.box` are periodic.
+
+    Args:
+        spheres: the solid; what lies outside the slab is no part of it, but the bodies of spheres
+            centred outside count as far as they reach in.
+        x_lo: lower plane, m.
+        x_hi: upper plane, m.
+        cells: on the longest of the slab's edges.
+        tolerance: as of `solve_stokes`.
+
+    Raises:
+        CaseError: the edges are no multiples of the spacing, or there is no wall.
+        FlowError: the iterations run out.
+    """
+    box = np.array([[x_lo, x_hi], *spheres.box[1:]])
+    way = _Way(axis=0, balanced=(0,), mirrored=True)
+    return _solved(replace(spheres, box=box), cells, way, tolerance)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Way:
+    """How the fluid is driven: axis, components without net force, mirrored or periodic."""
+
+    axis: int
+    balanced: Axes
+    mirrored: bool
+
+
+def _solved(spheres: Snapshot, cells: int, way: _Way, tolerance: float) -> StokesFlow:
+    start = time.monotonic()
+    shape, spacing = _grid(spheres.box, cells)
     centre, radius = (spheres.position - spheres.box[:, 0]) / spacing, spheres.radius / spacing
-    walls = [find_walls(centre, radius, shape, component=d) for d in range(3)]
+    walls = [
+        find_walls(centre, radius, shape, component=d, mirrored=way.mirrored) for d in range(3)
+    ]
     if not all(len(wall.node) for wall in walls):
         raise CaseError(
             f"stokes: no wall on the grid of {shape} cells, expected spheres; "
             "add some or refine the grid"
         )
-    problem = _Problem(walls, build_green(shape), axis=axis, transverse=transverse)
-    forces, iterations = _minimise(problem, tolerance)
+    green = build_mirrored_green(shape) if way.mirrored else build_green(shape)
+    problem = Problem(walls, green, axis=way.axis, balanced=way.balanced)
+    forces, iterations = minimise(problem, tolerance)
     k, slip = problem.permeability(forces)
     if not (k > 0.0 and slip < 2.0 * LARGEST_SLIP):
         raise FlowError(
@@ -144,7 +178,7 @@ def extrapolate(coarse: StokesFlow, fine: StokesFlow, *, order: float = 2.0) -> 
     return Extrapolated(k=fine.k + step, relative_error=abs(step) / 3.0 / (fine.k + step))
 
 
-def _grid(box: Array, cells: int) -> tuple[tuple[int, int, int], float]:
+def _grid(box: Array, cells: int) -> tuple[Shape, float]:
     """Cells along the edges and their spacing (m)."""
     edges = box[:, 1] - box[:, 0]
     if cells < 4 or not np.all(edges > 0.0):
@@ -162,106 +196,3 @@ def _grid(box: Array, cells: int) -> tuple[tuple[int, int, int], float]:
             f"({cells} cells on the longest); choose cells so that all edges are"
         )
     return (int(counts[0]), int(counts[1]), int(counts[2])), spacing
-
-
-class _Problem:
-    """The scaled operator A = W (S + D) W over the wall nodes, and its constraint."""
-
-    def __init__(self, walls: list[Walls], green: Green, *, axis: int, transverse: bool) -> None:
-        ends = np.cumsum([0, *(len(wall.node) for wall in walls)])
-        self.parts = [slice(int(a), int(b)) for a, b in pairwise(ends)]
-        self.nodes = [wall.node for wall in walls]
-        self.slack = np.concatenate([wall.slack for wall in walls])
-        self.weight = 1.0 / np.sqrt(OWN_RESPONSE + self.slack)
-        self.axis, self.balanced = axis, (0, 1, 2) if transverse else (axis,)
-        self.norms = [float(self.weight[part] @ self.weight[part]) for part in self.parts]
-        self.volume = float(np.prod(green.shape))
-        self.green = green
-        self.grids = [np.zeros(green.shape, np.float32) for _ in range(3)]
-
-    def apply(self, scaled: Array) -> Array:
-        """A times `scaled` (M,)."""
-        force = self.weight * scaled
-        for grid, node, part in zip(self.grids, self.nodes, self.parts, strict=True):
-            grid.reshape(-1)[node] = force[part]
-        moved = self.slack * force
-        for flow, node, part in zip(
-            self.green.velocity(self.grids), self.nodes, self.parts, strict=True
-        ):
-            moved[part] += flow.reshape(-1)[node]
-        return self.weight * moved
-
-    def project(self, scaled: Array) -> Array:
-        """`scaled` without the part that carries a net force, changed in place."""
-        for component in self.balanced:
-            part = self.parts[component]
-            weight = self.weight[part]
-            scaled[part] -= weight * float(weight @ scaled[part] / self.norms[component])
-        return scaled
-
-    def start(self) -> Array:
-        """Forces on the nodes of one component that balance a unit body force."""
-        scaled = np.zeros(len(self.weight))
-        part = self.parts[self.axis]
-        scaled[part] = -self.volume / self.norms[self.axis] * self.weight[part]
-        return scaled
-
-    def slip(self, square: float, energy: float) -> float:
-        """Rms wall velocity over the superficial one, from the square of the residual."""
-        return float(np.sqrt(square / self.norms[self.axis]) * self.volume / energy)
-
-    def permeability(self, scaled: Array) -> tuple[float, float]:
-        """k in squared spacings and the slip, from one fresh application."""
-        moved = self.apply(scaled)
-        energy = float(scaled @ moved)
-        residual = self.project(moved)
-        return energy / self.volume, self.slip(float(residual @ residual), energy)
-
-
-def _minimise(problem: _Problem, tolerance: float) -> tuple[Array, int]:
-    """The scaled forces of least dissipation and the iterations that they took."""
-    scaled = problem.start()
-    moved = problem.apply(scaled)
-    energies = [float(scaled @ moved)]
-    residual = problem.project(-moved)
-    step, square = residual.copy(), float(residual @ residual)
-    for iteration in range(1, ITERATIONS + 1):
-        moved = problem.project(problem.apply(step))
-        length = square / float(step @ moved)
-        scaled += length * step
-        residual -= length * moved
-        energies.append(energies[-1] - length * square)
-        if not 0.0 < energies[-1] <= energies[-2]:
-            raise FlowError(
-                f"stokes: dissipation {energies[-1]:.3g} after {energies[-2]:.3g} "
-                f"at iteration {iteration}, expected it to fall; refine the grid"
-            )
-        before, square = square, float(residual @ residual)
-        slip = problem.slip(square, energies[-1])
-        if iteration % 25 == 0:
-            LOG.info(
-                "iteration %d: k %.6g spacings squared, slip %.2g",
-                iteration,
-                energies[-1] / problem.volume,
-                slip,
-            )
-        if slip < LARGEST_SLIP and _settled(energies, tolerance):
-            return scaled, iteration
-        step *= square / before
-        step += residual
-    raise FlowError(
-        f"stokes: k still fell by more than {tolerance:g} after {ITERATIONS} iterations, down to "
-        f"{energies[-1] / energies[0]:.3g} of its start; is the pore space closed? "
-        "Otherwise raise the tolerance"
-    )
-
-
-def _settled(energies: list[float], tolerance: float) -> bool:
-    """Whether the dissipation fell by less than `tolerance` over the last iterations.
-
-    These are the last quarter of them, at least 20.
-    """
-    window = max(20, len(energies) // 4)
-    return (
-        len(energies) > window and energies[-1 - window] - energies[-1] < tolerance * energies[-1]
-    )

@@ -1,4 +1,4 @@
-"""Which nodes of a staggered periodic grid hold a wall, and how far the walls stand from them.
+"""Which nodes of a staggered grid hold a wall, and how far the walls stand from them.
 
 Lengths are in grid spacings. Component d of the velocity has its nodes at (i, j, k) + 1/2 across
 the other two axes.
@@ -11,6 +11,10 @@ the other two axes.
   the wall there: (0 - u) / t replaces (u_neighbour - u) (Shortley and Weller 1938, in the
   symmetric form of Gibou et al. 2002, J. Comput. Phys. 176, 205). Compared with the plain grid,
   that is the extra drag (1/t - 1) u.
+
+The grid is periodic along y and z. Along x it is periodic too, or it is the slab 0 <= x <= n of
+spheres that may reach out of it, mirrored at both of these planes: what lies outside is no solid,
+and the neighbour of a node beyond a plane is the image of the one before it.
 """
 
 from dataclasses import dataclass
@@ -38,26 +42,68 @@ class Walls:
 
 
 def find_walls(
-    centre: Array, radius: Array, shape: tuple[int, int, int], *, component: int
+    centre: Array,
+    radius: Array,
+    shape: tuple[int, int, int],
+    *,
+    component: int,
+    mirrored: bool = False,
 ) -> Walls:
-    """Walls of spheres at `centre` (S, 3) with `radius` (S,), for one velocity component."""
+    """Walls of spheres at `centre` (S, 3) with `radius` (S,), for one velocity component.
+
+    Args:
+        centre: in spacings from the corner of the grid.
+        radius: in spacings.
+        shape: cells of the grid. A mirrored grid has one more node along x for component 0.
+        component: of the velocity, 0, 1 or 2.
+        mirrored: whether the grid is a slab that is mirrored at both ends of x.
+    """
     stagger = np.full(3, 0.5)
     stagger[component] = 0.0
-    shell, solid = np.zeros(shape, bool), np.zeros(shape, bool)
-    reach = np.ones((3, 2, *shape), np.float32)
+    on_planes = mirrored and component == 0
+    nodes = (shape[0] + 1, *shape[1:]) if on_planes else shape
+    marks = _Marks(
+        shell=np.zeros(nodes, bool),
+        solid=np.zeros(nodes, bool),
+        reach=np.ones((3, 2, *nodes), np.float32),
+        mirrored=mirrored,
+        on_planes=on_planes,
+    )
     for point, r in zip(centre - stagger, radius, strict=True):
-        _stamp(point, r, shell, solid, reach)
-    drag = _extra_drag(solid, reach)
-    node = np.flatnonzero(shell | (drag > LEAST_DRAG))
-    free = ~solid.reshape(-1)[node]
+        _stamp(point, r, marks)
+    drag = _extra_drag(marks)
+    node = np.flatnonzero(marks.shell | (drag > LEAST_DRAG))
+    free = ~marks.solid.reshape(-1)[node]
     slack = np.zeros(len(node))
     slack[free] = 1.0 / drag.reshape(-1)[node[free]]
     return Walls(node=frozen(node), slack=frozen(slack))
 
 
-def _stamp(point: Array, r: float, shell: Array, solid: Array, reach: Array) -> None:
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Marks:
+    """What the spheres have marked on the nodes of one component, changed in place.
+
+    Attributes:
+        shell: nodes that carry u = 0.
+        solid: nodes inside a sphere.
+        reach: (3, 2, ...) free way along each axis, ahead and back, at most 1.
+        mirrored: whether the grid is mirrored at both ends of x.
+        on_planes: whether nodes lie on the planes of the mirror.
+    """
+
+    shell: Array
+    solid: Array
+    reach: Array
+    mirrored: bool
+    on_planes: bool
+
+
+def _stamp(point: Array, r: float, marks: _Marks) -> None:
     """Marks the nodes of one sphere and shortens the reach of the fluid nodes around it."""
     axes = [np.arange(np.floor(c - r - 1.0), np.ceil(c + r + 1.0) + 1.0) for c in point]
+    shell, solid, reach = marks.shell, marks.solid, marks.reach
+    if marks.mirrored:
+        axes[0] = axes[0][(axes[0] >= 0.0) & (axes[0] < solid.shape[0])]
     apart = [axis - c for axis, c in zip(axes, point, strict=True)]
     square = apart[0][:, None, None] ** 2 + apart[1][:, None] ** 2 + apart[2] ** 2
     wrapped = [axis.astype(np.int64) % n for axis, n in zip(axes, solid.shape, strict=True)]
@@ -82,11 +128,18 @@ def _shorten(reach: Array, node: Array, ahead: Array, power: Array) -> None:
     np.minimum.at(reach, node[hit], distance.astype(np.float32))
 
 
-def _extra_drag(solid: Array, reach: Array) -> Array:
+def _extra_drag(marks: _Marks) -> Array:
     """Sum of (1/t - 1) over the six directions in which a fluid node has a solid neighbour."""
+    solid, reach = marks.solid, marks.reach
+    if marks.on_planes:
+        reach[0, 1, 0], reach[0, 0, -1] = reach[0, 0, 0], reach[0, 1, -1]
     drag = np.zeros(solid.shape)
     for axis in range(3):
         for side, sign in enumerate((1, -1)):
-            wall = np.roll(solid, -sign, axis=axis) & ~solid
+            beyond = np.roll(solid, -sign, axis=axis)
+            if marks.mirrored and axis == 0:
+                end = -1 if sign == 1 else 0
+                beyond[end] = solid[end - sign if marks.on_planes else end]
+            wall = beyond & ~solid
             drag[wall] += 1.0 / np.maximum(reach[axis, side][wall], LEAST_DISTANCE) - 1.0
     return drag

@@ -110,7 +110,7 @@ def tabulated(rows: list[dict[str, str]]) -> list[dict[str, str]]:
         grids = list(group)[-2:]
         if len(grids) < 2:
             continue
-        end = extrapolate(*map(_flow_of, grids))
+        end = extrapolate(*map(flow_of, grids))
         intact = table.get((PACKS.get(case, {}).get("intact", ""), axis))
         table[case, axis] = {
             **{name: grids[0][name] for name in ("case", "file", "edge_mm", "axis")},
@@ -123,7 +123,7 @@ def tabulated(rows: list[dict[str, str]]) -> list[dict[str, str]]:
     return list(table.values())
 
 
-def _flow_of(row: dict[str, str]) -> StokesFlow:
+def flow_of(row: dict[str, str]) -> StokesFlow:
     """A row of the grids as a result, k in mm2."""
     return StokesFlow(
         k=float(row["k_mm2"]),

@@ -18,10 +18,13 @@ import numpy as np
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import case_from, read_case
 from fdnet.dem.checkpoint import read_history, state_at
+from fdnet.dem.pack_deck import check_radii
 from fdnet.dem.scene import box_of, snapshot_of
 from fdnet.errors import CaseError
 from fdnet.files.atomic import write_bytes
 from fdnet.run.folder import CASE, read_record
+from fdnet.run.made_files import check_files
+from fdnet.run.records import PACK_DUMP
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
@@ -39,6 +42,7 @@ ENDING = (
     "warnings",
 )
 
+RUN_ANEW = "put the file back, or remove the run folder to run it anew"
 BROKEN = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error)
 """The errors that reading a damaged npz raises."""
 
@@ -68,7 +72,8 @@ class State:
 def state_of_run(folder: Path) -> State:
     """The end of a finished invasion in a run folder.
 
-    Raises CaseError when the folder holds none, DumpError when a dump is cut.
+    Raises CaseError when the folder holds none or a file is not what the stage made, DumpError
+    when a dump is cut.
     """
     case = with_fines(read_case(folder / CASE))
     pack, invasion = read_record(folder, "pack"), read_record(folder, "invade")
@@ -76,8 +81,12 @@ def state_of_run(folder: Path) -> State:
         raise CaseError(
             f"{folder}: holds no finished invasion; run it to its end first (--resume)"
         )
+    check_files(folder / "pack", pack, RUN_ANEW)
+    check_files(folder / "invade", invasion, RUN_ANEW)
     scales, history = scales_of(case), read_history(folder / "invade")
-    grains = snapshot_of(read_frame(folder / "pack" / "post" / "pack.dump"), case, time_s=0.0)
+    dump = folder / "pack" / PACK_DUMP
+    grains = snapshot_of(read_frame(dump), case, time_s=0.0)
+    check_radii(grains, case, dump)
     last = history[-1]
     return State(
         case=case,

@@ -1,0 +1,151 @@
+"""The Stokes oracle between two planes: half of a mirrored cell against the whole, a direct solve,
+lattices, clipped spheres; the specimens of the slabs."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from direct_stokes import direct_tensor
+
+from fdnet.errors import CaseError
+from fdnet.spheres.snapshot import Array, Snapshot, resting
+from fdnet.studies.stokes.green import build_green, build_mirrored_green
+from fdnet.studies.stokes.stokes import extrapolate, solve_slab, solve_stokes
+from fdnet.studies.stokes.walls import find_walls
+
+EDGES = (7, 8, 9)
+CUT_PLACE = np.array(
+    [
+        [-1.3, 2, 2.5],
+        [0.4, 6, 5.0],
+        [2.7, 2.2, 5.5],
+        [6.9, 5.5, 2.0],
+        [8.6, 1.5, 6.1],
+        [-2.6, 6, 1],
+        [4.7, 7.5, 8.6],
+    ]
+)
+CUT_RADIUS = np.array([2.1, 1.7, 2.0, 2.2, 2.3, 2.9, 1.8])
+"""Spheres of which five are cut by a plane, three with their centres outside; the other two end
+less than a cell before a plane."""
+
+
+def cut_solid(point: Array) -> Array:
+    """Whether points (..., 3) lie in the solid of the cut spheres between 0 and 7 or its image."""
+    x = point[..., 0] % (2 * EDGES[0])
+    x = np.minimum(x, 2 * EDGES[0] - x)
+    within = np.zeros(point.shape[:-1], bool)
+    for centre, r in zip(CUT_PLACE, CUT_RADIUS, strict=True):
+        apart = [
+            (point[..., d] - centre[d] + EDGES[d] / 2) % EDGES[d] - EDGES[d] / 2 for d in (1, 2)
+        ]
+        within |= (x - centre[0]) ** 2 + apart[0] ** 2 + apart[1] ** 2 <= r * r
+    return within
+
+
+def whole(node: Array, shape: tuple[int, ...], component: int) -> Array:
+    """Flat indices (2, M) in the doubled grid of nodes of the half and of their images."""
+    i, j, k = np.unravel_index(node, (shape[0] + (component == 0), *shape[1:]))
+    doubled = (2 * shape[0], *shape[1:])
+    image = (2 * shape[0] - i - (component != 0)) % doubled[0]
+    return np.stack([np.ravel_multi_index((a, j, k), doubled) for a in (i, image)])
+
+
+def first_hit(place: Array, way: Array) -> float:
+    """Share of the step `way` after which it enters the solid: a coarse search, then bisection."""
+    steps = np.linspace(0.0, 1.0, 201)
+    first = int(np.argmax(cut_solid(place + steps[:, None] * way)))
+    low, high = steps[first - 1], steps[first]
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if cut_solid(place + middle * way) else (middle, high)
+    return high
+
+
+@pytest.mark.parametrize("component", range(3))
+def test_walls_of_cut_spheres(component):
+    """Against rays through the mirrored solid, at every node."""
+    walls = find_walls(CUT_PLACE, CUT_RADIUS, EDGES, component=component, mirrored=True)
+    nodes = (EDGES[0] + (component == 0), *EDGES[1:])
+    offset = np.full(3, 0.5)
+    offset[component] = 0.0
+    slack = dict(zip(walls.node.tolist(), walls.slack.tolist(), strict=True))
+    fluid = 0
+    for index in np.ndindex(*nodes):
+        node, place = int(np.ravel_multi_index(index, nodes)), np.array(index) + offset
+        if cut_solid(place):
+            assert slack.get(node, 0.0) == 0.0
+            continue
+        ways = [way for way in [*np.eye(3), *-np.eye(3)] if cut_solid(place + way)]
+        drag = sum(1.0 / first_hit(place, way) - 1.0 for way in ways)
+        own = 1.0 / slack[node] if node in slack else 0.0
+        assert own == pytest.approx(drag, rel=1e-4, abs=1e-4)
+        fluid += drag > 1e-3
+    assert fluid > 130
+
+
+def test_the_mirrored_response_is_that_of_the_doubled_grid():
+    shape = (5, 6, 7)
+    rng = np.random.default_rng(2)
+    half, doubled = build_mirrored_green(shape), build_green((10, 6, 7))
+    parts = [rng.normal(size=s).astype(np.float32) for s in half.shapes]
+    full = [np.zeros(doubled.shape, np.float32) for _ in range(3)]
+    places = [whole(np.arange(part.size), shape, d) for d, part in enumerate(parts)]
+    for d, (part, place) in enumerate(zip(parts, places, strict=True)):
+        full[d].reshape(-1)[place[0]] = part.reshape(-1)
+        full[d].reshape(-1)[place[1]] = (1.0 if d == 0 else -1.0) * part.reshape(-1)
+    slow = doubled.velocity([part - part.mean() for part in full])
+    fast = half.velocity(parts)
+    for d in range(3):
+        got, expected = fast[d].reshape(-1), slow[d].reshape(-1)[places[d][0]]
+        np.testing.assert_allclose(got - got.mean(), expected - expected.mean(), atol=3e-5)
+    assert max(np.abs(part).max() for part in fast) > 0.1
+
+
+def cut_slab() -> Snapshot:
+    box = np.array([[0.0, edge] for edge in EDGES])
+    return resting(CUT_PLACE, CUT_RADIUS, box)
+
+
+def test_a_direct_solve_of_the_whole_mirrored_cell_gives_the_same():
+    """One sparse LU on the doubled grid, with the walls of the half copied to their images."""
+    walls = []
+    for d in range(3):
+        half = find_walls(CUT_PLACE, CUT_RADIUS, EDGES, component=d, mirrored=True)
+        places = whole(half.node, EDGES, d)
+        walls.append((places.ravel(), np.tile(half.slack, 2)))
+    tensor = direct_tensor((2 * EDGES[0], *EDGES[1:]), walls)
+    assert np.abs(tensor[0, 1:]).max() < 1e-9 * tensor[0, 0]
+    k = solve_slab(cut_slab(), 0.0, EDGES[0], cells=EDGES[2], tolerance=1e-6).k
+    assert k == pytest.approx(tensor[0, 0], rel=1e-4)
+
+
+def test_half_of_a_cell_is_the_whole():
+    """Spheres that no plane cuts, with their images on the periodic grid."""
+    rng = np.random.default_rng(4)
+    place, r = rng.random((6, 3)) * [0.2, 1.0, 1.0] + [0.15, 0.0, 0.0], 0.14
+    half = resting(place, r, np.array([[0.0, 0.5], [0.0, 1.0], [0.0, 1.0]]))
+    both = resting(np.vstack([place, place * [-1, 1, 1]]), r, np.array([[0.0, 1.0]] * 3))
+    k = solve_slab(half, 0.0, 0.5, cells=20, tolerance=1e-6).k
+    assert k == pytest.approx(solve_stokes(both, cells=20, tolerance=1e-6).k, rel=1e-6)
+
+
+@pytest.mark.parametrize(("x_lo", "x_hi"), [(0.0, 0.5), (0.5, 1.0), (-0.5, 1.0)])
+def test_zick_and_homsy_cut_at_planes_of_symmetry(x_lo, x_hi):
+    """Touching spheres in a simple cubic lattice, cut through their centres and between them.
+
+    Drag factor 42.1: Zick and Homsy 1982, J. Fluid Mech. 115, 13, table 2.
+    """
+    chain = resting(
+        np.array([[i, 0.3, 0.7] for i in range(-2, 4)]), 0.5, np.array([[0.0, 1.0]] * 3)
+    )
+    cells = (48, 72) if x_hi - x_lo > 1.0 else (32, 48)
+    k = extrapolate(*(solve_slab(chain, x_lo, x_hi, cells=n) for n in cells)).k
+    assert k == pytest.approx(2.0 * 0.5**2 / (9.0 * (pi / 6) * 42.1), rel=0.005)
+
+
+def test_a_slab_needs_whole_cells_and_walls():
+    with pytest.raises(CaseError, match="no multiples"):
+        solve_slab(cut_slab(), 0.0, 6.5, cells=9)
+    with pytest.raises(CaseError, match="no wall"):
+        solve_slab(cut_slab(), 40.0, 47.0, cells=9)
