@@ -43,8 +43,8 @@ def even_state(network, *, volume, surface, layer=1e3, fine=0.0):
         pore_solid_surface=surface * network.pore_wall_surface,
         pore_fine_volume=np.full(pores, fine),
         pore_layer=np.full(pores, layer),
-        side_solid_volume=volume * np.maximum(void, 0.0),
-        side_solid_surface=surface * np.maximum(wall, 0.0),
+        side_solid_volume=volume * void,
+        side_solid_surface=surface * wall,
     )
 
 

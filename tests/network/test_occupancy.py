@@ -171,14 +171,38 @@ def test_fine_in_one_pore_against_random_points():
     assert volumes == pytest.approx(expected, rel=4 / np.sqrt(inside.sum()))
 
 
-@pytest.mark.parametrize("periodic", [(False, True, True), (True, False, True), NONE])
-def test_fines_of_a_walled_pack_count_once_with_their_mirror_images(periodic):
+def volume_inside(fines, periodic):
+    """Volume of balls on this side of the walls, by 20,000 points in each that a wall may cut."""
+    point = np.random.default_rng(2).normal(size=(20_000, 3))
+    point *= (np.random.default_rng(3).random(20_000) ** (1 / 3) / np.linalg.norm(point, axis=1))[
+        :, None
+    ]
+    walled = ~np.array(periodic)
+    low, high = fines.box.T
+    total = 0.0
+    for centre, radius in zip(fines.position, fines.radius, strict=True):
+        place = centre + radius * point
+        inside = np.all(((place > low) & (place < high)) | ~walled, axis=1)
+        total += inside.mean() * 4 / 3 * np.pi * radius**3
+    return total
+
+
+@pytest.mark.parametrize("periodic", [ALL, (False, True, True), (True, False, True), NONE])
+def test_every_fine_in_the_box_counts_once(periodic):
+    """By pores; and by sides of throats, with the pores that inlet and outlet cut."""
     pack = with_fines(random_pack(60), 200, 0.2)
+    fines = pack.fines()
+    upstream = replace(fines, position=fines.position - [[0.5 * fines.position[:, 0].max(), 0, 0]])
     network = build_network(pack.grains(), periodic=periodic, walls="slip")
-    occupancy = measure_occupancy(network, pack.fines())
-    assert np.sum(network.pore_share * occupancy.pore_solid_volume) == pytest.approx(
-        200 * 4 / 3 * np.pi * 0.2**3, rel=1e-9
-    )
+    for deposit in (fines, upstream):
+        occupancy = measure_occupancy(network, deposit)
+        by_pore = network.pore_share * occupancy.pore_solid_volume
+        assert by_pore.sum() == pytest.approx(volume_inside(deposit, periodic), rel=1e-3)
+        cut = network.pore_position[:, :1] == network.box[0]
+        face = np.any(cut, axis=1) & (not periodic[0])
+        by_side = occupancy.side_solid_volume * network.throat_share[:, None]
+        by_side = np.where(face[network.throat_pores], 0.0, by_side)
+        assert by_side.sum() + by_pore[face].sum() == pytest.approx(by_pore.sum(), rel=1e-6)
 
 
 def test_a_throat_between_pores_at_one_place_is_a_disc_across_x():

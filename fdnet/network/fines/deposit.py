@@ -4,7 +4,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fdnet.network.fines.ball import fill_pieces
-from fdnet.network.fines.fine_images import mirrored_images
+from fdnet.network.fines.fine_images import periodic_images
+from fdnet.network.fines.inside import clip_to_box
 from fdnet.network.fines.point_search import points_in_boxes
 from fdnet.network.network import Network
 from fdnet.spheres.images import wrapped
@@ -15,11 +16,12 @@ THIN_SIDE = 1e-6
 
 
 def deposit_in_pores(network: Network, fines: Snapshot) -> tuple[Array, Array, Array, Array]:
-    """What `fines`, all centred in the box, fill of each tetrahedron.
+    """What `fines`, each reaching into the box, fill of each tetrahedron.
 
-    Images across periodic sides and mirror images across the other faces count too (a pore that
-    such a face cuts is the whole mirrored tetrahedron). What fines hide of each other or of grains
-    is not subtracted.
+    Only what lies inside the box counts, with the images across periodic sides. A pore that a
+    mirrored face cuts stands for the whole mirrored tetrahedron, so what the part inside holds is
+    divided by the share inside (`Network.pore_share`); this is exact for all pores of one
+    `pore_group` together. What fines hide of each other or of grains is not subtracted.
 
     The thickness of the layer is mean(y) + sqrt(5 variance(y) + r^2), with y the distance of the
     centre of a fine from the nearest grain and r its radius. That is 2 r for fines on the grains
@@ -35,51 +37,61 @@ def deposit_in_pores(network: Network, fines: Snapshot) -> tuple[Array, Array, A
         [4.0 / 3.0 * np.pi * fines.radius**3, distance, 5.0 * distance**2 + fines.radius**2],
         axis=1,
     )
-    volume, surface, *sums = _filled(network, network.pore_corner, fines, value).T
+    inside = _filled(network, network.pore_corner, fines, value)
+    volume, surface, *sums = (inside / network.pore_share[:, None]).T
     whole, mean, square = (total / np.where(volume > 0, volume, 1.0) for total in sums)
     return volume, surface, whole, mean + np.sqrt(np.maximum(square - 5.0 * mean**2, 0.0))
 
 
 def deposit_on_sides(network: Network, fines: Snapshot) -> tuple[Array, Array]:
-    """What `fines`, all centred in the box, fill of the two sides of each throat.
+    """What `fines`, each reaching into the box, fill of the two sides of each throat.
 
-    A side is the pyramid from the facet to the power centre of a pore.
+    A side is the pyramid from the facet to the power centre of a pore. Where that centre lies
+    behind the facet, the pyramid is subtracted, as are its void and surface in `side_voids`: with
+    the signs, the sides of all facets of a pack fill space once.
 
     Returns:
         Volume (T, 2) m3 and surface (T, 2) m2 of the fines in the sides of the first and second
-        pore; 0 where the power centre lies on or behind the facet.
+        pore; 0 where the power centre lies on the facet, negative where it lies behind.
     """
     filled = np.zeros((len(network.throat_pores), 2, 2))
     facet = network.throat_corner
     for side in (0, 1):
-        real = np.flatnonzero(network.throat_heights[:, side] > THIN_SIDE * network.grain_radius)
+        height = network.throat_heights[:, side]
+        real = np.flatnonzero(np.abs(height) > THIN_SIDE * network.grain_radius)
         apex = network.pore_power_centre[network.throat_pores[real, side]]
         if side == 1:
             apex = apex + network.throat_shift[real] * np.ptp(network.box, axis=1)
         corner = np.concatenate([apex[:, None], facet[real]], axis=1)
-        filled[real, side] = _filled(network, corner, fines, np.zeros((len(fines), 0)))
+        inside = _filled(network, corner, fines, np.zeros((len(fines), 0)))
+        signed_share = np.copysign(network.throat_share[real], height[real])
+        filled[real, side] = inside / signed_share[:, None]
     return filled[..., 0], filled[..., 1]
 
 
 def _filled(network: Network, corner: Array, fines: Snapshot, value: Array) -> Array:
     """Volume m3, surface m2 and volume times each value of the fines in tetrahedra: (C, 2 + W).
 
-    The tetrahedra have the corners `corner` (C, 4, 3) m; `value` (N, W) belongs to the fines.
+    Only what lies inside the box is counted. The tetrahedra have the corners `corner` (C, 4, 3) m;
+    `value` (N, W) belongs to the fines.
     """
-    filled = np.zeros((len(corner), 2 + value.shape[1]))
-    if not len(fines) or not len(corner):
-        return filled
-    corner = np.ascontiguousarray(corner)
-    low, high = corner.min(axis=1), corner.max(axis=1)
+    total = np.zeros((len(corner), 2 + value.shape[1]))
+    piece, owner = clip_to_box(corner, network.box, network.periodic)
+    if not len(fines) or not len(piece):
+        return total
+    piece = np.ascontiguousarray(piece)
+    filled = np.zeros((len(piece), total.shape[1]))
+    low, high = piece.min(axis=1), piece.max(axis=1)
     for fine in size_classes(fines.radius):
         radius, largest = fines.radius[fine], float(fines.radius[fine].max())
-        position, owner = mirrored_images(
+        position, image = periodic_images(
             network, fines.position[fine], low.min(axis=0), high.max(axis=0), largest
         )
         pairs = points_in_boxes(position, low - largest, high + largest)
-        balls = (position, radius[owner], np.ascontiguousarray(value[fine][owner]))
-        fill_pieces(corner, pairs, balls, filled)
-    return filled
+        balls = (position, radius[image], np.ascontiguousarray(value[fine][image]))
+        fill_pieces(piece, pairs, balls, filled)
+    np.add.at(total, owner, filled)
+    return total
 
 
 def size_classes(radius: Array) -> list[Array]:

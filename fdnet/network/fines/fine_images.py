@@ -1,4 +1,4 @@
-"""Images of fines: shifted across the periodic sides, mirrored across the other faces."""
+"""Which fines reach into the box, and their images across its periodic sides."""
 
 import numpy as np
 
@@ -19,6 +19,26 @@ def reaching_inside(network: Network, fines: Snapshot) -> Array:
     reach = fines.radius[:, None]
     inside = (fines.position + reach > low) & (fines.position - reach < high)
     return np.all(inside | np.array(network.periodic), axis=1)
+
+
+def periodic_images(
+    network: Network, position: Array, low: Array, high: Array, largest: float
+) -> tuple[Array, Array]:
+    """Places (M, 3) m and owners (M,) of all images across the periodic sides, near a region.
+
+    The region is [`low`, `high`] (3,) m, widened by `largest` m; `position` (N, 3) m.
+    """
+    margin = (
+        np.maximum(np.maximum(network.box[:, 0] - low, high - network.box[:, 1]), 0.0) + largest
+    )
+    images = make_images(
+        position,
+        network.box,
+        periodic=network.periodic,
+        margin=np.where(network.periodic, margin, np.nan),
+        tolerance=0.0,
+    )
+    return images.position, images.owner
 
 
 def mirrored_images(

@@ -8,7 +8,7 @@ import numpy as np
 from fdnet.errors import CaseError, NetworkError
 from fdnet.network.fines.cylinder import OVERLAPS, Pairs
 from fdnet.network.fines.deposit import deposit_in_pores, deposit_on_sides
-from fdnet.network.fines.fine_images import centred_inside
+from fdnet.network.fines.fine_images import centred_inside, reaching_inside
 from fdnet.network.fines.in_throats import FinesInThroats, fines_in_throats
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
@@ -20,7 +20,8 @@ class Occupancy:
 
     A throat here is the cylinder of its inscribed radius between the positions of its two pores
     (Shi 2011, section 3.2.2). A side of a throat is the pyramid from its facet to the power centre
-    of the first or second pore.
+    of the first or second pore; where that centre lies behind the facet, the pyramid is
+    subtracted, so that the sides of all facets fill space once.
 
     Attributes:
         throat_solid_volume: (T,) m3, fines in the cylinder.
@@ -34,8 +35,9 @@ class Occupancy:
         pore_porosity: (P,) (void - fines) / tetrahedron.
         pore_fine_volume: (P,) m3, mean volume of a whole fine, weighted by the volume in the pore.
         pore_layer: (P,) m, thickness of the layer that the fines make on the grains, weighted so.
-        side_solid_volume: (T, 2) m3, fines in the two sides of the throat.
-        side_solid_surface: (T, 2) m2, surface of the fines in the two sides.
+        side_solid_volume: (T, 2) m3, fines in the two sides of the throat, with the sign of the
+            side.
+        side_solid_surface: (T, 2) m2, surface of the fines in the two sides, likewise.
         pair_throat: (K,) index of the throat.
         pair_fine: (K,) index of the fine.
         pair_distance: (K,) distance of the centre of the fine from the axis over the radius of
@@ -78,9 +80,11 @@ def measure_occupancy(
 ) -> Occupancy:
     """What `fines` fill of the throats and pores of a network (Shi 2011, section 3.2).
 
-    Throats see the fines whose sphere reaches into the box, pores those centred in it. Both also
-    see the mirror images of the latter across faces that are not periodic, where the pores and
-    throats that the face cuts are whole. Fines centred outside are counted (`fines_outside_box`).
+    Throats and pores see every fine whose sphere reaches into the box, also one that is centred
+    upstream of it. Pores and sides of throats hold what of it lies inside the box; a pore or
+    throat that a mirrored face cuts stands for its mirrored part as well. Throats also see the
+    mirror images of the fines centred inside. Fines centred outside are counted
+    (`fines_outside_box`).
 
     Args:
         network: pores and throats of the grains.
@@ -109,7 +113,8 @@ def measure_occupancy(
     _refuse_wide(network, fines)
     inside = centred_inside(network, fines.position)
     throats = fines_in_throats(network, fines, overlap)
-    fields = _throat_fields(network, throats) | _pore_fields(network, fines.where(inside))
+    reaching = fines.where(reaching_inside(network, fines))
+    fields = _throat_fields(network, throats) | _pore_fields(network, reaching)
     counts = {
         "fines_outside_box": int(np.sum(~inside)),
         "throat_porosity_negative": int(np.sum(fields["throat_porosity"] < 0)),
@@ -151,10 +156,10 @@ def _throat_fields(network: Network, throats: FinesInThroats) -> dict[str, Array
     }
 
 
-def _pore_fields(network: Network, inside: Snapshot) -> dict[str, Array]:
-    """The fields by pore and by side of a throat, from the fines centred in the box."""
-    solid, surface, fine_volume, layer = deposit_in_pores(network, inside)
-    side_solid, side_surface = deposit_on_sides(network, inside)
+def _pore_fields(network: Network, reaching: Snapshot) -> dict[str, Array]:
+    """The fields by pore and by side of a throat, from the fines that reach into the box."""
+    solid, surface, fine_volume, layer = deposit_in_pores(network, reaching)
+    side_solid, side_surface = deposit_on_sides(network, reaching)
     return {
         "pore_solid_volume": solid,
         "pore_solid_surface": surface,

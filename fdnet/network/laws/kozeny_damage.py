@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.network.fines.occupancy import Occupancy, ratio
+from fdnet.network.flow.links import PLANE_TOLERANCE
 from fdnet.network.laws.damage import BLOCKED, CLEAN, KOZENY, Damage
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.pyramids import side_voids
@@ -42,7 +43,9 @@ def side_kozeny_damage(network: Network, occupancy: Occupancy, clean: Array) -> 
     v and a are volume and surface of the fines over those of void and grains, as in
     `kozeny_damage`. They are taken in the side where a fine is much smaller than a quarter of the
     void of the pore, and in the whole pore where it is larger: the weight of the side is
-    1 / (1 + (4 V_fine / void)^2), with the volume V_fine of a fine.
+    1 / (1 + (4 V_fine / void)^2), with the volume V_fine of a fine. Pores that the inlet or the
+    outlet face cuts are always taken whole, for the fluid crosses them whole. With the sign of
+    the sides every fine counts once.
 
     s = 1 - (1 - t)^2 is the share of the section of a round tube that lies within the layer of
     fines on its wall. The radius of the tube is twice the hydraulic radius of the pack (void over
@@ -55,15 +58,7 @@ def side_kozeny_damage(network: Network, occupancy: Occupancy, clean: Array) -> 
     """
     pore = _pore_deposit(network, occupancy)
     ends = network.throat_pores
-    void, wall = side_voids(network)
-    open_side = (network.throat_heights > 0) & (void > 0) & (wall > 0)
-    own = np.where(open_side, 1.0 / (1.0 + (4.0 * ratio(pore.fine, pore.void))[ends] ** 2), 0.0)
-    volume = (
-        own * ratio(occupancy.side_solid_volume, np.where(open_side, void, 0.0))
-        + (1.0 - own) * pore.volume[ends]
-    )
-    surface = own * ratio(occupancy.side_solid_surface, np.where(open_side, wall, 0.0))
-    surface += (1.0 - own) * pore.surface[ends]
+    volume, surface = _on_sides(network, occupancy, pore)
     share = 1.0 - (1.0 - np.clip(pore.layer / (2.0 * _hydraulic_radius(network)), 0.0, 1.0)) ** 2
     filled = (volume >= 1.0) | pore.filled[ends]
     factor = np.where(filled, 0.0, _kozeny(np.minimum(volume, 1.0), surface, share[ends]))
@@ -75,6 +70,39 @@ def side_kozeny_damage(network: Network, occupancy: Occupancy, clean: Array) -> 
     }
     law = _law_used(np.any(volume > 0, axis=1), kept)
     return Damage(conductance=frozen(clean * kept), law_used=law, counts=counts)
+
+
+def _on_sides(network: Network, occupancy: Occupancy, pore: "_PoreDeposit") -> tuple[Array, Array]:
+    """Volume and surface (T, 2) of the fines over void and grain surface, as the sides see them.
+
+    They are weighted means of the side's own values and of those of its pore. A throat with both
+    power centres on one side of its facet has one side, the difference of the two pyramids.
+    """
+    void, wall = side_voids(network)
+    single = np.any(network.throat_heights <= 0, axis=1)
+    void, wall, solid, area = (
+        np.where(single[:, None], part.sum(axis=1, keepdims=True), part)
+        for part in (void, wall, occupancy.side_solid_volume, occupancy.side_solid_surface)
+    )
+    ends = network.throat_pores
+    own = (void > 0) & (wall > 0) & (solid >= 0) & ~_on_pressure_plane(network)[ends]
+    weight = np.where(own, 1.0 / (1.0 + (4.0 * ratio(pore.fine, pore.void)[ends]) ** 2), 0.0)
+    volume = weight * ratio(solid, np.where(own, void, 0.0)) + (1.0 - weight) * pore.volume[ends]
+    surface = weight * ratio(area, np.where(own, wall, 0.0)) + (1.0 - weight) * pore.surface[ends]
+    return volume, surface
+
+
+def _on_pressure_plane(network: Network) -> Array:
+    """Whether the inlet or the outlet face of the box cuts a pore (P,).
+
+    Such a pore is the prism between a facet and its mirror image. The fluid enters through its
+    whole section, but it has no throat across the face, so its sides hold a part of it only.
+    """
+    if network.periodic[0]:
+        return np.zeros(len(network.pore_position), bool)
+    tolerance = PLANE_TOLERANCE * float(np.ptp(network.box[0]))
+    apart = np.abs(network.pore_position[:, :1] - network.box[0])
+    return np.any(apart <= tolerance, axis=1)
 
 
 def _law_used(taken: Array, kept: Array) -> Array:

@@ -71,7 +71,7 @@ def _halves(
         low, high = -heights[t, 0], heights[t, 1]
         high = max(high, low + floor)
         even = np.max(radius[t]) - np.min(radius[t]) <= EQUAL * radius[t, 0]
-        wedge = wedges(corner[t]) if even else np.empty((0, 3))
+        wedge = wedges(corner[t]) if even else np.empty((0, 7))
         wall = (order[t], place[t], part[t])
         if low < 0.0 and high > 0.0:
             resistance[t, 0] = _resistance(
@@ -119,7 +119,7 @@ def _resistance(
             flux = part * _slipping_flux(base, disc, wedge, table)
         if not flux > 0.0:
             return np.inf
-        narrow[k] = (8.0 * flux / np.pi) ** -0.25
+        narrow[k] = 1.0 / np.sqrt(np.sqrt(8.0 * flux / np.pi))
     return (4.0 * summed(narrow, step, 1, widening) - summed(narrow, step, 2, widening)) / 3.0
 
 
