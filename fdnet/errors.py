@@ -127,7 +127,7 @@ def words_of(error: Exception) -> str:
     if isinstance(error, OSError):
         where, what = error.filename or "system", error.strerror or error
         return f"{where}: {what}; {cure_of(error)}, then repeat the command (a run: with --resume)"
-    if isinstance(error, ImportError):
+    if isinstance(error, ImportError | SystemError):  # Python's own, when memory runs out
         what = " ".join(str(error).split())[:200]
         return (
             f"a library cannot be loaded ({what}); give fdnet more memory, or install it again "

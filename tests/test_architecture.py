@@ -25,6 +25,7 @@ NETWORK_LAYERS = [
     ["network"],
     ["fines", "flow"],
     ["laws", "specimen", "analysis"],
+    ["resolved"],
     ["permeability"],
 ]
 STUDIES_LAYERS = [

@@ -49,7 +49,11 @@ def test_growth_is_the_exponent_of_the_time():
 
 def test_small_run_of_all_steps(tmp_path, root, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(root))
-    rows = {row["step"]: row for row in network.fdnet_rows(80, 50, tmp_path, 300)}
+    every = network.fdnet_rows(80, 50, tmp_path, 300)
+    walled = {row["step"]: row["cpu_s"] for row in every if row["case"] == "walled"}
+    assert walled.pop("total intact") == pytest.approx(sum(walled.values()))
+    assert list(walled) == ["tessellate", "geometry", "conductance", "solve"]
+    rows = {row["step"]: row for row in every if row["case"] == "tiled"}
     assert {
         "tessellate",
         "geometry",

@@ -234,6 +234,9 @@ def test_a_terminal_that_knows_ascii_alone_and_names_that_are_no_utf_8(tmp_path,
     assert refused.returncode == 2
     assert b"is not UTF-8" in refused.stderr
     assert not strange.exists()
+    done = command("render", case, "--out", tmp_path / "körner", **surroundings)
+    assert done.returncode == 0, done.stderr
+    assert b"k\\xf6rner/pack/in.pack" in done.stdout
 
 
 def test_a_reader_that_has_gone_does_not_fail_the_command(tmp_path):
@@ -257,6 +260,17 @@ def test_a_library_that_cannot_be_loaded_is_named(tmp_path, capsys, monkeypatch)
     monkeypatch.setitem(sys.modules, "fdnet.spheres.readers", None)
     arguments = ("permeability", table, "--units", "mm", "--box", "0,1,0,1,0,1")
     assert "fdnet: a library cannot be loaded (" in refusal(capsys, *arguments)
+
+
+def test_a_failure_of_python_itself_for_want_of_memory_is_named(capsys, monkeypatch, tmp_path):
+    """Attack 939 of seed 1: an import under a limit of 300 MiB ended with a SystemError."""
+    from fdnet.permeability import command as permeability_command
+
+    def importing(_):
+        raise SystemError("_find_and_load returned NULL without setting an exception")
+
+    monkeypatch.setattr(permeability_command, "run", importing)
+    assert "give fdnet more memory" in refusal(capsys, "permeability", tmp_path / "s.csv")
 
 
 def test_a_stop_that_a_library_turns_into_its_own_error_is_a_stop(capsys, monkeypatch, tmp_path):

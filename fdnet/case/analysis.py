@@ -1,14 +1,15 @@
 """How permeability is computed: the table [analysis] of a case, or the same without one."""
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Annotated, Any, Literal, TypedDict, TypeVar
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, ValidationError
 
 from fdnet.case.names import (
-    DEFAULT_DAMAGE_LAW,
+    ALL_SPHERES,
+    AUTO,
     DEFAULT_LAW,
     MOST_SECTIONS,
     DamageLawName,
@@ -53,8 +54,10 @@ class AnalysisChoices(Part):
     )
     law: LawName = Field(DEFAULT_LAW, description="Conductance of a clean throat.")
     damage_law: DamageLawName = Field(
-        DEFAULT_DAMAGE_LAW,
-        description="Conductance of a throat with fines over that of the clean one.",
+        AUTO,
+        description="How fines lower the permeability: a law that damages the throats between "
+        'grains, or "all-spheres", the network of grains and fines together. "auto" takes the '
+        "most accurate one that its cost allows.",
     )
     clogging_threshold: Fraction | None = Field(
         None,
@@ -81,6 +84,15 @@ class AnalysisChoices(Part):
         '"lubrication" and "side-kozeny".',
     )
 
+    def refusals(self) -> Iterator[str]:
+        """Why laws do not go together, one sentence each."""
+        if self.damage_law == ALL_SPHERES and self.law != DEFAULT_LAW:
+            yield (
+                f"analysis.damage_law: {ALL_SPHERES!r} is a network of its own with the law "
+                f"{DEFAULT_LAW!r}, analysis.law is {self.law!r}; take analysis.law = "
+                f"{DEFAULT_LAW!r}, or another damage law"
+            )
+
     @property
     def profile_bin_m(self) -> float | None:
         """Width of the depth bins, m; None stands for the mean radius of the grains."""
@@ -95,9 +107,12 @@ class AnalysisChoices(Part):
         given = {"sections": 1, "profile_bin_mm": None} | keys
         given["sections"] = _plain_sections(given["sections"])
         try:
-            return cls.model_validate(given)
+            choices = cls.model_validate(given)
         except ValidationError as error:
             raise CaseError("; ".join(map(_refusal, error.errors()))) from None
+        for refusal in choices.refusals():
+            raise CaseError(refusal)
+        return choices
 
     def changed(self, **keys: Any) -> "AnalysisChoices":
         """The same choices with `keys` changed. Raises CaseError as `of_pack` does."""

@@ -201,6 +201,10 @@ def _sections(analysis: AnalysisChoices) -> Iterator[str]:
         yield f"analysis.sections: {analysis.sections}: a case gives the number of sections"
 
 
+def _laws(analysis: AnalysisChoices) -> Iterator[str]:
+    yield from analysis.refusals()
+
+
 def _profile_bins(box: Box, analysis: AnalysisChoices) -> Iterator[str]:
     thickness = analysis.profile_bin_mm
     if thickness is None:
@@ -231,6 +235,7 @@ RULES = (
     Rule(("gravity.mode", "gravity.acceleration_m_s2", "gravity.buoyancy"), _buoyancy),
     Rule(("run.duration_ms", "run.cap_ms"), _end),
     Rule(("analysis.sections",), _sections),
+    Rule(("analysis.law", "analysis.damage_law"), _laws),
     Rule(("box.size_mm", "analysis.profile_bin_mm"), _profile_bins),
 )
 """All rules, in the order in which their problems are reported."""

@@ -1,9 +1,10 @@
 """What the analysis of a specimen gives."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from fdnet.network.fines.occupancy import Occupancy
+from fdnet.network.flow.depth import Layers
 from fdnet.network.flow.flow import Flow
 from fdnet.network.flow.sections import Profile, Section
 from fdnet.network.network import Network
@@ -22,7 +23,14 @@ class Analysis:
         network: pores and throats of the grains.
         occupancy: what the fines fill of each pore and throat; None without fines.
         law: name of the conductance law.
-        damage_law: name of the damage law.
+        damage_law: name of the damage law that was asked for.
+        damage_law_used: the one that `k_damaged` and the sections are from, where "auto" was asked
+            for the one that it took; None without fines.
+        damage_law_other: name of the other of `all-spheres` and `side-kozeny`, where it was
+            computed as well; else None. Values by pore and throat are of the network of the
+            grains, so with `all-spheres` they are those of this law.
+        k_damaged_other: permeability with fines by that law, m2; else None. The difference to
+            `k_damaged` is a measure of the error.
         conductance_initial: (T,) clean conductance of each throat, m3 (flux times viscosity over
             pressure drop).
         conductance_damaged: (T,) the same with fines, m3.
@@ -39,6 +47,8 @@ class Analysis:
         porosity_damaged: porosity with fines, overlap of spheres counted once.
         sections: slabs across the flow, each with its own permeability and porosity.
         profile: porosity and fines in finer bins of depth.
+        layers: permeability and pressure drop of thin layers of the first millimetre; None unless
+            the network of all spheres was solved.
         invaded_count: number of fines centred in the specimen.
         invaded_volume: their volume, m3.
         invasion_depth: depth of the deepest of them, m.
@@ -54,6 +64,9 @@ class Analysis:
     occupancy: Occupancy | None
     law: str
     damage_law: str
+    damage_law_used: str | None
+    damage_law_other: str | None
+    k_damaged_other: float | None
     conductance_initial: Array
     conductance_damaged: Array
     law_used: Array
@@ -69,6 +82,7 @@ class Analysis:
     porosity_damaged: float
     sections: tuple[Section, ...]
     profile: Profile
+    layers: Layers | None
     invaded_count: int
     invaded_volume: float
     invasion_depth: float
@@ -85,7 +99,27 @@ class Analysis:
             f"Analysis(k_initial={self.k_initial:.4g} m2, k_damaged={self.k_damaged:.4g} m2, "
             f"porosity={self.porosity_initial:.4f} -> {self.porosity_damaged:.4f}, "
             f"{pores} pores, {throats} throats, {len(self.sections)} sections, "
-            f"law={self.law}, damage_law={self.damage_law})"
+            f"law={self.law}, damage_law={self.damage_law_used or self.damage_law})"
+        )
+
+
+APART = 1.25
+"""Ratio of two laws' permeabilities from which a warning says that they differ."""
+
+
+def laws_apart(k: float, other: float, name: str) -> Iterator[str]:
+    """A warning where the k of `all-spheres` and that by the law `name` differ by much, m2."""
+    low, high = min(k, other), max(k, other)
+    if high > APART * low:
+        times = f"{high / low:.2f} times" if low > 0 else "above"
+        more = "above" if other > k else "below"
+        yield (
+            f"two ways of measuring the damage differ: {name} gives {other:.4g} m2, {more} the "
+            f"{k:.4g} m2 of all-spheres (the larger is {times} the smaller); take the difference "
+            "as the error of the damaged permeability"
+            if low > 0
+            else f"two ways of measuring the damage differ: {name} gives {other:.4g} m2, "
+            f"all-spheres {k:.4g} m2; one of them finds no open path"
         )
 
 

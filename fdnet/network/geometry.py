@@ -154,17 +154,6 @@ def power_centre(corner: Array, radius: Array) -> tuple[Array, Array]:
     return corner[..., 0, :] + offset, dot(offset, offset) - first[..., 0] ** 2
 
 
-def contains(corner: Array, point: Array, *, tolerance: float = 1e-9) -> Array:
-    """True (...) where `point` (..., 3) lies in the tetrahedron (..., 4, 3) or on its faces.
-
-    A barycentric coordinate may be negative by `tolerance`.
-    """
-    side = np.swapaxes(corner[..., 1:, :] - corner[..., :1, :], -1, -2)
-    share = _solve(side, (point - corner[..., 0, :])[..., None])[..., 0]
-    with np.errstate(invalid="ignore"):
-        return np.all(share >= -tolerance, axis=-1) & (share.sum(axis=-1) <= 1.0 + tolerance)
-
-
 def flat(triangle: Array) -> Array:
     """Corners (..., 3, 2) of triangles (..., 3, 3) in their own plane, the first at the origin."""
     ab, ac = triangle[..., 1, :] - triangle[..., 0, :], triangle[..., 2, :] - triangle[..., 0, :]

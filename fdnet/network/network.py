@@ -37,6 +37,10 @@ class Network:
         image_grain: (M,) index of the grain.
         image_position: (M, 3) m.
         image_radius: (M,) m.
+        image_height: (M,) m, how far the image reaches from its centre along x. It is the radius,
+            and less for the half ellipsoid (semi-axes h along x and (r^3 / h)^(1/2) across, with
+            the radius r of the half sphere of its volume) that stands for the cap of a grain
+            centred beyond an x face.
         pore_images: (P, 4) images at the corners of the tetrahedron.
         pore_wrap: (P, 3) whole periods by which these images lie beyond the place of the pore.
         pore_position: (P, 3) m, centre of the sphere that touches the four grains; the centroid
@@ -73,6 +77,7 @@ class Network:
     image_grain: Array
     image_position: Array
     image_radius: Array
+    image_height: Array
     pore_images: Array
     pore_wrap: Array
     pore_position: Array
@@ -136,6 +141,11 @@ class Network:
     def throat_corner_radius(self) -> Array:
         """Radii (T, 3) m of the grains at the corners of the facet."""
         return self.image_radius[self.throat_images]
+
+    @property
+    def throat_corner_height(self) -> Array:
+        """Heights along x (T, 3) m of the grains at the corners of the facet."""
+        return self.image_height[self.throat_images]
 
     @property
     def throat_ends(self) -> Array:
@@ -205,6 +215,7 @@ def _assembled(
         image_grain=placed.index[points.owner],
         image_position=points.position,
         image_radius=points.radius,
+        image_height=placed.height[points.owner],
         pore_images=pores.vertex,
         pore_wrap=pores.wrap,
         pore_position=pores.position,

@@ -1,28 +1,25 @@
 """Permeability of a pack before and after fines: the whole network analysis of one specimen."""
 
-import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
-from itertools import pairwise, product
-from typing import Unpack
+from itertools import product
+from typing import Any, Unpack
 
 import numpy as np
 
 from fdnet.case.analysis import AnalysisChoices, AnalysisKeys, with_visible_choices
-from fdnet.network.analysis import Analysis, worst_solve
+from fdnet.case.names import ALL_SPHERES, AUTO, DEFAULT_DAMAGE_LAW, law_pairs
+from fdnet.network.analysis import Analysis, laws_apart, worst_solve
 from fdnet.network.fines.occupancy import Occupancy
+from fdnet.network.flow.depth import Layers, Solved, layer_edges, make_layers
 from fdnet.network.flow.flow import Flow
 from fdnet.network.flow.sections import Section, make_profile, make_sections, reduction, thin_slabs
-from fdnet.network.flow.slabs import (
-    SlabK,
-    inplace_permeability,
-    slab_permeability,
-    whole_permeability,
-)
+from fdnet.network.flow.slabs import SlabK
 from fdnet.network.laws.damage import CLEAN, Damage
-from fdnet.network.laws.named import DAMAGE_LAWS, LAWS, damage_law
-from fdnet.network.network import Network
+from fdnet.network.laws.named import LAWS
+from fdnet.network.resolved.all_spheres import AllSpheres
+from fdnet.network.resolved.measured import Measured
+from fdnet.network.resolved.slab import Sides
+from fdnet.network.resolved.state import Log, State, capped, solved
 from fdnet.network.specimen.specimen import (
     Specimen,
     measure_specimen,
@@ -30,33 +27,7 @@ from fdnet.network.specimen.specimen import (
     specimen_doubts,
 )
 from fdnet.spheres.directions import Directions, periodic_axes
-from fdnet.spheres.snapshot import Array, Snapshot, frozen
-
-STAGES = ("tessellate", "occupancy", "conductance", "solve", "porosity")
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _State:
-    """A network with its conductance, its flow through the whole box and its k."""
-
-    network: Network
-    conductance: Array
-    flow: Flow
-    k: float
-
-
-@dataclass(slots=True)
-class _Log:
-    """Seconds of each stage, and warnings for the user."""
-
-    seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
-    warnings: list[str] = field(default_factory=list)
-
-    @contextmanager
-    def timed(self, stage: str) -> Iterator[None]:
-        start = time.perf_counter()
-        yield
-        self.seconds[stage] += time.perf_counter() - start
+from fdnet.spheres.snapshot import Snapshot, frozen
 
 
 @with_visible_choices
@@ -161,116 +132,129 @@ def compare(
     if damaged is None and len(spheres.fines()):
         damaged = spheres
     if laws is None:
-        rules = DAMAGE_LAWS if damaged is not None else [base.damage_law]
-        laws = list(product(LAWS, rules))
+        laws = law_pairs() if damaged is not None else list(product(LAWS, [base.damage_law]))
     chosen = [base.changed(law=law, damage_law=damage_law) for law, damage_law in laws]
-    log = _Log()
+    log = Log()
     specimen = measure_specimen(spheres, damaged, periodic=around, choices=base, timed=log.timed)
-    clean: dict[str, tuple[_State, SlabK]] = {}
+    measured = Measured(specimen=specimen, sides=Sides(periodic=around, walls=base.walls))
     for one in chosen:
-        yield _analysis(specimen, one, clean, log)
-        log = _Log()
+        yield _analysis(measured, one, log)
+        log = Log()
 
 
 def _chosen(options: AnalysisChoices | None, choices: AnalysisKeys) -> AnalysisChoices:
     return AnalysisChoices.of_pack(**choices) if options is None else options.changed(**choices)
 
 
-def _analysis(
-    specimen: Specimen, options: AnalysisChoices, known: dict[str, tuple[_State, SlabK]], log: _Log
-) -> Analysis:
-    if options.law not in known:
-        state = _clean_state(specimen.first, options, log)
-        known[options.law] = state, _slab_k(state, specimen.edges, log)
-    clean, clean_slabs = known[options.law]
-    base = _clean_state(specimen.network, options, log) if specimen.moved else clean
-    damage = _damage(base, specimen.occupancy, options, log)
-    final = base if damage is None else _state(base.network, damage.conductance, log)
-    slabs = clean_slabs if final is clean else _slab_k(final, specimen.edges, log)
-    sections = make_sections(
-        specimen.edges, specimen.porosity, (clean_slabs, slabs), specimen.depth
-    )
-    porosity, invaded = specimen.porosity, specimen.invaded
-    _warn(log, (clean, final), sections)
+def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysis:
+    specimen, law = measured.specimen, options.law
+    clean, clean_slabs = measured.clean(law, log)
+    base = measured.base(law, log)
+    whole = measured.wanted(options, base, log)
+    name = options.damage_law
+    if name in (AUTO, ALL_SPHERES):
+        name = DEFAULT_DAMAGE_LAW
+    final, damage = measured.damaged(options, name, log)
+    k_damaged, slabs = final.k, clean_slabs
+    more: dict[str, int] = {}
+    if whole is not None:
+        k_damaged, slabs, more = _resolved(whole, base, (clean_slabs, specimen.moved), log)
+    elif final is not clean:
+        slabs = measured.damaged_slabs(final, options, name, log)
+    pair = clean_slabs, slabs
+    sections = make_sections(specimen.edges, specimen.porosity, pair, specimen.depth)
+    _warn(log, (clean, final if whole is None else whole.solved), sections)
     log.warnings += specimen_doubts(specimen, clean.k, options.walls)
+    if whole is not None:
+        log.warnings += laws_apart(k_damaged, final.k, name)
     law_used = np.full(len(final.conductance), CLEAN) if damage is None else damage.law_used
+    flows = [clean.flow, base.flow, final.flow, *clean_slabs.flows, *slabs.flows]
     return Analysis(
         network=base.network,
         occupancy=specimen.occupancy,
-        law=options.law,
+        law=law,
         damage_law=options.damage_law,
+        damage_law_used=_used(specimen, whole, name),
+        damage_law_other=None if whole is None else name,
+        k_damaged_other=None if whole is None else final.k,
         conductance_initial=base.conductance,
         conductance_damaged=final.conductance,
         law_used=frozen(law_used),
         flow_initial=base.flow,
         flow_damaged=final.flow,
         k_initial=clean.k,
-        k_damaged=final.k,
+        k_damaged=k_damaged,
         k_moved=base.k if specimen.moved else None,
-        k_reduction=reduction(clean.k, final.k),
-        porosity_initial=porosity[0].mean,
-        porosity_initial_error=porosity[0].standard_error,
-        porosity_initial_sum=porosity[0].sum,
-        porosity_damaged=porosity[1].mean,
+        k_reduction=reduction(clean.k, k_damaged),
         sections=sections,
-        profile=make_profile(specimen.bins, porosity, specimen.depth),
-        invaded_count=invaded.count,
-        invaded_volume=invaded.volume,
-        invasion_depth=invaded.depth,
-        invasion_depth_p95=invaded.depth_p95,
-        cake_thickness=invaded.cake_thickness,
-        solver=worst_solve([clean.flow, base.flow, final.flow, *clean_slabs.flows, *slabs.flows]),
-        counts=_counts(base, specimen.occupancy, damage, final.flow),
+        layers=None if whole is None else _layers(specimen, clean, whole),
+        solver=worst_solve(flows if whole is None else [*flows, whole.solved.flow]),
+        counts=_counts(base, specimen.occupancy, damage, final.flow) | more,
         warnings=tuple(log.warnings),
         seconds=log.seconds,
+        **_without_laws(specimen),
     )
 
 
-def _clean_state(network: Network, options: AnalysisChoices, log: _Log) -> _State:
-    with log.timed("conductance"):
-        conductance = LAWS[options.law](network)
-    return _state(network, frozen(conductance), log)
+def _without_laws(specimen: Specimen) -> dict[str, Any]:
+    """The values of an `Analysis` that depend on no law."""
+    porosity, invaded = specimen.porosity, specimen.invaded
+    return {
+        "porosity_initial": porosity[0].mean,
+        "porosity_initial_error": porosity[0].standard_error,
+        "porosity_initial_sum": porosity[0].sum,
+        "porosity_damaged": porosity[1].mean,
+        "profile": make_profile(specimen.bins, porosity, specimen.depth),
+        "invaded_count": invaded.count,
+        "invaded_volume": invaded.volume,
+        "invasion_depth": invaded.depth,
+        "invasion_depth_p95": invaded.depth_p95,
+        "cake_thickness": invaded.cake_thickness,
+    }
 
 
-def _state(network: Network, conductance: Array, log: _Log) -> _State:
-    with log.timed("solve"):
-        k, flow = whole_permeability(network, conductance)
-    return _State(network=network, conductance=conductance, flow=flow, k=k)
+def _resolved(
+    whole: AllSpheres, base: State, before: tuple[SlabK, bool], log: Log
+) -> tuple[float, SlabK, dict[str, int]]:
+    """Permeability m2 and sections by the network of all spheres, and its counts.
+
+    Fines never raise the permeability. Where few of them make the network of all spheres finer,
+    its k may be above that of the grains by the difference of two errors; it is then set to that
+    of the grains, and counted. `before` are the sections without fines, and whether grains moved.
+    """
+    clean_slabs, moved = before
+    slabs, above = (whole.slabs, 0) if moved else capped(clean_slabs, whole.slabs)
+    log.warnings += whole.refused
+    counts = whole.solved.network.counts
+    return (
+        min(whole.k, base.k),
+        slabs,
+        {
+            "all_spheres_pores": len(whole.solved.network.pore_radius),
+            "all_spheres_throats": len(whole.solved.network.throat_radius),
+            "all_spheres_hidden": counts["grains_hidden"],
+            "all_spheres_above_grains": int(whole.k > base.k),
+            "all_spheres_sections_above_grains": above,
+        },
+    )
 
 
-def _damage(
-    base: _State, occupancy: Occupancy | None, options: AnalysisChoices, log: _Log
-) -> Damage | None:
-    if occupancy is None:
+def _used(specimen: Specimen, whole: AllSpheres | None, name: str) -> str | None:
+    if specimen.fines is None or not len(specimen.fines):
         return None
-    with log.timed("conductance"):
-        law = damage_law(
-            options.damage_law,
-            clogging_threshold=options.clogging_threshold,
-            middle_band=options.middle_band,
-        )
-        return law(base.network, occupancy, base.conductance)
+    return name if whole is None else ALL_SPHERES
 
 
-def _slab_k(state: _State, edges: Array, log: _Log) -> SlabK:
-    network = state.network
-    with log.timed("solve"):
-        if len(edges) == 2 and not network.periodic[0]:  # one slab is the whole box
-            solved = [(state.k, state.flow)]
-        else:
-            solved = [
-                slab_permeability(network, state.conductance, (float(low), float(high)))
-                for low, high in pairwise(edges)
-            ]
-        inplace = inplace_permeability(network, state.flow, edges)
-    return SlabK(
-        cut_out=frozen([k for k, _ in solved]),
-        inplace=frozen(inplace),
-        flows=tuple(flow for _, flow in solved),
-    )
+def _layers(specimen: Specimen, clean: State, whole: AllSpheres) -> Layers | None:
+    """Layers of the mean diameter of a fine, from the network that resolves them."""
+    initial, fines = solved(clean), specimen.fines
+    if initial is None or fines is None:
+        return None
+    edges = layer_edges(clean.network.box, 2.0 * float(fines.radius.mean()))
+    return make_layers(initial, whole.solved, edges=edges, depth=specimen.depth)
 
 
-def _warn(log: _Log, states: tuple[_State, _State], sections: tuple[Section, ...]) -> None:
+def _warn(log: Log, states: tuple[State, State | Solved], sections: tuple[Section, ...]) -> None:
     for name, state in zip(("k_initial", "k_damaged"), states, strict=True):
         if state.flow.reason:
             log.warnings.append(f"{name} = 0: {state.flow.reason}")
@@ -279,7 +263,7 @@ def _warn(log: _Log, states: tuple[_State, _State], sections: tuple[Section, ...
 
 
 def _counts(
-    base: _State, occupancy: Occupancy | None, damage: Damage | None, flow: Flow
+    base: State, occupancy: Occupancy | None, damage: Damage | None, flow: Flow
 ) -> dict[str, int]:
     counts = dict(base.network.counts) | {
         "throats_not_conducting": int(np.sum(base.conductance == 0))

@@ -3,15 +3,9 @@
 import argparse
 import time
 from collections.abc import Iterator
-from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from fdnet.case.names import (
-    DAMAGE_LAW_NAMES,
-    DEFAULT_DAMAGE_LAW,
-    DEFAULT_LAW,
-    LAW_NAMES,
-)
+from fdnet.case.names import AUTO, DEFAULT_LAW, law_pairs
 from fdnet.errors import CaseError
 from fdnet.permeability.options import (
     ALL_AXES,
@@ -95,10 +89,14 @@ def _along(
     if options.walls == "no-slip":
         notes += _crossing(given.spheres, periodic, axis)
     facts = [*given.assumptions, *_assumptions(spheres, periodic, options)]
-    return [
-        _row(result, seconds) | {"warnings": [*notes, *result.warnings], "assumptions": facts}
-        for result, seconds in _measure(spheres, around, options)
-    ]
+    rows: list[dict[str, Any]] = []
+    for result, seconds in _measure(spheres, around, options):
+        used = result.damage_law_used
+        if options.damage_law is None and not rows and used is not None:
+            facts = [*facts, f"The damage law is fdnet's default, here {used}."]
+        more = {"warnings": [*notes, *result.warnings], "assumptions": facts}
+        rows.append(_row(result, seconds) | more)
+    return rows
 
 
 def _measure(
@@ -107,8 +105,8 @@ def _measure(
     """Each result with its seconds; those of the first hold what all of them share."""
     from fdnet.network.permeability import compare
 
-    chosen = (given.law or DEFAULT_LAW, given.damage_law or DEFAULT_DAMAGE_LAW)
-    others = product(LAW_NAMES, DAMAGE_LAW_NAMES) if given.compare_laws else ()
+    chosen = (given.law or DEFAULT_LAW, given.damage_law or AUTO)
+    others = law_pairs() if given.compare_laws else ()
     start = time.perf_counter()
     for result in compare(
         spheres,
@@ -140,8 +138,6 @@ def _assumptions(
         yield f"The conductance law is fdnet's default, {DEFAULT_LAW}."
     if len(spheres.fines()):
         yield "Fines and grains stay where they are."
-        if given.damage_law is None:
-            yield f"The damage law is fdnet's default, {DEFAULT_DAMAGE_LAW}."
 
 
 def _crossing(spheres: "Snapshot", periodic: tuple[bool, bool, bool], axis: str) -> Iterator[str]:
@@ -194,7 +190,9 @@ def _row(result: "Analysis", seconds: float) -> dict[str, Any]:
         "solver": result.solver,
         "law": result.law,
         "damage_law": result.damage_law,
-        "damage_law_used": result.damage_law,
+        "damage_law_used": result.damage_law_used,
+        "damage_law_other": result.damage_law_other,
+        "k_damaged_other_m2": result.k_damaged_other,
         "sections": section_rows(result),
         "network_counts": result.counts,
         "seconds": seconds,

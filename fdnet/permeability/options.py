@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fdnet.case.names import (
+    AUTO,
     DAMAGE_LAW_NAMES,
     DEFAULT_DAMAGE_LAW,
     DEFAULT_LAW,
     LAW_NAMES,
     MOST_SECTIONS,
+    MOST_SPHERES,
     WALL_NAMES,
 )
 from fdnet.errors import CaseError
@@ -59,7 +61,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--damage-law",
         choices=DAMAGE_LAW_NAMES,
-        help=f"damage law (default {DEFAULT_DAMAGE_LAW})",
+        help=f"damage law (default {AUTO}: all-spheres up to {MOST_SPHERES} spheres, above "
+        f"{DEFAULT_DAMAGE_LAW})",
     )
     parser.add_argument(
         "--compare-laws", action="store_true", help="all laws with all damage laws as a table"

@@ -17,6 +17,7 @@ from fdnet.spheres.snapshot import Array, Snapshot
 
 if TYPE_CHECKING:
     from fdnet.network.analysis import Analysis
+    from fdnet.network.flow.depth import Layers
 
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#7F7F7F"
 MM, MICRON = 1e3, 1e6
@@ -48,6 +49,9 @@ CAPTIONS = {
     "once.",
     "size_distributions": "Inscribed radii of throats and pores between the grains alone, by "
     "number; the band is the range of the fines' radii.",
+    "layers": "The first millimetre in layers of a fine's diameter: permeability of each layer in "
+    "place, without and with the fines, and its share of the specimen's pressure drop. From the "
+    "network of all spheres.",
     "invasion_history": "Fines inside the specimen, passed through it and still upstream, against "
     "time.",
 }
@@ -76,6 +80,8 @@ def draw_all(
         draws["porosity_reduction"] = partial(_porosity_reduction, analysis=analysis)
         draws["invaded_fraction"] = partial(_invaded_fraction, analysis=analysis)
         draws["permeability_ratio"] = partial(_permeability_ratio, analysis=analysis)
+    if analysis.layers is not None:
+        draws["layers"] = partial(_layers, layers=analysis.layers)
     draws["porosity_profile"] = partial(_porosity_profile, analysis=analysis)
     draws["size_distributions"] = partial(_size_distributions, analysis=analysis, fines=fines)
     if history:
@@ -203,6 +209,22 @@ def _permeability_ratio(figure: Any, *, analysis: "Analysis") -> None:
     highest = np.nanmax([1.0, *cut_out, *in_place])
     axes.set_ylim(0, 1.05 * highest)
     _legend(axes, loc="lower right")
+
+
+def _layers(figure: Any, *, layers: "Layers") -> None:
+    above, below = figure.subplots(2, 1, sharex=True)
+    for axes, before, after, label in (
+        (above, layers.k_initial, layers.k_damaged, "k of the layer (m²)"),
+        (below, 100 * layers.drop_initial, 100 * layers.drop_damaged, "pressure drop (%)"),
+    ):
+        _stairs(axes, layers.edges, before, color=GREY, label="intact")
+        _stairs(axes, layers.edges, after, color=BLUE, label="damaged")
+        axes.set(ylabel=label, xlim=np.asarray(layers.edges[[0, -1]]) * MM)
+    if np.any(layers.k_damaged > 0):
+        above.set_yscale("log")
+    below.set_ylim(bottom=0)
+    below.set_xlabel(DEPTH_LABEL)
+    _legend(above, loc="lower right")
 
 
 def _porosity_profile(figure: Any, *, analysis: "Analysis") -> None:

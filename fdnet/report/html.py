@@ -104,7 +104,7 @@ def headline(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         (
             "permeability damaged",
             quantity(summary.get("k_damaged_m2"), "m²"),
-            f"{_darcy(summary.get('k_damaged_m2'))}, {loss}",
+            f"{_darcy(summary.get('k_damaged_m2'))}, {loss}{_other(summary)}",
         ),
         whole[1],
         ("porosity damaged", fixed(summary.get("porosity_damaged")), "overlap counted once"),
@@ -125,6 +125,14 @@ def headline(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         ),
         ("end of the run", quantity(reason), STOP_WORDS.get(str(reason), "")),
     ]
+
+
+def _other(summary: Mapping[str, Any]) -> str:
+    """The damaged permeability by the other law, as a measure of the error."""
+    other = summary.get("k_damaged_other_m2")
+    if other is None:
+        return ""
+    return f"; by {summary.get('damage_law_other')}: {quantity(other, 'm²')}"
 
 
 def quantity(value: Any, unit: str = "") -> str:

@@ -35,6 +35,14 @@ def answer_lines(results: Sequence[Row], given: Given) -> Iterator[str]:
         porosity += f" -> {first['porosity_damaged']:.5f}"
     yield f"{porosity}, {first['pores']} pores, {first['throats']} throats; {given.sides}"
     yield from _law_lines(results, fines=given.fines)
+    if first.get("damage_law_used") not in (None, first["damage_law"]):
+        yield f"{first['damage_law']}: the damage law {first['damage_law_used']} was taken"
+    if first.get("k_damaged_other_m2") is not None:
+        other = first["k_damaged_other_m2"]
+        yield (
+            f"with fines by {first['damage_law_other']}: {other:.5g} m2, {other / MILLIDARCY:.5g} "
+            "mD; the difference is a measure of the error"
+        )
     if given.sections:
         yield from _section_lines(first, fines=given.fines)
     for warning in first["warnings"]:
@@ -62,7 +70,8 @@ def _law_lines(results: Sequence[Row], *, fines: bool) -> Iterator[str]:
 
 def _section_lines(result: Row, *, fines: bool) -> Iterator[str]:
     where = " along x" if "k_x_m2" in result else ""
-    laws = f"{result['law']} and {result['damage_law']}" if fines else result["law"]
+    used = result.get("damage_law_used") or result["damage_law"]
+    laws = f"{result['law']} and {used}" if fines else result["law"]
     yield f"sections cut out{where}, {laws}:"
     damaged = f"{'damaged':>9} " if fines else ""
     yield f"{'from m':>10} {'to m':>10} {'porosity':>9} {damaged}{_names(fines=fines)}"

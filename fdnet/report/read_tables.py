@@ -25,6 +25,15 @@ COLUMNS: Mapping[str, tuple[str, ...]] = {
         "fines_fraction",
     ),
     "profile": (*_EDGES, "porosity_reduction", "fines_fraction"),
+    "layers": (
+        "x_lo_m",
+        "x_hi_m",
+        "k_initial_m2",
+        "k_damaged_m2",
+        "pressure_drop_initial",
+        "pressure_drop_damaged",
+        "fines_count",
+    ),
     "pores": (
         "pore",
         "pore_coords_0_m",

@@ -16,10 +16,12 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from fdnet.network.analysis import Analysis
+    from fdnet.network.flow.depth import Layers
 
 __all__ = [
     "section_rows",
     "write_laws",
+    "write_layers",
     "write_pores",
     "write_profile",
     "write_sections",
@@ -102,6 +104,24 @@ def write_profile(path: str | Path, analysis: "Analysis") -> Path:
             }
         ),
     )
+
+
+def write_layers(path: str | Path, layers: "Layers") -> Path:
+    """One row for each layer, in place, from the network of all spheres.
+
+    The pressure drops are over that of the specimen; empty where nothing flows.
+    """
+    edges = [repr(float(x)) for x in layers.edges]
+    columns = {
+        "x_lo_m": edges[:-1],
+        "x_hi_m": edges[1:],
+        "k_initial_m2": layers.k_initial,
+        "k_damaged_m2": layers.k_damaged,
+        "pressure_drop_initial": layers.drop_initial,
+        "pressure_drop_damaged": layers.drop_damaged,
+        "fines_count": layers.fines_count,
+    }
+    return _write(path, _frame(columns))
 
 
 def write_pores(path: str | Path, analysis: "Analysis") -> Path:

@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from fdnet.files.atomic import disk_is_full, replacing, write_text
+from fdnet.files.atomic import replacing, write_bytes, write_text
 from fdnet.report.tables import blocked_throats, pore_porosity
 from fdnet.spheres.snapshot import Array, Snapshot
 
@@ -143,17 +143,19 @@ def _refuse_failure(done: "subprocess.CompletedProcess[str]", part: Path) -> Non
 
 
 def _save(path: str | Path, mesh: Any) -> Path:
-    """Write the mesh. Raises OSError where VTK wrote none; VTK itself prints nothing."""
-    import pyvista as pv
+    """Write the mesh. Raises OSError where it cannot be written.
 
-    with replacing(path) as part:
-        with pv.vtk_verbosity("off"):
-            mesh.save(part)
-        if not part.exists() or not part.stat().st_size:
-            full = disk_is_full(part.parent)
-            code = errno.ENOSPC if full else errno.EIO
-            raise OSError(code, os.strerror(code), str(path))
-    return Path(path)
+    VTK makes the file in memory alone: on a full disk its own writer aborts the whole process.
+    """
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
+    writer = vtkXMLPolyDataWriter()
+    writer.SetInputData(mesh)
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()
+    if not writer.Write():
+        raise OSError(errno.EIO, "VTK could not make the file", str(path))
+    return write_bytes(path, writer.GetOutputString().encode())
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

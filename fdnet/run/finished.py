@@ -57,6 +57,18 @@ class FinishedRun:
         return self._table("profile", None)
 
     @cached_property
+    def layers(self) -> "pd.DataFrame":
+        """Thin layers of the first millimetre: edges (m), k (m2) in place, pressure drops, fines.
+
+        They are from the network of all spheres; without it (`damage_law_used`) there are no rows.
+        """
+        from fdnet.report.read_tables import COLUMNS, empty_table
+
+        if not (self.path / "layers.csv").exists():
+            return empty_table(COLUMNS["layers"])
+        return self._table("layers", None)
+
+    @cached_property
     def pores(self) -> "pd.DataFrame":
         """One row for each pore, with centre (m), radius (m), volume (m3), fines, pressures."""
         return self._table("pores", self.summary["pores"])

@@ -61,7 +61,14 @@ def _facts(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         )
     else:
         yield "fines", "none supplied"
-    yield "laws", f"{summary['law']} and {summary['damage_law']} (damage)"
+    used = summary.get("damage_law_used") or summary["damage_law"]
+    yield "laws", f"{summary['law']} and {used} (damage)"
+    if summary.get("k_damaged_other_m2") is not None:
+        after = summary["k_damaged_other_m2"]
+        yield (
+            "other law",
+            f"{_darcy(after)} mD ({after:.3g} m2) with fines by {summary['damage_law_other']}",
+        )
 
 
 def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ TABLES = (
     "spheres_damaged.csv",
     "sections.csv",
     "profile.csv",
+    "layers.csv",
     "pores.csv",
     "throats.csv",
     "summary.json",

@@ -69,6 +69,8 @@ def write_tables(results: Results) -> None:
     spheres.write_spheres(path / "spheres_damaged.csv", results.shown)
     tables.write_sections(path / "sections.csv", results.analysis)
     tables.write_profile(path / "profile.csv", results.analysis)
+    if results.analysis.layers is not None:
+        tables.write_layers(path / "layers.csv", results.analysis.layers)
     tables.write_pores(path / "pores.csv", results.analysis)
     tables.write_throats(path / "throats.csv", results.analysis)
 

@@ -18,6 +18,7 @@ OUTPUTS = {
         "spheres_damaged.csv",
         "sections.csv",
         "profile.csv",
+        "layers.csv",
         "pores.csv",
         "throats.csv",
         "summary.json",
@@ -34,6 +35,8 @@ OUTPUTS = {
     ),
 }
 """Files and folders that each stage writes, below the run folder."""
+OPTIONAL = ("layers.csv",)
+"""Those of them that a finished stage may lack."""
 
 _NUMBER, _TEXTS, _ROWS = "a number", "a list of texts", "a list of tables"
 _COMMON = {
@@ -59,7 +62,9 @@ def _expected(manifest: dict[str, Any], stage: str) -> tuple[str, ...]:
     """Files that must exist when `stage` is listed as done."""
     if stage not in manifest["stages"] or (stage == "invade" and manifest["invade"] is None):
         return ()
-    return (RECORDS[stage],) if stage in RECORDS else OUTPUTS[stage]
+    if stage in RECORDS:
+        return (RECORDS[stage],)
+    return tuple(name for name in OUTPUTS[stage] if name not in OPTIONAL)
 
 
 def write_json(path: Path, value: Any) -> None:

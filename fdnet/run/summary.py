@@ -31,6 +31,7 @@ def summarise(
         "seed": case.seed,
         "law": analysis.law,
         "damage_law": analysis.damage_law,
+        "damage_law_used": analysis.damage_law_used,
         **_porosities(analysis),
         **_permeabilities(analysis),
         **_counts(analysis, last, invasion),
@@ -66,6 +67,8 @@ def _permeabilities(analysis: "Analysis") -> dict[str, Any]:
         "k_initial_m2": analysis.k_initial,
         "k_damaged_m2": analysis.k_damaged,
         "k_reduction": analysis.k_reduction,
+        "damage_law_other": analysis.damage_law_other,
+        "k_damaged_other_m2": analysis.k_damaged_other,
         **moved,
     }
 

@@ -20,10 +20,11 @@ def _headline(summary: dict[str, Any]) -> list[str]:
     depth, depth_p95 = 1e3 * summary["invasion_depth_m"], 1e3 * summary["invasion_depth_p95_m"]
     return [
         f"case {summary['case']}, seed {summary['seed']}, laws {summary['law']} / "
-        f"{summary['damage_law']}",
+        f"{summary['damage_law_used'] or summary['damage_law']}",
         f"porosity      {summary['porosity_initial']:.4f} -> {summary['porosity_damaged']:.4f}",
         f"permeability  {summary['k_initial_m2']:.4g} -> {summary['k_damaged_m2']:.4g} m2  "
         f"(reduction {_share(summary['k_reduction'])})",
+        *_other(summary),
         f"fines         {summary['invaded_count']} invaded, {summary['passed_count']} passed, "
         f"{summary['upstream_count']} upstream of {summary['supplied_count']} supplied; "
         f"stopped: {stopped}",
@@ -33,6 +34,14 @@ def _headline(summary: dict[str, Any]) -> list[str]:
         f"{'depth mm':>11} {'porosity':>8} {'damaged':>8} {'k m2':>10} {'damaged':>10} "
         f"{'loss':>7} {'in place':>8} {'fines':>6}",
     ]
+
+
+def _other(summary: dict[str, Any]) -> list[str]:
+    """The damaged permeability by the other law, as a measure of the error."""
+    if summary["k_damaged_other_m2"] is None:
+        return []
+    after = summary["k_damaged_other_m2"]
+    return [f"              by {summary['damage_law_other']}: {after:.4g} m2 with fines"]
 
 
 def _section(row: dict[str, Any]) -> str:

@@ -12,6 +12,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import Delaunay, cKDTree
 
+from fdnet.network.flow.depth import Layers
 from fdnet.spheres.snapshot import Kind, Snapshot
 
 BOX = np.array([[0.0, 4e-3], [0.0, 2e-3], [0.0, 2e-3]])
@@ -219,6 +220,21 @@ def demo_sections(initial, damaged, flows, edges):
     ), invaded
 
 
+def demo_layers(inside):
+    """Ten layers of the first millimetre, the face less permeable than the rest."""
+    edges = np.linspace(0, 1e-3, 11)
+    k = 1e-11 * np.linspace(0.05, 1.0, 10)
+    drop = 0.25 * (1 / k) / np.sum(1 / k)
+    return Layers(
+        edges=edges,
+        k_initial=np.full(10, 1e-11),
+        k_damaged=k,
+        drop_initial=np.full(10, 0.02),
+        drop_damaged=drop,
+        fines_count=np.histogram(inside, edges)[0],
+    )
+
+
 @cache
 def demo_analysis():
     initial, damaged = demo_grains(), demo_damaged()
@@ -246,6 +262,10 @@ def demo_analysis():
         occupancy=occupancy,
         law="effective",
         damage_law="thesis",
+        damage_law_used="thesis",
+        damage_law_other=None,
+        k_damaged_other=None,
+        layers=demo_layers(inside),
         conductance_initial=clean,
         conductance_damaged=dirty,
         law_used=law_used,

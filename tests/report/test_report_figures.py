@@ -29,7 +29,8 @@ def test_all_figures_of_a_damaged_specimen(tmp_path):
 
 
 def test_an_intact_pack_gets_no_figures_of_damage(tmp_path):
-    intact = SimpleNamespace(**(vars(demo_analysis()) | {"occupancy": None, "invaded_count": 0}))
+    none = {"occupancy": None, "invaded_count": 0, "layers": None}
+    intact = SimpleNamespace(**(vars(demo_analysis()) | none))
     stems = {path.stem for path in figures.draw_all(tmp_path, intact, demo_grains())}
     assert stems == {"side_view", "porosity_profile", "size_distributions"}
 

@@ -1,5 +1,6 @@
 """ParaView files read back by an independent reader; the drawing child may die as it likes."""
 
+import subprocess
 import sys
 import time
 from types import SimpleNamespace
@@ -74,6 +75,21 @@ def test_spheres_read_back(tmp_path):
 def test_no_spheres_make_an_empty_file(tmp_path):
     path = vtk.write_spheres_vtp(tmp_path / "spheres_none.vtp", demo_grains().fines())
     assert pv.read(path).n_points == 0
+
+
+def test_a_mesh_on_a_full_disk_is_an_error_and_vtk_prints_nothing(tmp_path, capfd, caplog):
+    place = tmp_path / "disk"
+    place.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=8k", "tmpfs", str(place)]
+    if subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("mounting a small file system needs root")
+    try:
+        with pytest.raises(OSError, match="No space left"):
+            vtk.write_network_vtp(place / "network.vtp", demo_analysis())
+    finally:
+        subprocess.run(["umount", str(place)], check=True)
+    assert capfd.readouterr().err == ""
+    assert caplog.records == []
 
 
 def test_a_collection_reads_back_with_its_times(tmp_path):

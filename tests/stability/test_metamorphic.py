@@ -14,9 +14,9 @@ from fdnet.cli import main
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 from tests.network.packs import random_pack, with_fines
 
-INTACT = 3e-8
-"""Two descriptions without fines: the lubrication law's tables are interpolated."""
-PERIODIC = 3e-8
+INTACT = 1e-11
+"""Two descriptions without fines."""
+PERIODIC = 1e-11
 """The same with fines where no wall and no pressure plane is near."""
 AT_WALLS = 1e-4
 """The same with fines at walls: a prism and its mirror image are split in one of many ways."""
@@ -158,7 +158,7 @@ def test_another_description_of_the_same_pack_gives_its_permeability(
 
 
 def test_without_tables_the_mirror_image_agrees_to_rounding(tmp_path, capsys):
-    """The thesis's law has closed forms: what is left of INTACT then is rounding."""
+    """The law of the thesis has closed forms only."""
     pack = pack_of(spheres(0.3), "yz")
     values = [
         permeability(one, tmp_path, capsys, "--law", "thesis")[0]

@@ -143,7 +143,9 @@ def stiffness(
     node per unit of drive, so a link of level 1 takes at most some 1 / contrast of the drive.
     """
     level = np.zeros(len(ends), int)
-    lowest, highest = float(conductance.min(initial=1.0)), float(conductance.max(initial=1.0))
+    if not len(ends):
+        return level
+    lowest, highest = float(conductance.min()), float(conductance.max())
     if highest <= contrast * lowest:
         return level
     critical, bound = np.zeros(count), highest / contrast

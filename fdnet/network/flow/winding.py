@@ -9,8 +9,9 @@ nothing: pressures can be chosen that cancel all its jumps.
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.csgraph import breadth_first_order, connected_components
+from scipy.sparse.csgraph import breadth_first_order
 
+from fdnet.network.compiled import compiled
 from fdnet.spheres.snapshot import Array
 
 
@@ -19,10 +20,7 @@ def groups(ends: Array, count: int) -> Array:
 
     `ends` (K, 2) are the nodes that the links join.
     """
-    graph = sparse.coo_matrix(
-        (np.ones(len(ends), np.int8), (ends[:, 0], ends[:, 1])), shape=(count, count)
-    )
-    return connected_components(graph, directed=False)[1]
+    return winding_groups(ends, np.zeros(len(ends)), count)[0]
 
 
 def heights(ends: Array, jump: Array, group: Array) -> Array:
@@ -56,9 +54,51 @@ def heights(ends: Array, jump: Array, group: Array) -> Array:
 
 def winding_groups(ends: Array, jump: Array, count: int) -> tuple[Array, Array]:
     """Connected group (n,) of each of `count` nodes, and whether that group winds (n,)."""
-    group = groups(ends, count)
-    height = heights(ends, jump, group)
-    left = jump + height[ends[:, 0]] - height[ends[:, 1]]
-    winds = np.zeros(count, bool)
-    winds[group[ends[left != 0, 0]]] = True
+    group, winds = _joined(
+        np.ascontiguousarray(ends, np.int64), np.ascontiguousarray(jump, float), count
+    )
     return group, winds[group]
+
+
+@compiled
+def _joined(ends: Array, jump: Array, count: int) -> tuple[Array, Array]:
+    """Group (n,) of each node, and whether each group (G,) winds.
+
+    Every node knows another of its group and the pressure over it; links join two trees of such
+    nodes or close a loop (Tarjan 1975, J. ACM 22, 215). The root of a tree is its first node.
+    """
+    parent, rise, winding = np.arange(count), np.zeros(count), np.zeros(count, np.bool_)
+    for k in range(len(ends)):
+        one, other = ends[k, 0], ends[k, 1]
+        first, second = _root(parent, rise, one), _root(parent, rise, other)
+        over = rise[one] + jump[k] - rise[other]
+        if first == second:
+            winding[first] = winding[first] or over != 0.0
+            continue
+        if first > second:
+            first, second, over = second, first, -over
+        parent[second], rise[second] = first, over
+        winding[first] = winding[first] or winding[second]
+    group, winds, found = np.empty(count, np.int64), np.zeros(count, np.bool_), 0
+    for node in range(count):
+        root = _root(parent, rise, node)
+        if root == node:
+            group[node], winds[found] = found, winding[node]
+            found += 1
+        else:
+            group[node] = group[root]
+    return group, winds
+
+
+@compiled
+def _root(parent: Array, rise: Array, node: int) -> int:
+    """The root of a node, which afterwards knows it directly, as do all on the way."""
+    root, total = node, 0.0
+    while parent[root] != root:
+        total += rise[root]
+        root = parent[root]
+    while node != root:
+        step, after = rise[node], parent[node]
+        parent[node], rise[node] = root, total
+        total, node = total - step, after
+    return root

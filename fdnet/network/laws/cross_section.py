@@ -17,7 +17,13 @@ the triangle before a line midway or the opposite side.
 import numpy as np
 
 from fdnet.network.compiled import compiled
-from fdnet.network.laws.wedge import ray_flux, shear_ratio
+from fdnet.network.laws.wedge import (
+    ratio_in_row,
+    ray_flux,
+    ray_parts,
+    shear_ratio,
+    table_row,
+)
 from fdnet.spheres.snapshot import Array
 
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(6)
@@ -26,12 +32,13 @@ FINE_POINTS, FINE_WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 @compiled
 def wedges(base: Array) -> Array:
-    """Half edge m, tangent and angle rad of the six wedges of a triangle `base` (3, 2) m.
+    """The six wedges of a triangle `base` (3, 2) m with equal discs, for `even_flux`.
 
-    Discs are equal, so there are two wedges of each row of the result (3, 3). An angle is negative
-    where the circumcentre lies beyond that edge.
+    There are two of each row of the result (3, 7): half edge m, tangent and angle rad, both
+    negative where the circumcentre lies beyond that edge; what of `ray_flux` depends on these
+    alone, and the row of the table of `shear_ratio`.
     """
-    rows = np.empty((3, 3))
+    rows = np.empty((3, 7))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         ex, ey = base[j, 0] - base[i, 0], base[j, 1] - base[i, 1]
@@ -39,7 +46,9 @@ def wedges(base: Array) -> Array:
         gx, gy = base[k, 0] - base[j, 0], base[k, 1] - base[j, 1]
         # the angle at the far corner is that at the centre over half the edge
         slope = (fx * gx + fy * gy) / abs(ex * fy - ey * fx)
-        rows[i] = 0.5 * np.hypot(ex, ey), slope, np.arctan(slope)
+        half, angle = 0.5 * np.hypot(ex, ey), np.arctan(slope)
+        constant, of_log = ray_parts(abs(angle), abs(slope))
+        rows[i] = half, slope, angle, constant, of_log, np.log(half), table_row(abs(angle))
     return rows
 
 
@@ -49,12 +58,17 @@ def even_flux(wedge: Array, disc: float, table: Array) -> float:
 
     It is not positive where the sum of the signed wedges fails.
     """
-    total = 0.0
+    total, log_disc = 0.0, np.log(disc)
     for i in range(3):
-        half, slope, angle = wedge[i]
+        half, slope, angle = wedge[i, 0], abs(wedge[i, 1]), abs(wedge[i, 2])
         x = disc / half
-        flux = half**4 * ray_flux(abs(angle), abs(slope), x) * shear_ratio(abs(angle), x, table)
-        total += 2.0 * flux if slope > 0.0 else -2.0 * flux
+        if x <= 1.0:
+            rays = wedge[i, 3] - wedge[i, 4] * (log_disc - wedge[i, 5])
+            rays += x * x * (4.0 * slope - x * x * angle) / 16.0
+        else:
+            rays = ray_flux(angle, slope, x)
+        flux = half**4 * rays * ratio_in_row(wedge[i, 6], x, table)
+        total += 2.0 * flux if wedge[i, 1] > 0.0 else -2.0 * flux
     return total
 
 

@@ -14,7 +14,9 @@ It is within 7.5 % of the exact flow through every hyperboloid from a long tube 
 orifice (Happel and Brenner 1965, section 4-29).
 
 Where side walls hold the fluid (`Network.walls` "no-slip"), the sections that they cut are those
-of `wall_cross_section`.
+of `wall_cross_section`. The cap of a grain centred beyond an x face shows the discs of a half
+ellipsoid (`Network.image_height`). With `fourth`, a section is narrowed by the fourth grain of the
+tetrahedron where that reaches in (`fourth_grain`).
 """
 
 import numpy as np
@@ -22,6 +24,7 @@ import numpy as np
 from fdnet.network import geometry
 from fdnet.network.compiled import compiled
 from fdnet.network.laws.cross_section import even_flux, uneven_flux, wedges
+from fdnet.network.laws.fourth_grain import fourth_grains, share_left
 from fdnet.network.laws.wall_cross_section import wall_cuts, wall_flux
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import LENGTH_FLOOR, Network
@@ -37,56 +40,105 @@ EQUAL = 1e-9
 """Radii that differ by at most this share are equal."""
 
 
-def half_resistances(network: Network, *, widening: float = WIDENING) -> Array:
+def half_resistances(
+    network: Network, *, widening: float = WIDENING, fourth: bool = False
+) -> Array:
     """Resistance (T, 2) 1/m3 of each throat from its facet to the power centre on either side.
 
     Viscosity is factored out. A throat with both centres on one side of its facet is a resistance
     on that side alone. A closed throat has an infinite one. Heights whose sum is below 1e-3 mean
-    grain radii are taken as that. `widening` is the factor of da^2 in the formula of this module.
+    grain radii are taken as that.
+
+    Args:
+        network: pores and throats.
+        widening: the factor of da^2 in the formula of this module.
+        fourth: whether the fourth grain of a tetrahedron narrows the sections it reaches into.
     """
-    corner = geometry.flat(network.throat_corner)
-    radius = np.ascontiguousarray(network.throat_corner_radius)
-    heights = np.ascontiguousarray(network.throat_heights)
-    floor = LENGTH_FLOOR * network.grain_radius
-    resistance = _halves(
-        corner, radius, heights, wall_cuts(network), (floor, float(widening)), ratio_table()
-    )
-    resistance[network.throat_radius <= 0] = np.inf
+    floor, table = LENGTH_FLOOR * network.grain_radius, ratio_table()
+    order, place, share = wall_cuts(network)
+    resistance = np.empty((len(network.throat_pores), 2))
+    for part in geometry.slices(len(resistance)):
+        images = network.throat_images[part]
+        corner = network.image_position[images]
+        radius, flatness = _discs(network, images, corner)
+        beside = _beside(network, part, corner) if fourth else np.zeros((len(corner), 2, 5))
+        resistance[part] = _halves(
+            geometry.flat(corner),
+            (radius, flatness),
+            np.ascontiguousarray(network.throat_heights[part]),
+            (order[part], place[part], share[part]),
+            (floor, float(widening)),
+            (beside, table),
+        )
+    capped = np.any(network.throat_corner_height < network.throat_corner_radius, axis=1)
+    resistance[(network.throat_radius <= 0) & ~capped] = np.inf
     return resistance
+
+
+def _discs(network: Network, images: Array, corner: Array) -> tuple[Array, Array]:
+    """Radius (K, n) m of the discs of `images` (K, n) in the plane of a facet, and flatness.
+
+    The radius at the height z above the facet is sqrt(radius^2 - flatness z^2); a sphere has the
+    flatness 1. An ellipsoid of semi-axes h along x and a across reaches H above a plane whose
+    normal makes the angle t with x, H^2 = (h cos t)^2 + (a sin t)^2, and shows ellipses of the
+    area of a disc of radius sqrt(a^2 h / H (1 - z^2 / H^2)). `corner` (K, 3, 3) m is the facet.
+    """
+    radius, height = network.image_radius[images], network.image_height[images]
+    flatness = np.ones(radius.shape)
+    row, which = np.nonzero(height < radius)
+    if len(row):
+        normal = geometry.cross(corner[row, 1] - corner[row, 0], corner[row, 2] - corner[row, 0])
+        cosine = normal[:, 0] ** 2 / geometry.dot(normal, normal)
+        h, volume = height[row, which], radius[row, which] ** 3
+        reach = np.sqrt(cosine * h**2 + (1.0 - cosine) * volume / h)
+        radius[row, which] = np.sqrt(volume / reach)
+        flatness[row, which] = volume / reach**3
+    return radius, flatness
+
+
+def _beside(network: Network, part: slice, corner: Array) -> Array:
+    """The fourth grains (K, 2, 5): place (3) m, and their radius m and flatness as in `_discs`."""
+    image, place = fourth_grains(network, part)
+    radius, flatness = _discs(network, image, corner)
+    return np.concatenate([place, radius[..., None], flatness[..., None]], axis=2)
 
 
 @compiled
 def _halves(
     corner: Array,
-    radius: Array,
+    discs: tuple[Array, Array],
     heights: Array,
     cuts: tuple[Array, Array, Array],
     given: tuple[float, float],
-    table: Array,
+    more: tuple[Array, Array],
 ) -> Array:
+    radius, flatness = discs
     order, place, part = cuts
     floor, widening = given
+    beside, table = more
     resistance = np.zeros((len(corner), 2))
     for t in range(len(corner)):
         low, high = -heights[t, 0], heights[t, 1]
         high = max(high, low + floor)
         even = np.max(radius[t]) - np.min(radius[t]) <= EQUAL * radius[t, 0]
-        wedge = wedges(corner[t]) if even else np.empty((0, 3))
+        even = even and np.max(flatness[t]) - np.min(flatness[t]) <= EQUAL
+        wedge = wedges(corner[t]) if even else np.empty((0, 7))
         wall = (order[t], place[t], part[t])
+        grains = (radius[t], flatness[t])
         if low < 0.0 and high > 0.0:
             resistance[t, 0] = _resistance(
-                corner[t], radius[t], wedge, wall, (0.0, -low, widening), table
+                corner[t], grains, wedge, wall, (0.0, -low, widening), (beside[t, 0], table)
             )
             resistance[t, 1] = _resistance(
-                corner[t], radius[t], wedge, wall, (0.0, high, widening), table
+                corner[t], grains, wedge, wall, (0.0, high, widening), (beside[t, 1], table)
             )
         elif low >= 0.0:
             resistance[t, 1] = _resistance(
-                corner[t], radius[t], wedge, wall, (low, high, widening), table
+                corner[t], grains, wedge, wall, (low, high, widening), (beside[t, 1], table)
             )
         else:
             resistance[t, 0] = _resistance(
-                corner[t], radius[t], wedge, wall, (-high, -low, widening), table
+                corner[t], grains, wedge, wall, (-high, -low, widening), (beside[t, 0], table)
             )
     return resistance
 
@@ -94,17 +146,19 @@ def _halves(
 @compiled
 def _resistance(
     base: Array,
-    radius: Array,
+    grains: tuple[Array, Array],
     wedge: Array,
     wall: tuple[Array, Array, float],
     span: tuple[float, float, float],
-    table: Array,
+    more: tuple[Array, Array],
 ) -> float:
     """Integral of dR between two heights, 1/m3.
 
     1/a is linear within a step; the integral is extrapolated from STEPS and STEPS / 2 steps.
     """
+    radius, flatness = grains
     low, high, widening = span
+    beside, table = more
     step = (high - low) / STEPS
     narrow = np.empty(STEPS + 1)
     disc = np.empty(3)
@@ -112,14 +166,17 @@ def _resistance(
     for k in range(STEPS + 1):
         z = low + k * step
         for i in range(3):
-            disc[i] = np.sqrt(max(radius[i] ** 2 - z * z, (TIP * radius[i]) ** 2))
+            disc[i] = np.sqrt(max(radius[i] ** 2 - flatness[i] * z * z, (TIP * radius[i]) ** 2))
         if order[0] >= 0:
             flux = part * wall_flux(place, disc[order[0]], disc[order[1]], table)
         else:
             flux = part * _slipping_flux(base, disc, wedge, table)
+            square = beside[3] ** 2 - beside[4] * (beside[2] - z) ** 2
+            if square > 0.0 and flux > 0.0:
+                flux *= share_left(base, disc, beside[0], beside[1], np.sqrt(square), table)
         if not flux > 0.0:
             return np.inf
-        narrow[k] = (8.0 * flux / np.pi) ** -0.25
+        narrow[k] = 1.0 / np.sqrt(np.sqrt(8.0 * flux / np.pi))
     return (4.0 * summed(narrow, step, 1, widening) - summed(narrow, step, 2, widening)) / 3.0
 
 

@@ -22,7 +22,6 @@ from fdnet.network.laws.cross_section import (
     FINE_WEIGHTS,
     POINTS,
     WEIGHTS,
-    midway,
     ray,
 )
 from fdnet.network.laws.wedge import shear_ratio
@@ -135,16 +134,22 @@ def _share(
     m are the radii; `across` m is the height of the disc, that of the other, and their distance
     along the wall.
     """
-    apart = np.hypot(across[2], across[0] - across[1])
-    edge = np.arctan2(across[2], across[0] - across[1])
     flux = 0.0
+    if not high > low:
+        return flux
+    apart = np.hypot(across[2], across[0] - across[1])
+    along, upright = across[2] / apart, (across[0] - across[1]) / apart
+    wider = other - disc
+    half_gap = 0.5 * (apart * apart - wider * wider)
     # numba knows no strict zip
     for point, weight in zip(POINTS, WEIGHTS):  # noqa: B905
         turn = low + 0.5 * (high - low) * (1.0 + point)
-        reach = min(
-            (across[0] + disc) / (1.0 + np.cos(turn)), across[2] / max(np.sin(turn), TOLERANCE)
-        )
-        reach = min(reach, midway(apart, other - disc, edge - turn))
+        cosine, sine = np.cos(turn), np.sin(turn)
+        reach = min((across[0] + disc) / (1.0 + cosine), across[2] / max(sine, TOLERANCE))
+        # the line midway to the other disc, at the angle between the ray and the two centres
+        below = apart * (upright * cosine + along * sine) + wider
+        if below > 0.0:
+            reach = min(reach, max(half_gap / below, 0.0))
         flux += weight * 0.5 * (high - low) * ray(reach, disc)
     return flux
 

@@ -49,20 +49,40 @@ def ray_flux(angle: float, slope: float, disc: float) -> float:
 
 @compiled
 def _antiderivative(angle: float, slope: float, disc: float) -> float:
+    constant, of_log = ray_parts(angle, slope)
+    square = disc * disc
+    return constant - of_log * np.log(disc) + square * (4.0 * slope - square * angle) / 16.0
+
+
+@compiled
+def ray_parts(angle: float, slope: float) -> tuple[float, float]:
+    """The parts C and D of a flux over h^4 for rho <= h, which depend on the wedge alone.
+
+    `ray_flux` is C - D ln(x) + (4 x^2 tan(phi) - x^4 phi) / 16, with x = rho / h.
+    """
     square = slope * slope
     secant4 = slope * (1.0 + square / 3.0)
     log_secant = 0.5 * np.log1p(square)
-    spread = (
-        secant4 * (log_secant - np.log(disc)) - (slope - angle) * 2.0 / 3.0 - slope * square / 9.0
-    )
-    return (4.0 * spread - 3.0 * secant4 + 4.0 * disc**2 * slope - disc**4 * angle) / 16.0
+    spread = secant4 * log_secant - (slope - angle) * 2.0 / 3.0 - slope * square / 9.0
+    return (4.0 * spread - 3.0 * secant4) / 16.0, 0.25 * secant4
 
 
 @compiled
 def shear_ratio(angle: float, disc: float, table: Array) -> float:
     """exact_flux / ray_flux, bilinear in `table`; steeper wedges take its last row."""
+    return ratio_in_row(table_row(angle), disc, table)
+
+
+@compiled
+def table_row(angle: float) -> float:
+    """The row of the table of `shear_ratio` for an angle, with its fraction."""
+    return min(angle / STEEPEST, 1.0) * (len(ANGLES) - 1)
+
+
+@compiled
+def ratio_in_row(row: float, disc: float, table: Array) -> float:
+    """The ratio of `shear_ratio` at a row that `table_row` gives."""
     rows, columns = table.shape
-    row = min(angle / STEEPEST, 1.0) * (rows - 1)
     column = min(disc, 1.0) * (columns - 1)
     i, j = min(int(row), rows - 2), min(int(column), columns - 2)
     u, v = row - i, column - j

@@ -27,6 +27,8 @@ class Specimen:
     """The parts of an analysis that depend on no law, in SI units.
 
     Attributes:
+        grains: the grains as they were, and where they ended.
+        fines: all fines, those beyond the box among them; None without fines.
         first: network of the grains as they were.
         network: network of the grains where they ended, the same one unless they moved.
         moved: whether any grain moved by more than 1 nm.
@@ -39,6 +41,8 @@ class Specimen:
         outside_sides: number of fines centred beyond a side wall.
     """
 
+    grains: tuple[Snapshot, Snapshot]
+    fines: Snapshot | None
     first: Network
     network: Network
     moved: bool
@@ -90,6 +94,8 @@ def measure_specimen(
         )
     x = spheres.fines().position[:, 0]
     return Specimen(
+        grains=(before, after),
+        fines=None if damaged is None else damaged.fines(),
         first=first,
         network=network,
         moved=moved,

@@ -11,6 +11,8 @@ from scipy.spatial import ConvexHull, Delaunay, QhullError
 from fdnet.errors import NetworkError
 from fdnet.network import geometry
 from fdnet.network.tessellation.points import Points, make_points
+from fdnet.network.tessellation.tetrahedron import centres
+from fdnet.network.tessellation.triangulation import triangulate
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.images import INSIDE
 from fdnet.spheres.snapshot import Array, Snapshot
@@ -21,6 +23,9 @@ SAME_CENTRE = 1e-5
 """Power centres nearer than this, in mean grain radii, are one point."""
 EQUAL_SPREAD = 1e-3
 """Radii that spread by at most this share of their mean are treated as equal."""
+COMPILED_FROM = 2000
+"""Points from which on the compiled tessellation is used; below it Qhull takes less than 0.05 s,
+and the compiler is not needed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -63,17 +68,7 @@ def make_tetrahedra(
     scale = float(grains.radius.mean())
     points = make_points(grains, periodic=periodic, margin=margin)
     unequal = float(np.ptp(grains.radius)) > EQUAL_SPREAD * scale
-    try:
-        simplices, neighbours = (
-            _power_hull(points.scaled, points.radius / scale)
-            if unequal
-            else _delaunay(points.scaled)
-        )
-    except QhullError as error:
-        raise NetworkError(
-            f"tessellation of {len(grains)} grains failed, they lie in one plane or line: "
-            f"{str(error).splitlines()[0]}"
-        ) from error
+    simplices, neighbours = _tessellated(points, len(grains), scale, unequal=unequal)
     kept = _unique(points, simplices, grains.box, periodic)
     index = np.full(len(simplices) + 1, -1, np.int32)
     index[kept] = np.arange(len(kept))
@@ -91,6 +86,24 @@ def make_tetrahedra(
         margin=_needed_margin(centre, reach, grains.box),
         hidden=int(np.sum(~seen)),
     )
+
+
+def _tessellated(
+    points: Points, grains: int, scale: float, *, unequal: bool
+) -> tuple[Array, Array]:
+    """Tetrahedra and neighbours (-1: none), by the compiled tessellation or by Qhull."""
+    radius = points.radius / scale if unequal else np.zeros(len(points.radius))
+    if len(radius) >= COMPILED_FROM:
+        found = triangulate(points.scaled, radius**2)
+        if found is not None:
+            return found
+    try:
+        return _power_hull(points.scaled, radius) if unequal else _delaunay(points.scaled)
+    except QhullError as error:
+        raise NetworkError(
+            f"tessellation of {grains} grains failed, they lie in one plane or line: "
+            f"{str(error).splitlines()[0]}"
+        ) from error
 
 
 def _delaunay(points: Array) -> tuple[Array, Array]:
@@ -172,18 +185,11 @@ def _centres(points: Points, vertex: Array, scale: float) -> tuple[Array, Array,
     The reach is the radius about the centre in which the centre of another grain would have
     changed the tetrahedron. Flat tetrahedra take the centre of their shaken corners.
     """
-    count = len(vertex)
-    centre, reach = np.empty((count, 3)), np.empty(count)
-    volume, flat = np.empty(count), np.empty(count, bool)
-    largest = float(points.radius.max())
-    for part in geometry.slices(count):
-        true, radius = points.position[vertex[part]], points.radius[vertex[part]]
-        volume[part] = np.abs(geometry.signed_volume(true))
-        flat[part] = volume[part] < FLAT * scale**3
-        corner = np.where(flat[part][:, None, None], points.shaken[vertex[part]], true)
-        centre[part], power = geometry.power_centre(corner, radius)
-        reach[part] = np.sqrt(np.maximum(power + largest**2, 0.0))
-    return centre, reach, volume, flat
+    given = (FLAT * scale**3, float(points.radius.max()))
+    found: tuple[Array, Array, Array, Array] = centres(
+        points.position, points.shaken, points.radius, vertex, given
+    )
+    return found
 
 
 def _needed_margin(centre: Array, reach: Array, box: Array) -> Array:

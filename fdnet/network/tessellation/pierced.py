@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from fdnet.network import geometry
+from fdnet.network.compiled import compiled
 from fdnet.network.tessellation.delaunay import Tetrahedra
 from fdnet.network.tessellation.facets import Facets
 from fdnet.network.tessellation.tessellation import Tessellation
+from fdnet.network.tessellation.tetrahedron import Vector, along, less, times
 from fdnet.spheres.snapshot import Array
 
 GRID = 12
@@ -23,24 +24,17 @@ def pierced_facets(tessellation: Tessellation, facets: Facets, open_facet: Array
     is examined on a triangular grid of 91 points.
     """
     tetrahedra = tessellation.tetrahedra
-    position, grain = tetrahedra.points.position, tetrahedra.points.radius
-    pierced = np.zeros(len(facets.pore), bool)
-    apexes = _apexes_beyond(tetrahedra, facets)
-    for part in geometry.slices(len(pierced)):
-        corner = position[facets.vertex[part]]
-        normal = geometry.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-        normal /= np.linalg.norm(normal, axis=1)[:, None]
-        place, radius = _grains_near(tetrahedra, facets, part, (*apexes, tessellation.size))
-        away = np.einsum("tci,ti->tc", place - corner[:, :1], normal)
-        row, which = np.nonzero((np.abs(away) < radius) & open_facet[part, None])
-        disc = np.sqrt(radius[row, which] ** 2 - away[row, which] ** 2)
-        near = _reaches(corner[row], normal[row], place[row, which], disc)
-        row, which = row[near], which[near]
-        start = part.start or 0
-        own = grain[facets.vertex[row + start]]
-        hit = _covers_open_part(corner[row], own, place[row, which], radius[row, which])
-        pierced[start + row[hit]] = True
-    return pierced
+    beyond, turn = _apexes_beyond(tetrahedra, facets)
+    points = tetrahedra.points
+    size = np.asarray(tessellation.size, float)
+    found: Array = _pierced(
+        (points.position, points.radius),
+        (tetrahedra.vertex, beyond, turn),
+        (facets.vertex, facets.pore, facets.opposite, facets.shift),
+        open_facet,
+        size,
+    )
+    return found
 
 
 def _apexes_beyond(tetrahedra: Tetrahedra, facets: Facets) -> tuple[Array, Array]:
@@ -57,56 +51,109 @@ def _apexes_beyond(tetrahedra: Tetrahedra, facets: Facets) -> tuple[Array, Array
     return beyond, turn
 
 
-def _grains_near(
-    tetrahedra: Tetrahedra, facets: Facets, part: slice, table: tuple[Array, Array, Array]
-) -> tuple[Array, Array]:
-    """Places (K, 8, 3) m and radii (K, 8) m of the grains near facets; radius 0 where none is.
+@compiled
+def _pierced(
+    spheres: tuple[Array, Array],
+    tetrahedra: tuple[Array, Array, Array],
+    facets: tuple[Array, Array, Array, Array],
+    open_facet: Array,
+    size: Array,
+) -> Array:
+    """As `pierced_facets`, with the parts of `Tetrahedra`, `_apexes_beyond` and `Facets`."""
+    vertex, beyond, turn = tetrahedra
+    corner, pore, opposite, shift = facets
+    pierced = np.zeros(len(corner), np.bool_)
+    for t in range(len(corner)):
+        if not open_facet[t]:
+            continue
+        for side in range(2):
+            own, apex = pore[t, side], opposite[t, side]
+            for k in range(5):
+                # the apex of the tetrahedron first, then those across its other facets
+                if k == apex + 1:
+                    continue
+                other = vertex[own, apex] if k == 0 else beyond[own, k - 1]
+                if other < 0 or pierced[t]:
+                    continue
+                x, y, z = side * shift[t, 0], side * shift[t, 1], side * shift[t, 2]
+                if k > 0:
+                    x, y, z = (
+                        x + turn[own, k - 1, 0],
+                        y + turn[own, k - 1, 1],
+                        z + turn[own, k - 1, 2],
+                    )
+                moved = (x * size[0], y * size[1], z * size[2])
+                pierced[t] = _pierces(spheres, corner[t], other, moved)
+    return pierced
 
-    `table` holds the apexes beyond (P, 4), their periods (P, 4, 3) and the period (3,) m.
+
+@compiled
+def _moved(shift: Array, turn: Array, factors: tuple[int, int], size: Array) -> Vector:
+    """So many periods `shift` (3,) and so many `turn` (3,), m; `size` (3,) m are the periods."""
+    one, other = factors
+    return (
+        (one * shift[0] + other * turn[0]) * size[0],
+        (one * shift[1] + other * turn[1]) * size[1],
+        (one * shift[2] + other * turn[2]) * size[2],
+    )
+
+
+@compiled
+def _pierces(spheres: tuple[Array, Array], corner: Array, other: int, moved: Vector) -> bool:
+    """Whether the grain `other`, `moved` by a vector m, covers part of an open section."""
+    points, grain = spheres
+    a, b, c = corner[0], corner[1], corner[2]
+    one, two = less(points, b, a), less(points, c, a)
+    normal = times(one, two)
+    apart = less(points, other, a)
+    place = (apart[0] + moved[0], apart[1] + moved[1], apart[2] + moved[2])
+    square, radius = along(normal, normal), grain[other]
+    away = along(place, normal)
+    if not away * away < radius * radius * square:
+        return False
+    disc = np.sqrt(radius * radius - away * away / square)
+    size = np.sqrt(square)
+    third = (two[0] - one[0], two[1] - one[1], two[2] - one[2])
+    last = (place[0] - one[0], place[1] - one[1], place[2] - one[2])
+    if not (
+        _outside(one, normal, place, size) < disc
+        and _outside(third, normal, last, size) < disc
+        and -_outside(two, normal, place, size) < disc
+    ):
+        return False
+    return _covers((one, two, place), (grain[a], grain[b], grain[c], radius))
+
+
+@compiled
+def _outside(side: Vector, normal: Vector, place: Vector, size: float) -> float:
+    """How far m `place` lies to the right of a side of a triangle; `size` m2 is that of normal."""
+    return along(place, times(side, normal)) / (size * np.sqrt(along(side, side)))
+
+
+@compiled
+def _covers(
+    places: tuple[Vector, Vector, Vector], radii: tuple[float, float, float, float]
+) -> bool:
+    """Whether a ball covers a grid point of the triangle outside the three grains.
+
+    `places` m are the second and third corner and the ball, from the first corner; `radii` m are
+    those of the three grains and of the ball.
     """
-    beyond, turn, size = table
-    places, radii = [], []
-    for side in (0, 1):
-        pore, apex = facets.pore[part, side], facets.opposite[part, side]
-        others = np.concatenate([tetrahedra.vertex[pore, apex][:, None], beyond[pore]], axis=1)
-        shift = np.concatenate([np.zeros((len(pore), 1, 3), np.int8), turn[pore]], axis=1)
-        if side:
-            shift = shift + facets.shift[part, None]
-        place = tetrahedra.points.position[others] + shift * size
-        radius = np.where(others < 0, 0.0, tetrahedra.points.radius[others])
-        # across the facet itself lies the other apex, which its own side examines
-        radius[np.arange(len(pore)), 1 + apex.astype(int)] = 0.0
-        places.append(place)
-        radii.append(radius)
-    return np.concatenate(places, axis=1), np.concatenate(radii, axis=1)
+    one, two, place = places
+    for step in STEPS:
+        x = step[1] * one[0] + step[2] * two[0]
+        y = step[1] * one[1] + step[2] * two[1]
+        z = step[1] * one[2] + step[2] * two[2]
+        if (
+            _square(x, y, z, place) < radii[3] ** 2
+            and x * x + y * y + z * z > radii[0] ** 2
+            and _square(x, y, z, one) > radii[1] ** 2
+            and _square(x, y, z, two) > radii[2] ** 2
+        ):
+            return True
+    return False
 
 
-def _reaches(corner: Array, normal: Array, place: Array, disc: Array) -> Array:
-    """True (K,) where a disc reaches the inside of a triangle, side line by side line.
-
-    The disc has the centre `place` (K, 3) m and the radius `disc` (K,) m.
-    """
-    near = np.ones(len(disc), bool)
-    for first, second in geometry.SIDES:
-        outward = geometry.cross(corner[:, second] - corner[:, first], normal)
-        outward /= np.linalg.norm(outward, axis=1)[:, None]
-        near &= geometry.dot(place - corner[:, first], outward) < disc
-    return near
-
-
-def _covers_open_part(corner: Array, own: Array, place: Array, radius: Array) -> Array:
-    """True (K,) where a ball covers a grid point of the triangle outside its three grains.
-
-    The triangle has the corners `corner` (K, 3, 3) m, on which grains of radius `own` (K, 3) m
-    sit; the ball has the centre `place` (K, 3) m and the radius `radius` (K,) m.
-    """
-    covered = np.zeros(len(corner), bool)
-    for part in geometry.slices(len(covered), 20_000):
-        point = np.einsum("gc,kci->kgi", STEPS, corner[part])
-        inside = np.sum((point - place[part, None]) ** 2, axis=2) < radius[part, None] ** 2
-        for k in range(3):
-            inside &= (
-                np.sum((point - corner[part, k, None]) ** 2, axis=2) > own[part, k, None] ** 2
-            )
-        covered[part] = inside.any(axis=1)
-    return covered
+@compiled
+def _square(x: float, y: float, z: float, place: Vector) -> float:
+    return (x - place[0]) ** 2 + (y - place[1]) ** 2 + (z - place[2]) ** 2

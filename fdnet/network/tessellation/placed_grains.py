@@ -29,6 +29,8 @@ class PlacedGrains:
 
     Attributes:
         grains: the n grains, their positions and radii as they are tessellated.
+        height: (n,) m, how far what stands for each grain reaches from its centre along x: less
+            than the radius for the flat cap of a grain centred beyond an x face.
         index: (n,) which of the given grains they are.
         periodic: whether the sides x, y and z are periodic; the other faces are mirror planes.
         scale: m, mean radius of these grains as given.
@@ -36,6 +38,7 @@ class PlacedGrains:
     """
 
     grains: Snapshot
+    height: Array
     index: Array
     periodic: tuple[bool, bool, bool]
     scale: float
@@ -62,6 +65,7 @@ def place_grains(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Plac
     _refuse_coincident(placed, periodic)
     return PlacedGrains(
         grains=placed,
+        height=_heights_along_x(inside, placed, periodic),
         index=index,
         periodic=periodic,
         scale=float(inside.radius.mean()),
@@ -143,6 +147,22 @@ def _same_cap(radius: Array, height: Array, depth: float) -> Array:
     for _ in range(ITERATIONS):
         same = np.cbrt(np.maximum(cap - 1.5 * depth * same**2 + 0.5 * depth**3, 0.0))
     return np.maximum(same, depth)
+
+
+def _heights_along_x(given: Snapshot, placed: Snapshot, periodic: tuple[bool, ...]) -> Array:
+    """Semi-axis along x (n,) m of the half ellipsoids that stand for caps at the x faces.
+
+    Of a grain centred beyond an x face, a cap of height h on a disc of radius a is in the box. The
+    half ellipsoid on that disc with the volume of the cap has the height h (3 a^2 + h^2) / (4
+    a^2); `placed` has the radius of the half sphere of that volume. All other grains are spheres,
+    those that lie beyond a side wall as well among them: their height is their radius.
+    """
+    beyond = np.maximum(given.box[:, 0] - given.position, given.position - given.box[:, 1])
+    outside = (beyond > ON_FACE_TOLERANCE * float(given.radius.mean())) & ~np.array(periodic)
+    cap = outside[:, 0] & ~outside[:, 1:].any(axis=1)
+    tall = np.where(cap, given.radius - beyond[:, 0], given.radius)
+    base = tall * (2.0 * given.radius - tall)
+    return np.where(cap, tall * (3.0 * base + tall**2) / (4.0 * base), placed.radius)
 
 
 def _refuse_coincident(grains: Snapshot, periodic: tuple[bool, ...]) -> None:

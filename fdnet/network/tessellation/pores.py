@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fdnet.network import geometry
 from fdnet.network.tessellation.delaunay import Tetrahedra
 from fdnet.network.tessellation.polyhedra import Polyhedra
 from fdnet.network.tessellation.tessellation import Tessellation
+from fdnet.network.tessellation.tetrahedron import solids, touching_spheres
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
@@ -104,19 +104,16 @@ def measure_pores(tessellation: Tessellation, polyhedra: Polyhedra) -> Pores:
 
 def _measured(tetrahedra: Tetrahedra) -> tuple[_Spheres, Array, Array]:
     """Touching spheres, void (P,) m3 and grain surface (P,) m2 of the tetrahedra."""
-    count = len(tetrahedra.vertex)
-    position, radius, centred = np.empty((count, 3)), np.empty(count), np.empty(count, bool)
-    void, surface = np.empty(count), np.empty(count)
-    for part in geometry.slices(count):
-        vertex = tetrahedra.vertex[part]
-        corner, grain = tetrahedra.points.position[vertex], tetrahedra.points.radius[vertex]
-        centre, radius[part] = geometry.touching_sphere(corner, grain)
-        within = geometry.contains(corner, centre, tolerance=INSIDE_TOLERANCE)
-        centred[part] = within & ~tetrahedra.flat[part] & np.isfinite(radius[part])
-        position[part] = np.where(centred[part][:, None], centre, corner.mean(axis=1))
-        solid, surface[part] = geometry.solid_in_tetrahedra(corner, grain)
-        void[part] = tetrahedra.volume[part] - solid
-    return _Spheres(position=position, radius=radius, centred=centred), void, surface
+    points, vertex = tetrahedra.points, tetrahedra.vertex
+    centre, radius, within = touching_spheres(
+        points.position, points.radius, vertex, INSIDE_TOLERANCE
+    )
+    centred = within & ~tetrahedra.flat & np.isfinite(radius)
+    outside = np.flatnonzero(~centred)
+    centre[outside] = points.position[vertex[outside]].mean(axis=1)
+    solid, surface = solids(points.position, points.radius, vertex)
+    spheres = _Spheres(position=centre, radius=radius, centred=centred)
+    return spheres, tetrahedra.volume - solid, surface
 
 
 def _placed(

@@ -10,6 +10,7 @@ from fdnet.network.tessellation.pierced import pierced_facets
 from fdnet.network.tessellation.points import Points
 from fdnet.network.tessellation.polyhedra import Polyhedra
 from fdnet.network.tessellation.pores import Pores
+from fdnet.network.tessellation.section import sections
 from fdnet.network.tessellation.tessellation import Tessellation
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
@@ -107,17 +108,7 @@ def _sections(points: Points, facets: Facets) -> tuple[Array, Array, dict[str, i
     open and two of its grains overlap (the lens counts once). `throat_area_negative`: a circle
     fits but three grains overlap in one place; the area is then 0.
     """
-    radius, area = np.empty(len(facets.pore)), np.empty(len(facets.pore))
-    overlapping = np.empty(len(facets.pore), bool)
-    for part in geometry.slices(len(radius)):
-        vertex = facets.vertex[part]
-        corner, grain = points.position[vertex], points.radius[vertex]
-        radius[part] = geometry.touching_circle(corner, grain)
-        area[part] = geometry.open_area(corner, grain)
-        apart = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2)
-        overlapping[part] = np.any(
-            apart < (1.0 - TOUCHING) * (grain + np.roll(grain, 1, axis=1)), axis=1
-        )
+    radius, area, overlapping = sections(points.position, points.radius, facets.vertex, TOUCHING)
     closed = ~(radius > 0)
     counts = {
         "throats_closed": int(np.sum(closed)),

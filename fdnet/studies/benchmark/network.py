@@ -2,12 +2,13 @@
 
 Packs: pack H (40 grains, porosity 0.40) tiled, each grain moved by up to 2 % of its radius; fines
 of a tenth of the radius at random on the grains (they may overlap each other). Sides are periodic,
-and the flow goes between planes across x. Every size and tool has a process of its own with a time
-limit; imports, compiled kernels and file reading come before the clock starts. Peak memory is that
-of the process during the step. OpenPNM solves the same networks: intact; stiff, that is with
-conductances spread over 12 decades; and clogged, with a tenth of the throats closed as well. Yade
-tessellates the same grains, periodic and in a box of walls, and treats fines like grains. The case
-`specimen` is 1400 grains with 200,000 fines. Truth is resolved Stokes flow.
+and the flow goes between planes across x. The case `walled` is the same grains alone in a box of
+walls that hold the fluid. Every size and tool has a process of its own with a time limit; imports,
+compiled kernels and file reading come before the clock starts. Peak memory is that of the process
+during the step. OpenPNM solves the same networks: intact; stiff, that is with conductances spread
+over 12 decades; and clogged, with a tenth of the throats closed as well. Yade tessellates the same
+grains, periodic and in a box of walls, and treats fines like grains. The case `specimen` is 1400
+grains with 200,000 fines. Truth is resolved Stokes flow.
 """
 
 import json
@@ -120,7 +121,12 @@ def fdnet_rows(grains: int, fines: int, folder: Path, limit: float) -> list[Row]
         "pores": result.get("pores"),
     }
     steps = result.get("steps", {"total": {}})
-    return [common | {"step": step} | values for step, values in steps.items()]
+    rows = [common | {"step": step} | values for step, values in steps.items()]
+    walled = {"case": "walled", "fines": 0, "pores": None}
+    return rows + [
+        common | walled | {"step": step} | values
+        for step, values in result.get("walled", {}).items()
+    ]
 
 
 def openpnm_rows(python: str, folder: Path, base: Row, limit: float) -> list[Row]:
@@ -172,10 +178,11 @@ def error_rows(
 
 def set_growth(rows: list[Row]) -> None:
     """Exponent of CPU time against grains, by least squares over the sizes from 5000 grains on."""
-    groups: dict[tuple[str, str], list[Row]] = {}
+    groups: dict[tuple[str, str, str], list[Row]] = {}
     for row in rows:
-        if row["case"] == "tiled" and row.get("cpu_s") and (row["grains"] or 0) > 5000:
-            groups.setdefault((row["tool"], row["step"]), []).append(row)
+        tiled = row["case"] in ("tiled", "walled")
+        if tiled and row.get("cpu_s") and (row["grains"] or 0) > 5000:
+            groups.setdefault((row["tool"], row["case"], row["step"]), []).append(row)
     for group in groups.values():
         x, y = ([math.log(row[name]) for row in group] for name in ("grains", "cpu_s"))
         spread = sum((a - sum(x) / len(x)) ** 2 for a in x)
@@ -242,7 +249,7 @@ def measure(options: Options) -> list[Row]:
                 for sides in ("periodic", "box") if with_yade else ():
                     new.append(yade_row(folder / "spheres.npz", sides, base, options.limit))
             if grains == SPECIMEN[0]:
-                new = [row | {"case": "specimen"} for row in new]
+                new = [row | {"case": "specimen"} for row in new if row["case"] == "tiled"]
             show(new)
             rows += new
     set_growth(rows)
@@ -252,9 +259,9 @@ def measure(options: Options) -> list[Row]:
 def show_growth(rows: list[Row]) -> None:
     """Prints the exponents of the CPU time."""
     print("\ngrowth exponents of CPU time")
-    growths = {(r["tool"], r["step"], r["growth"]) for r in rows if r.get("growth")}
-    for tool, step, growth in sorted(growths):
-        print(f"  {tool:<16} {step:<14} {growth:.2f}")
+    growths = {(r["tool"], r["case"], r["step"], r["growth"]) for r in rows if r.get("growth")}
+    for tool, case, step, growth in sorted(growths):
+        print(f"  {tool:<16} {case:<8} {step:<14} {growth:.2f}")
 
 
 def write_table(rows: list[Row], path: Path) -> None:

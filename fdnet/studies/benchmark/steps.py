@@ -33,9 +33,12 @@ from fdnet.studies.truth.packs import read_pack, shaken, truth_folder
 TILE = "packH_40_eps40.csv"
 SHAKE = 0.02
 FINE = 0.1
-SIDES = (False, True, True)
+SIDES, BOX = (False, True, True), (False, False, False)
+"""Sides of the periodic packs, and of the same in a box of walls."""
 DECADES, CLOSED = 12, 0.1
 MOST_GRAINS_STIFF = 200_000
+COMPILING = 600
+"""Grains of a pack for which the compiled tessellation is used."""
 
 
 def tiled(grains: int, rng: np.random.Generator) -> Snapshot:
@@ -109,12 +112,16 @@ def _timed_call(clock: Clock, work: Callable[..., Any], *given: Any, **named: An
     return clock.timed("tessellate", lambda: work(*given, **named))
 
 
-def build_timed(clock: Clock, grains: Snapshot) -> tessellation.Network:
-    """build_network with the tessellation apart from the rest."""
+def build_timed(clock: Clock, grains: Snapshot, sides: tuple[bool, ...]) -> tessellation.Network:
+    """build_network with the tessellation apart from the rest.
+
+    In a box of walls the walls hold the fluid.
+    """
     spent, work = Clock(), tessellation.tessellate
     tessellation.tessellate = partial(_timed_call, spent, work)
+    walls = "slip" if any(sides) else "no-slip"
     network = clock.timed(
-        "geometry", lambda: tessellation.build_network(grains, periodic=SIDES, walls="slip")
+        "geometry", lambda: tessellation.build_network(grains, periodic=sides, walls=walls)
     )
     tessellation.tessellate = work
     clock.steps = {"tessellate": spent.steps["tessellate"], **clock.steps}
@@ -123,14 +130,29 @@ def build_timed(clock: Clock, grains: Snapshot) -> tessellation.Network:
     return network
 
 
+def run_intact(
+    clock: Clock, grains: Snapshot, sides: tuple[bool, ...]
+) -> tuple[tessellation.Network, Array, float]:
+    """The steps without fines; the network, its conductances and its inflow."""
+    network = build_timed(clock, grains, sides)
+    intact = clock.timed("conductance", lambda: LAWS[DEFAULT_LAW](network))
+    return network, intact, clock.timed("solve", lambda: solve_flow(network, intact)).inflow
+
+
+def run_walled(grains: Snapshot) -> Clock:
+    """The steps without fines in a box of walls."""
+    clock = Clock()
+    run_intact(clock, grains, BOX)
+    clock.steps["total intact"] = clock.total(list(clock.steps))
+    return clock
+
+
 def run_steps(
     grains: Snapshot, fines: Snapshot | None
 ) -> tuple[Clock, tessellation.Network, Array, float]:
     """All steps of an analysis on default laws; also the intact conductances and their inflow."""
     clock = Clock()
-    network = build_timed(clock, grains)
-    intact = clock.timed("conductance", lambda: LAWS[DEFAULT_LAW](network))
-    inflow = clock.timed("solve", lambda: solve_flow(network, intact)).inflow
+    network, intact, inflow = run_intact(clock, grains, SIDES)
     if fines is not None:
         occupancy = clock.timed("occupancy", lambda: measure_occupancy(network, fines))
         damage = clock.timed(
@@ -177,8 +199,9 @@ def leave_spheres(folder: Path, pack: Snapshot) -> None:
 def tiled_result(wanted: int, fine_count: int, folder: Path) -> dict[str, Any]:
     """Seconds and memory of every step on a tiled pack."""
     rng = np.random.default_rng(1)
-    small = tiled(40, rng)
-    run_steps(small, seated(small, 100, rng))  # compiles and loads
+    for grains in (tiled(40, rng), tiled(COMPILING, rng)):  # compiles and loads
+        run_steps(grains, seated(grains, 100, rng))
+        run_walled(grains)
     grains = tiled(wanted, rng)
     fines = seated(grains, fine_count, rng) if fine_count else None
     clock, network, intact, flux = run_steps(grains, fines)
@@ -191,7 +214,10 @@ def tiled_result(wanted: int, fine_count: int, folder: Path) -> dict[str, Any]:
         inflow[state] = clock.timed(f"solve {state}", work).inflow
     leave(folder, network, states, inflow)
     leave_spheres(folder, grains)
-    return {"grains": len(grains), "pores": len(network.pore_share), "steps": clock.steps}
+    count = len(network.pore_share)
+    del network, intact, states
+    walled = run_walled(grains).steps
+    return {"grains": len(grains), "pores": count, "steps": clock.steps, "walled": walled}
 
 
 def pack_result(path: Path, folder: Path) -> dict[str, Any]:

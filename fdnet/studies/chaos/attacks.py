@@ -10,7 +10,7 @@ from random import Random
 from fdnet.studies.chaos.commands import FaultError, wait_for
 from fdnet.studies.chaos.damages import cut, damage_and_go_on, garble, remove, swap, zero
 from fdnet.studies.chaos.judge import check_kept, finish, judge
-from fdnet.studies.chaos.runs import NOTES, Prepared, contents
+from fdnet.studies.chaos.runs import NOTES, Prepared, contents, to_go_on
 from fdnet.studies.chaos.surroundings import full_disk, report, two_ranks
 
 Attack = Callable[[Random, Path, Prepared], str]
@@ -44,7 +44,7 @@ def kill(rng: Random, place: Path, prepared: Prepared) -> str:
     which = rng.choice(("", "packed", "unfinished", "unfinished"))
     out = prepared.copy(which, place) if which else place / "run"
     for _ in range(rng.randrange(1, 4)):
-        resume = ["--resume"] * (out / "case.toml").exists()
+        resume = to_go_on(out)
         child = prepared.start(out, *resume, fresh=rng.random() < FRESH)
         child.let_run(rng.uniform(0.0, prepared.seconds[which]))
         child.send(rng.choice((signal.SIGKILL, signal.SIGTERM, signal.SIGINT)))

@@ -114,20 +114,20 @@ def chaos(
 
 def record_of(outcomes: Iterable[Outcome], seed: int) -> dict[str, Any]:
     """Counts by kind and outcome, every fault, and the reasons of what was skipped."""
-    found = sorted(outcomes, key=lambda outcome: outcome.index)
-    counts = Counter((outcome.kind, outcome.what) for outcome in found)
+    ordered = sorted(outcomes, key=lambda outcome: outcome.index)
+    counts = Counter((outcome.kind, outcome.what) for outcome in ordered)
     by_kind: dict[str, dict[str, int]] = {}
     for (kind, what), count in sorted(counts.items()):
         by_kind.setdefault(kind, {})[what] = count
     return {
-        "attacks": len(found),
+        "attacks": len(ordered),
         "seed": seed,
-        "seconds": round(sum(outcome.seconds for outcome in found), 1),
+        "seconds": round(sum(outcome.seconds for outcome in ordered), 1),
         "kinds": by_kind,
-        "skipped": sorted({one.words for one in found if one.what == "skipped"}),
+        "skipped": sorted({one.words for one in ordered if one.what == "skipped"}),
         "faults": [
             {"index": one.index, "kind": one.kind, "what": one.words}
-            for one in found
+            for one in ordered
             if one.what == "fault"
         ],
     }

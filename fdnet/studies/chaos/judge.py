@@ -6,7 +6,15 @@ from pathlib import Path
 
 from fdnet.run.record_files import OUTPUTS
 from fdnet.studies.chaos.commands import Ended, FaultError
-from fdnet.studies.chaos.runs import NOTES, TABLES, Prepared, contents, digest, read_results
+from fdnet.studies.chaos.runs import (
+    NOTES,
+    TABLES,
+    Prepared,
+    contents,
+    digest,
+    read_results,
+    to_go_on,
+)
 
 MOST_BYTES = 200 << 20
 """Bytes that one file of an attacked run may have."""
@@ -100,7 +108,7 @@ def _bad(files: Iterable[Path]) -> Iterator[Path]:
 
 def finish(prepared: Prepared, out: Path, *options: str) -> str:
     """Continue a run without any hindrance: it must end as the uncut one."""
-    resume = ["--resume"] * (out / "case.toml").exists()
+    resume = to_go_on(out)
     ended = prepared.call(out, *resume, *options)
     if judge(prepared, out, ended) != "ok":
         raise FaultError(f"stuck: {' '.join(ended.error.split())[:200]}")

@@ -122,4 +122,6 @@ if __name__ == "__main__":
     for _name in _SHOWN:
         import_module(_name)
     if _program()(sys.argv[2:]) == 0:
+        for _number in (signal.SIGINT, signal.SIGTERM):  # a child just forked ends by them
+            signal.signal(_number, signal.SIG_DFL)
         _serve(int(sys.argv[1]))

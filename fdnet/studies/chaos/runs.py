@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from fdnet.run.mark import CASE as CASE_FILE
+from fdnet.run.mark import UNFINISHED
 from fdnet.studies.chaos.commands import Child, Ended, started, wait_for
 from fdnet.studies.chaos.nursery import Nursery
 
@@ -97,6 +99,14 @@ class Prepared:
     ) -> Ended:
         """The command from its start to its end. Raises FaultError when it hangs."""
         return wait_for(self.start(out, *options, fresh=fresh, limits=limits))
+
+
+def to_go_on(out: Path) -> list[str]:
+    """The option that continues what is in the folder, none where no run was begun.
+
+    The mark of an unfinished run is written before its case.
+    """
+    return ["--resume"] * any((out / name).exists() for name in (CASE_FILE, UNFINISHED))
 
 
 @contextmanager

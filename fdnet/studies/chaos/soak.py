@@ -19,7 +19,7 @@ from typing import Any
 from fdnet.studies.chaos.attacks import FRESH
 from fdnet.studies.chaos.commands import LIMIT_S, FaultError, count_files, wait_for
 from fdnet.studies.chaos.judge import differs
-from fdnet.studies.chaos.runs import Prepared, nursery_in, prepare
+from fdnet.studies.chaos.runs import Prepared, nursery_in, prepare, to_go_on
 
 MARK = "FDNET_SOAK"
 """Name in the environment by which the processes of a soak are known."""
@@ -103,7 +103,7 @@ def _killed(prepared: Prepared, out: Path, rng: Random) -> int:
     """
     kills, files = 0, count_files(prepared.root / "finished")
     for _ in range(rng.randrange(1, MOST_KILLS + 1)):
-        resume = ["--resume"] * (out / "case.toml").exists()
+        resume = to_go_on(out)
         child = prepared.start(out, *resume, fresh=rng.random() < FRESH)
         child.let_write(out, rng.randrange(files))
         child.send(rng.choice((signal.SIGKILL, signal.SIGTERM)))
@@ -113,7 +113,7 @@ def _killed(prepared: Prepared, out: Path, rng: Random) -> int:
 
 def _finished(prepared: Prepared, out: Path, command: Command) -> str:
     """End the run in this process; what is wrong with it, "" when nothing is."""
-    resume = ["--resume"] * (out / "case.toml").exists()
+    resume = to_go_on(out)
     screen, handler = io.StringIO(), signal.getsignal(signal.SIGTERM)
     with (
         _alarm(),

@@ -1,0 +1,97 @@
+"""The damaged permeability from the network of all spheres, grains and fines alike.
+
+The power tessellation of grains and fines gives pores and throats at the scale of the fines, and
+the law `lubrication` gives their conductance, narrowed where a fourth sphere reaches into a
+section. No damage law is needed. Fines centred upstream whose bodies reach into the specimen count
+with what they have inside, as grains do.
+"""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fdnet.errors import NetworkError
+from fdnet.network.flow.depth import Solved, depth_permeability
+from fdnet.network.flow.flow import Flow
+from fdnet.network.flow.slabs import SlabK, whole_permeability
+from fdnet.network.laws.lubrication import half_resistances
+from fdnet.network.network import Network, build_network
+from fdnet.network.resolved.slab import Sides, cut_networks, slab_permeabilities
+from fdnet.spheres.arrays import one_line
+from fdnet.spheres.snapshot import Array, Kind, Snapshot, frozen
+
+Timed = Callable[[str], AbstractContextManager[None]]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class AllSpheres:
+    """Permeability of grains and fines from the network of all spheres.
+
+    Attributes:
+        solved: the network, its flow, and the resistances of its throats.
+        k: m2, of the whole specimen.
+        slabs: of each section, cut out and in place.
+        refused: sections whose spheres make no network of their own, one sentence each.
+    """
+
+    solved: Solved
+    k: float
+    slabs: SlabK
+    refused: tuple[str, ...]
+
+    __repr__ = one_line
+
+
+def as_grains(spheres: Snapshot) -> Snapshot:
+    """The same spheres, all of them of the kind grain."""
+    return replace(spheres, kind=np.full(len(spheres), Kind.GRAIN))
+
+
+def all_conductances(network: Network) -> Array:
+    """Conductance (T,) m3 of the throats between spheres of any size."""
+    return 1.0 / half_resistances(network, fourth=True).sum(axis=1)
+
+
+def measure_all_spheres(
+    spheres: Snapshot, edges: Array, *, sides: Sides, timed: Timed
+) -> AllSpheres:
+    """Permeability of all `spheres` together, of the whole and of the slabs between `edges` m.
+
+    `timed` takes the name of the stage that its block belongs to. Raises NetworkError where grains
+    and fines make no network (`build_network`), and FlowError as `solve_flow` does.
+    """
+    grains = as_grains(spheres)
+    with timed("tessellate"):
+        try:
+            network = build_network(grains, periodic=sides.periodic, walls=sides.walls)
+        except NetworkError as error:
+            raise NetworkError(
+                f"all-spheres: grains and fines together make no network: {error}; use "
+                "analysis.damage_law = 'side-kozeny'"
+            ) from error
+    with timed("conductance"):
+        halves = half_resistances(network, fourth=True)
+    conductance = 1.0 / halves.sum(axis=1)
+    with timed("solve"):
+        k, flow = whole_permeability(network, conductance)
+        inplace = depth_permeability(network, flow, halves, edges)
+    parts: list[tuple[float, Flow]] = [(k, flow)]
+    refused: tuple[str, ...] = ()
+    if len(edges) > 2 or sides.periodic[0]:  # else one slab is the whole box
+        with timed("tessellate"):
+            slabs = cut_networks(grains, edges, sides)
+        with timed("solve"):
+            parts = slab_permeabilities(slabs, all_conductances, (network, conductance))
+        refused = slabs.refused
+    return AllSpheres(
+        solved=Solved(network=network, flow=flow, halves=halves),
+        k=k,
+        slabs=SlabK(
+            cut_out=frozen([one for one, _ in parts]),
+            inplace=frozen(inplace),
+            flows=tuple(one for _, one in parts),
+        ),
+        refused=refused,
+    )

@@ -1,0 +1,113 @@
+"""A slab across the flow as a specimen of its own: what its two planes cut out of the spheres.
+
+The planes are inlet and outlet: the pressure is held on them, and the fluid crosses them at right
+angles. So the slab with its mirror image is a periodic pack, and its network is that of the
+spheres in a box of this length (`tessellation.placed_grains`). Cutting the throats of the whole
+specimen at the planes instead leaves stumps of oblique throats, and misses that a pore which a
+plane cuts is open to it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from fdnet.errors import NetworkError
+from fdnet.network.flow.flow import Flow
+from fdnet.network.flow.slabs import slab_permeability, whole_permeability
+from fdnet.network.network import Network, build_network
+from fdnet.spheres.arrays import one_line
+from fdnet.spheres.images import make_images
+from fdnet.spheres.snapshot import Array, Snapshot
+
+Conduct = Callable[[Network], Array]
+"""Conductance (T,) m3 of the throats of a network."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Sides:
+    """What the sides of a specimen are.
+
+    Attributes:
+        periodic: whether x, y and z repeat.
+        walls: "slip" or "no-slip", for the y and z sides that do not.
+    """
+
+    periodic: tuple[bool, bool, bool]
+    walls: str
+
+    __repr__ = one_line
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class CutNetworks:
+    """The networks of S slabs, each of its own spheres alone.
+
+    Attributes:
+        edges: (S+1,) m.
+        networks: S networks; None where the spheres of a slab make none.
+        refused: why not, one sentence for each of these.
+    """
+
+    edges: Array
+    networks: tuple[Network | None, ...]
+    refused: tuple[str, ...]
+
+    __repr__ = one_line
+
+
+def cut_out(spheres: Snapshot, span: tuple[float, float], periodic: Sequence[bool]) -> Snapshot:
+    """The spheres that reach between the planes at `span` (low, high) m, in a box of that length.
+
+    Where x is `periodic`, so do their images.
+    """
+    box = spheres.box.copy()
+    box[0] = span
+    if periodic[0]:
+        margin = np.array([float(spheres.radius.max()), np.nan, np.nan])
+        images = make_images(
+            spheres.position,
+            spheres.box,
+            periodic=(True, False, False),
+            margin=margin,
+            tolerance=0.0,
+        )
+        spheres = replace(spheres.where(images.owner), position=images.position)
+    x = spheres.position[:, 0]
+    reaches = (x + spheres.radius > span[0]) & (x - spheres.radius < span[1])
+    return replace(spheres.where(reaches), box=box)
+
+
+def cut_networks(spheres: Snapshot, edges: Array, sides: Sides) -> CutNetworks:
+    """The network of each slab between `edges` (S+1,) m, whose skeleton is all of `spheres`."""
+    around = (False, *sides.periodic[1:])
+    networks: list[Network | None] = []
+    refused = []
+    for number, (low, high) in enumerate(pairwise(edges)):
+        alone = cut_out(spheres, (float(low), float(high)), sides.periodic)
+        try:
+            networks.append(build_network(alone, periodic=around, walls=sides.walls))
+        except NetworkError as error:
+            networks.append(None)
+            refused.append(
+                f"section {number + 1} is no specimen of its own, so it was cut out of the "
+                f"network of the whole, which is less accurate: {error}"
+            )
+    return CutNetworks(edges=edges, networks=tuple(networks), refused=tuple(refused))
+
+
+def slab_permeabilities(
+    slabs: CutNetworks, conduct: Conduct, whole: tuple[Network, Array]
+) -> list[tuple[float, Flow]]:
+    """Permeability m2 of each of the S slabs cut out, and its flow.
+
+    The throats of a slab have the conductance `conduct`. A slab without a network of its own is
+    cut out of that of the `whole` specimen, which is given with its conductances (T,) m3.
+    """
+    return [
+        slab_permeability(*whole, (float(low), float(high)))
+        if network is None
+        else whole_permeability(network, conduct(network))
+        for network, (low, high) in zip(slabs.networks, pairwise(slabs.edges), strict=True)
+    ]

@@ -1,0 +1,181 @@
+"""The network of grains and fines together: what it adds up to, and where it is used."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fdnet.errors import CaseError, NetworkError
+from fdnet.network.flow.depth import Solved, depth_pressures, layer_edges
+from fdnet.network.flow.slabs import whole_permeability
+from fdnet.network.laws.fourth_grain import share_left
+from fdnet.network.laws.lubrication import half_resistances
+from fdnet.network.laws.wedge import ratio_table
+from fdnet.network.network import build_network
+from fdnet.network.permeability import analyse
+from fdnet.network.resolved import measured
+from fdnet.network.resolved.all_spheres import as_grains
+from fdnet.spheres.snapshot import Kind, Snapshot
+from fdnet.studies.truth.packs import read_pack, truth_folder
+from tests.network.packs import random_pack, with_fines
+
+SIDES = "yz"
+BASE = np.array([[0.0, 0.0], [1.0, 0.0], [0.3, 0.9]])
+
+
+@pytest.fixture(scope="module")
+def pack():
+    return with_fines(random_pack(40, aspect=2.0), 60, 0.2)
+
+
+@pytest.fixture(scope="module")
+def analysis(pack):
+    return analyse(pack, periodic=SIDES, sections=2, damage_law="all-spheres")
+
+
+def test_k_is_that_of_the_network_of_all_spheres(pack, analysis):
+    network = build_network(as_grains(pack), periodic=SIDES)
+    conductance = 1.0 / half_resistances(network, fourth=True).sum(axis=1)
+    assert analysis.k_damaged == pytest.approx(whole_permeability(network, conductance)[0])
+    assert analysis.damage_law_used == "all-spheres"
+    two_scale = analyse(pack, periodic=SIDES, damage_law="side-kozeny")
+    assert analysis.damage_law_other == two_scale.damage_law_used == "side-kozeny"
+    assert analysis.k_damaged_other == pytest.approx(two_scale.k_damaged)
+    assert len(analysis.conductance_damaged) == len(analysis.network.throat_radius)
+
+
+@pytest.mark.parametrize(("name", "ratio"), [("packH_r5_d1", 0.8866), ("packC_r5_d2", 0.6231)])
+def test_few_fines_lower_k_as_resolved_flow_does(name, ratio):
+    """Without the fourth grain these are 4.6 % and 4.4 % too high."""
+    spheres = read_pack(truth_folder() / f"{name}.csv")[0]
+    result = analyse(spheres, periodic="xyz", walls="slip", damage_law="all-spheres")
+    assert result.k_damaged / result.k_initial == pytest.approx(ratio, rel=0.02)
+
+
+def test_a_section_is_the_specimen_of_its_own_spheres(pack, analysis):
+    section = analysis.sections[1]
+    box = pack.box.copy()
+    box[0] = section.x_lo, section.x_hi
+    alone = analyse(replace(pack, box=box), periodic=SIDES, damage_law="all-spheres")
+    assert section.k_initial == pytest.approx(alone.k_initial)
+    assert section.k_damaged == pytest.approx(alone.k_damaged)
+
+
+def test_sections_of_a_periodic_pack_see_the_images_beyond_its_faces():
+    grains = random_pack(40, aspect=2.0)
+    turned = replace(
+        grains, position=grains.position + np.array([0.5 * np.ptp(grains.box[0]), 0, 0])
+    )
+    first = analyse(grains, periodic="xyz", sections=2)
+    second = analyse(turned, periodic="xyz", sections=2)
+    k = [one.k_initial for one in first.sections]
+    assert [one.k_initial for one in second.sections] == pytest.approx(k[::-1], rel=1e-4)
+
+
+def test_fines_upstream_count_as_far_as_they_reach_in(pack):
+    low = pack.box[0, 0]
+    radius = float(pack.fines().radius.mean())
+
+    def upstream(beyond):
+        rng = np.random.default_rng(3)
+        side = pack.box[1, 1]
+        place = np.column_stack([np.full(250, low - beyond), *rng.uniform(0, side, (2, 250))])
+        cake = Snapshot.from_arrays(place, radius, box=pack.box, kind=Kind.FINE)
+        both = pack.joined(replace(cake, id=cake.id + 10_000))
+        result = analyse(both, periodic=SIDES, sections=4, damage_law="all-spheres")
+        return result.sections[0].k_damaged
+
+    apart = upstream(1.01 * radius)
+    assert apart == pytest.approx(upstream(3.0 * radius))
+    assert upstream(0.3 * radius) < 0.98 * apart
+
+
+def test_values_in_place_and_layers_add_up_to_the_whole(pack, analysis):
+    thickness = [one.x_hi - one.x_lo for one in analysis.sections]
+    for name, whole in (("k_initial_inplace", analysis.k_initial), ("k_damaged_inplace", None)):
+        k = [getattr(one, name) for one in analysis.sections]
+        series = sum(thickness) / np.sum(np.divide(thickness, k))
+        assert series == pytest.approx(analysis.k_damaged if whole is None else whole)
+    network = build_network(pack.grains(), periodic=SIDES)
+    halves = half_resistances(network)
+    flow = whole_permeability(network, 1.0 / halves.sum(axis=1))[1]
+    planes = np.linspace(*pack.box[0], 30)
+    pressure = depth_pressures(network, flow, halves, planes)
+    assert pressure[[0, -1]] == pytest.approx([1.0, 0.0])
+    assert np.all(np.diff(pressure) < 0)
+    assert Solved(network=network, flow=flow, halves=halves).flow is flow
+
+
+def test_layers_are_as_thick_as_a_fine_and_fill_the_first_millimetre():
+    box = np.array([[0.0, 8e-3], [0, 1e-3], [0, 1e-3]])
+    edges = layer_edges(box, 3e-4)
+    assert edges == pytest.approx([0, 3e-4, 6e-4, 9e-4, 1e-3])
+    assert len(layer_edges(box, 1e-7)) == 201
+    box[0, 1] = 2e-4
+    assert layer_edges(box, 1e-4) == pytest.approx([0, 1e-4, 2e-4])
+
+
+def test_the_default_takes_all_spheres_up_to_a_number_of_them(pack, monkeypatch):
+    small = analyse(pack, periodic=SIDES)
+    assert (small.damage_law, small.damage_law_used) == ("auto", "all-spheres")
+    assert small.layers is not None
+    assert small.layers.fines_count.sum() <= small.invaded_count
+    monkeypatch.setattr(measured, "MOST_SPHERES", len(pack) - 1)
+    large = analyse(pack, periodic=SIDES)
+    assert (large.damage_law_used, large.k_damaged_other) == ("side-kozeny", None)
+    assert large.k_damaged == pytest.approx(small.k_damaged_other)
+    intact = analyse(pack.grains(), periodic=SIDES)
+    assert intact.damage_law_used is None
+    assert intact.k_damaged == intact.k_initial
+
+
+def test_fines_never_raise_k(pack):
+    """One small fine makes the network finer, and its k may come out above that of the grains."""
+    fines = pack.fines()
+    for count in (1, 5, len(fines)):
+        few = pack.grains().joined(fines.where(np.arange(count)))
+        few = replace(few, radius=np.where(few.kind == Kind.FINE, 0.3, 1.0) * few.radius)
+        for law in ("auto", "all-spheres"):
+            result = analyse(few, periodic=SIDES, sections=2, damage_law=law)
+            assert result.k_damaged <= result.k_initial
+            assert all(one.k_damaged <= one.k_initial for one in result.sections)
+
+
+def test_all_spheres_goes_with_its_own_law_alone(pack):
+    with pytest.raises(CaseError, match=r"analysis\.damage_law: 'all-spheres'.*'thesis'"):
+        analyse(pack, periodic=SIDES, law="thesis", damage_law="all-spheres")
+
+
+def test_spheres_that_make_no_network_are_refused_or_left_to_the_other_law(pack):
+    double = pack.joined(replace(pack.fines(), id=pack.fines().id + 10_000))
+    with pytest.raises(NetworkError, match=r"all-spheres.*coincide.*side-kozeny"):
+        analyse(double, periodic=SIDES, damage_law="all-spheres")
+    default = analyse(double, periodic=SIDES)
+    assert default.damage_law_used == "side-kozeny"
+    assert any("coincide" in text for text in default.warnings)
+
+
+def test_a_fourth_disc_takes_all_some_or_nothing():
+    disc, table = np.array([0.3, 0.2, 0.25]), ratio_table()
+
+    def left(x, y, radius):
+        return share_left(BASE, disc, x, y, radius, table)
+
+    assert left(0.5, -1.0, 0.9) == 1.0
+    assert left(0.4, 0.3, 2.0) == 0.0
+    shares = [left(0.45, 0.3, radius) for radius in (0.02, 0.05, 0.1, 0.2)]
+    assert np.all(np.diff(shares) < 0)
+    assert 0 < shares[-1] < shares[0] < 1
+
+
+def test_a_cap_shows_the_sections_of_its_half_ellipsoid():
+    """Of a grain of radius 5 centred 3 beyond the face: base 4, height 2; volume 52 pi / 3."""
+    grains = [[-3.0, 5.0, 5.0], [4.0, 2.0, 2.0], [4.0, 8.0, 2.0], [4.0, 5.0, 8.0], [9.0, 5.0, 5.0]]
+    spheres = Snapshot.from_arrays(grains, [5.0, 2, 2, 2, 2], box=[0, 10, 0, 10, 0, 10])
+    network = build_network(spheres)
+    cap = network.image_height < network.image_radius
+    assert cap.any()
+    h = 2.0 * (3.0 * 16.0 + 4.0) / (4.0 * 16.0)
+    assert network.image_height[cap] == pytest.approx(h, rel=1e-6)
+    assert 2.0 / 3.0 * network.image_radius[cap] ** 3 == pytest.approx(52.0 / 3.0, rel=1e-3)
+    assert network.image_radius[cap] ** 3 / h == pytest.approx(16.0, rel=1e-3)
