@@ -42,8 +42,9 @@ SLAB: dict[str, Any] = {
 }
 """The invasion of the studies: 300 fixed grains at porosity 0.40, 1,000 fines of 0.10 mm, 2 ms.
 
-The velocity (5.4 m/s) and the shear stiffnesses are those of the thesis's specimen 5. The duration is given, so that every run
-follows the same span of time. Drag has no error of its own (see the study of drag).
+The velocity (5.4 m/s) and the shear stiffnesses are those of the thesis's specimen 5. The duration
+is given, so that every run follows the same span of time. Drag has no error of its own (see the
+study of drag).
 """
 PROFILE_BINS = 16
 """Equal bins of depth over the specimen in which invaded fines are counted."""
