@@ -17,7 +17,7 @@ from fdnet.case.values import (
 
 SHEAR_RATIO = 0.04
 """Tangential over normal stiffness of a material that gives none: small enough that no fine larger
-than 1/400 of a grain locks between two grains (`fdnet.scales.sticking`)."""
+than 1/370 of a grain at friction 0.55 locks between two grains (`fdnet.scales.sticking`)."""
 
 
 class Spheres(Part):
