@@ -7,6 +7,11 @@ Computes every law on every pack of known permeability (about two minutes), writ
 docs/validation/accuracy_*.csv and accuracy.png, and the page from docs/accuracy.md.in. The tables
 of walls and of other tools are read from their files. Rows of the truth whose pack is in neither
 --packs nor --more are named on the page and left out.
+
+    .venv/bin/python scripts/accuracy.py --slabs yes no
+
+prints instead what the laws make of the slabs of deposits that LIGGGHTS made: of those whose truth
+was known before the laws were shaped ("yes"), and of those put aside ("no").
 """
 
 import argparse
@@ -14,7 +19,9 @@ from pathlib import Path
 
 from fdnet.files.paths import path_option
 from fdnet.studies.accuracy.page import write_accuracy
+from fdnet.studies.accuracy.slabs import slab_rows, slab_summary
 from fdnet.studies.truth.packs import DATA, OWN_TRUTH
+from fdnet.studies.truth.slabs import NO, SLAB_FOLDER, YES
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 parser = argparse.ArgumentParser(
@@ -27,6 +34,11 @@ parser.add_argument(
 parser.add_argument("--own", type=path_option, default=DATA / OWN_TRUTH, help="fdnet's own truth")
 parser.add_argument("--benchmark", type=path_option, default=DOCS / "benchmark_network.csv")
 parser.add_argument("--docs", type=path_option, default=DOCS, help="where to write")
+parser.add_argument("--slabs", nargs="+", choices=(YES, NO), help="print the slabs alone")
 
 if __name__ == "__main__":
-    print(write_accuracy(**vars(parser.parse_args())))
+    given = vars(parser.parse_args())
+    if known := given.pop("slabs"):
+        print(slab_summary(slab_rows(SLAB_FOLDER, known)))
+    else:
+        print(write_accuracy(**given))

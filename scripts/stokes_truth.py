@@ -1,11 +1,17 @@
 #!/usr/bin/env python3
-"""Stokes truth: make periodic packs and compute their permeability on two grids, extrapolated.
+"""Stokes truth: make packs and deposits and compute their permeability, extrapolated from grids.
 
     .venv/bin/python scripts/stokes_truth.py make
     .venv/bin/python scripts/stokes_truth.py solve PACK.csv --cells 128 192 --axis x
+    .venv/bin/python scripts/stokes_truth.py make-slabs
+    .venv/bin/python scripts/stokes_truth.py solve-slabs
+    .venv/bin/python scripts/stokes_truth.py list-slabs
 
-`make [NAME ...]` writes packs from their seeds. `solve` runs pack files grid by grid: a finished
-grid is a row of --grids and is not run again. Method and checks: docs/stokes.md.
+`make [NAME ...]` writes periodic packs from their seeds. `solve` runs pack files grid by grid: a
+finished grid is a row of --grids and is not run again. `make-slabs [NAME ...]` lets LIGGGHTS make
+the specimens of the slabs and keeps their run folders in --runs; `solve-slabs [NAME ...]` solves
+the slabs cut from them, grid by grid too; `list-slabs` prints what they are. Method and checks:
+docs/stokes.md.
 """
 
 import argparse
@@ -17,7 +23,10 @@ from pathlib import Path
 from fdnet.files.paths import path_option
 from fdnet.studies.truth.grids import Solve, make, solve
 from fdnet.studies.truth.made_packs import PACKS
+from fdnet.studies.truth.made_slabs import SLABS, SPECIMENS, make_specimens
 from fdnet.studies.truth.packs import DATA, OWN_GRIDS, OWN_TRUTH
+from fdnet.studies.truth.slab_grids import slab_table, solve_slabs
+from fdnet.studies.truth.slabs import SLAB_FOLDER
 
 parser = argparse.ArgumentParser(
     description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -33,12 +42,29 @@ solver.add_argument("--axis", choices="xyz", default="x")
 solver.add_argument("--tolerance", type=float, default=1e-4)
 solver.add_argument("--grids", type=path_option, default=DATA / OWN_GRIDS)
 solver.add_argument("--csv", dest="table", type=path_option, default=DATA / OWN_TRUTH)
+slab_maker = verbs.add_parser("make-slabs", help="run LIGGGHTS and write the slabs' specimens")
+slab_maker.add_argument("names", nargs="*", choices=[[], *SPECIMENS], metavar="NAME")
+slab_maker.add_argument("--runs", type=path_option, default=Path("runs"))
+slab_maker.add_argument("--slabs", type=path_option, default=SLAB_FOLDER)
+slab_solver = verbs.add_parser("solve-slabs", help="permeability of slabs with and without fines")
+slab_solver.add_argument("names", nargs="*", choices=[[], *SLABS], metavar="NAME")
+slab_solver.add_argument("--cells", nargs="+", type=int, default=[])
+slab_solver.add_argument("--slabs", type=path_option, default=SLAB_FOLDER)
+slab_lister = verbs.add_parser("list-slabs", help="what the slabs are, as a Markdown table")
+slab_lister.add_argument("--slabs", type=path_option, default=SLAB_FOLDER)
 
 if __name__ == "__main__":
     given = vars(parser.parse_args())
     logging.basicConfig(level=logging.INFO, format="  %(message)s")
-    if given.pop("verb") == "make":
+    verb = given.pop("verb")
+    if verb == "make":
         make(given["names"], given["packs"])
+    elif verb == "make-slabs":
+        make_specimens(given["names"], given["runs"], given["slabs"])
+    elif verb == "solve-slabs":
+        solve_slabs(given["names"], given["slabs"], given["cells"])
+    elif verb == "list-slabs":
+        print(slab_table(given["slabs"]))
     else:
         command = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
         for path in given.pop("files"):

@@ -253,7 +253,9 @@ def test_the_home_folder_is_meant_by_a_tilde(tmp_path, case, capsys, monkeypatch
     monkeypatch.chdir(tmp_path / "here")
     shutil.copy(case, tmp_path / "home" / "case.toml")
     (tmp_path / "home" / "s.csv").write_text(CUBE)
-    assert answer(capsys, "run", "~/case.toml", "--out=~/run", "--quiet")[0] == 0
+    stages = ("pack", "invade", "analyse")
+    given = ("~/case.toml", "--out=~/run", "--quiet", "--stages", ",".join(stages))
+    assert answer(capsys, "run", *given)[0] == 0
     assert answer(capsys, "render", "~/case.toml", "--out=~/decks")[0] == 0
     assert answer(capsys, "permeability", "~/s.csv", "--csv=~/laws.csv")[0] == 0
     assert not list((tmp_path / "here").iterdir())
@@ -262,7 +264,8 @@ def test_the_home_folder_is_meant_by_a_tilde(tmp_path, case, capsys, monkeypatch
     assert fdnet.open_run("~/run").sections is not None
     assert len(fdnet.read_spheres("~/s.csv")) == 27
     assert fdnet.read_case("~/case.toml").name == "tiny"
-    assert fdnet.run_case("~/case.toml", "~/run").path == tmp_path / "home" / "run"
+    again = fdnet.run_case("~/case.toml", "~/run", stages=stages)
+    assert again.path == tmp_path / "home" / "run"
     assert json.loads((tmp_path / "home" / "run" / "manifest.json").read_text())["case"] == "tiny"
 
 

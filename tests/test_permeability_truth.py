@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from fdnet.case.names import DAMAGE_LAW_NAMES, LAW_NAMES
+from fdnet.case.names import ALL_SPHERES, AUTO, DAMAGE_LAW_NAMES, LAW_NAMES
 from fdnet.cli import main
 from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, LAWS
 from fdnet.studies.truth.packs import DATA, truth_tables
@@ -74,15 +74,17 @@ def test_root_mean_square_errors_are_within_the_goals(capsys):
 
 def test_names_offered_are_the_laws_there_are():
     assert set(LAW_NAMES) == set(LAWS)
-    assert set(DAMAGE_LAW_NAMES) == set(DAMAGE_LAWS)
+    assert set(DAMAGE_LAW_NAMES) == {AUTO, ALL_SPHERES, *DAMAGE_LAWS}
 
 
 def test_compared_laws_give_what_each_gives_alone(capsys, tmp_path):
     table = tmp_path / "laws.csv"
     result = run(capsys, "packC_r5_d2-x", "--compare-laws", "--sections", "2", "--csv", str(table))
     pairs = {(one["law"], one["damage_law"]): one for one in result["laws"]}
-    assert set(pairs) == {(law, damage) for law in LAWS for damage in DAMAGE_LAWS}
-    assert result["k_damaged_m2"] == pairs[DEFAULT_LAW, DEFAULT_DAMAGE_LAW]["k_damaged_m2"]
+    two_scale = {(law, damage) for law in LAWS for damage in DAMAGE_LAWS}
+    assert set(pairs) == two_scale | {(DEFAULT_LAW, AUTO), (DEFAULT_LAW, ALL_SPHERES)}
+    assert result["k_damaged_m2"] == pairs[DEFAULT_LAW, result["damage_law_used"]]["k_damaged_m2"]
+    assert result["damage_law_other"] in (ALL_SPHERES, DEFAULT_DAMAGE_LAW)
     alone = run(
         capsys, "packC_r5_d2-x", "--law", "thesis", "--damage-law", "thesis", "--sections", "2"
     )

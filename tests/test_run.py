@@ -125,7 +125,8 @@ def test_stages_still_to_run_take_the_new_policy(finished, tmp_path):
         == 0
     )
     assert (tmp_path / "run" / "case.toml").read_text() == before
-    assert fdnet("run", case, "--out", tmp_path / "run", "--set", MORE_HOURS).returncode == 0
+    rest = ("--set", MORE_HOURS, "--stages", "invade")
+    assert fdnet("run", case, "--out", tmp_path / "run", *rest).returncode == 0
     assert "max_hours = 99" in (tmp_path / "run" / "case.toml").read_text()
 
 
@@ -481,7 +482,8 @@ def test_a_failing_binary_ends_with_3_and_keeps_what_was_written(finished, tmp_p
     assert failed.returncode == 3
     assert "ERROR: played" in failed.stderr
     assert "Traceback" not in failed.stderr
-    mended = fdnet("run", case, "--out", tmp_path / "run", "--resume")
+    stages = ("--stages", "pack,invade,analyse")
+    mended = fdnet("run", case, "--out", tmp_path / "run", "--resume", *stages)
     assert mended.returncode == 0, mended.stderr
 
 

@@ -150,23 +150,26 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
     specimen, law = measured.specimen, options.law
     clean, clean_slabs = measured.clean(law, log)
     base = measured.base(law, log)
-    whole = measured.wanted(options, base, log)
+    whole = measured.wanted(options, log)
     name = options.damage_law
     if name in (AUTO, ALL_SPHERES):
         name = DEFAULT_DAMAGE_LAW
     final, damage = measured.damaged(options, name, log)
     k_damaged, slabs = final.k, clean_slabs
     more: dict[str, int] = {}
-    if whole is not None:
-        k_damaged, slabs, more = _resolved(whole, base, (clean_slabs, specimen.moved), log)
+    light = options.damage_law == AUTO and measured.is_light(base, final)
+    taken = None if light else whole
+    if taken is not None:
+        k_damaged, slabs, more = _resolved(taken, base, (clean_slabs, specimen.moved), log)
     elif final is not clean:
         slabs = measured.damaged_slabs(final, options, name, log)
     pair = clean_slabs, slabs
     sections = make_sections(specimen.edges, specimen.porosity, pair, specimen.depth)
-    _warn(log, (clean, final if whole is None else whole.solved), sections)
+    _warn(log, (clean, final if taken is None else taken.solved), sections)
     log.warnings += specimen_doubts(specimen, clean.k, options.walls)
+    other, k_other = _other(whole, taken, (base, final), name)
     if whole is not None:
-        log.warnings += laws_apart(k_damaged, final.k, name)
+        log.warnings += laws_apart(min(whole.k, base.k), final.k, name)
     law_used = np.full(len(final.conductance), CLEAN) if damage is None else damage.law_used
     flows = [clean.flow, base.flow, final.flow, *clean_slabs.flows, *slabs.flows]
     return Analysis(
@@ -174,9 +177,9 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
         occupancy=specimen.occupancy,
         law=law,
         damage_law=options.damage_law,
-        damage_law_used=_used(specimen, whole, name),
-        damage_law_other=None if whole is None else name,
-        k_damaged_other=None if whole is None else final.k,
+        damage_law_used=_used(specimen, taken, name),
+        damage_law_other=other,
+        k_damaged_other=k_other,
         conductance_initial=base.conductance,
         conductance_damaged=final.conductance,
         law_used=frozen(law_used),
@@ -237,6 +240,18 @@ def _resolved(
             "all_spheres_sections_above_grains": above,
         },
     )
+
+
+def _other(
+    whole: AllSpheres | None, taken: AllSpheres | None, states: tuple[State, State], name: str
+) -> tuple[str | None, float | None]:
+    """Name and k (m2) of the law that was computed and not taken, if there is one.
+
+    `states` are the grains without and with fines by the law `name`.
+    """
+    if whole is None:
+        return None, None
+    return (ALL_SPHERES, min(whole.k, states[0].k)) if taken is None else (name, states[1].k)
 
 
 def _used(specimen: Specimen, whole: AllSpheres | None, name: str) -> str | None:

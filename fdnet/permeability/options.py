@@ -61,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--damage-law",
         choices=DAMAGE_LAW_NAMES,
-        help=f"damage law (default {AUTO}: all-spheres up to {MOST_SPHERES} spheres, above "
+        help=f"damage law (default {AUTO}: all-spheres up to {MOST_SPHERES} spheres, else "
         f"{DEFAULT_DAMAGE_LAW})",
     )
     parser.add_argument(

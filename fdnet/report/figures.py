@@ -224,7 +224,7 @@ def _layers(figure: Any, *, layers: "Layers") -> None:
         above.set_yscale("log")
     below.set_ylim(bottom=0)
     below.set_xlabel(DEPTH_LABEL)
-    _legend(above, loc="lower right")
+    _legend(below)
 
 
 def _porosity_profile(figure: Any, *, analysis: "Analysis") -> None:

@@ -60,7 +60,7 @@ class FinishedRun:
     def layers(self) -> "pd.DataFrame":
         """Thin layers of the first millimetre: edges (m), k (m2) in place, pressure drops, fines.
 
-        They are from the network of all spheres; without it (`damage_law_used`) there are no rows.
+        They are from the network of all spheres; where that was not solved there are no rows.
         """
         from fdnet.report.read_tables import COLUMNS, empty_table
 

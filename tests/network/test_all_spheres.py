@@ -116,6 +116,7 @@ def test_layers_are_as_thick_as_a_fine_and_fill_the_first_millimetre():
 
 
 def test_the_default_takes_all_spheres_up_to_a_number_of_them(pack, monkeypatch):
+    monkeypatch.setattr(measured, "LIGHT", 1.0)
     small = analyse(pack, periodic=SIDES)
     assert (small.damage_law, small.damage_law_used) == ("auto", "all-spheres")
     assert small.layers is not None
@@ -124,6 +125,11 @@ def test_the_default_takes_all_spheres_up_to_a_number_of_them(pack, monkeypatch)
     large = analyse(pack, periodic=SIDES)
     assert (large.damage_law_used, large.k_damaged_other) == ("side-kozeny", None)
     assert large.k_damaged == pytest.approx(small.k_damaged_other)
+    monkeypatch.undo()
+    light = analyse(pack, periodic=SIDES)
+    assert light.k_damaged_other == pytest.approx(small.k_damaged)
+    assert (light.damage_law_used, light.damage_law_other) == ("side-kozeny", "all-spheres")
+    assert light.k_damaged == pytest.approx(small.k_damaged_other)
     intact = analyse(pack.grains(), periodic=SIDES)
     assert intact.damage_law_used is None
     assert intact.k_damaged == intact.k_initial

@@ -41,9 +41,9 @@ def test_touching_spheres_and_whether_their_centres_are_within():
 
 def test_solids_in_tetrahedra():
     points, radius, vertex = bodies(4)
-    found = tetrahedron.solids(points, radius, vertex)
+    measured = tetrahedron.solids(points, radius, vertex)
     expected = geometry.solid_in_tetrahedra(points[vertex], radius[vertex])
-    for one, other in zip(found, expected, strict=True):
+    for one, other in zip(measured, expected, strict=True):
         assert one == pytest.approx(other, rel=1e-9, abs=1e-12)
 
 
@@ -81,11 +81,11 @@ def test_heights_are_those_of_the_places_and_sides_those_of_the_shaken():
     points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 0.0]])
     shaken = points + np.array([[0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, -1e-7]])
     centre = np.array([[0.2, 0.2, -0.5], [0.2, 0.2, -0.75]])
-    found = section.heights(
+    measured = section.heights(
         (points, shaken),
         np.array([[0, 1, 2]], np.int32),
         np.array([3]),
         centre,
         (np.array([[0, 1]], np.int32), np.array([[0.0, 0.0, 1.0]])),
     )
-    assert found[0] == pytest.approx([0.5, 0.25], rel=1e-14)
+    assert measured[0] == pytest.approx([0.5, 0.25], rel=1e-14)

@@ -54,7 +54,7 @@ def nearly_degenerate(kind: int, rng: np.random.Generator) -> np.ndarray:
 @pytest.mark.parametrize("kind", [0, 1, 2])
 def test_signs_are_those_of_exact_arithmetic_or_none(kind):
     rng = np.random.default_rng(kind)
-    told = 0
+    certain = 0
     for case in range(60):
         points = nearly_degenerate(kind, rng)
         weight = rng.random(5) if case % 2 and kind == 0 else np.full(5, 0.3)
@@ -62,8 +62,8 @@ def test_signs_are_those_of_exact_arithmetic_or_none(kind):
         given = side_of_plane(points, 0, 1, 2, 3), in_sphere(points, weight, (0, 1, 2, 3), 4)
         assert given[0] in (plane, 0)
         assert given[1] in (sphere, 0)
-        told += given == (plane, sphere)
-    assert told > 50
+        certain += given == (plane, sphere)
+    assert certain > 50
 
 
 def test_five_points_of_a_cube_have_no_sign():
@@ -87,18 +87,18 @@ def test_tetrahedra_are_those_of_qhull_but_for_slivers_at_the_hull(spread):
     rng = np.random.default_rng(8)
     points = 10.0 * rng.random((800, 3))
     radius = 1.0 + spread * rng.uniform(-1, 1, 800)
-    found, neighbour = triangulate(points, (radius - radius.min()) ** 2 + radius.min() ** 2)
+    made, neighbour = triangulate(points, (radius - radius.min()) ** 2 + radius.min() ** 2)
     expected = rows_of(by_qhull(points, np.sqrt((radius - radius.min()) ** 2 + radius.min() ** 2)))
-    assert rows_of(found) <= expected
-    assert len(found) > 0.99 * len(expected)
-    assert len(rows_of(found)) == len(found)
+    assert rows_of(made) <= expected
+    assert len(made) > 0.99 * len(expected)
+    assert len(rows_of(made)) == len(made)
     across, corner = np.nonzero(neighbour >= 0)
     shared = [
-        set(found[a]) - {found[a, c]} <= set(found[neighbour[a, c]])
+        set(made[a]) - {made[a, c]} <= set(made[neighbour[a, c]])
         for a, c in zip(across, corner, strict=True)
     ]
     assert all(shared)
-    assert np.sum(neighbour < 0) < 0.1 * len(found)
+    assert np.sum(neighbour < 0) < 0.1 * len(made)
 
 
 def test_room_grows_where_it_is_too_small(monkeypatch):

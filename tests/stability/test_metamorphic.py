@@ -14,12 +14,8 @@ from fdnet.cli import main
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 from tests.network.packs import random_pack, with_fines
 
-INTACT = 1e-11
-"""Two descriptions without fines."""
-PERIODIC = 1e-11
-"""The same with fines where no wall and no pressure plane is near."""
-AT_WALLS = 1e-4
-"""The same with fines at walls: a prism and its mirror image are split in one of many ways."""
+ROUNDING = 1e-11
+"""Largest relative difference of two descriptions, without fines and with them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,16 +141,18 @@ def spheres(spread: float) -> Snapshot:
 
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize("spread", [0.0, 0.3])
-@pytest.mark.parametrize(("periodic", "with_walls"), [("xyz", PERIODIC), ("yz", AT_WALLS)])
+@pytest.mark.parametrize("periodic", ["xyz", "yz", ""])
 def test_another_description_of_the_same_pack_gives_its_permeability(
-    tmp_path, capsys, change, spread, periodic, with_walls
+    tmp_path, capsys, change, spread, periodic
 ):
+    if change == "doubled" and "y" not in periodic:
+        return  # two walled packs side by side are another pack
     pack = pack_of(spheres(spread), periodic)
     intact, damaged = permeability(pack, tmp_path, capsys)
     other_intact, other_damaged = permeability(CHANGES[change](pack), tmp_path, capsys)
     assert damaged < intact
-    assert other_intact == pytest.approx(intact, rel=INTACT)
-    assert other_damaged == pytest.approx(damaged, rel=with_walls)
+    assert other_intact == pytest.approx(intact, rel=ROUNDING)
+    assert other_damaged == pytest.approx(damaged, rel=ROUNDING)
 
 
 def test_without_tables_the_mirror_image_agrees_to_rounding(tmp_path, capsys):

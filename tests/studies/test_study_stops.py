@@ -17,8 +17,11 @@ from fdnet.studies.thesis.runs.state import read_state
 
 pytestmark = pytest.mark.liggghts
 MARK = "FDNET_TEST_MARK"
-WITHIN_S = 3.0
-"""Seconds after the signal within which no process of the study is left."""
+WITHIN_S = 10.0
+"""Seconds after the signal within which no process of the study is left.
+
+On idle cores that takes a second or two; a machine with a load of 15 on two cores took over three.
+"""
 SMALL = ("box.size_mm=[2.0,1.2,1.2]", "grains.count=26", "fines.count=60", "run.cap_ms=0.1")
 
 

@@ -49,6 +49,8 @@ def finished(binary, tmp_path_factory):
                 str(folder),
                 *_sets(),
                 "--quiet",
+                "--stages",
+                "pack,invade,analyse",
             ]
         )
         == 0

@@ -30,7 +30,7 @@ def deposit_in_pores(network: Network, fines: Snapshot) -> tuple[Array, Array, A
     Returns:
         Volume (P,) m3 and surface (P,) m2 of the fines inside; of these fines, weighted by volume,
         the mean volume (P,) m3 of a whole fine, and the thickness (P,) m of the layer that they
-        make on the grains. All are 0 without fines.
+        make on the grains, both of the whole `pore_group`. All are 0 without fines.
     """
     distance = wall_distance(network, fines.position)
     value = np.stack(
@@ -39,7 +39,10 @@ def deposit_in_pores(network: Network, fines: Snapshot) -> tuple[Array, Array, A
     )
     inside = _filled(network, network.pore_corner, fines, value)
     volume, surface, *sums = (inside / network.pore_share[:, None]).T
-    whole, mean, square = (total / np.where(volume > 0, volume, 1.0) for total in sums)
+    held, *sums = (
+        np.bincount(network.pore_group, one)[network.pore_group] for one in (volume, *sums)
+    )
+    whole, mean, square = (total / np.where(held > 0, held, 1.0) for total in sums)
     return volume, surface, whole, mean + np.sqrt(np.maximum(square - 5.0 * mean**2, 0.0))
 
 

@@ -79,12 +79,12 @@ def _joined(ends: Array, jump: Array, count: int) -> tuple[Array, Array]:
             first, second, over = second, first, -over
         parent[second], rise[second] = first, over
         winding[first] = winding[first] or winding[second]
-    group, winds, found = np.empty(count, np.int64), np.zeros(count, np.bool_), 0
+    group, winds, roots = np.empty(count, np.int64), np.zeros(count, np.bool_), 0
     for node in range(count):
         root = _root(parent, rise, node)
         if root == node:
-            group[node], winds[found] = found, winding[node]
-            found += 1
+            group[node], winds[roots] = roots, winding[node]
+            roots += 1
         else:
             group[node] = group[root]
     return group, winds

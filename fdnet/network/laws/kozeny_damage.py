@@ -7,10 +7,14 @@ import numpy as np
 from fdnet.network.fines.occupancy import Occupancy, ratio
 from fdnet.network.flow.links import PLANE_TOLERANCE
 from fdnet.network.laws.damage import BLOCKED, CLEAN, KOZENY, Damage
+from fdnet.network.laws.faces import over_faces
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.pyramids import side_voids
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array, frozen
+
+ROUNDING = 1e-12
+"""A volume of fines more negative than this share of the void is negative."""
 
 
 def kozeny_damage(network: Network, occupancy: Occupancy, clean: Array) -> Damage:
@@ -76,16 +80,21 @@ def _on_sides(network: Network, occupancy: Occupancy, pore: "_PoreDeposit") -> t
     """Volume and surface (T, 2) of the fines over void and grain surface, as the sides see them.
 
     They are weighted means of the side's own values and of those of its pore. A throat with both
-    power centres on one side of its facet has one side, the difference of the two pyramids.
+    power centres on one side of its facet has one side, the difference of the two pyramids. The
+    triangles into which a face between two polyhedra is split are taken together.
     """
     void, wall = side_voids(network)
     single = np.any(network.throat_heights <= 0, axis=1)
     void, wall, solid, area = (
         np.where(single[:, None], part.sum(axis=1, keepdims=True), part)
-        for part in (void, wall, occupancy.side_solid_volume, occupancy.side_solid_surface)
+        for part in (
+            over_faces(network, sides)
+            for sides in (void, wall, occupancy.side_solid_volume, occupancy.side_solid_surface)
+        )
     )
     ends = network.throat_pores
-    own = (void > 0) & (wall > 0) & (solid >= 0) & ~_on_pressure_plane(network)[ends]
+    some = solid >= -ROUNDING * np.abs(void)
+    own = (void > 0) & (wall > 0) & some & ~_on_pressure_plane(network)[ends]
     weight = np.where(own, 1.0 / (1.0 + (4.0 * ratio(pore.fine, pore.void)[ends]) ** 2), 0.0)
     volume = weight * ratio(solid, np.where(own, void, 0.0)) + (1.0 - weight) * pore.volume[ends]
     surface = weight * ratio(area, np.where(own, wall, 0.0)) + (1.0 - weight) * pore.surface[ends]
@@ -169,7 +178,8 @@ def _kozeny(volume: Array, surface: Array, share: Array | float = 1.0) -> Array:
 
 def _hydraulic_radius(network: Network) -> float:
     """Void over grain surface of the pack, m."""
-    return float(np.sum(np.maximum(network.pore_volume, 0.0)) / np.sum(network.pore_wall_surface))
+    void = np.bincount(network.pore_group, network.pore_volume)
+    return float(np.sum(np.maximum(void, 0.0)) / np.sum(network.pore_wall_surface))
 
 
 def _kept(resistance: Array, factor: Array) -> Array:

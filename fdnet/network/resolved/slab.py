@@ -25,6 +25,10 @@ Conduct = Callable[[Network], Array]
 """Conductance (T,) m3 of the throats of a network."""
 
 
+SHALLOW = 1e-6
+"""A cap of less height, in radii of its sphere, is none: its sphere touches the plane."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Sides:
     """What the sides of a specimen are.
@@ -60,7 +64,7 @@ class CutNetworks:
 def cut_out(spheres: Snapshot, span: tuple[float, float], periodic: Sequence[bool]) -> Snapshot:
     """The spheres that reach between the planes at `span` (low, high) m, in a box of that length.
 
-    Where x is `periodic`, so do their images.
+    Where x is `periodic`, so do their images. Spheres that only touch a plane are left out.
     """
     box = spheres.box.copy()
     box[0] = span
@@ -74,8 +78,8 @@ def cut_out(spheres: Snapshot, span: tuple[float, float], periodic: Sequence[boo
             tolerance=0.0,
         )
         spheres = replace(spheres.where(images.owner), position=images.position)
-    x = spheres.position[:, 0]
-    reaches = (x + spheres.radius > span[0]) & (x - spheres.radius < span[1])
+    x, reach = spheres.position[:, 0], (1.0 - SHALLOW) * spheres.radius
+    reaches = (x + reach > span[0]) & (x - reach < span[1])
     return replace(spheres.where(reaches), box=box)
 
 

@@ -94,9 +94,9 @@ def _tessellated(
     """Tetrahedra and neighbours (-1: none), by the compiled tessellation or by Qhull."""
     radius = points.radius / scale if unequal else np.zeros(len(points.radius))
     if len(radius) >= COMPILED_FROM:
-        found = triangulate(points.scaled, radius**2)
-        if found is not None:
-            return found
+        made = triangulate(points.scaled, radius**2)
+        if made is not None:
+            return made
     try:
         return _power_hull(points.scaled, radius) if unequal else _delaunay(points.scaled)
     except QhullError as error:
@@ -186,10 +186,10 @@ def _centres(points: Points, vertex: Array, scale: float) -> tuple[Array, Array,
     changed the tetrahedron. Flat tetrahedra take the centre of their shaken corners.
     """
     given = (FLAT * scale**3, float(points.radius.max()))
-    found: tuple[Array, Array, Array, Array] = centres(
+    made: tuple[Array, Array, Array, Array] = centres(
         points.position, points.shaken, points.radius, vertex, given
     )
-    return found
+    return made
 
 
 def _needed_margin(centre: Array, reach: Array, box: Array) -> Array:

@@ -27,14 +27,14 @@ def pierced_facets(tessellation: Tessellation, facets: Facets, open_facet: Array
     beyond, turn = _apexes_beyond(tetrahedra, facets)
     points = tetrahedra.points
     size = np.asarray(tessellation.size, float)
-    found: Array = _pierced(
+    result: Array = _pierced(
         (points.position, points.radius),
         (tetrahedra.vertex, beyond, turn),
         (facets.vertex, facets.pore, facets.opposite, facets.shift),
         open_facet,
         size,
     )
-    return found
+    return result
 
 
 def _apexes_beyond(tetrahedra: Tetrahedra, facets: Facets) -> tuple[Array, Array]:

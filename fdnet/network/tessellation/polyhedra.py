@@ -103,8 +103,8 @@ def _heights(tessellation: Tessellation, centre: Array) -> Array:
     apex = tetrahedra.vertex[facets.pore[:, 0], facets.opposite[:, 0]]
     ends = (facets.pore, facets.shift * tessellation.size)
     places = (tetrahedra.points.position, tetrahedra.points.shaken)
-    found: Array = heights(places, facets.vertex, apex, centre, ends)
-    return found
+    result: Array = heights(places, facets.vertex, apex, centre, ends)
+    return result
 
 
 def _walls(tessellation: Tessellation, centre: Array, group: Array) -> Array:

@@ -112,6 +112,9 @@ def _measured(tetrahedra: Tetrahedra) -> tuple[_Spheres, Array, Array]:
     outside = np.flatnonzero(~centred)
     centre[outside] = points.position[vertex[outside]].mean(axis=1)
     solid, surface = solids(points.position, points.radius, vertex)
+    # its diagonals are counted by the polyhedra on either side, half each
+    between = tetrahedra.flat & (solid < 0)
+    solid[between] = surface[between] = 0.0
     spheres = _Spheres(position=centre, radius=radius, centred=centred)
     return spheres, tetrahedra.volume - solid, surface
 

@@ -93,7 +93,7 @@ def heights(
 ) -> Array:
     """Distances (T, 2) m of two power centres from each facet, positive on their own side.
 
-    `places` are the points (M, 3) m and their shaken places. Which side is whose is told by the
+    `places` are the points (M, 3) m and their shaken places. Which side is whose follows from the
     shaken ones, for a flat tetrahedron has none without. `vertex` (T, 3) are the corners, `apex`
     (T,) is the point on the side of the first; `ends` are the indices (T, 2) of the tetrahedra,
     whose centres are `centre` (P, 3) m, and what moves the second next to the first (T, 3) m.

@@ -1,0 +1,102 @@
+"""The laws on slabs of deposits that LIGGGHTS made: one row for each slab, model over truth."""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fdnet.case.names import ALL_SPHERES
+from fdnet.network.laws.named import DEFAULT_LAW
+from fdnet.network.permeability import analyse
+from fdnet.spheres.snapshot import Array, Snapshot
+from fdnet.studies.accuracy.goals import percent, ratio, summary
+from fdnet.studies.accuracy.measurement import DEFAULT, PAIRS
+from fdnet.studies.engine.csv_rows import read_named
+from fdnet.studies.engine.markdown import markdown_table
+from fdnet.studies.truth.packs import MM
+from fdnet.studies.truth.slabs import SLAB_TRUTH, read_specimen
+
+Row = dict[str, Any]
+SLAB_PAIRS = (*PAIRS, f"{DEFAULT_LAW} + {ALL_SPHERES}")
+"""The pairs of laws that are compared on slabs; the last is the network of all spheres."""
+
+
+def slab_rows(folder: Path, known: Iterable[str], names: Sequence[str] = SLAB_PAIRS) -> list[Row]:
+    """Model over truth of k/k0 and of k on every slab whose `known_before` is among `known`.
+
+    The slabs are sections of their specimens, cut out with the pressure held on both planes.
+
+    Args:
+        folder: of the specimens and of the table of their truth.
+        known: "yes" and "no", or one of them.
+        names: pairs of laws, as in `SLAB_PAIRS`.
+    """
+    wanted = set(known)
+    return [
+        _row(line, read_specimen(folder / line["file"]), names)
+        for line in read_named(folder / SLAB_TRUTH)
+        if line["known_before"] in wanted
+    ]
+
+
+def _row(line: dict[str, str], spheres: Snapshot, names: Sequence[str]) -> Row:
+    planes = np.array([float(line["x_lo_mm"]), float(line["x_hi_mm"])]) * MM
+    truth = {name: float(line[f"{name}_mm2"]) * MM**2 for name in ("k0", "k")}
+    row: Row = {
+        "case": line["slab"],
+        "grains": len(spheres.grains()),
+        "fines": int(np.count_nonzero(_inside(spheres.fines(), planes))),
+        "k_true_m2": truth["k"],
+        "truth_error": float(line["relative_error"].rstrip("%")) / 100.0,
+        "known_before": line["known_before"],
+        "k_over_k0": float(line["k_over_k0"]),
+    }
+    for name in names:
+        law, damage_law = name.split(" + ")
+        k0, k = _cut_out(spheres, planes, law=law, damage_law=damage_law)
+        row |= {
+            name: k / k0 / row["k_over_k0"],
+            f"{name}: k0": k0 / truth["k0"],
+            f"{name}: k": k / truth["k"],
+        }
+    return row
+
+
+def _inside(spheres: Snapshot, planes: Array) -> Array:
+    """Whose bodies (N,) reach between the planes."""
+    x, r = spheres.position[:, 0], spheres.radius
+    return (x + r > planes[0]) & (x - r < planes[1])
+
+
+def _cut_out(
+    spheres: Snapshot, planes: Array, *, law: str, damage_law: str
+) -> tuple[float, float]:
+    """k (m2) between the planes without and with the fines."""
+    edges = np.unique([*spheres.box[0], *planes])
+    result = analyse(
+        spheres, periodic="yz", sections=edges.tolist(), law=law, damage_law=damage_law
+    )
+    section = next(s for s in result.sections if s.x_lo == planes[0])
+    return section.k_initial, section.k_damaged
+
+
+def slab_summary(rows: list[Row], names: Sequence[str] = SLAB_PAIRS) -> str:
+    """Model over truth of k/k0 by each pair of laws, and of k0 by those of the default law."""
+    intact = [f"{name}: k0" for name in names if name in (DEFAULT, SLAB_PAIRS[-1])]
+    lines = [
+        [
+            row["case"],
+            str(row["fines"]),
+            ratio(row["k_over_k0"], 4),
+            percent(row["truth_error"]),
+            *(ratio(row[name]) for name in intact),
+            *(ratio(row[name]) for name in names),
+            row["known_before"],
+        ]
+        for row in rows
+    ]
+    ends = [summary(rows, name) for name in (*intact, *names)]
+    lines.append(["**rms of ln, worst**", "", "", "", *ends, ""])
+    header = ["slab", "fines", "true k/k0", "its error"]
+    return markdown_table([*header, *intact, *names, "looked at before"], lines)

@@ -1,0 +1,165 @@
+"""Deposits of the Stokes truth that LIGGGHTS makes, and the slabs cut from them.
+
+Every specimen is a run of fdnet's own chain: a pack in a box whose sides are periodic, then an
+invasion under a uniform drag. The seeds are those of the specimens, so that a specimen is made
+again by one command (docs/stokes.md).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fdnet.case.case import Case
+from fdnet.case.file import case_from
+from fdnet.run.open_run import run_case
+from fdnet.studies.truth.slabs import NO, YES, Slab, write_specimen
+
+BOX_MM = (2.5, 1.2, 1.2)
+DARCY_LENGTH_MM = 8.0
+SECTIONS = 5
+GRAIN_RANGE = [0.2, 0.3]
+Radius = float | list[float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Specimen:
+    """What the case of a specimen says; the rest of it is the same for all.
+
+    Attributes:
+        seed: of the case.
+        fine_mm: radius of the fines, or smallest and largest, mm.
+        supplied: number of fines.
+        friction: of grains and fines.
+        pack: porosity of the grains, or their number where no whole number of grains meets the
+            porosity within fdnet's bound of 0.003.
+        grain_mm: radius of the grains, or smallest and largest, mm.
+    """
+
+    seed: int
+    fine_mm: Radius
+    supplied: int
+    friction: float
+    pack: float | int
+    grain_mm: Radius = 0.25
+
+    def case(self, name: str) -> Case:
+        """The case of the specimen, with the default of every key that is not named here."""
+        grains = {"radius_mm": self.grain_mm, "friction": self.friction}
+        grains["count" if isinstance(self.pack, int) else "porosity"] = self.pack
+        return case_from(
+            {
+                "name": name,
+                "seed": self.seed,
+                "box": {"size_mm": list(BOX_MM), "sides": "periodic"},
+                "grains": grains,
+                "fines": {
+                    "radius_mm": self.fine_mm,
+                    "count": self.supplied,
+                    "friction": self.friction,
+                },
+                "fluid": {"darcy_length_mm": DARCY_LENGTH_MM},
+                "analysis": {"sections": SECTIONS},
+            }
+        )
+
+
+SPECIMENS = {
+    "slabA_r5": Specimen(seed=211, fine_mm=0.05, supplied=220, friction=0.55, pack=0.40),
+    "slabB_r5_cake": Specimen(seed=212, fine_mm=0.05, supplied=700, friction=0.55, pack=35),
+    "slabC_r5_mu0_cake": Specimen(seed=213, fine_mm=0.05, supplied=700, friction=0.0, pack=0.40),
+    "slabD_r5_range_mu0": Specimen(
+        seed=214, fine_mm=[0.04, 0.06], supplied=220, friction=0.0, pack=0.33
+    ),
+    "slabE_r3": Specimen(seed=215, fine_mm=0.0833, supplied=60, friction=0.55, pack=30),
+    "slabF_r3_mu0_cake": Specimen(seed=216, fine_mm=0.0833, supplied=150, friction=0.0, pack=0.38),
+    "slabG_r3_range_cake": Specimen(
+        seed=217, fine_mm=[0.07, 0.095], supplied=150, friction=0.55, pack=38
+    ),
+    "slabH_r8_cake": Specimen(seed=218, fine_mm=0.03125, supplied=2400, friction=0.55, pack=35),
+    "slabI_r8_mu0": Specimen(seed=219, fine_mm=0.03125, supplied=2500, friction=0.0, pack=38),
+    "slabJ_r8_ranges": Specimen(
+        seed=220,
+        fine_mm=[0.025, 0.0375],
+        supplied=900,
+        friction=0.55,
+        pack=0.40,
+        grain_mm=GRAIN_RANGE,
+    ),
+    "slabK_r10_cake": Specimen(seed=221, fine_mm=0.025, supplied=3500, friction=0.55, pack=36),
+    "slabL_r10": Specimen(seed=222, fine_mm=0.025, supplied=2500, friction=0.55, pack=31),
+    "slabP_r10": Specimen(seed=226, fine_mm=0.025, supplied=1500, friction=0.55, pack=36),
+    "slabM_r5_ranges_cake": Specimen(
+        seed=223,
+        fine_mm=[0.035, 0.065],
+        supplied=700,
+        friction=0.55,
+        pack=0.40,
+        grain_mm=GRAIN_RANGE,
+    ),
+    "slabN_r3_mu0": Specimen(seed=224, fine_mm=0.0833, supplied=30, friction=0.0, pack=0.35),
+    "slabO_r5_light": Specimen(seed=225, fine_mm=0.05, supplied=60, friction=0.55, pack=30),
+}
+"""The specimens by name: r5 are fines of a fifth of a grain, mu0 is no friction, a range is one of
+radii (ranges: of grains too), a cake remains upstream of the face."""
+
+COARSE, MIDDLE, FINE = (60, 72, 96), (72, 96, 120), (84, 96, 120)
+"""Cells on the edge of 1.2 mm. The heaviest deposits of fine fines are solved at 144 too."""
+FACE, TWICE, DEEP = (0.0, 0.5), (0.0, 1.0), (0.5, 1.0)
+"""Where slabs begin and end, mm from the face."""
+CUTS: tuple[tuple[str, tuple[float, float], tuple[int, ...], str], ...] = (
+    ("slabA_r5", FACE, MIDDLE, YES),
+    ("slabA_r5", DEEP, MIDDLE, YES),
+    ("slabB_r5_cake", FACE, MIDDLE, NO),
+    ("slabC_r5_mu0_cake", TWICE, COARSE, YES),
+    ("slabD_r5_range_mu0", FACE, MIDDLE, NO),
+    ("slabE_r3", FACE, COARSE, NO),
+    ("slabF_r3_mu0_cake", FACE, MIDDLE, YES),
+    ("slabG_r3_range_cake", FACE, COARSE, YES),
+    ("slabH_r8_cake", FACE, MIDDLE, YES),
+    ("slabI_r8_mu0", FACE, FINE, NO),
+    ("slabJ_r8_ranges", FACE, MIDDLE, YES),
+    ("slabK_r10_cake", FACE, FINE, NO),
+    ("slabK_r10_cake", DEEP, FINE, NO),
+    ("slabL_r10", FACE, FINE, YES),
+    ("slabP_r10", FACE, FINE, YES),
+    ("slabM_r5_ranges_cake", FACE, MIDDLE, NO),
+    ("slabN_r3_mu0", TWICE, COARSE, NO),
+    ("slabO_r5_light", FACE, MIDDLE, YES),
+)
+"""Specimen, slab, grids, and whether its truth was known when the laws were shaped."""
+SLABS = {
+    slab.name: slab
+    for slab in (
+        Slab(
+            name=name + ("_deep" if edges == DEEP else ""),
+            specimen=name,
+            x_lo_mm=edges[0],
+            x_hi_mm=edges[1],
+            cells=cells,
+            known_before=known,
+        )
+        for name, edges, cells, known in CUTS
+    )
+}
+
+
+def make_specimens(names: Sequence[str], runs: Path, folder: Path) -> None:
+    """Lets LIGGGHTS make specimens and writes their files.
+
+    Args:
+        names: of `SPECIMENS`; all of them if empty.
+        runs: where the run folders are; a finished run is not repeated.
+        folder: of the files.
+    """
+    for name in names or SPECIMENS:
+        specimen = SPECIMENS[name]
+        run = run_case(specimen.case(name), runs / name, stages=("pack", "invade", "analyse"))
+        spheres = run.spheres()
+        write_specimen(folder / f"{name}.csv", spheres, f"made by LIGGGHTS, seed {specimen.seed}")
+        summary = run.summary
+        print(
+            f"{name}: {len(spheres.grains())} grains, porosity "
+            f"{summary['porosity_initial']:.4f}, {summary['invaded_count']} fines in it, "
+            f"{summary['upstream_count']} upstream, {summary['passed_count']} passed",
+            flush=True,
+        )
