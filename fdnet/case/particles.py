@@ -15,6 +15,10 @@ from fdnet.case.values import (
     scaled,
 )
 
+SHEAR_RATIO = 0.04
+"""Tangential over normal stiffness of a material that gives none: small enough that no fine larger
+than 1/370 of a grain at friction 0.55 locks between two grains (`fdnet.scales.sticking`)."""
+
 
 class Spheres(Part):
     """What grains and fines share: sizes, density and linear (Hooke) contact parameters."""
@@ -28,8 +32,11 @@ class Spheres(Part):
         description="Normal contact stiffness of the material. Two spheres in contact act as two "
         "springs in series. `run.stiffness_N_m` scales all contact stiffnesses by one factor."
     )
-    shear_stiffness_N_m: Positive = Field(
-        description="Tangential contact stiffness of the material, scaled like the normal one."
+    shear_stiffness_N_m: Positive | None = Field(
+        None,
+        description="Tangential contact stiffness of the material, scaled like the normal one. "
+        "When absent: 0.04 of the normal one, so that friction lets go of fines that roll around "
+        "the neck of two grains.",
     )
     friction: NonNegative = Field(
         0.55,
@@ -41,6 +48,12 @@ class Spheres(Part):
         description="Damping of a contact over its critical damping. A contact takes the mean of "
         "its two materials.",
     )
+
+    @property
+    def tangential_stiffness(self) -> float:
+        """Tangential contact stiffness, N/m: the one given, or `SHEAR_RATIO` of the normal one."""
+        given = self.shear_stiffness_N_m
+        return SHEAR_RATIO * self.normal_stiffness_N_m if given is None else given
 
     @property
     def radius_range_m(self) -> tuple[float, float]:
@@ -95,9 +108,11 @@ class Grains(Spheres):
         description="Normal contact stiffness of the grains' material, and of the walls. "
         "`run.stiffness_N_m` scales all contact stiffnesses by one factor.",
     )
-    shear_stiffness_N_m: Positive = Field(
-        34.0e9,
-        description="Tangential contact stiffness of the grains' material, and of the walls.",
+    shear_stiffness_N_m: Positive | None = Field(
+        None,
+        description="Tangential contact stiffness of the grains' material, and of the walls. When "
+        "absent: 0.04 of the normal one, so that friction lets go of fines that roll around the "
+        "neck of two grains. The thesis has 34e9.",
     )
     motion: Literal["fixed", "mobile"] = Field(
         "fixed",
@@ -121,8 +136,10 @@ class Fines(Spheres):
     normal_stiffness_N_m: Positive = Field(
         63.0e9, description="Normal contact stiffness of the fines' material."
     )
-    shear_stiffness_N_m: Positive = Field(
-        26.0e9, description="Tangential contact stiffness of the fines' material."
+    shear_stiffness_N_m: Positive | None = Field(
+        None,
+        description="Tangential contact stiffness of the fines' material. When absent: 0.04 of "
+        "the normal one. The thesis has 26e9.",
     )
     concentration: Annotated[float, Field(gt=0, le=MAX_CONCENTRATION)] = Field(
         0.10, description="Volume of fines over the volume of suspension in the slab upstream."

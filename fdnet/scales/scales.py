@@ -14,6 +14,7 @@ from fdnet.scales.grain_pack import pack_step, target_porosity
 from fdnet.scales.overlaps import overlap_warnings, overlaps_of, refuse_deep_overlap
 from fdnet.scales.slab import slab_of, slab_warnings
 from fdnet.scales.springs import Contact, contacts_of, stiffness_factor
+from fdnet.scales.sticking import Sticking, sticking_of, sticking_warnings
 from fdnet.scales.stop_times import chunk_refreshes, plug_warnings, stop_times
 from fdnet.scales.time_step import drag_warnings, hold_steps, relaxation_time, time_step
 from fdnet.scales.velocity import velocity_of
@@ -66,6 +67,7 @@ class InvasionScales(Scales):
         gravity_over_drag: weight less buoyancy over drag, of the largest fine.
         impact_overlap: predicted overlap by impact, over the diameter of the largest fine.
         drag_overlap: predicted overlap by drag, over the diameter of the largest fine.
+        sticking: how far a fine may lock between two grains.
     """
 
     upstream_velocity: float
@@ -82,6 +84,7 @@ class InvasionScales(Scales):
     gravity_over_drag: float
     impact_overlap: float
     drag_overlap: float
+    sticking: Sticking
 
 
 @overload
@@ -127,7 +130,9 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     times = stop_times(case, slab, interstitial=velocity, upstream=upstream)
     hold = hold_steps(case, step, relaxation[0], times.chunk)
     chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
-    overlaps = overlaps_of(case, shared.contacts["grain-fine"].normal_stiffness, velocity)
+    contact = shared.contacts["grain-fine"]
+    overlaps = overlaps_of(case, contact.normal_stiffness, velocity)
+    sticking = sticking_of(case, contact, velocity, step)
     reynolds = _reynolds(case, velocity)
     stokes = relaxation[1] * velocity / (2 * case.grains.mean_radius_m)
     gravity = _gravity_over_drag(case, velocity)
@@ -139,6 +144,7 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
         *slab_warnings(case, slab),
         *drag_warnings(case, hold * step / relaxation[0]),
         *plug_warnings(case, times.plug, upstream),
+        *sticking_warnings(sticking),
     ]
     return InvasionScales(
         **{item.name: getattr(shared, item.name) for item in fields(shared)}
@@ -157,6 +163,7 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
         gravity_over_drag=gravity,
         impact_overlap=overlaps.impact,
         drag_overlap=overlaps.drag,
+        sticking=sticking,
     )
 
 

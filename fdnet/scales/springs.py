@@ -58,7 +58,7 @@ def mass_range(spheres: Spheres) -> tuple[float, float]:
 def _nominal(case: Case) -> dict[str, tuple[float, float, float]]:
     """Per material: normal and shear stiffness, friction. Walls are of the grains' material."""
     table = {
-        name: (spheres.normal_stiffness_N_m, spheres.shear_stiffness_N_m, spheres.friction)
+        name: (spheres.normal_stiffness_N_m, spheres.tangential_stiffness, spheres.friction)
         for name, spheres in case.spheres.items()
     }
     return table | {"wall": (*table["grain"][:2], case.box.wall_friction)}

@@ -16,6 +16,7 @@ from fdnet.studies.engine.study import Study
 STUDIES: Mapping[str, str] = {
     "stiffness": "contact stiffness, from 1e2 N/m to the nominal one",
     "time-step": "time step over sqrt(m/k) and over the drag relaxation time",
+    "size-ratio": "fines of 1/5 to 1/30 held in a pack, by stiffness, step and shear stiffness",
     "drag": "drag at every step, held, implicit, viscous",
     "speed": "mobile grains, neighbour skin and bins, MPI ranks",
     "throat-occupancy": "volume of a fine in a throat: the thesis's two planes or quadrature",

@@ -23,6 +23,7 @@ SETTINGS = {
         "10,000 20,000 30,000 100,000",
         "8. Specimen size and seed": "5",
         "9. Economies of full-scale invasions": "0.2 3 6 10 1e3 2e3 3e3 1e4",
+        "10. Size ratio of fines and grains": "0.2 1 2 6 60",
     },
     "accuracy": {
         "": "1 3 7",
@@ -39,6 +40,7 @@ MEASURED_APART = {
     "validation": {
         "4. Frozen or mobile grains, neighbour lists, MPI": "7 9",
         "9. Economies of full-scale invasions": "1 7 17,446 17,625 18,667 25,833 26,417",
+        "10. Size ratio of fines and grains": "5 229 238 6 816 822",
     },
     "accuracy": {"3. With fines": "0.93 0.96"},
 }

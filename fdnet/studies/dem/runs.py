@@ -33,8 +33,8 @@ from fdnet.studies.engine.runner import child_core_seconds
 SLAB: dict[str, Any] = {
     "name": "study",
     "box": {"size_mm": [4.0, 2.86, 2.86]},
-    "grains": {"radius_mm": 0.25, "count": 300},
-    "fines": {"radius_mm": 0.05, "count": 1000},
+    "grains": {"radius_mm": 0.25, "count": 300, "shear_stiffness_N_m": 34.0e9},
+    "fines": {"radius_mm": 0.05, "count": 1000, "shear_stiffness_N_m": 26.0e9},
     "fluid": {"darcy_length_mm": 8.0},
     "drag": {"scheme": "viscous"},
     "run": {"duration_ms": 2.0},
@@ -42,8 +42,9 @@ SLAB: dict[str, Any] = {
 }
 """The invasion of the studies: 300 fixed grains at porosity 0.40, 1,000 fines of 0.10 mm, 2 ms.
 
-The velocity (5.4 m/s) is that of the thesis's specimen 5. The duration is given, so that every run
-follows the same span of time. Drag has no error of its own (see the study of drag).
+The velocity (5.4 m/s) and the shear stiffnesses are those of the thesis's specimen 5. The duration
+is given, so that every run follows the same span of time. Drag has no error of its own (see the
+study of drag).
 """
 PROFILE_BINS = 16
 """Equal bins of depth over the specimen in which invaded fines are counted."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.studies.dem import drag, economies, speed, stiffness, time_step
+from fdnet.studies.dem import drag, economies, size_ratio, speed, stiffness, time_step
 from fdnet.studies.dem.runs import OBSERVED
 from fdnet.studies.engine.levels import Level, order
 from fdnet.studies.network import specimen_size
@@ -33,6 +33,7 @@ def invasion_numbers(validation: Path) -> dict[str, str]:
         **_speed(lookup(validation, "speed")),
         **_specimen_size(lookup(validation, "specimen-size")),
         **_economies(lookup(validation, "economies")),
+        **_size_ratio(lookup(validation, "size-ratio")),
     }
 
 
@@ -220,4 +221,23 @@ def _economies(table: Lookup) -> dict[str, str]:
         "implicit_gain": f"{gains[unequal, economies.IMPLICIT]:.1f}",
         "all_gain": between((gains[equal, economies.ALL], gains[unequal, economies.ALL])),
         "all_long": f"{gains[long, economies.ALL]:.0f}",
+    }
+
+
+def _size_ratio(table: Lookup) -> dict[str, str]:
+    def most(shear: str, ratios: Iterable[int]) -> str:
+        names = {f"1/{ratio}" for ratio in ratios}
+        return str(
+            max(
+                size_ratio.held_of(row)
+                for row in table.rows
+                if row.quantity == size_ratio.HELD
+                and row.series.split(", ")[0] in names
+                and row.series.split(", ")[1] == shear
+            )
+        )
+
+    return {
+        "ratio_material": most(size_ratio.MATERIAL, [30]),
+        "ratio_default": most(size_ratio.DEFAULT, [10, 20, 30]),
     }
