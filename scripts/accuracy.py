@@ -3,7 +3,7 @@
 
     .venv/bin/python scripts/accuracy.py [--more DIR]
 
-Computes every law on every pack of known permeability (about two minutes), writes the tables
+Computes every law on every pack of known permeability (some five minutes), writes the tables
 docs/validation/accuracy_*.csv and accuracy.png, and the page from docs/accuracy.md.in. The tables
 of walls and of other tools are read from their files. Rows of the truth whose pack is in neither
 --packs nor --more are named on the page and left out.

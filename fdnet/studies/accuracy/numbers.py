@@ -21,9 +21,11 @@ from fdnet.studies.accuracy.goals import (
 )
 from fdnet.studies.accuracy.measurement import DEFAULT, PAIRS, RESOLVED
 from fdnet.studies.accuracy.results import Results
+from fdnet.studies.accuracy.slabs import CHOSEN, FINEST
 from fdnet.studies.accuracy.tables import KNOWN
 from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.truth.cases import EQUAL, LATTICE, LOOSE, UNEQUAL
+from fdnet.studies.truth.slabs import NO
 
 FAR = 10.0
 """Widths, in grain diameters, from which the excess of walled packs is proportional to 1/W."""
@@ -41,6 +43,7 @@ def page_numbers(results: Results, validation: Path) -> dict[str, str]:
         **_intact(results.intact),
         **_damaged(results.damage),
         **_deposits(results),
+        **_slabs(results.slabs),
         **_choices(results),
         **_boundaries(validation),
         **_walls(validation),
@@ -119,6 +122,29 @@ def _deposits(results: Results) -> dict[str, str]:
         "bed_formula": f"{porosity / porosity**1.5:.1f}",
         "fines_a_pore": f"{fifth['fines'] / fifth['pores']:.0f}",
         "large_fine_span": span((row[DEFAULT] / row[RESOLVED] for row in results.large_fines), 2),
+    }
+
+
+def _slabs(rows: Sequence[Row]) -> dict[str, str]:
+    aside = [row for row in rows if row["known_before"] == NO]
+    names = {"default": CHOSEN, "finest": FINEST, "two_scale": DEFAULT}
+    numbers = {"slabs": str(len(rows)), "slabs_aside": str(len(aside))}
+    for key, name in names.items():
+        numbers |= {
+            f"slabs_{key}": summary(list(rows), name),
+            f"slabs_aside_{key}": summary(aside, name),
+            f"slabs_{key}_rms": percent(rms(values(aside, name)), 0),
+            f"slabs_{key}_worst": f"{worst(values(aside, name)):.3f}",
+            f"slabs_{key}_case": _worst(aside, name).split(",")[0],
+        }
+    coarse = [row for row in aside if "_r8" not in row["case"] and "_r10" not in row["case"]]
+    return numbers | {
+        "slabs_coarse": str(len(coarse)),
+        "slabs_coarse_k": _summed_up(row[f"{FINEST}: k"] for row in coarse),
+        "slabs_intact": _summed_up(row[f"{DEFAULT}: k0"] for row in rows),
+        "slabs_least": f"{min(row['k_over_k0'] for row in rows):.3f}",
+        "slabs_most": f"{max(row['k_over_k0'] for row in rows):.2f}",
+        "slabs_errors": _truth_errors(rows),
     }
 
 

@@ -14,6 +14,7 @@ from fdnet.studies.accuracy.measurement import DEFAULT
 from fdnet.studies.accuracy.numbers import page_numbers
 from fdnet.studies.accuracy.results import Results, compute_results, read_results, write_results
 from fdnet.studies.accuracy.rows import RULES
+from fdnet.studies.accuracy.slabs import slab_summary
 from fdnet.studies.engine.markdown import wrapped
 from fdnet.studies.truth.cases import EQUAL, LOOSE, read_cases
 from fdnet.studies.truth.packs import DATA, INDEPENDENT_TRUTH, LARGE_FINES_TRUTH
@@ -73,6 +74,7 @@ def page_tables(results: Results, validation: Path) -> dict[str, str]:
         ),
         "bed_table": tables.bed_table(list(results.beds)),
         "polydisperse_table": tables.polydisperse_table(list(results.polydisperse)),
+        "deposit_slabs": slab_summary(list(results.slabs)),
         "tiled_table": boundary_tables.tiled_table(validation / "boundary_tiled.csv"),
         "slab_table": boundary_tables.slab_table(validation / "boundary_slabs.csv"),
         "walled_table": boundary_tables.walled_table(validation / "boundary_walled.csv"),

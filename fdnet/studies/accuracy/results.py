@@ -8,8 +8,10 @@ from typing import Any
 from fdnet.studies.accuracy.choices import choice_rows, refitted_series
 from fdnet.studies.accuracy.deposits import bed_rows, large_fine_rows
 from fdnet.studies.accuracy.rows import damaged_row, intact_row, polydisperse_rows
+from fdnet.studies.accuracy.slabs import slab_rows
 from fdnet.studies.engine.csv_rows import DIGITS, read_named, write_named
 from fdnet.studies.truth.cases import Case
+from fdnet.studies.truth.slabs import NO, SLAB_FOLDER, YES
 
 Row = dict[str, Any]
 _TEXT = ("case", "group", "known_before", "choice", "tessellation")
@@ -27,6 +29,7 @@ class Results:
         refit: k over truth of `series` refitted, with and without the pack itself.
         large_fines: k/k0 of every pair of laws with fines of a third of a grain.
         beds: k/k0 of every pair of laws with all pores full of fines, and of the bed.
+        slabs: k/k0, k and k0 of every pair of laws over truth on slabs of real deposits.
     """
 
     intact: Sequence[Row]
@@ -36,10 +39,11 @@ class Results:
     refit: Sequence[Row]
     large_fines: Sequence[Row]
     beds: Sequence[Row]
+    slabs: Sequence[Row]
 
 
 def compute_results(cases: list[Case], folder: Path) -> Results:
-    """All rows, in about two minutes; `folder` holds the packs that deposits are made in."""
+    """All rows, in some five minutes; `folder` holds the packs that deposits are made in."""
     intact = [case for case in cases if case.ratio is None]
     return Results(
         intact=[intact_row(case) for case in intact],
@@ -49,6 +53,7 @@ def compute_results(cases: list[Case], folder: Path) -> Results:
         refit=refitted_series(cases),
         large_fines=large_fine_rows(folder),
         beds=bed_rows(folder),
+        slabs=slab_rows(SLAB_FOLDER, (YES, NO)),
     )
 
 

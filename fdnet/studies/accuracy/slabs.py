@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.case.names import ALL_SPHERES
+from fdnet.case.names import ALL_SPHERES, AUTO
 from fdnet.network.laws.named import DEFAULT_LAW
 from fdnet.network.permeability import analyse
 from fdnet.spheres.snapshot import Array, Snapshot
@@ -18,8 +18,10 @@ from fdnet.studies.truth.packs import MM
 from fdnet.studies.truth.slabs import SLAB_TRUTH, read_specimen
 
 Row = dict[str, Any]
-SLAB_PAIRS = (*PAIRS, f"{DEFAULT_LAW} + {ALL_SPHERES}")
-"""The pairs of laws that are compared on slabs; the last is the network of all spheres."""
+FINEST, CHOSEN = f"{DEFAULT_LAW} + {ALL_SPHERES}", f"{DEFAULT_LAW} + {AUTO}"
+"""The network of all spheres, and what the default of runs and commands chooses."""
+SLAB_PAIRS = (*PAIRS, FINEST, CHOSEN)
+"""The pairs of laws that are compared on slabs."""
 
 
 def slab_rows(folder: Path, known: Iterable[str], names: Sequence[str] = SLAB_PAIRS) -> list[Row]:
@@ -82,21 +84,21 @@ def _cut_out(
 
 
 def slab_summary(rows: list[Row], names: Sequence[str] = SLAB_PAIRS) -> str:
-    """Model over truth of k/k0 by each pair of laws, and of k0 by those of the default law."""
-    intact = [f"{name}: k0" for name in names if name in (DEFAULT, SLAB_PAIRS[-1])]
+    """Model over truth of k0 by the default law, and of k/k0 by each pair of laws."""
+    intact = f"{DEFAULT if DEFAULT in names else names[0]}: k0"
     lines = [
         [
             row["case"],
             str(row["fines"]),
             ratio(row["k_over_k0"], 4),
             percent(row["truth_error"]),
-            *(ratio(row[name]) for name in intact),
+            ratio(row[intact]),
             *(ratio(row[name]) for name in names),
             row["known_before"],
         ]
         for row in rows
     ]
-    ends = [summary(rows, name) for name in (*intact, *names)]
+    ends = [summary(rows, name) for name in (intact, *names)]
     lines.append(["**rms of ln, worst**", "", "", "", *ends, ""])
     header = ["slab", "fines", "true k/k0", "its error"]
-    return markdown_table([*header, *intact, *names, "looked at before"], lines)
+    return markdown_table([*header, "k0", *names, "looked at before"], lines)
