@@ -131,6 +131,8 @@ def _piece(place: Array, normal: Array, depth: Array, cuts: int) -> tuple[float,
             )
             side = _apart(end, start)
             length = sqrt(_dot(side, side))
+            if length == 0.0:  # shorter than the rounding of places in radii of the ball
+                continue
             inward = _cross(normal[f], side)
             height = -_dot(inward, start) / length
             if _dot(inward, _apart(third, start)) < 0.0:
