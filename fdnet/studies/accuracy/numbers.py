@@ -5,10 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
+from fdnet.case.names import MOST_SPHERES
 from fdnet.network.laws.named import DEFAULT_DAMAGE_LAW, DEFAULT_LAW
 from fdnet.studies.accuracy.choices import CHOICES
 from fdnet.studies.accuracy.deposits import BED_SHARE
 from fdnet.studies.accuracy.goals import (
+    ALL_SPHERES_GOAL,
     DAMAGE_GOAL,
     GOALS,
     Row,
@@ -39,6 +41,7 @@ def page_numbers(results: Results, validation: Path) -> dict[str, str]:
     return {
         "default_law": DEFAULT_LAW,
         "default_damage_law": DEFAULT_DAMAGE_LAW,
+        "most_spheres": f"{MOST_SPHERES:,}",
         **_goals(),
         **_intact(results.intact),
         **_damaged(results.damage),
@@ -58,6 +61,8 @@ def _goals() -> dict[str, str]:
         "goal_unequal": GOALS[UNEQUAL][1],
         "goal_damage_rms": DAMAGE_GOAL[0],
         "goal_damage": DAMAGE_GOAL[1],
+        "goal_spheres_rms": ALL_SPHERES_GOAL[0],
+        "goal_spheres": ALL_SPHERES_GOAL[1],
     }
     return {name: percent(goal, 0) for name, goal in whole.items() if goal is not None}
 
@@ -127,18 +132,16 @@ def _deposits(results: Results) -> dict[str, str]:
 
 def _slabs(rows: Sequence[Row]) -> dict[str, str]:
     aside = [row for row in rows if row["known_before"] == NO]
-    names = {"default": CHOSEN, "finest": FINEST, "two_scale": DEFAULT}
-    numbers = {"slabs": str(len(rows)), "slabs_aside": str(len(aside))}
-    for key, name in names.items():
-        numbers |= {
-            f"slabs_{key}": summary(list(rows), name),
-            f"slabs_aside_{key}": summary(aside, name),
-            f"slabs_{key}_rms": percent(rms(values(aside, name)), 0),
-            f"slabs_{key}_worst": f"{worst(values(aside, name)):.3f}",
-            f"slabs_{key}_case": _worst(aside, name).split(",")[0],
-        }
+    pairs = {"default": CHOSEN, "finest": FINEST, "two_scale": DEFAULT}
     coarse = [row for row in aside if "_r8" not in row["case"] and "_r10" not in row["case"]]
-    return numbers | {
+    return {
+        "slabs": str(len(rows)),
+        "slabs_aside": str(len(aside)),
+        **{f"slabs_aside_{key}": summary(aside, name) for key, name in pairs.items()},
+        "slabs_default_rms": percent(rms(values(aside, CHOSEN)), 0),
+        "slabs_default_worst": f"{worst(values(aside, CHOSEN)):.3f}",
+        "slabs_default_case": _worst(aside, CHOSEN).split(",")[0],
+        "slabs_two_scale_rms": percent(rms(values(aside, DEFAULT)), 0),
         "slabs_coarse": str(len(coarse)),
         "slabs_coarse_k": _summed_up(row[f"{FINEST}: k"] for row in coarse),
         "slabs_intact": _summed_up(row[f"{DEFAULT}: k0"] for row in rows),
