@@ -91,7 +91,8 @@ def test_its_network_is_the_one_of_its_tables(run):
     assert network.pore_position == pytest.approx(places, rel=1e-7, abs=1e-12)
     flow = fdnet.solve_flow(network, run.conductance())
     k = flow.inflow * float(np.ptp(network.box[0])) / network.area
-    assert k == pytest.approx(run.summary["k_damaged_m2"], rel=1e-7, abs=0)
+    assert run.summary["damage_law_used"] == "all-spheres"
+    assert k == pytest.approx(run.summary["k_damaged_other_m2"], rel=1e-7, abs=0)
 
 
 def test_its_meshes_are_ready_to_plot(run):
@@ -122,7 +123,8 @@ def test_openpnm_solves_its_network_to_the_same_flow(kind, state, request):
     flow = fdnet.solve_flow(one.network(), one.conductance(state))
     assert k == pytest.approx(flow.inflow * length / (width * height), rel=1e-6, abs=0)
     if state == "damaged":
-        assert k == pytest.approx(one.summary["k_damaged_m2"], rel=1e-6, abs=0)
+        two_scale = one.summary["k_damaged_other_m2"]
+        assert k == pytest.approx(two_scale, rel=1e-6, abs=0)
 
 
 @pytest.mark.parametrize("kind", ["fixed", "mobile"])
@@ -173,7 +175,7 @@ def test_it_prints_in_the_units_of_the_field(run):
     assert millidarcy == pytest.approx(summary["k_initial_m2"] / 9.869233e-16, rel=1e-3, abs=0)
     assert max(len(line) for line in text.split("warning", maxsplit=1)[0].splitlines()) <= 120
     assert repr(run) == f"FinishedRun('tiny', {str(run.path)!r})"
-    assert run._repr_html_().count("<tr>") == 4 + 1 + 3 + 1
+    assert run._repr_html_().count("<tr>") == 5 + 1 + 3 + 1
 
 
 def test_a_run_without_fines_has_no_history(tmp_path):

@@ -124,7 +124,11 @@ class FinishedRun:
         )
 
     def conductance(self, state: State = "damaged") -> Array:
-        """(T,) conductance of each throat, m3 (flux times viscosity over pressure drop)."""
+        """(T,) conductance of each throat, m3 (flux times viscosity over pressure drop).
+
+        With fines it is that of the two-scale damage law, also where `k_damaged_m2` of the summary
+        comes from the network of all spheres; then it belongs to `k_damaged_other_m2`.
+        """
         _check_state(state)
         return self.throats[f"conductance_{state}_m3"].to_numpy()
 

@@ -53,8 +53,9 @@ def place_grains(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Plac
     Raises NetworkError on impossible lengths (`check_lengths`), on fewer than four grains in the
     box, and on coincident grains.
     """
-    check_lengths(grains, periodic)
-    index = _reaching(grains, periodic)
+    if len(grains):
+        check_lengths(grains, periodic)
+    index = _reaching(grains, periodic) if len(grains) else np.zeros(0, int)
     if len(index) < 4:
         raise NetworkError(
             f"tessellation: {len(index)} of {len(grains)} grains reach into the box; a "

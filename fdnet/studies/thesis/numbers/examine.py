@@ -6,16 +6,16 @@ Tables, statistics and figures are made from it.
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from fdnet.case.names import AUTO, DEFAULT_LAW
 from fdnet.network.analysis import Analysis
-from fdnet.network.laws.named import DEFAULT_DAMAGE_LAW, DEFAULT_LAW
 from fdnet.network.permeability import compare
 from fdnet.studies.thesis.runs.state import State
 
-THESIS_PAIR, DEFAULT_PAIR = ("thesis", "thesis"), (DEFAULT_LAW, DEFAULT_DAMAGE_LAW)
+THESIS_PAIR, DEFAULT_PAIR = ("thesis", "thesis"), (DEFAULT_LAW, AUTO)
 """Pairs (law, damage law).
 
-The thesis's own pair has the threshold 0.40 of its text; fdnet's default pair is its most
-accurate one.
+The thesis's own pair has the threshold 0.40 of its text; fdnet's default takes its most
+accurate law that the size of the specimen allows.
 """
 
 
