@@ -160,7 +160,7 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
     light = options.damage_law == AUTO and measured.is_light(base, final)
     taken = None if light else whole
     if taken is not None:
-        k_damaged, slabs, more = _resolved(taken, base, (clean_slabs, specimen.moved), log)
+        k_damaged, slabs, more = _resolved(taken, base, (clean_slabs, specimen), log)
     elif final is not clean:
         slabs = measured.damaged_slabs(final, options, name, log)
     pair = clean_slabs, slabs
@@ -217,16 +217,18 @@ def _without_laws(specimen: Specimen) -> dict[str, Any]:
 
 
 def _resolved(
-    whole: AllSpheres, base: State, before: tuple[SlabK, bool], log: Log
+    whole: AllSpheres, base: State, before: tuple[SlabK, Specimen], log: Log
 ) -> tuple[float, SlabK, dict[str, int]]:
     """Permeability m2 and sections by the network of all spheres, and its counts.
 
     Fines never raise the permeability. Where few of them make the network of all spheres finer,
     its k may be above that of the grains by the difference of two errors; it is then set to that
-    of the grains, and counted. `before` are the sections without fines, and whether grains moved.
+    of the grains, and counted. `before` are the sections without fines, and the specimen.
     """
-    clean_slabs, moved = before
-    slabs, above = (whole.slabs, 0) if moved else capped(clean_slabs, whole.slabs)
+    clean_slabs, specimen = before
+    slabs, above = whole.slabs, 0
+    if not specimen.moved:
+        slabs, above = capped(clean_slabs, whole.slabs, specimen.empty_sections())
     log.warnings += whole.refused
     counts = whole.solved.network.counts
     return (

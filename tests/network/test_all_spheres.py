@@ -147,6 +147,16 @@ def test_fines_never_raise_k(pack):
             assert all(one.k_damaged <= one.k_initial for one in result.sections)
 
 
+def test_a_section_without_fines_loses_nothing(pack):
+    fines = pack.fines()
+    near = fines.where(fines.position[:, 0] < 0.2 * pack.box[0, 1])
+    result = analyse(
+        pack.grains().joined(near), periodic=SIDES, sections=2, damage_law="all-spheres"
+    )
+    assert result.sections[0].k_reduction > 0.01
+    assert result.sections[1].k_reduction == 0.0
+
+
 def test_all_spheres_goes_with_its_own_law_alone(pack):
     with pytest.raises(CaseError, match=r"analysis\.damage_law: 'all-spheres'.*'thesis'"):
         analyse(pack, periodic=SIDES, law="thesis", damage_law="all-spheres")

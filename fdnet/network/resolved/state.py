@@ -110,8 +110,11 @@ def state_slabs(
     )
 
 
-def capped(before: SlabK, after: SlabK) -> tuple[SlabK, int]:
-    """`after`, at most `before` in every slab cut out, and in how many it was above."""
-    above = after.cut_out > before.cut_out
-    cut = frozen(np.minimum(after.cut_out, before.cut_out))
-    return SlabK(cut_out=cut, inplace=after.inplace, flows=after.flows), int(above.sum())
+def capped(before: SlabK, after: SlabK, empty: Array) -> tuple[SlabK, int]:
+    """`after`, at most `before` in every slab cut out, and in how many it was above.
+
+    An `empty` (S,) slab, which holds no fines, has what it had before.
+    """
+    above = (after.cut_out > before.cut_out) & ~empty
+    cut = np.where(empty | above, before.cut_out, after.cut_out)
+    return SlabK(cut_out=frozen(cut), inplace=after.inplace, flows=after.flows), int(above.sum())

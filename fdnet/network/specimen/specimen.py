@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -55,6 +56,19 @@ class Specimen:
     outside_sides: int
 
     __repr__ = one_line
+
+    def empty_sections(self) -> Array:
+        """Whether no fine reaches into a section (S,), also none across a period along x."""
+        edges = self.edges
+        if self.fines is None:
+            return np.ones(len(edges) - 1, bool)
+        length = float(edges[-1] - edges[0])
+        shifts = (-length, 0.0, length) if self.network.periodic[0] else (0.0,)
+        x = np.concatenate([self.fines.position[:, 0] + shift for shift in shifts])
+        radius = np.tile(self.fines.radius, len(shifts))
+        return np.array(
+            [not np.any((x + radius > low) & (x - radius < high)) for low, high in pairwise(edges)]
+        )
 
 
 def measure_specimen(
