@@ -79,8 +79,10 @@ def _filled(network: Network, corner: Array, fines: Snapshot, value: Array) -> A
     `value` (N, W) belongs to the fines.
     """
     total = np.zeros((len(corner), 2 + value.shape[1]))
+    if not len(fines):
+        return total
     piece, owner = clip_to_box(corner, network.box, network.periodic)
-    if not len(fines) or not len(piece):
+    if not len(piece):
         return total
     piece = np.ascontiguousarray(piece)
     filled = np.zeros((len(piece), total.shape[1]))

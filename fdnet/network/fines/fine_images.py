@@ -1,4 +1,4 @@
-"""Which fines reach into the box, and their images across its periodic sides."""
+"""Which fines reach into the box; their images, shifted or mirrored, beyond its faces."""
 
 import numpy as np
 
@@ -28,9 +28,7 @@ def periodic_images(
 
     The region is [`low`, `high`] (3,) m, widened by `largest` m; `position` (N, 3) m.
     """
-    margin = (
-        np.maximum(np.maximum(network.box[:, 0] - low, high - network.box[:, 1]), 0.0) + largest
-    )
+    margin = _margin(network, low, high, largest)
     images = make_images(
         position,
         network.box,
@@ -49,10 +47,14 @@ def mirrored_images(
     The region is [`low`, `high`] (3,) m, widened by `largest` m. A centre (`position`, (N, 3) m)
     on or beyond a face that is not periodic has no mirror image there.
     """
-    margin = (
-        np.maximum(np.maximum(network.box[:, 0] - low, high - network.box[:, 1]), 0.0) + largest
-    )
+    margin = _margin(network, low, high, largest)
     images = make_images(
         position, network.box, periodic=network.periodic, margin=margin, tolerance=0.0
     )
     return images.position, images.owner
+
+
+def _margin(network: Network, low: Array, high: Array, largest: float) -> Array:
+    """How far (3,) m the region [`low`, `high`], widened by `largest`, leaves the box."""
+    beyond = np.maximum(network.box[:, 0] - low, high - network.box[:, 1])
+    return np.maximum(beyond, 0.0) + largest

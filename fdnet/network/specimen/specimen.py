@@ -20,7 +20,6 @@ from fdnet.spheres.snapshot import Array, Snapshot
 
 MOVED = 1e-9
 """A grain that is displaced by more than this, m, has moved."""
-"""Smallest displacement of a grain that counts as a move, m."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
