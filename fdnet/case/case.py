@@ -17,7 +17,7 @@ from pydantic import Field, model_validator
 from fdnet.case.added import without_added
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.control import Run
-from fdnet.case.fluid import Fluid
+from fdnet.case.fluid import Fluid, Well
 from fdnet.case.particles import Fines, Grains, Spheres
 from fdnet.case.parts import Box, Drag, Gravity
 from fdnet.case.rules import cross_problems
@@ -34,6 +34,7 @@ KEYS = (
     "grains",
     "fines",
     "fluid",
+    "well",
     "drag",
     "gravity",
     "run",
@@ -71,6 +72,7 @@ class Case(Part):
     box: Box
     grains: Grains
     fluid: Fluid = Fluid()
+    well: Well | None = None
     drag: Drag = Drag()
     gravity: Gravity = Gravity()
     run: Run = Run()
