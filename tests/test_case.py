@@ -9,10 +9,12 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import tomli_w
 from builders import TINY, tiny
 
 from fdnet.case.case import KEYS, Case, InvasionCase, with_fines
-from fdnet.case.file import case_from, known_keys, read_case, set_keys
+from fdnet.case.earlier import EARLIER, without_earlier
+from fdnet.case.file import case_from, known_keys, read_case, recorded_case, set_keys
 from fdnet.errors import CaseError
 from fdnet.scales.scales import InvasionScales, Scales, scales_of
 from fdnet.studies.thesis.runs.carry_out import find_state, state_path
@@ -251,19 +253,37 @@ def test_shipped_cases_are_valid_short_and_named_as_their_files(root: Path):
 
 
 def test_shipped_cases_keep_their_digests_and_their_text(root: Path):
-    """Any other digest would orphan the run folders and stored states that were made from them."""
+    """Any other digest would orphan the run folders and stored states that were made from them.
+
+    Keys that came later and say nothing new are left out (`fdnet.case.earlier`).
+    """
     with (root / "tests/data/case_digests.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     shipped = {p.relative_to(root / "cases") for p in (root / "cases").rglob("*.toml")}
     assert shipped == {Path(f"{row['case']}.toml") for row in rows}
     for row in rows:
         case = read_case(root / "cases" / f"{row['case']}.toml")
-        text = hashlib.sha256(case.toml().encode()).hexdigest()[:16]
+        written = tomli_w.dumps(without_earlier(case.data()))
+        text = hashlib.sha256(written.encode()).hexdigest()[:16]
         assert row == {
             "case": row["case"],
             **{stage: case.digest(stage) for stage in ("pack", "invade", "analyse")},
             "text": text,
         }
+
+
+def test_a_recorded_case_without_a_later_key_is_the_case_of_its_time(tmp_path: Path):
+    """Its digest is that of a case that says what was done then; a case file takes the default."""
+    for name, keys in EARLIER.items():
+        for key, value in keys.items():
+            data = tiny().data()
+            given = case_from(data | {name: data[name] | {key: value}})
+            del data[name][key]
+            (tmp_path / "case.toml").write_text(tomli_w.dumps(data))
+            assert recorded_case(tmp_path / "case.toml") == given
+            assert given.digest() == recorded_case(tmp_path / "case.toml").digest()
+            assert given.same_specimen((tmp_path / "case.toml").read_bytes())
+            assert key not in without_earlier(given.data())[name]
 
 
 def test_stored_states_still_belong_to_their_cases(root: Path):

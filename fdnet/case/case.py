@@ -16,6 +16,7 @@ from pydantic import Field, model_validator
 
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.control import Run
+from fdnet.case.earlier import completed, without_earlier
 from fdnet.case.fluid import Fluid
 from fdnet.case.particles import Fines, Grains, Spheres
 from fdnet.case.parts import Box, Drag, Gravity
@@ -115,9 +116,10 @@ class Case(Part):
         """Hash of what `stage` depends on.
 
         "pack" ignores fines, fluid and analysis; "invade" ignores the analysis. No result depends
-        on `POLICIES`, so no digest does.
+        on `POLICIES`, so no digest does. Keys that came later are left out where they change
+        nothing (`fdnet.case.earlier`).
         """
-        data = self.data()
+        data = without_earlier(self.data())
         data["run"] = {key: value for key, value in data["run"].items() if key not in POLICIES}
         if stage in ("pack", "invade"):
             data.pop("analysis")
@@ -132,7 +134,7 @@ class Case(Part):
     def same_specimen(self, text: bytes) -> bool:
         """Whether a case.toml as `toml` wrote it is this case but for `POLICIES`."""
         try:
-            data = tomllib.loads(text.decode())
+            data = completed(tomllib.loads(text.decode()))
             return case_type(data).model_validate(data).digest() == self.digest()
         except ValueError:
             return False
