@@ -12,8 +12,8 @@ import pytest
 import tomli_w
 from builders import TINY, tiny
 
+from fdnet.case.added import AS_BEFORE, completed, without_added
 from fdnet.case.case import KEYS, Case, InvasionCase, with_fines
-from fdnet.case.earlier import EARLIER, without_earlier
 from fdnet.case.file import case_from, known_keys, read_case, recorded_case, set_keys
 from fdnet.errors import CaseError
 from fdnet.scales.scales import InvasionScales, Scales, scales_of
@@ -253,37 +253,42 @@ def test_shipped_cases_are_valid_short_and_named_as_their_files(root: Path):
 
 
 def test_shipped_cases_keep_their_digests_and_their_text(root: Path):
-    """Any other digest would orphan the run folders and stored states that were made from them.
-
-    Keys that came later and say nothing new are left out (`fdnet.case.earlier`).
-    """
+    """Any other digest would orphan the run folders and stored states that were made from them."""
     with (root / "tests/data/case_digests.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     shipped = {p.relative_to(root / "cases") for p in (root / "cases").rglob("*.toml")}
     assert shipped == {Path(f"{row['case']}.toml") for row in rows}
     for row in rows:
         case = read_case(root / "cases" / f"{row['case']}.toml")
-        written = tomli_w.dumps(without_earlier(case.data()))
-        text = hashlib.sha256(written.encode()).hexdigest()[:16]
+        text = tomli_w.dumps(without_added(case.data()))
         assert row == {
             "case": row["case"],
             **{stage: case.digest(stage) for stage in ("pack", "invade", "analyse")},
-            "text": text,
+            "text": hashlib.sha256(text.encode()).hexdigest()[:16],
         }
 
 
-def test_a_recorded_case_without_a_later_key_is_the_case_of_its_time(tmp_path: Path):
-    """Its digest is that of a case that says what was done then; a case file takes the default."""
-    for name, keys in EARLIER.items():
-        for key, value in keys.items():
-            data = tiny().data()
-            given = case_from(data | {name: data[name] | {key: value}})
-            del data[name][key]
-            (tmp_path / "case.toml").write_text(tomli_w.dumps(data))
-            assert recorded_case(tmp_path / "case.toml") == given
-            assert given.digest() == recorded_case(tmp_path / "case.toml").digest()
-            assert given.same_specimen((tmp_path / "case.toml").read_bytes())
-            assert key not in without_earlier(given.data())[name]
+def test_new_keys_that_mean_as_before_are_in_no_digest():
+    before = {"name": "a", "fluid": {"viscosity_cP": 50.0}}
+    after = {"name": "a", "fluid": {"viscosity_cP": 50.0, "law": "old"}, "new": {"key": 1.0}}
+    meaning = {"fluid.law": "old", "new.key": 1.0}
+    assert without_added(after, meaning) == before
+    after["fluid"]["law"] = "other"
+    assert without_added(after, meaning) == before | {"fluid": after["fluid"]}
+    assert set(AS_BEFORE) <= set(known_keys())
+
+
+def test_a_recorded_case_that_lacks_new_keys_is_the_case_of_its_time(tmp_path: Path):
+    """A case file that lacks them takes the defaults of today instead."""
+    path, data = tmp_path / "case.toml", without_added(tiny().data())
+    path.write_text(tomli_w.dumps(data))
+    then = set_keys(data, [f"{key}={str(value).lower()}" for key, value in AS_BEFORE.items()])
+    assert recorded_case(path) == case_from(then)
+    assert recorded_case(path).same_specimen(path.read_bytes())
+    assert completed({"drag": {"scheme": "held"}}, {"drag.new": 1, "fines.new": 2}) == {
+        "drag": {"scheme": "held", "new": 1}
+    }
+    assert completed({}, {"well.new": 1}) == {"well": {"new": 1}}
 
 
 def test_stored_states_still_belong_to_their_cases(root: Path):

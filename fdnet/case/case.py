@@ -14,9 +14,9 @@ from typing import Annotated, Any, Self
 import tomli_w
 from pydantic import Field, model_validator
 
+from fdnet.case.added import completed, without_added
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.control import Run
-from fdnet.case.earlier import completed, without_earlier
 from fdnet.case.fluid import Fluid
 from fdnet.case.particles import Fines, Grains, Spheres
 from fdnet.case.parts import Box, Drag, Gravity
@@ -116,10 +116,10 @@ class Case(Part):
         """Hash of what `stage` depends on.
 
         "pack" ignores fines, fluid and analysis; "invade" ignores the analysis. No result depends
-        on `POLICIES`, so no digest does. Keys that came later are left out where they change
-        nothing (`fdnet.case.earlier`).
+        on `POLICIES`, so no digest does. A key that was added later counts only where its value
+        differs from what a case meant before (`fdnet.case.added`).
         """
-        data = without_earlier(self.data())
+        data = without_added(self.data())
         data["run"] = {key: value for key, value in data["run"].items() if key not in POLICIES}
         if stage in ("pack", "invade"):
             data.pop("analysis")

@@ -10,8 +10,8 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
+from fdnet.case.added import completed
 from fdnet.case.case import Case, InvasionCase, case_type
-from fdnet.case.earlier import completed
 from fdnet.case.rules import cross_problems
 from fdnet.case.values import Part
 from fdnet.errors import CaseError
@@ -192,7 +192,7 @@ def read_case(path: str | Path, *, assignments: list[str] | None = None) -> Case
 
 
 def recorded_case(path: Path) -> Case:
-    """The case that a run folder holds, perhaps of an earlier version (`fdnet.case.earlier`).
+    """The case that a run folder holds, perhaps of an earlier version (`fdnet.case.added`).
 
     Raises CaseError as `read_case` does.
     """

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from fdnet.case.added import completed
 from fdnet.case.case import InvasionCase, with_fines
-from fdnet.case.earlier import completed
 from fdnet.case.file import case_from, recorded_case
 from fdnet.dem.checkpoint import read_history, state_at
 from fdnet.dem.pack_deck import check_radii
