@@ -12,9 +12,9 @@ import pytest
 import tomli_w
 from builders import TINY, tiny
 
-from fdnet.case.added import AS_BEFORE, without_added
+from fdnet.case.added import AS_BEFORE, completed, without_added
 from fdnet.case.case import KEYS, Case, InvasionCase, with_fines
-from fdnet.case.file import case_from, known_keys, read_case, set_keys
+from fdnet.case.file import case_from, known_keys, read_case, recorded_case, set_keys
 from fdnet.errors import CaseError
 from fdnet.scales.scales import InvasionScales, Scales, scales_of
 from fdnet.studies.thesis.runs.carry_out import find_state, state_path
@@ -277,6 +277,19 @@ def test_new_keys_that_mean_as_before_are_in_no_digest():
     after["fluid"]["law"] = "other"
     assert without_added(after, meaning) == before | {"fluid": after["fluid"]}
     assert set(AS_BEFORE) <= set(known_keys())
+
+
+def test_a_recorded_case_that_lacks_new_keys_is_the_case_of_its_time(tmp_path: Path):
+    """A case file that lacks them takes the defaults of today instead."""
+    path, data = tmp_path / "case.toml", without_added(tiny().data())
+    path.write_text(tomli_w.dumps(data))
+    then = set_keys(data, [f"{key}={str(value).lower()}" for key, value in AS_BEFORE.items()])
+    assert recorded_case(path) == case_from(then)
+    assert recorded_case(path).same_specimen(path.read_bytes())
+    assert completed({"drag": {"scheme": "held"}}, {"drag.new": 1, "fines.new": 2}) == {
+        "drag": {"scheme": "held", "new": 1}
+    }
+    assert completed({}, {"well.new": 1}) == {"well": {"new": 1}}
 
 
 def test_stored_states_still_belong_to_their_cases(root: Path):

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Self
 import tomli_w
 from pydantic import Field, model_validator
 
-from fdnet.case.added import without_added
+from fdnet.case.added import completed, without_added
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.control import Run
 from fdnet.case.fluid import Fluid, Well
@@ -136,7 +136,7 @@ class Case(Part):
     def same_specimen(self, text: bytes) -> bool:
         """Whether a case.toml as `toml` wrote it is this case but for `POLICIES`."""
         try:
-            data = tomllib.loads(text.decode())
+            data = completed(tomllib.loads(text.decode()))
             return case_type(data).model_validate(data).digest() == self.digest()
         except ValueError:
             return False

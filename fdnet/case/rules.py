@@ -175,6 +175,14 @@ def _field(drag: Drag) -> Iterator[str]:
         yield "drag.field: 'network' is not available yet; expected 'uniform'"
 
 
+def _crowd(drag: Drag) -> Iterator[str]:
+    if drag.crowd != "none":
+        yield (
+            f"drag.crowd: {drag.crowd!r} needs the porosity around each fine during a run, which "
+            "is not available yet; expected 'none'"
+        )
+
+
 def _refresh(drag: Drag) -> Iterator[str]:
     if drag.scheme != "held" and drag.refresh_steps not in (None, 1):
         yield (
@@ -254,6 +262,7 @@ RULES = (
     Rule(("well", "fluid.velocity_m_s", "fluid.darcy_length_mm"), _one_drive),
     Rule(("well.radius_mm", "well.drainage_radius_m"), _radii_of_well),
     Rule(("drag.field",), _field),
+    Rule(("drag.crowd",), _crowd),
     Rule(("drag.scheme", "drag.refresh_steps"), _refresh),
     Rule(("drag.scheme", "fines.radius_mm"), _viscous),
     Rule(("drag.scheme", "drag.upstream"), _implicit),
