@@ -98,10 +98,35 @@ def _velocity_formulas(case: Case) -> tuple[str, str, str]:
 
 def _fine_rows(scales: InvasionScales) -> list[Quantity]:
     return [
+        *_drive_rows(scales),
         *_drag_rows(scales),
         *_ratio_rows(scales),
         *_supply_rows(scales),
         *_time_rows(scales),
+    ]
+
+
+def _drive_rows(scales: InvasionScales) -> list[Quantity]:
+    """How the simulation is driven; no rows where it moves as fast as the fluid."""
+    if scales.force_factor == 1.0:
+        return []
+    return [
+        _row(
+            "velocity in the simulation",
+            "u_DEM",
+            scales.drive_velocity,
+            "m/s",
+            "as given, or impact Stokes number 0.1",
+            "similarity without inertia",
+        ),
+        _row(
+            "factor on the forces and on time",
+            "s",
+            scales.force_factor,
+            "-",
+            "u_DEM / u; physical time = s t",
+            "similarity without inertia",
+        ),
     ]
 
 
@@ -147,8 +172,16 @@ def _ratio_rows(scales: InvasionScales) -> list[Quantity]:
             "St",
             scales.stokes,
             "-",
-            "tau u / d_grain",
+            "tau u / d_grain, as simulated",
             "inertia over drag at a grain",
+        ),
+        _row(
+            "impact Stokes number",
+            "St_i",
+            scales.impact_stokes,
+            "-",
+            "tau u / r, as simulated",
+            "Joseph 2001; inertia does not matter well below 1",
         ),
         _row(
             "gravity over drag",
@@ -182,7 +215,7 @@ def _supply_rows(scales: InvasionScales) -> list[Quantity]:
         _row("fines supplied", "n", scales.supplied_count, "-", "c A l / v", "slab of suspension"),
         _row("slab length", "l", scales.slab_length, "m", "n v / (c A)", "slab of suspension"),
         _row(
-            "time to feed the slab",
+            "time to feed the slab, simulated",
             "t_f",
             scales.slab_length / scales.upstream_velocity,
             "s",
@@ -195,7 +228,7 @@ def _supply_rows(scales: InvasionScales) -> list[Quantity]:
 def _time_rows(scales: InvasionScales) -> list[Quantity]:
     return [
         _row(
-            "plug time",
+            "plug time, simulated",
             "t_p",
             scales.plug_time,
             "s",
@@ -203,7 +236,7 @@ def _time_rows(scales: InvasionScales) -> list[Quantity]:
             "stop rule",
         ),
         _row(
-            "cap or duration",
+            "cap or duration, simulated",
             "t_c",
             scales.cap_time,
             "s",
