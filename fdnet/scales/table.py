@@ -1,132 +1,30 @@
 """The scales of a case as rows: name, symbol, value, unit, formula, source."""
 
-from dataclasses import dataclass
-
 from fdnet.case.case import Case
 from fdnet.scales.cost import cost_of, memory_bytes
+from fdnet.scales.flow_rows import drive_rows, flow_rows
 from fdnet.scales.grain_pack import grain_count
+from fdnet.scales.quantity import Quantity
+from fdnet.scales.quantity import row as _row
 from fdnet.scales.scales import InvasionScales, Scales
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Quantity:
-    """One row of the table of scales.
-
-    Attributes:
-        name: what it is, in words.
-        symbol: as in the formulas.
-        value: in `unit`.
-        unit: SI; "-" for a number without a unit.
-        formula: how it follows from the case.
-        source: author and year, or where it was measured.
-    """
-
-    name: str
-    symbol: str
-    value: float
-    unit: str
-    formula: str
-    source: str
-
-
-def _row(name: str, symbol: str, value: float, unit: str, formula: str, source: str) -> Quantity:
-    return Quantity(
-        name=name, symbol=symbol, value=value, unit=unit, formula=formula, source=source
-    )
 
 
 def scale_rows(case: Case, scales: Scales) -> list[Quantity]:
     """Every scale of the case with its formula and source, in reading order."""
-    rows = _flow_rows(case, scales)
+    rows = flow_rows(case, scales)
     if isinstance(scales, InvasionScales):
         rows += _fine_rows(scales)
     rows += _contact_rows(scales)
     return rows + _cost_rows(case, scales)
 
 
-def _flow_rows(case: Case, scales: Scales) -> list[Quantity]:
-    darcy, interstitial, source = _velocity_formulas(case)
-    return [
-        _row(
-            "Carman-Kozeny permeability",
-            "k_CK",
-            scales.permeability,
-            "m2",
-            "d^2 phi^3 / (180 (1-phi)^2)",
-            "Carman 1937",
-        ),
-        _row("Darcy velocity", "q", scales.darcy_velocity, "m/s", darcy, source),
-        _row(
-            "interstitial velocity",
-            "u",
-            scales.interstitial_velocity,
-            "m/s",
-            interstitial,
-            "Dupuit 1863",
-        ),
-        _row(
-            "pressure gradient in the pack",
-            "-dp/dx",
-            scales.pressure_gradient,
-            "Pa/m",
-            "mu q / k" if case.fluid.darcy_law == "darcy" else "mu q / k + b q^2",
-            source,
-        ),
-        _row(
-            "loss of velocity by inertia",
-            "1 - q_E/q_D",
-            scales.inertial_loss,
-            "-",
-            "b = 1.75/150 rho_f d / (k (1-phi))",
-            "Ergun 1952",
-        ),
-    ]
-
-
-def _velocity_formulas(case: Case) -> tuple[str, str, str]:
-    """Formulas of the Darcy and of the interstitial velocity, and the source of the first."""
-    ergun = case.fluid.darcy_law == "ergun"
-    source = "Ergun 1952" if ergun else "Darcy 1856"
-    if case.fluid.velocity_m_s is not None:
-        return "q = u phi", "given in the case", source
-    length = "L" if case.well is None else "r_w ln(r_e/r_w)"
-    if not ergun:
-        return f"q = k dP / (mu {length})", "u = q / phi", source
-    second = "L" if case.well is None else "r_w^2 (1/r_w - 1/r_e)"
-    return f"mu q {length} / k + b q^2 {second} = dP", "u = q / phi", source
-
-
 def _fine_rows(scales: InvasionScales) -> list[Quantity]:
     return [
-        *_drive_rows(scales),
+        *drive_rows(scales),
         *_drag_rows(scales),
         *_ratio_rows(scales),
         *_supply_rows(scales),
         *_time_rows(scales),
-    ]
-
-
-def _drive_rows(scales: InvasionScales) -> list[Quantity]:
-    """How the simulation is driven; no rows where it moves as fast as the fluid."""
-    if scales.force_factor == 1.0:
-        return []
-    return [
-        _row(
-            "velocity in the simulation",
-            "u_DEM",
-            scales.drive_velocity,
-            "m/s",
-            "as given, or impact Stokes number 0.1",
-            "similarity without inertia",
-        ),
-        _row(
-            "factor on the forces and on time",
-            "s",
-            scales.force_factor,
-            "-",
-            "u_DEM / u; physical time = s t",
-            "similarity without inertia",
-        ),
     ]
 
 
