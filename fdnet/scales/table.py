@@ -1,46 +1,19 @@
 """The scales of a case as rows: name, symbol, value, unit, formula, source."""
 
-from dataclasses import dataclass
-
 from fdnet.case.case import Case
+from fdnet.scales.contact_rows import contact_rows, overlap_rows
 from fdnet.scales.cost import cost_of, memory_bytes
 from fdnet.scales.grain_pack import grain_count
+from fdnet.scales.quantity import Quantity, row
 from fdnet.scales.scales import InvasionScales, Scales
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Quantity:
-    """One row of the table of scales.
-
-    Attributes:
-        name: what it is, in words.
-        symbol: as in the formulas.
-        value: in `unit`.
-        unit: SI; "-" for a number without a unit.
-        formula: how it follows from the case.
-        source: author and year, or where it was measured.
-    """
-
-    name: str
-    symbol: str
-    value: float
-    unit: str
-    formula: str
-    source: str
-
-
-def _row(name: str, symbol: str, value: float, unit: str, formula: str, source: str) -> Quantity:
-    return Quantity(
-        name=name, symbol=symbol, value=value, unit=unit, formula=formula, source=source
-    )
 
 
 def scale_rows(case: Case, scales: Scales) -> list[Quantity]:
     """Every scale of the case with its formula and source, in reading order."""
     rows = _flow_rows(case, scales)
     if isinstance(scales, InvasionScales):
-        rows += _fine_rows(scales)
-    rows += _contact_rows(scales)
+        rows += _fine_rows(case, scales)
+    rows += contact_rows(case, scales)
     return rows + _cost_rows(case, scales)
 
 
@@ -48,7 +21,7 @@ def _flow_rows(case: Case, scales: Scales) -> list[Quantity]:
     given = "given in the case" if case.fluid.velocity_m_s is not None else "u = q / phi"
     darcy = "q = u phi" if case.fluid.velocity_m_s is not None else "q = k dP / (mu L)"
     return [
-        _row(
+        row(
             "Carman-Kozeny permeability",
             "k_CK",
             scales.permeability,
@@ -56,17 +29,18 @@ def _flow_rows(case: Case, scales: Scales) -> list[Quantity]:
             "d^2 phi^3 / (180 (1-phi)^2)",
             "Carman 1937",
         ),
-        _row("Darcy velocity", "q", scales.darcy_velocity, "m/s", darcy, "Darcy 1856"),
-        _row(
+        row("Darcy velocity", "q", scales.darcy_velocity, "m/s", darcy, "Darcy 1856"),
+        row(
             "interstitial velocity", "u", scales.interstitial_velocity, "m/s", given, "Dupuit 1863"
         ),
     ]
 
 
-def _fine_rows(scales: InvasionScales) -> list[Quantity]:
+def _fine_rows(case: Case, scales: InvasionScales) -> list[Quantity]:
     return [
         *_drag_rows(scales),
         *_ratio_rows(scales),
+        *overlap_rows(case, scales),
         *_supply_rows(scales),
         *_time_rows(scales),
     ]
@@ -76,7 +50,7 @@ def _drag_rows(scales: InvasionScales) -> list[Quantity]:
     low, high = scales.relaxation_time
     sizes = [("smallest", low), ("largest", high)] if low != high else [("every", low)]
     rows = [
-        _row(
+        row(
             f"drag relaxation time, {name} fine",
             "tau",
             tau,
@@ -88,7 +62,7 @@ def _drag_rows(scales: InvasionScales) -> list[Quantity]:
     ]
     return [
         *rows,
-        _row(
+        row(
             "drag held for",
             "N dt / tau",
             scales.hold_steps * scales.time_step / low,
@@ -101,7 +75,7 @@ def _drag_rows(scales: InvasionScales) -> list[Quantity]:
 
 def _ratio_rows(scales: InvasionScales) -> list[Quantity]:
     return [
-        _row(
+        row(
             "particle Reynolds number",
             "Re",
             scales.reynolds,
@@ -109,7 +83,7 @@ def _ratio_rows(scales: InvasionScales) -> list[Quantity]:
             "rho_f u 2r / mu",
             "Stokes drag holds below about 1",
         ),
-        _row(
+        row(
             "Stokes number",
             "St",
             scales.stokes,
@@ -117,7 +91,7 @@ def _ratio_rows(scales: InvasionScales) -> list[Quantity]:
             "tau u / d_grain",
             "inertia over drag at a grain",
         ),
-        _row(
+        row(
             "gravity over drag",
             "G",
             scales.gravity_over_drag,
@@ -125,30 +99,14 @@ def _ratio_rows(scales: InvasionScales) -> list[Quantity]:
             "2 r^2 (rho - rho_f) g / (9 mu u M)",
             "force ratio",
         ),
-        _row(
-            "impact overlap over diameter",
-            "delta/d",
-            scales.impact_overlap,
-            "-",
-            "u sqrt(m/k) / 2r",
-            "linear spring",
-        ),
-        _row(
-            "drag overlap over diameter",
-            "delta/d",
-            scales.drag_overlap,
-            "-",
-            "6 pi mu M u / 2k",
-            "linear spring",
-        ),
     ]
 
 
 def _supply_rows(scales: InvasionScales) -> list[Quantity]:
     return [
-        _row("fines supplied", "n", scales.supplied_count, "-", "c A l / v", "slab of suspension"),
-        _row("slab length", "l", scales.slab_length, "m", "n v / (c A)", "slab of suspension"),
-        _row(
+        row("fines supplied", "n", scales.supplied_count, "-", "c A l / v", "slab of suspension"),
+        row("slab length", "l", scales.slab_length, "m", "n v / (c A)", "slab of suspension"),
+        row(
             "time to feed the slab",
             "t_f",
             scales.slab_length / scales.upstream_velocity,
@@ -161,7 +119,7 @@ def _supply_rows(scales: InvasionScales) -> list[Quantity]:
 
 def _time_rows(scales: InvasionScales) -> list[Quantity]:
     return [
-        _row(
+        row(
             "plug time",
             "t_p",
             scales.plug_time,
@@ -169,7 +127,7 @@ def _time_rows(scales: InvasionScales) -> list[Quantity]:
             "4 d_grain / u or 10 arrivals unless given",
             "stop rule",
         ),
-        _row(
+        row(
             "cap or duration",
             "t_c",
             scales.cap_time,
@@ -177,7 +135,7 @@ def _time_rows(scales: InvasionScales) -> list[Quantity]:
             "3 t_f + 4 t_p + 2 L / u unless given",
             "stop rule",
         ),
-        _row(
+        row(
             "time step",
             "dt",
             scales.time_step,
@@ -188,52 +146,11 @@ def _time_rows(scales: InvasionScales) -> list[Quantity]:
     ]
 
 
-def _contact_rows(scales: Scales) -> list[Quantity]:
-    rows = [
-        _row(
-            "stiffness factor",
-            "f_k",
-            scales.stiffness_factor,
-            "-",
-            "run.stiffness / stiffest pair",
-            "scaling",
-        )
-    ]
-    for contact in scales.contacts.values():
-        rows += [
-            _row(
-                f"{contact.pair} stiffness used",
-                "k",
-                contact.normal_stiffness,
-                "N/m",
-                "f_k kA kB / (kA + kB)",
-                "series springs",
-            ),
-            _row(
-                f"{contact.pair} contact time",
-                "t_c",
-                contact.contact_time,
-                "s",
-                "pi / (sqrt(k/m_eff) sqrt(1-zeta^2))",
-                "damped oscillator",
-            ),
-            _row(
-                f"{contact.pair} stable step",
-                "dt_s",
-                0.2 * contact.step_limit,
-                "s",
-                "0.2 sqrt(m/k)",
-                "measured, docs/physics.md",
-            ),
-        ]
-    return rows
-
-
 def _cost_rows(case: Case, scales: Scales) -> list[Quantity]:
     cost = cost_of(case, scales)
     rows = [
-        _row("grains, first guess", "N", grain_count(case), "-", "(1-phi) V / v", "plain sum"),
-        _row(
+        row("grains, first guess", "N", grain_count(case), "-", "(1-phi) V / v", "plain sum"),
+        row(
             "pack run time, one core",
             "t_pack",
             cost.pack_seconds,
@@ -241,7 +158,7 @@ def _cost_rows(case: Case, scales: Scales) -> list[Quantity]:
             "N steps 1e-7 s an attempt",
             "measured, within a factor of 3",
         ),
-        _row(
+        row(
             "memory",
             "M",
             memory_bytes(case, scales),
@@ -252,7 +169,7 @@ def _cost_rows(case: Case, scales: Scales) -> list[Quantity]:
     ]
     if isinstance(scales, InvasionScales):
         rows.append(
-            _row(
+            row(
                 "invasion run time, one core",
                 "t_run",
                 cost.invade_seconds,
