@@ -14,11 +14,11 @@ from typing import Annotated, Any, Self
 import tomli_w
 from pydantic import Field, model_validator
 
-from fdnet.case.added import without_added
+from fdnet.case.added import completed, without_added
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.contact import MODEL_KEYS, ContactLaw
 from fdnet.case.control import Run
-from fdnet.case.fluid import Fluid
+from fdnet.case.fluid import Fluid, Well
 from fdnet.case.particles import Fines, Grains, Spheres
 from fdnet.case.parts import Box, Drag, Gravity
 from fdnet.case.rules import cross_problems
@@ -35,6 +35,7 @@ KEYS = (
     "grains",
     "fines",
     "fluid",
+    "well",
     "drag",
     "gravity",
     "contact",
@@ -73,6 +74,7 @@ class Case(Part):
     box: Box
     grains: Grains
     fluid: Fluid = Fluid()
+    well: Well | None = None
     drag: Drag = Drag()
     gravity: Gravity = Gravity()
     contact: ContactLaw = ContactLaw()
@@ -152,7 +154,7 @@ class Case(Part):
     def same_specimen(self, text: bytes) -> bool:
         """Whether a case.toml as `toml` wrote it is this case but for `POLICIES`."""
         try:
-            data = tomllib.loads(text.decode())
+            data = completed(tomllib.loads(text.decode()))
             return case_type(data).model_validate(data).digest() == self.digest()
         except ValueError:
             return False

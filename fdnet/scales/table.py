@@ -4,7 +4,8 @@ from fdnet.case.case import Case
 from fdnet.scales.contact_rows import contact_rows, overlap_rows
 from fdnet.scales.cost import cost_of, memory_bytes
 from fdnet.scales.grain_pack import grain_count
-from fdnet.scales.quantity import Quantity, row
+from fdnet.scales.quantity import Quantity
+from fdnet.scales.quantity import row as _row
 from fdnet.scales.scales import InvasionScales, Scales
 
 
@@ -18,10 +19,9 @@ def scale_rows(case: Case, scales: Scales) -> list[Quantity]:
 
 
 def _flow_rows(case: Case, scales: Scales) -> list[Quantity]:
-    given = "given in the case" if case.fluid.velocity_m_s is not None else "u = q / phi"
-    darcy = "q = u phi" if case.fluid.velocity_m_s is not None else "q = k dP / (mu L)"
+    darcy, interstitial, source = _velocity_formulas(case)
     return [
-        row(
+        _row(
             "Carman-Kozeny permeability",
             "k_CK",
             scales.permeability,
@@ -29,11 +29,45 @@ def _flow_rows(case: Case, scales: Scales) -> list[Quantity]:
             "d^2 phi^3 / (180 (1-phi)^2)",
             "Carman 1937",
         ),
-        row("Darcy velocity", "q", scales.darcy_velocity, "m/s", darcy, "Darcy 1856"),
-        row(
-            "interstitial velocity", "u", scales.interstitial_velocity, "m/s", given, "Dupuit 1863"
+        _row("Darcy velocity", "q", scales.darcy_velocity, "m/s", darcy, source),
+        _row(
+            "interstitial velocity",
+            "u",
+            scales.interstitial_velocity,
+            "m/s",
+            interstitial,
+            "Dupuit 1863",
+        ),
+        _row(
+            "pressure gradient in the pack",
+            "-dp/dx",
+            scales.pressure_gradient,
+            "Pa/m",
+            "mu q / k" if case.fluid.darcy_law == "darcy" else "mu q / k + b q^2",
+            source,
+        ),
+        _row(
+            "loss of velocity by inertia",
+            "1 - q_E/q_D",
+            scales.inertial_loss,
+            "-",
+            "b = 1.75/150 rho_f d / (k (1-phi))",
+            "Ergun 1952",
         ),
     ]
+
+
+def _velocity_formulas(case: Case) -> tuple[str, str, str]:
+    """Formulas of the Darcy and of the interstitial velocity, and the source of the first."""
+    ergun = case.fluid.darcy_law == "ergun"
+    source = "Ergun 1952" if ergun else "Darcy 1856"
+    if case.fluid.velocity_m_s is not None:
+        return "q = u phi", "given in the case", source
+    length = "L" if case.well is None else "r_w ln(r_e/r_w)"
+    if not ergun:
+        return f"q = k dP / (mu {length})", "u = q / phi", source
+    second = "L" if case.well is None else "r_w^2 (1/r_w - 1/r_e)"
+    return f"mu q {length} / k + b q^2 {second} = dP", "u = q / phi", source
 
 
 def _fine_rows(case: Case, scales: InvasionScales) -> list[Quantity]:
@@ -50,7 +84,7 @@ def _drag_rows(scales: InvasionScales) -> list[Quantity]:
     low, high = scales.relaxation_time
     sizes = [("smallest", low), ("largest", high)] if low != high else [("every", low)]
     rows = [
-        row(
+        _row(
             f"drag relaxation time, {name} fine",
             "tau",
             tau,
@@ -62,7 +96,7 @@ def _drag_rows(scales: InvasionScales) -> list[Quantity]:
     ]
     return [
         *rows,
-        row(
+        _row(
             "drag held for",
             "N dt / tau",
             scales.hold_steps * scales.time_step / low,
@@ -75,7 +109,7 @@ def _drag_rows(scales: InvasionScales) -> list[Quantity]:
 
 def _ratio_rows(scales: InvasionScales) -> list[Quantity]:
     return [
-        row(
+        _row(
             "particle Reynolds number",
             "Re",
             scales.reynolds,
@@ -83,7 +117,7 @@ def _ratio_rows(scales: InvasionScales) -> list[Quantity]:
             "rho_f u 2r / mu",
             "Stokes drag holds below about 1",
         ),
-        row(
+        _row(
             "Stokes number",
             "St",
             scales.stokes,
@@ -91,7 +125,7 @@ def _ratio_rows(scales: InvasionScales) -> list[Quantity]:
             "tau u / d_grain",
             "inertia over drag at a grain",
         ),
-        row(
+        _row(
             "gravity over drag",
             "G",
             scales.gravity_over_drag,
@@ -104,9 +138,9 @@ def _ratio_rows(scales: InvasionScales) -> list[Quantity]:
 
 def _supply_rows(scales: InvasionScales) -> list[Quantity]:
     return [
-        row("fines supplied", "n", scales.supplied_count, "-", "c A l / v", "slab of suspension"),
-        row("slab length", "l", scales.slab_length, "m", "n v / (c A)", "slab of suspension"),
-        row(
+        _row("fines supplied", "n", scales.supplied_count, "-", "c A l / v", "slab of suspension"),
+        _row("slab length", "l", scales.slab_length, "m", "n v / (c A)", "slab of suspension"),
+        _row(
             "time to feed the slab",
             "t_f",
             scales.slab_length / scales.upstream_velocity,
@@ -119,7 +153,7 @@ def _supply_rows(scales: InvasionScales) -> list[Quantity]:
 
 def _time_rows(scales: InvasionScales) -> list[Quantity]:
     return [
-        row(
+        _row(
             "plug time",
             "t_p",
             scales.plug_time,
@@ -127,7 +161,7 @@ def _time_rows(scales: InvasionScales) -> list[Quantity]:
             "4 d_grain / u or 10 arrivals unless given",
             "stop rule",
         ),
-        row(
+        _row(
             "cap or duration",
             "t_c",
             scales.cap_time,
@@ -135,7 +169,7 @@ def _time_rows(scales: InvasionScales) -> list[Quantity]:
             "3 t_f + 4 t_p + 2 L / u unless given",
             "stop rule",
         ),
-        row(
+        _row(
             "time step",
             "dt",
             scales.time_step,
@@ -149,8 +183,8 @@ def _time_rows(scales: InvasionScales) -> list[Quantity]:
 def _cost_rows(case: Case, scales: Scales) -> list[Quantity]:
     cost = cost_of(case, scales)
     rows = [
-        row("grains, first guess", "N", grain_count(case), "-", "(1-phi) V / v", "plain sum"),
-        row(
+        _row("grains, first guess", "N", grain_count(case), "-", "(1-phi) V / v", "plain sum"),
+        _row(
             "pack run time, one core",
             "t_pack",
             cost.pack_seconds,
@@ -158,7 +192,7 @@ def _cost_rows(case: Case, scales: Scales) -> list[Quantity]:
             "N steps 1e-7 s an attempt",
             "measured, within a factor of 3",
         ),
-        row(
+        _row(
             "memory",
             "M",
             memory_bytes(case, scales),
@@ -169,7 +203,7 @@ def _cost_rows(case: Case, scales: Scales) -> list[Quantity]:
     ]
     if isinstance(scales, InvasionScales):
         rows.append(
-            row(
+            _row(
                 "invasion run time, one core",
                 "t_run",
                 cost.invade_seconds,
