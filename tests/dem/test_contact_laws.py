@@ -13,8 +13,9 @@ from fdnet.dem.packing import make_pack
 from fdnet.scales.hertz import collision_time, overlap_of_impact
 from fdnet.scales.hertz_contacts import pair_elastic
 from fdnet.scales.scales import scales_of
+from fdnet.spheres.contacts import max_overlap, touching_pairs
 from fdnet.spheres.snapshot import Kind, resting
-from fdnet.studies.dem.closed import Watch, closed_run, restitution_of
+from fdnet.studies.dem.closed import Watch, closed_run, kinetic_energy, restitution_of
 
 pytestmark = pytest.mark.liggghts
 HERTZ = "contact.model=hertz"
@@ -92,3 +93,34 @@ def test_a_dense_hertz_pack_meets_its_porosity_at_rest(binary, tmp_path):
     mass = 2650 * 4 / 3 * math.pi * GRAIN**3
     natural = math.sqrt(scales.contacts["grain-grain"].normal_stiffness / mass)
     assert np.max(np.abs(pack.grains.velocity)) < 1e-6 * 2 * GRAIN * natural
+
+
+def hertz_energy(spheres, contacts) -> float:
+    """Kinetic energy and 8/15 E* sqrt(R*) delta^(5/2) of grains and their six walls, J."""
+    _, depth = touching_pairs(spheres, (False, False, False))
+    below = spheres.radius[:, None] - (spheres.position - spheres.box[:, 0])
+    above = spheres.radius[:, None] - (spheres.box[:, 1] - spheres.position)
+    at_walls = sum(np.sum(np.maximum(side, 0.0) ** 2.5) for side in (below, above))
+    between = contacts["grain-grain"].elastic.modulus * math.sqrt(GRAIN / 2) * np.sum(depth**2.5)
+    walls = contacts["grain-wall"].elastic.modulus * math.sqrt(GRAIN) * at_walls
+    return float(8 / 15 * (between + walls) + kinetic_energy(spheres, 2650.0))
+
+
+def test_an_undamped_dense_pack_keeps_its_energy_at_the_largest_step(binary, tmp_path):
+    """Contacts reach 13 % of a diameter here, three times what the step is made for."""
+    case = tiny(
+        HERTZ,
+        "grains={radius_mm=0.25, count=90, damping_ratio=0.0, motion='mobile'}",
+        "box.size_mm=[2.0,2.0,2.1]",
+    )
+    scales = scales_of(case)
+    grains = make_pack(case, scales, tmp_path / "pack", Launch(binary=binary)).grains
+    assert max_overlap(grains, (False, False, False)) > 0.1
+    step = 0.2 * min(scales.contacts[f"grain-{other}"].step_limit for other in ("grain", "wall"))
+    thrown_at = np.random.default_rng(3).normal(0.0, 0.002 * GRAIN / step, (len(grains), 3))
+    start = replace(grains, velocity=thrown_at)
+    watch = Watch(step=step, steps=1500, every=15)
+    states = closed_run(case, start, 2650.0, watch, tmp_path / "run")
+    energy = np.array([hertz_energy(state, scales.contacts) for state in states])
+    assert np.max(np.abs(energy - energy[0])) < 0.05 * kinetic_energy(start, 2650.0)
+    assert np.max(np.abs(energy / energy[0] - 1)) < 2e-4
