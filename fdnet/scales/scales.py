@@ -10,11 +10,12 @@ from typing import overload
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.errors import CaseError
+from fdnet.scales.contacts import contacts_of, stiffness_factor
 from fdnet.scales.drive import drive_of, drive_warnings
 from fdnet.scales.grain_pack import pack_step, target_porosity
 from fdnet.scales.overlaps import overlap_warnings, overlaps_of, refuse_deep_overlap
 from fdnet.scales.slab import slab_of, slab_warnings
-from fdnet.scales.springs import Contact, contacts_of, stiffness_factor
+from fdnet.scales.springs import Contact
 from fdnet.scales.sticking import Sticking, sticking_of, sticking_warnings
 from fdnet.scales.stop_times import chunk_refreshes, plug_warnings, stop_times
 from fdnet.scales.time_step import drag_warnings, hold_steps, relaxation_time, time_step
@@ -35,7 +36,7 @@ class Scales:
         interstitial_velocity: m/s, mean velocity of the fluid in the pores.
         pressure_gradient: Pa/m, that drives this flow through the intact pack.
         inertial_loss: share by which Ergun's inertial term lowers the velocity of Darcy's law.
-        stiffness_factor: factor from the materials' stiffness to the one used.
+        stiffness_factor: factor from the materials' stiffness, or moduli, to those used.
         contacts: contact of each pair of materials, such as "grain-fine".
         pack_step: s, time step of packing.
         warnings: doubts about the case, one sentence each.
@@ -151,7 +152,7 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     hold = hold_steps(case, step, relaxation[0], times.chunk)
     chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
     contact = shared.contacts["grain-fine"]
-    overlaps = overlaps_of(case, contact.normal_stiffness, velocity)
+    overlaps = overlaps_of(case, contact, velocity)
     sticking = sticking_of(case, contact, velocity, step)
     reynolds = _reynolds(case, shared.interstitial_velocity)
     stokes = relaxation[1] * velocity / (2 * case.grains.mean_radius_m)

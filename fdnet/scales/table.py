@@ -1,6 +1,7 @@
 """The scales of a case as rows: name, symbol, value, unit, formula, source."""
 
 from fdnet.case.case import Case
+from fdnet.scales.contact_rows import contact_rows, overlap_rows
 from fdnet.scales.cost import cost_of, memory_bytes
 from fdnet.scales.flow_rows import drive_rows, flow_rows
 from fdnet.scales.grain_pack import grain_count
@@ -13,16 +14,17 @@ def scale_rows(case: Case, scales: Scales) -> list[Quantity]:
     """Every scale of the case with its formula and source, in reading order."""
     rows = flow_rows(case, scales)
     if isinstance(scales, InvasionScales):
-        rows += _fine_rows(scales)
-    rows += _contact_rows(scales)
+        rows += _fine_rows(case, scales)
+    rows += contact_rows(case, scales)
     return rows + _cost_rows(case, scales)
 
 
-def _fine_rows(scales: InvasionScales) -> list[Quantity]:
+def _fine_rows(case: Case, scales: InvasionScales) -> list[Quantity]:
     return [
         *drive_rows(scales),
         *_drag_rows(scales),
         *_ratio_rows(scales),
+        *overlap_rows(case, scales),
         *_supply_rows(scales),
         *_time_rows(scales),
     ]
@@ -89,22 +91,6 @@ def _ratio_rows(scales: InvasionScales) -> list[Quantity]:
             "2 r^2 (rho - rho_f) g / (9 mu u M)",
             "force ratio",
         ),
-        _row(
-            "impact overlap over diameter",
-            "delta/d",
-            scales.impact_overlap,
-            "-",
-            "u sqrt(m/k) / 2r",
-            "linear spring",
-        ),
-        _row(
-            "drag overlap over diameter",
-            "delta/d",
-            scales.drag_overlap,
-            "-",
-            "6 pi mu M u / 2k",
-            "linear spring",
-        ),
     ]
 
 
@@ -150,47 +136,6 @@ def _time_rows(scales: InvasionScales) -> list[Quantity]:
             "measured, docs/physics.md",
         ),
     ]
-
-
-def _contact_rows(scales: Scales) -> list[Quantity]:
-    rows = [
-        _row(
-            "stiffness factor",
-            "f_k",
-            scales.stiffness_factor,
-            "-",
-            "run.stiffness / stiffest pair",
-            "scaling",
-        )
-    ]
-    for contact in scales.contacts.values():
-        rows += [
-            _row(
-                f"{contact.pair} stiffness used",
-                "k",
-                contact.normal_stiffness,
-                "N/m",
-                "f_k kA kB / (kA + kB)",
-                "series springs",
-            ),
-            _row(
-                f"{contact.pair} contact time",
-                "t_c",
-                contact.contact_time,
-                "s",
-                "pi / (sqrt(k/m_eff) sqrt(1-zeta^2))",
-                "damped oscillator",
-            ),
-            _row(
-                f"{contact.pair} stable step",
-                "dt_s",
-                0.2 * contact.step_limit,
-                "s",
-                "0.2 sqrt(m/k)",
-                "measured, docs/physics.md",
-            ),
-        ]
-    return rows
 
 
 def _cost_rows(case: Case, scales: Scales) -> list[Quantity]:
