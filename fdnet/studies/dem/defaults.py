@@ -48,7 +48,7 @@ _WORDS: Mapping[str, str] = {
     "depth_p95": "95 % above, mm",
     "k_ratio": "k/k0",
 }
-_SMALL = ("box.size_mm=[2.0,1.2,1.2]", "grains.count=40", "fines.count=60", "run.cap_ms=0.2")
+_SMALL = ("box.size_mm=[2.0,1.2,1.2]", "grains.count=28", "fines.count=60", "run.cap_ms=0.4")
 
 
 def points(quick: bool) -> list[Point]:
@@ -98,9 +98,9 @@ def _is_now(run: Measured) -> bool:
 
 def summary(rows: Sequence[Row]) -> str:
     """A table of every setting: what it gives, and how that differs from the defaults."""
-    heads = ("specimen, setting", "seeds", "core s")
+    heads = ["specimen, setting", "seeds", "core s"]
     for name in OBSERVED:
-        heads += (_WORDS[name], "change")
+        heads += [_WORDS[name], "change"]
     lines = []
     for series in SERIES:
         by_quantity = {
