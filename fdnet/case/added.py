@@ -9,7 +9,11 @@ its default is now.
 from collections.abc import Mapping
 from typing import Any
 
-AS_BEFORE: dict[str, Any] = {"drag.crowd": "none"}
+AS_BEFORE: dict[str, Any] = {
+    "drag.crowd": "none",
+    "drag.inertia": "none",
+    "drag.pressure_gradient": False,
+}
 """New dotted keys, with the value that means what a case without the key meant. A key that is
 absent by default (None) needs no entry: it is not among the data of a case."""
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from fdnet.case.case import InvasionCase
 from fdnet.errors import CaseError
+from fdnet.scales.forces.push import Push, arrival_velocity, pore_width
 from fdnet.scales.springs import mass_range
 
 MOST_OVERLAP = 0.5
@@ -17,25 +18,25 @@ class Overlaps:
     """Predicted overlaps of a fine with a grain, over the diameter of the largest fine.
 
     Attributes:
-        drag: by the drag of the fluid on a fine at rest, 6 pi mu M u / 2 k.
-        impact: by a fine that arrives with the fluid's velocity, u sqrt(m / k) / 2 r.
+        drag: by drag and pressure gradient on a fine at rest, F / (2 k r).
+        impact: by a fine that arrives at its fastest velocity w, w sqrt(m / k) / 2 r.
     """
 
     drag: float
     impact: float
 
 
-def overlaps_of(case: InvasionCase, stiffness: float, velocity: float) -> Overlaps:
-    """The overlaps at a contact `stiffness` of N/m and a fluid `velocity` of m/s."""
+def overlaps_of(case: InvasionCase, stiffness: float, push: Push, porosity: float) -> Overlaps:
+    """The overlaps at a contact `stiffness` of N/m, in a pack of a porosity.
+
+    A fine comes with the fluid and gains speed by the pressure gradient across a pore.
+    """
+    radius = case.fines.radius_range_m[1]
+    width = pore_width(porosity, case.grains.sauter_diameter_m)
+    velocity = arrival_velocity(push, radius, case.fines.density_kg_m3, width)
     impact = velocity * math.sqrt(mass_range(case.fines)[1] / stiffness)
     return Overlaps(
-        impact=impact / (2 * case.fines.radius_range_m[1]),
-        drag=6
-        * math.pi
-        * case.fluid.viscosity_Pa_s
-        * case.drag.multiplier
-        * velocity
-        / (2 * stiffness),
+        impact=impact / (2 * radius), drag=push.force(radius) / (2 * stiffness * radius)
     )
 
 

@@ -10,6 +10,8 @@ from typing import overload
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.errors import CaseError
+from fdnet.scales.forces.push import gradient_over_drag, pack_gradient, push_of
+from fdnet.scales.forces.warnings import reynolds_warnings
 from fdnet.scales.grain_pack import pack_step, target_porosity
 from fdnet.scales.overlaps import overlap_warnings, overlaps_of, refuse_deep_overlap
 from fdnet.scales.slab import slab_of, slab_warnings
@@ -32,6 +34,7 @@ class Scales:
         permeability: m2, of the intact pack by Carman and Kozeny.
         darcy_velocity: m/s, flow rate over the whole cross-section.
         interstitial_velocity: m/s, mean velocity of the fluid in the pores.
+        pressure_gradient: Pa/m, fall of pressure with x in the intact pack.
         stiffness_factor: factor from the materials' stiffness to the one used.
         contacts: contact of each pair of materials, such as "grain-fine".
         pack_step: s, time step of packing.
@@ -42,6 +45,7 @@ class Scales:
     permeability: float
     darcy_velocity: float
     interstitial_velocity: float
+    pressure_gradient: float
     stiffness_factor: float
     contacts: dict[str, Contact]
     pack_step: float
@@ -62,11 +66,15 @@ class InvasionScales(Scales):
         plug_time: s without a crossing after which the face counts as plugged.
         cap_time: s, when the invasion ends at the latest.
         checkpoint_steps: steps between two checkpoints.
-        reynolds: particle Reynolds number of the largest fine.
+        reynolds: particle Reynolds number of the largest fine that is held.
         stokes: Stokes number of the largest fine at a grain.
         gravity_over_drag: weight less buoyancy over drag, of the largest fine.
+        gradient_over_drag: force of the pack's pressure gradient over Stokes's drag, of the
+            largest fine at rest, whether or not the case lets it act.
+        drift_velocity: m/s, of the largest fine that the fluid carries freely in the pores.
         impact_overlap: predicted overlap by impact, over the diameter of the largest fine.
-        drag_overlap: predicted overlap by drag, over the diameter of the largest fine.
+        drag_overlap: predicted overlap by drag and pressure gradient, over the diameter of the
+            largest fine.
         sticking: how far a fine may lock between two grains.
     """
 
@@ -82,6 +90,8 @@ class InvasionScales(Scales):
     reynolds: float
     stokes: float
     gravity_over_drag: float
+    gradient_over_drag: float
+    drift_velocity: float
     impact_overlap: float
     drag_overlap: float
     sticking: Sticking
@@ -116,6 +126,7 @@ def _shared(case: Case) -> Scales:
         permeability=velocity.permeability,
         darcy_velocity=velocity.darcy,
         interstitial_velocity=velocity.interstitial,
+        pressure_gradient=pack_gradient(case, velocity.darcy, velocity.permeability),
         stiffness_factor=stiffness_factor(case),
         contacts=contacts,
         pack_step=pack_step(case, contacts),
@@ -125,24 +136,26 @@ def _shared(case: Case) -> Scales:
 def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     velocity, slab = shared.interstitial_velocity, slab_of(case)
     upstream = velocity if case.drag.upstream == "interstitial" else shared.darcy_velocity
+    push = push_of(case, velocity, shared.pressure_gradient)
     relaxation = _relaxation_times(case)
-    step = time_step(case, shared.contacts, relaxation[0])
+    shortest = relaxation[0] * push.relaxation_share(case.fines.radius_range_m[0])
+    step = time_step(case, shared.contacts, shortest)
     times = stop_times(case, slab, interstitial=velocity, upstream=upstream)
-    hold = hold_steps(case, step, relaxation[0], times.chunk)
+    hold = hold_steps(case, step, shortest, times.chunk)
     chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
     contact = shared.contacts["grain-fine"]
-    overlaps = overlaps_of(case, contact.normal_stiffness, velocity)
-    sticking = sticking_of(case, contact, velocity, step)
+    overlaps = overlaps_of(case, contact.normal_stiffness, push, shared.porosity)
+    sticking = sticking_of(case, contact, push, step)
     reynolds = _reynolds(case, velocity)
     stokes = relaxation[1] * velocity / (2 * case.grains.mean_radius_m)
     gravity = _gravity_over_drag(case, velocity)
     refuse_deep_overlap(overlaps)
     _refuse_long_chunk(step, chunk_steps)
     warnings = [
-        *_reynolds_warnings(reynolds),
+        *reynolds_warnings(case, push, reynolds),
         *overlap_warnings(case, overlaps),
         *slab_warnings(case, slab),
-        *drag_warnings(case, hold * step / relaxation[0]),
+        *drag_warnings(case, hold * step / shortest),
         *plug_warnings(case, times.plug, upstream),
         *sticking_warnings(sticking),
     ]
@@ -161,6 +174,11 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
         reynolds=reynolds,
         stokes=stokes,
         gravity_over_drag=gravity,
+        gradient_over_drag=gradient_over_drag(
+            case.fines.radius_range_m[1], shared.porosity, shared.permeability
+        )
+        / case.drag.multiplier,
+        drift_velocity=velocity + push.drift(case.fines.radius_range_m[1]),
         impact_overlap=overlaps.impact,
         drag_overlap=overlaps.drag,
         sticking=sticking,
@@ -202,11 +220,3 @@ def _refuse_long_chunk(step: float, chunk_steps: int) -> None:
             f"run.time_step_s: {step:.3g} s needs {chunk_steps:.3g} steps between checkpoints "
             f"(limit {MOST_STEPS:.3g}); raise the step or shorten run.checkpoint_ms"
         )
-
-
-def _reynolds_warnings(reynolds: float) -> list[str]:
-    if reynolds <= 1:
-        return []
-    return [
-        f"particle Reynolds number {reynolds:.2g} is outside the range of Stokes drag (below 1)"
-    ]

@@ -1,38 +1,12 @@
 """The scales of a case as rows: name, symbol, value, unit, formula, source."""
 
-from dataclasses import dataclass
-
 from fdnet.case.case import Case
 from fdnet.scales.cost import cost_of, memory_bytes
+from fdnet.scales.forces.rows import force_rows
 from fdnet.scales.grain_pack import grain_count
+from fdnet.scales.quantity import Quantity
+from fdnet.scales.quantity import quantity as _row
 from fdnet.scales.scales import InvasionScales, Scales
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Quantity:
-    """One row of the table of scales.
-
-    Attributes:
-        name: what it is, in words.
-        symbol: as in the formulas.
-        value: in `unit`.
-        unit: SI; "-" for a number without a unit.
-        formula: how it follows from the case.
-        source: author and year, or where it was measured.
-    """
-
-    name: str
-    symbol: str
-    value: float
-    unit: str
-    formula: str
-    source: str
-
-
-def _row(name: str, symbol: str, value: float, unit: str, formula: str, source: str) -> Quantity:
-    return Quantity(
-        name=name, symbol=symbol, value=value, unit=unit, formula=formula, source=source
-    )
 
 
 def scale_rows(case: Case, scales: Scales) -> list[Quantity]:
@@ -60,13 +34,21 @@ def _flow_rows(case: Case, scales: Scales) -> list[Quantity]:
         _row(
             "interstitial velocity", "u", scales.interstitial_velocity, "m/s", given, "Dupuit 1863"
         ),
+        _row(
+            "pressure gradient of the pack",
+            "-dp/dx",
+            scales.pressure_gradient,
+            "Pa/m",
+            "mu q / k",
+            "Darcy 1856",
+        ),
     ]
 
 
 def _fine_rows(scales: InvasionScales) -> list[Quantity]:
     return [
         *_drag_rows(scales),
-        *_ratio_rows(scales),
+        *force_rows(scales),
         *_supply_rows(scales),
         *_time_rows(scales),
     ]
@@ -95,51 +77,6 @@ def _drag_rows(scales: InvasionScales) -> list[Quantity]:
             "-",
             "below 1 stable, 0.1 exact enough",
             "measured, docs/physics.md",
-        ),
-    ]
-
-
-def _ratio_rows(scales: InvasionScales) -> list[Quantity]:
-    return [
-        _row(
-            "particle Reynolds number",
-            "Re",
-            scales.reynolds,
-            "-",
-            "rho_f u 2r / mu",
-            "Stokes drag holds below about 1",
-        ),
-        _row(
-            "Stokes number",
-            "St",
-            scales.stokes,
-            "-",
-            "tau u / d_grain",
-            "inertia over drag at a grain",
-        ),
-        _row(
-            "gravity over drag",
-            "G",
-            scales.gravity_over_drag,
-            "-",
-            "2 r^2 (rho - rho_f) g / (9 mu u M)",
-            "force ratio",
-        ),
-        _row(
-            "impact overlap over diameter",
-            "delta/d",
-            scales.impact_overlap,
-            "-",
-            "u sqrt(m/k) / 2r",
-            "linear spring",
-        ),
-        _row(
-            "drag overlap over diameter",
-            "delta/d",
-            scales.drag_overlap,
-            "-",
-            "6 pi mu M u / 2k",
-            "linear spring",
         ),
     ]
 
