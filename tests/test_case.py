@@ -144,7 +144,8 @@ def test_a_case_without_fines_is_a_type_of_its_own():
 
 def test_every_table_is_written():
     assert set(KEYS) == set(InvasionCase.model_fields)
-    assert list(tiny().data()) == list(KEYS)
+    well = "well={radius_mm=108.0, drainage_radius_m=100.0}"
+    assert list(tiny(well).data()) == list(KEYS)
     assert {"fines", "fines.radius_mm"} <= set(known_keys())
 
 
@@ -318,7 +319,12 @@ def test_values_in_si_are_those_of_the_keys():
     assert case.fluid.viscosity_Pa_s == pytest.approx(0.05)
     assert case.fluid.stokes_coefficient_Pa_s == pytest.approx(6 * math.pi * 0.05)
     assert case.fluid.darcy_length_m == pytest.approx(3.3e-3)
-    assert case.fluid.darcy_velocity(1e-11, 7e-3) == pytest.approx(1e-11 / 0.05 * 3.5e6 / 7e-3)
+    assert case.fluid.overbalance_Pa == pytest.approx(3.5e6)
+    well = tiny(
+        "well={radius_mm=108.0, drainage_radius_m=9.0, formation_permeability_mD=2.0}"
+    ).well
+    assert well.radius_m == pytest.approx(0.108)
+    assert well.formation_permeability_m2 == pytest.approx(1.9738466e-15)
     assert case.analysis.profile_bin_m == pytest.approx(2.5e-4)
     run = case.run
     assert (run.cap_s, run.plug_time_s, run.checkpoint_s) == pytest.approx((3e-4, 2e-4, 1e-4))

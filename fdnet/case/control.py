@@ -16,7 +16,9 @@ class Run(Part):
 
     stiffness_N_m: Positive | Literal["nominal"] = Field(
         1.0e4,
-        description="Stiffness of the stiffest contact; all others keep their ratio to it. "
+        description="Stiffness of the stiffest contact; all others keep their ratio to it. With "
+        'contact.model = "hertz": force over overlap of the stiffest contact of a fine, at an '
+        "overlap of 1 % of its diameter. "
         '"nominal" keeps the materials\' own stiffness, which needs a far smaller time step.',
     )
     max_hours: Positive = Field(

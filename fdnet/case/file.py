@@ -5,7 +5,7 @@ import difflib
 import tomllib
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
@@ -105,8 +105,11 @@ def _tables_of(model: type[Part]) -> list[tuple[str, FieldInfo]]:
 
 
 def _table_of(field: FieldInfo) -> type[Part] | None:
-    kind = field.annotation
-    return kind if isinstance(kind, type) and issubclass(kind, Part) else None
+    """The class of a table's keys, also where the table may be absent; None for a plain key."""
+    for kind in (field.annotation, *get_args(field.annotation)):
+        if isinstance(kind, type) and issubclass(kind, Part):
+            return kind
+    return None
 
 
 def _problem(item: dict[str, Any]) -> str:

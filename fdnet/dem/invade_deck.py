@@ -7,11 +7,12 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, plug_allowance, quiet_chunks
+from fdnet.dem.contact_lines import contact_variables
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
 from fdnet.dem.drag import BELOW_ZERO, drag_variables, forces_left_out
 from fdnet.dem.gravity import gravity_variables
 from fdnet.dem.overlap import is_watched, watch_variables
-from fdnet.dem.scene import contact_variables, header_variables, wall_variables, write_data
+from fdnet.dem.scene import header_variables, wall_variables, write_data
 from fdnet.dem.supply import AT_ONCE, batches_of, place_batches, place_fines, slab_end
 from fdnet.errors import CaseError
 from fdnet.files.atomic import write_text

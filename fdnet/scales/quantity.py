@@ -1,4 +1,4 @@
-"""A row of the table of scales."""
+"""One row of the table of scales."""
 
 from dataclasses import dataclass
 
@@ -24,10 +24,7 @@ class Quantity:
     source: str
 
 
-def quantity(
-    name: str, symbol: str, value: float, unit: str, formula: str, source: str
-) -> Quantity:
-    """A row from its columns in order."""
+def row(name: str, symbol: str, value: float, unit: str, formula: str, source: str) -> Quantity:
     return Quantity(
         name=name, symbol=symbol, value=value, unit=unit, formula=formula, source=source
     )

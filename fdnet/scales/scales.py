@@ -5,21 +5,22 @@ report repeats.
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import overload
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.errors import CaseError
-from fdnet.scales.forces.push import gradient_over_drag, pack_gradient, push_of
+from fdnet.scales.contacts import contacts_of, stiffness_factor
+from fdnet.scales.forces.push import gradient_over_drag, push_of
 from fdnet.scales.forces.warnings import reynolds_warnings
 from fdnet.scales.grain_pack import pack_step, target_porosity
 from fdnet.scales.overlaps import overlap_warnings, overlaps_of, refuse_deep_overlap
 from fdnet.scales.slab import slab_of, slab_warnings
-from fdnet.scales.springs import Contact, contacts_of, stiffness_factor
+from fdnet.scales.springs import Contact
 from fdnet.scales.sticking import Sticking, sticking_of, sticking_warnings
 from fdnet.scales.stop_times import chunk_refreshes, plug_warnings, stop_times
 from fdnet.scales.time_step import drag_warnings, hold_steps, relaxation_time, time_step
-from fdnet.scales.velocity import velocity_of
+from fdnet.scales.velocity import Velocity, velocity_of, velocity_warnings
 
 MOST_STEPS = 2**31 - 1
 """LIGGGHTS counts the steps of a run in 32 bits."""
@@ -34,8 +35,9 @@ class Scales:
         permeability: m2, of the intact pack by Carman and Kozeny.
         darcy_velocity: m/s, flow rate over the whole cross-section.
         interstitial_velocity: m/s, mean velocity of the fluid in the pores.
-        pressure_gradient: Pa/m, fall of pressure with x in the intact pack.
-        stiffness_factor: factor from the materials' stiffness to the one used.
+        pressure_gradient: Pa/m, that drives this flow through the intact pack.
+        inertial_loss: share by which Ergun's inertial term lowers the velocity of Darcy's law.
+        stiffness_factor: factor from the materials' stiffness, or moduli, to those used.
         contacts: contact of each pair of materials, such as "grain-fine".
         pack_step: s, time step of packing.
         warnings: doubts about the case, one sentence each.
@@ -46,6 +48,7 @@ class Scales:
     darcy_velocity: float
     interstitial_velocity: float
     pressure_gradient: float
+    inertial_loss: float
     stiffness_factor: float
     contacts: dict[str, Contact]
     pack_step: float
@@ -109,8 +112,12 @@ def scales_of(case: Case) -> Scales:
     overflows.
     """
     try:
-        shared = _shared(case)
-        return _invasion(case, shared) if isinstance(case, InvasionCase) else shared
+        velocity = velocity_of(case, target_porosity(case))
+        shared = _shared(case, velocity)
+        if not isinstance(case, InvasionCase):
+            return shared
+        doubts = velocity_warnings(case, shared.porosity, velocity)
+        return _invasion(case, replace(shared, warnings=tuple(doubts)))
     except (OverflowError, ZeroDivisionError) as error:
         raise CaseError(
             f"case {case.name}: a formula leaves the range of numbers ({error}); check units and "
@@ -118,15 +125,15 @@ def scales_of(case: Case) -> Scales:
         ) from error
 
 
-def _shared(case: Case) -> Scales:
-    porosity, contacts = target_porosity(case), contacts_of(case)
-    velocity = velocity_of(case, porosity)
+def _shared(case: Case, velocity: Velocity) -> Scales:
+    contacts = contacts_of(case)
     return Scales(
-        porosity=porosity,
+        porosity=target_porosity(case),
         permeability=velocity.permeability,
         darcy_velocity=velocity.darcy,
         interstitial_velocity=velocity.interstitial,
-        pressure_gradient=pack_gradient(case, velocity.darcy, velocity.permeability),
+        pressure_gradient=velocity.pressure_gradient,
+        inertial_loss=velocity.inertial_loss,
         stiffness_factor=stiffness_factor(case),
         contacts=contacts,
         pack_step=pack_step(case, contacts),
@@ -144,7 +151,7 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     hold = hold_steps(case, step, shortest, times.chunk)
     chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
     contact = shared.contacts["grain-fine"]
-    overlaps = overlaps_of(case, contact.normal_stiffness, push, shared.porosity)
+    overlaps = overlaps_of(case, contact, push, shared.porosity)
     sticking = sticking_of(case, contact, push, step)
     reynolds = _reynolds(case, velocity)
     stokes = relaxation[1] * velocity / (2 * case.grains.mean_radius_m)
@@ -152,6 +159,7 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     refuse_deep_overlap(overlaps)
     _refuse_long_chunk(step, chunk_steps)
     warnings = [
+        *shared.warnings,
         *reynolds_warnings(case, push, reynolds),
         *overlap_warnings(case, overlaps),
         *slab_warnings(case, slab),
@@ -175,9 +183,8 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
         stokes=stokes,
         gravity_over_drag=gravity,
         gradient_over_drag=gradient_over_drag(
-            case.fines.radius_range_m[1], shared.porosity, shared.permeability
-        )
-        / case.drag.multiplier,
+            case, case.fines.radius_range_m[1], velocity, shared.pressure_gradient
+        ),
         drift_velocity=velocity + push.drift(case.fines.radius_range_m[1]),
         impact_overlap=overlaps.impact,
         drag_overlap=overlaps.drag,

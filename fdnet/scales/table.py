@@ -1,11 +1,12 @@
 """The scales of a case as rows: name, symbol, value, unit, formula, source."""
 
 from fdnet.case.case import Case
+from fdnet.scales.contact_rows import contact_rows, overlap_rows
 from fdnet.scales.cost import cost_of, memory_bytes
 from fdnet.scales.forces.rows import force_rows
 from fdnet.scales.grain_pack import grain_count
 from fdnet.scales.quantity import Quantity
-from fdnet.scales.quantity import quantity as _row
+from fdnet.scales.quantity import row as _row
 from fdnet.scales.scales import InvasionScales, Scales
 
 
@@ -13,14 +14,13 @@ def scale_rows(case: Case, scales: Scales) -> list[Quantity]:
     """Every scale of the case with its formula and source, in reading order."""
     rows = _flow_rows(case, scales)
     if isinstance(scales, InvasionScales):
-        rows += _fine_rows(scales)
-    rows += _contact_rows(scales)
+        rows += _fine_rows(case, scales)
+    rows += contact_rows(case, scales)
     return rows + _cost_rows(case, scales)
 
 
 def _flow_rows(case: Case, scales: Scales) -> list[Quantity]:
-    given = "given in the case" if case.fluid.velocity_m_s is not None else "u = q / phi"
-    darcy = "q = u phi" if case.fluid.velocity_m_s is not None else "q = k dP / (mu L)"
+    darcy, interstitial, source = _velocity_formulas(case)
     return [
         _row(
             "Carman-Kozeny permeability",
@@ -30,25 +30,52 @@ def _flow_rows(case: Case, scales: Scales) -> list[Quantity]:
             "d^2 phi^3 / (180 (1-phi)^2)",
             "Carman 1937",
         ),
-        _row("Darcy velocity", "q", scales.darcy_velocity, "m/s", darcy, "Darcy 1856"),
+        _row("Darcy velocity", "q", scales.darcy_velocity, "m/s", darcy, source),
         _row(
-            "interstitial velocity", "u", scales.interstitial_velocity, "m/s", given, "Dupuit 1863"
+            "interstitial velocity",
+            "u",
+            scales.interstitial_velocity,
+            "m/s",
+            interstitial,
+            "Dupuit 1863",
         ),
         _row(
-            "pressure gradient of the pack",
+            "pressure gradient in the pack",
             "-dp/dx",
             scales.pressure_gradient,
             "Pa/m",
-            "mu q / k",
-            "Darcy 1856",
+            "mu q / k" if case.fluid.darcy_law == "darcy" else "mu q / k + b q^2",
+            source,
+        ),
+        _row(
+            "loss of velocity by inertia",
+            "1 - q_E/q_D",
+            scales.inertial_loss,
+            "-",
+            "b = 1.75/150 rho_f d / (k (1-phi))",
+            "Ergun 1952",
         ),
     ]
 
 
-def _fine_rows(scales: InvasionScales) -> list[Quantity]:
+def _velocity_formulas(case: Case) -> tuple[str, str, str]:
+    """Formulas of the Darcy and of the interstitial velocity, and the source of the first."""
+    ergun = case.fluid.darcy_law == "ergun"
+    source = "Ergun 1952" if ergun else "Darcy 1856"
+    if case.fluid.velocity_m_s is not None:
+        return "q = u phi", "given in the case", source
+    length = "L" if case.well is None else "r_w ln(r_e/r_w)"
+    if not ergun:
+        return f"q = k dP / (mu {length})", "u = q / phi", source
+    second = "L" if case.well is None else "r_w^2 (1/r_w - 1/r_e)"
+    return f"mu q {length} / k + b q^2 {second} = dP", "u = q / phi", source
+
+
+def _fine_rows(case: Case, scales: InvasionScales) -> list[Quantity]:
     return [
         *_drag_rows(scales),
         *force_rows(scales),
+        *overlap_rows(case, scales),
         *_supply_rows(scales),
         *_time_rows(scales),
     ]
@@ -123,47 +150,6 @@ def _time_rows(scales: InvasionScales) -> list[Quantity]:
             "measured, docs/physics.md",
         ),
     ]
-
-
-def _contact_rows(scales: Scales) -> list[Quantity]:
-    rows = [
-        _row(
-            "stiffness factor",
-            "f_k",
-            scales.stiffness_factor,
-            "-",
-            "run.stiffness / stiffest pair",
-            "scaling",
-        )
-    ]
-    for contact in scales.contacts.values():
-        rows += [
-            _row(
-                f"{contact.pair} stiffness used",
-                "k",
-                contact.normal_stiffness,
-                "N/m",
-                "f_k kA kB / (kA + kB)",
-                "series springs",
-            ),
-            _row(
-                f"{contact.pair} contact time",
-                "t_c",
-                contact.contact_time,
-                "s",
-                "pi / (sqrt(k/m_eff) sqrt(1-zeta^2))",
-                "damped oscillator",
-            ),
-            _row(
-                f"{contact.pair} stable step",
-                "dt_s",
-                0.2 * contact.step_limit,
-                "s",
-                "0.2 sqrt(m/k)",
-                "measured, docs/physics.md",
-            ),
-        ]
-    return rows
 
 
 def _cost_rows(case: Case, scales: Scales) -> list[Quantity]:

@@ -33,7 +33,7 @@ def test_the_gradient_over_the_drag_of_the_thesis_specimens(root, specimen, rati
     assert scales.drift_velocity == scales.interstitial_velocity, "it does not act in the thesis"
     rows = {row.name: row.value for row in scale_rows(case, scales)}
     assert rows["pressure gradient over drag"] == scales.gradient_over_drag
-    assert rows["pressure gradient of the pack"] == pytest.approx(3.5e6 / 8e-3)
+    assert rows["pressure gradient in the pack"] == pytest.approx(3.5e6 / 8e-3)
 
 
 def test_the_gradient_is_the_overbalance_over_its_length_or_follows_from_the_velocity():

@@ -56,14 +56,6 @@ class Push:
         return 1 / reynolds.slope_factor(self.reynolds_slope * radius * self.largest_slip(radius))
 
 
-def pack_gradient(case: Case, darcy: float, permeability: float) -> float:
-    """mu q / k, Pa/m: the fall of pressure in a pack of `permeability` m2 at q = `darcy` m/s.
-
-    With the velocity by Darcy's law from an overbalance it is the overbalance over its length.
-    """
-    return case.fluid.viscosity_Pa_s * darcy / permeability
-
-
 def push_of(case: Case, velocity: float, gradient: float) -> Push:
     """The push at a fluid `velocity` of m/s and a fall of pressure of `gradient` Pa/m."""
     inertial = case.drag.inertia == "schiller-naumann"
@@ -75,12 +67,19 @@ def push_of(case: Case, velocity: float, gradient: float) -> Push:
     )
 
 
-def gradient_over_drag(radius: float, porosity: float, permeability: float) -> float:
-    """(2/9) r^2 phi / k: force of the pack's gradient over Stokes's drag of a held sphere.
+def gradient_over_drag(case: Case, radius: float, velocity: float, gradient: float) -> float:
+    """2 r^2 (-grad p) / (9 mu u M): force of the gradient over Stokes's drag of a held sphere.
 
-    The drag is that at the interstitial velocity q / phi with a multiplier of 1.
+    With Darcy's law in a pack of permeability k it is (2/9) r^2 phi / (k M).
+
+    Args:
+        case: gives the viscosity mu and the multiplier M.
+        radius: of the sphere, m.
+        velocity: u, of the fluid in the pores, m/s.
+        gradient: fall of pressure with x, Pa/m.
     """
-    return 2 / 9 * radius**2 * porosity / permeability
+    drag = case.fluid.viscosity_Pa_s * velocity * case.drag.multiplier
+    return 2 / 9 * radius**2 * gradient / drag
 
 
 def arrival_velocity(push: Push, radius: float, density: float, distance: float) -> float:
