@@ -93,7 +93,7 @@ def _feeding(case: InvasionCase, scales: InvasionScales) -> dict[str, int] | Non
 
 def _margin(case: InvasionCase, scales: InvasionScales) -> float:
     """How far a fine could go in one chunk at twice the fluid's velocity, plus two diameters."""
-    travel = 2 * scales.interstitial_velocity * scales.checkpoint_steps * scales.time_step
+    travel = 2 * scales.drive_velocity * scales.checkpoint_steps * scales.time_step
     return travel + 4 * case.fines.radius_range_m[1]
 
 
@@ -210,7 +210,7 @@ def _gravity(
             )
         ]
     pull = {
-        "magnitude": number(magnitude),
+        "magnitude": number(magnitude * scales.force_factor),
         "direction": " ".join(number(c / magnitude) for c in vector),
         "buoyancy": None,
     }
