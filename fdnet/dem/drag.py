@@ -10,7 +10,6 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase
 from fdnet.dem.deck import LeftOut, number
-from fdnet.scales.forces.push import push_of
 from fdnet.scales.forces.reynolds import COEFFICIENT, EXPONENT
 from fdnet.scales.scales import InvasionScales
 
@@ -21,16 +20,16 @@ BELOW_ZERO = -5e-324
 def drag_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]:
     """Variables of the drag block: the scheme and, as text, the numbers that it needs."""
     coefficient = case.fluid.stokes_coefficient_Pa_s * case.drag.multiplier
-    slower = scales.interstitial_velocity - scales.upstream_velocity
+    slower = scales.drive_velocity - scales.upstream_velocity
     own = (
         _viscous(case, scales, coefficient, slower)
         if case.drag.scheme == "viscous"
-        else _by_radius(case, scales, slower)
+        else _by_radius(scales, slower)
     )
     return {
         "scheme": case.drag.scheme,
         "coefficient": number(coefficient),
-        "velocity": number(scales.interstitial_velocity),
+        "velocity": number(scales.drive_velocity),
         "gradient": _gradient(case, scales),
         **own,
     }
@@ -38,7 +37,7 @@ def drag_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]
 
 def _gradient(case: InvasionCase, scales: InvasionScales) -> dict[str, str] | None:
     """V (-grad p) inside the pack: one force, or a coefficient of r^3 for fines of many sizes."""
-    push = push_of(case, scales.interstitial_velocity, scales.pressure_gradient)
+    push = scales.push
     if not push.gradient:
         return None
     end = number(np.nextafter(case.size_m[0], 0))
@@ -69,13 +68,13 @@ def forces_left_out(case: InvasionCase) -> list[LeftOut]:
     ]
 
 
-def _by_radius(case: InvasionCase, scales: InvasionScales, slower: float) -> dict[str, Any]:
+def _by_radius(scales: InvasionScales, slower: float) -> dict[str, Any]:
     """F = 6 pi mu M r (u - v), for each fine by its own radius r.
 
     mu is the viscosity, M the multiplier, u the fluid's and v the fine's velocity.
     """
     fluid = f"(f_uf[1]-(x<0.0)*{number(slower)})" if slower else "f_uf[1]"
-    slope = push_of(case, scales.interstitial_velocity, 0.0).reynolds_slope
+    slope = scales.push.reynolds_slope
     inertia = {
         "factor": number(COEFFICIENT),
         "exponent": number(EXPONENT),
@@ -98,7 +97,7 @@ def _viscous(
     damping = coefficient * case.fines.mean_radius_m
     return {
         "damping": number(damping),
-        "push": number(damping * scales.interstitial_velocity),
+        "push": number(damping * scales.drive_velocity),
         "slower": number(-damping * slower) if slower else "",
         "face": number(BELOW_ZERO),
     }

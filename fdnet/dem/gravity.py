@@ -3,6 +3,7 @@
 A sphere of mass m and density rho_p in a fluid of density rho_f at rest feels
 m g (1 - rho_f / rho_p), gravity and Archimedes's buoyancy, in any direction of g. That is
 LIGGGHTS's `fix gravity` with a magnitude for each group of equal density, and exact.
+A simulation that is driven faster than the fluid multiplies it as all forces.
 """
 
 import math
@@ -30,7 +31,8 @@ def gravity_variables(
     if case.grains.motion == "mobile":
         groups["grains"] = case.grains.density_kg_m3
     pulls = [
-        _pull(name, share_of_gravity(density, case), vector) for name, density in groups.items()
+        _pull(name, scales.force_factor * share_of_gravity(density, case), vector)
+        for name, density in groups.items()
     ]
     left_out = [] if case.gravity.buoyancy else [LeftOut(what="buoyancy", why="switched off")]
     return pulls, left_out

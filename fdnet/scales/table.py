@@ -3,6 +3,7 @@
 from fdnet.case.case import Case
 from fdnet.scales.contact_rows import contact_rows, overlap_rows
 from fdnet.scales.cost import cost_of, memory_bytes
+from fdnet.scales.flow_rows import drive_rows, flow_rows
 from fdnet.scales.forces.rows import force_rows
 from fdnet.scales.grain_pack import grain_count
 from fdnet.scales.quantity import Quantity
@@ -12,67 +13,16 @@ from fdnet.scales.scales import InvasionScales, Scales
 
 def scale_rows(case: Case, scales: Scales) -> list[Quantity]:
     """Every scale of the case with its formula and source, in reading order."""
-    rows = _flow_rows(case, scales)
+    rows = flow_rows(case, scales)
     if isinstance(scales, InvasionScales):
         rows += _fine_rows(case, scales)
     rows += contact_rows(case, scales)
     return rows + _cost_rows(case, scales)
 
 
-def _flow_rows(case: Case, scales: Scales) -> list[Quantity]:
-    darcy, interstitial, source = _velocity_formulas(case)
-    return [
-        _row(
-            "Carman-Kozeny permeability",
-            "k_CK",
-            scales.permeability,
-            "m2",
-            "d^2 phi^3 / (180 (1-phi)^2)",
-            "Carman 1937",
-        ),
-        _row("Darcy velocity", "q", scales.darcy_velocity, "m/s", darcy, source),
-        _row(
-            "interstitial velocity",
-            "u",
-            scales.interstitial_velocity,
-            "m/s",
-            interstitial,
-            "Dupuit 1863",
-        ),
-        _row(
-            "pressure gradient in the pack",
-            "-dp/dx",
-            scales.pressure_gradient,
-            "Pa/m",
-            "mu q / k" if case.fluid.darcy_law == "darcy" else "mu q / k + b q^2",
-            source,
-        ),
-        _row(
-            "loss of velocity by inertia",
-            "1 - q_E/q_D",
-            scales.inertial_loss,
-            "-",
-            "b = 1.75/150 rho_f d / (k (1-phi))",
-            "Ergun 1952",
-        ),
-    ]
-
-
-def _velocity_formulas(case: Case) -> tuple[str, str, str]:
-    """Formulas of the Darcy and of the interstitial velocity, and the source of the first."""
-    ergun = case.fluid.darcy_law == "ergun"
-    source = "Ergun 1952" if ergun else "Darcy 1856"
-    if case.fluid.velocity_m_s is not None:
-        return "q = u phi", "given in the case", source
-    length = "L" if case.well is None else "r_w ln(r_e/r_w)"
-    if not ergun:
-        return f"q = k dP / (mu {length})", "u = q / phi", source
-    second = "L" if case.well is None else "r_w^2 (1/r_w - 1/r_e)"
-    return f"mu q {length} / k + b q^2 {second} = dP", "u = q / phi", source
-
-
 def _fine_rows(case: Case, scales: InvasionScales) -> list[Quantity]:
     return [
+        *drive_rows(scales),
         *_drag_rows(scales),
         *force_rows(scales),
         *overlap_rows(case, scales),
@@ -113,7 +63,7 @@ def _supply_rows(scales: InvasionScales) -> list[Quantity]:
         _row("fines supplied", "n", scales.supplied_count, "-", "c A l / v", "slab of suspension"),
         _row("slab length", "l", scales.slab_length, "m", "n v / (c A)", "slab of suspension"),
         _row(
-            "time to feed the slab",
+            "time to feed the slab, simulated",
             "t_f",
             scales.slab_length / scales.upstream_velocity,
             "s",
@@ -126,7 +76,7 @@ def _supply_rows(scales: InvasionScales) -> list[Quantity]:
 def _time_rows(scales: InvasionScales) -> list[Quantity]:
     return [
         _row(
-            "plug time",
+            "plug time, simulated",
             "t_p",
             scales.plug_time,
             "s",
@@ -134,7 +84,7 @@ def _time_rows(scales: InvasionScales) -> list[Quantity]:
             "stop rule",
         ),
         _row(
-            "cap or duration",
+            "cap or duration, simulated",
             "t_c",
             scales.cap_time,
             "s",

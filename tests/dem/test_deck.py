@@ -245,7 +245,7 @@ def test_moduli_that_liggghts_would_refuse_are_said_to_be_meant():
         ("1e6", False, True),
     ):
         text = invade_text(
-            "contact.model=hertz", f"run.stiffness_N_m={stiffness}", "fluid.velocity_m_s=1e-4"
+            "contact.model=hertz", f"run.stiffness_N_m={stiffness}", "fluid.velocity_m_s=1e-3"
         )
         assert has(text, "^soft_particles yes") is soft
         assert has(text, "^hard_particles yes") is hard

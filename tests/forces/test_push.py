@@ -139,3 +139,14 @@ def test_beyond_schiller_and_naumann_a_fine_at_rest_is_refused_and_a_free_one_wa
     dense = ("grains.count=80", "fines.radius_mm=0.2", "fines.count=20")
     (text,) = warned("fluid={velocity_m_s=3.6, viscosity_cP=2.0}", ON, NAUMANN, *dense)
     assert "of a fine that drifts freely is outside" in text
+
+
+def test_a_driven_fluid_has_the_same_ratios_of_forces_and_its_own_reynolds_number():
+    """Twice as fast as the fluid: every force is twice as large, and so is the drift."""
+    slow = ("fluid.velocity_m_s=0.05", ON, NAUMANN)
+    own, driven = scales_of(tiny(*slow)), scales_of(tiny(*slow, "drag.drive_velocity_m_s=0.1"))
+    assert driven.force_factor == pytest.approx(2.0)
+    assert driven.push.force(5e-5) == pytest.approx(2 * own.push.force(5e-5))
+    assert driven.drift_velocity == pytest.approx(2 * own.drift_velocity)
+    assert driven.push.relaxation_share(5e-5) == pytest.approx(own.push.relaxation_share(5e-5))
+    assert driven.gradient_over_drag == pytest.approx(own.gradient_over_drag)

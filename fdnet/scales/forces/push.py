@@ -56,30 +56,19 @@ class Push:
         return 1 / reynolds.slope_factor(self.reynolds_slope * radius * self.largest_slip(radius))
 
 
-def push_of(case: Case, velocity: float, gradient: float) -> Push:
-    """The push at a fluid `velocity` of m/s and a fall of pressure of `gradient` Pa/m."""
-    inertial = case.drag.inertia == "schiller-naumann"
+def push_of(case: Case, velocity: float, gradient: float, *, factor: float = 1.0) -> Push:
+    """The push at a fluid `velocity` of m/s and a fall of pressure of `gradient` Pa/m.
+
+    `factor` is that of a fluid that is driven faster than it is (`fdnet.scales.drive`): `velocity`
+    has it already, the gradient gets it, and Reynolds numbers stay those of the fluid itself.
+    """
+    slope = 2 * case.fluid.density_kg_m3 / case.fluid.viscosity_Pa_s / factor
     return Push(
         coefficient=case.fluid.stokes_coefficient_Pa_s * case.drag.multiplier,
         velocity=velocity,
-        gradient=gradient if case.drag.pressure_gradient else 0.0,
-        reynolds_slope=2 * case.fluid.density_kg_m3 / case.fluid.viscosity_Pa_s * inertial,
+        gradient=gradient * factor if case.drag.pressure_gradient else 0.0,
+        reynolds_slope=0.0 if case.drag.inertia == "none" else slope,
     )
-
-
-def gradient_over_drag(case: Case, radius: float, velocity: float, gradient: float) -> float:
-    """2 r^2 (-grad p) / (9 mu u M): force of the gradient over Stokes's drag of a held sphere.
-
-    With Darcy's law in a pack of permeability k it is (2/9) r^2 phi / (k M).
-
-    Args:
-        case: gives the viscosity mu and the multiplier M.
-        radius: of the sphere, m.
-        velocity: u, of the fluid in the pores, m/s.
-        gradient: fall of pressure with x, Pa/m.
-    """
-    drag = case.fluid.viscosity_Pa_s * velocity * case.drag.multiplier
-    return 2 / 9 * radius**2 * gradient / drag
 
 
 def arrival_velocity(push: Push, radius: float, density: float, distance: float) -> float:

@@ -20,8 +20,16 @@ def force_rows(scales: InvasionScales) -> list[Quantity]:
             "St",
             scales.stokes,
             "-",
-            "tau u / d_grain",
+            "tau u / d_grain, as simulated",
             "inertia over drag at a grain",
+        ),
+        row(
+            "impact Stokes number",
+            "St_i",
+            scales.impact_stokes,
+            "-",
+            "tau u / r, as simulated",
+            "Joseph 2001; inertia does not matter well below 1",
         ),
         row(
             "pressure gradient over drag",
@@ -44,7 +52,7 @@ def force_rows(scales: InvasionScales) -> list[Quantity]:
             "w",
             scales.drift_velocity,
             "m/s",
-            "u (1 + P) where the gradient acts",
+            "u (1 + P) where the gradient acts, as simulated",
             "balance of drag and gradient",
         ),
     ]
