@@ -11,12 +11,15 @@ UNITS = {
     "_m_s2": "m/s²",
     "_N_m": "N/m",
     "_m_s": "m/s",
+    "_GPa": "GPa",
     "_MPa": "MPa",
     "_cP": "cP",
+    "_mD": "mD",
     "_mm": "mm",
     "_ms": "ms",
     "_hours": "h",
     "_s": "s",
+    "_m": "m",
 }
 """End of a key and the unit it stands for; the longer ends first."""
 SPACE = "\N{NO-BREAK SPACE}"

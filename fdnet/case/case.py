@@ -14,9 +14,11 @@ from typing import Annotated, Any, Self
 import tomli_w
 from pydantic import Field, model_validator
 
+from fdnet.case.added import completed, without_added
 from fdnet.case.analysis import AnalysisChoices
+from fdnet.case.contact import MODEL_KEYS, ContactLaw
 from fdnet.case.control import Run
-from fdnet.case.fluid import Fluid
+from fdnet.case.fluid import Fluid, Well
 from fdnet.case.particles import Fines, Grains, Spheres
 from fdnet.case.parts import Box, Drag, Gravity
 from fdnet.case.rules import cross_problems
@@ -33,8 +35,10 @@ KEYS = (
     "grains",
     "fines",
     "fluid",
+    "well",
     "drag",
     "gravity",
+    "contact",
     "run",
     "analysis",
 )
@@ -70,8 +74,10 @@ class Case(Part):
     box: Box
     grains: Grains
     fluid: Fluid = Fluid()
+    well: Well | None = None
     drag: Drag = Drag()
     gravity: Gravity = Gravity()
+    contact: ContactLaw = ContactLaw()
     run: Run = Run()
     analysis: AnalysisChoices = AnalysisChoices()
 
@@ -103,8 +109,14 @@ class Case(Part):
         return self.box.periodic
 
     def data(self) -> dict[str, Any]:
-        """All keys that have a value, defaults written out (TOML knows no null)."""
+        """All keys that have a value, defaults written out (TOML knows no null).
+
+        Keys that only the other contact model reads are left out.
+        """
         data = self.model_dump(mode="json")
+        for name in ("grains", "fines"):
+            for key in self.contact.other_keys & data.get(name, {}).keys():
+                del data[name][key]
         return _without_none({key: data[key] for key in KEYS if key in data})
 
     def toml(self) -> str:
@@ -115,9 +127,10 @@ class Case(Part):
         """Hash of what `stage` depends on.
 
         "pack" ignores fines, fluid and analysis; "invade" ignores the analysis. No result depends
-        on `POLICIES`, so no digest does.
+        on `POLICIES`, so no digest does. A key that was added later counts only where its value
+        differs from what a case meant before (`fdnet.case.added`).
         """
-        data = self.data()
+        data = without_added(self.data())
         data["run"] = {key: value for key, value in data["run"].items() if key not in POLICIES}
         if stage in ("pack", "invade"):
             data.pop("analysis")
@@ -126,13 +139,22 @@ class Case(Part):
             data["grains"].pop("motion")
             fines = data.get("fines", {}).get("normal_stiffness_N_m")
             scaling = {"stiffness": self.run.stiffness_N_m, "fines_stiffness": fines}
-            data = {key: data[key] for key in ("seed", "box", "grains")} | scaling
+            elastic = self._elastic_of_the_pack(data)
+            data = {key: data[key] for key in ("seed", "box", "grains")} | scaling | elastic
         return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
+
+    def _elastic_of_the_pack(self, data: dict[str, Any]) -> dict[str, Any]:
+        """What the stiffness of a pack depends on besides, with contacts that are not linear."""
+        if self.contact.model == "hooke":
+            return {}
+        fines = data.get("fines", {})
+        keys = ("radius_mm", *sorted(MODEL_KEYS["hertz"]))
+        return {"model": self.contact.model, "fines": {k: fines[k] for k in keys if k in fines}}
 
     def same_specimen(self, text: bytes) -> bool:
         """Whether a case.toml as `toml` wrote it is this case but for `POLICIES`."""
         try:
-            data = tomllib.loads(text.decode())
+            data = completed(tomllib.loads(text.decode()))
             return case_type(data).model_validate(data).digest() == self.digest()
         except ValueError:
             return False

@@ -33,10 +33,10 @@ def points(count: int = 2000) -> np.ndarray:
 
 
 def test_permeability_is_that_of_the_reference_solver_on_the_same_grid():
-    found = field("xyz")
-    reference = solve_stokes(pack(), cells=found.lattice.shape[0], tolerance=1e-6)
-    assert found.lattice.shape == (found.lattice.shape[0],) * 3
-    assert found.k == pytest.approx(reference.k, rel=2e-3)
+    current = field("xyz")
+    reference = solve_stokes(pack(), cells=current.lattice.shape[0], tolerance=1e-6)
+    assert current.lattice.shape == (current.lattice.shape[0],) * 3
+    assert current.k == pytest.approx(reference.k, rel=2e-3)
 
 
 def test_plane_walls_without_a_grain_give_the_parabola_of_poiseuille():
@@ -63,24 +63,24 @@ def test_plane_walls_without_a_grain_give_the_parabola_of_poiseuille():
 
 @pytest.mark.parametrize("periodic", ["xyz", "yz", "", "xz"])
 def test_the_flow_keeps_its_volume_and_passes_every_section(periodic):
-    found = field(periodic)
-    steps = found.lattice.spacing
-    gain = np.zeros(found.lattice.shape)
-    for axis, part in enumerate(found._flow):
+    current = field(periodic)
+    steps = current.lattice.spacing
+    gain = np.zeros(current.lattice.shape)
+    for axis, part in enumerate(current._flow):
         gain += (np.roll(part, -1, axis=axis) - part) / steps[axis]
     assert np.abs(gain).max() < 1e-4 / steps[0]
-    assert found._flow[0].mean(axis=(1, 2)) == pytest.approx(1.0, abs=1e-5)
+    assert current._flow[0].mean(axis=(1, 2)) == pytest.approx(1.0, abs=1e-5)
 
 
 @pytest.mark.parametrize("periodic", ["xyz", "yz", ""])
 def test_forces_add_up_to_the_pressure_drop_times_the_area(periodic):
     """The drop is read from the pressures before and beyond the specimen, not from the forces."""
-    found = field(periodic)
-    lattice, area = found.lattice, np.prod(np.ptp(pack().box, axis=1)[1:])
-    total = found.grain_force.sum(axis=0) + found.wall_force
-    assert total[0] == pytest.approx(found.resistance * area, rel=1e-9)
+    current = field(periodic)
+    lattice, area = current.lattice, np.prod(np.ptp(pack().box, axis=1)[1:])
+    total = current.grain_force.sum(axis=0) + current.wall_force
+    assert total[0] == pytest.approx(current.resistance * area, rel=1e-9)
     if periodic != "xyz":
-        gradient = found._gradient.parts[0].mean(axis=(1, 2)).astype(float)
+        gradient = current._gradient.parts[0].mean(axis=(1, 2)).astype(float)
         ends = lattice.low[0] + lattice.spacing[0] * np.arange(lattice.shape[0])
         clear = (ends < -1.3) | (ends > pack().box[0, 1] + 1.3)
         assert clear.any()
@@ -112,31 +112,31 @@ def test_velocity_at_a_grain_is_linear_along_it_and_quadratic_across():
 
 
 def test_nothing_moves_in_grains_and_at_walls():
-    found = field("")
-    assert np.all(found.at(pack().position) == 0.0)
+    current = field("")
+    assert np.all(current.at(pack().position) == 0.0)
     size = np.ptp(pack().box, axis=1)
     side = points(200) * [1.0, 0.0, 1.0] + [0.0, 1e-6 * size[1], 0.0]
-    assert np.abs(found.at(side)).max() < 1e-3
+    assert np.abs(current.at(side)).max() < 1e-3
 
 
 def test_far_upstream_the_mud_moves_evenly():
-    found = field("yz")
+    current = field("yz")
     far = points(50) - [40.0, 0.0, 0.0]
-    assert np.array_equal(found.at(far), np.tile([1.0, 0.0, 0.0], (50, 1)))
-    entry = points(4000) * [0.0, 1.0, 1.0] + [found.lattice.low[0] + 0.1, 0.0, 0.0]
-    assert found.at(entry).mean(axis=0)[0] == pytest.approx(1.0, abs=0.03)
+    assert np.array_equal(current.at(far), np.tile([1.0, 0.0, 0.0], (50, 1)))
+    entry = points(4000) * [0.0, 1.0, 1.0] + [current.lattice.low[0] + 0.1, 0.0, 0.0]
+    assert current.at(entry).mean(axis=0)[0] == pytest.approx(1.0, abs=0.03)
 
 
 def test_whole_periods_and_the_choice_of_the_cell_change_nothing():
-    found, size = field("xyz"), np.ptp(pack().box, axis=1)
-    u = found.at(points())
-    assert found.at(points() + size * [3, -2, 1]) == pytest.approx(u, abs=1e-5)
+    current, size = field("xyz"), np.ptp(pack().box, axis=1)
+    u = current.at(points())
+    assert current.at(points() + size * [3, -2, 1]) == pytest.approx(u, abs=1e-5)
     assert np.count_nonzero(np.any(u, axis=1)) == pytest.approx(0.42 * 2000, rel=0.1)
 
 
 def test_turning_and_scaling_the_pack():
     """y and z change places, and a pack in metres is one in millimetres."""
-    found = field("yz")
+    current = field("yz")
     turn = [0, 2, 1]
     turned = replace(
         pack(),
@@ -146,9 +146,9 @@ def test_turning_and_scaling_the_pack():
     )
     other = fdnet.velocity_field(turned, periodic="yz", cells=6.0, tolerance=0.01)
     assert other.at(1e-3 * points()[:, turn])[:, turn] == pytest.approx(
-        found.at(points()), abs=0.05
+        current.at(points()), abs=0.05
     )
-    assert other.k == pytest.approx(1e-6 * found.k, rel=2e-3)
+    assert other.k == pytest.approx(1e-6 * current.k, rel=2e-3)
 
 
 def test_a_finer_grid_is_closer():
@@ -188,9 +188,9 @@ def test_a_fine_that_moves_with_the_flow_feels_less():
 
 
 def test_fines_off_the_grid_are_left_out_and_counted():
-    found = field("yz").updated([[-30.0, 1.0, 1.0], [1.0, 1.0, 1.0]], [0.2, 0.2])
-    assert found.left_out == 1
-    assert np.all(found.fine_force[0] == 0.0)
+    current = field("yz").updated([[-30.0, 1.0, 1.0], [1.0, 1.0, 1.0]], [0.2, 0.2])
+    assert current.left_out == 1
+    assert np.all(current.fine_force[0] == 0.0)
     cake = Snapshot.from_arrays([[-9.0, 1.0, 1.0]], 0.2, box=pack().box, kind="fine")
     wide = fdnet.velocity_field(pack(), periodic="yz", fines=cake, cells=6.0)
     assert wide.left_out == 0

@@ -4,27 +4,20 @@ A coarse resolved Stokes flow on a staggered grid (`solved`), interpolated down 
 (`sampled`). Formulas and checks: docs/velocity_field.md.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.network.field.lattice import Lattice, build_lattice
+from fdnet.network.field.lattice import Lattice
 from fdnet.network.field.nearby import find_nearby
 from fdnet.network.field.pressure import Gradient, find_gradient
 from fdnet.network.field.sampled import Sampled, sample_velocity
-from fdnet.network.field.solved import Skeleton, Solved, Spheres, build_skeleton, solve
-from fdnet.spheres.directions import Directions, periodic_axes
-from fdnet.spheres.snapshot import Array, Kind, Snapshot, frozen
-
-CELLS = 10.0
-"""Cells across a mean grain (docs/validation/velocity-field.md)."""
-TOLERANCE = 0.05
-"""Rms velocity left at the walls over the superficial velocity."""
-UPSTREAM, DOWNSTREAM = 1.0, 0.5
-"""Clear fluid before and beyond a specimen that is not periodic along x, in grain diameters."""
+from fdnet.network.field.solved import Skeleton, Solved, Spheres, solve
+from fdnet.spheres.arrays import one_line
+from fdnet.spheres.snapshot import Array, frozen
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -132,13 +125,13 @@ class VelocityField:
                 f"velocity field: radius of shape {sizes.shape}, expected positive numbers, one "
                 f"or ({len(place)},)"
             )
-        wanted = _Wanted(
+        wanted = Wanted(
             place=place,
             radius=np.broadcast_to(sizes, len(place)),
             velocity=None if velocity is None else _checked(velocity, len(place)),
             tolerance=self.tolerance,
         )
-        return _solved_field(self.skeleton, wanted, self.solved)
+        return solved_field(self.skeleton, wanted, self.solved)
 
     @cached_property
     def _flow(self) -> list[Array]:
@@ -164,89 +157,8 @@ class VelocityField:
         return find_gradient(lattice, self.skeleton.response, self.solved, mean)
 
 
-def velocity_field(
-    grains: Snapshot,
-    *,
-    periodic: Directions = "",
-    fines: Snapshot | None = None,
-    cells: float = CELLS,
-    upstream: float | None = None,
-    tolerance: float = TOLERANCE,
-) -> VelocityField:
-    """The velocity of a slow fluid in the pores of a pack, over the superficial one along x.
-
-    Stokes flow is solved on a grid of `cells` cells across a mean grain. Fines are resolved as the
-    grains are. The sides y and z that are not periodic are walls that hold the fluid. A specimen
-    that is not periodic along x has clear fluid before and beyond it, which moves evenly.
-
-    Args:
-        grains: the skeleton, m; `box` is the specimen. Fines among them are the deposit where
-            `fines` is not given.
-        periodic: sides that repeat, letters such as "yz" or three truth values (x, y, z).
-        fines: the deposit; its spheres of kind grain are ignored where it has any of kind fine.
-        cells: across a mean grain diameter.
-        upstream: m of grid before the specimen; without it, a grain diameter more than the fines
-            reach. Without meaning where x is periodic.
-        tolerance: rms velocity over the superficial one that may be left at the walls.
-
-    Raises:
-        CaseError: there is no grain, or a value is outside its range.
-        NetworkError: the box has no extent, or no grain reaches into the grid.
-        FlowError: the iterations run out, as in a closed pore space.
-
-    Examples:
-        >>> import fdnet, numpy as np
-        >>> lattice = 1e-3 * (np.indices((2, 2, 2)).reshape(3, -1).T + 0.5)
-        >>> grains = fdnet.Snapshot.from_arrays(lattice, 0.5e-3)
-        >>> field = fdnet.velocity_field(grains, periodic="xyz")
-        >>> print(f"{field.at([[1e-3, 1e-3, 1e-3]])[0, 0]:.1f}")
-        4.2
-    """
-    if not len(grains.grains()):
-        raise CaseError("velocity field: no grain among the spheres, expected at least one")
-    if not (np.isfinite(cells) and cells >= 1.0 and 0.0 < tolerance < 1.0):
-        raise CaseError(
-            f"velocity field: {cells!r} cells across a grain and a tolerance of {tolerance!r}, "
-            "expected at least 1 cell and a tolerance between 0 and 1"
-        )
-    deposit = _deposit(grains if fines is None else fines, fines is not None)
-    skeleton = _skeleton(
-        grains, periodic_axes(periodic), (cells, _upstream(grains, deposit, upstream))
-    )
-    wanted = _Wanted(
-        place=deposit.position, radius=deposit.radius, velocity=None, tolerance=tolerance
-    )
-    return _solved_field(skeleton, wanted, None)
-
-
-def _upstream(grains: Snapshot, deposit: Snapshot, wanted: float | None) -> float:
-    """Metres of grid before the specimen."""
-    if wanted is not None:
-        return wanted
-    reach = grains.box[0, 0] - (deposit.position[:, 0] - deposit.radius)
-    clear = UPSTREAM * 2.0 * float(grains.grains().radius.mean())
-    return clear + float(max(0.0, reach.max(initial=0.0)))
-
-
-def _skeleton(
-    spheres: Snapshot, sides: tuple[bool, bool, bool], grid: tuple[float, float]
-) -> Skeleton:
-    """The grains on a grid of so many cells across a grain and so many metres upstream."""
-    grains, (cells, upstream) = spheres.grains(), grid
-    diameter = 2.0 * float(grains.radius.mean())
-    lattice = build_lattice(
-        spheres.box,
-        sides,
-        spacing=diameter / cells,
-        upstream=upstream,
-        downstream=DOWNSTREAM * diameter,
-    )
-    on_grid = grains.where(_on_grid(lattice, grains.position, grains.radius))
-    return build_skeleton(lattice, (on_grid.position, on_grid.radius))
-
-
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Wanted:
+class Wanted:
     """Fines at `place` (N, 3) m of `radius` (N,) m and `velocity` (N, 3), and the tolerance."""
 
     place: Array
@@ -254,9 +166,12 @@ class _Wanted:
     velocity: Array | None
     tolerance: float
 
+    __repr__ = one_line
 
-def _solved_field(skeleton: Skeleton, wanted: _Wanted, former: Solved | None) -> VelocityField:
-    inside = _on_grid(skeleton.lattice, wanted.place, wanted.radius)
+
+def solved_field(skeleton: Skeleton, wanted: Wanted, former: Solved | None) -> VelocityField:
+    """The field around grains and fines, from a `former` flow or from scratch."""
+    inside = on_grid(skeleton.lattice, wanted.place, wanted.radius)
     fines = frozen(wanted.place[inside]), frozen(wanted.radius[inside])
     moves = None if wanted.velocity is None else wanted.velocity[inside]
     return VelocityField(
@@ -269,20 +184,12 @@ def _solved_field(skeleton: Skeleton, wanted: _Wanted, former: Solved | None) ->
     )
 
 
-def _on_grid(lattice: Lattice, position: Array, radius: Array) -> Array:
+def on_grid(lattice: Lattice, position: Array, radius: Array) -> Array:
     """True (N,) for spheres that lie wholly between the ends of the grid along x."""
     if lattice.repeats:
         return np.ones(len(position), bool)
     low, high = lattice.low[0], lattice.high[0]
     return (position[:, 0] - radius >= low) & (position[:, 0] + radius <= high)
-
-
-def _deposit(spheres: Snapshot, given: bool) -> Snapshot:
-    """The spheres of kind fine; all of them where they were given as fines and none is."""
-    fines = spheres.fines()
-    if given and not len(fines):
-        return replace(spheres, kind=np.full(len(spheres), Kind.FINE))
-    return fines
 
 
 def _checked(points: Any, count: int | None = None) -> Array:

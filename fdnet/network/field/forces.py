@@ -19,6 +19,7 @@ import numpy as np
 from fdnet.errors import FlowError
 from fdnet.network.field.response import Response
 from fdnet.network.field.walls import Walls
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
 OWN_RESPONSE = 2.0 / 3.0 * 0.252731
@@ -93,6 +94,8 @@ class Held:
     drift: Array
     slip: float
     iterations: int
+
+    __repr__ = one_line
 
 
 def hold(

@@ -14,6 +14,7 @@ import numpy as np
 from scipy import fft
 
 from fdnet.errors import NetworkError
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, frozen
 
 LEAST_CELLS = 4
@@ -40,6 +41,8 @@ class Lattice:
     walled: tuple[bool, bool, bool]
     specimen: tuple[float, float]
     repeats: bool
+
+    __repr__ = one_line
 
     @property
     def unit(self) -> float:

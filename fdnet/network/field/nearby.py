@@ -17,6 +17,7 @@ import numpy as np
 
 from fdnet.network.compiled import compiled
 from fdnet.network.field.lattice import Lattice
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, frozen
 
 REACH = 2.0
@@ -40,6 +41,8 @@ class Nearby:
     first: Array
     place: Array
     sides: Array
+
+    __repr__ = one_line
 
 
 def find_nearby(lattice: Lattice, position: Array, radius: Array) -> Nearby:

@@ -9,6 +9,7 @@ from fdnet.network.compiled import compiled
 from fdnet.network.field.lattice import Lattice
 from fdnet.network.field.response import Response
 from fdnet.network.field.solved import Solved
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
 
@@ -25,6 +26,8 @@ class Gradient:
 
     lattice: Lattice
     parts: tuple[Array, Array, Array]
+
+    __repr__ = one_line
 
     def at(self, points: Array) -> Array:
         """Gradient (N, 3) 1/m2 at points (N, 3) m, linear between the faces."""

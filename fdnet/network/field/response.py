@@ -20,6 +20,7 @@ from scipy import fft
 
 from fdnet.network.compiled import compiled
 from fdnet.network.field.lattice import Lattice
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, frozen
 
 
@@ -36,6 +37,8 @@ class Response:
     shape: tuple[int, int, int]
     walled: tuple[bool, bool, bool]
     difference: tuple[Array, Array, Array]
+
+    __repr__ = one_line
 
     def velocity(self, force: list[Array]) -> list[Array]:
         """Velocity, three arrays of the grid's shape with mean 0, of such forces."""

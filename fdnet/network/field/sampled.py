@@ -19,6 +19,7 @@ import numpy as np
 from fdnet.network.compiled import compiled
 from fdnet.network.field.lattice import Lattice
 from fdnet.network.field.nearby import Nearby, Place, wall_profile
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
 LEAST_PROFILE = 0.15
@@ -41,6 +42,8 @@ class Sampled:
     lattice: Lattice
     nearby: Nearby
     smooth: tuple[Array, Array, Array]
+
+    __repr__ = one_line
 
     def velocity(self, points: Array) -> Array:
         """Velocity (N, 3) at points (N, 3) m.
@@ -143,11 +146,11 @@ def _linear(part: Array, x: float, y: float, z: float) -> float:
 
 @compiled
 def _off_the_wall(
-    point: Place, found: tuple[float, float, float, int], place: Array
+    point: Place, profile: tuple[float, float, float, int], place: Array
 ) -> tuple[Place, Place, float]:
     """Where to sample, the normal of the nearest sphere, and d / probe (1 away from spheres)."""
     x, y, z = point
-    _, least, second, row = found
+    _, least, second, row = profile
     probe = min(PROBE, 0.5 * (least + second))
     if row < 0 or least >= probe:
         return point, (0.0, 0.0, 0.0), 1.0
@@ -186,14 +189,14 @@ def _sample(
             continue
         number = (cell[0] * shape[1] + cell[1]) * shape[2] + cell[2]
         here = (inside[0], inside[1], inside[2])
-        found = wall_profile(here, (first[number], first[number + 1]), place, sides)
-        if found[0] <= 0.0:
+        profile = wall_profile(here, (first[number], first[number + 1]), place, sides)
+        if profile[0] <= 0.0:
             continue
-        there, normal, share = _off_the_wall(here, found, place)
+        there, normal, share = _off_the_wall(here, profile, place)
         x, y, z = there[0] / step[0], there[1] / step[1], there[2] / step[2]
-        u = found[0] * _linear(smooth[0], x + 2.0, y + 1.5, z + 1.5)
-        v = found[0] * _linear(smooth[1], x + 1.5, y + 2.0, z + 1.5)
-        w = found[0] * _linear(smooth[2], x + 1.5, y + 1.5, z + 2.0)
+        u = profile[0] * _linear(smooth[0], x + 2.0, y + 1.5, z + 1.5)
+        v = profile[0] * _linear(smooth[1], x + 1.5, y + 2.0, z + 1.5)
+        w = profile[0] * _linear(smooth[2], x + 1.5, y + 1.5, z + 2.0)
         across = (share - 1.0) * (u * normal[0] + v * normal[1] + w * normal[2])
         result[s, 0] = u + across * normal[0]
         result[s, 1] = v + across * normal[1]

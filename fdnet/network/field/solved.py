@@ -9,6 +9,7 @@ from fdnet.network.field.forces import Held, Problem, hold
 from fdnet.network.field.lattice import Lattice
 from fdnet.network.field.response import Response, build_response
 from fdnet.network.field.walls import SIDE_WALL, Marks, clear_marks, find_walls, mark
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, frozen
 
 Spheres = tuple[Array, Array]
@@ -30,6 +31,8 @@ class Skeleton:
     grains: Spheres
     marks: tuple[Marks, Marks, Marks]
     response: Response
+
+    __repr__ = one_line
 
 
 def build_skeleton(lattice: Lattice, grains: Spheres) -> Skeleton:
@@ -68,6 +71,8 @@ class Solved:
     solid: tuple[Array, Array, Array]
     sphere_force: Array
     wall_force: Array
+
+    __repr__ = one_line
 
 
 def solve(

@@ -22,6 +22,7 @@ import numpy as np
 
 from fdnet.network.compiled import compiled
 from fdnet.network.field.lattice import Lattice
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
 FLUID, SHELL, DEEP = 0, 1, 2
@@ -46,6 +47,8 @@ class Marks:
     reach: Array
     nearest: Array
     closest: Array
+
+    __repr__ = one_line
 
     def copy(self) -> "Marks":
         """Marks that may be changed apart from these."""
@@ -105,6 +108,8 @@ class Walls:
     node: Array
     slack: Array
     owner: Array
+
+    __repr__ = one_line
 
 
 def find_walls(marks: Marks, lattice: Lattice, component: int) -> Walls:
