@@ -12,7 +12,7 @@ from fdnet.scales.springs import Contact
 _MATERIALS = {"pack": ("grain", "wall"), "invade": ("grain", "fine", "wall")}
 _NORMAL = {"hooke": "hooke/stiffness", "hertz": "hertz"}
 SOFTEST, HARDEST = 5e6, 1e9
-"""Young's moduli, Pa, beyond which LIGGGHTS wants to be told that they are meant."""
+"""Young's moduli, Pa, beyond which LIGGGHTS asks for a confirmation in the deck."""
 
 
 def contact_variables(case: Case, scales: Scales, stage: str, *, friction: bool) -> dict[str, Any]:

@@ -42,7 +42,7 @@ SLAB: dict[str, Any] = {
         "supply": "slab",
     },
     "fluid": {"darcy_length_mm": 8.0},
-    "drag": {"upstream": "interstitial", "scheme": "viscous"},
+    "drag": {"upstream": "interstitial", "scheme": "viscous", "pressure_gradient": False},
     "run": {"duration_ms": 2.0, "time_step_factor": 0.1},
     "analysis": {"sections": 4},
 }
