@@ -10,6 +10,7 @@ from fdnet.case.file import known_keys
 LAYERS = [
     ["errors"],
     ["files"],
+    ["sizes"],
     ["spheres", "case"],
     ["scales", "network"],
     ["dem", "report"],

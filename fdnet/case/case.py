@@ -17,9 +17,10 @@ from pydantic import Field, model_validator
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.control import Run
 from fdnet.case.fluid import Fluid
-from fdnet.case.particles import Fines, Grains, Spheres
+from fdnet.case.particles import Fines, Grains
 from fdnet.case.parts import Box, Drag, Gravity
 from fdnet.case.rules import cross_problems
+from fdnet.case.spheres import Spheres
 from fdnet.case.stages import STAGES, Stage
 from fdnet.case.values import Part
 from fdnet.errors import CaseError

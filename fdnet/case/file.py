@@ -5,7 +5,7 @@ import difflib
 import tomllib
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
@@ -22,8 +22,8 @@ def known_keys(model: type[Part] = InvasionCase, prefix: str = "") -> Iterator[s
     for name, field in model.model_fields.items():
         yield prefix + name
         table = _table_of(field)
-        if table is not None:
-            yield from known_keys(table, f"{prefix}{name}.")
+        for inner in [table] if table is not None else _inner_tables(field.annotation):
+            yield from known_keys(inner, f"{prefix}{name}.")
 
 
 def case_from(data: Mapping[str, Any], *, source: str = "case") -> Case:
@@ -108,6 +108,15 @@ def _table_of(field: FieldInfo) -> type[Part] | None:
     return kind if isinstance(kind, type) and issubclass(kind, Part) else None
 
 
+def _inner_tables(annotation: Any) -> Iterator[type[Part]]:
+    """The tables that a key may hold, one or a list of them."""
+    for kind in get_args(annotation):
+        if isinstance(kind, type) and issubclass(kind, Part):
+            yield kind
+        else:
+            yield from _inner_tables(kind)
+
+
 def _problem(item: dict[str, Any]) -> str:
     path = ".".join(str(part) for part in item["loc"] if not _is_union_tag(part))
     given = item["input"]
@@ -117,6 +126,8 @@ def _problem(item: dict[str, Any]) -> str:
         return f"{path}: unknown key (given {given!r}){hint}"
     if item["type"] == "missing":
         return f"{path}: missing, a value is needed"
+    if item["type"] == "size_curve":
+        return f"{path}: {item['msg']}"
     message = (
         item["msg"].replace("Input should be", "should be").replace("a valid tuple", "a list")
     )

@@ -11,6 +11,7 @@ from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, plug_allowance, quiet_chunks
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
 from fdnet.dem.drag import BELOW_ZERO, drag_variables
+from fdnet.dem.measured_fines import densities
 from fdnet.dem.overlap import is_watched, watch_variables
 from fdnet.dem.scene import contact_variables, header_variables, wall_variables, write_data
 from fdnet.dem.supply import AT_ONCE, batches_of, place_batches, place_fines, slab_end
@@ -47,8 +48,11 @@ def write_invade_inputs(
             "fines: a fine would start in contact; this is an fdnet fault, please report the case "
             "and seed"
         )
-    density = np.where(
-        spheres.kind == Kind.GRAIN, case.grains.density_kg_m3, case.fines.density_kg_m3
+    density = np.concatenate(
+        [
+            np.full(len(grains), case.grains.density_kg_m3),
+            densities(case, batches_of(case, scales).counts)[: len(spheres) - len(grains)],
+        ]
     )
     write_data(
         folder / "invade.data",
@@ -74,11 +78,12 @@ def write_batches(
         "start_velocity": number(scales.upstream_velocity),
         "drag": drag_variables(case, scales),
     }
+    density, first = densities(case, batches_of(case, scales).counts), int(grains.id.max()) + 1
     (folder / SUPPLY).mkdir(exist_ok=True)
     for chunk, fines in enumerate(batches[AT_ONCE:], AT_ONCE):
         name = f"{SUPPLY}/batch_{chunk}"
-        density = np.full(len(fines), case.fines.density_kg_m3)
-        write_data(folder / f"{name}.data", fines, bounds=bounds, density=density, types=3)
+        own_density = density[fines.id.astype(int) - first]
+        write_data(folder / f"{name}.data", fines, bounds=bounds, density=own_density, types=3)
         own = {"name": name, "first": int(fines.id[0]), "last": int(fines.id[-1])}
         write_text(folder / f"{name}.in", render_text("batch.in.j2", shared | own))
     return reduce(Snapshot.joined, batches[:AT_ONCE])

@@ -12,6 +12,7 @@ from fdnet.case.case import Case, InvasionCase
 from fdnet.errors import CaseError
 from fdnet.scales.grain_pack import pack_step, target_porosity
 from fdnet.scales.overlaps import overlap_warnings, overlaps_of, refuse_deep_overlap
+from fdnet.scales.sizes import size_warnings
 from fdnet.scales.slab import slab_of, slab_warnings
 from fdnet.scales.springs import Contact, contacts_of, stiffness_factor
 from fdnet.scales.sticking import Sticking, sticking_of, sticking_warnings
@@ -119,6 +120,7 @@ def _shared(case: Case) -> Scales:
         stiffness_factor=stiffness_factor(case),
         contacts=contacts,
         pack_step=pack_step(case, contacts),
+        warnings=tuple(size_warnings(case)),
     )
 
 
@@ -139,6 +141,7 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     refuse_deep_overlap(overlaps)
     _refuse_long_chunk(step, chunk_steps)
     warnings = [
+        *shared.warnings,
         *_reynolds_warnings(reynolds),
         *overlap_warnings(case, overlaps),
         *slab_warnings(case, slab),
@@ -168,14 +171,18 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
 
 
 def _relaxation_times(case: InvasionCase) -> tuple[float, float]:
-    """Of the smallest and of the largest fine, s."""
-    density, viscosity = case.fines.density_kg_m3, case.fluid.viscosity_Pa_s
-    low, high = case.fines.radius_range_m
-    multiplier = case.drag.multiplier
-    return (
-        relaxation_time(low, density, viscosity, multiplier),
-        relaxation_time(high, density, viscosity, multiplier),
-    )
+    """The shortest and the longest of the fines, s; with one material smallest and largest."""
+    viscosity, multiplier = case.fluid.viscosity_Pa_s, case.drag.multiplier
+    if not case.fines.measured:
+        ends = [(radius, case.fines.density_kg_m3) for radius in case.fines.radius_range_m]
+    else:
+        ends = [
+            (0.5 * diameter, one.density)
+            for one in case.fines.components
+            for diameter in (one.curve.low, one.curve.high)
+        ]
+    times = [relaxation_time(radius, density, viscosity, multiplier) for radius, density in ends]
+    return min(times), max(times)
 
 
 def _reynolds(case: InvasionCase, velocity: float) -> float:
@@ -185,8 +192,12 @@ def _reynolds(case: InvasionCase, velocity: float) -> float:
 
 
 def _gravity_over_drag(case: InvasionCase, velocity: float) -> float:
-    """2 r^2 (rho - rho_fluid) g / (9 mu u M) of the largest fine, M the drag multiplier."""
-    excess = abs(case.fines.density_kg_m3 - case.fluid.density_kg_m3 * case.gravity.buoyancy)
+    """2 r^2 (rho - rho_fluid) g / (9 mu u M), M the drag multiplier.
+
+    Of the largest fine and the material that weighs most in the fluid.
+    """
+    displaced = case.fluid.density_kg_m3 * case.gravity.buoyancy
+    excess = max(abs(one.density - displaced) for one in case.fines.components)
     weight = math.hypot(*case.gravity.acceleration_m_s2) * excess
     return (
         2

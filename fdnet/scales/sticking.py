@@ -85,7 +85,7 @@ def sticking_of(case: InvasionCase, contact: Contact, velocity: float, step: flo
         step: time step, s.
     """
     radius, grain = case.fines.radius_range_m[0], case.grains.radius_range_m[1]
-    mass = sphere_mass(radius, case.fines.density_kg_m3)
+    mass = sphere_mass(radius, min(one.density for one in case.fines.components))
     push = 6 * math.pi * case.fluid.viscosity_Pa_s * case.drag.multiplier * radius * velocity
     slope = groove_slope(radius / grain)
     rolling = min(velocity, fall_velocity(push, mass, slope * grain))

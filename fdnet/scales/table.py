@@ -6,6 +6,7 @@ from fdnet.case.case import Case
 from fdnet.scales.cost import cost_of, memory_bytes
 from fdnet.scales.grain_pack import grain_count
 from fdnet.scales.scales import InvasionScales, Scales
+from fdnet.scales.sizes import size_rows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +38,7 @@ def _row(name: str, symbol: str, value: float, unit: str, formula: str, source: 
 
 def scale_rows(case: Case, scales: Scales) -> list[Quantity]:
     """Every scale of the case with its formula and source, in reading order."""
-    rows = _flow_rows(case, scales)
+    rows = [_row(*row) for row in size_rows(case)] + _flow_rows(case, scales)
     if isinstance(scales, InvasionScales):
         rows += _fine_rows(scales)
     rows += _contact_rows(scales)
