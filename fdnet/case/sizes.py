@@ -73,6 +73,12 @@ class Sizes(Part):
         given = {0.1: self.D10_mm, 0.5: self.D50_mm, 0.9: self.D90_mm}
         return {share: size * 1e-3 for share, size in given.items() if size is not None}
 
+    @property
+    def points(self) -> Iterator[tuple[float, float]]:
+        """Share finer and diameter, m, of each point of a measured curve."""
+        for size, finer in zip(self.size_mm or (), self.passing_percent or (), strict=False):
+            yield finer / 100, size * 1e-3
+
     @cached_property
     def fit(self) -> Fit | None:
         """The law through D10, D50 and D90; None for a measured curve."""

@@ -18,13 +18,14 @@ def summarise(
     pack: dict[str, Any],
     invasion: dict[str, Any] | None,
     last: Checkpoint | None,
+    sizes: dict[str, Any],
     seconds: dict[str, float],
     warnings: list[str],
 ) -> dict[str, Any]:
     """The mapping of summary.json.
 
     `pack` and `invasion` are the records of their stages, `last` is the last checkpoint; the two
-    of the invasion are None without fines.
+    of the invasion are None without fines. `sizes` are those of measured curves, {} without them.
     """
     result = {
         "case": case.name,
@@ -39,6 +40,7 @@ def summarise(
         "sections": section_rows(analysis),
         **_network(analysis),
         "solver": analysis.solver,
+        **({"sizes": sizes} if sizes else {}),
         "max_overlap_fraction": invasion["max_overlap"] if invasion else pack["max_overlap"],
         "grain_overlap_fraction": pack["max_overlap"],
         "ranks": {"pack": ranks_of(pack), "invade": ranks_of(invasion) if invasion else None},

@@ -41,9 +41,7 @@ def test_moments_between_cuts_are_those_of_the_truncated_log_normal():
     mean = math.log(40e-6) - 3 * spread**2
 
     def integral(power: float) -> float:
-        ends = [
-            (math.log(d) - mean) / spread - power * spread for d in (curve.low, curve.high)
-        ]
+        ends = [(math.log(d) - mean) / spread - power * spread for d in (curve.low, curve.high)]
         factor = math.exp(power * mean + 0.5 * (power * spread) ** 2)
         return factor * float(ndtr(ends[1]) - ndtr(ends[0]))
 
@@ -125,7 +123,9 @@ def test_strata_have_the_volume_and_the_quantiles_of_the_curve():
         assert np.sum(placed**3) == pytest.approx(count * curve.mean(3), rel=1e-12)
         assert np.all(np.diff(placed) >= -1e-9 * placed[1:])
         assert curve.low <= placed.min() <= placed.max() <= curve.high
-    for share, size in zip((0.1, 0.5, 0.9), volume_quantiles(placed, (0.1, 0.5, 0.9)), strict=True):
+    for share, size in zip(
+        (0.1, 0.5, 0.9), volume_quantiles(placed, (0.1, 0.5, 0.9)), strict=True
+    ):
         assert size == pytest.approx(curve.size_at(share), rel=1e-3)
 
 
