@@ -168,7 +168,7 @@ def test_the_misfit_of_three_points_is_that_of_the_line_of_least_squares():
 
 
 def test_every_batch_has_the_curve_of_the_whole():
-    """Each batch of n takes one fine of each n-th part; so any count is within one of its share."""
+    """Each batch of n takes one fine of each n-th part: a count is within 1.5 of its share."""
     counts = [50] * 19 + [31]
     batches = dealt(counts, np.random.default_rng(1))
     assert sorted(np.concatenate(batches)) == list(range(sum(counts)))
