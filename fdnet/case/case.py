@@ -40,6 +40,7 @@ KEYS = (
     "gravity",
     "run",
     "analysis",
+    "given",
 )
 """Keys at the top of a case file, in the order in which they are written."""
 
@@ -78,6 +79,11 @@ class Case(Part):
     gravity: Gravity = Gravity()
     run: Run = Run()
     analysis: AnalysisChoices = AnalysisChoices()
+    given: dict[str, str] = Field(
+        {},
+        description="Written by fdnet: what the case gave with units or as a file, by dotted key. "
+        "The other keys hold the same as numbers, and only they count.",
+    )
 
     @model_validator(mode="after")
     def _tables_fit(self) -> Self:
@@ -109,6 +115,8 @@ class Case(Part):
     def data(self) -> dict[str, Any]:
         """All keys that have a value, defaults written out (TOML knows no null)."""
         data = self.model_dump(mode="json")
+        if not self.given:
+            del data["given"]
         return _without_none({key: data[key] for key in KEYS if key in data})
 
     def toml(self) -> str:
@@ -123,6 +131,7 @@ class Case(Part):
         differs from what a case meant before (`fdnet.case.added`).
         """
         data = without_added(self.data())
+        data.pop("given", None)
         data["run"] = {key: value for key, value in data["run"].items() if key not in POLICIES}
         if stage in ("pack", "invade"):
             data.pop("analysis")
@@ -186,4 +195,6 @@ def with_fines(case: Case) -> InvasionCase:
 def _without_none(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _without_none(item) for key, item in value.items() if item is not None}
+    if isinstance(value, list):
+        return [_without_none(item) for item in value]
     return value

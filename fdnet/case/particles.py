@@ -4,12 +4,16 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from fdnet.case.materials import Material, Solid, components_of, mixed_density
 from fdnet.case.spheres import Spheres
-from fdnet.case.values import MAX_CONCENTRATION, Fraction, Positive, scaled
+from fdnet.case.values import MAX_CONCENTRATION, Fraction, Positive, as_tuple, scaled
+
+Materials = Annotated[
+    tuple[Material, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=20)
+]
 
 
 class Grains(Spheres):
@@ -62,7 +66,7 @@ class Fines(Spheres):
         description="Tangential contact stiffness of the fines' material. When absent: 0.04 of "
         "the normal one. The thesis has 26e9.",
     )
-    materials: tuple[Material, ...] | None = Field(
+    materials: Materials | None = Field(
         None,
         description="Several materials, each a table with its own sizes, instead of `radius_mm` "
         "or `sizes`; their keys are below.",

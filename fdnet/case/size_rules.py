@@ -45,7 +45,7 @@ def _one_curve(name: str) -> Rule:
 
 
 def _cut(fines: Fines) -> Iterator[str]:
-    if fines.cut_um is not None and not fines.measured:
+    if fines.cut_um is not None and not fines.measured and fines.has_one_curve:
         yield (
             f"fines.cut_um: {fines.cut_um:g} cuts measured sizes, but the case gives "
             "fines.radius_mm; leave it out or give fines.sizes"
@@ -84,8 +84,6 @@ def _names(fines: Fines) -> Iterator[str]:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         yield f"fines.materials: {twice[0]!r} is listed twice, give each material once"
-    if fines.materials is not None and not names:
-        yield "fines.materials: is empty, list at least one material"
 
 
 def _some_throat(grains: Grains, fines: Fines) -> Iterator[str]:

@@ -108,7 +108,7 @@ def scales_of(case: Case) -> Scales:
         shared = _shared(case, velocity)
         if not isinstance(case, InvasionCase):
             return shared
-        doubts = velocity_warnings(case, shared.porosity, velocity)
+        doubts = [*shared.warnings, *velocity_warnings(case, shared.porosity, velocity)]
         return _invasion(case, replace(shared, warnings=tuple(doubts)))
     except (OverflowError, ZeroDivisionError) as error:
         raise CaseError(
