@@ -13,6 +13,7 @@ UNITS = {
     "_m_s2": "m/s²",
     "_N_m": "N/m",
     "_m_s": "m/s",
+    "_GPa": "GPa",
     "_MPa": "MPa",
     "_cP": "cP",
     "_mD": "mD",
@@ -56,6 +57,7 @@ def part_model(annotation: Any) -> type[BaseModel] | None:
         if isinstance(kind, type) and issubclass(kind, BaseModel):
             return kind
     for kind in get_args(annotation):
+        kind = getattr(kind, "__origin__", kind) if hasattr(kind, "__metadata__") else kind
         inner = part_model(kind) if get_origin(kind) is tuple else None
         if inner is not None:
             return inner

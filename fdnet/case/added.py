@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 AS_BEFORE: dict[str, Any] = {
+    "contact.model": "hooke",
     "drag.crowd": "none",
     "fluid.darcy_law": "darcy",
 }

@@ -39,6 +39,17 @@ class Grains(Spheres):
         "absent: 0.04 of the normal one, so that friction lets go of fines that roll around the "
         "neck of two grains. The thesis has 34e9.",
     )
+    youngs_modulus_GPa: Positive = Field(
+        94.3,
+        description="Young's modulus of the grains' material, and of the walls, for "
+        'contact.model = "hertz". The default is the thesis\'s (quartz). `run.stiffness_N_m` '
+        "scales all moduli by one factor.",
+    )
+    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = Field(
+        0.387,
+        description="Poisson's ratio of the grains' material, and of the walls, for "
+        'contact.model = "hertz". The default is E / 2G - 1 of the thesis\'s 94.3 and 34 GPa.',
+    )
     motion: Literal["fixed", "mobile"] = Field(
         "fixed",
         description='Motion of the grains during the invasion: "fixed" keeps them in place, '
@@ -65,6 +76,16 @@ class Fines(Spheres):
         None,
         description="Tangential contact stiffness of the fines' material. When absent: 0.04 of "
         "the normal one. The thesis has 26e9.",
+    )
+    youngs_modulus_GPa: Positive = Field(
+        63.0,
+        description="Young's modulus of the fines' material, for contact.model = \"hertz\". The "
+        "default is the thesis's.",
+    )
+    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = Field(
+        0.212,
+        description="Poisson's ratio of the fines' material, for contact.model = \"hertz\". The "
+        "default is E / 2G - 1 of the thesis's 63 and 26 GPa.",
     )
     materials: Materials | None = Field(
         None,

@@ -66,6 +66,13 @@ class Drag(Part):
         description='Steps for which scheme "held" keeps the force. When absent the force is kept '
         "for at most 0.05 of the drag relaxation time.",
     )
+    drive_velocity_m_s: Positive | Literal["auto"] | None = Field(
+        None,
+        description="Velocity of the fluid in the pores of the simulation, to shorten a run with "
+        "a weak push: every force is scaled by the same factor, and the physical clock runs "
+        "faster by it. Allowed where the fines' inertia does not matter, up to an impact Stokes "
+        'number of 1. "auto" drives to 0.1, or as fast as the fluid itself.',
+    )
     upstream: Literal["interstitial", "darcy"] = Field(
         "interstitial",
         description="Velocity of the fluid upstream of the formation face: the interstitial one "

@@ -5,6 +5,8 @@ from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 from fdnet.case.analysis import AnalysisChoices
+from fdnet.case.contact import MODEL_KEYS
+from fdnet.case.contact_rules import of_the_model
 from fdnet.case.control import Run
 from fdnet.case.fluid import Fluid, Well
 from fdnet.case.particles import Fines, Grains
@@ -239,6 +241,11 @@ def _profile_bins(box: Box, analysis: AnalysisChoices) -> Iterator[str]:
         )
 
 
+def _of_the_contact(name: str) -> Rule:
+    keys = sorted(MODEL_KEYS["hooke"] | MODEL_KEYS["hertz"] | {"damping_ratio"})
+    return Rule(("contact.model", *(f"{name}.{key}" for key in keys)), of_the_model(name))
+
+
 _SPHERES = ("grains", "fines")
 _SLAB_KEYS = (
     *("fines.radius_mm", "fines.count", "fines.slab_mm"),
@@ -265,6 +272,7 @@ RULES = (
     Rule(("drag.scheme", "fines.radius_mm"), _viscous),
     Rule(("drag.scheme", "drag.upstream"), _implicit),
     Rule(("gravity.mode", "gravity.acceleration_m_s2", "gravity.buoyancy"), _buoyancy),
+    *(_of_the_contact(name) for name in ("grains", "fines")),
     Rule(("run.duration_ms", "run.cap_ms"), _end),
     Rule(("analysis.sections",), _sections),
     Rule(("analysis.law", "analysis.damage_law"), _laws),

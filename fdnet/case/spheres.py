@@ -18,7 +18,7 @@ than 1/370 of a grain at friction 0.55 locks between two grains (`fdnet.scales.s
 
 
 class Spheres(Part):
-    """What grains and fines share: sizes, density and linear (Hooke) contact parameters."""
+    """What grains and fines share: sizes, density and the parameters of their contacts."""
 
     radius_mm: Radius | None = Field(
         None,
@@ -40,6 +40,12 @@ class Spheres(Part):
         "When absent: 0.04 of the normal one, so that friction lets go of fines that roll around "
         "the neck of two grains.",
     )
+    youngs_modulus_GPa: Positive = Field(
+        description='Young\'s modulus of the material, for contact.model = "hertz".'
+    )
+    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = Field(
+        description='Poisson\'s ratio of the material, for contact.model = "hertz".'
+    )
     friction: NonNegative = Field(
         0.55,
         description="Coefficient of sliding friction. A contact takes the smaller value of its "
@@ -56,6 +62,11 @@ class Spheres(Part):
         """Tangential contact stiffness, N/m: the one given, or `SHEAR_RATIO` of the normal one."""
         given = self.shear_stiffness_N_m
         return SHEAR_RATIO * self.normal_stiffness_N_m if given is None else given
+
+    @property
+    def youngs_modulus_Pa(self) -> float:
+        """Young's modulus of the material, Pa."""
+        return self.youngs_modulus_GPa * 1e9
 
     @cached_property
     def components(self) -> tuple[Solid, ...]:

@@ -13,7 +13,7 @@ BELOW_ZERO = -5e-324
 def drag_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]:
     """Variables of the drag block: the scheme and, as text, the numbers that it needs."""
     coefficient = case.fluid.stokes_coefficient_Pa_s * case.drag.multiplier
-    slower = scales.interstitial_velocity - scales.upstream_velocity
+    slower = scales.drive_velocity - scales.upstream_velocity
     own = (
         _viscous(case, scales, coefficient, slower)
         if case.drag.scheme == "viscous"
@@ -22,7 +22,7 @@ def drag_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]
     return {
         "scheme": case.drag.scheme,
         "coefficient": number(coefficient),
-        "velocity": number(scales.interstitial_velocity),
+        "velocity": number(scales.drive_velocity),
         **own,
     }
 
@@ -46,7 +46,7 @@ def _viscous(
     damping = coefficient * case.fines.mean_radius_m
     return {
         "damping": number(damping),
-        "push": number(damping * scales.interstitial_velocity),
+        "push": number(damping * scales.drive_velocity),
         "slower": number(-damping * slower) if slower else "",
         "face": number(BELOW_ZERO),
     }

@@ -9,11 +9,12 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, plug_allowance, quiet_chunks
+from fdnet.dem.contact_lines import contact_variables
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
 from fdnet.dem.drag import BELOW_ZERO, drag_variables
 from fdnet.dem.measured_fines import densities
 from fdnet.dem.overlap import is_watched, watch_variables
-from fdnet.dem.scene import contact_variables, header_variables, wall_variables, write_data
+from fdnet.dem.scene import header_variables, wall_variables, write_data
 from fdnet.dem.supply import AT_ONCE, batches_of, place_batches, place_fines, slab_end
 from fdnet.errors import CaseError
 from fdnet.files.atomic import write_text
@@ -97,7 +98,7 @@ def _feeding(case: InvasionCase, scales: InvasionScales) -> dict[str, int] | Non
 
 def _margin(case: InvasionCase, scales: InvasionScales) -> float:
     """How far a fine could go in one chunk at twice the fluid's velocity, plus two diameters."""
-    travel = 2 * scales.interstitial_velocity * scales.checkpoint_steps * scales.time_step
+    travel = 2 * scales.drive_velocity * scales.checkpoint_steps * scales.time_step
     return travel + 4 * case.fines.radius_range_m[1]
 
 
@@ -214,7 +215,7 @@ def _gravity(
             )
         ]
     pull = {
-        "magnitude": number(magnitude),
+        "magnitude": number(magnitude * scales.force_factor),
         "direction": " ".join(number(c / magnitude) for c in vector),
         "buoyancy": None,
     }

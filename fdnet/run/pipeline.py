@@ -178,6 +178,7 @@ def _write_summary(
         invasion=invasion,
         sizes=size_summary(results.sizes),
         last=results.history[-1] if results.history else None,
+        physical_time_s=results.physical_time_s,
         seconds=stage_seconds(pack, invasion, session.seconds),
         warnings=[
             *scales.warnings,

@@ -10,11 +10,13 @@ from typing import overload
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.errors import CaseError
+from fdnet.scales.contacts import contacts_of, stiffness_factor
+from fdnet.scales.drive import drive_of, drive_warnings
 from fdnet.scales.grain_pack import pack_step, target_porosity
 from fdnet.scales.overlaps import overlap_warnings, overlaps_of, refuse_deep_overlap
 from fdnet.scales.sizes import size_warnings
 from fdnet.scales.slab import slab_of, slab_warnings
-from fdnet.scales.springs import Contact, contacts_of, stiffness_factor
+from fdnet.scales.springs import Contact
 from fdnet.scales.sticking import Sticking, sticking_of, sticking_warnings
 from fdnet.scales.stop_times import chunk_refreshes, plug_warnings, stop_times
 from fdnet.scales.time_step import drag_warnings, hold_steps, relaxation_time, time_step
@@ -35,7 +37,7 @@ class Scales:
         interstitial_velocity: m/s, mean velocity of the fluid in the pores.
         pressure_gradient: Pa/m, that drives this flow through the intact pack.
         inertial_loss: share by which Ergun's inertial term lowers the velocity of Darcy's law.
-        stiffness_factor: factor from the materials' stiffness to the one used.
+        stiffness_factor: factor from the materials' stiffness, or moduli, to those used.
         contacts: contact of each pair of materials, such as "grain-fine".
         pack_step: s, time step of packing.
         warnings: doubts about the case, one sentence each.
@@ -58,23 +60,30 @@ class InvasionScales(Scales):
     """What follows from a case with fines as well, in SI units.
 
     Attributes:
-        upstream_velocity: m/s, of the fluid upstream of the formation face.
+        drive_velocity: m/s, of the fluid in the pores as simulated; the fluid's own unless
+            `drag.drive_velocity_m_s` says otherwise.
+        force_factor: drive velocity over the fluid's own; the factor on all forces on a fine, and
+            physical time over simulated time.
+        upstream_velocity: m/s, upstream of the formation face, as simulated.
         supplied_count: number of fines in the slab.
         slab_length: m, along the flow.
         relaxation_time: s, of the drag on the smallest and on the largest fine.
         time_step: s, of the invasion.
         hold_steps: steps for which the drag is held.
-        plug_time: s without a crossing after which the face counts as plugged.
-        cap_time: s, when the invasion ends at the latest.
+        plug_time: s of the simulation without a crossing after which the face counts as plugged.
+        cap_time: s of the simulation, when the invasion ends at the latest.
         checkpoint_steps: steps between two checkpoints.
         reynolds: particle Reynolds number of the largest fine.
-        stokes: Stokes number of the largest fine at a grain.
+        stokes: Stokes number of the largest fine at a grain, as simulated.
+        impact_stokes: impact Stokes number of the largest fine, as simulated.
         gravity_over_drag: weight less buoyancy over drag, of the largest fine.
         impact_overlap: predicted overlap by impact, over the diameter of the largest fine.
         drag_overlap: predicted overlap by drag, over the diameter of the largest fine.
         sticking: how far a fine may lock between two grains.
     """
 
+    drive_velocity: float
+    force_factor: float
     upstream_velocity: float
     supplied_count: int
     slab_length: float
@@ -86,6 +95,7 @@ class InvasionScales(Scales):
     checkpoint_steps: int
     reynolds: float
     stokes: float
+    impact_stokes: float
     gravity_over_drag: float
     impact_overlap: float
     drag_overlap: float
@@ -134,33 +144,38 @@ def _shared(case: Case, velocity: Velocity) -> Scales:
 
 
 def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
-    velocity, slab = shared.interstitial_velocity, slab_of(case)
-    upstream = velocity if case.drag.upstream == "interstitial" else shared.darcy_velocity
-    relaxation = _relaxation_times(case)
+    slab, relaxation = slab_of(case), _relaxation_times(case)
+    drive = drive_of(case, shared.interstitial_velocity, relaxation[1])
+    velocity = drive.velocity
+    darcy = shared.darcy_velocity * drive.factor
+    upstream = velocity if case.drag.upstream == "interstitial" else darcy
     step = time_step(case, shared.contacts, relaxation[0])
-    times = stop_times(case, slab, interstitial=velocity, upstream=upstream)
+    times = stop_times(case, slab, drive, upstream=upstream)
     hold = hold_steps(case, step, relaxation[0], times.chunk)
     chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
     contact = shared.contacts["grain-fine"]
-    overlaps = overlaps_of(case, contact.normal_stiffness, velocity)
+    overlaps = overlaps_of(case, contact, velocity)
     sticking = sticking_of(case, contact, velocity, step)
-    reynolds = _reynolds(case, velocity)
+    reynolds = _reynolds(case, shared.interstitial_velocity)
     stokes = relaxation[1] * velocity / (2 * case.grains.mean_radius_m)
-    gravity = _gravity_over_drag(case, velocity)
+    gravity = _gravity_over_drag(case, shared.interstitial_velocity)
     refuse_deep_overlap(overlaps)
     _refuse_long_chunk(step, chunk_steps)
     warnings = [
         *shared.warnings,
+        *drive_warnings(case, drive),
         *_reynolds_warnings(reynolds),
         *overlap_warnings(case, overlaps),
         *slab_warnings(case, slab),
         *drag_warnings(case, hold * step / relaxation[0]),
-        *plug_warnings(case, times.plug, upstream),
+        *plug_warnings(case, times.plug, drive, upstream),
         *sticking_warnings(sticking),
     ]
     return InvasionScales(
         **{item.name: getattr(shared, item.name) for item in fields(shared)}
         | {"warnings": tuple(warnings)},
+        drive_velocity=velocity,
+        force_factor=drive.factor,
         upstream_velocity=upstream,
         supplied_count=slab.count,
         slab_length=slab.length,
@@ -172,6 +187,7 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
         checkpoint_steps=chunk_steps,
         reynolds=reynolds,
         stokes=stokes,
+        impact_stokes=drive.impact_stokes,
         gravity_over_drag=gravity,
         impact_overlap=overlaps.impact,
         drag_overlap=overlaps.drag,

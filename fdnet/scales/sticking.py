@@ -33,9 +33,10 @@ class Sticking:
         size_ratio: radius of the fine over that of the largest grain.
         friction: coefficient of friction of a fine against a grain.
         slope: of the sides of the groove; friction below it holds no fine.
-        shear_ratio: tangential over normal contact stiffness.
+        shear_ratio: tangential over normal contact stiffness, force over overlap.
         push: drag on the fine at rest over normal stiffness and radius, F / (k r).
         false_force: tangential force that the integrator adds in a quarter turn, over the push.
+        linear: whether the tangential stiffness can be chosen (Hertz-Mindlin's cannot).
     """
 
     size_ratio: float
@@ -44,6 +45,7 @@ class Sticking:
     shear_ratio: float
     push: float
     false_force: float
+    linear: bool = True
 
     @property
     def by_springs(self) -> bool:
@@ -96,6 +98,7 @@ def sticking_of(case: InvasionCase, contact: Contact, velocity: float, step: flo
         shear_ratio=contact.shear_stiffness / contact.normal_stiffness,
         push=push / (contact.normal_stiffness * radius),
         false_force=false_force(contact.shear_stiffness, rolling, step) / push,
+        linear=contact.elastic is None,
     )
 
 
@@ -110,10 +113,14 @@ def sticking_warnings(sticking: Sticking) -> list[str]:
     )
     if sticking.by_springs:
         most = sticking.friction * sticking.slope
+        remedy = (
+            "leave out grains.shear_stiffness_N_m and fines.shear_stiffness_N_m"
+            if sticking.linear
+            else "take contact.model = 'hooke'"
+        )
         return [
             f"{who}, tangential over normal stiffness {sticking.shear_ratio:.2g} (above "
-            f"{most:.2g}): leave out grains.shear_stiffness_N_m and fines.shear_stiffness_N_m, "
-            f"or lower friction to {sticking.slope:.2g}"
+            f"{most:.2g}): {remedy}, or lower friction to {sticking.slope:.2g}"
         ]
     excess = sticking.false_force / MOST_FALSE_FORCE
     return [

@@ -178,3 +178,32 @@ def test_the_stop_rule_allows_a_share_of_the_inflow():
     arrivals = 0.1 * area * scales.upstream_velocity * 0.2e-3 / volume
     text = invade_text("run.plug_rate=0.3", "run.plug_time_ms=0.2")
     assert has(text, rf"variable still equal \$\{{most\}}\+{math.floor(0.3 * arrivals)}$")
+
+
+@pytest.mark.parametrize(("model", "law"), [("hooke", "hooke/stiffness"), ("hertz", "hertz")])
+def test_pairs_and_walls_have_the_contact_model_of_the_case(model, law):
+    """Walls without friction of their own have no tangential model."""
+    text = invade_text(f"contact.model={model}", "box.wall_friction=0.3")
+    assert has(text, rf"^pair_style gran model {law} tangential history tangential_damping off")
+    assert has(text, rf"^fix wy0 fines wall/gran model {law} tangential history primitive type 3")
+    smooth = invade_text(f"contact.model={model}")
+    assert has(smooth, rf"^fix wy0 fines wall/gran model {law} primitive type 3 yplane")
+    case = tiny(f"contact.model={model}")
+    pack = render_pack(case, scales_of(case), count=66).text
+    assert has(pack, rf"^pair_style gran model {law} limitForce on")
+    assert has(pack, rf"^fix wx0 all wall/gran model {law} primitive type 2 xplane")
+
+
+def test_moduli_that_liggghts_would_refuse_are_said_to_be_meant():
+    """It wants to be told of a Young's modulus below 5e6 or above 1e9 Pa."""
+    for stiffness, soft, hard in (
+        ("1.0", True, False),
+        ("1e2", False, False),
+        ("1e6", False, True),
+    ):
+        text = invade_text(
+            "contact.model=hertz", f"run.stiffness_N_m={stiffness}", "fluid.velocity_m_s=1e-3"
+        )
+        assert has(text, "^soft_particles yes") is soft
+        assert has(text, "^hard_particles yes") is hard
+    assert not has(invade_text(), "_particles yes")

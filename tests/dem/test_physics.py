@@ -7,10 +7,11 @@ import pytest
 from builders import resting_spheres, tiny
 
 from fdnet.case.case import Case
+from fdnet.dem.contact_lines import contact_variables
 from fdnet.dem.deck import number, render_text
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch, run_deck
-from fdnet.dem.scene import contact_variables, write_data
+from fdnet.dem.scene import write_data
 from fdnet.scales.scales import scales_of
 from fdnet.scales.time_step import relaxation_time
 from fdnet.spheres.contacts import max_overlap, touching_pairs

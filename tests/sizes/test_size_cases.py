@@ -68,7 +68,9 @@ def test_what_is_left_out_and_what_the_law_misses_is_said():
     assert "carries 3.99 % of fines by volume instead of 5 %" in warnings
     assert "misses" not in warnings
     skew = {"D10": "0.25 mm", "D50": "0.5 mm", "D90": "0.60 mm"}
-    warnings = " ".join(scales_of(made(measured(grains=skew))).warnings)
+    warnings = " ".join(
+        scales_of(made(measured(grains=skew, fines={"D10": "25 um", "D90": "50 um"}))).warnings
+    )
     assert "grains.sizes: the rosin-rammler curve misses D10 by" in warnings
 
 

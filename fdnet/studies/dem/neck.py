@@ -12,9 +12,10 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import case_from
+from fdnet.dem.contact_lines import contact_variables
 from fdnet.dem.deck import number, render_text
 from fdnet.dem.liggghts import Launch, run_deck
-from fdnet.dem.scene import contact_variables, header_variables, write_data
+from fdnet.dem.scene import header_variables, write_data
 from fdnet.files.atomic import write_text
 from fdnet.scales.scales import scales_of
 from fdnet.scales.springs import sphere_mass
