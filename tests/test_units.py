@@ -146,7 +146,7 @@ def test_a_set_key_replaces_the_same_key_in_another_unit(tmp_path):
 @pytest.mark.parametrize(
     ("part", "values", "expected"),
     [
-        ("fluid", {"viscosity": "10 cP", "viscosity_cP": 10.0}, "viscosity: given beside visc"),
+        ("fluid", {"viscosity": "10 cP", "viscosity_cP": 10.0}, "viscosity: given next to visc"),
         ("fluid", {"viscosity": 10}, "fluid.viscosity: 10 has no unit"),
         ("fluid", {"viscosity": "10 psi"}, "'psi' is a unit of pressure"),
         ("fluid", {"viscosity_cP": "10 cP"}, "a value with its unit goes to viscosity"),

@@ -100,7 +100,7 @@ class Fines(Spheres):
     concentration: Annotated[float, Field(gt=0, le=MAX_CONCENTRATION)] | None = Field(
         0.10,
         description="Volume of solids over the volume of suspension in the slab upstream. It has "
-        "no default beside `solids_kg_m3`.",
+        "no default where `solids_kg_m3` is given.",
     )
     solids_kg_m3: Positive | None = Field(
         None, description="Mass of solids in a volume of mud, instead of `concentration`."
@@ -129,9 +129,8 @@ class Fines(Spheres):
     @classmethod
     def _one_concentration(cls, data: Any) -> Any:
         """The default of `concentration` gives way to `solids_kg_m3`."""
-        if isinstance(data, Mapping) and "solids_kg_m3" in data and "concentration" not in data:
-            return {**data, "concentration": None}
-        return data
+        by_mass = isinstance(data, Mapping) and data.get("solids_kg_m3") is not None
+        return {"concentration": None, **data} if by_mass else data
 
     @model_validator(mode="after")
     def _something_is_left(self) -> Self:
@@ -168,6 +167,11 @@ class Fines(Spheres):
         if self.materials is None:
             return self.density_kg_m3
         return mixed_density(self.materials, self.density_kg_m3)
+
+    @property
+    def has_one_concentration(self) -> bool:
+        """Whether the solids of the mud are given, and once only."""
+        return (self.solids_kg_m3 is None) != (self.concentration is None)
 
     @property
     def volume_fraction(self) -> float:

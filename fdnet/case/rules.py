@@ -31,6 +31,8 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
     `bad`: keys whose own value was refused, so that nothing can be said about them.
     """
     unsized = {f"{name}.radius_mm" for name in _SPHERES if not _has_one_curve(tables.get(name))}
+    if (fines := tables.get("fines")) is None or not fines.has_one_concentration:
+        unsized.add("fines.concentration")
     for rule in RULES:
         given = [tables.get(name) for name in rule.tables]
         silent = set(bad) if rule in SIZE_RULES else unsized | set(bad)

@@ -54,23 +54,23 @@ def parse_sizes(text: str) -> tuple[list[float], list[float]]:
 
 def _size_column(header: list[str]) -> tuple[int, float]:
     """Index of the column of sizes and the factor of its unit to mm."""
-    found = []
+    columns = []
     for index, name in enumerate(header):
         units = [*_BRACKETS.findall(name), re.split(r"[\s_,]+", name.strip())[-1]]
         factors = [factor for unit in units if (factor := length_factor(unit)) is not None]
         if factors and "%" not in name:
-            found.append((index, factors[0]))
-    if len(found) != 1:
+            columns.append((index, factors[0]))
+    if len(columns) != 1:
         raise ValueError(
-            f"{len(found)} columns of {header} have a unit of length, expected one, named such as "
-            "'size_um' or 'Diameter (mm)'"
+            f"{len(columns)} columns of {header} have a unit of length, expected one, named such "
+            "as 'size_um' or 'Diameter (mm)'"
         )
-    return found[0]
+    return columns[0]
 
 
 def _percent_column(header: list[str], sizes: int) -> tuple[int, bool]:
     """Index of the column of cumulative percentages, and whether it counts what is coarser."""
-    found = []
+    columns = []
     for index, name in enumerate(header):
         words = name.lower()
         percent = "%" in words or "percent" in words
@@ -83,13 +83,13 @@ def _percent_column(header: list[str], sizes: int) -> tuple[int, bool]:
                     f"column {name!r}: is it the share on each sieve, or on it and all above? "
                     "Name it 'cumulative % retained' if it is the latter"
                 )
-            found.append((index, coarser))
-    if len(found) != 1:
+            columns.append((index, coarser))
+    if len(columns) != 1:
         raise ValueError(
-            f"{len(found)} columns of {header} are cumulative percentages, expected one, named "
+            f"{len(columns)} columns of {header} are cumulative percentages, expected one, named "
             "such as 'passing %', 'cumulative % finer' or 'cumulative % retained'"
         )
-    return found[0]
+    return columns[0]
 
 
 def _row(row: list[str], sizes: int, percents: int, *, comma: bool) -> tuple[float, float]:

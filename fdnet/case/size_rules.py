@@ -54,7 +54,7 @@ def _cut(fines: Fines) -> Iterator[str]:
 
 def _solids(fines: Fines) -> Iterator[str]:
     """The solids are given once, and are no more than fit."""
-    if (fines.solids_kg_m3 is None) == (fines.concentration is None):
+    if not fines.has_one_concentration:
         yield (
             f"fines.solids_kg_m3: {fines.solids_kg_m3} with fines.concentration: "
             f"{fines.concentration}, give exactly one of the two"

@@ -128,7 +128,7 @@ def _with_unit(
         return {key: table[key]}
     target, value = meant[0], table[key]
     if target in table:
-        spoken.refuse(dotted, f"given beside {target}, give one of the two")
+        spoken.refuse(dotted, f"given next to {target}, give one of the two")
         spoken.bad.add(_two_parts(dotted, target))
         return {}
     texts = list(value) if isinstance(value, list | tuple) else [value]
@@ -149,7 +149,7 @@ def _with_unit(
 
 
 def _two_parts(dotted: str, target: str) -> str:
-    """The key `target` beside `dotted`, by at most its first two parts."""
+    """The key `target` next to `dotted`, by at most its first two parts."""
     return ".".join([*dotted.split(".")[:-1], target][:2])
 
 
@@ -157,11 +157,11 @@ def _curve(
     spoken: Spoken, dotted: str, value: Any, table: Mapping[str, Any], folder: Path
 ) -> dict[str, Any]:
     """The points of the file that a table of sizes names."""
-    beside = [key for key in table if stem_of(key) in ("size", "passing", "D10", "D50", "D90")]
+    others = [key for key in table if stem_of(key) in ("size", "passing", "D10", "D50", "D90")]
     if not isinstance(value, str):
         spoken.refuse(dotted, f"{value!r} should be the path of a CSV file, in quotes")
-    elif beside:
-        spoken.refuse(dotted, f"given beside {beside[0]}, give one of the two")
+    elif others:
+        spoken.refuse(dotted, f"given next to {others[0]}, give one of the two")
     else:
         try:
             size, passing = read_size_file(folder, value)

@@ -1,4 +1,4 @@
-"""Sizes of the spheres that a run placed, beside those that its case asks for."""
+"""Sizes of the spheres that a run placed, next to those that its case asks for."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -34,7 +34,7 @@ def diameter_at(curve: SizeCurve, share: float) -> float | None:
 def size_rows(case: Case) -> list[tuple[str, str, float, str, str, str]]:
     """Rows of the table of scales: name, symbol, value, unit, formula, source.
 
-    They are the diameters of every measured curve beside those given, and its ends.
+    They are the diameters of every measured curve next to those given, and its ends.
     """
     rows = []
     for name, spheres in sized(case).items():
@@ -52,7 +52,7 @@ def _curve_rows(name: str, spheres: Spheres) -> Iterator[tuple[str, str, float, 
         if value is None:
             continue
         given = asked.get(share)
-        beside = (
+        compared = (
             "" if given is None else f", given {given:.4g} m ({100 * (value / given - 1):+.1f} %)"
         )
         yield (
@@ -60,7 +60,7 @@ def _curve_rows(name: str, spheres: Spheres) -> Iterator[tuple[str, str, float, 
             f"D{100 * share:.0f}",
             value,
             "m",
-            f"{law} curve{beside}",
+            f"{law} curve{compared}",
             _SOURCES[law],
         )
 

@@ -103,7 +103,7 @@ def test_the_table_of_scales_shows_each_diameter_beside_the_given_one():
         ({"D10": "20 psi", "D50": "40 um"}, "'psi' is a unit of pressure"),
         ({"D10": 20.0, "D50": "40 um"}, "sizes.D10: 20.0 has no unit"),
         ({"file": "none.csv"}, "cannot be read as a table of sizes"),
-        ({"file": "none.csv", "D10": "20 um"}, "given beside D10"),
+        ({"file": "none.csv", "D10": "20 um"}, "given next to D10"),
     ],
 )
 def test_a_bad_curve_gets_one_clear_problem(part, expected):
