@@ -22,6 +22,7 @@ LAYERS = [
 
 NETWORK_LAYERS = [
     ["geometry", "compiled"],
+    ["field"],
     ["tessellation"],
     ["network"],
     ["fines", "flow"],
@@ -65,6 +66,7 @@ DOORS = {
     "matplotlib": {
         "report/figures",
         "report/side_view",
+        "report/size_figure",
         "studies/accuracy/figure",
         "studies/engine/draw",
         "studies/thesis/figures/canvas",

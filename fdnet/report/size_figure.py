@@ -39,6 +39,8 @@ class Sizes(Protocol):
 
 def fill_size_curves(figure: Any, *, sizes: Sequence[Sizes]) -> None:
     """Share finer by volume, in percent, over the diameter on a logarithmic axis."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
     axes = figure.add_subplot()
     for one in sizes:
         colour, curve = COLOURS[one.name], one.curve
@@ -52,17 +54,17 @@ def fill_size_curves(figure: Any, *, sizes: Sequence[Sizes]) -> None:
         )
         if one.invaded is not None and len(one.invaded):
             label = f"{len(one.invaded)} of them invaded"
-            _stairs(axes, one.invaded, None, color=INVADED, linestyle="--", label=label)
+            _stairs(axes, one.invaded, curve, color=INVADED, linestyle="--", label=label)
     axes.set_xscale("log")
     axes.set(xlabel="diameter (µm)", ylabel="finer by volume (%)", ylim=(0, 100))
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_locator(NullLocator())
     axes.legend(fontsize=9)
 
 
-def _stairs(axes: Any, diameter: Array, curve: SizeCurve | None, **style: Any) -> None:
-    """Steps of some spheres; with a curve, as shares of all its solids."""
+def _stairs(axes: Any, diameter: Array, curve: SizeCurve, **style: Any) -> None:
+    """Steps of some spheres, from the share that is left out below to that above."""
     rising = np.sort(diameter)
-    finer = np.cumsum(rising**3) / np.sum(rising**3)
-    if curve is not None:
-        finer = curve.below + curve.kept * finer
+    finer = curve.below + curve.kept * np.cumsum(rising**3) / np.sum(rising**3)
     axes.step(MICRON * rising, 100 * finer, where="post", linewidth=1.3, **style)
