@@ -118,7 +118,7 @@ def test_each_fine_of_several_materials_falls_by_its_own_density(binary, tmp_pat
         "run={duration_ms=0.2, checkpoint_ms=0.2}",
     )
     data = case.data()
-    data["fines"] = {"count": 6, "concentration": 0.01, "materials": materials}
+    data["fines"] = {"count": 6, "concentration": 0.01, "supply": "slab", "materials": materials}
     case = case_from(data)
     fines, elapsed = fallen(case, binary, tmp_path)
     density = densities(case, [6])
