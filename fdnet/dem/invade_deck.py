@@ -11,6 +11,7 @@ from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, plug_allowance, quiet_chunks
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
 from fdnet.dem.drag import BELOW_ZERO, drag_variables
+from fdnet.dem.fluid import STATE
 from fdnet.dem.overlap import is_watched, watch_variables
 from fdnet.dem.scene import contact_variables, header_variables, wall_variables, write_data
 from fdnet.dem.supply import AT_ONCE, batches_of, place_batches, place_fines, slab_end
@@ -59,6 +60,7 @@ def write_invade_inputs(
     )
     deck = render_invade(case, scales, grains, ranks=ranks)
     write_text(folder / "in.invade", deck.text)
+    write_driven_parts(case, scales, folder)
     return deck
 
 
@@ -84,10 +86,15 @@ def write_batches(
     return reduce(Snapshot.joined, batches[:AT_ONCE])
 
 
+def batch_chunks(case: InvasionCase, scales: InvasionScales) -> range:
+    """The chunks that take in a batch; empty when all fines are there from the start."""
+    return range(AT_ONCE, max(AT_ONCE, len(batches_of(case, scales).counts)))
+
+
 def _feeding(case: InvasionCase, scales: InvasionScales) -> dict[str, int] | None:
     """First and last chunk that take in a batch; None when all fines are there from the start."""
-    later = len(batches_of(case, scales).counts) - AT_ONCE
-    return {"first": AT_ONCE, "last": AT_ONCE + later - 1} if later > 0 else None
+    chunks = batch_chunks(case, scales)
+    return {"first": chunks[0], "last": chunks[-1]} if chunks else None
 
 
 def _margin(case: InvasionCase, scales: InvasionScales) -> float:
@@ -135,7 +142,7 @@ def render_invade(
             "fixed_grains": not mobile,
             "moving": "all" if mobile else "fines",
             "gravity": gravity,
-            "dump_group": "all" if mobile else "fines",
+            "dump_group": _dumped(case),
             "start_velocity": number(scales.upstream_velocity),
             "drag": drag_variables(case, scales),
             "overlap": watch_variables(case, scales),
@@ -155,6 +162,35 @@ def render_invade(
         },
     )
     return Deck(text=text, stage="invade", digest=case.digest("invade"), left_out=tuple(left_out))
+
+
+def write_driven_parts(case: InvasionCase, scales: InvasionScales, folder: Path) -> None:
+    """Write the files that fdnet feeds to LIGGGHTS beside the deck; none when it is not driven."""
+    for name, text in driven_parts(case, scales).items():
+        write_text(folder / name, text)
+
+
+def driven_parts(case: InvasionCase, scales: InvasionScales) -> dict[str, str]:
+    """Name and text of each file that a driven deck is continued by; empty when it is not."""
+    if not case.drag.driven:
+        return {}
+    shown = {"dump_columns": COLUMNS, "dump_format": FORMAT, "dump_group": _dumped(case)}
+    coefficient = "Ksl" if case.drag.scheme == "implicit" else "cd"
+    drag = drag_variables(case, scales)
+    parts = {
+        "ask.in": render_text("ask.in.j2", shown | {"state": STATE}),
+        "fluid.in": render_text("fluid.in.j2", {"coefficient": coefficient}),
+        "checkpoint.in": render_text(
+            "checkpoint.in.j2", shown | {"allowance": plug_allowance(case, scales)}
+        ),
+    }
+    if drag["hold_steps"]:
+        parts["held.in"] = render_text("held.in.j2", {"drag": drag})
+    return parts
+
+
+def _dumped(case: InvasionCase) -> str:
+    return "all" if case.grains.motion == "mobile" else "fines"
 
 
 def _skin(case: InvasionCase) -> float:

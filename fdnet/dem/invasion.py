@@ -4,6 +4,7 @@ A checkpoint after every chunk of steps lets a cut run go on.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from fdnet.case.case import InvasionCase
@@ -19,17 +20,20 @@ from fdnet.dem.checkpoint import (
     readable_states,
 )
 from fdnet.dem.checkpoint_record import (
-    WatchReader,
     keep_doubts,
     kept_doubts,
     last_checkpoint,
     passed_over,
     refuse_other_ranks,
-    write_record,
 )
+from fdnet.dem.crowd import fluid_of
 from fdnet.dem.deck import Deck, LeftOut
 from fdnet.dem.digests import checkpoint_files
-from fdnet.dem.invade_deck import SCRATCH, render_invade, write_batches, write_invade_inputs
+from fdnet.dem.driven import Drive
+from fdnet.dem.feed import run_fed
+from fdnet.dem.fluid import Fluid
+from fdnet.dem.keeper import CheckpointKeeper
+from fdnet.dem.invade_deck import SCRATCH, render_invade, write_batches, write_driven_parts, write_invade_inputs
 from fdnet.dem.liggghts import Launch, Run, run_deck
 from fdnet.dem.overlap import (
     WATCH,
@@ -41,9 +45,10 @@ from fdnet.dem.overlap import (
     refuse_overlap,
 )
 from fdnet.dem.supply import batches_of
+from fdnet.dem.updates import UPDATES
 from fdnet.dem.verdict import SCREEN
 from fdnet.errors import LiggghtsError
-from fdnet.files.atomic import disk_is_full, write_text
+from fdnet.files.atomic import write_text
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Snapshot
 
@@ -85,16 +90,27 @@ class Invasion:
 
 
 def invade(
-    case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path, launch: Launch
+    case: InvasionCase,
+    scales: InvasionScales,
+    grains: Snapshot,
+    folder: Path,
+    launch: Launch,
+    *,
+    fluid: Fluid | None = None,
 ) -> Invasion:
     """Drive the fines in; continues from the last complete checkpoint when `folder` holds one.
+
+    A driven case (`case.drag.driven`) is driven by `fluid`; None: by the fluid that the case alone
+    describes (`fdnet.dem.crowd`).
 
     Raises LiggghtsError when a run fails or fines are lost, CaseError when the fines cannot be
     placed or the invasion was begun on another number of MPI ranks.
     """
     (folder / "post").mkdir(parents=True, exist_ok=True)
     refuse_other_ranks(folder, case, launch.ranks)
-    deck, run = _drive(case, scales, grains, folder, launch)
+    if fluid is None and case.drag.driven:
+        fluid = fluid_of(case, scales)
+    deck, run = _drive(case, scales, grains, folder, launch, fluid)
     history = read_history(folder)
     overlaps, damaged = [], grains
     for _, damaged in readable_states(folder, history, case, scales, grains):
@@ -122,10 +138,14 @@ def invade(
 
 
 def _drive(
-    case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path, launch: Launch
+    case: InvasionCase,
+    scales: InvasionScales,
+    grains: Snapshot,
+    folder: Path,
+    launch: Launch,
+    fluid: Fluid | None,
 ) -> tuple[Deck, Run | None]:
     """Run to the end of the invasion; no run when the last checkpoint was the end already."""
-
     while True:
         last = last_checkpoint(folder, case)
         keep_doubts(folder, passed_over(folder, case, last))
@@ -135,18 +155,32 @@ def _drive(
         if _over(case, scales, last):
             return deck, None
         keeper = CheckpointKeeper(folder, case, scales, grains, launch=launch)
-        run = _run(folder, last, replace(launch, follow=keeper))
+        drive = fluid and Drive(
+            case=case,
+            scales=scales,
+            grains=grains,
+            folder=folder,
+            fluid=fluid,
+            last=last,
+            over=partial(_over, case, scales),
+        )
+        run = _run(folder, last, replace(launch, follow=keeper), drive)
         if run is not None:
             return deck, run
 
 
-def _run(folder: Path, last: Checkpoint | None, launch: Launch) -> Run | None:
+def _run(
+    folder: Path, last: Checkpoint | None, launch: Launch, drive: Drive | None
+) -> Run | None:
     """The run, or None when LIGGGHTS could not read the restart (a full disk cuts it silently).
 
     The restart is then set aside, so that the checkpoint before it is tried next.
     """
+    deck = "in.invade" if last is None else "in.invade.resume"
     try:
-        return run_deck(folder, "in.invade" if last is None else "in.invade.resume", launch)
+        if drive is not None:
+            return run_fed(folder, deck, launch, drive.play)
+        return run_deck(folder, deck, launch)
     except LiggghtsError:
         with (folder / SCREEN).open("rb") as file:
             screen = file.read(_START_OF_SCREEN)
@@ -157,61 +191,6 @@ def _run(folder: Path, last: Checkpoint | None, launch: Launch) -> Run | None:
         return None
     finally:
         (folder / SCRATCH).unlink(missing_ok=True)
-
-
-class CheckpointKeeper:
-    """Follows the screen of a run and passes every line on.
-
-    At each checkpoint it records what is whole now, keeps the two newest restarts, and stops a run
-    that writes to a full disk or whose fines overlap too much. LIGGGHTS itself goes on after a
-    failed write and ends with exit code 0. Older restarts are removed only while there is room on
-    the disk.
-    """
-
-    def __init__(
-        self,
-        folder: Path,
-        case: InvasionCase,
-        scales: InvasionScales,
-        grains: Snapshot,
-        *,
-        launch: Launch,
-    ) -> None:
-        self.folder, self.case, self.scales, self.grains = folder, case, scales, grains
-        self.ranks, self.follow, self.watch = launch.ranks, launch.follow, WatchReader(folder)
-
-    def __call__(self, line: str) -> None:
-        if line.startswith("FDNET checkpoint"):
-            self._keep(int(line.split()[3]))
-        if self.follow:
-            self.follow(line)
-
-    def _keep(self, step: int) -> None:
-        if disk_is_full(self.folder):
-            raise LiggghtsError(
-                f"{self.folder}: the disk is full, LIGGGHTS was stopped; make room and "
-                "continue with --resume"
-            )
-        rows = [row for row in read_history(self.folder) if row.step == step]
-        overlaps = self.watch.upto(step)
-        if rows:
-            write_record(self.folder, rows[-1], self.case, ranks=self.ranks, overlaps=overlaps)
-        elif self.case.run.on_overlap == "stop":
-            raise LiggghtsError(
-                f"{self.folder / HISTORY}: no row for the checkpoint at step {step}; continue "
-                "with --resume"
-            )
-        restarts = [
-            (at, path)
-            for at, path in checkpoint_files(self.folder)
-            if path.suffix == ".restart" and at <= step
-        ]
-        for _, old in sorted(restarts)[:-2]:
-            old.unlink(missing_ok=True)
-        for row in rows[-1:]:
-            refuse_overlap(
-                self.case, self.scales, self.grains, self.folder, history=[row], last=row
-            )
 
 
 def _over(case: InvasionCase, scales: InvasionScales, last: Checkpoint | None) -> bool:
@@ -235,7 +214,7 @@ def _prepare(
     """Write the inputs of a start, or of a restart from `last` with later files removed."""
     if last is None:
         old = (path for _, path in checkpoint_files(folder))
-        for stale in [folder / HISTORY, folder / WATCH, *old]:
+        for stale in [folder / HISTORY, folder / WATCH, folder / UPDATES, *old]:
             stale.unlink(missing_ok=True)
         deck = write_invade_inputs(case, scales, grains, folder, ranks=ranks)
         write_text(folder / HISTORY, HISTORY_HEADER + "\n")
@@ -250,6 +229,7 @@ def _prepare(
             path.unlink()
     if case.fines.supply == "batches":
         write_batches(case, scales, grains, folder)
+    write_driven_parts(case, scales, folder)
     deck = render_invade(case, scales, grains, ranks=ranks, resume=last)
     write_text(folder / "in.invade.resume", deck.text)
     return deck
