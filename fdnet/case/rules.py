@@ -176,10 +176,18 @@ def _field(drag: Drag) -> Iterator[str]:
 
 
 def _crowd(drag: Drag) -> Iterator[str]:
-    if drag.crowd != "none":
+    if drag.driven and drag.scheme == "viscous":
         yield (
-            f"drag.crowd: {drag.crowd!r} needs the porosity around each fine during a run, which "
-            "is not available yet; expected 'none'"
+            "drag.scheme: 'viscous' has one damping for all fines, drag.crowd "
+            f"{drag.crowd!r} one for each; take 'implicit', 'held' or 'every_step'"
+        )
+
+
+def _update_travel(drag: Drag) -> Iterator[str]:
+    if drag.update_travel is not None and not drag.driven:
+        yield (
+            f"drag.update_travel: {drag.update_travel:g} belongs to a drag that is computed while "
+            "LIGGGHTS waits; leave it out, or set drag.crowd = 'beetstra'"
         )
 
 
@@ -201,7 +209,7 @@ def _viscous(drag: Drag, fines: Fines) -> Iterator[str]:
 
 
 def _implicit(drag: Drag) -> Iterator[str]:
-    if drag.scheme == "implicit" and drag.upstream == "darcy":
+    if drag.scheme == "implicit" and drag.upstream == "darcy" and not drag.driven:
         yield (
             "drag.upstream: 'darcy' changes the fluid's velocity at x = 0, drag.scheme "
             "'implicit' keeps one a fine; take 'interstitial', or another drag.scheme"
@@ -262,7 +270,8 @@ RULES = (
     Rule(("well", "fluid.velocity_m_s", "fluid.darcy_length_mm"), _one_drive),
     Rule(("well.radius_mm", "well.drainage_radius_m"), _radii_of_well),
     Rule(("drag.field",), _field),
-    Rule(("drag.crowd",), _crowd),
+    Rule(("drag.scheme", "drag.crowd", "drag.field"), _crowd),
+    Rule(("drag.update_travel", "drag.crowd", "drag.field"), _update_travel),
     Rule(("drag.scheme", "drag.refresh_steps"), _refresh),
     Rule(("drag.scheme", "fines.radius_mm"), _viscous),
     Rule(("drag.scheme", "drag.upstream"), _implicit),

@@ -114,11 +114,11 @@ class Drive:
 
 
 def steps_between(case: InvasionCase, scales: InvasionScales, pace: float) -> int:
-    """Steps in which a fine at `pace` m/s covers `drag.update_travel` of the smallest diameter.
+    """Steps in which a fine at `pace` m/s covers `drag.update_travel` smallest diameters.
 
     They are whole refreshes of the drag, at least one.
     """
-    travel = case.drag.update_travel * 2 * case.fines.radius_range_m[0]
+    travel = case.drag.travel_diameters * 2 * case.fines.radius_range_m[0]
     refresh = scales.time_step * scales.hold_steps
     most = scales.checkpoint_steps // scales.hold_steps
     refreshes = travel / (pace * refresh) if pace > 0 else math.inf

@@ -71,18 +71,12 @@ class Fluid(Protocol):
 
 
 def write_forces(folder: Path, spheres: Snapshot, forces: FluidForces) -> None:
-    """Write the files that the deck reads: the number of atoms, then id and value of each.
-
-    Atoms that are not named have no value, so grains are named too, with 0.
-    """
+    """Write the files that the deck reads: the number of fines, then id and value of each."""
     fines = spheres.fines()
     carried = forces.velocity + forces.push / forces.coefficient[:, None]
-    highest = int(spheres.id.max())
     for name, value in zip(_FILES, (forces.coefficient, *carried.T), strict=True):
-        every = np.zeros(highest + 1)
-        every[fines.id] = value
-        lines = [f"{atom} {number:.17g}" for atom, number in enumerate(every.tolist())]
-        lines[0] = str(highest)
+        rows = zip(fines.id.tolist(), value.tolist(), strict=True)
+        lines = [str(len(fines)), *(f"{atom} {number:.17g}" for atom, number in rows)]
         (folder / "post" / f"fluid.{name}").write_text("\n".join(lines) + "\n")
 
 

@@ -11,7 +11,7 @@ from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, plug_allowance, quiet_chunks
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
 from fdnet.dem.drag import BELOW_ZERO, drag_variables
-from fdnet.dem.fluid import STATE
+from fdnet.dem.driven_deck import dumped_group, write_driven_parts
 from fdnet.dem.overlap import is_watched, watch_variables
 from fdnet.dem.scene import contact_variables, header_variables, wall_variables, write_data
 from fdnet.dem.supply import AT_ONCE, batches_of, place_batches, place_fines, slab_end
@@ -142,7 +142,7 @@ def render_invade(
             "fixed_grains": not mobile,
             "moving": "all" if mobile else "fines",
             "gravity": gravity,
-            "dump_group": _dumped(case),
+            "dump_group": dumped_group(case),
             "start_velocity": number(scales.upstream_velocity),
             "drag": drag_variables(case, scales),
             "overlap": watch_variables(case, scales),
@@ -162,35 +162,6 @@ def render_invade(
         },
     )
     return Deck(text=text, stage="invade", digest=case.digest("invade"), left_out=tuple(left_out))
-
-
-def write_driven_parts(case: InvasionCase, scales: InvasionScales, folder: Path) -> None:
-    """Write the files that fdnet feeds to LIGGGHTS beside the deck; none when it is not driven."""
-    for name, text in driven_parts(case, scales).items():
-        write_text(folder / name, text)
-
-
-def driven_parts(case: InvasionCase, scales: InvasionScales) -> dict[str, str]:
-    """Name and text of each file that a driven deck is continued by; empty when it is not."""
-    if not case.drag.driven:
-        return {}
-    shown = {"dump_columns": COLUMNS, "dump_format": FORMAT, "dump_group": _dumped(case)}
-    coefficient = "Ksl" if case.drag.scheme == "implicit" else "cd"
-    drag = drag_variables(case, scales)
-    parts = {
-        "ask.in": render_text("ask.in.j2", shown | {"state": STATE}),
-        "fluid.in": render_text("fluid.in.j2", {"coefficient": coefficient}),
-        "checkpoint.in": render_text(
-            "checkpoint.in.j2", shown | {"allowance": plug_allowance(case, scales)}
-        ),
-    }
-    if drag["hold_steps"]:
-        parts["held.in"] = render_text("held.in.j2", {"drag": drag})
-    return parts
-
-
-def _dumped(case: InvasionCase) -> str:
-    return "all" if case.grains.motion == "mobile" else "fines"
 
 
 def _skin(case: InvasionCase) -> float:

@@ -30,10 +30,11 @@ from fdnet.dem.crowd import fluid_of
 from fdnet.dem.deck import Deck, LeftOut
 from fdnet.dem.digests import checkpoint_files
 from fdnet.dem.driven import Drive
+from fdnet.dem.driven_deck import write_driven_parts
 from fdnet.dem.feed import run_fed
 from fdnet.dem.fluid import Fluid
 from fdnet.dem.keeper import CheckpointKeeper
-from fdnet.dem.invade_deck import SCRATCH, render_invade, write_batches, write_driven_parts, write_invade_inputs
+from fdnet.dem.invade_deck import SCRATCH, render_invade, write_batches, write_invade_inputs
 from fdnet.dem.liggghts import Launch, Run, run_deck
 from fdnet.dem.overlap import (
     WATCH,

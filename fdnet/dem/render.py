@@ -7,7 +7,8 @@ import numpy as np
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.stages import LIGGGHTS_STAGES
-from fdnet.dem.invade_deck import render_invade, write_driven_parts
+from fdnet.dem.driven_deck import write_driven_parts
+from fdnet.dem.invade_deck import render_invade
 from fdnet.dem.pack_deck import write_pack_inputs
 from fdnet.dem.scene import box_of
 from fdnet.errors import CaseError

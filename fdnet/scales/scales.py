@@ -16,7 +16,13 @@ from fdnet.scales.slab import slab_of, slab_warnings
 from fdnet.scales.springs import Contact, contacts_of, stiffness_factor
 from fdnet.scales.sticking import Sticking, sticking_of, sticking_warnings
 from fdnet.scales.stop_times import chunk_refreshes, plug_warnings, stop_times
-from fdnet.scales.time_step import drag_warnings, hold_steps, relaxation_time, time_step
+from fdnet.scales.time_step import (
+    densest_factor,
+    drag_warnings,
+    hold_steps,
+    relaxation_time,
+    time_step,
+)
 from fdnet.scales.velocity import Velocity, velocity_of, velocity_warnings
 
 MOST_STEPS = 2**31 - 1
@@ -137,7 +143,7 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     relaxation = _relaxation_times(case)
     step = time_step(case, shared.contacts, relaxation[0])
     times = stop_times(case, slab, interstitial=velocity, upstream=upstream)
-    hold = hold_steps(case, step, relaxation[0], times.chunk)
+    hold = hold_steps(case, step, relaxation[0] / densest_factor(case), times.chunk)
     chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
     contact = shared.contacts["grain-fine"]
     overlaps = overlaps_of(case, contact.normal_stiffness, velocity)
