@@ -14,7 +14,7 @@ from pathlib import Path
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, read_history
 from fdnet.dem.feed import Feed
-from fdnet.dem.fluid import STATE, Fluid, Moment, largest_share, write_forces
+from fdnet.dem.fluid import STATE, Fluid, FluidForces, Moment, largest_share, write_forces
 from fdnet.dem.invade_deck import SUPPLY, batch_chunks
 from fdnet.dem.scene import snapshot_of
 from fdnet.dem.updates import Updates
@@ -91,9 +91,7 @@ class Drive:
             step=step, time=time, before=updates.last, first=updates.first, fresh=fresh
         )
         forces = self.fluid.forces(spheres, moment)
-        self._refuse_overshoot(spheres, largest_share(
-            spheres, forces, self.case.fines.density_kg_m3,
-            self.scales.time_step * self.scales.hold_steps))
+        self._refuse_overshoot(spheres, forces)
         write_forces(self.folder, spheres, forces)
         updates.add(step, time, forces.measures)
         feed("include fluid.in")
@@ -103,7 +101,9 @@ class Drive:
         moved = snapshot_of(read_frame(self.folder / STATE), self.case, time_s=time)
         return moved if self.case.grains.motion == "mobile" else self.grains.joined(moved)
 
-    def _refuse_overshoot(self, spheres: Snapshot, share: float) -> None:
+    def _refuse_overshoot(self, spheres: Snapshot, forces: FluidForces) -> None:
+        held = self.scales.time_step * self.scales.hold_steps
+        share = largest_share(spheres, forces, self.case.fines.density_kg_m3, held)
         if self.case.drag.scheme != "implicit" and share > DRAG_LIMIT:
             raise LiggghtsError(
                 f"{self.folder}: at step {spheres.step} drag is constant for {share:.3g} "

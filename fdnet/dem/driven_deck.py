@@ -1,4 +1,4 @@
-"""The files beside a driven deck, which fdnet tells LIGGGHTS to include as the invasion goes on."""
+"""The files beside a driven deck, which LIGGGHTS is told to include as the invasion goes on."""
 
 from pathlib import Path
 

@@ -27,7 +27,10 @@ class _EndedError(Exception):
 
 
 class Feed:
-    """A LIGGGHTS that waits for commands; call it with some, and it returns when they are done."""
+    """A LIGGGHTS that waits for commands; call it with some, and it returns when they are done.
+
+    `busy` are the seconds that it has worked on them.
+    """
 
     def __init__(
         self,
@@ -40,7 +43,7 @@ class Feed:
     ) -> None:
         self.process, self.folder, self.screen = process, folder, screen
         self.follow, self.deadline = follow, deadline
-        self._fed, self._rest = 0, b""
+        self.busy, self._fed, self._rest = 0.0, 0, b""
 
     def __call__(self, *commands: str) -> None:
         """Carry out the commands, in order.
@@ -48,11 +51,12 @@ class Feed:
         Raises LiggghtsError after the time limit or when the screen is flooded, and what `follow`
         raises. `run_fed` reports a LIGGGHTS that ends before it has done them.
         """
-        self._fed += 1
+        self._fed, began = self._fed + 1, time.monotonic()
         mark = f"FDNET fed {self._fed}"
         self._write("".join(f"{line}\n" for line in (*commands, f'print "{mark}"')))
         while mark not in self._lines():
             pass
+        self.busy += time.monotonic() - began
 
     def finish(self) -> None:
         """Let LIGGGHTS print its end mark and end."""
@@ -109,7 +113,7 @@ def run_fed(folder: Path, deck: str, launch: Launch, play: Callable[[Feed], None
     raises. LIGGGHTS is stopped then, and what it wrote is kept.
     """
     command, start = launch.binary.command(None, launch.ranks), time.monotonic()
-    deadline = None if launch.timeout is None else start + launch.timeout
+    deadline, waited = None if launch.timeout is None else start + launch.timeout, 0.0
     with (
         only_writer(folder) as lock,
         (folder / SCREEN).open("wb", buffering=0) as screen,
@@ -124,19 +128,22 @@ def run_fed(folder: Path, deck: str, launch: Launch, play: Callable[[Feed], None
     ):
         feed = Feed(process, folder, screen, follow=launch.follow, deadline=deadline)
         try:
+            began = time.monotonic()
             play(feed)
+            waited = time.monotonic() - began - feed.busy
             feed.finish()
         except _EndedError:
             process.wait()
         finally:
             _close(process)
-    verify(folder, deck, process.returncode)
+    verify(folder, deck, process.returncode)  # no run that was cut short gets beyond this
     return Run(
         directory=folder,
         command=tuple(command),
         version=launch.binary.version,
         seconds=time.monotonic() - start,
         ranks=launch.ranks,
+        waited=waited,
     )
 
 

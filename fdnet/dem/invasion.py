@@ -3,6 +3,7 @@
 A checkpoint after every chunk of steps lets a cut run go on.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -26,15 +27,14 @@ from fdnet.dem.checkpoint_record import (
     passed_over,
     refuse_other_ranks,
 )
-from fdnet.dem.crowd import fluid_of
 from fdnet.dem.deck import Deck, LeftOut
 from fdnet.dem.digests import checkpoint_files
 from fdnet.dem.driven import Drive
 from fdnet.dem.driven_deck import write_driven_parts
 from fdnet.dem.feed import run_fed
 from fdnet.dem.fluid import Fluid
-from fdnet.dem.keeper import CheckpointKeeper
 from fdnet.dem.invade_deck import SCRATCH, render_invade, write_batches, write_invade_inputs
+from fdnet.dem.keeper import CheckpointKeeper
 from fdnet.dem.liggghts import Launch, Run, run_deck
 from fdnet.dem.overlap import (
     WATCH,
@@ -46,9 +46,9 @@ from fdnet.dem.overlap import (
     refuse_overlap,
 )
 from fdnet.dem.supply import batches_of
-from fdnet.dem.updates import UPDATES
+from fdnet.dem.updates import UPDATES, read_updates
 from fdnet.dem.verdict import SCREEN
-from fdnet.errors import LiggghtsError
+from fdnet.errors import CaseError, LiggghtsError
 from fdnet.files.atomic import write_text
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Snapshot
@@ -71,6 +71,7 @@ class Invasion:
         warnings: doubts about how it ended, one sentence each.
         ranks: MPI ranks of all executions of LIGGGHTS.
         runs: executions of LIGGGHTS; empty when an earlier session had come to the end.
+        updates: the record of a driven invasion, one row an update; empty when it is not driven.
     """
 
     damaged: Snapshot
@@ -83,6 +84,7 @@ class Invasion:
     warnings: tuple[str, ...]
     ranks: int
     runs: tuple[Run, ...]
+    updates: tuple[Mapping[str, float], ...]
 
     @property
     def max_overlap(self) -> float:
@@ -101,16 +103,14 @@ def invade(
 ) -> Invasion:
     """Drive the fines in; continues from the last complete checkpoint when `folder` holds one.
 
-    A driven case (`case.drag.driven`) is driven by `fluid`; None: by the fluid that the case alone
-    describes (`fdnet.dem.crowd`).
+    A driven case (`case.drag.driven`) needs the `fluid` that answers for its fines.
 
     Raises LiggghtsError when a run fails or fines are lost, CaseError when the fines cannot be
     placed or the invasion was begun on another number of MPI ranks.
     """
     (folder / "post").mkdir(parents=True, exist_ok=True)
     refuse_other_ranks(folder, case, launch.ranks)
-    if fluid is None and case.drag.driven:
-        fluid = fluid_of(case, scales)
+    _refuse_undriven(case, fluid)
     deck, run = _drive(case, scales, grains, folder, launch, fluid)
     history = read_history(folder)
     overlaps, damaged = [], grains
@@ -135,7 +135,19 @@ def invade(
         warnings=tuple(warnings),
         ranks=launch.ranks,
         runs=(run,) if run else (),
+        updates=tuple(read_updates(folder)),
     )
+
+
+def _refuse_undriven(case: InvasionCase, fluid: Fluid | None) -> None:
+    """Raise CaseError unless a driven case, and no other, has a fluid."""
+    if case.drag.driven != (fluid is not None):
+        raise CaseError(
+            f"drag.crowd: {case.drag.crowd!r} with drag.field {case.drag.field!r} "
+            f"{'needs' if case.drag.driven else 'takes'} "
+            f"{'a' if case.drag.driven else 'no'} fluid that fdnet computes; run the case with "
+            "fdnet run or fdnet.run_case"
+        )
 
 
 def _drive(
@@ -156,23 +168,23 @@ def _drive(
         if _over(case, scales, last):
             return deck, None
         keeper = CheckpointKeeper(folder, case, scales, grains, launch=launch)
-        drive = fluid and Drive(
-            case=case,
-            scales=scales,
-            grains=grains,
-            folder=folder,
-            fluid=fluid,
-            last=last,
-            over=partial(_over, case, scales),
-        )
-        run = _run(folder, last, replace(launch, follow=keeper), drive)
+        follower, drive = replace(launch, follow=keeper), None
+        if fluid is not None:
+            drive = Drive(
+                case=case,
+                scales=scales,
+                grains=grains,
+                folder=folder,
+                fluid=fluid,
+                last=last,
+                over=partial(_over, case, scales),
+            )
+        run = _run(folder, last, follower, drive)
         if run is not None:
             return deck, run
 
 
-def _run(
-    folder: Path, last: Checkpoint | None, launch: Launch, drive: Drive | None
-) -> Run | None:
+def _run(folder: Path, last: Checkpoint | None, launch: Launch, drive: Drive | None) -> Run | None:
     """The run, or None when LIGGGHTS could not read the restart (a full disk cuts it silently).
 
     The restart is then set aside, so that the checkpoint before it is tried next.

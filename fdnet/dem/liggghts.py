@@ -40,6 +40,7 @@ class Run:
         command: command line.
         version: of LIGGGHTS.
         seconds: s, from start to end.
+        waited: s of them, in which LIGGGHTS waited for fdnet to compute something.
         ranks: MPI ranks.
     """
 
@@ -48,6 +49,7 @@ class Run:
     version: str
     seconds: float
     ranks: int
+    waited: float = 0.0
 
 
 def run_deck(folder: Path, deck: str, launch: Launch) -> Run:

@@ -1,8 +1,8 @@
 """Drag in a crowd of fines in the uniform field: Beetstra's law of the porosity around each fine.
 
-The uniform velocity u is the volume of suspension that passes a unit area of pores in a unit of
-time. Where fines of porosity phi stand in it the fluid flows at u / phi between them; where they
-move with it there is no slip. So the superficial slip is u - v in either case, and
+The uniform velocity u is the volume of suspension that passes a unit area of pores in a unit
+of time. Where fines of porosity phi stand in it, the fluid flows at u / phi between them; where
+they move with it, there is no slip. So the superficial slip is u - v in either case, and
 
     F = 6 pi mu r M Y F_b / phi (u - v),
 
@@ -16,25 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.case.case import InvasionCase
-from fdnet.dem.fluid import Fluid, FluidForces, Moment
-from fdnet.errors import CaseError
+from fdnet.dem.fluid import FluidForces, Moment
+from fdnet.network.fines.crowding import local_porosity
 from fdnet.scales.forces.crowd import Crowd, drag_factor
 from fdnet.scales.scales import InvasionScales
-from fdnet.spheres.local_porosity import local_porosity
 from fdnet.spheres.snapshot import Snapshot
-
-
-def fluid_of(case: InvasionCase, scales: InvasionScales) -> Fluid:
-    """The fluid of a driven case in the uniform field.
-
-    Raises CaseError for a field that needs more than the case.
-    """
-    if case.drag.field != "uniform":
-        raise CaseError(
-            f"drag.field: {case.drag.field!r} needs the pore network of the grains; run the case "
-            "with fdnet run or fdnet.run_case"
-        )
-    return UniformCrowd(case=case, scales=scales)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
