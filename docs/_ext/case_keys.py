@@ -11,6 +11,7 @@ UNITS = {
     "_m_s2": "m/s²",
     "_N_m": "N/m",
     "_m_s": "m/s",
+    "_GPa": "GPa",
     "_MPa": "MPa",
     "_cP": "cP",
     "_mD": "mD",

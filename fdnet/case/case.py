@@ -16,6 +16,7 @@ from pydantic import Field, model_validator
 
 from fdnet.case.added import completed, without_added
 from fdnet.case.analysis import AnalysisChoices
+from fdnet.case.contact import MODEL_KEYS, ContactLaw
 from fdnet.case.control import Run
 from fdnet.case.fluid import Fluid, Well
 from fdnet.case.particles import Fines, Grains, Spheres
@@ -37,6 +38,7 @@ KEYS = (
     "well",
     "drag",
     "gravity",
+    "contact",
     "run",
     "analysis",
 )
@@ -75,6 +77,7 @@ class Case(Part):
     well: Well | None = None
     drag: Drag = Drag()
     gravity: Gravity = Gravity()
+    contact: ContactLaw = ContactLaw()
     run: Run = Run()
     analysis: AnalysisChoices = AnalysisChoices()
 
@@ -106,8 +109,14 @@ class Case(Part):
         return self.box.periodic
 
     def data(self) -> dict[str, Any]:
-        """All keys that have a value, defaults written out (TOML knows no null)."""
+        """All keys that have a value, defaults written out (TOML knows no null).
+
+        Keys that only the other contact model reads are left out.
+        """
         data = self.model_dump(mode="json")
+        for name in ("grains", "fines"):
+            for key in self.contact.other_keys & data.get(name, {}).keys():
+                del data[name][key]
         return _without_none({key: data[key] for key in KEYS if key in data})
 
     def toml(self) -> str:
@@ -130,8 +139,17 @@ class Case(Part):
             data["grains"].pop("motion")
             fines = data.get("fines", {}).get("normal_stiffness_N_m")
             scaling = {"stiffness": self.run.stiffness_N_m, "fines_stiffness": fines}
-            data = {key: data[key] for key in ("seed", "box", "grains")} | scaling
+            elastic = self._elastic_of_the_pack(data)
+            data = {key: data[key] for key in ("seed", "box", "grains")} | scaling | elastic
         return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
+
+    def _elastic_of_the_pack(self, data: dict[str, Any]) -> dict[str, Any]:
+        """What the stiffness of a pack depends on besides, with contacts that are not linear."""
+        if self.contact.model == "hooke":
+            return {}
+        fines = data.get("fines", {})
+        keys = ("radius_mm", *sorted(MODEL_KEYS["hertz"]))
+        return {"model": self.contact.model, "fines": {k: fines[k] for k in keys if k in fines}}
 
     def same_specimen(self, text: bytes) -> bool:
         """Whether a case.toml as `toml` wrote it is this case but for `POLICIES`."""

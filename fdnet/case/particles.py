@@ -21,7 +21,7 @@ than 1/370 of a grain at friction 0.55 locks between two grains (`fdnet.scales.s
 
 
 class Spheres(Part):
-    """What grains and fines share: sizes, density and linear (Hooke) contact parameters."""
+    """What grains and fines share: sizes, density and the parameters of their contacts."""
 
     radius_mm: Radius = Field(
         description="Radius of a sphere. A list of two values, [smallest, largest], gives radii "
@@ -37,6 +37,12 @@ class Spheres(Part):
         description="Tangential contact stiffness of the material, scaled like the normal one. "
         "When absent: 0.04 of the normal one, so that friction lets go of fines that roll around "
         "the neck of two grains.",
+    )
+    youngs_modulus_GPa: Positive = Field(
+        description='Young\'s modulus of the material, for contact.model = "hertz".'
+    )
+    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = Field(
+        description='Poisson\'s ratio of the material, for contact.model = "hertz".'
     )
     friction: NonNegative = Field(
         0.55,
@@ -54,6 +60,11 @@ class Spheres(Part):
         """Tangential contact stiffness, N/m: the one given, or `SHEAR_RATIO` of the normal one."""
         given = self.shear_stiffness_N_m
         return SHEAR_RATIO * self.normal_stiffness_N_m if given is None else given
+
+    @property
+    def youngs_modulus_Pa(self) -> float:
+        """Young's modulus of the material, Pa."""
+        return self.youngs_modulus_GPa * 1e9
 
     @property
     def radius_range_m(self) -> tuple[float, float]:
@@ -114,6 +125,17 @@ class Grains(Spheres):
         "absent: 0.04 of the normal one, so that friction lets go of fines that roll around the "
         "neck of two grains. The thesis has 34e9.",
     )
+    youngs_modulus_GPa: Positive = Field(
+        94.3,
+        description="Young's modulus of the grains' material, and of the walls, for "
+        'contact.model = "hertz". The default is the thesis\'s (quartz). `run.stiffness_N_m` '
+        "scales all moduli by one factor.",
+    )
+    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = Field(
+        0.387,
+        description="Poisson's ratio of the grains' material, and of the walls, for "
+        'contact.model = "hertz". The default is E / 2G - 1 of the thesis\'s 94.3 and 34 GPa.',
+    )
     motion: Literal["fixed", "mobile"] = Field(
         "fixed",
         description='Motion of the grains during the invasion: "fixed" keeps them in place, '
@@ -140,6 +162,16 @@ class Fines(Spheres):
         None,
         description="Tangential contact stiffness of the fines' material. When absent: 0.04 of "
         "the normal one. The thesis has 26e9.",
+    )
+    youngs_modulus_GPa: Positive = Field(
+        63.0,
+        description="Young's modulus of the fines' material, for contact.model = \"hertz\". The "
+        "default is the thesis's.",
+    )
+    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = Field(
+        0.212,
+        description="Poisson's ratio of the fines' material, for contact.model = \"hertz\". The "
+        "default is E / 2G - 1 of the thesis's 63 and 26 GPa.",
     )
     concentration: Annotated[float, Field(gt=0, le=MAX_CONCENTRATION)] = Field(
         0.10, description="Volume of fines over the volume of suspension in the slab upstream."

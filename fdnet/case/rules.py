@@ -6,10 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from fdnet.case.analysis import AnalysisChoices
+from fdnet.case.contact import MODEL_KEYS
+from fdnet.case.contact_rules import of_the_model
 from fdnet.case.control import Run
 from fdnet.case.fluid import Fluid, Well
 from fdnet.case.particles import Fines, Grains, Spheres
-from fdnet.case.parts import Box, Drag, Gravity
+from fdnet.case.parts import Box, Drag
 from fdnet.case.values import (
     LEAST_SKIN,
     MOST_BINS,
@@ -216,14 +218,11 @@ def _implicit(drag: Drag) -> Iterator[str]:
         )
 
 
-def _buoyancy(gravity: Gravity) -> Iterator[str]:
-    pulled = [component for component in gravity.acceleration_m_s2 if component]
-    one_axis_down = len(pulled) <= 1 and all(component <= 0 for component in pulled)
-    if gravity.mode != "off" and gravity.buoyancy and not one_axis_down:
+def _inertia(drag: Drag) -> Iterator[str]:
+    if drag.inertia != "none" and drag.scheme in ("viscous", "implicit"):
         yield (
-            f"gravity.acceleration_m_s2: {list(gravity.acceleration_m_s2)}: LIGGGHTS's buoyancy "
-            "needs gravity down one axis, e.g. [0.0, 0.0, -9.81]; turn it, or set "
-            "gravity.buoyancy = false"
+            f"drag.inertia: {drag.inertia!r} makes the drag coefficient depend on the slip, "
+            f"drag.scheme {drag.scheme!r} keeps one a fine; take 'held' or 'every_step'"
         )
 
 
@@ -255,6 +254,11 @@ def _profile_bins(box: Box, analysis: AnalysisChoices) -> Iterator[str]:
         )
 
 
+def _of_the_contact(name: str) -> Rule:
+    keys = sorted(MODEL_KEYS["hooke"] | MODEL_KEYS["hertz"] | {"damping_ratio"})
+    return Rule(("contact.model", *(f"{name}.{key}" for key in keys)), of_the_model(name))
+
+
 _SLAB_KEYS = ("fines.radius_mm", "fines.count", "fines.slab_mm", "fines.concentration")
 RULES = (
     _rising("grains"),
@@ -275,7 +279,8 @@ RULES = (
     Rule(("drag.scheme", "drag.refresh_steps"), _refresh),
     Rule(("drag.scheme", "fines.radius_mm"), _viscous),
     Rule(("drag.scheme", "drag.upstream"), _implicit),
-    Rule(("gravity.mode", "gravity.acceleration_m_s2", "gravity.buoyancy"), _buoyancy),
+    Rule(("drag.scheme", "drag.inertia"), _inertia),
+    *(_of_the_contact(name) for name in ("grains", "fines")),
     Rule(("run.duration_ms", "run.cap_ms"), _end),
     Rule(("analysis.sections",), _sections),
     Rule(("analysis.law", "analysis.damage_law"), _laws),

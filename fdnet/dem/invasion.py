@@ -263,9 +263,9 @@ def _ending(
     elif quiet_enough(case, scales, last):
         reason = "plugged" if waiting > 0 else "supply_exhausted"
     else:
-        reason = "cap"
+        reason, cap = "cap", scales.cap_time * scales.force_factor
         warnings.append(
-            f"invasion stopped at its cap of {1e3 * scales.cap_time:.3g} ms before the stop rule "
+            f"invasion stopped at its cap of {1e3 * cap:.3g} ms before the stop rule "
             "held: raise run.cap_ms"
         )
     if waiting == 0:

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.case.case import Case
+from fdnet.dem.contact_lines import contact_variables, damped_alike
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
 from fdnet.dem.scene import (
     box_of,
-    contact_variables,
     header_variables,
     wall_variables,
     write_data,
@@ -26,6 +26,8 @@ from fdnet.scales.springs import sphere_mass
 from fdnet.spheres.dump import COLUMNS, FORMAT
 from fdnet.spheres.snapshot import Array, Snapshot, resting
 
+PACK_DAMPING = 0.4 / math.sqrt(2)
+"""Damping of two grains over the critical one: 0.8 sqrt(k/m) of their joint mass m/2."""
 RELAX_RUN_STEPS = 2500
 """Steps between two tests for rest."""
 RADIUS_TOLERANCE = 1e-9
@@ -112,9 +114,9 @@ def render_pack(
     ]
     if ranks == 1:
         left_out.append(LeftOut(what="MPI processor grid", why="one rank"))
-    contacts = contact_variables(case, scales, "pack", friction=False)
-    contacts["damping"] = " ".join(
-        [number(0.8 * math.sqrt(stiffness / mass))] * contacts["size"] ** 2
+    rate = 0.8 * math.sqrt(stiffness / mass)
+    contacts = damped_alike(
+        case, contact_variables(case, scales, "pack", friction=False), PACK_DAMPING, rate
     )
     text = render_text(
         "pack.in.j2",

@@ -67,7 +67,7 @@ def draw_all(
 
     The folder is made if it is missing. `snapshot` is what the side view shows, the damaged
     specimen or the grains alone; without one there is no side view. Figures of damage are left out
-    for an intact pack. `history` rows hold time_s, invaded, passed and upstream. `CAPTIONS`
+    for an intact pack. `history` rows are those of history.csv. `CAPTIONS`
     explains each figure under the stem of its file.
     """
     target = Path(folder)
@@ -274,12 +274,12 @@ def _size_distributions(figure: Any, *, analysis: "Analysis", fines: Snapshot | 
 
 def _invasion_history(figure: Any, *, history: Sequence[Mapping[str, float]]) -> None:
     axes = figure.add_subplot()
-    time = np.array([row["time_s"] for row in history])
+    time = np.array([row["physical_time_s"] for row in history])
     scale, unit = (1.0, "s") if time.max() >= 1 else (1e3, "ms")
     for name, label, colour, line in (
-        ("invaded", "inside the specimen", BLUE, "-"),
-        ("passed", "passed the outlet", GREEN, "--"),
-        ("upstream", "upstream of the face", ORANGE, ":"),
+        ("invaded_count", "inside the specimen", BLUE, "-"),
+        ("passed_count", "passed the outlet", GREEN, "--"),
+        ("upstream_count", "upstream of the face", ORANGE, ":"),
     ):
         axes.plot(time * scale, [row[name] for row in history], line, color=colour, label=label)
     axes.set(xlabel=f"time since the fines were released ({unit})", ylabel="number of fines (–)")

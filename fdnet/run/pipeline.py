@@ -174,6 +174,7 @@ def _write_summary(
         pack=pack,
         invasion=invasion,
         last=results.history[-1] if results.history else None,
+        physical_time_s=results.physical_time_s,
         seconds=stage_seconds(pack, invasion, session.seconds),
         warnings=[
             *scales.warnings,

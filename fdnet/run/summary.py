@@ -18,13 +18,14 @@ def summarise(
     pack: dict[str, Any],
     invasion: dict[str, Any] | None,
     last: Checkpoint | None,
+    physical_time_s: float | None,
     seconds: dict[str, float],
     warnings: list[str],
 ) -> dict[str, Any]:
     """The mapping of summary.json.
 
-    `pack` and `invasion` are the records of their stages, `last` is the last checkpoint; the two
-    of the invasion are None without fines.
+    `pack` and `invasion` are the records of their stages, `last` is the last checkpoint and
+    `physical_time_s` the time of the fluid then; those of the invasion are None without fines.
     """
     result = {
         "case": case.name,
@@ -45,6 +46,7 @@ def summarise(
         "ranks": {"pack": ranks_of(pack), "invade": ranks_of(invasion) if invasion else None},
         "dem_steps": pack["steps"] + (invasion["steps"] if invasion else 0),
         "dem_dt_s": invasion["dt_s"] if invasion else pack["dt_s"],
+        "physical_time_s": physical_time_s,
         "seconds": seconds
         | {f"analyse_{name}": value for name, value in analysis.seconds.items()},
         "left_out": _left_out(pack, invasion),

@@ -27,7 +27,7 @@ class StopError(Exception):
     """Stands for any sudden end."""
 
 
-def cell_case(sides: str, motion: str, supply: str, scheme: str) -> InvasionCase:
+def cell_case(sides: str, motion: str, supply: str, scheme: str, *keys: str) -> InvasionCase:
     """The small case of one cell: 15 grains, 1,500 fines in batches, 5 checkpoints."""
     return tiny(
         f"box.sides={sides}",
@@ -39,6 +39,7 @@ def cell_case(sides: str, motion: str, supply: str, scheme: str) -> InvasionCase
         "fines.count=1500",
         "run.cap_ms=0.2",
         "run.checkpoint_ms=0.04",
+        *keys,
     )
 
 
