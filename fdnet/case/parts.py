@@ -107,13 +107,13 @@ class Drag(Part):
     )
 
     @property
-    def driven(self) -> bool:
+    def coupled(self) -> bool:
         """Whether fdnet computes the forces on each fine while LIGGGHTS waits."""
         return self.crowd != "none" or self.field == "network"
 
     @property
     def travel_diameters(self) -> float:
-        """Diameters of the smallest fine between two updates of a driven invasion."""
+        """Diameters of the smallest fine between two updates of a coupled invasion."""
         return UPDATE_TRAVEL if self.update_travel is None else self.update_travel
 
 

@@ -178,7 +178,7 @@ def _field(drag: Drag) -> Iterator[str]:
 
 
 def _crowd(drag: Drag) -> Iterator[str]:
-    if drag.driven and drag.scheme == "viscous":
+    if drag.coupled and drag.scheme == "viscous":
         yield (
             "drag.scheme: 'viscous' has one damping for all fines, drag.crowd "
             f"{drag.crowd!r} one for each; take 'implicit', 'held' or 'every_step'"
@@ -186,7 +186,7 @@ def _crowd(drag: Drag) -> Iterator[str]:
 
 
 def _update_travel(drag: Drag) -> Iterator[str]:
-    if drag.update_travel is not None and not drag.driven:
+    if drag.update_travel is not None and not drag.coupled:
         yield (
             f"drag.update_travel: {drag.update_travel:g} belongs to a drag that is computed while "
             "LIGGGHTS waits; leave it out, or set drag.crowd = 'beetstra'"
@@ -211,7 +211,7 @@ def _viscous(drag: Drag, fines: Fines) -> Iterator[str]:
 
 
 def _implicit(drag: Drag) -> Iterator[str]:
-    if drag.scheme == "implicit" and drag.upstream == "darcy" and not drag.driven:
+    if drag.scheme == "implicit" and drag.upstream == "darcy" and not drag.coupled:
         yield (
             "drag.upstream: 'darcy' changes the fluid's velocity at x = 0, drag.scheme "
             "'implicit' keeps one a fine; take 'interstitial', or another drag.scheme"
@@ -219,7 +219,7 @@ def _implicit(drag: Drag) -> Iterator[str]:
 
 
 def _inertia(drag: Drag) -> Iterator[str]:
-    if drag.inertia != "none" and drag.scheme in ("viscous", "implicit"):
+    if drag.inertia != "none" and drag.scheme in ("viscous", "implicit") and not drag.coupled:
         yield (
             f"drag.inertia: {drag.inertia!r} makes the drag coefficient depend on the slip, "
             f"drag.scheme {drag.scheme!r} keeps one a fine; take 'held' or 'every_step'"

@@ -23,7 +23,7 @@ class CheckpointRecord:
         overlap: digest of the rows of overlap.csv since the checkpoint before.
         dump: digest of the dump.
         restart: digest of the restart.
-        updates: digest of the updates of a driven invasion before the checkpoint; "" without any.
+        updates: digest of the updates of a coupled invasion before the checkpoint; "" without any.
     """
 
     case: str

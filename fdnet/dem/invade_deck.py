@@ -8,9 +8,9 @@ import numpy as np
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, plug_allowance, quiet_chunks
 from fdnet.dem.contact_lines import contact_variables
+from fdnet.dem.coupled_parts import dumped_group, write_coupled_parts
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
 from fdnet.dem.drag import BELOW_ZERO, drag_variables, forces_left_out
-from fdnet.dem.driven_deck import dumped_group, write_driven_parts
 from fdnet.dem.gravity import gravity_variables
 from fdnet.dem.overlap import is_watched, watch_variables
 from fdnet.dem.scene import header_variables, wall_variables, write_data
@@ -60,7 +60,7 @@ def write_invade_inputs(
     )
     deck = render_invade(case, scales, grains, ranks=ranks)
     write_text(folder / "in.invade", deck.text)
-    write_driven_parts(case, scales, folder)
+    write_coupled_parts(case, scales, folder)
     return deck
 
 

@@ -27,10 +27,10 @@ from fdnet.dem.checkpoint_record import (
     passed_over,
     refuse_other_ranks,
 )
+from fdnet.dem.coupled import Coupling
+from fdnet.dem.coupled_parts import write_coupled_parts
 from fdnet.dem.deck import Deck, LeftOut
 from fdnet.dem.digests import checkpoint_files
-from fdnet.dem.driven import Drive
-from fdnet.dem.driven_deck import write_driven_parts
 from fdnet.dem.feed import run_fed
 from fdnet.dem.fluid import Fluid
 from fdnet.dem.invade_deck import SCRATCH, render_invade, write_batches, write_invade_inputs
@@ -71,7 +71,7 @@ class Invasion:
         warnings: doubts about how it ended, one sentence each.
         ranks: MPI ranks of all executions of LIGGGHTS.
         runs: executions of LIGGGHTS; empty when an earlier session had come to the end.
-        updates: the record of a driven invasion, one row an update; empty when it is not driven.
+        updates: the record of a coupled invasion, one row an update; empty when it is not coupled.
     """
 
     damaged: Snapshot
@@ -103,14 +103,14 @@ def invade(
 ) -> Invasion:
     """Drive the fines in; continues from the last complete checkpoint when `folder` holds one.
 
-    A driven case (`case.drag.driven`) needs the `fluid` that answers for its fines.
+    A coupled case (`case.drag.coupled`) needs the `fluid` that answers for its fines.
 
     Raises LiggghtsError when a run fails or fines are lost, CaseError when the fines cannot be
     placed or the invasion was begun on another number of MPI ranks.
     """
+    _refuse_uncoupled(case, fluid)
     (folder / "post").mkdir(parents=True, exist_ok=True)
     refuse_other_ranks(folder, case, launch.ranks)
-    _refuse_undriven(case, fluid)
     deck, run = _drive(case, scales, grains, folder, launch, fluid)
     history = read_history(folder)
     overlaps, damaged = [], grains
@@ -139,13 +139,13 @@ def invade(
     )
 
 
-def _refuse_undriven(case: InvasionCase, fluid: Fluid | None) -> None:
-    """Raise CaseError unless a driven case, and no other, has a fluid."""
-    if case.drag.driven != (fluid is not None):
+def _refuse_uncoupled(case: InvasionCase, fluid: Fluid | None) -> None:
+    """Raise CaseError unless a coupled case, and no other, has a fluid."""
+    if case.drag.coupled != (fluid is not None):
         raise CaseError(
             f"drag.crowd: {case.drag.crowd!r} with drag.field {case.drag.field!r} "
-            f"{'needs' if case.drag.driven else 'takes'} "
-            f"{'a' if case.drag.driven else 'no'} fluid that fdnet computes; run the case with "
+            f"{'needs' if case.drag.coupled else 'takes'} "
+            f"{'a' if case.drag.coupled else 'no'} fluid that fdnet computes; run the case with "
             "fdnet run or fdnet.run_case"
         )
 
@@ -168,9 +168,9 @@ def _drive(
         if _over(case, scales, last):
             return deck, None
         keeper = CheckpointKeeper(folder, case, scales, grains, launch=launch)
-        follower, drive = replace(launch, follow=keeper), None
+        follower, coupling = replace(launch, follow=keeper), None
         if fluid is not None:
-            drive = Drive(
+            coupling = Coupling(
                 case=case,
                 scales=scales,
                 grains=grains,
@@ -179,20 +179,22 @@ def _drive(
                 last=last,
                 over=partial(_over, case, scales),
             )
-        run = _run(folder, last, follower, drive)
+        run = _run(folder, last, follower, coupling)
         if run is not None:
             return deck, run
 
 
-def _run(folder: Path, last: Checkpoint | None, launch: Launch, drive: Drive | None) -> Run | None:
+def _run(
+    folder: Path, last: Checkpoint | None, launch: Launch, coupling: Coupling | None
+) -> Run | None:
     """The run, or None when LIGGGHTS could not read the restart (a full disk cuts it silently).
 
     The restart is then set aside, so that the checkpoint before it is tried next.
     """
     deck = "in.invade" if last is None else "in.invade.resume"
     try:
-        if drive is not None:
-            return run_fed(folder, deck, launch, drive.play)
+        if coupling is not None:
+            return run_fed(folder, deck, launch, coupling.play)
         return run_deck(folder, deck, launch)
     except LiggghtsError:
         with (folder / SCREEN).open("rb") as file:
@@ -242,7 +244,7 @@ def _prepare(
             path.unlink()
     if case.fines.supply == "batches":
         write_batches(case, scales, grains, folder)
-    write_driven_parts(case, scales, folder)
+    write_coupled_parts(case, scales, folder)
     deck = render_invade(case, scales, grains, ranks=ranks, resume=last)
     write_text(folder / "in.invade.resume", deck.text)
     return deck

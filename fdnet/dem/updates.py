@@ -1,4 +1,4 @@
-"""The record of updates of a driven invasion, updates.csv: one row for each."""
+"""The record of updates of a coupled invasion, updates.csv: one row for each."""
 
 import hashlib
 from collections.abc import Mapping, Sequence

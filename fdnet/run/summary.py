@@ -93,7 +93,7 @@ def _counts(
 
 
 def _updates(invasion: dict[str, Any] | None) -> dict[str, Any]:
-    """What a driven invasion measured at its last update; nothing of one that is not driven."""
+    """What a coupled invasion measured at its last update; nothing of one that is not coupled."""
     updates = (invasion or {}).get("updates")
     if updates is None:
         return {}

@@ -7,5 +7,5 @@ from fdnet.scales.scales import InvasionScales
 
 
 def fluid_of(case: InvasionCase, scales: InvasionScales) -> Fluid | None:
-    """The fluid of a driven case; None where the deck holds the forces itself."""
-    return UniformCrowd(case=case, scales=scales) if case.drag.driven else None
+    """The fluid of a coupled case; None where the deck holds the forces itself."""
+    return UniformCrowd(case=case, scales=scales) if case.drag.coupled else None

@@ -4,11 +4,13 @@ The uniform velocity u is the volume of suspension that passes a unit area of po
 of time. Where fines of porosity phi stand in it, the fluid flows at u / phi between them; where
 they move with it, there is no slip. So the superficial slip is u - v in either case, and
 
-    F = 6 pi mu r M Y F_b / phi (u - v),
+    F = 6 pi mu r M Y F_b / phi (u - v) + V G,
 
-with Beetstra's factor F_b and the size factor Y (`fdnet.scales.forces.crowd`). This is the total
-force of the fluid in the crowd, the fall of pressure that the crowd itself causes among it: fines
-that fill a cross-section A and stand still take up dp A.
+with Beetstra's factor F_b and the size factor Y (`fdnet.scales.forces.crowd`). The first part is
+the total force of the fluid in the crowd, the fall of pressure that the crowd itself causes among
+it: fines that fill a cross-section A and stand take up dp A. G is the gradient of the intact pack
+without fines, which acts inside the pack where `drag.pressure_gradient` asks for it. So the two
+gradients add, and none is counted twice.
 """
 
 from dataclasses import dataclass
@@ -17,10 +19,10 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase
 from fdnet.dem.fluid import FluidForces, Moment
-from fdnet.network.fines.crowding import local_porosity
+from fdnet.network.fines.crowding import Neighbourhood, local_porosity
 from fdnet.scales.forces.crowd import Crowd, drag_factor
 from fdnet.scales.scales import InvasionScales
-from fdnet.spheres.snapshot import Snapshot
+from fdnet.spheres.snapshot import Array, Snapshot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,21 +39,21 @@ class UniformCrowd:
 
     def forces(self, spheres: Snapshot, moment: Moment) -> FluidForces:
         """What acts on the fines of `spheres`, in their order."""
-        fines = spheres.fines()
+        fines, scales = spheres.fines(), self.scales
+        depth = fines.position[:, 0]
+        velocity, push = np.zeros((2, len(fines), 3))
+        velocity[:, 0] = np.where(depth < 0, scales.upstream_velocity, scales.drive_velocity)
+        volume = 4.0 / 3.0 * np.pi * fines.radius**3
+        within = (depth >= 0) & (depth < self.case.size_m[0])
+        push[:, 0] = np.where(within, volume * scales.push.gradient, 0.0)
         near = local_porosity(spheres, self.case.periodic)
-        crowd = Crowd(porosity=near.porosity, size_ratio=near.size_ratio)
-        factor = drag_factor(crowd, gradient_apart=False) / near.porosity
-        lone = self.case.fluid.stokes_coefficient_Pa_s * self.case.drag.multiplier * fines.radius
-        velocity = np.zeros((len(fines), 3))
-        inside = fines.position[:, 0] >= 0.0
-        velocity[:, 0] = np.where(
-            inside, self.scales.interstitial_velocity, self.scales.upstream_velocity
-        )
+        slip = np.linalg.norm(velocity - fines.velocity, axis=1)
+        factor = self._factor(near, fines.radius, slip)
         return FluidForces(
-            coefficient=lone * factor,
+            coefficient=scales.push.coefficient * fines.radius * factor,
             velocity=velocity,
-            push=np.zeros((len(fines), 3)),
-            pace=self.scales.interstitial_velocity,
+            push=push,
+            pace=scales.drive_velocity,
             measures={
                 "factor_mean": float(np.mean(factor)) if len(fines) else 1.0,
                 "factor_most": float(np.max(factor, initial=1.0)),
@@ -59,3 +61,9 @@ class UniformCrowd:
                 "porosity_capped": near.capped,
             },
         )
+
+    def _factor(self, near: Neighbourhood, radius: Array, slip: Array) -> Array:
+        """Factor (N,) on the drag of lone fines of superficial `slip`, m/s."""
+        reynolds = self.scales.push.reynolds_slope * radius / near.size_ratio * slip
+        crowd = Crowd(porosity=near.porosity, size_ratio=near.size_ratio, reynolds=reynolds)
+        return drag_factor(crowd, gradient_apart=False) / near.porosity

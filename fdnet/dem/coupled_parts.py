@@ -1,4 +1,4 @@
-"""The files beside a driven deck, which LIGGGHTS is told to include as the invasion goes on."""
+"""The files beside a coupled deck, which LIGGGHTS is told to include as the invasion goes on."""
 
 from pathlib import Path
 
@@ -12,15 +12,15 @@ from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.dump import COLUMNS, FORMAT
 
 
-def write_driven_parts(case: InvasionCase, scales: InvasionScales, folder: Path) -> None:
-    """Write the files that fdnet feeds to LIGGGHTS beside the deck; none when it is not driven."""
-    for name, text in driven_parts(case, scales).items():
+def write_coupled_parts(case: InvasionCase, scales: InvasionScales, folder: Path) -> None:
+    """Write the files beside a coupled deck that LIGGGHTS is told to include."""
+    for name, text in coupled_parts(case, scales).items():
         write_text(folder / name, text)
 
 
-def driven_parts(case: InvasionCase, scales: InvasionScales) -> dict[str, str]:
-    """Name and text of each file that a driven deck is continued by; empty when it is not."""
-    if not case.drag.driven:
+def coupled_parts(case: InvasionCase, scales: InvasionScales) -> dict[str, str]:
+    """Name and text of each file that a coupled deck is continued by; empty when it is not."""
+    if not case.drag.coupled:
         return {}
     shown = {"dump_columns": COLUMNS, "dump_format": FORMAT, "dump_group": dumped_group(case)}
     coefficient = "Ksl" if case.drag.scheme == "implicit" else "cd"

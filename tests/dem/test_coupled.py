@@ -17,8 +17,8 @@ from cut_and_continue import StopError, differences
 
 from fdnet.case.file import case_from
 from fdnet.dem.checkpoint_record import last_checkpoint
-from fdnet.dem.driven import steps_between
-from fdnet.dem.driven_deck import write_driven_parts
+from fdnet.dem.coupled import steps_between
+from fdnet.dem.coupled_parts import write_coupled_parts
 from fdnet.dem.feed import run_fed
 from fdnet.dem.fluid import STATE, Moment, write_forces
 from fdnet.dem.invade_deck import render_invade
@@ -75,7 +75,7 @@ def run(case, grains, folder, launch):
 
 
 @pytest.mark.parametrize("scheme", ["implicit", "held"])
-def test_a_continued_driven_invasion_is_the_uncut_one(binary, grains, tmp_path, scheme):
+def test_a_continued_coupled_invasion_is_the_uncut_one(binary, grains, tmp_path, scheme):
     assert differences(small(scheme), grains, tmp_path, binary) == []
 
 
@@ -206,7 +206,7 @@ def test_what_cannot_carry_a_crowd_is_refused():
         invade(case, scales_of(case), None, Path("/nowhere"), None)
 
 
-def test_render_shows_the_driven_deck_with_what_it_is_fed(tmp_path):
+def test_render_shows_the_coupled_parts_with_what_it_is_fed(tmp_path):
     render_decks(small("held"), tmp_path)
     deck = (tmp_path / "invade" / "in.invade").read_text()
     assert "jump" not in deck
@@ -291,7 +291,7 @@ def applied_force(case, fines, folder, binary) -> np.ndarray:
     )
     (folder / "in.invade").write_text(render_invade(case, scales, grain).text)
     (folder / "post").mkdir()
-    write_driven_parts(case, scales, folder)
+    write_coupled_parts(case, scales, folder)
 
     def play(feed):
         show = 'write_dump fines custom post/{}.dump id fx modify sort id format "%d %.17g"'

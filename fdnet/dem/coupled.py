@@ -1,9 +1,9 @@
-"""A driven invasion: what the fluid does to each fine is computed anew while LIGGGHTS waits.
+"""A coupled invasion: what the fluid does to each fine is computed anew while LIGGGHTS waits.
 
 fdnet feeds LIGGGHTS the commands of an invasion: the deck, then for each chunk the batch of fines
 that comes, for each update the files `ask.in` and `fluid.in` with a `run` after them, and
 `checkpoint.in`. Every chunk begins with an update and a `run` that sets everything up, as in an
-invasion that is not driven; so a cut one goes on bit for bit.
+invasion that is not coupled; so a cut one goes on bit for bit.
 """
 
 import math
@@ -26,8 +26,8 @@ from fdnet.spheres.snapshot import Snapshot
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Drive:
-    """A driven invasion.
+class Coupling:
+    """A coupled invasion.
 
     Attributes:
         case: what is run.
