@@ -13,7 +13,8 @@ from fdnet.errors import CaseError
 from fdnet.scales.contacts import contacts_of, stiffness_factor
 from fdnet.scales.drive import drive_of, drive_warnings
 from fdnet.scales.forces.push import Push, push_of
-from fdnet.scales.forces.warnings import reynolds_warnings
+from fdnet.scales.forces.throat import throat_width
+from fdnet.scales.forces.warnings import reynolds_warnings, throat_warnings
 from fdnet.scales.grain_pack import pack_step, target_porosity
 from fdnet.scales.overlaps import overlap_warnings, overlaps_of, refuse_deep_overlap
 from fdnet.scales.slab import slab_of, slab_warnings
@@ -89,6 +90,7 @@ class InvasionScales(Scales):
         push: drag and pressure gradient on fines in the pack, as simulated.
         drift_velocity: m/s, of the largest fine that the fluid carries freely in the pores, as
             simulated.
+        throat_ratio: diameter of the largest fine over that of the pack's throats.
         impact_overlap: predicted overlap by impact, over the diameter of the largest fine.
         drag_overlap: predicted overlap by drag and pressure gradient, over the diameter of the
             largest fine.
@@ -113,6 +115,7 @@ class InvasionScales(Scales):
     gradient_over_drag: float
     push: Push
     drift_velocity: float
+    throat_ratio: float
     impact_overlap: float
     drag_overlap: float
     sticking: Sticking
@@ -174,14 +177,13 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     overlaps = overlaps_of(case, contact, push, shared.porosity)
     sticking = sticking_of(case, contact, push, step)
     reynolds = _reynolds(case, shared.interstitial_velocity)
-    stokes = relaxation[1] * velocity / (2 * case.grains.mean_radius_m)
-    gravity = _gravity_over_drag(case, shared.interstitial_velocity)
     refuse_deep_overlap(overlaps)
     _refuse_long_chunk(step, chunk_steps)
     warnings = [
         *shared.warnings,
         *drive_warnings(case, drive),
         *reynolds_warnings(case, push, reynolds),
+        *throat_warnings(case, _throat_ratio(case, shared)),
         *overlap_warnings(case, overlaps),
         *slab_warnings(case, slab),
         *drag_warnings(case, hold * step / shortest),
@@ -203,12 +205,13 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
         cap_time=times.cap,
         checkpoint_steps=chunk_steps,
         reynolds=reynolds,
-        stokes=stokes,
+        stokes=relaxation[1] * velocity / (2 * case.grains.mean_radius_m),
         impact_stokes=drive.impact_stokes,
-        gravity_over_drag=gravity,
+        gravity_over_drag=_gravity_over_drag(case, shared.interstitial_velocity),
         gradient_over_drag=_gradient_over_drag(case, shared),
         push=push,
         drift_velocity=velocity + push.drift(case.fines.radius_range_m[1]),
+        throat_ratio=_throat_ratio(case, shared),
         impact_overlap=overlaps.impact,
         drag_overlap=overlaps.drag,
         sticking=sticking,
@@ -239,6 +242,10 @@ def _gradient_over_drag(case: InvasionCase, shared: Scales) -> float:
     """
     drag = case.fluid.viscosity_Pa_s * shared.interstitial_velocity * case.drag.multiplier
     return 2 / 9 * case.fines.radius_range_m[1] ** 2 * shared.pressure_gradient / drag
+
+
+def _throat_ratio(case: InvasionCase, shared: Scales) -> float:
+    return 2 * case.fines.radius_range_m[1] / throat_width(shared.porosity, shared.permeability)
 
 
 def _gravity_over_drag(case: InvasionCase, velocity: float) -> float:
