@@ -55,7 +55,9 @@ DOORS = {
     "jinja2": {"dem/deck", "report/html", "studies/dem"},
     "subprocess": {
         "dem/binary",
+        "dem/feed",
         "dem/liggghts",
+        "dem/process",
         "report/vtk",
         "studies/benchmark",
         "studies/chaos",

@@ -172,10 +172,18 @@ def _field(drag: Drag) -> Iterator[str]:
 
 
 def _crowd(drag: Drag) -> Iterator[str]:
-    if drag.crowd != "none":
+    if drag.coupled and drag.scheme == "viscous":
         yield (
-            f"drag.crowd: {drag.crowd!r} needs the porosity around each fine during a run, which "
-            "is not available yet; expected 'none'"
+            "drag.scheme: 'viscous' has one damping for all fines, drag.crowd "
+            f"{drag.crowd!r} one for each; take 'implicit', 'held' or 'every_step'"
+        )
+
+
+def _update_travel(drag: Drag) -> Iterator[str]:
+    if drag.update_travel is not None and not drag.coupled:
+        yield (
+            f"drag.update_travel: {drag.update_travel:g} belongs to a drag that is computed while "
+            "LIGGGHTS waits; leave it out, or set drag.crowd = 'beetstra'"
         )
 
 
@@ -197,7 +205,7 @@ def _viscous(drag: Drag, fines: Fines) -> Iterator[str]:
 
 
 def _implicit(drag: Drag) -> Iterator[str]:
-    if drag.scheme == "implicit" and drag.upstream == "darcy":
+    if drag.scheme == "implicit" and drag.upstream == "darcy" and not drag.coupled:
         yield (
             "drag.upstream: 'darcy' changes the fluid's velocity at x = 0, drag.scheme "
             "'implicit' keeps one a fine; take 'interstitial', or another drag.scheme"
@@ -205,7 +213,7 @@ def _implicit(drag: Drag) -> Iterator[str]:
 
 
 def _inertia(drag: Drag) -> Iterator[str]:
-    if drag.inertia != "none" and drag.scheme in ("viscous", "implicit"):
+    if drag.inertia != "none" and drag.scheme in ("viscous", "implicit") and not drag.coupled:
         yield (
             f"drag.inertia: {drag.inertia!r} makes the drag coefficient depend on the slip, "
             f"drag.scheme {drag.scheme!r} keeps one a fine; take 'held' or 'every_step'"
@@ -266,7 +274,8 @@ RULES = (
     Rule(("well", "fluid.velocity_m_s", "fluid.darcy_length_mm"), _one_drive),
     Rule(("well.radius_mm", "well.drainage_radius_m"), _radii_of_well),
     Rule(("drag.field",), _field),
-    Rule(("drag.crowd",), _crowd),
+    Rule(("drag.scheme", "drag.crowd", "drag.field"), _crowd),
+    Rule(("drag.update_travel", "drag.crowd", "drag.field"), _update_travel),
     Rule(("drag.scheme", "drag.refresh_steps"), _refresh),
     Rule(("drag.scheme", "fines.radius_mm"), _viscous),
     Rule(("drag.scheme", "drag.upstream"), _implicit),

@@ -8,6 +8,7 @@ import numpy as np
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, plug_allowance, quiet_chunks
 from fdnet.dem.contact_lines import contact_variables
+from fdnet.dem.coupled_parts import dumped_group, write_coupled_parts
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
 from fdnet.dem.drag import BELOW_ZERO, drag_variables, forces_left_out
 from fdnet.dem.gravity import gravity_variables
@@ -63,6 +64,7 @@ def write_invade_inputs(
     )
     deck = render_invade(case, scales, grains, ranks=ranks)
     write_text(folder / "in.invade", deck.text)
+    write_coupled_parts(case, scales, folder)
     return deck
 
 
@@ -89,10 +91,15 @@ def write_batches(
     return reduce(Snapshot.joined, batches[:AT_ONCE])
 
 
+def batch_chunks(case: InvasionCase, scales: InvasionScales) -> range:
+    """The chunks that take in a batch; empty when all fines are there from the start."""
+    return range(AT_ONCE, max(AT_ONCE, len(batches_of(case, scales).counts)))
+
+
 def _feeding(case: InvasionCase, scales: InvasionScales) -> dict[str, int] | None:
     """First and last chunk that take in a batch; None when all fines are there from the start."""
-    later = len(batches_of(case, scales).counts) - AT_ONCE
-    return {"first": AT_ONCE, "last": AT_ONCE + later - 1} if later > 0 else None
+    chunks = batch_chunks(case, scales)
+    return {"first": chunks[0], "last": chunks[-1]} if chunks else None
 
 
 def _margin(case: InvasionCase, scales: InvasionScales) -> float:
@@ -140,7 +147,7 @@ def render_invade(
             "fixed_grains": not mobile,
             "moving": "all" if mobile else "fines",
             "gravity": gravity,
-            "dump_group": "all" if mobile else "fines",
+            "dump_group": dumped_group(case),
             "start_velocity": number(scales.upstream_velocity),
             "drag": drag_variables(case, scales),
             "overlap": watch_variables(case, scales),

@@ -41,6 +41,7 @@ def summarise(
         "stop_reason": invasion["stop_reason"] if invasion else None,
         "sections": section_rows(analysis),
         **_network(analysis),
+        **_updates(invasion),
         "solver": analysis.solver,
         **({"sizes": sizes} if sizes else {}),
         "max_overlap_fraction": invasion["max_overlap"] if invasion else pack["max_overlap"],
@@ -92,6 +93,14 @@ def _counts(
         "invasion_depth_p95_m": analysis.invasion_depth_p95,
         "cake_thickness_m": analysis.cake_thickness,
     }
+
+
+def _updates(invasion: dict[str, Any] | None) -> dict[str, Any]:
+    """What a coupled invasion measured at its last update; nothing of one that is not coupled."""
+    updates = (invasion or {}).get("updates")
+    if updates is None:
+        return {}
+    return {"drag_updates": updates["count"], "drag_last_update": updates["last"]}
 
 
 def _network(analysis: "Analysis") -> dict[str, Any]:

@@ -22,7 +22,13 @@ from fdnet.scales.slab import slab_of, slab_warnings
 from fdnet.scales.springs import Contact
 from fdnet.scales.sticking import Sticking, sticking_of, sticking_warnings
 from fdnet.scales.stop_times import chunk_refreshes, plug_warnings, stop_times
-from fdnet.scales.time_step import drag_warnings, hold_steps, relaxation_time, time_step
+from fdnet.scales.time_step import (
+    densest_factor,
+    drag_warnings,
+    hold_steps,
+    relaxation_time,
+    time_step,
+)
 from fdnet.scales.velocity import Velocity, velocity_of, velocity_warnings
 
 MOST_STEPS = 2**31 - 1
@@ -167,7 +173,7 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     shortest = relaxation[0] * push.relaxation_share(case.fines.radius_range_m[0])
     step = time_step(case, shared.contacts, shortest)
     times = stop_times(case, slab, drive, upstream=upstream)
-    hold = hold_steps(case, step, shortest, times.chunk)
+    hold = hold_steps(case, step, shortest / densest_factor(case), times.chunk)
     chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
     contact = shared.contacts["grain-fine"]
     overlaps = overlaps_of(case, contact, push, shared.porosity)
