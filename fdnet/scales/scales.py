@@ -165,7 +165,9 @@ def _shared(case: Case, velocity: Velocity) -> Scales:
 
 def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     slab, relaxation = slab_of(case), _relaxation_times(case)
-    drive = drive_of(case, shared.interstitial_velocity, relaxation[1])
+    own = push_of(case, shared.interstitial_velocity, shared.pressure_gradient)
+    free = own.velocity + own.drift(case.fines.radius_range_m[1])
+    drive = drive_of(case, own.velocity, relaxation[1], free=free)
     velocity = drive.velocity
     push = push_of(case, velocity, shared.pressure_gradient, factor=drive.factor)
     darcy = shared.darcy_velocity * drive.factor

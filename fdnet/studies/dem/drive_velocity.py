@@ -14,7 +14,7 @@ from fdnet.studies.thesis.runs.plan import case_path
 SERIES = "specimen 5 at a well"
 _WELL = "well={radius_mm=108.0, drainage_radius_m=100.0}"
 OWN = 1.0
-FACTORS = (OWN, 3.0, 9.0, 27.0)
+FACTORS = (OWN, 3.0, 9.0, 18.0)
 """Velocity of the simulation over that of the fluid."""
 _STIFFNESS_N_M = 30.0
 """At the fluid's own velocity. It grows with the velocity, so that the push over the stiffness,
@@ -27,7 +27,12 @@ _WORDS: Mapping[str, str] = {
     "porosity_loss": "porosity lost",
     "k_ratio": "k/k0",
 }
-_SMALL = ("box.size_mm=[2.0,1.2,1.2]", "grains.count=26", "fines.count=120")
+_SMALL = (
+    "box.size_mm=[1.5,1.2,1.2]",
+    "grains.count=19",
+    "fines.count=60",
+    "run.duration_ms=12.0",
+)
 
 
 def points(quick: bool) -> list[Point]:
