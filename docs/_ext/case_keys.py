@@ -8,6 +8,7 @@ from pydantic.fields import FieldInfo
 
 UNITS = {
     "_kg_m3": "kg/m³",
+    "_J_m3": "J/m³",
     "_m_s2": "m/s²",
     "_N_m": "N/m",
     "_m_s": "m/s",

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from fdnet.case.case import InvasionCase
 from fdnet.errors import CaseError
 from fdnet.scales.hertz import overlap_of_impact, overlap_under
-from fdnet.scales.hertz_contacts import pair_radius
-from fdnet.scales.springs import Contact, mass_range
+from fdnet.scales.springs import Contact, mass_range, pair_radius
 
 MOST_OVERLAP = 0.5
 """Predicted overlap over a fine's diameter from which a case is refused: beyond it a fine could

@@ -10,6 +10,7 @@ from typing import overload
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.errors import CaseError
+from fdnet.scales.cohesion import cohesion_warnings, refuse_collapse
 from fdnet.scales.contacts import contacts_of, stiffness_factor
 from fdnet.scales.drive import drive_of, drive_warnings
 from fdnet.scales.grain_pack import pack_step, target_porosity
@@ -127,7 +128,7 @@ def scales_of(case: Case) -> Scales:
 
 
 def _shared(case: Case, velocity: Velocity) -> Scales:
-    contacts = contacts_of(case)
+    contacts = contacts_of(case, velocity.interstitial)
     return Scales(
         porosity=target_porosity(case),
         permeability=velocity.permeability,
@@ -158,12 +159,14 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     stokes = relaxation[1] * velocity / (2 * case.grains.mean_radius_m)
     gravity = _gravity_over_drag(case, shared.interstitial_velocity)
     refuse_deep_overlap(overlaps)
+    refuse_collapse(case, contact)
     _refuse_long_chunk(step, chunk_steps)
     warnings = [
         *shared.warnings,
         *drive_warnings(case, drive),
         *_reynolds_warnings(reynolds),
         *overlap_warnings(case, overlaps),
+        *cohesion_warnings(case, contact),
         *slab_warnings(case, slab),
         *drag_warnings(case, hold * step / relaxation[0]),
         *plug_warnings(case, times.plug, drive, upstream),
