@@ -21,6 +21,7 @@ LAYERS = [
 
 NETWORK_LAYERS = [
     ["geometry", "compiled"],
+    ["field"],
     ["tessellation"],
     ["network"],
     ["fines", "flow"],

@@ -70,8 +70,10 @@ def test_every_problem_is_listed_at_once():
         ("box", {"size_mm": [3.0, 0.9, 1.6], "sides": "periodic"}, "its own image"),
         ("box", {"size_mm": [3.0, float("inf"), 1.6]}, "finite number"),
         ("box", {"size_mm": [3.0, 1e16, 1.6]}, "less than or equal to"),
-        ("gravity", {"acceleration_m_s2": [1.0, 0.0, -9.0]}, "gravity down one axis"),
-        ("gravity", {"acceleration_m_s2": [9.81, 0.0, 0.0]}, "gravity down one axis"),
+        ("gravity", {"acceleration_m_s2": [1.0, 0.0]}, "gravity.acceleration_m_s2"),
+        ("drag", {"crowd": "beetstra"}, "drag.crowd: 'beetstra' needs the porosity around"),
+        ("drag", {"scheme": "viscous", "inertia": "schiller-naumann"}, "depend on the slip"),
+        ("drag", {"pressure_gradient": 1}, "drag.pressure_gradient: 1"),
         ("run", {"duration_ms": 1.0, "cap_ms": 2.0}, "give one of the two"),
         ("analysis", {"profile_bin_mm": 1e-9}, "more than 10000 bins"),
         ("analysis", {"sections": 10**6}, "less than or equal to"),
@@ -250,7 +252,7 @@ def test_shipped_cases_are_valid_short_and_named_as_their_files(root: Path):
     assert set(quick) == {*SPECIMENS, *VARIANTS}
     for name, path in [*full.items(), *((f"quick-{name}", path) for name, path in quick.items())]:
         assert read_case(path).name == name
-        assert len(path.read_text().splitlines()) < 50
+        assert len(path.read_text().splitlines()) < 60
 
 
 def test_shipped_cases_keep_their_digests_and_their_text(root: Path):

@@ -13,6 +13,8 @@ AS_BEFORE: dict[str, Any] = {
     "contact.model": "hooke",
     "contact.restitution": "dry",
     "drag.crowd": "none",
+    "drag.inertia": "none",
+    "drag.pressure_gradient": False,
     "fluid.darcy_law": "darcy",
 }
 """New dotted keys, with the value that means what a case without the key meant. A key that is

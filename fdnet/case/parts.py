@@ -46,7 +46,7 @@ class Box(Part):
 
 
 class Drag(Part):
-    """Stokes drag on every fine: 6 pi viscosity multiplier radius (fluid minus fine velocity)."""
+    """Forces of the fluid on every fine: drag by its slip, and that of the pressure gradient."""
 
     field: Literal["uniform", "network"] = Field(
         "uniform",
@@ -78,6 +78,18 @@ class Drag(Part):
         description="Velocity of the fluid upstream of the formation face: the interstitial one "
         "of the pack, or the Darcy velocity.",
     )
+    pressure_gradient: bool = Field(
+        True,
+        description="Whether the pressure gradient of the pack acts on every fine inside it, with "
+        "the volume of the fine times the fall of pressure with x. The thesis's cases leave it "
+        "out.",
+    )
+    inertia: Literal["none", "schiller-naumann"] = Field(
+        "none",
+        description='Drag at finite Reynolds numbers: "none" is Stokes\'s at any speed, '
+        '"schiller-naumann" multiplies it by 1 + 0.15 Re^0.687 (Re up to 800; schemes "held" and '
+        '"every_step").',
+    )
     crowd: Literal["none", "beetstra"] = Field(
         "none",
         description='How other spheres nearby change the drag on a fine: "none" leaves it that of '
@@ -94,10 +106,13 @@ class Gravity(Part):
         description='"auto" leaves gravity out where weight over drag is below '
         "`negligible_below`; the run summary then says so.",
     )
-    acceleration_m_s2: Vector = Field((0.0, 0.0, -9.81), description="Gravity vector (x, y, z).")
+    acceleration_m_s2: Vector = Field(
+        (0.0, 0.0, -9.81), description="Gravity vector (x, y, z), in any direction."
+    )
     buoyancy: bool = Field(
         True,
-        description="Whether the fluid's buoyancy acts. It needs gravity down one axis.",
+        description="Whether the fluid's buoyancy acts: gravity times 1 - fluid over sphere "
+        "density, for fines and for mobile grains.",
     )
     negligible_below: NonNegative = Field(
         1e-3, description='Ratio of weight to drag below which mode "auto" leaves gravity out.'

@@ -11,7 +11,7 @@ from fdnet.case.contact_rules import of_cohesion, of_rolling, of_the_model
 from fdnet.case.control import Run
 from fdnet.case.fluid import Fluid, Well
 from fdnet.case.particles import Fines, Grains, Spheres
-from fdnet.case.parts import Box, Drag, Gravity
+from fdnet.case.parts import Box, Drag
 from fdnet.case.values import (
     LEAST_SKIN,
     MOST_BINS,
@@ -210,14 +210,11 @@ def _implicit(drag: Drag) -> Iterator[str]:
         )
 
 
-def _buoyancy(gravity: Gravity) -> Iterator[str]:
-    pulled = [component for component in gravity.acceleration_m_s2 if component]
-    one_axis_down = len(pulled) <= 1 and all(component <= 0 for component in pulled)
-    if gravity.mode != "off" and gravity.buoyancy and not one_axis_down:
+def _inertia(drag: Drag) -> Iterator[str]:
+    if drag.inertia != "none" and drag.scheme in ("viscous", "implicit"):
         yield (
-            f"gravity.acceleration_m_s2: {list(gravity.acceleration_m_s2)}: LIGGGHTS's buoyancy "
-            "needs gravity down one axis, e.g. [0.0, 0.0, -9.81]; turn it, or set "
-            "gravity.buoyancy = false"
+            f"drag.inertia: {drag.inertia!r} makes the drag coefficient depend on the slip, "
+            f"drag.scheme {drag.scheme!r} keeps one a fine; take 'held' or 'every_step'"
         )
 
 
@@ -273,7 +270,7 @@ RULES = (
     Rule(("drag.scheme", "drag.refresh_steps"), _refresh),
     Rule(("drag.scheme", "fines.radius_mm"), _viscous),
     Rule(("drag.scheme", "drag.upstream"), _implicit),
-    Rule(("gravity.mode", "gravity.acceleration_m_s2", "gravity.buoyancy"), _buoyancy),
+    Rule(("drag.scheme", "drag.inertia"), _inertia),
     *(_of_the_contact(name) for name in ("grains", "fines")),
     Rule(("contact.model", "contact.cohesion_J_m3"), of_cohesion),
     Rule(("contact.rolling_friction", "grains.friction", "fines.friction"), of_rolling),

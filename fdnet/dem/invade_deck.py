@@ -1,9 +1,7 @@
 """The invasion deck and its data file."""
 
-import math
 from functools import reduce
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -11,7 +9,8 @@ from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, plug_allowance, quiet_chunks
 from fdnet.dem.contact_lines import contact_variables, left_out_of_contacts
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
-from fdnet.dem.drag import BELOW_ZERO, drag_variables
+from fdnet.dem.drag import BELOW_ZERO, drag_variables, forces_left_out
+from fdnet.dem.gravity import gravity_variables
 from fdnet.dem.overlap import is_watched, watch_variables
 from fdnet.dem.scene import header_variables, wall_variables, write_data
 from fdnet.dem.supply import AT_ONCE, batches_of, place_batches, place_fines, slab_end
@@ -92,8 +91,8 @@ def _feeding(case: InvasionCase, scales: InvasionScales) -> dict[str, int] | Non
 
 
 def _margin(case: InvasionCase, scales: InvasionScales) -> float:
-    """How far a fine could go in one chunk at twice the fluid's velocity, plus two diameters."""
-    travel = 2 * scales.drive_velocity * scales.checkpoint_steps * scales.time_step
+    """How far a fine could go in one chunk at twice its free velocity, plus two diameters."""
+    travel = 2 * scales.drift_velocity * scales.checkpoint_steps * scales.time_step
     return travel + 4 * case.fines.radius_range_m[1]
 
 
@@ -121,8 +120,8 @@ def render_invade(
     frictional = [c for name, c in scales.contacts.items() if "fine" in name or mobile]
     friction = any(c.friction > 0 for c in frictional)
     wall_friction = any(c.friction > 0 for c in frictional if "wall" in c.pair)
-    gravity, left_out = _gravity(case, scales)
-    left_out += _left_out(case, friction=friction, ranks=ranks)
+    gravity, left_out = gravity_variables(case, scales)
+    left_out += [*forces_left_out(case), *_left_out(case, friction=friction, ranks=ranks)]
     text = render_text(
         "invade.in.j2",
         header_variables(case, "invade", left_out, ranks)
@@ -192,34 +191,6 @@ def _regions(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> di
         "beyond": f"{number(length)} INF {sides}",
         "behind": f"INF {number(behind)} {sides}",
     }
-
-
-def _gravity(
-    case: InvasionCase, scales: InvasionScales
-) -> tuple[dict[str, Any] | None, list[LeftOut]]:
-    mode, vector = case.gravity.mode, case.gravity.acceleration_m_s2
-    magnitude = math.hypot(*vector)
-    if mode == "off" or magnitude == 0:
-        return None, [LeftOut(what="gravity and buoyancy", why="switched off")]
-    if mode == "auto" and scales.gravity_over_drag < case.gravity.negligible_below:
-        return None, [
-            LeftOut(
-                what="gravity and buoyancy",
-                why=f"gravity is {scales.gravity_over_drag:.1e} of the drag, below "
-                f"{case.gravity.negligible_below:g}",
-            )
-        ]
-    pull = {
-        "magnitude": number(magnitude * scales.force_factor),
-        "direction": " ".join(number(c / magnitude) for c in vector),
-        "buoyancy": None,
-    }
-    if not case.gravity.buoyancy:
-        return pull, [LeftOut(what="buoyancy", why="switched off")]
-    axis = next(name for name, component in zip("xyz", vector, strict=True) if component)
-    return pull | {
-        "buoyancy": {"density": number(case.fluid.density_kg_m3), "axis": axis, "level": "1.0"}
-    }, []
 
 
 def _left_out(case: InvasionCase, *, friction: bool, ranks: int) -> list[LeftOut]:

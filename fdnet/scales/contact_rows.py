@@ -43,7 +43,7 @@ def overlap_rows(case: Case, scales: InvasionScales) -> list[Quantity]:
             "delta/d",
             scales.impact_overlap,
             "-",
-            "(15 m u^2 / (16 E* sqrt(R*)))^(2/5) / 2r" if hertz else "u sqrt(m/k) / 2r",
+            "(15 m v^2 / (16 E* sqrt(R*)))^(2/5) / 2r" if hertz else "v sqrt(m/k) / 2r, v <= w",
             "Hertz 1882" if hertz else "linear spring",
         ),
         row(
@@ -51,7 +51,7 @@ def overlap_rows(case: Case, scales: InvasionScales) -> list[Quantity]:
             "delta/d",
             scales.drag_overlap,
             "-",
-            "(3 F / (4 E* sqrt(R*)))^(2/3) / 2r" if hertz else "6 pi mu M u / 2k",
+            "(3 F / (4 E* sqrt(R*)))^(2/3) / 2r" if hertz else "F / (2 k r), F of a fine at rest",
             "Hertz 1882" if hertz else "linear spring",
         ),
     ]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from fdnet.case.case import InvasionCase
 from fdnet.errors import CaseError
+from fdnet.scales.forces.push import Push, arrival_velocity, pore_width
 from fdnet.scales.hertz import overlap_of_impact, overlap_under
 from fdnet.scales.springs import Contact, mass_range, pair_radius
 
@@ -18,25 +19,30 @@ class Overlaps:
     """Predicted overlaps of a fine with a grain, over the diameter of the largest fine.
 
     Attributes:
-        drag: by the drag F = 6 pi mu M r u of the fluid on a fine at rest: F / k, or by Hertz.
-        impact: by a fine that arrives with the fluid's velocity: u sqrt(m / k), or by Hertz.
+        drag: by drag and pressure gradient F on a fine at rest: F / k, or by Hertz.
+        impact: by a fine that arrives at its fastest velocity w: w sqrt(m / k), or by Hertz.
     """
 
     drag: float
     impact: float
 
 
-def overlaps_of(case: InvasionCase, contact: Contact, velocity: float) -> Overlaps:
-    """The overlaps in the `contact` of a grain and a fine at a fluid `velocity` of m/s."""
+def overlaps_of(case: InvasionCase, contact: Contact, push: Push, porosity: float) -> Overlaps:
+    """The overlaps in the `contact` of a grain and a fine, in a pack of a porosity.
+
+    A fine comes with the fluid and gains speed by the pressure gradient across a pore.
+    """
     radius, mass = case.fines.radius_range_m[1], mass_range(case.fines)[1]
-    push = 6 * math.pi * case.fluid.viscosity_Pa_s * case.drag.multiplier * radius * velocity
+    width = pore_width(porosity, case.grains.sauter_diameter_m)
+    velocity = arrival_velocity(push, radius, case.fines.density_kg_m3, width)
+    force = push.force(radius)
     if contact.elastic:
         modulus, joint = contact.elastic.modulus, pair_radius(case, ("grain", "fine"), radius)
         impact = overlap_of_impact(mass, velocity, modulus, joint)
-        drag = overlap_under(push, modulus, joint)
+        drag = overlap_under(force, modulus, joint)
     else:
         impact = velocity * math.sqrt(mass / contact.normal_stiffness)
-        drag = push / contact.normal_stiffness
+        drag = force / contact.normal_stiffness
     return Overlaps(impact=impact / (2 * radius), drag=drag / (2 * radius))
 
 

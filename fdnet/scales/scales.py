@@ -13,6 +13,8 @@ from fdnet.errors import CaseError
 from fdnet.scales.cohesion import cohesion_warnings, refuse_collapse
 from fdnet.scales.contacts import contacts_of, stiffness_factor
 from fdnet.scales.drive import drive_of, drive_warnings
+from fdnet.scales.forces.push import Push, push_of
+from fdnet.scales.forces.warnings import reynolds_warnings
 from fdnet.scales.grain_pack import pack_step, target_porosity
 from fdnet.scales.overlaps import overlap_warnings, overlaps_of, refuse_deep_overlap
 from fdnet.scales.slab import slab_of, slab_warnings
@@ -73,12 +75,18 @@ class InvasionScales(Scales):
         plug_time: s of the simulation without a crossing after which the face counts as plugged.
         cap_time: s of the simulation, when the invasion ends at the latest.
         checkpoint_steps: steps between two checkpoints.
-        reynolds: particle Reynolds number of the largest fine.
+        reynolds: particle Reynolds number of the largest fine that is held.
         stokes: Stokes number of the largest fine at a grain, as simulated.
         impact_stokes: impact Stokes number of the largest fine, as simulated.
         gravity_over_drag: weight less buoyancy over drag, of the largest fine.
+        gradient_over_drag: force of the pack's pressure gradient over Stokes's drag, of the
+            largest fine at rest, whether or not the case lets it act.
+        push: drag and pressure gradient on fines in the pack, as simulated.
+        drift_velocity: m/s, of the largest fine that the fluid carries freely in the pores, as
+            simulated.
         impact_overlap: predicted overlap by impact, over the diameter of the largest fine.
-        drag_overlap: predicted overlap by drag, over the diameter of the largest fine.
+        drag_overlap: predicted overlap by drag and pressure gradient, over the diameter of the
+            largest fine.
         sticking: how far a fine may lock between two grains.
     """
 
@@ -97,6 +105,9 @@ class InvasionScales(Scales):
     stokes: float
     impact_stokes: float
     gravity_over_drag: float
+    gradient_over_drag: float
+    push: Push
+    drift_velocity: float
     impact_overlap: float
     drag_overlap: float
     sticking: Sticking
@@ -146,15 +157,17 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     slab, relaxation = slab_of(case), _relaxation_times(case)
     drive = drive_of(case, shared.interstitial_velocity, relaxation[1])
     velocity = drive.velocity
+    push = push_of(case, velocity, shared.pressure_gradient, factor=drive.factor)
     darcy = shared.darcy_velocity * drive.factor
     upstream = velocity if case.drag.upstream == "interstitial" else darcy
-    step = time_step(case, shared.contacts, relaxation[0])
+    shortest = relaxation[0] * push.relaxation_share(case.fines.radius_range_m[0])
+    step = time_step(case, shared.contacts, shortest)
     times = stop_times(case, slab, drive, upstream=upstream)
-    hold = hold_steps(case, step, relaxation[0], times.chunk)
+    hold = hold_steps(case, step, shortest, times.chunk)
     chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
     contact = shared.contacts["grain-fine"]
-    overlaps = overlaps_of(case, contact, velocity)
-    sticking = sticking_of(case, contact, velocity, step)
+    overlaps = overlaps_of(case, contact, push, shared.porosity)
+    sticking = sticking_of(case, contact, push, step)
     reynolds = _reynolds(case, shared.interstitial_velocity)
     stokes = relaxation[1] * velocity / (2 * case.grains.mean_radius_m)
     gravity = _gravity_over_drag(case, shared.interstitial_velocity)
@@ -164,11 +177,11 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     warnings = [
         *shared.warnings,
         *drive_warnings(case, drive),
-        *_reynolds_warnings(reynolds),
+        *reynolds_warnings(case, push, reynolds),
         *overlap_warnings(case, overlaps),
         *cohesion_warnings(case, contact),
         *slab_warnings(case, slab),
-        *drag_warnings(case, hold * step / relaxation[0]),
+        *drag_warnings(case, hold * step / shortest),
         *plug_warnings(case, times.plug, drive, upstream),
         *sticking_warnings(sticking),
     ]
@@ -190,6 +203,9 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
         stokes=stokes,
         impact_stokes=drive.impact_stokes,
         gravity_over_drag=gravity,
+        gradient_over_drag=_gradient_over_drag(case, shared),
+        push=push,
+        drift_velocity=velocity + push.drift(case.fines.radius_range_m[1]),
         impact_overlap=overlaps.impact,
         drag_overlap=overlaps.drag,
         sticking=sticking,
@@ -213,6 +229,15 @@ def _reynolds(case: InvasionCase, velocity: float) -> float:
     return case.fluid.density_kg_m3 * velocity * 2 * radius / case.fluid.viscosity_Pa_s
 
 
+def _gradient_over_drag(case: InvasionCase, shared: Scales) -> float:
+    """2 r^2 (-grad p) / (9 mu u M) of the largest fine, (2/9) r^2 phi / (k M) by Darcy's law.
+
+    It is the force V (-grad p) over Stokes's drag at rest, whether or not the case lets it act.
+    """
+    drag = case.fluid.viscosity_Pa_s * shared.interstitial_velocity * case.drag.multiplier
+    return 2 / 9 * case.fines.radius_range_m[1] ** 2 * shared.pressure_gradient / drag
+
+
 def _gravity_over_drag(case: InvasionCase, velocity: float) -> float:
     """2 r^2 (rho - rho_fluid) g / (9 mu u M) of the largest fine, M the drag multiplier."""
     excess = abs(case.fines.density_kg_m3 - case.fluid.density_kg_m3 * case.gravity.buoyancy)
@@ -231,11 +256,3 @@ def _refuse_long_chunk(step: float, chunk_steps: int) -> None:
             f"run.time_step_s: {step:.3g} s needs {chunk_steps:.3g} steps between checkpoints "
             f"(limit {MOST_STEPS:.3g}); raise the step or shorten run.checkpoint_ms"
         )
-
-
-def _reynolds_warnings(reynolds: float) -> list[str]:
-    if reynolds <= 1:
-        return []
-    return [
-        f"particle Reynolds number {reynolds:.2g} is outside the range of Stokes drag (below 1)"
-    ]

@@ -4,6 +4,7 @@ from fdnet.case.case import Case
 from fdnet.scales.contact_rows import contact_rows, overlap_rows
 from fdnet.scales.cost import cost_of, memory_bytes
 from fdnet.scales.flow_rows import drive_rows, flow_rows
+from fdnet.scales.forces.rows import force_rows
 from fdnet.scales.grain_pack import grain_count
 from fdnet.scales.quantity import Quantity
 from fdnet.scales.quantity import row as _row
@@ -23,7 +24,7 @@ def _fine_rows(case: Case, scales: InvasionScales) -> list[Quantity]:
     return [
         *drive_rows(scales),
         *_drag_rows(scales),
-        *_ratio_rows(scales),
+        *force_rows(scales),
         *overlap_rows(case, scales),
         *_supply_rows(scales),
         *_time_rows(scales),
@@ -53,43 +54,6 @@ def _drag_rows(scales: InvasionScales) -> list[Quantity]:
             "-",
             "below 1 stable, 0.1 exact enough",
             "measured, docs/physics.md",
-        ),
-    ]
-
-
-def _ratio_rows(scales: InvasionScales) -> list[Quantity]:
-    return [
-        _row(
-            "particle Reynolds number",
-            "Re",
-            scales.reynolds,
-            "-",
-            "rho_f u 2r / mu",
-            "Stokes drag holds below about 1",
-        ),
-        _row(
-            "Stokes number",
-            "St",
-            scales.stokes,
-            "-",
-            "tau u / d_grain, as simulated",
-            "inertia over drag at a grain",
-        ),
-        _row(
-            "impact Stokes number",
-            "St_i",
-            scales.impact_stokes,
-            "-",
-            "tau u / r, as simulated",
-            "Joseph 2001; inertia does not matter well below 1",
-        ),
-        _row(
-            "gravity over drag",
-            "G",
-            scales.gravity_over_drag,
-            "-",
-            "2 r^2 (rho - rho_f) g / (9 mu u M)",
-            "force ratio",
         ),
     ]
 

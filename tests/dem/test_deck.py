@@ -94,11 +94,54 @@ def test_gravity_is_left_out_when_negligible_and_reported():
     text = invade_text()
     assert not has(text, "gravity|buoyancy")
     assert "# left out: gravity and buoyancy (gravity is" in text
-    assert has(invade_text("gravity.mode=on"), r"^fix grav fines gravity 9.81 vector 0.0 0.0 -1.0")
-    assert has(
-        invade_text("gravity.mode=on"), r"^fix buoy fines buoyancy density 1095.0 dim z level"
+    on = invade_text("gravity.mode=on")
+    pull = 9.81 * (1 - 1095 / 2146)
+    assert has(on, rf"^fix grav_fines fines gravity {pull} vector 0.0 0.0 -1.0$")
+    assert not has(on, "grav_grains|buoyancy density")
+    heavy = invade_text("gravity.mode=on", "gravity.buoyancy=false")
+    assert has(heavy, r"^fix grav_fines fines gravity 9.81 vector 0.0 0.0 -1.0$")
+    assert "# left out: buoyancy (switched off)" in heavy
+
+
+def test_each_group_of_spheres_has_the_gravity_of_its_own_density():
+    """Also light ones, which rise: the direction turns, the magnitude stays positive."""
+    text = invade_text(
+        "gravity.mode=on",
+        "gravity.acceleration_m_s2=[3.0, 0.0, -4.0]",
+        "grains.motion=mobile",
+        "fines.density_kg_m3=1000.0",
     )
-    assert not has(invade_text("gravity.mode=on", "gravity.buoyancy=false"), "buoyancy")
+    light, heavy = 5 * (1095 / 1000 - 1), 5 * (1 - 1095 / 2650)
+    fines = re.search(r"(?m)^fix grav_fines fines gravity (\S+) vector -0.6 0.0 0.8$", text)
+    grains = re.search(r"(?m)^fix grav_grains grains gravity (\S+) vector 0.6 0.0 -0.8$", text)
+    assert float(fines[1]) == pytest.approx(light)
+    assert float(grains[1]) == pytest.approx(heavy)
+
+
+def test_the_forces_of_the_fluid_that_are_not_asked_for_are_left_out_and_named():
+    text = invade_text()
+    for what in ("force of the pressure gradient (switched off)", "drag in a crowd (not asked"):
+        assert f"# left out: {what}" in text
+    assert "# left out: drag at finite Reynolds numbers (not asked for)" in text
+    assert not has(text, "gradient|pores|slip")
+    asked = invade_text("drag.pressure_gradient=true", "drag.inertia=schiller-naumann")
+    assert not re.search(r"left out: (force|drag at)", asked)
+    assert "the fluid pushes the fines only" in invade_text(
+        "drag.pressure_gradient=true", "grains.motion=mobile"
+    )
+
+
+def test_the_pressure_gradient_acts_on_the_volume_of_each_fine_inside_the_pack():
+    gradient = scales_of(tiny()).pressure_gradient
+    one = invade_text("drag.pressure_gradient=true")
+    force = re.search(r"(?m)^fix gradient fines addforce (\S+) 0.0 0.0 region pores$", one)
+    assert float(force[1]) == pytest.approx(4 / 3 * math.pi * 5e-5**3 * gradient)
+    end = re.search(r"(?m)^region pores block 0.0 (\S+) INF INF INF INF units box$", one)
+    assert float(end[1]) == np.nextafter(3e-3, 0)
+    many = invade_text("drag.pressure_gradient=true", "fines.radius_mm=[0.04, 0.06]")
+    formula = re.search(r"(?m)^variable gx atom (\S+)\*r\*r\*r$", many)
+    assert float(formula[1]) == pytest.approx(4 / 3 * math.pi * gradient)
+    assert has(many, r"^fix gradient fines addforce v_gx 0.0 0.0 region pores$")
 
 
 def test_fixed_grains_have_no_mutual_contacts_and_mobile_ones_are_held_by_planes():

@@ -112,7 +112,11 @@ def drive(
         resting_spheres([[at, 8e-4, 8e-4]], RADIUS, box, kind=Kind.FINE, first=2)
     )
     write_data(
-        folder / "one.data", spheres, bounds=box, density=np.array([2650.0, 2146.0]), types=3
+        folder / "one.data",
+        spheres,
+        bounds=box - [[5e-4, 0], [0, 0], [0, 0]],
+        density=np.array([2650.0, 2146.0]),
+        types=3,
     )
     header = {
         "stage": "test",

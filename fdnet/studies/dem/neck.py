@@ -96,6 +96,7 @@ def _case(neck: Neck) -> InvasionCase:
                 "grains": {"radius_mm": 1e3 * GRAIN, "count": 2, **material},
                 "fines": {**fine, **material},
                 "fluid": {"velocity_m_s": 1e-3},
+                "drag": {"pressure_gradient": False},
                 "run": {"stiffness_N_m": neck.stiffness},
             }
         )

@@ -58,6 +58,7 @@ class Specimen:
                     "friction": self.friction,
                 },
                 "fluid": {"darcy_length_mm": DARCY_LENGTH_MM},
+                "drag": {"pressure_gradient": False},
                 "analysis": {"sections": SECTIONS},
             }
         )
