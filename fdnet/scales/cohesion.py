@@ -48,8 +48,11 @@ def pull_off_of(case: InvasionCase, contact: Contact) -> PullOff:
     return pull_off(density, contact.elastic.modulus, joint)
 
 
-def refuse_collapse(case: InvasionCase, contact: Contact) -> None:
-    """Raises CaseError when cohesion alone would draw a fine half into a grain."""
+def cohesion_warnings(case: InvasionCase, contact: Contact) -> list[str]:
+    """A resting overlap above `run.max_overlap`, in words.
+
+    Raises CaseError when cohesion alone would draw a fine half into a grain.
+    """
     share = _resting_share(case, contact)
     if share > MOST_OVERLAP:
         raise CaseError(
@@ -57,11 +60,6 @@ def refuse_collapse(case: InvasionCase, contact: Contact) -> None:
             f"{100 * share:.3g} % of its diameter into a grain (limit "
             f"{100 * MOST_OVERLAP:.0f} %); lower it, or raise run.stiffness_N_m"
         )
-
-
-def cohesion_warnings(case: InvasionCase, contact: Contact) -> list[str]:
-    """A resting overlap above `run.max_overlap`, in words."""
-    share = _resting_share(case, contact)
     if share <= case.run.max_overlap:
         return []
     return [

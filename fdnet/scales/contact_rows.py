@@ -5,7 +5,7 @@ from fdnet.scales.cohesion import pull_off_of
 from fdnet.scales.hertz import rayleigh_time
 from fdnet.scales.hertz_contacts import material_of
 from fdnet.scales.quantity import Quantity, row
-from fdnet.scales.restitution import LEAST_OF_HERTZ
+from fdnet.scales.restitution import LEAST
 from fdnet.scales.scales import InvasionScales, Scales
 from fdnet.scales.springs import Contact
 
@@ -137,7 +137,7 @@ def _rayleigh_row(case: InvasionCase, scales: Scales) -> Quantity:
 
 
 def _rebound_rows(contact: Contact, stokes: float) -> list[Quantity]:
-    least = f", at least {LEAST_OF_HERTZ:g}" if contact.elastic else ""
+    least = LEAST["hertz" if contact.elastic else "hooke"]
     return [
         row(
             f"{contact.pair} impact Stokes number",
@@ -152,7 +152,7 @@ def _rebound_rows(contact: Contact, stokes: float) -> list[Quantity]:
             "e",
             contact.restitution,
             "-",
-            f"e_dry exp(-35 / St){least}",
+            f"e_dry exp(-35 / St), at least {least:g}",
             "Legendre and others 2005",
         ),
     ]

@@ -8,13 +8,15 @@ walls show no rebound below an impact Stokes number of about 10, and the dry res
 """
 
 import math
+from collections.abc import Mapping
 
 from fdnet.case.case import Case, InvasionCase
 
 FILM = 35.0
 """Stokes number at which the liquid leaves exp(-1) of the dry restitution (Legendre 2005)."""
-LEAST_OF_HERTZ = 0.0501
-"""Least restitution: LIGGGHTS's Hertz model takes 0.05 and less for an error."""
+LEAST: Mapping[str, float] = {"hooke": 1e-6, "hertz": 0.0501}
+"""Least restitution by contact model, below which nothing is lowered further. LIGGGHTS's Hertz
+model takes 0.05 and less for an error; for linear contacts it keeps the damping ratio below 1."""
 
 
 def pair_stokes(mass: float, radius: float, velocity: float, viscosity: float) -> float:
@@ -26,14 +28,13 @@ def pair_stokes(mass: float, radius: float, velocity: float, viscosity: float) -
     return mass * velocity / (6 * math.pi * viscosity * radius**2)
 
 
-def wet_ratio(dry_ratio: float, stokes: float, *, least: float = 0.0) -> float:
+def wet_ratio(dry_ratio: float, stokes: float, *, least: float) -> float:
     """Damping ratio of a contact with exp(-35 / St) of the restitution of `dry_ratio`.
 
     z = -ln e / sqrt(ln^2 e + pi^2), with e at least `least`.
     """
     log = -math.pi * dry_ratio / math.sqrt(1 - dry_ratio**2) - FILM / stokes
-    if least > 0:
-        log = max(log, math.log(least))
+    log = max(log, math.log(least))
     return -log / math.hypot(log, math.pi)
 
 

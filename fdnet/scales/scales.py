@@ -10,7 +10,7 @@ from typing import overload
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.errors import CaseError
-from fdnet.scales.cohesion import cohesion_warnings, refuse_collapse
+from fdnet.scales.cohesion import cohesion_warnings
 from fdnet.scales.contacts import contacts_of, stiffness_factor
 from fdnet.scales.drive import drive_of, drive_warnings
 from fdnet.scales.forces.push import Push, push_of
@@ -169,10 +169,8 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     overlaps = overlaps_of(case, contact, push, shared.porosity)
     sticking = sticking_of(case, contact, push, step)
     reynolds = _reynolds(case, shared.interstitial_velocity)
-    stokes = relaxation[1] * velocity / (2 * case.grains.mean_radius_m)
     gravity = _gravity_over_drag(case, shared.interstitial_velocity)
     refuse_deep_overlap(overlaps)
-    refuse_collapse(case, contact)
     _refuse_long_chunk(step, chunk_steps)
     warnings = [
         *shared.warnings,
@@ -200,7 +198,7 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
         cap_time=times.cap,
         checkpoint_steps=chunk_steps,
         reynolds=reynolds,
-        stokes=stokes,
+        stokes=relaxation[1] * velocity / (2 * case.grains.mean_radius_m),
         impact_stokes=drive.impact_stokes,
         gravity_over_drag=gravity,
         gradient_over_drag=_gradient_over_drag(case, shared),

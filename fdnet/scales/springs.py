@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from fdnet.case.case import Case
 from fdnet.case.particles import Spheres
 from fdnet.scales.hertz import Elastic, joint_radius, restitution_of
-from fdnet.scales.restitution import LEAST_OF_HERTZ, is_wet, pair_stokes, wet_ratio
+from fdnet.scales.restitution import LEAST, is_wet, pair_stokes, wet_ratio
 
 PAIRS = (
     ("grain", "grain"),
@@ -137,8 +137,7 @@ def damping_and_stokes(
     radius = pair_radius(case, pair, case.spheres["fine"].mean_radius_m)
     mass = effective_mass(case, pair)
     stokes = pair_stokes(mass, radius, velocity, case.fluid.viscosity_Pa_s)
-    least = LEAST_OF_HERTZ if case.contact.model == "hertz" else 0.0
-    return wet_ratio(dry, stokes, least=least), stokes
+    return wet_ratio(dry, stokes, least=LEAST[case.contact.model]), stokes
 
 
 def pair_radius(case: Case, pair: tuple[str, str], radius: float) -> float:
