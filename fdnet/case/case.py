@@ -19,9 +19,10 @@ from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.contact import MODEL_KEYS, ContactLaw
 from fdnet.case.control import Run
 from fdnet.case.fluid import Fluid, Well
-from fdnet.case.particles import Fines, Grains, Spheres
+from fdnet.case.particles import Fines, Grains
 from fdnet.case.parts import Box, Drag, Gravity
 from fdnet.case.rules import cross_problems
+from fdnet.case.spheres import Spheres
 from fdnet.case.stages import STAGES, Stage
 from fdnet.case.values import Part
 from fdnet.errors import CaseError
@@ -41,6 +42,7 @@ KEYS = (
     "contact",
     "run",
     "analysis",
+    "given",
 )
 """Keys at the top of a case file, in the order in which they are written."""
 
@@ -80,6 +82,11 @@ class Case(Part):
     contact: ContactLaw = ContactLaw()
     run: Run = Run()
     analysis: AnalysisChoices = AnalysisChoices()
+    given: dict[str, str] = Field(
+        {},
+        description="Written by fdnet: what the case gave with units or as a file, by dotted key. "
+        "The other keys hold the same as numbers, and only they count.",
+    )
 
     @model_validator(mode="after")
     def _tables_fit(self) -> Self:
@@ -114,6 +121,8 @@ class Case(Part):
         Keys that only the other contact model reads are left out.
         """
         data = self.model_dump(mode="json")
+        if not self.given:
+            del data["given"]
         for name in ("grains", "fines"):
             for key in self.contact.other_keys & data.get(name, {}).keys():
                 del data[name][key]
@@ -131,6 +140,7 @@ class Case(Part):
         differs from what a case meant before (`fdnet.case.added`).
         """
         data = without_added(self.data())
+        data.pop("given", None)
         data["run"] = {key: value for key, value in data["run"].items() if key not in POLICIES}
         if stage in ("pack", "invade"):
             data.pop("analysis")
@@ -203,4 +213,6 @@ def with_fines(case: Case) -> InvasionCase:
 def _without_none(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _without_none(item) for key, item in value.items() if item is not None}
+    if isinstance(value, list):
+        return [_without_none(item) for item in value]
     return value

@@ -15,6 +15,9 @@ from fdnet.case.values import (
     Vector,
 )
 
+UPDATE_TRAVEL, MOST_TRAVEL = 0.5, 10.0
+"""Diameters of the smallest fine between two updates: by default, and at most."""
+
 
 class Box(Part):
     """The specimen: flow and depth run along the first side; x = 0 is the formation face."""
@@ -92,10 +95,26 @@ class Drag(Part):
     )
     crowd: Literal["none", "beetstra"] = Field(
         "none",
-        description='How other spheres nearby change the drag on a fine: "none" leaves it that of '
-        'a lone sphere. "beetstra", the law of Beetstra, van der Hoef and Kuipers (2007), is '
-        "refused for now.",
+        description='How other fines nearby change the drag on a fine: "none" leaves it that of a '
+        'lone sphere, "beetstra" takes the law of Beetstra, van der Hoef and Kuipers (2007) with '
+        "the porosity around each fine, which fdnet computes while LIGGGHTS waits.",
     )
+    update_travel: Annotated[float, Field(gt=0, le=MOST_TRAVEL)] | None = Field(
+        None,
+        description="How far the fluid carries a fine, in diameters of the smallest fine, before "
+        "the forces in a crowd are computed anew. When absent: "
+        f"{UPDATE_TRAVEL:g}.",
+    )
+
+    @property
+    def coupled(self) -> bool:
+        """Whether fdnet computes the forces on each fine while LIGGGHTS waits."""
+        return self.crowd != "none" or self.field == "network"
+
+    @property
+    def travel_diameters(self) -> float:
+        """Diameters of the smallest fine between two updates of a coupled invasion."""
+        return UPDATE_TRAVEL if self.update_travel is None else self.update_travel
 
 
 class Gravity(Part):

@@ -35,7 +35,8 @@ def overlaps_of(case: InvasionCase, contact: Contact, push: Push, porosity: floa
     """
     radius, mass = case.fines.radius_range_m[1], mass_range(case.fines)[1]
     width = pore_width(porosity, case.grains.sauter_diameter_m)
-    velocity = arrival_velocity(push, radius, case.fines.density_kg_m3, width)
+    lightest = min(one.density for one in case.fines.components)
+    velocity = arrival_velocity(push, radius, lightest, width)
     force = push.force(radius)
     if contact.elastic:
         modulus, joint = contact.elastic.modulus, pair_radius(case, ("grain", "fine"), radius)
