@@ -115,6 +115,12 @@ class Case(Part):
         """Which directions are periodic; the flow direction never is."""
         return self.box.periodic
 
+    @property
+    def wall_friction(self) -> float:
+        """Friction of the side walls: the one given, or that of the grains."""
+        given = self.box.wall_friction
+        return self.grains.friction if given is None else given
+
     def data(self) -> dict[str, Any]:
         """All keys that have a value, defaults written out (TOML knows no null).
 

@@ -88,7 +88,7 @@ def _contact(case: Case, pair: tuple[str, str], factor: float, velocity: float) 
     damping = mean_damping([case.spheres[name] for name in pair if name != "wall"])
     stiffest = tangent_stiffness(case, pair, factor, STEP_OVERLAP)
     frictions = [
-        case.box.wall_friction if name == "wall" else case.spheres[name].friction for name in pair
+        case.wall_friction if name == "wall" else case.spheres[name].friction for name in pair
     ]
     return Contact(
         pair="-".join(pair),

@@ -84,7 +84,7 @@ def _nominal(case: Case) -> dict[str, tuple[float, float, float]]:
         name: (spheres.normal_stiffness_N_m, spheres.tangential_stiffness, spheres.friction)
         for name, spheres in case.spheres.items()
     }
-    return table | {"wall": (*table["grain"][:2], case.box.wall_friction)}
+    return table | {"wall": (*table["grain"][:2], case.wall_friction)}
 
 
 def pairs_of(case: Case) -> list[tuple[str, str]]:
