@@ -3,7 +3,8 @@
 from collections.abc import Callable, Iterator
 
 from fdnet.case.contact import DEEPEST_DAMPING, ContactLaw
-from fdnet.case.particles import Fines, Grains, Spheres
+from fdnet.case.particles import Fines, Grains
+from fdnet.case.spheres import Spheres
 
 
 def of_the_model(name: str) -> Callable[[ContactLaw, Spheres], Iterator[str]]:

@@ -126,10 +126,11 @@ def _hertz_rows(contact: Contact) -> list[Quantity]:
 
 def _rayleigh_row(case: InvasionCase, scales: Scales) -> Quantity:
     modulus, ratio = material_of(case, "fine", scales.stiffness_factor)
+    density = min(one.density for one in case.fines.components)
     return row(
         "Rayleigh time of the smallest fine",
         "t_R",
-        rayleigh_time(case.fines.radius_range_m[0], case.fines.density_kg_m3, modulus, ratio),
+        rayleigh_time(case.fines.radius_range_m[0], density, modulus, ratio),
         "s",
         "pi r sqrt(rho/G) / (0.1631 nu + 0.8766)",
         "Thornton and Randall 1988",

@@ -83,7 +83,7 @@ def _contact(case: Case, pair: tuple[str, str], factor: float, velocity: float) 
     damping, stokes = damping_and_stokes(case, pair, velocity)
     stiffest = tangent_stiffness(case, pair, factor, STEP_OVERLAP)
     frictions = [
-        case.box.wall_friction if name == "wall" else case.spheres[name].friction for name in pair
+        case.wall_friction if name == "wall" else case.spheres[name].friction for name in pair
     ]
     return Contact(
         pair="-".join(pair),

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from fdnet.case.case import Case
-from fdnet.case.particles import Spheres
+from fdnet.case.spheres import Spheres
 from fdnet.scales.hertz import Elastic, joint_radius, restitution_of
 from fdnet.scales.restitution import LEAST, is_wet, pair_stokes, wet_ratio
 
@@ -69,8 +69,17 @@ def sphere_mass(radius: float, density: float) -> float:
 
 def mass_range(spheres: Spheres) -> tuple[float, float]:
     """Mass of the smallest and of the largest sphere, kg."""
-    low, high = spheres.radius_range_m
-    return sphere_mass(low, spheres.density_kg_m3), sphere_mass(high, spheres.density_kg_m3)
+    if not spheres.measured:
+        low, high = spheres.radius_range_m
+        return sphere_mass(low, spheres.density_kg_m3), sphere_mass(high, spheres.density_kg_m3)
+    ends = [
+        (
+            sphere_mass(0.5 * one.curve.low, one.density),
+            sphere_mass(0.5 * one.curve.high, one.density),
+        )
+        for one in spheres.components
+    ]
+    return min(low for low, _ in ends), max(high for _, high in ends)
 
 
 def _nominal(case: Case) -> dict[str, tuple[float, float, float]]:
@@ -79,7 +88,7 @@ def _nominal(case: Case) -> dict[str, tuple[float, float, float]]:
         name: (spheres.normal_stiffness_N_m, spheres.tangential_stiffness, spheres.friction)
         for name, spheres in case.spheres.items()
     }
-    return table | {"wall": (*table["grain"][:2], case.box.wall_friction)}
+    return table | {"wall": (*table["grain"][:2], case.wall_friction)}
 
 
 def pairs_of(case: Case) -> list[tuple[str, str]]:
@@ -158,4 +167,4 @@ def effective_mass(case: Case, pair: tuple[str, str]) -> float:
 
 
 def _inverse_mass(spheres: Spheres) -> float:
-    return 1 / sphere_mass(spheres.mean_radius_m, spheres.density_kg_m3)
+    return 1 / sphere_mass(spheres.mean_radius_m, spheres.mean_density_kg_m3)
