@@ -108,6 +108,12 @@ def test_a_drive_near_the_bound_warns():
     assert "inertia may" not in " ".join(scales_of(tiny()).warnings)
 
 
+def test_a_drive_does_not_go_with_cohesion():
+    keys = ("contact.model=hertz", "contact.cohesion_J_m3=1e4")
+    with pytest.raises(CaseError, match=r"drag\.drive_velocity_m_s: auto with .*cohesion is not"):
+        tiny("drag.drive_velocity_m_s=auto", *keys)
+
+
 def test_the_table_of_scales_shows_the_drive():
     case = tiny(WELL, "drag.drive_velocity_m_s=0.5")
     rows = {one.symbol: one.value for one in scale_rows(case, scales_of(case))}

@@ -48,6 +48,8 @@ _WORDS: Mapping[str, str] = {
     "depth_p95": "95 % above, mm",
     "k_ratio": "k/k0",
 }
+_SHORT = ("fines.count=4000", "run.cap_ms=0.5")
+"""Specimen 6 is followed for half of its quick form, since its fines are the most."""
 _SMALL = ("box.size_mm=[2.0,1.2,1.2]", "grains.count=28", "fines.count=60", "run.cap_ms=0.4")
 
 
@@ -66,7 +68,9 @@ def case_of(point: Point) -> InvasionCase:
     """The quick form of a specimen of the thesis with some settings as before."""
     changed = _BEFORE if point.value == BEFORE else _CHANGES[str(point.value)]
     keys = {**_NOW, **changed, "seed": str(point.seed)}
-    small = _SMALL if point.settings["size"] == "small" else ()
+    small: tuple[str, ...] = _SHORT if point.series == SERIES[2] else ()
+    if point.settings["size"] == "small":
+        small = _SMALL
     path = case_path(f"quick-{point.series.replace(' ', '')}")
     assignments = [*(f"{key}={value}" for key, value in keys.items()), *small]
     return with_fines(read_case(path, assignments=assignments))
