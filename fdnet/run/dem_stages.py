@@ -45,7 +45,7 @@ def invade_stage(session: Session, case: InvasionCase) -> None:
     expected = _expected_steps(scales)
     progress = Progress("invade", expected, show=session.options.show_progress)
     with session.timed("invade"), progress:
-        launch, fluid = session.launch(progress), fluid_of(case, scales)
+        launch, fluid = session.launch(progress), fluid_of(case, scales, grains)
         result = invade(case, scales, grains, folder, launch, fluid=fluid)
     seconds = session.seconds["invade"]
     record = invade_record(case, result, folder, seconds=seconds)
