@@ -32,7 +32,7 @@ STUDIES_LAYERS = [
     ["engine", "stokes", "fuzz", "chaos"],
     ["truth"],
     ["accuracy", "benchmark", "dem", "thesis"],
-    ["network"],
+    ["network", "outside"],
     ["command"],
     ["pages"],
 ]
@@ -66,6 +66,7 @@ DOORS = {
         "report/side_view",
         "studies/accuracy/figure",
         "studies/engine/draw",
+        "studies/outside/figure",
         "studies/thesis/figures/canvas",
     },
     "PIL": {"studies/thesis/figures/canvas"},
