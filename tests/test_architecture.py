@@ -150,7 +150,7 @@ def test_the_network_half_never_imports_the_dem_half(root):
             ), module
 
 
-FIELD_UNITS = ("_mm", "_cP", "_MPa", "_ms")
+FIELD_UNITS = ("_mm", "_cP", "_MPa", "_ms", "_mD")
 NO_KEYS = {"fdnet/studies/dem/economies.py": {"duration_ms"}}
 """Attributes, by file, that share the name of a case's key but mean something else."""
 

@@ -9,10 +9,12 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import tomli_w
 from builders import TINY, tiny
 
+from fdnet.case.added import AS_BEFORE, completed, without_added
 from fdnet.case.case import KEYS, Case, InvasionCase, with_fines
-from fdnet.case.file import case_from, known_keys, read_case, set_keys
+from fdnet.case.file import case_from, known_keys, read_case, recorded_case, set_keys
 from fdnet.errors import CaseError
 from fdnet.scales.scales import InvasionScales, Scales, scales_of
 from fdnet.studies.thesis.runs.carry_out import find_state, state_path
@@ -140,7 +142,8 @@ def test_a_case_without_fines_is_a_type_of_its_own():
 
 def test_every_table_is_written():
     assert set(KEYS) == set(InvasionCase.model_fields)
-    assert list(tiny().data()) == list(KEYS)
+    well = "well={radius_mm=108.0, drainage_radius_m=100.0}"
+    assert list(tiny(well).data()) == list(KEYS)
     assert {"fines", "fines.radius_mm"} <= set(known_keys())
 
 
@@ -258,12 +261,35 @@ def test_shipped_cases_keep_their_digests_and_their_text(root: Path):
     assert shipped == {Path(f"{row['case']}.toml") for row in rows}
     for row in rows:
         case = read_case(root / "cases" / f"{row['case']}.toml")
-        text = hashlib.sha256(case.toml().encode()).hexdigest()[:16]
+        text = tomli_w.dumps(without_added(case.data()))
         assert row == {
             "case": row["case"],
             **{stage: case.digest(stage) for stage in ("pack", "invade", "analyse")},
-            "text": text,
+            "text": hashlib.sha256(text.encode()).hexdigest()[:16],
         }
+
+
+def test_new_keys_that_mean_as_before_are_in_no_digest():
+    before = {"name": "a", "fluid": {"viscosity_cP": 50.0}}
+    after = {"name": "a", "fluid": {"viscosity_cP": 50.0, "law": "old"}, "new": {"key": 1.0}}
+    meaning = {"fluid.law": "old", "new.key": 1.0}
+    assert without_added(after, meaning) == before
+    after["fluid"]["law"] = "other"
+    assert without_added(after, meaning) == before | {"fluid": after["fluid"]}
+    assert set(AS_BEFORE) <= set(known_keys())
+
+
+def test_a_recorded_case_that_lacks_new_keys_is_the_case_of_its_time(tmp_path: Path):
+    """A case file that lacks them takes the defaults of today instead."""
+    path, data = tmp_path / "case.toml", without_added(tiny().data())
+    path.write_text(tomli_w.dumps(data))
+    then = set_keys(data, [f"{key}={str(value).lower()}" for key, value in AS_BEFORE.items()])
+    assert recorded_case(path) == case_from(then)
+    assert recorded_case(path).same_specimen(path.read_bytes())
+    assert completed({"drag": {"scheme": "held"}}, {"drag.new": 1, "fines.new": 2}) == {
+        "drag": {"scheme": "held", "new": 1}
+    }
+    assert completed({}, {"well.new": 1}) == {"well": {"new": 1}}
 
 
 def test_stored_states_still_belong_to_their_cases(root: Path):
@@ -291,7 +317,12 @@ def test_values_in_si_are_those_of_the_keys():
     assert case.fluid.viscosity_Pa_s == pytest.approx(0.05)
     assert case.fluid.stokes_coefficient_Pa_s == pytest.approx(6 * math.pi * 0.05)
     assert case.fluid.darcy_length_m == pytest.approx(3.3e-3)
-    assert case.fluid.darcy_velocity(1e-11, 7e-3) == pytest.approx(1e-11 / 0.05 * 3.5e6 / 7e-3)
+    assert case.fluid.overbalance_Pa == pytest.approx(3.5e6)
+    well = tiny(
+        "well={radius_mm=108.0, drainage_radius_m=9.0, formation_permeability_mD=2.0}"
+    ).well
+    assert well.radius_m == pytest.approx(0.108)
+    assert well.formation_permeability_m2 == pytest.approx(1.9738466e-15)
     assert case.analysis.profile_bin_m == pytest.approx(2.5e-4)
     run = case.run
     assert (run.cap_s, run.plug_time_s, run.checkpoint_s) == pytest.approx((3e-4, 2e-4, 1e-4))

@@ -13,10 +13,12 @@ UNITS = {
     "_m_s": "m/s",
     "_MPa": "MPa",
     "_cP": "cP",
+    "_mD": "mD",
     "_mm": "mm",
     "_ms": "ms",
     "_hours": "h",
     "_s": "s",
+    "_m": "m",
 }
 """End of a key and the unit it stands for; the longer ends first."""
 SPACE = "\N{NO-BREAK SPACE}"

@@ -14,9 +14,10 @@ from typing import Annotated, Any, Self
 import tomli_w
 from pydantic import Field, model_validator
 
+from fdnet.case.added import completed, without_added
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.control import Run
-from fdnet.case.fluid import Fluid
+from fdnet.case.fluid import Fluid, Well
 from fdnet.case.particles import Fines, Grains, Spheres
 from fdnet.case.parts import Box, Drag, Gravity
 from fdnet.case.rules import cross_problems
@@ -33,6 +34,7 @@ KEYS = (
     "grains",
     "fines",
     "fluid",
+    "well",
     "drag",
     "gravity",
     "run",
@@ -70,6 +72,7 @@ class Case(Part):
     box: Box
     grains: Grains
     fluid: Fluid = Fluid()
+    well: Well | None = None
     drag: Drag = Drag()
     gravity: Gravity = Gravity()
     run: Run = Run()
@@ -115,9 +118,10 @@ class Case(Part):
         """Hash of what `stage` depends on.
 
         "pack" ignores fines, fluid and analysis; "invade" ignores the analysis. No result depends
-        on `POLICIES`, so no digest does.
+        on `POLICIES`, so no digest does. A key that was added later counts only where its value
+        differs from what a case meant before (`fdnet.case.added`).
         """
-        data = self.data()
+        data = without_added(self.data())
         data["run"] = {key: value for key, value in data["run"].items() if key not in POLICIES}
         if stage in ("pack", "invade"):
             data.pop("analysis")
@@ -132,7 +136,7 @@ class Case(Part):
     def same_specimen(self, text: bytes) -> bool:
         """Whether a case.toml as `toml` wrote it is this case but for `POLICIES`."""
         try:
-            data = tomllib.loads(text.decode())
+            data = completed(tomllib.loads(text.decode()))
             return case_type(data).model_validate(data).digest() == self.digest()
         except ValueError:
             return False

@@ -5,11 +5,12 @@ import difflib
 import tomllib
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
+from fdnet.case.added import completed
 from fdnet.case.case import Case, InvasionCase, case_type
 from fdnet.case.rules import cross_problems
 from fdnet.case.values import Part
@@ -104,8 +105,11 @@ def _tables_of(model: type[Part]) -> list[tuple[str, FieldInfo]]:
 
 
 def _table_of(field: FieldInfo) -> type[Part] | None:
-    kind = field.annotation
-    return kind if isinstance(kind, type) and issubclass(kind, Part) else None
+    """The class of a table's keys, also where the table may be absent; None for a plain key."""
+    for kind in (field.annotation, *get_args(field.annotation)):
+        if isinstance(kind, type) and issubclass(kind, Part):
+            return kind
+    return None
 
 
 def _problem(item: dict[str, Any]) -> str:
@@ -185,7 +189,22 @@ def read_case(path: str | Path, *, assignments: list[str] | None = None) -> Case
         3
     """
     try:
-        data = tomllib.loads(expanded(path).read_text(encoding="utf-8"))
+        return case_from(set_keys(_tables(path), assignments or []), source=str(path))
+    except RecursionError as error:
+        raise CaseError(f"{path}: its tables or lists are nested too deeply for a case") from error
+
+
+def recorded_case(path: Path) -> Case:
+    """The case that a run folder holds, perhaps of an earlier version (`fdnet.case.added`).
+
+    Raises CaseError as `read_case` does.
+    """
+    return case_from(completed(_tables(path)), source=str(path))
+
+
+def _tables(path: str | Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(expanded(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise CaseError(
             f"{path}: cannot be read as a case file: {error}; give the path of a TOML file"
@@ -194,7 +213,3 @@ def read_case(path: str | Path, *, assignments: list[str] | None = None) -> Case
         raise CaseError(f"{path}: its tables or lists are nested too deeply for a case") from error
     except ValueError as error:
         raise CaseError(f"{path}: not valid TOML: {error}") from error
-    try:
-        return case_from(set_keys(data, assignments or []), source=str(path))
-    except RecursionError as error:
-        raise CaseError(f"{path}: its tables or lists are nested too deeply for a case") from error

@@ -1,14 +1,18 @@
-"""The table [fluid] of a case file: the liquid of the mud and what drives it."""
+"""The tables [fluid] and [well] of a case file: the liquid of the mud and what drives it."""
 
 import math
+from typing import Literal
 
 from pydantic import Field
 
 from fdnet.case.values import Part, Positive, scaled
 
+M2_PER_MD = 9.869233e-16
+"""One millidarcy in m2."""
+
 
 class Fluid(Part):
-    """The mud's liquid. Its velocity is given, or follows from Darcy's law and Carman-Kozeny."""
+    """The mud's liquid. Its velocity is given, or follows from the overbalance by Darcy's law."""
 
     viscosity_cP: Positive = Field(50.0, description="Dynamic viscosity.")
     density_kg_m3: Positive = Field(
@@ -22,12 +26,19 @@ class Fluid(Part):
     velocity_m_s: Positive | None = Field(
         None,
         description="Interstitial velocity of the fluid along x. When absent it follows from "
-        "`overbalance_MPa` and `darcy_length_mm`.",
+        "`overbalance_MPa` and either the table `[well]` or `darcy_length_mm`.",
     )
     darcy_length_mm: Positive | None = Field(
         None,
-        description="Length over which the overbalance is lost. When absent it is the length of "
-        "the box.",
+        description="Length of a plug over which the whole overbalance is lost. Without it and "
+        "without the table `[well]` it is the length of the box, which warns: around a well the "
+        "gradient is about a hundred times less.",
+    )
+    darcy_law: Literal["darcy", "ergun"] = Field(
+        "darcy",
+        description='How the overbalance becomes a velocity: "darcy" takes the viscous loss '
+        'alone, "ergun" adds the loss by inertia. Where this loss lowers the velocity by 5 % or '
+        'more, "darcy" warns.',
     )
 
     @property
@@ -45,6 +56,34 @@ class Fluid(Part):
         """Length over which the overbalance is lost, m; None: the length of the box."""
         return scaled(self.darcy_length_mm, 1e-3)
 
-    def darcy_velocity(self, permeability: float, length: float) -> float:
-        """q = k dP / (mu L), m/s, for `permeability` m2 and `length` m (Darcy 1856)."""
-        return permeability / self.viscosity_Pa_s * self.overbalance_MPa * 1e6 / length
+    @property
+    def overbalance_Pa(self) -> float:
+        """Pressure of the mud above that of the formation, Pa."""
+        return self.overbalance_MPa * 1e6
+
+
+class Well(Part):
+    """A vertical well in its formation: the overbalance is lost in radial flow around it.
+
+    The specimen is a piece of the formation at the face of the well.
+    """
+
+    radius_mm: Positive = Field(description="Radius of the well, to the formation face.")
+    drainage_radius_m: Positive = Field(
+        description="Radius at which the pressure is that of the undisturbed formation."
+    )
+    formation_permeability_mD: Positive | None = Field(
+        None,
+        description="Permeability of the formation around the well. When absent it is that of "
+        "the pack by Carman and Kozeny.",
+    )
+
+    @property
+    def radius_m(self) -> float:
+        """Radius of the well, m."""
+        return self.radius_mm * 1e-3
+
+    @property
+    def formation_permeability_m2(self) -> float | None:
+        """Permeability of the formation, m2; None: that of the pack."""
+        return scaled(self.formation_permeability_mD, M2_PER_MD)

@@ -71,6 +71,12 @@ class Drag(Part):
         description="Velocity of the fluid upstream of the formation face: the interstitial one "
         "of the pack, or the Darcy velocity.",
     )
+    crowd: Literal["none", "beetstra"] = Field(
+        "none",
+        description='How other spheres nearby change the drag on a fine: "none" leaves it that of '
+        'a lone sphere. "beetstra", the law of Beetstra, van der Hoef and Kuipers (2007), is '
+        "refused for now.",
+    )
 
 
 class Gravity(Part):

@@ -7,6 +7,7 @@ from typing import Any
 
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.control import Run
+from fdnet.case.fluid import Fluid, Well
 from fdnet.case.particles import Fines, Grains, Spheres
 from fdnet.case.parts import Box, Drag, Gravity
 from fdnet.case.values import (
@@ -147,9 +148,39 @@ def _neighbour_bins(run: Run, box: Box, fines: Fines) -> Iterator[str]:
         )
 
 
+def _one_drive(well: Well, fluid: Fluid) -> Iterator[str]:
+    """A well gives the velocity, so nothing else may."""
+    given = [
+        f"fluid.{name} = {value:g}"
+        for name in ("velocity_m_s", "darcy_length_mm")
+        if (value := getattr(fluid, name)) is not None
+    ]
+    if given:
+        yield (
+            f"well: the table [well] with {' and '.join(given)}: each gives the velocity of the "
+            "fluid; keep one of them"
+        )
+
+
+def _radii_of_well(well: Well) -> Iterator[str]:
+    if well.drainage_radius_m <= well.radius_m:
+        yield (
+            f"well.drainage_radius_m: {well.drainage_radius_m:g} m is not above the radius of the "
+            f"well, well.radius_mm = {well.radius_mm:g} ({well.radius_m:g} m)"
+        )
+
+
 def _field(drag: Drag) -> Iterator[str]:
     if drag.field == "network":
         yield "drag.field: 'network' is not available yet; expected 'uniform'"
+
+
+def _crowd(drag: Drag) -> Iterator[str]:
+    if drag.crowd != "none":
+        yield (
+            f"drag.crowd: {drag.crowd!r} needs the porosity around each fine during a run, which "
+            "is not available yet; expected 'none'"
+        )
 
 
 def _refresh(drag: Drag) -> Iterator[str]:
@@ -228,7 +259,10 @@ RULES = (
     Rule(("grains.radius_mm", "fines.radius_mm"), _gap_of_sizes),
     Rule(("run.skin_mm", "grains.radius_mm", "fines.radius_mm"), _skin),
     Rule(("run.neighbour_bin_mm", "box.size_mm", "fines"), _neighbour_bins),
+    Rule(("well", "fluid.velocity_m_s", "fluid.darcy_length_mm"), _one_drive),
+    Rule(("well.radius_mm", "well.drainage_radius_m"), _radii_of_well),
     Rule(("drag.field",), _field),
+    Rule(("drag.crowd",), _crowd),
     Rule(("drag.scheme", "drag.refresh_steps"), _refresh),
     Rule(("drag.scheme", "fines.radius_mm"), _viscous),
     Rule(("drag.scheme", "drag.upstream"), _implicit),

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from fdnet.case.case import Case
-from fdnet.case.file import read_case
+from fdnet.case.file import read_case, recorded_case
 from fdnet.errors import CaseError
 from fdnet.files.paths import expanded
 from fdnet.run.finished import FinishedRun
@@ -40,7 +40,7 @@ def open_run(path: str | Path) -> FinishedRun:
     folder = expanded(path)
     _refuse_unfinished(folder)
     manifest = read_manifest(folder) or {}
-    return FinishedRun(path=folder, case=read_case(folder / CASE), manifest=manifest)
+    return FinishedRun(path=folder, case=recorded_case(folder / CASE), manifest=manifest)
 
 
 def run_case(

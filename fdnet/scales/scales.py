@@ -5,7 +5,7 @@ report repeats.
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import overload
 
 from fdnet.case.case import Case, InvasionCase
@@ -17,7 +17,7 @@ from fdnet.scales.springs import Contact, contacts_of, stiffness_factor
 from fdnet.scales.sticking import Sticking, sticking_of, sticking_warnings
 from fdnet.scales.stop_times import chunk_refreshes, plug_warnings, stop_times
 from fdnet.scales.time_step import drag_warnings, hold_steps, relaxation_time, time_step
-from fdnet.scales.velocity import velocity_of
+from fdnet.scales.velocity import Velocity, velocity_of, velocity_warnings
 
 MOST_STEPS = 2**31 - 1
 """LIGGGHTS counts the steps of a run in 32 bits."""
@@ -32,6 +32,8 @@ class Scales:
         permeability: m2, of the intact pack by Carman and Kozeny.
         darcy_velocity: m/s, flow rate over the whole cross-section.
         interstitial_velocity: m/s, mean velocity of the fluid in the pores.
+        pressure_gradient: Pa/m, that drives this flow through the intact pack.
+        inertial_loss: share by which Ergun's inertial term lowers the velocity of Darcy's law.
         stiffness_factor: factor from the materials' stiffness to the one used.
         contacts: contact of each pair of materials, such as "grain-fine".
         pack_step: s, time step of packing.
@@ -42,6 +44,8 @@ class Scales:
     permeability: float
     darcy_velocity: float
     interstitial_velocity: float
+    pressure_gradient: float
+    inertial_loss: float
     stiffness_factor: float
     contacts: dict[str, Contact]
     pack_step: float
@@ -99,8 +103,12 @@ def scales_of(case: Case) -> Scales:
     overflows.
     """
     try:
-        shared = _shared(case)
-        return _invasion(case, shared) if isinstance(case, InvasionCase) else shared
+        velocity = velocity_of(case, target_porosity(case))
+        shared = _shared(case, velocity)
+        if not isinstance(case, InvasionCase):
+            return shared
+        doubts = velocity_warnings(case, shared.porosity, velocity)
+        return _invasion(case, replace(shared, warnings=tuple(doubts)))
     except (OverflowError, ZeroDivisionError) as error:
         raise CaseError(
             f"case {case.name}: a formula leaves the range of numbers ({error}); check units and "
@@ -108,14 +116,15 @@ def scales_of(case: Case) -> Scales:
         ) from error
 
 
-def _shared(case: Case) -> Scales:
-    porosity, contacts = target_porosity(case), contacts_of(case)
-    velocity = velocity_of(case, porosity)
+def _shared(case: Case, velocity: Velocity) -> Scales:
+    contacts = contacts_of(case)
     return Scales(
-        porosity=porosity,
+        porosity=target_porosity(case),
         permeability=velocity.permeability,
         darcy_velocity=velocity.darcy,
         interstitial_velocity=velocity.interstitial,
+        pressure_gradient=velocity.pressure_gradient,
+        inertial_loss=velocity.inertial_loss,
         stiffness_factor=stiffness_factor(case),
         contacts=contacts,
         pack_step=pack_step(case, contacts),
@@ -139,6 +148,7 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     refuse_deep_overlap(overlaps)
     _refuse_long_chunk(step, chunk_steps)
     warnings = [
+        *shared.warnings,
         *_reynolds_warnings(reynolds),
         *overlap_warnings(case, overlaps),
         *slab_warnings(case, slab),

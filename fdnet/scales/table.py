@@ -45,8 +45,7 @@ def scale_rows(case: Case, scales: Scales) -> list[Quantity]:
 
 
 def _flow_rows(case: Case, scales: Scales) -> list[Quantity]:
-    given = "given in the case" if case.fluid.velocity_m_s is not None else "u = q / phi"
-    darcy = "q = u phi" if case.fluid.velocity_m_s is not None else "q = k dP / (mu L)"
+    darcy, interstitial, source = _velocity_formulas(case)
     return [
         _row(
             "Carman-Kozeny permeability",
@@ -56,11 +55,45 @@ def _flow_rows(case: Case, scales: Scales) -> list[Quantity]:
             "d^2 phi^3 / (180 (1-phi)^2)",
             "Carman 1937",
         ),
-        _row("Darcy velocity", "q", scales.darcy_velocity, "m/s", darcy, "Darcy 1856"),
+        _row("Darcy velocity", "q", scales.darcy_velocity, "m/s", darcy, source),
         _row(
-            "interstitial velocity", "u", scales.interstitial_velocity, "m/s", given, "Dupuit 1863"
+            "interstitial velocity",
+            "u",
+            scales.interstitial_velocity,
+            "m/s",
+            interstitial,
+            "Dupuit 1863",
+        ),
+        _row(
+            "pressure gradient in the pack",
+            "-dp/dx",
+            scales.pressure_gradient,
+            "Pa/m",
+            "mu q / k" if case.fluid.darcy_law == "darcy" else "mu q / k + b q^2",
+            source,
+        ),
+        _row(
+            "loss of velocity by inertia",
+            "1 - q_E/q_D",
+            scales.inertial_loss,
+            "-",
+            "b = 1.75/150 rho_f d / (k (1-phi))",
+            "Ergun 1952",
         ),
     ]
+
+
+def _velocity_formulas(case: Case) -> tuple[str, str, str]:
+    """Formulas of the Darcy and of the interstitial velocity, and the source of the first."""
+    ergun = case.fluid.darcy_law == "ergun"
+    source = "Ergun 1952" if ergun else "Darcy 1856"
+    if case.fluid.velocity_m_s is not None:
+        return "q = u phi", "given in the case", source
+    length = "L" if case.well is None else "r_w ln(r_e/r_w)"
+    if not ergun:
+        return f"q = k dP / (mu {length})", "u = q / phi", source
+    second = "L" if case.well is None else "r_w^2 (1/r_w - 1/r_e)"
+    return f"mu q {length} / k + b q^2 {second} = dP", "u = q / phi", source
 
 
 def _fine_rows(scales: InvasionScales) -> list[Quantity]:

@@ -23,8 +23,8 @@ from fdnet.network.flow.flow import Flow
 from fdnet.network.flow.slabs import plane_pressures, slab_permeability, whole_permeability
 from fdnet.network.laws.named import DEFAULT_LAW, LAWS
 from fdnet.network.network import WALLS, Network, build_network
+from fdnet.scales.darcy import carman_kozeny
 from fdnet.scales.scales import scales_of
-from fdnet.scales.velocity import carman_kozeny
 from fdnet.spheres.images import make_images
 from fdnet.spheres.porosity import measure_porosity
 from fdnet.spheres.snapshot import Array, Snapshot, resting

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.scales.velocity import carman_kozeny
+from fdnet.scales.darcy import carman_kozeny
 from fdnet.spheres.snapshot import Kind, Snapshot
 from fdnet.studies.accuracy.measurement import PAIRS, measure_loss, network_of
 from fdnet.studies.accuracy.rows import RULES

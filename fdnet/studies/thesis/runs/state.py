@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from fdnet.case.added import completed
 from fdnet.case.case import InvasionCase, with_fines
-from fdnet.case.file import case_from, read_case
+from fdnet.case.file import case_from, recorded_case
 from fdnet.dem.checkpoint import read_history, state_at
 from fdnet.dem.pack_deck import check_radii
 from fdnet.dem.scene import box_of, snapshot_of
@@ -75,7 +76,7 @@ def state_of_run(folder: Path) -> State:
     Raises CaseError when the folder holds none or a file is not what the stage made, DumpError
     when a dump is cut.
     """
-    case = with_fines(read_case(folder / CASE))
+    case = with_fines(recorded_case(folder / CASE))
     pack, invasion = read_record(folder, "pack"), read_record(folder, "invade")
     if pack is None or invasion is None:
         raise CaseError(
@@ -135,7 +136,7 @@ def read_state(path: Path) -> State:
         with np.load(path) as file:
             arrays = dict(file)
         text = json.loads(arrays["text"].tobytes())
-        case = with_fines(case_from(tomllib.loads(text["case"]), source=str(path)))
+        case = with_fines(case_from(completed(tomllib.loads(text["case"])), source=str(path)))
         return State(
             case=case,
             grains=_spheres(arrays, "grains", case, 0, 0.0),

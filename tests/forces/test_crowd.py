@@ -1,0 +1,129 @@
+"""Drag in a crowd and the pressure drop of a bed, against closed forms and published numbers."""
+
+import math
+
+import numpy as np
+import pytest
+from builders import tiny
+
+from fdnet.errors import CaseError
+from fdnet.scales.forces.bed import (
+    Bed,
+    ergun_gradient,
+    ergun_velocity,
+    fluidisation_velocity,
+    kozeny_gradient,
+)
+from fdnet.scales.forces.crowd import (
+    CUBIC_TERM,
+    MOST_REYNOLDS,
+    Crowd,
+    bed_factor,
+    drag_factor,
+    sauter_mean,
+    size_factor,
+)
+
+TUTORIAL = Bed(diameter=1e-3, porosity=0.451335, viscosity=1.5e-3, density=10.0)
+"""CFDEMcoupling's ErgunTestMPI, as its totalPressureDrop.m has it."""
+
+
+def test_the_bed_of_cfdem_by_ergun():
+    assert ergun_gradient(TUTORIAL, 0.02) * 0.0156 == pytest.approx(230.5, abs=0.05)
+    assert ergun_velocity(TUTORIAL, ergun_gradient(TUTORIAL, 0.02)) == pytest.approx(0.02)
+    lifted = fluidisation_velocity(TUTORIAL, 2000.0)
+    weight = (1 - TUTORIAL.porosity) * (2000 - 10) * 9.81
+    assert ergun_gradient(TUTORIAL, lifted) == pytest.approx(weight)
+    assert lifted == pytest.approx(0.01454, rel=3e-3), "the tutorial leaves the inertial term out"
+    slow = Bed(diameter=1e-3, porosity=0.451335, viscosity=1.5e3, density=10.0)
+    assert fluidisation_velocity(slow, 2000.0) * 1e6 == pytest.approx(0.01454, abs=5e-6)
+
+
+def test_a_lone_sphere_that_creeps_feels_stokes():
+    for apart in (True, False):
+        assert drag_factor(Crowd(porosity=1.0), gradient_apart=apart) == pytest.approx(1.0)
+    assert drag_factor(
+        Crowd(porosity=1 - 1e-10, size_ratio=np.ones(2)), gradient_apart=True
+    ) == pytest.approx(1.0, abs=1e-4)
+
+
+def test_a_lone_sphere_that_moves_fast_feels_schiller_and_naumann():
+    """The law's Reynolds part was fitted to beds; at one sphere it is within 16 % up to 100."""
+    for reynolds in (1.0, 10.0, 100.0):
+        assert bed_factor(1.0, reynolds) == pytest.approx(1 + 0.15 * reynolds**0.687, rel=0.16)
+
+
+@pytest.mark.parametrize("porosity", [0.35, 0.40, 0.45])
+def test_the_forces_on_a_bed_are_its_pressure_drop(porosity):
+    """Per volume, n (F_drag + V grad p) = grad p, and grad p is Carman and Kozeny's within 1.2 %.
+
+    The drag part is the porosity times the total force of the fluid.
+    """
+    diameter, viscosity, slip = 0.1e-3, 0.05, 0.3
+    stokes = 3 * math.pi * viscosity * diameter * slip
+    number = (1 - porosity) / (math.pi / 6 * diameter**3)
+    crowd = Crowd(porosity=porosity)
+    total = number * stokes * float(drag_factor(crowd, gradient_apart=False))
+    drag = number * stokes * float(drag_factor(crowd, gradient_apart=True))
+    assert drag == pytest.approx(porosity * total)
+    assert drag + (1 - porosity) * total == pytest.approx(total, rel=1e-12)
+    bed = Bed(diameter=diameter, porosity=porosity, viscosity=viscosity, density=0.0)
+    kozeny = kozeny_gradient(bed, porosity * slip)
+    extra = porosity**4 * (1 + 1.5 * math.sqrt(1 - porosity)) / (10 * (1 - porosity))
+    assert total == pytest.approx(kozeny * (1 + extra), rel=1e-12)
+    assert extra < 0.022
+    assert ergun_gradient(bed, porosity * slip) == pytest.approx(150 / 180 * kozeny)
+
+
+def test_a_bed_of_0_40_is_within_1_percent_of_carman_and_kozeny():
+    extra = float(bed_factor(0.40)) / (10 * 0.6 / 0.4**2) - 1
+    assert extra == pytest.approx(0.4**4 * (1 + 1.5 * math.sqrt(0.6)) / 6)
+    assert extra < 0.01
+
+
+def test_any_mixture_has_the_pressure_drop_of_its_sauter_diameter():
+    """Sum of d_i Y(y_i) over n_i, over that of equal spheres of the Sauter mean: 1."""
+    rng = np.random.default_rng(4)
+    for porosity in (0.36, 0.6, 0.9):
+        diameter = rng.uniform(0.1, 1.0, 500)
+        mean = sauter_mean(diameter)
+        factor = size_factor(porosity, diameter / mean)
+        equal = np.sum(diameter**3) / mean**3
+        assert np.sum(diameter * factor) == pytest.approx(mean * equal)
+        published = size_factor(porosity, diameter / mean, cubic=CUBIC_TERM)
+        assert np.sum(diameter * published) > 1.02 * mean * equal
+    assert size_factor(0.4, 1.0) == pytest.approx(1.0)
+    assert size_factor(1.0, 1.0, cubic=CUBIC_TERM) == pytest.approx(1.064)
+
+
+def test_the_law_at_numbers_worked_out_by_hand():
+    """Solid fraction 0.5, Re 100: F0 = 20 + 0.25 (1 + 1.5 / sqrt 2), and the inertial part."""
+    still = 20 + 0.25 * (1 + 1.5 * math.sqrt(0.5))
+    assert bed_factor(0.5) == pytest.approx(still)
+    shape = 2 + 0.75 + 8.4 * 100**-0.343
+    moving = 0.413 * 100 / (24 * 0.25) * shape / (1 + 10**1.5 * 100**-1.5)
+    assert bed_factor(0.5, 100.0) == pytest.approx(still + moving)
+    assert bed_factor(np.array([0.5, 0.5]), np.array([0.0, 100.0])) == pytest.approx(
+        [still, still + moving]
+    )
+
+
+@pytest.mark.parametrize(
+    ("porosity", "reynolds", "message"),
+    [
+        (0.0, 0.0, "porosity 0, expected above 0 and at most 1"),
+        (1.5, 0.0, "porosity 1.5"),
+        (np.nan, 0.0, "porosity nan"),
+        (0.4, -1.0, "Reynolds number -1"),
+        (0.4, 2 * MOST_REYNOLDS, "Reynolds number 2000, expected 0 to 1000"),
+    ],
+)
+def test_values_outside_of_the_law_are_refused(porosity, reynolds, message):
+    with pytest.raises(CaseError, match=message):
+        bed_factor(np.array([0.5, porosity]), np.array([1.0, reynolds]))
+
+
+def test_crowd_drag_is_refused_until_a_run_knows_the_porosity():
+    with pytest.raises(CaseError, match=r"drag.crowd: 'beetstra' needs the porosity around"):
+        tiny("drag.crowd=beetstra")
+    assert tiny().drag.crowd == "none"
