@@ -25,9 +25,9 @@ class Clogging:
     """The probability of a clog for each fine that comes to a hole.
 
     Attributes:
-        clogs: number of clogs after the settling.
-        escapes: fines that escaped after the settling.
-        early: runs that clogged during the settling and are not counted.
+        clogs: number of clogs after the first fine that escaped.
+        escapes: fines that escaped after it.
+        early: runs in which none escaped, which are not counted.
         low: lower end of the 95 % band of the probability.
         high: upper end of the band.
     """
@@ -40,30 +40,24 @@ class Clogging:
 
     @property
     def probability(self) -> float:
-        """Clogs over trials, the estimate of the largest likelihood; 0 without a clog."""
-        return self.clogs / (self.clogs + self.escapes)
+        """Clogs over trials, the estimate of the largest likelihood; nan without a trial."""
+        trials = self.clogs + self.escapes
+        return self.clogs / trials if trials else math.nan
 
 
-def settling(ratio: float) -> int:
-    """Fines that escape before clogs are counted: 2 R^2, some two layers over the hole.
+def after_first(runs: Sequence[tuple[int, bool]]) -> tuple[list[tuple[int, bool]], int]:
+    """Runs (escaped, clogged) less their first fine, and the number of runs without one.
 
-    Until then what escapes is the arrangement in which the heap was laid on the lid.
+    A run without one may have clogged while the heap was growing. The geometric law has no
+    memory, so it holds for what follows the first fine.
     """
-    return math.ceil(2 * ratio**2)
+    kept = [(escaped - 1, clogged) for escaped, clogged in runs if escaped]
+    return kept, len(runs) - len(kept)
 
 
-def after_settling(
-    runs: Sequence[tuple[int, bool]], ratio: float
-) -> tuple[list[tuple[int, bool]], int]:
-    """Runs (escaped, clogged) without the settling, and the number of those that it ended."""
-    skipped = settling(ratio)
-    kept = [(escaped - skipped, clogged) for escaped, clogged in runs if escaped >= skipped]
-    return kept, sum(1 for escaped, clogged in runs if clogged and escaped < skipped)
-
-
-def clogging(runs: Sequence[tuple[int, bool]], ratio: float) -> Clogging:
+def clogging(runs: Sequence[tuple[int, bool]]) -> Clogging:
     """The probability from runs (escaped, clogged) with its band (Clopper and Pearson 1934)."""
-    kept, early = after_settling(runs, ratio)
+    kept, early = after_first(runs)
     clogs, escapes = sum(clogged for _, clogged in kept), sum(escaped for escaped, _ in kept)
     tail = 0.5 * (1 - CONFIDENCE)
     return Clogging(

@@ -16,7 +16,7 @@ from fdnet.studies.outside.clogs import (
     FEWEST,
     Clogging,
     Line,
-    after_settling,
+    after_first,
     clogging,
     fitted_line,
     geometric_chance,
@@ -26,18 +26,20 @@ from fdnet.studies.outside.orifice import discharge, stokes_number
 KNOB, ESCAPED, FLOWING = "hole over fine", "escaped before a clog", "escaped, no clog"
 LOW, HIGH = 0.1, 0.5
 RUNS: Mapping[float, Mapping[float, int]] = {
-    LOW: {1.75: 40, 2.0: 40, 2.25: 40, 2.5: 30, 2.75: 16, 3.0: 6, 3.25: 4, 3.5: 4, 4.0: 4},
-    HIGH: {2.0: 60, 2.25: 50, 2.5: 40, 2.75: 40, 3.0: 30, 3.25: 16, 3.5: 10, 4.0: 4},
+    HIGH: {2.0: 40, 2.125: 40, 2.25: 36, 2.375: 30, 2.5: 30, 2.625: 24, 2.75: 20}
+    | {2.875: 12, 3.0: 10, 3.25: 3, 3.5: 3, 4.0: 2},
+    LOW: {1.5: 30, 1.625: 30, 1.75: 36, 1.875: 30, 2.0: 30, 2.125: 24, 2.25: 16}
+    | {2.375: 8, 2.5: 4, 2.75: 3, 3.0: 3, 3.25: 2, 3.5: 2, 4.0: 2},
 }
 """Number of runs by friction and R."""
-QUICK = ((LOW, 2.0, 2, 100.0), (LOW, 3.5, 1, 100.0), (HIGH, 2.0, 2, 100.0))
-MOST = 1200.0
+QUICK = ((LOW, 3.0, 1, 20.0), (HIGH, 1.5, 1, 200.0))
+MOST = 800.0
 """Longest run, in times in which the fluid passes a fine's diameter."""
 BELOW, ABOVE = 3.0, 3.03
 """Diameters below which fines clog, and where the intermittent range begins."""
 _SIGNIFICANT = 0.05
 _EXPLAINED = 0.95
-_TEST = "tests/studies/test_outside_constriction.py"
+_TEST = "tests/studies/test_outside_numbers.py"
 _MARIN = "[Marin et al.](https://arxiv.org/abs/1711.06119)"
 _SOUZY = "[Souzy and Marin 2022](https://arxiv.org/abs/2205.04354)"
 _LAFOND = (
@@ -108,7 +110,7 @@ def runs_of(rows: Sequence[Row], friction: float) -> dict[float, list[tuple[int,
 
 def cloggings_of(rows: Sequence[Row], friction: float) -> dict[float, Clogging]:
     """The probability of a clog of a friction by R."""
-    return {ratio: clogging(runs, ratio) for ratio, runs in runs_of(rows, friction).items()}
+    return {ratio: clogging(runs) for ratio, runs in runs_of(rows, friction).items()}
 
 
 def line_of(rows: Sequence[Row], friction: float) -> Line:
@@ -120,8 +122,8 @@ def line_of(rows: Sequence[Row], friction: float) -> Line:
 def least_chance(rows: Sequence[Row], friction: float) -> tuple[float, int]:
     """The least chance of the geometric law over the holes with clogs enough, and their number."""
     chances = []
-    for ratio, runs in runs_of(rows, friction).items():
-        kept, _ = after_settling(runs, ratio)
+    for runs in runs_of(rows, friction).values():
+        kept, _ = after_first(runs)
         if len(kept) >= FEWEST and all(clogged for _, clogged in kept):
             chances.append(geometric_chance([escaped for escaped, _ in kept], seed=1))
     return min(chances, default=float("nan")), len(chances)
@@ -129,13 +131,18 @@ def least_chance(rows: Sequence[Row], friction: float) -> tuple[float, int]:
 
 def answers(rows: Sequence[Row]) -> list[Answer]:
     """Below and above three diameters, the intermittent range, and the law of the probability."""
-    if not (runs_of(rows, LOW) and runs_of(rows, HIGH)):
-        return []
-    return [_below(rows), _above(rows), _between(rows), *_laws(rows)]
+    below = {r: found for r, found in runs_of(rows, LOW).items() if r < BELOW}
+    above = {r: one for r, one in cloggings_of(rows, LOW).items() if r >= BELOW}
+    between = {r: one for r, one in cloggings_of(rows, HIGH).items() if r >= ABOVE}
+    return [
+        *([_below(below)] if below else []),
+        *([_above(above)] if above else []),
+        *([_between(between)] if between else []),
+        *_laws(rows),
+    ]
 
 
-def _below(rows: Sequence[Row]) -> Answer:
-    runs = {r: found for r, found in runs_of(rows, LOW).items() if r < BELOW}
+def _below(runs: Mapping[float, Sequence[tuple[int, bool]]]) -> Answer:
     clogged = sum(stopped for found in runs.values() for _, stopped in found)
     count = sum(map(len, runs.values()))
     return Answer(
@@ -147,8 +154,7 @@ def _below(rows: Sequence[Row]) -> Answer:
     )
 
 
-def _above(rows: Sequence[Row]) -> Answer:
-    found = {r: one for r, one in cloggings_of(rows, LOW).items() if r >= BELOW}
+def _above(found: Mapping[float, Clogging]) -> Answer:
     clogs, escapes = (
         sum(one.clogs + one.early for one in found.values()),
         sum(one.escapes for one in found.values()),
@@ -164,8 +170,7 @@ def _above(rows: Sequence[Row]) -> Answer:
     )
 
 
-def _between(rows: Sequence[Row]) -> Answer:
-    found = {r: one for r, one in cloggings_of(rows, HIGH).items() if r >= ABOVE}
+def _between(found: Mapping[float, Clogging]) -> Answer:
     told = "; ".join(f"R {r:g}: {one.clogs} clogs in {one.escapes:,}" for r, one in found.items())
     return Answer(
         what=f"hole of 3.03 to 5.26 diameters, friction {HIGH:g}",

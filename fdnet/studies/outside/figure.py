@@ -10,7 +10,7 @@ from fdnet.files.atomic import replacing
 from fdnet.studies.engine.palette import BLUE, NEARLY_BLACK, ORANGE
 from fdnet.studies.engine.study import DONE, Row
 from fdnet.studies.outside import throat
-from fdnet.studies.outside.clogs import FEWEST, after_settling
+from fdnet.studies.outside.clogs import FEWEST, after_first
 from fdnet.studies.outside.constriction import HIGH, LOW, cloggings_of, line_of, runs_of
 
 _STYLES = ((LOW, BLUE, "o"), (HIGH, ORANGE, "s"))
@@ -39,7 +39,8 @@ def draw(rows: Sequence[Row], path: Path) -> None:
 def _draw_throats(axes: Any, rows: Sequence[Row]) -> None:
     own = [row for row in rows if row.series == throat.SERIES and row.status == DONE]
     along = np.linspace(0.0, 0.075, 50)
-    axes.plot(100 * along, throat.passing_ratio(along), color=NEARLY_BLACK, label="closed form")
+    exact = [throat.passing_ratio(float(overlap)) for overlap in along]
+    axes.plot(100 * along, exact, color=NEARLY_BLACK, label="closed form")
     axes.plot(
         [100 * float(row.value) for row in own],
         [row.observed for row in own],
@@ -92,8 +93,8 @@ def _draw_counts(axes: Any, rows: Sequence[Row]) -> None:
     """Share of runs that let more fines out, over their mean: exp(-x) if geometric."""
     for friction, colour, marker in _STYLES:
         label: str | None = f"friction {friction:g}, every hole"
-        for ratio, runs in runs_of(rows, friction).items():
-            kept, _ = after_settling(runs, ratio)
+        for runs in runs_of(rows, friction).values():
+            kept, _ = after_first(runs)
             if len(kept) < FEWEST or not all(clogged for _, clogged in kept):
                 continue
             counts = np.sort([escaped for escaped, _ in kept])

@@ -13,7 +13,7 @@ import numpy as np
 
 from fdnet.scales.springs import sphere_mass
 from fdnet.scales.time_step import relaxation_time
-from fdnet.spheres.dump import Frame
+from fdnet.spheres.dump import Frame, read_dump
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
 from fdnet.studies.outside.pushed import (
     DENSITY,
@@ -21,7 +21,6 @@ from fdnet.studies.outside.pushed import (
     Pushed,
     case_of,
     contact_step,
-    plane_wall,
     run_pushed,
     stokes_drag,
 )
@@ -125,16 +124,15 @@ def start_of(ratio: float, seed: int) -> Snapshot:
 def discharge(ratio: float, friction: float, folder: Path, *, seed: int, most: float) -> Discharge:
     """A heap that runs out through a hole until it clogs, on the real binary.
 
-    A lid closes the hole until the heap has formed. `most` is the longest time of the run, in
-    times in which the fluid passes a fine's diameter.
+    The fines rain on the wall until all that were scattered have come down; counting begins then.
+    `most` is the longest time after that, in times in which the fluid passes a fine's diameter.
     """
     start = start_of(ratio, seed)
     drag, step, fast = stokes_drag(FINE), contact_step(FINE, STIFFNESS, _STEP), velocity()
     passage = 2 * FINE / fast / step
-    look = math.ceil(_LOOK * passage)
-    height = float(np.ptp(start.box[0])) / (2 * FINE)
+    look, chunks = math.ceil(_LOOK * passage), math.ceil(most / _LOOK)
+    settling = math.ceil(passage * float(np.ptp(start.box[0])) / (2 * FINE))
     moving = 0.5 * sphere_mass(FINE, DENSITY) * fast**2
-    chunks = math.ceil(most / _LOOK)
     end = run_pushed(
         Pushed(
             case=case_of(
@@ -148,15 +146,14 @@ def discharge(ratio: float, friction: float, folder: Path, *, seed: int, most: f
             chunks=chunks,
             boundary="p p p",
             rest_energy=_REST * moving,
-            walls=(plane_wall(0.0, friction=True),),
-            lid_steps=math.ceil(2 * height * passage),
+            settle_steps=settling,
         ),
         folder,
     )
-    lid = math.ceil(2 * height * passage)
+    before = read_dump(folder / "settled.dump")[-1]
     return Discharge(
-        escaped=_escaped(end, start.box),
-        clogged=end.step < lid + chunks * look,
+        escaped=_escaped(end, start.box) - _escaped(before, start.box),
+        clogged=end.step < settling + chunks * look,
         steps=end.step,
     )
 

@@ -7,6 +7,7 @@ from types import ModuleType
 from fdnet.studies.engine.study import Measured, Point, Row, Study
 from fdnet.studies.outside import (
     constriction,
+    ergun,
     passing,
     rolling,
     settling,
@@ -16,7 +17,15 @@ from fdnet.studies.outside import (
 from fdnet.studies.outside.figure import draw
 from fdnet.studies.outside.page import page
 
-CASES: Sequence[ModuleType] = (throat, passing, constriction, settling, rolling, three_spheres)
+CASES: Sequence[ModuleType] = (
+    throat,
+    passing,
+    constriction,
+    ergun,
+    settling,
+    rolling,
+    three_spheres,
+)
 """Modules of the cases in the order of the page; each has points, measure, judge, answers."""
 
 

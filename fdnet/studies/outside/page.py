@@ -30,14 +30,14 @@ The last column is the reduced form, which the tests run in seconds; a test file
 
 ## How the constriction is built
 
-A wall of held spheres, half as large as the fines, leaves a round hole of R fine diameters. A lid
-holds the fines until they lie as a heap, then it is taken away. Stokes drag in a uniform velocity
-along x pushes every fine with $push k r, at a Stokes number of $stokes: a body force with viscous
-damping, not a field that converges on the hole. The box is periodic along x, so those that escape
-come back on top of the heap, which stays crowded. A run ends when nothing moves any more, or when
-the fluid has passed $most fine diameters. Clogs are counted after the first 2 R² fines, since
-those carry the arrangement in which the heap was laid. The line is fitted to holes with at least
-$fewest clogs.
+A wall of held spheres, half as large as the fines, leaves a round hole of R fine diameters. Fines
+rain on it and lie as a heap. Stokes drag in a uniform velocity along x pushes every fine with $push
+k r, at a Stokes number of $stokes: a body force with viscous damping, not a field that converges on
+the hole. The box is periodic along x, so those that escape come back on top of the heap, which
+stays crowded. Counting begins when all have come down; a run ends when nothing moves any more, or
+when the fluid has passed $most fine diameters since. What follows the first fine that escapes is
+counted, so runs that clogged earlier have a column of their own. The line is fitted to holes with
+at least $fewest clogs.
 
 $clogs
 
@@ -49,7 +49,7 @@ $clogs
   channel, of 3.03 to 5.26 diameters, flows and stops by turns. What breaks an arch there are the
   fluctuations of the flow, which a steady push does not have.
 - AIChE 2013, 172h, and Lafond's thesis (Colorado School of Mines 2014): the abstracts. They give
-  the geometric law, its onset behind a deep heap, and ln P proportional to R² − 1, but no slope.
+  the geometric law, its onset once a heap is there, and ln P proportional to R² − 1, but no slope.
 - Percolation of a cohesive fine particle (arXiv 2605.19845): abstract. Fines of 1/7 that do not
   touch each other pass a static bed unless they are cohesive.
 - LAMMPS's `examples/granular/in.sync_verlet`: the set-up and the time of 0.145 s.
@@ -98,5 +98,5 @@ def _clogs(rows: Sequence[Row]) -> str:
         for friction in (LOW, HIGH)
         for ratio, one in cloggings_of(rows, friction).items()
     ]
-    heads = ["friction", "R", "clogs", "earlier clogs", "escaped", "P", "95 % (binomial)"]
+    heads = ["friction", "R", "clogs", "clogged before", "escaped", "P", "95 % (binomial)"]
     return markdown_table(heads, lines)

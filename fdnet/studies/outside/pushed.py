@@ -47,7 +47,8 @@ class Pushed:
         boundary: of the box along x, y, z, as LIGGGHTS names it.
         rest_energy: kinetic energy, J, below which the run ends; 0 to go on.
         walls: planes that touch the fines, as `_walls.in.j2` takes them.
-        lid_steps: steps after which the walls are taken away; 0 leaves them.
+        settle_steps: steps before the first look, after which the fines are seen once.
+        density: of all spheres, kg/m3.
     """
 
     case: InvasionCase
@@ -60,11 +61,17 @@ class Pushed:
     boundary: str = "f f f"
     rest_energy: float = 0.0
     walls: Sequence[Mapping[str, Any]] = field(default=())
-    lid_steps: int = 0
+    settle_steps: int = 0
+    density: float = DENSITY
 
 
 def case_of(
-    *, fine: float, stiffness: float, friction: float, damping_ratio: float
+    *,
+    fine: float,
+    stiffness: float,
+    friction: float,
+    damping_ratio: float,
+    density: float = DENSITY,
 ) -> InvasionCase:
     """A case with contacts of one normal stiffness, N/m, for fines of radius `fine`, m."""
     grain = 2 * fine
@@ -82,7 +89,7 @@ def case_of(
                 "fines": {
                     "radius_mm": 1e3 * fine,
                     "count": 1,
-                    "density_kg_m3": DENSITY,
+                    "density_kg_m3": density,
                     **material,
                 },
                 "fluid": {"velocity_m_s": 1e-3, "viscosity_cP": 1e3 * VISCOSITY},
@@ -97,9 +104,11 @@ def stokes_drag(radius: float) -> float:
     return 6 * math.pi * VISCOSITY * radius
 
 
-def contact_step(radius: float, stiffness: float, factor: float) -> float:
+def contact_step(
+    radius: float, stiffness: float, factor: float, *, density: float = DENSITY
+) -> float:
     """`factor` sqrt(m/k) of a fine, s, for its radius in m and a stiffness in N/m."""
-    return factor * math.sqrt(sphere_mass(radius, DENSITY) / stiffness)
+    return factor * math.sqrt(sphere_mass(radius, density) / stiffness)
 
 
 def plane_wall(position: float, *, friction: bool) -> dict[str, Any]:
@@ -120,6 +129,8 @@ def plane_wall(position: float, *, friction: bool) -> dict[str, Any]:
 def run_pushed(pushed: Pushed, folder: Path) -> Frame:
     """The fines at the end: unwrapped places `xu`, `yu`, `zu`, m, and velocities.
 
+    Those after the settling, if there is one, are in `folder`/settled.dump.
+
     Raises LiggghtsError when the run does not finish.
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -128,7 +139,7 @@ def run_pushed(pushed: Pushed, folder: Path) -> Frame:
         folder / "pushed.data",
         spheres,
         bounds=spheres.box,
-        density=np.full(len(spheres), DENSITY),
+        density=np.full(len(spheres), pushed.density),
         types=3,
     )
     text = render_text(
@@ -142,7 +153,7 @@ def run_pushed(pushed: Pushed, folder: Path) -> Frame:
             "push": " ".join(number(force) for force in pushed.push),
             "damping": number(pushed.damping) if pushed.damping else "",
             "walls": pushed.walls,
-            "lid_steps": pushed.lid_steps,
+            "settle_steps": pushed.settle_steps,
             "chunk_steps": pushed.chunk_steps,
             "chunks": pushed.chunks,
             "rest_energy": number(pushed.rest_energy) if pushed.rest_energy else "",

@@ -37,7 +37,7 @@ _STEPS, _STEP = 40_000, 0.1
 
 
 def rolling_gain(slope: float, friction: float) -> float:
-    """Acceleration down a slope, degrees, over that of gravity, of a sphere that starts at rest."""
+    """Acceleration over g, down a slope in degrees, of a sphere that starts at rest."""
     angle = math.radians(slope)
     if math.tan(angle) <= 3.5 * friction:
         return 5 / 7 * math.sin(angle)
@@ -109,7 +109,7 @@ def answers(rows: Sequence[Row]) -> list[Answer]:
                     f"{worst.value:g} degrees (rigid sphere, slips from {slips_from:.1f})",
                     measured=f"{worst.observed:.4f} g, {percent_error(worst.error)}, the worst",
                     holds=abs(worst.error) < TOLERANCE,
-                    test="tests/studies/test_outside_rolling.py",
+                    test="tests/studies/test_outside_numbers.py",
                 )
             )
     return lines

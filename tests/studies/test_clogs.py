@@ -1,0 +1,62 @@
+"""Statistics of clogs: bands, the geometric law and the fitted line, against closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fdnet.studies.outside.clogs import (
+    Clogging,
+    after_first,
+    clogging,
+    fitted_line,
+    geometric_chance,
+)
+
+
+def test_runs_that_clog_before_the_first_fine_are_not_counted():
+    runs = [(0, True), (1, True), (13, True), (93, False)]
+    assert after_first(runs) == ([(0, True), (12, True), (92, False)], 1)
+    found = clogging(runs)
+    assert (found.clogs, found.escapes, found.early) == (2, 104, 1)
+    assert found.probability == pytest.approx(2 / 106)
+    assert math.isnan(clogging([(0, True)]).probability)
+
+
+def test_the_band_without_a_clog_by_hand():
+    """None of n: below 1 - 0.025^(1/n)."""
+    found = clogging([(1000, False)])
+    assert (found.probability, found.low) == (0.0, 0.0)
+    assert found.high == pytest.approx(1 - 0.025 ** (1 / 999))
+
+
+def test_the_band_holds_the_probability_of_most_samples():
+    rng, hits, chance = np.random.default_rng(2), 0, 0.05
+    for _ in range(200):
+        runs = [(int(n), True) for n in rng.geometric(chance, 20)]
+        found = clogging(runs)
+        hits += found.low <= chance <= found.high
+    assert hits >= 184
+
+
+def test_geometric_samples_are_told_from_others():
+    rng = np.random.default_rng(4)
+    chances = [geometric_chance(rng.geometric(0.02, 40) - 1, seed=k) for k in range(20)]
+    assert 0.2 < np.mean(chances) < 0.8
+    assert geometric_chance([50] * 40, seed=1) == 0.0
+    assert geometric_chance([0] * 30 + [500] * 10, seed=1) < 0.01
+
+
+def test_the_fitted_line_is_found_again():
+    ratios = [1.75, 2.0, 2.5, 3.0, 4.0]
+    found = []
+    for ratio in ratios:
+        chance = math.exp(-0.4 - 0.7 * (ratio**2 - 1))
+        clogs = 4 if ratio == 4.0 else 10_000
+        escapes = round(clogs * (1 - chance) / chance)
+        found.append(Clogging(clogs=clogs, escapes=escapes, early=0, low=0.0, high=1.0))
+    line = fitted_line(ratios, found)
+    assert (line.slope, line.start) == pytest.approx((-0.7, -0.4), rel=1e-3)
+    assert (line.holes, line.explained) == (4, pytest.approx(1.0))
+    with pytest.raises(ValueError, match="2 holes"):
+        fitted_line(ratios[:2], found[:2])
