@@ -1,6 +1,7 @@
 """Statistics of clogs: bands, the geometric law and the fitted line, against closed forms."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,21 +12,24 @@ from fdnet.studies.outside.clogs import (
     clogging,
     fitted_line,
     geometric_chance,
+    under_arch,
 )
 
 
-def test_runs_that_clog_before_the_first_fine_are_not_counted():
-    runs = [(0, True), (1, True), (13, True), (93, False)]
-    assert after_first(runs) == ([(0, True), (12, True), (92, False)], 1)
-    found = clogging(runs)
+def test_runs_that_clog_while_the_heap_grows_are_not_counted():
+    """0.3 R^3 fines lie under the arch of a hole: 2.4 at R = 2."""
+    assert [under_arch(ratio) for ratio in (1.0, 2.0, 3.0)] == [1, 3, 9]
+    runs = [(2, True), (3, True), (15, True), (95, False)]
+    assert after_first(runs, 2.0) == ([(0, True), (12, True), (92, False)], 1)
+    found = clogging(runs, 2.0)
     assert (found.clogs, found.escapes, found.early) == (2, 104, 1)
     assert found.probability == pytest.approx(2 / 106)
-    assert math.isnan(clogging([(0, True)]).probability)
+    assert math.isnan(clogging([(2, True)], 2.0).probability)
 
 
 def test_the_band_without_a_clog_by_hand():
     """None of n: below 1 - 0.025^(1/n)."""
-    found = clogging([(1000, False)])
+    found = clogging([(1000, False)], 1.0)
     assert (found.probability, found.low) == (0.0, 0.0)
     assert found.high == pytest.approx(1 - 0.025 ** (1 / 999))
 
@@ -34,7 +38,7 @@ def test_the_band_holds_the_probability_of_most_samples():
     rng, hits, chance = np.random.default_rng(2), 0, 0.05
     for _ in range(200):
         runs = [(int(n), True) for n in rng.geometric(chance, 20)]
-        found = clogging(runs)
+        found = clogging(runs, 1.0)
         hits += found.low <= chance <= found.high
     assert hits >= 184
 
@@ -54,9 +58,16 @@ def test_the_fitted_line_is_found_again():
         chance = math.exp(-0.4 - 0.7 * (ratio**2 - 1))
         clogs = 4 if ratio == 4.0 else 10_000
         escapes = round(clogs * (1 - chance) / chance)
-        found.append(Clogging(clogs=clogs, escapes=escapes, early=0, low=0.0, high=1.0))
+        found.append(
+            Clogging(clogs=clogs, escapes=escapes, early=0, counted=clogs, low=0.0, high=1.0)
+        )
     line = fitted_line(ratios, found)
     assert (line.slope, line.start) == pytest.approx((-0.7, -0.4), rel=1e-3)
-    assert (line.holes, line.explained) == (4, pytest.approx(1.0))
+    assert (line.holes, line.least, line.most) == (4, 1.75, 3.0)
+    assert (line.explained, line.chance) == (pytest.approx(1.0), pytest.approx(1.0, abs=0.01))
+    lived = replace(found[0], early=found[0].counted)
+    assert fitted_line(ratios, [lived, *found[1:]]).holes == 3
+    bent = [replace(found[0], escapes=2 * found[0].escapes), *found[1:]]
+    assert fitted_line(ratios, bent).chance < 1e-6
     with pytest.raises(ValueError, match="2 holes"):
         fitted_line(ratios[:2], found[:2])

@@ -47,6 +47,9 @@ def test_slipping_begins_where_both_closed_forms_agree():
     slope = math.degrees(math.atan(3.5 * 0.3))
     below, above = (rolling.rolling_gain(slope * (1 + e), 0.3) for e in (-1e-9, 1e-9))
     assert below == pytest.approx(above, rel=1e-7)
+    for angle, factor in ((40.0, 5 / 7), (50.0, 1 - 0.3 / math.tan(math.radians(50.0)))):
+        gain = rolling.rolling_gain(angle, 0.3)
+        assert gain == pytest.approx(factor * math.sin(math.radians(angle)))
 
 
 @pytest.mark.liggghts

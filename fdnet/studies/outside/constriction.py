@@ -27,9 +27,9 @@ KNOB, ESCAPED, FLOWING = "hole over fine", "escaped before a clog", "escaped, no
 LOW, HIGH = 0.1, 0.5
 RUNS: Mapping[float, Mapping[float, int]] = {
     HIGH: {2.0: 40, 2.125: 40, 2.25: 36, 2.375: 30, 2.5: 30, 2.625: 24, 2.75: 20}
-    | {2.875: 12, 3.0: 10, 3.25: 3, 3.5: 3, 4.0: 2},
-    LOW: {1.5: 30, 1.625: 30, 1.75: 36, 1.875: 30, 2.0: 30, 2.125: 24, 2.25: 16}
-    | {2.375: 8, 2.5: 4, 2.75: 3, 3.0: 3, 3.25: 2, 3.5: 2, 4.0: 2},
+    | {2.875: 12, 3.0: 8, 3.25: 2, 3.5: 2, 4.0: 2},
+    LOW: {1.75: 24, 1.875: 24, 2.0: 24, 2.125: 20, 2.25: 12, 2.375: 5, 2.5: 3}
+    | {2.75: 2, 3.0: 3, 3.25: 2, 3.5: 2, 4.0: 2},
 }
 """Number of runs by friction and R."""
 QUICK = ((LOW, 3.0, 1, 20.0), (HIGH, 1.5, 1, 200.0))
@@ -38,7 +38,7 @@ MOST = 800.0
 BELOW, ABOVE = 3.0, 3.03
 """Diameters below which fines clog, and where the intermittent range begins."""
 _SIGNIFICANT = 0.05
-_EXPLAINED = 0.95
+_EXPLAINED = 0.9
 _TEST = "tests/studies/test_outside_numbers.py"
 _MARIN = "[Marin et al.](https://arxiv.org/abs/1711.06119)"
 _SOUZY = "[Souzy and Marin 2022](https://arxiv.org/abs/2205.04354)"
@@ -110,7 +110,7 @@ def runs_of(rows: Sequence[Row], friction: float) -> dict[float, list[tuple[int,
 
 def cloggings_of(rows: Sequence[Row], friction: float) -> dict[float, Clogging]:
     """The probability of a clog of a friction by R."""
-    return {ratio: clogging(runs) for ratio, runs in runs_of(rows, friction).items()}
+    return {ratio: clogging(runs, ratio) for ratio, runs in runs_of(rows, friction).items()}
 
 
 def line_of(rows: Sequence[Row], friction: float) -> Line:
@@ -122,8 +122,8 @@ def line_of(rows: Sequence[Row], friction: float) -> Line:
 def least_chance(rows: Sequence[Row], friction: float) -> tuple[float, int]:
     """The least chance of the geometric law over the holes with clogs enough, and their number."""
     chances = []
-    for runs in runs_of(rows, friction).values():
-        kept, _ = after_first(runs)
+    for ratio, runs in runs_of(rows, friction).items():
+        kept, _ = after_first(runs, ratio)
         if len(kept) >= FEWEST and all(clogged for _, clogged in kept):
             chances.append(geometric_chance([escaped for escaped, _ in kept], seed=1))
     return min(chances, default=float("nan")), len(chances)
@@ -202,9 +202,11 @@ def _laws(rows: Sequence[Row]) -> list[Answer]:
             Answer(
                 what=f"ln of the probability of a clog over R² − 1, friction {friction:g}",
                 expected=f"linear ({_LAFOND})",
-                measured=f"slope {line.slope:.2f} ± {line.slope_error:.2f} (95 %), the line "
-                f"explains {100 * line.explained:.1f} % of {line.holes} holes' variance",
-                holds=line.explained > _EXPLAINED,
+                measured=f"slope {line.slope:.2f} ± {line.slope_error:.2f} (95 %) over "
+                f"{line.holes} holes, R {line.least:g} to {line.most:g}; it explains "
+                f"{100 * line.explained:.0f} % of the variance, and chance alone scatters more in "
+                f"{100 * line.chance:.2g} % of cases",
+                holds=line.explained > _EXPLAINED and line.chance > _SIGNIFICANT,
                 test=_TEST,
             ),
         ]

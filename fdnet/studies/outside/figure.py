@@ -13,26 +13,30 @@ from fdnet.studies.outside import throat
 from fdnet.studies.outside.clogs import FEWEST, after_first
 from fdnet.studies.outside.constriction import HIGH, LOW, cloggings_of, line_of, runs_of
 
+DOTS = 130
+"""Per inch of the figure."""
 _STYLES = ((LOW, BLUE, "o"), (HIGH, ORANGE, "s"))
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """Three axes side by side."""
+    """The axes whose rows are there, side by side."""
     import matplotlib as mpl
 
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(1, 3, figsize=(16.5, 5.0), constrained_layout=True)
-    _draw_throats(axes[0], rows)
-    _draw_chances(axes[1], rows)
-    _draw_counts(axes[2], rows)
-    for one in axes:
+    clogged = any(runs_of(rows, friction) for friction, *_ in _STYLES)
+    drawn = [_draw_throats, *([_draw_chances, _draw_counts] if clogged else [])]
+    figure, axes = plt.subplots(
+        1, len(drawn), figsize=(5.5 * len(drawn), 5.0), squeeze=False, constrained_layout=True
+    )
+    for one, draw_on in zip(axes.flat, drawn, strict=True):
+        draw_on(one, rows)
         one.grid(which="major", lw=0.4, color="0.85")
         if one.get_legend_handles_labels()[0]:
             one.legend(fontsize=8, framealpha=0.9)
     with replacing(path) as part:
-        figure.savefig(part, dpi=110)
+        figure.savefig(part, dpi=DOTS)
     plt.close(figure)
 
 
@@ -93,8 +97,8 @@ def _draw_counts(axes: Any, rows: Sequence[Row]) -> None:
     """Share of runs that let more fines out, over their mean: exp(-x) if geometric."""
     for friction, colour, marker in _STYLES:
         label: str | None = f"friction {friction:g}, every hole"
-        for runs in runs_of(rows, friction).values():
-            kept, _ = after_first(runs)
+        for ratio, runs in runs_of(rows, friction).items():
+            kept, _ = after_first(runs, ratio)
             if len(kept) < FEWEST or not all(clogged for _, clogged in kept):
                 continue
             counts = np.sort([escaped for escaped, _ in kept])

@@ -28,20 +28,7 @@ The last column is the reduced form, which the tests run in seconds; a test file
 
 ![Passing ratio of a throat, probability of a clog, and fines before a clog](outside-numbers.png)
 
-## How the constriction is built
-
-A wall of held spheres, half as large as the fines, leaves a round hole of R fine diameters. Fines
-rain on it and lie as a heap. Stokes drag in a uniform velocity along x pushes every fine with $push
-k r, at a Stokes number of $stokes: a body force with viscous damping, not a field that converges on
-the hole. The box is periodic along x, so those that escape come back on top of the heap, which
-stays crowded. Counting begins when all have come down; a run ends when nothing moves any more, or
-when the fluid has passed $most fine diameters since. What follows the first fine that escapes is
-counted, so runs that clogged earlier have a column of their own. The line is fitted to holes with
-at least $fewest clogs.
-
-$clogs
-
-## What could be read of the sources
+$constriction## What could be read of the sources
 
 - Marin and others (arXiv 1711.06119): abstract and beginning of the text. Charged particles of
   low friction; clogs below three diameters, an uninterrupted flow above, at 60 % by volume.
@@ -54,6 +41,23 @@ $clogs
   touch each other pass a static bed unless they are cohesive.
 - LAMMPS's `examples/granular/in.sync_verlet`: the set-up and the time of 0.145 s.
 $not_done""")
+
+_CONSTRICTION = Template("""## How the constriction is built
+
+A wall of held spheres, half as large as the fines, leaves a round hole of R fine diameters. Fines
+rain on it and lie as a heap. Stokes drag in a uniform velocity along x pushes every fine with
+$push k r, at a Stokes number of $stokes: a body force with viscous damping, not a field that
+converges on the hole. The box is periodic along x, so those that escape come back on top of the
+heap, which stays crowded. Counting begins when all have come down; a run ends when nothing moves
+any more, or when the fluid has passed $most fine diameters since. As many fines as lie in the half
+ball over the hole, 0.3 R³, escape even when an arch stands over them already; what follows them is
+counted, and runs that clogged before have a column of their own. The line is fitted to holes with
+at least $fewest clogs at which most runs were counted: of a narrower hole those that are left are
+not a sample of the flow, but of what survives the growth of the heap.
+
+$clogs
+
+""")
 
 
 def page(answers: Sequence[Answer], rows: Sequence[Row]) -> str:
@@ -74,12 +78,21 @@ def page(answers: Sequence[Answer], rows: Sequence[Row]) -> str:
         table=table,
         runs=len(seconds),
         hours=f"{sum(seconds.values()) / 3600:.2g}",
+        constriction=_constriction(rows),
+        not_done=f"\nNot done:\n\n{bullets(missing)}\n" if missing else "",
+    )
+
+
+def _constriction(rows: Sequence[Row]) -> str:
+    """How the constriction is built and all its holes; nothing without a row of it."""
+    if not any(cloggings_of(rows, friction) for friction in (LOW, HIGH)):
+        return ""
+    return _CONSTRICTION.substitute(
         push=f"{PUSH:g}",
         stokes=regime(),
         most=f"{MOST:g}",
         fewest=FEWEST,
         clogs=_clogs(rows),
-        not_done=f"\nNot done:\n\n{bullets(missing)}\n" if missing else "",
     )
 
 
