@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from fdnet.errors import FlowError as FlowError
     from fdnet.errors import LiggghtsError as LiggghtsError
     from fdnet.errors import NetworkError as NetworkError
+    from fdnet.network.field.of_pack import velocity_field as velocity_field
     from fdnet.network.fines.occupancy import measure_occupancy as measure_occupancy
     from fdnet.network.flow.flow import solve_flow as solve_flow
     from fdnet.network.laws.named import DAMAGE_LAWS as DAMAGE_LAWS
@@ -55,6 +56,7 @@ _HOME = {
     "build_network": "fdnet.network.network",
     "measure_occupancy": "fdnet.network.fines.occupancy",
     "solve_flow": "fdnet.network.flow.flow",
+    "velocity_field": "fdnet.network.field.of_pack",
     "LAWS": "fdnet.network.laws.named",
     "DAMAGE_LAWS": "fdnet.network.laws.named",
     "FdnetError": "fdnet.errors",

@@ -14,6 +14,7 @@ TINY: dict[str, Any] = {
     "box": {"size_mm": [3.0, 1.6, 1.6]},
     "grains": {"radius_mm": 0.25, "count": 66},
     "fines": {"radius_mm": 0.05, "count": 300},
+    "drag": {"pressure_gradient": False},
     "analysis": {"sections": 3},
 }
 

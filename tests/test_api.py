@@ -57,6 +57,7 @@ def test_the_fixed_names_are_there():
         "build_network",
         "measure_occupancy",
         "solve_flow",
+        "velocity_field",
         "LAWS",
         "DAMAGE_LAWS",
         "__version__",

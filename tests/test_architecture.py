@@ -10,6 +10,7 @@ from fdnet.case.file import known_keys
 LAYERS = [
     ["errors"],
     ["files"],
+    ["sizes"],
     ["spheres", "case"],
     ["scales", "network"],
     ["dem", "report"],
@@ -21,6 +22,7 @@ LAYERS = [
 
 NETWORK_LAYERS = [
     ["geometry", "compiled"],
+    ["field"],
     ["tessellation"],
     ["network"],
     ["fines", "flow"],
@@ -53,7 +55,9 @@ DOORS = {
     "jinja2": {"dem/deck", "report/html", "studies/dem"},
     "subprocess": {
         "dem/binary",
+        "dem/feed",
         "dem/liggghts",
+        "dem/process",
         "report/vtk",
         "studies/benchmark",
         "studies/chaos",
@@ -64,6 +68,7 @@ DOORS = {
     "matplotlib": {
         "report/figures",
         "report/side_view",
+        "report/size_figure",
         "studies/accuracy/figure",
         "studies/engine/draw",
         "studies/outside/figure",
@@ -150,7 +155,7 @@ def test_the_network_half_never_imports_the_dem_half(root):
             ), module
 
 
-FIELD_UNITS = ("_mm", "_cP", "_MPa", "_ms", "_mD")
+FIELD_UNITS = ("_GPa", "_mm", "_cP", "_MPa", "_ms", "_mD")
 NO_KEYS = {"fdnet/studies/dem/economies.py": {"duration_ms"}}
 """Attributes, by file, that share the name of a case's key but mean something else."""
 

@@ -10,7 +10,10 @@ from collections.abc import Mapping
 from typing import Any
 
 AS_BEFORE: dict[str, Any] = {
+    "contact.model": "hooke",
     "drag.crowd": "none",
+    "drag.inertia": "none",
+    "drag.pressure_gradient": False,
     "fluid.darcy_law": "darcy",
 }
 """New dotted keys, with the value that means what a case without the key meant. A key that is

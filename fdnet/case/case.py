@@ -16,11 +16,13 @@ from pydantic import Field, model_validator
 
 from fdnet.case.added import completed, without_added
 from fdnet.case.analysis import AnalysisChoices
+from fdnet.case.contact import MODEL_KEYS, ContactLaw
 from fdnet.case.control import Run
 from fdnet.case.fluid import Fluid, Well
-from fdnet.case.particles import Fines, Grains, Spheres
+from fdnet.case.particles import Fines, Grains
 from fdnet.case.parts import Box, Drag, Gravity
 from fdnet.case.rules import cross_problems
+from fdnet.case.spheres import Spheres
 from fdnet.case.stages import STAGES, Stage
 from fdnet.case.values import Part
 from fdnet.errors import CaseError
@@ -37,8 +39,10 @@ KEYS = (
     "well",
     "drag",
     "gravity",
+    "contact",
     "run",
     "analysis",
+    "given",
 )
 """Keys at the top of a case file, in the order in which they are written."""
 
@@ -75,8 +79,14 @@ class Case(Part):
     well: Well | None = None
     drag: Drag = Drag()
     gravity: Gravity = Gravity()
+    contact: ContactLaw = ContactLaw()
     run: Run = Run()
     analysis: AnalysisChoices = AnalysisChoices()
+    given: dict[str, str] = Field(
+        {},
+        description="Written by fdnet: what the case gave with units or as a file, by dotted key. "
+        "The other keys hold the same as numbers, and only they count.",
+    )
 
     @model_validator(mode="after")
     def _tables_fit(self) -> Self:
@@ -106,8 +116,16 @@ class Case(Part):
         return self.box.periodic
 
     def data(self) -> dict[str, Any]:
-        """All keys that have a value, defaults written out (TOML knows no null)."""
+        """All keys that have a value, defaults written out (TOML knows no null).
+
+        Keys that only the other contact model reads are left out.
+        """
         data = self.model_dump(mode="json")
+        if not self.given:
+            del data["given"]
+        for name in ("grains", "fines"):
+            for key in self.contact.other_keys & data.get(name, {}).keys():
+                del data[name][key]
         return _without_none({key: data[key] for key in KEYS if key in data})
 
     def toml(self) -> str:
@@ -122,6 +140,7 @@ class Case(Part):
         differs from what a case meant before (`fdnet.case.added`).
         """
         data = without_added(self.data())
+        data.pop("given", None)
         data["run"] = {key: value for key, value in data["run"].items() if key not in POLICIES}
         if stage in ("pack", "invade"):
             data.pop("analysis")
@@ -130,8 +149,17 @@ class Case(Part):
             data["grains"].pop("motion")
             fines = data.get("fines", {}).get("normal_stiffness_N_m")
             scaling = {"stiffness": self.run.stiffness_N_m, "fines_stiffness": fines}
-            data = {key: data[key] for key in ("seed", "box", "grains")} | scaling
+            elastic = self._elastic_of_the_pack(data)
+            data = {key: data[key] for key in ("seed", "box", "grains")} | scaling | elastic
         return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
+
+    def _elastic_of_the_pack(self, data: dict[str, Any]) -> dict[str, Any]:
+        """What the stiffness of a pack depends on besides, with contacts that are not linear."""
+        if self.contact.model == "hooke":
+            return {}
+        fines = data.get("fines", {})
+        keys = ("radius_mm", *sorted(MODEL_KEYS["hertz"]))
+        return {"model": self.contact.model, "fines": {k: fines[k] for k in keys if k in fines}}
 
     def same_specimen(self, text: bytes) -> bool:
         """Whether a case.toml as `toml` wrote it is this case but for `POLICIES`."""
@@ -185,4 +213,6 @@ def with_fines(case: Case) -> InvasionCase:
 def _without_none(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _without_none(item) for key, item in value.items() if item is not None}
+    if isinstance(value, list):
+        return [_without_none(item) for item in value]
     return value

@@ -11,12 +11,15 @@ class Run(Part):
     """Run control: contact stiffness, time step, when to stop and what to refuse.
 
     `max_hours`, `max_overlap` and `on_overlap` decide only whether a run may go on. No result
-    depends on them, so they may be changed when a run is resumed.
+    depends on them, so they may be changed when a run is resumed. Times in ms are physical times;
+    they differ from those of the simulation with `drag.drive_velocity_m_s`.
     """
 
     stiffness_N_m: Positive | Literal["nominal"] = Field(
         1.0e4,
-        description="Stiffness of the stiffest contact; all others keep their ratio to it. "
+        description="Stiffness of the stiffest contact; all others keep their ratio to it. With "
+        'contact.model = "hertz": force over overlap of the stiffest contact of a fine, at an '
+        "overlap of 1 % of its diameter. "
         '"nominal" keeps the materials\' own stiffness, which needs a far smaller time step.',
     )
     max_hours: Positive = Field(

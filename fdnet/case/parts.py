@@ -15,6 +15,9 @@ from fdnet.case.values import (
     Vector,
 )
 
+UPDATE_TRAVEL, MOST_TRAVEL = 0.5, 10.0
+"""Diameters of the smallest fine between two updates: by default, and at most."""
+
 
 class Box(Part):
     """The specimen: flow and depth run along the first side; x = 0 is the formation face."""
@@ -46,7 +49,7 @@ class Box(Part):
 
 
 class Drag(Part):
-    """Stokes drag on every fine: 6 pi viscosity multiplier radius (fluid minus fine velocity)."""
+    """Forces of the fluid on every fine: drag by its slip, and that of the pressure gradient."""
 
     field: Literal["uniform", "network"] = Field(
         "uniform",
@@ -66,17 +69,52 @@ class Drag(Part):
         description='Steps for which scheme "held" keeps the force. When absent the force is kept '
         "for at most 0.05 of the drag relaxation time.",
     )
+    drive_velocity_m_s: Positive | Literal["auto"] | None = Field(
+        None,
+        description="Velocity of the fluid in the pores of the simulation, to shorten a run with "
+        "a weak push: every force is scaled by the same factor, and the physical clock runs "
+        "faster by it. Allowed where the fines' inertia does not matter, up to an impact Stokes "
+        'number of 1. "auto" drives to 0.1, or as fast as the fluid itself.',
+    )
     upstream: Literal["interstitial", "darcy"] = Field(
         "interstitial",
         description="Velocity of the fluid upstream of the formation face: the interstitial one "
         "of the pack, or the Darcy velocity.",
     )
+    pressure_gradient: bool = Field(
+        True,
+        description="Whether the pressure gradient of the pack acts on every fine inside it, with "
+        "the volume of the fine times the fall of pressure with x. The thesis's cases leave it "
+        "out.",
+    )
+    inertia: Literal["none", "schiller-naumann"] = Field(
+        "none",
+        description='Drag at finite Reynolds numbers: "none" is Stokes\'s at any speed, '
+        '"schiller-naumann" multiplies it by 1 + 0.15 Re^0.687 (Re up to 800; schemes "held" and '
+        '"every_step").',
+    )
     crowd: Literal["none", "beetstra"] = Field(
         "none",
-        description='How other spheres nearby change the drag on a fine: "none" leaves it that of '
-        'a lone sphere. "beetstra", the law of Beetstra, van der Hoef and Kuipers (2007), is '
-        "refused for now.",
+        description='How other fines nearby change the drag on a fine: "none" leaves it that of a '
+        'lone sphere, "beetstra" takes the law of Beetstra, van der Hoef and Kuipers (2007) with '
+        "the porosity around each fine, which fdnet computes while LIGGGHTS waits.",
     )
+    update_travel: Annotated[float, Field(gt=0, le=MOST_TRAVEL)] | None = Field(
+        None,
+        description="How far the fluid carries a fine, in diameters of the smallest fine, before "
+        "the forces in a crowd are computed anew. When absent: "
+        f"{UPDATE_TRAVEL:g}.",
+    )
+
+    @property
+    def coupled(self) -> bool:
+        """Whether fdnet computes the forces on each fine while LIGGGHTS waits."""
+        return self.crowd != "none" or self.field == "network"
+
+    @property
+    def travel_diameters(self) -> float:
+        """Diameters of the smallest fine between two updates of a coupled invasion."""
+        return UPDATE_TRAVEL if self.update_travel is None else self.update_travel
 
 
 class Gravity(Part):
@@ -87,10 +125,13 @@ class Gravity(Part):
         description='"auto" leaves gravity out where weight over drag is below '
         "`negligible_below`; the run summary then says so.",
     )
-    acceleration_m_s2: Vector = Field((0.0, 0.0, -9.81), description="Gravity vector (x, y, z).")
+    acceleration_m_s2: Vector = Field(
+        (0.0, 0.0, -9.81), description="Gravity vector (x, y, z), in any direction."
+    )
     buoyancy: bool = Field(
         True,
-        description="Whether the fluid's buoyancy acts. It needs gravity down one axis.",
+        description="Whether the fluid's buoyancy acts: gravity times 1 - fluid over sphere "
+        "density, for fines and for mobile grains.",
     )
     negligible_below: NonNegative = Field(
         1e-3, description='Ratio of weight to drag below which mode "auto" leaves gravity out.'

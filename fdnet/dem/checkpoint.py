@@ -78,7 +78,7 @@ def empty_chunks(case: InvasionCase, scales: InvasionScales) -> int:
 
     They take twice the passage of the fluid through the specimen, at least the plug time.
     """
-    passage = 2 * case.size_m[0] / scales.interstitial_velocity
+    passage = 2 * case.size_m[0] / scales.drive_velocity
     return max(
         quiet_chunks(scales), math.ceil(passage / (scales.checkpoint_steps * scales.time_step))
     )

@@ -1,9 +1,16 @@
-"""Stokes drag in the invasion deck: what each scheme of `drag.scheme` puts into `_drag.in.j2`."""
+"""The fluid in the invasion deck: what each scheme of `drag.scheme` puts into `_drag.in.j2`.
+
+The force of the pressure gradient is the same in all schemes: constant on each fine, and only
+inside the pack. It acts on the fines alone, as the drag does.
+"""
 
 from typing import Any
 
+import numpy as np
+
 from fdnet.case.case import InvasionCase
-from fdnet.dem.deck import number
+from fdnet.dem.deck import LeftOut, number
+from fdnet.scales.forces.reynolds import COEFFICIENT, EXPONENT
 from fdnet.scales.scales import InvasionScales
 
 BELOW_ZERO = -5e-324
@@ -12,19 +19,57 @@ BELOW_ZERO = -5e-324
 
 def drag_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]:
     """Variables of the drag block: the scheme and, as text, the numbers that it needs."""
+    if case.drag.coupled:
+        hold = scales.hold_steps if scales.hold_steps > 1 else 0
+        return {"coupled": True, "scheme": case.drag.scheme, "hold_steps": hold}
     coefficient = case.fluid.stokes_coefficient_Pa_s * case.drag.multiplier
-    slower = scales.interstitial_velocity - scales.upstream_velocity
+    slower = scales.drive_velocity - scales.upstream_velocity
     own = (
         _viscous(case, scales, coefficient, slower)
         if case.drag.scheme == "viscous"
         else _by_radius(scales, slower)
     )
     return {
+        "coupled": False,
         "scheme": case.drag.scheme,
         "coefficient": number(coefficient),
-        "velocity": number(scales.interstitial_velocity),
+        "velocity": number(scales.drive_velocity),
+        "gradient": _gradient(case, scales),
         **own,
     }
+
+
+def _gradient(case: InvasionCase, scales: InvasionScales) -> dict[str, str] | None:
+    """V (-grad p) inside the pack: one force, or a coefficient of r^3 for fines of many sizes."""
+    push = scales.push
+    if not push.gradient:
+        return None
+    end = number(np.nextafter(case.size_m[0], 0))
+    one_size = case.fines.one_size
+    return {
+        "pores": f"0.0 {end} INF INF INF INF",
+        "force": number(push.gradient_force(case.fines.mean_radius_m)) if one_size else "",
+        "coefficient": "" if one_size else number(push.gradient_force(1.0)),
+    }
+
+
+def forces_left_out(case: InvasionCase) -> list[LeftOut]:
+    """The forces of the fluid that the deck does without."""
+    drag = case.drag
+    return [
+        LeftOut(what=what, why=why)
+        for what, left, why in (
+            ("force of the pressure gradient", not drag.pressure_gradient, "switched off"),
+            (
+                "force of the pressure gradient on the grains",
+                drag.pressure_gradient and case.grains.motion == "mobile",
+                "the fluid pushes the fines only",
+            ),
+            ("drag at finite Reynolds numbers", drag.inertia == "none", "not asked for"),
+            ("drag in a crowd", drag.crowd == "none", "not asked for"),
+        )
+        if left
+    ]
 
 
 def _by_radius(scales: InvasionScales, slower: float) -> dict[str, Any]:
@@ -33,7 +78,17 @@ def _by_radius(scales: InvasionScales, slower: float) -> dict[str, Any]:
     mu is the viscosity, M the multiplier, u the fluid's and v the fine's velocity.
     """
     fluid = f"(f_uf[1]-(x<0.0)*{number(slower)})" if slower else "f_uf[1]"
-    return {"fluid_x": fluid, "hold_steps": scales.hold_steps if scales.hold_steps > 1 else 0}
+    slope = scales.push.reynolds_slope
+    inertia = {
+        "factor": number(COEFFICIENT),
+        "exponent": number(EXPONENT),
+        "reynolds": number(slope),
+    }
+    return {
+        "fluid_x": fluid,
+        "hold_steps": scales.hold_steps if scales.hold_steps > 1 else 0,
+        "inertia": inertia if slope else None,
+    }
 
 
 def _viscous(
@@ -46,7 +101,7 @@ def _viscous(
     damping = coefficient * case.fines.mean_radius_m
     return {
         "damping": number(damping),
-        "push": number(damping * scales.interstitial_velocity),
+        "push": number(damping * scales.drive_velocity),
         "slower": number(-damping * slower) if slower else "",
         "face": number(BELOW_ZERO),
     }

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.case.case import Case
+from fdnet.dem.contact_lines import contact_variables, damped_alike
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
 from fdnet.dem.scene import (
     box_of,
-    contact_variables,
     header_variables,
     wall_variables,
     write_data,
@@ -26,6 +26,8 @@ from fdnet.scales.springs import sphere_mass
 from fdnet.spheres.dump import COLUMNS, FORMAT
 from fdnet.spheres.snapshot import Array, Snapshot, resting
 
+PACK_DAMPING = 0.4 / math.sqrt(2)
+"""Damping of two grains over the critical one: 0.8 sqrt(k/m) of their joint mass m/2."""
 RELAX_RUN_STEPS = 2500
 """Steps between two tests for rest."""
 RADIUS_TOLERANCE = 1e-9
@@ -68,10 +70,14 @@ def write_pack_inputs(
 
 
 def draw_radii(case: Case, count: int) -> Array:
-    """`count` radii (N,) m, uniform by number.
+    """`count` radii (N,) m.
 
-    The last one is chosen so that the sum of volumes comes as near to the expected one as it can.
+    Of a measured curve they are its strata in random order. Of a range they are uniform by number,
+    the last one chosen so that the sum of volumes comes as near to the expected one as it can.
     """
+    if case.grains.measured:
+        order = np.random.default_rng([case.seed, 7]).permutation(count)
+        return 0.5 * case.grains.curve.strata(count)[order]
     low, high = case.grains.radius_range_m
     radii = np.random.default_rng([case.seed, 7]).uniform(low, high, count)
     if low < high and count > 1:
@@ -112,9 +118,9 @@ def render_pack(
     ]
     if ranks == 1:
         left_out.append(LeftOut(what="MPI processor grid", why="one rank"))
-    contacts = contact_variables(case, scales, "pack", friction=False)
-    contacts["damping"] = " ".join(
-        [number(0.8 * math.sqrt(stiffness / mass))] * contacts["size"] ** 2
+    rate = 0.8 * math.sqrt(stiffness / mass)
+    contacts = damped_alike(
+        case, contact_variables(case, scales, "pack", friction=False), PACK_DAMPING, rate
     )
     text = render_text(
         "pack.in.j2",

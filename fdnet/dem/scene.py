@@ -1,4 +1,4 @@
-"""What both scenes share in a deck: header, contacts, walls, and the data file of spheres."""
+"""What both scenes share in a deck: header, walls, and the data file of spheres."""
 
 from pathlib import Path
 from typing import Any
@@ -6,15 +6,12 @@ from typing import Any
 import numpy as np
 
 from fdnet.case.case import Case
+from fdnet.dem.contact_lines import wall_law
 from fdnet.dem.deck import LeftOut, number
 from fdnet.errors import DumpError
 from fdnet.files.atomic import write_text
-from fdnet.scales.scales import Scales
-from fdnet.scales.springs import Contact
 from fdnet.spheres.dump import Frame
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
-
-_MATERIALS = {"pack": ("grain", "wall"), "invade": ("grain", "fine", "wall")}
 
 
 def header_variables(
@@ -35,44 +32,9 @@ def header_variables(
     }
 
 
-def contact_variables(case: Case, scales: Scales, stage: str, *, friction: bool) -> dict[str, Any]:
-    """The symmetric property matrices of a scene, row by row, and its contact model."""
-    materials = _MATERIALS[stage]
-
-    def matrix(value: str) -> str:
-        return " ".join(
-            number(getattr(_contact(scales, a, b), value)) for a in materials for b in materials
-        )
-
-    size = len(materials)
-    tangential = " tangential history" if friction else ""
-    return {
-        "materials": " ".join(materials),
-        "size": size,
-        "normal": matrix("normal_stiffness"),
-        "damping": matrix("damping_rate"),
-        "shear": matrix("shear_stiffness"),
-        "no_damping": " ".join(["0"] * size**2),
-        "friction": matrix("friction") if friction else "",
-        "pair_model": f"hooke/stiffness{tangential}{_settings(friction)}",
-    }
-
-
-def _settings(friction: bool) -> str:
-    return " tangential_damping off limitForce on" if friction else " limitForce on"
-
-
-def _contact(scales: Scales, first: str, second: str) -> Contact:
-    """The pair's contact in either order; walls do not touch each other, so any value serves."""
-    for pair in (f"{first}-{second}", f"{second}-{first}"):
-        if pair in scales.contacts:
-            return scales.contacts[pair]
-    return scales.contacts["grain-wall"]
-
-
 def wall_variables(case: Case, stage: str, *, friction: bool) -> list[dict[str, Any]]:
     """Planes at the sides, and at both ends for grains that move; fines pass the ends freely."""
-    size, material = case.size_m, len(_MATERIALS[stage])
+    size, law = case.size_m, wall_law(case, stage, friction=friction)
     ends_hold = "all" if stage == "pack" else ("grains" if case.grains.motion == "mobile" else "")
     sides_hold = (
         ""
@@ -83,20 +45,16 @@ def wall_variables(case: Case, stage: str, *, friction: bool) -> list[dict[str, 
     for axis, held in ((0, ends_hold), (1, sides_hold), (2, sides_hold)):
         for end, position in enumerate((0.0, size[axis])):
             if held:
-                walls.append(_wall(f"w{'xyz'[axis]}{end}", held, material, position, friction))
+                walls.append(_wall(f"w{'xyz'[axis]}{end}", held, position) | law)
     return walls
 
 
-def _wall(name: str, group: str, material: int, position: float, friction: bool) -> dict[str, Any]:
-    model = "hooke/stiffness" + (" tangential history" if friction else "")
+def _wall(name: str, group: str, position: float) -> dict[str, Any]:
     return {
         "id": name,
         "group": group,
-        "model": model,
-        "material": material,
         "plane": f"{name[1]}plane",
         "position": number(position),
-        "settings": _settings(friction),
     }
 
 

@@ -188,6 +188,11 @@ def write_throats(path: str | Path, analysis: "Analysis") -> Path:
     return _write(path, _frame(columns))
 
 
+def write_history(path: str | Path, rows: Sequence[Mapping[str, float]]) -> Path:
+    """history.csv: one row a checkpoint, with times in s and numbers of fines."""
+    return _write(path, _frame(rows))
+
+
 def plain_json(mapping: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
     """`mapping` as plain values and as JSON text.
 

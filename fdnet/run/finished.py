@@ -82,20 +82,22 @@ class FinishedRun:
     def history(self) -> "pd.DataFrame":
         """The invasion over time, one row for each checkpoint, `time_s` of the simulation first.
 
-        It comes from history.csv of the run folder where there is one, else from
-        invade/history.csv. A run without fines has no history: the table then has no rows.
+        It joins history.csv of the run folder, where there is one, with the counts that the deck
+        wrote to invade/history.csv. A run without fines has no history: the table has no rows.
         """
         from fdnet.report.read_tables import HISTORY_COLUMNS, empty_table, read_table
 
-        whole = self.path / "history.csv"
-        if whole.exists():
-            return read_table(whole, ["time_s"])
         if not isinstance(self.case, InvasionCase):
             return empty_table(["time_s", *HISTORY_COLUMNS])
-        table = read_table(self.path / "invade" / "history.csv", HISTORY_COLUMNS)
+        counts = read_table(self.path / "invade" / "history.csv", HISTORY_COLUMNS)
         check_one(self.path / "invade", self.manifest["invade"], "history.csv", START_OVER)
-        table.insert(0, "time_s", table["step"] * self.manifest["invade"]["dt_s"])
-        return table
+        whole = self.path / "history.csv"
+        if not whole.exists():
+            counts.insert(0, "time_s", counts["step"] * self.manifest["invade"]["dt_s"])
+            return counts
+        times = read_table(whole, ["time_s", "physical_time_s", "step"])
+        self._check("history.csv")
+        return times.merge(counts, on="step", how="left")
 
     def spheres(self, state: State = "damaged") -> Snapshot:
         """Grains and fines at the end of the run, or the grains alone before it.

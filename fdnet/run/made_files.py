@@ -15,6 +15,7 @@ TABLES = (
     "layers.csv",
     "pores.csv",
     "throats.csv",
+    "history.csv",
     "summary.json",
 )
 """Files of the analysis whose digests are in the manifest."""

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, readable_states
+from fdnet.run.history import history_rows
+from fdnet.run.placed_sizes import PlacedSizes
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Snapshot
 
@@ -41,12 +43,14 @@ class Results:
         grains: as packed.
         invasion: None when the case has no fines.
         analysis: permeability, porosity and fines of the specimen.
+        sizes: of grains and fines with measured curves.
     """
 
     path: Path
     grains: Snapshot
     invasion: Invaded | None
     analysis: "Analysis"
+    sizes: tuple[PlacedSizes, ...] = ()
 
     @property
     def shown(self) -> Snapshot:
@@ -57,6 +61,18 @@ class Results:
     def history(self) -> tuple[Checkpoint, ...]:
         """The checkpoints of the invasion; empty without one."""
         return () if self.invasion is None else self.invasion.history
+
+    @property
+    def history_rows(self) -> list[dict[str, float]]:
+        """The rows of history.csv; none without an invasion."""
+        one = self.invasion
+        return [] if one is None else history_rows(one.case, one.scales, one.history)
+
+    @property
+    def physical_time_s(self) -> float | None:
+        """How long the fluid drove the fines, s; None without an invasion."""
+        rows = self.history_rows
+        return rows[-1]["physical_time_s"] if rows else None
 
 
 def write_tables(results: Results) -> None:
@@ -73,6 +89,8 @@ def write_tables(results: Results) -> None:
         tables.write_layers(path / "layers.csv", results.analysis.layers)
     tables.write_pores(path / "pores.csv", results.analysis)
     tables.write_throats(path / "throats.csv", results.analysis)
+    if results.history_rows:
+        tables.write_history(path / "history.csv", results.history_rows)
 
 
 def write_paraview(results: Results) -> None:
@@ -111,9 +129,12 @@ def draw_figures(results: Results) -> tuple[list[tuple[Path, str]], list[str]]:
     """All figures with their captions, and why the 3-D picture is missing if it is."""
     from fdnet.report import figures, vtk
 
-    rows = [] if results.invasion is None else _history_rows(results.invasion)
     drawn = figures.draw_all(
-        results.path / "figures", results.analysis, results.shown, rows or None
+        results.path / "figures",
+        results.analysis,
+        results.shown,
+        results.history_rows or None,
+        results.sizes,
     )
     picture = results.path / "figures" / "spheres_3d.png"
     reason = vtk.render_spheres_png(
@@ -122,15 +143,3 @@ def draw_figures(results: Results) -> tuple[list[tuple[Path, str]], list[str]]:
     if reason:
         return [(file, figures.CAPTIONS[file.stem]) for file in drawn], [reason]
     return [(file, figures.CAPTIONS[file.stem]) for file in (picture, *drawn)], []
-
-
-def _history_rows(invasion: Invaded) -> list[dict[str, float]]:
-    return [
-        {
-            "time_s": row.step * invasion.scales.time_step,
-            "upstream": row.upstream,
-            "invaded": row.invaded,
-            "passed": row.passed,
-        }
-        for row in invasion.history
-    ]

@@ -64,7 +64,7 @@ def cost_of(case: Case, scales: Scales) -> Cost:
 def _expected_duration(case: Case, scales: InvasionScales) -> float:
     if case.run.duration_s is not None:
         return scales.cap_time
-    passage = case.size_m[0] / scales.interstitial_velocity
+    passage = case.size_m[0] / scales.drive_velocity
     feeding = scales.slab_length / scales.upstream_velocity
     return min(scales.cap_time, feeding + passage + scales.plug_time)
 

@@ -3,6 +3,7 @@
 import math
 
 from fdnet.case.case import Case
+from fdnet.scales.hertz import REFERENCE_OVERLAP
 from fdnet.scales.springs import Contact, mass_range
 
 PACK_STAGES, PACK_STAGE_STEPS, PACK_RELAX_STEPS, PACK_START, PACK_STEP = 30, 300, 20_000, 0.6, 0.15
@@ -28,6 +29,13 @@ def grain_count(case: Case) -> int:
 
 
 def pack_step(case: Case, contacts: dict[str, Contact]) -> float:
-    """Time step of packing, s: `PACK_STEP` of sqrt(m/k) of the lightest grain."""
-    stiffness = contacts["grain-grain"].normal_stiffness
+    """Time step of packing, s: `PACK_STEP` of sqrt(m/k) of the lightest grain.
+
+    The stiffness of Hertz contacts is that of its tangent at `grains.max_overlap`.
+    """
+    contact = contacts["grain-grain"]
+    stiffness = contact.normal_stiffness
+    if contact.elastic:
+        size = case.grains.radius_range_m[0] / case.grains.mean_radius_m
+        stiffness *= 1.5 * size * math.sqrt(case.grains.max_overlap / REFERENCE_OVERLAP)
     return PACK_STEP * math.sqrt(mass_range(case.grains)[0] / stiffness)

@@ -5,7 +5,10 @@ from dataclasses import dataclass
 
 from fdnet.case.case import InvasionCase
 from fdnet.errors import CaseError
-from fdnet.scales.springs import mass_range
+from fdnet.scales.forces.push import Push, arrival_velocity, pore_width
+from fdnet.scales.hertz import overlap_of_impact, overlap_under
+from fdnet.scales.hertz_contacts import pair_radius
+from fdnet.scales.springs import Contact, mass_range
 
 MOST_OVERLAP = 0.5
 """Predicted overlap over a fine's diameter from which a case is refused: beyond it a fine could
@@ -17,26 +20,32 @@ class Overlaps:
     """Predicted overlaps of a fine with a grain, over the diameter of the largest fine.
 
     Attributes:
-        drag: by the drag of the fluid on a fine at rest, 6 pi mu M u / 2 k.
-        impact: by a fine that arrives with the fluid's velocity, u sqrt(m / k) / 2 r.
+        drag: by drag and pressure gradient F on a fine at rest: F / k, or by Hertz.
+        impact: by a fine that arrives at its fastest velocity w: w sqrt(m / k), or by Hertz.
     """
 
     drag: float
     impact: float
 
 
-def overlaps_of(case: InvasionCase, stiffness: float, velocity: float) -> Overlaps:
-    """The overlaps at a contact `stiffness` of N/m and a fluid `velocity` of m/s."""
-    impact = velocity * math.sqrt(mass_range(case.fines)[1] / stiffness)
-    return Overlaps(
-        impact=impact / (2 * case.fines.radius_range_m[1]),
-        drag=6
-        * math.pi
-        * case.fluid.viscosity_Pa_s
-        * case.drag.multiplier
-        * velocity
-        / (2 * stiffness),
-    )
+def overlaps_of(case: InvasionCase, contact: Contact, push: Push, porosity: float) -> Overlaps:
+    """The overlaps in the `contact` of a grain and a fine, in a pack of a porosity.
+
+    A fine comes with the fluid and gains speed by the pressure gradient across a pore.
+    """
+    radius, mass = case.fines.radius_range_m[1], mass_range(case.fines)[1]
+    width = pore_width(porosity, case.grains.sauter_diameter_m)
+    lightest = min(one.density for one in case.fines.components)
+    velocity = arrival_velocity(push, radius, lightest, width)
+    force = push.force(radius)
+    if contact.elastic:
+        modulus, joint = contact.elastic.modulus, pair_radius(case, ("grain", "fine"), radius)
+        impact = overlap_of_impact(mass, velocity, modulus, joint)
+        drag = overlap_under(force, modulus, joint)
+    else:
+        impact = velocity * math.sqrt(mass / contact.normal_stiffness)
+        drag = force / contact.normal_stiffness
+    return Overlaps(impact=impact / (2 * radius), drag=drag / (2 * radius))
 
 
 def refuse_deep_overlap(overlaps: Overlaps) -> None:

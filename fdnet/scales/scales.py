@@ -10,13 +10,25 @@ from typing import overload
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.errors import CaseError
+from fdnet.scales.contacts import contacts_of, stiffness_factor
+from fdnet.scales.drive import drive_of, drive_warnings
+from fdnet.scales.forces.push import Push, push_of
+from fdnet.scales.forces.throat import throat_width
+from fdnet.scales.forces.warnings import reynolds_warnings, throat_warnings
 from fdnet.scales.grain_pack import pack_step, target_porosity
 from fdnet.scales.overlaps import overlap_warnings, overlaps_of, refuse_deep_overlap
+from fdnet.scales.sizes import size_warnings
 from fdnet.scales.slab import slab_of, slab_warnings
-from fdnet.scales.springs import Contact, contacts_of, stiffness_factor
+from fdnet.scales.springs import Contact
 from fdnet.scales.sticking import Sticking, sticking_of, sticking_warnings
 from fdnet.scales.stop_times import chunk_refreshes, plug_warnings, stop_times
-from fdnet.scales.time_step import drag_warnings, hold_steps, relaxation_time, time_step
+from fdnet.scales.time_step import (
+    densest_factor,
+    drag_warnings,
+    hold_steps,
+    relaxation_time,
+    time_step,
+)
 from fdnet.scales.velocity import Velocity, velocity_of, velocity_warnings
 
 MOST_STEPS = 2**31 - 1
@@ -34,7 +46,7 @@ class Scales:
         interstitial_velocity: m/s, mean velocity of the fluid in the pores.
         pressure_gradient: Pa/m, that drives this flow through the intact pack.
         inertial_loss: share by which Ergun's inertial term lowers the velocity of Darcy's law.
-        stiffness_factor: factor from the materials' stiffness to the one used.
+        stiffness_factor: factor from the materials' stiffness, or moduli, to those used.
         contacts: contact of each pair of materials, such as "grain-fine".
         pack_step: s, time step of packing.
         warnings: doubts about the case, one sentence each.
@@ -57,23 +69,37 @@ class InvasionScales(Scales):
     """What follows from a case with fines as well, in SI units.
 
     Attributes:
-        upstream_velocity: m/s, of the fluid upstream of the formation face.
+        drive_velocity: m/s, of the fluid in the pores as simulated; the fluid's own unless
+            `drag.drive_velocity_m_s` says otherwise.
+        force_factor: drive velocity over the fluid's own; the factor on all forces on a fine, and
+            physical time over simulated time.
+        upstream_velocity: m/s, upstream of the formation face, as simulated.
         supplied_count: number of fines in the slab.
         slab_length: m, along the flow.
         relaxation_time: s, of the drag on the smallest and on the largest fine.
         time_step: s, of the invasion.
         hold_steps: steps for which the drag is held.
-        plug_time: s without a crossing after which the face counts as plugged.
-        cap_time: s, when the invasion ends at the latest.
+        plug_time: s of the simulation without a crossing after which the face counts as plugged.
+        cap_time: s of the simulation, when the invasion ends at the latest.
         checkpoint_steps: steps between two checkpoints.
-        reynolds: particle Reynolds number of the largest fine.
-        stokes: Stokes number of the largest fine at a grain.
+        reynolds: particle Reynolds number of the largest fine that is held.
+        stokes: Stokes number of the largest fine at a grain, as simulated.
+        impact_stokes: impact Stokes number of the largest fine, as simulated.
         gravity_over_drag: weight less buoyancy over drag, of the largest fine.
+        gradient_over_drag: force of the pack's pressure gradient over Stokes's drag, of the
+            largest fine at rest, whether or not the case lets it act.
+        push: drag and pressure gradient on fines in the pack, as simulated.
+        drift_velocity: m/s, of the largest fine that the fluid carries freely in the pores, as
+            simulated.
+        throat_ratio: diameter of the largest fine over that of the pack's throats.
         impact_overlap: predicted overlap by impact, over the diameter of the largest fine.
-        drag_overlap: predicted overlap by drag, over the diameter of the largest fine.
+        drag_overlap: predicted overlap by drag and pressure gradient, over the diameter of the
+            largest fine.
         sticking: how far a fine may lock between two grains.
     """
 
+    drive_velocity: float
+    force_factor: float
     upstream_velocity: float
     supplied_count: int
     slab_length: float
@@ -85,7 +111,12 @@ class InvasionScales(Scales):
     checkpoint_steps: int
     reynolds: float
     stokes: float
+    impact_stokes: float
     gravity_over_drag: float
+    gradient_over_drag: float
+    push: Push
+    drift_velocity: float
+    throat_ratio: float
     impact_overlap: float
     drag_overlap: float
     sticking: Sticking
@@ -107,7 +138,7 @@ def scales_of(case: Case) -> Scales:
         shared = _shared(case, velocity)
         if not isinstance(case, InvasionCase):
             return shared
-        doubts = velocity_warnings(case, shared.porosity, velocity)
+        doubts = [*shared.warnings, *velocity_warnings(case, shared.porosity, velocity)]
         return _invasion(case, replace(shared, warnings=tuple(doubts)))
     except (OverflowError, ZeroDivisionError) as error:
         raise CaseError(
@@ -128,37 +159,44 @@ def _shared(case: Case, velocity: Velocity) -> Scales:
         stiffness_factor=stiffness_factor(case),
         contacts=contacts,
         pack_step=pack_step(case, contacts),
+        warnings=tuple(size_warnings(case)),
     )
 
 
 def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
-    velocity, slab = shared.interstitial_velocity, slab_of(case)
-    upstream = velocity if case.drag.upstream == "interstitial" else shared.darcy_velocity
-    relaxation = _relaxation_times(case)
-    step = time_step(case, shared.contacts, relaxation[0])
-    times = stop_times(case, slab, interstitial=velocity, upstream=upstream)
-    hold = hold_steps(case, step, relaxation[0], times.chunk)
+    slab, relaxation = slab_of(case), _relaxation_times(case)
+    drive = drive_of(case, shared.interstitial_velocity, relaxation[1])
+    velocity = drive.velocity
+    push = push_of(case, velocity, shared.pressure_gradient, factor=drive.factor)
+    darcy = shared.darcy_velocity * drive.factor
+    upstream = velocity if case.drag.upstream == "interstitial" else darcy
+    shortest = relaxation[0] * push.relaxation_share(case.fines.radius_range_m[0])
+    step = time_step(case, shared.contacts, shortest)
+    times = stop_times(case, slab, drive, upstream=upstream)
+    hold = hold_steps(case, step, shortest / densest_factor(case), times.chunk)
     chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
     contact = shared.contacts["grain-fine"]
-    overlaps = overlaps_of(case, contact.normal_stiffness, velocity)
-    sticking = sticking_of(case, contact, velocity, step)
-    reynolds = _reynolds(case, velocity)
-    stokes = relaxation[1] * velocity / (2 * case.grains.mean_radius_m)
-    gravity = _gravity_over_drag(case, velocity)
+    overlaps = overlaps_of(case, contact, push, shared.porosity)
+    sticking = sticking_of(case, contact, push, step)
+    reynolds = _reynolds(case, shared.interstitial_velocity)
     refuse_deep_overlap(overlaps)
     _refuse_long_chunk(step, chunk_steps)
     warnings = [
         *shared.warnings,
-        *_reynolds_warnings(reynolds),
+        *drive_warnings(case, drive),
+        *reynolds_warnings(case, push, reynolds),
+        *throat_warnings(case, _throat_ratio(case, shared)),
         *overlap_warnings(case, overlaps),
         *slab_warnings(case, slab),
-        *drag_warnings(case, hold * step / relaxation[0]),
-        *plug_warnings(case, times.plug, upstream),
+        *drag_warnings(case, hold * step / shortest),
+        *plug_warnings(case, times.plug, drive, upstream),
         *sticking_warnings(sticking),
     ]
     return InvasionScales(
         **{item.name: getattr(shared, item.name) for item in fields(shared)}
         | {"warnings": tuple(warnings)},
+        drive_velocity=velocity,
+        force_factor=drive.factor,
         upstream_velocity=upstream,
         supplied_count=slab.count,
         slab_length=slab.length,
@@ -169,8 +207,13 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
         cap_time=times.cap,
         checkpoint_steps=chunk_steps,
         reynolds=reynolds,
-        stokes=stokes,
-        gravity_over_drag=gravity,
+        stokes=relaxation[1] * velocity / (2 * case.grains.mean_radius_m),
+        impact_stokes=drive.impact_stokes,
+        gravity_over_drag=_gravity_over_drag(case, shared.interstitial_velocity),
+        gradient_over_drag=_gradient_over_drag(case, shared),
+        push=push,
+        drift_velocity=velocity + push.drift(case.fines.radius_range_m[1]),
+        throat_ratio=_throat_ratio(case, shared),
         impact_overlap=overlaps.impact,
         drag_overlap=overlaps.drag,
         sticking=sticking,
@@ -178,14 +221,18 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
 
 
 def _relaxation_times(case: InvasionCase) -> tuple[float, float]:
-    """Of the smallest and of the largest fine, s."""
-    density, viscosity = case.fines.density_kg_m3, case.fluid.viscosity_Pa_s
-    low, high = case.fines.radius_range_m
-    multiplier = case.drag.multiplier
-    return (
-        relaxation_time(low, density, viscosity, multiplier),
-        relaxation_time(high, density, viscosity, multiplier),
-    )
+    """The shortest and the longest of the fines, s; with one material smallest and largest."""
+    viscosity, multiplier = case.fluid.viscosity_Pa_s, case.drag.multiplier
+    if not case.fines.measured:
+        ends = [(radius, case.fines.density_kg_m3) for radius in case.fines.radius_range_m]
+    else:
+        ends = [
+            (0.5 * diameter, one.density)
+            for one in case.fines.components
+            for diameter in (one.curve.low, one.curve.high)
+        ]
+    times = [relaxation_time(radius, density, viscosity, multiplier) for radius, density in ends]
+    return min(times), max(times)
 
 
 def _reynolds(case: InvasionCase, velocity: float) -> float:
@@ -194,9 +241,26 @@ def _reynolds(case: InvasionCase, velocity: float) -> float:
     return case.fluid.density_kg_m3 * velocity * 2 * radius / case.fluid.viscosity_Pa_s
 
 
+def _gradient_over_drag(case: InvasionCase, shared: Scales) -> float:
+    """2 r^2 (-grad p) / (9 mu u M) of the largest fine, (2/9) r^2 phi / (k M) by Darcy's law.
+
+    It is the force V (-grad p) over Stokes's drag at rest, whether or not the case lets it act.
+    """
+    drag = case.fluid.viscosity_Pa_s * shared.interstitial_velocity * case.drag.multiplier
+    return 2 / 9 * case.fines.radius_range_m[1] ** 2 * shared.pressure_gradient / drag
+
+
+def _throat_ratio(case: InvasionCase, shared: Scales) -> float:
+    return 2 * case.fines.radius_range_m[1] / throat_width(shared.porosity, shared.permeability)
+
+
 def _gravity_over_drag(case: InvasionCase, velocity: float) -> float:
-    """2 r^2 (rho - rho_fluid) g / (9 mu u M) of the largest fine, M the drag multiplier."""
-    excess = abs(case.fines.density_kg_m3 - case.fluid.density_kg_m3 * case.gravity.buoyancy)
+    """2 r^2 (rho - rho_fluid) g / (9 mu u M), M the drag multiplier.
+
+    Of the largest fine and the material that weighs most in the fluid.
+    """
+    displaced = case.fluid.density_kg_m3 * case.gravity.buoyancy
+    excess = max(abs(one.density - displaced) for one in case.fines.components)
     weight = math.hypot(*case.gravity.acceleration_m_s2) * excess
     return (
         2
@@ -212,11 +276,3 @@ def _refuse_long_chunk(step: float, chunk_steps: int) -> None:
             f"run.time_step_s: {step:.3g} s needs {chunk_steps:.3g} steps between checkpoints "
             f"(limit {MOST_STEPS:.3g}); raise the step or shorten run.checkpoint_ms"
         )
-
-
-def _reynolds_warnings(reynolds: float) -> list[str]:
-    if reynolds <= 1:
-        return []
-    return [
-        f"particle Reynolds number {reynolds:.2g} is outside the range of Stokes drag (below 1)"
-    ]

@@ -1,10 +1,11 @@
-"""Linear (Hooke) contacts of a case: springs in series, smaller friction, viscous damping."""
+"""Contacts of pairs of materials, and linear (Hooke) ones: springs in series, viscous damping."""
 
 import math
 from dataclasses import dataclass
 
 from fdnet.case.case import Case
-from fdnet.case.particles import Spheres
+from fdnet.case.spheres import Spheres
+from fdnet.scales.hertz import Elastic, restitution_of
 
 PAIRS = (
     ("grain", "grain"),
@@ -18,25 +19,38 @@ PAIRS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contact:
-    """Linear contact of one pair of materials, as it is used.
+    """Contact of one pair of materials, as it is used.
+
+    A Hertz contact has no stiffness of its own: its stiffnesses are those at an overlap of
+    `fdnet.scales.hertz.REFERENCE_OVERLAP`.
 
     Attributes:
         pair: names of the two materials, such as "grain-fine".
-        normal_stiffness: N/m.
+        normal_stiffness: N/m, force over overlap.
         shear_stiffness: N/m.
         friction: coefficient of sliding friction.
+        damping_ratio: damping over the critical one.
         damping_rate: 1/s, viscous damping force over effective mass and velocity.
-        contact_time: s, half a period of the damped oscillation.
+        contact_time: s, half a period of the damped oscillation; of a Hertz contact the duration
+            of an undamped collision at the velocity of the fluid.
         step_limit: s, sqrt(m/k) of the lighter sphere.
+        elastic: constants of a Hertz contact; None when the contact is linear.
     """
 
     pair: str
     normal_stiffness: float
     shear_stiffness: float
     friction: float
+    damping_ratio: float
     damping_rate: float
     contact_time: float
     step_limit: float
+    elastic: Elastic | None = None
+
+    @property
+    def restitution(self) -> float:
+        """Coefficient of restitution of a contact that may pull: exp(-pi z / sqrt(1 - z^2))."""
+        return restitution_of(self.damping_ratio)
 
 
 def series(first: float, second: float) -> float:
@@ -51,8 +65,17 @@ def sphere_mass(radius: float, density: float) -> float:
 
 def mass_range(spheres: Spheres) -> tuple[float, float]:
     """Mass of the smallest and of the largest sphere, kg."""
-    low, high = spheres.radius_range_m
-    return sphere_mass(low, spheres.density_kg_m3), sphere_mass(high, spheres.density_kg_m3)
+    if not spheres.measured:
+        low, high = spheres.radius_range_m
+        return sphere_mass(low, spheres.density_kg_m3), sphere_mass(high, spheres.density_kg_m3)
+    ends = [
+        (
+            sphere_mass(0.5 * one.curve.low, one.density),
+            sphere_mass(0.5 * one.curve.high, one.density),
+        )
+        for one in spheres.components
+    ]
+    return min(low for low, _ in ends), max(high for _, high in ends)
 
 
 def _nominal(case: Case) -> dict[str, tuple[float, float, float]]:
@@ -64,25 +87,25 @@ def _nominal(case: Case) -> dict[str, tuple[float, float, float]]:
     return table | {"wall": (*table["grain"][:2], case.box.wall_friction)}
 
 
-def _pairs(case: Case) -> list[tuple[str, str]]:
+def pairs_of(case: Case) -> list[tuple[str, str]]:
     """Pairs of materials that may touch; walls do not touch each other."""
     return [pair for pair in PAIRS if set(pair) <= {*case.spheres, "wall"}]
 
 
-def stiffness_factor(case: Case) -> float:
+def hooke_factor(case: Case) -> float:
     """Factor on all contact stiffnesses: run.stiffness_N_m over that of the stiffest pair."""
     if case.run.stiffness_N_m == "nominal":
         return 1.0
     nominal = _nominal(case)
     return case.run.stiffness_N_m / max(
-        series(nominal[a][0], nominal[b][0]) for a, b in _pairs(case)
+        series(nominal[a][0], nominal[b][0]) for a, b in pairs_of(case)
     )
 
 
-def contacts_of(case: Case) -> dict[str, Contact]:
-    """The contact of each pair of materials of the case, by its name."""
-    nominal, factor = _nominal(case), stiffness_factor(case)
-    return {f"{a}-{b}": _contact(case, (a, b), nominal, factor) for a, b in _pairs(case)}
+def hooke_contacts(case: Case) -> dict[str, Contact]:
+    """The linear contact of each pair of materials of the case, by its name."""
+    nominal, factor = _nominal(case), hooke_factor(case)
+    return {f"{a}-{b}": _contact(case, (a, b), nominal, factor) for a, b in pairs_of(case)}
 
 
 def _contact(
@@ -93,22 +116,27 @@ def _contact(
 ) -> Contact:
     first, second = pair
     normal = factor * series(nominal[first][0], nominal[second][0])
-    spheres = [case.spheres[name] for name in pair if name != "wall"]
-    damping = sum(one.damping_ratio for one in spheres) / len(spheres)
-    frequency = math.sqrt(normal / _effective_mass(case, pair))
+    damping = mean_damping([case.spheres[name] for name in pair if name != "wall"])
+    frequency = math.sqrt(normal / effective_mass(case, pair))
     lightest = case.spheres["fine" if "fine" in pair else "grain"]
     return Contact(
         pair=f"{first}-{second}",
         normal_stiffness=normal,
         shear_stiffness=factor * series(nominal[first][1], nominal[second][1]),
         friction=min(nominal[first][2], nominal[second][2]),
+        damping_ratio=damping,
         damping_rate=2 * damping * frequency,
         contact_time=math.pi / (frequency * math.sqrt(1 - damping**2)),
         step_limit=math.sqrt(mass_range(lightest)[0] / normal),
     )
 
 
-def _effective_mass(case: Case, pair: tuple[str, str]) -> float:
+def mean_damping(spheres: list[Spheres]) -> float:
+    """Damping ratio of a contact: the mean of its materials, a wall taking the sphere's."""
+    return sum(one.damping_ratio for one in spheres) / len(spheres)
+
+
+def effective_mass(case: Case, pair: tuple[str, str]) -> float:
     """m1 m2 / (m1 + m2) of a typical contact, kg.
 
     Walls have infinite mass, and fixed grains too while fines invade; so it is in LIGGGHTS.
@@ -118,4 +146,4 @@ def _effective_mass(case: Case, pair: tuple[str, str]) -> float:
 
 
 def _inverse_mass(spheres: Spheres) -> float:
-    return 1 / sphere_mass(spheres.mean_radius_m, spheres.density_kg_m3)
+    return 1 / sphere_mass(spheres.mean_radius_m, spheres.mean_density_kg_m3)

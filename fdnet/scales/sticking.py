@@ -17,6 +17,7 @@ import math
 from dataclasses import dataclass
 
 from fdnet.case.case import InvasionCase
+from fdnet.scales.forces.push import Push
 from fdnet.scales.springs import Contact, sphere_mass
 
 MOST_FALSE_FORCE = 0.5
@@ -33,9 +34,10 @@ class Sticking:
         size_ratio: radius of the fine over that of the largest grain.
         friction: coefficient of friction of a fine against a grain.
         slope: of the sides of the groove; friction below it holds no fine.
-        shear_ratio: tangential over normal contact stiffness.
-        push: drag on the fine at rest over normal stiffness and radius, F / (k r).
+        shear_ratio: tangential over normal contact stiffness, force over overlap.
+        push: force of the fluid on the fine at rest over normal stiffness and radius, F / (k r).
         false_force: tangential force that the integrator adds in a quarter turn, over the push.
+        linear: whether the tangential stiffness can be chosen (Hertz-Mindlin's cannot).
     """
 
     size_ratio: float
@@ -44,6 +46,7 @@ class Sticking:
     shear_ratio: float
     push: float
     false_force: float
+    linear: bool = True
 
     @property
     def by_springs(self) -> bool:
@@ -75,27 +78,28 @@ def fall_velocity(push: float, mass: float, distance: float) -> float:
     return math.sqrt(2 * push * distance / mass)
 
 
-def sticking_of(case: InvasionCase, contact: Contact, velocity: float, step: float) -> Sticking:
+def sticking_of(case: InvasionCase, contact: Contact, push: Push, step: float) -> Sticking:
     """Of the smallest fine between two of the largest grains, which locks most easily.
 
     Args:
         case: the case.
         contact: of a grain and a fine.
-        velocity: of the fluid, m/s; a fine rolls no faster.
+        push: of the fluid; a fine rolls no faster than it drifts freely.
         step: time step, s.
     """
     radius, grain = case.fines.radius_range_m[0], case.grains.radius_range_m[1]
-    mass = sphere_mass(radius, case.fines.density_kg_m3)
-    push = 6 * math.pi * case.fluid.viscosity_Pa_s * case.drag.multiplier * radius * velocity
-    slope = groove_slope(radius / grain)
-    rolling = min(velocity, fall_velocity(push, mass, slope * grain))
+    mass = sphere_mass(radius, min(one.density for one in case.fines.components))
+    force, slope = push.force(radius), groove_slope(radius / grain)
+    drift = push.velocity + push.drift(radius)
+    rolling = min(drift, fall_velocity(force, mass, slope * grain))
     return Sticking(
         size_ratio=radius / grain,
         friction=contact.friction,
         slope=slope,
         shear_ratio=contact.shear_stiffness / contact.normal_stiffness,
-        push=push / (contact.normal_stiffness * radius),
-        false_force=false_force(contact.shear_stiffness, rolling, step) / push,
+        push=force / (contact.normal_stiffness * radius),
+        false_force=false_force(contact.shear_stiffness, rolling, step) / force,
+        linear=contact.elastic is None,
     )
 
 
@@ -110,10 +114,14 @@ def sticking_warnings(sticking: Sticking) -> list[str]:
     )
     if sticking.by_springs:
         most = sticking.friction * sticking.slope
+        remedy = (
+            "leave out grains.shear_stiffness_N_m and fines.shear_stiffness_N_m"
+            if sticking.linear
+            else "take contact.model = 'hooke'"
+        )
         return [
             f"{who}, tangential over normal stiffness {sticking.shear_ratio:.2g} (above "
-            f"{most:.2g}): leave out grains.shear_stiffness_N_m and fines.shear_stiffness_N_m, "
-            f"or lower friction to {sticking.slope:.2g}"
+            f"{most:.2g}): {remedy}, or lower friction to {sticking.slope:.2g}"
         ]
     excess = sticking.false_force / MOST_FALSE_FORCE
     return [

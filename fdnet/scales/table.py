@@ -1,105 +1,32 @@
 """The scales of a case as rows: name, symbol, value, unit, formula, source."""
 
-from dataclasses import dataclass
-
 from fdnet.case.case import Case
+from fdnet.scales.contact_rows import contact_rows, overlap_rows
 from fdnet.scales.cost import cost_of, memory_bytes
+from fdnet.scales.flow_rows import drive_rows, flow_rows
+from fdnet.scales.forces.rows import force_rows
 from fdnet.scales.grain_pack import grain_count
+from fdnet.scales.quantity import Quantity
+from fdnet.scales.quantity import row as _row
 from fdnet.scales.scales import InvasionScales, Scales
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Quantity:
-    """One row of the table of scales.
-
-    Attributes:
-        name: what it is, in words.
-        symbol: as in the formulas.
-        value: in `unit`.
-        unit: SI; "-" for a number without a unit.
-        formula: how it follows from the case.
-        source: author and year, or where it was measured.
-    """
-
-    name: str
-    symbol: str
-    value: float
-    unit: str
-    formula: str
-    source: str
-
-
-def _row(name: str, symbol: str, value: float, unit: str, formula: str, source: str) -> Quantity:
-    return Quantity(
-        name=name, symbol=symbol, value=value, unit=unit, formula=formula, source=source
-    )
+from fdnet.scales.sizes import size_rows
 
 
 def scale_rows(case: Case, scales: Scales) -> list[Quantity]:
     """Every scale of the case with its formula and source, in reading order."""
-    rows = _flow_rows(case, scales)
+    rows = [_row(*one) for one in size_rows(case)] + flow_rows(case, scales)
     if isinstance(scales, InvasionScales):
-        rows += _fine_rows(scales)
-    rows += _contact_rows(scales)
+        rows += _fine_rows(case, scales)
+    rows += contact_rows(case, scales)
     return rows + _cost_rows(case, scales)
 
 
-def _flow_rows(case: Case, scales: Scales) -> list[Quantity]:
-    darcy, interstitial, source = _velocity_formulas(case)
+def _fine_rows(case: Case, scales: InvasionScales) -> list[Quantity]:
     return [
-        _row(
-            "Carman-Kozeny permeability",
-            "k_CK",
-            scales.permeability,
-            "m2",
-            "d^2 phi^3 / (180 (1-phi)^2)",
-            "Carman 1937",
-        ),
-        _row("Darcy velocity", "q", scales.darcy_velocity, "m/s", darcy, source),
-        _row(
-            "interstitial velocity",
-            "u",
-            scales.interstitial_velocity,
-            "m/s",
-            interstitial,
-            "Dupuit 1863",
-        ),
-        _row(
-            "pressure gradient in the pack",
-            "-dp/dx",
-            scales.pressure_gradient,
-            "Pa/m",
-            "mu q / k" if case.fluid.darcy_law == "darcy" else "mu q / k + b q^2",
-            source,
-        ),
-        _row(
-            "loss of velocity by inertia",
-            "1 - q_E/q_D",
-            scales.inertial_loss,
-            "-",
-            "b = 1.75/150 rho_f d / (k (1-phi))",
-            "Ergun 1952",
-        ),
-    ]
-
-
-def _velocity_formulas(case: Case) -> tuple[str, str, str]:
-    """Formulas of the Darcy and of the interstitial velocity, and the source of the first."""
-    ergun = case.fluid.darcy_law == "ergun"
-    source = "Ergun 1952" if ergun else "Darcy 1856"
-    if case.fluid.velocity_m_s is not None:
-        return "q = u phi", "given in the case", source
-    length = "L" if case.well is None else "r_w ln(r_e/r_w)"
-    if not ergun:
-        return f"q = k dP / (mu {length})", "u = q / phi", source
-    second = "L" if case.well is None else "r_w^2 (1/r_w - 1/r_e)"
-    return f"mu q {length} / k + b q^2 {second} = dP", "u = q / phi", source
-
-
-def _fine_rows(scales: InvasionScales) -> list[Quantity]:
-    return [
+        *drive_rows(scales),
         *_drag_rows(scales),
-        *_ratio_rows(scales),
+        *force_rows(scales),
+        *overlap_rows(case, scales),
         *_supply_rows(scales),
         *_time_rows(scales),
     ]
@@ -132,57 +59,12 @@ def _drag_rows(scales: InvasionScales) -> list[Quantity]:
     ]
 
 
-def _ratio_rows(scales: InvasionScales) -> list[Quantity]:
-    return [
-        _row(
-            "particle Reynolds number",
-            "Re",
-            scales.reynolds,
-            "-",
-            "rho_f u 2r / mu",
-            "Stokes drag holds below about 1",
-        ),
-        _row(
-            "Stokes number",
-            "St",
-            scales.stokes,
-            "-",
-            "tau u / d_grain",
-            "inertia over drag at a grain",
-        ),
-        _row(
-            "gravity over drag",
-            "G",
-            scales.gravity_over_drag,
-            "-",
-            "2 r^2 (rho - rho_f) g / (9 mu u M)",
-            "force ratio",
-        ),
-        _row(
-            "impact overlap over diameter",
-            "delta/d",
-            scales.impact_overlap,
-            "-",
-            "u sqrt(m/k) / 2r",
-            "linear spring",
-        ),
-        _row(
-            "drag overlap over diameter",
-            "delta/d",
-            scales.drag_overlap,
-            "-",
-            "6 pi mu M u / 2k",
-            "linear spring",
-        ),
-    ]
-
-
 def _supply_rows(scales: InvasionScales) -> list[Quantity]:
     return [
         _row("fines supplied", "n", scales.supplied_count, "-", "c A l / v", "slab of suspension"),
         _row("slab length", "l", scales.slab_length, "m", "n v / (c A)", "slab of suspension"),
         _row(
-            "time to feed the slab",
+            "time to feed the slab, simulated",
             "t_f",
             scales.slab_length / scales.upstream_velocity,
             "s",
@@ -195,7 +77,7 @@ def _supply_rows(scales: InvasionScales) -> list[Quantity]:
 def _time_rows(scales: InvasionScales) -> list[Quantity]:
     return [
         _row(
-            "plug time",
+            "plug time, simulated",
             "t_p",
             scales.plug_time,
             "s",
@@ -203,7 +85,7 @@ def _time_rows(scales: InvasionScales) -> list[Quantity]:
             "stop rule",
         ),
         _row(
-            "cap or duration",
+            "cap or duration, simulated",
             "t_c",
             scales.cap_time,
             "s",
@@ -219,47 +101,6 @@ def _time_rows(scales: InvasionScales) -> list[Quantity]:
             "measured, docs/physics.md",
         ),
     ]
-
-
-def _contact_rows(scales: Scales) -> list[Quantity]:
-    rows = [
-        _row(
-            "stiffness factor",
-            "f_k",
-            scales.stiffness_factor,
-            "-",
-            "run.stiffness / stiffest pair",
-            "scaling",
-        )
-    ]
-    for contact in scales.contacts.values():
-        rows += [
-            _row(
-                f"{contact.pair} stiffness used",
-                "k",
-                contact.normal_stiffness,
-                "N/m",
-                "f_k kA kB / (kA + kB)",
-                "series springs",
-            ),
-            _row(
-                f"{contact.pair} contact time",
-                "t_c",
-                contact.contact_time,
-                "s",
-                "pi / (sqrt(k/m_eff) sqrt(1-zeta^2))",
-                "damped oscillator",
-            ),
-            _row(
-                f"{contact.pair} stable step",
-                "dt_s",
-                0.2 * contact.step_limit,
-                "s",
-                "0.2 sqrt(m/k)",
-                "measured, docs/physics.md",
-            ),
-        ]
-    return rows
 
 
 def _cost_rows(case: Case, scales: Scales) -> list[Quantity]:

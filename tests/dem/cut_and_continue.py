@@ -10,6 +10,7 @@ from fdnet.case.case import InvasionCase
 from fdnet.dem.binary import Binary
 from fdnet.dem.invasion import Invasion, invade
 from fdnet.dem.liggghts import Launch
+from fdnet.run.fluid.fluid_of import fluid_of
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Snapshot
 
@@ -26,7 +27,7 @@ class StopError(Exception):
     """Stands for any sudden end."""
 
 
-def cell_case(sides: str, motion: str, supply: str, scheme: str) -> InvasionCase:
+def cell_case(sides: str, motion: str, supply: str, scheme: str, *keys: str) -> InvasionCase:
     """The small case of one cell: 15 grains, 1,500 fines in batches, 5 checkpoints."""
     return tiny(
         f"box.sides={sides}",
@@ -38,6 +39,7 @@ def cell_case(sides: str, motion: str, supply: str, scheme: str) -> InvasionCase
         "fines.count=1500",
         "run.cap_ms=0.2",
         "run.checkpoint_ms=0.04",
+        *keys,
     )
 
 
@@ -50,7 +52,8 @@ def differences(
     end, are compared bit for bit.
     """
     launch = Launch(binary=binary, ranks=ranks)
-    whole = invade(case, scales_of(case), grains, folder / "whole", launch)
+    scales = scales_of(case)
+    whole = invade(case, scales, grains, folder / "whole", launch, fluid=fluid_of(case, scales))
     again = cut_and_continue(case, grains, folder / "cut", launch)
     columns = ("id", "kind", "position", "radius", "velocity")
     different = [
@@ -60,6 +63,8 @@ def differences(
     ]
     if again.history != whole.history:
         different.append("history")
+    if again.updates != whole.updates:
+        different.append("updates")
     return different
 
 
@@ -73,8 +78,9 @@ def cut_and_continue(
             raise StopError
 
     cut = Launch(binary=launch.binary, ranks=launch.ranks, follow=stop)
+    scales = scales_of(case)
     try:
-        invade(case, scales_of(case), grains, folder, cut)
+        invade(case, scales, grains, folder, cut, fluid=fluid_of(case, scales))
     except StopError:
-        return invade(case, scales_of(case), grains, folder, launch)
+        return invade(case, scales, grains, folder, launch, fluid=fluid_of(case, scales))
     raise AssertionError(f"the invasion ended before checkpoint {CUT_AT}")

@@ -94,11 +94,54 @@ def test_gravity_is_left_out_when_negligible_and_reported():
     text = invade_text()
     assert not has(text, "gravity|buoyancy")
     assert "# left out: gravity and buoyancy (gravity is" in text
-    assert has(invade_text("gravity.mode=on"), r"^fix grav fines gravity 9.81 vector 0.0 0.0 -1.0")
-    assert has(
-        invade_text("gravity.mode=on"), r"^fix buoy fines buoyancy density 1095.0 dim z level"
+    on = invade_text("gravity.mode=on")
+    pull = 9.81 * (1 - 1095 / 2146)
+    assert has(on, rf"^fix grav_fines fines gravity {pull} vector 0.0 0.0 -1.0$")
+    assert not has(on, "grav_grains|buoyancy density")
+    heavy = invade_text("gravity.mode=on", "gravity.buoyancy=false")
+    assert has(heavy, r"^fix grav_fines fines gravity 9.81 vector 0.0 0.0 -1.0$")
+    assert "# left out: buoyancy (switched off)" in heavy
+
+
+def test_each_group_of_spheres_has_the_gravity_of_its_own_density():
+    """Also light ones, which rise: the direction turns, the magnitude stays positive."""
+    text = invade_text(
+        "gravity.mode=on",
+        "gravity.acceleration_m_s2=[3.0, 0.0, -4.0]",
+        "grains.motion=mobile",
+        "fines.density_kg_m3=1000.0",
     )
-    assert not has(invade_text("gravity.mode=on", "gravity.buoyancy=false"), "buoyancy")
+    light, heavy = 5 * (1095 / 1000 - 1), 5 * (1 - 1095 / 2650)
+    fines = re.search(r"(?m)^fix grav_fines fines gravity (\S+) vector -0.6 0.0 0.8$", text)
+    grains = re.search(r"(?m)^fix grav_grains grains gravity (\S+) vector 0.6 0.0 -0.8$", text)
+    assert float(fines[1]) == pytest.approx(light)
+    assert float(grains[1]) == pytest.approx(heavy)
+
+
+def test_the_forces_of_the_fluid_that_are_not_asked_for_are_left_out_and_named():
+    text = invade_text()
+    for what in ("force of the pressure gradient (switched off)", "drag in a crowd (not asked"):
+        assert f"# left out: {what}" in text
+    assert "# left out: drag at finite Reynolds numbers (not asked for)" in text
+    assert not has(text, "gradient|pores|slip")
+    asked = invade_text("drag.pressure_gradient=true", "drag.inertia=schiller-naumann")
+    assert not re.search(r"left out: (force|drag at)", asked)
+    assert "the fluid pushes the fines only" in invade_text(
+        "drag.pressure_gradient=true", "grains.motion=mobile"
+    )
+
+
+def test_the_pressure_gradient_acts_on_the_volume_of_each_fine_inside_the_pack():
+    gradient = scales_of(tiny()).pressure_gradient
+    one = invade_text("drag.pressure_gradient=true")
+    force = re.search(r"(?m)^fix gradient fines addforce (\S+) 0.0 0.0 region pores$", one)
+    assert float(force[1]) == pytest.approx(4 / 3 * math.pi * 5e-5**3 * gradient)
+    end = re.search(r"(?m)^region pores block 0.0 (\S+) INF INF INF INF units box$", one)
+    assert float(end[1]) == np.nextafter(3e-3, 0)
+    many = invade_text("drag.pressure_gradient=true", "fines.radius_mm=[0.04, 0.06]")
+    formula = re.search(r"(?m)^variable gx atom (\S+)\*r\*r\*r$", many)
+    assert float(formula[1]) == pytest.approx(4 / 3 * math.pi * gradient)
+    assert has(many, r"^fix gradient fines addforce v_gx 0.0 0.0 region pores$")
 
 
 def test_fixed_grains_have_no_mutual_contacts_and_mobile_ones_are_held_by_planes():
@@ -178,3 +221,32 @@ def test_the_stop_rule_allows_a_share_of_the_inflow():
     arrivals = 0.1 * area * scales.upstream_velocity * 0.2e-3 / volume
     text = invade_text("run.plug_rate=0.3", "run.plug_time_ms=0.2")
     assert has(text, rf"variable still equal \$\{{most\}}\+{math.floor(0.3 * arrivals)}$")
+
+
+@pytest.mark.parametrize(("model", "law"), [("hooke", "hooke/stiffness"), ("hertz", "hertz")])
+def test_pairs_and_walls_have_the_contact_model_of_the_case(model, law):
+    """Walls without friction of their own have no tangential model."""
+    text = invade_text(f"contact.model={model}", "box.wall_friction=0.3")
+    assert has(text, rf"^pair_style gran model {law} tangential history tangential_damping off")
+    assert has(text, rf"^fix wy0 fines wall/gran model {law} tangential history primitive type 3")
+    smooth = invade_text(f"contact.model={model}")
+    assert has(smooth, rf"^fix wy0 fines wall/gran model {law} primitive type 3 yplane")
+    case = tiny(f"contact.model={model}")
+    pack = render_pack(case, scales_of(case), count=66).text
+    assert has(pack, rf"^pair_style gran model {law} limitForce on")
+    assert has(pack, rf"^fix wx0 all wall/gran model {law} primitive type 2 xplane")
+
+
+def test_moduli_that_liggghts_would_refuse_are_said_to_be_meant():
+    """It wants to be told of a Young's modulus below 5e6 or above 1e9 Pa."""
+    for stiffness, soft, hard in (
+        ("1.0", True, False),
+        ("1e2", False, False),
+        ("1e6", False, True),
+    ):
+        text = invade_text(
+            "contact.model=hertz", f"run.stiffness_N_m={stiffness}", "fluid.velocity_m_s=1e-3"
+        )
+        assert has(text, "^soft_particles yes") is soft
+        assert has(text, "^hard_particles yes") is hard
+    assert not has(invade_text(), "_particles yes")

@@ -11,10 +11,11 @@ from builders import resting_spheres, tiny
 from fdnet.case.case import Case
 from fdnet.case.file import case_from
 from fdnet.dem.binary import Binary
+from fdnet.dem.contact_lines import contact_variables
 from fdnet.dem.deck import number, render_text
 from fdnet.dem.drag import drag_variables
 from fdnet.dem.liggghts import Launch, run_deck
-from fdnet.dem.scene import contact_variables, write_data
+from fdnet.dem.scene import write_data
 from fdnet.errors import CaseError
 from fdnet.scales.scales import InvasionScales, scales_of
 from fdnet.scales.time_step import relaxation_time
@@ -111,7 +112,11 @@ def drive(
         resting_spheres([[at, 8e-4, 8e-4]], RADIUS, box, kind=Kind.FINE, first=2)
     )
     write_data(
-        folder / "one.data", spheres, bounds=box, density=np.array([2650.0, 2146.0]), types=3
+        folder / "one.data",
+        spheres,
+        bounds=box - [[5e-4, 0], [0, 0], [0, 0]],
+        density=np.array([2650.0, 2146.0]),
+        types=3,
     )
     header = {
         "stage": "test",

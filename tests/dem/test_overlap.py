@@ -8,13 +8,14 @@ import pytest
 from builders import resting_spheres, tiny
 
 from fdnet.dem import invade_deck, invasion
+from fdnet.dem.contact_lines import contact_variables
 from fdnet.dem.deck import number, render_text
 from fdnet.dem.invade_deck import render_invade
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.overlap import Deepest, cut_watch, deepest_of, read_watch, watch_variables
 from fdnet.dem.packing import make_pack
-from fdnet.dem.scene import box_of, contact_variables, write_data
+from fdnet.dem.scene import box_of, write_data
 from fdnet.errors import LiggghtsError
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Kind

@@ -7,10 +7,13 @@ import pytest
 from builders import resting_spheres, tiny
 
 from fdnet.case.case import Case
+from fdnet.case.file import case_from
+from fdnet.dem.contact_lines import contact_variables
 from fdnet.dem.deck import number, render_text
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch, run_deck
-from fdnet.dem.scene import contact_variables, write_data
+from fdnet.dem.measured_fines import densities
+from fdnet.dem.scene import write_data
 from fdnet.scales.scales import scales_of
 from fdnet.scales.time_step import relaxation_time
 from fdnet.spheres.contacts import max_overlap, touching_pairs
@@ -18,6 +21,8 @@ from fdnet.spheres.dump import read_dump
 from fdnet.spheres.snapshot import Kind, Snapshot
 
 pytestmark = pytest.mark.liggghts
+
+FEW = {"D10_mm": 0.08, "D90_mm": 0.12}
 
 
 def snapshot(case: Case, position: list, kind: Kind, radius: float, first: int = 1) -> Snapshot:
@@ -52,6 +57,108 @@ def test_gravity_buoyancy_and_drag_relax_to_the_terminal_velocity(binary, tmp_pa
     )
     assert fine.velocity[0, 0] == pytest.approx(2.0, rel=1e-6)
     assert result.stop_reason == "duration"
+
+
+OBLIQUE = (1.2e4, -0.9e4, -2.0e4)
+"""Gravity, m/s2, across all axes, so that a fine settles within a millimetre."""
+
+
+@pytest.mark.parametrize("scheme", ["every_step", "held", "implicit", "viscous"])
+def test_a_fine_settles_along_an_oblique_gravity(binary, tmp_path, scheme):
+    """v(t) = u + v_T (1 - exp(-t / tau)), v_T = 2 r^2 (rho - rho_f) g / (9 mu), in each axis."""
+    case = tiny(
+        "fines.count=1",
+        f"drag.scheme={scheme}",
+        "gravity.mode=on",
+        f"gravity.acceleration_m_s2={list(OBLIQUE)}",
+        "box.size_mm=[3.0,3.0,3.0]",
+        "fluid.velocity_m_s=2.0",
+        "run.duration_ms=0.06",
+        "run.checkpoint_ms=0.06",
+    )
+    fine, elapsed = fallen(case, binary, tmp_path)
+    tau = relaxation_time(0.05e-3, 2146, 0.05)
+    terminal = 2 * (0.05e-3) ** 2 * (2146 - 1095) * np.array(OBLIQUE) / (9 * 0.05)
+    expected = np.array([2.0, 0, 0]) + terminal * (1 - math.exp(-elapsed / tau))
+    assert fine.velocity[0] == pytest.approx(expected, abs=0.005 * np.linalg.norm(terminal))
+
+
+@pytest.mark.parametrize(("density", "share"), [(2146.0, 1 - 1095 / 2146), (1000.0, -0.095)])
+def test_free_fall_and_rise_are_exact_in_any_direction(binary, tmp_path, density, share):
+    """With hardly any drag dv = g (1 - rho_f / rho_p) t, to 1e-6; a light fine rises."""
+    case = tiny(
+        "fines.count=1",
+        f"fines.density_kg_m3={density}",
+        "gravity.mode=on",
+        "gravity.acceleration_m_s2=[60.0, -45.0, -100.0]",
+        "box.size_mm=[3.0,3.0,3.0]",
+        "fluid={velocity_m_s=0.5, viscosity_cP=1e-12}",
+        "run.duration_ms=0.2",
+        "run.checkpoint_ms=0.2",
+    )
+    fine, elapsed = fallen(case, binary, tmp_path)
+    fall = share * np.array([60.0, -45.0, -100.0]) * elapsed
+    assert fine.velocity[0] - [0.5, 0, 0] == pytest.approx(fall, rel=1e-5)
+
+
+@pytest.mark.parametrize("buoyancy", ["true", "false"])
+def test_each_fine_of_several_materials_falls_by_its_own_density(binary, tmp_path, buoyancy):
+    """dv = g (1 - rho_f / rho_p) t with the density of its material, in the same run."""
+    materials = [
+        {"name": "light", "share": 1.0, "density_kg_m3": 1500.0, "sizes": FEW},
+        {"name": "heavy", "share": 3.0, "density_kg_m3": 4500.0, "sizes": FEW},
+    ]
+    pull = np.array([60.0, -45.0, -100.0])
+    case = tiny(
+        "gravity.mode=on",
+        f"gravity.acceleration_m_s2={pull.tolist()}",
+        f"gravity.buoyancy={buoyancy}",
+        "box.size_mm=[3.0,3.0,3.0]",
+        "fluid={velocity_m_s=0.5, viscosity_cP=1e-12}",
+        "run={duration_ms=0.2, checkpoint_ms=0.2}",
+    )
+    data = case.data()
+    data["fines"] = {"count": 6, "concentration": 0.01, "supply": "slab", "materials": materials}
+    case = case_from(data)
+    fines, elapsed = fallen(case, binary, tmp_path)
+    density = densities(case, [6])
+    assert set(density) == {1500.0, 4500.0}
+    share = 1 - (1095 / density[:, None] if buoyancy == "true" else 0.0)
+    order = np.argsort(fines.id)
+    fall = fines.velocity[order] - [0.5, 0, 0]
+    assert fall == pytest.approx(share * pull * elapsed, rel=1e-5)
+
+
+def test_mobile_grains_fall_by_their_own_density(binary, tmp_path):
+    """Grain and fine at once; the fluid drags the fine only."""
+    pull = np.array([30.0, -45.0, -100.0])
+    case = tiny(
+        "fines.count=1",
+        "grains.motion=mobile",
+        "gravity.mode=on",
+        f"gravity.acceleration_m_s2={pull.tolist()}",
+        "box.size_mm=[3.0,3.0,3.0]",
+        "fluid={velocity_m_s=0.5, viscosity_cP=1e-12}",
+        "run.duration_ms=0.2",
+        "run.checkpoint_ms=0.2",
+    )
+    lonely = snapshot(case, [[2e-3, 1.5e-3, 1.5e-3]], Kind.GRAIN, 2.5e-4)
+    scales = scales_of(case)
+    result = invade(case, scales, lonely, tmp_path, Launch(binary=binary))
+    elapsed = result.history[-1].step * scales.time_step
+    grain, fine = result.damaged.grains(), result.damaged.fines()
+    assert grain.velocity[0] == pytest.approx((1 - 1095 / 2650) * pull * elapsed, rel=1e-6)
+    moved = fine.velocity[0] - [0.5, 0, 0]
+    assert moved == pytest.approx((1 - 1095 / 2146) * pull * elapsed, rel=1e-5)
+
+
+def fallen(case: Case, binary, folder) -> tuple[Snapshot, float]:
+    """One fine after its fall, far from the only grain, and the time, s."""
+    scales = scales_of(case)
+    lonely = snapshot(case, [[2.7e-3, 3e-4, 3e-4]], Kind.GRAIN, 2.5e-4)
+    result = invade(case, scales, lonely, folder, Launch(binary=binary))
+    assert result.stop_reason == "duration"
+    return result.damaged.fines(), result.history[-1].step * scales.time_step
 
 
 def collide(case: Case, speed: float, binary, folder) -> tuple[float, float]:

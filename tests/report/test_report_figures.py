@@ -12,7 +12,15 @@ from fdnet.report import figures
 from fdnet.report.side_view import cut_circles
 from fdnet.spheres.snapshot import Kind
 
-HISTORY = [{"time_s": 1e-4 * i, "invaded": i, "passed": 0, "upstream": 50 - i} for i in range(50)]
+HISTORY = [
+    {
+        "physical_time_s": 1e-4 * i,
+        "invaded_count": i,
+        "passed_count": 0,
+        "upstream_count": 50 - i,
+    }
+    for i in range(50)
+]
 DAMAGE = {"porosity_reduction", "invaded_fraction", "permeability_ratio"}
 
 

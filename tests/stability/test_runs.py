@@ -16,9 +16,10 @@ from builders import TINY, tiny
 from fdnet.case.case import Case
 from fdnet.case.file import read_case, set_keys
 from fdnet.cli import main
+from fdnet.dem.contact_lines import contact_variables
 from fdnet.dem.deck import number, render_text
 from fdnet.dem.liggghts import Launch, run_deck
-from fdnet.dem.scene import contact_variables, write_data
+from fdnet.dem.scene import write_data
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.contacts import touching_pairs
 from fdnet.spheres.dump import Frame, read_dump

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.case.case import Case
+from fdnet.dem.contact_lines import contact_variables
 from fdnet.dem.deck import number, render_text
 from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.scene import (
-    contact_variables,
     header_variables,
     snapshot_of,
     wall_variables,

@@ -12,9 +12,10 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import case_from
+from fdnet.dem.contact_lines import contact_variables
 from fdnet.dem.deck import number, render_text
 from fdnet.dem.liggghts import Launch, run_deck
-from fdnet.dem.scene import contact_variables, header_variables, write_data
+from fdnet.dem.scene import header_variables, write_data
 from fdnet.files.atomic import write_text
 from fdnet.scales.scales import scales_of
 from fdnet.scales.springs import sphere_mass
@@ -95,6 +96,7 @@ def _case(neck: Neck) -> InvasionCase:
                 "grains": {"radius_mm": 1e3 * GRAIN, "count": 2, **material},
                 "fines": {**fine, **material},
                 "fluid": {"velocity_m_s": 1e-3},
+                "drag": {"pressure_gradient": False},
                 "run": {"stiffness_N_m": neck.stiffness},
             }
         )

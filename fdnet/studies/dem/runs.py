@@ -37,7 +37,7 @@ SLAB: dict[str, Any] = {
     "grains": {"radius_mm": 0.25, "count": 300, "shear_stiffness_N_m": 34.0e9},
     "fines": {"radius_mm": 0.05, "count": 1000, "shear_stiffness_N_m": 26.0e9},
     "fluid": {"darcy_length_mm": 8.0},
-    "drag": {"scheme": "viscous"},
+    "drag": {"scheme": "viscous", "pressure_gradient": False},
     "run": {"duration_ms": 2.0},
     "analysis": {"sections": 4},
 }

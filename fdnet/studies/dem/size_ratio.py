@@ -75,7 +75,7 @@ def case_of(point: Point) -> InvasionCase:
                     **material[1],
                 },
                 "fluid": {"darcy_length_mm": 8.0},
-                "drag": {"scheme": "viscous"},
+                "drag": {"scheme": "viscous", "pressure_gradient": False},
                 "run": {
                     "duration_ms": 2.4,
                     "checkpoint_ms": 0.6,

@@ -71,7 +71,11 @@ def case_of(point: Point) -> InvasionCase:
                     "friction": FRICTION,
                 },
                 "fluid": {"velocity_m_s": VELOCITY},
-                "drag": {"scheme": "viscous"},
+                "drag": {
+                    "scheme": "viscous",
+                    "upstream": "interstitial",
+                    "pressure_gradient": False,
+                },
                 "run": {
                     "duration_ms": _PASSAGES * length / VELOCITY,
                     "checkpoint_ms": 0.25 * length / VELOCITY,

@@ -14,9 +14,10 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import case_from
+from fdnet.dem.contact_lines import contact_variables
 from fdnet.dem.deck import number, render_text
 from fdnet.dem.liggghts import Launch, run_deck
-from fdnet.dem.scene import contact_variables, header_variables, write_data
+from fdnet.dem.scene import header_variables, write_data
 from fdnet.files.atomic import write_text
 from fdnet.scales.scales import scales_of
 from fdnet.scales.springs import sphere_mass
@@ -84,7 +85,11 @@ def case_of(
         case_from(
             {
                 "name": "outside",
-                "box": {"size_mm": [1e5 * grain] * 3, "wall_friction": friction},
+                "box": {
+                    "size_mm": [1e5 * grain] * 3,
+                    "sides": "walls",
+                    "wall_friction": friction,
+                },
                 "grains": {"radius_mm": 1e3 * grain, "count": 2, **material},
                 "fines": {
                     "radius_mm": 1e3 * fine,

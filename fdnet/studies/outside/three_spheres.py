@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from fdnet.case.particles import SHEAR_RATIO
+from fdnet.case.spheres import SHEAR_RATIO
 from fdnet.studies.dem.neck import LEAVES_AFTER, Neck, factor_step, leaving_time
 from fdnet.studies.engine.error_rows import against_exact
 from fdnet.studies.engine.study import DONE, Measured, Point, Row

@@ -58,6 +58,7 @@ class Specimen:
                     "friction": self.friction,
                 },
                 "fluid": {"darcy_length_mm": DARCY_LENGTH_MM},
+                "drag": {"pressure_gradient": False},
                 "analysis": {"sections": SECTIONS},
             }
         )
@@ -98,33 +99,57 @@ SPECIMENS = {
     ),
     "slabN_r3_mu0": Specimen(seed=224, fine_mm=0.0833, supplied=30, friction=0.0, pack=0.35),
     "slabO_r5_light": Specimen(seed=225, fine_mm=0.05, supplied=60, friction=0.55, pack=30),
+    "slabQ_r5_mu0_light": Specimen(seed=231, fine_mm=0.05, supplied=120, friction=0.0, pack=31),
+    "slabR_r8": Specimen(seed=232, fine_mm=0.03125, supplied=900, friction=0.55, pack=33),
+    "slabS_r10_mu0_light": Specimen(seed=233, fine_mm=0.025, supplied=2000, friction=0.0, pack=37),
+    "slabT_r8_cake": Specimen(seed=234, fine_mm=0.03125, supplied=1900, friction=0.55, pack=34),
+    "slabU_r10_range_cake": Specimen(
+        seed=235, fine_mm=[0.022, 0.03], supplied=2500, friction=0.55, pack=0.38
+    ),
+    "slabV_r5_ranges_cake": Specimen(
+        seed=236,
+        fine_mm=[0.04, 0.06],
+        supplied=300,
+        friction=0.55,
+        pack=0.36,
+        grain_mm=GRAIN_RANGE,
+    ),
 }
 """The specimens by name: r5 are fines of a fifth of a grain, mu0 is no friction, a range is one of
 radii (ranges: of grains too), a cake remains upstream of the face."""
 
 COARSE, MIDDLE, FINE = (60, 72, 96), (72, 96, 120), (84, 96, 120)
-"""Cells on the edge of 1.2 mm. The heaviest deposits of fine fines are solved at 144 too."""
+FINEST = (96, 120, 144)
+"""Cells on the edge of 1.2 mm. Two more heavy deposits of fine fines are solved at 144 too."""
 FACE, TWICE, DEEP = (0.0, 0.5), (0.0, 1.0), (0.5, 1.0)
 """Where slabs begin and end, mm from the face."""
 CUTS: tuple[tuple[str, tuple[float, float], tuple[int, ...], str], ...] = (
     ("slabA_r5", FACE, MIDDLE, YES),
     ("slabA_r5", DEEP, MIDDLE, YES),
-    ("slabB_r5_cake", FACE, MIDDLE, NO),
+    ("slabB_r5_cake", FACE, MIDDLE, YES),
     ("slabC_r5_mu0_cake", TWICE, COARSE, YES),
-    ("slabD_r5_range_mu0", FACE, MIDDLE, NO),
-    ("slabE_r3", FACE, COARSE, NO),
+    ("slabD_r5_range_mu0", FACE, MIDDLE, YES),
+    ("slabE_r3", FACE, COARSE, YES),
     ("slabF_r3_mu0_cake", FACE, MIDDLE, YES),
     ("slabG_r3_range_cake", FACE, COARSE, YES),
     ("slabH_r8_cake", FACE, MIDDLE, YES),
-    ("slabI_r8_mu0", FACE, FINE, NO),
+    ("slabI_r8_mu0", FACE, FINE, YES),
     ("slabJ_r8_ranges", FACE, MIDDLE, YES),
-    ("slabK_r10_cake", FACE, FINE, NO),
-    ("slabK_r10_cake", DEEP, FINE, NO),
+    ("slabK_r10_cake", FACE, FINE, YES),
+    ("slabK_r10_cake", DEEP, FINE, YES),
     ("slabL_r10", FACE, FINE, YES),
     ("slabP_r10", FACE, FINE, YES),
-    ("slabM_r5_ranges_cake", FACE, MIDDLE, NO),
-    ("slabN_r3_mu0", TWICE, COARSE, NO),
+    ("slabM_r5_ranges_cake", FACE, MIDDLE, YES),
+    ("slabN_r3_mu0", TWICE, COARSE, YES),
     ("slabO_r5_light", FACE, MIDDLE, YES),
+    ("slabQ_r5_mu0_light", TWICE, COARSE, NO),
+    ("slabR_r8", FACE, MIDDLE, NO),
+    ("slabS_r10_mu0_light", TWICE, FINE, NO),
+    ("slabT_r8_cake", FACE, FINEST, NO),
+    ("slabT_r8_cake", DEEP, FINE, NO),
+    ("slabU_r10_range_cake", FACE, FINEST, NO),
+    ("slabU_r10_range_cake", DEEP, FINE, NO),
+    ("slabV_r5_ranges_cake", FACE, MIDDLE, NO),
 )
 """Specimen, slab, grids, and whether its truth was known when the laws were shaped."""
 SLABS = {

@@ -25,7 +25,7 @@ class Slab:
         x_hi_mm: where it ends.
         cells: of the grids on which it is solved, on its longest edge.
         known_before: "yes" where the laws may have been shaped on its truth, "no" where it was put
-            aside before it was solved and before the laws of 0.6 were touched.
+            aside before it was solved and before the laws were last touched.
     """
 
     name: str

@@ -1,0 +1,31 @@
+"""The table [contact] of a case file: the law of contacts, and what acts in them besides."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from fdnet.case.values import Part
+
+MODEL_KEYS = {
+    "hooke": frozenset({"normal_stiffness_N_m", "shear_stiffness_N_m"}),
+    "hertz": frozenset({"youngs_modulus_GPa", "poissons_ratio"}),
+}
+"""Keys of [grains] and [fines] that only one contact model reads."""
+DEEPEST_DAMPING = 0.69
+"""Damping ratio up to which LIGGGHTS's Hertz model takes the restitution (above 0.05)."""
+
+
+class ContactLaw(Part):
+    """The law of all contacts; what is not asked for is left out of the deck."""
+
+    model: Literal["hooke", "hertz"] = Field(
+        "hooke",
+        description='Contact law: "hooke", linear springs of `normal_stiffness_N_m` and '
+        '`shear_stiffness_N_m`, or "hertz", Hertz-Mindlin contacts of `youngs_modulus_GPa` and '
+        "`poissons_ratio`.",
+    )
+
+    @property
+    def other_keys(self) -> frozenset[str]:
+        """Keys of [grains] and [fines] that the other contact model reads."""
+        return frozenset().union(*(MODEL_KEYS[name] for name in MODEL_KEYS if name != self.model))

@@ -1,0 +1,131 @@
+"""Rows of the contacts in the table of scales."""
+
+from fdnet.case.case import Case, InvasionCase
+from fdnet.scales.hertz import rayleigh_time
+from fdnet.scales.hertz_contacts import material_of
+from fdnet.scales.quantity import Quantity, row
+from fdnet.scales.scales import InvasionScales, Scales
+from fdnet.scales.springs import Contact
+
+
+def contact_rows(case: Case, scales: Scales) -> list[Quantity]:
+    """What the contacts of the case are, and the bounds on its time step."""
+    hertz = case.contact.model == "hertz"
+    rows = [
+        row(
+            "stiffness factor",
+            "f_k",
+            scales.stiffness_factor,
+            "-",
+            "run.stiffness / stiffest pair" + (" of a fine, at delta = 0.01 d" if hertz else ""),
+            "scaling",
+        )
+    ]
+    for contact in scales.contacts.values():
+        rows += _hertz_rows(contact) if hertz else _hooke_rows(contact)
+    if hertz and isinstance(case, InvasionCase):
+        rows.append(_rayleigh_row(case, scales))
+    return rows
+
+
+def overlap_rows(case: Case, scales: InvasionScales) -> list[Quantity]:
+    """How deep impact and drag press a fine into a grain."""
+    hertz = case.contact.model == "hertz"
+    return [
+        row(
+            "impact overlap over diameter",
+            "delta/d",
+            scales.impact_overlap,
+            "-",
+            "(15 m v^2 / (16 E* sqrt(R*)))^(2/5) / 2r" if hertz else "v sqrt(m/k) / 2r, v <= w",
+            "Hertz 1882" if hertz else "linear spring",
+        ),
+        row(
+            "drag overlap over diameter",
+            "delta/d",
+            scales.drag_overlap,
+            "-",
+            "(3 F / (4 E* sqrt(R*)))^(2/3) / 2r" if hertz else "F / (2 k r), F of a fine at rest",
+            "Hertz 1882" if hertz else "linear spring",
+        ),
+    ]
+
+
+def _hooke_rows(contact: Contact) -> list[Quantity]:
+    return [
+        row(
+            f"{contact.pair} stiffness used",
+            "k",
+            contact.normal_stiffness,
+            "N/m",
+            "f_k kA kB / (kA + kB)",
+            "series springs",
+        ),
+        row(
+            f"{contact.pair} contact time",
+            "t_c",
+            contact.contact_time,
+            "s",
+            "pi / (sqrt(k/m_eff) sqrt(1-zeta^2))",
+            "damped oscillator",
+        ),
+        row(
+            f"{contact.pair} stable step",
+            "dt_s",
+            0.2 * contact.step_limit,
+            "s",
+            "0.2 sqrt(m/k)",
+            "measured, docs/physics.md",
+        ),
+    ]
+
+
+def _hertz_rows(contact: Contact) -> list[Quantity]:
+    assert contact.elastic is not None
+    return [
+        row(
+            f"{contact.pair} modulus used",
+            "E*",
+            contact.elastic.modulus,
+            "Pa",
+            "f_k / ((1-nuA^2)/EA + (1-nuB^2)/EB)",
+            "Hertz 1882",
+        ),
+        row(
+            f"{contact.pair} stiffness at 0.01 d",
+            "k",
+            contact.normal_stiffness,
+            "N/m",
+            "4/3 E* sqrt(R* 0.01 d)",
+            "Hertz 1882",
+        ),
+        row(
+            f"{contact.pair} contact time",
+            "t_c",
+            contact.contact_time,
+            "s",
+            "2.87 (m_eff^2 / (R* E*^2 u))^(1/5)",
+            "Hertz 1882",
+        ),
+        row(
+            f"{contact.pair} stable step",
+            "dt_s",
+            0.2 * contact.step_limit,
+            "s",
+            "0.2 sqrt(m/k), k = 2 E* sqrt(R* 0.04 d)",
+            "measured, docs/physics.md",
+        ),
+    ]
+
+
+def _rayleigh_row(case: InvasionCase, scales: Scales) -> Quantity:
+    modulus, ratio = material_of(case, "fine", scales.stiffness_factor)
+    density = min(one.density for one in case.fines.components)
+    return row(
+        "Rayleigh time of the smallest fine",
+        "t_R",
+        rayleigh_time(case.fines.radius_range_m[0], density, modulus, ratio),
+        "s",
+        "pi r sqrt(rho/G) / (0.1631 nu + 0.8766)",
+        "Thornton and Randall 1988",
+    )
