@@ -11,6 +11,7 @@ from fdnet.studies.engine.table import read_rows, study_text
 from fdnet.studies.outside import (
     constriction,
     ergun,
+    free_fine,
     passing,
     rolling,
     settling,
@@ -91,6 +92,7 @@ def test_the_quick_form_gives_the_numbers_from_outside(quick):
     assert all(row.observed == 0 for row in of(quick, passing.SERIES, passing.OVERLAP))
     assert all(abs(row.error) < rolling.TOLERANCE for row in of(quick, rolling.SERIES))
     assert all(row.error < settling.TOLERANCE for row in of(quick, settling.SERIES))
+    assert all(row.error < free_fine.TOLERANCE for row in of(quick, free_fine.SERIES))
     (leaving,) = of(quick, three_spheres.SERIES)
     assert leaving.observed == pytest.approx(LEAVES_AFTER, rel=three_spheres.TOLERANCE)
 

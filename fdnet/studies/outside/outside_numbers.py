@@ -8,6 +8,7 @@ from fdnet.studies.engine.study import Measured, Point, Row, Study
 from fdnet.studies.outside import (
     constriction,
     ergun,
+    free_fine,
     passing,
     rolling,
     settling,
@@ -23,6 +24,7 @@ CASES: Sequence[ModuleType] = (
     constriction,
     ergun,
     settling,
+    free_fine,
     rolling,
     three_spheres,
 )
