@@ -6,6 +6,7 @@ from types import ModuleType
 
 from fdnet.studies.engine.study import Measured, Point, Row, Study
 from fdnet.studies.outside import (
+    collision,
     constriction,
     ergun,
     free_fine,
@@ -26,6 +27,7 @@ CASES: Sequence[ModuleType] = (
     settling,
     free_fine,
     rolling,
+    collision,
     three_spheres,
 )
 """Modules of the cases in the order of the page; each has points, measure, judge, answers."""

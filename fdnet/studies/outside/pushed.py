@@ -73,14 +73,13 @@ def case_of(
     friction: float,
     damping_ratio: float,
     density: float = DENSITY,
+    contact: Mapping[str, Any] | None = None,
 ) -> InvasionCase:
     """A case with contacts of one normal stiffness, N/m, for fines of radius `fine`, m."""
-    grain = 2 * fine
-    material = {
-        "normal_stiffness_N_m": 2 * stiffness,
-        "friction": friction,
-        "damping_ratio": damping_ratio,
-    }
+    grain, law = 2 * fine, dict(contact or {})
+    material = {"friction": friction, "damping_ratio": damping_ratio}
+    if law.get("model", "hooke") == "hooke":
+        material["normal_stiffness_N_m"] = 2 * stiffness
     return with_fines(
         case_from(
             {
@@ -99,6 +98,7 @@ def case_of(
                 },
                 "fluid": {"velocity_m_s": 1e-3, "viscosity_cP": 1e3 * VISCOSITY},
                 "run": {"stiffness_N_m": stiffness},
+                "contact": law,
             }
         )
     )
