@@ -21,25 +21,25 @@ def test_runs_that_clog_while_the_heap_grows_are_not_counted():
     assert [under_arch(ratio) for ratio in (1.0, 2.0, 3.0)] == [1, 3, 9]
     runs = [(2, True), (3, True), (15, True), (95, False)]
     assert after_first(runs, 2.0) == ([(0, True), (12, True), (92, False)], 1)
-    found = clogging(runs, 2.0)
-    assert (found.clogs, found.escapes, found.early) == (2, 104, 1)
-    assert found.probability == pytest.approx(2 / 106)
+    one_hole = clogging(runs, 2.0)
+    assert (one_hole.clogs, one_hole.escapes, one_hole.early) == (2, 104, 1)
+    assert one_hole.probability == pytest.approx(2 / 106)
     assert math.isnan(clogging([(2, True)], 2.0).probability)
 
 
 def test_the_band_without_a_clog_by_hand():
     """None of n: below 1 - 0.025^(1/n)."""
-    found = clogging([(1000, False)], 1.0)
-    assert (found.probability, found.low) == (0.0, 0.0)
-    assert found.high == pytest.approx(1 - 0.025 ** (1 / 999))
+    one_hole = clogging([(1000, False)], 1.0)
+    assert (one_hole.probability, one_hole.low) == (0.0, 0.0)
+    assert one_hole.high == pytest.approx(1 - 0.025 ** (1 / 999))
 
 
 def test_the_band_holds_the_probability_of_most_samples():
     rng, hits, chance = np.random.default_rng(2), 0, 0.05
     for _ in range(200):
         runs = [(int(n), True) for n in rng.geometric(chance, 20)]
-        found = clogging(runs, 1.0)
-        hits += found.low <= chance <= found.high
+        one_hole = clogging(runs, 1.0)
+        hits += one_hole.low <= chance <= one_hole.high
     assert hits >= 184
 
 
@@ -53,21 +53,21 @@ def test_geometric_samples_are_told_from_others():
 
 def test_the_fitted_line_is_found_again():
     ratios = [1.75, 2.0, 2.5, 3.0, 4.0]
-    found = []
+    cloggings = []
     for ratio in ratios:
         chance = math.exp(-0.4 - 0.7 * (ratio**2 - 1))
         clogs = 4 if ratio == 4.0 else 10_000
         escapes = round(clogs * (1 - chance) / chance)
-        found.append(
+        cloggings.append(
             Clogging(clogs=clogs, escapes=escapes, early=0, counted=clogs, low=0.0, high=1.0)
         )
-    line = fitted_line(ratios, found)
+    line = fitted_line(ratios, cloggings)
     assert (line.slope, line.start) == pytest.approx((-0.7, -0.4), rel=1e-3)
     assert (line.holes, line.least, line.most) == (4, 1.75, 3.0)
     assert (line.explained, line.chance) == (pytest.approx(1.0), pytest.approx(1.0, abs=0.01))
-    lived = replace(found[0], early=found[0].counted)
-    assert fitted_line(ratios, [lived, *found[1:]]).holes == 3
-    bent = [replace(found[0], escapes=2 * found[0].escapes), *found[1:]]
+    lived = replace(cloggings[0], early=cloggings[0].counted)
+    assert fitted_line(ratios, [lived, *cloggings[1:]]).holes == 3
+    bent = [replace(cloggings[0], escapes=2 * cloggings[0].escapes), *cloggings[1:]]
     assert fitted_line(ratios, bent).chance < 1e-6
     with pytest.raises(ValueError, match="2 holes"):
-        fitted_line(ratios[:2], found[:2])
+        fitted_line(ratios[:2], cloggings[:2])

@@ -36,8 +36,8 @@ def of(rows, series, quantity=None):
 
 def test_closed_forms_have_the_numbers_of_their_sources():
     """From the issue and the tutorial, by hand."""
-    found = [round(throat.passing_ratio(overlap), 4) for overlap in throat.ASKED]
-    assert found == [0.1547, 0.1201, 0.0970]
+    ratios = [round(throat.passing_ratio(overlap), 4) for overlap in throat.ASKED]
+    assert ratios == [0.1547, 0.1201, 0.0970]
     assert ergun.measure(ergun.points(True)[0], None)[ergun.DROP] == pytest.approx(230.5, abs=0.05)
     assert ergun.viscous_lift() == pytest.approx(0.01454, abs=5e-6)
     assert rolling.rolling_gain(30.0, 0.3) == pytest.approx(5 / 14)
@@ -83,8 +83,8 @@ def test_a_bed_of_spheres_carries_its_pressure_drop():
 
 @pytest.mark.liggghts
 def test_the_quick_form_gives_the_numbers_from_outside(quick):
-    (found,) = of(quick, throat.SERIES)
-    assert abs(found.error) < throat.TOLERANCE
+    (passing_ratio,) = of(quick, throat.SERIES)
+    assert abs(passing_ratio.error) < throat.TOLERANCE
     held = {row.value: row.observed for row in of(quick, passing.SERIES, passing.HELD)}
     supplied = {row.value: row.observed for row in of(quick, passing.SERIES, passing.SUPPLIED)}
     assert held[passing.PASSES] == 0

@@ -145,12 +145,12 @@ class Line:
     most: float
 
 
-def fitted_line(ratios: Sequence[float], found: Sequence[Clogging]) -> Line:
+def fitted_line(ratios: Sequence[float], cloggings: Sequence[Clogging]) -> Line:
     """Least squares of ln P with weights of the number of clogs, whose inverse is its variance.
 
     Holes that are not `fitted` are left out. Raises ValueError below three holes.
     """
-    used = [(r, one) for r, one in zip(ratios, found, strict=True) if one.fitted]
+    used = [(r, one) for r, one in zip(ratios, cloggings, strict=True) if one.fitted]
     if len(used) < 3:
         raise ValueError(f"{len(used)} holes with at least {FEWEST} clogs, expected 3")
     x = np.array([r**2 - 1 for r, _ in used])

@@ -26,15 +26,14 @@ from fdnet.studies.outside.orifice import discharge, stokes_number
 KNOB, ESCAPED, FLOWING = "hole over fine", "escaped before a clog", "escaped, no clog"
 LOW, HIGH = 0.1, 0.5
 RUNS: Mapping[float, Mapping[float, int]] = {
+    LOW: {2.0: 16, 2.25: 6, 3.0: 1, 3.5: 1, 4.0: 1, 2.5: 2, 2.125: 12, 1.875: 12},
     HIGH: {2.0: 40, 2.125: 40, 2.25: 36, 2.375: 30, 2.5: 30, 2.625: 24, 2.75: 20}
-    | {2.875: 12, 3.0: 8, 3.25: 2, 3.5: 2, 4.0: 2},
-    LOW: {1.75: 24, 1.875: 24, 2.0: 24, 2.125: 20, 2.25: 12, 2.375: 5, 2.5: 3}
-    | {2.75: 2, 3.0: 3, 3.25: 2, 3.5: 2, 4.0: 2},
+    | {2.875: 12, 3.0: 5, 3.5: 1, 4.0: 1},
 }
 """Number of runs by friction and R."""
 QUICK = ((LOW, 3.0, 1, 20.0), (HIGH, 1.5, 1, 200.0))
-MOST = 800.0
-"""Longest run, in times in which the fluid passes a fine's diameter."""
+MOST: Mapping[float, float] = {LOW: 400.0, HIGH: 800.0}
+"""Longest run by friction, in times in which the fluid passes a fine's diameter."""
 BELOW, ABOVE = 3.0, 3.03
 """Diameters below which fines clog, and where the intermittent range begins."""
 _SIGNIFICANT = 0.05
@@ -58,7 +57,7 @@ def points(quick: bool) -> list[Point]:
     plan = (
         list(QUICK)
         if quick
-        else [(f, r, runs, MOST) for f, holes in RUNS.items() for r, runs in holes.items()]
+        else [(f, r, runs, MOST[f]) for f, holes in RUNS.items() for r, runs in holes.items()]
     )
     return [
         point
@@ -115,8 +114,8 @@ def cloggings_of(rows: Sequence[Row], friction: float) -> dict[float, Clogging]:
 
 def line_of(rows: Sequence[Row], friction: float) -> Line:
     """The fitted line of a friction. Raises ValueError below three holes that clogged enough."""
-    found = cloggings_of(rows, friction)
-    return fitted_line(list(found), list(found.values()))
+    cloggings = cloggings_of(rows, friction)
+    return fitted_line(list(cloggings), list(cloggings.values()))
 
 
 def least_chance(rows: Sequence[Row], friction: float) -> tuple[float, int]:
@@ -131,7 +130,7 @@ def least_chance(rows: Sequence[Row], friction: float) -> tuple[float, int]:
 
 def answers(rows: Sequence[Row]) -> list[Answer]:
     """Below and above three diameters, the intermittent range, and the law of the probability."""
-    below = {r: found for r, found in runs_of(rows, LOW).items() if r < BELOW}
+    below = {r: runs for r, runs in runs_of(rows, LOW).items() if r < BELOW}
     above = {r: one for r, one in cloggings_of(rows, LOW).items() if r >= BELOW}
     between = {r: one for r, one in cloggings_of(rows, HIGH).items() if r >= ABOVE}
     return [
@@ -143,7 +142,7 @@ def answers(rows: Sequence[Row]) -> list[Answer]:
 
 
 def _below(runs: Mapping[float, Sequence[tuple[int, bool]]]) -> Answer:
-    clogged = sum(stopped for found in runs.values() for _, stopped in found)
+    clogged = sum(stopped for ends in runs.values() for _, stopped in ends)
     count = sum(map(len, runs.values()))
     return Answer(
         what=f"hole below 3 fine diameters, friction {LOW:g}",
@@ -154,28 +153,28 @@ def _below(runs: Mapping[float, Sequence[tuple[int, bool]]]) -> Answer:
     )
 
 
-def _above(found: Mapping[float, Clogging]) -> Answer:
+def _above(holes: Mapping[float, Clogging]) -> Answer:
     clogs, escapes = (
-        sum(one.clogs + one.early for one in found.values()),
-        sum(one.escapes for one in found.values()),
+        sum(one.clogs + one.early for one in holes.values()),
+        sum(one.escapes for one in holes.values()),
     )
     return Answer(
         what=f"hole of 3 diameters and more, friction {LOW:g}, under a heap that never runs out",
         expected=f"flows without a clog ({_MARIN})",
-        measured=f"{clogs} clogs, {escapes:,} fines escaped, R {min(found):g} to {max(found):g}; "
-        + "; ".join(f"P below {one.high:.1g} at {r:g}" for r, one in found.items())
+        measured=f"{clogs} clogs, {escapes:,} fines escaped, R {min(holes):g} to {max(holes):g}; "
+        + "; ".join(f"P below {one.high:.1g} at {r:g}" for r, one in holes.items())
         + " (95 %)",
         holds=clogs == 0,
         test=_TEST,
     )
 
 
-def _between(found: Mapping[float, Clogging]) -> Answer:
-    told = "; ".join(f"R {r:g}: {one.clogs} clogs in {one.escapes:,}" for r, one in found.items())
+def _between(holes: Mapping[float, Clogging]) -> Answer:
+    words = "; ".join(f"R {r:g}: {one.clogs} clogs in {one.escapes:,}" for r, one in holes.items())
     return Answer(
         what=f"hole of 3.03 to 5.26 diameters, friction {HIGH:g}",
         expected=f"flows and stops by turns ({_SOUZY})",
-        measured=told,
+        measured=words,
         holds=None,
         verdict="partly: arches form, but a steady push breaks none, so a stop is for good",
         test=_TEST,

@@ -107,13 +107,13 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
     if point.value == DROP:
         return {DROP: LENGTH * ergun_gradient(BED, VELOCITY)}
     folder, exact = work / point.slug, viscous_lift()
-    found = bisected(
+    bisection = bisected(
         lambda velocity: not lifts(velocity, folder),
         (1 - _BRACKET) * exact,
         (1 + _BRACKET) * exact,
         WITHIN,
     )
-    return {LIFT: found}
+    return {LIFT: bisection}
 
 
 def judge(measured: Sequence[Measured]) -> list[Row]:
@@ -147,12 +147,12 @@ def answers(rows: Sequence[Row]) -> list[Answer]:
     lines = []
     for row in rows:
         if row.series == SERIES and row.status == DONE:
-            what, expected, told = texts[str(row.value)]
+            what, expected, words = texts[str(row.value)]
             lines.append(
                 Answer(
                     what=what,
                     expected=f"{expected} ({source})",
-                    measured=f"{told.format(row.observed)}, {percent_error(row.error)}",
+                    measured=f"{words.format(row.observed)}, {percent_error(row.error)}",
                     holds=abs(row.error) < TOLERANCE,
                     test=test,
                 )

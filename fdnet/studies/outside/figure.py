@@ -61,8 +61,8 @@ def _draw_throats(axes: Any, rows: Sequence[Row]) -> None:
 
 def _draw_chances(axes: Any, rows: Sequence[Row]) -> None:
     for friction, colour, marker in _STYLES:
-        found = cloggings_of(rows, friction)
-        seen = {ratio: one for ratio, one in found.items() if one.clogs}
+        cloggings = cloggings_of(rows, friction)
+        seen = {ratio: one for ratio, one in cloggings.items() if one.clogs}
         x = np.array([ratio**2 - 1 for ratio in seen])
         chance = np.array([one.probability for one in seen.values()])
         low = chance - [one.low for one in seen.values()]
@@ -70,7 +70,7 @@ def _draw_chances(axes: Any, rows: Sequence[Row]) -> None:
         axes.errorbar(
             x, chance, [low, high], fmt=marker, color=colour, label=f"friction {friction:g}"
         )
-        none = {ratio: one for ratio, one in found.items() if not one.clogs and one.escapes}
+        none = {ratio: one for ratio, one in cloggings.items() if not one.clogs and one.escapes}
         axes.plot(
             [ratio**2 - 1 for ratio in none],
             [one.high for one in none.values()],
@@ -84,10 +84,10 @@ def _draw_chances(axes: Any, rows: Sequence[Row]) -> None:
             line = line_of(rows, friction)
         except ValueError:
             continue
-        along = np.linspace(x.min(), x.max(), 2)
-        axes.plot(along, np.exp(line.start + line.slope * along), "-", color=colour, lw=1.0)
-    axes.axvline(8.0, color="0.6", lw=0.8, ls=":")
-    axes.text(8.1, 0.5, "R = 3", fontsize=8, color="0.4")
+        for ends, style in (((line.least, line.most), "-"), ((min(seen), max(seen)), ":")):
+            along = np.array(ends) ** 2 - 1
+            axes.plot(along, np.exp(line.start + line.slope * along), style, color=colour, lw=1.2)
+    axes.axvline(8.0, color="0.6", lw=0.8, ls="--", label="R = 3")
     axes.set(yscale="log", xlabel="R² − 1, R = hole over fine")
     axes.set_ylabel("probability of a clog, each fine")
     axes.set_title("one constriction (bars: binomial 95 %)", fontsize=10)

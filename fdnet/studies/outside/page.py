@@ -33,8 +33,8 @@ $constriction## What could be read of the sources
 - Marin and others (arXiv 1711.06119): abstract and beginning of the text. Charged particles of
   low friction; clogs below three diameters, an uninterrupted flow above, at 60 % by volume.
 - Souzy and Marin (J. Fluid Mech. 2022, arXiv 2205.04354): abstract and beginning of the text. Its
-  channel, of 3.03 to 5.26 diameters, flows and stops by turns. What breaks an arch there are the
-  fluctuations of the flow, which a steady push does not have.
+  channel, of 3.03 to 5.26 diameters, flows and stops by turns: arches break again, as none does
+  here under a steady push.
 - AIChE 2013, 172h, and Lafond's thesis (Colorado School of Mines 2014): the abstracts. They give
   the geometric law, its onset once a heap is there, and ln P proportional to R² − 1, but no slope.
 - Percolation of a cohesive fine particle (arXiv 2605.19845): abstract. Fines of 1/7 that do not
@@ -90,7 +90,7 @@ def _constriction(rows: Sequence[Row]) -> str:
     return _CONSTRICTION.substitute(
         push=f"{PUSH:g}",
         stokes=regime(),
-        most=f"{MOST:g}",
+        most=f"{MOST[LOW]:g} (friction {LOW:g}) or {MOST[HIGH]:g} ({HIGH:g})",
         fewest=FEWEST,
         clogs=_clogs(rows),
     )

@@ -122,13 +122,13 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
     """The passing ratio, bisected from 2 % to either side of the closed form."""
     overlap, folder = float(point.value), work / point.slug
     exact = passing_ratio(overlap)
-    found = bisected(
+    bisection = bisected(
         lambda ratio: passes(ratio, overlap, folder, seed=point.seed),
         (1 - _BRACKET) * exact,
         (1 + _BRACKET) * exact,
         float(point.settings["within"]),
     )
-    return {PASSING: found}
+    return {PASSING: bisection}
 
 
 def judge(measured: Sequence[Measured]) -> list[Row]:
