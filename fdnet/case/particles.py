@@ -114,10 +114,10 @@ class Fines(Spheres):
         "from it.",
     )
     supply: Literal["slab", "batches"] = Field(
-        "slab",
-        description='How the fines enter: "slab" puts all of them in at the start, "batches" puts '
-        "each part of the slab in when it is about to arrive. The suspension is the same; batches "
-        "are much faster for a long slab.",
+        "batches",
+        description='How the fines enter: "batches" puts each part of the slab in when it is '
+        'about to arrive, "slab" puts all of them in at the start. The suspension is the same; '
+        "batches are much faster for a long slab.",
     )
 
     @property

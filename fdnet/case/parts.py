@@ -26,13 +26,14 @@ class Box(Part):
         description="Three side lengths of the box. The mud flows along the first side."
     )
     sides: Literal["walls", "periodic"] = Field(
-        "walls",
-        description="What bounds the box in y and z: solid walls, or periodic images of itself.",
+        "periodic",
+        description="What bounds the box in y and z: periodic images of itself, or solid walls.",
     )
-    wall_friction: NonNegative = Field(
-        0.0,
-        description="Coefficient of sliding friction of the side walls. A contact takes the "
-        "smaller value of the wall and the sphere.",
+    wall_friction: NonNegative | None = Field(
+        None,
+        description="Coefficient of sliding friction of the side walls, if there are any. When "
+        "absent it is that of the grains. A contact takes the smaller value of the wall and the "
+        "sphere.",
     )
 
     @property
@@ -77,9 +78,10 @@ class Drag(Part):
         'number of 1. "auto" drives to 0.1, or as fast as the fluid itself.',
     )
     upstream: Literal["interstitial", "darcy"] = Field(
-        "interstitial",
-        description="Velocity of the fluid upstream of the formation face: the interstitial one "
-        "of the pack, or the Darcy velocity.",
+        "darcy",
+        description="Velocity of the fluid upstream of the formation face: the Darcy velocity of "
+        "the mud, or the interstitial one of the pack, which brings the mud faster than it flows "
+        "in.",
     )
     pressure_gradient: bool = Field(
         True,

@@ -6,7 +6,7 @@ from typing import Any
 
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.contact import MODEL_KEYS
-from fdnet.case.contact_rules import of_the_model
+from fdnet.case.contact_rules import of_cohesion, of_rolling, of_the_model
 from fdnet.case.control import Run
 from fdnet.case.fluid import Fluid, Well
 from fdnet.case.particles import Fines, Grains
@@ -281,6 +281,8 @@ RULES = (
     Rule(("drag.scheme", "drag.upstream"), _implicit),
     Rule(("drag.scheme", "drag.inertia"), _inertia),
     *(_of_the_contact(name) for name in ("grains", "fines")),
+    Rule(("contact.model", "contact.cohesion_J_m3"), of_cohesion),
+    Rule(("contact.rolling_friction", "grains.friction", "fines.friction"), of_rolling),
     Rule(("run.duration_ms", "run.cap_ms"), _end),
     Rule(("analysis.sections",), _sections),
     Rule(("analysis.law", "analysis.damage_law"), _laws),

@@ -123,7 +123,7 @@ def test_each_fine_of_several_materials_falls_by_its_own_density(binary, tmp_pat
     fines, elapsed = fallen(case, binary, tmp_path)
     density = densities(case, [6])
     assert set(density) == {1500.0, 4500.0}
-    share = 1 - (1095 / density[:, None] if buoyancy == "true" else 0.0)
+    share = 1 - 1095 / density[:, None] * (buoyancy == "true")
     order = np.argsort(fines.id)
     fall = fines.velocity[order] - [0.5, 0, 0]
     assert fall == pytest.approx(share * pull * elapsed, rel=1e-5)
