@@ -29,7 +29,7 @@ PASSES, BLOCKED = 7.0, 5.0
 """Size ratios: one that no throat holds, and one above 0.1547 as a check of the count."""
 FRICTION = 0.1
 FINES, SEEDS = 1000, 3
-_SIDES, _QUICK_SIDES, _QUICK_FINES = (4.0, 2.0), (1.5, 1.5), 60
+_SIDES, _QUICK_SIDES, _QUICK_FINES = (4.0, 2.0), (2.0, 1.6), 60
 SUPPLIED, OVERLAP = "supplied", "overlap of grains"
 MOST_HELD = 0.01
 """Share of the fines that may be held."""
