@@ -12,8 +12,8 @@ from fdnet.studies.engine.bands import half_width
 from fdnet.studies.engine.error_rows import against_reference
 from fdnet.studies.engine.levels import levels, percent
 from fdnet.studies.engine.markdown import markdown_table
+from fdnet.studies.engine.shipped import case_path
 from fdnet.studies.engine.study import DONE, Measured, Panel, Point, Row, Study
-from fdnet.studies.thesis.runs.plan import case_path
 
 SERIES = ("specimen 1", "specimen 5", "specimen 6")
 NOW, WALLS, SMOOTH, FAST, SHORT, AT_ONCE, BEFORE = (

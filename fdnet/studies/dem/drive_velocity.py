@@ -8,8 +8,8 @@ from fdnet.case.file import case_from, read_case, set_keys
 from fdnet.scales.scales import scales_of
 from fdnet.studies.dem.runs import invasion_run
 from fdnet.studies.engine.error_rows import against_reference
+from fdnet.studies.engine.shipped import case_path
 from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study
-from fdnet.studies.thesis.runs.plan import case_path
 
 SERIES = "specimen 5 at a well"
 _WELL = "well={radius_mm=108.0, drainage_radius_m=100.0}"
