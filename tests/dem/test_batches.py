@@ -131,9 +131,18 @@ def test_the_deck_takes_each_batch_in_once_and_gives_it_its_drag(tmp_path, schem
 
 
 @pytest.mark.liggghts
-@pytest.mark.parametrize("scheme", ["viscous", "held", "implicit"])
-def test_a_batched_invasion_accounts_for_every_fine_and_resumes(binary, tmp_path, scheme):
-    case = tiny(*BATCHED, f"drag.scheme={scheme}", "run.cap_ms=0.1", "fines.friction=0.2")
+@pytest.mark.parametrize(
+    ("scheme", "forces"),
+    [
+        ("viscous", ()),
+        ("held", ()),
+        ("implicit", ()),
+        ("every_step", ("drag.inertia=schiller-naumann", "drag.pressure_gradient=true")),
+    ],
+)
+def test_a_batched_invasion_accounts_for_every_fine_and_resumes(binary, tmp_path, scheme, forces):
+    settings = (f"drag.scheme={scheme}", "run.cap_ms=0.1", "fines.friction=0.2")
+    case = tiny(*BATCHED, *settings, *forces)
     scales = scales_of(case)
     grains = make_pack(case, scales, tmp_path / "pack", Launch(binary=binary)).grains
     whole = invade(case, scales, grains, tmp_path / "whole", Launch(binary=binary))
