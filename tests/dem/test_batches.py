@@ -1,5 +1,7 @@
 """Fines fed in batches: the suspension of one slab, each part present once it is due."""
 
+import re
+
 import numpy as np
 import pytest
 from builders import resting_spheres, tiny
@@ -128,6 +130,24 @@ def test_the_deck_takes_each_batch_in_once_and_gives_it_its_drag(tmp_path, schem
         line.split()[4] for line in lines if line.startswith("set group batch property/atom")
     } == sets
     assert any(line.startswith("velocity batch set") for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("settings", "stored"),
+    [
+        (("drag.scheme=held",), "v_fx v_fy v_fz"),
+        (("drag.scheme=every_step", "drag.inertia=schiller-naumann"), "v_cr"),
+        (("drag.scheme=every_step",), None),
+    ],
+)
+def test_what_is_stored_for_each_fine_is_stored_anew_after_a_batch(tmp_path, settings, stored):
+    """LIGGGHTS stores nothing for atoms that come later: they would feel no drag."""
+    case = tiny(*BATCHED, *settings)
+    write_batches(case, scales_of(case), one_grain(case), tmp_path)
+    text = (tmp_path / "supply/batch_2.in").read_text()
+    again = re.findall(r"(?m)^unfix drag\nunfix st\nfix st fines store/state \d+ (.*)$", text)
+    assert again == ([] if stored is None else [stored])
+    assert len(re.findall("(?m)^fix drag fines addforce", text)) == len(again)
 
 
 @pytest.mark.liggghts
