@@ -34,7 +34,7 @@ STUDIES_LAYERS = [
     ["engine", "stokes", "fuzz", "chaos"],
     ["truth"],
     ["accuracy", "benchmark", "dem", "thesis"],
-    ["network"],
+    ["network", "outside"],
     ["command"],
     ["pages"],
 ]
@@ -71,6 +71,7 @@ DOORS = {
         "report/size_figure",
         "studies/accuracy/figure",
         "studies/engine/draw",
+        "studies/outside/figure",
         "studies/thesis/figures/canvas",
     },
     "PIL": {"studies/thesis/figures/canvas"},

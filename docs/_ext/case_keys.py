@@ -8,6 +8,7 @@ from pydantic.fields import FieldInfo
 
 UNITS = {
     "_kg_m3": "kg/m³",
+    "_J_m3": "J/m³",
     "_percent": "%",
     "_um": "µm",
     "_m_s2": "m/s²",

@@ -163,9 +163,10 @@ class Case(Part):
         """What the stiffness of a pack depends on besides, with contacts that are not linear."""
         if self.contact.model == "hooke":
             return {}
-        fines = data.get("fines", {})
-        keys = ("radius_mm", *sorted(MODEL_KEYS["hertz"]))
-        return {"model": self.contact.model, "fines": {k: fines[k] for k in keys if k in fines}}
+        fines, keys = self.spheres.get("fine"), sorted(MODEL_KEYS["hertz"])
+        size = {"mean_radius_m": fines.mean_radius_m} if fines else {}
+        given = {key: data["fines"][key] for key in keys} if fines else {}
+        return {"model": self.contact.model, "fines": size | given}
 
     def same_specimen(self, text: bytes) -> bool:
         """Whether a case.toml as `toml` wrote it is this case but for `POLICIES`."""

@@ -6,8 +6,16 @@ from typing import Any
 
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.contact import MODEL_KEYS
-from fdnet.case.contact_rules import of_the_model
+from fdnet.case.contact_rules import of_cohesion, of_rolling, of_the_model
 from fdnet.case.control import Run
+from fdnet.case.coupled_rules import (
+    crowd_scheme,
+    flow_field,
+    network_grains,
+    network_supply,
+    stop_rate,
+    update_travel,
+)
 from fdnet.case.fluid import Fluid, Well
 from fdnet.case.particles import Fines, Grains
 from fdnet.case.parts import Box, Drag
@@ -166,27 +174,6 @@ def _radii_of_well(well: Well) -> Iterator[str]:
         )
 
 
-def _field(drag: Drag) -> Iterator[str]:
-    if drag.field == "network":
-        yield "drag.field: 'network' is not available yet; expected 'uniform'"
-
-
-def _crowd(drag: Drag) -> Iterator[str]:
-    if drag.coupled and drag.scheme == "viscous":
-        yield (
-            "drag.scheme: 'viscous' has one damping for all fines, drag.crowd "
-            f"{drag.crowd!r} one for each; take 'implicit', 'held' or 'every_step'"
-        )
-
-
-def _update_travel(drag: Drag) -> Iterator[str]:
-    if drag.update_travel is not None and not drag.coupled:
-        yield (
-            f"drag.update_travel: {drag.update_travel:g} belongs to a drag that is computed while "
-            "LIGGGHTS waits; leave it out, or set drag.crowd = 'beetstra'"
-        )
-
-
 def _refresh(drag: Drag) -> Iterator[str]:
     if drag.scheme != "held" and drag.refresh_steps not in (None, 1):
         yield (
@@ -273,14 +260,19 @@ RULES = (
     Rule(("run.neighbour_bin_mm", "box.size_mm", "fines"), _neighbour_bins),
     Rule(("well", "fluid.velocity_m_s", "fluid.darcy_length_mm"), _one_drive),
     Rule(("well.radius_mm", "well.drainage_radius_m"), _radii_of_well),
-    Rule(("drag.field",), _field),
-    Rule(("drag.scheme", "drag.crowd", "drag.field"), _crowd),
-    Rule(("drag.update_travel", "drag.crowd", "drag.field"), _update_travel),
+    Rule(("drag.field", "drag.upstream", "drag.drive"), flow_field),
+    Rule(("drag.field", "grains.motion"), network_grains),
+    Rule(("drag.field", "drag.drive", "fines.supply"), network_supply),
+    Rule(("run.stop_rate", "drag.field", "drag.drive"), stop_rate),
+    Rule(("drag.scheme", "drag.crowd", "drag.field"), crowd_scheme),
+    Rule(("drag.update_travel", "drag.crowd", "drag.field"), update_travel),
     Rule(("drag.scheme", "drag.refresh_steps"), _refresh),
     Rule(("drag.scheme", "fines.radius_mm"), _viscous),
     Rule(("drag.scheme", "drag.upstream"), _implicit),
     Rule(("drag.scheme", "drag.inertia"), _inertia),
     *(_of_the_contact(name) for name in ("grains", "fines")),
+    Rule(("contact.model", "contact.cohesion_J_m3"), of_cohesion),
+    Rule(("contact.rolling_friction", "grains.friction", "fines.friction"), of_rolling),
     Rule(("run.duration_ms", "run.cap_ms"), _end),
     Rule(("analysis.sections",), _sections),
     Rule(("analysis.law", "analysis.damage_law"), _laws),

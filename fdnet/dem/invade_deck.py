@@ -7,7 +7,7 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, plug_allowance, quiet_chunks
-from fdnet.dem.contact_lines import contact_variables
+from fdnet.dem.contact_lines import contact_variables, left_out_of_contacts
 from fdnet.dem.coupled_parts import dumped_group, write_coupled_parts
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
 from fdnet.dem.drag import BELOW_ZERO, drag_variables, forces_left_out
@@ -213,6 +213,7 @@ def _left_out(case: InvasionCase, *, friction: bool, ranks: int) -> list[LeftOut
         )
     if not friction:
         left_out.append(LeftOut(what="tangential history", why="no pair has friction"))
+    left_out += left_out_of_contacts(case)
     if case.box.sides == "periodic":
         left_out.append(LeftOut(what="side walls", why="sides are periodic"))
     if not is_watched(case):

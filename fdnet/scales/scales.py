@@ -10,13 +10,14 @@ from typing import overload
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.errors import CaseError
+from fdnet.scales.cohesion import cohesion_warnings
 from fdnet.scales.contacts import contacts_of, stiffness_factor
 from fdnet.scales.drive import drive_of, drive_warnings
 from fdnet.scales.forces.push import Push, push_of
 from fdnet.scales.forces.throat import throat_width
 from fdnet.scales.forces.warnings import reynolds_warnings, throat_warnings
 from fdnet.scales.grain_pack import pack_step, target_porosity
-from fdnet.scales.overlaps import overlap_warnings, overlaps_of, refuse_deep_overlap
+from fdnet.scales.overlaps import overlap_warnings, overlaps_of
 from fdnet.scales.sizes import size_warnings
 from fdnet.scales.slab import slab_of, slab_warnings
 from fdnet.scales.springs import Contact
@@ -148,7 +149,7 @@ def scales_of(case: Case) -> Scales:
 
 
 def _shared(case: Case, velocity: Velocity) -> Scales:
-    contacts = contacts_of(case)
+    contacts = contacts_of(case, velocity.interstitial)
     return Scales(
         porosity=target_porosity(case),
         permeability=velocity.permeability,
@@ -179,7 +180,6 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     overlaps = overlaps_of(case, contact, push, shared.porosity)
     sticking = sticking_of(case, contact, push, step)
     reynolds = _reynolds(case, shared.interstitial_velocity)
-    refuse_deep_overlap(overlaps)
     _refuse_long_chunk(step, chunk_steps)
     warnings = [
         *shared.warnings,
@@ -187,6 +187,7 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
         *reynolds_warnings(case, push, reynolds),
         *throat_warnings(case, _throat_ratio(case, shared)),
         *overlap_warnings(case, overlaps),
+        *cohesion_warnings(case, contact),
         *slab_warnings(case, slab),
         *drag_warnings(case, hold * step / shortest),
         *plug_warnings(case, times.plug, drive, upstream),

@@ -150,11 +150,23 @@ def _gridded(
     case: InvasionCase, grains: Snapshot, folder: Path, grid: tuple[int, ...], launch: Launch
 ) -> Run:
     """The whole invasion under another processor grid than fdnet's; `invade` then reads it."""
+    line = "processors " + " ".join(map(str, grid))
+    return edited_run(case, grains, folder, launch, (r"^processors .*$", line))
+
+
+def edited_run(
+    case: InvasionCase, grains: Snapshot, folder: Path, launch: Launch, edit: tuple[str, str]
+) -> Run:
+    """The whole invasion with one line of its deck replaced; `invade` then reads the folder.
+
+    `edit` is the pattern of the line and what takes its place. Raises AssertionError when not
+    exactly one line of the deck has the pattern.
+    """
     (folder / "post").mkdir(parents=True)
     scales = scales_of(case)
     deck = write_invade_inputs(case, scales, grains, folder, ranks=launch.ranks).text
-    text, count = re.subn(r"(?m)^processors .*$", "processors " + " ".join(map(str, grid)), deck)
-    assert count == 1, f"{count} lines of the deck begin with processors, expected 1"
+    text, count = re.subn(f"(?m){edit[0]}", edit[1], deck)
+    assert count == 1, f"{count} lines of the deck have the pattern {edit[0]}, expected 1"
     write_text(folder / "in.invade", text)
     write_text(folder / HISTORY, HISTORY_HEADER + "\n")
     keeper = CheckpointKeeper(folder, case, scales, grains, launch=launch)
