@@ -118,14 +118,14 @@ def wall_profile(
     where no sphere is nearer. Inside a solid phi is 0.
     """
     x, y, z = point
-    inverse, least, second, nearest = 2.0 / REACH, REACH, REACH, -1
+    profile, least, second, nearest = 1.0, REACH, REACH, -1
     for row in range(rows[0], rows[1]):
         dx, dy, dz = x - place[row, 0], y - place[row, 1], z - place[row, 2]
         away = sqrt(dx * dx + dy * dy + dz * dz) - place[row, 3]
         if away <= 0.0:
             return 0.0, away, away, row
         if away < REACH:
-            inverse += 1.0 / away + 1.0 / (2.0 * REACH - away) - 2.0 / REACH
+            profile *= away * (2.0 * REACH - away) / REACH**2
             if away < least:
                 least, second, nearest = away, least, row
             elif away < second:
@@ -137,6 +137,6 @@ def wall_profile(
             if away <= 0.0:
                 return 0.0, away, away, -1
             if away < REACH:
-                inverse += 1.0 / away + 1.0 / (2.0 * REACH - away) - 2.0 / REACH
+                profile *= away * (2.0 * REACH - away) / REACH**2
                 second = min(second, away)
-    return 1.0 / inverse, least, second, nearest
+    return profile, least, second, nearest
