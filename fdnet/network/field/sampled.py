@@ -24,9 +24,9 @@ from fdnet.spheres.snapshot import Array
 
 LEAST_PROFILE = 0.02
 """Least phi, in spacings, of a node whose own velocity is used."""
-PROBE = 0.7
+PROBE = 0.8
 """Distance from a sphere, in spacings, within which the flow across its surface is quadratic."""
-STEP = 0.35
+STEP = 0.5
 """Length, in spacings, over which the velocity along a sphere is differentiated."""
 
 Near = tuple[float, float, float, int]
@@ -77,11 +77,17 @@ def sample_velocity(lattice: Lattice, nearby: Nearby, flow: list[Array]) -> Samp
     for d, part in enumerate(flow):
         phi = _profile_at_nodes(np.array(lattice.shape), step, d, walls)
         smooth.append(_filled(_padded(part, lattice, d), _padded(phi, lattice, d)))
+    mean = (smooth[0], smooth[1], smooth[2])
+    bounded = []
+    for d, part in enumerate(mean):
+        inner = part[2:-2, 2:-2, 2:-2].copy()
+        _turn_along_walls(d, step, walls, mean, inner)
+        bounded.append(_padded(inner, lattice, d))
         if lattice.walled[d]:
             # no flow through the walls: their own nodes carry nothing
-            across = np.moveaxis(smooth[d], d, 0)
+            across = np.moveaxis(bounded[d], d, 0)
             across[:3], across[lattice.shape[d] + 2 :] = 0.0, 0.0
-    return Sampled(lattice=lattice, nearby=nearby, smooth=(smooth[0], smooth[1], smooth[2]))
+    return Sampled(lattice=lattice, nearby=nearby, smooth=(bounded[0], bounded[1], bounded[2]))
 
 
 def _padded(part: Array, lattice: Lattice, component: int) -> Array:
@@ -149,6 +155,40 @@ def _linear(part: Array, x: float, y: float, z: float) -> float:
         (1.0 - c) * part[i, j + 1, k] + c * part[i, j + 1, k + 1]
     )
     return float((1.0 - a) * low + a * high)
+
+
+@compiled
+def _turn_along_walls(
+    component: int, step: Array, walls: Walls, smooth: Parts, part: Array
+) -> None:
+    """Takes the part across its sphere from velocity / phi at nodes in the solid.
+
+    Across a wall velocity / phi is 0 at the wall, where along it it is not. `part` holds the nodes
+    of this component of `smooth` without those added around, and is changed.
+    """
+    first, place, sides = walls
+    shape = part.shape
+    away = np.full(3, 0.5)
+    away[component] = 0.0
+    for i in range(shape[0]):
+        for j in range(shape[1]):
+            for k in range(shape[2]):
+                if part[i, j, k] == 0.0:
+                    continue
+                x, y, z = i + away[0], j + away[1], k + away[2]
+                node = (x * step[0], y * step[1], z * step[2])
+                cell = (i * shape[1] + j) * shape[2] + k
+                near = wall_profile(node, (first[cell], first[cell + 1]), place, sides)
+                row = near[3]
+                if near[0] > 0.0 or row < 0:
+                    continue
+                p, q, r = node[0] - place[row, 0], node[1] - place[row, 1], node[2] - place[row, 2]
+                square = p * p + q * q + r * r
+                u = _linear(smooth[0], x + 2.0, y + 1.5, z + 1.5)
+                v = _linear(smooth[1], x + 1.5, y + 2.0, z + 1.5)
+                w = _linear(smooth[2], x + 1.5, y + 1.5, z + 2.0)
+                own = p if component == 0 else (q if component == 1 else r)
+                part[i, j, k] -= own * (u * p + v * q + w * r) / square
 
 
 @compiled
