@@ -1,13 +1,13 @@
 """Which walls stand near a point of the grid, and the profile of the flow that they allow.
 
-Between walls at distances d_1, d_2, ... the velocity is taken as a smooth vector times
+Between walls at distances d_1, d_2, ... below R the velocity is taken as a smooth vector times
 
-    phi = 1 / (2/R + sum of 1/d_i + 1/(2R - d_i) - 2/R over walls nearer than R),
+    phi = product of d_i (2R - d_i) / R^2,
 
-which is 0 at every wall and grows like the distance from it. With one wall it is the parabola
-d (2R - d) / 2R, smooth up to R and constant beyond; between two near plates it is that of the flow
-between them, d_1 d_2 / (d_1 + d_2). Lengths are in the spacing along x, from the lower corner of
-the grid.
+which is 0 at every wall, grows like the distance from it, and becomes flat at R. Between two
+plates the product of the distances is the exact profile of the flow, and so is that of the three
+distances in a duct whose section is an equilateral triangle. Lengths are in the spacing along x,
+from the lower corner of the grid.
 """
 
 from dataclasses import dataclass

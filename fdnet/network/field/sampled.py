@@ -2,13 +2,19 @@
 
 Linear interpolation from node to node knows nothing of a wall between them. So the nodes carry
 velocity / phi, with the profile phi that the walls allow (`nearby`), which is smooth up to the
-walls; it is interpolated linearly and multiplied by phi at the point. Nodes in the solid, or
-nearer than LEAST_PROFILE to it, take the mean of their neighbours.
+walls; it is interpolated linearly and multiplied by phi at the point. Nodes in the solid, or of a
+phi below LEAST_PROFILE, take the mean of their neighbours; in the solid, without its part across
+the wall.
 
 Fluid that cannot slip and keeps its volume approaches a wall like the square of the distance d.
-Nearer than PROBE to a sphere, the velocity is therefore that at the distance PROBE on the same
-normal, its part along the wall times phi/phi(PROBE), its part across times (d / PROBE)^2 instead.
-Between two spheres nearer than that the probe stays on this side of the middle.
+Nearer than PROBE to a sphere, velocity / phi is therefore taken at the distance PROBE on the same
+normal; between two spheres nearer than that the probe stays on this side of the middle. The part
+of the velocity across the wall is replaced by
+
+    w^2 (velocity across as sampled) - (1 - w) d / 2 (divergence along the sphere)
+
+with w = d / PROBE; the divergence is that of the velocity along the sphere at the same distance, by central
+differences. The last term is what keeps the volume of a velocity that is linear in d.
 """
 
 from dataclasses import dataclass
@@ -23,9 +29,9 @@ from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
 LEAST_PROFILE = 0.02
-"""Least phi, in spacings, of a node whose own velocity is used."""
+"""Least phi of a node whose own velocity is used."""
 PROBE = 0.8
-"""Distance from a sphere, in spacings, within which the flow across its surface is quadratic."""
+"""Distance from a sphere, in spacings, within which the flow follows the laws at a wall."""
 STEP = 0.5
 """Length, in spacings, over which the velocity along a sphere is differentiated."""
 
