@@ -11,10 +11,11 @@ from fdnet.spheres.snapshot import Array, Kind, Snapshot
 TINY: dict[str, Any] = {
     "name": "tiny",
     "seed": 1,
-    "box": {"size_mm": [3.0, 1.6, 1.6]},
+    "box": {"size_mm": [3.0, 1.6, 1.6], "sides": "walls", "wall_friction": 0.0},
     "grains": {"radius_mm": 0.25, "count": 66},
-    "fines": {"radius_mm": 0.05, "count": 300},
-    "drag": {"pressure_gradient": False},
+    "fines": {"radius_mm": 0.05, "count": 300, "supply": "slab"},
+    "drag": {"upstream": "interstitial", "pressure_gradient": False},
+    "run": {"time_step_factor": 0.1},
     "analysis": {"sections": 3},
 }
 

@@ -10,6 +10,7 @@ from fdnet.case.file import known_keys
 LAYERS = [
     ["errors"],
     ["files"],
+    ["sizes"],
     ["spheres", "case"],
     ["scales", "network"],
     ["dem", "report"],
@@ -33,7 +34,7 @@ STUDIES_LAYERS = [
     ["engine", "stokes", "fuzz", "chaos"],
     ["truth"],
     ["accuracy", "benchmark", "dem", "thesis"],
-    ["network"],
+    ["network", "outside"],
     ["command"],
     ["pages"],
 ]
@@ -54,7 +55,9 @@ DOORS = {
     "jinja2": {"dem/deck", "report/html", "studies/dem"},
     "subprocess": {
         "dem/binary",
+        "dem/feed",
         "dem/liggghts",
+        "dem/process",
         "report/vtk",
         "studies/benchmark",
         "studies/chaos",
@@ -65,8 +68,10 @@ DOORS = {
     "matplotlib": {
         "report/figures",
         "report/side_view",
+        "report/size_figure",
         "studies/accuracy/figure",
         "studies/engine/draw",
+        "studies/outside/figure",
         "studies/thesis/figures/canvas",
     },
     "PIL": {"studies/thesis/figures/canvas"},

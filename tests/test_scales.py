@@ -5,7 +5,7 @@ import math
 import pytest
 from builders import tiny
 
-from fdnet.case.file import read_case
+from fdnet.case.file import case_from, read_case
 from fdnet.dem.checkpoint import chunks_of
 from fdnet.errors import CaseError
 from fdnet.scales.darcy import carman_kozeny
@@ -222,3 +222,27 @@ def test_every_row_has_formula_source_and_a_finite_value(specimen1):
         assert row.formula
         assert row.source
         assert math.isfinite(row.value)
+
+
+def test_defaults_follow_the_physics():
+    """Periodic sides, or walls as rough as the grains; mud that arrives as fast as it flows in."""
+    tables = {
+        "name": "plain",
+        "box": {"size_mm": [3.0, 1.6, 1.6]},
+        "grains": {"radius_mm": 0.25, "count": 66, "friction": 0.3},
+        "fines": {"radius_mm": 0.05, "count": 300},
+    }
+    plain = case_from(tables)
+    assert plain.periodic == (False, True, True)
+    assert plain.fines.supply == "batches"
+    scales = scales_of(plain)
+    assert scales.upstream_velocity == scales.darcy_velocity
+    contact = scales.contacts["grain-fine"].step_limit
+    assert scales.time_step == pytest.approx(0.2 * contact, rel=1e-12)
+
+    def frictions(**walls: float) -> list[float]:
+        walled = case_from(tables | {"box": tables["box"] | {"sides": "walls"} | walls})
+        return [scales_of(walled).contacts[f"{name}-wall"].friction for name in ("grain", "fine")]
+
+    assert frictions() == [0.3, 0.3]
+    assert frictions(wall_friction=0.1) == [0.1, 0.1]

@@ -6,7 +6,7 @@ import re
 import pytest
 from builders import tiny
 
-from fdnet.case.particles import SHEAR_RATIO
+from fdnet.case.spheres import SHEAR_RATIO
 from fdnet.scales.scales import scales_of
 from fdnet.scales.springs import sphere_mass
 from fdnet.scales.sticking import fall_velocity, false_force, groove_slope

@@ -8,6 +8,9 @@ from pydantic.fields import FieldInfo
 
 UNITS = {
     "_kg_m3": "kg/m³",
+    "_J_m3": "J/m³",
+    "_percent": "%",
+    "_um": "µm",
     "_m_s2": "m/s²",
     "_N_m": "N/m",
     "_m_s": "m/s",
@@ -26,13 +29,19 @@ SPACE = "\N{NO-BREAK SPACE}"
 
 
 def key_rows(part: str) -> Iterator[tuple[str, ...]]:
-    """Key, unit, default, range and meaning, in Markdown, of every key of the table `part`."""
+    """Key, unit, default, range and meaning, in Markdown, of every key of the table `part`.
+
+    A dotted `part` is a table inside another, such as grains.sizes.
+    """
     from fdnet.case.case import InvasionCase
 
-    model = part_model(InvasionCase.model_fields[part].annotation) if part else InvasionCase
-    assert model is not None, part
+    model: type[BaseModel] = InvasionCase
+    for name in part.split(".") if part else ():
+        inner = part_model(model.model_fields[name].annotation)
+        assert inner is not None, part
+        model = inner
     for name, field in model.model_fields.items():
-        if part_model(field.annotation) is None:
+        if part or part_model(field.annotation) is None:
             key = f"{part}.{name}" if part else name
             yield (
                 f"`{key}`",
@@ -48,6 +57,11 @@ def part_model(annotation: Any) -> type[BaseModel] | None:
     for kind in (annotation, *get_args(annotation)):
         if isinstance(kind, type) and issubclass(kind, BaseModel):
             return kind
+    for kind in get_args(annotation):
+        kind = getattr(kind, "__origin__", kind) if hasattr(kind, "__metadata__") else kind
+        inner = part_model(kind) if get_origin(kind) is tuple else None
+        if inner is not None:
+            return inner
     return None
 
 
@@ -80,7 +94,13 @@ def _range(field: FieldInfo) -> str:
 def _ranges(annotation: Any, metadata: list[Any]) -> Iterator[str]:
     """What values a type takes; `metadata` are its bounds."""
     arguments = get_args(annotation)
-    if get_origin(annotation) is Literal:
+    if part_model(annotation) is not None and get_origin(annotation) is None:
+        yield "table"
+    elif arguments and part_model(arguments[0]) is not None and ... in arguments:
+        yield "list of tables"
+    elif get_origin(annotation) is tuple and ... in arguments:
+        yield f"list, each {next(_ranges(arguments[0], []))}"
+    elif get_origin(annotation) is Literal:
         yield ", ".join(f"`{_toml(value)}`" for value in arguments)
     elif get_origin(annotation) is tuple:
         each = next(_ranges(arguments[0], metadata))

@@ -15,7 +15,9 @@ from case_keys import key_rows
 from command_options import commands, option_rows, usage_of
 
 PAGES = ("docs/reference/case.md", "docs/reference/commands.md")
-BLOCK = re.compile(r"(<!-- (case-keys|command-options)(?: (\w+))? -->\n).*?(<!-- end -->)", re.S)
+BLOCK = re.compile(
+    r"(<!-- (case-keys|command-options)(?: ([\w.]+))? -->\n).*?(<!-- end -->)", re.S
+)
 
 
 def filled(page: str) -> str:

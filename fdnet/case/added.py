@@ -11,6 +11,7 @@ from typing import Any
 
 AS_BEFORE: dict[str, Any] = {
     "contact.model": "hooke",
+    "contact.restitution": "dry",
     "drag.crowd": "none",
     "drag.inertia": "none",
     "drag.pressure_gradient": False,

@@ -19,9 +19,10 @@ from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.contact import MODEL_KEYS, ContactLaw
 from fdnet.case.control import Run
 from fdnet.case.fluid import Fluid, Well
-from fdnet.case.particles import Fines, Grains, Spheres
+from fdnet.case.particles import Fines, Grains
 from fdnet.case.parts import Box, Drag, Gravity
 from fdnet.case.rules import cross_problems
+from fdnet.case.spheres import Spheres
 from fdnet.case.stages import STAGES, Stage
 from fdnet.case.values import Part
 from fdnet.errors import CaseError
@@ -41,6 +42,7 @@ KEYS = (
     "contact",
     "run",
     "analysis",
+    "given",
 )
 """Keys at the top of a case file, in the order in which they are written."""
 
@@ -80,6 +82,11 @@ class Case(Part):
     contact: ContactLaw = ContactLaw()
     run: Run = Run()
     analysis: AnalysisChoices = AnalysisChoices()
+    given: dict[str, str] = Field(
+        {},
+        description="Written by fdnet: what the case gave with units or as a file, by dotted key. "
+        "The other keys hold the same as numbers, and only they count.",
+    )
 
     @model_validator(mode="after")
     def _tables_fit(self) -> Self:
@@ -108,12 +115,20 @@ class Case(Part):
         """Which directions are periodic; the flow direction never is."""
         return self.box.periodic
 
+    @property
+    def wall_friction(self) -> float:
+        """Friction of the side walls: the one given, or that of the grains."""
+        given = self.box.wall_friction
+        return self.grains.friction if given is None else given
+
     def data(self) -> dict[str, Any]:
         """All keys that have a value, defaults written out (TOML knows no null).
 
         Keys that only the other contact model reads are left out.
         """
         data = self.model_dump(mode="json")
+        if not self.given:
+            del data["given"]
         for name in ("grains", "fines"):
             for key in self.contact.other_keys & data.get(name, {}).keys():
                 del data[name][key]
@@ -131,6 +146,7 @@ class Case(Part):
         differs from what a case meant before (`fdnet.case.added`).
         """
         data = without_added(self.data())
+        data.pop("given", None)
         data["run"] = {key: value for key, value in data["run"].items() if key not in POLICIES}
         if stage in ("pack", "invade"):
             data.pop("analysis")
@@ -147,9 +163,10 @@ class Case(Part):
         """What the stiffness of a pack depends on besides, with contacts that are not linear."""
         if self.contact.model == "hooke":
             return {}
-        fines = data.get("fines", {})
-        keys = ("radius_mm", *sorted(MODEL_KEYS["hertz"]))
-        return {"model": self.contact.model, "fines": {k: fines[k] for k in keys if k in fines}}
+        fines, keys = self.spheres.get("fine"), sorted(MODEL_KEYS["hertz"])
+        size = {"mean_radius_m": fines.mean_radius_m} if fines else {}
+        given = {key: data["fines"][key] for key in keys} if fines else {}
+        return {"model": self.contact.model, "fines": size | given}
 
     def same_specimen(self, text: bytes) -> bool:
         """Whether a case.toml as `toml` wrote it is this case but for `POLICIES`."""
@@ -203,4 +220,6 @@ def with_fines(case: Case) -> InvasionCase:
 def _without_none(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _without_none(item) for key, item in value.items() if item is not None}
+    if isinstance(value, list):
+        return [_without_none(item) for item in value]
     return value

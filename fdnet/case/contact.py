@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from fdnet.case.values import Part
+from fdnet.case.values import Part, Positive
 
 MODEL_KEYS = {
     "hooke": frozenset({"normal_stiffness_N_m", "shear_stiffness_N_m"}),
@@ -23,6 +23,24 @@ class ContactLaw(Part):
         description='Contact law: "hooke", linear springs of `normal_stiffness_N_m` and '
         '`shear_stiffness_N_m`, or "hertz", Hertz-Mindlin contacts of `youngs_modulus_GPa` and '
         "`poissons_ratio`.",
+    )
+
+    restitution: Literal["dry", "liquid"] = Field(
+        "dry",
+        description='Rebound of fines: "dry" takes `damping_ratio` as it is, "liquid" lowers the '
+        "restitution of every contact of a fine by exp(-35 / St), St being the impact Stokes "
+        "number at the velocity of the fluid. Below a St of 10 nothing rebounds.",
+    )
+    rolling_friction: Positive | None = Field(
+        None,
+        description="Coefficient of rolling friction of all contacts with friction: the largest "
+        "rolling torque over normal force and effective radius. When absent nothing resists "
+        "rolling.",
+    )
+    cohesion_J_m3: Positive | None = Field(
+        None,
+        description="Cohesion of every contact of a fine: attraction over the area of contact "
+        '(LIGGGHTS\'s SJKR). It needs contact.model = "hertz". When absent nothing attracts.',
     )
 
     @property

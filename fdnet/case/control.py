@@ -36,7 +36,7 @@ class Run(Part):
         "the run stops with its state kept.",
     )
     time_step_factor: Annotated[float, Field(gt=0, le=CONTACT_STEP_LIMIT)] = Field(
-        0.1, description="Time step over sqrt(m/k) of the lightest sphere and stiffest contact."
+        0.2, description="Time step over sqrt(m/k) of the lightest sphere and stiffest contact."
     )
     time_step_s: Positive | None = Field(
         None,

@@ -2,6 +2,7 @@
 
 import copy
 import difflib
+import re
 import tomllib
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
@@ -13,6 +14,8 @@ from pydantic.fields import FieldInfo
 from fdnet.case.added import completed
 from fdnet.case.case import Case, InvasionCase, case_type
 from fdnet.case.rules import cross_problems
+from fdnet.case.spoken import plain_tables
+from fdnet.case.units import stem_of, suffix_of
 from fdnet.case.values import Part
 from fdnet.errors import CaseError
 from fdnet.files.paths import expanded
@@ -23,16 +26,18 @@ def known_keys(model: type[Part] = InvasionCase, prefix: str = "") -> Iterator[s
     for name, field in model.model_fields.items():
         yield prefix + name
         table = _table_of(field)
-        if table is not None:
-            yield from known_keys(table, f"{prefix}{name}.")
+        for inner in [table] if table is not None else _inner_tables(field.annotation):
+            yield from known_keys(inner, f"{prefix}{name}.")
 
 
-def case_from(data: Mapping[str, Any], *, source: str = "case") -> Case:
+def case_from(data: Mapping[str, Any], *, source: str = "case", folder: str | Path = ".") -> Case:
     """A case from nested tables; an InvasionCase when there is a table of fines.
 
     Args:
-        data: the tables and keys of a case file. Each key carries its unit: `radius_mm` is in mm.
+        data: the tables and keys of a case file. A key carries its unit, `radius_mm` is in mm, or
+            its value does, `radius = "0.25 mm"`.
         source: how messages name these tables.
+        folder: where files that `data` names are looked for.
 
     Returns:
         The case, with the default of every key that `data` leaves out.
@@ -56,10 +61,14 @@ def case_from(data: Mapping[str, Any], *, source: str = "case") -> Case:
     model = case_type(data)
     for key in _long_numbers(data):
         raise CaseError(f"{source}: 1 problem: {key}: holds a whole number of more than 18 digits")
+    spoken = plain_tables(model, data, Path(folder))
     try:
-        return model.model_validate(data)
+        case = model.model_validate(spoken.data)
+        if not spoken.problems:
+            return case
+        problems = spoken.problems
     except ValidationError as error:
-        problems = _problems(model, data, error)
+        problems = [*spoken.problems, *_problems(model, spoken.data, error, spoken.bad)]
     plural = "s" if len(problems) > 1 else ""
     raise CaseError(f"{source}: {len(problems)} problem{plural}: {' | '.join(problems)}")
 
@@ -76,10 +85,16 @@ def _long_numbers(value: Any, key: str = "") -> Iterator[str]:
         yield key
 
 
-def _problems(model: type[Case], data: Mapping[str, Any], error: ValidationError) -> list[str]:
-    """The problems of single keys, then those between the keys that are good."""
+def _problems(
+    model: type[Case], data: Mapping[str, Any], error: ValidationError, refused: Collection[str]
+) -> list[str]:
+    """The problems of single keys, then those between the keys that are good.
+
+    Keys that were `refused` before are missing from `data`, of which nothing is said again.
+    """
     items = [item for item in error.errors() if item["type"] != "value_error"]
-    bad = {".".join(map(str, item["loc"][:2])) for item in items}
+    items = [item for item in items if ".".join(map(str, item["loc"][:2])) not in refused]
+    bad = {".".join(map(str, item["loc"][:2])) for item in items} | set(refused)
     tables = {name: _good_keys(name, field, data, bad) for name, field in _tables_of(model)}
     return [*dict.fromkeys(_problem(dict(item)) for item in items), *cross_problems(tables, bad)]
 
@@ -112,25 +127,47 @@ def _table_of(field: FieldInfo) -> type[Part] | None:
     return None
 
 
+def _inner_tables(annotation: Any) -> Iterator[type[Part]]:
+    """The tables that a key may hold, one or a list of them."""
+    for kind in get_args(annotation):
+        if isinstance(kind, type) and issubclass(kind, Part):
+            yield kind
+        else:
+            yield from _inner_tables(kind)
+
+
 def _problem(item: dict[str, Any]) -> str:
     path = ".".join(str(part) for part in item["loc"] if not _is_union_tag(part))
     given = item["input"]
     if item["type"] == "extra_forbidden":
-        near = difflib.get_close_matches(path, list(known_keys()), n=1, cutoff=0.5)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        return f"{path}: unknown key (given {given!r}){hint}"
+        return f"{path}: unknown key (given {given!r}){_nearest(path)}"
     if item["type"] == "missing":
         return f"{path}: missing, a value is needed"
+    if item["type"] == "size_curve":
+        return f"{path}: {item['msg']}"
     message = (
         item["msg"].replace("Input should be", "should be").replace("a valid tuple", "a list")
     )
+    key = path.rsplit(".", 1)[-1]
+    if isinstance(given, str) and suffix_of(key) and given[:1].isdigit():
+        message += f"; a value with its unit goes to {stem_of(key)}"
     return f"{path}: {given!r} {message}"
+
+
+def _nearest(path: str) -> str:
+    """The known key that is nearest to an unknown one, in words; empty where none is near."""
+    table, _, key = path.rpartition(".")
+    if table in ("grains", "fines") and _DIAMETER.match(key):
+        return f'; did you mean {table}.sizes = {{ D10 = "20 um", D50 = "40 um", ... }}?'
+    near = difflib.get_close_matches(path, list(known_keys()), n=1, cutoff=0.5)
+    return f"; did you mean {near[0]}?" if near else ""
 
 
 def _is_union_tag(part: Any) -> bool:
     return isinstance(part, str) and ("[" in part or part in ("float", "int", "constrained-float"))
 
 
+_DIAMETER = re.compile(r"[dD]_?\d\d")
 _LONGEST_WORD = 1000
 _MOST_NAMES = 8
 """Most parts of a dotted key; no key of a case has so many."""
@@ -160,6 +197,8 @@ def set_keys(data: dict[str, Any], assignments: list[str]) -> dict[str, Any]:
             table = table.setdefault(name, {})
             if not isinstance(table, dict):
                 raise CaseError(f"--set {assignment}: {name} is a value, not a table")
+        for other in [name for name in table if stem_of(name) == stem_of(names[-1])]:
+            del table[other]
         table[names[-1]] = _toml_value(text.strip())
     return result
 
@@ -189,7 +228,8 @@ def read_case(path: str | Path, *, assignments: list[str] | None = None) -> Case
         3
     """
     try:
-        return case_from(set_keys(_tables(path), assignments or []), source=str(path))
+        data = set_keys(_tables(path), assignments or [])
+        return case_from(data, source=str(path), folder=expanded(path).parent)
     except RecursionError as error:
         raise CaseError(f"{path}: its tables or lists are nested too deeply for a case") from error
 
@@ -199,7 +239,7 @@ def recorded_case(path: Path) -> Case:
 
     Raises CaseError as `read_case` does.
     """
-    return case_from(completed(_tables(path)), source=str(path))
+    return case_from(completed(_tables(path)), source=str(path), folder=path.parent)
 
 
 def _tables(path: str | Path) -> dict[str, Any]:

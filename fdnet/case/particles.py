@@ -1,105 +1,19 @@
-"""The tables [grains] and [fines] of a case file: sizes, material and number of the spheres."""
+"""The tables [grains] and [fines] of a case file: material and number of the spheres."""
 
-import math
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
 
-from fdnet.case.values import (
-    MAX_CONCENTRATION,
-    Fraction,
-    NonNegative,
-    Part,
-    Positive,
-    Radius,
-    scaled,
-)
+from fdnet.case.materials import Material, Solid, components_of, mixed_density
+from fdnet.case.spheres import Spheres
+from fdnet.case.values import MAX_CONCENTRATION, Fraction, Positive, as_tuple, scaled
 
-SHEAR_RATIO = 0.04
-"""Tangential over normal stiffness of a material that gives none: small enough that no fine larger
-than 1/370 of a grain at friction 0.55 locks between two grains (`fdnet.scales.sticking`)."""
-
-
-class Spheres(Part):
-    """What grains and fines share: sizes, density and the parameters of their contacts."""
-
-    radius_mm: Radius = Field(
-        description="Radius of a sphere. A list of two values, [smallest, largest], gives radii "
-        "that are uniform by number between them."
-    )
-    density_kg_m3: Positive = Field(description="Density of the solid.")
-    normal_stiffness_N_m: Positive = Field(
-        description="Normal contact stiffness of the material. Two spheres in contact act as two "
-        "springs in series. `run.stiffness_N_m` scales all contact stiffnesses by one factor."
-    )
-    shear_stiffness_N_m: Positive | None = Field(
-        None,
-        description="Tangential contact stiffness of the material, scaled like the normal one. "
-        "When absent: 0.04 of the normal one, so that friction lets go of fines that roll around "
-        "the neck of two grains.",
-    )
-    youngs_modulus_GPa: Positive = Field(
-        description='Young\'s modulus of the material, for contact.model = "hertz".'
-    )
-    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = Field(
-        description='Poisson\'s ratio of the material, for contact.model = "hertz".'
-    )
-    friction: NonNegative = Field(
-        0.55,
-        description="Coefficient of sliding friction. A contact takes the smaller value of its "
-        "two materials.",
-    )
-    damping_ratio: Annotated[float, Field(ge=0, lt=1)] = Field(
-        0.2,
-        description="Damping of a contact over its critical damping. A contact takes the mean of "
-        "its two materials.",
-    )
-
-    @property
-    def tangential_stiffness(self) -> float:
-        """Tangential contact stiffness, N/m: the one given, or `SHEAR_RATIO` of the normal one."""
-        given = self.shear_stiffness_N_m
-        return SHEAR_RATIO * self.normal_stiffness_N_m if given is None else given
-
-    @property
-    def youngs_modulus_Pa(self) -> float:
-        """Young's modulus of the material, Pa."""
-        return self.youngs_modulus_GPa * 1e9
-
-    @property
-    def radius_range_m(self) -> tuple[float, float]:
-        """Smallest and largest radius, m; radii are uniform by number between them."""
-        pair = (
-            self.radius_mm
-            if isinstance(self.radius_mm, tuple)
-            else (self.radius_mm, self.radius_mm)
-        )
-        return pair[0] * 1e-3, pair[1] * 1e-3
-
-    @property
-    def one_size(self) -> bool:
-        """Whether all radii are equal."""
-        return not isinstance(self.radius_mm, tuple)
-
-    @property
-    def mean_radius_m(self) -> float:
-        """Number mean of the radius, m."""
-        low, high = self.radius_range_m
-        return 0.5 * (low + high)
-
-    @property
-    def mean_volume_m3(self) -> float:
-        """Mean sphere volume of a radius uniform in [a, b]: pi/3 (a + b)(a^2 + b^2)."""
-        low, high = self.radius_range_m
-        return math.pi / 3 * (low + high) * (low**2 + high**2)
-
-    @property
-    def sauter_diameter_m(self) -> float:
-        """Diameter of equal volume to surface ratio, 2 <r^3>/<r^2>, radius uniform in [a, b]."""
-        low, high = self.radius_range_m
-        return (
-            2 * (0.25 * (low + high) * (low**2 + high**2)) / ((low**2 + low * high + high**2) / 3)
-        )
+Materials = Annotated[
+    tuple[Material, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=20)
+]
 
 
 class Grains(Spheres):
@@ -173,8 +87,23 @@ class Fines(Spheres):
         description="Poisson's ratio of the fines' material, for contact.model = \"hertz\". The "
         "default is E / 2G - 1 of the thesis's 63 and 26 GPa.",
     )
-    concentration: Annotated[float, Field(gt=0, le=MAX_CONCENTRATION)] = Field(
-        0.10, description="Volume of fines over the volume of suspension in the slab upstream."
+    materials: Materials | None = Field(
+        None,
+        description="Several materials, each a table with its own sizes, instead of `radius_mm` "
+        "or `sizes`; their keys are below.",
+    )
+    cut_um: Positive | None = Field(
+        None,
+        description="Diameter below which solids of measured sizes are left out. Their share is "
+        "said in the warnings of the summary, and the suspension is thinner by it.",
+    )
+    concentration: Annotated[float, Field(gt=0, le=MAX_CONCENTRATION)] | None = Field(
+        0.10,
+        description="Volume of solids over the volume of suspension in the slab upstream. It has "
+        "no default where `solids_kg_m3` is given.",
+    )
+    solids_kg_m3: Positive | None = Field(
+        None, description="Mass of solids in a volume of mud, instead of `concentration`."
     )
     count: Annotated[int, Field(ge=1)] | None = Field(
         None, description="Number of fines supplied. The length of the slab follows from it."
@@ -185,13 +114,73 @@ class Fines(Spheres):
         "from it.",
     )
     supply: Literal["slab", "batches"] = Field(
-        "slab",
-        description='How the fines enter: "slab" puts all of them in at the start, "batches" puts '
-        "each part of the slab in when it is about to arrive. The suspension is the same; batches "
-        "are much faster for a long slab.",
+        "batches",
+        description='How the fines enter: "batches" puts each part of the slab in when it is '
+        'about to arrive, "slab" puts all of them in at the start. The suspension is the same; '
+        "batches are much faster for a long slab.",
     )
 
     @property
     def slab_m(self) -> float | None:
         """Length of the slab of suspension, m; None: it follows from the count."""
         return scaled(self.slab_mm, 1e-3)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_concentration(cls, data: Any) -> Any:
+        """The default of `concentration` gives way to `solids_kg_m3`."""
+        by_mass = isinstance(data, Mapping) and data.get("solids_kg_m3") is not None
+        return {"concentration": None, **data} if by_mass else data
+
+    @model_validator(mode="after")
+    def _something_is_left(self) -> Self:
+        sizes = [self.sizes] if self.sizes is not None else []
+        for one in [*sizes, *(material.sizes for material in self.materials or ())]:
+            largest = one.curve().high
+            if self.finest_m >= largest:
+                problem = (
+                    f"cut_um {self.cut_um:g} leaves nothing of a curve that ends at "
+                    f"{1e6 * largest:.3g} um; lower it"
+                )
+                raise PydanticCustomError("size_curve", "{problem}", {"problem": problem})
+        return self
+
+    @property
+    def _size_keys(self) -> tuple[Any, ...]:
+        return self.radius_mm, self.sizes, self.materials
+
+    @property
+    def finest_m(self) -> float:
+        """Diameter, m, below which sizes are left out."""
+        return (self.cut_um or 0.0) * 1e-6
+
+    @cached_property
+    def components(self) -> tuple[Solid, ...]:
+        """The materials that the fines are of, with their shares by volume of what is kept."""
+        if self.materials is None:
+            return super().components
+        return components_of(self.materials, density=self.density_kg_m3, finest=self.finest_m)
+
+    @property
+    def solids_density_kg_m3(self) -> float:
+        """Mass over volume of all solids of the mud, those that are left out as well."""
+        if self.materials is None:
+            return self.density_kg_m3
+        return mixed_density(self.materials, self.density_kg_m3)
+
+    @property
+    def has_one_concentration(self) -> bool:
+        """Whether the solids of the mud are given, and once only."""
+        return (self.solids_kg_m3 is None) != (self.concentration is None)
+
+    @property
+    def volume_fraction(self) -> float:
+        """Volume of all solids over that of the suspension."""
+        if self.solids_kg_m3 is not None:
+            return self.solids_kg_m3 / self.solids_density_kg_m3
+        return self.concentration or 0.0
+
+    @property
+    def placed_fraction(self) -> float:
+        """Volume of the fines over that of the suspension: the solids without what is left out."""
+        return self.volume_fraction * self.curve.kept if self.measured else self.volume_fraction

@@ -15,6 +15,9 @@ from fdnet.case.values import (
     Vector,
 )
 
+UPDATE_TRAVEL, MOST_TRAVEL = 0.5, 10.0
+"""Diameters of the smallest fine between two updates: by default, and at most."""
+
 
 class Box(Part):
     """The specimen: flow and depth run along the first side; x = 0 is the formation face."""
@@ -23,13 +26,14 @@ class Box(Part):
         description="Three side lengths of the box. The mud flows along the first side."
     )
     sides: Literal["walls", "periodic"] = Field(
-        "walls",
-        description="What bounds the box in y and z: solid walls, or periodic images of itself.",
+        "periodic",
+        description="What bounds the box in y and z: periodic images of itself, or solid walls.",
     )
-    wall_friction: NonNegative = Field(
-        0.0,
-        description="Coefficient of sliding friction of the side walls. A contact takes the "
-        "smaller value of the wall and the sphere.",
+    wall_friction: NonNegative | None = Field(
+        None,
+        description="Coefficient of sliding friction of the side walls, if there are any. When "
+        "absent it is that of the grains. A contact takes the smaller value of the wall and the "
+        "sphere.",
     )
 
     @property
@@ -74,9 +78,10 @@ class Drag(Part):
         'number of 1. "auto" drives to 0.1, or as fast as the fluid itself.',
     )
     upstream: Literal["interstitial", "darcy"] = Field(
-        "interstitial",
-        description="Velocity of the fluid upstream of the formation face: the interstitial one "
-        "of the pack, or the Darcy velocity.",
+        "darcy",
+        description="Velocity of the fluid upstream of the formation face: the Darcy velocity of "
+        "the mud, or the interstitial one of the pack, which brings the mud faster than it flows "
+        "in.",
     )
     pressure_gradient: bool = Field(
         True,
@@ -92,10 +97,26 @@ class Drag(Part):
     )
     crowd: Literal["none", "beetstra"] = Field(
         "none",
-        description='How other spheres nearby change the drag on a fine: "none" leaves it that of '
-        'a lone sphere. "beetstra", the law of Beetstra, van der Hoef and Kuipers (2007), is '
-        "refused for now.",
+        description='How other fines nearby change the drag on a fine: "none" leaves it that of a '
+        'lone sphere, "beetstra" takes the law of Beetstra, van der Hoef and Kuipers (2007) with '
+        "the porosity around each fine, which fdnet computes while LIGGGHTS waits.",
     )
+    update_travel: Annotated[float, Field(gt=0, le=MOST_TRAVEL)] | None = Field(
+        None,
+        description="How far the fluid carries a fine, in diameters of the smallest fine, before "
+        "the forces in a crowd are computed anew. When absent: "
+        f"{UPDATE_TRAVEL:g}.",
+    )
+
+    @property
+    def coupled(self) -> bool:
+        """Whether fdnet computes the forces on each fine while LIGGGHTS waits."""
+        return self.crowd != "none" or self.field == "network"
+
+    @property
+    def travel_diameters(self) -> float:
+        """Diameters of the smallest fine between two updates of a coupled invasion."""
+        return UPDATE_TRAVEL if self.update_travel is None else self.update_travel
 
 
 class Gravity(Part):

@@ -1,17 +1,19 @@
 """What must hold between the keys of a case."""
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.contact import MODEL_KEYS
-from fdnet.case.contact_rules import of_the_model
+from fdnet.case.contact_rules import of_cohesion, of_rolling, of_the_model
 from fdnet.case.control import Run
 from fdnet.case.fluid import Fluid, Well
-from fdnet.case.particles import Fines, Grains, Spheres
+from fdnet.case.particles import Fines, Grains
 from fdnet.case.parts import Box, Drag
+from fdnet.case.rule import Rule
+from fdnet.case.size_rules import SIZE_RULES, SOME_THROAT, concentration_text, size_text
+from fdnet.case.spheres import Spheres
 from fdnet.case.values import (
     LEAST_SKIN,
     MOST_BINS,
@@ -22,34 +24,24 @@ from fdnet.case.values import (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Rule:
-    """A check of some keys against each other.
-
-    Attributes:
-        keys: dotted keys that the check reads.
-        check: yields what is wrong; it is given the tables of `keys`, each once, in order.
-    """
-
-    keys: tuple[str, ...]
-    check: Callable[..., Iterator[str]]
-
-    @property
-    def tables(self) -> tuple[str, ...]:
-        """Names of the tables that the check is given."""
-        return tuple(dict.fromkeys(key.split(".")[0] for key in self.keys))
-
-
 def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iterator[str]:
     """What is wrong between the keys of a case.
 
     A rule is passed over where one of its tables is absent or None, or one of its keys is among
     `bad`: keys whose own value was refused, so that nothing can be said about them.
     """
+    unsized = {f"{name}.radius_mm" for name in _SPHERES if not _has_one_curve(tables.get(name))}
+    if (fines := tables.get("fines")) is None or not fines.has_one_concentration:
+        unsized.add("fines.concentration")
     for rule in RULES:
         given = [tables.get(name) for name in rule.tables]
-        if all(table is not None for table in given) and not set(rule.keys) & set(bad):
+        silent = set(bad) if rule in SIZE_RULES else unsized | set(bad)
+        if all(table is not None for table in given) and not set(rule.keys) & silent:
             yield from rule.check(*given)
+
+
+def _has_one_curve(spheres: Spheres | None) -> bool:
+    return spheres is not None and spheres.has_one_curve
 
 
 def _rising(name: str) -> Rule:
@@ -107,16 +99,17 @@ def _room_for_one_grain(box: Box, grains: Grains) -> Iterator[str]:
 def _slab(box: Box, fines: Fines) -> Iterator[str]:
     """The slab must hold its fines and stay a slab; their number is bounded by memory."""
     area = box.size_mm[1] * box.size_mm[2]
-    volume = fines.mean_volume_m3 * 1e9
-    count = fines.count or fines.concentration * area * (fines.slab_mm or 0.0) / volume
-    length = fines.slab_mm or count * volume / (fines.concentration * area)
+    volume, fraction = fines.mean_volume_m3 * 1e9, fines.placed_fraction
+    count = fines.count or fraction * area * (fines.slab_mm or 0.0) / volume
+    length = fines.slab_mm or count * volume / (fraction * area)
     if count > MOST_FINES:
         yield (
             f"fines.count: {count:.3g} fines, expected at most {MOST_FINES:.0e}; shorten the slab"
+            + (" or raise fines.cut_um" if fines.measured else "")
         )
     if length > MOST_SLAB * box.size_mm[0]:
         yield (
-            f"fines.concentration: {fines.concentration:g} makes a slab of {length:.3g} mm, "
+            f"{concentration_text(fines)} makes a slab of {length:.3g} mm, "
             f"expected at most {MOST_SLAB} box lengths; raise it or supply fewer fines"
         )
 
@@ -124,8 +117,9 @@ def _slab(box: Box, fines: Fines) -> Iterator[str]:
 def _gap_of_sizes(grains: Grains, fines: Fines) -> Iterator[str]:
     if fines.radius_range_m[1] >= grains.radius_range_m[0]:
         yield (
-            f"fines.radius_mm: {fines.radius_mm} is not below grains.radius_mm "
-            f"{grains.radius_mm} (the network needs a clear gap)"
+            f"{size_text('fines', fines)} is not below {size_text('grains', grains)} "
+            "(the network needs a clear gap)"
+            + ("; narrow sizes.cut_percent of one" if fines.measured or grains.measured else "")
         )
 
 
@@ -178,10 +172,18 @@ def _field(drag: Drag) -> Iterator[str]:
 
 
 def _crowd(drag: Drag) -> Iterator[str]:
-    if drag.crowd != "none":
+    if drag.coupled and drag.scheme == "viscous":
         yield (
-            f"drag.crowd: {drag.crowd!r} needs the porosity around each fine during a run, which "
-            "is not available yet; expected 'none'"
+            "drag.scheme: 'viscous' has one damping for all fines, drag.crowd "
+            f"{drag.crowd!r} one for each; take 'implicit', 'held' or 'every_step'"
+        )
+
+
+def _update_travel(drag: Drag) -> Iterator[str]:
+    if drag.update_travel is not None and not drag.coupled:
+        yield (
+            f"drag.update_travel: {drag.update_travel:g} belongs to a drag that is computed while "
+            "LIGGGHTS waits; leave it out, or set drag.crowd = 'beetstra'"
         )
 
 
@@ -194,16 +196,16 @@ def _refresh(drag: Drag) -> Iterator[str]:
 
 
 def _viscous(drag: Drag, fines: Fines) -> Iterator[str]:
-    if drag.scheme == "viscous" and isinstance(fines.radius_mm, tuple):
+    if drag.scheme == "viscous" and not fines.one_size:
         yield (
-            "drag.scheme: 'viscous' needs fines of one size, fines.radius_mm is "
-            f"{list(fines.radius_mm)} (LIGGGHTS's viscous force is one number a material); take "
-            "'held', 'every_step' or 'implicit'"
+            f"drag.scheme: 'viscous' needs fines of one size, {size_text('fines', fines)} "
+            "(LIGGGHTS's viscous force is one number a material); take 'held', 'every_step' or "
+            "'implicit'"
         )
 
 
 def _implicit(drag: Drag) -> Iterator[str]:
-    if drag.scheme == "implicit" and drag.upstream == "darcy":
+    if drag.scheme == "implicit" and drag.upstream == "darcy" and not drag.coupled:
         yield (
             "drag.upstream: 'darcy' changes the fluid's velocity at x = 0, drag.scheme "
             "'implicit' keeps one a fine; take 'interstitial', or another drag.scheme"
@@ -211,7 +213,7 @@ def _implicit(drag: Drag) -> Iterator[str]:
 
 
 def _inertia(drag: Drag) -> Iterator[str]:
-    if drag.inertia != "none" and drag.scheme in ("viscous", "implicit"):
+    if drag.inertia != "none" and drag.scheme in ("viscous", "implicit") and not drag.coupled:
         yield (
             f"drag.inertia: {drag.inertia!r} makes the drag coefficient depend on the slip, "
             f"drag.scheme {drag.scheme!r} keeps one a fine; take 'held' or 'every_step'"
@@ -251,8 +253,13 @@ def _of_the_contact(name: str) -> Rule:
     return Rule(("contact.model", *(f"{name}.{key}" for key in keys)), of_the_model(name))
 
 
-_SLAB_KEYS = ("fines.radius_mm", "fines.count", "fines.slab_mm", "fines.concentration")
+_SPHERES = ("grains", "fines")
+_SLAB_KEYS = (
+    *("fines.radius_mm", "fines.count", "fines.slab_mm"),
+    *("fines.concentration", "fines.solids_kg_m3"),
+)
 RULES = (
+    *SIZE_RULES,
     _rising("grains"),
     _rising("fines"),
     Rule(("grains.porosity", "grains.count"), _number_of_grains),
@@ -261,17 +268,21 @@ RULES = (
     Rule(("box.size_mm", "box.sides", "grains.radius_mm"), _room_for_one_grain),
     Rule(("box.size_mm", *_SLAB_KEYS), _slab),
     Rule(("grains.radius_mm", "fines.radius_mm"), _gap_of_sizes),
+    SOME_THROAT,
     Rule(("run.skin_mm", "grains.radius_mm", "fines.radius_mm"), _skin),
     Rule(("run.neighbour_bin_mm", "box.size_mm", "fines"), _neighbour_bins),
     Rule(("well", "fluid.velocity_m_s", "fluid.darcy_length_mm"), _one_drive),
     Rule(("well.radius_mm", "well.drainage_radius_m"), _radii_of_well),
     Rule(("drag.field",), _field),
-    Rule(("drag.crowd",), _crowd),
+    Rule(("drag.scheme", "drag.crowd", "drag.field"), _crowd),
+    Rule(("drag.update_travel", "drag.crowd", "drag.field"), _update_travel),
     Rule(("drag.scheme", "drag.refresh_steps"), _refresh),
     Rule(("drag.scheme", "fines.radius_mm"), _viscous),
     Rule(("drag.scheme", "drag.upstream"), _implicit),
     Rule(("drag.scheme", "drag.inertia"), _inertia),
     *(_of_the_contact(name) for name in ("grains", "fines")),
+    Rule(("contact.model", "contact.cohesion_J_m3"), of_cohesion),
+    Rule(("contact.rolling_friction", "grains.friction", "fines.friction"), of_rolling),
     Rule(("run.duration_ms", "run.cap_ms"), _end),
     Rule(("analysis.sections",), _sections),
     Rule(("analysis.law", "analysis.damage_law"), _laws),

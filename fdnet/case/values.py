@@ -17,7 +17,8 @@ CONTACT_STEP_LIMIT = 0.2
 """Largest time step over sqrt(m/k): at 0.3 energy is still kept, at 0.5 it grows (measured)."""
 
 
-def _as_tuple(value: Any) -> Any:
+def as_tuple(value: Any) -> Any:
+    """A list of a case file as a tuple; anything else as it is."""
     return tuple(value) if isinstance(value, list) else value
 
 
@@ -25,9 +26,9 @@ Positive = Annotated[float, Field(ge=1e-18, le=1e15, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(gt=0, lt=1)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Pair = Annotated[tuple[Positive, Positive], BeforeValidator(_as_tuple)]
-Triple = Annotated[tuple[Positive, Positive, Positive], BeforeValidator(_as_tuple)]
-Vector = Annotated[tuple[Finite, Finite, Finite], BeforeValidator(_as_tuple)]
+Pair = Annotated[tuple[Positive, Positive], BeforeValidator(as_tuple)]
+Triple = Annotated[tuple[Positive, Positive, Positive], BeforeValidator(as_tuple)]
+Vector = Annotated[tuple[Finite, Finite, Finite], BeforeValidator(as_tuple)]
 Radius = Annotated[Positive | Pair, Field(union_mode="smart")]
 
 

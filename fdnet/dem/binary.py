@@ -32,12 +32,13 @@ class Binary:
     version: str
     launcher: Path | None
 
-    def command(self, deck: str, ranks: int) -> list[str]:
-        """The command line for a deck in the current folder.
+    def command(self, deck: str | None, ranks: int) -> list[str]:
+        """The command line for a deck in the current folder; None: for commands on stdin.
 
         Raises LiggghtsError for several ranks without a launcher.
         """
-        base = [str(self.path), "-in", deck, "-log", LOG]
+        source = [] if deck is None else ["-in", deck]
+        base = [str(self.path), *source, "-log", LOG]
         stdbuf = shutil.which("stdbuf")
         if ranks == 1:
             return ([stdbuf, "-oL"] if stdbuf else []) + base

@@ -18,6 +18,7 @@ from fdnet.dem.digests import (
     store_record,
 )
 from fdnet.dem.overlap import WATCH, Deepest, read_watch, watch_rows
+from fdnet.dem.updates import UPDATES, updates_digest
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.files.atomic import write_text
 
@@ -43,6 +44,7 @@ def write_record(
         overlap=overlap_digest(overlaps),
         dump=file_digest(post / f"invade_{row.step}.dump"),
         restart=file_digest(post / f"invade_{row.step}.restart"),
+        updates=updates_digest(folder, row.step),
     )
     store_record(folder, row.step, record)
 
@@ -103,7 +105,11 @@ def last_checkpoint(folder: Path, case: InvasionCase) -> Checkpoint | None:
 def _changed(folder: Path, row: Checkpoint, record: CheckpointRecord) -> list[str]:
     """Names of the files of a checkpoint that are missing or not what was recorded."""
     names = {f"invade_{row.step}.dump": record.dump, f"invade_{row.step}.restart": record.restart}
-    return [name for name, digest in names.items() if not _matches(folder / "post" / name, digest)]
+    changed = [
+        name for name, digest in names.items() if not _matches(folder / "post" / name, digest)
+    ]
+    same = record.updates == updates_digest(folder, row.step)
+    return changed if same else [*changed, UPDATES]
 
 
 def _matches(path: Path, digest: str) -> bool:

@@ -3,7 +3,7 @@
 from typing import Any
 
 from fdnet.case.case import Case
-from fdnet.dem.deck import number
+from fdnet.dem.deck import LeftOut, number
 from fdnet.scales.hertz import restitution_of
 from fdnet.scales.hertz_contacts import material_of
 from fdnet.scales.scales import Scales
@@ -24,7 +24,9 @@ def contact_variables(case: Case, scales: Scales, stage: str, *, friction: bool)
         "materials": " ".join(materials),
         "size": size,
         "friction": _matrix(scales, stage, "friction") if friction else "",
-        "pair_model": _models(case, friction) + _settings(friction),
+        "rolling": _rolling(case, size) if friction else "",
+        "cohesion": _cohesion(case, stage),
+        "pair_model": _models(case, stage, friction) + _settings(case, stage, friction),
     }
     if case.contact.model == "hertz":
         return shared | _hertz(case, scales, stage)
@@ -53,18 +55,57 @@ def damped_alike(
 def wall_law(case: Case, stage: str, *, friction: bool) -> dict[str, Any]:
     """Contact model, material and settings of a plane."""
     return {
-        "model": _models(case, friction),
+        "model": _models(case, stage, friction),
         "material": len(_MATERIALS[stage]),
-        "settings": _settings(friction),
+        "settings": _settings(case, stage, friction),
     }
 
 
-def _models(case: Case, friction: bool) -> str:
-    return _NORMAL[case.contact.model] + (" tangential history" if friction else "")
+def left_out_of_contacts(case: Case) -> list[LeftOut]:
+    """What contacts could do and the case does not ask for."""
+    contact = case.contact
+    asked = {
+        "loss of rebound in the liquid": contact.restitution == "liquid",
+        "rolling resistance": contact.rolling_friction is not None,
+        "cohesion": contact.cohesion_J_m3 is not None,
+    }
+    return [LeftOut(what=what, why="not asked for") for what, given in asked.items() if not given]
 
 
-def _settings(friction: bool) -> str:
-    return " tangential_damping off limitForce on" if friction else " limitForce on"
+def _models(case: Case, stage: str, friction: bool) -> str:
+    """LIGGGHTS's models in its order; packing knows neither friction nor cohesion."""
+    words = [_NORMAL[case.contact.model]]
+    if friction:
+        words.append("tangential history")
+    if _cohesion(case, stage):
+        words.append("cohesion sjkr")
+    if friction and case.contact.rolling_friction:
+        words.append("rolling_friction epsd2")
+    return " ".join(words)
+
+
+def _settings(case: Case, stage: str, friction: bool) -> str:
+    """A contact that a liquid damps may pull: the film resists parting as it does approach."""
+    pulls = stage == "invade" and case.contact.restitution == "liquid"
+    tangential = " tangential_damping off" if friction else ""
+    return tangential + (" limitForce off" if pulls else " limitForce on")
+
+
+def _rolling(case: Case, size: int) -> str:
+    """The same coefficient for all pairs."""
+    if case.contact.rolling_friction is None:
+        return ""
+    return " ".join([number(case.contact.rolling_friction)] * size**2)
+
+
+def _cohesion(case: Case, stage: str) -> str:
+    """Of the pairs with a fine; grains do not attract each other or a wall."""
+    density, materials = case.contact.cohesion_J_m3, _MATERIALS[stage]
+    if density is None or "fine" not in materials:
+        return ""
+    return " ".join(
+        number(density if "fine" in (a, b) else 0.0) for a in materials for b in materials
+    )
 
 
 def _hertz(case: Case, scales: Scales, stage: str) -> dict[str, Any]:

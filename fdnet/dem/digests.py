@@ -23,6 +23,7 @@ class CheckpointRecord:
         overlap: digest of the rows of overlap.csv since the checkpoint before.
         dump: digest of the dump.
         restart: digest of the restart.
+        updates: digest of the updates of a coupled invasion before the checkpoint; "" without any.
     """
 
     case: str
@@ -31,6 +32,7 @@ class CheckpointRecord:
     overlap: str
     dump: str
     restart: str
+    updates: str = ""
 
 
 def file_digest(path: Path) -> str:
@@ -60,7 +62,14 @@ def read_record(folder: Path, step: int) -> CheckpointRecord | None:
         record = CheckpointRecord(**json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError, RecursionError):
         return None
-    texts = (record.case, record.row, record.overlap, record.dump, record.restart)
+    texts = (
+        record.case,
+        record.row,
+        record.overlap,
+        record.dump,
+        record.restart,
+        record.updates,
+    )
     sound = type(record.ranks) is int and all(isinstance(text, str) for text in texts)
     return record if sound and record.row.split(",")[1:2] == [str(step)] else None
 

@@ -19,6 +19,9 @@ BELOW_ZERO = -5e-324
 
 def drag_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]:
     """Variables of the drag block: the scheme and, as text, the numbers that it needs."""
+    if case.drag.coupled:
+        hold = scales.hold_steps if scales.hold_steps > 1 else 0
+        return {"coupled": True, "scheme": case.drag.scheme, "hold_steps": hold}
     coefficient = case.fluid.stokes_coefficient_Pa_s * case.drag.multiplier
     slower = scales.drive_velocity - scales.upstream_velocity
     own = (
@@ -27,6 +30,7 @@ def drag_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]
         else _by_radius(scales, slower)
     )
     return {
+        "coupled": False,
         "scheme": case.drag.scheme,
         "coefficient": number(coefficient),
         "velocity": number(scales.drive_velocity),

@@ -7,10 +7,12 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, plug_allowance, quiet_chunks
-from fdnet.dem.contact_lines import contact_variables
+from fdnet.dem.contact_lines import contact_variables, left_out_of_contacts
+from fdnet.dem.coupled_parts import dumped_group, write_coupled_parts
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
 from fdnet.dem.drag import BELOW_ZERO, drag_variables, forces_left_out
 from fdnet.dem.gravity import gravity_variables
+from fdnet.dem.measured_fines import densities
 from fdnet.dem.overlap import is_watched, watch_variables
 from fdnet.dem.scene import header_variables, wall_variables, write_data
 from fdnet.dem.supply import AT_ONCE, batches_of, place_batches, place_fines, slab_end
@@ -47,8 +49,11 @@ def write_invade_inputs(
             "fines: a fine would start in contact; this is an fdnet fault, please report the case "
             "and seed"
         )
-    density = np.where(
-        spheres.kind == Kind.GRAIN, case.grains.density_kg_m3, case.fines.density_kg_m3
+    density = np.concatenate(
+        [
+            np.full(len(grains), case.grains.density_kg_m3),
+            densities(case, batches_of(case, scales).counts)[: len(spheres) - len(grains)],
+        ]
     )
     write_data(
         folder / "invade.data",
@@ -59,6 +64,7 @@ def write_invade_inputs(
     )
     deck = render_invade(case, scales, grains, ranks=ranks)
     write_text(folder / "in.invade", deck.text)
+    write_coupled_parts(case, scales, folder)
     return deck
 
 
@@ -74,20 +80,26 @@ def write_batches(
         "start_velocity": number(scales.upstream_velocity),
         "drag": drag_variables(case, scales),
     }
+    density, first = densities(case, batches_of(case, scales).counts), int(grains.id.max()) + 1
     (folder / SUPPLY).mkdir(exist_ok=True)
     for chunk, fines in enumerate(batches[AT_ONCE:], AT_ONCE):
         name = f"{SUPPLY}/batch_{chunk}"
-        density = np.full(len(fines), case.fines.density_kg_m3)
-        write_data(folder / f"{name}.data", fines, bounds=bounds, density=density, types=3)
+        own_density = density[fines.id.astype(int) - first]
+        write_data(folder / f"{name}.data", fines, bounds=bounds, density=own_density, types=3)
         own = {"name": name, "first": int(fines.id[0]), "last": int(fines.id[-1])}
         write_text(folder / f"{name}.in", render_text("batch.in.j2", shared | own))
     return reduce(Snapshot.joined, batches[:AT_ONCE])
 
 
+def batch_chunks(case: InvasionCase, scales: InvasionScales) -> range:
+    """The chunks that take in a batch; empty when all fines are there from the start."""
+    return range(AT_ONCE, max(AT_ONCE, len(batches_of(case, scales).counts)))
+
+
 def _feeding(case: InvasionCase, scales: InvasionScales) -> dict[str, int] | None:
     """First and last chunk that take in a batch; None when all fines are there from the start."""
-    later = len(batches_of(case, scales).counts) - AT_ONCE
-    return {"first": AT_ONCE, "last": AT_ONCE + later - 1} if later > 0 else None
+    chunks = batch_chunks(case, scales)
+    return {"first": chunks[0], "last": chunks[-1]} if chunks else None
 
 
 def _margin(case: InvasionCase, scales: InvasionScales) -> float:
@@ -135,7 +147,7 @@ def render_invade(
             "fixed_grains": not mobile,
             "moving": "all" if mobile else "fines",
             "gravity": gravity,
-            "dump_group": "all" if mobile else "fines",
+            "dump_group": dumped_group(case),
             "start_velocity": number(scales.upstream_velocity),
             "drag": drag_variables(case, scales),
             "overlap": watch_variables(case, scales),
@@ -201,6 +213,7 @@ def _left_out(case: InvasionCase, *, friction: bool, ranks: int) -> list[LeftOut
         )
     if not friction:
         left_out.append(LeftOut(what="tangential history", why="no pair has friction"))
+    left_out += left_out_of_contacts(case)
     if case.box.sides == "periodic":
         left_out.append(LeftOut(what="side walls", why="sides are periodic"))
     if not is_watched(case):

@@ -3,7 +3,9 @@
 A checkpoint after every chunk of steps lets a cut run go on.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from fdnet.case.case import InvasionCase
@@ -19,17 +21,20 @@ from fdnet.dem.checkpoint import (
     readable_states,
 )
 from fdnet.dem.checkpoint_record import (
-    WatchReader,
     keep_doubts,
     kept_doubts,
     last_checkpoint,
     passed_over,
     refuse_other_ranks,
-    write_record,
 )
+from fdnet.dem.coupled import Coupling
+from fdnet.dem.coupled_parts import write_coupled_parts
 from fdnet.dem.deck import Deck, LeftOut
 from fdnet.dem.digests import checkpoint_files
+from fdnet.dem.feed import run_fed
+from fdnet.dem.fluid import Fluid
 from fdnet.dem.invade_deck import SCRATCH, render_invade, write_batches, write_invade_inputs
+from fdnet.dem.keeper import CheckpointKeeper
 from fdnet.dem.liggghts import Launch, Run, run_deck
 from fdnet.dem.overlap import (
     WATCH,
@@ -41,9 +46,10 @@ from fdnet.dem.overlap import (
     refuse_overlap,
 )
 from fdnet.dem.supply import batches_of
+from fdnet.dem.updates import UPDATES, read_updates
 from fdnet.dem.verdict import SCREEN
-from fdnet.errors import LiggghtsError
-from fdnet.files.atomic import disk_is_full, write_text
+from fdnet.errors import CaseError, LiggghtsError
+from fdnet.files.atomic import write_text
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Snapshot
 
@@ -65,6 +71,7 @@ class Invasion:
         warnings: doubts about how it ended, one sentence each.
         ranks: MPI ranks of all executions of LIGGGHTS.
         runs: executions of LIGGGHTS; empty when an earlier session had come to the end.
+        updates: the record of a coupled invasion, one row an update; empty when it is not coupled.
     """
 
     damaged: Snapshot
@@ -77,6 +84,7 @@ class Invasion:
     warnings: tuple[str, ...]
     ranks: int
     runs: tuple[Run, ...]
+    updates: tuple[Mapping[str, float], ...]
 
     @property
     def max_overlap(self) -> float:
@@ -85,16 +93,25 @@ class Invasion:
 
 
 def invade(
-    case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path, launch: Launch
+    case: InvasionCase,
+    scales: InvasionScales,
+    grains: Snapshot,
+    folder: Path,
+    launch: Launch,
+    *,
+    fluid: Fluid | None = None,
 ) -> Invasion:
     """Drive the fines in; continues from the last complete checkpoint when `folder` holds one.
+
+    A coupled case (`case.drag.coupled`) needs the `fluid` that answers for its fines.
 
     Raises LiggghtsError when a run fails or fines are lost, CaseError when the fines cannot be
     placed or the invasion was begun on another number of MPI ranks.
     """
+    _refuse_uncoupled(case, fluid)
     (folder / "post").mkdir(parents=True, exist_ok=True)
     refuse_other_ranks(folder, case, launch.ranks)
-    deck, run = _drive(case, scales, grains, folder, launch)
+    deck, run = _drive(case, scales, grains, folder, launch, fluid)
     history = read_history(folder)
     overlaps, damaged = [], grains
     for _, damaged in readable_states(folder, history, case, scales, grains):
@@ -118,14 +135,30 @@ def invade(
         warnings=tuple(warnings),
         ranks=launch.ranks,
         runs=(run,) if run else (),
+        updates=tuple(read_updates(folder)),
     )
 
 
+def _refuse_uncoupled(case: InvasionCase, fluid: Fluid | None) -> None:
+    """Raise CaseError unless a coupled case, and no other, has a fluid."""
+    if case.drag.coupled != (fluid is not None):
+        raise CaseError(
+            f"drag.crowd: {case.drag.crowd!r} with drag.field {case.drag.field!r} "
+            f"{'needs' if case.drag.coupled else 'takes'} "
+            f"{'a' if case.drag.coupled else 'no'} fluid that fdnet computes; run the case with "
+            "fdnet run or fdnet.run_case"
+        )
+
+
 def _drive(
-    case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path, launch: Launch
+    case: InvasionCase,
+    scales: InvasionScales,
+    grains: Snapshot,
+    folder: Path,
+    launch: Launch,
+    fluid: Fluid | None,
 ) -> tuple[Deck, Run | None]:
     """Run to the end of the invasion; no run when the last checkpoint was the end already."""
-
     while True:
         last = last_checkpoint(folder, case)
         keep_doubts(folder, passed_over(folder, case, last))
@@ -135,18 +168,34 @@ def _drive(
         if _over(case, scales, last):
             return deck, None
         keeper = CheckpointKeeper(folder, case, scales, grains, launch=launch)
-        run = _run(folder, last, replace(launch, follow=keeper))
+        follower, coupling = replace(launch, follow=keeper), None
+        if fluid is not None:
+            coupling = Coupling(
+                case=case,
+                scales=scales,
+                grains=grains,
+                folder=folder,
+                fluid=fluid,
+                last=last,
+                over=partial(_over, case, scales),
+            )
+        run = _run(folder, last, follower, coupling)
         if run is not None:
             return deck, run
 
 
-def _run(folder: Path, last: Checkpoint | None, launch: Launch) -> Run | None:
+def _run(
+    folder: Path, last: Checkpoint | None, launch: Launch, coupling: Coupling | None
+) -> Run | None:
     """The run, or None when LIGGGHTS could not read the restart (a full disk cuts it silently).
 
     The restart is then set aside, so that the checkpoint before it is tried next.
     """
+    deck = "in.invade" if last is None else "in.invade.resume"
     try:
-        return run_deck(folder, "in.invade" if last is None else "in.invade.resume", launch)
+        if coupling is not None:
+            return run_fed(folder, deck, launch, coupling.play)
+        return run_deck(folder, deck, launch)
     except LiggghtsError:
         with (folder / SCREEN).open("rb") as file:
             screen = file.read(_START_OF_SCREEN)
@@ -157,61 +206,6 @@ def _run(folder: Path, last: Checkpoint | None, launch: Launch) -> Run | None:
         return None
     finally:
         (folder / SCRATCH).unlink(missing_ok=True)
-
-
-class CheckpointKeeper:
-    """Follows the screen of a run and passes every line on.
-
-    At each checkpoint it records what is whole now, keeps the two newest restarts, and stops a run
-    that writes to a full disk or whose fines overlap too much. LIGGGHTS itself goes on after a
-    failed write and ends with exit code 0. Older restarts are removed only while there is room on
-    the disk.
-    """
-
-    def __init__(
-        self,
-        folder: Path,
-        case: InvasionCase,
-        scales: InvasionScales,
-        grains: Snapshot,
-        *,
-        launch: Launch,
-    ) -> None:
-        self.folder, self.case, self.scales, self.grains = folder, case, scales, grains
-        self.ranks, self.follow, self.watch = launch.ranks, launch.follow, WatchReader(folder)
-
-    def __call__(self, line: str) -> None:
-        if line.startswith("FDNET checkpoint"):
-            self._keep(int(line.split()[3]))
-        if self.follow:
-            self.follow(line)
-
-    def _keep(self, step: int) -> None:
-        if disk_is_full(self.folder):
-            raise LiggghtsError(
-                f"{self.folder}: the disk is full, LIGGGHTS was stopped; make room and "
-                "continue with --resume"
-            )
-        rows = [row for row in read_history(self.folder) if row.step == step]
-        overlaps = self.watch.upto(step)
-        if rows:
-            write_record(self.folder, rows[-1], self.case, ranks=self.ranks, overlaps=overlaps)
-        elif self.case.run.on_overlap == "stop":
-            raise LiggghtsError(
-                f"{self.folder / HISTORY}: no row for the checkpoint at step {step}; continue "
-                "with --resume"
-            )
-        restarts = [
-            (at, path)
-            for at, path in checkpoint_files(self.folder)
-            if path.suffix == ".restart" and at <= step
-        ]
-        for _, old in sorted(restarts)[:-2]:
-            old.unlink(missing_ok=True)
-        for row in rows[-1:]:
-            refuse_overlap(
-                self.case, self.scales, self.grains, self.folder, history=[row], last=row
-            )
 
 
 def _over(case: InvasionCase, scales: InvasionScales, last: Checkpoint | None) -> bool:
@@ -235,7 +229,7 @@ def _prepare(
     """Write the inputs of a start, or of a restart from `last` with later files removed."""
     if last is None:
         old = (path for _, path in checkpoint_files(folder))
-        for stale in [folder / HISTORY, folder / WATCH, *old]:
+        for stale in [folder / HISTORY, folder / WATCH, folder / UPDATES, *old]:
             stale.unlink(missing_ok=True)
         deck = write_invade_inputs(case, scales, grains, folder, ranks=ranks)
         write_text(folder / HISTORY, HISTORY_HEADER + "\n")
@@ -250,6 +244,7 @@ def _prepare(
             path.unlink()
     if case.fines.supply == "batches":
         write_batches(case, scales, grains, folder)
+    write_coupled_parts(case, scales, folder)
     deck = render_invade(case, scales, grains, ranks=ranks, resume=last)
     write_text(folder / "in.invade.resume", deck.text)
     return deck

@@ -70,10 +70,14 @@ def write_pack_inputs(
 
 
 def draw_radii(case: Case, count: int) -> Array:
-    """`count` radii (N,) m, uniform by number.
+    """`count` radii (N,) m.
 
-    The last one is chosen so that the sum of volumes comes as near to the expected one as it can.
+    Of a measured curve they are its strata in random order. Of a range they are uniform by number,
+    the last one chosen so that the sum of volumes comes as near to the expected one as it can.
     """
+    if case.grains.measured:
+        order = np.random.default_rng([case.seed, 7]).permutation(count)
+        return 0.5 * case.grains.curve.strata(count)[order]
     low, high = case.grains.radius_range_m
     radii = np.random.default_rng([case.seed, 7]).uniform(low, high, count)
     if low < high and count > 1:

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.case.case import InvasionCase
+from fdnet.case.size_rules import concentration_text
+from fdnet.dem.measured_fines import drawn_fines
 from fdnet.errors import CaseError
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
@@ -57,19 +59,25 @@ def crowding(case: InvasionCase) -> float:
     """How crowded the slab is: the concentration c for equal fines, more for unequal ones.
 
     It is an eighth of the share of space that is closed to the centre of a largest fine,
-    c <(R + r)^3> / (8 <r^3>) for radii r uniform up to R, over the share of the cross-section that
+    c <(R + r)^3> / (8 <r^3>) for radii r up to R, over the share of the cross-section that
     centres can reach (a diameter less between walls); inf when that is nothing. The `CLEARANCE`
     between fines is not counted.
     """
     low, high = case.fines.radius_range_m
-    shut = (
-        (2 * high + low + high)
-        * ((2 * high) ** 2 + (low + high) ** 2)
-        / (8 * (low + high) * (low**2 + high**2))
-    )
+    if case.fines.measured:
+        one, two, three = (
+            case.fines.curve.mean(power) / (2 * high) ** power for power in (1, 2, 3)
+        )
+        shut = (1 + 3 * one + 3 * two + three) / (8 * three)
+    else:
+        shut = (
+            (2 * high + low + high)
+            * ((2 * high) ** 2 + (low + high) ** 2)
+            / (8 * (low + high) * (low**2 + high**2))
+        )
     sides = zip(case.size_m[1:], case.periodic[1:], strict=True)
     reach = [1.0 if periodic else 1 - 2 * high / side for side, periodic in sides]
-    return case.fines.concentration * shut / math.prod(reach) if min(reach) > 0 else math.inf
+    return case.fines.placed_fraction * shut / math.prod(reach) if min(reach) > 0 else math.inf
 
 
 def place_fines(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> Snapshot:
@@ -142,7 +150,7 @@ def batches_of(case: InvasionCase, scales: InvasionScales) -> Batches:
     """
     travel = scales.upstream_velocity * scales.checkpoint_steps * scales.time_step
     apart = 1.01 * CLEARANCE * 2 * case.fines.radius_range_m[1]
-    length = max(travel / (1 - case.fines.concentration / LOOSEST_CAKE), apart)
+    length = max(travel / (1 - case.fines.placed_fraction / LOOSEST_CAKE), apart)
     whole = Batches(counts=(scales.supplied_count,), length=scales.slab_length, travel=travel)
     if case.fines.supply == "slab" or scales.slab_length <= AT_ONCE * length:
         return whole
@@ -159,7 +167,8 @@ def place_batches(
 ) -> Iterator[Snapshot]:
     """The slab batch by batch, each where the fluid has carried it when it enters.
 
-    The ids are numbered through all batches. A batch does not depend on how many follow.
+    The ids are numbered through all batches. A batch does not depend on how many follow, but for
+    measured sizes, of which each batch gets its part of the whole.
     """
     travel, first = batches_of(case, scales).travel, int(grains.id.max()) + 1
     for number, (position, radius) in enumerate(
@@ -175,9 +184,10 @@ def _draw_batches(
 ) -> Iterator[tuple[Array, Array]]:
     """Places (n, 3) m in the slab and radii (n,) m of each batch, clear of the one before."""
     batches, before = batches_of(case, scales), (np.empty((0, 3)), np.empty(0))
+    drawn = drawn_fines(case, batches.counts) if case.fines.measured else []
     for number, count in enumerate(batches.counts):
         rng = np.random.default_rng([case.seed, 11, number])
-        radius = rng.uniform(*case.fines.radius_range_m, count)
+        radius = drawn[number].radius if drawn else rng.uniform(*case.fines.radius_range_m, count)
         high = end - number * batches.length
         low = max(high - batches.length, end - scales.slab_length)
         before = (_add_sequentially(case, radius, (low, high), rng, others=before), radius)
@@ -187,7 +197,13 @@ def _draw_batches(
 def _draw(case: InvasionCase, scales: InvasionScales, *, end: float) -> tuple[Array, Array]:
     """Places (N, 3) and radii (N,) m of the slab's fines; it ends at x = `end`."""
     rng = np.random.default_rng([case.seed, 11])
-    radius = rng.uniform(*case.fines.radius_range_m, scales.supplied_count)
+    count = scales.supplied_count
+    measured = case.fines.measured
+    radius = (
+        drawn_fines(case, [count])[0].radius
+        if measured
+        else rng.uniform(*case.fines.radius_range_m, count)
+    )
     return _add_sequentially(case, radius, (end - scales.slab_length, end), rng), radius
 
 
@@ -229,7 +245,7 @@ def _add_sequentially(
         )
         waiting = waiting[~free]
     raise CaseError(
-        f"fines.concentration: {case.fines.concentration:g} leaves {len(waiting)} of "
+        f"{concentration_text(case.fines)} leaves {len(waiting)} of "
         f"{len(radius)} fines without a place in a slab of {1e3 * size[0]:.3g} mm; lower it or "
         "lengthen fines.slab_mm"
     )

@@ -13,6 +13,7 @@ import numpy as np
 
 from fdnet.files.atomic import replacing
 from fdnet.report.side_view import fill_side_view
+from fdnet.report.size_figure import Sizes, fill_size_curves
 from fdnet.spheres.snapshot import Array, Snapshot
 
 if TYPE_CHECKING:
@@ -49,6 +50,8 @@ CAPTIONS = {
     "once.",
     "size_distributions": "Inscribed radii of throats and pores between the grains alone, by "
     "number; the band is the range of the fines' radii.",
+    "size_curves": "Sizes by volume: the curve that the case asks for, with what is left out at "
+    "its ends, the spheres that were placed, and the fines in the specimen at the end.",
     "layers": "The first millimetre in layers of a fine's diameter: permeability of each layer in "
     "place, without and with the fines, and its share of the specimen's pressure drop. From the "
     "network of all spheres.",
@@ -62,13 +65,14 @@ def draw_all(
     analysis: "Analysis",
     snapshot: Snapshot | None = None,
     history: Sequence[Mapping[str, float]] | None = None,
+    sizes: Sequence[Sizes] = (),
 ) -> list[Path]:
     """Draw every figure that has data into `folder`; return the paths in the order of the report.
 
     The folder is made if it is missing. `snapshot` is what the side view shows, the damaged
     specimen or the grains alone; without one there is no side view. Figures of damage are left out
-    for an intact pack. `history` rows are those of history.csv. `CAPTIONS`
-    explains each figure under the stem of its file.
+    for an intact pack. `history` rows are those of history.csv. `sizes` are those of grains and
+    fines with measured curves. `CAPTIONS` explains each figure under the stem of its file.
     """
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
@@ -84,6 +88,8 @@ def draw_all(
         draws["layers"] = partial(_layers, layers=analysis.layers)
     draws["porosity_profile"] = partial(_porosity_profile, analysis=analysis)
     draws["size_distributions"] = partial(_size_distributions, analysis=analysis, fines=fines)
+    if sizes:
+        draws["size_curves"] = partial(fill_size_curves, sizes=sizes)
     if history:
         draws["invasion_history"] = partial(_invasion_history, history=history)
     return [_draw(target / f"{name}.png", fill) for name, fill in draws.items()]

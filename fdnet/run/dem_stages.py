@@ -10,6 +10,7 @@ from fdnet.dem.pack_deck import check_radii
 from fdnet.dem.packing import make_pack
 from fdnet.dem.scene import snapshot_of
 from fdnet.errors import CaseError
+from fdnet.run.fluid.fluid_of import fluid_of
 from fdnet.run.made_files import ANALYSE_AGAIN, MESHES, START_OVER, check_files
 from fdnet.run.outputs import Invaded
 from fdnet.run.progress import Progress
@@ -44,7 +45,8 @@ def invade_stage(session: Session, case: InvasionCase) -> None:
     expected = _expected_steps(scales)
     progress = Progress("invade", expected, show=session.options.show_progress)
     with session.timed("invade"), progress:
-        result = invade(case, scales, grains, folder, session.launch(progress))
+        launch, fluid = session.launch(progress), fluid_of(case, scales)
+        result = invade(case, scales, grains, folder, launch, fluid=fluid)
     seconds = session.seconds["invade"]
     record = invade_record(case, result, folder, seconds=seconds)
     session.folder.finish("invade", record)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, readable_states
 from fdnet.run.history import history_rows
+from fdnet.run.placed_sizes import PlacedSizes
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Snapshot
 
@@ -42,12 +43,14 @@ class Results:
         grains: as packed.
         invasion: None when the case has no fines.
         analysis: permeability, porosity and fines of the specimen.
+        sizes: of grains and fines with measured curves.
     """
 
     path: Path
     grains: Snapshot
     invasion: Invaded | None
     analysis: "Analysis"
+    sizes: tuple[PlacedSizes, ...] = ()
 
     @property
     def shown(self) -> Snapshot:
@@ -127,7 +130,11 @@ def draw_figures(results: Results) -> tuple[list[tuple[Path, str]], list[str]]:
     from fdnet.report import figures, vtk
 
     drawn = figures.draw_all(
-        results.path / "figures", results.analysis, results.shown, results.history_rows or None
+        results.path / "figures",
+        results.analysis,
+        results.shown,
+        results.history_rows or None,
+        results.sizes,
     )
     picture = results.path / "figures" / "spheres_3d.png"
     reason = vtk.render_spheres_png(

@@ -24,6 +24,7 @@ from fdnet.run.folder import RunFolder, open_folder
 from fdnet.run.made_files import MESHES, TABLES, digests_of
 from fdnet.run.mark import RECORDS
 from fdnet.run.outputs import Results, draw_figures, write_paraview, write_tables
+from fdnet.run.placed_sizes import placed_sizes, size_summary
 from fdnet.run.records import record_warnings, stage_seconds, versions
 from fdnet.run.session import RunOptions, Session
 from fdnet.run.summary import summarise
@@ -143,12 +144,14 @@ def _analyse_and_report(session: Session) -> dict[str, Any]:
     case, grains = session.case, packed_grains(session)
     invasion = invaded(session, case, grains) if isinstance(case, InvasionCase) else None
     damaged = None if invasion is None else invasion.damaged
+    supplied = (session.folder.record("invade") or {}).get("supplied", 0)
     with session.timed("analyse"):
         results = Results(
             path=session.path,
             grains=grains,
             invasion=invasion,
             analysis=analyse(grains, damaged, periodic=case.periodic, options=case.analysis),
+            sizes=tuple(placed_sizes(case, grains, damaged, supplied)),
         )
         write_tables(results)
     figures: list[tuple[Path, str]] = []
@@ -173,6 +176,7 @@ def _write_summary(
         results.analysis,
         pack=pack,
         invasion=invasion,
+        sizes=size_summary(results.sizes),
         last=results.history[-1] if results.history else None,
         physical_time_s=results.physical_time_s,
         seconds=stage_seconds(pack, invasion, session.seconds),

@@ -14,6 +14,7 @@ from fdnet.dem.invasion import Invasion
 from fdnet.dem.liggghts import Run
 from fdnet.dem.overlap import WATCH, Deepest, overlap_text
 from fdnet.dem.packing import Pack
+from fdnet.dem.updates import UPDATES
 from fdnet.run.folder import RECORD_FORMAT
 from fdnet.run.made_files import digests_of
 
@@ -72,10 +73,17 @@ def invade_record(case: Case, result: Invasion, folder: Path, *, seconds: float)
         "supplied": result.supplied,
         "warnings": list(result.warnings),
         "ranks": result.ranks,
-        "files": digests_of(folder, [HISTORY, WATCH, *dumps]),
+        **({"updates": _updates(result)} if result.updates else {}),
+        "files": digests_of(folder, [HISTORY, WATCH, UPDATES, *dumps]),
         "runs": [run_record(run) for run in result.runs],
         "left_out": [str(item) for item in result.left_out],
     }
+
+
+def _updates(result: Invasion) -> dict[str, Any]:
+    """How often the forces were computed anew, and what the last update measured."""
+    last = dict(result.updates[-1])
+    return {"count": len(result.updates), "last": last}
 
 
 def ranks_of(record: dict[str, Any]) -> int | None:
@@ -94,6 +102,7 @@ def run_record(run: Run) -> dict[str, Any]:
         "command": " ".join(run.command),
         "version": run.version,
         "seconds": run.seconds,
+        **({"waited": run.waited} if run.waited else {}),
         "ranks": run.ranks,
         "deck_sha256": decks,
     }
@@ -147,13 +156,16 @@ def stage_seconds(
     They are those of the session that finished the stage; `own` are those of this session.
     """
     runs = pack["runs"] + (invasion["runs"] if invasion else [])
+    waited = sum(run.get("waited", 0.0) for run in runs)
     return {
         "pack": pack["seconds"],
         "invade": invasion["seconds"] if invasion else 0.0,
         "analyse": own.get("analyse", 0.0),
         "report": own.get("report", 0.0),
         "liggghts": sum(run["seconds"] for run in runs)
-        + sum(row["liggghts_s"] for row in pack["attempts"][:-1]),
+        + sum(row["liggghts_s"] for row in pack["attempts"][:-1])
+        - waited,
+        **({"updates": waited} if waited else {}),
     }
 
 

@@ -19,6 +19,7 @@ def summarise(
     invasion: dict[str, Any] | None,
     last: Checkpoint | None,
     physical_time_s: float | None,
+    sizes: dict[str, Any],
     seconds: dict[str, float],
     warnings: list[str],
 ) -> dict[str, Any]:
@@ -26,6 +27,7 @@ def summarise(
 
     `pack` and `invasion` are the records of their stages, `last` is the last checkpoint and
     `physical_time_s` the time of the fluid then; those of the invasion are None without fines.
+    `sizes` are those of measured curves, {} without them.
     """
     result = {
         "case": case.name,
@@ -39,7 +41,9 @@ def summarise(
         "stop_reason": invasion["stop_reason"] if invasion else None,
         "sections": section_rows(analysis),
         **_network(analysis),
+        **_updates(invasion),
         "solver": analysis.solver,
+        **({"sizes": sizes} if sizes else {}),
         "max_overlap_fraction": invasion["max_overlap"] if invasion else pack["max_overlap"],
         "grain_overlap_fraction": pack["max_overlap"],
         "ranks": {"pack": ranks_of(pack), "invade": ranks_of(invasion) if invasion else None},
@@ -89,6 +93,14 @@ def _counts(
         "invasion_depth_p95_m": analysis.invasion_depth_p95,
         "cake_thickness_m": analysis.cake_thickness,
     }
+
+
+def _updates(invasion: dict[str, Any] | None) -> dict[str, Any]:
+    """What a coupled invasion measured at its last update; nothing of one that is not coupled."""
+    updates = (invasion or {}).get("updates")
+    if updates is None:
+        return {}
+    return {"drag_updates": updates["count"], "drag_last_update": updates["last"]}
 
 
 def _network(analysis: "Analysis") -> dict[str, Any]:

@@ -1,9 +1,11 @@
 """Rows of the contacts in the table of scales."""
 
 from fdnet.case.case import Case, InvasionCase
+from fdnet.scales.cohesion import pull_off_of
 from fdnet.scales.hertz import rayleigh_time
 from fdnet.scales.hertz_contacts import material_of
 from fdnet.scales.quantity import Quantity, row
+from fdnet.scales.restitution import LEAST
 from fdnet.scales.scales import InvasionScales, Scales
 from fdnet.scales.springs import Contact
 
@@ -23,6 +25,10 @@ def contact_rows(case: Case, scales: Scales) -> list[Quantity]:
     ]
     for contact in scales.contacts.values():
         rows += _hertz_rows(contact) if hertz else _hooke_rows(contact)
+        if contact.stokes is not None:
+            rows += _rebound_rows(contact, contact.stokes)
+    if case.contact.cohesion_J_m3 and isinstance(case, InvasionCase):
+        rows.append(_pull_off_row(case, scales))
     if hertz and isinstance(case, InvasionCase):
         rows.append(_rayleigh_row(case, scales))
     return rows
@@ -120,11 +126,45 @@ def _hertz_rows(contact: Contact) -> list[Quantity]:
 
 def _rayleigh_row(case: InvasionCase, scales: Scales) -> Quantity:
     modulus, ratio = material_of(case, "fine", scales.stiffness_factor)
+    density = min(one.density for one in case.fines.components)
     return row(
         "Rayleigh time of the smallest fine",
         "t_R",
-        rayleigh_time(case.fines.radius_range_m[0], case.fines.density_kg_m3, modulus, ratio),
+        rayleigh_time(case.fines.radius_range_m[0], density, modulus, ratio),
         "s",
         "pi r sqrt(rho/G) / (0.1631 nu + 0.8766)",
         "Thornton and Randall 1988",
+    )
+
+
+def _rebound_rows(contact: Contact, stokes: float) -> list[Quantity]:
+    least = LEAST["hertz" if contact.elastic else "hooke"]
+    return [
+        row(
+            f"{contact.pair} impact Stokes number",
+            "St",
+            stokes,
+            "-",
+            "m_eff u / (6 pi mu R*^2)",
+            "Joseph and others 2001",
+        ),
+        row(
+            f"{contact.pair} restitution in the liquid",
+            "e",
+            contact.restitution,
+            "-",
+            f"e_dry exp(-35 / St), at least {least:g}",
+            "Legendre and others 2005",
+        ),
+    ]
+
+
+def _pull_off_row(case: InvasionCase, scales: Scales) -> Quantity:
+    return row(
+        "pull-off force of a fine from a grain",
+        "F_c",
+        pull_off_of(case, scales.contacts["grain-fine"]).force,
+        "N",
+        "2/3 (pi c)^3 R*^2 / E*^2",
+        "Hertz and LIGGGHTS's SJKR",
     )

@@ -3,25 +3,28 @@
 import math
 
 from fdnet.case.case import Case
-from fdnet.scales.grain_pack import target_porosity
 from fdnet.scales.hertz import (
     REFERENCE_OVERLAP,
     STEP_OVERLAP,
     Elastic,
     collision_time,
     elastic,
-    joint_radius,
     secant_stiffness,
     tangential_stiffness,
 )
-from fdnet.scales.springs import Contact, effective_mass, mass_range, mean_damping, pairs_of
-from fdnet.scales.velocity import velocity_of
+from fdnet.scales.springs import (
+    Contact,
+    damping_and_stokes,
+    effective_mass,
+    mass_range,
+    pair_radius,
+    pairs_of,
+)
 
 
-def hertz_contacts(case: Case) -> dict[str, Contact]:
-    """The Hertz-Mindlin contact of each pair of materials of the case, by its name."""
+def hertz_contacts(case: Case, velocity: float) -> dict[str, Contact]:
+    """The Hertz-Mindlin contact of each pair of materials, in a fluid of a velocity in m/s."""
     factor = hertz_factor(case)
-    velocity = velocity_of(case, target_porosity(case)).interstitial
     return {f"{a}-{b}": _contact(case, (a, b), factor, velocity) for a, b in pairs_of(case)}
 
 
@@ -45,14 +48,6 @@ def material_of(case: Case, name: str, factor: float) -> tuple[float, float]:
 def pair_elastic(case: Case, pair: tuple[str, str], factor: float) -> Elastic:
     """Elastic constants of a pair of materials, softened by `factor`."""
     return elastic(material_of(case, pair[0], factor), material_of(case, pair[1], factor))
-
-
-def pair_radius(case: Case, pair: tuple[str, str], radius: float) -> float:
-    """R*, m, of a sphere of `radius` m, the lighter one of the pair, and its partner."""
-    if "wall" in pair:
-        return radius
-    mixed = "fine" in pair and "grain" in pair
-    return joint_radius(radius, case.grains.mean_radius_m if mixed else radius)
 
 
 def _lighter(pair: tuple[str, str]) -> str:
@@ -85,10 +80,10 @@ def _contact(case: Case, pair: tuple[str, str], factor: float, velocity: float) 
     radius = pair_radius(case, pair, lighter.mean_radius_m)
     overlap = REFERENCE_OVERLAP * 2 * lighter.mean_radius_m
     normal = _stiffness(case, pair, factor)
-    damping = mean_damping([case.spheres[name] for name in pair if name != "wall"])
+    damping, stokes = damping_and_stokes(case, pair, velocity)
     stiffest = tangent_stiffness(case, pair, factor, STEP_OVERLAP)
     frictions = [
-        case.box.wall_friction if name == "wall" else case.spheres[name].friction for name in pair
+        case.wall_friction if name == "wall" else case.spheres[name].friction for name in pair
     ]
     return Contact(
         pair="-".join(pair),
@@ -100,4 +95,5 @@ def _contact(case: Case, pair: tuple[str, str], factor: float, velocity: float) 
         contact_time=collision_time(mass, velocity, constants.modulus, radius),
         step_limit=math.sqrt(mass_range(lighter)[0] / stiffest),
         elastic=constants,
+        stokes=stokes,
     )

@@ -7,8 +7,7 @@ from fdnet.case.case import InvasionCase
 from fdnet.errors import CaseError
 from fdnet.scales.forces.push import Push, arrival_velocity, pore_width
 from fdnet.scales.hertz import overlap_of_impact, overlap_under
-from fdnet.scales.hertz_contacts import pair_radius
-from fdnet.scales.springs import Contact, mass_range
+from fdnet.scales.springs import Contact, mass_range, pair_radius
 
 MOST_OVERLAP = 0.5
 """Predicted overlap over a fine's diameter from which a case is refused: beyond it a fine could
@@ -35,7 +34,8 @@ def overlaps_of(case: InvasionCase, contact: Contact, push: Push, porosity: floa
     """
     radius, mass = case.fines.radius_range_m[1], mass_range(case.fines)[1]
     width = pore_width(porosity, case.grains.sauter_diameter_m)
-    velocity = arrival_velocity(push, radius, case.fines.density_kg_m3, width)
+    lightest = min(one.density for one in case.fines.components)
+    velocity = arrival_velocity(push, radius, lightest, width)
     force = push.force(radius)
     if contact.elastic:
         modulus, joint = contact.elastic.modulus, pair_radius(case, ("grain", "fine"), radius)
@@ -47,7 +47,22 @@ def overlaps_of(case: InvasionCase, contact: Contact, push: Push, porosity: floa
     return Overlaps(impact=impact / (2 * radius), drag=drag / (2 * radius))
 
 
-def refuse_deep_overlap(overlaps: Overlaps) -> None:
+def overlap_warnings(case: InvasionCase, overlaps: Overlaps) -> list[str]:
+    """Overlaps above `run.max_overlap`, in words.
+
+    Raises CaseError when drag or impact alone would press a fine half through a grain.
+    """
+    _refuse_deep(overlaps)
+    return [
+        f"predicted overlap under {name} is {100 * getattr(overlaps, name):.2g} % of a fine's "
+        f"diameter (above run.max_overlap, {100 * case.run.max_overlap:.3g} %): raise "
+        "run.stiffness_N_m"
+        for name in ("impact", "drag")
+        if getattr(overlaps, name) > case.run.max_overlap
+    ]
+
+
+def _refuse_deep(overlaps: Overlaps) -> None:
     """Raises CaseError when drag or impact alone would press a fine half through a grain."""
     remedies = {
         "drag": "drag.multiplier, fluid.viscosity_cP or fluid.velocity_m_s",
@@ -61,14 +76,3 @@ def refuse_deep_overlap(overlaps: Overlaps) -> None:
                 f"diameter into a grain (limit {100 * MOST_OVERLAP:.0f} %); raise it, or lower "
                 f"{remedy}"
             )
-
-
-def overlap_warnings(case: InvasionCase, overlaps: Overlaps) -> list[str]:
-    """Overlaps above `run.max_overlap`, in words."""
-    return [
-        f"predicted overlap under {name} is {100 * getattr(overlaps, name):.2g} % of a fine's "
-        f"diameter (above run.max_overlap, {100 * case.run.max_overlap:.3g} %): raise "
-        "run.stiffness_N_m"
-        for name in ("impact", "drag")
-        if getattr(overlaps, name) > case.run.max_overlap
-    ]

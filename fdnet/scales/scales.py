@@ -10,17 +10,26 @@ from typing import overload
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.errors import CaseError
+from fdnet.scales.cohesion import cohesion_warnings
 from fdnet.scales.contacts import contacts_of, stiffness_factor
 from fdnet.scales.drive import drive_of, drive_warnings
 from fdnet.scales.forces.push import Push, push_of
-from fdnet.scales.forces.warnings import reynolds_warnings
+from fdnet.scales.forces.throat import throat_width
+from fdnet.scales.forces.warnings import reynolds_warnings, throat_warnings
 from fdnet.scales.grain_pack import pack_step, target_porosity
-from fdnet.scales.overlaps import overlap_warnings, overlaps_of, refuse_deep_overlap
+from fdnet.scales.overlaps import overlap_warnings, overlaps_of
+from fdnet.scales.sizes import size_warnings
 from fdnet.scales.slab import slab_of, slab_warnings
 from fdnet.scales.springs import Contact
 from fdnet.scales.sticking import Sticking, sticking_of, sticking_warnings
 from fdnet.scales.stop_times import chunk_refreshes, plug_warnings, stop_times
-from fdnet.scales.time_step import drag_warnings, hold_steps, relaxation_time, time_step
+from fdnet.scales.time_step import (
+    densest_factor,
+    drag_warnings,
+    hold_steps,
+    relaxation_time,
+    time_step,
+)
 from fdnet.scales.velocity import Velocity, velocity_of, velocity_warnings
 
 MOST_STEPS = 2**31 - 1
@@ -83,6 +92,7 @@ class InvasionScales(Scales):
         push: drag and pressure gradient on fines in the pack, as simulated.
         drift_velocity: m/s, of the largest fine that the fluid carries freely in the pores, as
             simulated.
+        throat_ratio: diameter of the largest fine over that of the pack's throats.
         impact_overlap: predicted overlap by impact, over the diameter of the largest fine.
         drag_overlap: predicted overlap by drag and pressure gradient, over the diameter of the
             largest fine.
@@ -107,6 +117,7 @@ class InvasionScales(Scales):
     gradient_over_drag: float
     push: Push
     drift_velocity: float
+    throat_ratio: float
     impact_overlap: float
     drag_overlap: float
     sticking: Sticking
@@ -128,7 +139,7 @@ def scales_of(case: Case) -> Scales:
         shared = _shared(case, velocity)
         if not isinstance(case, InvasionCase):
             return shared
-        doubts = velocity_warnings(case, shared.porosity, velocity)
+        doubts = [*shared.warnings, *velocity_warnings(case, shared.porosity, velocity)]
         return _invasion(case, replace(shared, warnings=tuple(doubts)))
     except (OverflowError, ZeroDivisionError) as error:
         raise CaseError(
@@ -138,7 +149,7 @@ def scales_of(case: Case) -> Scales:
 
 
 def _shared(case: Case, velocity: Velocity) -> Scales:
-    contacts = contacts_of(case)
+    contacts = contacts_of(case, velocity.interstitial)
     return Scales(
         porosity=target_porosity(case),
         permeability=velocity.permeability,
@@ -149,6 +160,7 @@ def _shared(case: Case, velocity: Velocity) -> Scales:
         stiffness_factor=stiffness_factor(case),
         contacts=contacts,
         pack_step=pack_step(case, contacts),
+        warnings=tuple(size_warnings(case)),
     )
 
 
@@ -162,21 +174,20 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     shortest = relaxation[0] * push.relaxation_share(case.fines.radius_range_m[0])
     step = time_step(case, shared.contacts, shortest)
     times = stop_times(case, slab, drive, upstream=upstream)
-    hold = hold_steps(case, step, shortest, times.chunk)
+    hold = hold_steps(case, step, shortest / densest_factor(case), times.chunk)
     chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
     contact = shared.contacts["grain-fine"]
     overlaps = overlaps_of(case, contact, push, shared.porosity)
     sticking = sticking_of(case, contact, push, step)
     reynolds = _reynolds(case, shared.interstitial_velocity)
-    stokes = relaxation[1] * velocity / (2 * case.grains.mean_radius_m)
-    gravity = _gravity_over_drag(case, shared.interstitial_velocity)
-    refuse_deep_overlap(overlaps)
     _refuse_long_chunk(step, chunk_steps)
     warnings = [
         *shared.warnings,
         *drive_warnings(case, drive),
         *reynolds_warnings(case, push, reynolds),
+        *throat_warnings(case, _throat_ratio(case, shared)),
         *overlap_warnings(case, overlaps),
+        *cohesion_warnings(case, contact),
         *slab_warnings(case, slab),
         *drag_warnings(case, hold * step / shortest),
         *plug_warnings(case, times.plug, drive, upstream),
@@ -197,12 +208,13 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
         cap_time=times.cap,
         checkpoint_steps=chunk_steps,
         reynolds=reynolds,
-        stokes=stokes,
+        stokes=relaxation[1] * velocity / (2 * case.grains.mean_radius_m),
         impact_stokes=drive.impact_stokes,
-        gravity_over_drag=gravity,
+        gravity_over_drag=_gravity_over_drag(case, shared.interstitial_velocity),
         gradient_over_drag=_gradient_over_drag(case, shared),
         push=push,
         drift_velocity=velocity + push.drift(case.fines.radius_range_m[1]),
+        throat_ratio=_throat_ratio(case, shared),
         impact_overlap=overlaps.impact,
         drag_overlap=overlaps.drag,
         sticking=sticking,
@@ -210,14 +222,18 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
 
 
 def _relaxation_times(case: InvasionCase) -> tuple[float, float]:
-    """Of the smallest and of the largest fine, s."""
-    density, viscosity = case.fines.density_kg_m3, case.fluid.viscosity_Pa_s
-    low, high = case.fines.radius_range_m
-    multiplier = case.drag.multiplier
-    return (
-        relaxation_time(low, density, viscosity, multiplier),
-        relaxation_time(high, density, viscosity, multiplier),
-    )
+    """The shortest and the longest of the fines, s; with one material smallest and largest."""
+    viscosity, multiplier = case.fluid.viscosity_Pa_s, case.drag.multiplier
+    if not case.fines.measured:
+        ends = [(radius, case.fines.density_kg_m3) for radius in case.fines.radius_range_m]
+    else:
+        ends = [
+            (0.5 * diameter, one.density)
+            for one in case.fines.components
+            for diameter in (one.curve.low, one.curve.high)
+        ]
+    times = [relaxation_time(radius, density, viscosity, multiplier) for radius, density in ends]
+    return min(times), max(times)
 
 
 def _reynolds(case: InvasionCase, velocity: float) -> float:
@@ -235,9 +251,17 @@ def _gradient_over_drag(case: InvasionCase, shared: Scales) -> float:
     return 2 / 9 * case.fines.radius_range_m[1] ** 2 * shared.pressure_gradient / drag
 
 
+def _throat_ratio(case: InvasionCase, shared: Scales) -> float:
+    return 2 * case.fines.radius_range_m[1] / throat_width(shared.porosity, shared.permeability)
+
+
 def _gravity_over_drag(case: InvasionCase, velocity: float) -> float:
-    """2 r^2 (rho - rho_fluid) g / (9 mu u M) of the largest fine, M the drag multiplier."""
-    excess = abs(case.fines.density_kg_m3 - case.fluid.density_kg_m3 * case.gravity.buoyancy)
+    """2 r^2 (rho - rho_fluid) g / (9 mu u M), M the drag multiplier.
+
+    Of the largest fine and the material that weighs most in the fluid.
+    """
+    displaced = case.fluid.density_kg_m3 * case.gravity.buoyancy
+    excess = max(abs(one.density - displaced) for one in case.fines.components)
     weight = math.hypot(*case.gravity.acceleration_m_s2) * excess
     return (
         2

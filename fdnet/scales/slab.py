@@ -21,23 +21,23 @@ class Slab:
 def slab_of(case: InvasionCase) -> Slab:
     """Number of fines n and length l of the slab, n v = c A l.
 
-    v is the mean volume of a fine, c the concentration, A the cross-section of the box. A case
-    gives either n or l.
+    v is the mean volume of a fine, c the share by volume of the fines that are placed, A the
+    cross-section of the box. A case gives either n or l.
     """
     fines = case.fines
     area, volume = case.size_m[1] * case.size_m[2], fines.mean_volume_m3
     least = 2 * fines.radius_range_m[1]
     if fines.count is not None:
-        length = max(fines.count * volume / (fines.concentration * area), least)
+        length = max(fines.count * volume / (fines.placed_fraction * area), least)
         return Slab(count=fines.count, length=length)
     length = max(fines.slab_m or 0.0, least)
-    return Slab(count=max(1, round(fines.concentration * area * length / volume)), length=length)
+    return Slab(count=max(1, round(fines.placed_fraction * area * length / volume)), length=length)
 
 
 def arrival_time(case: InvasionCase, upstream: float) -> float:
     """Mean time between two fines that arrive at the face, v / (c A u), s; u = `upstream` m/s."""
     return case.fines.mean_volume_m3 / (
-        case.fines.concentration * case.size_m[1] * case.size_m[2] * upstream
+        case.fines.placed_fraction * case.size_m[1] * case.size_m[2] * upstream
     )
 
 

@@ -4,8 +4,9 @@ import math
 from dataclasses import dataclass
 
 from fdnet.case.case import Case
-from fdnet.case.particles import Spheres
-from fdnet.scales.hertz import Elastic, restitution_of
+from fdnet.case.spheres import Spheres
+from fdnet.scales.hertz import Elastic, joint_radius, restitution_of
+from fdnet.scales.restitution import LEAST, is_wet, pair_stokes, wet_ratio
 
 PAIRS = (
     ("grain", "grain"),
@@ -35,6 +36,8 @@ class Contact:
             of an undamped collision at the velocity of the fluid.
         step_limit: s, sqrt(m/k) of the lighter sphere.
         elastic: constants of a Hertz contact; None when the contact is linear.
+        stokes: impact Stokes number at the velocity of the fluid; None where the restitution does
+            not depend on it.
     """
 
     pair: str
@@ -46,6 +49,7 @@ class Contact:
     contact_time: float
     step_limit: float
     elastic: Elastic | None = None
+    stokes: float | None = None
 
     @property
     def restitution(self) -> float:
@@ -65,8 +69,17 @@ def sphere_mass(radius: float, density: float) -> float:
 
 def mass_range(spheres: Spheres) -> tuple[float, float]:
     """Mass of the smallest and of the largest sphere, kg."""
-    low, high = spheres.radius_range_m
-    return sphere_mass(low, spheres.density_kg_m3), sphere_mass(high, spheres.density_kg_m3)
+    if not spheres.measured:
+        low, high = spheres.radius_range_m
+        return sphere_mass(low, spheres.density_kg_m3), sphere_mass(high, spheres.density_kg_m3)
+    ends = [
+        (
+            sphere_mass(0.5 * one.curve.low, one.density),
+            sphere_mass(0.5 * one.curve.high, one.density),
+        )
+        for one in spheres.components
+    ]
+    return min(low for low, _ in ends), max(high for _, high in ends)
 
 
 def _nominal(case: Case) -> dict[str, tuple[float, float, float]]:
@@ -75,7 +88,7 @@ def _nominal(case: Case) -> dict[str, tuple[float, float, float]]:
         name: (spheres.normal_stiffness_N_m, spheres.tangential_stiffness, spheres.friction)
         for name, spheres in case.spheres.items()
     }
-    return table | {"wall": (*table["grain"][:2], case.box.wall_friction)}
+    return table | {"wall": (*table["grain"][:2], case.wall_friction)}
 
 
 def pairs_of(case: Case) -> list[tuple[str, str]]:
@@ -93,21 +106,16 @@ def hooke_factor(case: Case) -> float:
     )
 
 
-def hooke_contacts(case: Case) -> dict[str, Contact]:
-    """The linear contact of each pair of materials of the case, by its name."""
+def hooke_contacts(case: Case, velocity: float) -> dict[str, Contact]:
+    """The linear contact of each pair of materials, in a fluid of a velocity in m/s."""
+    return {f"{a}-{b}": _contact(case, (a, b), velocity) for a, b in pairs_of(case)}
+
+
+def _contact(case: Case, pair: tuple[str, str], velocity: float) -> Contact:
     nominal, factor = _nominal(case), hooke_factor(case)
-    return {f"{a}-{b}": _contact(case, (a, b), nominal, factor) for a, b in pairs_of(case)}
-
-
-def _contact(
-    case: Case,
-    pair: tuple[str, str],
-    nominal: dict[str, tuple[float, float, float]],
-    factor: float,
-) -> Contact:
     first, second = pair
     normal = factor * series(nominal[first][0], nominal[second][0])
-    damping = mean_damping([case.spheres[name] for name in pair if name != "wall"])
+    damping, stokes = damping_and_stokes(case, pair, velocity)
     frequency = math.sqrt(normal / effective_mass(case, pair))
     lightest = case.spheres["fine" if "fine" in pair else "grain"]
     return Contact(
@@ -119,12 +127,34 @@ def _contact(
         damping_rate=2 * damping * frequency,
         contact_time=math.pi / (frequency * math.sqrt(1 - damping**2)),
         step_limit=math.sqrt(mass_range(lightest)[0] / normal),
+        stokes=stokes,
     )
 
 
-def mean_damping(spheres: list[Spheres]) -> float:
-    """Damping ratio of a contact: the mean of its materials, a wall taking the sphere's."""
-    return sum(one.damping_ratio for one in spheres) / len(spheres)
+def damping_and_stokes(
+    case: Case, pair: tuple[str, str], velocity: float
+) -> tuple[float, float | None]:
+    """Damping ratio of a contact, and the impact Stokes number where that decides it.
+
+    Dry it is the mean of the two materials, a wall taking the sphere's. `velocity` is the fluid's,
+    m/s.
+    """
+    spheres = [case.spheres[name] for name in pair if name != "wall"]
+    dry = sum(one.damping_ratio for one in spheres) / len(spheres)
+    if not is_wet(case, pair):
+        return dry, None
+    radius = pair_radius(case, pair, case.spheres["fine"].mean_radius_m)
+    mass = effective_mass(case, pair)
+    stokes = pair_stokes(mass, radius, velocity, case.fluid.viscosity_Pa_s)
+    return wet_ratio(dry, stokes, least=LEAST[case.contact.model]), stokes
+
+
+def pair_radius(case: Case, pair: tuple[str, str], radius: float) -> float:
+    """R*, m, of a sphere of `radius` m, the lighter one of the pair, and its partner."""
+    if "wall" in pair:
+        return radius
+    mixed = "fine" in pair and "grain" in pair
+    return joint_radius(radius, case.grains.mean_radius_m if mixed else radius)
 
 
 def effective_mass(case: Case, pair: tuple[str, str]) -> float:
@@ -137,4 +167,4 @@ def effective_mass(case: Case, pair: tuple[str, str]) -> float:
 
 
 def _inverse_mass(spheres: Spheres) -> float:
-    return 1 / sphere_mass(spheres.mean_radius_m, spheres.density_kg_m3)
+    return 1 / sphere_mass(spheres.mean_radius_m, spheres.mean_density_kg_m3)

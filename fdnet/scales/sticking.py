@@ -88,7 +88,7 @@ def sticking_of(case: InvasionCase, contact: Contact, push: Push, step: float) -
         step: time step, s.
     """
     radius, grain = case.fines.radius_range_m[0], case.grains.radius_range_m[1]
-    mass = sphere_mass(radius, case.fines.density_kg_m3)
+    mass = sphere_mass(radius, min(one.density for one in case.fines.components))
     force, slope = push.force(radius), groove_slope(radius / grain)
     drift = push.velocity + push.drift(radius)
     rolling = min(drift, fall_velocity(force, mass, slope * grain))

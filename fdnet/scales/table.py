@@ -9,11 +9,12 @@ from fdnet.scales.grain_pack import grain_count
 from fdnet.scales.quantity import Quantity
 from fdnet.scales.quantity import row as _row
 from fdnet.scales.scales import InvasionScales, Scales
+from fdnet.scales.sizes import size_rows
 
 
 def scale_rows(case: Case, scales: Scales) -> list[Quantity]:
     """Every scale of the case with its formula and source, in reading order."""
-    rows = flow_rows(case, scales)
+    rows = [_row(*one) for one in size_rows(case)] + flow_rows(case, scales)
     if isinstance(scales, InvasionScales):
         rows += _fine_rows(case, scales)
     rows += contact_rows(case, scales)

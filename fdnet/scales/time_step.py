@@ -8,6 +8,7 @@ import math
 from fdnet.case.case import Case
 from fdnet.case.values import CONTACT_STEP_LIMIT
 from fdnet.errors import CaseError
+from fdnet.scales.forces.crowd import Crowd, drag_factor
 from fdnet.scales.springs import Contact
 
 HOLD_OVER_RELAXATION = 0.05
@@ -16,6 +17,8 @@ be as large as the scatter between seeds."""
 DRAG_WARNING, DRAG_LIMIT = 0.1, 1.0
 """Time for which drag is constant over tau: above the first value fdnet warns, above the second it
 refuses the case."""
+RANDOM_CLOSE = 0.36
+"""Porosity of random close packing of equal spheres (Scott and Kilgour 1969)."""
 _ROUNDING = 1 + 1e-12
 
 
@@ -81,6 +84,14 @@ def hold_steps(case: Case, step: float, tau: float, longest: float) -> int:
             f"{longest:.3g} s between checkpoints; expected at most {most}"
         )
     return given
+
+
+def densest_factor(case: Case) -> float:
+    """Factor on the drag of a fine in a random close packing of fines; 1 without a crowd."""
+    if case.drag.crowd == "none":
+        return 1.0
+    crowd = Crowd(porosity=RANDOM_CLOSE)
+    return float(drag_factor(crowd, gradient_apart=False)) / RANDOM_CLOSE
 
 
 def drag_warnings(case: Case, held: float) -> list[str]:

@@ -25,11 +25,15 @@ STUDIES: Mapping[str, str] = {
     "velocity-field": "cells across a grain for the velocity between the grains",
     "specimen-size": "number of grains and seed: how large a specimen must be",
     "economies": "settings that make full-scale invasions affordable: error and speed-up of each",
+    "outside-numbers": "the invasion on the real binary against closed forms and literature",
 }
 """Name of each study and its question; the module has the same name with underscores."""
 
 OF_NETWORK = ("throat-occupancy", "linear-solver", "laws", "velocity-field", "specimen-size")
 """The studies of the network half; the others are of the invasion."""
+
+OUTSIDE = "outside-numbers"
+"""The study whose cases are a package of their own."""
 
 THESIS = "thesis"
 """A further study, of runs and figures rather than of error against run time."""
@@ -121,7 +125,7 @@ def study_named(name: str) -> Study:
 
 
 def _module(name: str) -> str:
-    room = "network" if name in OF_NETWORK else "dem"
+    room = "outside" if name == OUTSIDE else "network" if name in OF_NETWORK else "dem"
     return f"fdnet.studies.{room}.{name.replace('-', '_')}"
 
 

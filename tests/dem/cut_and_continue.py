@@ -10,6 +10,7 @@ from fdnet.case.case import InvasionCase
 from fdnet.dem.binary import Binary
 from fdnet.dem.invasion import Invasion, invade
 from fdnet.dem.liggghts import Launch
+from fdnet.run.fluid.fluid_of import fluid_of
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Snapshot
 
@@ -51,7 +52,8 @@ def differences(
     end, are compared bit for bit.
     """
     launch = Launch(binary=binary, ranks=ranks)
-    whole = invade(case, scales_of(case), grains, folder / "whole", launch)
+    scales = scales_of(case)
+    whole = invade(case, scales, grains, folder / "whole", launch, fluid=fluid_of(case, scales))
     again = cut_and_continue(case, grains, folder / "cut", launch)
     columns = ("id", "kind", "position", "radius", "velocity")
     different = [
@@ -61,6 +63,8 @@ def differences(
     ]
     if again.history != whole.history:
         different.append("history")
+    if again.updates != whole.updates:
+        different.append("updates")
     return different
 
 
@@ -74,8 +78,9 @@ def cut_and_continue(
             raise StopError
 
     cut = Launch(binary=launch.binary, ranks=launch.ranks, follow=stop)
+    scales = scales_of(case)
     try:
-        invade(case, scales_of(case), grains, folder, cut)
+        invade(case, scales, grains, folder, cut, fluid=fluid_of(case, scales))
     except StopError:
-        return invade(case, scales_of(case), grains, folder, launch)
+        return invade(case, scales, grains, folder, launch, fluid=fluid_of(case, scales))
     raise AssertionError(f"the invasion ended before checkpoint {CUT_AT}")

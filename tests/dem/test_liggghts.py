@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from fdnet.dem import liggghts
+from fdnet.dem import process
 from fdnet.dem.binary import Binary, find_binary
 from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.errors import LiggghtsError
@@ -115,7 +115,7 @@ def test_the_run_dies_with_its_parent(fake, tmp_path):
 
 def test_a_folder_where_liggghts_still_writes_is_refused(fake, tmp_path, monkeypatch):
     """LIGGGHTS holds the lock itself: it outlives a killed parent; MPI ranks take time to end."""
-    monkeypatch.setattr(liggghts, "LOCK_PATIENCE", 0.3)
+    monkeypatch.setattr(process, "LOCK_PATIENCE", 0.3)
     command = ["sh", "-c", f"exec 9>{tmp_path}/.lock; flock 9; sleep 30 9>&9"]
     orphan = subprocess.Popen(command, start_new_session=True)
     time.sleep(0.5)
@@ -171,7 +171,7 @@ def test_two_ranks_run(binary, tmp_path):
 
 @pytest.mark.parametrize("mode", ["flood", "zeros", "log"])
 def test_a_run_that_floods_its_screen_or_log_is_stopped(fake, tmp_path, monkeypatch, mode):
-    monkeypatch.setattr(liggghts, "MOST_BYTES", 1 << 20)
+    monkeypatch.setattr(process, "MOST_BYTES", 1 << 20)
     with pytest.raises(LiggghtsError, match=r"LIGGGHTS wrote more than 1 MiB into .*; "):
         run(fake, tmp_path, mode, timeout=60.0)
 

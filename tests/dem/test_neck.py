@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from fdnet.case.particles import SHEAR_RATIO
+from fdnet.case.spheres import SHEAR_RATIO
 from fdnet.scales.sticking import MOST_FALSE_FORCE
 from fdnet.studies.dem.neck import LEAVES_AFTER, Neck, factor_step, leaving_time
 

@@ -7,10 +7,12 @@ import pytest
 from builders import resting_spheres, tiny
 
 from fdnet.case.case import Case
+from fdnet.case.file import case_from
 from fdnet.dem.contact_lines import contact_variables
 from fdnet.dem.deck import number, render_text
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch, run_deck
+from fdnet.dem.measured_fines import densities
 from fdnet.dem.scene import write_data
 from fdnet.scales.scales import scales_of
 from fdnet.scales.time_step import relaxation_time
@@ -19,6 +21,8 @@ from fdnet.spheres.dump import read_dump
 from fdnet.spheres.snapshot import Kind, Snapshot
 
 pytestmark = pytest.mark.liggghts
+
+FEW = {"D10_mm": 0.08, "D90_mm": 0.12}
 
 
 def snapshot(case: Case, position: list, kind: Kind, radius: float, first: int = 1) -> Snapshot:
@@ -95,6 +99,34 @@ def test_free_fall_and_rise_are_exact_in_any_direction(binary, tmp_path, density
     fine, elapsed = fallen(case, binary, tmp_path)
     fall = share * np.array([60.0, -45.0, -100.0]) * elapsed
     assert fine.velocity[0] - [0.5, 0, 0] == pytest.approx(fall, rel=1e-5)
+
+
+@pytest.mark.parametrize("buoyancy", ["true", "false"])
+def test_each_fine_of_several_materials_falls_by_its_own_density(binary, tmp_path, buoyancy):
+    """dv = g (1 - rho_f / rho_p) t with the density of its material, in the same run."""
+    materials = [
+        {"name": "light", "share": 1.0, "density_kg_m3": 1500.0, "sizes": FEW},
+        {"name": "heavy", "share": 3.0, "density_kg_m3": 4500.0, "sizes": FEW},
+    ]
+    pull = np.array([60.0, -45.0, -100.0])
+    case = tiny(
+        "gravity.mode=on",
+        f"gravity.acceleration_m_s2={pull.tolist()}",
+        f"gravity.buoyancy={buoyancy}",
+        "box.size_mm=[3.0,3.0,3.0]",
+        "fluid={velocity_m_s=0.5, viscosity_cP=1e-12}",
+        "run={duration_ms=0.2, checkpoint_ms=0.2}",
+    )
+    data = case.data()
+    data["fines"] = {"count": 6, "concentration": 0.01, "supply": "slab", "materials": materials}
+    case = case_from(data)
+    fines, elapsed = fallen(case, binary, tmp_path)
+    density = densities(case, [6])
+    assert set(density) == {1500.0, 4500.0}
+    share = 1 - 1095 / density[:, None] * (buoyancy == "true")
+    order = np.argsort(fines.id)
+    fall = fines.velocity[order] - [0.5, 0, 0]
+    assert fall == pytest.approx(share * pull * elapsed, rel=1e-5)
 
 
 def test_mobile_grains_fall_by_their_own_density(binary, tmp_path):

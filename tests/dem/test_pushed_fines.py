@@ -4,12 +4,18 @@ import math
 
 import numpy as np
 import pytest
-from builders import tiny
-from test_drag import RADIUS, TAU, drive, speeds
+from builders import resting_spheres, tiny
+from test_drag import RADIUS, TAU, drag_text, drive, speeds
 
 from fdnet.case.case import Case
+from fdnet.dem.deck import render_text
+from fdnet.dem.liggghts import Launch, run_deck
+from fdnet.dem.scene import write_data
+from fdnet.scales.forces.crowd import Crowd, drag_factor
 from fdnet.scales.forces.push import push_of
 from fdnet.scales.scales import scales_of
+from fdnet.spheres.dump import read_dump
+from fdnet.spheres.snapshot import Kind
 
 pytestmark = pytest.mark.liggghts
 SPEED, START = 0.5, 1.75e-3 - RADIUS
@@ -106,3 +112,66 @@ def test_drag_at_a_finite_reynolds_number_relaxes_as_schiller_and_naumann_have_i
         expected = 8.0 - np.interp(frame.step * step, time, slip)
         assert speed == pytest.approx(expected, abs=0.01 * 8.0)
     assert seen[-1] > 2 * 8.0 * (1 - math.exp(-800 * step / tau)), "Stokes's is far slower"
+
+
+@pytest.mark.parametrize("scheme", ["every_step", "viscous"])
+def test_the_forces_on_a_dense_bed_add_up_to_its_pressure_drop(binary, tmp_path, scheme):
+    """150 held fines at a porosity of 0.40: the sum of the dumped forces is G A L within 1 %.
+
+    The drag coefficient is that of Beetstra's law beside the gradient of Carman and Kozeny's.
+    """
+    factor = float(drag_factor(Crowd(porosity=0.4), gradient_apart=True))
+    volume = 150 * 4 / 3 * math.pi * RADIUS**3 / 0.6
+    length = volume / 0.5e-3**2
+    case = tiny(
+        f"drag={{multiplier={factor}, scheme={scheme!r}}}",
+        "grains={radius_mm=0.0500001, porosity=0.4}",
+        f"box.size_mm=[{1e3 * length}, 0.5, 0.5]",
+        "fines={radius_mm=0.05, count=150}",
+        "fluid.velocity_m_s=0.01",
+    )
+    scales = scales_of(case)
+    forces = bed_forces(case, binary, tmp_path)
+    assert len(forces) == 150
+    assert np.sum(forces) == pytest.approx(scales.pressure_gradient * volume, rel=0.01)
+    single = 6 * math.pi * 0.05 * RADIUS * 0.01 * factor
+    assert np.sum(forces) - 150 * single == pytest.approx(0.6 * scales.pressure_gradient * volume)
+
+
+def bed_forces(case: Case, binary, folder) -> np.ndarray:
+    """Forces along x, N, on fines that neither move nor touch, by the deck's own lines."""
+    size = np.array(case.size_m)
+    grid = np.stack(np.meshgrid(*[(np.arange(n) + 0.5) / n for n in (6, 5, 5)], indexing="ij"))
+    box = np.column_stack([np.zeros(3), size])
+    place = (grid.reshape(3, -1).T * size).tolist()
+    fines = resting_spheres(place, RADIUS, box, kind=Kind.FINE, first=2)
+    grain = resting_spheres([(size / 2).tolist()], RADIUS, box, kind=Kind.GRAIN)
+    write_data(
+        folder / "bed.data",
+        grain.joined(fines),
+        bounds=box,
+        density=np.full(len(fines) + 1, 2146.0),
+        types=2,
+    )
+    header = {
+        "stage": "test",
+        "case_name": "bed",
+        "digest": "-",
+        "left_out": [],
+        "boundary": "f f f",
+        "processors": "",
+    }
+    text = render_text("_header.in.j2", header) + "read_data bed.data\n"
+    text += "group grains type 1\ngroup fines type 2\nneighbor 1e-5 bin\n"
+    text += "fix kn all property/global kn peratomtypepair 2 1 1 1 1\n"
+    text += "fix kt all property/global kt peratomtypepair 2 0 0 0 0\n"
+    text += "fix gn all property/global gamman peratomtypepair 2 0 0 0 0\n"
+    text += "fix gt all property/global gammat peratomtypepair 2 0 0 0 0\n"
+    text += "pair_style gran model hooke/stiffness\npair_coeff * *\ntimestep 1e-8\n"
+    text += "neigh_modify delay 0 exclude group all all\n"
+    text += drag_text(case, scales_of(case))
+    text += "dump d fines custom 1 d.dump id x fx\n"
+    text += 'dump_modify d sort id format "%d %.17g %.17g"\nrun 1\nprint "DECK_DONE"\n'
+    (folder / "in.bed").write_text(text)
+    run_deck(folder, "in.bed", Launch(binary=binary))
+    return read_dump(folder / "d.dump")[-1].column("fx")

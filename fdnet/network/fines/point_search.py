@@ -19,15 +19,7 @@ def points_in_boxes(point: Array, low: Array, high: Array) -> tuple[Array, Array
     """
     if not len(point) or not len(low):
         return np.zeros(0, np.intp), np.zeros(0, np.intp)
-    start = point.min(axis=0)
-    # as many cells as points at the most
-    edge = max(float(np.ptp(point, axis=0).max()) / len(point) ** (1.0 / 3.0), 1e-300)
-    cell = ((point - start) / edge).astype(np.intp)
-    shape = cell.max(axis=0) + 1
-    flat = np.ravel_multi_index(tuple(cell.T), tuple(shape))
-    order = np.argsort(flat, kind="stable")
-    first = np.concatenate([[0], np.cumsum(np.bincount(flat, minlength=int(shape.prod())))])
-    grid = (start, edge, shape, first)
+    grid, order = grid_of(point)
     placed = point[order]
     count = _search(grid, placed, low, high, np.zeros(0, np.intp))
     box = np.repeat(np.arange(len(low)), count)
@@ -36,15 +28,33 @@ def points_in_boxes(point: Array, low: Array, high: Array) -> tuple[Array, Array
     return box, order[inside]
 
 
-@compiled
-def _search(
-    grid: tuple[Array, float, Array, Array], point: Array, low: Array, high: Array, inside: Array
-) -> Array:
-    """Number of points (M,) in each box; writes their indices to `inside` where that has room.
+Grid = tuple[Array, float, Array, Array]
+"""Low corner (3,) m, edge m of a cell, number of cells (3,) along each axis, and for each cell the
+index of its first point, with the number of points at the end."""
 
-    `grid` holds the low corner (3,) m, the edge m of a cell, the number of cells (3,) along each
-    axis, and for each cell the index of its first point, with the number of points at the end.
+
+def grid_of(point: Array, edge: float | None = None) -> tuple[Grid, Array]:
+    """Points (N, 3) m sorted into cubic cells of `edge` m, with N at least 1.
+
+    Without an edge the cells are as many as the points along the longest side of a cube.
+
+    Returns:
+        The cells, and the order (N,) in which they hold the points.
     """
+    start = point.min(axis=0)
+    if edge is None:
+        edge = max(float(np.ptp(point, axis=0).max()) / len(point) ** (1.0 / 3.0), 1e-300)
+    cell = ((point - start) / edge).astype(np.intp)
+    shape = cell.max(axis=0) + 1
+    flat = np.ravel_multi_index(tuple(cell.T), tuple(shape))
+    order = np.argsort(flat, kind="stable")
+    first = np.concatenate([[0], np.cumsum(np.bincount(flat, minlength=int(shape.prod())))])
+    return (start, edge, shape, first), order
+
+
+@compiled
+def _search(grid: Grid, point: Array, low: Array, high: Array, inside: Array) -> Array:
+    """Number of points (M,) in each box; writes their indices to `inside` where that has room."""
     start, edge, shape, first = grid
     count = np.zeros(len(low), np.intp)
     cell = np.empty((3, 2), np.intp)

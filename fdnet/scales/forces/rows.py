@@ -1,5 +1,6 @@
 """The forces on a fine as rows of the table of scales."""
 
+from fdnet.scales.forces.throat import MOST_RATIO, held_factor
 from fdnet.scales.quantity import Quantity, row
 from fdnet.scales.scales import InvasionScales
 
@@ -55,4 +56,31 @@ def force_rows(scales: InvasionScales) -> list[Quantity]:
             "u (1 + P) where the gradient acts, as simulated",
             "balance of drag and gradient",
         ),
+        *_throat_rows(scales),
     ]
+
+
+def _throat_rows(scales: InvasionScales) -> list[Quantity]:
+    """The walls of the throats; no factor for a fine that closes them."""
+    rows = [
+        row(
+            "largest fine over throat",
+            "d/D",
+            scales.throat_ratio,
+            "-",
+            "2r / sqrt(32 k / phi)",
+            "tubes of the pack's permeability",
+        )
+    ]
+    if scales.throat_ratio <= MOST_RATIO:
+        rows.append(
+            row(
+                "drag in a throat over a lone sphere's",
+                "K",
+                held_factor(scales.throat_ratio),
+                "-",
+                "at rest on the axis",
+                "Haberman & Sayre 1958, solved anew",
+            )
+        )
+    return rows

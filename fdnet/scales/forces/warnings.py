@@ -3,9 +3,13 @@
 from fdnet.case.case import InvasionCase
 from fdnet.scales.forces.push import Push
 from fdnet.scales.forces.reynolds import MOST_REYNOLDS, drag_factor
+from fdnet.scales.forces.throat import MOST_RATIO, held_factor
 
 STOKES_REYNOLDS = 1.0
 """Reynolds number above which Stokes's drag is more than 15 % too small."""
+
+THROAT_FACTOR = 2.0
+"""Drag in a throat over that of a lone sphere, from which fdnet warns."""
 
 
 def reynolds_warnings(case: InvasionCase, push: Push, reynolds: float) -> list[str]:
@@ -39,4 +43,25 @@ def _beyond(case: InvasionCase, push: Push, reynolds: float) -> list[str]:
     return [
         f"particle Reynolds number {fastest:.3g} of a fine that drifts freely is outside the "
         f"range of Schiller and Naumann's drag (below {MOST_REYNOLDS:g})"
+    ]
+
+
+def throat_warnings(case: InvasionCase, ratio: float) -> list[str]:
+    """By how much the drag of a lone sphere is too small between the walls of a throat.
+
+    `ratio` is the diameter of the largest fine over that of the throats.
+    """
+    diameter = 2e3 * case.fines.radius_range_m[1]
+    who = f"the largest fine ({diameter:.3g} mm) is {ratio:.2g} of the width of the throats"
+    if ratio > MOST_RATIO:
+        return [
+            f"{who} (tubes of the pack's permeability): it closes them, and there the pressure "
+            "drop across it is its force, not the drag of a lone sphere"
+        ]
+    factor = held_factor(ratio)
+    if factor < THROAT_FACTOR:
+        return []
+    return [
+        f"{who} (tubes of the pack's permeability): at rest on the axis of one it feels "
+        f"{factor:.2g} times the drag of a lone sphere, by which the drag is too small there"
     ]

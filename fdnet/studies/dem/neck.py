@@ -92,7 +92,7 @@ def _case(neck: Neck) -> InvasionCase:
         case_from(
             {
                 "name": "neck",
-                "box": {"size_mm": [50.0, 50.0, 50.0]},
+                "box": {"size_mm": [50.0, 50.0, 50.0], "sides": "walls", "wall_friction": 0.0},
                 "grains": {"radius_mm": 1e3 * GRAIN, "count": 2, **material},
                 "fines": {**fine, **material},
                 "fluid": {"velocity_m_s": 1e-3},

@@ -33,12 +33,17 @@ from fdnet.studies.engine.runner import child_core_seconds
 
 SLAB: dict[str, Any] = {
     "name": "study",
-    "box": {"size_mm": [4.0, 2.86, 2.86]},
+    "box": {"size_mm": [4.0, 2.86, 2.86], "sides": "walls", "wall_friction": 0.0},
     "grains": {"radius_mm": 0.25, "count": 300, "shear_stiffness_N_m": 34.0e9},
-    "fines": {"radius_mm": 0.05, "count": 1000, "shear_stiffness_N_m": 26.0e9},
+    "fines": {
+        "radius_mm": 0.05,
+        "count": 1000,
+        "shear_stiffness_N_m": 26.0e9,
+        "supply": "slab",
+    },
     "fluid": {"darcy_length_mm": 8.0},
-    "drag": {"scheme": "viscous", "pressure_gradient": False},
-    "run": {"duration_ms": 2.0},
+    "drag": {"upstream": "interstitial", "scheme": "viscous", "pressure_gradient": False},
+    "run": {"duration_ms": 2.0, "time_step_factor": 0.1},
     "analysis": {"sections": 4},
 }
 """The invasion of the studies: 300 fixed grains at porosity 0.40, 1,000 fines of 0.10 mm, 2 ms.
@@ -78,7 +83,7 @@ def slab_case(seed: int, *assignments: str, small: bool = False) -> InvasionCase
     if small:
         for part, values in _SMALL.items():
             data[part] |= values
-        data["run"] = {"duration_ms": 0.5}
+        data["run"] |= {"duration_ms": 0.5}
     return with_fines(case_from(set_keys(data, [f"seed={seed}", *assignments])))
 
 
@@ -145,11 +150,23 @@ def _gridded(
     case: InvasionCase, grains: Snapshot, folder: Path, grid: tuple[int, ...], launch: Launch
 ) -> Run:
     """The whole invasion under another processor grid than fdnet's; `invade` then reads it."""
+    line = "processors " + " ".join(map(str, grid))
+    return edited_run(case, grains, folder, launch, (r"^processors .*$", line))
+
+
+def edited_run(
+    case: InvasionCase, grains: Snapshot, folder: Path, launch: Launch, edit: tuple[str, str]
+) -> Run:
+    """The whole invasion with one line of its deck replaced; `invade` then reads the folder.
+
+    `edit` is the pattern of the line and what takes its place. Raises AssertionError when not
+    exactly one line of the deck has the pattern.
+    """
     (folder / "post").mkdir(parents=True)
     scales = scales_of(case)
     deck = write_invade_inputs(case, scales, grains, folder, ranks=launch.ranks).text
-    text, count = re.subn(r"(?m)^processors .*$", "processors " + " ".join(map(str, grid)), deck)
-    assert count == 1, f"{count} lines of the deck begin with processors, expected 1"
+    text, count = re.subn(f"(?m){edit[0]}", edit[1], deck)
+    assert count == 1, f"{count} lines of the deck have the pattern {edit[0]}, expected 1"
     write_text(folder / "in.invade", text)
     write_text(folder / HISTORY, HISTORY_HEADER + "\n")
     keeper = CheckpointKeeper(folder, case, scales, grains, launch=launch)
@@ -177,6 +194,7 @@ def invasion_observed(case: InvasionCase, grains: Snapshot, result: Invasion) ->
         "invaded": float(last.invaded),
         "passed": float(last.passed),
         "mean_depth": _mean(depth),
+        "depth_p95": analysis.invasion_depth_p95,
         "count_first": float(first.fines_count),
         "porosity_initial": analysis.porosity_initial,
         "k_initial": analysis.k_initial,

@@ -66,16 +66,21 @@ def case_of(point: Point) -> InvasionCase:
             {
                 "name": "size-ratio",
                 "seed": point.seed,
-                "box": {"size_mm": [_LENGTH_MM, _SIDE_MM, _SIDE_MM], "sides": "periodic"},
+                "box": {"size_mm": [_LENGTH_MM, *[_SIDE_MM] * 2], "wall_friction": 0.0},
                 "grains": {"radius_mm": _GRAIN_MM, "porosity": 0.40, **material[0]},
                 "fines": {
                     "radius_mm": radius,
                     "count": FINES,
                     "concentration": FINES * volume / (_SIDE_MM**2 * _SLAB_MM),
+                    "supply": "slab",
                     **material[1],
                 },
                 "fluid": {"darcy_length_mm": 8.0},
-                "drag": {"scheme": "viscous", "pressure_gradient": False},
+                "drag": {
+                    "upstream": "interstitial",
+                    "scheme": "viscous",
+                    "pressure_gradient": False,
+                },
                 "run": {
                     "duration_ms": 2.4,
                     "checkpoint_ms": 0.6,

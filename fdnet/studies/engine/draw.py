@@ -24,7 +24,13 @@ _COST_LABELS = {
 
 
 def draw_study(study: Study, rows: Sequence[Row], path: Path) -> None:
-    """Draws one axes for each panel that has rows, up to three side by side."""
+    """Draws one axes for each panel that has rows, up to three side by side.
+
+    A study that draws its own figure does that.
+    """
+    if study.draw:
+        study.draw(rows, path)
+        return
     import matplotlib as mpl
 
     mpl.use("Agg")

@@ -152,6 +152,8 @@ class Study:
         needs_liggghts: whether LIGGGHTS must be there.
         seconds: limit of an isolated point.
         bytes: memory limit of an isolated point.
+        page: Markdown of the whole page, in place of knees and tables; None for these.
+        draw: draws the figure to a path, in place of the panels; None for these.
     """
 
     name: str
@@ -168,6 +170,8 @@ class Study:
     needs_liggghts: bool = False
     seconds: float = 3600.0
     bytes: float = 16 * 2.0**30
+    page: Callable[[Sequence[Row]], str] | None = None
+    draw: Callable[[Sequence[Row], Path], None] | None = None
 
 
 def ladder(

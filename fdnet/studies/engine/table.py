@@ -52,8 +52,11 @@ def study_text(study: Study, rows: Sequence[Row]) -> str:
     """The Markdown of a study.
 
     It holds one sentence for every series of every panel (or the study's own summary), the points
-    that were not done, and a table of the levels of each series.
+    that were not done, and a table of the levels of each series. A study with a page of its own
+    has that.
     """
+    if study.page:
+        return wrapped(study.page(rows))
     parts = [f"# {study.title}"]
     if study.summary:
         parts += [f"The table shows what each {study.knob_label} costs and saves."]

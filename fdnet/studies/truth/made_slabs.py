@@ -50,15 +50,17 @@ class Specimen:
             {
                 "name": name,
                 "seed": self.seed,
-                "box": {"size_mm": list(BOX_MM), "sides": "periodic"},
+                "box": {"size_mm": list(BOX_MM), "sides": "periodic", "wall_friction": 0.0},
                 "grains": grains,
                 "fines": {
                     "radius_mm": self.fine_mm,
                     "count": self.supplied,
+                    "supply": "slab",
                     "friction": self.friction,
                 },
                 "fluid": {"darcy_length_mm": DARCY_LENGTH_MM},
-                "drag": {"pressure_gradient": False},
+                "drag": {"upstream": "interstitial", "pressure_gradient": False},
+                "run": {"time_step_factor": 0.1},
                 "analysis": {"sections": SECTIONS},
             }
         )

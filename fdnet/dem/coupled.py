@@ -1,0 +1,125 @@
+"""A coupled invasion: what the fluid does to each fine is computed anew while LIGGGHTS waits.
+
+fdnet feeds LIGGGHTS the commands of an invasion: the deck, then for each chunk the batch of fines
+that comes, for each update the files `ask.in` and `fluid.in` with a `run` after them, and
+`checkpoint.in`. Every chunk begins with an update and a `run` that sets everything up, as in an
+invasion that is not coupled; so a cut one goes on bit for bit.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from fdnet.case.case import InvasionCase
+from fdnet.dem.checkpoint import Checkpoint, chunks_of, read_history
+from fdnet.dem.feed import Feed
+from fdnet.dem.fluid import STATE, Fluid, FluidForces, Moment, largest_share, write_forces
+from fdnet.dem.invade_deck import SUPPLY, batch_chunks
+from fdnet.dem.scene import snapshot_of
+from fdnet.dem.updates import Updates
+from fdnet.errors import LiggghtsError
+from fdnet.scales.scales import InvasionScales
+from fdnet.scales.time_step import DRAG_LIMIT
+from fdnet.spheres.dump import read_frame
+from fdnet.spheres.snapshot import Snapshot
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Coupling:
+    """A coupled invasion.
+
+    Attributes:
+        case: what is run.
+        scales: of the case.
+        grains: of the pack.
+        folder: of the invasion.
+        fluid: answers for the fines.
+        last: checkpoint from which it goes on; None from the start.
+        over: whether a checkpoint is the end.
+    """
+
+    case: InvasionCase
+    scales: InvasionScales
+    grains: Snapshot
+    folder: Path
+    fluid: Fluid
+    last: Checkpoint | None
+    over: Callable[[Checkpoint], bool]
+
+    @property
+    def deck(self) -> str:
+        """Name of the deck that LIGGGHTS begins with."""
+        return "in.invade" if self.last is None else "in.invade.resume"
+
+    def play(self, feed: Feed) -> None:
+        """Feed LIGGGHTS the whole invasion.
+
+        Raises LiggghtsError when explicit drag would overshoot, DumpError when LIGGGHTS did not
+        show its spheres, and what the fluid raises.
+        """
+        step, chunk = (self.last.step, self.last.chunk) if self.last else (0, 0)
+        updates = Updates(self.folder, self.fluid.measured, upto=step)
+        feed(f"include {self.deck}")
+        batches = batch_chunks(self.case, self.scales)
+        while chunk < chunks_of(self.case, self.scales):
+            chunk += 1
+            if chunk in batches:
+                feed(f"include {SUPPLY}/batch_{chunk}.in")
+            step = self._chunk(feed, updates, step)
+            feed("include checkpoint.in")
+            if self.over(read_history(self.folder)[-1]):
+                return
+
+    def _chunk(self, feed: Feed, updates: Updates, step: int) -> int:
+        """A chunk of steps from `step`; returns its last one."""
+        end, fresh = step + self.scales.checkpoint_steps, True
+        while step < end:
+            steps = min(self._update(feed, updates, step, fresh), end - step)
+            if fresh and self.case.drag.scheme == "held" and self.scales.hold_steps > 1:
+                feed("include held.in")
+            feed(f"run {steps}" + ("" if fresh else " pre no post no"))
+            step, fresh = step + steps, False
+        return step
+
+    def _update(self, feed: Feed, updates: Updates, step: int, fresh: bool) -> int:
+        """Compute the fluid's forces for the state at `step`; returns the steps they hold for."""
+        feed("include ask.in")
+        time = step * self.scales.time_step
+        spheres = self._spheres(time)
+        moment = Moment(
+            step=step, time=time, before=updates.last, first=updates.first, fresh=fresh
+        )
+        forces = self.fluid.forces(spheres, moment)
+        self._refuse_overshoot(spheres, forces)
+        write_forces(self.folder, spheres, forces)
+        updates.add(step, time, forces.measures)
+        feed("include fluid.in")
+        return steps_between(self.case, self.scales, forces.pace)
+
+    def _spheres(self, time: float) -> Snapshot:
+        moved = snapshot_of(read_frame(self.folder / STATE), self.case, time_s=time)
+        return moved if self.case.grains.motion == "mobile" else self.grains.joined(moved)
+
+    def _refuse_overshoot(self, spheres: Snapshot, forces: FluidForces) -> None:
+        held = self.scales.time_step * self.scales.hold_steps
+        share = largest_share(spheres, forces, self.case.fines.density_kg_m3, held)
+        if self.case.drag.scheme != "implicit" and share > DRAG_LIMIT:
+            raise LiggghtsError(
+                f"{self.folder}: at step {spheres.step} drag is constant for {share:.3g} "
+                f"relaxation times of a fine in the crowd (limit {DRAG_LIMIT:g}), explicit drag "
+                "would overshoot; take drag.scheme = 'implicit', or lower run.time_step_factor, "
+                "and start over with --force"
+            )
+
+
+def steps_between(case: InvasionCase, scales: InvasionScales, pace: float) -> int:
+    """Steps in which a fine at `pace` m/s covers `drag.update_travel` smallest diameters.
+
+    They are whole refreshes of the drag, at least one.
+    """
+    travel = case.drag.travel_diameters * 2 * case.fines.radius_range_m[0]
+    refresh = scales.time_step * scales.hold_steps
+    most = scales.checkpoint_steps // scales.hold_steps
+    refreshes = travel / (pace * refresh) if pace > 0 else math.inf
+    return max(1, math.floor(min(refreshes, most))) * scales.hold_steps

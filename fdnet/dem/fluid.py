@@ -1,0 +1,88 @@
+"""What the fluid does to each fine, and how LIGGGHTS is told: files with one value an atom.
+
+The force on a fine of velocity v is F = C (u - v) + P: C its drag coefficient, u the velocity of
+the fluid at it, and P a force that does not depend on v, such as its volume times the fall of
+pressure. LIGGGHTS is given C and w = u + P / C, since F = C (w - v).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from fdnet.spheres.arrays import Array
+from fdnet.spheres.snapshot import Snapshot
+
+STATE = "post/fluid.dump"
+"""File in which LIGGGHTS shows the spheres when it asks for the fluid."""
+_FILES = ("cd", "ux", "uy", "uz")
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class FluidForces:
+    """What acts on N fines until they are looked at again.
+
+    Attributes:
+        coefficient: (N,) N s/m, C; above 0.
+        velocity: (N, 3) m/s, u.
+        push: (N, 3) N, P.
+        pace: m/s, speed with which the fines move on; it decides when they are looked at again.
+        measures: what the record of updates keeps, by the names of `Fluid.measured`.
+    """
+
+    coefficient: Array
+    velocity: Array
+    push: Array
+    pace: float
+    measures: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Moment:
+    """When the fines are looked at.
+
+    Attributes:
+        step: of the simulation.
+        time: s, since the start.
+        before: the row of the update before this one; None for the first.
+        first: the row of the first update; None for the first.
+        fresh: whether a chunk begins. What is answered then must follow from the spheres and the
+            two rows alone, so that a run that was cut gives the same.
+    """
+
+    step: int
+    time: float
+    before: Mapping[str, float] | None
+    first: Mapping[str, float] | None
+    fresh: bool
+
+
+class Fluid(Protocol):
+    """A fluid that answers for all fines of a state."""
+
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """Names of the measures, in the order of the columns."""
+
+    def forces(self, spheres: Snapshot, moment: Moment) -> FluidForces:
+        """What acts on the fines of `spheres`, in their order."""
+
+
+def write_forces(folder: Path, spheres: Snapshot, forces: FluidForces) -> None:
+    """Write the files that the deck reads: the number of fines, then id and value of each."""
+    fines = spheres.fines()
+    carried = forces.velocity + forces.push / forces.coefficient[:, None]
+    for name, value in zip(_FILES, (forces.coefficient, *carried.T), strict=True):
+        rows = zip(fines.id.tolist(), value.tolist(), strict=True)
+        lines = [str(len(fines)), *(f"{atom} {number:.17g}" for atom, number in rows)]
+        (folder / "post" / f"fluid.{name}").write_text("\n".join(lines) + "\n")
+
+
+def largest_share(spheres: Snapshot, forces: FluidForces, density: float, time: float) -> float:
+    """`time` s over the shortest relaxation time m / C of a fine of `density` kg/m3."""
+    if not len(forces.coefficient):
+        return 0.0
+    mass = density * 4.0 / 3.0 * np.pi * spheres.fines().radius ** 3
+    return float(np.max(forces.coefficient / mass)) * time

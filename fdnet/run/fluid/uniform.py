@@ -1,0 +1,69 @@
+"""Drag in a crowd of fines in the uniform field: Beetstra's law of the porosity around each fine.
+
+The uniform velocity u is the volume of suspension that passes a unit area of pores in a unit
+of time. Where fines of porosity phi stand in it, the fluid flows at u / phi between them; where
+they move with it, there is no slip. So the superficial slip is u - v in either case, and
+
+    F = 6 pi mu r M Y F_b / phi (u - v) + V G,
+
+with Beetstra's factor F_b and the size factor Y (`fdnet.scales.forces.crowd`). The first part is
+the total force of the fluid in the crowd, the fall of pressure that the crowd itself causes among
+it: fines that fill a cross-section A and stand take up dp A. G is the gradient of the intact pack
+without fines, which acts inside the pack where `drag.pressure_gradient` asks for it. So the two
+gradients add, and none is counted twice.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fdnet.case.case import InvasionCase
+from fdnet.dem.fluid import FluidForces, Moment
+from fdnet.network.fines.crowding import Neighbourhood, local_porosity
+from fdnet.scales.forces.crowd import Crowd, drag_factor
+from fdnet.scales.scales import InvasionScales
+from fdnet.spheres.snapshot import Array, Snapshot
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UniformCrowd:
+    """The uniform field, with drag by the crowd around each fine."""
+
+    case: InvasionCase
+    scales: InvasionScales
+
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """Mean and largest factor on the drag, least porosity, fines whose porosity was capped."""
+        return ("factor_mean", "factor_most", "porosity_least", "porosity_capped")
+
+    def forces(self, spheres: Snapshot, moment: Moment) -> FluidForces:
+        """What acts on the fines of `spheres`, in their order."""
+        fines, scales = spheres.fines(), self.scales
+        depth = fines.position[:, 0]
+        velocity, push = np.zeros((2, len(fines), 3))
+        velocity[:, 0] = np.where(depth < 0, scales.upstream_velocity, scales.drive_velocity)
+        volume = 4.0 / 3.0 * np.pi * fines.radius**3
+        within = (depth >= 0) & (depth < self.case.size_m[0])
+        push[:, 0] = np.where(within, volume * scales.push.gradient, 0.0)
+        near = local_porosity(spheres, self.case.periodic)
+        slip = np.linalg.norm(velocity - fines.velocity, axis=1)
+        factor = self._factor(near, fines.radius, slip)
+        return FluidForces(
+            coefficient=scales.push.coefficient * fines.radius * factor,
+            velocity=velocity,
+            push=push,
+            pace=scales.drive_velocity,
+            measures={
+                "factor_mean": float(np.mean(factor)) if len(fines) else 1.0,
+                "factor_most": float(np.max(factor, initial=1.0)),
+                "porosity_least": float(np.min(near.porosity, initial=1.0)),
+                "porosity_capped": near.capped,
+            },
+        )
+
+    def _factor(self, near: Neighbourhood, radius: Array, slip: Array) -> Array:
+        """Factor (N,) on the drag of lone fines of superficial `slip`, m/s."""
+        reynolds = self.scales.push.reynolds_slope * radius / near.size_ratio * slip
+        crowd = Crowd(porosity=near.porosity, size_ratio=near.size_ratio, reynolds=reynolds)
+        return drag_factor(crowd, gradient_apart=False) / near.porosity

@@ -1,0 +1,116 @@
+"""The same invasion with different fluids: one row for each fluid and seed of a case.
+
+It is not a study with a knee: it shows what a coupled drag changes and what it costs.
+"""
+
+import csv
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fdnet.case.file import read_case
+from fdnet.files.atomic import write_text
+from fdnet.run.open_run import open_run, run_case
+
+LAWS = ("analysis.law=lubrication", "analysis.damage_law=side-kozeny")
+FLUIDS: dict[str, tuple[str, ...]] = {
+    "uniform": ("drag.scheme=implicit",),
+    "uniform, crowd": ("drag.scheme=implicit", "drag.crowd=beetstra"),
+}
+"""Settings of each fluid, by its name in the table."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CouplingRow:
+    """One run.
+
+    Attributes:
+        case: name of the case.
+        fluid: name of the fluid.
+        seed: of the case.
+        invaded: number of fines inside at the end.
+        mean_depth_mm: of their centres.
+        p95_depth_mm: depth above which 95 % of them lie.
+        k_over_k0: damaged over intact permeability.
+        stop_reason: why it ended.
+        time_ms: simulated time.
+        liggghts_s: seconds of LIGGGHTS in the invasion.
+        updates_s: seconds in which it waited for the forces.
+        updates: number of updates.
+    """
+
+    case: str
+    fluid: str
+    seed: int
+    invaded: int
+    mean_depth_mm: float
+    p95_depth_mm: float
+    k_over_k0: float
+    stop_reason: str
+    time_ms: float
+    liggghts_s: float
+    updates_s: float
+    updates: int
+
+
+COLUMNS = tuple(CouplingRow.__dataclass_fields__)
+
+
+def coupling_rows(
+    case: Path, fluids: Iterable[str], seeds: Iterable[int], folder: Path
+) -> list[CouplingRow]:
+    """Run a case with each fluid and seed; runs that are finished in `folder` are read.
+
+    Raises what `run_case` raises.
+    """
+    return [
+        _row(case, fluid, seed, folder / f"{case.stem}-{fluid.replace(', ', '-')}-{seed}")
+        for seed in seeds
+        for fluid in fluids
+    ]
+
+
+def _row(path: Path, fluid: str, seed: int, out: Path) -> CouplingRow:
+    case = read_case(path, assignments=[*LAWS, *FLUIDS[fluid], f"seed={seed}"])
+    if not (out / "manifest.json").exists():
+        stages = ("pack", "invade", "analyse")
+        run_case(case, out, stages=stages, resume=out.exists(), progress=False)
+    run = open_run(out)
+    summary, fines = run.summary, run.spheres().fines()
+    depth = fines.position[:, 0]
+    inside = depth[(depth >= 0) & (depth < case.size_m[0])]
+    record = run.manifest["invade"]
+    runs = record["runs"]
+    waited = sum(part.get("waited", 0.0) for part in runs)
+    return CouplingRow(
+        case=case.name,
+        fluid=fluid,
+        seed=seed,
+        invaded=summary["invaded_count"],
+        mean_depth_mm=1e3 * float(np.mean(inside)) if len(inside) else 0.0,
+        p95_depth_mm=1e3 * summary["invasion_depth_p95_m"],
+        k_over_k0=summary["k_damaged_m2"] / summary["k_initial_m2"],
+        stop_reason=summary["stop_reason"],
+        time_ms=1e3 * record["steps"] * record["dt_s"],
+        liggghts_s=sum(part["seconds"] for part in runs) - waited,
+        updates_s=waited,
+        updates=record.get("updates", {}).get("count", 0),
+    )
+
+
+def write_rows(path: Path, rows: Sequence[CouplingRow]) -> None:
+    """Write the rows as CSV, numbers with four digits."""
+    lines = [",".join(COLUMNS)]
+    for row in rows:
+        cells = [getattr(row, name) for name in COLUMNS]
+        texts = [f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in cells]
+        lines.append(",".join(f'"{text}"' if "," in text else text for text in texts))
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def read_rows(path: Path) -> list[dict[str, str]]:
+    """The rows of such a CSV file, as text."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))

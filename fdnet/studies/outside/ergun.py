@@ -1,0 +1,160 @@
+"""Ergun's bed: its pressure drop, and the velocity at which its spheres lift on the real binary.
+
+The case is CFDEMcoupling's tutorial ErgunTestMPI (`CFD/octave/totalPressureDrop.m`), whose
+velocity of fluidisation takes the viscous term of Ergun's law alone.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from fdnet.scales.forces.bed import Bed, ergun_gradient
+from fdnet.scales.springs import sphere_mass
+from fdnet.spheres.snapshot import Kind, resting
+from fdnet.studies.engine.error_rows import against_exact
+from fdnet.studies.engine.study import DONE, Measured, Point, Row
+from fdnet.studies.outside.answers import Answer, percent_error
+from fdnet.studies.outside.pushed import (
+    Pushed,
+    case_of,
+    contact_step,
+    plane_wall,
+    run_pushed,
+)
+from fdnet.studies.outside.throat import bisected
+
+SERIES, KNOB = "Ergun's bed", "quantity"
+DROP, LIFT = "pressure drop, Pa", "velocity that lifts the bed, m/s"
+BED = Bed(diameter=1e-3, porosity=0.451335, viscosity=1.5e-3, density=10.0)
+LENGTH, VELOCITY, DENSITY, GRAVITY = 0.0156, 0.02, 2000.0, 9.81
+"""Length of the bed, m; superficial velocity, m/s; density of the spheres, kg/m3; g, m/s2."""
+TUTORIAL: Mapping[str, float] = {DROP: 230.5, LIFT: 0.01454}
+"""What the tutorial's formulas give."""
+TOLERANCE = 5e-3
+WITHIN = 1e-3
+STIFFNESS = 100.0
+"""Normal stiffness of the contacts, N/m."""
+_ACROSS, _LAYERS = 3, 5
+_STEP, _STEPS, _RISEN = 0.2, 40_000, 0.02
+_BRACKET = 0.02
+
+
+def viscous_lift() -> float:
+    """d^2 (rho_p - rho) g phi^3 / (150 mu (1 - phi)), m/s: the tutorial's formula."""
+    solid = 1 - BED.porosity
+    weight = (DENSITY - BED.density) * GRAVITY
+    return BED.diameter**2 * weight * BED.porosity**3 / (150 * BED.viscosity * solid)
+
+
+def forces_on(velocity: float) -> tuple[float, float]:
+    """Push on a sphere at rest, N, and its drag coefficient, N s/m, in the bed's flow.
+
+    Model A: V G of the gradient G, and the drag phi G V / (1 - phi), so that N spheres carry the
+    pressure drop of their bed; the push is both less the weight in the fluid. `velocity` is the
+    superficial one, m/s.
+    """
+    volume, solid = sphere_mass(0.5 * BED.diameter, 1.0), 1 - BED.porosity
+    gradient = ergun_gradient(BED, velocity)
+    drag = BED.porosity * gradient * volume / solid
+    weight = volume * (DENSITY - BED.density) * GRAVITY
+    return volume * gradient + drag - weight, drag * BED.porosity / velocity
+
+
+def lifts(velocity: float, folder: Path) -> bool:
+    """Whether spheres that lie in layers on a floor rise at this superficial velocity, m/s."""
+    radius = 0.5 * BED.diameter
+    push, drag = forces_on(velocity)
+    grid = np.arange(_ACROSS) * 2 * radius
+    layers = radius + np.arange(_LAYERS) * 2 * radius
+    place = np.stack(np.meshgrid(layers, grid, grid, indexing="ij"), axis=-1).reshape(-1, 3)
+    side, top = _ACROSS * 2 * radius, 4 * _LAYERS * radius
+    marker = [[top - radius, 0.0, 0.0]]
+    kinds = np.array([Kind.GRAIN] + [Kind.FINE] * len(place))
+    bounds = np.array([[-4 * radius, top], [-radius, side - radius], [-radius, side - radius]])
+    end = run_pushed(
+        Pushed(
+            case=case_of(
+                fine=radius,
+                stiffness=STIFFNESS,
+                friction=0.1,
+                damping_ratio=0.5,
+                density=DENSITY,
+            ),
+            spheres=resting(np.vstack([marker, place]), radius, bounds, kinds),
+            push=(push, 0.0, 0.0),
+            damping=drag,
+            step=contact_step(radius, STIFFNESS, _STEP, density=DENSITY),
+            chunk_steps=_STEPS,
+            chunks=1,
+            boundary="f p p",
+            walls=(plane_wall(0.0, friction=True),),
+            density=DENSITY,
+        ),
+        folder,
+    )
+    fines = end.column("type") == Kind.FINE
+    return float(end.column("xu")[fines].min()) > radius * (1 + 2 * _RISEN)
+
+
+def points(quick: bool) -> list[Point]:
+    """The pressure drop, and the velocity that lifts the bed; the quick form has the first."""
+    return [Point(series=SERIES, knob=KNOB, value=n) for n in ([DROP] if quick else [DROP, LIFT])]
+
+
+def measure(point: Point, work: Path) -> Mapping[str, float]:
+    """The pressure drop by fdnet's formula, or the velocity bisected on the real binary."""
+    if point.value == DROP:
+        return {DROP: LENGTH * ergun_gradient(BED, VELOCITY)}
+    folder, exact = work / point.slug, viscous_lift()
+    bisection = bisected(
+        lambda velocity: not lifts(velocity, folder),
+        (1 - _BRACKET) * exact,
+        (1 + _BRACKET) * exact,
+        WITHIN,
+    )
+    return {LIFT: bisection}
+
+
+def judge(measured: Sequence[Measured]) -> list[Row]:
+    """Relative errors against the tutorial's numbers."""
+    own = [one for one in measured if one.point.series == SERIES]
+    return [
+        row
+        for one in own
+        for row in against_exact(
+            [one], str(one.point.value), lambda m: TUTORIAL[str(m.point.value)]
+        )
+    ]
+
+
+def answers(rows: Sequence[Row]) -> list[Answer]:
+    """Both numbers."""
+    source = "CFDEMcoupling's tutorial ErgunTestMPI"
+    test = "tests/studies/test_outside_numbers.py"
+    texts = {
+        DROP: (
+            "pressure drop of Ergun's bed: d 1 mm, porosity 0.451335, 15.6 mm, U 0.02 m/s",
+            "230.5 Pa",
+            "{:.1f} Pa (formula of `fdnet.scales.forces.bed`)",
+        ),
+        LIFT: (
+            "superficial velocity that lifts spheres of that bed from the floor, model A",
+            "0.01454 m/s (viscous term alone)",
+            f"{{:.5f}} m/s, bisected to {100 * WITHIN:g} %; Ergun's inertial term is in it",
+        ),
+    }
+    lines = []
+    for row in rows:
+        if row.series == SERIES and row.status == DONE:
+            what, expected, words = texts[str(row.value)]
+            lines.append(
+                Answer(
+                    what=what,
+                    expected=f"{expected} ({source})",
+                    measured=f"{words.format(row.observed)}, {percent_error(row.error)}",
+                    holds=abs(row.error) < TOLERANCE,
+                    test=test,
+                )
+            )
+    return lines

@@ -1,0 +1,115 @@
+"""A fine on an inclined plane: it rolls, or slides while it rolls, as closed forms say.
+
+A sphere that rolls without slip down a slope of the angle a gains g sin(a) 5/7; it slips where
+tan(a) > 7/2 f, f the friction, and then gains g (sin(a) - f cos(a)).
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from fdnet.scales.springs import sphere_mass
+from fdnet.spheres.snapshot import Kind, resting
+from fdnet.studies.engine.error_rows import against_exact
+from fdnet.studies.engine.study import DONE, Measured, Point, Row, ladder
+from fdnet.studies.outside.answers import Answer, percent_error
+from fdnet.studies.outside.pushed import (
+    DENSITY,
+    Pushed,
+    case_of,
+    contact_step,
+    plane_wall,
+    run_pushed,
+)
+
+SERIES, KNOB, GAIN = "fine on a slope", "slope, degrees", "acceleration over g"
+FRICTION = 0.3
+SLOPES = (5.0, 20.0, 40.0, 60.0, 75.0)
+TOLERANCE = 0.01
+GRAVITY = 9.81
+FINE = 5e-5
+"""Radius of the fine, m."""
+STIFFNESS = 10.0
+"""Normal stiffness of the contact, N/m: weight bends it by 1e-5 radii."""
+_STEPS, _STEP = 40_000, 0.1
+
+
+def rolling_gain(slope: float, friction: float) -> float:
+    """Acceleration over g, down a slope in degrees, of a sphere that starts at rest."""
+    angle = math.radians(slope)
+    if math.tan(angle) <= 3.5 * friction:
+        return 5 / 7 * math.sin(angle)
+    return math.sin(angle) - friction * math.cos(angle)
+
+
+def gain_on(slope: float, folder: Path, *, friction: float = FRICTION) -> float:
+    """Mean acceleration over g of a fine that starts at rest on the plane x = 0.
+
+    The weight is a constant force into the plane and along y. `slope` is in degrees.
+    """
+    angle, mass = math.radians(slope), sphere_mass(FINE, DENSITY)
+    weight = mass * GRAVITY
+    sunk = weight * math.cos(angle) / STIFFNESS
+    step = contact_step(FINE, STIFFNESS, _STEP)
+    far = 0.5 * GRAVITY * (_STEPS * step) ** 2 + 20 * FINE
+    place = np.array([[6 * FINE, -8 * FINE, 0.0], [FINE - sunk, 0.0, 0.0]])
+    bounds = np.array([[-10 * FINE, 10 * FINE], [-12 * FINE, far], [-10 * FINE, 10 * FINE]])
+    end = run_pushed(
+        Pushed(
+            case=case_of(fine=FINE, stiffness=STIFFNESS, friction=friction, damping_ratio=0.5),
+            spheres=resting(place, FINE, bounds, np.array([Kind.GRAIN, Kind.FINE])),
+            push=(-weight * math.cos(angle), weight * math.sin(angle), 0.0),
+            damping=0.0,
+            step=step,
+            chunk_steps=_STEPS,
+            chunks=1,
+            walls=(plane_wall(0.0, friction=True),),
+        ),
+        folder,
+    )
+    fine = end.column("type") == Kind.FINE
+    return float(end.column("vy")[fine][0]) / (end.step * step * GRAVITY)
+
+
+def points(quick: bool) -> list[Point]:
+    """Slopes below and above the one where the fine begins to slip."""
+    return ladder(SERIES, KNOB, SLOPES[1:4:2] if quick else SLOPES, seeds=1, settings={})
+
+
+def measure(point: Point, work: Path) -> Mapping[str, float]:
+    """The acceleration over g."""
+    return {GAIN: gain_on(float(point.value), work / point.slug)}
+
+
+def judge(measured: Sequence[Measured]) -> list[Row]:
+    """Relative errors of the acceleration."""
+    own = [one for one in measured if one.point.series == SERIES]
+    return against_exact(own, GAIN, lambda one: rolling_gain(float(one.point.value), FRICTION))
+
+
+def answers(rows: Sequence[Row]) -> list[Answer]:
+    """The slopes on which the fine rolls, and those on which it slips; the worst of each."""
+    slips_from = math.degrees(math.atan(3.5 * FRICTION))
+    own = [row for row in rows if row.series == SERIES and row.status == DONE]
+    lines = []
+    for what, formula, group in (
+        ("rolls", "5/7 g sin a", [row for row in own if float(row.value) < slips_from]),
+        ("slips", "g (sin a − f cos a)", [row for row in own if float(row.value) > slips_from]),
+    ):
+        if group:
+            worst = max(group, key=lambda row: abs(row.error))
+            slopes = ", ".join(f"{row.value:g}" for row in group)
+            lines.append(
+                Answer(
+                    what=f"fine {what} down a plane of {slopes} degrees, friction {FRICTION:g}: "
+                    "acceleration",
+                    expected=f"{formula}, {rolling_gain(float(worst.value), FRICTION):.4f} g at "
+                    f"{worst.value:g} degrees (rigid sphere, slips from {slips_from:.1f})",
+                    measured=f"{worst.observed:.4f} g, {percent_error(worst.error)}, the worst",
+                    holds=abs(worst.error) < TOLERANCE,
+                    test="tests/studies/test_outside_numbers.py",
+                )
+            )
+    return lines

@@ -1,0 +1,269 @@
+"""Curves of sizes in a case: what is accepted, refused, left out and placed."""
+
+import math
+import tomllib
+
+import numpy as np
+import pytest
+from builders import TINY
+
+from fdnet.case.case import InvasionCase
+from fdnet.case.file import case_from, read_case
+from fdnet.case.size_file import parse_sizes
+from fdnet.dem.measured_fines import densities, drawn_fines
+from fdnet.dem.pack_deck import draw_radii
+from fdnet.dem.supply import batches_of, crowding, place_batches
+from fdnet.errors import CaseError
+from fdnet.scales.scales import scales_of
+from fdnet.scales.sizes import diameter_at, size_rows
+from fdnet.scales.springs import mass_range
+from fdnet.sizes.deal import volume_quantiles
+from fdnet.spheres.snapshot import Kind
+
+SAND = {"D10": "0.25 mm", "D50": "0.40 mm", "D90": "0.60 mm"}
+MUD = {"D10": "20 um", "D50": "40 um", "D90": "80 um"}
+
+
+def measured(*, grains=SAND, fines=MUD, **keys) -> dict:
+    more = {"cut": "25 um", "slab": "0.5 mm", "concentration": "5 %"} | keys
+    return {
+        "name": "measured",
+        "box": {"size_mm": [3.0, 2.4, 2.4]},
+        "grains": {"sizes": grains, "porosity": 0.38},
+        "fines": {"sizes": fines, **more},
+    }
+
+
+def made(data: dict) -> InvasionCase:
+    case = case_from(data)
+    assert isinstance(case, InvasionCase)
+    return case
+
+
+def problem(data: dict) -> str:
+    with pytest.raises(CaseError, match="1 problem:") as caught:
+        case_from(data)
+    return str(caught.value)
+
+
+def test_sizes_are_diameters_and_their_moments_are_used():
+    """A log-normal curve between cuts; volumes by number from its third moment."""
+    case = made(measured())
+    spread = math.log(2) / 1.2815515655446004
+    assert case.fines.sizes.fit.law.spread == pytest.approx(spread)
+    assert case.fines.radius_range_m[0] == pytest.approx(12.5e-6)
+    assert case.fines.radius_range_m[1] == pytest.approx(
+        20e-6 * math.exp(2.3263478740408408 * spread)
+    )
+    assert case.fines.mean_volume_m3 == pytest.approx(
+        math.pi / 6 * case.fines.curve.mean(3), rel=1e-12
+    )
+    assert not case.fines.one_size
+    assert case.fines.placed_fraction == pytest.approx(0.05 * case.fines.curve.kept)
+
+
+def test_what_is_left_out_and_what_the_law_misses_is_said():
+    warnings = " ".join(scales_of(made(measured())).warnings)
+    assert "fines: 19.2 % of the solids (finer than 25 um) and 1 % of the solids" in warnings
+    assert "carries 3.99 % of fines by volume instead of 5 %" in warnings
+    assert "misses" not in warnings
+    skew = {"D10": "0.25 mm", "D50": "0.5 mm", "D90": "0.60 mm"}
+    warnings = " ".join(
+        scales_of(made(measured(grains=skew, fines={"D10": "25 um", "D90": "50 um"}))).warnings
+    )
+    assert "grains.sizes: the rosin-rammler curve misses D10 by" in warnings
+
+
+def test_the_table_of_scales_shows_each_diameter_beside_the_given_one():
+    rows = {row[0]: row for row in size_rows(made(measured()))}
+    row = rows["grains: 50 % by volume finer than"]
+    assert row[2] == pytest.approx((0.25 * 0.40 * 0.60) ** (1 / 3) * 1e-3, rel=1e-6)
+    assert "given 0.0004 m (-2.1 %)" in row[4]
+    assert "fines: 10 % by volume finer than" not in rows
+
+
+@pytest.mark.parametrize(
+    ("part", "expected"),
+    [
+        ({"D50": "40 um"}, "gives 1 of D10, D50 and D90"),
+        ({"D10": "60 um", "D50": "40 um"}, "must rise from D10 to D90"),
+        ({"D10": "20 um", "size_mm": [0.1, 0.2], "passing_percent": [0, 100]}, "beside a meas"),
+        ({"size_mm": [0.1, 0.2, 0.3], "passing_percent": [0, 60, 50]}, "the curve must not fall"),
+        ({"size_mm": [0.1, 0.2, 0.3], "passing_percent": [0, 50, 90]}, "ends at 90 % at 0.3 mm"),
+        ({"size_mm": [0.1, 0.3, 0.2], "passing_percent": [0, 50, 100]}, "size_mm must rise"),
+        ({"size_mm": [0.1, 0.2, 0.3], "passing_percent": [0, 100]}, "3 sizes with 2 percentages"),
+        ({"size_mm": [0.1, 0.2]}, "needs both size_mm and passing_percent"),
+        (SAND | {"cut_percent": [5.0, 1.0]}, "must rise, [finest, coarsest]"),
+        (SAND | {"cut_percent": [0.0, 99.0]}, "has no ends"),
+        (
+            {"size_mm": [0.1, 0.2], "passing_percent": [5, 100], "by": "number"},
+            "spheres of unknown size have no volume",
+        ),
+        ({"D10": "20", "D50": "40 um"}, "sizes.D10: '20': has no unit"),
+        ({"D10": "20 psi", "D50": "40 um"}, "'psi' is a unit of pressure"),
+        ({"D10": 20.0, "D50": "40 um"}, "sizes.D10: 20.0 has no unit"),
+        ({"file": "none.csv"}, "cannot be read as a table of sizes"),
+        ({"file": "none.csv", "D10": "20 um"}, "given next to D10"),
+    ],
+)
+def test_a_bad_curve_gets_one_clear_problem(part, expected):
+    assert expected in problem(measured(grains=part))
+
+
+def test_bad_sizes_of_fines_get_one_clear_problem():
+    assert "leaves nothing of a curve that ends at 141 um" in problem(measured(cut="150 um"))
+    coarse = {"D10": "0.14 mm", "D90": "0.16 mm"}
+    assert "is not below grains.sizes" in problem(measured(fines={"D10": "0.1 mm", "D90": "1 mm"}))
+    big = {"D10": "1.0 mm", "D90": "1.05 mm"}
+    text = problem(
+        measured(grains=big, fines={"D10": "0.6 mm", "D90": "0.65 mm"})
+        | {"box": {"size_mm": [9.0, 9.0, 9.0]}}
+    )
+    assert "above every throat between touching grains" in text
+    assert made(measured(fines=coarse)).fines.curve.high < 0.18e-3
+    data = measured()
+    data["fines"]["radius_mm"] = 0.02
+    assert "give exactly one of radius_mm, sizes and materials" in problem(data)
+    del data["fines"]["sizes"]
+    assert "fines.cut_um: 25 cuts measured sizes" in problem(data)
+    del data["fines"]["cut"], data["fines"]["radius_mm"]
+    assert "fines.radius_mm: missing" in problem(data)
+
+
+def test_placed_grains_have_the_curve_and_the_seed_decides_their_order():
+    case = made(measured())
+    radii = draw_radii(case, 531)
+    assert np.array_equal(radii, draw_radii(case, 531))
+    other = draw_radii(made(measured() | {"seed": 2}), 531)
+    assert not np.array_equal(radii, other)
+    assert np.array_equal(np.sort(radii), np.sort(other))
+    assert np.mean(4 / 3 * math.pi * radii**3) == pytest.approx(case.grains.mean_volume_m3)
+    for share in (0.1, 0.5, 0.9):
+        inside = (share - 0.01) / 0.98
+        size = volume_quantiles(2 * radii, [inside])[0]
+        assert size == pytest.approx(diameter_at(case.grains.curve, share), rel=0.03)
+
+
+def test_each_batch_has_the_curve_of_the_mud():
+    """The volume of a batch over its number is that of the whole within what its fines allow."""
+    keys = {"supply": "batches", "slab": "3 mm"}
+    case = made(measured(**keys) | {"run": {"checkpoint_ms": 0.002}})
+    counts = batches_of(case, scales_of(case)).counts
+    batches = drawn_fines(case, counts)
+    assert len(counts) > 5
+    whole = np.sort(np.concatenate([batch.radius for batch in batches]))
+    assert np.sum(whole**3) == pytest.approx(len(whole) * case.fines.curve.mean(3) / 8, rel=1e-9)
+    for count, batch in zip(counts, batches, strict=True):
+        for share in (0.2, 0.5, 0.8):
+            below = np.sum(batch.radius < np.quantile(whole, share))
+            assert abs(below - share * count) <= 2
+
+
+def test_crowding_of_a_range_is_that_of_its_moments():
+    """A curve uniform by number must give what the formula for ranges gives."""
+    curve = {"size_mm": [0.05, 0.12], "passing_percent": [0, 100], "by": "number"}
+    case = made(measured(fines=curve | {"cut_percent": [0.0, 100.0]}, cut="50 um"))
+    radius = np.exp(np.linspace(math.log(25e-6), math.log(60e-6), 200_001))
+    exact = np.mean((radius + 60e-6) ** 3) / (8 * np.mean(radius**3))
+    reach = (1 - 2 * 60e-6 / 2.4e-3) ** 2
+    assert crowding(case) == pytest.approx(0.05 * exact / reach, rel=1e-4)
+
+
+BARITE = {"D50": "30 um", "D90": "50 um"}
+MIXTURE = [
+    {"name": "CaCO3", "density": "2.71 g/cc", "share": 3.0, "sizes": MUD},
+    {"name": "barite", "density": "4.2 g/cc", "share": 1.0, "sizes": BARITE},
+]
+
+
+def mixed(**keys) -> dict:
+    data = measured(**keys)
+    del data["fines"]["sizes"]
+    data["fines"]["materials"] = MIXTURE
+    return data
+
+
+def test_materials_have_their_shares_of_mass_and_their_densities():
+    case = made(mixed(supply="batches", slab="3 mm"))
+    counts = batches_of(case, scales_of(case)).counts
+    density, drawn = densities(case, counts), drawn_fines(case, counts)
+    mass = density * np.concatenate([batch.radius for batch in drawn]) ** 3
+    assert set(density) == {2710.0, 4200.0}
+    first, second = case.fines.components
+    ratio = np.sum(mass[density == 4200]) / np.sum(mass[density == 2710])
+    assert ratio == pytest.approx(second.curve.kept / (3 * first.curve.kept), rel=0.01)
+    assert case.fines.solids_density_kg_m3 == pytest.approx(4 / (3 / 2710 + 1 / 4200))
+    assert mass_range(case.fines)[0] == pytest.approx(2710 * math.pi / 6 * 25e-6**3)
+    assert case_from(tomllib.loads(case.toml())) == case
+
+
+def test_every_fine_has_the_density_of_its_material_in_its_data_file(tmp_path):
+    """The density column of the batches, read back by id."""
+    from fdnet.dem.invade_deck import write_invade_inputs
+    from fdnet.dem.scene import box_of
+    from fdnet.spheres.snapshot import resting
+
+    case = made(mixed(supply="batches", slab="3 mm") | {"run": {"checkpoint_ms": 0.005}})
+    scales = scales_of(case)
+    grain = resting(np.array([[1.5e-3, 1.2e-3, 1.2e-3]]), 2e-4, box_of(case))
+    write_invade_inputs(case, scales, grain, tmp_path)
+    rows = {}
+    for path in [tmp_path / "invade.data", *(tmp_path / "supply").glob("*.data")]:
+        lines = path.read_text().split("Atoms\n\n")[1].splitlines()
+        rows |= {int(line.split()[0]): [float(x) for x in line.split()[1:4]] for line in lines}
+    expected = densities(case, batches_of(case, scales).counts)
+    placed = np.concatenate([b.radius for b in place_batches(case, scales, grain)])
+    first = int(grain.id.max()) + 1
+    assert len(rows) == len(expected) + 1
+    for number, (density, radius) in enumerate(zip(expected, placed, strict=True), first):
+        assert rows[number] == pytest.approx([Kind.FINE, 2 * radius, density])
+
+
+def test_materials_of_unlike_friction_are_refused():
+    data = mixed()
+    data["fines"]["materials"] = [MIXTURE[0] | {"friction": 0.3}, MIXTURE[1]]
+    assert "fines.materials.0.friction: 0.3 of 'CaCO3'" in problem(data)
+    data["fines"]["materials"] = [MIXTURE[0], MIXTURE[0]]
+    assert "'CaCO3' is listed twice" in problem(data)
+
+
+def test_a_table_of_sieves_is_read_and_turned_round(tmp_path):
+    (tmp_path / "sand.csv").write_text(
+        "# made by hand\nSieve (µm);Cumulative % retained\n"
+        "850;0\n600;10,5\n425;44\n212;97\n180;100\n"
+    )
+    path = tmp_path / "case.toml"
+    path.write_text(
+        'name = "sand"\n[box]\nsize_mm = [4.0, 2.4, 2.4]\n'
+        '[grains]\nporosity = 0.4\nsizes = { file = "sand.csv" }\n'
+    )
+    case = read_case(path)
+    assert case.grains.sizes.size_mm == pytest.approx((0.18, 0.212, 0.425, 0.6, 0.85))
+    assert case.grains.sizes.passing_percent == pytest.approx((0, 3, 56, 89.5, 100))
+    assert case.given == {"grains.sizes.file": "sand.csv"}
+    path.write_text(case.toml())
+    (tmp_path / "sand.csv").unlink()
+    assert read_case(path) == case
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("size,passing %\n1,2\n3,4\n", "0 columns"),
+        ("size_um,volume %\n1,2\n3,4\n", "are cumulative percentages, expected one"),
+        ("size_um,retained %\n1,2\n3,4\n", "share on each sieve, or on it and all above"),
+        ("size_um,passing %,finer %\n1,2,2\n3,4,4\n", "2 columns"),
+        ("size_um,passing %\n1 mm,2\n3,4\n", "'1 mm' is no number; units stand in the names"),
+        ("size_um,passing %\n1,2\n", "at least two rows"),
+    ],
+)
+def test_a_table_that_may_mean_several_things_is_refused(text, expected):
+    with pytest.raises(ValueError, match=expected):
+        parse_sizes(text)
+
+
+def test_a_plain_table_is_read():
+    sizes, finer = parse_sizes("size_um,passing_percent\n10,0\n20,40.5\n80,100\n")
+    assert sizes == pytest.approx([0.01, 0.02, 0.08])
+    assert finer == [0, 40.5, 100]
+    assert TINY["fines"]["radius_mm"] == 0.05
