@@ -13,7 +13,7 @@ from fdnet.spheres.snapshot import Kind, Snapshot
 
 COARSEST, FINEST, AFFORDED = 10.0, 16.0, 1_000_000
 """Cells across a mean grain where none is given: as many between the first two as keep the grid
-below the third number of cells (docs/validation/velocity-field.md)."""
+below the third number of cells (`fdnet study velocity-field`)."""
 TOLERANCE = 0.05
 """Rms velocity left at the walls over the superficial velocity."""
 UPSTREAM, DOWNSTREAM = 1.0, 0.5

@@ -13,8 +13,8 @@ of the velocity across the wall is replaced by
 
     w^2 (velocity across as sampled) - (1 - w) d / 2 (divergence along the sphere)
 
-with w = d / PROBE; the divergence is that of the velocity along the sphere at the same distance, by central
-differences. The last term is what keeps the volume of a velocity that is linear in d.
+with w = d / PROBE; the divergence is that of the velocity along the sphere at the same distance,
+by central differences. The last term is what keeps the volume of a velocity that is linear in d.
 """
 
 from dataclasses import dataclass
