@@ -51,6 +51,7 @@ def pack_record(
         "porosity_sum": pack.porosity_sum,
         "max_overlap": pack.max_overlap,
         "creep_m_s": pack.creep,
+        "restless": sum(row.get("restless", 0) for row in pack.attempts),
         "steps": pack.steps,
         "dt_s": pack.step_s,
         "attempts": list(pack.attempts),
@@ -158,6 +159,11 @@ def _pack_warnings(pack: dict[str, Any]) -> list[str]:
         warnings.append(
             f"grains overlap by up to {100 * pack['max_overlap']:.1f} % of a diameter: the pack "
             "is denser than rigid spheres get"
+        )
+    if pack.get("restless"):
+        warnings.append(
+            f"{pack['restless']} packs did not come to rest and were made again from other random "
+            "places: the pack is not that of the seed's first places"
         )
     if pack.get("creep_m_s"):
         warnings.append(
