@@ -25,6 +25,8 @@ STUDIES: Mapping[str, str] = {
     "velocity-field": "cells across a grain for the velocity between the grains",
     "specimen-size": "number of grains and seed: how large a specimen must be",
     "economies": "settings that make full-scale invasions affordable: error and speed-up of each",
+    "defaults": "sides, walls, upstream, step and supply: what each default changes",
+    "drive-velocity": "fines at a well, driven 1 to 18 times as fast as the fluid",
     "outside-numbers": "the invasion on the real binary against closed forms and literature",
 }
 """Name of each study and its question; the module has the same name with underscores."""
