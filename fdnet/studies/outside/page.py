@@ -8,7 +8,7 @@ from fdnet.studies.engine.study import Row
 from fdnet.studies.engine.table import missing_lines
 from fdnet.studies.outside.answers import Answer
 from fdnet.studies.outside.clogs import FEWEST
-from fdnet.studies.outside.constriction import HIGH, LOW, MOST, cloggings_of, regime
+from fdnet.studies.outside.constriction import HIGH, LONG, LOW, SHORT, cloggings_of, regime
 from fdnet.studies.outside.orifice import PUSH
 
 TITLE = "The invasion against numbers from outside"
@@ -90,7 +90,7 @@ def _constriction(rows: Sequence[Row]) -> str:
     return _CONSTRICTION.substitute(
         push=f"{PUSH:g}",
         stokes=regime(),
-        most=f"{MOST[LOW]:g} (friction {LOW:g}) or {MOST[HIGH]:g} ({HIGH:g})",
+        most=f"{LONG:g} (at wide holes {SHORT:g})",
         fewest=FEWEST,
         clogs=_clogs(rows),
     )
