@@ -81,7 +81,8 @@ def test_every_problem_is_listed_at_once():
         ("fines", {"count": 10**9}, "expected at most 1e+07"),
         ("fines", {"concentration": 1e-8}, "box lengths"),
         ("grains", {"count": 200}, "sum to more than the box; expected at most 117"),
-        ("drag", {"field": "network"}, "not available yet"),
+        ("drag", {"field": "network"}, "drag.upstream: 'interstitial', but with drag.field"),
+        ("run", {"stop_rate": 0.1}, "run.stop_rate: 0.1 needs a rate that falls"),
         ("drag", {"scheme": "every_step", "refresh_steps": 5}, "belongs to drag.scheme 'held'"),
         ("run", {"time_step_factor": 0.3}, "run.time_step_factor: 0.3"),
         ("run", {"skin_mm": 1e-5}, "run.skin_mm: 1e-05 mm, expected 0.0005"),
@@ -113,7 +114,7 @@ def test_problems_between_keys_are_listed_one_by_one_next_to_those_of_keys():
     text = problems(data)
     assert "3 problems: run.cap_ms: True" in text
     assert " | fines.radius_mm: 0.3 is not below grains.radius_mm 0.25" in text
-    assert " | drag.field: 'network'" in text
+    assert " | drag.upstream: 'interstitial', but with drag.field" in text
 
 
 def test_a_bad_key_silences_only_the_rules_that_read_it():
@@ -250,7 +251,7 @@ def test_shipped_cases_are_valid_short_and_named_as_their_files(root: Path):
         {path.stem: path for path in (root / folder).glob("*.toml")}
         for folder in ("cases", "cases/quick")
     )
-    assert set(full) == {"quick", *SPECIMENS, *VARIANTS}
+    assert set(full) == {"quick", "sand-and-mud", "well", *SPECIMENS, *VARIANTS}
     assert set(quick) == {*SPECIMENS, *VARIANTS}
     for name, path in [*full.items(), *((f"quick-{name}", path) for name, path in quick.items())]:
         assert read_case(path).name == name

@@ -58,6 +58,11 @@ class Run(Part):
         description="Share of the undisturbed supply that may still cross the face while it "
         "counts as plugged.",
     )
+    stop_rate: Fraction | None = Field(
+        None,
+        description="Share of the first rate below which the invasion counts as plugged, where "
+        'drag.field is "network" at constant pressure.',
+    )
     cap_ms: Positive | None = Field(
         None,
         description="The invasion ends at this time at the latest. When absent it is derived from "

@@ -55,7 +55,8 @@ class Drag(Part):
     field: Literal["uniform", "network"] = Field(
         "uniform",
         description='Velocity field of the fluid: "uniform" is the same velocity everywhere. '
-        '"network" is reserved and is refused for now.',
+        '"network" follows the pores of the pack and the deposit in them: fdnet solves it anew '
+        "while LIGGGHTS waits.",
     )
     multiplier: Positive = Field(1.0, description="Factor on the Stokes drag.")
     scheme: Literal["every_step", "held", "implicit", "viscous"] = Field(
@@ -100,6 +101,12 @@ class Drag(Part):
         description='How other fines nearby change the drag on a fine: "none" leaves it that of a '
         'lone sphere, "beetstra" takes the law of Beetstra, van der Hoef and Kuipers (2007) with '
         "the porosity around each fine, which fdnet computes while LIGGGHTS waits.",
+    )
+    drive: Literal["pressure", "rate"] | None = Field(
+        None,
+        description='What stays constant where the field is "network": the pressure over pack, '
+        "cake and the rest of the way on which the overbalance is lost, or the rate. When absent: "
+        '"pressure".',
     )
     update_travel: Annotated[float, Field(gt=0, le=MOST_TRAVEL)] | None = Field(
         None,

@@ -1,4 +1,4 @@
-"""The files beside a coupled deck, which LIGGGHTS is told to include as the invasion goes on."""
+"""The files of a coupled deck that LIGGGHTS includes as the invasion goes on."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from fdnet.spheres.dump import COLUMNS, FORMAT
 
 
 def write_coupled_parts(case: InvasionCase, scales: InvasionScales, folder: Path) -> None:
-    """Write the files beside a coupled deck that LIGGGHTS is told to include."""
+    """Write the files that a coupled deck is continued by."""
     for name, text in coupled_parts(case, scales).items():
         write_text(folder / name, text)
 

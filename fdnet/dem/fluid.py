@@ -1,4 +1,4 @@
-"""What the fluid does to each fine, and how LIGGGHTS is told: files with one value an atom.
+"""What the fluid does to each fine, and how it is handed to LIGGGHTS: files of one value an atom.
 
 The force on a fine of velocity v is F = C (u - v) + P: C its drag coefficient, u the velocity of
 the fluid at it, and P a force that does not depend on v, such as its volume times the fall of

@@ -46,7 +46,7 @@ from fdnet.dem.overlap import (
     refuse_overlap,
 )
 from fdnet.dem.supply import batches_of
-from fdnet.dem.updates import UPDATES, read_updates
+from fdnet.dem.updates import UPDATES, rate_is_low, read_updates
 from fdnet.dem.verdict import SCREEN
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.files.atomic import write_text
@@ -116,7 +116,7 @@ def invade(
     overlaps, damaged = [], grains
     for _, damaged in readable_states(folder, history, case, scales, grains):
         overlaps.append(overlap_in(case, damaged))
-    reason, warnings = _ending(case, scales, history)
+    reason, warnings = _ending(case, scales, folder, history)
     warnings += kept_doubts(folder)
     if len(overlaps) < len(history):
         lost = len(history) - len(overlaps)
@@ -165,7 +165,7 @@ def _drive(
         deck = _prepare(case, scales, grains, folder, ranks=launch.ranks, last=last)
         if last is not None:
             refuse_overlap(case, scales, grains, folder, history=read_history(folder), last=last)
-        if _over(case, scales, last):
+        if _over(case, scales, folder, last):
             return deck, None
         keeper = CheckpointKeeper(folder, case, scales, grains, launch=launch)
         follower, coupling = replace(launch, follow=keeper), None
@@ -177,7 +177,7 @@ def _drive(
                 folder=folder,
                 fluid=fluid,
                 last=last,
-                over=partial(_over, case, scales),
+                over=partial(_over, case, scales, folder),
             )
         run = _run(folder, last, follower, coupling)
         if run is not None:
@@ -208,13 +208,15 @@ def _run(
         (folder / SCRATCH).unlink(missing_ok=True)
 
 
-def _over(case: InvasionCase, scales: InvasionScales, last: Checkpoint | None) -> bool:
+def _over(
+    case: InvasionCase, scales: InvasionScales, folder: Path, last: Checkpoint | None
+) -> bool:
     """Whether the last checkpoint is the end of the invasion."""
     if last is None:
         return False
-    return (
-        case.run.duration_s is None and quiet_enough(case, scales, last)
-    ) or last.chunk >= chunks_of(case, scales)
+    if last.chunk >= chunks_of(case, scales) or rate_is_low(folder, case, last.step):
+        return True
+    return case.run.duration_s is None and quiet_enough(case, scales, last)
 
 
 def _prepare(
@@ -251,7 +253,7 @@ def _prepare(
 
 
 def _ending(
-    case: InvasionCase, scales: InvasionScales, history: tuple[Checkpoint, ...]
+    case: InvasionCase, scales: InvasionScales, folder: Path, history: tuple[Checkpoint, ...]
 ) -> tuple[str, list[str]]:
     """The stop reason, and warnings.
 
@@ -260,7 +262,9 @@ def _ending(
     last = history[-1]
     waiting = last.upstream - last.removed_upstream
     warnings = []
-    if case.run.duration_s is not None:
+    if rate_is_low(folder, case, last.step):
+        reason = "plugged"
+    elif case.run.duration_s is not None:
         reason = "duration"
     elif quiet_enough(case, scales, last):
         reason = "plugged" if waiting > 0 else "supply_exhausted"

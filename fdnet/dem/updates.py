@@ -4,6 +4,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from fdnet.case.case import InvasionCase
 from fdnet.errors import LiggghtsError
 from fdnet.files.atomic import write_text
 
@@ -67,3 +68,11 @@ def updates_digest(folder: Path, step: int) -> str:
         return "unreadable"
     text = "".join(f"{sorted(row.items())!r}\n" for row in rows)
     return hashlib.sha256(text.encode()).hexdigest() if rows else ""
+
+
+def rate_is_low(folder: Path, case: InvasionCase, step: int) -> bool:
+    """Whether the rate before `step` was below `run.stop_rate` of the first one."""
+    if case.run.stop_rate is None:
+        return False
+    rows = [row for row in read_updates(folder) if row["step"] < step]
+    return bool(rows) and rows[-1]["rate_over_initial"] < case.run.stop_rate

@@ -9,6 +9,7 @@ from fdnet.dem.invasion import invade
 from fdnet.dem.pack_deck import check_radii
 from fdnet.dem.packing import make_pack
 from fdnet.dem.scene import snapshot_of
+from fdnet.dem.updates import read_updates
 from fdnet.errors import CaseError
 from fdnet.run.fluid.fluid_of import fluid_of
 from fdnet.run.made_files import ANALYSE_AGAIN, MESHES, START_OVER, check_files
@@ -45,7 +46,7 @@ def invade_stage(session: Session, case: InvasionCase) -> None:
     expected = _expected_steps(scales)
     progress = Progress("invade", expected, show=session.options.show_progress)
     with session.timed("invade"), progress:
-        launch, fluid = session.launch(progress), fluid_of(case, scales)
+        launch, fluid = session.launch(progress), fluid_of(case, scales, grains)
         result = invade(case, scales, grains, folder, launch, fluid=fluid)
     seconds = session.seconds["invade"]
     record = invade_record(case, result, folder, seconds=seconds)
@@ -113,7 +114,13 @@ def invaded(session: Session, case: InvasionCase, grains: Snapshot) -> Invaded:
     check_files(folder, record, START_OVER, may_lack=_is_dump)
     history = read_history(folder)
     damaged = state_at(folder, history[-1], case, scales, grains)
-    return Invaded(case=case, scales=scales, history=history, damaged=damaged)
+    return Invaded(
+        case=case,
+        scales=scales,
+        history=history,
+        damaged=damaged,
+        updates=tuple(read_updates(folder)),
+    )
 
 
 def file_warnings(session: Session) -> list[str]:

@@ -1,5 +1,6 @@
 """What a run writes next to its summary: tables, figures, ParaView files."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,12 +27,14 @@ class Invaded:
         scales: of the case.
         history: one row a checkpoint.
         damaged: grains and all remaining fines at the end.
+        updates: the record of a coupled invasion, one row an update; empty of others.
     """
 
     case: InvasionCase
     scales: InvasionScales
     history: tuple[Checkpoint, ...]
     damaged: Snapshot
+    updates: tuple[Mapping[str, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -66,7 +69,7 @@ class Results:
     def history_rows(self) -> list[dict[str, float]]:
         """The rows of history.csv; none without an invasion."""
         one = self.invasion
-        return [] if one is None else history_rows(one.case, one.scales, one.history)
+        return [] if one is None else history_rows(one.case, one.scales, one.history, one.updates)
 
     @property
     def physical_time_s(self) -> float | None:

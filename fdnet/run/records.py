@@ -3,6 +3,7 @@
 import hashlib
 import platform
 import sys
+from collections.abc import Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,8 @@ from fdnet.run.folder import RECORD_FORMAT
 from fdnet.run.made_files import digests_of
 
 PACK_DUMP = "post/pack.dump"
+MOMENTUM_LIMIT = 0.01
+"""Largest difference of the forces in the pack and its drop of pressure times area, over it."""
 OVERLAP_WARNING, POROSITY_WARNING = 0.03, 0.02
 _PACKAGES = (
     "fdnet",
@@ -48,6 +51,7 @@ def pack_record(
         "porosity_sum": pack.porosity_sum,
         "max_overlap": pack.max_overlap,
         "creep_m_s": pack.creep,
+        "restless": sum(row.get("restless", 0) for row in pack.attempts),
         "steps": pack.steps,
         "dt_s": pack.step_s,
         "attempts": list(pack.attempts),
@@ -82,8 +86,17 @@ def invade_record(case: Case, result: Invasion, folder: Path, *, seconds: float)
 
 def _updates(result: Invasion) -> dict[str, Any]:
     """How often the forces were computed anew, and what the last update measured."""
-    last = dict(result.updates[-1])
-    return {"count": len(result.updates), "last": last}
+    last, defects = dict(result.updates[-1]), _defects(result.updates)
+    return {"count": len(result.updates), "last": last, **defects}
+
+
+def _defects(updates: Sequence[Mapping[str, float]]) -> dict[str, Any]:
+    """Where the flow follows the deposit: how often momentum did not close, and by how much."""
+    defects = [row["momentum_defect"] for row in updates if "momentum_defect" in row]
+    if not defects:
+        return {}
+    over = sum(defect > MOMENTUM_LIMIT for defect in defects)
+    return {"momentum_defect_most": max(defects), "momentum_open": over}
 
 
 def ranks_of(record: dict[str, Any]) -> int | None:
@@ -122,7 +135,20 @@ def record_warnings(
     )
     too_deep = deepest.fraction > case.run.max_overlap
     overlap = [f"{overlap_text(case, deepest)}: raise run.stiffness_N_m"] if too_deep else []
-    return [*invasion["warnings"], *_pack_warnings(pack), *overlap]
+    return [*invasion["warnings"], *_pack_warnings(pack), *overlap, *_momentum(invasion)]
+
+
+def _momentum(invasion: dict[str, Any]) -> list[str]:
+    """The forces in the pack did not always add up to its drop of pressure."""
+    updates = invasion.get("updates", {})
+    if not updates.get("momentum_open"):
+        return []
+    return [
+        f"the forces on fines and grains differ from the drop of pressure times area by up to "
+        f"{100 * updates['momentum_defect_most']:.2g} %, and by more than "
+        f"{100 * MOMENTUM_LIMIT:g} % in {updates['momentum_open']} of {updates['count']} updates "
+        "(history.csv, momentum_defect)"
+    ]
 
 
 def _pack_warnings(pack: dict[str, Any]) -> list[str]:
@@ -133,6 +159,11 @@ def _pack_warnings(pack: dict[str, Any]) -> list[str]:
         warnings.append(
             f"grains overlap by up to {100 * pack['max_overlap']:.1f} % of a diameter: the pack "
             "is denser than rigid spheres get"
+        )
+    if pack.get("restless"):
+        warnings.append(
+            f"{pack['restless']} packs did not come to rest and were made again from other random "
+            "places: the pack is not that of the seed's first places"
         )
     if pack.get("creep_m_s"):
         warnings.append(

@@ -39,6 +39,7 @@ def summarise(
         **_permeabilities(analysis),
         **_counts(analysis, last, invasion),
         "stop_reason": invasion["stop_reason"] if invasion else None,
+        "final": invasion["stop_reason"] != "cap" if invasion else None,
         "sections": section_rows(analysis),
         **_network(analysis),
         **_updates(invasion),
@@ -98,9 +99,19 @@ def _counts(
 def _updates(invasion: dict[str, Any] | None) -> dict[str, Any]:
     """What a coupled invasion measured at its last update; nothing of one that is not coupled."""
     updates = (invasion or {}).get("updates")
-    if updates is None:
+    if invasion is None or updates is None:
         return {}
-    return {"drag_updates": updates["count"], "drag_last_update": updates["last"]}
+    last = updates["last"]
+    common = {"drag_updates": updates["count"], "drag_last_update": last}
+    if "rate_over_initial" not in last:
+        return common
+    drop = last["pressure_cake_Pa"] + last["pressure_pack_Pa"]
+    return common | {
+        "rate_over_initial": last["rate_over_initial"],
+        "filtrate_m3": last["filtrate_m3"],
+        "cake_resistance_share": last["pressure_cake_Pa"] / drop if drop > 0 else None,
+        "momentum_defect_most": updates["momentum_defect_most"],
+    }
 
 
 def _network(analysis: "Analysis") -> dict[str, Any]:

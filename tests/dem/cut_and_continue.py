@@ -53,7 +53,9 @@ def differences(
     """
     launch = Launch(binary=binary, ranks=ranks)
     scales = scales_of(case)
-    whole = invade(case, scales, grains, folder / "whole", launch, fluid=fluid_of(case, scales))
+    whole = invade(
+        case, scales, grains, folder / "whole", launch, fluid=fluid_of(case, scales, grains)
+    )
     again = cut_and_continue(case, grains, folder / "cut", launch)
     columns = ("id", "kind", "position", "radius", "velocity")
     different = [
@@ -80,7 +82,7 @@ def cut_and_continue(
     cut = Launch(binary=launch.binary, ranks=launch.ranks, follow=stop)
     scales = scales_of(case)
     try:
-        invade(case, scales, grains, folder, cut, fluid=fluid_of(case, scales))
+        invade(case, scales, grains, folder, cut, fluid=fluid_of(case, scales, grains))
     except StopError:
-        return invade(case, scales, grains, folder, launch, fluid=fluid_of(case, scales))
+        return invade(case, scales, grains, folder, launch, fluid=fluid_of(case, scales, grains))
     raise AssertionError(f"the invasion ended before checkpoint {CUT_AT}")

@@ -8,6 +8,8 @@ import pytest
 from builders import tiny
 from cut_and_continue import cell_case, differences
 
+from fdnet.case.case import with_fines
+from fdnet.case.file import case_from
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
 from fdnet.scales.hertz import collision_time, overlap_of_impact
@@ -15,7 +17,9 @@ from fdnet.scales.hertz_contacts import pair_elastic
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.contacts import max_overlap, touching_pairs
 from fdnet.spheres.snapshot import Kind, resting
+from fdnet.studies.dem import size_ratio
 from fdnet.studies.dem.closed import Watch, closed_run, kinetic_energy, restitution_of
+from fdnet.studies.dem.runs import window_run
 
 pytestmark = pytest.mark.liggghts
 HERTZ = "contact.model=hertz"
@@ -124,3 +128,23 @@ def test_an_undamped_dense_pack_keeps_its_energy_at_the_largest_step(binary, tmp
     energy = np.array([hertz_energy(state, scales.contacts) for state in states])
     assert np.max(np.abs(energy - energy[0])) < 0.05 * kinetic_energy(start, 2650.0)
     assert np.max(np.abs(energy / energy[0] - 1)) < 2e-4
+
+
+def held_of_sixty(friction: float, folder) -> float:
+    """Dilute fines of 1/20 of a grain that the pack of the study `size-ratio` holds."""
+    data = size_ratio.case_of(size_ratio.points(quick=True)[0]).data()
+    for name in ("grains", "fines"):
+        del data[name]["normal_stiffness_N_m"]
+    data["fines"]["friction"] = friction
+    data["contact"] = {"model": "hertz"}
+    data["run"]["stiffness_N_m"] = 3e2
+    case = with_fines(case_from(data))
+    warned = any("may lock between grains" in text for text in scales_of(case).warnings)
+    assert warned is (friction > 0.32)
+    return window_run(case, folder, f"friction_{friction}")["invaded"]
+
+
+def test_hertz_contacts_lock_small_fines_with_friction_as_the_warning_says(binary, tmp_path):
+    """The groove has a slope of 0.32 for them; no geometry of this pack holds such a fine."""
+    assert held_of_sixty(0.55, tmp_path) > 5
+    assert held_of_sixty(0.2, tmp_path) == 0

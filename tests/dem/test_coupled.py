@@ -71,7 +71,7 @@ def done(binary, grains, tmp_path_factory):
 
 def run(case, grains, folder, launch):
     scales = scales_of(case)
-    return invade(case, scales, grains, folder, launch, fluid=fluid_of(case, scales))
+    return invade(case, scales, grains, folder, launch, fluid=fluid_of(case, scales, grains))
 
 
 @pytest.mark.parametrize("scheme", ["implicit", "held"])
@@ -300,7 +300,7 @@ def applied_force(case, fines, folder, binary) -> np.ndarray:
         shown = snapshot_of(read_frame(folder / STATE), case, time_s=0.0)
         assert np.array_equal(shown.id, fines.id)
         moment = Moment(step=0, time=0.0, before=None, first=None, fresh=True)
-        write_forces(folder, shown, fluid_of(case, scales).forces(shown, moment))
+        write_forces(folder, shown, fluid_of(case, scales, grain).forces(shown, moment))
         feed("include fluid.in", "run 0", show.format("with"))
 
     run_fed(folder, "in.invade", Launch(binary=binary), play)

@@ -37,7 +37,9 @@ def kozeny_damage(network: Network, occupancy: Occupancy, clean: Array) -> Damag
     )
 
 
-def side_kozeny_damage(network: Network, occupancy: Occupancy, clean: Array) -> Damage:
+def side_kozeny_damage(
+    network: Network, occupancy: Occupancy, clean: Array, *, halves: Array | None = None
+) -> Damage:
     """Local Kozeny factor of each side of a throat: f = (1 - s v)^3 / (1 + a)^2.
 
     The sides are the pyramids from the facet to the power centres. Their clean resistances are R1
@@ -58,7 +60,8 @@ def side_kozeny_damage(network: Network, occupancy: Occupancy, clean: Array) -> 
     deeper inside a grain than their radius make no layer (`layers_within_grains`, t = 0) and count
     by their surface alone.
 
-    A side or pore that its fines fill (v >= 1) is closed and counted.
+    A side or pore that its fines fill (v >= 1) is closed and counted. `halves` are the clean
+    resistances (T, 2) of the sides where they are known already.
     """
     pore = _pore_deposit(network, occupancy)
     ends = network.throat_pores
@@ -66,7 +69,7 @@ def side_kozeny_damage(network: Network, occupancy: Occupancy, clean: Array) -> 
     share = 1.0 - (1.0 - np.clip(pore.layer / (2.0 * _hydraulic_radius(network)), 0.0, 1.0)) ** 2
     filled = (volume >= 1.0) | pore.filled[ends]
     factor = np.where(filled, 0.0, _kozeny(np.minimum(volume, 1.0), surface, share[ends]))
-    kept = _kept(half_resistances(network), factor)
+    kept = _kept(half_resistances(network) if halves is None else halves, factor)
     counts = {
         "pores_filled": int(pore.filled.sum()),
         "sides_filled": int(filled.sum()),

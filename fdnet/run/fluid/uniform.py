@@ -48,7 +48,7 @@ class UniformCrowd:
         push[:, 0] = np.where(within, volume * scales.push.gradient, 0.0)
         near = local_porosity(spheres, self.case.periodic)
         slip = np.linalg.norm(velocity - fines.velocity, axis=1)
-        factor = self._factor(near, fines.radius, slip)
+        factor = crowd_factor(scales, near, fines.radius, slip)
         return FluidForces(
             coefficient=scales.push.coefficient * fines.radius * factor,
             velocity=velocity,
@@ -62,8 +62,13 @@ class UniformCrowd:
             },
         )
 
-    def _factor(self, near: Neighbourhood, radius: Array, slip: Array) -> Array:
-        """Factor (N,) on the drag of lone fines of superficial `slip`, m/s."""
-        reynolds = self.scales.push.reynolds_slope * radius / near.size_ratio * slip
-        crowd = Crowd(porosity=near.porosity, size_ratio=near.size_ratio, reynolds=reynolds)
-        return drag_factor(crowd, gradient_apart=False) / near.porosity
+
+def crowd_factor(scales: InvasionScales, near: Neighbourhood, radius: Array, slip: Array) -> Array:
+    """Factor (N,) on the drag of lone fines of `radius` m and superficial `slip` m/s.
+
+    It is the total force in the crowd, Y F_b / phi. The Reynolds number is 0 unless the case asks
+    for drag at finite ones.
+    """
+    reynolds = scales.push.reynolds_slope * radius / near.size_ratio * slip
+    crowd = Crowd(porosity=near.porosity, size_ratio=near.size_ratio, reynolds=reynolds)
+    return drag_factor(crowd, gradient_apart=False) / near.porosity

@@ -15,9 +15,18 @@ from fdnet.files.atomic import write_text
 from fdnet.run.open_run import open_run, run_case
 
 LAWS = ("analysis.law=lubrication", "analysis.damage_law=side-kozeny")
+SHARED = (
+    "fines.supply=slab",
+    "drag.upstream=darcy",
+    "fluid.velocity_m_s=5.4",
+    "run.duration_ms=2.0",
+)
+"""The supply at the Darcy velocity, and the pressure that drives it, over the specimen alone."""
+CROWD = ("drag.scheme=implicit", "drag.crowd=beetstra")
 FLUIDS: dict[str, tuple[str, ...]] = {
-    "uniform": ("drag.scheme=implicit",),
-    "uniform, crowd": ("drag.scheme=implicit", "drag.crowd=beetstra"),
+    "uniform": ("drag.scheme=held",),
+    "uniform, crowd": CROWD,
+    "network": (*CROWD, "drag.field=network", "drag.pressure_gradient=true"),
 }
 """Settings of each fluid, by its name in the table."""
 
@@ -73,7 +82,7 @@ def coupling_rows(
 
 
 def _row(path: Path, fluid: str, seed: int, out: Path) -> CouplingRow:
-    case = read_case(path, assignments=[*LAWS, *FLUIDS[fluid], f"seed={seed}"])
+    case = read_case(path, assignments=[*LAWS, *SHARED, *FLUIDS[fluid], f"seed={seed}"])
     if not (out / "manifest.json").exists():
         stages = ("pack", "invade", "analyse")
         run_case(case, out, stages=stages, resume=out.exists(), progress=False)

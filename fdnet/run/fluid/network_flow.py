@@ -1,0 +1,195 @@
+"""The flow through a pack with its deposit: shape from the intact pack, share from the network.
+
+The resolved Stokes flow of the intact pack (`fdnet.network.field`) is solved once and says how the
+fluid moves inside each pore. The pore network, damaged by the fines that are there now, says how
+much of it each pore still carries. In a pore the velocity is that of the intact pack times the
+ratio of the damaged to the clean flux, both at the same rate through the specimen.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fdnet.case.names import DEFAULT_LAW
+from fdnet.network.field.field import VelocityField
+from fdnet.network.field.of_pack import velocity_field
+from fdnet.network.fines.fine_images import reaching_inside
+from fdnet.network.fines.occupancy import measure_deposit
+from fdnet.network.flow.flow import Flow, solve_flow
+from fdnet.network.laws.kozeny_damage import side_kozeny_damage
+from fdnet.network.laws.lubrication import half_resistances
+from fdnet.network.laws.named import LAWS
+from fdnet.network.network import Network, build_network
+from fdnet.spheres.images import neighbour_tree, wrapped
+from fdnet.spheres.snapshot import Array, Snapshot
+
+STAGNANT = 1e-2
+"""A pore that carries less than this share of the mean flux of a pore, clean, keeps ratio 1."""
+RENEWED = 0.02
+"""Share of the deposit by volume that may change before the network is solved anew."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Carried:
+    """What the pores (P) of a damaged pack still carry.
+
+    Attributes:
+        k_over_k0: permeability over that of the intact pack.
+        ratio: (P,) flux over that of the intact pack at the same rate through the specimen; 0
+            where no path is open.
+        stagnant: number of pores that carry next to nothing when clean; their ratio is 1.
+    """
+
+    k_over_k0: float
+    ratio: Array
+    stagnant: int
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PackFlow:
+    """The intact pack: its network, its flow, and its resolved velocity field.
+
+    Attributes:
+        network: pores and throats of the grains.
+        clean: (T,) m3, conductances.
+        halves: (T, 2) 1/m3, resistances of the sides of the clean throats.
+        flow: through the clean network.
+        through: (P,) share of the inflow that each pore carries.
+        shape: resolved velocity field of the grains.
+        tree: search tree of the places of the pores.
+    """
+
+    network: Network
+    clean: Array
+    halves: Array
+    flow: Flow
+    through: Array
+    shape: VelocityField
+    tree: Any
+
+    @property
+    def length(self) -> float:
+        """Of the specimen, m."""
+        return float(np.ptp(self.network.box[0]))
+
+    @property
+    def permeability(self) -> float:
+        """Of the intact pack by its network, m2."""
+        return self.flow.inflow * self.length / self.network.area
+
+    @property
+    def scale(self) -> float:
+        """The network's resistance over that of the coarse resolved field."""
+        return self.length / self.permeability / self.shape.resistance
+
+    def carried(self, fines: Snapshot) -> Carried:
+        """What the pores carry with `fines` among the grains."""
+        occupancy = measure_deposit(self.network, fines)
+        damaged = side_kozeny_damage(self.network, occupancy, self.clean, halves=self.halves)
+        flow = solve_flow(self.network, damaged.conductance)
+        usual = STAGNANT * float(np.mean(self.through))
+        moving = self.through > usual
+        share = pore_through(self.network, flow)
+        ratio = np.divide(share, self.through, out=np.ones_like(share), where=moving)
+        return Carried(
+            k_over_k0=flow.inflow / self.flow.inflow,
+            ratio=ratio if flow.inflow > 0 else np.zeros_like(share),
+            stagnant=int(np.sum(~moving)),
+        )
+
+    def pore_of(self, position: Array) -> Array:
+        """The pore (N,) whose place is nearest to each position (N, 3) m."""
+        box, periodic = self.network.box, self.network.periodic
+        place = wrapped(position, box, periodic) - box[:, 0]
+        size = np.ptp(box, axis=1)
+        return self.tree.query(np.where(periodic & (place >= size), 0.0, place))[1]
+
+    def grain_force(self, carried: Carried) -> float:
+        """Force of the fluid on the grains along x over mu U, m: intact, times the ratios.
+
+        It is that of the network's resistance, each grain with the mean ratio of its pores by
+        their volume.
+        """
+        network = self.network
+        grain = network.image_grain[network.pore_images]
+        volume = np.repeat(np.maximum(network.pore_volume, 0.0)[:, None], 4, axis=1)
+        count = len(self.shape.grain_force)
+        weight = np.bincount(grain.ravel(), volume.ravel(), count)
+        summed = np.bincount(grain.ravel(), (volume * carried.ratio[:, None]).ravel(), count)
+        mean = np.divide(summed, weight, out=np.ones(count), where=weight > 0)
+        return self.scale * float(self.shape.grain_force[:, 0] @ mean)
+
+
+def pack_flow(grains: Snapshot, periodic: tuple[bool, bool, bool], walls: str) -> PackFlow:
+    """The flow through an intact pack. Raises NetworkError or FlowError where there is none."""
+    network = build_network(grains, periodic=periodic, walls=walls)
+    clean = LAWS[DEFAULT_LAW](network)
+    flow = solve_flow(network, clean)
+    return PackFlow(
+        network=network,
+        clean=clean,
+        halves=half_resistances(network),
+        flow=flow,
+        through=pore_through(network, flow),
+        shape=velocity_field(grains, periodic=periodic),
+        tree=neighbour_tree(network.pore_position, network.box, periodic=periodic),
+    )
+
+
+def pore_through(network: Network, flow: Flow) -> Array:
+    """Share (P,) of the inflow that passes each pore; pores of one group are one.
+
+    It is the larger of what comes in and what goes out, for the flux across a face of the specimen
+    is that of no throat.
+    """
+    if flow.inflow <= 0:
+        return np.zeros(len(network.pore_group))
+    group, count = network.pore_group, int(network.pore_group.max()) + 1
+    first, second = group[network.throat_pores].T
+    flux = np.where(first == second, 0.0, flow.throat_flux * network.throat_share)
+    forth, back = np.maximum(flux, 0.0), np.maximum(-flux, 0.0)
+    into = np.bincount(second, forth, count) + np.bincount(first, back, count)
+    out = np.bincount(first, forth, count) + np.bincount(second, back, count)
+    return (np.maximum(into, out) / flow.inflow)[group]
+
+
+@dataclass(slots=True, eq=False)
+class Renewal:
+    """What a damaged pack carries, solved anew when enough of its deposit has changed.
+
+    Attributes:
+        pack: the intact pack.
+        deposit: the fines of the last solve; None before the first.
+        carried: what it gave.
+        solves: number of solves.
+    """
+
+    pack: PackFlow
+    deposit: Snapshot | None = None
+    carried: Carried | None = None
+    solves: int = 0
+
+    def of(self, fines: Snapshot, *, anew: bool) -> Carried:
+        """What the pores carry with standing `fines`; solved in any case where `anew` asks."""
+        inside = fines.where(reaching_inside(self.pack.network, fines))
+        known = self.carried if self.deposit is not None and not anew else None
+        if known is None or changed_share(self.deposit, inside) > RENEWED:
+            known = self.pack.carried(inside)
+            self.deposit, self.carried, self.solves = inside, known, self.solves + 1
+        return known
+
+
+def changed_share(former: Snapshot | None, fines: Snapshot) -> float:
+    """Volume of the fines that came, left, or moved by more than their radius, over that of all.
+
+    "All" are those of either state; 0 where neither has any.
+    """
+    if former is None:
+        return 1.0
+    _, old, new = np.intersect1d(former.id, fines.id, assume_unique=True, return_indices=True)
+    way = np.linalg.norm(fines.position[new] - former.position[old], axis=1)
+    same = float(np.sum(fines.radius[new][way <= fines.radius[new]] ** 3))
+    both = float(np.sum(fines.radius[new] ** 3))
+    whole = float(np.sum(former.radius**3) + np.sum(fines.radius**3)) - both
+    return 1.0 - same / whole if whole > 0 else 0.0

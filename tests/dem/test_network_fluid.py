@@ -1,0 +1,268 @@
+"""Invasions in the field of the network: the flow follows the deposit."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders import tiny
+from cut_and_continue import differences
+
+from fdnet.dem.fluid import Moment
+from fdnet.dem.invasion import invade
+from fdnet.dem.liggghts import Launch
+from fdnet.dem.packing import make_pack
+from fdnet.errors import CaseError
+from fdnet.run.fluid.fluid_of import fluid_of
+from fdnet.run.fluid.network_flow import Renewal, changed_share, pore_through
+from fdnet.run.fluid.network_fluid import Balance, NetworkFluid
+from fdnet.run.history import history_rows
+from fdnet.scales.scales import scales_of
+from fdnet.spheres.snapshot import Kind, Snapshot
+
+pytestmark = pytest.mark.liggghts
+FIRST = Moment(step=0, time=0.0, before=None, first=None, fresh=True)
+
+
+def small(*more, way="fluid.velocity_m_s=5.0"):
+    """Some 20 grains and 150 fines, five checkpoints with a few updates each."""
+    return tiny(
+        "drag.field=network",
+        "drag.crowd=beetstra",
+        "drag.scheme=implicit",
+        "drag.upstream=darcy",
+        way,
+        "run.time_step_factor=0.2",
+        "box.sides=periodic",
+        "box.size_mm=[1.6,1.0,1.0]",
+        "grains.count=15",
+        "fines.count=150",
+        "fines.concentration=0.2",
+        "run.cap_ms=0.5",
+        "run.checkpoint_ms=0.1",
+        *more,
+    )
+
+
+@pytest.fixture(scope="module")
+def fluid(binary, tmp_path_factory) -> NetworkFluid:
+    case, folder = small(), tmp_path_factory.mktemp("pack")
+    grains = make_pack(case, scales_of(case), folder, Launch(binary=binary)).grains
+    made = fluid_of(case, scales_of(case), grains)
+    assert isinstance(made, NetworkFluid)
+    return made
+
+
+@pytest.fixture(scope="module")
+def done(binary, fluid, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("done")
+    return invade(
+        fluid.case, fluid.scales, fluid.grains, folder, Launch(binary=binary), fluid=fluid
+    )
+
+
+def fines(position, radius, box, velocity=(0.0, 0.0, 0.0)) -> Snapshot:
+    count = len(position)
+    return Snapshot(
+        step=0,
+        time_s=0.0,
+        box=box,
+        id=np.arange(10_000, 10_000 + count),
+        kind=np.full(count, Kind.FINE),
+        position=np.array(position),
+        radius=np.full(count, radius),
+        velocity=np.tile(velocity, (count, 1)),
+    )
+
+
+def with_case(fluid, *more, **way):
+    """The same pack in a case with other settings; the pack is not solved again."""
+    case = small(*more, **way)
+    other = replace(fluid, case=case, scales=scales_of(case))
+    other.__dict__["pack"] = fluid.pack
+    return other
+
+
+def deposit_of(done) -> Snapshot:
+    return replace(done.damaged.fines(), velocity=np.zeros((len(done.damaged.fines()), 3)))
+
+
+def test_a_continued_invasion_is_the_uncut_one(binary, fluid, tmp_path):
+    assert differences(fluid.case, fluid.grains, tmp_path, binary) == []
+
+
+def test_an_intact_pack_carries_all_and_its_grains_take_up_the_pressure_drop(fluid):
+    none = fines(np.empty((0, 3)), 5e-5, fluid.grains.box)
+    carried = fluid.pack.carried(none)
+    assert carried.k_over_k0 == pytest.approx(1.0, rel=1e-9)
+    assert carried.ratio == pytest.approx(1.0, rel=1e-9)
+    whole = fluid.pack.length / fluid.pack.permeability * fluid.pack.network.area
+    assert fluid.pack.grain_force(carried) == pytest.approx(whole, rel=1e-2)
+
+
+def test_pores_carry_what_enters_them(fluid):
+    """The mean share over the layers of pores: each plane across the flow carries all of it."""
+    pack, network = fluid.pack, fluid.pack.network
+    through = pore_through(network, pack.flow)
+    assert np.all(through >= 0)
+    assert through.max() < 1.0 + 1e-9
+    first, second = network.throat_pores.T
+    x = network.pore_position[:, 0]
+    for plane in (0.4e-3, 0.8e-3, 1.2e-3):
+        crossing = (x[first] - plane) * (x[second] - plane) < 0
+        sign = np.sign(x[second] - x[first])
+        flux = (pack.flow.throat_flux * network.throat_share * sign)[crossing].sum()
+        assert flux == pytest.approx(pack.flow.inflow, rel=1e-6)
+
+
+def test_the_deposit_turns_the_flow_and_lowers_the_rate(fluid, done):
+    carried = fluid.pack.carried(deposit_of(done))
+    assert 0.0 < carried.k_over_k0 < 0.95
+    assert carried.ratio.min() < 0.8
+    assert carried.ratio.max() > 1.05
+
+
+def test_the_rate_follows_the_resistances_in_series(fluid, done):
+    """Closed form for pack, cake and the rest of the way."""
+    carried = replace(fluid.pack.carried(deposit_of(done)), k_over_k0=0.25)
+    assert fluid._velocity(carried, 0.0) == pytest.approx(0.25 * fluid.first_velocity, rel=1e-9)
+    intact = fluid._viscosity * fluid.pack.length / fluid.pack.permeability
+    with_cake = fluid._velocity(carried, 2.0 * intact)
+    assert with_cake == pytest.approx(fluid.first_velocity / 6.0, rel=1e-9)
+    long = with_case(fluid, way="fluid.darcy_length_mm=4.8")
+    assert long.rest == pytest.approx(2.0, rel=1e-9)
+    assert long._velocity(carried, 0.0) == pytest.approx(long.first_velocity * 3 / 6, rel=1e-9)
+    steady = with_case(fluid, "drag.drive=rate")
+    assert steady._velocity(carried, intact) == steady.first_velocity
+    shut = replace(carried, k_over_k0=0.0)
+    assert fluid._velocity(shut, 0.0) == 0.0
+
+
+def test_a_standing_cake_takes_the_pressure_of_carman_and_kozeny(fluid):
+    """Five layers of a cubic bed upstream, 0.1 mm apart, at rest."""
+    spacing, radius = 1e-4, 4.9e-5
+    axis = np.arange(spacing / 2, 1e-3, spacing)
+    x = -1e-3 + spacing * np.arange(-8, 8)
+    place = np.stack(np.meshgrid(x, axis, axis, indexing="ij"), -1).reshape(-1, 3)
+    bed = fines(place - np.array([1e-3, 0, 0]), radius, fluid.grains.box)
+    row = fluid.forces(fluid.grains.joined(bed), FIRST).measures
+    solid = 4 / 3 * np.pi * (radius / spacing) ** 3
+    gradient = (
+        180
+        * fluid._viscosity
+        * solid**2
+        * row["velocity_m_s"]
+        / ((1 - solid) ** 3 * (2 * radius) ** 2)
+    )
+    assert row["pressure_cake_Pa"] == pytest.approx(gradient * 16 * spacing, rel=0.15)
+    assert row["cake_thickness_m"] == pytest.approx(16 * spacing, rel=0.1)
+
+
+def test_fines_that_move_with_the_mud_make_no_cake_and_feel_no_force(fluid):
+    place = np.random.default_rng(1).random((200, 3)) * 1e-3 - np.array([3e-3, 0, 0])
+    speed = fluid.first_velocity
+    moving = fines(place, 5e-5, fluid.grains.box, velocity=(speed, 0.0, 0.0))
+    forces = fluid.forces(fluid.grains.joined(moving), FIRST)
+    assert forces.measures["pressure_cake_Pa"] == 0.0
+    assert forces.measures["rate_over_initial"] == pytest.approx(1.0, rel=1e-9)
+    assert forces.velocity[:, 0] == pytest.approx(speed, rel=1e-6)
+    assert np.abs(forces.push).max() == 0.0
+
+
+def test_forces_on_fines_and_grains_add_up_to_the_drop_of_pressure(fluid, done):
+    standing = deposit_of(done)
+    forces = fluid.forces(fluid.grains.joined(standing), FIRST)
+    depth = standing.position[:, 0]
+    inside = (depth >= 0) & (depth < fluid.pack.length)
+    on_fines = forces.coefficient * forces.velocity[:, 0] + forces.push[:, 0]
+    carried = fluid.pack.carried(standing)
+    speed = forces.measures["velocity_m_s"]
+    on_grains = fluid._viscosity * speed * fluid.pack.grain_force(carried)
+    drop = forces.measures["pressure_pack_Pa"] * fluid.pack.network.area
+    assert float(on_fines[inside].sum()) + on_grains == pytest.approx(drop, rel=0.01)
+    assert forces.measures["throat_factor"] > 1.0
+
+
+def test_the_network_is_solved_anew_when_the_deposit_changed(fluid, done):
+    standing = deposit_of(done)
+    renewal = Renewal(fluid.pack)
+    first = renewal.of(standing, anew=False)
+    assert renewal.of(standing, anew=False) is first
+    inner = np.flatnonzero((standing.position[:, 0] > 0) & (standing.position[:, 0] < 1e-3))
+    place = np.array(standing.position)
+    place[inner[0], 2] += 0.9 * standing.radius[0]
+    moved = replace(standing, position=place)
+    assert renewal.of(moved, anew=False) is first
+    keep = np.ones(len(standing), bool)
+    keep[inner[: len(inner) // 2]] = False
+    assert changed_share(renewal.deposit, standing.where(keep)) > 0.1
+    less = renewal.of(standing.where(keep), anew=False)
+    assert less.k_over_k0 > first.k_over_k0
+    assert renewal.of(standing.where(keep), anew=True) is not less
+    assert renewal.solves == 3
+
+
+def test_what_changed_counts_by_volume():
+    box = np.array([[0.0, 1.0]] * 3)
+    four = fines(np.array([[0.1 * k, 0.5, 0.5] for k in range(4)]), 0.01, box)
+    assert changed_share(four, four) == 0.0
+    three = four.where(np.arange(4) < 3)
+    assert changed_share(four, three) == pytest.approx(0.25)
+    assert changed_share(three, four) == pytest.approx(0.25)
+    shift = replace(four, position=four.position + np.array([[0.011, 0, 0]] + 3 * [[0.0] * 3]))
+    assert changed_share(four, shift) == pytest.approx(0.25)
+    nothing = four.where(np.zeros(4, bool))
+    assert changed_share(nothing, nothing) == 0.0
+
+
+def test_a_balance_that_cannot_close_says_by_how_much():
+    assert Balance(whole=10.0, grains=4.0).throat_factor(2.0, 4.0) == pytest.approx(3.0)
+    assert Balance(whole=10.0, grains=9.0).throat_factor(2.0, 9.0) == 1.0
+    assert Balance(whole=10.0, grains=9.0).defect(11.0) == pytest.approx(0.1)
+
+
+def test_the_ledger_adds_up_and_momentum_closes(fluid, done):
+    rows = done.updates
+    passed = [
+        one["rate_m3_s"] * (two["time_s"] - one["time_s"]) for one, two in itertools.pairwise(rows)
+    ]
+    assert rows[-1]["filtrate_m3"] == pytest.approx(sum(passed), rel=1e-9)
+    assert rows[0]["rate_over_initial"] == pytest.approx(1.0, rel=0.02)
+    assert rows[-1]["rate_over_initial"] < 0.95
+    area, whole = fluid.pack.network.area, rows[0]
+    total = whole["pressure_pack_Pa"] + whole["pressure_cake_Pa"]
+    for row in rows:
+        assert row["pressure_pack_Pa"] + row["pressure_cake_Pa"] == pytest.approx(total, rel=1e-6)
+        assert row["rate_m3_s"] == pytest.approx(row["velocity_m_s"] * area, rel=1e-12)
+        assert row["momentum_defect"] <= 0.01
+    table = history_rows(fluid.case, fluid.scales, done.history, rows)
+    assert [line["step"] for line in table] == [row.step for row in done.history]
+    assert table[-1]["filtrate_m3"] == rows[-1]["filtrate_m3"]
+    assert "rate_over_initial" not in history_rows(fluid.case, fluid.scales, done.history)[0]
+
+
+def test_a_rate_below_the_asked_share_ends_the_run(binary, fluid, done, tmp_path):
+    share = done.updates[len(done.updates) // 2]["rate_over_initial"]
+    other = with_case(fluid, f"run.stop_rate={share}")
+    result = invade(
+        other.case, other.scales, other.grains, tmp_path, Launch(binary=binary), fluid=other
+    )
+    assert result.stop_reason == "plugged"
+    assert len(result.history) < len(done.history)
+    assert result.updates == done.updates[: len(result.updates)]
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (["drag.upstream=interstitial"], r"drag\.upstream: 'interstitial', but with drag\.field"),
+        (["grains.motion=mobile"], r"grains\.motion: 'mobile' with drag\.field 'network'"),
+        (["fines.supply=batches"], r"fines\.supply: 'batches' come on as fast as at the start"),
+        (["drag.field=uniform", "drag.drive=rate"], r"drag\.drive: 'rate' belongs to"),
+        (["drag.drive=rate", "run.stop_rate=0.1"], r"run\.stop_rate: 0\.1 needs a rate that"),
+        (["drag.scheme=viscous"], r"drag\.scheme: 'viscous' has one damping for all fines"),
+    ],
+)
+def test_what_does_not_go_with_the_network_is_refused(settings, message):
+    with pytest.raises(CaseError, match=message):
+        small(*settings)
