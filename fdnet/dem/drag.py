@@ -41,16 +41,25 @@ def drag_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]
 
 
 def _gradient(case: InvasionCase, scales: InvasionScales) -> dict[str, str] | None:
-    """V (-grad p) inside the pack: one force, or a coefficient of r^3 for fines of many sizes."""
+    """V (-grad p) inside the pack: one force, or a formula for fines of many sizes.
+
+    Where all have one density V is taken from the mass, which is the cheaper formula.
+    """
     push = scales.push
     if not push.gradient:
         return None
     end = number(np.nextafter(case.size_m[0], 0))
+    densities = {one.density for one in case.fines.components}
+    formula = (
+        f"{number(push.gradient / min(densities))}*mass"
+        if len(densities) == 1
+        else f"{number(push.gradient_force(1.0))}*r*r*r"
+    )
     one_size = case.fines.one_size
     return {
         "pores": f"0.0 {end} INF INF INF INF",
         "force": number(push.gradient_force(case.fines.mean_radius_m)) if one_size else "",
-        "coefficient": "" if one_size else number(push.gradient_force(1.0)),
+        "formula": "" if one_size else formula,
     }
 
 

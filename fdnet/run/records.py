@@ -174,7 +174,7 @@ def _pack_warnings(pack: dict[str, Any]) -> list[str]:
         warnings.append(
             "the fluid's velocity follows from a porosity of "
             f"{pack['porosity_assumed']:.3f} (plain sum of grains.count), the pack has "
-            f"{pack['porosity']:.3f}: give fluid.velocity_m_s"
+            f"{pack['porosity']:.3f}: give grains.porosity instead of the count"
         )
     return warnings
 

@@ -139,8 +139,8 @@ def test_the_pressure_gradient_acts_on_the_volume_of_each_fine_inside_the_pack()
     end = re.search(r"(?m)^region pores block 0.0 (\S+) INF INF INF INF units box$", one)
     assert float(end[1]) == np.nextafter(3e-3, 0)
     many = invade_text("drag.pressure_gradient=true", "fines.radius_mm=[0.04, 0.06]")
-    formula = re.search(r"(?m)^variable gx atom (\S+)\*r\*r\*r$", many)
-    assert float(formula[1]) == pytest.approx(4 / 3 * math.pi * gradient)
+    formula = re.search(r"(?m)^variable gx atom (\S+)\*mass$", many)
+    assert float(formula[1]) == pytest.approx(gradient / 2146)
     assert has(many, r"^fix gradient fines addforce v_gx 0.0 0.0 region pores$")
 
 
