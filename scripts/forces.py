@@ -21,8 +21,8 @@ parser.add_argument("study", choices=["effect", "cost"])
 parser.add_argument("cases", nargs="*", type=path_option, metavar="CASE.toml")
 parser.add_argument("--seeds", nargs="+", type=int, default=[1, 2, 3])
 parser.add_argument("--fines", nargs="+", type=int, default=[5_000, 50_000])
-parser.add_argument("--fine-steps", type=float, default=2e7, help="steps times fines of a cost")
-parser.add_argument("--repeats", type=int, default=3)
+parser.add_argument("--fine-steps", type=float, default=2.5e5, help="steps times fines of a turn")
+parser.add_argument("--rounds", type=int, default=40, help="turns of each force")
 parser.add_argument("--out", type=path_option, default=Path("runs/forces"))
 parser.add_argument("--csv", type=path_option, required=True)
 
@@ -31,7 +31,7 @@ if __name__ == "__main__":
     rows = (
         effect_rows(given.cases, given.seeds, given.out)
         if given.study == "effect"
-        else cost_rows(given.fines, given.fine_steps, given.repeats, given.out)
+        else cost_rows(given.fines, given.fine_steps, given.rounds, given.out)
     )
     for row in write_as_they_come(given.csv, rows):
         print(row, flush=True)

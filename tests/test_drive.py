@@ -23,11 +23,14 @@ def driven(*assignments: str) -> InvasionScales:
 
 
 def test_the_impact_stokes_number_by_hand():
-    """m v / (6 pi mu r^2) = (2/9) rho r v / mu."""
+    """m v / (6 pi mu r^2) = (2/9) rho r v / mu, v that of a free fine."""
     scales = driven()
     mass = 4 / 3 * math.pi * 5e-5**3 * 2146
     by_hand = mass * scales.interstitial_velocity / (6 * math.pi * 0.05 * 5e-5**2)
     assert scales.impact_stokes == pytest.approx(by_hand, rel=1e-12)
+    pushed = driven("drag.pressure_gradient=true")
+    ratio = 2 / 9 * 5e-5**2 * pushed.porosity / pushed.permeability
+    assert pushed.impact_stokes == pytest.approx((1 + ratio) * by_hand, rel=1e-12)
     assert impact_stokes(2.0, 3.0, 4.0) == 1.5
 
 
@@ -103,6 +106,12 @@ def test_a_drive_near_the_bound_warns():
     assert f"lower it to {most:.2g} m/s" in texts
     assert "inertia may" not in " ".join(driven(f"drag.drive_velocity_m_s={most}").warnings)
     assert "inertia may" not in " ".join(scales_of(tiny()).warnings)
+
+
+def test_a_drive_does_not_go_with_cohesion():
+    keys = ("contact.model=hertz", "contact.cohesion_J_m3=1e4")
+    with pytest.raises(CaseError, match=r"drag\.drive_velocity_m_s: auto with .*cohesion is not"):
+        tiny("drag.drive_velocity_m_s=auto", *keys)
 
 
 def test_the_table_of_scales_shows_the_drive():

@@ -9,6 +9,7 @@ from fdnet.case.contact import MODEL_KEYS
 from fdnet.case.contact_rules import of_cohesion, of_rolling, of_the_model
 from fdnet.case.control import Run
 from fdnet.case.coupled_rules import (
+    coupled_inertia,
     crowd_scheme,
     flow_field,
     network_grains,
@@ -16,7 +17,7 @@ from fdnet.case.coupled_rules import (
     stop_rate,
     update_travel,
 )
-from fdnet.case.fluid import Fluid, Well
+from fdnet.case.flow_rules import FLOW_RULES
 from fdnet.case.particles import Fines, Grains
 from fdnet.case.parts import Box, Drag
 from fdnet.case.rule import Rule
@@ -152,28 +153,6 @@ def _neighbour_bins(run: Run, box: Box, fines: Fines) -> Iterator[str]:
         )
 
 
-def _one_drive(well: Well, fluid: Fluid) -> Iterator[str]:
-    """A well gives the velocity, so nothing else may."""
-    given = [
-        f"fluid.{name} = {value:g}"
-        for name in ("velocity_m_s", "darcy_length_mm")
-        if (value := getattr(fluid, name)) is not None
-    ]
-    if given:
-        yield (
-            f"well: the table [well] with {' and '.join(given)}: each gives the velocity of the "
-            "fluid; keep one of them"
-        )
-
-
-def _radii_of_well(well: Well) -> Iterator[str]:
-    if well.drainage_radius_m <= well.radius_m:
-        yield (
-            f"well.drainage_radius_m: {well.drainage_radius_m:g} m is not above the radius of the "
-            f"well, well.radius_mm = {well.radius_mm:g} ({well.radius_m:g} m)"
-        )
-
-
 def _refresh(drag: Drag) -> Iterator[str]:
     if drag.scheme != "held" and drag.refresh_steps not in (None, 1):
         yield (
@@ -258,10 +237,10 @@ RULES = (
     SOME_THROAT,
     Rule(("run.skin_mm", "grains.radius_mm", "fines.radius_mm"), _skin),
     Rule(("run.neighbour_bin_mm", "box.size_mm", "fines"), _neighbour_bins),
-    Rule(("well", "fluid.velocity_m_s", "fluid.darcy_length_mm"), _one_drive),
-    Rule(("well.radius_mm", "well.drainage_radius_m"), _radii_of_well),
+    *FLOW_RULES,
     Rule(("drag.field", "drag.upstream", "drag.drive"), flow_field),
     Rule(("drag.field", "grains.motion"), network_grains),
+    Rule(("drag.field", "drag.crowd", "drag.inertia"), coupled_inertia),
     Rule(("drag.field", "drag.drive", "fines.supply"), network_supply),
     Rule(("run.stop_rate", "drag.field", "drag.drive"), stop_rate),
     Rule(("drag.scheme", "drag.crowd", "drag.field"), crowd_scheme),

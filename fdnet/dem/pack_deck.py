@@ -44,15 +44,17 @@ def write_pack_inputs(
     count: int,
     ranks: int = 1,
     shown: tuple[int, ...] = (),
+    places: int = 0,
 ) -> Deck:
     """Write in.pack and pack.data, `count` small spheres at random, into `folder`.
 
-    For `shown` see `render_pack`.
+    `places` numbers the sets of random places that the same grains may start from. For `shown` see
+    `render_pack`.
     """
     deck = render_pack(case, scales, count=count, ranks=ranks, shown=shown)
     (folder / "in.pack").write_text(deck.text)
     radii = draw_radii(case, count)
-    rng = np.random.default_rng([case.seed, count])
+    rng = np.random.default_rng([case.seed, count, *([places] if places else [])])
     small, size = PACK_START * radii, np.array(case.size_m)
     margin = small[:, None] * np.array(
         [1.0, *([0.0, 0.0] if case.box.sides == "periodic" else [1.0, 1.0])]

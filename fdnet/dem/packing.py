@@ -21,6 +21,7 @@ from fdnet.dem.scene import (
     snapshot_of,
 )
 from fdnet.errors import CaseError, LiggghtsError
+from fdnet.scales.densest import densest_porosity, reach_text, within_limit
 from fdnet.scales.grain_pack import (
     PACK_STEP,
     grain_count,
@@ -35,6 +36,9 @@ POROSITY_TOLERANCE = 0.003
 """Accepted difference to the porosity of the case."""
 ATTEMPTS = 8
 """Most packs with different numbers of grains that are tried."""
+PLACES = 4
+"""Most sets of random places from which the same grains are packed, when they do not come to
+rest."""
 MOST_CREEP = 1e-5
 """Root-mean-square speed, in grain diameters per sqrt(m/k), up to which a creeping pack is
 accepted."""
@@ -53,6 +57,7 @@ class Pack:
         steps: of the last attempt.
         step_s: s, time step.
         attempts: one row for each number of grains that was tried.
+        restless: packs that did not come to rest, before others from the next random places did.
         left_out: what the deck does without.
         run: the execution of LIGGGHTS that made it.
         creep: m/s, root-mean-square speed of grains that never came to rest; 0 for a pack at rest.
@@ -69,6 +74,11 @@ class Pack:
     left_out: tuple[LeftOut, ...]
     run: Run
     creep: float
+    restless: int = 0
+
+
+class RestlessError(LiggghtsError):
+    """The grains never came to rest."""
 
 
 def make_pack(case: Case, scales: Scales, folder: Path, launch: Launch) -> Pack:
@@ -81,13 +91,14 @@ def make_pack(case: Case, scales: Scales, folder: Path, launch: Launch) -> Pack:
     counts, tried = [grain_count(case)], []
     while True:
         attempt = folder / f"attempt_{len(counts)}"
-        pack = _attempt(case, scales, attempt, launch, count=counts[-1])
+        pack = _at_rest(case, scales, attempt, launch, count=counts[-1])
         tried.append(
             {
                 "grains": len(pack.grains),
                 "porosity": pack.porosity,
                 "porosity_error": pack.porosity_error,
                 "max_overlap": pack.max_overlap,
+                "restless": pack.restless,
                 "liggghts_s": pack.run.seconds,
             }
         )
@@ -104,9 +115,18 @@ def _refuse_overlap(case: Case, pack: Pack) -> None:
         value = case.grains.porosity if case.grains.count is None else case.grains.count
         raise CaseError(
             f"{key}: {value} needs grains that overlap by {100 * pack.max_overlap:.1f} % of a "
-            f"diameter (limit grains.max_overlap {case.grains.max_overlap:g}); take a looser pack "
-            "or raise the limit"
+            f"diameter (limit grains.max_overlap {case.grains.max_overlap:g}); "
+            f"{_what_can_be(case, pack)}take a looser pack or raise the limit"
         )
+
+
+def _what_can_be(case: Case, pack: Pack) -> str:
+    """The porosities that these grains can have, in words; empty where the pack is loose."""
+    rigid = densest_porosity(case.grains)
+    if pack.porosity >= rigid:
+        return ""
+    limit = within_limit(rigid, pack.porosity, pack.max_overlap, case.grains.max_overlap)
+    return f"{reach_text(rigid)}, and about {limit:.2f} within the limit: "
 
 
 def _is_met(target: float, pack: Pack) -> bool:
@@ -154,11 +174,28 @@ def _accept(folder: Path, attempt: Path, pack: Pack, tried: list[dict[str, Any]]
     return replace(pack, attempts=tuple(tried), run=replace(pack.run, directory=folder))
 
 
-def _attempt(case: Case, scales: Scales, folder: Path, launch: Launch, *, count: int) -> Pack:
+def _at_rest(case: Case, scales: Scales, folder: Path, launch: Launch, *, count: int) -> Pack:
+    """A pack of `count` grains, from the next random places where it does not come to rest.
+
+    Raises RestlessError when it does not after `PLACES` of them.
+    """
+    for places in range(PLACES):
+        try:
+            pack = _attempt(case, scales, folder, launch, count=count, places=places)
+        except RestlessError as error:
+            last = error
+        else:
+            return replace(pack, restless=places)
+    raise RestlessError(f"{last} (tried {PLACES} times from other places)") from last
+
+
+def _attempt(
+    case: Case, scales: Scales, folder: Path, launch: Launch, *, count: int, places: int
+) -> Pack:
     if folder.exists():
         shutil.rmtree(folder)
     (folder / "post").mkdir(parents=True)
-    deck = write_pack_inputs(case, scales, folder, count=count, ranks=launch.ranks)
+    deck = write_pack_inputs(case, scales, folder, count=count, ranks=launch.ranks, places=places)
     run = _run(case, folder, count, launch)
     frame = read_frame(folder / "post" / "pack.dump")
     screen = (folder / "screen.txt").read_text(encoding="utf-8", errors="replace")
@@ -188,13 +225,13 @@ def _attempt(case: Case, scales: Scales, folder: Path, launch: Launch, *, count:
 def _creep(case: Case, scales: Scales, folder: Path, grains: Snapshot) -> float:
     """Root-mean-square speed, m/s, of grains that never came to rest.
 
-    A pack that is barely jammed has such soft modes. Raises LiggghtsError above `MOST_CREEP` grain
+    A pack that is barely jammed has such soft modes. Raises RestlessError above `MOST_CREEP` grain
     diameters per sqrt(m/k).
     """
     speed = float(np.sqrt(np.mean(np.sum(grains.velocity**2, axis=1))))
     natural = 2 * case.grains.mean_radius_m * PACK_STEP / scales.pack_step
     if speed > MOST_CREEP * natural:
-        raise LiggghtsError(
+        raise RestlessError(
             f"{folder}: the pack did not come to rest in {REST_RUNS * RELAX_RUN_STEPS} steps, its "
             f"grains still move at {speed:.3g} m/s (limit {MOST_CREEP * natural:.3g}); take "
             "another seed or porosity"

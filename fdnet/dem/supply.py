@@ -16,13 +16,11 @@ import numpy as np
 from fdnet.case.case import InvasionCase
 from fdnet.case.size_rules import concentration_text
 from fdnet.dem.measured_fines import drawn_fines
+from fdnet.dem.size_classes import CLEARANCE, ROUNDS, places_by_size
 from fdnet.errors import CaseError
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 
-CLEARANCE = 1.02
-"""Fines start at least this many radius sums apart."""
-_ROUNDS = 400
 LOOSEST_CAKE = 0.5
 """Volume fraction of the loosest cake that batches leave room for. Random loose packing has 0.55
 (Onoda & Liniger 1990)."""
@@ -184,26 +182,50 @@ def _draw_batches(
 ) -> Iterator[tuple[Array, Array]]:
     """Places (n, 3) m in the slab and radii (n,) m of each batch, clear of the one before."""
     batches, before = batches_of(case, scales), (np.empty((0, 3)), np.empty(0))
-    drawn = drawn_fines(case, batches.counts) if case.fines.measured else []
+    if case.fines.measured:
+        yield from _draw_measured(case, scales, batches, end=end)
+        return
     for number, count in enumerate(batches.counts):
         rng = np.random.default_rng([case.seed, 11, number])
-        radius = drawn[number].radius if drawn else rng.uniform(*case.fines.radius_range_m, count)
+        radius = rng.uniform(*case.fines.radius_range_m, count)
         high = end - number * batches.length
         low = max(high - batches.length, end - scales.slab_length)
         before = (_add_sequentially(case, radius, (low, high), rng, others=before), radius)
         yield before
 
 
+def _draw_measured(
+    case: InvasionCase, scales: InvasionScales, batches: Batches, *, end: float
+) -> Iterator[tuple[Array, Array]]:
+    """The same for measured sizes, placed all at once."""
+    radius = [batch.radius for batch in drawn_fines(case, batches.counts)]
+    every, batch = np.concatenate(radius), np.repeat(np.arange(len(radius)), batches.counts)
+    size = np.array(case.size_m)
+    low, high = np.zeros((len(every), 3)), np.tile(size, (len(every), 1))
+    high[:, 0] = end - batch * batches.length
+    low[:, 0] = np.maximum(high[:, 0] - batches.length, end - scales.slab_length)
+    period = np.where(case.periodic, size, 0.0)
+    margin = np.where(period > 0, 0.0, every[:, None]) * np.array([0.0, 1.0, 1.0])
+    rng = np.random.default_rng([case.seed, 11])
+    place, lost = places_by_size(every, low + margin, high - margin, period, rng=rng)
+    if lost:
+        raise _no_place(case, lost, len(every), scales.slab_length)
+    yield from zip(np.split(place, np.cumsum(batches.counts)[:-1]), radius, strict=True)
+
+
+def _no_place(case: InvasionCase, lost: int, count: int, length: float) -> CaseError:
+    return CaseError(
+        f"{concentration_text(case.fines)} leaves {lost} of {count} fines without a place in a "
+        f"slab of {1e3 * length:.3g} mm; lower it or lengthen fines.slab_mm"
+    )
+
+
 def _draw(case: InvasionCase, scales: InvasionScales, *, end: float) -> tuple[Array, Array]:
     """Places (N, 3) and radii (N,) m of the slab's fines; it ends at x = `end`."""
+    if case.fines.measured:
+        return next(_draw_measured(case, scales, batches_of(case, scales), end=end))
     rng = np.random.default_rng([case.seed, 11])
-    count = scales.supplied_count
-    measured = case.fines.measured
-    radius = (
-        drawn_fines(case, [count])[0].radius
-        if measured
-        else rng.uniform(*case.fines.radius_range_m, count)
-    )
+    radius = rng.uniform(*case.fines.radius_range_m, scales.supplied_count)
     return _add_sequentially(case, radius, (end - scales.slab_length, end), rng), radius
 
 
@@ -217,7 +239,7 @@ def _add_sequentially(
     """Places (N, 3) m by random sequential addition, largest first, between the x of `slab`, m.
 
     It goes in rounds: of two fines that overlap the later one is drawn again. `others` are places
-    (M, 3) and radii (M,) m of spheres to keep clear of. Raises CaseError after `_ROUNDS` rounds.
+    (M, 3) and radii (M,) m of spheres to keep clear of. Raises CaseError after `ROUNDS` rounds.
     """
     size = np.array([slab[1] - slab[0], *case.size_m[1:]])
     period = np.where(case.periodic, size, 0.0)
@@ -227,7 +249,7 @@ def _add_sequentially(
     position = np.empty((len(radius), 3))
     waiting = order
     done = others[1]
-    for _ in range(_ROUNDS):
+    for _ in range(ROUNDS):
         if not len(waiting):
             return position + corner
         margin = np.where(period > 0, 0.0, radius[waiting][:, None]) * np.array([0.0, 1.0, 1.0])
@@ -244,11 +266,7 @@ def _add_sequentially(
             np.concatenate([placed, drawn[free]]),
         )
         waiting = waiting[~free]
-    raise CaseError(
-        f"{concentration_text(case.fines)} leaves {len(waiting)} of "
-        f"{len(radius)} fines without a place in a slab of {1e3 * size[0]:.3g} mm; lower it or "
-        "lengthen fines.slab_mm"
-    )
+    raise _no_place(case, len(waiting), len(radius), size[0])
 
 
 def _free(points: Array, radius: Array, placed: int, period: Array) -> Array:

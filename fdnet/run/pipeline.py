@@ -29,6 +29,7 @@ from fdnet.run.records import record_warnings, stage_seconds, versions
 from fdnet.run.session import RunOptions, Session
 from fdnet.run.summary import summarise
 from fdnet.scales.cost import refuse_long
+from fdnet.scales.densest import refuse_unreachable
 from fdnet.scales.grain_pack import grain_count
 from fdnet.scales.scales import scales_of
 from fdnet.scales.table import scale_rows
@@ -66,6 +67,7 @@ def _refuse(case: Case, options: RunOptions) -> None:
     """Raise, before anything is written, what would stop the run later."""
     needed = _stages_to_run(case, options)
     _refuse_few_grains(case, options)
+    refuse_unreachable(case)
     refuse_long(case, scales_of(case), pack="pack" in needed, invade="invade" in needed)
     fresh = options.force or not has_history(options.out / "invade")
     if isinstance(case, InvasionCase) and "invade" in needed and fresh:

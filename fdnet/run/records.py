@@ -51,6 +51,7 @@ def pack_record(
         "porosity_sum": pack.porosity_sum,
         "max_overlap": pack.max_overlap,
         "creep_m_s": pack.creep,
+        "restless": sum(row.get("restless", 0) for row in pack.attempts),
         "steps": pack.steps,
         "dt_s": pack.step_s,
         "attempts": list(pack.attempts),
@@ -159,6 +160,11 @@ def _pack_warnings(pack: dict[str, Any]) -> list[str]:
             f"grains overlap by up to {100 * pack['max_overlap']:.1f} % of a diameter: the pack "
             "is denser than rigid spheres get"
         )
+    if pack.get("restless"):
+        warnings.append(
+            f"{pack['restless']} packs did not come to rest and were made again from other random "
+            "places: the pack is not that of the seed's first places"
+        )
     if pack.get("creep_m_s"):
         warnings.append(
             f"the pack is barely jammed and still creeps, at {pack['creep_m_s']:.2g} m/s; it is "
@@ -168,7 +174,7 @@ def _pack_warnings(pack: dict[str, Any]) -> list[str]:
         warnings.append(
             "the fluid's velocity follows from a porosity of "
             f"{pack['porosity_assumed']:.3f} (plain sum of grains.count), the pack has "
-            f"{pack['porosity']:.3f}: give fluid.velocity_m_s"
+            f"{pack['porosity']:.3f}: give grains.porosity instead of the count"
         )
     return warnings
 

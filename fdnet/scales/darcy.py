@@ -3,7 +3,9 @@
 import math
 from dataclasses import dataclass
 
-ERGUN_RATIO = 1.75 / 150
+from fdnet.scales.forces.bed import CARMAN_KOZENY, ERGUN_INERTIAL, ERGUN_VISCOUS
+
+ERGUN_RATIO = ERGUN_INERTIAL / ERGUN_VISCOUS
 """Loss by inertia over viscous loss, for each rho q d / (mu (1 - phi)) (Ergun 1952)."""
 
 
@@ -48,7 +50,7 @@ class Losses:
 
 def carman_kozeny(porosity: float, diameter: float) -> float:
     """k = d^2 phi^3 / (180 (1 - phi)^2), m2 (Carman 1937; 180 = 72 x tortuosity 2.5)."""
-    return diameter**2 * porosity**3 / (180 * (1 - porosity) ** 2)
+    return diameter**2 * porosity**3 / (CARMAN_KOZENY * (1 - porosity) ** 2)
 
 
 def ergun_inertia(permeability: float, porosity: float, diameter: float, density: float) -> float:

@@ -28,7 +28,7 @@ class Drive:
         velocity: m/s, in the pores.
         factor: velocity over the fluid's own: the factor on all forces on a fine, and physical
             time over simulated time.
-        impact_stokes: impact Stokes number of the largest fine at this velocity.
+        impact_stokes: impact Stokes number of the largest fine, free in this fluid.
     """
 
     velocity: float
@@ -45,7 +45,9 @@ def impact_stokes(relaxation_time: float, velocity: float, radius: float) -> flo
     return relaxation_time * velocity / radius
 
 
-def drive_of(case: InvasionCase, velocity: float, relaxation_time: float) -> Drive:
+def drive_of(
+    case: InvasionCase, velocity: float, relaxation_time: float, *, free: float | None = None
+) -> Drive:
     """The velocity that the case asks for, or the fluid's own.
 
     "auto" never drives slower than the fluid moves.
@@ -54,24 +56,24 @@ def drive_of(case: InvasionCase, velocity: float, relaxation_time: float) -> Dri
         case: the case.
         velocity: of the fluid in the pores, m/s.
         relaxation_time: of the largest fine, s.
+        free: velocity of a free fine in this fluid, m/s: faster where a pressure gradient pushes
+            it; the fluid's own if not given.
 
     Raises:
         CaseError: a driven case whose impact Stokes number is above `STOKES_LIMIT`, as simulated
             or at the fluid's own velocity.
     """
     radius, asked = case.fines.radius_range_m[1], case.drag.drive_velocity_m_s
+    own = impact_stokes(relaxation_time, velocity if free is None else free, radius)
     driven = velocity
     if asked == "auto":
-        driven = max(velocity, AUTO_STOKES * radius / relaxation_time)
+        driven = velocity * max(1.0, AUTO_STOKES / own)
     elif asked is not None:
         driven = asked
-    drive = Drive(
-        velocity=driven,
-        factor=driven / velocity,
-        impact_stokes=impact_stokes(relaxation_time, driven, radius),
-    )
+    factor = driven / velocity
+    drive = Drive(velocity=driven, factor=factor, impact_stokes=own * factor)
     if asked is not None:
-        _refuse_inertia(drive, impact_stokes(relaxation_time, velocity, radius))
+        _refuse_inertia(drive, own)
     return drive
 
 

@@ -12,7 +12,7 @@ from fdnet.case.case import Case, InvasionCase
 from fdnet.errors import CaseError
 from fdnet.scales.cohesion import cohesion_warnings
 from fdnet.scales.contacts import contacts_of, stiffness_factor
-from fdnet.scales.drive import drive_of, drive_warnings
+from fdnet.scales.drive import Drive, drive_of, drive_warnings
 from fdnet.scales.forces.push import Push, push_of
 from fdnet.scales.forces.throat import throat_width
 from fdnet.scales.forces.warnings import reynolds_warnings, throat_warnings
@@ -166,7 +166,7 @@ def _shared(case: Case, velocity: Velocity) -> Scales:
 
 def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     slab, relaxation = slab_of(case), _relaxation_times(case)
-    drive = drive_of(case, shared.interstitial_velocity, relaxation[1])
+    drive = _drive(case, shared, relaxation[1])
     velocity = drive.velocity
     push = push_of(case, velocity, shared.pressure_gradient, factor=drive.factor)
     darcy = shared.darcy_velocity * drive.factor
@@ -219,6 +219,13 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
         drag_overlap=overlaps.drag,
         sticking=sticking,
     )
+
+
+def _drive(case: InvasionCase, shared: Scales, relaxation: float) -> Drive:
+    """How fast the simulation is driven; a free fine outruns the fluid by its drift."""
+    own = push_of(case, shared.interstitial_velocity, shared.pressure_gradient)
+    free = own.velocity + own.drift(case.fines.radius_range_m[1])
+    return drive_of(case, own.velocity, relaxation, free=free)
 
 
 def _relaxation_times(case: InvasionCase) -> tuple[float, float]:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.sizes import Sizes
 from fdnet.case.spheres import Spheres
+from fdnet.scales.densest import densest_porosity, reach_text
 from fdnet.sizes.curve import SizeCurve
 
 SHARES = (0.1, 0.5, 0.9)
@@ -111,7 +112,18 @@ def size_warnings(case: Case) -> list[str]:
                 f"fines: the suspension carries {100 * placed:.3g} % of fines by volume instead "
                 f"of {100 * given:.3g} %, because the sizes left out are not in it"
             )
-    return warnings
+    return warnings + _dense_warnings(case)
+
+
+def _dense_warnings(case: Case) -> list[str]:
+    """The sand is denser than rigid spheres of its sizes get."""
+    porosity = case.grains.porosity
+    if not case.grains.measured or case.grains.count is not None or porosity is None:
+        return []
+    rigid = densest_porosity(case.grains)
+    if porosity >= rigid:
+        return []
+    return [f"grains.porosity: {reach_text(rigid)}; at {porosity:g} grains overlap"]
 
 
 def _curves(name: str, spheres: Spheres) -> Iterator[tuple[str, Sizes]]:

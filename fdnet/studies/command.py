@@ -22,13 +22,14 @@ STUDIES: Mapping[str, str] = {
     "throat-occupancy": "volume of a fine in a throat: the thesis's two planes or quadrature",
     "linear-solver": "method and tolerance of the network's solve, by size and conductances",
     "laws": "conductance and damage laws, and coarse resolved flow, against Stokes truth",
+    "velocity-field": "cells across a grain for the velocity between the grains",
     "specimen-size": "number of grains and seed: how large a specimen must be",
     "economies": "settings that make full-scale invasions affordable: error and speed-up of each",
     "outside-numbers": "the invasion on the real binary against closed forms and literature",
 }
 """Name of each study and its question; the module has the same name with underscores."""
 
-OF_NETWORK = ("throat-occupancy", "linear-solver", "laws", "specimen-size")
+OF_NETWORK = ("throat-occupancy", "linear-solver", "laws", "velocity-field", "specimen-size")
 """The studies of the network half; the others are of the invasion."""
 
 OUTSIDE = "outside-numbers"

@@ -1,5 +1,7 @@
 """Fines fed in batches: the suspension of one slab, each part present once it is due."""
 
+import re
+
 import numpy as np
 import pytest
 from builders import resting_spheres, tiny
@@ -130,10 +132,37 @@ def test_the_deck_takes_each_batch_in_once_and_gives_it_its_drag(tmp_path, schem
     assert any(line.startswith("velocity batch set") for line in lines)
 
 
+@pytest.mark.parametrize(
+    ("settings", "stored"),
+    [
+        (("drag.scheme=held",), "v_fx v_fy v_fz"),
+        (("drag.scheme=every_step", "drag.inertia=schiller-naumann"), "v_cr"),
+        (("drag.scheme=every_step",), None),
+    ],
+)
+def test_what_is_stored_for_each_fine_is_stored_anew_after_a_batch(tmp_path, settings, stored):
+    """LIGGGHTS stores nothing for atoms that come later: they would feel no drag."""
+    case = tiny(*BATCHED, *settings)
+    write_batches(case, scales_of(case), one_grain(case), tmp_path)
+    text = (tmp_path / "supply/batch_2.in").read_text()
+    again = re.findall(r"(?m)^unfix drag\nunfix st\nfix st fines store/state \d+ (.*)$", text)
+    assert again == ([] if stored is None else [stored])
+    assert len(re.findall("(?m)^fix drag fines addforce", text)) == len(again)
+
+
 @pytest.mark.liggghts
-@pytest.mark.parametrize("scheme", ["viscous", "held", "implicit"])
-def test_a_batched_invasion_accounts_for_every_fine_and_resumes(binary, tmp_path, scheme):
-    case = tiny(*BATCHED, f"drag.scheme={scheme}", "run.cap_ms=0.1", "fines.friction=0.2")
+@pytest.mark.parametrize(
+    ("scheme", "forces"),
+    [
+        ("viscous", ()),
+        ("held", ()),
+        ("implicit", ()),
+        ("every_step", ("drag.inertia=schiller-naumann", "drag.pressure_gradient=true")),
+    ],
+)
+def test_a_batched_invasion_accounts_for_every_fine_and_resumes(binary, tmp_path, scheme, forces):
+    settings = (f"drag.scheme={scheme}", "run.cap_ms=0.1", "fines.friction=0.2")
+    case = tiny(*BATCHED, *settings, *forces)
     scales = scales_of(case)
     grains = make_pack(case, scales, tmp_path / "pack", Launch(binary=binary)).grains
     whole = invade(case, scales, grains, tmp_path / "whole", Launch(binary=binary))

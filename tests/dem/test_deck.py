@@ -139,8 +139,8 @@ def test_the_pressure_gradient_acts_on_the_volume_of_each_fine_inside_the_pack()
     end = re.search(r"(?m)^region pores block 0.0 (\S+) INF INF INF INF units box$", one)
     assert float(end[1]) == np.nextafter(3e-3, 0)
     many = invade_text("drag.pressure_gradient=true", "fines.radius_mm=[0.04, 0.06]")
-    formula = re.search(r"(?m)^variable gx atom (\S+)\*r\*r\*r$", many)
-    assert float(formula[1]) == pytest.approx(4 / 3 * math.pi * gradient)
+    formula = re.search(r"(?m)^variable gx atom (\S+)\*mass$", many)
+    assert float(formula[1]) == pytest.approx(gradient / 2146)
     assert has(many, r"^fix gradient fines addforce v_gx 0.0 0.0 region pores$")
 
 
@@ -250,3 +250,19 @@ def test_moduli_that_liggghts_would_refuse_are_said_to_be_meant():
         assert has(text, "^soft_particles yes") is soft
         assert has(text, "^hard_particles yes") is hard
     assert not has(invade_text(), "_particles yes")
+
+
+def test_every_step_keeps_the_coefficient_of_a_finite_reynolds_number_but_not_the_force():
+    """For a divisor of the steps between checkpoints, so that cut runs continue bit for bit."""
+    settings = ("drag.inertia=schiller-naumann", "drag.scheme=every_step")
+    text, scales = invade_text(*settings), scales_of(tiny(*settings))
+    kept = int(re.search(r"(?m)^fix st fines store/state (\d+) v_cr$", text)[1])
+    assert kept > 1
+    assert scales.checkpoint_steps % kept == 0
+    share = scales.push.relaxation_share(5e-5) * scales.relaxation_time[0]
+    assert kept * scales.time_step <= 0.05 * share
+    assert has(text, r"^variable fx atom f_st\*v_sx$")
+    assert has(text, r"^fix drag fines addforce v_fx v_fy v_fz$")
+    held = invade_text("drag.inertia=schiller-naumann")
+    assert has(held, r"^variable fx atom v_cr\*v_sx$")
+    assert has(held, r"^fix drag fines addforce v_hx v_hy v_hz$")

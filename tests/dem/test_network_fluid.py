@@ -14,7 +14,7 @@ from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
 from fdnet.errors import CaseError
 from fdnet.run.fluid.fluid_of import fluid_of
-from fdnet.run.fluid.network_flow import pore_through
+from fdnet.run.fluid.network_flow import Renewal, changed_share, pore_through
 from fdnet.run.fluid.network_fluid import Balance, NetworkFluid
 from fdnet.run.history import history_rows
 from fdnet.scales.scales import scales_of
@@ -183,6 +183,38 @@ def test_forces_on_fines_and_grains_add_up_to_the_drop_of_pressure(fluid, done):
     assert forces.measures["throat_factor"] > 1.0
 
 
+def test_the_network_is_solved_anew_when_the_deposit_changed(fluid, done):
+    standing = deposit_of(done)
+    renewal = Renewal(fluid.pack)
+    first = renewal.of(standing, anew=False)
+    assert renewal.of(standing, anew=False) is first
+    inner = np.flatnonzero((standing.position[:, 0] > 0) & (standing.position[:, 0] < 1e-3))
+    place = np.array(standing.position)
+    place[inner[0], 2] += 0.9 * standing.radius[0]
+    moved = replace(standing, position=place)
+    assert renewal.of(moved, anew=False) is first
+    keep = np.ones(len(standing), bool)
+    keep[inner[: len(inner) // 2]] = False
+    assert changed_share(renewal.deposit, standing.where(keep)) > 0.1
+    less = renewal.of(standing.where(keep), anew=False)
+    assert less.k_over_k0 > first.k_over_k0
+    assert renewal.of(standing.where(keep), anew=True) is not less
+    assert renewal.solves == 3
+
+
+def test_what_changed_counts_by_volume():
+    box = np.array([[0.0, 1.0]] * 3)
+    four = fines(np.array([[0.1 * k, 0.5, 0.5] for k in range(4)]), 0.01, box)
+    assert changed_share(four, four) == 0.0
+    three = four.where(np.arange(4) < 3)
+    assert changed_share(four, three) == pytest.approx(0.25)
+    assert changed_share(three, four) == pytest.approx(0.25)
+    shift = replace(four, position=four.position + np.array([[0.011, 0, 0]] + 3 * [[0.0] * 3]))
+    assert changed_share(four, shift) == pytest.approx(0.25)
+    nothing = four.where(np.zeros(4, bool))
+    assert changed_share(nothing, nothing) == 0.0
+
+
 def test_a_balance_that_cannot_close_says_by_how_much():
     assert Balance(whole=10.0, grains=4.0).throat_factor(2.0, 4.0) == pytest.approx(3.0)
     assert Balance(whole=10.0, grains=9.0).throat_factor(2.0, 9.0) == 1.0
@@ -220,6 +252,12 @@ def test_a_rate_below_the_asked_share_ends_the_run(binary, fluid, done, tmp_path
     assert result.updates == done.updates[: len(result.updates)]
 
 
+def test_no_warning_of_throats_where_the_balance_of_momentum_sees_them():
+    assert not [text for text in scales_of(small()).warnings if "throats" in text]
+    uniform = small("drag.field=uniform")
+    assert [text for text in scales_of(uniform).warnings if "throats" in text]
+
+
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
@@ -228,6 +266,10 @@ def test_a_rate_below_the_asked_share_ends_the_run(binary, fluid, done, tmp_path
         (["fines.supply=batches"], r"fines\.supply: 'batches' come on as fast as at the start"),
         (["drag.field=uniform", "drag.drive=rate"], r"drag\.drive: 'rate' belongs to"),
         (["drag.drive=rate", "run.stop_rate=0.1"], r"run\.stop_rate: 0\.1 needs a rate that"),
+        (
+            ["drag.crowd=none", "drag.inertia=schiller-naumann"],
+            r"drag\.inertia: 'schiller-naumann'",
+        ),
         (["drag.scheme=viscous"], r"drag\.scheme: 'viscous' has one damping for all fines"),
     ],
 )

@@ -9,9 +9,10 @@ from builders import tiny
 
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.pack_deck import check_radii, draw_radii
-from fdnet.dem.packing import _creep, make_pack
+from fdnet.dem.packing import RestlessError, _creep, make_pack
 from fdnet.dem.scene import box_of
 from fdnet.errors import CaseError, DumpError, LiggghtsError
+from fdnet.run.records import pack_record, record_warnings
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import resting
 
@@ -86,7 +87,10 @@ def test_count_overrides_porosity(binary, tmp_path):
 
 @pytest.mark.parametrize(
     ("porosity", "message"),
-    [(0.12, "pushed out of it"), (0.27, "0.27 needs grains that overlap by")],
+    [
+        (0.12, "pushed out of it"),
+        (0.27, "0.27 needs .* a porosity of 0.35. at random .*, and about 0.[23]. within"),
+    ],
 )
 def test_unreachable_porosity_is_an_error(binary, tmp_path, porosity, message):
     case = tiny(f"grains={{radius_mm=0.25, porosity={porosity}, max_overlap=0.08}}")
@@ -107,3 +111,49 @@ def test_the_overlap_limit_holds_for_a_count_too(binary, tmp_path):
         match=r"grains\.count: 98 needs (grains that overlap|more room)|98 grains needs more room",
     ):
         make_pack(case, scales_of(case), tmp_path, Launch(binary=binary))
+
+
+def short_relaxation(monkeypatch):
+    monkeypatch.setattr("fdnet.dem.pack_deck.REST_RUNS", 1)
+    monkeypatch.setattr("fdnet.dem.pack_deck.RELAX_RUN_STEPS", 10)
+
+
+def test_a_pack_that_never_rests_is_given_up_after_some_places(binary, tmp_path, monkeypatch):
+    short_relaxation(monkeypatch)
+    monkeypatch.setattr("fdnet.dem.packing.PLACES", 2)
+    case = tiny("grains={radius_mm=0.25, count=72}")
+    with pytest.raises(RestlessError, match="tried 2 times from other places"):
+        make_pack(case, scales_of(case), tmp_path, Launch(binary=binary))
+
+
+def test_a_pack_that_does_not_rest_is_made_again_from_the_next_places(
+    binary, tmp_path, monkeypatch
+):
+    """The first one is called restless; the second starts from other places, the same radii."""
+    short_relaxation(monkeypatch)
+    judged = []
+
+    def creep(*_):
+        judged.append(len(judged))
+        if len(judged) == 1:
+            raise RestlessError("the first")
+        return 1e-9
+
+    monkeypatch.setattr("fdnet.dem.packing._creep", creep)
+    case = tiny("grains={radius_mm=[0.2, 0.25], count=72}")
+    pack = make_pack(case, scales_of(case), tmp_path, Launch(binary=binary))
+    assert pack.restless == 1
+    assert [row["restless"] for row in pack.attempts] == [1]
+    assert judged == [0, 1]
+    start = np.loadtxt(tmp_path / "pack.data", skiprows=11)
+    drawn = np.random.default_rng([case.seed, 72, 1]).random((72, 3))
+    reach = np.array(case.size_m) * drawn
+    radius = 0.5 * start[:, 2]
+    assert 0.6 * draw_radii(case, 72) == pytest.approx(radius)
+    middle = 0.5 * np.array(case.size_m)
+    inner = np.abs(reach - middle) < 0.5 * middle
+    shift = np.abs(start[:, 4:7] - reach)
+    assert np.all(shift[inner] <= radius.max() + 1e-12)
+    record = pack_record(case, pack, tmp_path, assumed=0.4, seconds=1.0)
+    warnings = record_warnings(case, record, None)
+    assert any("1 packs did not come to rest" in one for one in warnings)

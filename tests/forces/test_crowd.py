@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from builders import tiny
 
 from fdnet.errors import CaseError
 from fdnet.scales.forces.bed import (
@@ -121,9 +120,3 @@ def test_the_law_at_numbers_worked_out_by_hand():
 def test_values_outside_of_the_law_are_refused(porosity, reynolds, message):
     with pytest.raises(CaseError, match=message):
         bed_factor(np.array([0.5, porosity]), np.array([1.0, reynolds]))
-
-
-def test_crowd_drag_is_refused_until_a_run_knows_the_porosity():
-    with pytest.raises(CaseError, match=r"drag.crowd: 'beetstra' needs the porosity around"):
-        tiny("drag.crowd=beetstra")
-    assert tiny().drag.crowd == "none"

@@ -90,6 +90,26 @@ def test_fines_upstream_count_as_far_as_they_reach_in(pack):
     assert upstream(0.3 * radius) < 0.98 * apart
 
 
+def test_renumbering_mirror_shift_and_scale_leave_k(pack, analysis):
+    """Within 0.3 %: the 36 rays of a fourth disc are counted from the first edge of a section."""
+    order = np.random.default_rng(5).permutation(len(pack))
+    numbered = pack.where(order)
+    mirrored, shifted = pack.position.copy(), pack.position.copy()
+    mirrored[:, 1] = pack.box[1].sum() - mirrored[:, 1]
+    shifted[:, 1:] += 0.37 * np.ptp(pack.box[1:], axis=1)
+    larger = replace(pack, position=3 * pack.position, radius=3 * pack.radius, box=3 * pack.box)
+    for other, factor in (
+        (numbered, 1.0),
+        (replace(pack, position=mirrored), 1.0),
+        (replace(pack, position=shifted), 1.0),
+        (larger, 9.0),
+    ):
+        result = analyse(other, periodic=SIDES, sections=2, damage_law="all-spheres")
+        assert result.k_damaged == pytest.approx(factor * analysis.k_damaged, rel=3e-3)
+        for one, own in zip(result.sections, analysis.sections, strict=True):
+            assert one.k_damaged == pytest.approx(factor * own.k_damaged, rel=3e-3)
+
+
 def test_values_in_place_and_layers_add_up_to_the_whole(pack, analysis):
     thickness = [one.x_hi - one.x_lo for one in analysis.sections]
     for name, whole in (("k_initial_inplace", analysis.k_initial), ("k_damaged_inplace", None)):

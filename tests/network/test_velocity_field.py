@@ -13,6 +13,9 @@ from fdnet.network.field.field import VelocityField
 from fdnet.network.field.lattice import build_lattice
 from fdnet.network.field.solved import build_skeleton, solve
 from fdnet.spheres.snapshot import Snapshot
+from fdnet.studies.engine.timing import least_time
+from fdnet.studies.network.interception import happel, intercepted
+from fdnet.studies.network.velocity_field import throat_fluxes
 from fdnet.studies.stokes.stokes import solve_stokes
 
 
@@ -212,3 +215,43 @@ def test_refusals():
     far = replace(pack(), position=pack().position + np.array([100.0, 0.0, 0.0]))
     with pytest.raises(NetworkError, match="no wall"):
         fdnet.velocity_field(far, periodic="yz")
+
+
+def test_fluxes_of_throats_are_those_of_a_fine_grid():
+    network = fdnet.build_network(pack(), periodic="xyz")
+    coarse, fine = (throat_fluxes(network, field("xyz", n)) for n in (10.0, 20.0))
+    lost = np.sum((coarse - fine) ** 2) / np.sum((fine - fine.mean()) ** 2)
+    assert lost < 0.01
+
+
+@pytest.mark.parametrize("cells", [18.0])
+def test_tracers_are_intercepted_as_in_happels_cell(cells):
+    """Within a factor 1.5; a uniform velocity, which leads through the grains, gives about 1."""
+    current = fdnet.velocity_field(pack(), periodic="xyz", cells=cells)
+    expected = happel(0.42, 0.05)
+    caught = intercepted(current.at, pack(), 0.05, tracers=800)
+    assert caught.unfinished == 0
+    assert 1.0 / 1.5 < caught.efficiency / expected < 1.5
+
+    def even(place: np.ndarray) -> np.ndarray:
+        return np.tile([1.0, 0.0, 0.0], (len(place), 1))
+
+    assert intercepted(even, pack(), 0.05, tracers=800).efficiency > 4.0 * expected
+
+
+def test_happels_cell_at_the_porosity_of_the_issue():
+    assert happel(0.40, 0.02) == pytest.approx(0.0228, abs=5e-5)
+    assert happel(0.40, 0.01) == pytest.approx(0.0057, abs=5e-5)
+
+
+def test_where_no_number_of_cells_is_given_the_grid_is_fine_as_far_as_a_million_cells_go():
+    small = fdnet.velocity_field(pack(), periodic="xyz")
+    assert small.lattice.spacing == pytest.approx(2.0 / 18.0, rel=0.1)
+    assert small.lattice.spacing.max() <= 2.0 / 18.0
+
+
+def test_two_hundred_thousand_points_take_a_third_of_a_second():
+    place = points(200_000)
+    field("xyz").at(place[:10])
+    seconds = least_time(lambda: field("xyz").at(place))[1]
+    assert seconds < 0.6

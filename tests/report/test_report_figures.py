@@ -10,6 +10,10 @@ from report_demo import demo_analysis, demo_damaged, demo_grains, snapshot_of
 
 from fdnet.report import figures
 from fdnet.report.side_view import cut_circles
+from fdnet.report.size_figure import fill_size_curves
+from fdnet.run.placed_sizes import PlacedSizes
+from fdnet.sizes.curve import cut_curve
+from fdnet.sizes.laws import LogNormal
 from fdnet.spheres.snapshot import Kind
 
 HISTORY = [
@@ -31,7 +35,7 @@ def coloured_share(path):
 
 def test_all_figures_of_a_damaged_specimen(tmp_path):
     paths = figures.draw_all(tmp_path / "figures", demo_analysis(), demo_damaged(), HISTORY)
-    assert {path.stem for path in paths} == set(figures.CAPTIONS) - {"spheres_3d"}
+    assert {path.stem for path in paths} == set(figures.CAPTIONS) - {"spheres_3d", "size_curves"}
     assert sorted(paths) == sorted((tmp_path / "figures").iterdir())
     assert all(imread(path).shape[1] >= 900 and coloured_share(path) > 0.02 for path in paths)
 
@@ -65,3 +69,28 @@ def test_cut_circles_are_pythagoras():
     assert index.tolist() == [0, 1]  # touching (d = r) is no cut
     assert centre.tolist() == [[1, 2], [3, 4]]
     assert radius == pytest.approx([5.0, 4.0])  # the 3-4-5 triangle
+
+
+def test_the_curves_of_sizes_are_drawn_over_the_diameter_in_microns(tmp_path):
+    """The steps of the placed spheres end at the shares that the cuts leave."""
+    from matplotlib.figure import Figure
+
+    curve = cut_curve(LogNormal(40e-6, 0.5), cut=(0.02, 0.95))
+    sizes = PlacedSizes(
+        name="fines",
+        law="log-normal",
+        asked={0.5: 40e-6},
+        curve=curve,
+        placed=curve.strata(500),
+        invaded=curve.strata(20),
+    )
+    figure = Figure()
+    fill_size_curves(figure, sizes=[sizes])
+    asked, given, placed, invaded = figure.axes[0].get_lines()
+    assert given.get_xydata()[0] == pytest.approx([40.0, 50.0])
+    assert asked.get_ydata()[[0, -1]] == pytest.approx([2.0, 95.0])
+    assert placed.get_ydata()[-1] == pytest.approx(95.0)
+    assert np.interp(40.0, placed.get_xdata(), placed.get_ydata()) == pytest.approx(50.0, abs=0.5)
+    assert len(invaded.get_xdata()) == 20
+    demo = figures.draw_all(tmp_path, demo_analysis(), sizes=[sizes])
+    assert "size_curves" in {path.stem for path in demo}

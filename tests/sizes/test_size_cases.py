@@ -6,19 +6,28 @@ import tomllib
 import numpy as np
 import pytest
 from builders import TINY
+from scipy.spatial import cKDTree
 
 from fdnet.case.case import InvasionCase
 from fdnet.case.file import case_from, read_case
 from fdnet.case.size_file import parse_sizes
 from fdnet.dem.measured_fines import densities, drawn_fines
 from fdnet.dem.pack_deck import draw_radii
-from fdnet.dem.supply import batches_of, crowding, place_batches
+from fdnet.dem.scene import box_of
+from fdnet.dem.supply import (
+    AT_ONCE,
+    CLEARANCE,
+    batches_of,
+    crowding,
+    place_batches,
+    slab_end,
+)
 from fdnet.errors import CaseError
 from fdnet.scales.scales import scales_of
 from fdnet.scales.sizes import diameter_at, size_rows
 from fdnet.scales.springs import mass_range
 from fdnet.sizes.deal import volume_quantiles
-from fdnet.spheres.snapshot import Kind
+from fdnet.spheres.snapshot import Kind, resting
 
 SAND = {"D10": "0.25 mm", "D50": "0.40 mm", "D90": "0.60 mm"}
 MUD = {"D10": "20 um", "D50": "40 um", "D90": "80 um"}
@@ -162,7 +171,9 @@ def test_each_batch_has_the_curve_of_the_mud():
 def test_crowding_of_a_range_is_that_of_its_moments():
     """A curve uniform by number must give what the formula for ranges gives."""
     curve = {"size_mm": [0.05, 0.12], "passing_percent": [0, 100], "by": "number"}
-    case = made(measured(fines=curve | {"cut_percent": [0.0, 100.0]}, cut="50 um"))
+    data = measured(fines=curve | {"cut_percent": [0.0, 100.0]}, cut="50 um")
+    data["box"]["sides"] = "walls"
+    case = made(data)
     radius = np.exp(np.linspace(math.log(25e-6), math.log(60e-6), 200_001))
     exact = np.mean((radius + 60e-6) ** 3) / (8 * np.mean(radius**3))
     reach = (1 - 2 * 60e-6 / 2.4e-3) ** 2
@@ -200,8 +211,6 @@ def test_materials_have_their_shares_of_mass_and_their_densities():
 def test_every_fine_has_the_density_of_its_material_in_its_data_file(tmp_path):
     """The density column of the batches, read back by id."""
     from fdnet.dem.invade_deck import write_invade_inputs
-    from fdnet.dem.scene import box_of
-    from fdnet.spheres.snapshot import resting
 
     case = made(mixed(supply="batches", slab="3 mm") | {"run": {"checkpoint_ms": 0.005}})
     scales = scales_of(case)
@@ -267,3 +276,41 @@ def test_a_plain_table_is_read():
     assert sizes == pytest.approx([0.01, 0.02, 0.08])
     assert finer == [0, 40.5, 100]
     assert TINY["fines"]["radius_mm"] == 0.05
+
+
+@pytest.mark.parametrize("sides", ["walls", "periodic"])
+def test_a_crowded_wide_supply_has_no_gaps_and_touches_nothing(sides):
+    """Sizes 1 : 7 at 20 % by volume in thin batches: all clear each other in the slab."""
+    data = measured(supply="batches", slab="0.7 mm", cut="20 um", concentration="20 %")
+    data |= {"box": {"size_mm": [1.8, 1.8, 1.8], "sides": sides}}
+    case = made(data | {"run": {"checkpoint_ms": 0.002}})
+    scales = scales_of(case)
+    grain = resting(np.array([[0.9e-3, 0.9e-3, 0.9e-3]]), 2e-4, box_of(case))
+    batches, placed = batches_of(case, scales), list(place_batches(case, scales, grain))
+    assert len(placed) == len(batches.counts) > 3
+    assert batches.length < 1.1 * 2 * CLEARANCE * case.fines.radius_range_m[1]
+    shift = [max(0, number - AT_ONCE) * batches.travel for number in range(1, len(placed) + 1)]
+    place = np.concatenate(
+        [fines.position - [moved, 0, 0] for fines, moved in zip(placed, shift, strict=True)]
+    )
+    radius, end = np.concatenate([fines.radius for fines in placed]), slab_end(case, grain)
+    for number, fines in enumerate(placed):
+        x = fines.position[:, 0] - shift[number]
+        assert np.all(x <= end - number * batches.length)
+        assert np.all(x >= end - (number + 1) * batches.length - 1e-15)
+    side = np.where(case.periodic, case.size_m, 0.0)
+    if sides == "walls":
+        assert np.all(place[:, 1:] >= radius[:, None])
+        assert np.all(place[:, 1:] <= 1.8e-3 - radius[:, None])
+    largest = np.argsort(-radius)[:200]
+    for one in largest:
+        gap = place - place[one]
+        gap -= side * np.round(gap / np.where(side > 0, side, 1.0))
+        apart = np.linalg.norm(gap, axis=1)
+        apart[one] = 1.0
+        assert np.all(apart >= CLEARANCE * (radius + radius[one]) * (1 - 1e-12))
+    small = cKDTree(np.mod(place - place.min(axis=0), 1.0)).query_pairs(40e-6)
+    assert all(
+        np.linalg.norm(place[i] - place[j]) >= CLEARANCE * (radius[i] + radius[j]) * (1 - 1e-12)
+        for i, j in small
+    )

@@ -12,7 +12,7 @@ from fdnet.studies.pages.network_numbers import network_numbers
 NUMBER = re.compile(r"(?<![\w.])\d+(?:,\d{3})*(?:\.\d+)?(?:e\d+)?(?:/\d+)?(?!\w)")
 SETTINGS = {
     "validation": {
-        "": "0.05 0.1 1e4 200 30 95",
+        "": "0.05 0.2 1e4 200 30 95",
         "1. Contact stiffness": "0.10 0.16 0.2 1e2 1e3 1e4 1e6 1e8 2 3e2 94.3e9",
         "2. Time step": "0.2 0.4 0.5 0.6 95",
         "3. Drag": "0.05 0.1 1 2 4 10 20,000 95",

@@ -1,13 +1,13 @@
 """Which walls stand near a point of the grid, and the profile of the flow that they allow.
 
-Between walls at distances d_1, d_2, ... the velocity is taken as a smooth vector times
+Between walls at distances d_1, d_2, ... below R the velocity is taken as a smooth vector times
 
-    phi = 1 / (2/R + sum of 1/d_i + 1/(2R - d_i) - 2/R over walls nearer than R),
+    phi = product of d_i (2R - d_i) / R^2,
 
-which is 0 at every wall and grows like the distance from it. With one wall it is the parabola
-d (2R - d) / 2R, smooth up to R and constant beyond; between two near plates it is that of the flow
-between them, d_1 d_2 / (d_1 + d_2). Lengths are in the spacing along x, from the lower corner of
-the grid.
+which is 0 at every wall, grows like the distance from it, and becomes flat at R. Between two
+plates the product of the distances is the exact profile of the flow, and so is that of the three
+distances in a duct whose section is an equilateral triangle. Lengths are in the spacing along x,
+from the lower corner of the grid.
 """
 
 from dataclasses import dataclass
@@ -118,14 +118,14 @@ def wall_profile(
     where no sphere is nearer. Inside a solid phi is 0.
     """
     x, y, z = point
-    inverse, least, second, nearest = 2.0 / REACH, REACH, REACH, -1
+    profile, least, second, nearest = 1.0, REACH, REACH, -1
     for row in range(rows[0], rows[1]):
         dx, dy, dz = x - place[row, 0], y - place[row, 1], z - place[row, 2]
         away = sqrt(dx * dx + dy * dy + dz * dz) - place[row, 3]
         if away <= 0.0:
             return 0.0, away, away, row
         if away < REACH:
-            inverse += 1.0 / away + 1.0 / (2.0 * REACH - away) - 2.0 / REACH
+            profile *= away * (2.0 * REACH - away) / REACH**2
             if away < least:
                 least, second, nearest = away, least, row
             elif away < second:
@@ -137,6 +137,6 @@ def wall_profile(
             if away <= 0.0:
                 return 0.0, away, away, -1
             if away < REACH:
-                inverse += 1.0 / away + 1.0 / (2.0 * REACH - away) - 2.0 / REACH
+                profile *= away * (2.0 * REACH - away) / REACH**2
                 second = min(second, away)
-    return 1.0 / inverse, least, second, nearest
+    return profile, least, second, nearest

@@ -11,8 +11,9 @@ from fdnet.network.field.solved import Skeleton, build_skeleton
 from fdnet.spheres.directions import Directions, periodic_axes
 from fdnet.spheres.snapshot import Kind, Snapshot
 
-CELLS = 10.0
-"""Cells across a mean grain (docs/validation/velocity-field.md)."""
+COARSEST, FINEST, AFFORDED = 10.0, 18.0, 1_000_000
+"""Cells across a mean grain where none is given: as many between the first two as keep the grid
+below the third number of cells (`fdnet study velocity-field`)."""
 TOLERANCE = 0.05
 """Rms velocity left at the walls over the superficial velocity."""
 UPSTREAM, DOWNSTREAM = 1.0, 0.5
@@ -24,7 +25,7 @@ def velocity_field(
     *,
     periodic: Directions = "",
     fines: Snapshot | None = None,
-    cells: float = CELLS,
+    cells: float | None = None,
     upstream: float | None = None,
     tolerance: float = TOLERANCE,
 ) -> VelocityField:
@@ -39,7 +40,7 @@ def velocity_field(
             `fines` is not given.
         periodic: sides that repeat, letters such as "yz" or three truth values (x, y, z).
         fines: the deposit; its spheres of kind grain are ignored where it has any of kind fine.
-        cells: across a mean grain diameter.
+        cells: across a mean grain diameter; without it 10 to 18, as a million cells allow.
         upstream: m of grid before the specimen; without it, a grain diameter more than the fines
             reach. Without meaning where x is periodic.
         tolerance: rms velocity over the superficial one that may be left at the walls.
@@ -59,7 +60,7 @@ def velocity_field(
     """
     if not len(grains.grains()):
         raise CaseError("velocity field: no grain among the spheres, expected at least one")
-    if not (np.isfinite(cells) and cells >= 1.0 and 0.0 < tolerance < 1.0):
+    if not ((cells is None or 1.0 <= cells < np.inf) and 0.0 < tolerance < 1.0):
         raise CaseError(
             f"velocity field: {cells!r} cells across a grain and a tolerance of {tolerance!r}, "
             "expected at least 1 cell and a tolerance between 0 and 1"
@@ -84,11 +85,16 @@ def _upstream(grains: Snapshot, deposit: Snapshot, wanted: float | None) -> floa
 
 
 def _skeleton(
-    spheres: Snapshot, sides: tuple[bool, bool, bool], grid: tuple[float, float]
+    spheres: Snapshot, sides: tuple[bool, bool, bool], grid: tuple[float | None, float]
 ) -> Skeleton:
     """The grains on a grid of so many cells across a grain and so many metres upstream."""
     grains, (cells, upstream) = spheres.grains(), grid
     diameter = 2.0 * float(grains.radius.mean())
+    if cells is None:
+        edges = np.ptp(spheres.box, axis=1)
+        edges[0] += 0.0 if sides[0] else upstream + DOWNSTREAM * diameter
+        affordable = diameter * (AFFORDED / np.prod(edges)) ** (1.0 / 3.0)
+        cells = float(np.clip(affordable, COARSEST, FINEST))
     lattice = build_lattice(
         spheres.box,
         sides,

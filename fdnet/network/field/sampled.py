@@ -2,30 +2,26 @@
 
 Linear interpolation from node to node knows nothing of a wall between them. So the nodes carry
 velocity / phi, with the profile phi that the walls allow (`nearby`), which is smooth up to the
-walls; it is interpolated linearly and multiplied by phi at the point. Nodes in the solid, or
-nearer than LEAST_PROFILE to it, take the mean of their neighbours.
+walls; it is interpolated linearly and multiplied by phi at the point. Nodes in the solid, or of a
+phi below LEAST_PROFILE, take the mean of their neighbours; in the solid, without its part across
+the wall.
 
-Fluid that cannot slip and keeps its volume approaches a wall like the square of the distance d.
-Nearer than PROBE to a sphere, the velocity is therefore that at the distance PROBE on the same
-normal, its part along the wall times phi/phi(PROBE), its part across times (d / PROBE)^2 instead.
-Between two spheres nearer than that the probe stays on this side of the middle.
+What happens at the walls is in `wall_laws`.
 """
 
 from dataclasses import dataclass
-from math import floor, sqrt
 
 import numpy as np
 
 from fdnet.network.compiled import compiled
 from fdnet.network.field.lattice import Lattice
-from fdnet.network.field.nearby import Nearby, Place, wall_profile
+from fdnet.network.field.nearby import Nearby, wall_profile
+from fdnet.network.field.wall_laws import Parts, Walls, linear, sample_points
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
-LEAST_PROFILE = 0.15
-"""Least phi, in spacings, of a node whose own velocity is used."""
-PROBE = 0.7
-"""Distance from a sphere, in spacings, within which the flow across its surface is quadratic."""
+LEAST_PROFILE = 0.02
+"""Least phi of a node whose own velocity is used."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -58,7 +54,7 @@ class Sampled:
         wraps = np.array([lattice.repeats, not lattice.walled[1], not lattice.walled[2]])
         result = np.zeros(points.shape)
         place = np.ascontiguousarray((points - lattice.low) / lattice.unit)
-        _sample(place, (shape, step, wraps), nearby, self.smooth, result)
+        sample_points(place, (shape, step, wraps), nearby, self.smooth, result)
         return result
 
 
@@ -70,11 +66,17 @@ def sample_velocity(lattice: Lattice, nearby: Nearby, flow: list[Array]) -> Samp
     for d, part in enumerate(flow):
         phi = _profile_at_nodes(np.array(lattice.shape), step, d, walls)
         smooth.append(_filled(_padded(part, lattice, d), _padded(phi, lattice, d)))
+    mean = (smooth[0], smooth[1], smooth[2])
+    bounded = []
+    for d, part in enumerate(mean):
+        inner = part[2:-2, 2:-2, 2:-2].copy()
+        _turn_along_walls(d, step, walls, mean, inner)
+        bounded.append(_padded(inner, lattice, d))
         if lattice.walled[d]:
             # no flow through the walls: their own nodes carry nothing
-            across = np.moveaxis(smooth[d], d, 0)
+            across = np.moveaxis(bounded[d], d, 0)
             across[:3], across[lattice.shape[d] + 2 :] = 0.0, 0.0
-    return Sampled(lattice=lattice, nearby=nearby, smooth=(smooth[0], smooth[1], smooth[2]))
+    return Sampled(lattice=lattice, nearby=nearby, smooth=(bounded[0], bounded[1], bounded[2]))
 
 
 def _padded(part: Array, lattice: Lattice, component: int) -> Array:
@@ -130,74 +132,34 @@ def _filled(flow: Array, phi: Array) -> Array:
 
 
 @compiled
-def _linear(part: Array, x: float, y: float, z: float) -> float:
-    """Linear interpolation at (x, y, z), in nodes of the padded grid."""
-    i, j, k = int(x), int(y), int(z)
-    a, b, c = x - i, y - j, z - k
-    low = (1.0 - b) * ((1.0 - c) * part[i, j, k] + c * part[i, j, k + 1]) + b * (
-        (1.0 - c) * part[i, j + 1, k] + c * part[i, j + 1, k + 1]
-    )
-    i += 1
-    high = (1.0 - b) * ((1.0 - c) * part[i, j, k] + c * part[i, j, k + 1]) + b * (
-        (1.0 - c) * part[i, j + 1, k] + c * part[i, j + 1, k + 1]
-    )
-    return float((1.0 - a) * low + a * high)
-
-
-@compiled
-def _off_the_wall(
-    point: Place, profile: tuple[float, float, float, int], place: Array
-) -> tuple[Place, Place, float]:
-    """Where to sample, the normal of the nearest sphere, and d / probe (1 away from spheres)."""
-    x, y, z = point
-    _, least, second, row = profile
-    probe = min(PROBE, 0.5 * (least + second))
-    if row < 0 or least >= probe:
-        return point, (0.0, 0.0, 0.0), 1.0
-    p, q, r = x - place[row, 0], y - place[row, 1], z - place[row, 2]
-    length = sqrt(p * p + q * q + r * r)
-    p, q, r = p / length, q / length, r / length
-    more = probe - least
-    return (x + more * p, y + more * q, z + more * r), (p, q, r), least / probe
-
-
-@compiled
-def _sample(
-    point: Array,
-    grid: tuple[Array, Array, Array],
-    nearby: tuple[Array, Array, Array],
-    smooth: tuple[Array, Array, Array],
-    result: Array,
+def _turn_along_walls(
+    component: int, step: Array, walls: Walls, smooth: Parts, part: Array
 ) -> None:
-    """Writes the velocity at each `point` (N, 3), in spacings, to `result`."""
-    shape, step, wraps = grid
-    first, place, sides = nearby
-    cell, inside = np.zeros(3, np.int64), np.zeros(3)
-    for s in range(len(point)):
-        out = -1
-        for axis in range(3):
-            length = shape[axis] * step[axis]
-            at = point[s, axis]
-            if wraps[axis]:
-                at -= floor(at / length) * length
-            elif at < 0.0 or at >= length:
-                out = axis
-            inside[axis] = at
-            cell[axis] = max(0, min(int(at / step[axis]), shape[axis] - 1))
-        if out >= 0:
-            result[s, 0] = 1.0 if out == 0 else 0.0
-            continue
-        number = (cell[0] * shape[1] + cell[1]) * shape[2] + cell[2]
-        here = (inside[0], inside[1], inside[2])
-        profile = wall_profile(here, (first[number], first[number + 1]), place, sides)
-        if profile[0] <= 0.0:
-            continue
-        there, normal, share = _off_the_wall(here, profile, place)
-        x, y, z = there[0] / step[0], there[1] / step[1], there[2] / step[2]
-        u = profile[0] * _linear(smooth[0], x + 2.0, y + 1.5, z + 1.5)
-        v = profile[0] * _linear(smooth[1], x + 1.5, y + 2.0, z + 1.5)
-        w = profile[0] * _linear(smooth[2], x + 1.5, y + 1.5, z + 2.0)
-        across = (share - 1.0) * (u * normal[0] + v * normal[1] + w * normal[2])
-        result[s, 0] = u + across * normal[0]
-        result[s, 1] = v + across * normal[1]
-        result[s, 2] = w + across * normal[2]
+    """Takes the part across its sphere from velocity / phi at nodes in the solid.
+
+    Across a wall velocity / phi is 0 at the wall, where along it it is not. `part` holds the nodes
+    of this component of `smooth` without those added around, and is changed.
+    """
+    first, place, sides = walls
+    shape = part.shape
+    away = np.full(3, 0.5)
+    away[component] = 0.0
+    for i in range(shape[0]):
+        for j in range(shape[1]):
+            for k in range(shape[2]):
+                if part[i, j, k] == 0.0:
+                    continue
+                x, y, z = i + away[0], j + away[1], k + away[2]
+                node = (x * step[0], y * step[1], z * step[2])
+                cell = (i * shape[1] + j) * shape[2] + k
+                near = wall_profile(node, (first[cell], first[cell + 1]), place, sides)
+                row = near[3]
+                if near[0] > 0.0 or row < 0:
+                    continue
+                p, q, r = node[0] - place[row, 0], node[1] - place[row, 1], node[2] - place[row, 2]
+                square = p * p + q * q + r * r
+                u = linear(smooth[0], x + 2.0, y + 1.5, z + 1.5)
+                v = linear(smooth[1], x + 1.5, y + 2.0, z + 1.5)
+                w = linear(smooth[2], x + 1.5, y + 1.5, z + 2.0)
+                own = p if component == 0 else (q if component == 1 else r)
+                part[i, j, k] -= own * (u * p + v * q + w * r) / square

@@ -14,6 +14,7 @@ import numpy as np
 from fdnet.case.names import DEFAULT_LAW
 from fdnet.network.field.field import VelocityField
 from fdnet.network.field.of_pack import velocity_field
+from fdnet.network.fines.fine_images import reaching_inside
 from fdnet.network.fines.occupancy import measure_deposit
 from fdnet.network.flow.flow import Flow, solve_flow
 from fdnet.network.laws.kozeny_damage import side_kozeny_damage
@@ -25,6 +26,8 @@ from fdnet.spheres.snapshot import Array, Snapshot
 
 STAGNANT = 1e-2
 """A pore that carries less than this share of the mean flux of a pore, clean, keeps ratio 1."""
+RENEWED = 0.02
+"""Share of the deposit by volume that may change before the network is solved anew."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -149,3 +152,44 @@ def pore_through(network: Network, flow: Flow) -> Array:
     into = np.bincount(second, forth, count) + np.bincount(first, back, count)
     out = np.bincount(first, forth, count) + np.bincount(second, back, count)
     return (np.maximum(into, out) / flow.inflow)[group]
+
+
+@dataclass(slots=True, eq=False)
+class Renewal:
+    """What a damaged pack carries, solved anew when enough of its deposit has changed.
+
+    Attributes:
+        pack: the intact pack.
+        deposit: the fines of the last solve; None before the first.
+        carried: what it gave.
+        solves: number of solves.
+    """
+
+    pack: PackFlow
+    deposit: Snapshot | None = None
+    carried: Carried | None = None
+    solves: int = 0
+
+    def of(self, fines: Snapshot, *, anew: bool) -> Carried:
+        """What the pores carry with standing `fines`; solved in any case where `anew` asks."""
+        inside = fines.where(reaching_inside(self.pack.network, fines))
+        known = self.carried if self.deposit is not None and not anew else None
+        if known is None or changed_share(self.deposit, inside) > RENEWED:
+            known = self.pack.carried(inside)
+            self.deposit, self.carried, self.solves = inside, known, self.solves + 1
+        return known
+
+
+def changed_share(former: Snapshot | None, fines: Snapshot) -> float:
+    """Volume of the fines that came, left, or moved by more than their radius, over that of all.
+
+    "All" are those of either state; 0 where neither has any.
+    """
+    if former is None:
+        return 1.0
+    _, old, new = np.intersect1d(former.id, fines.id, assume_unique=True, return_indices=True)
+    way = np.linalg.norm(fines.position[new] - former.position[old], axis=1)
+    same = float(np.sum(fines.radius[new][way <= fines.radius[new]] ** 3))
+    both = float(np.sum(fines.radius[new] ** 3))
+    whole = float(np.sum(former.radius**3) + np.sum(fines.radius**3)) - both
+    return 1.0 - same / whole if whole > 0 else 0.0

@@ -18,7 +18,7 @@ import numpy as np
 from fdnet.case.case import InvasionCase
 from fdnet.dem.fluid import FluidForces, Moment
 from fdnet.network.fines.crowding import Neighbourhood, local_porosity
-from fdnet.run.fluid.network_flow import Carried, PackFlow, pack_flow
+from fdnet.run.fluid.network_flow import Carried, PackFlow, Renewal, pack_flow
 from fdnet.run.fluid.uniform import crowd_factor
 from fdnet.scales.scales import InvasionScales
 from fdnet.scales.velocity import path_of
@@ -93,6 +93,10 @@ class NetworkFluid:
         """The intact pack."""
         return pack_flow(self.grains, self.case.periodic, self.case.analysis.walls)
 
+    @cached_property
+    def _renewal(self) -> Renewal:
+        return Renewal(self.pack)
+
     @property
     def first_velocity(self) -> float:
         """Superficial velocity at the start, m/s as simulated."""
@@ -119,7 +123,7 @@ class NetworkFluid:
         shape = pack.shape.at(fines.position)
         before = self.first_velocity if moment.before is None else moment.before["velocity_m_s"]
         standing = _speed(fines.velocity) < STANDING * before * _speed(shape)
-        carried = pack.carried(fines.where(standing))
+        carried = self._renewal.of(fines.where(standing), anew=moment.fresh)
         near = local_porosity(spheres, self.case.periodic)
         share = np.where(within, carried.ratio[pack.pore_of(fines.position)], 1.0)
         shape = shape * share[:, None]

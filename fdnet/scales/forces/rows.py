@@ -29,7 +29,7 @@ def force_rows(scales: InvasionScales) -> list[Quantity]:
             "St_i",
             scales.impact_stokes,
             "-",
-            "tau u / r, as simulated",
+            "tau w / r, as simulated",
             "Joseph 2001; inertia does not matter well below 1",
         ),
         row(

@@ -34,6 +34,8 @@ FAR = 10.0
 WIDE_PORES = ("A_200_eps40", "C_80_eps40", "F_80_eps45", "H_40_eps40", "I_80_eps45", "J_80_eps42")
 """Random packs of equal grains of porosity 0.40 and more."""
 THESIS = PAIRS[:2]
+FINE_RATIOS = (8, 10)
+"""Grains over fines in the names of the slabs with fine fines."""
 
 
 def page_numbers(results: Results, validation: Path) -> dict[str, str]:
@@ -132,18 +134,25 @@ def _deposits(results: Results) -> dict[str, str]:
 
 def _slabs(rows: Sequence[Row]) -> dict[str, str]:
     aside = [row for row in rows if row["known_before"] == NO]
+    known = [row for row in rows if row["known_before"] != NO]
     pairs = {"default": CHOSEN, "finest": FINEST, "two_scale": DEFAULT}
-    coarse = [row for row in aside if "_r8" not in row["case"] and "_r10" not in row["case"]]
+    fine = [row for row in rows if any(f"_r{size}" in row["case"] for size in FINE_RATIOS)]
+    coarse = [row for row in rows if row not in fine]
     return {
         "slabs": str(len(rows)),
         "slabs_aside": str(len(aside)),
+        "slabs_known": str(len(known)),
         **{f"slabs_aside_{key}": summary(aside, name) for key, name in pairs.items()},
+        **{f"slabs_known_{key}": summary(known, name) for key, name in pairs.items()},
         "slabs_default_rms": percent(rms(values(aside, CHOSEN)), 0),
         "slabs_default_worst": f"{worst(values(aside, CHOSEN)):.3f}",
         "slabs_default_case": _worst(aside, CHOSEN).split(",")[0],
-        "slabs_two_scale_rms": percent(rms(values(aside, DEFAULT)), 0),
+        "slabs_two_scale_rms": percent(rms(values(aside, DEFAULT))),
+        "slabs_two_scale_known": percent(rms(values(known, DEFAULT)), 0),
         "slabs_coarse": str(len(coarse)),
         "slabs_coarse_k": _summed_up(row[f"{FINEST}: k"] for row in coarse),
+        "slabs_fine": str(len(fine)),
+        "slabs_fine_k": _summed_up(row[f"{FINEST}: k"] for row in fine),
         "slabs_intact": _summed_up(row[f"{DEFAULT}: k0"] for row in rows),
         "slabs_least": f"{min(row['k_over_k0'] for row in rows):.3f}",
         "slabs_most": f"{max(row['k_over_k0'] for row in rows):.2f}",

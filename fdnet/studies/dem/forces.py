@@ -1,22 +1,25 @@
 """What the forces of the fluid change in an invasion, and what they cost.
 
 `effect_rows` runs the quick specimens with and without the force of the pressure gradient.
-`cost_rows` measures the time of one step with each force, by the CPU time of LIGGGHTS in two runs
-of different length, so that its start is not counted.
+`cost_rows` measures the time of one step with each force.
 """
 
+import re
 import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from fdnet.case.case import with_fines
+import numpy as np
+
+from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import read_case
-from fdnet.dem.invasion import invade
-from fdnet.dem.liggghts import Launch
+from fdnet.dem.invade_deck import render_invade, write_invade_inputs
+from fdnet.dem.liggghts import SCREEN, Launch, run_deck
+from fdnet.files.atomic import write_text
 from fdnet.run.open_run import run_case
 from fdnet.scales.scales import scales_of
+from fdnet.spheres.snapshot import Array, Snapshot
 from fdnet.studies.dem.runs import grains_of, slab_case, the_binary
-from fdnet.studies.engine.runner import child_core_seconds
 
 STAGES = ("pack", "invade", "analyse")
 FORCES = {
@@ -28,8 +31,6 @@ FORCES = {
 """Settings of the measured forces on top of Stokes's drag."""
 UNEQUAL = "fines.radius_mm=[0.04, 0.055]"
 """Fines of many sizes, whose force of the gradient is a formula."""
-SHORT, LONG = 0.25, 1.25
-"""Lengths of the two runs of a cost, over the steps that are counted."""
 
 
 def effect_rows(
@@ -63,53 +64,69 @@ def _effect(path: Path, seed: int, acts: bool, work: Path) -> dict[str, object]:
 
 
 def cost_rows(
-    counts: Sequence[int], fine_steps: float, repeats: int, work: Path
+    counts: Sequence[int], fine_steps: float, rounds: int, work: Path
 ) -> Iterator[dict[str, object]]:
-    """One row a number of fines, kind of fines, forces and repeat: steps a second of one core.
+    """One row a number of fines, kind of fines and forces: steps a second of one core.
+
+    The forces take turns in one process, a few steps each in every round. The fastest turn of each
+    counts, because other programs can only slow a turn. "dearer" is its time over that of drag
+    alone, less 1.
 
     Args:
         counts: numbers of fines.
-        fine_steps: steps times fines of each measurement.
-        repeats: measurements of each; the forces take turns, so that a busy machine slows all.
+        fine_steps: steps times fines of one turn.
+        rounds: how often the forces take turns.
         work: folder of the runs.
     """
     for count in counts:
-        steps = max(20, round(fine_steps / count))
         for kind, size in (("one size", ()), ("many sizes", (UNEQUAL,))):
-            for repeat in range(repeats):
-                for name, settings in FORCES.items():
-                    rate = _rate(count, steps, (*size, *settings), work)
-                    yield {
-                        "fines": count,
-                        "sizes": kind,
-                        "forces": name,
-                        "repeat": repeat,
-                        "steps_per_s": rate,
-                    }
+            steps = max(2, round(fine_steps / count))
+            seconds = _turns(count, size, (steps, rounds), work)
+            for name, own in zip(FORCES, seconds, strict=True):
+                yield {
+                    "fines": count,
+                    "sizes": kind,
+                    "forces": name,
+                    "steps_per_s": steps / float(np.min(own)),
+                    "dearer": float(np.min(own) / np.min(seconds[0])) - 1,
+                }
 
 
-def _rate(count: int, steps: int, settings: tuple[str, ...], work: Path) -> float:
-    seconds = [
-        _core_seconds(count, round(share * steps), settings, work) for share in (SHORT, LONG)
-    ]
-    return (round(LONG * steps) - round(SHORT * steps)) / (seconds[1] - seconds[0])
-
-
-def _core_seconds(count: int, steps: int, settings: tuple[str, ...], work: Path) -> float:
-    """CPU seconds of LIGGGHTS for `steps` steps in one chunk."""
-    step = 1e-8
-    duration = f"{1e3 * step * steps!r}"
-    case = slab_case(
-        1,
-        f"fines.count={count}",
-        "drag.scheme=every_step",
-        f"run.time_step_s={step}",
-        f"run.duration_ms={duration}",
-        f"run.checkpoint_ms={duration}",
-        *settings,
-    )
-    folder, grains = work / "cost", grains_of(case, work)
+def _turns(count: int, size: tuple[str, ...], turns: tuple[int, int], work: Path) -> Array:
+    """(F, R) s of each force in each round; `turns` are the steps of one and the rounds."""
+    folder, (steps, rounds) = work / "cost", turns
     shutil.rmtree(folder, ignore_errors=True)
-    before = child_core_seconds()
-    invade(case, scales_of(case), grains, folder, Launch(binary=the_binary()))
-    return child_core_seconds() - before
+    (folder / "post").mkdir(parents=True)
+    cases = [_case(count, *size, *settings) for settings in FORCES.values()]
+    grains = grains_of(cases[0], work)
+    write_invade_inputs(cases[0], scales_of(cases[0]), grains, folder)
+    parts = [_deck(case, grains) for case in cases]
+    lines = [parts[0][0], f"variable turn loop {rounds}", "label turn"]
+    for _, block in parts:
+        lines += [block, f"run {steps}", *_taken_back(block)]
+    lines += ["next turn", "jump SELF turn", 'print "DECK_DONE"', ""]
+    write_text(folder / "in.cost", "\n".join(lines))
+    run_deck(folder, "in.cost", Launch(binary=the_binary()))
+    screen = (folder / SCREEN).read_text(encoding="utf-8", errors="replace")
+    times = re.findall(rf"Loop time of (\S+) on 1 procs for {steps} steps", screen)
+    return np.array(times, float).reshape(rounds, len(parts)).T
+
+
+def _case(count: int, *settings: str) -> InvasionCase:
+    return slab_case(1, f"fines.count={count}", "drag.scheme=every_step", *settings)
+
+
+def _deck(case: InvasionCase, grains: Snapshot) -> tuple[str, str]:
+    """The deck of one case up to the forces of the fluid, and these."""
+    deck = render_invade(case, scales_of(case), grains).text
+    start, end = deck.index("# Stokes drag"), deck.index("region specimen")
+    return f"{deck[:start]}thermo_modify lost error norm no", deck[start:end]
+
+
+def _taken_back(block: str) -> list[str]:
+    """Commands that remove what a block has defined, the last first."""
+    made = [line.split()[:2] for line in block.splitlines() if line.startswith(("fix", "region"))]
+    return [
+        f"unfix {name}" if command == "fix" else f"region {name} delete"
+        for command, name in reversed(made)
+    ]

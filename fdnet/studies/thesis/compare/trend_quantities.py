@@ -9,9 +9,9 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from fdnet.studies.engine.bands import Sample
+from fdnet.studies.engine.shipped import QUICK
 from fdnet.studies.thesis.numbers.examine import THESIS_PAIR
 from fdnet.studies.thesis.numbers.results import ResultRow
-from fdnet.studies.thesis.runs.plan import QUICK
 
 DEEP = slice(1, 4)
 """Sections 2 to 4, between 1 and 4 mm; the quick forms end there."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from fdnet.studies.engine.bands import Band
 from fdnet.studies.engine.markdown import figure, markdown_table
+from fdnet.studies.engine.shipped import QUICK
 from fdnet.studies.thesis.compare.trend_claims import ABOVE, TRENDS
 from fdnet.studies.thesis.compare.trends import (
     FAILS,
@@ -16,7 +17,6 @@ from fdnet.studies.thesis.compare.trends import (
     Comparison,
 )
 from fdnet.studies.thesis.numbers.examine import DEFAULT_PAIR, THESIS_PAIR
-from fdnet.studies.thesis.runs.plan import QUICK
 
 IN_PART, NO_RUNS = "holds in part", "no runs"
 BORROWED = "*"

@@ -20,9 +20,9 @@ from fdnet.studies.engine.palette import (
     SKY,
     YELLOW,
 )
+from fdnet.studies.engine.shipped import QUICK
 from fdnet.studies.thesis.numbers.examine import Examined
 from fdnet.studies.thesis.numbers.values import specimen_number
-from fdnet.studies.thesis.runs.plan import QUICK
 
 MM = 1e3
 DPI = 150

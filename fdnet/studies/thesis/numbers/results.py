@@ -12,6 +12,7 @@ from fdnet.errors import CaseError
 from fdnet.network.analysis import Analysis
 from fdnet.network.flow.sections import reduction
 from fdnet.studies.engine.csv_rows import parsed, read_csv, write_csv
+from fdnet.studies.engine.shipped import QUICK
 from fdnet.studies.thesis.numbers.examine import Examined
 from fdnet.studies.thesis.numbers.invasion import (
     FIRST,
@@ -22,7 +23,6 @@ from fdnet.studies.thesis.numbers.invasion import (
     porosity_loss,
 )
 from fdnet.studies.thesis.numbers.values import ThesisSpecimen, thesis_of
-from fdnet.studies.thesis.runs.plan import QUICK
 from fdnet.studies.thesis.runs.state import State
 
 SECTIONS = 8

@@ -2,13 +2,11 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from importlib.resources import files
-from pathlib import Path
 
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import read_case
-from fdnet.errors import CaseError
 from fdnet.scales.scales import scales_of
+from fdnet.studies.engine.shipped import QUICK, case_path
 
 SPECIMENS = tuple(f"specimen{number}" for number in range(1, 9))
 VARIANTS = ("specimen1-7to8", "specimen1-1410", "specimen5-5to6", "table3")
@@ -43,7 +41,6 @@ grains leave 0.30), strong drag, and no walls.
 """
 BASE_VALUES = {"friction": 0.55, "drag": 1.0, "supply": 1.0}
 """The value of each scanned quantity in the cases themselves, by group."""
-QUICK = "quick-"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,27 +80,6 @@ class Planned:
         """Read its case. Raises CaseError when the case file is missing or wrong."""
         settings = [f"seed={self.seed}", *self.settings, *self.consequences]
         return with_fines(read_case(case_path(self.case), assignments=settings))
-
-
-def cases_folder() -> Path:
-    """The folder of the shipped cases: in an installed package, or next to an editable one."""
-    package = Path(str(files("fdnet")))
-    for folder in (package / "cases", package.parent / "cases"):
-        if folder.is_dir():
-            return folder
-    raise CaseError(
-        f"{package.parent / 'cases'}: the shipped case files are missing; install fdnet again"
-    )
-
-
-def case_path(name: str) -> Path:
-    """The file of a shipped case; "quick-NAME" is the quick form of NAME."""
-    quick = name.startswith(QUICK)
-    return (
-        cases_folder()
-        / ("quick" if quick else "")
-        / f"{name.removeprefix(QUICK) if quick else name}.toml"
-    )
 
 
 def planned(*, quick: bool) -> list[Planned]:

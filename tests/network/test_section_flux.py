@@ -1,0 +1,45 @@
+"""Sections of throats against finite elements: where the division by midway lines holds."""
+
+import numpy as np
+import pytest
+
+from fdnet.network.laws import cross_section as section
+from fdnet.network.laws import wedge
+from fdnet.network.laws.wedge import ratio_table
+from tests.network.section_flux import resolved_flux
+
+RIGHT_ISOSCELES = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]])
+ACUTE = np.array([[0.0, 0.0], [2.0, 0.0], [1.1175, 1.7808]])
+
+
+def test_finite_elements_give_the_exact_wedges() -> None:
+    """Half a square is four wedges of 45 degrees, by symmetry and without a law."""
+    exact = 4.0 * wedge.exact_flux(np.pi / 4.0, 0.95)
+    assert resolved_flux(RIGHT_ISOSCELES, np.full(3, 0.95)) == pytest.approx(exact, rel=1e-3)
+
+
+@pytest.mark.parametrize("disc", [0.3, 0.7, 0.93])
+def test_equal_discs(disc: float) -> None:
+    flux = section.even_flux(section.wedges(ACUTE), disc, ratio_table())
+    assert flux == pytest.approx(resolved_flux(ACUTE, np.full(3, disc)), rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("apex", "disc", "ratio"),
+    [
+        ((0.5, 0.4), (0.5, 0.5, 0.1), 0.98),
+        ((0.6, 0.5), (0.5, 0.5, 0.1), 0.99),
+        ((0.8, 0.5), (0.5, 0.5, 0.1), 1.03),
+        ((0.6, 0.2), (0.5, 0.5, 0.1), 0.94),
+        ((0.35, 0.7), (0.1, 0.1, 0.5), 0.62),
+    ],
+    ids=["touching", "apart", "askew", "obtuse", "two small and one large"],
+)
+def test_unequal_discs(
+    apex: tuple[float, float], disc: tuple[float, float, float], ratio: float
+) -> None:
+    """The law over finite elements; the last is its known limit (docs/physics_network.md)."""
+    edge = {0.5: 1.0, 0.35: 0.7}.get(apex[0], 1.2)
+    base, discs = np.array([[0.0, 0.0], [edge, 0.0], apex]), np.array(disc)
+    flux = section.uneven_flux(base, discs, ratio_table())
+    assert flux / resolved_flux(base, discs) == pytest.approx(ratio, abs=0.01)
