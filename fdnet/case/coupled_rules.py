@@ -65,3 +65,12 @@ def update_travel(drag: Drag) -> Iterator[str]:
             f"drag.update_travel: {drag.update_travel:g} belongs to a drag that is computed while "
             "LIGGGHTS waits; leave it out, or set drag.crowd = 'beetstra'"
         )
+
+
+def coupled_inertia(drag: Drag) -> Iterator[str]:
+    """The Reynolds number of coupled drag is that of the law of the crowd."""
+    if drag.field == "network" and drag.crowd == "none" and drag.inertia != "none":
+        yield (
+            f"drag.inertia: {drag.inertia!r} with drag.field 'network' is part of the law of the "
+            "crowd; set drag.crowd = 'beetstra', or drag.inertia = 'none'"
+        )

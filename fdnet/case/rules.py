@@ -9,6 +9,7 @@ from fdnet.case.contact import MODEL_KEYS
 from fdnet.case.contact_rules import of_cohesion, of_rolling, of_the_model
 from fdnet.case.control import Run
 from fdnet.case.coupled_rules import (
+    coupled_inertia,
     crowd_scheme,
     flow_field,
     network_grains,
@@ -239,6 +240,7 @@ RULES = (
     *FLOW_RULES,
     Rule(("drag.field", "drag.upstream", "drag.drive"), flow_field),
     Rule(("drag.field", "grains.motion"), network_grains),
+    Rule(("drag.field", "drag.crowd", "drag.inertia"), coupled_inertia),
     Rule(("drag.field", "drag.drive", "fines.supply"), network_supply),
     Rule(("run.stop_rate", "drag.field", "drag.drive"), stop_rate),
     Rule(("drag.scheme", "drag.crowd", "drag.field"), crowd_scheme),

@@ -252,6 +252,12 @@ def test_a_rate_below_the_asked_share_ends_the_run(binary, fluid, done, tmp_path
     assert result.updates == done.updates[: len(result.updates)]
 
 
+def test_no_warning_of_throats_where_the_balance_of_momentum_sees_them():
+    assert not [text for text in scales_of(small()).warnings if "throats" in text]
+    uniform = small("drag.field=uniform")
+    assert [text for text in scales_of(uniform).warnings if "throats" in text]
+
+
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
@@ -260,6 +266,10 @@ def test_a_rate_below_the_asked_share_ends_the_run(binary, fluid, done, tmp_path
         (["fines.supply=batches"], r"fines\.supply: 'batches' come on as fast as at the start"),
         (["drag.field=uniform", "drag.drive=rate"], r"drag\.drive: 'rate' belongs to"),
         (["drag.drive=rate", "run.stop_rate=0.1"], r"run\.stop_rate: 0\.1 needs a rate that"),
+        (
+            ["drag.crowd=none", "drag.inertia=schiller-naumann"],
+            r"drag\.inertia: 'schiller-naumann'",
+        ),
         (["drag.scheme=viscous"], r"drag\.scheme: 'viscous' has one damping for all fines"),
     ],
 )

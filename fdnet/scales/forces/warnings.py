@@ -24,7 +24,7 @@ def reynolds_warnings(case: InvasionCase, push: Push, reynolds: float) -> list[s
     if reynolds > MOST_REYNOLDS:
         return [f"{outside} and of Schiller and Naumann's (below {MOST_REYNOLDS:g})"]
     remedy = 'set drag.inertia = "schiller-naumann"'
-    if case.drag.scheme not in ("held", "every_step"):
+    if case.drag.scheme not in ("held", "every_step") and not case.drag.coupled:
         remedy += ' with drag.scheme = "held"'
     return [
         f"{outside}: the drag on a fine at rest is {drag_factor(reynolds):.3g} times as large by "
@@ -49,8 +49,11 @@ def _beyond(case: InvasionCase, push: Push, reynolds: float) -> list[str]:
 def throat_warnings(case: InvasionCase, ratio: float) -> list[str]:
     """By how much the drag of a lone sphere is too small between the walls of a throat.
 
-    `ratio` is the diameter of the largest fine over that of the throats.
+    `ratio` is the diameter of the largest fine over that of the throats. Where the flow follows
+    the deposit the balance of momentum makes up for it (`throat_factor` of its record).
     """
+    if case.drag.field == "network":
+        return []
     diameter = 2e3 * case.fines.radius_range_m[1]
     who = f"the largest fine ({diameter:.3g} mm) is {ratio:.2g} of the width of the throats"
     if ratio > MOST_RATIO:

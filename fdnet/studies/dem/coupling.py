@@ -4,6 +4,7 @@ It is not a study with a knee: it shows what a coupled drag changes and what it 
 """
 
 import csv
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,9 +25,10 @@ SHARED = (
 """The supply at the Darcy velocity, and the pressure that drives it, over the specimen alone."""
 CROWD = ("drag.scheme=implicit", "drag.crowd=beetstra")
 FLUIDS: dict[str, tuple[str, ...]] = {
-    "uniform": ("drag.scheme=held",),
-    "uniform, crowd": CROWD,
-    "network": (*CROWD, "drag.field=network", "drag.pressure_gradient=true"),
+    "as the case is": ("drag.scheme=implicit",),
+    "uniform": (*SHARED, "drag.scheme=held"),
+    "uniform, crowd": (*SHARED, *CROWD),
+    "network": (*SHARED, *CROWD, "drag.field=network", "drag.pressure_gradient=true"),
 }
 """Settings of each fluid, by its name in the table."""
 
@@ -75,14 +77,14 @@ def coupling_rows(
     Raises what `run_case` raises.
     """
     return [
-        _row(case, fluid, seed, folder / f"{case.stem}-{fluid.replace(', ', '-')}-{seed}")
+        _row(case, fluid, seed, folder / f"{case.stem}-{re.sub('[^a-z]+', '-', fluid)}-{seed}")
         for seed in seeds
         for fluid in fluids
     ]
 
 
 def _row(path: Path, fluid: str, seed: int, out: Path) -> CouplingRow:
-    case = read_case(path, assignments=[*LAWS, *SHARED, *FLUIDS[fluid], f"seed={seed}"])
+    case = read_case(path, assignments=[*LAWS, *FLUIDS[fluid], f"seed={seed}"])
     if not (out / "manifest.json").exists():
         stages = ("pack", "invade", "analyse")
         run_case(case, out, stages=stages, resume=out.exists(), progress=False)
