@@ -48,6 +48,10 @@ def test_slipping_begins_where_both_closed_forms_agree():
     slope = math.degrees(math.atan(3.5 * 0.3))
     below, above = (rolling.rolling_gain(slope * (1 + e), 0.3) for e in (-1e-9, 1e-9))
     assert below == pytest.approx(above, rel=1e-7)
+    assert rolling.resisted_gain(11.0, 0.2) == 0
+    angle = math.radians(20.0)
+    exact = 5 / 7 * math.cos(angle) * (math.tan(angle) - 0.2)
+    assert rolling.resisted_gain(20.0, 0.2) == pytest.approx(exact)
     for angle, factor in ((40.0, 5 / 7), (50.0, 1 - 0.3 / math.tan(math.radians(50.0)))):
         gain = rolling.rolling_gain(angle, 0.3)
         assert gain == pytest.approx(factor * math.sin(math.radians(angle)))
@@ -91,6 +95,9 @@ def test_the_quick_form_gives_the_numbers_from_outside(quick):
     assert held[passing.BLOCKED] > 0.5 * supplied[passing.BLOCKED]
     assert all(row.observed == 0 for row in of(quick, passing.SERIES, passing.OVERLAP))
     assert all(abs(row.error) < rolling.TOLERANCE for row in of(quick, rolling.SERIES))
+    rests, rolls = sorted(of(quick, rolling.RESISTED), key=lambda row: row.value)
+    assert abs(rests.observed) < rolling.RESTS
+    assert abs(rolls.error) < rolling.TOLERANCE
     assert all(row.error < settling.TOLERANCE for row in of(quick, settling.SERIES))
     assert all(row.error < free_fine.TOLERANCE for row in of(quick, free_fine.SERIES))
     (leaving,) = of(quick, three_spheres.SERIES)

@@ -11,7 +11,7 @@ from fdnet.network.field.solved import Skeleton, build_skeleton
 from fdnet.spheres.directions import Directions, periodic_axes
 from fdnet.spheres.snapshot import Kind, Snapshot
 
-COARSEST, FINEST, AFFORDED = 10.0, 16.0, 1_000_000
+COARSEST, FINEST, AFFORDED = 10.0, 18.0, 1_000_000
 """Cells across a mean grain where none is given: as many between the first two as keep the grid
 below the third number of cells (`fdnet study velocity-field`)."""
 TOLERANCE = 0.05
@@ -40,7 +40,7 @@ def velocity_field(
             `fines` is not given.
         periodic: sides that repeat, letters such as "yz" or three truth values (x, y, z).
         fines: the deposit; its spheres of kind grain are ignored where it has any of kind fine.
-        cells: across a mean grain diameter; without it 10 to 16, as a million cells allow.
+        cells: across a mean grain diameter; without it 10 to 18, as a million cells allow.
         upstream: m of grid before the specimen; without it, a grain diameter more than the fines
             reach. Without meaning where x is periodic.
         tolerance: rms velocity over the superficial one that may be left at the walls.

@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+EXACT = 1e-5
+"""Relative error below which no digit of it is shown."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
@@ -31,4 +34,6 @@ class Answer:
 
 def percent_error(error: float) -> str:
     """A relative error with its sign, in percent."""
+    if abs(error) < EXACT:
+        return f"within {100 * EXACT:g} %"
     return f"{100 * error:+.2g} %".replace("-", "−")

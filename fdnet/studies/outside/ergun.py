@@ -72,15 +72,12 @@ def lifts(velocity: float, folder: Path) -> bool:
     marker = [[top - radius, 0.0, 0.0]]
     kinds = np.array([Kind.GRAIN] + [Kind.FINE] * len(place))
     bounds = np.array([[-4 * radius, top], [-radius, side - radius], [-radius, side - radius]])
+    case = case_of(
+        fine=radius, stiffness=STIFFNESS, friction=0.1, damping_ratio=0.5, density=DENSITY
+    )
     end = run_pushed(
         Pushed(
-            case=case_of(
-                fine=radius,
-                stiffness=STIFFNESS,
-                friction=0.1,
-                damping_ratio=0.5,
-                density=DENSITY,
-            ),
+            case=case,
             spheres=resting(np.vstack([marker, place]), radius, bounds, kinds),
             push=(push, 0.0, 0.0),
             damping=drag,
@@ -88,7 +85,7 @@ def lifts(velocity: float, folder: Path) -> bool:
             chunk_steps=_STEPS,
             chunks=1,
             boundary="f p p",
-            walls=(plane_wall(0.0, friction=True),),
+            walls=(plane_wall(case, 0.0),),
             density=DENSITY,
         ),
         folder,

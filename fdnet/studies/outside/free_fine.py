@@ -23,14 +23,13 @@ from fdnet.spheres.snapshot import Array, Kind, resting
 from fdnet.studies.dem.runs import the_binary
 from fdnet.studies.engine.error_rows import sizes
 from fdnet.studies.engine.study import DONE, Measured, Point, Row
-from fdnet.studies.outside.answers import Answer
+from fdnet.studies.outside.answers import EXACT, Answer
 
 SERIES, KNOB, ERROR = "free fine", "force", "error of the velocity"
 OBLIQUE, GRADIENT, INERTIA = "oblique gravity", "pressure gradient", "finite Reynolds number"
 TOLERANCE = 0.01
 RADIUS, DENSITY, LIQUID, VISCOSITY = 5e-5, 2146.0, 1095.0, 0.05
 """Radius of the fine, m; densities of fine and fluid, kg/m3; viscosity, Pa s."""
-_SHOWN = 1e-5
 _SPEED, _THIN = 0.5, 0.1
 """Velocity of the fluid along x, m/s; the viscosity in the case of inertia over `VISCOSITY`."""
 _PULLS: Mapping[str, tuple[float, float, float]] = {
@@ -142,8 +141,8 @@ def answers(rows: Sequence[Row]) -> list[Answer]:
             what=f"free fine, {row.value}: velocity in the end",
             expected=laws[str(row.value)],
             measured=f"off by {100 * row.error:.1g} % of the slip"
-            if row.error > _SHOWN
-            else f"off by less than {100 * _SHOWN:g} % of the slip",
+            if row.error > EXACT
+            else f"off by less than {100 * EXACT:g} % of the slip",
             holds=row.error < TOLERANCE,
             test="tests/studies/test_outside_numbers.py",
         )

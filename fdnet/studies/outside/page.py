@@ -8,7 +8,7 @@ from fdnet.studies.engine.study import Row
 from fdnet.studies.engine.table import missing_lines
 from fdnet.studies.outside.answers import Answer
 from fdnet.studies.outside.clogs import FEWEST
-from fdnet.studies.outside.constriction import HIGH, LOW, MOST, cloggings_of, regime
+from fdnet.studies.outside.constriction import HIGH, LONG, LOW, SHORT, cloggings_of, regime
 from fdnet.studies.outside.orifice import PUSH
 
 TITLE = "The invasion against numbers from outside"
@@ -53,7 +53,8 @@ any more, or when the fluid has passed $most fine diameters since. As many fines
 ball over the hole, 0.3 R³, escape even when an arch stands over them already; what follows them is
 counted, and runs that clogged before have a column of their own. The line is fitted to holes with
 at least $fewest clogs at which most runs were counted: of a narrower hole those that are left are
-not a sample of the flow, but of what survives the growth of the heap.
+not a sample of the flow, but of what survives the growth of the heap. Beyond R = 3 clogs are too
+rare to be seen in runs of this length.
 
 $clogs
 
@@ -90,7 +91,7 @@ def _constriction(rows: Sequence[Row]) -> str:
     return _CONSTRICTION.substitute(
         push=f"{PUSH:g}",
         stokes=regime(),
-        most=f"{MOST[LOW]:g} (friction {LOW:g}) or {MOST[HIGH]:g} ({HIGH:g})",
+        most=f"{LONG:g} (at wide holes {SHORT:g})",
         fewest=FEWEST,
         clogs=_clogs(rows),
     )

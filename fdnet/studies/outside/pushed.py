@@ -14,7 +14,7 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import case_from
-from fdnet.dem.contact_lines import contact_variables
+from fdnet.dem.contact_lines import contact_variables, wall_law
 from fdnet.dem.deck import number, render_text
 from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.scene import header_variables, write_data
@@ -116,19 +116,10 @@ def contact_step(
     return factor * math.sqrt(sphere_mass(radius, density) / stiffness)
 
 
-def plane_wall(position: float, *, friction: bool) -> dict[str, Any]:
-    """A plane x = `position` m that touches the fines, as `_walls.in.j2` takes it."""
-    tangential = " tangential history" if friction else ""
-    off = " tangential_damping off" if friction else ""
-    return {
-        "id": "plane",
-        "group": "fines",
-        "model": f"hooke/stiffness{tangential}",
-        "material": 3,
-        "plane": "xplane",
-        "position": number(position),
-        "settings": f"{off} limitForce on",
-    }
+def plane_wall(case: InvasionCase, position: float) -> dict[str, Any]:
+    """A rough plane x = `position` m that touches the fines, as `_walls.in.j2` takes it."""
+    place = {"id": "plane", "group": "fines", "plane": "xplane", "position": number(position)}
+    return place | wall_law(case, "invade", friction=True)
 
 
 def run_pushed(pushed: Pushed, folder: Path) -> Frame:
