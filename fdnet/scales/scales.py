@@ -24,6 +24,7 @@ from fdnet.scales.springs import Contact
 from fdnet.scales.sticking import Sticking, sticking_of, sticking_warnings
 from fdnet.scales.stop_times import chunk_refreshes, plug_warnings, stop_times
 from fdnet.scales.time_step import (
+    coefficient_steps,
     densest_factor,
     drag_warnings,
     hold_steps,
@@ -175,16 +176,16 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     step = time_step(case, shared.contacts, shortest)
     times = stop_times(case, slab, drive, upstream=upstream)
     hold = hold_steps(case, step, shortest / densest_factor(case), times.chunk)
-    chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
+    unit = hold * coefficient_steps(case, step, shortest)
+    chunk_steps = chunk_refreshes(case, times.chunk, step * unit) * unit
     contact = shared.contacts["grain-fine"]
     overlaps = overlaps_of(case, contact, push, shared.porosity)
     sticking = sticking_of(case, contact, push, step)
-    reynolds = _reynolds(case, shared.interstitial_velocity)
     _refuse_long_chunk(step, chunk_steps)
     warnings = [
         *shared.warnings,
         *drive_warnings(case, drive),
-        *reynolds_warnings(case, push, reynolds),
+        *reynolds_warnings(case, push, _reynolds(case, shared.interstitial_velocity)),
         *throat_warnings(case, _throat_ratio(case, shared)),
         *overlap_warnings(case, overlaps),
         *cohesion_warnings(case, contact),
@@ -207,7 +208,7 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
         plug_time=times.plug,
         cap_time=times.cap,
         checkpoint_steps=chunk_steps,
-        reynolds=reynolds,
+        reynolds=_reynolds(case, shared.interstitial_velocity),
         stokes=relaxation[1] * velocity / (2 * case.grains.mean_radius_m),
         impact_stokes=drive.impact_stokes,
         gravity_over_drag=_gravity_over_drag(case, shared.interstitial_velocity),
