@@ -77,7 +77,7 @@ def rows(cases: Path, work: Path, done: Sequence[Mapping[str, str]]) -> Iterator
 
 
 def summary(table: Sequence[Mapping[str, Any]]) -> str:
-    """Markdown: mean, least and largest value over the seeds; the cost over hooke's, same seeds."""
+    """Markdown: mean, least and largest value over the seeds; the cost over hooke's."""
     heads = (
         "specimen",
         "contacts",
