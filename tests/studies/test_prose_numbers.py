@@ -24,8 +24,8 @@ SETTINGS = {
         "8. Specimen size and seed": "5",
         "9. Economies of full-scale invasions": "0.2 3 6 10 1e3 2e3 3e3 1e4",
         "10. Size ratio of fines and grains": "0.2 1 2 6 60",
-        "12. Defaults of an invasion": "0.5 1 2 3 5 6 4,000",
-        "13. Fines that are driven faster than the fluid": "1 3 3.5 5 9 18 100 108",
+        "12. Defaults of an invasion": "0.5 1 2 5 6 4,000",
+        "13. Fines that are driven faster than the fluid": "1 3 3.5 5 9 18 95 100 108",
     },
     "accuracy": {
         "": "1 3 7",

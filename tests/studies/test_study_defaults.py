@@ -8,6 +8,7 @@ from fdnet.case.file import case_from
 from fdnet.scales.scales import scales_of
 from fdnet.studies.command import run_study
 from fdnet.studies.dem import defaults, drive_velocity
+from fdnet.studies.engine.levels import levels
 from fdnet.studies.engine.study import DONE, Measured, Point
 from fdnet.studies.engine.table import read_rows
 
@@ -107,13 +108,15 @@ def test_driven_invasions_on_the_binary(tmp_path):
 
 
 def test_in_the_table_of_the_page_the_deposit_does_not_depend_on_the_drive(root):
-    """Up to nine times, with the same pack; near an impact Stokes number of one inertia shows."""
+    """Of 15 means over four seeds chance would leave about one outside its 95 % band."""
     rows = read_rows(root / "docs/validation/drive-velocity.csv")
-    change = {(row.value, row.quantity): row.error for row in rows if row.seed == 1}
+    means = [
+        level
+        for name in drive_velocity.OBSERVED
+        for level in levels(rows, drive_velocity.SERIES, name)
+        if not level.reference
+    ]
+    assert [level.runs for level in means] == [4] * 15
+    assert sum(level.size > level.half_width for level in means) <= 2
     stokes = {row.value: row.observed for row in rows if row.quantity == "impact_stokes"}
-    for value in (3.0, 9.0):
-        assert stokes[value] < 0.5
-        assert abs(change[value, "invaded"]) < 0.05
-        assert abs(change[value, "depth_p95"]) < 0.1
-    assert stokes[18.0] > 0.9
-    assert change[18.0, "depth_p95"] > 0.5
+    assert all(stokes[value] < 0.5 for value in (1.0, 3.0, 9.0))
