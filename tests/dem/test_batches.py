@@ -173,7 +173,7 @@ def test_a_batched_invasion_accounts_for_every_fine_and_resumes(binary, tmp_path
         == batches.supplied_at(last.chunk)
         == last.upstream + last.invaded + last.passed
     )
-    assert whole.max_overlap < 0.1
+    assert whole.max_overlap < (0.15 if forces else 0.1)
 
     def stop(line: str) -> None:
         if line.startswith("FDNET checkpoint 4 "):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from builders import resting_spheres, tiny
 
-from fdnet.dem import invade_deck, invasion
+from fdnet.dem import invade_deck, invasion, keeper
 from fdnet.dem.contact_lines import contact_variables
 from fdnet.dem.deck import number, render_text
 from fdnet.dem.invade_deck import render_invade
@@ -183,8 +183,9 @@ def test_a_checkpoint_without_its_row_is_named_where_it_is_looked_at(
         f"run.on_overlap={policy}",
     )
     real = invasion.read_history
-    monkeypatch.setattr(
-        invasion, "read_history", lambda folder: tuple(r for r in real(folder) if r.chunk != 1)
-    )
+    for reader in (invasion, keeper):
+        monkeypatch.setattr(
+            reader, "read_history", lambda folder: tuple(r for r in real(folder) if r.chunk != 1)
+        )
     with pytest.raises(LiggghtsError, match=raised) if raised else nullcontext():
         invade(case, scales_of(case), grains, tmp_path, Launch(binary=binary))

@@ -56,7 +56,7 @@ def velocity_field(
         >>> grains = fdnet.Snapshot.from_arrays(lattice, 0.5e-3)
         >>> field = fdnet.velocity_field(grains, periodic="xyz")
         >>> print(f"{field.at([[1e-3, 1e-3, 1e-3]])[0, 0]:.1f}")
-        4.2
+        4.4
     """
     if not len(grains.grains()):
         raise CaseError("velocity field: no grain among the spheres, expected at least one")

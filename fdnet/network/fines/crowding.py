@@ -10,6 +10,7 @@ import numpy as np
 
 from fdnet.network.compiled import compiled
 from fdnet.network.fines.point_search import Grid, grid_of
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.images import make_images, wrapped
 from fdnet.spheres.snapshot import Array, Snapshot
 
@@ -37,6 +38,9 @@ class Neighbourhood:
     porosity: Array
     size_ratio: Array
     capped: int
+
+    def __repr__(self) -> str:
+        return one_line(self)
 
 
 def local_porosity(

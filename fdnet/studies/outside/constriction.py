@@ -28,9 +28,9 @@ LOW, HIGH = 0.1, 0.5
 LONG, SHORT = 800.0, 300.0
 """Longest run at narrow and wide holes, in times in which the fluid passes a fine's diameter."""
 RUNS: Mapping[float, Mapping[float, int]] = {
-    LOW: {2.0: 8, 2.25: 1, 2.5: 1, 3.0: 1, 3.5: 1},
-    HIGH: {2.0: 40, 2.125: 40, 2.25: 36, 2.375: 30, 2.5: 30, 2.625: 24, 2.75: 20}
-    | {2.875: 12, 3.0: 5, 3.25: 1},
+    LOW: {2.0: 40, 2.125: 30, 2.25: 30, 2.375: 24, 2.5: 20, 2.75: 8, 3.0: 8, 3.5: 4},
+    HIGH: {2.0: 40, 2.125: 40, 2.25: 36, 2.375: 30, 2.5: 60, 2.625: 48, 2.75: 40}
+    | {2.875: 24, 3.0: 10, 3.25: 3},
 }
 """Number of runs by friction and R."""
 QUICK = ((LOW, 3.0, 1, 20.0), (HIGH, 1.5, 1, 200.0))
