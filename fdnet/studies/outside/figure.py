@@ -34,7 +34,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
         draw_on(one, rows)
         one.grid(which="major", lw=0.4, color="0.85")
         if one.get_legend_handles_labels()[0]:
-            one.legend(fontsize=8, framealpha=0.9)
+            one.legend(fontsize=8, framealpha=0.9, loc="upper right")
     with replacing(path) as part:
         figure.savefig(part, dpi=DOTS)
     plt.close(figure)
