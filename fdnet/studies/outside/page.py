@@ -55,7 +55,8 @@ counted, and runs that clogged before have a column of their own. The line is fi
 at least $fewest clogs at which most runs were counted: of a narrower hole those that are left are
 not a sample of the flow, but of what survives the growth of the heap. The number of fines skipped
 and this rule were chosen after the first half of the runs of friction 0.5 had been looked at; the
-second half was added afterwards. Beyond R = 3 clogs are too rare to be seen in runs of this length.
+second half was added afterwards. Beyond R = 3 clogs are too rare to be seen in runs of this
+length.
 
 $clogs
 
