@@ -7,19 +7,19 @@ by the user.
 
 import argparse
 import io
-import json
 import os
 import shlex
 import signal
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, NoReturn
 
-from fdnet.case.stages import STAGES
-from fdnet.errors import CaseError, FdnetError, words_of
-from fdnet.files.paths import path_option
+from fdnet.commands import permeability, render, run, study
+from fdnet.errors import FdnetError, words_of
 from fdnet.permeability.options import joined_box
+
+COMMANDS = (run, render, permeability, study)
+"""Modules of the commands, in the order that `fdnet --help` shows."""
 
 _STOPPED = 130
 _SIGNALS: list[int] = []
@@ -96,10 +96,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="fdnet", description=str(__doc__).splitlines()[0])
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
     commands = parser.add_subparsers(required=True, metavar="command")
-    _add_run(commands, common)
-    _add_render(commands, common)
-    _add_permeability(commands, common)
-    _add_study(commands, common)
+    for command in COMMANDS:
+        command.add_command(commands, common)
     return parser
 
 
@@ -109,179 +107,6 @@ class _Version(argparse.Action):
 
         print(f"fdnet {metadata.version('fdnet')}")
         parser.exit(0)
-
-
-def _add_case(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("case", type=path_option, metavar="CASE.toml", help="the case file")
-    parser.add_argument("--seed", type=int, help="overrides the seed of the case")
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="overrides a key, e.g. fines.count=500",
-    )
-    parser.add_argument(
-        "--np",
-        type=_ranks,
-        default=1,
-        metavar="N",
-        help="MPI ranks for LIGGGHTS (default 1); another number of ranks gives another pack from "
-        "the same seed, and a cut run is continued with the number it was begun with",
-    )
-
-
-def _ranks(text: str) -> int:
-    if not text.isdecimal() or len(text) > 9 or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text[:40]!r}, expected a number of ranks, 1 or more")
-    return int(text)
-
-
-def _add_run(commands: Any, common: argparse.ArgumentParser) -> None:
-    run = commands.add_parser(
-        "run", parents=[common], help="pack, invade, analyse and report one case"
-    )
-    _add_case(run)
-    run.add_argument("--out", type=path_option, help="run folder (default runs/NAME)")
-    run.add_argument("--resume", action="store_true", help="continue an unfinished run")
-    run.add_argument("--force", action="store_true", help="replace an earlier run")
-    run.add_argument(
-        "--stages",
-        default=",".join(STAGES),
-        help="comma-separated (default: all four)",
-    )
-    run.add_argument("--json", action="store_true", help="print summary.json on standard output")
-    run.add_argument("--liggghts", metavar="PATH", help="the LIGGGHTS binary")
-    run.add_argument(
-        "--timeout",
-        type=float,
-        metavar="SECONDS",
-        help="stop LIGGGHTS after this time (continue with --resume)",
-    )
-    run.add_argument("--quiet", action="store_true", help="no progress")
-    run.set_defaults(action=_run)
-
-
-def _add_render(commands: Any, common: argparse.ArgumentParser) -> None:
-    render = commands.add_parser(
-        "render", parents=[common], help="write the decks without LIGGGHTS and print the scales"
-    )
-    _add_case(render)
-    render.add_argument("--out", type=path_option, required=True, help="folder for the decks")
-    render.set_defaults(action=_render)
-
-
-def _add_permeability(commands: Any, common: argparse.ArgumentParser) -> None:
-    from fdnet.permeability.command import run
-    from fdnet.permeability.options import add_arguments
-
-    command = commands.add_parser(
-        "permeability",
-        parents=[common],
-        help="permeability of a file of spheres, without LIGGGHTS",
-    )
-    add_arguments(command)
-    command.set_defaults(action=run)
-
-
-def _add_study(commands: Any, common: argparse.ArgumentParser) -> None:
-    from fdnet.studies.command import add_arguments, run
-
-    command = commands.add_parser(
-        "study", parents=[common], help="error against run time of one of fdnet's choices"
-    )
-    add_arguments(command)
-    command.set_defaults(action=run)
-
-
-def _case_of(options: argparse.Namespace) -> Any:
-    from fdnet.case.file import read_case
-
-    seed = [] if options.seed is None else [f"seed={options.seed}"]
-    return read_case(options.case, assignments=[*options.set, *seed])
-
-
-def _stages(text: str) -> tuple[str, ...]:
-    names = [part.strip() for part in text.split(",") if part.strip()]
-    unknown = [name for name in names if name not in STAGES]
-    if unknown or not names:
-        raise CaseError(
-            f"--stages: {text!r} has {unknown or 'nothing'}, expected some of {','.join(STAGES)}"
-        )
-    return tuple(stage for stage in STAGES if stage in names)
-
-
-def _run(options: argparse.Namespace) -> int:
-    from fdnet.run.pipeline import run_stages
-    from fdnet.run.session import RunOptions, cores
-
-    case = _case_of(options)
-    out = options.out or Path("runs") / case.name
-    chosen = RunOptions(
-        out=out,
-        ranks=options.np,
-        resume=options.resume,
-        force=options.force,
-        stages=_stages(options.stages),
-        liggghts=options.liggghts,
-        timeout=options.timeout,
-        show_progress=not options.quiet,
-        command=options.command_line,
-    )
-    if options.np > cores():
-        _warn(
-            f"--np {options.np}: this machine has {cores()} cores, so the run will be slower than "
-            f"with --np {cores()}"
-        )
-    summary = run_stages(case, chosen)
-    for text in summary.get("warnings", []):
-        if "3-D picture" in text or text.startswith("the drawing process"):
-            _warn(text)
-    if options.json:
-        print(json.dumps(summary, indent=2))
-    else:
-        _print_summary(summary, out)
-    return 0
-
-
-def _warn(text: str) -> None:
-    print(f"fdnet: warning: {text}", file=sys.stderr, flush=True)
-
-
-def _print_summary(summary: dict[str, Any], out: Path) -> None:
-    from fdnet.run.summary_text import summary_lines
-
-    for line in (
-        summary_lines(summary) if summary else ["done (the analysis was not among the stages)"]
-    ):
-        print(line)
-    print(f"run folder: {out}")
-
-
-def _render(options: argparse.Namespace) -> int:
-    from fdnet.dem.render import render_decks
-    from fdnet.run.mark import is_run_folder
-    from fdnet.scales.cost import over_limit
-    from fdnet.scales.scales import scales_of
-    from fdnet.scales.table import scale_rows
-
-    case = _case_of(options)
-    scales = scales_of(case)
-    if is_run_folder(options.out):
-        raise CaseError(
-            f"{options.out}: is a run folder; give another --out (nothing was changed)"
-        )
-    decks = render_decks(case, options.out, ranks=options.np)
-    for row in scale_rows(case, scales):
-        print(
-            f"{row.name:<36} {row.symbol:<11} {row.value:>12.4g} {row.unit:<5} "
-            f"{row.formula:<40} {row.source}"
-        )
-    for warning in filter(None, [*scales.warnings, over_limit(case, scales)]):
-        print(f"warning: {warning}")
-    for deck in decks:
-        print(f"deck: {deck}")
-    return 0
 
 
 if __name__ == "__main__":

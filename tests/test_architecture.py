@@ -16,6 +16,7 @@ LAYERS = [
     ["dem", "report"],
     ["run"],
     ["permeability", "studies"],
+    ["commands"],
     ["cli"],
 ]
 """Rooms of the package from the bottom up; a room imports from lower lines only."""

@@ -14,6 +14,7 @@ to rounding. Transforms are in single precision: see docs/stokes.md for what tha
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import fft
@@ -104,21 +105,27 @@ def _odd_back(wave: Array, axis: int) -> Array:
 
 
 @compiled
+def _inverse_square(p: complex, q: complex, r: complex) -> Any:
+    """One over the square of a wave's gradient (p, q, r); 0 for the mean, which has none."""
+    square = (
+        p.real * p.real
+        + p.imag * p.imag
+        + q.real * q.real
+        + q.imag * q.imag
+        + r.real * r.real
+        + r.imag * r.imag
+    )
+    return np.float32(0.0) if square == 0.0 else np.float32(1.0) / square
+
+
+@compiled
 def _respond(a: Array, b: Array, c: Array, g0: Array, g1: Array, g2: Array) -> None:
     """Turns the transforms of forces into those of velocities, in place."""
     for i in range(a.shape[0]):
         for j in range(a.shape[1]):
             for k in range(a.shape[2]):
                 p, q, r = g0[i], g1[j], g2[k]
-                square = (
-                    p.real * p.real
-                    + p.imag * p.imag
-                    + q.real * q.real
-                    + q.imag * q.imag
-                    + r.real * r.real
-                    + r.imag * r.imag
-                )
-                inverse = np.float32(0.0) if square == 0.0 else np.float32(1.0) / square
+                inverse = _inverse_square(p, q, r)
                 x, y, z = a[i, j, k], b[i, j, k], c[i, j, k]
                 along = (np.conj(p) * x + np.conj(q) * y + np.conj(r) * z) * inverse
                 a[i, j, k] = (x - p * along) * inverse
@@ -133,14 +140,6 @@ def _press(a: Array, b: Array, c: Array, g0: Array, g1: Array, g2: Array) -> Non
         for j in range(a.shape[1]):
             for k in range(a.shape[2]):
                 p, q, r = g0[i], g1[j], g2[k]
-                square = (
-                    p.real * p.real
-                    + p.imag * p.imag
-                    + q.real * q.real
-                    + q.imag * q.imag
-                    + r.real * r.real
-                    + r.imag * r.imag
-                )
-                inverse = np.float32(0.0) if square == 0.0 else np.float32(1.0) / square
+                inverse = _inverse_square(p, q, r)
                 x, y, z = a[i, j, k], b[i, j, k], c[i, j, k]
                 a[i, j, k] = (np.conj(p) * x + np.conj(q) * y + np.conj(r) * z) * inverse

@@ -20,6 +20,7 @@ from fdnet.dem.fluid import FluidForces, Moment
 from fdnet.network.fines.crowding import Neighbourhood, local_porosity
 from fdnet.run.fluid.network_flow import Carried, PackFlow, Renewal, pack_flow
 from fdnet.run.fluid.uniform import crowd_factor
+from fdnet.run.history import FLOW_COLUMNS
 from fdnet.scales.scales import InvasionScales
 from fdnet.scales.velocity import path_of
 from fdnet.spheres.snapshot import Array, Snapshot
@@ -72,15 +73,7 @@ class NetworkFluid:
         """What a row of the record holds; see docs/physics.md."""
         return (
             "velocity_m_s",
-            "rate_m3_s",
-            "rate_over_initial",
-            "k_over_k0",
-            "filtrate_m3",
-            "cake_thickness_m",
-            "pressure_cake_Pa",
-            "pressure_pack_Pa",
-            "momentum_defect",
-            "throat_factor",
+            *FLOW_COLUMNS,
             "factor_mean",
             "factor_most",
             "porosity_least",
