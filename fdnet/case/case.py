@@ -16,6 +16,7 @@ from pydantic import Field, model_validator
 
 from fdnet.case.added import completed, without_added
 from fdnet.case.analysis import AnalysisChoices
+from fdnet.case.clean_up import CleanUp
 from fdnet.case.contact import MODEL_KEYS, ContactLaw
 from fdnet.case.control import Run
 from fdnet.case.fluid import Fluid, Well
@@ -23,7 +24,7 @@ from fdnet.case.particles import Fines, Grains
 from fdnet.case.parts import Box, Drag, Gravity
 from fdnet.case.rules import cross_problems
 from fdnet.case.spheres import Spheres
-from fdnet.case.stages import STAGES, Stage
+from fdnet.case.stages import LIGGGHTS_STAGES, STAGES, Stage
 from fdnet.case.values import Part
 from fdnet.errors import CaseError
 
@@ -40,6 +41,7 @@ KEYS = (
     "drag",
     "gravity",
     "contact",
+    "clean_up",
     "run",
     "analysis",
     "given",
@@ -103,7 +105,7 @@ class Case(Part):
     @property
     def stages(self) -> tuple[Stage, ...]:
         """The stages that a run of this case consists of."""
-        return tuple(stage for stage in STAGES if stage != "invade")
+        return tuple(stage for stage in STAGES if stage not in ("invade", "clean_up"))
 
     @property
     def size_m(self) -> tuple[float, float, float]:
@@ -141,16 +143,19 @@ class Case(Part):
     def digest(self, stage: str = "analyse") -> str:
         """Hash of what `stage` depends on.
 
-        "pack" ignores fines, fluid and analysis; "invade" ignores the analysis. No result depends
-        on `POLICIES`, so no digest does. A key that was added later counts only where its value
-        differs from what a case meant before (`fdnet.case.added`).
+        "pack" ignores fines, fluid and analysis; "invade" ignores the analysis and the clean-up,
+        "clean_up" the analysis. No result depends on `POLICIES`, so no digest does. A key that was
+        added later counts only where its value differs from what a case meant before
+        (`fdnet.case.added`).
         """
         data = without_added(self.data())
         data.pop("given", None)
         data["run"] = {key: value for key, value in data["run"].items() if key not in POLICIES}
-        if stage in ("pack", "invade"):
+        if stage in LIGGGHTS_STAGES:
             data.pop("analysis")
             data.pop("name")
+        if stage == "invade":
+            data.pop("clean_up", None)
         if stage == "pack":
             data["grains"].pop("motion")
             fines = data.get("fines", {}).get("normal_stiffness_N_m")
@@ -191,6 +196,7 @@ class InvasionCase(Case):
     """
 
     fines: Fines
+    clean_up: CleanUp | None = None
 
     @property
     def spheres(self) -> dict[str, Spheres]:
@@ -199,8 +205,8 @@ class InvasionCase(Case):
 
     @property
     def stages(self) -> tuple[Stage, ...]:
-        """The stages that a run of this case consists of: all."""
-        return STAGES
+        """The stages that a run of this case consists of."""
+        return tuple(stage for stage in STAGES if stage != "clean_up" or self.clean_up)
 
 
 def case_type(data: Mapping[str, Any]) -> type[Case]:

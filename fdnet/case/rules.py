@@ -5,6 +5,7 @@ from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 from fdnet.case.analysis import AnalysisChoices
+from fdnet.case.clean_up import CLEAN_UP_RULES
 from fdnet.case.contact import MODEL_KEYS
 from fdnet.case.contact_rules import of_cohesion, of_rolling, of_the_model
 from fdnet.case.control import Run
@@ -238,6 +239,7 @@ RULES = (
     Rule(("run.skin_mm", "grains.radius_mm", "fines.radius_mm"), _skin),
     Rule(("run.neighbour_bin_mm", "box.size_mm", "fines"), _neighbour_bins),
     *FLOW_RULES,
+    *CLEAN_UP_RULES,
     Rule(("drag.field", "drag.upstream", "drag.drive"), flow_field),
     Rule(("drag.field", "grains.motion"), network_grains),
     Rule(("drag.field", "drag.crowd", "drag.inertia"), coupled_inertia),

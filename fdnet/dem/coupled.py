@@ -66,12 +66,12 @@ class Coupling:
             chunk += 1
             if chunk in batches:
                 feed(f"include {SUPPLY}/batch_{chunk}.in")
-            step = self._chunk(feed, updates, step)
+            step = self.chunk(feed, updates, step)
             feed("include checkpoint.in")
             if self.over(read_history(self.folder)[-1]):
                 return
 
-    def _chunk(self, feed: Feed, updates: Updates, step: int) -> int:
+    def chunk(self, feed: Feed, updates: Updates, step: int) -> int:
         """A chunk of steps from `step`; returns its last one."""
         end, fresh = step + self.scales.checkpoint_steps, True
         while step < end:

@@ -139,7 +139,7 @@ def render_invade(
         header_variables(case, "invade", left_out, ranks)
         | {
             "resume": _restart(resume) if resume else None,
-            "skin": number(_skin(case)),
+            "skin": number(neighbour_skin(case)),
             "neighbour_bin": number(case.run.neighbour_bin_m) if case.run.neighbour_bin_m else "",
             "contacts": contact_variables(case, scales, "invade", friction=friction),
             "time_step": number(scales.time_step),
@@ -169,7 +169,7 @@ def render_invade(
     return Deck(text=text, stage="invade", digest=case.digest("invade"), left_out=tuple(left_out))
 
 
-def _skin(case: InvasionCase) -> float:
+def neighbour_skin(case: InvasionCase) -> float:
     """The neighbour skin, m: given, or the radius of the smallest fine.
 
     A skin of 0.3 to 0.8 of its diameter was measured to be fastest.

@@ -1,0 +1,133 @@
+"""The deck of a clean-up: the end of an invasion, with the flow turned back."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fdnet.dem.clean_up_states import Cleaned
+from fdnet.dem.contact_lines import contact_variables
+from fdnet.dem.coupled_parts import coupled_parts, dumped_group
+from fdnet.dem.deck import Deck, LeftOut, number, render_text
+from fdnet.dem.drag import BELOW_ZERO, drag_variables, forces_left_out
+from fdnet.dem.gravity import gravity_variables
+from fdnet.dem.invade_deck import neighbour_skin
+from fdnet.dem.scene import header_variables, wall_variables
+from fdnet.scales.clean_up import BackFlow
+from fdnet.scales.scales import InvasionScales
+from fdnet.spheres.dump import COLUMNS, FORMAT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Beginning:
+    """Where LIGGGHTS begins.
+
+    Attributes:
+        restart: path of the restart file, from the folder of the deck.
+        row: the checkpoint of the clean-up that it holds; None at the end of the invasion.
+        face: x (m), at most 0, upstream of which a fine has come out.
+    """
+
+    restart: str
+    row: Cleaned | None
+    face: float
+
+
+def render_clean_up(flow: BackFlow, digest: str, begin: Beginning, *, ranks: int = 1) -> Deck:
+    """The deck of a clean-up, at the end of the invasion or continued from a checkpoint."""
+    case, scales = flow.case, flow.scales
+    mobile = case.grains.motion == "mobile"
+    frictional = [c for name, c in scales.contacts.items() if "fine" in name or mobile]
+    friction = any(c.friction > 0 for c in frictional)
+    wall_friction = any(c.friction > 0 for c in frictional if "wall" in c.pair)
+    gravity, left_out = gravity_variables(case, scales)
+    left_out += forces_left_out(case)
+    if begin.face < 0:
+        left_out.append(LeftOut(what="resistance of the cake", why="the fluid is not slowed by it"))
+    header = header_variables(case, "invade", left_out, ranks)
+    text = render_text(
+        "clean_up.in.j2",
+        header
+        | {
+            "stage": "clean_up",
+            "digest": digest,
+            "going_on": begin.row is not None,
+            "restart": begin.restart,
+            "skin": number(neighbour_skin(case)),
+            "neighbour_bin": number(case.run.neighbour_bin_m) if case.run.neighbour_bin_m else "",
+            "contacts": contact_variables(case, scales, "invade", friction=friction),
+            "time_step": number(scales.time_step),
+            "walls": wall_variables(case, "invade", friction=wall_friction),
+            "fixed_grains": not mobile,
+            "moving": "all" if mobile else "fines",
+            "gravity": gravity,
+            "drag": turned_drag(flow),
+            "resume": False,
+            "regions": _regions(flow, begin.face),
+            "ahead": begin.face < 0,
+            "thermo_steps": max(1, scales.checkpoint_steps // 4),
+            "start": _start(begin.row),
+            "chunks": flow.chunks,
+            "chunk_steps": scales.checkpoint_steps,
+            "quiet_chunks": flow.quiet_chunks,
+            **_dump(flow),
+        },
+    )
+    return Deck(text=text, stage="clean_up", digest=digest, left_out=tuple(left_out))
+
+
+def clean_up_parts(flow: BackFlow, face: float) -> dict[str, str]:
+    """Name and text of each file that a coupled clean-up includes; empty when it is not."""
+    parts = coupled_parts(flow.case, flow.scales)
+    if parts:
+        parts["checkpoint.in"] = render_text("cleaned.in.j2", {"ahead": face < 0} | _dump(flow))
+    return parts
+
+
+def turned_drag(flow: BackFlow) -> dict[str, Any]:
+    """The variables of `_drag.in.j2` with the velocities and the gradient below 0.
+
+    What depends on the size of a slip alone is that of the flow ahead.
+    """
+    ahead = drag_variables(flow.case, flow.scales)
+    back = drag_variables(flow.case, _turned(flow.scales))
+    return back | {"inertia": ahead["inertia"]} if "inertia" in ahead else back
+
+
+def _turned(scales: InvasionScales) -> InvasionScales:
+    push = scales.push
+    return replace(
+        scales,
+        drive_velocity=-scales.drive_velocity,
+        upstream_velocity=-scales.upstream_velocity,
+        push=replace(
+            push, velocity=-push.velocity, gradient=-push.gradient, reynolds_slope=0.0
+        ),
+    )
+
+
+def _dump(flow: BackFlow) -> dict[str, str]:
+    return {
+        "dump_group": dumped_group(flow.case),
+        "dump_columns": COLUMNS,
+        "dump_format": FORMAT,
+    }
+
+
+def _start(row: Cleaned | None) -> dict[str, int]:
+    if row is None:
+        return {"chunk": 1, "out": 0, "passed": 0, "quiet": 0}
+    return {"chunk": row.chunk + 1, "out": row.out, "passed": row.passed, "quiet": row.quiet}
+
+
+def _regions(flow: BackFlow, face: float) -> dict[str, str]:
+    length, sides = flow.case.size_m[0], "INF INF INF INF"
+    end = face if face < 0 else BELOW_ZERO
+    return {
+        "specimen": f"0.0 {number(np.nextafter(length, 0))} {sides}",
+        "ahead": f"{number(np.nextafter(end, 0))} {number(BELOW_ZERO)} {sides}"
+        if face < 0
+        else "",
+        "out": f"INF {number(end)} {sides}",
+        "beyond": f"{number(length)} INF {sides}",
+    }

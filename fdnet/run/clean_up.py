@@ -1,0 +1,194 @@
+"""The stage clean_up of a run: the flow is turned back, and what it gives is measured."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fdnet.case.case import InvasionCase
+from fdnet.dem.clean_up import DECK, CleanedUp, Start, clean_up
+from fdnet.dem.clean_up_states import cleaned_state, dump_name, read_cleaned
+from fdnet.dem.overlap import overlap_in
+from fdnet.dem.updates import UPDATES
+from fdnet.errors import CaseError
+from fdnet.network.fines.invaded import measure_invaded
+from fdnet.run.dem_stages import invaded, is_done, packed_grains
+from fdnet.run.fluid.fluid_of import fluid_of
+from fdnet.run.fluid.mirrored import Mirrored, mirrored
+from fdnet.run.made_files import START_OVER, check_files, digests_of
+from fdnet.run.mark import RECORD_FORMAT
+from fdnet.run.outputs import Invaded
+from fdnet.run.progress import Progress
+from fdnet.run.records import run_record
+from fdnet.run.session import Session
+from fdnet.scales.clean_up import BackFlow, back_flow
+from fdnet.spheres.snapshot import Array, Snapshot
+
+if TYPE_CHECKING:
+    from fdnet.network.analysis import Analysis
+
+STAGE = "clean_up"
+
+
+def clean_up_stage(session: Session, case: InvasionCase) -> None:
+    """Turn the flow back, unless that is done. Raises what `clean_up` raises."""
+    if is_done(session, STAGE):
+        return
+    grains, flow = packed_grains(session), back_flow(case)
+    before, folder = invaded(session, case, grains), session.path / STAGE
+    progress = Progress("clean_up", flow.chunks * flow.scales.checkpoint_steps, show=False)
+    with session.timed(STAGE), progress:
+        launch = session.launch(progress)
+        fluid = fluid_of(flow.case, flow.scales, mirrored(grains))
+        result = clean_up(
+            flow,
+            _start(session, case, grains, before),
+            folder,
+            launch,
+            fluid=None if fluid is None else Mirrored(fluid=fluid),
+        )
+    record = _record(session, case, flow, result, folder)
+    session.folder.finish(STAGE, record)
+
+
+def _start(session: Session, case: InvasionCase, grains: Snapshot, before: Invaded) -> Start:
+    cake = measure_invaded(before.damaged, periodic=case.periodic).cake_thickness
+    return Start(
+        grains=grains,
+        invaded=before.damaged,
+        invasion=session.path / "invade",
+        cake=cake,
+        digest=case.digest(STAGE),
+    )
+
+
+def _record(
+    session: Session, case: InvasionCase, flow: BackFlow, result: CleanedUp, folder: Path
+) -> dict[str, Any]:
+    """clean_up/stage.json: how the clean-up in `folder` ended."""
+    known = set(session.scales.warnings)
+    doubts = [f"clean-up: {text}" for text in flow.scales.warnings if text not in known]
+    dumps = (dump_name(row.step) for row in result.history)
+    last = result.history[-1]
+    return {
+        "format": RECORD_FORMAT,
+        "digest": case.digest(STAGE),
+        "seconds": session.seconds[STAGE],
+        "stop_reason": result.stop_reason,
+        "out": last.out,
+        "max_overlap": overlap_in(case, result.state).fraction,
+        "steps": last.step,
+        "dt_s": flow.step,
+        "physical_time_s": last.chunk
+        * flow.scales.checkpoint_steps
+        * flow.step
+        * flow.scales.force_factor,
+        "warnings": [*doubts, *result.warnings],
+        "ranks": result.ranks,
+        "files": digests_of(folder, [DECK, "history.csv", UPDATES, *dumps]),
+        "runs": [run_record(run) for run in result.runs],
+        "left_out": [str(item) for item in result.left_out],
+    }
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Returned:
+    """What a clean-up gave.
+
+    Attributes:
+        state: grains and remaining fines at the end.
+        analysis: of this state, with the damage law that the invasion was measured by.
+        before: (N,) depth of the fines inside before, m.
+        stayed: (N,) whether each of them is still inside.
+    """
+
+    state: Snapshot
+    analysis: "Analysis"
+    before: Array
+    stayed: Array
+
+
+def returned(session: Session, case: InvasionCase, grains: Snapshot, damaged: Snapshot) -> Snapshot:
+    """The state at the end of the finished clean-up.
+
+    Raises CaseError when a file is not what the stage made, DumpError when one cannot be read.
+    """
+    folder = session.path / STAGE
+    record = session.folder.record(STAGE) or {}
+    check_files(folder, record, START_OVER, may_lack=lambda name: name.endswith(".dump"))
+    history = read_cleaned(folder)
+    if not history:
+        raise CaseError(f"{folder}/history.csv: no checkpoint is recorded; {START_OVER}")
+    return cleaned_state(folder, history[-1], back_flow(case), grains)
+
+
+def compared(damaged: Snapshot, state: Snapshot, analysis: "Analysis") -> Returned:
+    """The fines of two states, matched by their id; `analysis` is of the second `state`."""
+    low, high = damaged.box[0]
+    fines, left = damaged.fines(), state.fines()
+    x, end = fines.position[:, 0], left.position[:, 0]
+    inside = (x >= low) & (x < high)
+    still = left.id[(end >= low) & (end < high)]
+    return Returned(
+        state=state,
+        analysis=analysis,
+        before=x[inside] - low,
+        stayed=np.isin(fines.id[inside], still),
+    )
+
+
+def clean_up_rows(first: "Analysis", after: Returned) -> list[dict[str, Any]]:
+    """The sections as clean_up.csv names their values.
+
+    `first` is the analysis after the invasion. A ratio is None where the intact value is 0.
+    """
+    rows = []
+    for damaged, back in zip(first.sections, after.analysis.sections, strict=True):
+        within = (after.before >= damaged.x_lo) & (after.before < damaged.x_hi)
+        rows.append(
+            {
+                "section": damaged.section,
+                "x_lo_m": damaged.x_lo,
+                "x_hi_m": damaged.x_hi,
+                "porosity_initial": damaged.porosity_initial,
+                "porosity_damaged": damaged.porosity_damaged,
+                "porosity_returned": back.porosity_damaged,
+                "k_initial_m2": damaged.k_initial,
+                "k_damaged_m2": damaged.k_damaged,
+                "k_returned_m2": back.k_damaged,
+                "k_initial_inplace_m2": damaged.k_initial_inplace,
+                "k_damaged_inplace_m2": damaged.k_damaged_inplace,
+                "k_returned_inplace_m2": back.k_damaged_inplace,
+                "damaged_k_over_k0": ratio(damaged.k_damaged, damaged.k_initial),
+                "return_k_over_k0": ratio(back.k_damaged, damaged.k_initial),
+                "fines_before": int(within.sum()),
+                "fines_left_it": int(np.sum(within & ~after.stayed)),
+                "fines_after": back.fines_count,
+            }
+        )
+    return rows
+
+
+def ratio(part: float, whole: float) -> float | None:
+    """`part` over `whole`; None where `whole` is 0."""
+    return part / whole if whole > 0 else None
+
+
+def clean_up_summary(first: "Analysis", after: Returned, record: dict[str, Any]) -> dict[str, Any]:
+    """The keys that a clean-up adds to summary.json."""
+    stayed = int(after.stayed.sum())
+    return {
+        "return_k_over_k0": ratio(after.analysis.k_damaged, first.k_initial),
+        "k_returned_m2": after.analysis.k_damaged,
+        "clean_up": {
+            "stop_reason": record["stop_reason"],
+            "physical_time_s": record["physical_time_s"],
+            "inside_before": len(after.before),
+            "came_out": len(after.before) - stayed,
+            "stayed": stayed,
+            "damaged_k_over_k0": ratio(first.k_damaged, first.k_initial),
+            "damage_law_used": after.analysis.damage_law_used,
+            "sections": clean_up_rows(first, after),
+        },
+    }
