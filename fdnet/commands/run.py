@@ -24,7 +24,7 @@ def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
     run.add_argument(
         "--stages",
         default=",".join(STAGES),
-        help="comma-separated (default: all four)",
+        help="comma-separated (default: all that the case has)",
     )
     run.add_argument("--json", action="store_true", help="print summary.json on standard output")
     run.add_argument("--liggghts", metavar="PATH", help="the LIGGGHTS binary")

@@ -92,10 +92,11 @@ def draw_all(
         draws["size_curves"] = partial(fill_size_curves, sizes=sizes)
     if history:
         draws["invasion_history"] = partial(_invasion_history, history=history)
-    return [_draw(target / f"{name}.png", fill) for name, fill in draws.items()]
+    return [draw(target / f"{name}.png", fill) for name, fill in draws.items()]
 
 
-def _draw(path: Path, fill: Callable[[Any], None]) -> Path:
+def draw(path: Path, fill: Callable[[Any], None]) -> Path:
+    """Save a figure that `fill` draws into, whole or not at all."""
     with _figure(path) as figure:
         fill(figure)
     return path

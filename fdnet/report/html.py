@@ -48,6 +48,7 @@ class ReportParts:
         scales: rows with name, symbol, value, unit, formula and source (objects or mappings).
         versions: version of each program.
         commands: the command lines as they were typed.
+        tables: further tables (`fdnet.report.added.PageTable`), in order.
     """
 
     figures: Sequence[tuple[Path, str]] = ()
@@ -55,6 +56,7 @@ class ReportParts:
     scales: Sequence[Any] = ()
     versions: Mapping[str, Any] = field(default_factory=dict)
     commands: Sequence[str] = ()
+    tables: Sequence[Any] = ()
 
 
 def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportParts) -> Path:

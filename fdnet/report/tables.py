@@ -193,6 +193,15 @@ def write_history(path: str | Path, rows: Sequence[Mapping[str, float]]) -> Path
     return _write(path, _frame(rows))
 
 
+def write_rows(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> Path:
+    """Rows of equal keys; edges of slabs at full precision, empty where a value is None."""
+    edges = ("x_lo_m", "x_hi_m")
+    exact = [
+        {**row, **{edge: repr(float(row[edge])) for edge in edges if edge in row}} for row in rows
+    ]
+    return _write(path, _frame(exact))
+
+
 def plain_json(mapping: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
     """`mapping` as plain values and as JSON text.
 

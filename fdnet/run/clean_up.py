@@ -109,7 +109,7 @@ class Returned:
     stayed: Array
 
 
-def returned(session: Session, case: InvasionCase, grains: Snapshot, damaged: Snapshot) -> Snapshot:
+def returned(session: Session, case: InvasionCase, grains: Snapshot) -> Snapshot:
     """The state at the end of the finished clean-up.
 
     Raises CaseError when a file is not what the stage made, DumpError when one cannot be read.

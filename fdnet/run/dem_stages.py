@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from fdnet.case.case import InvasionCase
+from fdnet.case.stages import LIGGGHTS_STAGES
 from fdnet.dem.checkpoint import read_history, state_at
 from fdnet.dem.digests import checkpoint_files
 from fdnet.dem.invasion import invade
@@ -25,7 +26,7 @@ from fdnet.spheres.snapshot import Snapshot
 
 def pack_stage(session: Session) -> None:
     """Make the pack, unless it is made. Raises what `make_pack` raises."""
-    if _is_done(session, "pack"):
+    if is_done(session, "pack"):
         return
     case, scales = session.case, session.scales
     expected = PACK_STAGES * PACK_STAGE_STEPS + PACK_RELAX_STEPS // 2
@@ -39,7 +40,7 @@ def pack_stage(session: Session) -> None:
 
 def invade_stage(session: Session, case: InvasionCase) -> None:
     """Drive the fines in, unless that is done. Raises what `invade` raises."""
-    if _is_done(session, "invade"):
+    if is_done(session, "invade"):
         return
     scales, grains, folder = scales_of(case), packed_grains(session), session.path / "invade"
     _refuse_mixed_ranks(session, folder)
@@ -70,7 +71,11 @@ def _expected_steps(scales: InvasionScales) -> int:
     return round(min(scales.cap_time, feeding + 2 * scales.plug_time) / scales.time_step)
 
 
-def _is_done(session: Session, stage: str) -> bool:
+def is_done(session: Session, stage: str) -> bool:
+    """Whether a stage of this case is done, its files as they were.
+
+    Raises CaseError when it belongs to another case or a file of it is not what it made.
+    """
     record = session.folder.record(stage)
     if record is None:
         return False
@@ -126,7 +131,7 @@ def invaded(session: Session, case: InvasionCase, grains: Snapshot) -> Invaded:
 def file_warnings(session: Session) -> list[str]:
     """What could not be checked, and dumps that are gone, one sentence each."""
     warnings = []
-    for stage in ("pack", "invade"):
+    for stage in LIGGGHTS_STAGES:
         record = session.folder.record(stage) if stage in session.case.stages else None
         if record is None:
             continue
@@ -153,7 +158,7 @@ def check_finished(session: Session) -> None:
     """
     manifest = session.folder.manifest() or {}
     check_files(session.path, manifest, ANALYSE_AGAIN, may_lack=_is_mesh)
-    for stage in ("pack", "invade"):
+    for stage in LIGGGHTS_STAGES:
         record = session.folder.record(stage) or {}
         check_files(session.path / stage, record, START_OVER, may_lack=_is_dump)
 

@@ -65,7 +65,8 @@ class RunFolder:
         """Whether all of `stages` are done. Raises CaseError as `manifest` and `record` do."""
         manifest = self.manifest()
         if manifest is not None:
-            return set(stages) <= set(manifest["stages"])
+            asked = [stage for stage in stages if stage in (*case.stages, "invade")]
+            return set(asked) <= set(manifest["stages"])
         needed = [stage for stage in stages if stage in case.stages]
         return set(needed) <= set(RECORDS) and all(
             self.record(stage) is not None for stage in needed
@@ -182,8 +183,13 @@ def _refuse_foreign(path: Path) -> None:
 def _refuse_gap(path: Path, case: Case, stages: tuple[str, ...]) -> None:
     """A stage needs the finished ones before it that run LIGGGHTS."""
     analysed = bool({"analyse", "report"} & set(stages))
-    needed = {"pack": stages != ("pack",), "invade": "invade" in case.stages and analysed}
-    for stage, what in (("pack", "pack"), ("invade", "invasion")):
+    cleaned = "clean_up" in case.stages
+    needed = {
+        "pack": stages != ("pack",),
+        "invade": "invade" in case.stages and (analysed or cleaned and "clean_up" in stages),
+        "clean_up": cleaned and analysed,
+    }
+    for stage, what in (("pack", "pack"), ("invade", "invasion"), ("clean_up", "clean-up")):
         missing = stage not in stages and not (path / RECORDS[stage]).exists()
         if needed[stage] and missing:
             raise CaseError(

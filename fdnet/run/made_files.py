@@ -15,6 +15,8 @@ TABLES = (
     "layers.csv",
     "pores.csv",
     "throats.csv",
+    "spheres_cleaned.csv",
+    "clean_up.csv",
     "history.csv",
     "summary.json",
 )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, readable_states
+from fdnet.report.added import Added, draw_added, write_added
 from fdnet.run.history import history_rows
 from fdnet.run.placed_sizes import PlacedSizes
 from fdnet.scales.scales import InvasionScales
@@ -47,6 +48,8 @@ class Results:
         invasion: None when the case has no fines.
         analysis: permeability, porosity and fines of the specimen.
         sizes: of grains and fines with measured curves.
+        cleaned: grains and fines after the clean-up; None without one.
+        added: results that only some runs have.
     """
 
     path: Path
@@ -54,6 +57,8 @@ class Results:
     invasion: Invaded | None
     analysis: "Analysis"
     sizes: tuple[PlacedSizes, ...] = ()
+    cleaned: Snapshot | None = None
+    added: tuple[Added, ...] = ()
 
     @property
     def shown(self) -> Snapshot:
@@ -92,6 +97,9 @@ def write_tables(results: Results) -> None:
         tables.write_layers(path / "layers.csv", results.analysis.layers)
     tables.write_pores(path / "pores.csv", results.analysis)
     tables.write_throats(path / "throats.csv", results.analysis)
+    if results.cleaned is not None:
+        spheres.write_spheres(path / "spheres_cleaned.csv", results.cleaned)
+    write_added(path, results.added)
     if results.history_rows:
         tables.write_history(path / "history.csv", results.history_rows)
 
@@ -139,10 +147,11 @@ def draw_figures(results: Results) -> tuple[list[tuple[Path, str]], list[str]]:
         results.history_rows or None,
         results.sizes,
     )
+    more = draw_added(results.path / "figures", results.added)
     picture = results.path / "figures" / "spheres_3d.png"
     reason = vtk.render_spheres_png(
         picture, results.path / "spheres_damaged.vtp", results.shown.box
     )
     if reason:
-        return [(file, figures.CAPTIONS[file.stem]) for file in drawn], [reason]
-    return [(file, figures.CAPTIONS[file.stem]) for file in (picture, *drawn)], []
+        return [(file, figures.CAPTIONS[file.stem]) for file in drawn] + more, [reason]
+    return [(file, figures.CAPTIONS[file.stem]) for file in (picture, *drawn)] + more, []

@@ -3,8 +3,9 @@
 Each stage is kept when it is done and continued when it was cut.
 """
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.stages import LIGGGHTS_STAGES, STAGES
@@ -12,6 +13,8 @@ from fdnet.dem.binary import find_binary
 from fdnet.dem.checkpoint import has_history
 from fdnet.dem.supply import refuse_crowded_supply
 from fdnet.errors import CaseError
+from fdnet.run.added_results import added_results
+from fdnet.run.clean_up import Returned, clean_up_stage, compared, returned
 from fdnet.run.dem_stages import (
     check_finished,
     file_warnings,
@@ -28,11 +31,16 @@ from fdnet.run.placed_sizes import placed_sizes, size_summary
 from fdnet.run.records import record_warnings, stage_seconds, versions
 from fdnet.run.session import RunOptions, Session
 from fdnet.run.summary import summarise
+from fdnet.scales.clean_up import back_flow
 from fdnet.scales.cost import refuse_long
 from fdnet.scales.densest import refuse_unreachable
 from fdnet.scales.grain_pack import grain_count
 from fdnet.scales.scales import scales_of
 from fdnet.scales.table import scale_rows
+from fdnet.spheres.snapshot import Snapshot
+
+if TYPE_CHECKING:
+    from fdnet.network.analysis import Analysis
 
 
 def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
@@ -69,6 +77,8 @@ def _refuse(case: Case, options: RunOptions) -> None:
     _refuse_few_grains(case, options)
     refuse_unreachable(case)
     refuse_long(case, scales_of(case), pack="pack" in needed, invade="invade" in needed)
+    if isinstance(case, InvasionCase) and "clean_up" in case.stages:
+        back_flow(case)
     fresh = options.force or not has_history(options.out / "invade")
     if isinstance(case, InvasionCase) and "invade" in needed and fresh:
         refuse_crowded_supply(case, scales_of(case))
@@ -109,6 +119,8 @@ def _carry_out(session: Session) -> dict[str, Any]:
         pack_stage(session)
     if isinstance(session.case, InvasionCase) and session.wants("invade"):
         invade_stage(session, session.case)
+    if isinstance(session.case, InvasionCase) and session.wants("clean_up"):
+        clean_up_stage(session, session.case)
     if not {"analyse", "report"} & set(stages):
         session.folder.complete(None)
         return {}
@@ -126,18 +138,27 @@ def _pack_record(session: Session) -> dict[str, Any]:
 
 def _manifest(session: Session) -> dict[str, Any]:
     pack, invasion = _pack_record(session), session.folder.record("invade")
+    cleaned = _clean_up_record(session)
+    left_out = set() if cleaned else {"clean_up"}
+    done = [stage for stage in STAGES if stage not in left_out]
     return {
         "case": session.case.name,
-        "digests": {stage: session.case.digest(stage) for stage in STAGES if stage != "report"},
+        "digests": {stage: session.case.digest(stage) for stage in done if stage != "report"},
         "seed": session.case.seed,
-        "stages": [s for s in STAGES if s != "report" or s in session.options.stages],
+        "stages": [s for s in done if s != "report" or s in session.options.stages],
         "command": session.options.command,
-        "seconds": stage_seconds(pack, invasion, session.seconds),
+        "seconds": stage_seconds(pack, invasion, session.seconds, cleaned=cleaned),
         "versions": versions(pack),
         "files": digests_of(session.path, [*TABLES, *MESHES, *RECORDS.values()]),
         "pack": pack,
         "invade": invasion,
+        **({"clean_up": cleaned} if cleaned else {}),
     }
+
+
+def _clean_up_record(session: Session) -> dict[str, Any] | None:
+    """The record of the clean-up; None of a case without one."""
+    return session.folder.record("clean_up") if "clean_up" in session.case.stages else None
 
 
 def _analyse_and_report(session: Session) -> dict[str, Any]:
@@ -148,13 +169,18 @@ def _analyse_and_report(session: Session) -> dict[str, Any]:
     damaged = None if invasion is None else invasion.damaged
     supplied = (session.folder.record("invade") or {}).get("supplied", 0)
     with session.timed("analyse"):
+        first = analyse(grains, damaged, periodic=case.periodic, options=case.analysis)
+        after = _returned(session, grains, damaged, first)
         results = Results(
             path=session.path,
             grains=grains,
             invasion=invasion,
-            analysis=analyse(grains, damaged, periodic=case.periodic, options=case.analysis),
+            analysis=first,
             sizes=tuple(placed_sizes(case, grains, damaged, supplied)),
+            cleaned=None if after is None else after.state,
         )
+        added = added_results(results, after, _clean_up_record(session))
+        results = replace(results, added=tuple(added))
         write_tables(results)
     figures: list[tuple[Path, str]] = []
     notes: list[str] = []
@@ -165,6 +191,21 @@ def _analyse_and_report(session: Session) -> dict[str, Any]:
     return _write_summary(session, results, figures, notes)
 
 
+def _returned(
+    session: Session, grains: Snapshot, damaged: Snapshot | None, first: "Analysis"
+) -> Returned | None:
+    """The state after the clean-up, measured by the damage law of the first analysis."""
+    from fdnet.network.permeability import analyse
+
+    case = session.case
+    if damaged is None or not isinstance(case, InvasionCase) or "clean_up" not in case.stages:
+        return None
+    state = returned(session, case, grains)
+    options = case.analysis.changed(damage_law=first.damage_law_used)
+    analysis = analyse(grains, state, periodic=case.periodic, options=options)
+    return compared(damaged, state, analysis)
+
+
 def _write_summary(
     session: Session, results: Results, figures: list[tuple[Path, str]], notes: list[str]
 ) -> dict[str, Any]:
@@ -173,6 +214,7 @@ def _write_summary(
     case, scales = session.case, session.scales
     pack = _pack_record(session)
     invasion = session.folder.record("invade") if results.history else None
+    cleaned = _clean_up_record(session)
     summary = summarise(
         case,
         results.analysis,
@@ -181,14 +223,17 @@ def _write_summary(
         sizes=size_summary(results.sizes),
         last=results.history[-1] if results.history else None,
         physical_time_s=results.physical_time_s,
-        seconds=stage_seconds(pack, invasion, session.seconds),
+        seconds=stage_seconds(pack, invasion, session.seconds, cleaned=cleaned),
         warnings=[
             *scales.warnings,
             *record_warnings(case, pack, invasion),
+            *(cleaned["warnings"] if cleaned else []),
             *file_warnings(session),
             *notes,
         ],
     )
+    for one in results.added:
+        summary |= one.summary
     summary = tables.write_summary(session.path / "summary.json", summary)
     if "report" in session.options.stages:
         parts = html.ReportParts(
@@ -197,6 +242,7 @@ def _write_summary(
             scales=scale_rows(case, scales),
             versions=versions(pack),
             commands=[session.options.command] if session.options.command else [],
+            tables=[one.page for one in results.added if one.page is not None],
         )
         html.write_report(session.path / "report.html", summary, parts=parts)
     return summary

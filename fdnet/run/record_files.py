@@ -13,6 +13,7 @@ from fdnet.run.mark import MANIFEST, RECORD_FORMAT, RECORDS
 OUTPUTS = {
     "pack": ("pack",),
     "invade": ("invade",),
+    "clean_up": ("clean_up",),
     "analyse": (
         "spheres_initial.csv",
         "spheres_damaged.csv",
@@ -21,6 +22,8 @@ OUTPUTS = {
         "layers.csv",
         "pores.csv",
         "throats.csv",
+        "spheres_cleaned.csv",
+        "clean_up.csv",
         "summary.json",
     ),
     "report": (
@@ -35,7 +38,7 @@ OUTPUTS = {
     ),
 }
 """Files and folders that each stage writes, below the run folder."""
-OPTIONAL = ("layers.csv",)
+OPTIONAL = ("layers.csv", "spheres_cleaned.csv", "clean_up.csv")
 """Those of them that a finished stage may lack."""
 
 _NUMBER, _TEXTS, _ROWS = "a number", "a list of texts", "a list of tables"
@@ -51,6 +54,7 @@ _COMMON = {
 _SHAPES: Mapping[str, Mapping[str, str]] = {
     "pack": _COMMON | {"porosity": _NUMBER, "porosity_assumed": _NUMBER, "attempts": _ROWS},
     "invade": _COMMON | {"stop_reason": "a text", "supplied": _NUMBER, "warnings": _TEXTS},
+    "clean_up": _COMMON | {"stop_reason": "a text", "physical_time_s": _NUMBER, "warnings": _TEXTS},
     "runs": {"version": "a text", "seconds": _NUMBER},
     "attempts": {"liggghts_s": _NUMBER},
     "manifest": {"stages": _TEXTS, "invade": "a table or null"},
@@ -88,7 +92,7 @@ def read_manifest(folder: Path) -> dict[str, Any] | None:
     manifest = _read_record(folder / MANIFEST, "manifest")
     if manifest is None:
         return None
-    expected = (name for stage in STAGES[:3] for name in _expected(manifest, stage))
+    expected = (name for stage in STAGES[:4] for name in _expected(manifest, stage))
     missing = next((name for name in expected if not (folder / name).exists()), None)
     if missing is not None:
         raise CaseError(
@@ -129,7 +133,7 @@ def _problems(record: Mapping[str, Any], shape: str) -> Iterator[str]:
         elif not _is(record[key], expected):
             yield f"{key} is {str(record[key])[:40]!r}, expected {expected}"
         elif expected == _ROWS:
-            if not record[key] and shape != "invade":  # cut after its last checkpoint: no run
+            if not record[key] and shape not in ("invade", "clean_up"):  # cut after its last checkpoint: no run
                 yield f"{key} is empty, expected at least one table"
             for row in record[key]:
                 yield from (f"{key}: {problem}" for problem in _problems(row, key))

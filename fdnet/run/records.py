@@ -180,17 +180,22 @@ def _pack_warnings(pack: dict[str, Any]) -> list[str]:
 
 
 def stage_seconds(
-    pack: dict[str, Any], invasion: dict[str, Any] | None, own: dict[str, float]
+    pack: dict[str, Any],
+    invasion: dict[str, Any] | None,
+    own: dict[str, float],
+    *,
+    cleaned: dict[str, Any] | None = None,
 ) -> dict[str, float]:
     """Seconds of each stage, and those of them that LIGGGHTS took.
 
     They are those of the session that finished the stage; `own` are those of this session.
     """
-    runs = pack["runs"] + (invasion["runs"] if invasion else [])
+    runs = [run for one in (pack, invasion, cleaned) if one for run in one["runs"]]
     waited = sum(run.get("waited", 0.0) for run in runs)
     return {
         "pack": pack["seconds"],
         "invade": invasion["seconds"] if invasion else 0.0,
+        **({"clean_up": cleaned["seconds"]} if cleaned else {}),
         "analyse": own.get("analyse", 0.0),
         "report": own.get("report", 0.0),
         "liggghts": sum(run["seconds"] for run in runs)

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from fdnet.case.stages import STAGES
+
 
 def summary_lines(summary: dict[str, Any]) -> list[str]:
     """Headline numbers, the table of sections, warnings."""
@@ -9,7 +11,7 @@ def summary_lines(summary: dict[str, Any]) -> list[str]:
     lines += [_section(row) for row in summary["sections"]]
     seconds = summary["seconds"]
     outside = (
-        sum(seconds[s] for s in ("pack", "invade", "analyse", "report")) - seconds["liggghts"]
+        sum(seconds.get(stage, 0.0) for stage in STAGES) - seconds["liggghts"]
     )
     lines += ["", f"seconds       {seconds['liggghts']:.1f} in LIGGGHTS, {outside:.1f} outside"]
     return lines + [f"warning: {warning}" for warning in summary["warnings"]]
