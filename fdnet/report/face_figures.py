@@ -33,7 +33,7 @@ def fill_clean_up(
             values, edges, baseline=None, color=colour, linestyle=line, linewidth=2, label=label
         )
     above.axhline(1.0, color=GREY, linewidth=0.8)
-    above.set(ylabel="k of the section / intact (–)", ylim=(0, None))
+    above.set(ylabel="k / intact k (–)", ylim=(0, None))
     bins = np.linspace(edges[0], edges[-1], 41)
     for depth, colour, name in (
         (depths[0], ORANGE, "before"),
