@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from pydantic import Field
 
+from fdnet.case.control import Run
 from fdnet.case.fluid import Fluid
 from fdnet.case.rule import Rule
 from fdnet.case.values import Part, Positive, scaled
@@ -39,6 +40,20 @@ class CleanUp(Part):
         description="The clean-up ends at this time at the latest. When absent: twenty times the "
         "time in which the fluid passes the specimen.",
     )
+
+    @property
+    def drawdown_Pa(self) -> float:
+        """Pressure of the formation above that of the well, Pa."""
+        return self.drawdown_MPa * 1e6
+
+    def fluid_of(self, fluid: Fluid) -> Fluid:
+        """The fluid with the drawdown for its overbalance."""
+        return fluid.model_copy(update={"overbalance_MPa": self.drawdown_MPa})
+
+    def run_of(self, run: Run) -> Run:
+        """The control of the invasion with the length of the clean-up."""
+        own = dict.fromkeys(("cap_ms", "plug_time_ms", "checkpoint_ms"))
+        return run.model_copy(update=own | {"duration_ms": self.duration_ms})
 
     @property
     def duration_s(self) -> float | None:

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import HISTORY
 from fdnet.dem.clean_up_deck import Beginning, clean_up_parts, render_clean_up
 from fdnet.dem.clean_up_states import (
@@ -213,8 +212,9 @@ def _check_balance(
     inside = int(np.count_nonzero((x >= 0) & (x < length)))
     if inside != last.inside or len(fines) != last.inside + last.ahead:
         raise LiggghtsError(
-            f"{folder}: the last dump holds {len(fines)} fines, {inside} of them inside; expected "
-            f"{last.inside + last.ahead} and {last.inside} as in {HISTORY}; start over with --force"
+            f"{folder}: the last dump holds {len(fines)} fines, {inside} of them inside; "
+            f"expected {last.inside + last.ahead} and {last.inside} as in {HISTORY}; start over "
+            "with --force"
         )
     if before != last.inside + last.ahead + last.out + last.passed:
         raise LiggghtsError(

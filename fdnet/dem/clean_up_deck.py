@@ -43,7 +43,9 @@ def render_clean_up(flow: BackFlow, digest: str, begin: Beginning, *, ranks: int
     gravity, left_out = gravity_variables(case, scales)
     left_out += forces_left_out(case)
     if begin.face < 0:
-        left_out.append(LeftOut(what="resistance of the cake", why="the fluid is not slowed by it"))
+        left_out.append(
+            LeftOut(what="resistance of the cake", why="the fluid is not slowed by it")
+        )
     header = header_variables(case, "invade", left_out, ranks)
     text = render_text(
         "clean_up.in.j2",
@@ -100,9 +102,7 @@ def _turned(scales: InvasionScales) -> InvasionScales:
         scales,
         drive_velocity=-scales.drive_velocity,
         upstream_velocity=-scales.upstream_velocity,
-        push=replace(
-            push, velocity=-push.velocity, gradient=-push.gradient, reynolds_slope=0.0
-        ),
+        push=replace(push, velocity=-push.velocity, gradient=-push.gradient, reynolds_slope=0.0),
     )
 
 

@@ -44,5 +44,3 @@ def fill_clean_up(
     below.set(xlabel=DEPTH_LABEL, ylabel="fines (–)", xlim=edges[[0, -1]])
     above.legend()
     below.legend()
-
-

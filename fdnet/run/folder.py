@@ -186,7 +186,7 @@ def _refuse_gap(path: Path, case: Case, stages: tuple[str, ...]) -> None:
     cleaned = "clean_up" in case.stages
     needed = {
         "pack": stages != ("pack",),
-        "invade": "invade" in case.stages and (analysed or cleaned and "clean_up" in stages),
+        "invade": "invade" in case.stages and (analysed or (cleaned and "clean_up" in stages)),
         "clean_up": cleaned and analysed,
     }
     for stage, what in (("pack", "pack"), ("invade", "invasion"), ("clean_up", "clean-up")):

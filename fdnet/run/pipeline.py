@@ -73,6 +73,11 @@ def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
 
 def _refuse(case: Case, options: RunOptions) -> None:
     """Raise, before anything is written, what would stop the run later."""
+    if "clean_up" in set(options.stages) - set(case.stages) and options.stages != STAGES:
+        raise CaseError(
+            f"--stages clean_up: case {case.name} has no table [clean_up]; add it with "
+            "drawdown_MPa, or leave the stage out"
+        )
     needed = _stages_to_run(case, options)
     _refuse_few_grains(case, options)
     refuse_unreachable(case)

@@ -54,7 +54,8 @@ _COMMON = {
 _SHAPES: Mapping[str, Mapping[str, str]] = {
     "pack": _COMMON | {"porosity": _NUMBER, "porosity_assumed": _NUMBER, "attempts": _ROWS},
     "invade": _COMMON | {"stop_reason": "a text", "supplied": _NUMBER, "warnings": _TEXTS},
-    "clean_up": _COMMON | {"stop_reason": "a text", "physical_time_s": _NUMBER, "warnings": _TEXTS},
+    "clean_up": _COMMON
+    | {"stop_reason": "a text", "physical_time_s": _NUMBER, "warnings": _TEXTS},
     "runs": {"version": "a text", "seconds": _NUMBER},
     "attempts": {"liggghts_s": _NUMBER},
     "manifest": {"stages": _TEXTS, "invade": "a table or null"},
@@ -133,7 +134,10 @@ def _problems(record: Mapping[str, Any], shape: str) -> Iterator[str]:
         elif not _is(record[key], expected):
             yield f"{key} is {str(record[key])[:40]!r}, expected {expected}"
         elif expected == _ROWS:
-            if not record[key] and shape not in ("invade", "clean_up"):  # cut after its last checkpoint: no run
+            if not record[key] and shape not in (
+                "invade",
+                "clean_up",
+            ):  # cut after its last checkpoint: no run
                 yield f"{key} is empty, expected at least one table"
             for row in record[key]:
                 yield from (f"{key}: {problem}" for problem in _problems(row, key))

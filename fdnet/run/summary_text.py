@@ -10,9 +10,7 @@ def summary_lines(summary: dict[str, Any]) -> list[str]:
     lines = _headline(summary)
     lines += [_section(row) for row in summary["sections"]]
     seconds = summary["seconds"]
-    outside = (
-        sum(seconds.get(stage, 0.0) for stage in STAGES) - seconds["liggghts"]
-    )
+    outside = sum(seconds.get(stage, 0.0) for stage in STAGES) - seconds["liggghts"]
     lines += ["", f"seconds       {seconds['liggghts']:.1f} in LIGGGHTS, {outside:.1f} outside"]
     return lines + [f"warning: {warning}" for warning in summary["warnings"]]
 

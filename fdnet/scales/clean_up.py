@@ -52,7 +52,8 @@ def back_flow(case: InvasionCase) -> BackFlow:
     try:
         scales = scales_of(turned)
     except CaseError as error:
-        raise CaseError(f"clean_up.drawdown_MPa: {choices.drawdown_MPa:g}: {error}") from error
+        given = 1e-6 * choices.drawdown_Pa
+        raise CaseError(f"clean_up.drawdown_MPa: {given:g}: {error}") from error
     chunk = scales.checkpoint_steps * scales.time_step * scales.force_factor
     passage = case.size_m[0] / scales.drive_velocity * scales.force_factor
     longest = choices.duration_s or choices.cap_s or MOST_PASSAGES * passage
@@ -72,11 +73,7 @@ def _at_drawdown(case: InvasionCase, choices: CleanUp) -> InvasionCase:
 
     What its table [run] says of the length of the invasion is that of the clean-up.
     """
-    fluid = case.fluid.model_copy(update={"overbalance_MPa": choices.drawdown_MPa})
-    run = case.run.model_copy(
-        update=dict.fromkeys(("cap_ms", "plug_time_ms", "checkpoint_ms"))
-        | {"duration_ms": choices.duration_ms}
-    )
+    fluid, run = choices.fluid_of(case.fluid), choices.run_of(case.run)
     undriven = case.drag.model_copy(update={"drive_velocity_m_s": None})
     turned = case.model_copy(update={"fluid": fluid, "run": run, "drag": undriven})
     if case.drag.drive_velocity_m_s is None:

@@ -1,0 +1,217 @@
+"""The clean-up: the flow of an invasion turned back, on the real binary."""
+
+import json
+import math
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from builders import tiny
+
+from fdnet.case.file import case_from
+from fdnet.dem.clean_up import Start, clean_up, fines_to_clean
+from fdnet.dem.clean_up_deck import Beginning, render_clean_up, turned_drag
+from fdnet.dem.liggghts import Launch
+from fdnet.errors import CaseError
+from fdnet.network.fines.invaded import measure_invaded
+from fdnet.run.dem_stages import invaded, packed_grains
+from fdnet.run.folder import open_folder
+from fdnet.run.pipeline import RunOptions, run_stages
+from fdnet.run.session import Session
+from fdnet.scales.clean_up import back_flow
+from fdnet.scales.scales import scales_of
+
+pytestmark = pytest.mark.liggghts
+STAGES = ("pack", "invade", "clean_up", "analyse")
+
+
+def small(*more):
+    """25 grains; 300 fines are driven in and some come out again."""
+    return tiny(
+        "box.size_mm=[2.0,1.2,1.2]",
+        "box.sides=periodic",
+        "grains.count=25",
+        "fluid.darcy_length_mm=8.0",
+        "run.time_step_factor=0.2",
+        "run.cap_ms=0.3",
+        "clean_up.drawdown_MPa=1.0",
+        *more,
+    )
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """The run folder of a finished clean-up and its summary."""
+    folder = tmp_path_factory.mktemp("run") / "run"
+    options = RunOptions(out=folder, show_progress=False, stages=STAGES)
+    return folder, run_stages(small(), options)
+
+
+@pytest.fixture(scope="module")
+def start(run):
+    """What the clean-up of the run began with."""
+    folder, case = run[0], small()
+    held = open_folder(folder, case, stages=STAGES, resume=False, force=False)
+    session = Session(
+        case=case, scales=scales_of(case), folder=held, options=RunOptions(out=folder)
+    )
+    grains = packed_grains(session)
+    damaged = invaded(session, case, grains).damaged
+    held.close()
+    return Start(
+        grains=grains,
+        invaded=damaged,
+        invasion=folder / "invade",
+        cake=measure_invaded(damaged, periodic=case.periodic).cake_thickness,
+        digest="test",
+    )
+
+
+def again(start, flow, folder, binary, **options):
+    """A clean-up of the same invasion in another folder."""
+    invasion = folder / "invade"
+    if not invasion.exists():
+        shutil.copytree(start.invasion, invasion)
+    begin = replace(start, invasion=invasion)
+    return clean_up(flow, begin, folder / "clean_up", Launch(binary=binary, **options))
+
+
+def test_what_came_out_and_what_stays_is_what_was_there(run):
+    folder, summary = run
+    length = 2e-3
+    before, after = (
+        table[(table.kind == "fine") & (table.x_m >= 0) & (table.x_m < length)]
+        for table in (
+            pd.read_csv(folder / f"spheres_{name}.csv") for name in ("damaged", "cleaned")
+        )
+    )
+    counts = summary["clean_up"]
+    assert set(after.id) <= set(before.id)
+    assert counts["inside_before"] == len(before) == summary["invaded_count"]
+    assert counts["stayed"] == len(after)
+    assert counts["came_out"] == len(before) - len(after) > 0
+    rows = pd.read_csv(folder / "clean_up.csv")
+    assert rows.fines_before.sum() == len(before)
+    assert rows.fines_left_it.sum() == counts["came_out"]
+    assert rows.fines_after.sum() == len(after)
+    record = json.loads((folder / "clean_up" / "stage.json").read_text())
+    assert record["out"] == counts["came_out"]
+
+
+def test_the_permeability_returns_in_part(run):
+    _, summary = run
+    damaged = summary["k_damaged_m2"] / summary["k_initial_m2"]
+    assert damaged < summary["return_k_over_k0"] <= 1.0
+
+
+def test_a_finished_clean_up_is_not_repeated(run):
+    folder, summary = run
+    stamp = (folder / "clean_up" / "log.liggghts").stat().st_mtime_ns
+    options = RunOptions(out=folder, show_progress=False, stages=STAGES)
+    assert run_stages(small(), options) == summary
+    assert (folder / "clean_up" / "log.liggghts").stat().st_mtime_ns == stamp
+
+
+def test_a_cut_clean_up_goes_on_bit_for_bit(start, tmp_path, binary):
+    flow = back_flow(small("clean_up.duration_ms=1.0"))
+
+    class StopError(Exception):
+        pass
+
+    def stop(line):
+        if line.startswith("FDNET cleaned 2 "):
+            raise StopError
+
+    whole = again(start, flow, tmp_path / "whole", binary)
+    with pytest.raises(StopError):
+        again(start, flow, tmp_path / "cut", binary, follow=stop)
+    rest = again(start, flow, tmp_path / "cut", binary)
+    assert (tmp_path / "cut" / "clean_up" / "in.clean_up.resume").exists()
+    assert rest.history == whole.history
+    for column in ("id", "position", "velocity"):
+        assert np.array_equal(getattr(rest.state, column), getattr(whole.state, column))
+    with pytest.raises(CaseError, match="begun with --np 1"):
+        again(start, flow, tmp_path / "cut", binary, ranks=2)
+
+
+def test_friction_decides_what_stays(start, tmp_path, binary):
+    """The same deposit, once with slippery and once with rough contacts."""
+    stayed = {}
+    for friction in (0.01, 5.0):
+        keys = (f"fines.friction={friction}", f"grains.friction={friction}")
+        flow = back_flow(small("clean_up.drawdown_MPa=0.5", *keys))
+        done = again(start, flow, tmp_path / str(friction), binary)
+        stayed[friction] = done.history[-1].inside
+    assert stayed[0.01] < stayed[5.0]
+
+
+def test_a_cake_that_stays_takes_part(start):
+    lifted, kept = back_flow(small()), back_flow(small("clean_up.lift_cake=false"))
+    x = start.invaded.fines().position[:, 0]
+    inside = int(np.sum((x >= 0) & (x < 2e-3)))
+    cake = int(np.sum((x < 0) & (x > -start.cake)))
+    assert start.cake > 0
+    assert cake > 0
+    assert len(fines_to_clean(lifted, start)) == inside
+    assert len(fines_to_clean(kept, start)) >= inside + cake
+
+
+def test_the_drag_is_that_of_the_drawdown_turned_back():
+    """Darcy's law: the velocity is as the pressure; Stokes: 6 pi mu r u."""
+    case = small("drag.scheme=viscous", "drag.upstream=darcy", "drag.pressure_gradient=true")
+    ahead, flow = scales_of(case), back_flow(case)
+    share = 1.0 / case.fluid.overbalance_MPa
+    drag = turned_drag(flow)
+    push = -6 * math.pi * 0.05 * 5e-5 * ahead.interstitial_velocity * share
+    assert float(drag["push"]) == pytest.approx(push, rel=1e-12)
+    volume = 4 / 3 * math.pi * 5e-5**3
+    gradient = -ahead.pressure_gradient * share * volume
+    assert float(drag["gradient"]["force"]) == pytest.approx(gradient, rel=1e-12)
+    outside = float(drag["push"]) + float(drag["slower"])
+    assert outside == pytest.approx(push * ahead.porosity, rel=1e-12)
+    begin = Beginning(restart="../invade/post/invade_1.restart", row=None, face=0.0)
+    assert f"addforce {drag['push']} 0.0 0.0" in render_clean_up(flow, "0", begin).text
+
+
+def test_a_case_without_the_table_has_no_such_stage():
+    plain = small().data()
+    del plain["clean_up"]
+    assert "clean_up" not in case_from(plain).stages
+    assert case_from(plain).digest("invade") == small().digest("invade")
+    with pytest.raises(CaseError, match=r"no table \[clean_up\]"):
+        back_flow(case_from(plain))
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        (("clean_up.drawdown_MPa=-1",), "clean_up.drawdown_MPa: -1"),
+        (("fluid.velocity_m_s=0.1",), "nothing says on which way the drawdown is lost"),
+        (
+            ("clean_up.duration_ms=1", "clean_up.cap_ms=2"),
+            "clean_up.cap_ms: 2 together with clean_up.duration_ms 1",
+        ),
+        (("clean_up.lift_cakes=true",), "did you mean clean_up.lift_cake"),
+    ],
+)
+def test_bad_keys_are_named(keys, said):
+    with pytest.raises(CaseError, match=said.replace("(", r"\(")):
+        small(*keys)
+
+
+def test_a_missing_restart_is_named(start, tmp_path, binary):
+    (tmp_path / "invade").mkdir()
+    with pytest.raises(
+        CaseError, match=r"invade_\d+\.restart: the clean-up begins with this file"
+    ):
+        again(start, back_flow(small()), tmp_path, binary)
+
+
+def test_the_stage_without_its_table_is_refused(tmp_path):
+    plain = small().data()
+    del plain["clean_up"]
+    options = RunOptions(out=tmp_path / "run", show_progress=False, stages=("pack", "clean_up"))
+    with pytest.raises(CaseError, match=r"clean_up: .* no table \[clean_up\]"):
+        run_stages(case_from(plain), options)
