@@ -15,12 +15,12 @@ TABLES = (
     "layers.csv",
     "pores.csv",
     "throats.csv",
-    "spheres_cleaned.csv",
-    "clean_up.csv",
     "history.csv",
     "summary.json",
 )
 """Files of the analysis whose digests are in the manifest."""
+SOME_TABLES = ("spheres_cleaned.csv", "clean_up.csv", "cake.csv", "bridging.csv")
+"""Files of the analysis that only some runs have; their digests are in the manifest too."""
 MESHES = ("network.vtp", "spheres_initial.vtp", "spheres_damaged.vtp")
 """Files of the report that an opened run reads; their digests are in the manifest too."""
 START_OVER = "put the file back, or start over with --force"

@@ -24,7 +24,7 @@ from fdnet.run.dem_stages import (
     packed_grains,
 )
 from fdnet.run.folder import RunFolder, open_folder
-from fdnet.run.made_files import MESHES, TABLES, digests_of
+from fdnet.run.made_files import MESHES, SOME_TABLES, TABLES, digests_of
 from fdnet.run.mark import RECORDS
 from fdnet.run.outputs import Results, draw_figures, write_paraview, write_tables
 from fdnet.run.placed_sizes import placed_sizes, size_summary
@@ -154,7 +154,7 @@ def _manifest(session: Session) -> dict[str, Any]:
         "command": session.options.command,
         "seconds": stage_seconds(pack, invasion, session.seconds, cleaned=cleaned),
         "versions": versions(pack),
-        "files": digests_of(session.path, [*TABLES, *MESHES, *RECORDS.values()]),
+        "files": digests_of(session.path, [*TABLES, *SOME_TABLES, *MESHES, *RECORDS.values()]),
         "pack": pack,
         "invade": invasion,
         **({"clean_up": cleaned} if cleaned else {}),

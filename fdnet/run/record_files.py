@@ -8,6 +8,7 @@ from typing import Any
 from fdnet.case.stages import STAGES
 from fdnet.errors import CaseError
 from fdnet.files.atomic import write_text
+from fdnet.run.made_files import SOME_TABLES
 from fdnet.run.mark import MANIFEST, RECORD_FORMAT, RECORDS
 
 OUTPUTS = {
@@ -22,8 +23,7 @@ OUTPUTS = {
         "layers.csv",
         "pores.csv",
         "throats.csv",
-        "spheres_cleaned.csv",
-        "clean_up.csv",
+        *SOME_TABLES,
         "summary.json",
     ),
     "report": (
@@ -38,7 +38,7 @@ OUTPUTS = {
     ),
 }
 """Files and folders that each stage writes, below the run folder."""
-OPTIONAL = ("layers.csv", "spheres_cleaned.csv", "clean_up.csv")
+OPTIONAL = ("layers.csv", *SOME_TABLES)
 """Those of them that a finished stage may lack."""
 
 _NUMBER, _TEXTS, _ROWS = "a number", "a list of texts", "a list of tables"
