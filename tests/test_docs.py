@@ -252,6 +252,9 @@ def test_every_key_of_the_summary_is_explained(run_folder):
         "filtrate_m3",
         "cake_resistance_share",
         "momentum_defect_most",
+        "return_k_over_k0",
+        "k_returned_m2",
+        "clean_up",
     }
     assert set(summary) | only_sometimes == set(names_under("summary.json"))
     counts = set(names_under("summary.json", table=1))
