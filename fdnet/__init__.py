@@ -15,6 +15,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from fdnet.campaign.api import compare_runs as compare_runs
+    from fdnet.campaign.api import ensemble as ensemble
+    from fdnet.campaign.api import sweep as sweep
     from fdnet.case.case import Case as Case
     from fdnet.case.case import InvasionCase as InvasionCase
     from fdnet.case.file import case_from as case_from
@@ -49,6 +52,9 @@ _HOME = {
     "read_case": "fdnet.case.file",
     "run_case": "fdnet.run.open_run",
     "open_run": "fdnet.run.open_run",
+    "ensemble": "fdnet.campaign.api",
+    "sweep": "fdnet.campaign.api",
+    "compare_runs": "fdnet.campaign.api",
     "Snapshot": "fdnet.spheres.snapshot",
     "read_spheres": "fdnet.spheres.readers",
     "analyse": "fdnet.network.permeability",

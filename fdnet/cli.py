@@ -1,8 +1,8 @@
-"""The `fdnet` command: run, render, permeability, study.
+"""The `fdnet` command: run, ensemble, sweep, compare, design, render, permeability, study.
 
 It reads the arguments, calls the package and prints. Exit codes: 0 done, 2 bad input (nothing
-written), 3 LIGGGHTS missing or failed, 4 degenerate geometry or an unconverged solve, 130 stopped
-by the user.
+written), 3 LIGGGHTS missing or failed, 4 degenerate geometry or an unconverged solve, 5 some
+runs of an ensemble or a sweep failed, 130 stopped by the user.
 """
 
 import argparse
@@ -14,11 +14,11 @@ import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from fdnet.commands import permeability, render, run, study
+from fdnet.commands import compare, design, ensemble, permeability, render, run, study, sweep
 from fdnet.errors import FdnetError, words_of
 from fdnet.permeability.options import joined_box
 
-COMMANDS = (run, render, permeability, study)
+COMMANDS = (run, ensemble, sweep, compare, design, render, permeability, study)
 """Modules of the commands, in the order that `fdnet --help` shows."""
 
 _STOPPED = 130

@@ -10,12 +10,12 @@ from fdnet.case.file import known_keys
 LAYERS = [
     ["errors"],
     ["files"],
-    ["sizes"],
+    ["sizes", "statistics"],
     ["spheres", "case"],
     ["scales", "network"],
     ["dem", "report"],
     ["run"],
-    ["permeability", "studies"],
+    ["permeability", "studies", "campaign"],
     ["commands"],
     ["cli"],
 ]
@@ -46,15 +46,26 @@ THESIS_LAYERS = [
     ["outputs"],
     ["command", "page"],
 ]
+CAMPAIGN_LAYERS = [
+    ["plan"],
+    ["engine"],
+    ["result"],
+    ["until"],
+    ["page", "campaign"],
+    ["api"],
+]
 ROOMS = {
     "fdnet": LAYERS,
+    "fdnet.campaign": CAMPAIGN_LAYERS,
     "fdnet.network": NETWORK_LAYERS,
     "fdnet.studies": STUDIES_LAYERS,
     "fdnet.studies.thesis": THESIS_LAYERS,
 }
 DOORS = {
-    "jinja2": {"dem/deck", "report/html", "studies/dem"},
+    "jinja2": {"dem/deck", "report/html", "campaign/engine", "campaign/page", "studies/dem"},
     "subprocess": {
+        "campaign/engine/local",
+        "campaign/engine/snakemake",
         "dem/binary",
         "dem/feed",
         "dem/liggghts",
@@ -66,7 +77,9 @@ DOORS = {
     "pandas": {"spheres/dump", "spheres/csv_file", "report/tables", "report/read_tables"},
     "pyvista": {"report/vtk", "report/picture", "report/meshes", "spheres/vtk_file"},
     "openpnm": {"report/openpnm", "studies/benchmark"},
+    "pyarrow": {"campaign/result/table"},
     "matplotlib": {
+        "campaign/page/figures",
         "report/figures",
         "report/side_view",
         "report/size_figure",

@@ -264,6 +264,7 @@ def test_shipped_cases_keep_their_digests_and_their_text(root: Path):
     with (root / "tests/data/case_digests.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     shipped = {p.relative_to(root / "cases") for p in (root / "cases").rglob("*.toml")}
+    shipped -= {path for path in shipped if path.parts[0] == "sweeps"}
     assert shipped == {Path(f"{row['case']}.toml") for row in rows}
     for row in rows:
         case = read_case(root / "cases" / f"{row['case']}.toml")

@@ -192,15 +192,31 @@ def set_keys(data: dict[str, Any], assignments: list[str]) -> dict[str, Any]:
                 f"--set {assignment}: expected key=value with a dotted key, "
                 "e.g. fines.radius_mm=0.05"
             )
-        table = result
-        for name in names[:-1]:
-            table = table.setdefault(name, {})
-            if not isinstance(table, dict):
-                raise CaseError(f"--set {assignment}: {name} is a value, not a table")
-        for other in [name for name in table if stem_of(name) == stem_of(names[-1])]:
-            del table[other]
-        table[names[-1]] = _toml_value(text.strip())
+        _put(result, names, _toml_value(text.strip()), f"--set {assignment}")
     return result
+
+
+def put_keys(data: dict[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """`data` with the `values` of dotted keys put in, as `set_keys` does with texts.
+
+    Raises CaseError where a key lies in something that is no table.
+    """
+    result = copy.deepcopy(data)
+    for key, value in values.items():
+        _put(result, key.split("."), value, f"{key} = {value!r}")
+    return result
+
+
+def _put(data: dict[str, Any], names: list[str], value: Any, source: str) -> None:
+    """Put one key in; the same key with another unit, or without one, goes away."""
+    table = data
+    for name in names[:-1]:
+        table = table.setdefault(name, {})
+        if not isinstance(table, dict):
+            raise CaseError(f"{source}: {name} is a value, not a table")
+    for other in [name for name in table if stem_of(name) == stem_of(names[-1])]:
+        del table[other]
+    table[names[-1]] = value
 
 
 def _toml_value(text: str) -> Any:
@@ -215,11 +231,17 @@ def _toml_value(text: str) -> Any:
     return table["value"]
 
 
-def read_case(path: str | Path, *, assignments: list[str] | None = None) -> Case:
+def read_case(
+    path: str | Path,
+    *,
+    assignments: list[str] | None = None,
+    values: Mapping[str, Any] | None = None,
+) -> Case:
     """The case in the TOML file at `path`, with dotted `assignments` ("key=value") put in.
 
-    Lengths in the file are in mm, as its keys say. Raises CaseError when the file cannot be read,
-    is not TOML, or holds an invalid parameter; the message lists every problem.
+    `values` does the same with values by dotted key. Lengths in the file are in mm, as its keys
+    say. Raises CaseError when the file cannot be read, is not TOML, or holds an invalid parameter;
+    the message lists every problem.
 
     Examples:
         >>> import fdnet
@@ -228,7 +250,7 @@ def read_case(path: str | Path, *, assignments: list[str] | None = None) -> Case
         3
     """
     try:
-        data = set_keys(_tables(path), assignments or [])
+        data = put_keys(set_keys(_tables(path), assignments or []), values or {})
         return case_from(data, source=str(path), folder=expanded(path).parent)
     except RecursionError as error:
         raise CaseError(f"{path}: its tables or lists are nested too deeply for a case") from error

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fdnet.case.stages import STAGES
-from fdnet.commands.case_options import add_case, case_of
-from fdnet.errors import CaseError
+from fdnet.commands.case_options import add_case, add_program, case_of, stages_of
 from fdnet.files.paths import path_option
 
 
@@ -27,25 +26,15 @@ def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
         help="comma-separated (default: all that the case has)",
     )
     run.add_argument("--json", action="store_true", help="print summary.json on standard output")
-    run.add_argument("--liggghts", metavar="PATH", help="the LIGGGHTS binary")
+    add_program(run)
     run.add_argument(
-        "--timeout",
-        type=float,
-        metavar="SECONDS",
-        help="stop LIGGGHTS after this time (continue with --resume)",
+        "--pack-from",
+        type=path_option,
+        metavar="RUN",
+        help="take the finished pack of this run folder, made of the same grains and seed",
     )
     run.add_argument("--quiet", action="store_true", help="no progress")
     run.set_defaults(action=_run)
-
-
-def _stages(text: str) -> tuple[str, ...]:
-    names = [part.strip() for part in text.split(",") if part.strip()]
-    unknown = [name for name in names if name not in STAGES]
-    if unknown or not names:
-        raise CaseError(
-            f"--stages: {text!r} has {unknown or 'nothing'}, expected some of {','.join(STAGES)}"
-        )
-    return tuple(stage for stage in STAGES if stage in names)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -59,8 +48,10 @@ def _run(options: argparse.Namespace) -> int:
         ranks=options.np,
         resume=options.resume,
         force=options.force,
-        stages=_stages(options.stages),
+        stages=stages_of(options.stages),
         liggghts=options.liggghts,
+        launcher=options.launcher,
+        pack_from=options.pack_from,
         timeout=options.timeout,
         show_progress=not options.quiet,
         command=options.command_line,

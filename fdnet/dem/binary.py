@@ -3,16 +3,19 @@
 import os
 import re
 import resource
+import shlex
 import shutil
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
-from fdnet.errors import LiggghtsError
+from fdnet.errors import CaseError, LiggghtsError
 
 KNOWN_VERSION = "3.8.0"
 """The version that fdnet was measured and tested with."""
 LOG = "log.liggghts"
+RANKS = "{ranks}"
+"""Where a template of a launcher has the number of MPI ranks."""
 FEWEST_HANDLES = 64
 """Fewest open files with which LIGGGHTS and MPI start."""
 _PROJECT = Path(__file__).resolve().parents[2]
@@ -26,11 +29,13 @@ class Binary:
         path: of the binary.
         version: as it prints it.
         launcher: the mpirun that belongs to it; None: one rank only.
+        template: words of another launcher, `{ranks}` among them; empty: `launcher` is taken.
     """
 
     path: Path
     version: str
     launcher: Path | None
+    template: tuple[str, ...] = ()
 
     def command(self, deck: str | None, ranks: int) -> list[str]:
         """The command line for a deck in the current folder; None: for commands on stdin.
@@ -42,6 +47,8 @@ class Binary:
         stdbuf = shutil.which("stdbuf")
         if ranks == 1:
             return ([stdbuf, "-oL"] if stdbuf else []) + base
+        if self.template:
+            return [word.replace(RANKS, str(ranks)) for word in self.template] + base
         if self.launcher is None:
             raise LiggghtsError(
                 f"--np {ranks}: no mpirun next to {self.path} or on PATH; install openmpi-bin or "
@@ -57,11 +64,15 @@ class Binary:
         ]
 
 
-def find_binary(option: str | None = None) -> Binary:
+def find_binary(option: str | None = None, *, launcher: str | None = None) -> Binary:
     """LIGGGHTS from `option`, $FDNET_LIGGGHTS, PATH or the project's .prefix, in that order.
 
-    Raises LiggghtsError when there is none, or when it does not answer like LIGGGHTS.
+    `launcher` is a template that starts several ranks, for example "srun -n {ranks}".
+
+    Raises LiggghtsError when there is none, when it does not answer like LIGGGHTS, or when the
+    launcher is not there; CaseError for a template without `{ranks}`.
     """
+    template = _template(launcher)
     given = os.path.expanduser(option or os.environ.get("FDNET_LIGGGHTS") or "")
     places = [given] if given else ["liggghts", str(_PROJECT / ".prefix" / "bin" / "liggghts")]
     _refuse_surroundings()
@@ -72,7 +83,28 @@ def find_binary(option: str | None = None) -> Binary:
             "the Debian package liggghts, or give its path with --liggghts"
         )
     path = Path(hit).absolute()
-    return Binary(path=path, version=_version(path), launcher=_launcher(path))
+    return Binary(path=path, version=_version(path), launcher=_launcher(path), template=template)
+
+
+def _template(launcher: str | None) -> tuple[str, ...]:
+    """The words of a launcher's template. Raises as `find_binary` does."""
+    if launcher is None:
+        return ()
+    try:
+        words = tuple(shlex.split(launcher))
+    except ValueError as error:
+        raise CaseError(f"--launcher {launcher!r}: {error}; quote it as in a shell") from error
+    if not any(RANKS in word for word in words):
+        raise CaseError(
+            f"--launcher {launcher!r}: does not say where the number of ranks goes; write "
+            f"{RANKS} there, e.g. 'srun -n {RANKS}'"
+        )
+    if shutil.which(words[0]) is None:
+        raise LiggghtsError(
+            f"--launcher {launcher!r}: {words[0]} is not on PATH; load it, or leave the option "
+            "out for mpirun"
+        )
+    return words
 
 
 def _refuse_surroundings() -> None:

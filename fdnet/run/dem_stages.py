@@ -18,6 +18,7 @@ from fdnet.run.outputs import Invaded
 from fdnet.run.progress import Progress
 from fdnet.run.records import PACK_DUMP, invade_record, pack_record, ranks_of
 from fdnet.run.session import Session
+from fdnet.run.shared_pack import take_pack
 from fdnet.scales.grain_pack import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES
 from fdnet.scales.scales import InvasionScales, scales_of
 from fdnet.spheres.dump import read_frame
@@ -27,6 +28,9 @@ from fdnet.spheres.snapshot import Snapshot
 def pack_stage(session: Session) -> None:
     """Make the pack, unless it is made. Raises what `make_pack` raises."""
     if is_done(session, "pack"):
+        return
+    if session.options.pack_from is not None:
+        take_pack(session, session.options.pack_from)
         return
     case, scales = session.case, session.scales
     expected = PACK_STAGES * PACK_STAGE_STEPS + PACK_RELAX_STEPS // 2

@@ -52,7 +52,7 @@ def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
     Raises the FdnetError of the stage that fails; what was written stays, and `resume` continues
     from it.
     """
-    _refuse(case, options)
+    refuse(case, options)
     folder = open_folder(
         options.out, case, stages=options.stages, resume=options.resume, force=options.force
     )
@@ -71,7 +71,7 @@ def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
         folder.close()
 
 
-def _refuse(case: Case, options: RunOptions) -> None:
+def refuse(case: Case, options: RunOptions) -> None:
     """Raise, before anything is written, what would stop the run later."""
     if "clean_up" in set(options.stages) - set(case.stages) and options.stages != STAGES:
         raise CaseError(
@@ -88,7 +88,7 @@ def _refuse(case: Case, options: RunOptions) -> None:
     if isinstance(case, InvasionCase) and "invade" in needed and fresh:
         refuse_crowded_supply(case, scales_of(case))
     if needed:
-        find_binary(options.liggghts)
+        find_binary(options.liggghts, launcher=options.launcher)
 
 
 def _refuse_few_grains(case: Case, options: RunOptions) -> None:
@@ -104,6 +104,8 @@ def _refuse_few_grains(case: Case, options: RunOptions) -> None:
 def _stages_to_run(case: Case, options: RunOptions) -> list[str]:
     """The stages that will need LIGGGHTS."""
     asked = [s for s in LIGGGHTS_STAGES if s in options.stages and s in case.stages]
+    if options.pack_from is not None:
+        asked = [s for s in asked if s != "pack"]
     return [s for s in asked if options.force or not (options.out / s / "stage.json").exists()]
 
 

@@ -29,6 +29,8 @@ class RunOptions:
         force: replace what is there.
         stages: stages to run, of "pack", "invade", "analyse" and "report".
         liggghts: path of the binary; None: looked for.
+        launcher: template that starts several ranks, as "srun -n {ranks}"; None: mpirun.
+        pack_from: run folder whose finished pack is taken; None: the pack is made.
         timeout: s, after which LIGGGHTS is stopped; None: never.
         show_progress: whether to write progress to standard error.
         command: command line that started the run, for its records.
@@ -40,6 +42,8 @@ class RunOptions:
     force: bool = False
     stages: tuple[str, ...] = STAGES
     liggghts: str | None = None
+    launcher: str | None = None
+    pack_from: Path | None = None
     timeout: float | None = None
     show_progress: bool = True
     command: str = ""
@@ -99,7 +103,8 @@ class Session:
     def launch(self, progress: Progress) -> Launch:
         """How this run starts LIGGGHTS; the binary is looked for when a stage first needs it."""
         if self._binary is None:
-            self._binary = find_binary(self.options.liggghts)
+            options = self.options
+            self._binary = find_binary(options.liggghts, launcher=options.launcher)
         return Launch(
             binary=self._binary,
             ranks=self.options.ranks,

@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-from fdnet.studies.engine.bands import ROUNDING, Band
+from fdnet.statistics.bands import ROUNDING, Band
 
 NONE = "–"
 WIDTH = 99

@@ -1,0 +1,137 @@
+"""The folder of a campaign: one plan, and the case of each of its runs."""
+
+import contextlib
+import fcntl
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from fdnet.campaign.plan.job import Job, Plan
+from fdnet.errors import CaseError
+from fdnet.files.atomic import write_text
+from fdnet.files.paths import refuse_folder_name
+
+PLAN, CASES, RUNS, PACKS, LOGS, LOCK = "plan.json", "cases", "runs", "packs", "logs", ".lock"
+FORMAT = 1
+
+
+def read_plan_record(folder: Path) -> dict[str, Any] | None:
+    """What plan.json of a folder says; None where there is none.
+
+    Raises CaseError when it cannot be read.
+    """
+    path = folder / PLAN
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, RecursionError) as error:
+        raise CaseError(f"{path}: cannot be read ({error}); give another --out") from error
+    if not isinstance(record, dict) or record.get("fdnet_campaign") != FORMAT:
+        raise CaseError(f"{path}: is no plan of this fdnet; give another --out")
+    return record
+
+
+@contextlib.contextmanager
+def campaign_folder(path: Path, plan: Plan) -> Iterator[Plan]:
+    """Hold the lock of the folder while the block runs; gives the plan with all its seeds.
+
+    A folder keeps its plan. The same plan with further seeds extends it, and seeds that are
+    there already stay.
+
+    Raises CaseError, with nothing changed, when the folder holds another plan or something else,
+    or when another campaign is writing there.
+    """
+    refuse_folder_name(path)
+    _refuse_foreign(path)
+    try:
+        (path / LOGS).mkdir(parents=True, exist_ok=True)
+        lock = os.open(path / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+    except OSError as error:
+        raise CaseError(
+            f"{path}: cannot be made or written: {error.strerror}; give another --out"
+        ) from error
+    try:
+        _take(lock, path)
+        yield _admitted(path, plan)
+    finally:
+        os.close(lock)
+
+
+def extended(path: Path, plan: Plan, seeds: tuple[int, ...]) -> Plan:
+    """The plan with further seeds, written to its folder."""
+    longer = replace(plan, seeds=tuple(dict.fromkeys([*plan.seeds, *seeds])))
+    _write(path, longer)
+    return longer
+
+
+def case_path(job: Job) -> Path:
+    """The case file of a run, below the folder."""
+    return Path(CASES) / f"{job.name}.toml"
+
+
+def _refuse_foreign(path: Path) -> None:
+    if path.exists() and not path.is_dir():
+        raise CaseError(f"{path}: is a file, expected a folder for --out")
+    if not path.is_dir() or read_plan_record(path) is not None:
+        return
+    others = {child.name for child in path.iterdir()} - {LOCK, LOGS}
+    if others:
+        raise CaseError(
+            f"{path}: is not empty and holds no campaign of fdnet; give another --out (nothing "
+            "was changed)"
+        )
+
+
+def _take(lock: int, path: Path) -> None:
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        raise CaseError(
+            f"{path}: another fdnet is running jobs here; wait for it or give another --out"
+        ) from error
+
+
+def _admitted(path: Path, plan: Plan) -> Plan:
+    record = read_plan_record(path)
+    if record is None:
+        _write(path, plan)
+        return plan
+    if record["digest"] != plan.digest:
+        names = ", ".join(one["name"] for one in record["variants"][:3])
+        raise CaseError(
+            f"{path}: holds another plan ({record['name']}: {names}...; digest "
+            f"{record['digest']}, this one {plan.digest}); give another --out (nothing was "
+            "changed)"
+        )
+    seeds = tuple(dict.fromkeys([*record["seeds"], *plan.seeds]))
+    longer = replace(plan, seeds=seeds)
+    _write(path, longer)
+    return longer
+
+
+def _write(path: Path, plan: Plan) -> None:
+    """The cases first, so that a plan never names a case that is not there."""
+    (path / CASES).mkdir(exist_ok=True)
+    for job in plan.jobs:
+        if not (path / case_path(job)).exists():
+            write_text(path / case_path(job), job.case.toml())
+    record = {
+        "fdnet_campaign": FORMAT,
+        "name": plan.name,
+        "digest": plan.digest,
+        "seeds": list(plan.seeds),
+        "ranks": plan.ranks,
+        "stages": list(plan.stages),
+        "variants": [
+            {"name": one.name, "keys": dict(one.keys), "pack": one.case.digest("pack")}
+            for one in plan.variants
+        ],
+        "runs": [
+            {"name": job.name, "variant": job.variant.name, "seed": job.seed} for job in plan.jobs
+        ],
+    }
+    write_text(path / PLAN, json.dumps(record, indent=1, default=str) + "\n")

@@ -1,0 +1,1 @@
+"""Means, bands and differences over seeds: pure functions of numbers."""

@@ -1,0 +1,150 @@
+"""A sweep through the real binary: its table, its page, its failed runs, and its second call."""
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import pytest
+import tomli_w
+from builders import TINY
+
+from fdnet.cli import main
+
+pytestmark = pytest.mark.liggghts
+SWEEP = """
+name = "muds"
+case = "tiny.toml"
+seeds = 2
+[[variants]]
+name = "few"
+fines.count = 40
+[[variants]]
+name = "many"
+fines.count = 120
+[[variants]]
+name = "late"
+run.max_hours = 1e-9
+"""
+STAGES = ["--stages", "pack,invade,analyse", "--engine", "local", "--jobs", "2", "--quiet"]
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    """Folder of the sweep, and its exit code; `late` may take no time."""
+    folder = tmp_path_factory.mktemp("sweep")
+    (folder / "tiny.toml").write_text(tomli_w.dumps(TINY))
+    (folder / "sweep.toml").write_text(SWEEP)
+    code = main(["sweep", str(folder / "sweep.toml"), "--out", str(folder / "out"), *STAGES])
+    return folder / "out", code
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_table_has_every_run_and_number(swept):
+    out, code = swept
+    assert code == 5
+    table = {row["run"]: row for row in rows(out / "table.csv")}
+    assert len(table) == 6
+    for name, row in table.items():
+        assert row["status"] == ("failed" if name.startswith("late") else "done")
+    summary = json.loads((out / "runs/many-seed-2/summary.json").read_text())
+    row = table["many-seed-2"]
+    assert row["fines.count"] == "120"
+    assert float(row["k_damaged_m2"]) == summary["k_damaged_m2"]
+    assert float(row["sections.2.k_reduction"]) == summary["sections"][1]["k_reduction"]
+    assert int(row["warnings"]) == len(summary["warnings"])
+
+
+def test_the_summary_has_students_bands(swept):
+    """Of two values a and b the half band is t(1) |a - b| / 2, t(1) = 12.706205."""
+    out, _ = swept
+    summary = json.loads((out / "summary.json").read_text())
+    assert (summary["runs"], summary["done"], summary["failed"]) == (6, 4, 2)
+    values = [float(r["k_reduction"]) for r in rows(out / "table.csv") if r["variant"] == "many"]
+    many = next(one for one in summary["variants"] if one["name"] == "many")["k_reduction"]
+    assert many["mean"] == pytest.approx(sum(values) / 2)
+    half = 12.706205 * abs(values[0] - values[1]) / 2
+    assert many["high"] - many["mean"] == pytest.approx(half, rel=1e-6)
+    assert set(summary["k_damaged_m2"]) >= {"mean", "low", "high"}
+    (pair,) = summary["pairs"]
+    assert pair["paired"]
+    gaps = [
+        json.loads((out / f"runs/few-seed-{seed}/summary.json").read_text())["k_reduction"]
+        - json.loads((out / f"runs/many-seed-{seed}/summary.json").read_text())["k_reduction"]
+        for seed in (1, 2)
+    ]
+    assert pair["difference"]["mean"] == pytest.approx(sum(gaps) / 2)
+
+
+def test_packs_are_made_once(swept):
+    """Two packs for four runs; the copies have the same files and count no time of LIGGGHTS."""
+    out, _ = swept
+    records = [json.loads(p.read_text()) for p in sorted(out.glob("runs/*/pack/stage.json"))]
+    assert len(records) == 4
+    assert len({record["taken_from"] for record in records}) == 2
+    assert all(run["seconds"] == 0 for record in records for run in record["runs"])
+    made = {p.read_bytes() for p in out.glob("packs/*/pack/post/pack.dump")}
+    assert made == {p.read_bytes() for p in out.glob("runs/*/pack/post/pack.dump")}
+
+
+def test_the_failed_runs_are_named_with_reason_and_folder(swept):
+    out, _ = swept
+    failures = json.loads((out / "summary.json").read_text())["failures"]
+    assert [row["run"] for row in failures] == ["late-seed-1", "late-seed-2"]
+    for row in failures:
+        assert row["reason"].startswith("run.max_hours: 1e-09 h, but")
+        assert row["folder"] == f"runs/{row['run']}"
+
+
+def test_the_page_stands_alone_and_leads_to_every_run(swept):
+    out, _ = swept
+    page = (out / "compare.html").read_text()
+    links = re.findall(r'href="([^"]+)"', page)
+    assert {link for link in links if link.startswith("runs/")} >= {
+        f"runs/{name}-seed-{seed}" for name in ("few", "many") for seed in (1, 2)
+    }
+    assert not [s for s in re.findall(r'(?:src|href)="([^"]+)"', page) if s.startswith("http")]
+    assert all((out / link).exists() for link in links if "late" not in link)
+    assert page.index("Ranking") < page.index("<img") < page.index("Differences")
+    first = re.search(r"<li>(.*?)</li>", page)
+    assert first is not None
+    assert re.match(r"few: permeability lost .* % \(95 % band .* to .* %\), 2 seeds", first[1])
+
+
+def test_a_second_call_runs_only_what_is_missing(swept, capsys):
+    out, _ = swept
+    before = {p: p.stat().st_mtime_ns for p in out.glob("runs/*/manifest.json")}
+    gone = out / "runs/few-seed-1/manifest.json"
+    gone.unlink()
+    assert main(["sweep", str(out.parent / "sweep.toml"), "--out", str(out), *STAGES]) == 5
+    after = {p: p.stat().st_mtime_ns for p in out.glob("runs/*/manifest.json")}
+    assert after.keys() == before.keys()
+    assert [p for p in before if before[p] != after[p]] == [gone]
+    assert "late-seed-1 failed" in capsys.readouterr().err
+
+
+def test_runs_are_compared_by_what_differs_in_their_cases(swept, tmp_path, capsys):
+    out, _ = swept
+    runs = [str(out / f"runs/{name}-seed-{seed}") for name in ("few", "many") for seed in (1, 2)]
+    assert main(["compare", *runs, "--out", str(tmp_path / "c")]) == 0
+    assert capsys.readouterr().out.startswith("1. count=40: permeability lost ")
+    table = rows(tmp_path / "c" / "table.csv")
+    assert {row["fines.count"] for row in table} == {"40", "120"}
+    assert main(["compare", runs[0], runs[0], "--out", str(tmp_path / "d")]) == 2
+    assert "counted twice" in capsys.readouterr().err
+    assert main(["compare", str(tmp_path), "--out", str(tmp_path / "d")]) == 2
+    assert main(["compare", str(out), "--out", str(tmp_path / "d")]) == 0
+    assert len(rows(tmp_path / "d" / "table.csv")) == 4
+
+
+def test_a_pack_of_another_seed_is_not_taken(swept, tmp_path, capsys):
+    out, _ = swept
+    arguments = ["run", str(out.parent / "tiny.toml"), "--seed", "7", "--quiet"]
+    source = next(out.glob("packs/*"))
+    assert main([*arguments, "--out", str(tmp_path / "r"), "--pack-from", str(source)]) == 2
+    assert "another case or seed" in capsys.readouterr().err
+    assert not (tmp_path / "r").exists()
