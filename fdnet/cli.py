@@ -1,4 +1,4 @@
-"""The `fdnet` command: run, ensemble, sweep, compare, design, render, permeability, study.
+"""The `fdnet` command: run, ensemble, sweep, compare, design, render, permeability, movie, study.
 
 It reads the arguments, calls the package and prints. Exit codes: 0 done, 2 bad input (nothing
 written), 3 LIGGGHTS missing or failed, 4 degenerate geometry or an unconverged solve, 5 some
@@ -14,11 +14,21 @@ import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from fdnet.commands import compare, design, ensemble, permeability, render, run, study, sweep
+from fdnet.commands import (
+    compare,
+    design,
+    ensemble,
+    movie,
+    permeability,
+    render,
+    run,
+    study,
+    sweep,
+)
 from fdnet.errors import FdnetError, words_of
 from fdnet.permeability.options import joined_box
 
-COMMANDS = (run, ensemble, sweep, compare, design, render, permeability, study)
+COMMANDS = (run, ensemble, sweep, compare, design, render, permeability, movie, study)
 """Modules of the commands, in the order that `fdnet --help` shows."""
 
 _STOPPED = 130

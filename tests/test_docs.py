@@ -246,6 +246,9 @@ def test_every_key_of_the_summary_is_explained(run_folder):
     only_sometimes = {
         "k_moved_m2",
         "sizes",
+        "skin",
+        "skin_flow_lost",
+        "skin_well_radius_m",
         "drag_updates",
         "drag_last_update",
         "rate_over_initial",

@@ -102,7 +102,7 @@ def test_its_network_is_the_one_of_its_tables(run):
 def test_its_meshes_are_ready_to_plot(run):
     network, balls = run.network_mesh(), run.sphere_mesh("initial")
     assert network.n_lines == run.summary["throats"]
-    assert "conductance_damaged" in network.cell_data
+    assert "conductance_damaged_m3" in network.cell_data
     grains = run.spheres("initial")
     top = (grains.position + grains.radius[:, None]).max(axis=0)
     assert np.array(balls.bounds)[1::2] == pytest.approx(top, rel=0.02, abs=0)

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-DARCY = 9.869233e-13
-"""One darcy in m2."""
+MILLIDARCY = 9.869233e-16
+"""One millidarcy in m2."""
 MM = 1e3
 GRAIN, FINE, BEFORE, AFTER = "#D9D9D9", "#D55E00", "#7F7F7F", "#0072B2"
 
 
 def draw_cut(axes: Any, spheres: pd.DataFrame) -> None:
-    """Circles, in mm, in which the plane through the middle of the specimen cuts the spheres."""
+    """The specimen at the plane through its middle, in mm: grains cut, fines it meets whole."""
     from matplotlib.collections import EllipseCollection
 
     grains = spheres[spheres.kind == "grain"]
@@ -27,6 +27,8 @@ def draw_cut(axes: Any, spheres: pd.DataFrame) -> None:
     for kind, colour in (("grain", GRAIN), ("fine", FINE)):
         cut = spheres[(spheres.kind == kind) & (squared > 0)]
         width = 2 * np.sqrt(squared[cut.index].to_numpy()) * MM
+        if kind == "fine":
+            width = 2 * cut.radius_m.to_numpy() * MM
         axes.add_collection(
             EllipseCollection(
                 width,
@@ -46,9 +48,10 @@ def draw_cut(axes: Any, spheres: pd.DataFrame) -> None:
 
 
 def draw_permeability(axes: Any, sections: pd.DataFrame) -> None:
-    """Permeability of each section before and after the invasion, in darcy, with its loss."""
+    """Permeability of each section before and after the invasion, in mD, with its loss."""
     edges = np.append(sections.x_lo_m, sections.x_hi_m.iloc[-1]) * MM
-    before, after = sections.k_initial_m2 / DARCY, sections.k_damaged_m2 / DARCY
+    before = sections.k_initial_m2 / MILLIDARCY
+    after = sections.k_damaged_m2 / MILLIDARCY
     axes.stairs(before, edges, color=BEFORE, linewidth=2, label="before", baseline=None)
     axes.stairs(after, edges, color=AFTER, linewidth=2, label="after the invasion", baseline=None)
     axes.stairs(before, edges, baseline=after, fill=True, color=FINE, alpha=0.25)
@@ -59,8 +62,9 @@ def draw_permeability(axes: Any, sections: pd.DataFrame) -> None:
     axes.set(
         ylim=(0, None),
         xlabel="depth from the formation face (mm)",
-        ylabel="permeability (darcy)",
+        ylabel="permeability (mD)",
     )
+    axes.yaxis.set_major_formatter("{x:,.0f}")
     axes.legend(loc="lower right", frameon=False)
 
 

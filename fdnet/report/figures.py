@@ -12,8 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fdnet.files.atomic import replacing
+from fdnet.report.deposit_figure import fill_deposit, has_sizes
+from fdnet.report.depth_figure import DEPTH_LABEL, fill_depth, legend_above, plain_decades
+from fdnet.report.history_figure import fill_history
+from fdnet.report.network_figure import fill_network
 from fdnet.report.side_view import fill_side_view
 from fdnet.report.size_figure import Sizes, fill_size_curves
+from fdnet.report.units import MILLIDARCY
 from fdnet.spheres.snapshot import Array, Snapshot
 
 if TYPE_CHECKING:
@@ -22,7 +27,6 @@ if TYPE_CHECKING:
 
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#7F7F7F"
 MM, MICRON = 1e3, 1e6
-DEPTH_LABEL = "depth from the formation face (mm)"
 STYLE: Any = {
     "font.size": 11,
     "axes.grid": True,
@@ -34,20 +38,26 @@ STYLE: Any = {
     "legend.framealpha": 0.9,
     "lines.linewidth": 2,
 }
-
 CAPTIONS = {
     "spheres_3d": "The specimen from the front and upstream: the grains of the far half (grey) "
     "and the fines, coloured by radius, or by depth where they are of one size. The fluid enters "
     "at x = 0.",
-    "side_view": "Section x-z through the middle of the specimen: every circle is the true cut "
-    "through a sphere.",
+    "side_view": "Section x-z through the middle of the specimen. Grains are drawn where the "
+    "plane cuts them, so that a grain cut off its middle looks small; fines that the plane meets "
+    "are drawn whole.",
     "porosity_reduction": "Porosity lost to the fines against depth: difference of the intact and "
     "the damaged porosity, in fine bins and per section.",
     "invaded_fraction": "Share of the invaded fines, by number, against depth.",
     "permeability_ratio": "Damaged over intact permeability of each section, cut out with its own "
     "network and in place from the pressures of the whole specimen.",
-    "porosity_profile": "Porosity before and after the invasion against depth, overlap counted "
-    "once.",
+    "depth": "Permeability in place (sections, and thin layers of the first millimetre) and "
+    "porosity against depth, intact and damaged. In place is under the pressures of the whole "
+    "specimen.",
+    "network": "Throats of a slice through the middle of the network, with the fines: pressure, "
+    "absolute flux over the largest, and share of the conductance lost; crosses mark blocked "
+    "throats.",
+    "deposit_by_size": "Volume of the deposit against depth, in classes of the fines' diameter "
+    "that hold equal volume.",
     "size_distributions": "Inscribed radii of throats and pores between the grains alone, by "
     "number; the band is the range of the fines' radii.",
     "size_curves": "Sizes by volume: the curve that the case asks for, with what is left out at "
@@ -56,7 +66,7 @@ CAPTIONS = {
     "place, without and with the fines, and its share of the specimen's pressure drop. From the "
     "network of all spheres.",
     "invasion_history": "Fines inside the specimen, passed through it and still upstream, against "
-    "time.",
+    "time; where the flow follows the deposit, also the rate of flow and the permeability.",
 }
 
 
@@ -77,21 +87,23 @@ def draw_all(
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
     fines = None if snapshot is None else snapshot.fines()
-    draws: dict[str, Callable[[Any], None]] = {}
+    draws: dict[str, Callable[[Any], None]] = {"depth": partial(fill_depth, analysis=analysis)}
     if snapshot is not None:
         draws["side_view"] = partial(fill_side_view, snapshot=snapshot)
+        if has_sizes(snapshot):
+            draws["deposit_by_size"] = partial(fill_deposit, spheres=snapshot)
     if analysis.occupancy is not None:
         draws["porosity_reduction"] = partial(_porosity_reduction, analysis=analysis)
         draws["invaded_fraction"] = partial(_invaded_fraction, analysis=analysis)
         draws["permeability_ratio"] = partial(_permeability_ratio, analysis=analysis)
     if analysis.layers is not None:
         draws["layers"] = partial(_layers, layers=analysis.layers)
-    draws["porosity_profile"] = partial(_porosity_profile, analysis=analysis)
+    draws["network"] = partial(fill_network, analysis=analysis)
     draws["size_distributions"] = partial(_size_distributions, analysis=analysis, fines=fines)
     if sizes:
         draws["size_curves"] = partial(fill_size_curves, sizes=sizes)
     if history:
-        draws["invasion_history"] = partial(_invasion_history, history=history)
+        draws["invasion_history"] = partial(fill_history, history=history)
     return [draw(target / f"{name}.png", fill) for name, fill in draws.items()]
 
 
@@ -137,11 +149,6 @@ def _depth_axes(figure: Any, analysis: "Analysis", label: str) -> Any:
     return axes
 
 
-def _legend(axes: Any, **style: Any) -> None:
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(**style)
-
-
 def _porosity_reduction(figure: Any, *, analysis: "Analysis") -> None:
     axes = _depth_axes(figure, analysis, "porosity reduction, intact − damaged (–)")
     profile, edges = analysis.profile, _section_edges(analysis)
@@ -157,7 +164,7 @@ def _porosity_reduction(figure: Any, *, analysis: "Analysis") -> None:
         label="sections",
     )
     axes.axhline(0, color=GREY, linewidth=0.8)
-    _legend(axes)
+    legend_above(axes)
 
 
 def _invaded_fraction(figure: Any, *, analysis: "Analysis") -> None:
@@ -188,7 +195,7 @@ def _invaded_fraction(figure: Any, *, analysis: "Analysis") -> None:
             label=f"deepest {analysis.invasion_depth * MM:.2f} mm",
         )
     axes.set_ylim(bottom=0)
-    _legend(axes)
+    legend_above(axes)
 
 
 def _ratios(damaged: Sequence[float], initial: Sequence[float]) -> Array:
@@ -215,13 +222,13 @@ def _permeability_ratio(figure: Any, *, analysis: "Analysis") -> None:
         )
     highest = np.nanmax([1.0, *cut_out, *in_place])
     axes.set_ylim(0, 1.05 * highest)
-    _legend(axes, loc="lower right")
+    legend_above(axes)
 
 
 def _layers(figure: Any, *, layers: "Layers") -> None:
     above, below = figure.subplots(2, 1, sharex=True)
     for axes, before, after, label in (
-        (above, layers.k_initial, layers.k_damaged, "k of the layer (m²)"),
+        (above, *_in_millidarcy(layers), "k of the layer (mD)"),
         (below, 100 * layers.drop_initial, 100 * layers.drop_damaged, "pressure drop (%)"),
     ):
         _stairs(axes, layers.edges, before, color=GREY, label="intact")
@@ -229,31 +236,14 @@ def _layers(figure: Any, *, layers: "Layers") -> None:
         axes.set(ylabel=label, xlim=np.asarray(layers.edges[[0, -1]]) * MM)
     if np.any(layers.k_damaged > 0):
         above.set_yscale("log")
+        plain_decades(above)
     below.set_ylim(bottom=0)
     below.set_xlabel(DEPTH_LABEL)
-    _legend(below)
+    legend_above(above)
 
 
-def _porosity_profile(figure: Any, *, analysis: "Analysis") -> None:
-    axes = _depth_axes(figure, analysis, "porosity (–)")
-    profile = analysis.profile
-    _stairs(
-        axes,
-        profile.edges,
-        profile.porosity_initial,
-        color=GREY,
-        label=f"intact, mean {analysis.porosity_initial:.4f}",
-    )
-    if analysis.occupancy is not None:
-        _stairs(
-            axes,
-            profile.edges,
-            profile.porosity_damaged,
-            color=BLUE,
-            label=f"damaged, mean {analysis.porosity_damaged:.4f}",
-        )
-    axes.set_ylim(bottom=0)
-    _legend(axes)
+def _in_millidarcy(layers: "Layers") -> tuple[Array, Array]:
+    return np.asarray(layers.k_initial) / MILLIDARCY, np.asarray(layers.k_damaged) / MILLIDARCY
 
 
 def _size_distributions(figure: Any, *, analysis: "Analysis", fines: Snapshot | None) -> None:
@@ -272,23 +262,17 @@ def _size_distributions(figure: Any, *, analysis: "Analysis", fines: Snapshot | 
             weights = np.full(len(open_ones), 1 / len(radius))
             axes.hist(open_ones, bins=30, weights=weights, color=colour, alpha=0.7, label=label)
         if fines is not None and len(fines):
-            low, high = np.quantile(fines.radius, [0, 1]) * MICRON
-            axes.axvspan(low, high, color=ORANGE, alpha=0.2, linewidth=1, label="fines")
+            _mark_fines(axes, fines)
         axes.set(xlabel=f"{name} radius, inscribed (µm)", ylabel=f"share of {name}s per bin (–)")
         axes.set_xlim(left=0)
-        _legend(axes, fontsize=9)
+        legend_above(axes, columns=1)
 
 
-def _invasion_history(figure: Any, *, history: Sequence[Mapping[str, float]]) -> None:
-    axes = figure.add_subplot()
-    time = np.array([row["physical_time_s"] for row in history])
-    scale, unit = (1.0, "s") if time.max() >= 1 else (1e3, "ms")
-    for name, label, colour, line in (
-        ("invaded_count", "inside the specimen", BLUE, "-"),
-        ("passed_count", "passed the outlet", GREEN, "--"),
-        ("upstream_count", "upstream of the face", ORANGE, ":"),
-    ):
-        axes.plot(time * scale, [row[name] for row in history], line, color=colour, label=label)
-    axes.set(xlabel=f"time since the fines were released ({unit})", ylabel="number of fines (–)")
-    axes.set_ylim(bottom=0)
-    _legend(axes)
+def _mark_fines(axes: Any, fines: Snapshot) -> None:
+    """The range of the fines' radii as a band, or one radius as a line."""
+    low, high = np.quantile(fines.radius, [0, 1]) * MICRON
+    if high - low > 0.02 * high:
+        label = f"fines, {low:.3g} to {high:.3g} µm"
+        axes.axvspan(low, high, color=ORANGE, alpha=0.25, linewidth=1, label=label)
+    else:
+        axes.axvline(high, color=ORANGE, linewidth=2.5, label=f"fines, {high:.3g} µm")

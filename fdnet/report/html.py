@@ -1,6 +1,7 @@
 """report.html: one self-contained page of a run, its pictures inside."""
 
 import base64
+import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,12 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 from fdnet.errors import CaseError
 from fdnet.files.atomic import write_text
+from fdnet.report.units import in_millidarcy
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-DARCY_M2 = 9.869233e-13  # one darcy, API RP 27 (1952)
 DASH = "–"
+LEADING, STILL = "depth.png", "spheres_3d.png"
+"""The figure that stands at the top, and the one in place of the 3-D view."""
 STOP_WORDS = {
     "plugged": "plugged: no fine crossed the face for the set time",
     "duration": "the set duration was over",
@@ -28,11 +31,13 @@ SECTION_COLUMNS = (  # key, heading, unit, factor to that unit
     ("x_hi_m", "to", "mm", 1e3),
     ("porosity_initial", "porosity intact", "–", 1),
     ("porosity_damaged", "porosity damaged", "–", 1),
+    ("k_initial_m2", "k intact", "mD", 1),
+    ("k_damaged_m2", "k damaged", "mD", 1),
+    ("k_reduction", "k lost", "%", 1e2),
     ("k_initial_m2", "k intact", "m²", 1),
     ("k_damaged_m2", "k damaged", "m²", 1),
-    ("k_reduction", "k lost", "%", 1e2),
-    ("k_initial_inplace_m2", "k intact, in place", "m²", 1),
-    ("k_damaged_inplace_m2", "k damaged, in place", "m²", 1),
+    ("k_initial_inplace_m2", "k intact, in place", "mD", 1),
+    ("k_damaged_inplace_m2", "k damaged, in place", "mD", 1),
     ("fines_count", "fines", "", None),
     ("fines_fraction", "share of fines", "%", 1e2),
 )
@@ -44,6 +49,8 @@ class ReportParts:
 
     Attributes:
         figures: path and caption of each figure.
+        case_words: the case in sentences.
+        view: spheres of the 3-D view (`fdnet.report.view.view_of`); None: a picture alone.
         case_text: the resolved case as TOML.
         scales: rows with name, symbol, value, unit, formula and source (objects or mappings).
         versions: version of each program.
@@ -52,6 +59,8 @@ class ReportParts:
     """
 
     figures: Sequence[tuple[Path, str]] = ()
+    case_words: Sequence[str] = ()
+    view: Mapping[str, Any] | None = None
     case_text: str = ""
     scales: Sequence[Any] = ()
     versions: Mapping[str, Any] = field(default_factory=dict)
@@ -71,14 +80,29 @@ def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportP
         {"data": _data_uri(Path(file)), "caption": caption, "name": Path(file).name}
         for file, caption in parts.figures
     ]
+    still = next((one for one in figures if one["name"] == STILL), None)
+    first = [one for one in figures if one["name"] == LEADING]
     text = template.render(
         summary=summary,
         parts=parts,
-        figures=figures,
+        figures=[one for one in figures if one is not still and one not in first],
+        leading=first,
+        still=still,
+        **_view_parts(parts.view),
         headline=headline(summary),
         columns=SECTION_COLUMNS,
     )
     return write_text(path, text)
+
+
+def _view_parts(view: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Data and script of the 3-D view; what the page writes without escaping is made here."""
+    if view is None:
+        return {}
+    from markupsafe import Markup
+
+    script = resources.files("fdnet.report").joinpath("view.js").read_text(encoding="utf-8")
+    return {"view_json": Markup(json.dumps(dict(view))), "view_script": Markup(script)}
 
 
 def headline(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
@@ -89,8 +113,8 @@ def headline(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     whole = [
         (
             "permeability intact",
+            f"{in_millidarcy(summary.get('k_initial_m2'))} mD",
             quantity(summary.get("k_initial_m2"), "m²"),
-            _darcy(summary.get("k_initial_m2")),
         ),
         ("porosity intact", fixed(summary.get("porosity_initial")), "overlap counted once"),
     ]
@@ -102,12 +126,18 @@ def headline(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         quantity(summary.get("upstream_count")),
     )
     return [
+        (
+            "95 % of the fines above",
+            _millimetres(summary, "invasion_depth_p95_m"),
+            f"deepest {_millimetres(summary, 'invasion_depth_m')}",
+        ),
         whole[0],
         (
             "permeability damaged",
-            quantity(summary.get("k_damaged_m2"), "m²"),
-            f"{_darcy(summary.get('k_damaged_m2'))}, {loss}{_other(summary)}",
+            f"{in_millidarcy(summary.get('k_damaged_m2'))} mD",
+            f"{quantity(summary.get('k_damaged_m2'), 'm²')}, {loss}{_other(summary)}",
         ),
+        *_skin(summary),
         whole[1],
         ("porosity damaged", fixed(summary.get("porosity_damaged")), "overlap counted once"),
         (
@@ -116,17 +146,29 @@ def headline(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
             f"of {quantity(supplied)} supplied; {passed} passed, {upstream} upstream",
         ),
         (
-            "invasion depth",
-            _millimetres(summary, "invasion_depth_m"),
-            f"95 % shallower than {_millimetres(summary, 'invasion_depth_p95_m')}",
-        ),
-        (
             "cake thickness",
             _millimetres(summary, "cake_thickness_m"),
-            "deposit upstream of the face",
+            _cake(summary.get("cake")),
         ),
         ("end of the run", quantity(reason), STOP_WORDS.get(str(reason), "")),
     ]
+
+
+def _skin(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Skin and the flow that it costs, where the case has a well."""
+    if "skin" not in summary:
+        return []
+    radius = scaled(summary.get("skin_well_radius_m"), 1e3)
+    value = "infinite" if summary["skin"] is None else f"{summary['skin']:.2g}"
+    cost = f"{100 * summary['skin_flow_lost']:.2g} % of the flow"
+    return [("skin", value, f"costs {cost} of a well of {quantity(radius, 'mm')} radius")]
+
+
+def _cake(cake: Mapping[str, Any] | None) -> str:
+    if cake is None:
+        return "deposit upstream of the face"
+    k = in_millidarcy(cake["k_carman_kozeny_m2"])
+    return f"{k} mD by Carman and Kozeny, resistance {quantity(cake['resistance_1_m'], '1/m')}"
 
 
 def _other(summary: Mapping[str, Any]) -> str:
@@ -134,7 +176,7 @@ def _other(summary: Mapping[str, Any]) -> str:
     other = summary.get("k_damaged_other_m2")
     if other is None:
         return ""
-    return f"; by {summary.get('damage_law_other')}: {quantity(other, 'm²')}"
+    return f"; by {summary.get('damage_law_other')}: {in_millidarcy(other)} mD"
 
 
 def quantity(value: Any, unit: str = "") -> str:
@@ -170,10 +212,6 @@ def _digits(value: float) -> str:
     return f"{mantissa}·10{str(int(power)).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
 
 
-def _darcy(value: Any) -> str:
-    return DASH if value is None else quantity(value / DARCY_M2, "darcy")
-
-
 def _millimetres(summary: Mapping[str, Any], key: str) -> str:
     return quantity(scaled(summary.get(key), 1e3), "mm")
 
@@ -185,6 +223,7 @@ def _environment() -> "Environment":
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters.update(quantity=quantity, fixed=fixed, scaled=scaled)
+    environment.filters["millidarcy"] = in_millidarcy
     return environment
 
 

@@ -29,9 +29,13 @@ def read_mesh(path: Path) -> Any:
 
 
 def read_balls(path: Path) -> Any:
-    """The spheres in a .vtp file as balls, m, with `radius` (m), `kind` and `id` on them."""
+    """The spheres in a .vtp file as balls, m, with `radius_m`, `kind` and `id` on them.
+
+    In files of earlier versions the array is named `radius`.
+    """
     import pyvista as pv
 
     points = read_mesh(path)
     ball = pv.Sphere(radius=1.0, theta_resolution=ROUNDNESS, phi_resolution=ROUNDNESS)
-    return points.glyph(geom=ball, scale="radius", orient=False)
+    name = "radius_m" if "radius_m" in points.point_data else "radius"
+    return points.glyph(geom=ball, scale=name, orient=False)

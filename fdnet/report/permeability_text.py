@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from fdnet.report.units import MILLIDARCY
+
 Row = Mapping[str, Any]
-MILLIDARCY = 9.869233e-16
-"""One millidarcy, m2 (API RP 27, 1952)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,7 +1,7 @@
 """The 3-D picture of a sphere file, drawn in a process of its own, which OpenGL may end.
 
 Usage: python -m fdnet.report.picture SPHERES.vtp --box=x0,x1,y0,y1,z0,z1 PICTURE.png
-The bounds are in m. See `fdnet.report.vtk.render_spheres_png`.
+The bounds are in m. See `fdnet.report.child.render_spheres_png`.
 """
 
 import sys
@@ -14,6 +14,8 @@ from fdnet.spheres.snapshot import Array, Kind
 MM, MICRON = 1e3, 1e6
 WINDOW = [1500, 950]
 UPSTREAM_SHOWN = 0.12
+DEEPEST = 0.97
+"""Share of the fines up to whose depth the colours reach; a few deep ones take the last colour."""
 FACETS = (
     6e5  # about half the triangles all fines together may have: memory and time of the picture
 )
@@ -31,10 +33,10 @@ def render(source: str, box: Array, target: str) -> None:
     bounds = box * MM
     plotter: Any = pv.Plotter(off_screen=True, window_size=WINDOW)
     plotter.set_background("white")
-    _add_grains(plotter, spheres, bounds)
-    _add_fines(plotter, spheres, bounds)
-    _add_frame(plotter, bounds)
-    _look(plotter, bounds)
+    add_grains(plotter, spheres, bounds)
+    add_fines(plotter, spheres, bounds, colours_of(spheres, bounds))
+    add_frame(plotter, bounds)
+    look(plotter, bounds)
     plotter.screenshot(target)
     plotter.close()
 
@@ -44,7 +46,7 @@ def _balls(spheres: Any, mask: Array, resolution: int) -> Any:
     import pyvista as pv
 
     points = pv.PolyData(spheres.points[mask] * MM)
-    radius = spheres.point_data["radius"][mask]
+    radius = spheres.point_data["radius_m"][mask]
     points.point_data["diameter"] = 2 * radius * MM
     points.point_data["radius_um"] = radius * MICRON
     points.point_data["depth_mm"] = points.points[:, 0]
@@ -52,7 +54,8 @@ def _balls(spheres: Any, mask: Array, resolution: int) -> Any:
     return points.glyph(geom=ball, scale="diameter", orient=False)
 
 
-def _add_grains(plotter: Any, spheres: Any, bounds: Array) -> None:
+def add_grains(plotter: Any, spheres: Any, bounds: Array) -> None:
+    """The grains of the far half, grey; `bounds` are in mm."""
     far = (spheres.point_data["kind"] == Kind.GRAIN) & (
         spheres.points[:, 1] * MM > bounds[1].mean()
     )
@@ -62,25 +65,36 @@ def _add_grains(plotter: Any, spheres: Any, bounds: Array) -> None:
         )
 
 
-def _add_fines(plotter: Any, spheres: Any, bounds: Array) -> None:
-    """Coloured by radius, or by depth when they are (nearly) of one size."""
+def colours_of(spheres: Any, bounds: Array) -> tuple[str, str, list[float]]:
+    """What the fines are coloured by: by radius, or by depth when they are (nearly) of one size.
+
+    Returns the name of the array, the title of the scale and its limits; `bounds` are in mm.
+    """
+    mask = _shown_fines(spheres, bounds)
+    radius = spheres.point_data["radius_m"][mask] if spheres.n_points else np.zeros(0)
+    if len(radius) and np.ptp(radius) >= 0.02 * radius.max():
+        limits = [radius.min() * MICRON, radius.max() * MICRON]
+        return "radius_um", "fines, radius (µm)", limits
+    depth = spheres.points[mask, 0] * MM if len(radius) else np.zeros(1)
+    deepest = min(float(np.quantile(depth, DEEPEST)), bounds[0, 1])
+    limits = [bounds[0, 0], max(deepest, 0.1 * bounds[0, 1])]
+    return "depth_mm", "fines, depth (mm)", limits
+
+
+def _shown_fines(spheres: Any, bounds: Array) -> Array:
+    if not spheres.n_points:
+        return np.zeros(0, bool)
     shown = spheres.points[:, 0] * MM > bounds[0, 0] - UPSTREAM_SHOWN * np.ptp(bounds[0])
-    mask = (spheres.point_data["kind"] == Kind.FINE) & shown
+    return np.asarray((spheres.point_data["kind"] == Kind.FINE) & shown)
+
+
+def add_fines(
+    plotter: Any, spheres: Any, bounds: Array, colours: tuple[str, str, list[float]]
+) -> None:
+    """Fines that are not far upstream, coloured as `colours_of` says; `bounds` are in mm."""
+    mask, (name, title, limits) = _shown_fines(spheres, bounds), colours
     if not mask.any():
         return
-    radius = spheres.point_data["radius"][mask]
-    name, title, limits = (
-        "radius_um",
-        "fines, radius (µm)",
-        [radius.min() * MICRON, radius.max() * MICRON],
-    )
-    if np.ptp(radius) < 0.02 * radius.max():
-        deepest = min(spheres.points[mask, 0].max() * MM, bounds[0, 1])
-        name, title, limits = (
-            "depth_mm",
-            "fines, depth (mm)",
-            [bounds[0, 0], max(deepest, 0.1 * bounds[0, 1])],
-        )
     balls = _balls(spheres, mask, int(np.clip(np.sqrt(FACETS / mask.sum()), 5, 16)))
     bar = {
         "title": title,
@@ -100,7 +114,8 @@ def _add_fines(plotter: Any, spheres: Any, bounds: Array) -> None:
     )
 
 
-def _add_frame(plotter: Any, bounds: Array) -> None:
+def add_frame(plotter: Any, bounds: Array) -> None:
+    """The box with its scales (mm), and the formation face."""
     import pyvista as pv
 
     (x0, x1), (y0, y1), (z0, z1) = bounds
@@ -141,14 +156,14 @@ def _add_frame(plotter: Any, bounds: Array) -> None:
         font_size=18,
         location="outer",
         grid=False,
-        fmt="%.1f",
+        fmt="%.3g",
         n_xlabels=5,
         n_ylabels=3,
         n_zlabels=3,
     )
 
 
-def _look(plotter: Any, bounds: Array) -> None:
+def look(plotter: Any, bounds: Array) -> None:
     """Look from the front, a little from upstream and above.
 
     The projected box fills the window left of the scalar bar.
@@ -170,15 +185,16 @@ def _look(plotter: Any, bounds: Array) -> None:
     plotter.reset_camera_clipping_range()
 
 
+def parsed_box(text: str) -> Array:
+    """The box (3, 2) of an argument --box=x0,x1,y0,y1,z0,z1."""
+    return np.array([float(value) for value in text.removeprefix("--box=").split(",")]).reshape(
+        3, 2
+    )
+
+
 def main(arguments: list[str]) -> None:
     source, bounds, target = arguments
-    render(
-        source,
-        np.array([float(value) for value in bounds.removeprefix("--box=").split(",")]).reshape(
-            3, 2
-        ),
-        target,
-    )
+    render(source, parsed_box(bounds), target)
 
 
 if __name__ == "__main__":

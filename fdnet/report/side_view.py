@@ -23,9 +23,9 @@ def cut_circles(spheres: Snapshot, plane: float) -> tuple[Array, Array, Array]:
 
 
 def fill_side_view(figure: Any, *, snapshot: Snapshot) -> None:
-    """Draw grains (grey) and fines (by radius) cut at mid-width, to scale.
+    """Draw grains (grey) cut at mid-width, and the fines (by radius) that the plane meets whole.
 
-    The formation face is marked.
+    All is to scale, and the formation face is marked.
     """
     axes = figure.add_subplot()
     plane = float(snapshot.box[1].mean())
@@ -33,13 +33,26 @@ def fill_side_view(figure: Any, *, snapshot: Snapshot) -> None:
     _circles(axes, grains, plane, facecolor=GRAIN_FACE, edgecolor=GRAIN_EDGE, linewidth=0.5)
     _fines(figure, axes, fines, plane)
     _frame(figure, axes, snapshot)
-    axes.set_title(f"section at y = {plane * MM:.3g} mm", fontsize=11, loc="left")
+    title = f"section at y = {plane * MM:.3g} mm: {_grain_words(grains)}"
+    axes.set_title(title, fontsize=10, loc="left", pad=22)
+
+
+def _grain_words(grains: Snapshot) -> str:
+    """The radius of the grains, so that those that are cut off their middle mislead nobody."""
+    if not len(grains):
+        return "no grains"
+    low, high = grains.radius.min() * MICRON, grains.radius.max() * MICRON
+    if high - low < 0.02 * high:
+        return f"all grains have a radius of {high:.3g} µm, some are cut off their middle"
+    return f"grains of {low:.3g} to {high:.3g} µm radius, cut by the plane"
 
 
 def _circles(axes: Any, spheres: Snapshot, plane: float, **style: Any) -> Any:
     from matplotlib.collections import EllipseCollection
 
     index, centre, radius = cut_circles(spheres, plane)
+    if style.pop("whole", False):
+        radius = spheres.radius[index]
     values = style.pop("values", None)
     circles = EllipseCollection(
         2 * radius * MM,
@@ -62,14 +75,16 @@ def _fines(figure: Any, axes: Any, fines: Snapshot, plane: float) -> None:
         return
     low, high = fines.radius.min() * MICRON, fines.radius.max() * MICRON
     if high - low < 0.02 * high:
-        _circles(axes, fines, plane, facecolor=FINE_FACE, edgecolor="black", linewidth=0.3)
+        style = {"facecolor": FINE_FACE, "edgecolor": "black", "linewidth": 0.3}
+        _circles(axes, fines, plane, whole=True, **style)
         axes.plot([], [], "o", color=FINE_FACE, label=f"fines, radius {high:.3g} µm")
-        axes.legend(loc="lower right", bbox_to_anchor=(1, 1), fontsize=9)
+        axes.legend(loc="lower right", bbox_to_anchor=(1, 1), fontsize=9, frameon=False)
         return
     circles = _circles(
         axes,
         fines,
         plane,
+        whole=True,
         values=fines.radius * MICRON,
         cmap="plasma",
         edgecolor="black",

@@ -5,6 +5,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from fdnet.report.depth_figure import legend_above
 from fdnet.sizes.curve import SizeCurve
 from fdnet.spheres.snapshot import Array
 
@@ -60,7 +61,7 @@ def fill_size_curves(figure: Any, *, sizes: Sequence[Sizes]) -> None:
     axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.xaxis.set_major_formatter("{x:g}")
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.legend(fontsize=9)
+    legend_above(axes, columns=3)
 
 
 def _stairs(axes: Any, diameter: Array, curve: SizeCurve, **style: Any) -> None:

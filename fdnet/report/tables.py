@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fdnet.files.atomic import replacing, write_text
+from fdnet.report.units import millidarcy
 from fdnet.spheres.snapshot import Array
 
 if TYPE_CHECKING:
@@ -54,9 +55,14 @@ def section_rows(analysis: "Analysis") -> list[dict[str, Any]]:
 
 
 def write_sections(path: str | Path, analysis: "Analysis") -> Path:
-    """One row for each section, edges at full precision; k_reduction is empty where k is 0."""
+    """One row for each section, edges at full precision; k_reduction is empty where k is 0.
+
+    The permeabilities of the slab cut out stand in mD as well.
+    """
     rows = [
-        row | {edge: repr(float(row[edge])) for edge in ("x_lo_m", "x_hi_m")}
+        row
+        | {edge: repr(float(row[edge])) for edge in ("x_lo_m", "x_hi_m")}
+        | {f"k_{name}_mD": millidarcy(row[f"k_{name}_m2"]) for name in ("initial", "damaged")}
         for row in section_rows(analysis)
     ]
     return _write(path, _frame(rows))

@@ -1,25 +1,25 @@
-"""ParaView files (.vtp, .pvd) of one specimen, and the 3-D picture drawn in a child process."""
+"""ParaView files (.vtp, .pvd) of one specimen."""
 
 import errno
 import os
-import subprocess
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from fdnet.files.atomic import replacing, write_bytes, write_text
+from fdnet.files.atomic import write_bytes, write_text
 from fdnet.report.tables import blocked_throats, pore_porosity
 from fdnet.spheres.snapshot import Array, Snapshot
 
 if TYPE_CHECKING:
     from fdnet.network.analysis import Analysis
 
-PNG_START, PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND"
+SPHERE_ARRAYS = {"radius": "radius_m", "kind": "kind", "id": "id", "velocity": "velocity_m_s"}
+"""Names of the point data of sphere files, by the attribute of a snapshot."""
 LAW_CODES = {"clean": 0, "deposition": 1, "clogging": 2, "blocked": 3, "kozeny": 4}
 
 
@@ -29,8 +29,8 @@ def write_network_vtp(path: str | Path, analysis: "Analysis") -> Path:
     Points 0 .. P-1 are the pores. Further points (`end` 1) are where a throat leaves the network
     at a face or goes to a periodic image, so that no line crosses the whole box. Cell data:
     geometry and porosity of the throats, conductances (times viscosity, m3), fluxes (times
-    viscosity over the pressure drop, m3), blocked, law_used as in `LAW_CODES`. Point data:
-    pressure over the pressure drop, radius, volume.
+    viscosity over the pressure drop, m3), share of the conductance lost, blocked, law_used as in
+    `LAW_CODES`. Point data: pressure over the pressure drop, radius (m), volume (m3).
     """
     import pyvista as pv
 
@@ -44,15 +44,15 @@ def write_network_vtp(path: str | Path, analysis: "Analysis") -> Path:
 
 
 def write_spheres_vtp(path: str | Path, snapshot: Snapshot) -> Path:
-    """The spheres as points with radius (m), kind (1 grain, 2 fine), id and velocity (m/s).
+    """The spheres as points with `radius_m`, `kind` (1 grain, 2 fine), `id` and `velocity_m_s`.
 
-    In ParaView: Glyph, sphere of radius 1, scaled by `radius`.
+    In ParaView: Glyph, sphere of radius 1, scaled by `radius_m`.
     """
     import pyvista as pv
 
     mesh = pv.PolyData(np.array(snapshot.position)) if len(snapshot) else pv.PolyData()
-    for name in ("radius", "kind", "id", "velocity") if len(snapshot) else ():
-        mesh.point_data[name] = np.array(getattr(snapshot, name))
+    for name, array in SPHERE_ARRAYS.items() if len(snapshot) else ():
+        mesh.point_data[array] = np.array(getattr(snapshot, name))
     return _save(path, mesh)
 
 
@@ -74,72 +74,10 @@ def write_pvd(path: str | Path, entries: Sequence[tuple[float, str | Path]]) -> 
     )
 
 
-def render_spheres_png(
-    path: str | Path, spheres_vtp: str | Path, box: Array, *, seconds: float = 120.0
-) -> str:
-    """Draw the 3-D view of `spheres_vtp` into `path` in a child process.
-
-    Returns "" or the reason why there is no picture; nothing is raised, and only a complete
-    picture replaces `path`. `box` is (3, 2) m. Without usable OpenGL, VTK ends its process with no
-    Python error; in a child process that costs the picture alone.
-    """
-    try:
-        with replacing(path) as part:
-            done = subprocess.run(
-                [*_command(spheres_vtp, box), str(part.absolute())],
-                capture_output=True,
-                text=True,
-                errors="replace",
-                timeout=seconds,
-                check=False,
-                stdin=subprocess.DEVNULL,
-                env=_child_environment(),
-            )
-            _refuse_failure(done, part)
-    except subprocess.TimeoutExpired:
-        return f"the 3-D picture was given up after {seconds:g} s"
-    except OSError as error:
-        return f"no 3-D picture: {error}"
-    return ""
-
-
-def _command(spheres_vtp: str | Path, box: Array) -> list[str]:
-    """The child's command line, with the software OpenGL that the set-up may have installed."""
-    bounds = ",".join(repr(float(value)) for value in np.asarray(box).ravel())
-    libraries = Path(__file__).resolve().parents[2] / ".prefix" / "bin" / "with-libraries"
-    wrapper = [str(libraries)] if os.access(libraries, os.X_OK) else []
-    return [
-        *wrapper,
-        sys.executable,
-        "-m",
-        "fdnet.report.picture",
-        str(Path(spheres_vtp).absolute()),
-        f"--box={bounds}",
-    ]
-
-
-def _child_environment() -> dict[str, str]:
-    """The environment with this very package first on the child's path."""
-    here, before = str(Path(__file__).resolve().parents[2]), os.environ.get("PYTHONPATH")
-    return os.environ | {"PYTHONPATH": os.pathsep.join([here, before] if before else [here])}
-
-
-class _NoPictureError(OSError):
-    """Leaves `replacing` without replacing anything."""
-
-
-def _refuse_failure(done: "subprocess.CompletedProcess[str]", part: Path) -> None:
-    """Raise _NoPictureError, with the reason, unless the child ended well and left a whole PNG."""
-    if done.returncode:
-        printed = [line.strip() for line in (done.stderr or "").splitlines() if line.strip()]
-        how = (
-            f"signal {-done.returncode}" if done.returncode < 0 else f"exit code {done.returncode}"
-        )
-        why = printed[-1][:200] if printed else "no usable OpenGL?"
-        raise _NoPictureError(f"the drawing process ended with {how}; {why}")
-    picture = part.read_bytes() if part.is_file() else b""
-    if not (picture.startswith(PNG_START) and PNG_END in picture[-12:]):
-        raise _NoPictureError("the drawing process left no complete PNG")
+def write_macro(path: str | Path) -> Path:
+    """The script that opens a run in ParaView as the report shows it, next to the run's files."""
+    macro = resources.files("fdnet.report").joinpath("paraview_view.py.txt")
+    return write_text(path, macro.read_text(encoding="utf-8"))
 
 
 def _save(path: str | Path, mesh: Any) -> Path:
@@ -198,18 +136,26 @@ def _throat_data(analysis: "Analysis") -> dict[str, Array]:
     )
     codes = [LAW_CODES.get(str(name), -1) for name in analysis.law_used]
     return {
-        "throat_radius": network.throat_radius,
-        "throat_length": network.throat_length,
+        "throat_radius_m": network.throat_radius,
+        "throat_length_m": network.throat_length,
         "throat_share": network.throat_share,
         "porosity": np.ones(count) if occupancy is None else occupancy.throat_porosity,
         "fines": np.zeros(count, int) if occupancy is None else occupancy.throat_fines,
         "blocked": blocked_throats(analysis).astype(np.uint8),
         "law_used": np.array(codes, np.int8),
-        "conductance_initial": analysis.conductance_initial,
-        "conductance_damaged": analysis.conductance_damaged,
-        "flux_initial": analysis.flow_initial.throat_flux,
-        "flux_damaged": analysis.flow_damaged.throat_flux,
+        "conductance_initial_m3": analysis.conductance_initial,
+        "conductance_damaged_m3": analysis.conductance_damaged,
+        "flux_initial_m3": analysis.flow_initial.throat_flux,
+        "flux_damaged_m3": analysis.flow_damaged.throat_flux,
+        "conductance_lost": _lost(analysis),
     }
+
+
+def _lost(analysis: "Analysis") -> Array:
+    """(T,) share of the conductance that each throat lost; 0 where it had none."""
+    clean = np.asarray(analysis.conductance_initial)
+    damaged = np.asarray(analysis.conductance_damaged)
+    return 1.0 - np.divide(damaged, clean, out=np.ones(len(clean)), where=clean > 0)
 
 
 def _pore_data(analysis: "Analysis", drawing: _Drawing) -> dict[str, Array]:
@@ -228,11 +174,11 @@ def _pore_data(analysis: "Analysis", drawing: _Drawing) -> dict[str, Array]:
         name: np.append(p, _of_ends(p, source, (1.0, 0.0)) - fall) for name, p in pressures.items()
     }
     return data | {
-        "radius": np.append(
+        "radius_m": np.append(
             network.pore_radius, _of_ends(network.pore_radius, source, (0.0, 0.0))
         ),
         "porosity": np.append(porosity, _of_ends(porosity, source, (np.nan, np.nan))),
-        "volume": np.append(network.pore_volume, none),
+        "volume_m3": np.append(network.pore_volume, none),
         "share": np.append(network.pore_share, none),
         "end": np.append(np.zeros(count, np.uint8), np.ones(len(source), np.uint8)),
     }

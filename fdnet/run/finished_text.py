@@ -5,14 +5,15 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-MILLIDARCY = 9.869233e-16
-"""m2; a darcy is 1 cP cm/s under 1 atm/cm."""
+from fdnet.report.units import in_millidarcy
+
 _HEAD = ("depth (mm)", "porosity", "with fines", "k (mD)", "with fines", "lost (%)", "fines")
 
 
 def text_lines(path: Path, summary: Mapping[str, Any]) -> Iterator[str]:
     """The result and its table of sections."""
     yield f"fdnet run {summary['case']} in {path}"
+    yield from filter(None, (summary.get("answer"), *summary.get("certainty", ())))
     for name, value in _facts(summary):
         yield f"{name:<14}{value}"
     yield ""
@@ -26,6 +27,8 @@ def text_lines(path: Path, summary: Mapping[str, Any]) -> Iterator[str]:
 def html_lines(path: Path, summary: Mapping[str, Any]) -> Iterator[str]:
     """The same as a small table for a notebook."""
     yield f"<p><b>fdnet run {escape(str(summary['case']))}</b> in {escape(str(path))}</p>"
+    for text in filter(None, (summary.get("answer"), *summary.get("certainty", ()))):
+        yield f"<p>{escape(text)}</p>"
     yield "<table>"
     for name, value in _facts(summary):
         yield f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>"
@@ -40,7 +43,7 @@ def _facts(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     before, after = summary["k_initial_m2"], summary["k_damaged_m2"]
     yield (
         "permeability",
-        f"{_darcy(before)} -> {_darcy(after)} mD ({before:.3g} -> {after:.3g} m2), "
+        f"{in_millidarcy(before)} -> {in_millidarcy(after)} mD ({before:.3g} -> {after:.3g} m2), "
         f"{_lost(summary['k_reduction'])} % lost",
     )
     yield (
@@ -55,8 +58,8 @@ def _facts(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         )
         yield (
             "depth",
-            f"deepest {1e3 * summary['invasion_depth_m']:.2f} mm, 95 % above "
-            f"{1e3 * summary['invasion_depth_p95_m']:.2f} mm; "
+            f"95 % above {1e3 * summary['invasion_depth_p95_m']:.2f} mm, "
+            f"deepest {1e3 * summary['invasion_depth_m']:.2f} mm; "
             f"cake {1e3 * summary['cake_thickness_m']:.2f} mm",
         )
     else:
@@ -67,7 +70,8 @@ def _facts(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         after = summary["k_damaged_other_m2"]
         yield (
             "other law",
-            f"{_darcy(after)} mD ({after:.3g} m2) with fines by {summary['damage_law_other']}",
+            f"{in_millidarcy(after)} mD ({after:.3g} m2) with fines by "
+            f"{summary['damage_law_other']}",
         )
 
 
@@ -76,16 +80,11 @@ def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:
         f"{1e3 * row['x_lo_m']:.2f}-{1e3 * row['x_hi_m']:.2f}",
         f"{row['porosity_initial']:.4f}",
         f"{row['porosity_damaged']:.4f}",
-        _darcy(row["k_initial_m2"]),
-        _darcy(row["k_damaged_m2"]),
+        in_millidarcy(row["k_initial_m2"]),
+        in_millidarcy(row["k_damaged_m2"]),
         _lost(row["k_reduction"]),
         str(row["fines_count"]),
     )
-
-
-def _darcy(k: float) -> str:
-    """k (m2) in mD with four digits."""
-    return f"{float(f'{k / MILLIDARCY:.4g}'):,.10g}"
 
 
 def _lost(share: float | None) -> str:

@@ -117,6 +117,7 @@ def write_paraview(results: Results) -> None:
     )
     if results.invasion is not None:
         _write_frames(path, results.grains, results.invasion)
+    vtk.write_macro(path / "paraview_view.py")
 
 
 def _write_frames(path: Path, grains: Snapshot, invasion: Invaded) -> None:
@@ -138,7 +139,7 @@ def _write_frames(path: Path, grains: Snapshot, invasion: Invaded) -> None:
 
 def draw_figures(results: Results) -> tuple[list[tuple[Path, str]], list[str]]:
     """All figures with their captions, and why the 3-D picture is missing if it is."""
-    from fdnet.report import figures, vtk
+    from fdnet.report import child, figures
 
     drawn = figures.draw_all(
         results.path / "figures",
@@ -149,7 +150,7 @@ def draw_figures(results: Results) -> tuple[list[tuple[Path, str]], list[str]]:
     )
     more = draw_added(results.path / "figures", results.added)
     picture = results.path / "figures" / "spheres_3d.png"
-    reason = vtk.render_spheres_png(
+    reason = child.render_spheres_png(
         picture, results.path / "spheres_damaged.vtp", results.shown.box
     )
     if reason:

@@ -14,6 +14,8 @@ from fdnet.dem.checkpoint import has_history
 from fdnet.dem.supply import refuse_crowded_supply
 from fdnet.errors import CaseError
 from fdnet.run.added_results import added_results
+from fdnet.run.answer.answer import with_answer
+from fdnet.run.answer.case_words import case_words
 from fdnet.run.clean_up import Returned, clean_up_stage, compared, returned
 from fdnet.run.dem_stages import (
     check_finished,
@@ -217,6 +219,7 @@ def _write_summary(
     session: Session, results: Results, figures: list[tuple[Path, str]], notes: list[str]
 ) -> dict[str, Any]:
     from fdnet.report import html, tables
+    from fdnet.report.view import view_of
 
     case, scales = session.case, session.scales
     pack = _pack_record(session)
@@ -241,10 +244,13 @@ def _write_summary(
     )
     for one in results.added:
         summary |= one.summary
+    summary = with_answer(summary, case, results.analysis, results.shown)
     summary = tables.write_summary(session.path / "summary.json", summary)
     if "report" in session.options.stages:
         parts = html.ReportParts(
             figures=figures,
+            case_words=case_words(case, scales),
+            view=view_of(results.shown),
             case_text=case.toml(),
             scales=scale_rows(case, scales),
             versions=versions(pack),

@@ -10,18 +10,23 @@ from fdnet.spheres.arrays import Array, frozen
 from fdnet.spheres.rows import SphereRows, metres_per
 from fdnet.spheres.snapshot import Kind
 
+IN_METRES = "radius_m"
+"""Point data of fdnet's own files, whose lengths are in m."""
 SUFFIXES = (".vtp", ".vtu")
 
 
 def read_vtk(path: Path, *, units: str | None = None) -> SphereRows:
     """The spheres of a .vtp or .vtu file, in metres.
 
-    The centres are its points; the point data are `radius` or `diameter`, and, if there, `kind`
-    (1 grain, 2 fine), `type` and `id`. `units` is the unit of length of the file, m without it.
-    Raises CaseError where the file cannot be read, is empty, or holds no or impossible values.
+    The centres are its points; the point data are `radius`, `radius_m` or `diameter`, and, if
+    there, `kind` (1 grain, 2 fine), `type` and `id`. `units` is the unit of length of the file, m
+    without it; with `radius_m` there is none to give. Raises CaseError where the file cannot be
+    read, is empty, or holds no or impossible values.
     """
     scale = 1.0 if units is None else metres_per(units)
     mesh = _mesh(path)
+    if IN_METRES in mesh.point_data and units not in (None, "m"):
+        raise CaseError(f"{path}: its {IN_METRES} is in m; leave out --units {units}")
     position, radius = np.asarray(mesh.points, dtype=float), _radius(mesh, path)
     for name, values, good in (
         ("a centre that is not finite", position, np.isfinite(position).all(axis=1)),
@@ -63,12 +68,12 @@ def _mesh(path: Path) -> Any:
 
 
 def _radius(mesh: Any, path: Path) -> Array:
-    for name, factor in (("radius", 1.0), ("diameter", 0.5)):
+    for name, factor in (("radius", 1.0), (IN_METRES, 1.0), ("diameter", 0.5)):
         if name in mesh.point_data:
             return factor * _one_each(mesh, name, path).astype(float)
     known = ", ".join(mesh.point_data.keys()) or "none"
     raise CaseError(
-        f"{path}: no point data radius or diameter (it has: {known}); write one of them"
+        f"{path}: no point data radius, radius_m or diameter (it has: {known}); write one of them"
     )
 
 

@@ -44,7 +44,7 @@ def test_an_intact_pack_gets_no_figures_of_damage(tmp_path):
     none = {"occupancy": None, "invaded_count": 0, "layers": None}
     intact = SimpleNamespace(**(vars(demo_analysis()) | none))
     stems = {path.stem for path in figures.draw_all(tmp_path, intact, demo_grains())}
-    assert stems == {"side_view", "porosity_profile", "size_distributions"}
+    assert stems == {"side_view", "depth", "network", "size_distributions"}
 
 
 def test_sections_without_flow_fines_of_one_size_and_no_invasion_can_be_drawn(tmp_path):

@@ -1,15 +1,28 @@
 """report.html: self-contained, escaped, and it says what the summary says."""
 
 import base64
+import json
 import re
 from html.parser import HTMLParser
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
+from report_demo import demo_damaged
 
 from fdnet.errors import CaseError
+from fdnet.report import view
 from fdnet.report.html import ReportParts, headline, quantity, write_report
+from fdnet.report.view import view_of
+from fdnet.run.answer.rules import Sizes, rules_of
 
+SIZES = Sizes(
+    fines={"D50": 40e-6, "D85": 60e-6, "D90": 100e-6},
+    throat_median=100e-6,
+    throat_largest=90e-6,
+    grain_d15=270e-6,
+    concentration=0.05,
+)
 PNG = b"\x89PNG\r\n\x1a\n" + b"anything"
 SECTION = {
     "section": 1,
@@ -65,7 +78,7 @@ class Reader(HTMLParser):
 
     def handle_starttag(self, tag, attributes):
         self.tags.append((tag, dict(attributes)))
-        if tag not in ("meta", "img", "br"):
+        if tag not in ("meta", "img", "br", "input"):
             self.open.append(tag)
 
     def handle_endtag(self, tag):
@@ -94,13 +107,13 @@ def test_it_says_what_the_summary_says(tmp_path):
     for said in (
         "specimen <1>",
         "7.650·10⁻¹¹ m²",
+        "77,510 mD",
         "33.3 % lost",
         "0.3000",
         "0.2900",
         "704",
         "of 3\u2009000 supplied",
-        "4 mm",
-        "95 % shallower than 2.5 mm",
+        "95 % of the fines above 2.5 mm deepest 4 mm",
         "plugged",
         "34.6",
         "gravity: a & b",
@@ -141,6 +154,58 @@ def test_nothing_is_taken_for_markup_or_fetched_from_outside(tmp_path):
     assert not any("onclick" in attributes for _, attributes in reader.tags)
     sources = [attributes["src"] for tag, attributes in reader.tags if tag == "img"]
     assert sources == ["data:image/png;base64," + base64.b64encode(PNG).decode()]
+
+
+def test_the_page_answers_first_and_checks_the_run_before_the_rest(tmp_path):
+    """Answer, case in words, k and porosity by depth, health, and only then the scales."""
+    leading = tmp_path / "depth.png"
+    leading.write_bytes(PNG)
+    said = SUMMARY | {
+        "answer": "THE ANSWER.",
+        "certainty": ["ONE SEED."],
+        "skin": 0.056,
+        "skin_flow_lost": 0.008,
+        "skin_well_radius_m": 0.108,
+        "run_shows": "bridges",
+        "rules": rules_of(SIZES, "bridges"),
+    }
+    _, text = page_of(
+        tmp_path,
+        said,
+        case_words=["THE CASE."],
+        figures=[(leading, "BY DEPTH.")],
+        scales=[
+            {"name": "SCALE", "symbol": "", "value": 1.0, "unit": "", "formula": "", "source": ""}
+        ],
+    )
+    order = ("THE ANSWER.", "ONE SEED.", "skin 0.056", "THE CASE.", "BY DEPTH.", "50,660")
+    order += ("Health of the run", "agrees", "Abrams 1977", "SCALE")
+    places = [text.index(part) for part in order]
+    assert places == sorted(places)
+    assert "costs 0.8 % of the flow of a well of 108 mm radius" in text
+
+
+def test_the_view_holds_every_sphere_to_the_sixteenth_bit(tmp_path):
+    spheres = demo_damaged()
+    model = view_of(spheres)
+    table = np.frombuffer(base64.b64decode(model["data"]), "<u2").reshape(-1, 4) / 65535
+    low, high = np.array(model["low"]), np.array(model["high"])
+    both = [spheres.grains(), spheres.fines()]
+    position = np.concatenate([one.position for one in both]) * 1e3
+    assert model["grains"] == len(both[0])
+    assert np.abs(low + table[:, :3] * (high - low) - position).max() < 1e-4
+    radius = np.concatenate([one.radius for one in both]) * 1e3
+    assert table[:, 3] * model["radius"] == pytest.approx(radius, rel=1e-3)
+    reader, text = page_of(tmp_path, SUMMARY, view=model)
+    scripts = [attributes for tag, attributes in reader.tags if tag == "script"]
+    assert len(scripts) == 2
+    assert not any("src" in attributes for attributes in scripts)
+    assert json.loads(text[text.index('{"grains"') : text.index("}", text.index('{"grains"')) + 1])
+
+
+def test_a_view_of_too_many_spheres_is_left_to_the_picture(monkeypatch):
+    monkeypatch.setattr(view, "MOST_SPHERES", len(demo_damaged()) - 1)
+    assert view_of(demo_damaged()) is None
 
 
 def test_scales_are_rows_of_objects_or_mappings(tmp_path):

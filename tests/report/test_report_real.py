@@ -64,9 +64,9 @@ def test_fluxes_in_paraview_follow_from_pressures_and_conductances(tmp_path, sid
         vtk.write_network_vtp(tmp_path / "network.vtp", analysis_of(sides, moved=moved))
     )
     pressure = mesh.point_data[f"pressure_{state}"][mesh.lines.reshape(-1, 3)[:, 1:]]
-    flux = mesh.cell_data[f"flux_{state}"]
+    flux = mesh.cell_data[f"flux_{state}_m3"]
     connected = np.isfinite(pressure).all(axis=1)
-    conductance = mesh.cell_data[f"conductance_{state}"] * mesh.cell_data["throat_share"]
+    conductance = mesh.cell_data[f"conductance_{state}_m3"] * mesh.cell_data["throat_share"]
     expected = conductance * (pressure[:, 0] - pressure[:, 1])
     assert connected.mean() > 0.9
     assert np.allclose(

@@ -58,7 +58,7 @@ def changed(analysis, **values):
 def test_sections_hold_the_contract_columns_and_count_what_the_sphere_table_says(tmp_path):
     sections = rows_of(write_sections(tmp_path / "sections.csv", demo_analysis()))
     spheres = rows_of(write_spheres(tmp_path / "s.csv", demo_damaged()))
-    assert list(sections[0]) == SECTION_COLUMNS
+    assert list(sections[0]) == [*SECTION_COLUMNS, "k_initial_mD", "k_damaged_mD"]
     depth = [float(sphere["x_m"]) for sphere in spheres if sphere["kind"] == "fine"]
     for row in sections:
         assert int(row["fines_count"]) == sum(
@@ -174,7 +174,7 @@ def test_summary_refuses_what_is_no_data(tmp_path):
 def test_section_rows_are_what_the_table_says(tmp_path):
     rows = section_rows(demo_analysis())
     table = pd.read_csv(write_sections(tmp_path / "sections.csv", demo_analysis()))
-    assert list(rows[0]) == list(table.columns)
+    assert [*rows[0], "k_initial_mD", "k_damaged_mD"] == list(table.columns)
     assert [row["fines_count"] for row in rows] == table.fines_count.tolist()
 
 

@@ -10,7 +10,7 @@ import pytest
 import pyvista as pv
 from report_demo import BOX, demo_analysis, demo_damaged, demo_grains
 
-from fdnet.report import vtk
+from fdnet.report import child, vtk
 
 
 def test_network_lines_join_the_ends_of_their_throats(tmp_path):
@@ -22,16 +22,16 @@ def test_network_lines_join_the_ends_of_their_throats(tmp_path):
     ends = mesh.points[mesh.lines.reshape(-1, 3)[:, 1:]]
     assert np.allclose(ends, network.throat_ends, rtol=0, atol=1e-12)
     assert np.array_equal(mesh.points[: len(network.pore_radius)], network.pore_position)
-    assert np.array_equal(mesh.cell_data["conductance_damaged"], analysis.conductance_damaged)
+    assert np.array_equal(mesh.cell_data["conductance_damaged_m3"], analysis.conductance_damaged)
     assert np.array_equal(mesh.cell_data["blocked"], analysis.occupancy.blocked)
 
 
 def test_pressures_at_the_faces_drive_every_flux(tmp_path):
     mesh = pv.read(vtk.write_network_vtp(tmp_path / "network.vtp", demo_analysis()))
     pressure = mesh.point_data["pressure_damaged"][mesh.lines.reshape(-1, 3)[:, 1:]]
-    expected = mesh.cell_data["conductance_damaged"] * (pressure[:, 0] - pressure[:, 1])
+    expected = mesh.cell_data["conductance_damaged_m3"] * (pressure[:, 0] - pressure[:, 1])
     assert np.allclose(
-        mesh.cell_data["flux_damaged"], expected, rtol=0, atol=1e-12 * np.abs(expected).max()
+        mesh.cell_data["flux_damaged_m3"], expected, rtol=0, atol=1e-12 * np.abs(expected).max()
     )
 
 
@@ -47,7 +47,7 @@ def test_a_throat_across_a_periodic_side_ends_in_an_image(tmp_path):
     assert mesh.point_data["end"][image] == 1
     assert mesh.points[image] == pytest.approx(network.pore_position[other] + [0, 2e-3, 0])
     assert mesh.point_data["pressure_damaged"][image] == analysis.flow_damaged.pore_pressure[other]
-    assert mesh.point_data["volume"].sum() == pytest.approx(
+    assert mesh.point_data["volume_m3"].sum() == pytest.approx(
         network.pore_volume.sum()
     )  # images hold no volume
 
@@ -68,8 +68,8 @@ def test_spheres_read_back(tmp_path):
     snapshot = demo_damaged()
     mesh = pv.read(vtk.write_spheres_vtp(tmp_path / "spheres_damaged.vtp", snapshot))
     assert np.array_equal(mesh.points, snapshot.position)
-    for name in ("radius", "kind", "id", "velocity"):
-        assert np.array_equal(mesh.point_data[name], getattr(snapshot, name))
+    for name, array in vtk.SPHERE_ARRAYS.items():
+        assert np.array_equal(mesh.point_data[array], getattr(snapshot, name))
 
 
 def test_no_spheres_make_an_empty_file(tmp_path):
@@ -106,7 +106,7 @@ def test_a_collection_reads_back_with_its_times(tmp_path):
 
 def test_the_picture_is_drawn_or_the_process_was_killed_for_want_of_opengl(tmp_path):
     source = vtk.write_spheres_vtp(tmp_path / "spheres_damaged.vtp", demo_damaged())
-    reason = vtk.render_spheres_png(tmp_path / "spheres_3d.png", source, BOX)
+    reason = child.render_spheres_png(tmp_path / "spheres_3d.png", source, BOX)
     assert "exit code" not in reason, reason  # a Python error in the child
     assert (tmp_path / "spheres_3d.png").exists() == (reason == "")
     if not reason:
@@ -131,25 +131,25 @@ CRASHES = {
 @pytest.mark.parametrize("name", CRASHES)
 def test_a_dead_child_gives_a_reason_and_touches_nothing(tmp_path, monkeypatch, name):
     program, expected = CRASHES[name]
-    monkeypatch.setattr(vtk, "_command", lambda *_: [sys.executable, "-c", program])
+    monkeypatch.setattr(child, "_command", lambda *_: [sys.executable, "-c", program])
     picture = tmp_path / "spheres_3d.png"
     picture.write_bytes(b"old")
-    assert expected in vtk.render_spheres_png(picture, "s.vtp", BOX)
+    assert expected in child.render_spheres_png(picture, "s.vtp", BOX)
     assert picture.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [picture]
 
 
 def test_a_hanging_child_is_given_up(tmp_path, monkeypatch):
     monkeypatch.setattr(
-        vtk, "_command", lambda *_: [sys.executable, "-c", "import time; time.sleep(60)"]
+        child, "_command", lambda *_: [sys.executable, "-c", "import time; time.sleep(60)"]
     )
     start = time.monotonic()
-    assert vtk.render_spheres_png(tmp_path / "v.png", "s.vtp", BOX, seconds=0.5).endswith(
+    assert child.render_spheres_png(tmp_path / "v.png", "s.vtp", BOX, seconds=0.5).endswith(
         "given up after 0.5 s"
     )
     assert time.monotonic() - start < 20
 
 
 def test_an_unwritable_folder_or_missing_interpreter_is_a_reason_too(tmp_path, monkeypatch):
-    monkeypatch.setattr(vtk, "_command", lambda *_: [str(tmp_path / "no-python")])
-    assert "no 3-D picture" in vtk.render_spheres_png(tmp_path / "v.png", "s.vtp", BOX)
+    monkeypatch.setattr(child, "_command", lambda *_: [str(tmp_path / "no-python")])
+    assert "no 3-D picture" in child.render_spheres_png(tmp_path / "v.png", "s.vtp", BOX)

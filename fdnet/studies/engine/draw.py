@@ -13,7 +13,8 @@ from fdnet.studies.engine.study import Panel, Row, Study, shown
 MARKERS = "osD^vP<X"
 TURN = 0.75
 """Share of the range of run times beyond which names stand to the left of their markers."""
-NEAR = 1.25
+PLACES = ((4, -11), (8, -3), (4, 14), (4, -20), (14, 5), (14, -11), (4, 23), (4, -29), (24, -3))
+"""Where a label may stand from its point, in points, in the order in which it is tried."""
 _WIDTH, _HEIGHT = 6.2, 4.6
 _COST_LABELS = {
     "core_s": "run time, core s",
@@ -49,6 +50,9 @@ def draw_study(study: Study, rows: Sequence[Row], path: Path) -> None:
     flat = list(axes.flat)
     for panel, place in zip(panels, flat, strict=False):
         _draw_panel(place, study, panel, rows)
+    figure.draw_without_rendering()
+    for place in flat[: len(panels)]:
+        spread_labels(place)
     for place in flat[len(panels) :]:
         place.set_visible(False)
     figure.suptitle(f"{study.title} (labels: {study.knob_label})", fontsize=11)
@@ -99,7 +103,15 @@ def _draw_panel(axes: Any, study: Study, panel: Panel, rows: Sequence[Row]) -> N
     handles, names = axes.get_legend_handles_labels()
     once = dict(zip(names, handles, strict=True))
     if once:
-        axes.legend([*once.values()], [*once], fontsize=8, framealpha=0.9)
+        axes.legend(
+            [*once.values()],
+            [*once],
+            fontsize=8,
+            frameon=False,
+            loc="upper center",
+            bbox_to_anchor=(0.5, -0.13),
+            ncols=2,
+        )
 
 
 def _floor(of_series: Sequence[Level]) -> float:
@@ -181,18 +193,13 @@ def _draw_series(
 
 
 def _label(axes: Any, of_series: Sequence[Level], index: int, floor: float, turn: float) -> None:
-    """The values of the knob next to their markers.
-
-    They stand below the marker where an earlier marker is near, and names stand to its left from
-    the cost `turn` on.
-    """
-    for number, level in enumerate(of_series):
+    """The values of the knob next to their markers; names stand to the left from `turn` on."""
+    for level in of_series:
         left = isinstance(level.value, str) and level.cost > turn
-        below = any(_near(level, other) for other in of_series[:number])
         axes.annotate(
             shown(level.value),
             (level.cost, max(level.size, floor)),
-            xytext=(-5 if left else 4, -10 if below else 5),
+            xytext=(-5 if left else 4, 5),
             textcoords="offset points",
             ha="right" if left else "left",
             fontsize=7,
@@ -200,6 +207,22 @@ def _label(axes: Any, of_series: Sequence[Level], index: int, floor: float, turn
         )
 
 
-def _near(one: Level, other: Level) -> bool:
-    pairs = ((one.cost, other.cost), (one.size, other.size))
-    return all(1.0 / NEAR < a / b < NEAR for a, b in pairs if a > 0 and b > 0)
+def spread_labels(axes: Any) -> None:
+    """Move each label that lies on an earlier one to a free place around its point.
+
+    The figure must have been laid out. A label for which no place is free stays where it is.
+    """
+    placed: list[Any] = []
+    for label in axes.texts:
+        if not hasattr(label, "xyann"):
+            continue
+        side = -1 if label.get_ha() == "right" else 1
+        start = label.xyann
+        for x, y in ((start[0], start[1]), *((side * x, y) for x, y in PLACES)):
+            label.xyann = (x, y)
+            box = label.get_window_extent()
+            if not any(box.overlaps(other) for other in placed):
+                break
+        else:
+            label.xyann = start
+        placed.append(label.get_window_extent())

@@ -1,0 +1,108 @@
+"""What a run says about the well: keys of summary.json that follow from its other results."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fdnet.case.case import Case, InvasionCase
+from fdnet.run.answer.bridged import bridged_throats
+from fdnet.run.answer.cake import cake_of
+from fdnet.run.answer.damage import DAMAGED_FROM, Zone, steps_of, zone_of
+from fdnet.run.answer.rules import Sizes, rules_of, run_shows
+from fdnet.run.answer.scatter import scatter_of
+from fdnet.run.answer.sentence import answer_sentence, certainty
+from fdnet.run.answer.skin import Step, flow_lost, layered_skin
+from fdnet.spheres.snapshot import Snapshot
+
+if TYPE_CHECKING:
+    from fdnet.network.analysis import Analysis
+
+LARGEST = 0.99
+"""Share of the open throats, by number, that are narrower than the "largest" one."""
+
+
+def with_answer(
+    summary: Mapping[str, Any], case: Case, analysis: "Analysis", spheres: Snapshot
+) -> dict[str, Any]:
+    """`summary` with the keys of the answer; `spheres` are those at the end.
+
+    Adds `answer` and `certainty` (sentences) always; with fines also `damage`, `cake`,
+    `throats_bridged`, `rules`, `scatter`, and `skin` and `skin_flow_lost` where the case has a
+    well. Infinite skins are null.
+    """
+    result = dict(summary)
+    if isinstance(case, InvasionCase) and analysis.occupancy is not None:
+        result |= _damage_keys(case, analysis, spheres)
+        result["run_shows"] = run_shows(summary)
+        result["rules"] = rules_of(_sizes(case, analysis), result["run_shows"])
+    return {**result, "answer": answer_sentence(result), "certainty": list(certainty(result))}
+
+
+def _damage_keys(case: InvasionCase, analysis: "Analysis", spheres: Snapshot) -> dict[str, Any]:
+    steps = steps_of(analysis)
+    cake = cake_of(spheres, analysis.cake_thickness)
+    return {
+        "damage": _zone_keys(zone_of(steps)),
+        **_skin_keys(case, steps),
+        "cake": None if cake is None else _cake_keys(asdict(cake)),
+        "throats_bridged": bridged_throats(analysis),
+        "scatter": _scatter_keys(len(spheres.grains())),
+    }
+
+
+def _zone_keys(zone: Zone) -> dict[str, Any]:
+    return {
+        "zone_depth_m": zone.depth,
+        "zone_k_over_k0": zone.ratio,
+        "zone_k_initial_m2": zone.before,
+        "zone_k_damaged_m2": zone.after,
+        "lost_from": DAMAGED_FROM,
+        "reaches_the_end": zone.open_end,
+    }
+
+
+def _skin_keys(case: Case, steps: list[Step]) -> dict[str, float | None]:
+    if case.well is None:
+        return {}
+    radius, drainage = case.well.radius_m, case.well.drainage_radius_m
+    skin = layered_skin(steps, radius)
+    return {
+        "skin": None if math.isinf(skin) else skin,
+        "skin_flow_lost": flow_lost(skin, well=radius, drainage=drainage),
+        "skin_well_radius_m": radius,
+    }
+
+
+def _cake_keys(cake: Mapping[str, float]) -> dict[str, float]:
+    return {
+        "thickness_m": cake["thickness"],
+        "porosity": cake["porosity"],
+        "k_carman_kozeny_m2": cake["permeability"],
+        "resistance_1_m": cake["resistance"],
+    }
+
+
+def _scatter_keys(grains: int) -> dict[str, Any]:
+    one = scatter_of(grains)
+    return {
+        "depth_p95_relative": one.depth,
+        "first_mm_loss": one.loss,
+        "runs": one.runs,
+        "source": one.source,
+    }
+
+
+def _sizes(case: InvasionCase, analysis: "Analysis") -> Sizes:
+    width = 2.0 * np.asarray(analysis.network.throat_radius)
+    middle, largest = np.quantile(width[width > 0], (0.5, LARGEST))
+    fines = case.fines.curve
+    return Sizes(
+        fines={f"D{share}": fines.size_at(share / 100) for share in (50, 85, 90)},
+        throat_median=float(middle),
+        throat_largest=float(largest),
+        grain_d15=case.grains.curve.size_at(0.15),
+        concentration=case.fines.volume_fraction,
+    )

@@ -1,0 +1,87 @@
+"""The answer of a run in words: one sentence to act on, how the run ended, how sure it is."""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from fdnet.report.units import in_millidarcy
+from fdnet.run.answer.skin import size_words
+
+ENDS = {
+    "plugged": "the face plugged, and next to no fine entered any more for the set time",
+    "supply_exhausted": "the supply of fines ran out (the face is still open)",
+    "duration": "the set duration was over (the face may still be open)",
+    "cap": "the run reached its cap before anything else ended it",
+}
+
+
+def answer_sentence(summary: Mapping[str, Any]) -> str:
+    """One sentence to act on; `summary` has the keys of the answer where there are fines."""
+    if "damage" not in summary:
+        k, porosity = summary["k_initial_m2"], 100 * summary["porosity_initial"]
+        return f"The intact sand has {in_millidarcy(k)} mD at a porosity of {porosity:.1f} %."
+    return " ".join(filter(None, (_depth(summary), _skin_words(summary))))
+
+
+def _depth(summary: Mapping[str, Any]) -> str:
+    damage, invaded = summary["damage"], summary["invaded_count"]
+    if not invaded:
+        return "No fine entered the sand, so it keeps its permeability."
+    p95 = f"95 % of the fines that entered lie within {_mm(summary['invasion_depth_p95_m'])}"
+    if summary["final"] is False:
+        return (
+            f"So far {p95}, but the run was cut at its cap and this is not final: raise "
+            "run.cap_ms or resume it before you use these numbers."
+        )
+    if not damage["zone_depth_m"]:
+        return f"{p95}, and no layer loses 5 % of its permeability: the damage is negligible."
+    share = f"{_percent(damage['zone_k_over_k0'])} of the permeability"
+    if damage["reaches_the_end"]:
+        return (
+            f"{p95}, and the damage reaches the end of the specimen, which keeps {share}: "
+            "lengthen the box before you rely on the depth."
+        )
+    zone = _mm(damage["zone_depth_m"])
+    return (
+        f"{p95} and the first {zone} keep {share}, so a perforation, a cut or a wash that reaches "
+        f"deeper than {zone} meets undamaged sand."
+    )
+
+
+def _skin_words(summary: Mapping[str, Any]) -> str:
+    if "skin" not in summary or not summary["invaded_count"]:
+        return ""
+    lost, skin = summary["skin_flow_lost"], summary["skin"]
+    if skin is None or math.isinf(skin):
+        return "Nothing flows through the plugged layer, so the skin is infinite."
+    well = f"a well of {1e3 * summary['skin_well_radius_m']:.0f} mm radius"
+    return (
+        f"For {well} this is a {size_words(lost)} skin of {skin:.2g}, which costs "
+        f"{_percent(lost)} of the flow."
+    )
+
+
+def certainty(summary: Mapping[str, Any]) -> Iterator[str]:
+    """How the run ended, whether that is final, and what one seed is worth; sentences."""
+    reason = summary.get("stop_reason")
+    if reason is None:
+        return
+    final = summary.get("final")
+    end = ENDS.get(reason, str(reason))
+    yield f"The result is {'final' if final else 'not final'}, because {end}."
+    scatter = summary.get("scatter")
+    if scatter and summary.get("invaded_count"):
+        yield (
+            f"This is one run with one seed ({summary['seed']}). Repeated seeds of such "
+            f"specimens differ by {_percent(scatter['depth_p95_relative'])} in the depth and by "
+            f"{100 * scatter['first_mm_loss']:.2g} points in the loss of the first millimetre "
+            f"(one standard deviation, {scatter['runs']} runs; {scatter['source']})."
+        )
+
+
+def _mm(depth: float) -> str:
+    return f"{1e3 * depth:.3g} mm"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"

@@ -1,0 +1,257 @@
+"""Skin, damaged zone, rules of thumb and millidarcy against closed forms and the literature."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from fdnet.case.file import read_case
+from fdnet.report.units import in_millidarcy, millidarcy
+from fdnet.run.answer.bridged import bridged_throats
+from fdnet.run.answer.cake import cake_of
+from fdnet.run.answer.case_words import case_words
+from fdnet.run.answer.damage import series, steps_of, zone_of
+from fdnet.run.answer.rules import Sizes, rules_of, run_shows
+from fdnet.run.answer.scatter import FULL, QUICK
+from fdnet.run.answer.sentence import answer_sentence, certainty
+from fdnet.run.answer.skin import Step, flow_lost, hawkins, layered_skin
+from fdnet.scales.scales import scales_of
+from fdnet.spheres.snapshot import Kind, Snapshot
+
+
+def step(near, far, before, after):
+    return Step(near=near, far=far, before=before, after=after)
+
+
+def test_hawkins_skin_of_a_thin_zone_is_small():
+    """(1/0.141 - 1) ln(109/108) = 6.0922 x 0.0092167."""
+    skin = hawkins(0.141, well=0.108, damaged=0.109)
+    assert skin == pytest.approx(0.0561, abs=5e-5)
+    assert hawkins(1.0, well=0.1, damaged=0.2) == 0.0
+    assert math.isinf(hawkins(0.0, well=0.1, damaged=0.2))
+
+
+def test_rings_in_series_are_the_integral_of_the_pressure():
+    """p' = q / (k r): integrated numerically with and without the damage, over q / k."""
+    edges, ratio = np.array([0.0, 1e-3, 3e-3, 10e-3]), (0.05, 0.4, 0.9)
+    steps = [
+        step(a, b, 2e-12, 2e-12 * r) for a, b, r in zip(edges[:-1], edges[1:], ratio, strict=True)
+    ]
+    extra = 0.0
+    for a, b, r in zip(edges[:-1], edges[1:], ratio, strict=True):
+        radius = np.linspace(0.1 + a, 0.1 + b, 20001)
+        middle = 0.5 * (radius[1:] + radius[:-1])
+        extra += float(np.sum(np.diff(radius) * (1 / r - 1) / middle))
+    assert layered_skin(steps, 0.1) == pytest.approx(extra, rel=1e-6)
+    one = layered_skin([step(0, 1e-3, 1e-12, 0.141e-12)], 0.108)
+    assert one == pytest.approx(hawkins(0.141, well=0.108, damaged=0.109), rel=1e-12)
+
+
+def test_the_flow_that_a_skin_costs_is_that_of_the_longer_way():
+    """A skin of ln(r_e / r_w) doubles the resistance and halves the flow."""
+    assert flow_lost(math.log(100 / 0.1), well=0.1, drainage=100.0) == pytest.approx(0.5)
+    assert flow_lost(math.inf, well=0.1, drainage=100.0) == 1.0
+
+
+def test_millidarcy_is_that_of_the_recommended_practice():
+    assert millidarcy(9.869233e-13) == pytest.approx(1000.0, rel=1e-12)
+    assert in_millidarcy(9.869233e-13) == "1,000"
+    assert in_millidarcy(9.869233e-16 * 194553.0) == "194,600"
+    assert in_millidarcy(9.869233e-16 * 0.25) == "0.25"
+    assert in_millidarcy(None) == in_millidarcy(float("nan")) == "–"
+
+
+def analysis_of(sections, layers=None, law="all-spheres"):
+    names = ("x_lo", "x_hi", "k_initial_inplace", "k_damaged_inplace")
+    made = [SimpleNamespace(**dict(zip(names, row, strict=True))) for row in sections]
+    if layers is not None:
+        rows = np.array(layers)
+        layers = SimpleNamespace(
+            edges=np.append(rows[:, 0], rows[-1, 1]), k_initial=rows[:, 2], k_damaged=rows[:, 3]
+        )
+    return SimpleNamespace(sections=made, layers=layers, damage_law_used=law)
+
+
+def test_layers_and_what_is_left_of_a_section_are_the_section_in_series():
+    """Two layers of 0.5 mm and a rest of 1 mm make a section of 2 mm, by either permeability."""
+    thin = [(0.0, 5e-4, 4.0, 0.5), (5e-4, 1e-3, 2.0, 1.0)]
+    whole = [series([(5e-4, k[0]), (5e-4, k[1]), (1e-3, 3.0)]) for k in ((4.0, 2.0), (0.5, 1.0))]
+    steps = steps_of(analysis_of([(0.0, 2e-3, *whole), (2e-3, 4e-3, 5.0, 5.0)], thin))
+    assert [(s.near, s.far) for s in steps] == [
+        (0.0, 5e-4),
+        (5e-4, 1e-3),
+        (1e-3, 2e-3),
+        (2e-3, 4e-3),
+    ]
+    assert steps[2].before == pytest.approx(3.0)
+    assert steps[2].after == pytest.approx(3.0)
+    zone = zone_of(steps)
+    assert zone.depth == 1e-3
+    assert zone.ratio == pytest.approx((1 / 4 + 1 / 2) / (1 / 0.5 + 1 / 1.0))
+    assert not zone.open_end
+    assert len(steps_of(analysis_of([(0.0, 2e-3, *whole)], thin, law="side-kozeny"))) == 1
+
+
+@pytest.mark.parametrize(
+    ("after", "depth", "ratio", "open_end"),
+    [((1.0, 1.0), 0.0, 1.0, False), ((0.5, 0.5), 2.0, 0.5, True), ((0.0, 1.0), 1.0, 0.0, False)],
+)
+def test_a_zone_without_damage_without_end_and_without_flow(after, depth, ratio, open_end):
+    zone = zone_of([step(0, 1, 1.0, after[0]), step(1, 2, 1.0, after[1])])
+    assert (zone.depth, zone.ratio, zone.open_end) == (depth, pytest.approx(ratio), open_end)
+
+
+def sizes(**changed):
+    fines = {"D50": 40e-6, "D85": 60e-6, "D90": 100e-6} | changed.pop("fines", {})
+    given = {"throat_median": 100e-6, "throat_largest": 90e-6, "grain_d15": 270e-6}
+    return Sizes(fines=fines, **(given | {"concentration": 0.05} | changed))
+
+
+@pytest.mark.parametrize(
+    ("changed", "says"),
+    [
+        ({}, ["bridges", "bridges", "bridges", "bridges"]),
+        ({"concentration": 0.049}, ["passes", "bridges", "bridges", "bridges"]),
+        ({"throat_median": 121e-6}, ["passes", "bridges", "bridges", "bridges"]),
+        ({"throat_largest": 101e-6}, ["bridges", "passes", "passes", "bridges"]),
+        ({"fines": {"D50": 18e-6}}, ["passes", "bridges", "passes", "bridges"]),
+        ({"grain_d15": 301e-6}, ["bridges", "bridges", "bridges", "between"]),
+        ({"grain_d15": 541e-6}, ["bridges", "bridges", "bridges", "passes"]),
+    ],
+)
+def test_each_rule_turns_at_its_published_limit(changed, says):
+    rules = rules_of(sizes(**changed), "bridges")
+    assert [rule["says"] for rule in rules] == says
+    expected = {"bridges": True, "passes": False, "between": None}
+    assert [rule["agrees"] for rule in rules] == [expected[word] for word in says]
+    assert all(rule["agrees"] is None for rule in rules_of(sizes(**changed), "undecided"))
+
+
+def test_the_value_of_each_rule_is_its_ratio():
+    """0.309 is (5/9)^2: the share finer grows with the square root of the size up to D90."""
+    values = [rule["value"] for rule in rules_of(sizes(), "bridges")]
+    assert values == pytest.approx([0.4, 100 / 90, 40 / 90 * (9 / 5) ** 2, 270 / 60])
+
+
+def shown(**changed):
+    base = {"invaded_count": 900, "passed_count": 20, "stop_reason": "plugged"}
+    base |= {"invasion_depth_p95_m": 1e-3, "sections": [{"x_hi_m": 4e-3}]}
+    return run_shows(base | changed)
+
+
+def test_the_run_bridges_passes_or_does_not_decide():
+    assert shown() == "bridges"
+    assert shown(passed_count=901) == "passes"
+    assert shown(invasion_depth_p95_m=3.8e-3) == "passes"
+    assert shown(stop_reason="cap") == shown(stop_reason="duration") == "undecided"
+
+
+def test_bridged_throats_are_counted_by_width_with_the_fines_in_them():
+    radius = np.array([1.0, 2.0, 3.0, 4.0, 0.0])
+    occupancy = SimpleNamespace(
+        throat_fine_radius=np.array([0.5, 0.0, 2.0, 0.0, 9.0]),
+        throat_fines=np.array([1, 0, 2, 0, 3]),
+        blocked=np.array([True, False, False, False, True]),
+    )
+    rows = bridged_throats(
+        SimpleNamespace(
+            occupancy=occupancy,
+            network=SimpleNamespace(throat_radius=radius),
+            conductance_initial=np.array([1.0, 1.0, 1.0, 1.0, 0.0]),
+            conductance_damaged=np.array([0.0, 1.0, 0.5, 0.6, 0.0]),
+        )
+    )
+    assert [row["throats"] for row in rows] == [1, 1, 1, 1]
+    assert [row["bridged"] for row in rows] == [1, 0, 1, 0]
+    assert [row["blocked"] for row in rows] == [1, 0, 0, 0]
+    assert [row["fine_over_throat"] for row in rows] == [0.5, None, pytest.approx(2 / 3), None]
+
+
+def test_the_scatter_of_a_seed_is_that_of_the_published_repeats(root):
+    table = pd.read_csv(root / "docs/thesis/results.csv")
+    table = table[table["law"] == "lubrication"]
+    for one in (QUICK, FULL):
+        seeds = table[table["id"].isin(one.cases)].groupby("id")
+        depth, loss = seeds["invasion_depth_p95_mm"], seeds["k_reduction_1"]
+        assert seeds.size().sum() == one.runs
+        assert one.depth == pytest.approx(((depth.std() / depth.mean()) ** 2).mean() ** 0.5, 0.02)
+        assert one.loss == pytest.approx((loss.std() ** 2).mean() ** 0.5, 0.03)
+
+
+SUMMARY = {
+    "case": "a",
+    "seed": 3,
+    "stop_reason": "plugged",
+    "final": True,
+    "invaded_count": 900,
+    "invasion_depth_p95_m": 1.388e-3,
+    "k_initial_m2": 2e-12,
+    "porosity_initial": 0.38,
+    "damage": {"zone_depth_m": 2e-3, "zone_k_over_k0": 0.34, "reaches_the_end": False},
+    "scatter": {"depth_p95_relative": 0.36, "first_mm_loss": 0.067, "runs": 30, "source": "x.csv"},
+}
+WELL = {"skin": 0.056, "skin_flow_lost": 0.0081, "skin_well_radius_m": 0.108}
+
+
+@pytest.mark.parametrize(
+    ("changed", "said", "not_said"),
+    [
+        ({}, ["within 1.39 mm", "keep 34 %", "deeper than 2 mm"], "skin"),
+        (WELL, ["small skin of 0.056", "0.81 % of the flow", "108 mm"], "infinite"),
+        (WELL | {"skin": None, "skin_flow_lost": 1.0}, ["skin is infinite"], "small"),
+        ({"final": False, "stop_reason": "cap"}, ["not final", "run.cap_ms"], "deeper"),
+        ({"invaded_count": 0}, ["No fine entered"], "95 %"),
+    ],
+)
+def test_the_answer_is_a_sentence_to_act_on(changed, said, not_said):
+    text = answer_sentence(SUMMARY | changed)
+    assert all(part in text for part in said), text
+    assert not_said not in text
+
+
+def test_one_seed_is_said_to_be_one_seed_and_a_cap_not_final():
+    final, seed = certainty(SUMMARY)
+    assert "is final" in final
+    assert all(part in seed for part in ("one seed (3)", "36 %", "6.7 points", "x.csv"))
+    assert "not final" in next(certainty(SUMMARY | {"final": False, "stop_reason": "cap"}))
+    assert "sand has 2,027 mD" in answer_sentence(
+        {"k_initial_m2": 2e-12 * 1.0003, "porosity_initial": 0.38}
+    )
+
+
+def test_a_cake_is_a_bed_of_three_layers_or_more():
+    """Eight fines of diameter 1 in 2 x 2 x 8.5: volume pi/6 each, k by the closed formula."""
+    position = [[-1.0 - layer, 1.0, 1.0] for layer in range(8)]
+    spheres = Snapshot(
+        step=0,
+        time_s=0.0,
+        box=np.array([[0.0, 4.0], [0.0, 2.0], [0.0, 2.0]]),
+        id=np.arange(8),
+        kind=np.full(8, int(Kind.FINE)),
+        position=np.array(position),
+        radius=np.full(8, 0.5),
+        velocity=np.zeros((8, 3)),
+    )
+    cake = cake_of(spheres, 8.5)
+    porosity = 1 - 8 * math.pi / 6 / (4 * 8.5)
+    assert cake.porosity == pytest.approx(porosity)
+    assert cake.permeability == pytest.approx(porosity**3 / (180 * (1 - porosity) ** 2))
+    assert cake.resistance == pytest.approx(8.5 / cake.permeability)
+    assert cake_of(spheres, 2.9) is None
+    assert cake_of(spheres, 0.0) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("quick", ["grains of 0.5 mm (500 µm)", "lost over 8 mm", "508 psi", "between walls"]),
+        ("well", ["a well of 108 mm radius", "a drainage radius of 100 m"]),
+        ("sand-and-mud", ["D50 400", "D90 600", "300 psi", "10 cP"]),
+    ],
+)
+def test_the_case_in_words(root, name, said):
+    case = read_case(root / f"cases/{name}.toml")
+    text = " ".join(case_words(case, scales_of(case)))
+    assert all(part in text for part in said), text
