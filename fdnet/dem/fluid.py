@@ -71,13 +71,16 @@ class Fluid(Protocol):
 
 
 def write_forces(folder: Path, spheres: Snapshot, forces: FluidForces) -> None:
-    """Write the files that the deck reads: the number of fines, then id and value of each."""
+    """Write the files that the deck reads: the number of fines, then id and value of each.
+
+    Values have twelve digits.
+    """
     fines = spheres.fines()
     carried = forces.velocity + forces.push / forces.coefficient[:, None]
+    form = f"{len(fines)}\n" + "%d %.12g\n" * len(fines)
     for name, value in zip(_FILES, (forces.coefficient, *carried.T), strict=True):
-        rows = zip(fines.id.tolist(), value.tolist(), strict=True)
-        lines = [str(len(fines)), *(f"{atom} {number:.17g}" for atom, number in rows)]
-        (folder / "post" / f"fluid.{name}").write_text("\n".join(lines) + "\n")
+        rows = np.column_stack([fines.id, value]).ravel().tolist()
+        (folder / "post" / f"fluid.{name}").write_text(form % tuple(rows))
 
 
 def largest_share(spheres: Snapshot, forces: FluidForces, density: float, time: float) -> float:

@@ -16,7 +16,8 @@ FLOW_COLUMNS = (
     "pressure_cake_Pa",
     "pressure_pack_Pa",
     "momentum_defect",
-    "throat_factor",
+    "fines_share",
+    "crowd_over_network",
 )
 """What the record of updates holds of the flow, where it follows the deposit."""
 

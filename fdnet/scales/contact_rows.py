@@ -4,6 +4,7 @@ from fdnet.case.case import Case, InvasionCase
 from fdnet.scales.cohesion import pull_off_of
 from fdnet.scales.hertz import rayleigh_time
 from fdnet.scales.hertz_contacts import material_of
+from fdnet.scales.overlaps import LARGEST_CHAIN
 from fdnet.scales.quantity import Quantity, row
 from fdnet.scales.restitution import LEAST
 from fdnet.scales.scales import InvasionScales, Scales
@@ -37,7 +38,7 @@ def contact_rows(case: Case, scales: Scales) -> list[Quantity]:
 def overlap_rows(case: Case, scales: InvasionScales) -> list[Quantity]:
     """How deep impact and drag press a fine into a grain."""
     hertz = case.contact.model == "hertz"
-    return [
+    rows = [
         row(
             "impact overlap over diameter",
             "delta/d",
@@ -55,6 +56,18 @@ def overlap_rows(case: Case, scales: InvasionScales) -> list[Quantity]:
             "Hertz 1882" if hertz else "linear spring",
         ),
     ]
+    if case.drag.field == "network":
+        rows.append(
+            row(
+                "overlap in the deposit over diameter",
+                "delta/d",
+                scales.deposit_overlap,
+                "-",
+                f"as by drag, F = {LARGEST_CHAIN:g} dp pi D^2 / 4, D of a throat",
+                "measured, docs/how-to",
+            )
+        )
+    return rows
 
 
 def _hooke_rows(contact: Contact) -> list[Quantity]:

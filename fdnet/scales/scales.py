@@ -17,7 +17,7 @@ from fdnet.scales.forces.push import Push, push_of
 from fdnet.scales.forces.throat import throat_width
 from fdnet.scales.forces.warnings import reynolds_warnings, throat_warnings
 from fdnet.scales.grain_pack import pack_step, target_porosity
-from fdnet.scales.overlaps import overlap_warnings, overlaps_of
+from fdnet.scales.overlaps import deposit_force, overlap_warnings, overlaps_of
 from fdnet.scales.sizes import size_warnings
 from fdnet.scales.slab import slab_of, slab_warnings
 from fdnet.scales.springs import Contact
@@ -31,7 +31,7 @@ from fdnet.scales.time_step import (
     relaxation_time,
     time_step,
 )
-from fdnet.scales.velocity import Velocity, velocity_of, velocity_warnings
+from fdnet.scales.velocity import Velocity, driving_pressure, velocity_of, velocity_warnings
 
 MOST_STEPS = 2**31 - 1
 """LIGGGHTS counts the steps of a run in 32 bits."""
@@ -97,6 +97,8 @@ class InvasionScales(Scales):
         impact_overlap: predicted overlap by impact, over the diameter of the largest fine.
         drag_overlap: predicted overlap by drag and pressure gradient, over the diameter of the
             largest fine.
+        deposit_overlap: where the flow follows the deposit, predicted overlap of fines that hold
+            the whole pressure, over the diameter of the largest one; else 0.
         sticking: how far a fine may lock between two grains.
     """
 
@@ -121,6 +123,7 @@ class InvasionScales(Scales):
     throat_ratio: float
     impact_overlap: float
     drag_overlap: float
+    deposit_overlap: float
     sticking: Sticking
 
 
@@ -179,7 +182,9 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     unit = hold * coefficient_steps(case, step, shortest)
     chunk_steps = chunk_refreshes(case, times.chunk, step * unit) * unit
     contact = shared.contacts["grain-fine"]
-    overlaps = overlaps_of(case, contact, push, shared.porosity)
+    pressure = drive.factor * driving_pressure(case, shared.pressure_gradient)
+    plug = deposit_force(case, pressure, throat_width(shared.porosity, shared.permeability))
+    overlaps = overlaps_of(case, contact, push, shared.porosity, deposit=plug)
     sticking = sticking_of(case, contact, push, step)
     _refuse_long_chunk(step, chunk_steps)
     warnings = [
@@ -218,6 +223,7 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
         throat_ratio=_throat_ratio(case, shared),
         impact_overlap=overlaps.impact,
         drag_overlap=overlaps.drag,
+        deposit_overlap=overlaps.deposit,
         sticking=sticking,
     )
 

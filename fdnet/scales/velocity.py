@@ -54,6 +54,15 @@ def velocity_of(case: Case, porosity: float) -> Velocity:
     )
 
 
+def driving_pressure(case: Case, gradient: float) -> float:
+    """Pressure, Pa, that drives the fluid: over its whole way, or over the specimen alone.
+
+    The latter is the `gradient`, Pa/m, times the length, where the case gives a velocity.
+    """
+    given = case.fluid.velocity_m_s
+    return case.fluid.overbalance_Pa if given is None else gradient * case.size_m[0]
+
+
 def path_of(case: Case) -> Path:
     """The way on which the case's overbalance is lost: around the well, or along a plug."""
     if case.well is not None:

@@ -43,8 +43,6 @@ def fill_pieces(
 ) -> None:
     """Add up the pieces of balls inside tetrahedra.
 
-    Pieces below 1e-13 cubes of the radius are rounding and left out.
-
     Args:
         corner: (P, 4, 3) m, corners of the tetrahedra.
         pairs: index of the tetrahedron and of the ball (K,), which may be apart.
@@ -52,9 +50,27 @@ def fill_pieces(
         filled: (P, 2 + W), to which the volume m3 of the pieces, their surface m2 and the volume
             times each value are added.
     """
-    pore, ball = pairs
     centre, radius, value = balls
+    piece = pieces(corner, pairs, centre, radius)
+    for k in range(len(piece)):
+        if piece[k, 0] > 0.0:
+            p, b = pairs[0][k], pairs[1][k]
+            filled[p, 0] += piece[k, 0]
+            filled[p, 1] += piece[k, 1]
+            for w in range(value.shape[1]):
+                filled[p, 2 + w] += piece[k, 0] * value[b, w]
+
+
+@compiled
+def pieces(corner: Array, pairs: tuple[Array, Array], centre: Array, radius: Array) -> Array:
+    """Volume m3 and surface m2 (K, 2) of the piece of a ball in a tetrahedron, pair by pair.
+
+    Both are 0 where the two are apart. Pieces below 1e-13 cubes of the radius are rounding and
+    left out. The arguments are those of `fill_pieces`.
+    """
+    pore, ball = pairs
     normal, place, depth = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(4)
+    found = np.zeros((len(pore), 2))
     last = -1
     for k in range(len(pore)):
         p, b = pore[k], ball[k]
@@ -72,10 +88,8 @@ def fill_pieces(
                 place[c, axis] = (corner[p, c, axis] - centre[b, axis]) / radius[b]
         inside, area = _piece(place, normal, depth, cuts)
         if inside > ROUNDING:
-            filled[p, 0] += inside * radius[b] ** 3
-            filled[p, 1] += area * radius[b] ** 2
-            for w in range(value.shape[1]):
-                filled[p, 2 + w] += inside * radius[b] ** 3 * value[b, w]
+            found[k, 0], found[k, 1] = inside * radius[b] ** 3, area * radius[b] ** 2
+    return found
 
 
 @compiled

@@ -38,11 +38,20 @@ def deposit_in_pores(network: Network, fines: Snapshot) -> tuple[Array, Array, A
         axis=1,
     )
     inside = _filled(network, network.pore_corner, fines, value)
-    volume, surface, *sums = (inside / network.pore_share[:, None]).T
-    held, *sums = (
-        np.bincount(network.pore_group, one)[network.pore_group] for one in (volume, *sums)
+    return means_in_pores(network, (inside / network.pore_share[:, None]).T)
+
+
+def means_in_pores(network: Network, sums: Array) -> tuple[Array, Array, Array, Array]:
+    """What `deposit_in_pores` returns, of the sums (5, P) over the fines in each pore.
+
+    They are the volume and the surface; then volume times that of the whole fine, times its
+    distance y from the nearest grain, times 5 y^2 + r^2.
+    """
+    volume, surface, *others = sums
+    held, *others = (
+        np.bincount(network.pore_group, one)[network.pore_group] for one in (volume, *others)
     )
-    whole, mean, square = (total / np.where(held > 0, held, 1.0) for total in sums)
+    whole, mean, square = (total / np.where(held > 0, held, 1.0) for total in others)
     return volume, surface, whole, mean + np.sqrt(np.maximum(square - 5.0 * mean**2, 0.0))
 
 

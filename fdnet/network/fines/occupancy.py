@@ -110,7 +110,7 @@ def measure_occupancy(
         raise CaseError(
             f"analysis.throat_overlap: {overlap!r} is not known; choose one of {sorted(OVERLAPS)}"
         )
-    _refuse_wide(network, fines)
+    refuse_wide(network, fines)
     inside = centred_inside(network, fines.position)
     throats = fines_in_throats(network, fines, overlap)
     reaching = fines.where(reaching_inside(network, fines))
@@ -128,15 +128,36 @@ def measure_deposit(network: Network, fines: Snapshot) -> Occupancy:
 
     The fields by throat say "no fines", and there are no pairs: enough for the law `side-kozeny`.
     """
-    _refuse_wide(network, fines)
-    none = fines.where(np.zeros(len(fines), bool))
-    fields = _throat_fields(network, fines_in_throats(network, none, "exact"))
-    fields |= _pore_fields(network, fines.where(reaching_inside(network, fines)))
-    counts = {"pore_porosity_negative": _overfilled(network, fields["pore_solid_volume"])}
+    refuse_wide(network, fines)
+    reaching = fines.where(reaching_inside(network, fines))
+    return occupancy_of_deposit(
+        network, deposit_in_pores(network, reaching), deposit_on_sides(network, reaching)
+    )
+
+
+def occupancy_of_deposit(
+    network: Network, pores: tuple[Array, ...], sides: tuple[Array, Array]
+) -> Occupancy:
+    """The occupancy of a deposit with the values of `deposit_in_pores` and `deposit_on_sides`."""
+    throats = len(network.throat_radius)
+    zero, none = np.zeros(throats), np.zeros(0)
+    fields = _fields_of_deposit(network, pores, sides) | {
+        "throat_solid_volume": zero,
+        "throat_porosity": np.ones(throats),
+        "throat_fine_radius": zero,
+        "throat_fines": np.zeros(throats, int),
+        "blocked": np.zeros(throats, bool),
+        "pair_throat": np.zeros(0, int),
+        "pair_fine": np.zeros(0, int),
+        "pair_distance": none,
+        "pair_radius": none,
+        "pair_volume": none,
+    }
+    counts = {"pore_porosity_negative": _overfilled(network, pores[0])}
     return Occupancy(counts=counts, **{name: frozen(value) for name, value in fields.items()})
 
 
-def _refuse_wide(network: Network, fines: Snapshot) -> None:
+def refuse_wide(network: Network, fines: Snapshot) -> None:
     """Raise NetworkError on fines that would meet their own image across a periodic side."""
     side = np.where(network.periodic, np.ptp(network.box, axis=1), np.inf)
     wide = np.flatnonzero(2.0 * fines.radius > side.min())
@@ -171,16 +192,23 @@ def _throat_fields(network: Network, throats: FinesInThroats) -> dict[str, Array
 
 def _pore_fields(network: Network, reaching: Snapshot) -> dict[str, Array]:
     """The fields by pore and by side of a throat, from the fines that reach into the box."""
-    solid, surface, fine_volume, layer = deposit_in_pores(network, reaching)
-    side_solid, side_surface = deposit_on_sides(network, reaching)
+    return _fields_of_deposit(
+        network, deposit_in_pores(network, reaching), deposit_on_sides(network, reaching)
+    )
+
+
+def _fields_of_deposit(
+    network: Network, pores: tuple[Array, ...], sides: tuple[Array, Array]
+) -> dict[str, Array]:
+    solid, surface, fine_volume, layer = pores
     return {
         "pore_solid_volume": solid,
         "pore_solid_surface": surface,
         "pore_porosity": ratio(network.pore_volume - solid, network.pore_tetra_volume),
         "pore_fine_volume": fine_volume,
         "pore_layer": layer,
-        "side_solid_volume": side_solid,
-        "side_solid_surface": side_surface,
+        "side_solid_volume": sides[0],
+        "side_solid_surface": sides[1],
     }
 
 

@@ -37,6 +37,43 @@ def kozeny_damage(network: Network, occupancy: Occupancy, clean: Array) -> Damag
     )
 
 
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Sides:
+    """What the sides of the clean throats (T) are, which no fine changes.
+
+    Attributes:
+        void: (T, 2) m3, of the side, or of the throat where that has one side only.
+        wall: (T, 2) m2, grain surface likewise.
+        single: (T,) whether both power centres lie on one side of the facet.
+        own: (T, 2) whether the side can be taken by itself.
+        resistance: (T, 2) 1/m3, from the facet to the power centre; 0 where it is infinite.
+        tube: m, twice the hydraulic radius of the pack.
+    """
+
+    void: Array
+    wall: Array
+    single: Array
+    own: Array
+    resistance: Array
+    tube: float
+
+
+def sides_of(network: Network, *, halves: Array | None = None) -> Sides:
+    """The sides of the throats; `halves` are their resistances (T, 2) where they are known."""
+    single = np.any(network.throat_heights <= 0, axis=1)
+    void, wall = (_joined(network, part, single) for part in side_voids(network))
+    clean = half_resistances(network) if halves is None else halves
+    cut = _on_pressure_plane(network)[network.throat_pores]
+    return Sides(
+        void=frozen(void),
+        wall=frozen(wall),
+        single=frozen(single),
+        own=frozen((void > 0) & (wall > 0) & ~cut),
+        resistance=frozen(np.where(np.isfinite(clean), clean, 0.0)),
+        tube=2.0 * _hydraulic_radius(network),
+    )
+
+
 def side_kozeny_damage(
     network: Network, occupancy: Occupancy, clean: Array, *, halves: Array | None = None
 ) -> Damage:
@@ -63,45 +100,60 @@ def side_kozeny_damage(
     A side or pore that its fines fill (v >= 1) is closed and counted. `halves` are the clean
     resistances (T, 2) of the sides where they are known already.
     """
-    pore = _pore_deposit(network, occupancy)
-    ends = network.throat_pores
-    volume, surface = _on_sides(network, occupancy, pore)
-    share = 1.0 - (1.0 - np.clip(pore.layer / (2.0 * _hydraulic_radius(network)), 0.0, 1.0)) ** 2
+    sides = sides_of(network, halves=halves)
+    factor, volume, counts = _side_factors(network, occupancy, sides)
+    kept = _kept(sides.resistance, factor)
+    law = _law_used(np.any(volume > 0, axis=1), kept)
+    return Damage(conductance=frozen(clean * kept), law_used=law, counts=counts)
+
+
+def side_factors(network: Network, occupancy: Occupancy, sides: Sides) -> Array:
+    """Factor (T, 2) on the conductance of each side, 0 where closed; see `side_kozeny_damage`."""
+    return _side_factors(network, occupancy, sides)[0]
+
+
+def _side_factors(
+    network: Network, occupancy: Occupancy, sides: Sides
+) -> tuple[Array, Array, dict[str, int]]:
+    """The factors (T, 2), the relative volume of the fines (T, 2), and what is counted."""
+    pore, ends = _pore_deposit(network, occupancy), network.throat_pores
+    volume, surface = _on_sides(network, occupancy, pore, sides)
+    share = 1.0 - (1.0 - np.clip(pore.layer / sides.tube, 0.0, 1.0)) ** 2
     filled = (volume >= 1.0) | pore.filled[ends]
     factor = np.where(filled, 0.0, _kozeny(np.minimum(volume, 1.0), surface, share[ends]))
-    kept = _kept(half_resistances(network) if halves is None else halves, factor)
     counts = {
         "pores_filled": int(pore.filled.sum()),
         "sides_filled": int(filled.sum()),
         "layers_within_grains": int(np.sum(pore.layer < 0)),
     }
-    law = _law_used(np.any(volume > 0, axis=1), kept)
-    return Damage(conductance=frozen(clean * kept), law_used=law, counts=counts)
+    return factor, volume, counts
 
 
-def _on_sides(network: Network, occupancy: Occupancy, pore: "_PoreDeposit") -> tuple[Array, Array]:
+def _joined(network: Network, part: Array, single: Array) -> Array:
+    """Values (T, 2) of the sides; of the throat where it has one, of the face where it is split.
+
+    A throat with both power centres on one side of its facet has one side, the difference of the
+    two pyramids. The triangles into which a face between two polyhedra is split are one.
+    """
+    part = over_faces(network, part)
+    return np.where(single[:, None], part.sum(axis=1, keepdims=True), part)
+
+
+def _on_sides(
+    network: Network, occupancy: Occupancy, pore: "_PoreDeposit", sides: Sides
+) -> tuple[Array, Array]:
     """Volume and surface (T, 2) of the fines over void and grain surface, as the sides see them.
 
-    They are weighted means of the side's own values and of those of its pore. A throat with both
-    power centres on one side of its facet has one side, the difference of the two pyramids. The
-    triangles into which a face between two polyhedra is split are taken together.
+    They are weighted means of the side's own values and of those of its pore.
     """
-    void, wall = side_voids(network)
-    single = np.any(network.throat_heights <= 0, axis=1)
-    void, wall, solid, area = (
-        np.where(single[:, None], part.sum(axis=1, keepdims=True), part)
-        for part in (
-            over_faces(network, sides)
-            for sides in (void, wall, occupancy.side_solid_volume, occupancy.side_solid_surface)
-        )
-    )
-    ends = network.throat_pores
-    some = solid >= -ROUNDING * np.abs(void)
-    own = (void > 0) & (wall > 0) & some & ~_on_pressure_plane(network)[ends]
+    solid = _joined(network, occupancy.side_solid_volume, sides.single)
+    area = _joined(network, occupancy.side_solid_surface, sides.single)
+    ends, own = network.throat_pores, sides.own & (solid >= -ROUNDING * np.abs(sides.void))
     weight = np.where(own, 1.0 / (1.0 + (4.0 * ratio(pore.fine, pore.void)[ends]) ** 2), 0.0)
-    volume = weight * ratio(solid, np.where(own, void, 0.0)) + (1.0 - weight) * pore.volume[ends]
-    surface = weight * ratio(area, np.where(own, wall, 0.0)) + (1.0 - weight) * pore.surface[ends]
-    return volume, surface
+    volume = weight * ratio(solid, np.where(own, sides.void, 0.0))
+    surface = weight * ratio(area, np.where(own, sides.wall, 0.0))
+    rest = 1.0 - weight
+    return volume + rest * pore.volume[ends], surface + rest * pore.surface[ends]
 
 
 def _on_pressure_plane(network: Network) -> Array:
@@ -190,7 +242,6 @@ def _kept(resistance: Array, factor: Array) -> Array:
 
     Each resistance is divided by its factor (T, 2).
     """
-    resistance = np.where(np.isfinite(resistance), resistance, 0.0)
     shut = np.any((factor == 0) & (resistance > 0), axis=1)
     raised = np.sum(resistance / np.where(factor > 0, factor, 1.0), axis=1)
     return np.where(shut, 0.0, ratio(resistance.sum(axis=1), raised))

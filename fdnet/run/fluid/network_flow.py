@@ -15,12 +15,13 @@ from fdnet.case.names import DEFAULT_LAW
 from fdnet.network.field.field import VelocityField
 from fdnet.network.field.of_pack import velocity_field
 from fdnet.network.fines.fine_images import reaching_inside
-from fdnet.network.fines.occupancy import measure_deposit
+from fdnet.network.fines.kept_deposit import Holders, KeptDeposit, holders_of, measured_deposit
+from fdnet.network.fines.occupancy import Occupancy, ratio
 from fdnet.network.flow.flow import Flow, solve_flow
-from fdnet.network.laws.kozeny_damage import side_kozeny_damage
-from fdnet.network.laws.lubrication import half_resistances
+from fdnet.network.laws.kozeny_damage import Sides, side_factors, sides_of
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import Network, build_network
+from fdnet.run.fluid.pressed import Facets, Pressed, facets_of, pressed_by
 from fdnet.spheres.images import neighbour_tree, wrapped
 from fdnet.spheres.snapshot import Array, Snapshot
 
@@ -28,6 +29,13 @@ STAGNANT = 1e-2
 """A pore that carries less than this share of the mean flux of a pore, clean, keeps ratio 1."""
 RENEWED = 0.02
 """Share of the deposit by volume that may change before the network is solved anew."""
+MOVED = 0.01
+"""Way in radii within which a fine is taken to be where it was."""
+LEAK = 1e-6
+"""Share of its clean conductance that a side keeps at least, so that pressures are known beyond
+what the fines close."""
+CELLS = 10.0
+"""Cells of the resolved field across a grain (`fdnet study velocity-field`)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -36,14 +44,15 @@ class Carried:
 
     Attributes:
         k_over_k0: permeability over that of the intact pack.
-        ratio: (P,) flux over that of the intact pack at the same rate through the specimen; 0
-            where no path is open.
+        ratio: (P,) flux over that of the intact pack at the same rate through the specimen.
         stagnant: number of pores that carry next to nothing when clean; their ratio is 1.
+        pressed: forces of the fluid on grains and fines over the drop of pressure.
     """
 
     k_over_k0: float
     ratio: Array
     stagnant: int
+    pressed: Pressed
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -53,7 +62,9 @@ class PackFlow:
     Attributes:
         network: pores and throats of the grains.
         clean: (T,) m3, conductances.
-        halves: (T, 2) 1/m3, resistances of the sides of the clean throats.
+        sides: of the clean throats, with their resistances.
+        facets: of the throats.
+        holders: pores and sides, which hold the deposit.
         flow: through the clean network.
         through: (P,) share of the inflow that each pore carries.
         shape: resolved velocity field of the grains.
@@ -62,7 +73,9 @@ class PackFlow:
 
     network: Network
     clean: Array
-    halves: Array
+    sides: Sides
+    facets: Facets
+    holders: Holders
     flow: Flow
     through: Array
     shape: VelocityField
@@ -83,19 +96,20 @@ class PackFlow:
         """The network's resistance over that of the coarse resolved field."""
         return self.length / self.permeability / self.shape.resistance
 
-    def carried(self, fines: Snapshot) -> Carried:
-        """What the pores carry with `fines` among the grains."""
-        occupancy = measure_deposit(self.network, fines)
-        damaged = side_kozeny_damage(self.network, occupancy, self.clean, halves=self.halves)
-        flow = solve_flow(self.network, damaged.conductance)
+    def carried(self, occupancy: Occupancy) -> Carried:
+        """What the pores carry with the fines of an `occupancy` among the grains."""
+        factor = np.maximum(side_factors(self.network, occupancy, self.sides), LEAK)
+        raised = np.sum(self.sides.resistance / factor, axis=1)
+        left = ratio(self.sides.resistance.sum(axis=1), raised)
+        flow = solve_flow(self.network, self.clean * left)
         usual = STAGNANT * float(np.mean(self.through))
         moving = self.through > usual
         share = pore_through(self.network, flow)
-        ratio = np.divide(share, self.through, out=np.ones_like(share), where=moving)
         return Carried(
             k_over_k0=flow.inflow / self.flow.inflow,
-            ratio=ratio if flow.inflow > 0 else np.zeros_like(share),
+            ratio=np.divide(share, self.through, out=np.ones_like(share), where=moving),
             stagnant=int(np.sum(~moving)),
+            pressed=pressed_by(self.network, self.facets, self.sides, factor, flow),
         )
 
     def pore_of(self, position: Array) -> Array:
@@ -104,21 +118,6 @@ class PackFlow:
         place = wrapped(position, box, periodic) - box[:, 0]
         size = np.ptp(box, axis=1)
         return self.tree.query(np.where(periodic & (place >= size), 0.0, place))[1]
-
-    def grain_force(self, carried: Carried) -> float:
-        """Force of the fluid on the grains along x over mu U, m: intact, times the ratios.
-
-        It is that of the network's resistance, each grain with the mean ratio of its pores by
-        their volume.
-        """
-        network = self.network
-        grain = network.image_grain[network.pore_images]
-        volume = np.repeat(np.maximum(network.pore_volume, 0.0)[:, None], 4, axis=1)
-        count = len(self.shape.grain_force)
-        weight = np.bincount(grain.ravel(), volume.ravel(), count)
-        summed = np.bincount(grain.ravel(), (volume * carried.ratio[:, None]).ravel(), count)
-        mean = np.divide(summed, weight, out=np.ones(count), where=weight > 0)
-        return self.scale * float(self.shape.grain_force[:, 0] @ mean)
 
 
 def pack_flow(grains: Snapshot, periodic: tuple[bool, bool, bool], walls: str) -> PackFlow:
@@ -129,10 +128,12 @@ def pack_flow(grains: Snapshot, periodic: tuple[bool, bool, bool], walls: str) -
     return PackFlow(
         network=network,
         clean=clean,
-        halves=half_resistances(network),
+        sides=sides_of(network),
+        facets=facets_of(network),
+        holders=holders_of(network),
         flow=flow,
         through=pore_through(network, flow),
-        shape=velocity_field(grains, periodic=periodic),
+        shape=velocity_field(grains, periodic=periodic, cells=CELLS),
         tree=neighbour_tree(network.pore_position, network.box, periodic=periodic),
     )
 
@@ -156,28 +157,35 @@ def pore_through(network: Network, flow: Flow) -> Array:
 
 @dataclass(slots=True, eq=False)
 class Renewal:
-    """What a damaged pack carries, solved anew when enough of its deposit has changed.
+    """What a damaged pack carries: its deposit followed, its network solved when enough changed.
 
     Attributes:
         pack: the intact pack.
-        deposit: the fines of the last solve; None before the first.
-        carried: what it gave.
+        renewed: share of the deposit that may change before the network is solved anew.
+        solved: the fines of the last solve; None before the first.
+        deposit: the fines as they were measured last.
+        carried: what the last solve gave.
         solves: number of solves.
     """
 
     pack: PackFlow
-    deposit: Snapshot | None = None
+    renewed: float = RENEWED
+    solved: Snapshot | None = None
+    deposit: KeptDeposit | None = None
     carried: Carried | None = None
     solves: int = 0
 
-    def of(self, fines: Snapshot, *, anew: bool) -> Carried:
-        """What the pores carry with standing `fines`; solved in any case where `anew` asks."""
+    def of(self, fines: Snapshot, *, anew: bool) -> tuple[Carried, KeptDeposit]:
+        """What the pores carry with standing `fines`; all is done anew where `anew` asks."""
         inside = fines.where(reaching_inside(self.pack.network, fines))
-        known = self.carried if self.deposit is not None and not anew else None
-        if known is None or changed_share(self.deposit, inside) > RENEWED:
-            known = self.pack.carried(inside)
-            self.deposit, self.carried, self.solves = inside, known, self.solves + 1
-        return known
+        if anew or self.deposit is None:
+            self.deposit, self.carried = measured_deposit(self.pack.holders, inside), None
+        else:
+            self.deposit = self.deposit.changed_to(inside, tolerance=MOVED)
+        if self.carried is None or changed_share(self.solved, inside) > self.renewed:
+            self.carried = self.pack.carried(self.deposit.occupancy)
+            self.solved, self.solves = inside, self.solves + 1
+        return self.carried, self.deposit
 
 
 def changed_share(former: Snapshot | None, fines: Snapshot) -> float:

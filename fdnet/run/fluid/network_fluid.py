@@ -1,9 +1,10 @@
 """The fluid of `drag.field` = "network": it follows the deposit, and the deposit follows it.
 
-The force on a fine is that of the uniform field (`uniform`) with local values: u is the volume of
-suspension that passes a unit area of pores at its place (`network_flow`), G the fall of pressure
-that this flow causes in the grains alone. What the fines add to the fall of pressure is in the
-drag of the crowd. Upstream of the face the mud moves at the rate over the cross-section.
+The force on a fine that moves is that of the uniform field (`uniform`) with local values: u is the
+volume of suspension that passes a unit area of pores at its place (`network_flow`), G the fall of
+pressure that this flow causes in the grains alone. A fine that stands in the pack feels what the
+network's pressure does there (`pressed`), and G. Upstream of the face the mud moves at the rate
+over the cross-section, and fines that stand there feel the drag of the crowd.
 
 The rate U follows from the resistances in series: the pack with its deposit (network), the cake
 (the drag on the fines that stand upstream) and the rest of the way on which the overbalance is
@@ -18,7 +19,17 @@ import numpy as np
 from fdnet.case.case import InvasionCase
 from fdnet.dem.fluid import FluidForces, Moment
 from fdnet.network.fines.crowding import Neighbourhood, local_porosity
-from fdnet.run.fluid.network_flow import Carried, PackFlow, Renewal, pack_flow
+from fdnet.run.fluid.fine_forces import Deposit, FineForces, forces_on
+from fdnet.run.fluid.network_flow import (
+    MOVED,
+    RENEWED,
+    Carried,
+    PackFlow,
+    Renewal,
+    pack_flow,
+)
+from fdnet.run.fluid.pressed import on_each_fine
+from fdnet.run.fluid.sampled_places import Sampled, nowhere
 from fdnet.run.fluid.uniform import crowd_factor
 from fdnet.run.history import FLOW_COLUMNS
 from fdnet.scales.scales import InvasionScales
@@ -29,29 +40,18 @@ STANDING = 0.5
 """A fine belongs to the deposit when it moves slower than this share of the intact pack's flow."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Balance:
-    """Momentum of the fluid in the pack along x, N.
+@dataclass(slots=True, eq=False)
+class Kept:
+    """What is kept from one update to the next: the damaged pack, and the flow at the fines."""
 
-    Attributes:
-        whole: drop of pressure times area, which the forces on grains and fines must add up to.
-        grains: force on the grains.
-    """
+    renewal: Renewal
+    places: Sampled
 
-    whole: float
-    grains: float
-
-    def throat_factor(self, held: float, others: float) -> float:
-        """Factor on the drag `held` of the deposit that closes the balance; `others` are known.
-
-        At least 1: a fine that stands in a throat takes up more than one in a wide crowd (5 times
-        at half the width of a tube, Haberman and Sayre 1958), and the network says how much.
-        """
-        return max(1.0, (self.whole - others) / held) if held > 0 else 1.0
-
-    def defect(self, force: float) -> float:
-        """|forces - drop times area| over drop times area; 0 without a drop."""
-        return abs(force - self.whole) / self.whole if self.whole > 0 else 0.0
+    def sampled(self, fines: Snapshot, pack: PackFlow, *, anew: bool) -> Sampled:
+        """The intact pack's flow at the fines; taken anew at all of them where `anew` asks."""
+        former = nowhere() if anew else self.places
+        self.places = former.at(fines, pack.shape, tolerance=MOVED)
+        return self.places
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -62,11 +62,15 @@ class NetworkFluid:
         case: what is run.
         scales: of the case.
         grains: of the pack, fixed.
+        standing: share of the intact pack's flow below which a fine belongs to the deposit.
+        renewed: share of the deposit that may change before the network is solved anew.
     """
 
     case: InvasionCase
     scales: InvasionScales
     grains: Snapshot
+    standing: float = STANDING
+    renewed: float = RENEWED
 
     @property
     def measured(self) -> tuple[str, ...]:
@@ -79,6 +83,10 @@ class NetworkFluid:
             "porosity_least",
             "porosity_capped",
             "pores_stagnant",
+            "fines_standing",
+            "fines_measured",
+            "fines_share",
+            "crowd_over_network",
         )
 
     @cached_property
@@ -87,8 +95,8 @@ class NetworkFluid:
         return pack_flow(self.grains, self.case.periodic, self.case.analysis.walls)
 
     @cached_property
-    def _renewal(self) -> Renewal:
-        return Renewal(self.pack)
+    def _kept(self) -> Kept:
+        return Kept(Renewal(self.pack, renewed=self.renewed), nowhere())
 
     @property
     def first_velocity(self) -> float:
@@ -113,38 +121,74 @@ class NetworkFluid:
         fines, pack = spheres.fines(), self.pack
         depth = fines.position[:, 0]
         within = (depth >= 0) & (depth < pack.length)
-        shape = pack.shape.at(fines.position)
+        place = self._kept.sampled(fines, pack, anew=moment.fresh)
         before = self.first_velocity if moment.before is None else moment.before["velocity_m_s"]
-        standing = _speed(fines.velocity) < STANDING * before * _speed(shape)
-        carried = self._renewal.of(fines.where(standing), anew=moment.fresh)
+        standing = _speed(fines.velocity) < self.standing * before * _speed(place.velocity)
+        carried, deposit = self._kept.renewal.of(fines.where(standing), anew=moment.fresh)
         near = local_porosity(spheres, self.case.periodic)
-        share = np.where(within, carried.ratio[pack.pore_of(fines.position)], 1.0)
-        shape = shape * share[:, None]
-        held, caked = standing & within, standing & (depth < 0)
+        share = np.ones(len(fines))
+        share[within] = carried.ratio[pack.pore_of(fines.position[within])]
+        shape = place.velocity * share[:, None]
+        caked = standing & (depth < 0)
         factor = self._factor(near, fines, before * shape)
-        coefficient = self.scales.push.coefficient * fines.radius * factor
-        cake = float(coefficient[caked] @ shape[caked, 0]) / pack.network.area
-        speed = self._velocity(carried, cake)
-        push = self._push(fines, speed * np.where(within, share, 0.0))
-        drag = coefficient * (speed * shape - fines.velocity)[:, 0]
-        balance = self._balance(carried, speed)
-        others = float(push[within, 0].sum() + drag[within & ~held].sum()) + balance.grains
-        narrow = balance.throat_factor(float(drag[held].sum()), others)
+        crowd = self.scales.push.coefficient * fines.radius * factor
+        pressed = np.zeros((len(fines), 3))
+        pressed[_rows(fines, deposit.fines)] = on_each_fine(carried.pressed, deposit)
+        held = standing & within & np.any(pressed != 0.0, axis=1)
+        area = pack.network.area
+        cake = float(crowd[caked] @ shape[caked, 0]) / area
+        slip = before * shape[:, 0] - fines.velocity[:, 0]
+        loose = float(crowd @ np.where(within & ~held, slip, 0.0)) / (area * before)
+        speed = self._velocity(carried, cake + loose)
+        drop = self._drop(carried, speed)
+        made = forces_on(
+            fines,
+            Deposit(held=held, pressed=drop * pressed),
+            crowd=crowd,
+            lone=self.scales.push.coefficient * fines.radius,
+            carried=speed * shape,
+            intact=speed * place.velocity,
+            push=self._push(fines, place.gradient, speed * np.where(within, share, 0.0)),
+            pace=speed,
+        )
         return FluidForces(
-            coefficient=np.where(held, narrow * coefficient, coefficient),
-            velocity=speed * shape,
-            push=push,
+            coefficient=made.coefficient,
+            velocity=made.velocity,
+            push=made.push,
             pace=speed / self.scales.porosity,
-            measures=self._pressures(carried, cake, speed)
+            measures=self._pressures(carried, cake, loose, speed)
             | self._ledger(speed, moment)
             | _crowd(factor, near)
+            | self._momentum(
+                made, fines, within, drop * float(carried.pressed.grains[0]), drop + loose * speed
+            )
             | {
                 "cake_thickness_m": self._thickness(fines.radius[caked], near, caked),
-                "momentum_defect": balance.defect(narrow * float(drag[held].sum()) + others),
-                "throat_factor": narrow,
                 "pores_stagnant": carried.stagnant,
+                "fines_standing": int(np.sum(standing & within)),
+                "fines_measured": deposit.renewed,
             },
         )
+
+    def _momentum(
+        self, made: FineForces, fines: Snapshot, within: Array, grains: float, drop: float
+    ) -> dict[str, float]:
+        """By how much forces and drop of pressure `drop` Pa differ; what the crowd's law says.
+
+        The push of the intact pack's gradient is part of what the network gives to the grains.
+        """
+        drag = made.coefficient * (made.velocity - fines.velocity)[:, 0]
+        at_rest = np.where(made.held, made.coefficient * made.velocity[:, 0], drag)
+        acting = within | np.any(made.pressed != 0.0, axis=1)
+        cake = ~within & acting
+        on_fines = float(at_rest[within].sum()) + float(made.pressed[cake, 0].sum())
+        whole = drop * self.pack.network.area
+        network = float(made.pressed[made.held, 0].sum())
+        return {
+            "momentum_defect": abs(on_fines + grains - whole) / whole if whole > 0 else 0.0,
+            "fines_share": network / whole if whole > 0 else 0.0,
+            "crowd_over_network": made.crowd_drag / network if network > 0 else 0.0,
+        }
 
     def _factor(self, near: Neighbourhood, fines: Snapshot, velocity: Array) -> Array:
         if self.case.drag.crowd == "none":
@@ -153,14 +197,12 @@ class NetworkFluid:
         return crowd_factor(self.scales, near, fines.radius, slip)
 
     def _velocity(self, carried: Carried, cake: float) -> float:
-        """Superficial velocity, m/s, with a cake of `cake` Pa s/m.
+        """Superficial velocity, m/s, with a cake and moving fines of `cake` Pa s/m.
 
         At constant pressure U / U0 = (1 + rest) / (k0 / k + rest + cake k0 / (mu L)).
         """
         if self.case.drag.drive == "rate":
             return self.first_velocity
-        if carried.k_over_k0 <= 0:
-            return 0.0
         intact = self._viscosity * self.pack.length / self.pack.permeability
         resistance = 1.0 / carried.k_over_k0 + self.rest + cake / intact
         return self.first_velocity * (1.0 + self.rest) / resistance
@@ -169,35 +211,28 @@ class NetworkFluid:
     def _viscosity(self) -> float:
         return self.case.fluid.viscosity_Pa_s
 
-    def _push(self, fines: Snapshot, speed: Array) -> Array:
+    def _push(self, fines: Snapshot, gradient: Array, speed: Array) -> Array:
         """V (-grad p) of the grains, (N, 3) N, for the local `speed` (N,) m/s over the shape."""
         if not self.case.drag.pressure_gradient:
             return np.zeros((len(fines), 3))
-        gradient = self.pack.shape.pressure_gradient_at(fines.position) * self.pack.scale
         volume = 4.0 / 3.0 * np.pi * fines.radius**3
-        return -gradient * (self._viscosity * volume * speed)[:, None]
+        return -self.pack.scale * gradient * (self._viscosity * volume * speed)[:, None]
 
-    def _pressures(self, carried: Carried, cake: float, speed: float) -> dict[str, float]:
+    def _pressures(
+        self, carried: Carried, cake: float, loose: float, speed: float
+    ) -> dict[str, float]:
         """Drops of pressure of the fluid itself, Pa, and the permeability."""
         factor = self.scales.force_factor
         return {
             "k_over_k0": carried.k_over_k0,
             "pressure_cake_Pa": cake * speed / factor,
-            "pressure_pack_Pa": self._drop(carried, speed) / factor,
+            "pressure_pack_Pa": (self._drop(carried, speed) + loose * speed) / factor,
         }
 
     def _drop(self, carried: Carried, speed: float) -> float:
-        """Drop of pressure over the pack as simulated, Pa."""
-        if carried.k_over_k0 <= 0:
-            return 0.0
+        """Drop of pressure over the pack with its deposit as simulated, Pa."""
         intact = self._viscosity * speed * self.pack.length / self.pack.permeability
         return intact / carried.k_over_k0
-
-    def _balance(self, carried: Carried, speed: float) -> Balance:
-        return Balance(
-            whole=self._drop(carried, speed) * self.pack.network.area,
-            grains=self._viscosity * speed * self.pack.grain_force(carried),
-        )
 
     def _ledger(self, speed: float, moment: Moment) -> dict[str, float]:
         """Rate and filtrate of the fluid itself, which is slower than a driven one."""
@@ -220,6 +255,12 @@ class NetworkFluid:
         solid = float(np.sum(4.0 / 3.0 * np.pi * radius**3))
         dense = float(np.mean(1.0 - near.porosity[standing]))
         return solid / (self.pack.network.area * dense) if dense > 0 else 0.0
+
+
+def _rows(fines: Snapshot, some: Snapshot) -> Array:
+    """Where in `fines` each of `some` of them is, by their ids."""
+    order = np.argsort(fines.id)
+    return order[np.searchsorted(fines.id[order], some.id)]
 
 
 def _speed(velocity: Array) -> Array:

@@ -1,0 +1,45 @@
+"""The intact pack's flow at the fines, taken again only where they moved."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fdnet.network.field.field import VelocityField
+from fdnet.spheres.snapshot import Array, Snapshot
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Sampled:
+    """What the intact pack's flow is at N fines.
+
+    Attributes:
+        id: (N,) of the fines.
+        position: (N, 3) m, where it was taken.
+        velocity: (N, 3) over the superficial velocity.
+        gradient: (N, 3) 1/m2, of the pressure over mu U.
+    """
+
+    id: Array
+    position: Array
+    velocity: Array
+    gradient: Array
+
+    def at(self, fines: Snapshot, shape: VelocityField, *, tolerance: float) -> "Sampled":
+        """The same at other `fines`, those within `tolerance` radii of their place as before."""
+        _, new, old = np.intersect1d(fines.id, self.id, assume_unique=True, return_indices=True)
+        way = np.linalg.norm(fines.position[new] - self.position[old], axis=1)
+        same = way <= tolerance * fines.radius[new]
+        new, old = new[same], old[same]
+        moved = np.setdiff1d(np.arange(len(fines)), new, assume_unique=True)
+        position, velocity, gradient = (np.empty((len(fines), 3)) for _ in range(3))
+        position[new], position[moved] = self.position[old], fines.position[moved]
+        velocity[new], velocity[moved] = self.velocity[old], shape.at(fines.position[moved])
+        gradient[new] = self.gradient[old]
+        gradient[moved] = shape.pressure_gradient_at(fines.position[moved])
+        return Sampled(id=fines.id, position=position, velocity=velocity, gradient=gradient)
+
+
+def nowhere() -> Sampled:
+    """No fine yet."""
+    none = np.zeros((0, 3))
+    return Sampled(id=np.zeros(0, int), position=none, velocity=none, gradient=none)
