@@ -4,7 +4,7 @@
     .venv/bin/python scripts/coupling.py cases/quick/specimen5.toml --csv coupling.csv
 
 Every fluid and seed is a run in its own folder below --out; finished ones are read, so the command
-can be repeated.
+can be repeated. CPU seconds are known of runs that this call makes.
 """
 
 import argparse

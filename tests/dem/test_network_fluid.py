@@ -318,6 +318,23 @@ def test_a_rate_below_the_asked_share_ends_the_run(binary, fluid, done, tmp_path
     assert result.updates == done.updates[: len(result.updates)]
 
 
+def test_a_slab_at_constant_rate_raises_the_pressure(binary, fluid, tmp_path):
+    """The mud comes on as at the start, the filtrate is rate times time, and the pressure grows."""
+    other = with_case(fluid, "drag.drive=rate", "run.cap_ms=0.3")
+    result = invade(
+        other.case, other.scales, other.grains, tmp_path, Launch(binary=binary), fluid=other
+    )
+    assert other.case.fines.supply == "slab"
+    assert result.stop_reason == "cap"
+    first, last = result.updates[0], result.updates[-1]
+    assert last["velocity_m_s"] == first["velocity_m_s"] == other.first_velocity
+    assert last["filtrate_m3"] == pytest.approx(first["rate_m3_s"] * last["time_s"], rel=1e-9)
+    assert last["k_over_k0"] < 0.95
+    network = first["pressure_pack_Pa"] / last["k_over_k0"]
+    assert last["pressure_pack_Pa"] == pytest.approx(network, rel=0.05)
+    assert max(row["momentum_defect"] for row in result.updates) <= 0.01
+
+
 def test_no_warning_of_throats_where_the_balance_of_momentum_sees_them():
     assert not [text for text in scales_of(small()).warnings if "throats" in text]
     uniform = small("drag.field=uniform")

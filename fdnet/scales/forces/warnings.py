@@ -50,7 +50,7 @@ def throat_warnings(case: InvasionCase, ratio: float) -> list[str]:
     """By how much the drag of a lone sphere is too small between the walls of a throat.
 
     `ratio` is the diameter of the largest fine over that of the throats. Where the flow follows
-    the deposit the balance of momentum makes up for it (`throat_factor` of its record).
+    the deposit a fine that stands feels the pressures of the network instead.
     """
     if case.drag.field == "network":
         return []
