@@ -73,7 +73,7 @@ def overlaps_of(
 def overlap_warnings(case: InvasionCase, overlaps: Overlaps) -> list[str]:
     """Overlaps above `run.max_overlap`, in words.
 
-    Raises CaseError when drag or impact alone would press a fine half through a grain.
+    Raises CaseError when one of them alone would press a fine half through a grain.
     """
     _refuse_deep(overlaps)
     return _deposit_warnings(case, overlaps.deposit) + [
@@ -110,10 +110,11 @@ def _two_digits_up(value: float) -> float:
 
 
 def _refuse_deep(overlaps: Overlaps) -> None:
-    """Raises CaseError when drag or impact alone would press a fine half through a grain."""
+    """Raises CaseError when one of them alone would press a fine half through a grain."""
     remedies = {
         "drag": "drag.multiplier, fluid.viscosity_cP or fluid.velocity_m_s",
         "impact": "the velocity (fluid.velocity_m_s)",
+        "deposit": "the pressure (fluid.overbalance_MPa, fluid.velocity_m_s)",
     }
     for name, remedy in remedies.items():
         overlap = getattr(overlaps, name)

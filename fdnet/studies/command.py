@@ -27,7 +27,6 @@ STUDIES: Mapping[str, str] = {
     "economies": "settings that make full-scale invasions affordable: error and speed-up of each",
     "defaults": "sides, walls, upstream, step and supply: what each default changes",
     "drive-velocity": "fines at a well, driven 1 to 18 times as fast as the fluid",
-    "flow-updates": "how often a flow that follows its deposit is computed anew",
     "outside-numbers": "the invasion on the real binary against closed forms and literature",
 }
 """Name of each study and its question; the module has the same name with underscores."""

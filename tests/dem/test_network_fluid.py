@@ -1,6 +1,7 @@
 """Invasions in the field of the network: the flow follows the deposit."""
 
 import itertools
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +22,7 @@ from fdnet.run.fluid.network_fluid import NetworkFluid
 from fdnet.run.fluid.pressed import bed_section, on_each_fine
 from fdnet.run.history import history_rows
 from fdnet.scales.scales import scales_of
+from fdnet.scales.table import scale_rows
 from fdnet.spheres.snapshot import Kind, Snapshot
 
 pytestmark = pytest.mark.liggghts
@@ -319,7 +321,7 @@ def test_a_rate_below_the_asked_share_ends_the_run(binary, fluid, done, tmp_path
 
 
 def test_a_slab_at_constant_rate_raises_the_pressure(binary, fluid, tmp_path):
-    """The mud comes on as at the start, the filtrate is rate times time, and the pressure grows."""
+    """The mud comes on as at the start, the filtrate is rate times time, the pressure grows."""
     other = with_case(fluid, "drag.drive=rate", "run.cap_ms=0.3")
     result = invade(
         other.case, other.scales, other.grains, tmp_path, Launch(binary=binary), fluid=other
@@ -333,6 +335,37 @@ def test_a_slab_at_constant_rate_raises_the_pressure(binary, fluid, tmp_path):
     network = first["pressure_pack_Pa"] / last["k_over_k0"]
     assert last["pressure_pack_Pa"] == pytest.approx(network, rel=0.05)
     assert max(row["momentum_defect"] for row in result.updates) <= 0.01
+
+
+def asked_stiffness(case) -> float:
+    """What the warnings of a case ask for."""
+    text = " ".join(scales_of(case).warnings)
+    return float(
+        re.search(r"hold the whole pressure.*set run\.stiffness_N_m = (\S+?);? ", text + " ")[1]
+    )
+
+
+def test_the_stiffness_that_a_deposit_needs_is_named_and_holds(binary, fluid, tmp_path):
+    """Springs: F = 6 dp pi D^2 / 4 with D^2 = 32 k / phi, and dp = mu U L / k by Darcy."""
+    case, scales = fluid.case, fluid.scales
+    pressure = case.fluid.viscosity_Pa_s * scales.darcy_velocity * 1.6e-3 / scales.permeability
+    force = 6 * pressure * np.pi / 4 * 32 * scales.permeability / scales.porosity
+    stiffness = scales.contacts["grain-fine"].normal_stiffness
+    assert scales.deposit_overlap == pytest.approx(force / stiffness / 1e-4, rel=1e-9)
+    asked = f"run.stiffness_N_m={asked_stiffness(case)}"
+    firm = with_case(fluid, asked, "run.cap_ms=0.3")
+    assert firm.scales.deposit_overlap <= case.run.max_overlap
+    assert not [text for text in firm.scales.warnings if "whole pressure" in text]
+    assert "overlap in the deposit" in " ".join(row.name for row in scale_rows(case, scales))
+    result = invade(
+        firm.case, firm.scales, firm.grains, tmp_path, Launch(binary=binary), fluid=firm
+    )
+    assert 0.0 < result.max_overlap < 0.05
+
+
+def test_a_deposit_that_would_be_pressed_through_a_grain_is_refused():
+    with pytest.raises(CaseError, match="deposit alone would press"):
+        scales_of(small("run.stiffness_N_m=50", "run.max_overlap=0.4"))
 
 
 def test_no_warning_of_throats_where_the_balance_of_momentum_sees_them():
