@@ -17,7 +17,7 @@ from fdnet.scales.forces.push import Push, push_of
 from fdnet.scales.forces.throat import throat_width
 from fdnet.scales.forces.warnings import reynolds_warnings, throat_warnings
 from fdnet.scales.grain_pack import pack_step, target_porosity
-from fdnet.scales.overlaps import deposit_force, overlap_warnings, overlaps_of
+from fdnet.scales.overlaps import Overlaps, deposit_force, overlap_warnings, overlaps_of
 from fdnet.scales.sizes import size_warnings
 from fdnet.scales.slab import slab_of, slab_warnings
 from fdnet.scales.springs import Contact
@@ -182,9 +182,7 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     unit = hold * coefficient_steps(case, step, shortest)
     chunk_steps = chunk_refreshes(case, times.chunk, step * unit) * unit
     contact = shared.contacts["grain-fine"]
-    pressure = drive.factor * driving_pressure(case, shared.pressure_gradient)
-    plug = deposit_force(case, pressure, throat_width(shared.porosity, shared.permeability))
-    overlaps = overlaps_of(case, contact, push, shared.porosity, deposit=plug)
+    overlaps = _overlaps(case, shared, push, drive.factor)
     sticking = sticking_of(case, contact, push, step)
     _refuse_long_chunk(step, chunk_steps)
     warnings = [
@@ -248,6 +246,13 @@ def _relaxation_times(case: InvasionCase) -> tuple[float, float]:
         ]
     times = [relaxation_time(radius, density, viscosity, multiplier) for radius, density in ends]
     return min(times), max(times)
+
+
+def _overlaps(case: InvasionCase, shared: Scales, push: Push, factor: float) -> Overlaps:
+    """The overlaps of fines; forces are `factor` times those of the fluid itself."""
+    pressure = factor * driving_pressure(case, shared.pressure_gradient)
+    plug = deposit_force(case, pressure, throat_width(shared.porosity, shared.permeability))
+    return overlaps_of(case, shared.contacts["grain-fine"], push, shared.porosity, deposit=plug)
 
 
 def _reynolds(case: InvasionCase, velocity: float) -> float:

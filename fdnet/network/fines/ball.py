@@ -70,7 +70,7 @@ def pieces(corner: Array, pairs: tuple[Array, Array], centre: Array, radius: Arr
     """
     pore, ball = pairs
     normal, place, depth = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(4)
-    found = np.zeros((len(pore), 2))
+    measured = np.zeros((len(pore), 2))
     last = -1
     for k in range(len(pore)):
         p, b = pore[k], ball[k]
@@ -88,8 +88,8 @@ def pieces(corner: Array, pairs: tuple[Array, Array], centre: Array, radius: Arr
                 place[c, axis] = (corner[p, c, axis] - centre[b, axis]) / radius[b]
         inside, area = _piece(place, normal, depth, cuts)
         if inside > ROUNDING:
-            found[k, 0], found[k, 1] = inside * radius[b] ** 3, area * radius[b] ** 2
-    return found
+            measured[k, 0], measured[k, 1] = inside * radius[b] ** 3, area * radius[b] ** 2
+    return measured
 
 
 @compiled

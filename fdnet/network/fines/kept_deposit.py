@@ -152,7 +152,7 @@ def measured_deposit(holders: Holders, fines: Snapshot) -> KeptDeposit:
 
 def _pieces_of(holders: Holders, fines: Snapshot) -> tuple[Array, Array, Array]:
     """Holder, fine and (volume, surface) of each piece of `fines`."""
-    found = [(np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros((0, 2)))]
+    parts = [(np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros((0, 2)))]
     low, high = holders.piece.min(axis=1), holders.piece.max(axis=1)
     for some in size_classes(fines.radius) if len(fines) else []:
         radius = fines.radius[some]
@@ -165,6 +165,6 @@ def _pieces_of(holders: Holders, fines: Snapshot) -> tuple[Array, Array, Array]:
         real = measure[:, 0] > 0.0
         holder = holders.owner[pairs[0][real]]
         fine = some[image[pairs[1][real]]]
-        found.append((holder, fine, measure[real] / holders.share[holder, None]))
-    holder, fine, measure = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        parts.append((holder, fine, measure[real] / holders.share[holder, None]))
+    holder, fine, measure = (np.concatenate(column) for column in zip(*parts, strict=True))
     return holder, fine, measure
