@@ -173,16 +173,15 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     drive = _drive(case, shared, relaxation[1])
     velocity = drive.velocity
     push = push_of(case, velocity, shared.pressure_gradient, factor=drive.factor)
-    darcy = shared.darcy_velocity * drive.factor
-    upstream = velocity if case.drag.upstream == "interstitial" else darcy
+    slow = case.drag.upstream == "darcy"
+    upstream = shared.darcy_velocity * drive.factor if slow else velocity
     shortest = relaxation[0] * push.relaxation_share(case.fines.radius_range_m[0])
     step = time_step(case, shared.contacts, shortest)
     times = stop_times(case, slab, drive, upstream=upstream)
     hold = hold_steps(case, step, shortest / densest_factor(case), times.chunk)
     unit = hold * coefficient_steps(case, step, shortest)
     chunk_steps = chunk_refreshes(case, times.chunk, step * unit) * unit
-    contact = shared.contacts["grain-fine"]
-    overlaps = _overlaps(case, shared, push, drive.factor)
+    contact, overlaps = shared.contacts["grain-fine"], _overlaps(case, shared, push, drive.factor)
     sticking = sticking_of(case, contact, push, step)
     _refuse_long_chunk(step, chunk_steps)
     warnings = [
