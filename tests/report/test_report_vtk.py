@@ -1,5 +1,6 @@
 """ParaView files read back by an independent reader; the drawing child may die as it likes."""
 
+import re
 import subprocess
 import sys
 import time
@@ -10,7 +11,9 @@ import pytest
 import pyvista as pv
 from report_demo import BOX, demo_analysis, demo_damaged, demo_grains
 
+from fdnet.errors import CaseError
 from fdnet.report import child, vtk
+from fdnet.spheres.vtk_file import read_vtk
 
 
 def test_network_lines_join_the_ends_of_their_throats(tmp_path):
@@ -153,3 +156,24 @@ def test_a_hanging_child_is_given_up(tmp_path, monkeypatch):
 def test_an_unwritable_folder_or_missing_interpreter_is_a_reason_too(tmp_path, monkeypatch):
     monkeypatch.setattr(child, "_command", lambda *_: [str(tmp_path / "no-python")])
     assert "no 3-D picture" in child.render_spheres_png(tmp_path / "v.png", "s.vtp", BOX)
+
+
+def test_its_own_spheres_are_in_metres_and_no_other_unit_is_taken(tmp_path):
+    snapshot = demo_damaged()
+    path = vtk.write_spheres_vtp(tmp_path / "spheres_damaged.vtp", snapshot)
+    assert np.array_equal(read_vtk(path).radius, snapshot.radius)
+    with pytest.raises(CaseError, match=r"radius_m is in m; leave out --units mm"):
+        read_vtk(path, units="mm")
+
+
+def test_the_paraview_script_names_arrays_that_the_files_have(tmp_path):
+    """It needs ParaView to run; here it compiles, and every array that it names is written."""
+    script = vtk.write_macro(tmp_path / "paraview_view.py").read_text(encoding="utf-8")
+    compile(script, "paraview_view.py", "exec")
+    spheres = pv.read(vtk.write_spheres_vtp(tmp_path / "s.vtp", demo_damaged()))
+    network = pv.read(vtk.write_network_vtp(tmp_path / "n.vtp", demo_analysis()))
+    own = {*spheres.point_data, *network.point_data, "depth_mm"}
+    assert set(re.findall(r'\("POINTS", "(\w+)"\)|\["POINTS", "(\w+)"\]', script)) <= {
+        pair for name in own for pair in ((name, ""), ("", name))
+    }
+    assert "blocked" in network.cell_data
