@@ -97,7 +97,7 @@ def add_fines(
         return
     balls = _balls(spheres, mask, int(np.clip(np.sqrt(FACETS / mask.sum()), 5, 16)))
     bar = {
-        "title": title,
+        "title": f"{title}\n",
         "color": "black",
         "title_font_size": 22,
         "label_font_size": 22,
@@ -150,7 +150,8 @@ def add_frame(plotter: Any, bounds: Array) -> None:
     plotter.show_bounds(
         bounds=(x0, x1, y0, y1, z0, z1),
         xtitle="x (mm)",
-        ytitle="y (mm)",
+        ytitle=f"y: {y0:.3g} to {y1:.3g} mm",
+        show_ylabels=False,
         ztitle="z (mm)",
         color="black",
         font_size=18,
