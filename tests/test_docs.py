@@ -228,7 +228,7 @@ def header_of(path: Path) -> list[str]:
 @pytest.mark.liggghts
 @pytest.mark.parametrize(
     "table",
-    ["sections", "profile", "pores", "throats", "spheres_initial", "invade/history"],
+    ["sections", "profile", "pores", "throats", "spheres_initial", "cake", "invade/history"],
 )
 def test_every_column_of_a_run_is_explained(run_folder, table):
     assert header_of(run_folder / f"{table}.csv") == names_under(f"{table}.csv")
@@ -255,6 +255,10 @@ def test_every_key_of_the_summary_is_explained(run_folder):
         "filtrate_m3",
         "cake_resistance_share",
         "momentum_defect_most",
+        "spurt_m3_m2",
+        "volume_30min_m3_m2",
+        "filtrate_fit",
+        "cake",
         "return_k_over_k0",
         "k_returned_m2",
         "clean_up",

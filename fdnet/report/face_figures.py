@@ -44,3 +44,66 @@ def fill_clean_up(
     below.set(xlabel=DEPTH_LABEL, ylabel="fines (–)", xlim=edges[[0, -1]])
     above.legend()
     below.legend()
+
+
+def fill_cake(figure: Any, *, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Porosity and permeability of the slices of the cake, against the distance from the face."""
+    left, right = figure.subplots(1, 2)
+    edges = MM * np.array([-row["x_hi_m"] for row in rows] + [-rows[-1]["x_lo_m"]])
+    left.stairs([row["porosity"] for row in rows], edges, baseline=None, color=BLUE, linewidth=2)
+    left.set(ylabel="porosity (–)", ylim=(0, 1))
+    for key, colour, line, name in (
+        ("k_network_m2", BLUE, "-", "network"),
+        ("k_kozeny_m2", ORANGE, "--", "Carman-Kozeny"),
+    ):
+        values = np.array([np.nan if row[key] is None else row[key] for row in rows], float)
+        if np.any(np.isfinite(values)):
+            right.stairs(
+                values, edges, baseline=None, color=colour, linestyle=line, linewidth=2, label=name
+            )
+    right.set(ylabel="permeability (m²)", yscale="log")
+    right.legend()
+    for axes in (left, right):
+        axes.set(xlabel="distance from the face (mm)", xlim=(0, edges[-1]))
+
+
+def fill_filtrate(
+    figure: Any, *, time: Array, volume: Array, fitted: Array | None, said: str
+) -> None:
+    """Filtrate per area, m, against the root of time, s, and the fit at the same times."""
+    axes = figure.add_subplot()
+    root = np.sqrt(time)
+    axes.plot(root, MM * volume, color=BLUE, label="simulated")
+    if fitted is not None:
+        axes.plot(root, MM * fitted, "--", color=ORANGE, label="t = a V² + b V + c")
+    axes.set(
+        xlabel="root of the time of the fluid (s$^{1/2}$)",
+        ylabel="filtrate per area (mm)",
+        xlim=(0, None),
+        ylim=(0, None),
+    )
+    axes.set_title(said, fontsize=10)
+    axes.legend(loc="lower right")
+
+
+def fill_bridging(figure: Any, *, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Share of blocked throats by the ratio of diameters, with its band."""
+    axes = figure.add_subplot()
+    place = np.arange(len(rows))
+    share = np.array([row["share_blocked"] for row in rows])
+    low, high = (np.array([row[key] for row in rows]) for key in ("share_low", "share_high"))
+    axes.bar(place, share, color=BLUE, alpha=0.7)
+    axes.errorbar(place, share, [share - low, high - share], fmt="none", color="black", capsize=3)
+    names = [
+        f"{row['ratio_lo']:g} to {row['ratio_hi']:g}"
+        if row["ratio_hi"]
+        else f"> {row['ratio_lo']:g}"
+        for row in rows
+    ]
+    labels = [f"{name}\n({row['throats']})" for name, row in zip(names, rows, strict=True)]
+    axes.set_xticks(place, labels, fontsize=9)
+    axes.set(
+        xlabel="diameter of the fines over that of the throat (number of throats)",
+        ylabel="share of the throats that is blocked (–)",
+        ylim=(0, 1),
+    )

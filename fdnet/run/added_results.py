@@ -1,13 +1,19 @@
-"""Results that only some runs have: what the clean-up brings back."""
+"""Results that only some runs have: cake, filtrate, bridging, and what the clean-up returns."""
 
 from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
+import numpy as np
+
+from fdnet.network.resolved.slab import Sides
 from fdnet.report.added import Added, PageTable
-from fdnet.report.face_figures import fill_clean_up
+from fdnet.report.face_figures import fill_bridging, fill_cake, fill_clean_up, fill_filtrate
+from fdnet.run.bridging import CLOGGED, bridging_rows, reached_throats
+from fdnet.run.cake import cake_rows, cake_summary, measure_cake
 from fdnet.run.clean_up import Returned, clean_up_rows, clean_up_summary
-from fdnet.run.outputs import Results
+from fdnet.run.outputs import Invaded, Results
+from fdnet.scales.filtrate import HALF_HOUR, Filtration, fit_filtration
 
 _CLEAN_UP_COLUMNS = (
     ("section", "section", "", None),
@@ -28,6 +34,12 @@ def added_results(
     results: Results, after: Returned | None, record: dict[str, Any] | None
 ) -> Iterator[Added]:
     """The added results; `record` is that of the clean-up `after` which the specimen is."""
+    one = results.invasion
+    if one is not None:
+        yield _cake(results, one)
+        yield from _filtrate(one)
+        if results.analysis.invaded_count:
+            yield _bridging(results, one)
     if after is not None and record is not None:
         yield _clean_up(results, after, record)
 
@@ -58,5 +70,136 @@ def _clean_up(results: Results, after: Returned, record: dict[str, Any]) -> Adde
             note=f"The flow was turned back. Of {counts['inside_before']} fines inside, "
             f"{counts['came_out']} came out and {counts['stayed']} stayed. k/k0 of the whole "
             f"specimen before and after: {said}. The damage law is that of the invasion.",
+        ),
+    )
+
+
+_CAKE_COLUMNS = (
+    ("x_lo_m", "from", "mm", 1e3),
+    ("x_hi_m", "to", "mm", 1e3),
+    ("fines_count", "fines", "", None),
+    ("porosity", "porosity", "–", 1),
+    ("sauter_diameter_m", "Sauter diameter", "mm", 1e3),
+    ("k_network_m2", "k by the network", "m²", 1),
+    ("k_kozeny_m2", "k by Carman-Kozeny", "m²", 1),
+)
+
+
+def _cake(results: Results, one: Invaded) -> Added:
+    """The external cake by depth, and its share of the resistance."""
+    case, analysis = one.case, results.analysis
+    sides = Sides(periodic=case.periodic, walls=case.analysis.walls)
+    cake = measure_cake(one.damaged, sides)
+    pack = case.size_m[0] / analysis.k_damaged if analysis.k_damaged > 0 else np.inf
+    flowing = one.updates and "pressure_cake_Pa" in one.updates[-1]
+    known = ("cake_resistance_share",) if flowing else ()
+    summary = cake_summary(cake, pack, known)
+    if cake is None:
+        return Added(name="cake", summary=summary)
+    rows, table = cake_rows(cake), summary["cake"]
+    network = table["share_network"]
+    said = "" if network is None else f"{100 * network:.1f} % by the network, "
+    return Added(
+        name="cake",
+        rows=rows,
+        summary=summary,
+        fill=partial(fill_cake, rows=rows),
+        caption="The external cake in slices of a fine's diameter: porosity, and permeability by "
+        "the network of its own spheres and by Carman and Kozeny.",
+        page=PageTable(
+            title="External cake",
+            columns=_CAKE_COLUMNS,
+            rows=rows,
+            note=f"{table['fines']} fines, {1e3 * cake.thickness:.3g} mm thick. Its share of the "
+            f"resistance of cake and specimen: {said}{100 * table['share_kozeny']:.1f} % by "
+            f"Carman and Kozeny. {table['unresolved']}".strip(),
+        ),
+    )
+
+
+def _filtrate(one: Invaded) -> Iterator[Added]:
+    """Filtrate against the root of time, where the flow follows the deposit."""
+    if not one.updates or "filtrate_m3" not in one.updates[-1]:
+        return
+    area = one.case.size_m[1] * one.case.size_m[2]
+    time = one.scales.force_factor * np.array([row["time_s"] for row in one.updates])
+    volume = np.array([row["filtrate_m3"] for row in one.updates]) / area
+    fit = fit_filtration(time, volume)
+    if fit is None:
+        return
+    usable = not fit.unsupported
+    yield Added(
+        name="filtrate",
+        summary=_filtrate_keys(fit),
+        fill=partial(
+            fill_filtrate,
+            time=time,
+            volume=volume,
+            fitted=np.array([fit.volume(at) for at in time]) if usable else None,
+            said=f"30 minutes by extrapolation: {1e3 * fit.half_hour:.3g} mm"
+            if usable
+            else "no extrapolation",
+        ),
+        caption="Filtrate per area of the face against the root of time. A cake that grows at "
+        "constant pressure makes t quadratic in V; where the history is that, it is extrapolated "
+        f"from {fit.until:.2g} s to 30 minutes."
+        + (f" Here it is not: {fit.unsupported}." if not usable else ""),
+    )
+
+
+def _filtrate_keys(fit: Filtration) -> dict[str, Any]:
+    usable = not fit.unsupported
+    return {
+        "spurt_m3_m2": fit.spurt if usable else None,
+        "volume_30min_m3_m2": fit.half_hour if usable else None,
+        "filtrate_fit": {
+            "a_s_m2": fit.a,
+            "b_s_m": fit.b,
+            "c_s": fit.c,
+            "intercept_m3_m2": fit.intercept if usable else None,
+            "misfit": fit.misfit,
+            "until_s": fit.until,
+            "extrapolated_by": HALF_HOUR / fit.until,
+            "unsupported": fit.unsupported,
+        },
+    }
+
+
+_BRIDGING_COLUMNS = (
+    ("ratio_lo", "fine over throat from", "", None),
+    ("ratio_hi", "to", "", None),
+    ("throats", "throats", "", None),
+    ("with_fines", "with fines", "", None),
+    ("covered", "covered by one", "", None),
+    ("clogged", "clogged", "", None),
+    ("blocked", "blocked", "", None),
+    ("share_blocked", "share blocked", "%", 1e2),
+    ("share_low", "low", "%", 1e2),
+    ("share_high", "high", "%", 1e2),
+    ("arrived_mean", "fines that would arrive", "", None),
+)
+
+
+def _bridging(results: Results, one: Invaded) -> Added:
+    """Which throats the fines block, by the ratio of diameters."""
+    last = one.history[-1]
+    diameter = 2.0 * float(np.mean(one.damaged.fines().radius))
+    throats = reached_throats(results.analysis, last.invaded + last.passed, diameter)
+    rows = bridging_rows(throats, one.case.fines.placed_fraction)
+    return Added(
+        name="bridging",
+        rows=rows,
+        fill=partial(fill_bridging, rows=rows),
+        caption="Throats down to the depth above which 95 % of the fines lie: share that "
+        "is blocked, by the ratio of the fines' diameter "
+        "to that of the throat, with Wilson's 95 % band.",
+        page=PageTable(
+            title="Throats that fines block",
+            columns=_BRIDGING_COLUMNS,
+            rows=rows,
+            note=f"Suspension of {100 * one.case.fines.placed_fraction:.3g} % by volume. A throat "
+            "is blocked where one fine covers its cross-section or where it is clogged: its "
+            f"conductance is below {CLOGGED:g} of the clean one. The last column is by the "
+            "clean flow, as if no fine were caught.",
         ),
     )

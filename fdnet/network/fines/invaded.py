@@ -52,14 +52,22 @@ def measure_invaded(spheres: Snapshot, *, periodic: Sequence[bool]) -> Invaded:
 
 
 def _cake_thickness(spheres: Snapshot, fines: Snapshot, periodic: Sequence[bool]) -> float:
-    """How far upstream of the face, m, fines reach that touch the pack, maybe by other fines.
+    """How far upstream of the face, m, the cake reaches."""
+    low = float(spheres.box[0, 0])
+    if not np.any(fines.position[:, 0] < low):
+        return 0.0
+    cake = cake_of(spheres, periodic)
+    front = cake.position[:, 0] - cake.radius
+    return float(max(low - front.min(initial=low), 0.0))
+
+
+def cake_of(spheres: Snapshot, periodic: Sequence[bool]) -> Snapshot:
+    """The fines upstream of the face that touch the pack, maybe by other fines.
 
     Contact is a gap of at most 1 % of the smaller diameter. The pack is the grains and the fines
     centred inside the box.
     """
     low = float(spheres.box[0, 0])
-    if not np.any(fines.position[:, 0] < low):
-        return 0.0
     reach = float(np.max(spheres.radius)) * (2.0 + 4.0 * CONTACT_GAP)
     everything = spheres.where(spheres.position[:, 0] < low + reach)
     upstream = (everything.position[:, 0] < low) & (everything.kind == Kind.FINE)
@@ -72,6 +80,4 @@ def _cake_thickness(spheres: Snapshot, fines: Snapshot, periodic: Sequence[bool]
     columns = np.concatenate([pair[:, 1], np.full(len(pack), count)])
     graph = sparse.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(count + 1, count + 1))
     _, group = connected_components(graph, directed=False)
-    cake = upstream & (group[:-1] == group[-1])
-    front = everything.position[cake, 0] - everything.radius[cake]
-    return float(max(low - front.min(initial=low), 0.0))
+    return everything.where(upstream & (group[:-1] == group[-1]))
