@@ -1,45 +1,26 @@
+#!/usr/bin/env python3
 """Which ratio of fine to throat blocks, at which concentration: several runs added up.
 
-    python scripts/bridging.py runs/* --csv bridging.csv
+.venv/bin/python scripts/bridging.py runs/* --csv bridging.csv
 """
 
 import argparse
-import csv
-import sys
-from pathlib import Path
 
-from fdnet.errors import CaseError
-from fdnet.report.tables import write_rows
-from fdnet.run.bridging import pooled
+from fdnet.files.paths import path_option
+from fdnet.studies.dem.bridging import pooled_runs
 
-
-def main() -> int:
-    """Read the bridging.csv of each run, write the pooled table, and print it."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("runs", nargs="+", type=Path, help="run folders")
-    parser.add_argument("--csv", type=Path, required=True, help="the pooled table")
-    options = parser.parse_args()
-    try:
-        rows = pooled([read_classes(run / "bridging.csv") for run in options.runs])
-    except CaseError as error:
-        print(f"bridging.py: {error}", file=sys.stderr)
-        return 2
-    write_rows(options.csv, rows)
-    print(options.csv.read_text(encoding="utf-8"), end="")
-    return 0
-
-
-def read_classes(path: Path) -> list[dict[str, str]]:
-    """The rows of one table. Raises CaseError where it is missing."""
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            return list(csv.DictReader(file))
-    except OSError as error:
-        raise CaseError(
-            f"{path}: cannot be read ({error.strerror}); give folders of runs in which fines "
-            "invaded, or write it anew with --stages analyse,report --force"
-        ) from error
-
+parser = argparse.ArgumentParser(
+    description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+)
+parser.add_argument("runs", nargs="+", type=path_option, metavar="RUN_DIR")
+parser.add_argument("--csv", type=path_option, required=True, help="write the table here")
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    options = parser.parse_args()
+    for row in pooled_runs(options.runs, options.csv):
+        upper = "inf" if row["ratio_hi"] is None else f"{row['ratio_hi']:g}"
+        print(
+            f"{row['concentration']:g} by volume, {row['ratio_lo']:g} to {upper}: "
+            f"{row['blocked']} of {row['throats']} blocked, {row['share_blocked']:.2f} "
+            f"({row['share_low']:.2f} to {row['share_high']:.2f})"
+        )

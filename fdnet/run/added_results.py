@@ -12,8 +12,8 @@ from fdnet.report.face_figures import fill_bridging, fill_cake, fill_clean_up, f
 from fdnet.run.bridging import CLOGGED, bridging_rows, reached_throats
 from fdnet.run.cake import cake_rows, cake_summary, measure_cake
 from fdnet.run.clean_up import Returned, clean_up_rows, clean_up_summary
+from fdnet.run.filtrate import HALF_HOUR, Filtration, fit_filtration
 from fdnet.run.outputs import Invaded, Results
-from fdnet.scales.filtrate import HALF_HOUR, Filtration, fit_filtration
 
 _CLEAN_UP_COLUMNS = (
     ("section", "section", "", None),
