@@ -258,7 +258,7 @@ def test_every_key_of_the_summary_is_explained(run_folder):
         "spurt_m3_m2",
         "volume_30min_m3_m2",
         "filtrate_fit",
-        "cake",
+        "cake_by_depth",
         "return_k_over_k0",
         "k_returned_m2",
         "clean_up",

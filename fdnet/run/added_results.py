@@ -96,7 +96,7 @@ def _cake(results: Results, one: Invaded) -> Added:
     summary = cake_summary(cake, pack, known)
     if cake is None:
         return Added(name="cake", summary=summary)
-    rows, table = cake_rows(cake), summary["cake"]
+    rows, table = cake_rows(cake), summary["cake_by_depth"]
     network = table["share_network"]
     said = "" if network is None else f"{100 * network:.1f} % by the network, "
     return Added(

@@ -182,4 +182,4 @@ def cake_summary(cake: Cake | None, pack: float, known: Sequence[str] = ()) -> M
         "unresolved": cake.unresolved,
     }
     own = {} if "cake_resistance_share" in known else {"cake_resistance_share": best}
-    return own | {"cake": table}
+    return own | {"cake_by_depth": table}

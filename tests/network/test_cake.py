@@ -58,8 +58,8 @@ def test_the_share_is_that_of_beds_in_series():
     cake = measure_cake(as_cake(simple_cubic(repeat=6)), SIDES)
     pack = 2.0 * cake.resistance(cake.k_kozeny)
     summary = cake_summary(cake, pack)
-    assert summary["cake"]["share_kozeny"] == pytest.approx(1 / 3, rel=1e-12)
-    assert summary["cake_resistance_share"] == summary["cake"]["share_network"]
+    assert summary["cake_by_depth"]["share_kozeny"] == pytest.approx(1 / 3, rel=1e-12)
+    assert summary["cake_resistance_share"] == summary["cake_by_depth"]["share_network"]
     assert "cake_resistance_share" not in cake_summary(cake, pack, ("cake_resistance_share",))
 
 
