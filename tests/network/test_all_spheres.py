@@ -13,7 +13,7 @@ from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse
-from fdnet.network.resolved import measured
+from fdnet.network.resolved import chosen, measured
 from fdnet.network.resolved.all_spheres import as_grains
 from fdnet.spheres.snapshot import Kind, Snapshot
 from fdnet.studies.truth.packs import read_pack, truth_folder
@@ -44,9 +44,9 @@ def test_k_is_that_of_the_network_of_all_spheres(pack, analysis):
     assert len(analysis.conductance_damaged) == len(analysis.network.throat_radius)
 
 
-@pytest.mark.parametrize(("name", "ratio"), [("packH_r5_d1", 0.8866), ("packC_r5_d2", 0.6231)])
+@pytest.mark.parametrize(("name", "ratio"), [("packH_r5_d1", 0.8866), ("packC_r10_d2", 0.4796)])
 def test_few_fines_lower_k_as_resolved_flow_does(name, ratio):
-    """Without the fourth grain these are 4.6 % and 4.4 % too high."""
+    """Without the fourth grain the first, without those around the second is 5 to 7 % high."""
     spheres = read_pack(truth_folder() / f"{name}.csv")[0]
     result = analyse(spheres, periodic="xyz", walls="slip", damage_law="all-spheres")
     assert result.k_damaged / result.k_initial == pytest.approx(ratio, rel=0.02)
@@ -91,7 +91,6 @@ def test_fines_upstream_count_as_far_as_they_reach_in(pack):
 
 
 def test_renumbering_mirror_shift_and_scale_leave_k(pack, analysis):
-    """Within 0.3 %: the 36 rays of a fourth disc are counted from the first edge of a section."""
     order = np.random.default_rng(5).permutation(len(pack))
     numbered = pack.where(order)
     mirrored, shifted = pack.position.copy(), pack.position.copy()
@@ -105,9 +104,9 @@ def test_renumbering_mirror_shift_and_scale_leave_k(pack, analysis):
         (larger, 9.0),
     ):
         result = analyse(other, periodic=SIDES, sections=2, damage_law="all-spheres")
-        assert result.k_damaged == pytest.approx(factor * analysis.k_damaged, rel=3e-3)
+        assert result.k_damaged == pytest.approx(factor * analysis.k_damaged, rel=1e-5)
         for one, own in zip(result.sections, analysis.sections, strict=True):
-            assert one.k_damaged == pytest.approx(factor * own.k_damaged, rel=3e-3)
+            assert one.k_damaged == pytest.approx(factor * own.k_damaged, rel=1e-5)
 
 
 def test_values_in_place_and_layers_add_up_to_the_whole(pack, analysis):
@@ -136,7 +135,7 @@ def test_layers_are_as_thick_as_a_fine_and_fill_the_first_millimetre():
 
 
 def test_the_default_takes_all_spheres_up_to_a_number_of_them(pack, monkeypatch):
-    monkeypatch.setattr(measured, "LIGHT", 1.0)
+    monkeypatch.setattr(chosen, "LIGHT", 1.0)
     small = analyse(pack, periodic=SIDES)
     assert (small.damage_law, small.damage_law_used) == ("auto", "all-spheres")
     assert small.layers is not None

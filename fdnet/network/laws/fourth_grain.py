@@ -15,16 +15,10 @@ import numpy as np
 from fdnet.network import geometry
 from fdnet.network.compiled import compiled
 from fdnet.network.laws.cross_section import FINE_POINTS, FINE_WEIGHTS, midway, ray
+from fdnet.network.laws.section_rays import disc_flux
 from fdnet.network.laws.wedge import shear_ratio
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array
-
-RAYS = 36
-"""Rays of the fourth disc around its whole circle."""
-SECTOR = np.pi / 3.0
-"""Half angle, rad, between two of the three rims that surround the fourth disc."""
-ALONG = 1e-300
-"""A ray is parallel to a side whose distance it changes by less than this."""
 
 
 def fourth_grains(network: Network, part: slice) -> tuple[Array, Array]:
@@ -72,7 +66,11 @@ def share_left(base: Array, disc: Array, x: float, y: float, fourth: float, tabl
     if not clear > 0.0:
         return 1.0
     left = _corner_shares(base, disc, x, y, fourth, table)
-    left += _own_share(base, disc, x, y, fourth, table)
+    discs = np.empty((4, 3))
+    for i in range(3):
+        discs[i] = base[i, 0], base[i, 1], disc[i]
+    discs[3] = x, y, fourth
+    left += disc_flux(base, discs, 4, 3, table)
     return min(left / clear, 1.0)
 
 
@@ -137,44 +135,3 @@ def _corner_shares(
             closest = min(disc[i] / nearest, 1.0) if nearest > 0.0 else 1.0
             total += flux * shear_ratio(0.5 * opening, closest, table)
     return total
-
-
-@compiled
-def _own_share(base: Array, disc: Array, x: float, y: float, fourth: float, table: Array) -> float:
-    """Flux m4 on the rays of the fourth disc, as far as they lie in the triangle."""
-    flux, nearest = 0.0, np.inf
-    for ray_number in range(RAYS):
-        turn = 2.0 * np.pi * (ray_number + 0.5) / RAYS
-        ux, uy = np.cos(turn), np.sin(turn)
-        start, reach = 0.0, np.inf
-        for i in range(3):
-            nx, ny = _inward(base, i)
-            inside = nx * (x - base[i, 0]) + ny * (y - base[i, 1])
-            speed = nx * ux + ny * uy
-            if speed > ALONG:
-                start = max(start, -inside / speed)
-            elif speed < -ALONG:
-                reach = min(reach, -inside / speed)
-            qx, qy = base[i, 0] - x, base[i, 1] - y
-            apart = np.hypot(qx, qy)
-            if apart <= disc[i] - fourth:
-                return 0.0
-            if apart > fourth - disc[i]:
-                angle = np.arctan2(qx * uy - qy * ux, qx * ux + qy * uy)
-                reach = min(reach, midway(apart, disc[i] - fourth, angle))
-        if reach > max(start, fourth):
-            flux += 2.0 * np.pi / RAYS * _part_of_ray(max(start, fourth), reach, fourth)
-            nearest = min(nearest, reach)
-    return flux * shear_ratio(SECTOR, fourth / nearest, table) if flux > 0.0 else 0.0
-
-
-@compiled
-def _part_of_ray(start: float, reach: float, disc: float) -> float:
-    """Flux m4 per angle on a ray between `start` and `reach` m from the centre of its disc.
-
-    It is what `cross_section.ray` sums from the rim, where there is no shear at `reach`.
-    """
-    d2, t2, r2 = reach * reach, start * start, disc * disc
-    whole = d2 * d2 * (0.25 * np.log(reach / disc) - 3.0 / 16.0) + r2 * d2 / 8.0
-    before = d2 * t2 * (0.25 * np.log(start / disc) - 1.0 / 8.0) - t2 * t2 / 16.0 + r2 * t2 / 8.0
-    return whole - before

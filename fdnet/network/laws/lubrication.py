@@ -25,6 +25,7 @@ from fdnet.network import geometry
 from fdnet.network.compiled import compiled
 from fdnet.network.laws.cross_section import even_flux, uneven_flux, wedges
 from fdnet.network.laws.fourth_grain import fourth_grains, share_left
+from fdnet.network.laws.outside import Neighbourhood, share_beside
 from fdnet.network.laws.wall_cross_section import wall_cuts, wall_flux
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import LENGTH_FLOOR, Network
@@ -36,6 +37,8 @@ STEPS = 8
 """Steps in height between the facet and a power centre."""
 TIP = 1e-2
 """Smallest radius of the disc that a grain shows in a section, in radii of the grain."""
+THROATS = 20_000
+"""Throats that are worked off at once."""
 EQUAL = 1e-9
 """Radii that differ by at most this share are equal."""
 
@@ -52,23 +55,25 @@ def half_resistances(
     Args:
         network: pores and throats.
         widening: the factor of da^2 in the formula of this module.
-        fourth: whether the fourth grain of a tetrahedron narrows the sections it reaches into.
+        fourth: whether the fourth grain of a tetrahedron, and those around, narrow the sections.
     """
     floor, table = LENGTH_FLOOR * network.grain_radius, ratio_table()
     order, place, share = wall_cuts(network)
     resistance = np.empty((len(network.throat_pores), 2))
-    for part in geometry.slices(len(resistance)):
+    around = Neighbourhood(network) if fourth else None
+    for part in geometry.slices(len(resistance), THROATS):
         images = network.throat_images[part]
         corner = network.image_position[images]
         radius, flatness = _discs(network, images, corner)
         beside = _beside(network, part, corner) if fourth else np.zeros((len(corner), 2, 5))
+        outside = _outside(around, part, corner)
         resistance[part] = _halves(
             geometry.flat(corner),
             (radius, flatness),
             np.ascontiguousarray(network.throat_heights[part]),
             (order[part], place[part], share[part]),
             (floor, float(widening)),
-            (beside, table),
+            (beside, *outside, table),
         )
     capped = np.any(network.throat_corner_height < network.throat_corner_radius, axis=1)
     resistance[(network.throat_radius <= 0) & ~capped] = np.inf
@@ -103,6 +108,16 @@ def _beside(network: Network, part: slice, corner: Array) -> Array:
     return np.concatenate([place, radius[..., None], flatness[..., None]], axis=2)
 
 
+def _outside(around: Neighbourhood | None, part: slice, corner: Array) -> tuple[Array, Array]:
+    """The grains around (N, 5), as in `_beside`, and the first (K+1,) of each throat."""
+    if around is None:
+        return np.empty((0, 5)), np.zeros(len(corner) + 1, int)
+    found = around.beside(part)
+    throat = np.repeat(np.arange(len(corner)), np.diff(found.first))
+    radius, flatness = _discs(around.network, found.image[:, None], corner[throat])
+    return np.concatenate([found.place, radius, flatness], axis=1), found.first
+
+
 @compiled
 def _halves(
     corner: Array,
@@ -110,14 +125,17 @@ def _halves(
     heights: Array,
     cuts: tuple[Array, Array, Array],
     given: tuple[float, float],
-    more: tuple[Array, Array],
+    more: tuple[Array, Array, Array, Array],
 ) -> Array:
     radius, flatness = discs
     order, place, part = cuts
     floor, widening = given
-    beside, table = more
+    beside, around, first, table = more
     resistance = np.zeros((len(corner), 2))
+    most = np.max(first[1:] - first[:-1]) if len(corner) else 0
+    room = np.empty((most + 3, 3))
     for t in range(len(corner)):
+        outside = around[first[t] : first[t + 1]].copy()
         low, high = -heights[t, 0], heights[t, 1]
         high = max(high, low + floor)
         even = np.max(radius[t]) - np.min(radius[t]) <= EQUAL * radius[t, 0]
@@ -125,20 +143,24 @@ def _halves(
         wedge = wedges(corner[t]) if even else np.empty((0, 7))
         wall = (order[t], place[t], part[t])
         grains = (radius[t], flatness[t])
-        if low < 0.0 and high > 0.0:
-            resistance[t, 0] = _resistance(
-                corner[t], grains, wedge, wall, (0.0, -low, widening), (beside[t, 0], table)
-            )
+        if high > 0.0:
             resistance[t, 1] = _resistance(
-                corner[t], grains, wedge, wall, (0.0, high, widening), (beside[t, 1], table)
+                corner[t],
+                grains,
+                wedge,
+                wall,
+                (max(low, 0.0), high, widening),
+                (beside[t, 1], outside, room, table),
             )
-        elif low >= 0.0:
-            resistance[t, 1] = _resistance(
-                corner[t], grains, wedge, wall, (low, high, widening), (beside[t, 1], table)
-            )
-        else:
+        if low < 0.0:
+            outside[:, 2] *= -1.0
             resistance[t, 0] = _resistance(
-                corner[t], grains, wedge, wall, (-high, -low, widening), (beside[t, 0], table)
+                corner[t],
+                grains,
+                wedge,
+                wall,
+                (max(-high, 0.0), -low, widening),
+                (beside[t, 0], outside, room, table),
             )
     return resistance
 
@@ -150,7 +172,7 @@ def _resistance(
     wedge: Array,
     wall: tuple[Array, Array, float],
     span: tuple[float, float, float],
-    more: tuple[Array, Array],
+    more: tuple[Array, Array, Array, Array],
 ) -> float:
     """Integral of dR between two heights, 1/m3.
 
@@ -158,22 +180,28 @@ def _resistance(
     """
     radius, flatness = grains
     low, high, widening = span
-    beside, table = more
+    fourth, outside, room, table = more
     step = (high - low) / STEPS
     narrow = np.empty(STEPS + 1)
     disc = np.empty(3)
     order, place, part = wall
     for k in range(STEPS + 1):
-        z = low + k * step
+        z, beyond = low + k * step, False
         for i in range(3):
-            disc[i] = np.sqrt(max(radius[i] ** 2 - flatness[i] * z * z, (TIP * radius[i]) ** 2))
+            square = radius[i] ** 2 - flatness[i] * z * z
+            disc[i] = np.sqrt(max(square, (TIP * radius[i]) ** 2))
+            beyond = beyond or square <= 0.0
         if order[0] >= 0:
             flux = part * wall_flux(place, disc[order[0]], disc[order[1]], table)
         else:
             flux = part * _slipping_flux(base, disc, wedge, table)
-            square = beside[3] ** 2 - beside[4] * (beside[2] - z) ** 2
+            square = fourth[3] ** 2 - fourth[4] * (fourth[2] - z) ** 2
+            share = 1.0
             if square > 0.0 and flux > 0.0:
-                flux *= share_left(base, disc, beside[0], beside[1], np.sqrt(square), table)
+                share = share_left(base, disc, fourth[0], fourth[1], np.sqrt(square), table)
+            if beyond and len(outside) and flux > 0.0:
+                share = min(share, share_beside(base, disc, z, outside, (room, table)))
+            flux *= share
         if not flux > 0.0:
             return np.inf
         narrow[k] = 1.0 / np.sqrt(np.sqrt(8.0 * flux / np.pi))

@@ -3,13 +3,10 @@
 from dataclasses import dataclass, field
 from functools import partial
 
-import numpy as np
-
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.names import ALL_SPHERES, AUTO, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, MOST_SPHERES
 from fdnet.errors import FlowError, NetworkError
 from fdnet.network.fines.occupancy import measure_occupancy
-from fdnet.network.flow.depth import depth_permeability
 from fdnet.network.flow.slabs import SlabK
 from fdnet.network.laws.damage import Damage, DamageLaw
 from fdnet.network.laws.named import LAWS, damage_law
@@ -19,13 +16,6 @@ from fdnet.network.resolved.slab import CutNetworks, Sides, cut_networks
 from fdnet.network.resolved.state import Log, State, clean_halves, make_state, state_slabs
 from fdnet.network.specimen.specimen import Specimen
 from fdnet.spheres.snapshot import Array, frozen
-
-LIGHT = 0.5
-"""Share of the permeability above which "auto" takes `side-kozeny`.
-
-The error of `all-spheres` is a share of the permeability, that of `side-kozeny` a share of what
-the fines take, so the one is better under heavy damage and the other under light damage.
-"""
 
 
 @dataclass(slots=True, eq=False, kw_only=True)
@@ -104,21 +94,6 @@ class Measured:
         except (NetworkError, FlowError) as error:
             log.warnings.append(f"the damage law {DEFAULT_DAMAGE_LAW} was taken: {error}")
             return None
-
-    def is_light(self, base: State, final: State) -> bool:
-        """Whether the fines leave more than `LIGHT` of the permeability everywhere.
-
-        That is of the whole and, in place, of every section; `base` is without fines and `final`
-        with them, by a law of the network of the grains.
-        """
-        if base.halves is None or not final.k > LIGHT * base.k:
-            return False
-        edges = self.specimen.edges
-        before, after = (
-            depth_permeability(state.network, state.flow, base.halves, edges)
-            for state in (base, final)
-        )
-        return bool(np.all(after > LIGHT * before))
 
     def _damaged_conductance(self, choices: AnalysisChoices, name: str, network: Network) -> Array:
         """Conductance (T,) m3 of the throats of a slab's own network with its fines."""

@@ -1,0 +1,38 @@
+"""Section by section, the law that "auto" takes of the two that were computed."""
+
+import numpy as np
+
+from fdnet.network.flow.slabs import SlabK
+from fdnet.spheres.snapshot import Array, frozen
+
+LIGHT = 0.5
+"""Share of the permeability above which "auto" takes `side-kozeny`.
+
+The error of `all-spheres` is a share of the permeability, that of `side-kozeny` a share of what
+the fines take, so the one is better under heavy damage and the other under light damage.
+"""
+
+
+def light_sections(before: SlabK, after: SlabK) -> Array:
+    """Whether (S,) the fines leave more than `LIGHT` of the permeability of a section cut out.
+
+    `before` is without fines and `after` with them, by a law of the network of the grains.
+    """
+    return np.asarray(after.cut_out > LIGHT * before.cut_out)
+
+
+def by_section(light: Array, two_scale: SlabK, resolved: SlabK) -> SlabK:
+    """Sections (S,) of the two-scale law where `light`, else those of all spheres."""
+    return SlabK(
+        cut_out=frozen(np.where(light, two_scale.cut_out, resolved.cut_out)),
+        inplace=frozen(np.where(light, two_scale.inplace, resolved.inplace)),
+        flows=(*two_scale.flows, *resolved.flows),
+    )
+
+
+def in_series(slabs: SlabK, edges: Array) -> float:
+    """Permeability m2 of sections between `edges` (S+1,) m in series, from those in place."""
+    if not np.all(slabs.inplace > 0):
+        return 0.0
+    thick = np.diff(edges)
+    return float(thick.sum() / np.sum(thick / slabs.inplace))
