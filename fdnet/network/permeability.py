@@ -17,7 +17,7 @@ from fdnet.network.flow.slabs import SlabK
 from fdnet.network.laws.damage import CLEAN, Damage
 from fdnet.network.laws.named import LAWS
 from fdnet.network.resolved.all_spheres import AllSpheres
-from fdnet.network.resolved.chosen import by_section, in_series, light_sections
+from fdnet.network.resolved.chosen import by_section, light_sections
 from fdnet.network.resolved.measured import Measured
 from fdnet.network.resolved.slab import Sides
 from fdnet.network.resolved.state import Log, State, capped, solved
@@ -163,13 +163,12 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
     light = light_sections(clean_slabs, slabs)
     taken = None if options.damage_law == AUTO and np.all(light) else whole
     if taken is not None:
-        k_all, all_slabs, more = _resolved(taken, base, (clean_slabs, specimen), log)
+        k_damaged, resolved, more = _resolved(taken, base, (clean_slabs, specimen), log)
         if options.damage_law == AUTO and np.any(light):
-            slabs = by_section(light, slabs, all_slabs)
-            k_damaged = min(in_series(slabs, specimen.edges), base.k)
-            more["sections_two_scale"] = int(light.sum())
+            slabs, in_series = by_section(light, slabs, resolved, specimen.edges)
+            k_damaged, more["sections_two_scale"] = min(in_series, base.k), int(light.sum())
         else:
-            k_damaged, slabs = k_all, all_slabs
+            slabs = resolved
     pair = clean_slabs, slabs
     sections = make_sections(specimen.edges, specimen.porosity, pair, specimen.depth)
     _warn(log, (clean, final if taken is None else taken.solved), sections)

@@ -10,6 +10,7 @@ from fdnet.network.flow.depth import Solved, depth_pressures, layer_edges
 from fdnet.network.flow.slabs import whole_permeability
 from fdnet.network.laws.fourth_grain import share_left
 from fdnet.network.laws.lubrication import half_resistances
+from fdnet.network.laws.outside import share_beside
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse
@@ -91,6 +92,7 @@ def test_fines_upstream_count_as_far_as_they_reach_in(pack):
 
 
 def test_renumbering_mirror_shift_and_scale_leave_k(pack, analysis):
+    """Within 0.1 %: prisms that a face cuts are split either way, which changes their fourth."""
     order = np.random.default_rng(5).permutation(len(pack))
     numbered = pack.where(order)
     mirrored, shifted = pack.position.copy(), pack.position.copy()
@@ -104,9 +106,50 @@ def test_renumbering_mirror_shift_and_scale_leave_k(pack, analysis):
         (larger, 9.0),
     ):
         result = analyse(other, periodic=SIDES, sections=2, damage_law="all-spheres")
-        assert result.k_damaged == pytest.approx(factor * analysis.k_damaged, rel=1e-5)
+        assert result.k_damaged == pytest.approx(factor * analysis.k_damaged, rel=3e-4)
         for one, own in zip(result.sections, analysis.sections, strict=True):
-            assert one.k_damaged == pytest.approx(factor * own.k_damaged, rel=1e-5)
+            assert one.k_damaged == pytest.approx(factor * own.k_damaged, rel=1e-3)
+
+
+def test_a_mirrored_periodic_pack_has_the_same_throats(pack):
+    """The rays of a section start from no edge of it."""
+    place = pack.position.copy()
+    place[:, 1] = pack.box[1].sum() - place[:, 1]
+    both = [
+        np.sort(half_resistances(build_network(as_grains(one), periodic="xyz"), fourth=True), None)
+        for one in (pack, replace(pack, position=place))
+    ]
+    assert both[0] == pytest.approx(both[1], rel=1e-9)
+
+
+def test_auto_takes_the_two_scale_law_in_light_sections_alone(pack):
+    """All fines lie in the first half; the second keeps what it has without fines."""
+    crowd = with_fines(pack.grains(), 300, 0.2)
+    half = crowd.where((crowd.kind == Kind.GRAIN) | (crowd.position[:, 0] < 0.35 * pack.box[0, 1]))
+    result = {
+        law: analyse(half, periodic=SIDES, sections=2, damage_law=law)
+        for law in ("auto", "all-spheres", "side-kozeny")
+    }
+    k = {law: [one.k_damaged for one in found.sections] for law, found in result.items()}
+    assert k["auto"] == pytest.approx([k["all-spheres"][0], k["side-kozeny"][1]])
+    assert result["auto"].counts["sections_two_scale"] == 1
+    inplace = [one.k_damaged_inplace for one in result["auto"].sections]
+    assert result["auto"].k_damaged == pytest.approx(2.0 / np.sum(np.divide(1.0, inplace)))
+
+
+def test_spheres_beside_a_facet_leave_all_some_or_nothing():
+    """Of a section whose third corner's sphere has ended."""
+    disc, room = np.array([0.3, 0.3, 1e-3]), (np.empty((5, 3)), ratio_table())
+
+    def left(*spheres):
+        return share_beside(BASE, disc, 0.5, np.array(spheres), room)
+
+    far, near, over = (0.3, 9.0, 0.5, 0.5, 1.0), (0.3, 1.2, 0.5, 0.5, 1.0), (0.4, 0.4, 0.5, 2.0, 1)
+    assert left(far) == left((*near[:2], 1.1, *near[3:])) == 1.0
+    assert 0.1 < left(near) < 0.9
+    assert left(near, far) == pytest.approx(left(near))
+    assert left(near, (0.6, 1.0, 0.5, 0.3, 1.0)) < left(near)
+    assert left(over) == 0.0
 
 
 def test_values_in_place_and_layers_add_up_to_the_whole(pack, analysis):

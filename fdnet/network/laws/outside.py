@@ -5,9 +5,9 @@ reaches. Sections between the two have no disc on that corner, so the triangle i
 sphere of the facet holds the fluid on that side, but the spheres around it do. Without them the
 throats of a light deposit of fine fines carry 2 to 16 times too much.
 
-The flow through such a section is multiplied by the share that the spheres around leave of it. Both
-fluxes are summed over rays (`section_rays`). Adding a solid never adds flow, so the share is at
-most 1.
+The flow through such a section is multiplied by the share that the spheres around leave of it.
+Both fluxes are summed over rays (`section_rays`). Adding a solid never adds flow, so the share is
+at most 1.
 """
 
 from dataclasses import dataclass

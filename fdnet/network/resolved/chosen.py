@@ -21,18 +21,20 @@ def light_sections(before: SlabK, after: SlabK) -> Array:
     return np.asarray(after.cut_out > LIGHT * before.cut_out)
 
 
-def by_section(light: Array, two_scale: SlabK, resolved: SlabK) -> SlabK:
-    """Sections (S,) of the two-scale law where `light`, else those of all spheres."""
-    return SlabK(
-        cut_out=frozen(np.where(light, two_scale.cut_out, resolved.cut_out)),
-        inplace=frozen(np.where(light, two_scale.inplace, resolved.inplace)),
-        flows=(*two_scale.flows, *resolved.flows),
+def by_section(
+    light: Array, two_scale: SlabK, resolved: SlabK, edges: Array
+) -> tuple[SlabK, float]:
+    """Sections (S,) of the two-scale law where `light`, else those of all spheres.
+
+    Returns:
+        The sections, and the permeability m2 of the whole: of those in place in series, between
+        `edges` (S+1,) m.
+    """
+    cut_out, inplace = (
+        frozen(np.where(light, getattr(two_scale, name), getattr(resolved, name)))
+        for name in ("cut_out", "inplace")
     )
-
-
-def in_series(slabs: SlabK, edges: Array) -> float:
-    """Permeability m2 of sections between `edges` (S+1,) m in series, from those in place."""
-    if not np.all(slabs.inplace > 0):
-        return 0.0
     thick = np.diff(edges)
-    return float(thick.sum() / np.sum(thick / slabs.inplace))
+    whole = float(thick.sum() / np.sum(thick / inplace)) if np.all(inplace > 0) else 0.0
+    flows = (*two_scale.flows, *resolved.flows)
+    return SlabK(cut_out=cut_out, inplace=inplace, flows=flows), whole
