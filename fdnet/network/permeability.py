@@ -152,19 +152,18 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
     clean, clean_slabs = measured.clean(law, log)
     base = measured.base(law, log)
     whole = measured.wanted(options, log)
-    name = options.damage_law
-    if name in (AUTO, ALL_SPHERES):
-        name = DEFAULT_DAMAGE_LAW
+    auto, name = options.damage_law == AUTO, options.damage_law
+    name = DEFAULT_DAMAGE_LAW if name in (AUTO, ALL_SPHERES) else name
     final, damage = measured.damaged(options, name, log)
     k_damaged, slabs = final.k, clean_slabs
     more: dict[str, int] = {}
-    if final is not clean and (whole is None or options.damage_law == AUTO):
+    if final is not clean and (whole is None or auto):
         slabs = measured.damaged_slabs(final, options, name, log)
     light = light_sections(clean_slabs, slabs)
-    taken = None if options.damage_law == AUTO and np.all(light) else whole
+    taken = None if auto and np.all(light) else whole
     if taken is not None:
         k_damaged, resolved, more = _resolved(taken, base, (clean_slabs, specimen), log)
-        if options.damage_law == AUTO and np.any(light):
+        if auto and np.any(light):
             slabs, in_series = by_section(light, slabs, resolved, specimen.edges)
             k_damaged, more["sections_two_scale"] = min(in_series, base.k), int(light.sum())
         else:
