@@ -10,7 +10,7 @@ from fdnet.network.flow.depth import Solved, depth_pressures, layer_edges
 from fdnet.network.flow.slabs import whole_permeability
 from fdnet.network.laws.fourth_grain import share_left
 from fdnet.network.laws.lubrication import half_resistances
-from fdnet.network.laws.outside import share_beside
+from fdnet.network.laws.outside import share_around
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse
@@ -130,19 +130,19 @@ def test_auto_takes_the_two_scale_law_in_light_sections_alone(pack):
         law: analyse(half, periodic=SIDES, sections=2, damage_law=law)
         for law in ("auto", "all-spheres", "side-kozeny")
     }
-    k = {law: [one.k_damaged for one in found.sections] for law, found in result.items()}
+    k = {law: [one.k_damaged for one in full.sections] for law, full in result.items()}
     assert k["auto"] == pytest.approx([k["all-spheres"][0], k["side-kozeny"][1]])
     assert result["auto"].counts["sections_two_scale"] == 1
     inplace = [one.k_damaged_inplace for one in result["auto"].sections]
     assert result["auto"].k_damaged == pytest.approx(2.0 / np.sum(np.divide(1.0, inplace)))
 
 
-def test_spheres_beside_a_facet_leave_all_some_or_nothing():
+def test_spheres_around_a_facet_leave_all_some_or_nothing():
     """Of a section whose third corner's sphere has ended."""
     disc, room = np.array([0.3, 0.3, 1e-3]), (np.empty((5, 3)), ratio_table())
 
     def left(*spheres):
-        return share_beside(BASE, disc, 0.5, np.array(spheres), room)
+        return share_around(BASE, disc, 0.5, np.array(spheres), room)
 
     far, near, over = (0.3, 9.0, 0.5, 0.5, 1.0), (0.3, 1.2, 0.5, 0.5, 1.0), (0.4, 0.4, 0.5, 2.0, 1)
     assert left(far) == left((*near[:2], 1.1, *near[3:])) == 1.0

@@ -25,7 +25,7 @@ from fdnet.network import geometry
 from fdnet.network.compiled import compiled
 from fdnet.network.laws.cross_section import even_flux, uneven_flux, wedges
 from fdnet.network.laws.fourth_grain import fourth_grains, share_left
-from fdnet.network.laws.outside import Neighbourhood, share_beside
+from fdnet.network.laws.outside import Neighbourhood, share_around
 from fdnet.network.laws.wall_cross_section import wall_cuts, wall_flux
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import LENGTH_FLOOR, Network
@@ -112,10 +112,10 @@ def _outside(around: Neighbourhood | None, part: slice, corner: Array) -> tuple[
     """The grains around (N, 5), as in `_beside`, and the first (K+1,) of each throat."""
     if around is None:
         return np.empty((0, 5)), np.zeros(len(corner) + 1, int)
-    found = around.beside(part)
-    throat = np.repeat(np.arange(len(corner)), np.diff(found.first))
-    radius, flatness = _discs(around.network, found.image[:, None], corner[throat])
-    return np.concatenate([found.place, radius, flatness], axis=1), found.first
+    near = around.near_facets(part)
+    throat = np.repeat(np.arange(len(corner)), np.diff(near.first))
+    radius, flatness = _discs(around.network, near.image[:, None], corner[throat])
+    return np.concatenate([near.place, radius, flatness], axis=1), near.first
 
 
 @compiled
@@ -200,7 +200,7 @@ def _resistance(
             if square > 0.0 and flux > 0.0:
                 share = share_left(base, disc, fourth[0], fourth[1], np.sqrt(square), table)
             if beyond and len(outside) and flux > 0.0:
-                share = min(share, share_beside(base, disc, z, outside, (room, table)))
+                share = min(share, share_around(base, disc, z, outside, (room, table)))
             flux *= share
         if not flux > 0.0:
             return np.inf

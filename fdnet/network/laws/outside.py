@@ -1,4 +1,4 @@
-"""The spheres beside the facet of a throat, for the sections that one of its spheres misses.
+"""The spheres around the facet of a throat, for the sections that one of its spheres misses.
 
 Among unequal spheres a power centre often lies farther from a facet than its smallest sphere
 reaches. Sections between the two have no disc on that corner, so the triangle is open there: no
@@ -23,12 +23,12 @@ from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
 NEAREST = 12
-"""Spheres beside a facet that are looked for among those of one size, to a factor of 2."""
+"""Spheres around a facet that are looked for among those of one size, to a factor of 2."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Beside:
-    """Spheres beside the facets of K throats.
+class Around:
+    """Spheres around the facets of K throats.
 
     Attributes:
         first: (K+1,) the first sphere of each throat, and their number at the end.
@@ -54,8 +54,8 @@ class Neighbourhood:
         self._kinds = [np.nonzero(size == one)[0] for one in np.unique(size)]
         self._trees = [cKDTree(network.image_position[kind]) for kind in self._kinds]
 
-    def beside(self, part: slice) -> Beside:
-        """The spheres beside the throats `part` (K) that have sections beyond a sphere's reach.
+    def near_facets(self, part: slice) -> Around:
+        """The spheres around the throats `part` (K) that have sections beyond a sphere's reach.
 
         They are those nearer to the centroid of the facet than its farthest corner or power
         centre. The spheres of the facet are not among them.
@@ -74,7 +74,7 @@ class Neighbourhood:
         row, image = row[~own][order], image[~own][order]
         place = _from_facet(network, part, facet, (open_row, row, image))
         first = np.searchsorted(open_row[row], np.arange(len(images) + 1))
-        return Beside(first=first, image=image, place=place)
+        return Around(first=first, image=image, place=place)
 
     def _nearest(self, middle: Array, reach: Array) -> tuple[Array, Array]:
         """Pairs of a row of `middle` (K, 3) m and an image whose body is within `reach` (K,)."""
@@ -83,13 +83,13 @@ class Neighbourhood:
             radius = self.network.image_radius[kind]
             if not len(middle):
                 break
-            apart, found = tree.query(
+            apart, closest = tree.query(
                 middle,
                 k=list(range(1, min(NEAREST, len(kind)) + 1)),
                 distance_upper_bound=float(reach.max() + radius.max()),
             )
             row, column = np.nonzero(np.isfinite(apart))
-            one = found[row, column]
+            one = closest[row, column]
             near = apart[row, column] - radius[one] < reach[row]
             rows.append(row[near])
             images.append(kind[one[near]])
@@ -97,10 +97,10 @@ class Neighbourhood:
 
 
 def _from_facet(
-    network: Network, part: slice, facet: Array, found: tuple[Array, Array, Array]
+    network: Network, part: slice, facet: Array, of_row: tuple[Array, Array, Array]
 ) -> Array:
     """Places (N, 3) m of images from the first corner of their `facet` (K, 3, 3) m."""
-    open_row, row, image = found
+    open_row, row, image = of_row
     along = facet[:, 1] - facet[:, 0]
     along /= np.linalg.norm(along, axis=1)[:, None]
     normal = geometry.cross(along, facet[:, 2] - facet[:, 0])
@@ -115,26 +115,26 @@ def _from_facet(
 
 
 @compiled
-def share_beside(
-    base: Array, disc: Array, z: float, beside: Array, room: tuple[Array, Array]
+def share_around(
+    base: Array, disc: Array, z: float, around: Array, room: tuple[Array, Array]
 ) -> float:
-    """Share of the flux at the height `z` m that the spheres `beside` a facet leave, 0 to 1.
+    """Share of the flux at the height `z` m that the spheres `around` a facet leave, 0 to 1.
 
     Args:
         base: (3, 2) m, corners of the facet.
         disc: (3,) m, radii of the discs on them at this height.
         z: m above the facet.
-        beside: (N, 5): place (3) m, radius m and flatness (`lubrication`), heights as `z`.
+        around: (N, 5): place (3) m, radius m and flatness (`lubrication`), heights as `z`.
         room: at least N + 3 rows of three, which are written to, and the table of `shear_ratio`.
     """
     discs, table = room
     count = 3
     for i in range(3):
         discs[i] = base[i, 0], base[i, 1], disc[i]
-    for i in range(len(beside)):
-        square = beside[i, 3] ** 2 - beside[i, 4] * (beside[i, 2] - z) ** 2
+    for i in range(len(around)):
+        square = around[i, 3] ** 2 - around[i, 4] * (around[i, 2] - z) ** 2
         if square > 0.0:
-            discs[count] = beside[i, 0], beside[i, 1], np.sqrt(square)
+            discs[count] = around[i, 0], around[i, 1], np.sqrt(square)
             count += 1
     if count == 3:
         return 1.0
