@@ -1,4 +1,4 @@
-"""The `fdnet` command: run, ensemble, sweep, compare, design, render, permeability, movie, study.
+"""The `fdnet` command: from a sand and a mud to the damage they do.
 
 It reads the arguments, calls the package and prints. Exit codes: 0 done, 2 bad input (nothing
 written), 3 LIGGGHTS missing or failed, 4 degenerate geometry or an unconverged solve, 5 some
@@ -15,9 +15,12 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from fdnet.commands import (
+    cases,
+    check,
     compare,
     design,
     ensemble,
+    init,
     movie,
     permeability,
     render,
@@ -28,7 +31,10 @@ from fdnet.commands import (
 from fdnet.errors import FdnetError, words_of
 from fdnet.permeability.options import joined_box
 
-COMMANDS = (run, ensemble, sweep, compare, design, render, permeability, movie, study)
+COMMANDS = (
+    *(init, cases, check, run, ensemble, sweep, compare, design),
+    *(render, permeability, movie, study),
+)
 """Modules of the commands, in the order that `fdnet --help` shows."""
 
 _STOPPED = 130

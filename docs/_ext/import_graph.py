@@ -123,7 +123,7 @@ def write_counts(page: Path, nodes: set[str], edges: set[Edge]) -> None:
     layers = 1 + max(layers_of(nodes, edges).values())
     row = f"| now | {len(nodes)} | {layers} | {len(edges)} |"
     text = page.read_text("utf-8")
-    page.write_text(re.sub(r"(?m)^\| now \|.*$", row, text), "utf-8")
+    page.write_text(re.sub(r"(?m)^\| now \|.*$", row, text, count=1), "utf-8")
 
 
 def draw_svg(path: Path, nodes: set[str], edges: set[Edge]) -> None:

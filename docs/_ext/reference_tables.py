@@ -14,6 +14,8 @@ from pathlib import Path
 from case_keys import key_rows
 from command_options import commands, option_rows, usage_of
 
+from fdnet.scales.check.catalogue import PAGE, page
+
 PAGES = ("docs/reference/case.md", "docs/reference/commands.md")
 BLOCK = re.compile(
     r"(<!-- (case-keys|command-options)(?: ([\w.]+))? -->\n).*?(<!-- end -->)", re.S
@@ -39,19 +41,26 @@ def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in cells)
 
 
+def written(root: Path) -> list[tuple[Path, str]]:
+    """The generated pages with the text that they should have."""
+    pages = [root / name for name in PAGES]
+    return [
+        *((path, filled(path.read_text(encoding="utf-8"))) for path in pages),
+        (root / PAGE, page()),
+    ]
+
+
 def main() -> int:
     """Write the pages with `--write`; otherwise name those that are out of date, with code 1."""
     root, code = Path(__file__).resolve().parents[2], 0
-    for name in PAGES:
-        page = root / name
-        text = page.read_text(encoding="utf-8")
-        if filled(text) == text:
+    for path, text in written(root):
+        if path.exists() and path.read_text(encoding="utf-8") == text:
             continue
         if "--write" in sys.argv[1:]:
-            page.write_text(filled(text), encoding="utf-8")
+            path.write_text(text, encoding="utf-8")
         else:
             code = 1
-            print(f"{name}: its tables are not those of the code", file=sys.stderr)
+            print(f"{path.relative_to(root)}: it is not that of the code", file=sys.stderr)
     return code
 
 

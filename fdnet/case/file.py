@@ -14,6 +14,7 @@ from pydantic.fields import FieldInfo
 from fdnet.case.added import completed
 from fdnet.case.case import Case, InvasionCase, case_type
 from fdnet.case.rules import cross_problems
+from fdnet.case.sizes import Sizes
 from fdnet.case.spoken import plain_tables
 from fdnet.case.units import stem_of, suffix_of
 from fdnet.case.values import Part
@@ -71,6 +72,22 @@ def case_from(data: Mapping[str, Any], *, source: str = "case", folder: str | Pa
         problems = [*spoken.problems, *_problems(model, spoken.data, error, spoken.bad)]
     plural = "s" if len(problems) > 1 else ""
     raise CaseError(f"{source}: {len(problems)} problem{plural}: {' | '.join(problems)}")
+
+
+def sizes_from(table: Mapping[str, Any], *, source: str, folder: Path) -> Sizes:
+    """A curve of sizes from the keys of its table; see `case_from`.
+
+    Raises CaseError that lists every problem.
+    """
+    spoken = plain_tables(Sizes, table, folder)
+    problems = list(spoken.problems)
+    try:
+        if not problems:
+            known = Sizes.model_fields
+            return Sizes.model_validate({k: v for k, v in spoken.data.items() if k in known})
+    except ValidationError as error:
+        problems += [_problem(dict(item)).lstrip(": ") for item in error.errors()]
+    raise CaseError(f"{source}: the sizes make no curve: {' | '.join(problems)}")
 
 
 def _long_numbers(value: Any, key: str = "") -> Iterator[str]:
@@ -159,8 +176,22 @@ def _nearest(path: str) -> str:
     table, _, key = path.rpartition(".")
     if table in ("grains", "fines") and _DIAMETER.match(key):
         return f'; did you mean {table}.sizes = {{ D10 = "20 um", D50 = "40 um", ... }}?'
-    near = difflib.get_close_matches(path, list(known_keys()), n=1, cutoff=0.5)
+    here = [one for one in known_keys() if one.rpartition(".")[0] == table]
+    stems = {one: stem_of(one.rpartition(".")[2]) for one in here}
+    same = [one for one in here if stems[one] == stem_of(key)]
+    near = same or _near(key, here) or _named_alike(key) or _near(key, list(known_keys()))
     return f"; did you mean {near[0]}?" if near else ""
+
+
+def _near(key: str, keys: list[str]) -> list[str]:
+    """The key of nearly the same spelling; tables and units count for nothing."""
+    stems = {stem_of(one.rpartition(".")[2]): one for one in reversed(keys)}
+    return [stems[one] for one in difflib.get_close_matches(stem_of(key), stems, n=1, cutoff=0.65)]
+
+
+def _named_alike(key: str) -> list[str]:
+    """A key of another table with the same name."""
+    return [one for one in known_keys() if stem_of(one.rpartition(".")[2]) == stem_of(key)]
 
 
 def _is_union_tag(part: Any) -> bool:

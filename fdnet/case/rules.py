@@ -125,7 +125,8 @@ def _slab(box: Box, fines: Fines) -> Iterator[str]:
 
 
 def _gap_of_sizes(grains: Grains, fines: Fines) -> Iterator[str]:
-    if fines.radius_range_m[1] >= grains.radius_range_m[0]:
+    none_fits = any(True for _ in SOME_THROAT.check(grains, fines))
+    if fines.radius_range_m[1] >= grains.radius_range_m[0] and not none_fits:
         yield (
             f"{size_text('fines', fines)} is not below {size_text('grains', grains)} "
             "(the network needs a clear gap)"

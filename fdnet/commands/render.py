@@ -4,6 +4,7 @@ import argparse
 from typing import Any
 
 from fdnet.commands.case_options import add_case, case_of
+from fdnet.commands.check import looked_at
 from fdnet.errors import CaseError
 from fdnet.files.paths import path_option
 
@@ -21,7 +22,6 @@ def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
 def _render(options: argparse.Namespace) -> int:
     from fdnet.dem.render import render_decks
     from fdnet.run.mark import is_run_folder
-    from fdnet.scales.cost import over_limit
     from fdnet.scales.scales import scales_of
     from fdnet.scales.table import scale_rows
 
@@ -37,8 +37,7 @@ def _render(options: argparse.Namespace) -> int:
             f"{row.name:<36} {row.symbol:<11} {row.value:>12.4g} {row.unit:<5} "
             f"{row.formula:<40} {row.source}"
         )
-    for warning in filter(None, [*scales.warnings, over_limit(case, scales)]):
-        print(f"warning: {warning}")
+    print("\n".join(looked_at(case, scales).lines()))
     for deck in decks:
         print(f"deck: {deck}")
     return 0

@@ -14,6 +14,7 @@ from fdnet.permeability.options import (
     table_file,
     types_of,
 )
+from fdnet.scales.check.catalogue import explained
 
 if TYPE_CHECKING:
     from fdnet.network.analysis import Analysis
@@ -94,7 +95,8 @@ def _along(
         used = result.damage_law_used
         if options.damage_law is None and not rows and used is not None:
             facts = [*facts, f"The damage law is fdnet's default, here {used}."]
-        more = {"warnings": [*notes, *result.warnings], "assumptions": facts}
+        said = [explained(one) for one in [*notes, *result.warnings]]
+        more = {"warnings": said, "assumptions": facts}
         rows.append(_row(result, seconds) | more)
     return rows
 

@@ -1,5 +1,6 @@
 """The stages of a run that need LIGGGHTS: the pack and the invasion."""
 
+import math
 from pathlib import Path
 
 from fdnet.case.case import InvasionCase
@@ -13,12 +14,14 @@ from fdnet.dem.scene import snapshot_of
 from fdnet.dem.updates import read_updates
 from fdnet.errors import CaseError
 from fdnet.run.fluid.fluid_of import fluid_of
+from fdnet.run.forecast import Forecast
 from fdnet.run.made_files import ANALYSE_AGAIN, MESHES, START_OVER, check_files
 from fdnet.run.outputs import Invaded
 from fdnet.run.progress import Progress
 from fdnet.run.records import PACK_DUMP, invade_record, pack_record, ranks_of
 from fdnet.run.session import Session
 from fdnet.run.shared_pack import take_pack
+from fdnet.scales.cost import expected_duration
 from fdnet.scales.grain_pack import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES
 from fdnet.scales.scales import InvasionScales, scales_of
 from fdnet.spheres.dump import read_frame
@@ -34,7 +37,7 @@ def pack_stage(session: Session) -> None:
         return
     case, scales = session.case, session.scales
     expected = PACK_STAGES * PACK_STAGE_STEPS + PACK_RELAX_STEPS // 2
-    progress = Progress("pack", expected, show=session.options.show_progress)
+    progress = Progress("pack", Forecast(expected=expected), show=session.options.show_progress)
     with session.timed("pack"), progress:
         pack = make_pack(case, scales, session.path / "pack", session.launch(progress))
     folder, seconds = session.path / "pack", session.seconds["pack"]
@@ -48,8 +51,8 @@ def invade_stage(session: Session, case: InvasionCase) -> None:
         return
     scales, grains, folder = scales_of(case), packed_grains(session), session.path / "invade"
     _refuse_mixed_ranks(session, folder)
-    expected = _expected_steps(scales)
-    progress = Progress("invade", expected, show=session.options.show_progress)
+    forecast = invasion_forecast(case, scales)
+    progress = Progress("invade", forecast, show=session.options.show_progress)
     with session.timed("invade"), progress:
         launch, fluid = session.launch(progress), fluid_of(case, scales, grains)
         result = invade(case, scales, grains, folder, launch, fluid=fluid)
@@ -70,9 +73,16 @@ def _refuse_mixed_ranks(session: Session, folder: Path) -> None:
         )
 
 
-def _expected_steps(scales: InvasionScales) -> int:
-    feeding = scales.slab_length / scales.upstream_velocity
-    return round(min(scales.cap_time, feeding + 2 * scales.plug_time) / scales.time_step)
+def invasion_forecast(case: InvasionCase, scales: InvasionScales) -> Forecast:
+    """When the invasion of a case ends, as far as it is known before."""
+    step = scales.time_step
+    arrivals = scales.supplied_count * scales.upstream_velocity / scales.slab_length
+    return Forecast(
+        expected=round(expected_duration(case, scales) / step),
+        plug=0 if case.run.duration_s is not None else round(scales.plug_time / step),
+        cap=math.ceil(scales.cap_time / step),
+        allowed=case.run.plug_rate * arrivals * step,
+    )
 
 
 def is_done(session: Session, stage: str) -> bool:

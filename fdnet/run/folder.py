@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from fdnet.case.case import Case
+from fdnet.case.difference import difference_text
+from fdnet.case.file import recorded_case
 from fdnet.case.stages import STAGES
 from fdnet.errors import CaseError
 from fdnet.files.atomic import remove_half_written, write_text
@@ -206,8 +208,9 @@ def _admit(
         _force(folder, case, stages)
     elif written.exists() and not case.same_specimen(written.read_bytes()):
         raise CaseError(
-            f"{folder.path}: holds a run of another case (see {written}); give another --out, or "
-            "--force to replace it"
+            f"{folder.path}: holds a run of another case{_other_keys(written, case)}; give "
+            f"another --out, {'repeat the --set of these keys, ' if resume else ''}or --force to "
+            "replace it"
         )
     elif (folder.path / UNFINISHED).exists() and not resume:
         raise CaseError(
@@ -218,6 +221,15 @@ def _admit(
         write_text(folder.path / UNFINISHED, " ".join(stages) + "\n")
     if force or not written.exists() or not folder.holds(case, stages):
         write_text(written, case.toml())
+
+
+def _other_keys(written: Path, case: Case) -> str:
+    """What the case of the folder has otherwise; only its place where it cannot be read."""
+    try:
+        keys = difference_text(case, recorded_case(written).data())
+    except CaseError:
+        keys = ""
+    return f" ({keys})" if keys else f" (see {written})"
 
 
 def _force(folder: RunFolder, case: Case, stages: tuple[str, ...]) -> None:

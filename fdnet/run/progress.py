@@ -7,17 +7,28 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
+from fdnet.run.forecast import Forecast
+from fdnet.scales.times import spoken_time
+
 _THERMO = re.compile(r"^\s*(\d+)\s+\d+\s+[-+.\deE]+\s+[-+.\deE]+\s*$")
 _QUIET_SECONDS = 5.0
 
 
 class Progress:
-    """Follows the screen of a run; a stage is `expected` to take about that many steps."""
+    """Follows the screen of a run, whose end is forecast anew at every line.
 
-    def __init__(self, stage: str, expected: int, *, show: bool = True) -> None:
-        self.stage, self.expected, self.show = stage, max(1, expected), show
-        self.start = self.last = time.monotonic()
-        self.first_step: int | None = None
+    The forecast is one, or the expected number of steps.
+
+    The time left goes by the speed of the last third of the steps, because fines that come make
+    steps slower. The bar is never full before the stage has ended.
+    """
+
+    def __init__(self, stage: str, forecast: Forecast | int, *, show: bool = True) -> None:
+        self.stage, self.show = stage, show
+        self.forecast = Forecast(expected=forecast) if isinstance(forecast, int) else forecast
+        self.last = time.monotonic()
+        self.crossed: list[tuple[int, int]] = []
+        self.clock: list[tuple[int, float]] = []
         self.step, self.note = 0, ""
         self._draw: Callable[[], None] = self._line
         self._stop: Callable[[], None] = lambda: None
@@ -49,9 +60,9 @@ class Progress:
             transient=True,
         )
         bar.start()
-        task = bar.add_task(self.stage, total=self.expected, note="")
+        task = bar.add_task(self.stage, total=max(1, self.forecast.expected), note="")
         self._draw = lambda: bar.update(
-            task, completed=min(self.step, self.expected), note=self._text()
+            task, completed=self.step, total=max(self.end, self.step + 1), note=self._text()
         )
         self._stop = bar.stop
 
@@ -60,6 +71,7 @@ class Progress:
         if line.startswith("FDNET checkpoint"):
             step, upstream, invaded, passed = line.split()[3:7]
             self.note = f"upstream {upstream}, invaded {invaded}, passed {passed}"
+            self.crossed.append((int(step), int(invaded) + int(passed)))
             self._at(int(step))
         elif line.startswith("FDNET"):
             self.note = " ".join(line.split()[1:4])
@@ -67,22 +79,34 @@ class Progress:
         elif match := _THERMO.match(line):
             self._at(int(match.group(1)))
 
+    @property
+    def end(self) -> int:
+        """The step at which the stage is expected to end, as far as is known now."""
+        last = self.crossed[-1][1] if self.crossed else 0
+        return self.forecast.end([*self.crossed, (self.step, last)])
+
     def _at(self, step: int) -> None:
+        if step < self.step:  # another attempt at a pack counts from zero
+            self.clock, self.crossed = [], []
         self.step = step
-        if self.first_step is None:
-            self.first_step, self.start = step, time.monotonic()
+        self.clock.append((step, time.monotonic()))
         if self.show:
             self._draw()
 
+    def _left(self) -> float:
+        """Seconds left by the speed of the last third of the steps; 0 where it is not known."""
+        step, now = self.clock[-1]
+        since = self.clock[0][0] + 2 * (step - self.clock[0][0]) / 3
+        before, then = next(one for one in self.clock if one[0] >= since)
+        if before == step:
+            before, then = self.clock[0]
+        done = step - before
+        return (self.end - step) * (now - then) / done if done > 0 else 0.0
+
     def _text(self) -> str:
-        elapsed, done = time.monotonic() - self.start, self.step - (self.first_step or 0)
-        left = (
-            (self.expected - self.step) * elapsed / done
-            if done > 0 and self.step < self.expected
-            else 0.0
-        )
-        eta = f", ~{_clock(left)} left" if left else ""
-        return f"step {self.step} of ~{self.expected}, {self.note}{eta}"
+        left = self._left() if self.clock else 0.0
+        eta = f", ~{spoken_time(left)} left" if left else ""
+        return f"step {self.step} of ~{self.end}, {self.note}{eta}"
 
     def _line(self) -> None:
         now = time.monotonic()
@@ -92,12 +116,3 @@ class Progress:
                 print(f"{self.stage}: {self._text()}", file=sys.stderr, flush=True)
             except BrokenPipeError:  # nobody reads the progress any more; the run goes on
                 self.show = False
-
-
-def _clock(seconds: float) -> str:
-    minutes, rest = divmod(round(seconds), 60)
-    return (
-        f"{minutes // 60} h {minutes % 60} min"
-        if minutes >= 60
-        else (f"{minutes} min {rest} s" if minutes else f"{rest} s")
-    )

@@ -6,6 +6,7 @@ from fdnet.case.case import Case
 from fdnet.dem.checkpoint import Checkpoint
 from fdnet.report.tables import section_rows
 from fdnet.run.records import ranks_of
+from fdnet.scales.check.catalogue import explained
 
 if TYPE_CHECKING:
     from fdnet.network.analysis import Analysis
@@ -54,7 +55,7 @@ def summarise(
         "seconds": seconds
         | {f"analyse_{name}": value for name, value in analysis.seconds.items()},
         "left_out": _left_out(pack, invasion),
-        "warnings": [*warnings, *analysis.warnings],
+        "warnings": [explained(one) for one in [*warnings, *analysis.warnings]],
     }
     return result
 

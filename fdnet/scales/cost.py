@@ -3,8 +3,9 @@
 import math
 from dataclasses import dataclass
 
-from fdnet.case.case import Case
+from fdnet.case.case import Case, InvasionCase
 from fdnet.errors import CaseError
+from fdnet.scales.forces.warnings import BRIDGING
 from fdnet.scales.grain_pack import (
     PACK_RELAX_STEPS,
     PACK_STAGE_STEPS,
@@ -12,61 +13,130 @@ from fdnet.scales.grain_pack import (
     grain_count,
 )
 from fdnet.scales.scales import InvasionScales, Scales
+from fdnet.scales.supply import TAKEN_SOLIDS, present_share, supplied_solids
 from fdnet.scales.time_step import contact_step
+from fdnet.scales.times import spoken_time
 
 STEP_SECONDS = 2.0e-6
 """Seconds of one step with nothing to do."""
 FIXED_GRAIN_SECONDS, MOVING_GRAIN_SECONDS = 1.3e-8, 1.0e-7
 """Seconds of one grain in one step."""
-FINE_SECONDS = {"every_step": 1.8e-7, "held": 1.5e-7, "implicit": 1.5e-7, "viscous": 1.45e-7}
+FINE_SECONDS = {"every_step": 1.7e-7, "held": 1.4e-7, "implicit": 1.4e-7, "viscous": 1.35e-7}
 """Seconds of one fine in one step, contacts and drag, by `drag.scheme`."""
+CACHED_FINES = 8000
+"""Fines n cost (1 + n / (n + CACHED_FINES)) times as much each: their neighbours leave the
+cache."""
+UPDATE_SECONDS = {"network": (0.03, 9.0e-5), "uniform": (0.004, 1.4e-5)}
+"""Seconds of one update of the forces that fdnet computes itself, by `drag.field`: at least, and
+for each grain and fine."""
+FALLING_RATE = 0.6
+"""Mean rate over the first, where the deposit slows the flow."""
+WAITING, TRICKLING = 2.0, 1.4
+"""Plug times that the face is watched when what plugs it has come; passages of the fluid through
+the box in which single fines still enter, where these count (`run.plug_rate` = 0)."""
+START_SECONDS, REPORT_SECONDS, SPHERE_SECONDS = 3.0, 8.0, 6.0e-4
+"""Seconds of the Python half: to start, for the report, for each sphere that is analysed."""
 BYTES_PER_SPHERE = 600
+REPORT_BYTES, NETWORK_BYTES, MOST_RESOLVED = 6.0e8, 3.0e4, 20_000
+"""Memory of the report, and of the network for each of up to so many spheres."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cost:
-    """What a run is expected to take on one core, within a factor of about 3.
+    """What a run is expected to take on one core, within a factor of about 2.
 
     Attributes:
         pack_seconds: s, of one attempt at the pack.
         invade_seconds: s, of the invasion; 0 when the case has no fines.
+        update_seconds: s of these, for forces that fdnet computes while LIGGGHTS waits.
+        analyse_seconds: s, of analysis and report.
         steps: of the invasion.
+        duration: s of the simulation, of the invasion.
     """
 
     pack_seconds: float
     invade_seconds: float = 0.0
+    update_seconds: float = 0.0
+    analyse_seconds: float = 0.0
     steps: float = 0.0
+    duration: float = 0.0
+
+    @property
+    def seconds(self) -> float:
+        """Of the whole run."""
+        return self.pack_seconds + self.invade_seconds + self.analyse_seconds
 
 
 def cost_of(case: Case, scales: Scales) -> Cost:
-    """The cost of a case.
-
-    An invasion without a duration is expected to last until the slab is fed, the fluid has passed
-    through the box once and one plug time is over, or until its cap.
-    """
-    pack = (
-        grain_count(case)
-        * (PACK_STAGES * PACK_STAGE_STEPS + PACK_RELAX_STEPS)
-        * MOVING_GRAIN_SECONDS
-    )
-    if not isinstance(scales, InvasionScales):
-        return Cost(pack_seconds=pack)
-    steps = math.ceil(_expected_duration(case, scales) / scales.time_step)
-    grain = MOVING_GRAIN_SECONDS if case.grains.motion == "mobile" else FIXED_GRAIN_SECONDS
-    fines = scales.supplied_count * FINE_SECONDS[case.drag.scheme]
+    """The cost of a case; how long its invasion lasts is that of `expected_duration`."""
+    grains = grain_count(case)
+    pack = grains * (PACK_STAGES * PACK_STAGE_STEPS + PACK_RELAX_STEPS) * MOVING_GRAIN_SECONDS
+    python = START_SECONDS + REPORT_SECONDS
+    if not isinstance(case, InvasionCase) or not isinstance(scales, InvasionScales):
+        return Cost(pack_seconds=pack, analyse_seconds=python + grains * SPHERE_SECONDS)
+    duration = expected_duration(case, scales)
+    steps = math.ceil(duration / scales.time_step)
+    feeding = scales.slab_length / scales.upstream_velocity
+    fines = scales.supplied_count * present_share(case, duration=duration, feeding=feeding)
+    updates = _updates(case, scales, duration) * _update_seconds(case, grains + fines)
     return Cost(
         pack_seconds=pack,
-        invade_seconds=steps * (STEP_SECONDS + grain_count(case) * grain + fines),
+        invade_seconds=steps * _step_seconds(case, grains, fines) + updates,
+        update_seconds=updates,
+        analyse_seconds=python + (grains + fines) * SPHERE_SECONDS,
         steps=steps,
+        duration=duration,
     )
 
 
-def _expected_duration(case: Case, scales: InvasionScales) -> float:
+def _step_seconds(case: InvasionCase, grains: int, fines: float) -> float:
+    grain = MOVING_GRAIN_SECONDS if case.grains.motion == "mobile" else FIXED_GRAIN_SECONDS
+    fine = FINE_SECONDS[case.drag.scheme] * (1 + fines / (fines + CACHED_FINES))
+    return STEP_SECONDS + grains * grain + fines * fine
+
+
+def _updates(case: InvasionCase, scales: InvasionScales, duration: float) -> float:
+    """Updates of the forces that fdnet computes: the travel of the fluid over that of one."""
+    if not case.drag.coupled:
+        return 0.0
+    travel = case.drag.travel_diameters
+    falling = FALLING_RATE if case.drag.field == "network" else 1.0
+    way = falling * scales.drive_velocity * duration
+    return way / (travel * 2 * case.fines.radius_range_m[0])
+
+
+def _update_seconds(case: InvasionCase, spheres: float) -> float:
+    least, each = UPDATE_SECONDS[case.drag.field]
+    return least + each * spheres
+
+
+def expected_duration(case: InvasionCase, scales: InvasionScales) -> float:
+    """How long the invasion is expected to last, s of the simulation.
+
+    It is the duration that is given. Else what plugs the face must come (`TAKEN_SOLIDS`), or the
+    whole slab where the fines are too small to bridge, and then the face is watched for some
+    plug times. At a constant pressure the flow slows down, and with it all that comes.
+    """
     if case.run.duration_s is not None:
         return scales.cap_time
-    passage = case.size_m[0] / scales.drive_velocity
     feeding = scales.slab_length / scales.upstream_velocity
-    return min(scales.cap_time, feeding + passage + scales.plug_time)
+    share = TAKEN_SOLIDS / supplied_solids(case, scales.slab_length)
+    if scales.throat_ratio < BRIDGING:
+        share = 1.0
+        feeding += case.size_m[0] / scales.drive_velocity
+    slower = 1 / FALLING_RATE if case.drag.field == "network" else 1.0
+    trickle = 0.0 if case.run.plug_rate > 0 else TRICKLING
+    watched = max(WAITING * scales.plug_time, trickle * case.size_m[0] / scales.drive_velocity)
+    return min(scales.cap_time, slower * feeding * min(1.0, share) + watched)
+
+
+def peak_memory(case: Case, scales: Scales) -> float:
+    """Memory of the largest process of a run, bytes: that of the report, or of the network.
+
+    The network of all spheres takes most, up to the number that it is used for.
+    """
+    fines = scales.supplied_count if isinstance(scales, InvasionScales) else 0
+    return REPORT_BYTES + NETWORK_BYTES * min(grain_count(case) + fines, MOST_RESOLVED)
 
 
 def memory_bytes(case: Case, scales: Scales) -> float:
@@ -83,7 +153,7 @@ def over_limit(case: Case, scales: Scales, *, pack: bool = True, invade: bool = 
         return ""
     refusal = (
         f"run.max_hours: {case.run.max_hours:g} h, but this case is expected to take "
-        f"{_hours(seconds)} on one core"
+        f"{spoken_time(seconds)} on one core"
     )
     mostly_pack = not invade or cost.pack_seconds > cost.invade_seconds
     if mostly_pack or not isinstance(scales, InvasionScales):
@@ -105,11 +175,6 @@ def refuse_long(case: Case, scales: Scales, *, pack: bool, invade: bool) -> None
     refusal = over_limit(case, scales, pack=pack, invade=invade)
     if refusal:
         raise CaseError(refusal)
-
-
-def _hours(seconds: float) -> str:
-    years = f" ({seconds / (365.25 * 86400):.2g} years)" if seconds > 365.25 * 86400 else ""
-    return f"{seconds / 3600:.3g} h{years}"
 
 
 def _step_reason(case: Case, scales: InvasionScales) -> tuple[str, str]:

@@ -170,11 +170,11 @@ def _shared(case: Case, velocity: Velocity) -> Scales:
 
 def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     slab, relaxation = slab_of(case), _relaxation_times(case)
+    reynolds, throat = _reynolds(case, shared.interstitial_velocity), _throat_ratio(case, shared)
     drive = _drive(case, shared, relaxation[1])
     velocity = drive.velocity
     push = push_of(case, velocity, shared.pressure_gradient, factor=drive.factor)
-    slow = case.drag.upstream == "darcy"
-    upstream = shared.darcy_velocity * drive.factor if slow else velocity
+    upstream = _upstream(case, shared, drive)
     shortest = relaxation[0] * push.relaxation_share(case.fines.radius_range_m[0])
     step = time_step(case, shared.contacts, shortest)
     times = stop_times(case, slab, drive, upstream=upstream)
@@ -187,8 +187,8 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     warnings = [
         *shared.warnings,
         *drive_warnings(case, drive),
-        *reynolds_warnings(case, push, _reynolds(case, shared.interstitial_velocity)),
-        *throat_warnings(case, _throat_ratio(case, shared)),
+        *reynolds_warnings(case, push, reynolds, throat_ratio=throat),
+        *throat_warnings(case, throat),
         *overlap_warnings(case, overlaps),
         *cohesion_warnings(case, contact),
         *slab_warnings(case, slab),
@@ -210,19 +210,24 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
         plug_time=times.plug,
         cap_time=times.cap,
         checkpoint_steps=chunk_steps,
-        reynolds=_reynolds(case, shared.interstitial_velocity),
+        reynolds=reynolds,
         stokes=relaxation[1] * velocity / (2 * case.grains.mean_radius_m),
         impact_stokes=drive.impact_stokes,
         gravity_over_drag=_gravity_over_drag(case, shared.interstitial_velocity),
         gradient_over_drag=_gradient_over_drag(case, shared),
         push=push,
         drift_velocity=velocity + push.drift(case.fines.radius_range_m[1]),
-        throat_ratio=_throat_ratio(case, shared),
+        throat_ratio=throat,
         impact_overlap=overlaps.impact,
         drag_overlap=overlaps.drag,
         deposit_overlap=overlaps.deposit,
         sticking=sticking,
     )
+
+
+def _upstream(case: InvasionCase, shared: Scales, drive: Drive) -> float:
+    interstitial = case.drag.upstream == "interstitial"
+    return drive.velocity if interstitial else shared.darcy_velocity * drive.factor
 
 
 def _drive(case: InvasionCase, shared: Scales, relaxation: float) -> Drive:

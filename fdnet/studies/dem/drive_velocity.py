@@ -5,10 +5,10 @@ from pathlib import Path
 
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import case_from, read_case, set_keys
+from fdnet.case.shipped import case_path
 from fdnet.scales.scales import scales_of
 from fdnet.studies.dem.runs import invasion_run
 from fdnet.studies.engine.error_rows import against_reference
-from fdnet.studies.engine.shipped import case_path
 from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study
 
 SERIES = "specimen 5 at a well"

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fdnet.case.shipped import QUICK
 from fdnet.files.atomic import replacing
 from fdnet.report.figures import STYLE
 from fdnet.spheres.snapshot import Array
@@ -20,7 +21,6 @@ from fdnet.studies.engine.palette import (
     SKY,
     YELLOW,
 )
-from fdnet.studies.engine.shipped import QUICK
 from fdnet.studies.thesis.numbers.examine import Examined
 from fdnet.studies.thesis.numbers.values import specimen_number
 

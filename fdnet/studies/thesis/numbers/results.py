@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from fdnet.case.shipped import QUICK
 from fdnet.errors import CaseError
 from fdnet.network.analysis import Analysis
 from fdnet.network.flow.sections import reduction
 from fdnet.studies.engine.csv_rows import parsed, read_csv, write_csv
-from fdnet.studies.engine.shipped import QUICK
 from fdnet.studies.thesis.numbers.examine import Examined
 from fdnet.studies.thesis.numbers.invasion import (
     FIRST,

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import read_case
+from fdnet.case.shipped import QUICK, case_path
 from fdnet.scales.scales import scales_of
-from fdnet.studies.engine.shipped import QUICK, case_path
 
 SPECIMENS = tuple(f"specimen{number}" for number in range(1, 9))
 VARIANTS = ("specimen1-7to8", "specimen1-1410", "specimen5-5to6", "table3")

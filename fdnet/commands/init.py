@@ -1,0 +1,88 @@
+"""`fdnet init`: a case file from a sand, a mud and a well."""
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fdnet.files.paths import path_option
+
+if TYPE_CHECKING:
+    from fdnet.scales.design.answers import Question
+
+SIZES = ("quick", "standard")
+
+
+def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Adds the command to the command line."""
+    from fdnet.scales.design.questions import QUESTIONS
+
+    init = commands.add_parser(
+        "init",
+        parents=[common],
+        help="write a case from a sand, a mud and a well: asks, or takes options",
+    )
+    for question in QUESTIONS:
+        flag = f"--{question.key.replace('_', '-')}"
+        init.add_argument(flag, metavar="TEXT", help=f'{question.text}, e.g. "{question.example}"')
+    for group, what in (("sand", "sieve"), ("mud", "laser")):
+        init.add_argument(
+            f"--{group}-file",
+            type=path_option,
+            metavar="CSV",
+            help=f"a table of sizes instead ({what})",
+        )
+    init.add_argument("--name", default="my-case", help="of the case (default my-case)")
+    init.add_argument(
+        "--size", choices=SIZES, default=SIZES[0], help="how long it may take (default quick)"
+    )
+    init.add_argument("--out", type=path_option, help="file to write (default NAME.toml)")
+    init.add_argument("--force", action="store_true", help="replace a file that is there")
+    init.set_defaults(action=_init)
+
+
+def _init(options: argparse.Namespace) -> int:
+    from fdnet.files.new import refuse_present, write_new
+    from fdnet.scales.design.answers import answers_of, filled
+    from fdnet.scales.design.choice import BUDGETS
+    from fdnet.scales.design.sizing import designed
+    from fdnet.scales.design.text import case_text
+    from fdnet.scales.times import spoken_time
+
+    out = options.out or Path(f"{options.name}.toml")
+    refuse_present(out, force=options.force)
+    texts = filled(_given(options, out), _ask if sys.stdin.isatty() else None)
+    answers = answers_of(options.name, texts)
+    design = designed(answers, BUDGETS[options.size], folder=out.absolute().parent)
+    write_new(out, case_text(design), force=options.force)
+    print(f"{out}: written, expected to take {spoken_time(design.seconds)} on one core")
+    print(f"  fdnet check {out}    what is odd, time and memory")
+    print(f"  fdnet run {out}      the answer, in runs/{options.name}/report.html")
+    return 0
+
+
+def _given(options: argparse.Namespace, out: Path) -> dict[str, str]:
+    """The options that were given; files as seen from the folder of the case."""
+    from fdnet.scales.design.questions import QUESTIONS
+
+    given = {
+        question.key: text
+        for question in QUESTIONS
+        if (text := getattr(options, question.key)) is not None
+    }
+    folder = out.absolute().parent
+    for group in ("sand", "mud"):
+        file = getattr(options, f"{group}_file")
+        if file is not None:
+            given[f"{group}_file"] = os.path.relpath(file.absolute(), folder)
+    return given
+
+
+def _ask(question: "Question") -> str:
+    default = f" [{question.default}]" if question.default else ""
+    example = "" if default else f', e.g. "{question.example}"'
+    try:
+        return input(f"{question.text}{example}{default}: ")
+    except EOFError:
+        return ""

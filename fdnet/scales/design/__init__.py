@@ -1,0 +1,1 @@
+"""From a sand, a mud and a well to a case whose answer means something."""

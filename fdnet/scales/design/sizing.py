@@ -1,0 +1,200 @@
+"""How large a specimen and how much mud a sand and a mud need, and what of them fits a budget."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fdnet.case.case import InvasionCase, with_fines
+from fdnet.case.file import case_from, sizes_from
+from fdnet.case.sizes import Sizes
+from fdnet.errors import CaseError
+from fdnet.scales.cost import cost_of
+from fdnet.scales.design.answers import Answers
+from fdnet.scales.design.choice import Budget, Choice, Design, tables_of, um
+from fdnet.scales.forces.reynolds import MOST_REYNOLDS
+from fdnet.scales.forces.throat import throat_width
+from fdnet.scales.forces.warnings import STOKES_REYNOLDS
+from fdnet.scales.scales import scales_of
+from fdnet.scales.supply import PLUG_SOLIDS
+from fdnet.sizes.curve import SizeCurve
+
+SECTION = 2.0
+"""Thickness of a section in mean grain diameters."""
+STIFFNESSES = (30.0, 60.0, 100.0, 200.0, 500.0, 1e3, 2e3, 5e3, 1e4)
+SAND_CUTS = (1.0, 2.0, 5.0, 10.0)
+"""Shares of the finest sand, percent, that may be left out to clear the coarsest mud."""
+LEAST_KEPT = 0.5
+"""Share of the solids that must stay when the finest are left out."""
+FINEST_OF_THROAT = 1 / 7
+"""Fines below this part of the throats pass (Barkman and Davidson 1972, J. Pet. Tech. 24)."""
+GAP = 0.95
+"""Largest fine over smallest grain."""
+MOST_COARSE = 0.35
+"""Share of the coarsest solids that may be left out."""
+PATIENCE = 1.5
+"""Cap over the expected time."""
+
+
+def designed(answers: Answers, budget: Budget, *, folder: Path) -> Design:
+    """The case of the answers within a budget; `folder` is where files of sizes are looked for.
+
+    The width and length follow from the grains, the supply from what plugs the face. Then the
+    finest solids are left out as far as the budget asks, and only then is the supply shortened.
+
+    Raises:
+        CaseError: the answers make no case; it says which.
+    """
+    first = _first_choice(answers, budget, folder)
+    choices = list(_candidates(answers, first, folder))
+    low, high = 0, len(choices) - 1
+    while low < high:
+        middle = (low + high) // 2
+        fits = _design(answers, choices[middle], budget, folder).seconds <= budget.seconds
+        low, high = (low, middle) if fits else (middle + 1, high)
+    return _design(answers, choices[low], budget, folder)
+
+
+def _first_choice(answers: Answers, budget: Budget, folder: Path) -> Choice:
+    """The specimen that the sand and the mud ask for, with all solids that matter."""
+    sand = sizes_from(answers.sand.table, source="--sand", folder=folder)
+    mud = sizes_from(answers.mud.table, source="--mud", folder=folder)
+    sand_cut, mud_cut = _clear_cuts(sand, mud)
+    grains = _cut(sand, low=sand_cut).curve()
+    mean = grains.mean(3) / grains.mean(2)
+    width = _up(max(budget.width * mean, 2.02 * grains.high))
+    length = _up(max(budget.length * mean, 2 * grains.high))
+    choice = Choice(
+        width=width,
+        length=length,
+        sections=max(1, int(length / (SECTION * mean))),
+        sand_cut=sand_cut,
+        mud_cut=mud_cut,
+        cut=0.0,
+        slab=length,
+        supply_share=1.0,
+        stiffness=STIFFNESSES[-1],
+    )
+    return replace(choice, slab=_slab(_case(answers, choice, folder), 1.0))
+
+
+def _clear_cuts(sand: Sizes, mud: Sizes) -> tuple[float, float]:
+    """Percent of the finest sand left out, and of the mud that stays, so that the sizes differ.
+
+    Raises CaseError when the mud is as coarse as the sand.
+    """
+    whole = mud.curve()
+    best: tuple[float, float, float] | None = None
+    for cut in SAND_CUTS:
+        most = GAP * _cut(sand, low=cut).curve().low
+        above = 1 - whole.below - _share_below(whole, most)
+        lost = above + cut / 100
+        if above <= MOST_COARSE and (best is None or lost < best[0] - 1e-9):
+            best = (lost, cut, max(1.0, 100 * above))
+    if best is None:
+        raise CaseError(
+            f"--mud-d90: more than {100 * MOST_COARSE:.0f} % of the solids are as coarse as the "
+            f"finest sand grains (mud up to {um(whole.high)}, sand from {um(sand.curve().low)}): "
+            "nothing of them can invade; check the units of both curves"
+        )
+    return best[1], min(99.0, round(100 - best[2] - 0.05, 1))
+
+
+def _candidates(answers: Answers, first: Choice, folder: Path) -> Iterator[Choice]:
+    """From all solids that matter to half of them, and then with less mud."""
+    case = _case(answers, first, folder)
+    throat = throat_width(scales_of(case).porosity, scales_of(case).permeability)
+    curve = case.fines.curve
+    finest = max(curve.low, FINEST_OF_THROAT * throat)
+    choice = replace(first, cut=finest if finest > curve.low else 0.0)
+    yield choice
+    while _kept_above(curve, finest := 1.1 * finest) >= LEAST_KEPT:
+        choice = replace(first, cut=_tidy(finest))
+        yield choice
+    while choice.supply_share > 0.3:
+        choice = replace(choice, supply_share=0.85 * choice.supply_share)
+        yield choice
+
+
+def _design(answers: Answers, choice: Choice, budget: Budget, folder: Path) -> Design:
+    """The candidate with its supply, contacts, drag and cap."""
+    choice = replace(choice, slab=_slab(_case(answers, choice, folder), choice.supply_share))
+    choice = _softest(answers, choice, folder)
+    choice = _with_drag(answers, choice, folder)
+    case = _case(answers, choice, folder)
+    scales = scales_of(case)
+    cost = cost_of(case, scales)
+    cap = _up(PATIENCE * cost.duration * scales.force_factor)
+    choice = replace(choice, cap=cap)
+    case = _case(answers, choice, folder)
+    return Design(
+        answers=answers,
+        choice=choice,
+        case=case,
+        scales=scales_of(case),
+        budget=budget,
+        seconds=cost.seconds,
+    )
+
+
+def _softest(answers: Answers, choice: Choice, folder: Path) -> Choice:
+    """The softest contacts whose predicted overlaps stay below run.max_overlap."""
+    for stiffness in STIFFNESSES:
+        trial = replace(choice, stiffness=stiffness)
+        try:
+            warnings = scales_of(_case(answers, trial, folder)).warnings
+        except CaseError:
+            continue
+        if not any("overlap" in one or "may lock" in one for one in warnings):
+            return trial
+    return choice
+
+
+def _with_drag(answers: Answers, choice: Choice, folder: Path) -> Choice:
+    """Drag of finite Reynolds numbers where they are, fines that are driven where they may be."""
+    scales = scales_of(_case(answers, choice, folder))
+    inertia = STOKES_REYNOLDS < scales.reynolds < MOST_REYNOLDS
+    choice = replace(choice, inertia=inertia)
+    driven = replace(choice, driven=True)
+    try:
+        faster = scales_of(_case(answers, driven, folder)).force_factor > 1.1
+    except CaseError:
+        return choice
+    return driven if faster else choice
+
+
+def _slab(case: InvasionCase, share: float) -> float:
+    """Length of mud, m, whose fines are `share` of what plugs the face."""
+    median = case.grains.curve.size_at(0.5)
+    return _up(share * PLUG_SOLIDS * median / case.fines.placed_fraction)
+
+
+def _case(answers: Answers, choice: Choice, folder: Path) -> InvasionCase:
+    return with_fines(case_from(tables_of(answers, choice), source="fdnet init", folder=folder))
+
+
+def _cut(sizes: Sizes, *, low: float) -> Sizes:
+    return sizes.model_copy(update={"cut_percent": (low, sizes.cut_percent[1])})
+
+
+def _share_below(curve: SizeCurve, diameter: float) -> float:
+    """Share of all solids between the fine end of the curve and a diameter, m."""
+    return curve.kept * float(curve.share_finer(np.array(min(diameter, curve.high))))
+
+
+def _kept_above(curve: SizeCurve, diameter: float) -> float:
+    """Share of all solids between a diameter, m, and the coarse end of the curve."""
+    return curve.kept - _share_below(curve, diameter)
+
+
+def _up(length: float) -> float:
+    """A length, m, rounded up to two digits."""
+    step = 10.0 ** (math.floor(math.log10(length)) - 1)
+    return step * math.ceil(length / step - 1e-9)
+
+
+def _tidy(length: float) -> float:
+    """Two digits of a length."""
+    return float(f"{length:.2g}")

@@ -1,0 +1,153 @@
+"""`fdnet init` and `fdnet cases`: a case file that runs, from what an engineer knows."""
+
+import math
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from fdnet.case.file import case_from, read_case
+from fdnet.cli import main
+from fdnet.scales.cost import cost_of
+from fdnet.scales.scales import scales_of
+
+SAND = {"--sand-d10": "0.25 mm", "--sand-d50": "0.40 mm", "--sand-d90": "0.60 mm"}
+MUD = {
+    "--porosity": "0.38",
+    "--mud-d50": "40 um",
+    "--solids": "5 %",
+    "--viscosity": "10 cP",
+    "--overbalance": "300 psi",
+}
+
+
+def init(out: Path, *extra: str, **changed: str) -> int:
+    given = {**SAND, **MUD, **{f"--{key.replace('_', '-')}": one for key, one in changed.items()}}
+    words = [word for pair in given.items() if pair[1] for word in pair]
+    return main(["init", *words, "--out", str(out), *extra])
+
+
+@pytest.mark.parametrize("median", [30, 60, 100])
+def test_the_case_of_a_sand_and_a_mud_is_sized_by_them(median, tmp_path, capsys):
+    """Each size against its reason: the box by the grains, the cuts, contacts and the time."""
+    out = tmp_path / "case.toml"
+    assert init(out, mud_d50=f"{median} um") == 0
+    case = read_case(out)
+    scales, cost = scales_of(case), cost_of(case, scales_of(case))
+    length, width, _ = case.size_m
+    grain = case.grains.sauter_diameter_m
+    assert width >= 2 * 2 * case.grains.radius_range_m[1]
+    assert width >= 4.9 * grain
+    assert length / case.analysis.sections >= 1.5 * grain
+    assert 2 * case.fines.radius_range_m[1] < 2 * case.grains.radius_range_m[0]
+    assert case.fines.curve.kept > 0.5
+    assert max(scales.impact_overlap, scales.drag_overlap) <= case.run.max_overlap
+    assert cost.seconds <= 1.05 * 600
+    assert case.run.cap_s == pytest.approx(1.5 * cost.duration * scales.force_factor, rel=0.15)
+    assert case.fines.sizes.D10_mm == pytest.approx(5e-4 * median)
+    assert case.well.radius_mm == 108.0
+    text = out.read_text()
+    assert f"{100 * case.fines.curve.below:.0f} % of the solids" in text
+    assert "assumed" in text
+    assert max(map(len, text.splitlines())) <= 99
+
+
+def test_more_time_leaves_less_out_and_makes_a_wider_box(tmp_path):
+    quick, standard = tmp_path / "quick.toml", tmp_path / "standard.toml"
+    assert init(quick) == init(standard, "--size", "standard") == 0
+    small, large = read_case(quick), read_case(standard)
+    assert large.fines.curve.kept > small.fines.curve.kept
+    assert large.size_m[1] > small.size_m[1]
+
+
+def test_sizes_may_be_in_files_named_from_anywhere(tmp_path, monkeypatch):
+    (tmp_path / "lab").mkdir()
+    (tmp_path / "cases").mkdir()
+    table = "sieve (mm),passing %\n0.2,0\n0.3,30\n0.45,70\n0.7,100\n"
+    (tmp_path / "lab" / "sand.csv").write_text(table)
+    monkeypatch.chdir(tmp_path / "lab")
+    out = tmp_path / "cases" / "case.toml"
+    none = dict.fromkeys(("sand_d10", "sand_d50", "sand_d90"), "")
+    assert init(out, "--sand-file", "sand.csv", **none) == 0
+    assert tomllib.loads(out.read_text())["grains"]["sizes"]["file"] == "../lab/sand.csv"
+    assert read_case(out).grains.sizes.size_mm == (0.2, 0.3, 0.45, 0.7)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"sand_d50": "", "solids": ""}, '2 answers are missing: --sand-d50 "0.40 mm", --solids'),
+        ({"overbalance": "300"}, "fluid.overbalance: '300': has no unit"),
+        ({"sand_d50": "0.2 mm"}, "--sand: the sizes make no curve"),
+        ({"mud_d50": "0.4"}, "--mud-d50: '0.4': has no unit"),
+        ({"mud_d50": "400 um"}, "as coarse as the finest sand"),
+        ({"solids": "45 %"}, "fines.concentration: 0.45"),
+        ({"porosity": "38 mm"}, "grains.porosity"),
+    ],
+)
+def test_answers_that_make_no_case_are_refused(changed, message, tmp_path, capsys):
+    out = tmp_path / "case.toml"
+    assert init(out, **changed) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert len(error.splitlines()) == 1
+    assert not out.exists()
+
+
+def test_on_a_terminal_what_is_missing_is_asked_for(tmp_path, monkeypatch):
+    asked: list[str] = []
+    replies = {"Sand, D50": "0.40 mm", "Solids, D90": "90 um", "Radius of the well": ""}
+
+    def answer(prompt: str) -> str:
+        asked.append(prompt)
+        return next((one for start, one in replies.items() if prompt.startswith(start)), "")
+
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
+    monkeypatch.setattr("builtins.input", answer)
+    out = tmp_path / "case.toml"
+    assert init(out, sand_d50="") == 0
+    case = read_case(out)
+    assert case.grains.sizes.D50_mm == 0.4
+    assert case.fines.sizes.D90_mm == pytest.approx(0.09)
+    assert case.fines.sizes.D10_mm == pytest.approx(0.02)
+    assert not any(prompt.startswith(("Sand, D10", "Viscosity")) for prompt in asked)
+
+
+def test_cases_lists_and_copies_what_comes_with_fdnet(tmp_path, capsys, root, monkeypatch):
+    assert main(["cases"]) == 0
+    listed = {line.split()[0] for line in capsys.readouterr().out.splitlines()}
+    full = {path.stem for path in (root / "cases").glob("*.toml")}
+    quick = {f"quick-{path.stem}" for path in (root / "cases" / "quick").glob("*.toml")}
+    assert listed == full | quick
+    monkeypatch.chdir(tmp_path)
+    assert main(["cases", "quick-specimen1"]) == 0
+    copied = tmp_path / "quick-specimen1.toml"
+    assert copied.read_text() == (root / "cases/quick/specimen1.toml").read_text()
+    copied.write_text("mine")
+    assert main(["cases", "quick-specimen1"]) == 2
+    assert copied.read_text() == "mine"
+    assert "--force" in capsys.readouterr().err
+    assert main(["cases", "quick-specimen1", "--force"]) == 0
+    assert main(["cases", "quik"]) == 2
+    assert "did you mean quick?" in capsys.readouterr().err
+
+
+def test_a_shipped_case_is_described_by_its_first_sentence():
+    from fdnet.case.shipped import first_sentence
+
+    text = "# A box of 4 x 2.4 mm, that is small.\n# More.\nname = 1\n# no\n"
+    assert first_sentence(text) == "A box of 4 x 2.4 mm, that is small"
+
+
+def test_an_existing_case_is_refused_before_anything_is_asked(tmp_path, capsys):
+    out = tmp_path / "case.toml"
+    out.write_text("mine")
+    assert init(out, sand_d50="") == 2
+    assert "is there already" in capsys.readouterr().err
+    assert out.read_text() == "mine"
+    assert math.isclose(case_from(tomllib.loads(_written(tmp_path))).fluid.viscosity_cP, 10)
+
+
+def _written(folder: Path) -> str:
+    assert init(folder / "new.toml") == 0
+    return (folder / "new.toml").read_text()
