@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from fdnet.case.file import known_keys
+from fdnet.case.keys import known_keys
 
 LAYERS = [
     ["errors"],

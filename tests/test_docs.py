@@ -69,7 +69,7 @@ def test_every_key_of_a_case_has_a_meaning():
 
 
 def test_the_case_reference_shows_every_table(root):
-    from fdnet.case.file import known_keys
+    from fdnet.case.keys import known_keys
 
     page = (root / "docs" / "reference" / "case.md").read_text()
     tables = {key.split(".")[0] for key in known_keys() if "." in key}

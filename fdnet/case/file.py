@@ -1,18 +1,17 @@
 """Case files: a case is read from TOML, and all its problems are named at once."""
 
 import copy
-import difflib
-import re
 import tomllib
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
 from fdnet.case.added import completed
-from fdnet.case.case import Case, InvasionCase, case_type
+from fdnet.case.case import Case, case_type
+from fdnet.case.keys import nearest, table_of
 from fdnet.case.rules import cross_problems
 from fdnet.case.sizes import Sizes
 from fdnet.case.spoken import plain_tables
@@ -20,15 +19,6 @@ from fdnet.case.units import stem_of, suffix_of
 from fdnet.case.values import Part
 from fdnet.errors import CaseError
 from fdnet.files.paths import expanded
-
-
-def known_keys(model: type[Part] = InvasionCase, prefix: str = "") -> Iterator[str]:
-    """Every dotted key that a case file may hold."""
-    for name, field in model.model_fields.items():
-        yield prefix + name
-        table = _table_of(field)
-        for inner in [table] if table is not None else _inner_tables(field.annotation):
-            yield from known_keys(inner, f"{prefix}{name}.")
 
 
 def case_from(data: Mapping[str, Any], *, source: str = "case", folder: str | Path = ".") -> Case:
@@ -122,7 +112,7 @@ def _good_keys(
     """A table without its bad keys; None where it is missing or cannot do without them."""
     if name not in data:
         return None if field.is_required() else field.default
-    table, values = _table_of(field), data[name]
+    table, values = table_of(field), data[name]
     if table is None or not isinstance(values, dict):
         return None
     good = {key: value for key, value in values.items() if f"{name}.{key}" not in bad}
@@ -133,31 +123,14 @@ def _good_keys(
 
 
 def _tables_of(model: type[Part]) -> list[tuple[str, FieldInfo]]:
-    return [(name, field) for name, field in model.model_fields.items() if _table_of(field)]
-
-
-def _table_of(field: FieldInfo) -> type[Part] | None:
-    """The class of a table's keys, also where the table may be absent; None for a plain key."""
-    for kind in (field.annotation, *get_args(field.annotation)):
-        if isinstance(kind, type) and issubclass(kind, Part):
-            return kind
-    return None
-
-
-def _inner_tables(annotation: Any) -> Iterator[type[Part]]:
-    """The tables that a key may hold, one or a list of them."""
-    for kind in get_args(annotation):
-        if isinstance(kind, type) and issubclass(kind, Part):
-            yield kind
-        else:
-            yield from _inner_tables(kind)
+    return [(name, field) for name, field in model.model_fields.items() if table_of(field)]
 
 
 def _problem(item: dict[str, Any]) -> str:
     path = ".".join(str(part) for part in item["loc"] if not _is_union_tag(part))
     given = item["input"]
     if item["type"] == "extra_forbidden":
-        return f"{path}: unknown key (given {given!r}){_nearest(path)}"
+        return f"{path}: unknown key (given {given!r}){nearest(path)}"
     if item["type"] == "missing":
         return f"{path}: missing, a value is needed"
     if item["type"] == "size_curve":
@@ -171,34 +144,10 @@ def _problem(item: dict[str, Any]) -> str:
     return f"{path}: {given!r} {message}"
 
 
-def _nearest(path: str) -> str:
-    """The known key that is nearest to an unknown one, in words; empty where none is near."""
-    table, _, key = path.rpartition(".")
-    if table in ("grains", "fines") and _DIAMETER.match(key):
-        return f'; did you mean {table}.sizes = {{ D10 = "20 um", D50 = "40 um", ... }}?'
-    here = [one for one in known_keys() if one.rpartition(".")[0] == table]
-    stems = {one: stem_of(one.rpartition(".")[2]) for one in here}
-    same = [one for one in here if stems[one] == stem_of(key)]
-    near = same or _near(key, here) or _named_alike(key) or _near(key, list(known_keys()))
-    return f"; did you mean {near[0]}?" if near else ""
-
-
-def _near(key: str, keys: list[str]) -> list[str]:
-    """The key of nearly the same spelling; tables and units count for nothing."""
-    stems = {stem_of(one.rpartition(".")[2]): one for one in reversed(keys)}
-    return [stems[one] for one in difflib.get_close_matches(stem_of(key), stems, n=1, cutoff=0.65)]
-
-
-def _named_alike(key: str) -> list[str]:
-    """A key of another table with the same name."""
-    return [one for one in known_keys() if stem_of(one.rpartition(".")[2]) == stem_of(key)]
-
-
 def _is_union_tag(part: Any) -> bool:
     return isinstance(part, str) and ("[" in part or part in ("float", "int", "constrained-float"))
 
 
-_DIAMETER = re.compile(r"[dD]_?\d\d")
 _LONGEST_WORD = 1000
 _MOST_NAMES = 8
 """Most parts of a dotted key; no key of a case has so many."""
