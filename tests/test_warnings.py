@@ -78,7 +78,7 @@ def template(node: ast.expr, names: dict[str, str]) -> str:
         return "".join(template(part, names) for part in node.values)
     if isinstance(node, ast.FormattedValue):
         return template(node.value, names)
-    if isinstance(node, ast.BinOp):
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
         return template(node.left, names) + template(node.right, names)
     return GAP
 
@@ -100,6 +100,9 @@ def texts(value: ast.expr, names: dict[str, str]) -> Iterator[str]:
             yield from texts(one.value if isinstance(one, ast.Starred) else one, names)
     elif isinstance(value, ast.ListComp):
         yield from texts(value.elt, names)
+    elif isinstance(value, ast.BinOp) and not isinstance(value.left, ast.JoinedStr):
+        yield from texts(value.left, names)
+        yield from texts(value.right, names)
     elif isinstance(value, ast.JoinedStr | ast.Constant | ast.BinOp):
         text = template(value, names)
         if " " in text and len(text) > 20:

@@ -1,7 +1,6 @@
 """The scales of a case: what follows from it in closed form.
 
-Every formula and its source is also a row of `scale_rows`, which `fdnet render` prints and the
-report repeats.
+Every formula is also a row of `scale_rows`, with its source.
 """
 
 import math
