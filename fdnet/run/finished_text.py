@@ -1,5 +1,6 @@
 """A finished run as a few lines for a person, in the units of the field."""
 
+import textwrap
 from collections.abc import Iterator, Mapping
 from html import escape
 from pathlib import Path
@@ -13,7 +14,8 @@ _HEAD = ("depth (mm)", "porosity", "with fines", "k (mD)", "with fines", "lost (
 def text_lines(path: Path, summary: Mapping[str, Any]) -> Iterator[str]:
     """The result and its table of sections."""
     yield f"fdnet run {summary['case']} in {path}"
-    yield from filter(None, (summary.get("answer"), *summary.get("certainty", ())))
+    for text in filter(None, (summary.get("answer"), *summary.get("certainty", ()))):
+        yield from textwrap.wrap(text, 96)
     for name, value in _facts(summary):
         yield f"{name:<14}{value}"
     yield ""
