@@ -28,7 +28,10 @@ if TYPE_CHECKING:
     from fdnet.errors import FdnetError as FdnetError
     from fdnet.errors import FlowError as FlowError
     from fdnet.errors import LiggghtsError as LiggghtsError
+    from fdnet.errors import MechanicsError as MechanicsError
     from fdnet.errors import NetworkError as NetworkError
+    from fdnet.mechanics.of_case import elastic_moduli as elastic_moduli
+    from fdnet.mechanics.of_case import triaxial_test as triaxial_test
     from fdnet.network.field.of_pack import velocity_field as velocity_field
     from fdnet.network.fines.occupancy import measure_occupancy as measure_occupancy
     from fdnet.network.flow.flow import solve_flow as solve_flow
@@ -63,6 +66,8 @@ _HOME = {
     "measure_occupancy": "fdnet.network.fines.occupancy",
     "solve_flow": "fdnet.network.flow.flow",
     "velocity_field": "fdnet.network.field.of_pack",
+    "elastic_moduli": "fdnet.mechanics.of_case",
+    "triaxial_test": "fdnet.mechanics.of_case",
     "LAWS": "fdnet.network.laws.named",
     "DAMAGE_LAWS": "fdnet.network.laws.named",
     "FdnetError": "fdnet.errors",
@@ -72,6 +77,7 @@ _HOME = {
     "DumpError": "fdnet.errors",
     "NetworkError": "fdnet.errors",
     "FlowError": "fdnet.errors",
+    "MechanicsError": "fdnet.errors",
 }
 __all__ = ["__version__", *_HOME]  # noqa: PLE0604
 

@@ -1,4 +1,4 @@
-"""The `fdnet` command: from a sand and a mud to the damage they do.
+"""The `fdnet` command: runs, ensembles and sweeps of cases, permeability, mechanics, studies.
 
 It reads the arguments, calls the package and prints. Exit codes: 0 done, 2 bad input (nothing
 written), 3 LIGGGHTS missing or failed, 4 degenerate geometry or an unconverged solve, 5 some
@@ -21,6 +21,7 @@ from fdnet.commands import (
     design,
     ensemble,
     init,
+    mechanics,
     movie,
     permeability,
     render,
@@ -33,7 +34,7 @@ from fdnet.permeability.options import joined_box
 
 COMMANDS = (
     *(init, cases, check, run, ensemble, sweep, compare, design),
-    *(render, permeability, movie, study),
+    *(render, permeability, mechanics, movie, study),
 )
 """Modules of the commands, in the order that `fdnet --help` shows."""
 

@@ -106,6 +106,21 @@ class FlowError(FdnetError):
     exit_code = 4
 
 
+class MechanicsError(FdnetError):
+    """A pack does not carry a load, or its mechanics cannot be solved.
+
+    Examples:
+        >>> import fdnet
+        >>> case = fdnet.read_case("cases/quick.toml")
+        >>> fdnet.elastic_moduli(fdnet.Snapshot.from_arrays([[0, 0, 0]], 0.5), case)
+        Traceback (most recent call last):
+            ...
+        fdnet.errors.MechanicsError: ... carries no load along x: ...
+    """
+
+    exit_code = 4
+
+
 _CURES = {
     errno.ENOSPC: "free space or files (inodes)",
     errno.EDQUOT: "free space or files (inodes)",

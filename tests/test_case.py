@@ -148,8 +148,9 @@ def test_a_case_without_fines_is_a_type_of_its_own():
 def test_every_table_is_written():
     assert set(KEYS) == set(InvasionCase.model_fields)
     well = "well={radius_mm=108.0, drainage_radius_m=100.0}"
-    clean_up = "clean_up.drawdown_MPa=1.0"
-    assert list(tiny(well, clean_up, 'fluid.viscosity="10 cP"').data()) == list(KEYS)
+    clean_up, bonds = "clean_up.drawdown_MPa=1.0", "bonds={radius_ratio=0.5}"
+    settings = (well, clean_up, bonds, 'fluid.viscosity="10 cP"')
+    assert list(tiny(*settings).data()) == list(KEYS)
     assert "given" not in tiny(well).data()
     assert {"fines", "fines.radius_mm"} <= set(known_keys())
 

@@ -7,6 +7,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 UNITS = {
+    "_GPa_m": "GPa/m",
     "_kg_m3": "kg/m³",
     "_J_m3": "J/m³",
     "_percent": "%",

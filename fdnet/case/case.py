@@ -16,6 +16,7 @@ from pydantic import Field, model_validator
 
 from fdnet.case.added import completed, without_added
 from fdnet.case.analysis import AnalysisChoices
+from fdnet.case.bonds import Bonds
 from fdnet.case.clean_up import CleanUp
 from fdnet.case.contact import MODEL_KEYS, ContactLaw
 from fdnet.case.control import Run
@@ -42,6 +43,7 @@ KEYS = (
     "gravity",
     "contact",
     "clean_up",
+    "bonds",
     "run",
     "analysis",
     "given",
@@ -82,6 +84,7 @@ class Case(Part):
     drag: Drag = Drag()
     gravity: Gravity = Gravity()
     contact: ContactLaw = ContactLaw()
+    bonds: Bonds | None = None
     run: Run = Run()
     analysis: AnalysisChoices = AnalysisChoices()
     given: dict[str, str] = Field(
@@ -144,12 +147,13 @@ class Case(Part):
         """Hash of what `stage` depends on.
 
         "pack" ignores fines, fluid and analysis; "invade" ignores the analysis and the clean-up,
-        "clean_up" the analysis. No result depends on `POLICIES`, so no digest does. A key that was
-        added later counts only where its value differs from what a case meant before
-        (`fdnet.case.added`).
+        "clean_up" the analysis. No result depends on `POLICIES` or on the bonds, which mechanics
+        alone reads, so no digest does. A key that was added later counts only where its value
+        differs from what a case meant before (`fdnet.case.added`).
         """
         data = without_added(self.data())
         data.pop("given", None)
+        data.pop("bonds", None)
         data["run"] = {key: value for key, value in data["run"].items() if key not in POLICIES}
         if stage in LIGGGHTS_STAGES:
             data.pop("analysis")

@@ -5,6 +5,7 @@ from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 from fdnet.case.analysis import AnalysisChoices
+from fdnet.case.bonds import Bonds
 from fdnet.case.clean_up import CLEAN_UP_RULES
 from fdnet.case.contact import MODEL_KEYS
 from fdnet.case.contact_rules import of_cohesion, of_rolling, of_the_model
@@ -188,6 +189,16 @@ def _inertia(drag: Drag) -> Iterator[str]:
         )
 
 
+def _strengths(bonds: Bonds) -> Iterator[str]:
+    """Bonds have both strengths or neither."""
+    if (bonds.tensile_strength_MPa is None) != (bonds.shear_strength_MPa is None):
+        absent = "tensile" if bonds.tensile_strength_MPa is None else "shear"
+        yield (
+            f"bonds.{absent}_strength_MPa: missing next to the other strength; give both, or "
+            "neither for bonds that never break"
+        )
+
+
 def _end(run: Run) -> Iterator[str]:
     if run.duration_ms is not None and run.cap_ms is not None:
         yield (
@@ -255,6 +266,7 @@ RULES = (
     *(_of_the_contact(name) for name in ("grains", "fines")),
     Rule(("contact.model", "contact.cohesion_J_m3"), of_cohesion),
     Rule(("contact.rolling_friction", "grains.friction", "fines.friction"), of_rolling),
+    Rule(("bonds.tensile_strength_MPa", "bonds.shear_strength_MPa"), _strengths),
     Rule(("run.duration_ms", "run.cap_ms"), _end),
     Rule(("analysis.sections",), _sections),
     Rule(("analysis.law", "analysis.damage_law"), _laws),

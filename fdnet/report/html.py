@@ -56,6 +56,7 @@ class ReportParts:
         versions: version of each program.
         commands: the command lines as they were typed.
         tables: further tables (`fdnet.report.added.PageTable`), in order.
+        mechanics: the section on the mechanics of the pack, as HTML.
     """
 
     figures: Sequence[tuple[Path, str]] = ()
@@ -66,6 +67,7 @@ class ReportParts:
     versions: Mapping[str, Any] = field(default_factory=dict)
     commands: Sequence[str] = ()
     tables: Sequence[Any] = ()
+    mechanics: str = ""
 
 
 def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportParts) -> Path:

@@ -219,6 +219,7 @@ def _write_summary(
     session: Session, results: Results, figures: list[tuple[Path, str]], notes: list[str]
 ) -> dict[str, Any]:
     from fdnet.report import html, tables
+    from fdnet.report.mechanics_section import section_html
     from fdnet.report.view import view_of
 
     case, scales = session.case, session.scales
@@ -256,6 +257,7 @@ def _write_summary(
             versions=versions(pack),
             commands=[session.options.command] if session.options.command else [],
             tables=[one.page for one in results.added if one.page is not None],
+            mechanics=section_html(session.path / "mechanics"),
         )
         html.write_report(session.path / "report.html", summary, parts=parts)
     return summary

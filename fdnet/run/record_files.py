@@ -12,7 +12,7 @@ from fdnet.run.made_files import SOME_TABLES
 from fdnet.run.mark import MANIFEST, RECORD_FORMAT, RECORDS
 
 OUTPUTS = {
-    "pack": ("pack",),
+    "pack": ("pack", "mechanics"),
     "invade": ("invade",),
     "clean_up": ("clean_up",),
     "analyse": (

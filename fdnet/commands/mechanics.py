@@ -1,0 +1,147 @@
+"""`fdnet mechanics`: elastic moduli and triaxial tests of a pack, without time steps."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from fdnet.errors import CaseError
+from fdnet.files.paths import path_option
+
+
+def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Adds the command to the command line."""
+    parser = commands.add_parser(
+        "mechanics",
+        parents=[common],
+        help="elastic moduli and triaxial tests of a pack, without time steps",
+    )
+    parser.add_argument(
+        "source", type=path_option, metavar="CASE.toml", help="the case file, or a run folder"
+    )
+    parser.add_argument("--seed", type=int, help="overrides the seed of the case")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="overrides a key, e.g. bonds.radius_ratio=0.5",
+    )
+    parser.add_argument(
+        "--out", type=path_option, help="run folder of a case file (default runs/NAME)"
+    )
+    parser.add_argument(
+        "--confining_MPa",
+        type=float,
+        metavar="MPA",
+        help="confining stress of the triaxial test, and the pressure that sets the stiffness of "
+        "Hertz contacts",
+    )
+    parser.add_argument(
+        "--triaxial",
+        action="store_true",
+        help="compress the pack along x with the confining stress on its sides, until --strain",
+    )
+    parser.add_argument(
+        "--strain",
+        type=float,
+        default=0.01,
+        metavar="SHARE",
+        help="axial strain at the end of the triaxial test (default 0.01)",
+    )
+    parser.add_argument(
+        "--steps", type=int, default=20, metavar="N", help="load steps of it (default 20)"
+    )
+    parser.add_argument("--json", action="store_true", help="print the numbers as JSON")
+    parser.add_argument("--liggghts", metavar="PATH", help="the LIGGGHTS binary")
+    parser.add_argument("--quiet", action="store_true", help="no progress")
+    parser.set_defaults(action=_mechanics)
+
+
+def _mechanics(options: argparse.Namespace) -> int:
+    from fdnet.run.mechanics import measure_elastic, packed_case, write_mechanics
+    from fdnet.run.session import RunOptions
+
+    pressure = _pressure(options.confining_MPa)
+    _check_test(options)
+    seed = [] if options.seed is None else [f"seed={options.seed}"]
+    chosen = RunOptions(
+        out=options.out or Path("runs"),
+        liggghts=options.liggghts,
+        show_progress=not options.quiet,
+        command=options.command_line,
+    )
+    packed = packed_case(options.source, chosen, [*options.set, *seed])
+    numbers = measure_elastic(packed, pressure)
+    if options.triaxial:
+        numbers["triaxial"] = _triaxial(options, packed, pressure or 0.0)
+    path = write_mechanics(packed, numbers)
+    for warning in [*numbers["warnings"], *numbers.get("triaxial", {}).get("warnings", [])]:
+        print(f"fdnet: warning: {warning}", file=sys.stderr)
+    if options.json:
+        print(json.dumps(numbers, indent=2))
+    else:
+        _print(numbers)
+        print(f"written: {path}")
+    return 0
+
+
+def _check_test(options: argparse.Namespace) -> None:
+    if not options.triaxial:
+        return
+    if options.confining_MPa is None:
+        raise CaseError("--triaxial: needs the stress on the sides; give --confining_MPa")
+    if not 0 < options.strain <= 0.3:
+        raise CaseError(f"--strain: {options.strain}, expected a share above 0, at most 0.3")
+    if not 1 <= options.steps <= 10_000:
+        raise CaseError(f"--steps: {options.steps}, expected 1 to 10000 load steps")
+
+
+def _triaxial(options: argparse.Namespace, packed: Any, confining: float) -> dict[str, Any]:
+    from fdnet.mechanics.rest import Row, Triaxial
+    from fdnet.run.mechanics import measure_triaxial, write_curve
+
+    def follow(row: Row) -> None:
+        if not options.quiet:
+            print(
+                f"triaxial: strain {row.axial_strain:.3e}, deviatoric {row.deviatoric / 1e6:.4g} "
+                f"MPa, bonds broken {row.tension + row.shear}",
+                file=sys.stderr,
+                flush=True,
+            )
+
+    test = Triaxial(confining=confining, strain=options.strain, steps=options.steps)
+    result, numbers = measure_triaxial(packed, test, follow)
+    write_curve(packed, result)
+    return numbers
+
+
+def _pressure(given: float | None) -> float | None:
+    if given is None:
+        return None
+    if not 0 < given < 1e9:
+        raise CaseError(f"--confining_MPa: {given}, expected a stress above 0, in MPa")
+    return given * 1e6
+
+
+def _print(numbers: dict[str, Any]) -> None:
+    print(f"Young's modulus       {numbers['young_modulus_Pa'] / 1e9:.4g} GPa")
+    print(f"Poisson's ratio       {numbers['poisson_ratio']:.3f}")
+    print(f"bulk modulus          {numbers['bulk_modulus_Pa'] / 1e9:.4g} GPa")
+    print(f"shear modulus         {numbers['shear_modulus_Pa'] / 1e9:.4g} GPa")
+    print(f"P wave, S wave        {numbers['p_wave_m_s']:.4g}, {numbers['s_wave_m_s']:.4g} m/s")
+    print(f"joints of a grain     {numbers['coordination']:.3g}, {numbers['bonds']} bonds")
+    print(f"grains without load   {numbers['rattlers']} of {numbers['grains']}")
+    test = numbers.get("triaxial")
+    if test:
+        print(f"triaxial, {test['confining_Pa'] / 1e6:g} MPa:")
+        print(f"  initial slope       {test['young_modulus_Pa'] / 1e9:.4g} GPa")
+        print(
+            f"  largest stress      {test['peak_Pa'] / 1e6:.4g} MPa deviatoric at a strain of "
+            f"{test['peak_strain']:.3g}"
+        )
+        print(
+            f"  bonds broken        {test['broken_in_tension']} in tension, "
+            f"{test['broken_in_shear']} in shear, of {test['bonds']}"
+        )

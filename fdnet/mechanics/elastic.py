@@ -1,0 +1,179 @@
+"""Elastic moduli of a pack from one sparse stiffness and six uniform strains, without time steps.
+
+The pack is a cell with periodic sides or with walls that move with the strain. For each strain the
+grains find the displacements and rotations of least energy; twice that energy over volume and
+squared strain is the tensor.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from fdnet.errors import MechanicsError
+from fdnet.mechanics.joints import Joints, find_joints
+from fdnet.mechanics.kinematics import STRAINS, kinematics
+from fdnet.mechanics.solver import solver_of, stiffness
+from fdnet.mechanics.springs import Material, bond_springs, contact_springs
+from fdnet.mechanics.tensor import Moduli, anisotropy_of, voigt_average, wave_speeds, young_along
+from fdnet.spheres.arrays import one_line
+from fdnet.spheres.snapshot import Array, Snapshot
+
+LEAST_STIFFNESS = 1e-7
+"""Stiffness along an axis, over that of grains held to the uniform strain, below which a pack
+does not carry."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Elastic:
+    """Elastic behaviour of a pack for small strains.
+
+    Attributes:
+        tensor: (6, 6) stiffness, Pa, in the order xx, yy, zz, yz, xz, xy.
+        affine: (6, 6) the same with all grains held to the uniform strain: an upper bound.
+        averaged: the mean over all directions (Voigt).
+        affine_averaged: the same of `affine`.
+        density: of the dry pack, kg/m3.
+        coordination: mean number of joints with other grains, of a grain that carries.
+        grains: number of grains.
+        rattlers: grains that carry nothing.
+        contacts: joints that touch, those with walls among them.
+        bonds: bonded joints.
+        joints: all joints of the grains that carry; their indices count all grains.
+        motion: (6, N, 6) for each strain the displacement and rotation of each grain on top of
+            the uniform strain, m and rad.
+    """
+
+    tensor: Array
+    affine: Array
+    averaged: Moduli
+    affine_averaged: Moduli
+    density: float
+    coordination: float
+    grains: int
+    rattlers: int
+    contacts: int
+    bonds: int
+    joints: Joints
+    motion: Array
+
+    __repr__ = one_line
+
+    @property
+    def anisotropy(self) -> float | None:
+        """Universal index of anisotropy, 0 when isotropic; None where nothing resists a shear."""
+        return anisotropy_of(self.tensor)
+
+    @property
+    def young_along(self) -> tuple[float, ...] | None:
+        """Young's modulus, Pa, along x, y and z with free sides."""
+        return young_along(self.tensor)
+
+    @property
+    def waves(self) -> tuple[float, float]:
+        """Velocity of P and S waves, m/s."""
+        return wave_speeds(self.averaged, self.density)
+
+
+def elastic_of(
+    grains: Snapshot,
+    material: Material,
+    *,
+    periodic: tuple[bool, bool, bool],
+    porosity: float = 0.0,
+) -> Elastic:
+    """Elastic tensor of a pack of grains.
+
+    Args:
+        grains: spheres; those of another kind must be taken out before.
+        material: contacts and bonds.
+        periodic: which sides are periodic; the others are walls.
+        porosity: of the pack, for its density.
+
+    Raises MechanicsError where the pack does not carry a load along every axis.
+    """
+    joints, kept = carrying(grains, material, periodic)
+    volume = float(np.prod(np.diff(grains.box, axis=1)))
+    count, length = len(grains), float(grains.radius.mean()) if len(grains) else 1.0
+    springs = contact_springs(joints, material) + bond_springs(joints, material)
+    maps = kinematics(joints, count, length=length)
+    pulled = springs.reshape(-1, 1) * maps.of_strain
+    affine = maps.of_strain.T @ pulled / volume
+    motion = _motion(maps.of_grains, springs, pulled, kept)
+    tensor = affine + (pulled.T @ (maps.of_grains @ motion)) / volume
+    tensor = 0.5 * (tensor + tensor.T)
+    _refuse_loose(tensor, affine, count=count, rattlers=int(count - kept.sum()))
+    pairs = ~joints.at_wall
+    shown = motion.T.reshape(len(STRAINS), count, 6).copy()
+    shown[:, :, 3:] /= length
+    return Elastic(
+        tensor=tensor,
+        affine=affine,
+        averaged=voigt_average(tensor),
+        affine_averaged=voigt_average(affine),
+        density=(1 - porosity) * material.density,
+        coordination=2 * float(pairs.sum()) / max(1, int(kept.sum())),
+        grains=count,
+        rattlers=int(count - kept.sum()),
+        contacts=int(np.sum(contact_springs(joints, material)[:, 0] > 0)),
+        bonds=0 if material.cement is None else int(pairs.sum()),
+        joints=joints,
+        motion=shown,
+    )
+
+
+def carrying(
+    grains: Snapshot, material: Material, periodic: tuple[bool, bool, bool]
+) -> tuple[Joints, Array]:
+    """Joints of the grains that can carry a load, and which grains those are (N,).
+
+    Grains with fewer than two joints are taken out until none is left, and so are groups that
+    touch neither walls nor the largest group.
+    """
+    joints, count = find_joints(grains, periodic, gap=material.gap), len(grains)
+    kept = np.ones(count, bool)
+    while True:
+        live = kept[joints.first] & (joints.at_wall | kept[joints.second])
+        ends = np.concatenate([joints.first[live], joints.second[live & ~joints.at_wall]])
+        single = kept & (np.bincount(ends, minlength=count) < 2)
+        if not single.any():
+            break
+        kept = kept & ~single
+    kept = kept & _largest_group(joints.where(live), kept)
+    return joints.where(kept[joints.first] & (joints.at_wall | kept[joints.second])), kept
+
+
+def _largest_group(joints: Joints, kept: Array) -> Array:
+    """(N,) grains of the largest group; the walls join what touches them."""
+    count = len(kept)
+    other = np.where(joints.at_wall, count, joints.second)
+    links = sparse.coo_matrix(
+        (np.ones(len(joints)), (joints.first, other)), shape=(count + 1, count + 1)
+    )
+    _, group = connected_components(links, directed=False)
+    sizes = np.bincount(group[:-1], weights=kept)
+    return group[:-1] == np.argmax(sizes) if len(sizes) else kept
+
+
+def _motion(of_grains: sparse.csr_matrix, springs: Array, pulled: Array, kept: Array) -> Array:
+    """(6 N, 6) motion of the grains under each strain; zero for those that carry nothing."""
+    moving = np.repeat(kept, 6)
+    motion = np.zeros((len(moving), pulled.shape[1]))
+    if not kept.any():
+        return motion
+    live = of_grains[:, np.flatnonzero(moving)]
+    solve = solver_of(stiffness(live, springs))
+    load = -(live.T @ pulled)
+    motion[moving] = np.column_stack([solve(column) for column in load.T])
+    return motion
+
+
+def _refuse_loose(tensor: Array, affine: Array, *, count: int, rattlers: int) -> None:
+    for axis in range(3):
+        if not tensor[axis, axis] > LEAST_STIFFNESS * affine[axis, axis]:
+            raise MechanicsError(
+                f"pack of {count} grains carries no load along {'xyz'[axis]}: {rattlers} of them "
+                "carry nothing, and the joints of the rest form no path from side to side; make "
+                "the pack denser, or bridge wider gaps with bonds.gap_ratio"
+            )

@@ -1,0 +1,173 @@
+"""The material of a case's grains and bonds, and the moduli of its pack."""
+
+import numpy as np
+
+from fdnet.case.bonds import Bonds
+from fdnet.case.case import Case
+from fdnet.errors import CaseError
+from fdnet.mechanics.elastic import Elastic, elastic_of
+from fdnet.mechanics.joints import find_joints
+from fdnet.mechanics.rest import Triaxial
+from fdnet.mechanics.springs import Cement, Material
+from fdnet.mechanics.triaxial import Sheared, triaxial
+from fdnet.scales.hertz import Elastic as Moduli
+from fdnet.scales.hertz import overlap_under, secant_stiffness, tangential_stiffness
+from fdnet.scales.hertz_contacts import pair_elastic
+from fdnet.scales.springs import series
+from fdnet.spheres.porosity import measure_porosity
+from fdnet.spheres.snapshot import Snapshot
+
+QUARTZ_YOUNG = 94.3e9
+"""Young's modulus of quartz, Pa (Shi 2011, section 2.3.1)."""
+MANY_RATTLERS = 0.05
+"""Share of grains that carry nothing above which a result warns."""
+
+
+def elastic_moduli(grains: Snapshot, case: Case, *, pressure_Pa: float | None = None) -> Elastic:
+    """Elastic moduli of a pack, by one sparse solve for each of six uniform strains.
+
+    Args:
+        grains: the pack; fines among the spheres are left out. Its box is the cell.
+        case: gives contacts, bonds and which sides are periodic; the others are plates to which
+            the grains are glued.
+        pressure_Pa: isotropic pressure, Pa, that sets the stiffness of Hertz contacts; linear ones
+            do not depend on it.
+
+    Returns:
+        The (6, 6) tensor in Pa, its isotropic average, velocities of waves in m/s and counts.
+
+    Raises:
+        CaseError: Hertz contacts without a pressure.
+        MechanicsError: the pack carries no load along an axis.
+
+    Examples:
+        >>> import fdnet
+        >>> case = fdnet.read_case("cases/quick.toml", assignments=["bonds.radius_ratio=0.5"])
+        >>> pack = fdnet.open_run("runs/quick").spheres("initial")
+        >>> 0 < fdnet.elastic_moduli(pack, case).averaged.poisson < 0.5
+        True
+    """
+    pack = grains.grains()
+    material = material_of(case, pack, pressure_Pa)
+    porosity = measure_porosity(pack, periodic=case.periodic).mean if len(pack) else 1.0
+    return elastic_of(pack, material, periodic=case.periodic, porosity=porosity)
+
+
+def triaxial_test(
+    grains: Snapshot,
+    case: Case,
+    *,
+    confining_Pa: float,
+    strain: float = 0.01,
+    steps: int = 20,
+) -> Sheared:
+    """Confine a pack and compress it along x, quasi-statically; all in SI units.
+
+    Args:
+        grains: the pack; fines among the spheres are left out.
+        case: gives contacts, friction, bonds and which sides are periodic.
+        confining_Pa: stress on the sides, Pa.
+        strain: axial strain at the end.
+        steps: load steps to it.
+
+    Returns:
+        `rows` (stresses in Pa and strains, compression above 0, bonds broken), `peak`, `young` in
+        Pa, and the pack at the end.
+
+    Raises:
+        CaseError: a stress that the springs cannot hold.
+        MechanicsError: the pack carries none.
+
+    Examples:
+        >>> import fdnet
+        >>> settings = ["bonds.radius_ratio=0.5", "grains.normal_stiffness_N_m=1e8"]
+        >>> case = fdnet.read_case("cases/quick.toml", assignments=settings)
+        >>> pack = fdnet.open_run("runs/quick").spheres("initial")
+        >>> test = fdnet.triaxial_test(pack, case, confining_Pa=1e4, strain=1e-3, steps=1)
+        >>> test.bonds > 100
+        True
+    """
+    pack = grains.grains()
+    test = Triaxial(confining=confining_Pa, strain=strain, steps=steps)
+    return triaxial(pack, material_of(case, pack, confining_Pa), test, periodic=case.periodic)
+
+
+def material_of(case: Case, grains: Snapshot, pressure_Pa: float | None = None) -> Material:
+    """Contacts and bonds of the grains of a case, at its nominal stiffness, in SI.
+
+    Two grains, or a grain and a wall, act as two springs in series. Raises CaseError for Hertz
+    contacts without a pressure in Pa.
+    """
+    one = case.grains
+    if case.contact.model == "hertz":
+        normal, shear = _hertz_springs(case, grains, pressure_Pa)
+    else:
+        normal = series(one.normal_stiffness_N_m, one.normal_stiffness_N_m)
+        shear = series(one.tangential_stiffness, one.tangential_stiffness)
+    return Material(
+        normal=normal,
+        shear=shear,
+        friction=one.friction,
+        wall_friction=case.wall_friction,
+        density=one.mean_density_kg_m3,
+        cement=None if case.bonds is None else _cement(case.bonds),
+    )
+
+
+def _cement(bonds: Bonds) -> Cement:
+    tensile, shear = bonds.tensile_strength_Pa, bonds.shear_strength_Pa
+    return Cement(
+        radius_ratio=bonds.radius_ratio,
+        normal=bonds.normal_stiffness_Pa_m,
+        shear=bonds.shear_stiffness_Pa_m,
+        tensile_strength=np.inf if tensile is None else tensile,
+        shear_strength=np.inf if shear is None else shear,
+        gap_ratio=bonds.gap_ratio,
+    )
+
+
+def _hertz_springs(case: Case, grains: Snapshot, pressure_Pa: float | None) -> tuple[float, float]:
+    """Tangent stiffnesses, N/m, of a contact that bears the mean force of the pack.
+
+    An isotropic pressure p makes F = 3 p V / sum(b) in joints with branches b (Digby 1981).
+    """
+    if pressure_Pa is None:
+        raise CaseError(
+            "contact.model: 'hertz' contacts have no stiffness without a load; give "
+            "--confining_MPa, or take contact.model = 'hooke'"
+        )
+    joints = find_joints(grains, case.periodic)
+    branches = float(np.sum(np.linalg.norm(joints.branch, axis=1)))
+    if branches == 0:
+        return 1.0, 1.0
+    volume = float(np.prod(np.diff(grains.box, axis=1)))
+    force = 3 * pressure_Pa * volume / branches
+    elastic: Moduli = pair_elastic(case, ("grain", "grain"), 1.0)
+    radius = 0.5 * case.grains.mean_radius_m
+    overlap = overlap_under(force, elastic.modulus, radius)
+    normal = 1.5 * secant_stiffness(elastic.modulus, radius, overlap)
+    return normal, tangential_stiffness(elastic.shear, radius, overlap)
+
+
+def warnings_of(result: Elastic, case: Case) -> list[str]:
+    """What a reader of the moduli must know, one sentence each."""
+    warnings: list[str] = []
+    young = result.averaged.young
+    if young > QUARTZ_YOUNG:
+        real = 4 * QUARTZ_YOUNG * case.grains.mean_radius_m
+        warnings.append(
+            f"Young's modulus {young:.3g} Pa is above that of solid quartz, {QUARTZ_YOUNG:.3g} "
+            "Pa: no sand is as stiff as these contacts make it; for quartz grains of this size "
+            f"take grains.normal_stiffness_N_m = {real:.2g} (4 E R)"
+        )
+    if result.rattlers > MANY_RATTLERS * result.grains:
+        warnings.append(
+            f"{result.rattlers} of {result.grains} grains carry nothing; the moduli are those of "
+            "a loose pack and change with the seed: run several seeds"
+        )
+    if case.bonds is None:
+        warnings.append(
+            "no table [bonds]: the moduli hold while a pressure keeps every contact closed; add "
+            "[bonds] for cemented grains"
+        )
+    return warnings

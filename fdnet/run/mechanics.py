@@ -1,0 +1,163 @@
+"""The mechanics of the pack of a case or of a run: found or packed, solved, and written down."""
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from fdnet.case.case import Case
+from fdnet.case.file import case_from, read_case, recorded_case, set_keys
+from fdnet.dem.scene import snapshot_of
+from fdnet.errors import CaseError
+from fdnet.files.atomic import write_text
+from fdnet.mechanics.numbers import elastic_numbers, triaxial_numbers, triaxial_warnings
+from fdnet.mechanics.of_case import elastic_moduli, material_of, warnings_of
+from fdnet.mechanics.rest import Row, Triaxial
+from fdnet.mechanics.triaxial import Sheared, triaxial
+from fdnet.report.mechanics_section import put_section
+from fdnet.run.made_files import START_OVER, check_files
+from fdnet.run.mark import CASE, is_run_folder
+from fdnet.run.record_files import read_record
+from fdnet.run.records import PACK_DUMP
+from fdnet.run.session import RunOptions
+from fdnet.spheres.dump import read_frame
+from fdnet.spheres.snapshot import Snapshot
+
+FOLDER, NUMBERS, CURVE = "mechanics", "mechanics.json", "stress_strain.csv"
+"""Folder of the mechanics in a run folder, the file with its numbers, the curve of a test."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Packed:
+    """A case and its grains at rest.
+
+    Attributes:
+        case: what was packed.
+        grains: as packed.
+        folder: the run folder.
+    """
+
+    case: Case
+    grains: Snapshot
+    folder: Path
+
+
+def packed_case(source: Path, options: RunOptions, assignments: list[str]) -> Packed:
+    """The pack of a case file, made in `options.out` if need be, or that of a run folder.
+
+    Raises CaseError when `source` is neither, or when the `assignments` ("key=value") change the
+    pack of a run folder; LiggghtsError when packing fails.
+    """
+    if source.is_dir():
+        return _of_folder(source, assignments)
+    case = read_case(source, assignments=assignments)
+    folder = options.out / case.name if options.out == Path("runs") else options.out
+    if read_record(folder, "pack") is None:
+        from fdnet.run.pipeline import run_stages
+
+        run_stages(case, replace(options, out=folder, stages=("pack",)))
+    return Packed(case=case, grains=_grains_of(folder, case), folder=folder)
+
+
+def _of_folder(folder: Path, assignments: list[str]) -> Packed:
+    if not is_run_folder(folder) or not (folder / CASE).is_file():
+        raise CaseError(f"{folder}: holds no fdnet run; give a case file or a run folder")
+    recorded = recorded_case(folder / CASE)
+    case = case_from(set_keys(recorded.data(), assignments), source=str(folder / CASE))
+    if read_record(folder, "pack") is None:
+        raise CaseError(
+            f"{folder}: holds no finished pack; run the stage pack first "
+            f"(fdnet run {folder / CASE} --out {folder} --stages pack --resume)"
+        )
+    return Packed(case=case, grains=_grains_of(folder, case), folder=folder)
+
+
+def _grains_of(folder: Path, case: Case) -> Snapshot:
+    record = read_record(folder, "pack") or {}
+    frame = read_frame(folder / "pack" / PACK_DUMP)
+    check_files(folder / "pack", record, START_OVER)
+    if record["digest"] != _pack_digest(case, folder):
+        raise CaseError(
+            f"{folder}: its pack belongs to another case; give another --out, or leave out --set "
+            "of keys that change the pack"
+        )
+    return snapshot_of(frame, case, time_s=0.0)
+
+
+def _pack_digest(case: Case, folder: Path) -> str:
+    """Of the pack of `case`, which keeps its grains when only their springs are changed."""
+    recorded = recorded_case(folder / CASE)
+    same = case.grains.model_copy(update={key: getattr(recorded.grains, key) for key in _SPRINGS})
+    return case.model_copy(update={"grains": same}).digest("pack")
+
+
+_SPRINGS = ("normal_stiffness_N_m", "shear_stiffness_N_m", "friction", "density_kg_m3")
+"""Keys of [grains] that a test may set anew on grains that are packed: no place depends on them
+where the grains were packed without friction, as all are."""
+
+
+def measure_elastic(packed: Packed, pressure_Pa: float | None) -> dict[str, Any]:
+    """Elastic moduli of the pack as keys of mechanics.json, with warnings and seconds."""
+    start = time.monotonic()
+    result = elastic_moduli(packed.grains, packed.case, pressure_Pa=pressure_Pa)
+    return {
+        "case": packed.case.name,
+        "seed": packed.case.seed,
+        **elastic_numbers(result),
+        "springs": _springs(packed.case),
+        "warnings": warnings_of(result, packed.case),
+        "seconds": time.monotonic() - start,
+    }
+
+
+def measure_triaxial(
+    packed: Packed, test: Triaxial, follow: Callable[[Row], None]
+) -> tuple[Sheared, dict[str, Any]]:
+    """A triaxial test of the pack, and its numbers with warnings and seconds."""
+    start, case = time.monotonic(), packed.case
+    material = material_of(case, packed.grains, test.confining)
+    result = triaxial(packed.grains, material, test, periodic=case.periodic, follow=follow)
+    numbers = triaxial_numbers(result)
+    numbers["warnings"] = triaxial_warnings(result)
+    numbers["seconds"] = time.monotonic() - start
+    return result, numbers
+
+
+def write_curve(packed: Packed, result: Sheared) -> Path:
+    """Write stress_strain.csv and its figure to the folder of the mechanics; the table's path."""
+    from fdnet.report.stress_strain import draw_stress_strain
+
+    folder = packed.folder / FOLDER
+    folder.mkdir(parents=True, exist_ok=True)
+    names = [one.name for one in fields(Row)]
+    lines = [",".join(_COLUMNS.get(name, name) for name in names)]
+    lines += [",".join(f"{getattr(row, name):.9g}" for name in names) for row in result.rows]
+    path = write_text(folder / CURVE, "\n".join(lines) + "\n")
+    draw_stress_strain(result.rows, folder / "stress_strain.png", bonds=result.bonds)
+    return path
+
+
+_COLUMNS = {"axial": "axial_Pa", "side": "side_Pa", "tension": "broken_in_tension"} | {
+    "shear": "broken_in_shear"
+}
+
+
+def _springs(case: Case) -> dict[str, Any]:
+    data = case.data()
+    grains = data["grains"]
+    return {
+        **{f"grains.{key}": grains[key] for key in _SPRINGS if key in grains},
+        **{f"bonds.{key}": value for key, value in data.get("bonds", {}).items()},
+    }
+
+
+def write_mechanics(packed: Packed, numbers: dict[str, Any]) -> Path:
+    """Write mechanics.json and, where there is a report, its section; returns the path."""
+    folder = packed.folder / FOLDER
+    folder.mkdir(parents=True, exist_ok=True)
+    path = write_text(folder / NUMBERS, json.dumps(numbers, indent=2) + "\n")
+    if (packed.folder / "report.html").is_file():
+        put_section(packed.folder / "report.html", folder)
+    return path

@@ -1,0 +1,129 @@
+"""Porosity and permeability of sand under stress, and how far bonds hold grains in the flow."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from fdnet.case.case import Case
+from fdnet.case.file import case_from
+from fdnet.mechanics.flow_load import displacement_under_flow
+from fdnet.mechanics.of_case import material_of
+from fdnet.mechanics.springs import Cement, Material
+from fdnet.mechanics.triaxial import confined
+from fdnet.network.permeability import analyse
+from fdnet.studies.dem.mechanics_page import compaction_page
+from fdnet.studies.dem.runs import grains_of
+from fdnet.studies.engine.error_rows import against_reference
+from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study
+
+QUARTZ, FIELD = "sand of quartz", "sand of 4.8 GPa"
+STIFFNESS: Mapping[str, float] = {QUARTZ: 9.43e7, FIELD: 7.2e6}
+"""Normal stiffness of the grains, N/m: 4 E R of quartz, and one whose pack has the 4.8 GPa of the
+thesis's Figure 10."""
+BONDS: Mapping[str, Cement] = {
+    "bonds of the thesis": Cement(radius_ratio=1.0, normal=95e9, shear=40e9),
+    "bonds of 4.8 GPa": Cement(radius_ratio=1.0, normal=1.84e13, shear=7.7e12),
+}
+"""Cement that alone carries a pack of porosity 0.40."""
+PRESSURES = (0.0, 3.5, 7.0, 14.0, 35.0)
+"""Isotropic effective stress, MPa."""
+MEASURED_TREND = 0.0021
+"""Fall of ln k with effective stress, 1/MPa, in specimens of medium-grained sand (Nazarova,
+Nazarov, Golikov and Skulkin, Journal of Mining Science 55, 708, 2019)."""
+GRADIENT = 3.5e6 / 8e-3
+"""Fall of pressure over the specimen of the thesis, Pa/m."""
+_EDGE, _SHEAR = 2.4, 34.0 / 94.3
+
+
+def points(quick: bool) -> list[Point]:
+    """Stress on two sands, and bonded packs of specimen 5's porosity in the flow."""
+    seeds = range(1, 2 if quick else 4)
+    stresses = PRESSURES[:2] if quick else PRESSURES
+    chosen = [
+        Point(series=series, knob="stress", value=value, seed=seed)
+        for value in stresses
+        for series in STIFFNESS
+        for seed in seeds
+    ]
+    return chosen + [
+        Point(series=series, knob="porosity", value=0.40, seed=seed)
+        for series in BONDS
+        for seed in seeds
+    ]
+
+
+def _case(seed: int, stiffness: float, porosity: float) -> Case:
+    return case_from(
+        {
+            "name": "cube",
+            "seed": seed,
+            "box": {"size_mm": [_EDGE] * 3, "wall_friction": 0.0},
+            "grains": {
+                "radius_mm": 0.25,
+                "porosity": porosity,
+                "density_kg_m3": 2650.0,
+                "normal_stiffness_N_m": stiffness,
+                "shear_stiffness_N_m": _SHEAR * stiffness,
+            },
+        }
+    )
+
+
+def measure(point: Point, work: Path) -> Mapping[str, float]:
+    """Porosity and permeability under a stress, or the largest displacement of a bonded grain."""
+    if point.series in BONDS:
+        case = _case(point.seed, STIFFNESS[QUARTZ], float(point.value))
+        springs = material_of(case, grains_of(case, work))
+        material = Material(normal=springs.normal, shear=springs.shear, cement=BONDS[point.series])
+        moved = displacement_under_flow(
+            grains_of(case, work), material, GRADIENT, periodic=case.periodic
+        )
+        return {"moved": float(moved[:, 0].max())}
+    case = _case(point.seed, STIFFNESS[point.series], 0.36)
+    grains = grains_of(case, work)
+    if point.value:
+        material = material_of(case, grains)
+        stress = 1e6 * float(point.value)
+        grains = confined(grains, material, stress, periodic=case.periodic)
+    result = analyse(grains, None, periodic=case.periodic)
+    return {"porosity": result.porosity_initial, "k": result.k_initial}
+
+
+def judge(measured: Sequence[Measured]) -> list[Row]:
+    """Changes over the same pack without stress; displacements over their own mean."""
+    rows = []
+    for series in STIFFNESS:
+        runs = [run for run in measured if run.point.series == series]
+        for name in ("porosity", "k"):
+            rows += against_reference(runs, name, lambda run: run.point.value == 0.0)
+    for series in BONDS:
+        runs = [run for run in measured if run.point.series == series]
+        rows += against_reference(runs, "moved", lambda run: True)
+    return rows
+
+
+STUDY = Study(
+    name="compaction",
+    title="Sand under stress",
+    knob_label="effective stress, MPa",
+    points=points,
+    measure=measure,
+    judge=judge,
+    panels=(
+        Panel(
+            quantity="k",
+            title="permeability",
+            label="m²",
+            cost="value",
+            knob="effective stress, MPa",
+        ),
+        Panel(
+            quantity="porosity",
+            title="porosity",
+            label="–",
+            cost="value",
+            knob="effective stress, MPa",
+        ),
+    ),
+    needs_liggghts=True,
+    page=lambda rows: compaction_page(rows, tuple(STIFFNESS), tuple(BONDS), MEASURED_TREND),
+)
