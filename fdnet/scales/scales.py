@@ -1,7 +1,4 @@
-"""The scales of a case: what follows from it in closed form.
-
-Every formula is also a row of `scale_rows`, with its source.
-"""
+"""The scales of a case in closed form; `scale_rows` has each formula and its source."""
 
 import math
 from dataclasses import dataclass, fields, replace
