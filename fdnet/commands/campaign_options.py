@@ -46,7 +46,7 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--stages",
         default=",".join(STAGES),
-        help="comma-separated (default: all four; without report a run draws nothing)",
+        help="comma-separated (default: all; without report a run draws nothing)",
     )
     parser.add_argument(
         "--jobs",

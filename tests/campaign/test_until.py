@@ -11,7 +11,6 @@ from fdnet.campaign.engine.tasks import HowToRun
 from fdnet.campaign.plan.ensemble import ensemble_plan
 from fdnet.campaign.until import parse_until
 from fdnet.case.file import read_case
-from fdnet.case.stages import STAGES
 from fdnet.errors import CaseError
 
 VALUES = [0.30, 0.40, 0.50, 0.38, 0.42, 0.40, 0.41, 0.39, 0.40, 0.40]
@@ -28,7 +27,7 @@ def answers(monkeypatch):
             folder.mkdir(parents=True)
             value = {"k_reduction": VALUES[case.seed - 1], "seed": case.seed}
             (folder / "summary.json").write_text(json.dumps(value))
-            stages = list(STAGES)
+            stages = list(case.stages)
             manifest = {"stages": stages, "digests": {"analyse": case.digest()}}
             (folder / "manifest.json").write_text(json.dumps(manifest))
             ended(task.name, 0)

@@ -44,7 +44,8 @@ def is_done(path: Path, plan: Plan, job: Job) -> bool:
         return False
     done = manifest.get("stages", [])
     same = manifest.get("digests", {}).get("analyse") == job.case.digest()
-    return same and set(plan.stages) <= set(done) and (folder / "summary.json").is_file()
+    asked = {stage for stage in plan.stages if stage in job.case.stages}
+    return same and asked <= set(done) and (folder / "summary.json").is_file()
 
 
 def pack_is_done(folder: Path) -> bool:
