@@ -63,6 +63,12 @@ def test_a_history_that_is_no_growing_cake_supports_nothing(volume, why):
     assert why in fit_filtration(times, volume(times)).unsupported
 
 
+def test_a_history_that_the_pack_shapes_supports_nothing():
+    times = np.linspace(0.0, 20.0, 60)
+    fit = fit_filtration(times, grown(times)[0], cake_share=0.28)
+    assert "the cake has 28 % of the resistance" in fit.unsupported
+
+
 def test_few_points_support_nothing():
     times = np.linspace(0.0, 1.0, 6)
     assert "6 points" in fit_filtration(times, np.sqrt(times)).unsupported

@@ -124,7 +124,9 @@ def _filtrate(one: Invaded) -> Iterator[Added]:
     area = one.case.size_m[1] * one.case.size_m[2]
     time = one.scales.force_factor * np.array([row["time_s"] for row in one.updates])
     volume = np.array([row["filtrate_m3"] for row in one.updates]) / area
-    fit = fit_filtration(time, volume)
+    last = one.updates[-1]
+    drop = last["pressure_cake_Pa"] + last["pressure_pack_Pa"]
+    fit = fit_filtration(time, volume, last["pressure_cake_Pa"] / drop if drop > 0 else 0.0)
     if fit is None:
         return
     usable = not fit.unsupported

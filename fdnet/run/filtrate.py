@@ -17,9 +17,10 @@ from fdnet.spheres.arrays import Array
 
 HALF_HOUR = 1800.0
 """s; the API's filter press runs for 30 minutes."""
-FEWEST, FALLEN, MISFIT = 8, 0.7, 0.02
-"""What a fit needs: so many points, a last rate below this share of the first, and an rms misfit
-of at most this share of the whole time."""
+FEWEST, FALLEN, MISFIT, CAKE_SHARE = 8, 0.5, 0.02, 0.5
+"""What a fit needs: so many points, a last rate below this share of the first, an rms misfit of
+at most this share of the whole time, and at the end at least this share of the resistance in the
+cake, for the law is the cake's."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,10 +64,11 @@ class Filtration:
         return max(0.0, self.intercept)
 
 
-def fit_filtration(time: Array, volume: Array) -> Filtration | None:
+def fit_filtration(time: Array, volume: Array, cake_share: float = 1.0) -> Filtration | None:
     """The fit to filtrate per area (N,) m at `time` (N,) s; None with fewer than four points.
 
-    It is least squares in t. Nothing is extrapolated from a history whose rate hardly fell, that
+    `cake_share` is the share of the last drop of pressure that the cake takes up. The fit is least
+    squares in t. Nothing is extrapolated from a history whose rate hardly fell, that
     is not curved as a growing cake's, or that the formula does not meet.
     """
     time, volume = np.asarray(time, float), np.asarray(volume, float)
@@ -85,15 +87,24 @@ def fit_filtration(time: Array, volume: Array) -> Filtration | None:
         **fit,
         misfit=misfit,
         until=float(time[-1]),
-        unsupported=_unsupported(len(time), fit["a"], misfit, float(rates[-1] / rates[0])),
+        unsupported=_unsupported(
+            len(time), fit["a"], misfit, float(rates[-1] / rates[0]), cake_share
+        ),
     )
 
 
-def _unsupported(points: int, curvature: float, misfit: float, rate: float) -> str:
+def _unsupported(
+    points: int, curvature: float, misfit: float, rate: float, cake_share: float
+) -> str:
     if points < FEWEST:
         return f"{points} points of the history; {FEWEST} are needed"
     if rate > FALLEN:
         return f"the rate only fell to {rate:.2f} of the first; below {FALLEN:g} is needed"
+    if cake_share < CAKE_SHARE:
+        return (
+            f"the cake has {100 * cake_share:.0f} % of the resistance of cake and pack, at least "
+            f"{100 * CAKE_SHARE:g} % is needed: the pack shapes the history"
+        )
     if curvature <= 0:
         return "the history is not curved as that of a growing cake"
     if misfit > MISFIT:
