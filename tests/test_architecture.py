@@ -95,6 +95,7 @@ DOORS = {
         "report/side_view",
         "report/size_figure",
         "studies/accuracy/figure",
+        "studies/dem/mechanics_figure",
         "studies/engine/draw",
         "studies/outside/figure",
         "studies/thesis/figures/canvas",

@@ -27,6 +27,8 @@ STUDIES: Mapping[str, str] = {
     "economies": "settings that make full-scale invasions affordable: error and speed-up of each",
     "defaults": "sides, walls, upstream, step and supply: what each default changes",
     "drive-velocity": "fines at a well, driven 1 to 18 times as fast as the fluid",
+    "mechanics": "moduli by size and sides, triaxial tests by load steps and against LIGGGHTS",
+    "compaction": "porosity and permeability of sand under stress, bonded grains in the flow",
     "outside-numbers": "the invasion on the real binary against closed forms and literature",
 }
 """Name of each study and its question; the module has the same name with underscores."""

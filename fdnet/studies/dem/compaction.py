@@ -10,10 +10,11 @@ from fdnet.mechanics.of_case import material_of
 from fdnet.mechanics.springs import Cement, Material
 from fdnet.mechanics.triaxial import confined
 from fdnet.network.permeability import analyse
+from fdnet.studies.dem.mechanics_figure import Panel, draw_ranges
 from fdnet.studies.dem.mechanics_page import compaction_page
 from fdnet.studies.dem.runs import grains_of
 from fdnet.studies.engine.error_rows import against_reference
-from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study
+from fdnet.studies.engine.study import Measured, Point, Row, Study
 
 QUARTZ, FIELD = "sand of quartz", "sand of 4.8 GPa"
 STIFFNESS: Mapping[str, float] = {QUARTZ: 9.43e7, FIELD: 7.2e6}
@@ -101,6 +102,20 @@ def judge(measured: Sequence[Measured]) -> list[Row]:
     return rows
 
 
+def draw_stress(rows: Sequence[Row], path: Path) -> None:
+    """Permeability and porosity over those without stress."""
+    sands = tuple(STIFFNESS)
+    panels: list[Panel] = [
+        (f"{what} over that without stress", "effective stress, MPa", sands, name, _share)
+        for what, name in (("permeability", "k"), ("porosity", "porosity"))
+    ]
+    draw_ranges([row for row in rows if row.value != 0.0], path, panels)
+
+
+def _share(row: Row) -> float:
+    return 1 + row.error
+
+
 STUDY = Study(
     name="compaction",
     title="Sand under stress",
@@ -108,22 +123,8 @@ STUDY = Study(
     points=points,
     measure=measure,
     judge=judge,
-    panels=(
-        Panel(
-            quantity="k",
-            title="permeability",
-            label="m²",
-            cost="value",
-            knob="effective stress, MPa",
-        ),
-        Panel(
-            quantity="porosity",
-            title="porosity",
-            label="–",
-            cost="value",
-            knob="effective stress, MPa",
-        ),
-    ),
+    panels=(),
     needs_liggghts=True,
+    draw=draw_stress,
     page=lambda rows: compaction_page(rows, tuple(STIFFNESS), tuple(BONDS), MEASURED_TREND),
 )

@@ -14,11 +14,12 @@ from fdnet.mechanics.rest import Triaxial
 from fdnet.mechanics.springs import Cement
 from fdnet.mechanics.triaxial import Sheared, triaxial
 from fdnet.spheres.snapshot import Array, Snapshot
+from fdnet.studies.dem.mechanics_figure import Panel, draw_ranges
 from fdnet.studies.dem.mechanics_page import mechanics_page
 from fdnet.studies.dem.runs import grains_of
 from fdnet.studies.dem.servo import Curve, Servo, run_servo, time_step
 from fdnet.studies.engine.error_rows import against_reference
-from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study
+from fdnet.studies.engine.study import Measured, Point, Row, Study
 
 WALLS, PERIODIC = "moduli, walls at the sides", "moduli, periodic sides"
 BARE, BONDED = "load steps, bare", "load steps, bonded"
@@ -61,7 +62,7 @@ def points(quick: bool) -> list[Point]:
     ]
     return chosen + [
         Point(series=series, knob="seeds", value=0.0, seed=seed)
-        for seed in range(1, (1 if quick else 5) + 1)
+        for seed in range(1, seeds + 1)
         for series in (STATIC, LIGGGHTS)
     ]
 
@@ -181,6 +182,31 @@ def _is_reference(runs: Sequence[Measured], what: str) -> Callable[[Measured], b
     return reference
 
 
+def draw_moduli(rows: Sequence[Row], path: Path) -> None:
+    """Young's modulus by size, the peak by load steps, and the unbonded test by seed."""
+    both = (LIGGGHTS, STATIC)
+    tests = [replace(row, value=float(row.seed)) for row in rows if row.series in both]
+    panels: list[Panel] = [
+        ("Young's modulus, MPa", "edge of the cube, mm", (WALLS, PERIODIC), "young", _in_MPa),
+        ("peak over that of the most steps", "load steps", (BARE, BONDED), "peak", _share),
+        ("axial over side stress, 1.5 to 2 %", "seed", (LIGGGHTS, STATIC), "ratio_end", _itself),
+    ]
+    others = [row for row in rows if row.series not in both]
+    draw_ranges([*others, *tests], path, panels)
+
+
+def _in_MPa(row: Row) -> float:
+    return 1e-6 * row.observed
+
+
+def _share(row: Row) -> float:
+    return 1 + row.error
+
+
+def _itself(row: Row) -> float:
+    return row.observed
+
+
 STUDY = Study(
     name="mechanics",
     title="Mechanics of packs",
@@ -188,32 +214,9 @@ STUDY = Study(
     points=points,
     measure=measure,
     judge=judge,
-    panels=(
-        Panel(
-            quantity="young",
-            title="Young's modulus",
-            label="Pa",
-            series=(WALLS, PERIODIC),
-            cost="value",
-            knob="edge, mm",
-        ),
-        Panel(
-            quantity="peak",
-            title="largest deviatoric stress",
-            label="Pa",
-            cost="value",
-            knob="load steps",
-        ),
-        Panel(
-            quantity="volume_strain",
-            title="volume strain",
-            label="compression above 0",
-            cost="value",
-            knob="load steps",
-        ),
-        Panel(quantity="peak", title="largest stress, by run time"),
-    ),
+    panels=(),
     defaults={BARE: 20.0, BONDED: 20.0},
+    draw=draw_moduli,
     page=lambda rows: mechanics_page(rows, (WALLS, PERIODIC, BARE, BONDED, LIGGGHTS, STATIC)),
     needs_liggghts=True,
 )

@@ -120,9 +120,9 @@ def compaction_page(
         "effective stress, over those without stress (mean and range over the seeds). The last "
         f"column is the law that Nazarova and others (2019) measured, exp(-{trend:g} p/MPa).",
         _stressed(rows, sands, trend),
-        "The largest displacement of a grain in a pack of porosity 0.40 that bonds alone hold, "
-        "by the fall of pressure over the thesis's specimen, 3.5 MPa over 8 mm, in cubes of "
-        "2.4 mm between two plates. It grows with the square of the length.",
+        "The largest displacement of a grain in a bonded pack of porosity 0.40, whose grains "
+        "hardly touch, by the fall of pressure over the thesis's specimen, 3.5 MPa over 8 mm, in "
+        "cubes of 2.4 mm between two plates. It grows with the square of the length.",
         markdown_table(
             ["bonds", "displacement, µm"],
             [
@@ -138,6 +138,8 @@ def _stressed(rows: Sequence[Row], sands: Sequence[str], trend: float) -> str:
     lines = []
     for name in sands:
         for value in _values(_of(rows, name, "k")):
+            if value == 0.0:
+                continue
             changes = [
                 [1 + row.error for row in _of(rows, name, quantity) if row.value == value]
                 for quantity in ("porosity", "k")
