@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from fdnet.report.depth_figure import legend_above
 from fdnet.report.figures import BLUE, DEPTH_LABEL, GREY, MM, ORANGE
 from fdnet.spheres.snapshot import Array
 
@@ -42,8 +43,8 @@ def fill_clean_up(
         label = f"{name}: {len(depth)}"
         below.hist(MM * depth, bins=bins, color=colour, alpha=0.6, label=label)
     below.set(xlabel=DEPTH_LABEL, ylabel="fines (–)", xlim=edges[[0, -1]])
-    above.legend()
-    below.legend()
+    legend_above(above)
+    legend_above(below)
 
 
 def fill_cake(figure: Any, *, rows: Sequence[Mapping[str, Any]]) -> None:
@@ -62,7 +63,7 @@ def fill_cake(figure: Any, *, rows: Sequence[Mapping[str, Any]]) -> None:
                 values, edges, baseline=None, color=colour, linestyle=line, linewidth=2, label=name
             )
     right.set(ylabel="permeability (m²)", yscale="log")
-    right.legend()
+    legend_above(right)
     for axes in (left, right):
         axes.set(xlabel="distance from the face (mm)", xlim=(0, edges[-1]))
 
