@@ -13,6 +13,7 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import read_case
+from fdnet.case.shipped import case_path
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.run.fluid.network_flow import RENEWED
@@ -22,7 +23,6 @@ from fdnet.studies.dem.coupling import FLUIDS
 from fdnet.studies.dem.runs import grains_of, the_binary
 from fdnet.studies.engine.error_rows import against_reference
 from fdnet.studies.engine.runner import child_core_seconds
-from fdnet.studies.engine.shipped import case_path
 from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study
 
 TRAVEL, SOLVED, STOOD = "way between updates", "deposit changed before a solve", "standing below"
