@@ -10,7 +10,7 @@ from fdnet.files.paths import path_option
 def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
     """Adds the command to the command line."""
     parser = commands.add_parser(
-        "compare", parents=[common], help="compare finished runs, with 95 % bands over seeds"
+        "compare", parents=[common], help="compare finished runs, with 95 %% bands over seeds"
     )
     parser.add_argument(
         "runs",

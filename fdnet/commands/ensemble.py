@@ -10,7 +10,7 @@ from fdnet.commands.case_options import add_file_and_set, case_of
 def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
     """Adds the command to the command line."""
     parser = commands.add_parser(
-        "ensemble", parents=[common], help="one case with several seeds, with 95 % bands"
+        "ensemble", parents=[common], help="one case with several seeds, with 95 %% bands"
     )
     add_file_and_set(parser)
     parser.add_argument(

@@ -10,7 +10,7 @@ from fdnet.files.paths import path_option
 def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
     """Adds the command to the command line."""
     parser = commands.add_parser(
-        "sweep", parents=[common], help="many cases and seeds, compared with 95 % bands"
+        "sweep", parents=[common], help="many cases and seeds, compared with 95 %% bands"
     )
     parser.add_argument("sweep", type=path_option, metavar="SWEEP.toml", help="the sweep file")
     add_result(parser)

@@ -113,7 +113,7 @@ def _cost_rows(case: Case, scales: Scales) -> list[Quantity]:
             cost.pack_seconds,
             "s",
             "N steps 1e-7 s an attempt",
-            "measured, within a factor of 3",
+            "measured, within a factor of 2",
         ),
         _row(
             "memory",
@@ -132,7 +132,7 @@ def _cost_rows(case: Case, scales: Scales) -> list[Quantity]:
                 cost.invade_seconds,
                 "s",
                 "steps (2e-6 s + N and n x seconds a sphere)",
-                "measured, within a factor of 3",
+                "measured, within a factor of 2",
             )
         )
     return rows

@@ -78,7 +78,7 @@ def slurm(tmp_path_factory):
 
 def test_packs_come_before_runs_and_a_failing_job_stops_nothing(slurm, tmp_path):
     (tmp_path / "logs").mkdir()
-    make = "import time; time.sleep(1); open('pack', 'w').write('made')"
+    make = "import time; time.sleep(6); open('pack', 'w').write('made')"
     copy = "open('{0}', 'w').write(open('pack').read())"
     tasks = [
         Task(name="pack-1", words=(sys.executable, "-c", make), makes="pack"),

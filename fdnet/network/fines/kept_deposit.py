@@ -21,6 +21,7 @@ from fdnet.network.fines.inside import clip_to_box
 from fdnet.network.fines.occupancy import Occupancy, occupancy_of_deposit
 from fdnet.network.fines.point_search import points_in_boxes
 from fdnet.network.network import Network
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
 
@@ -40,6 +41,8 @@ class Holders:
     piece: Array
     owner: Array
     share: Array
+
+    __repr__ = one_line
 
 
 def holders_of(network: Network) -> Holders:
@@ -86,6 +89,8 @@ class KeptDeposit:
     fine: Array
     measure: Array
     renewed: int
+
+    __repr__ = one_line
 
     @property
     def occupancy(self) -> Occupancy:

@@ -11,6 +11,7 @@ from fdnet.network.laws.faces import over_faces
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.pyramids import side_voids
 from fdnet.network.network import Network
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, frozen
 
 ROUNDING = 1e-12
@@ -56,6 +57,8 @@ class Sides:
     own: Array
     resistance: Array
     tube: float
+
+    __repr__ = one_line
 
 
 def sides_of(network: Network, *, halves: Array | None = None) -> Sides:
