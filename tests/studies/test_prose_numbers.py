@@ -27,6 +27,7 @@ SETTINGS = {
         "11. Velocity between the grains": "0.30 1.5 20 3,000",
         "12. Defaults of an invasion": "0.5 1 2 5 6 4,000",
         "13. Fines that are driven faster than the fluid": "1 3 3.5 5 9 18 95 100 108",
+        "14. How often the flow follows its deposit": "5 95",
     },
     "accuracy": {
         "": "1 3 7",
