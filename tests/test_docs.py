@@ -151,7 +151,7 @@ def fences(page: Path, language: str) -> list[str]:
 def fdnet_commands(page: Path) -> list[list[str]]:
     """Arguments of every `fdnet ...` on a page, up to a pipe or redirection."""
     text = "\n".join([*fences(page, "bash"), *fences(page, "")])
-    lines = re.sub(r"\bSEED\b", "1", text.replace("\\\n", " ")).splitlines()
+    lines = re.sub(r"\bSEED\b|\$[a-z]+", "1", text.replace("\\\n", " ")).splitlines()
     plain = [re.sub(r"(^|\s)#.*", "", line) for line in lines]
     matches = [re.search(r"(?:^|[\s/])fdnet (.*?)(?:[|>;]|$)", line) for line in plain]
     return [shlex.split(match[1]) for match in matches if match]

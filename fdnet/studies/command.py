@@ -29,6 +29,7 @@ STUDIES: Mapping[str, str] = {
     "drive-velocity": "fines at a well, driven 1 to 18 times as fast as the fluid",
     "mechanics": "moduli by size and sides, triaxial tests by load steps and against LIGGGHTS",
     "compaction": "porosity and permeability of sand under stress, bonded grains in the flow",
+    "flow-updates": "how often a flow that follows its deposit is computed anew",
     "outside-numbers": "the invasion on the real binary against closed forms and literature",
 }
 """Name of each study and its question; the module has the same name with underscores."""

@@ -27,12 +27,14 @@ SETTINGS = {
         "11. Velocity between the grains": "0.30 1.5 20 3,000",
         "12. Defaults of an invasion": "0.5 1 2 5 6 4,000",
         "13. Fines that are driven faster than the fluid": "1 3 3.5 5 9 18 95 100 108",
+        "14. How often the flow follows its deposit": "5 95",
     },
     "accuracy": {
         "": "1 3 7",
         "1. What is compared": "1 1/5 2 13",
         "2. Intact": "0.22 0.30 0.35 0.45 0.55 0.70 3.12 8/3",
-        "3. With fines": "0.30 0.40 0.45 1 1.5 1/10 1/3 1/40 1/5 1/8 128 160 1935 2 2000 3 408",
+        "3. With fines": "0.30 0.40 0.45 1 1.5 8 9 13 26 1/10 1/3 1/40 1/5 1/8 128 160 1935 2 "
+        "2000 3 408",
         "4. Walls, cut planes, size": "1 1.5 2 3 8 10 11 20",
         "5. Unequal grains": "1 2 3",
         "7. What remains wrong, and why": "0.30 0.4 0.40 1/10 1/3 1/8 3",
