@@ -112,7 +112,8 @@ class MechanicsError(FdnetError):
     Examples:
         >>> import fdnet
         >>> case = fdnet.read_case("cases/quick.toml")
-        >>> fdnet.elastic_moduli(fdnet.Snapshot.from_arrays([[0, 0, 0]], 0.5), case)
+        >>> alone = fdnet.Snapshot.from_arrays([[0, 0, 0]], 0.5, box=[[-2, 2]] * 3)
+        >>> fdnet.elastic_moduli(alone, case)
         Traceback (most recent call last):
             ...
         fdnet.errors.MechanicsError: ... carries no load along x: ...

@@ -15,13 +15,14 @@ from pathlib import Path
 
 from fdnet.case.file import read_case
 from fdnet.case.shipped import case_path, shipped_cases
+from fdnet.files.paths import path_option
 from fdnet.scales.cost import cost_of, peak_memory
 from fdnet.scales.scales import scales_of
 
 parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
 parser.add_argument("names", nargs="*", help="shipped cases (default: the quick ones)")
 parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
-parser.add_argument("--csv", type=Path, required=True)
+parser.add_argument("--csv", type=path_option, required=True)
 COLUMNS = ("case", "changed", "expected_s", "cpu_s", "ratio", "expected_MB", "memory_MB")
 
 

@@ -21,8 +21,8 @@ import fdnet
 HEAVY = ("numpy", "pandas", "scipy", "pydantic", "pyvista", "vtk", "matplotlib", "numba", "rich")
 ERRORS = {name for name in fdnet.__all__ if name.endswith("Error")}
 UNITS = re.compile(r"(?<![A-Za-z])(m|mm|um|m2|m3|mD|Pa s|SI|s)(?![A-Za-z0-9])")
-NEED_A_RUN = ("run_case", "open_run")
-"""The example of run_case makes the run that the example of open_run opens."""
+NEED_A_RUN = ("run_case", "open_run", "elastic_moduli", "triaxial_test")
+"""The example of run_case makes the run that the others open."""
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 

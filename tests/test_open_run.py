@@ -1,6 +1,7 @@
 """A finished run as an object: tables, spheres, network, hand-over, and what is refused."""
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -175,7 +176,9 @@ def test_it_prints_in_the_units_of_the_field(run):
     assert f"fdnet run tiny in {run.path}" in text
     assert f"{summary['k_initial_m2']:.3g} -> {summary['k_damaged_m2']:.3g} m2" in text
     assert f"{100 * summary['k_reduction']:.1f} % lost" in text
-    millidarcy = float(text.split("\npermeability")[1].split("->", maxsplit=1)[0].replace(",", ""))
+    found = re.search(r"\npermeability +([\d,]+) ->", text)
+    assert found
+    millidarcy = float(found[1].replace(",", ""))
     assert text.splitlines()[1].startswith("95 % of the fines that entered lie within")
     assert millidarcy == pytest.approx(summary["k_initial_m2"] / 9.869233e-16, rel=1e-3, abs=0)
     assert max(len(line) for line in text.split("warning", maxsplit=1)[0].splitlines()) <= 120

@@ -155,4 +155,4 @@ def wilson(hits: int, trials: int) -> tuple[float, float]:
     share, weight = hits / trials, _Z**2 / trials
     middle = (share + weight / 2.0) / (1.0 + weight)
     half = _Z / (1.0 + weight) * math.sqrt(share * (1 - share) / trials + weight / (4.0 * trials))
-    return max(0.0, middle - half), min(1.0, middle + half)
+    return max(0.0, min(share, middle - half)), min(1.0, max(share, middle + half))

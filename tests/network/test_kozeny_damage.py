@@ -98,7 +98,7 @@ def test_filled_pores_are_closed_and_counted(network):
 
 
 def test_resistances_in_series_are_raised_side_by_side():
-    resistance = np.array([[1.0, 3.0], [1.0, 3.0], [0.0, 2.0], [np.inf, 1.0]])
+    resistance = np.array([[1.0, 3.0], [1.0, 3.0], [0.0, 2.0], [0.0, 1.0]])
     factor = np.array([[0.5, 0.25], [1.0, 0.0], [0.0, 0.5], [1.0, 1.0]])
     assert _kept(resistance, factor) == pytest.approx([4.0 / 14.0, 0.0, 0.5, 1.0])
 

@@ -131,6 +131,7 @@ def _deck(case: Case, servo: Servo, side: Array) -> str:
         "boundary": "f f f",
         "contacts": contact_variables(case, scales, "pack", friction=servo.friction),
         "plates": PLATES,
+        "plate_names": " ".join(PLATES),
         "wall_model": f"model {law['model']}",
         "wall_settings": law["settings"],
         "skin": number(0.4 * case.grains.radius_range_m[0]),
