@@ -39,37 +39,30 @@ def run(capsys: pytest.CaptureFixture[str], name: str, *more: str) -> dict:
     return json.loads(capsys.readouterr().out)
 
 
-@pytest.mark.parametrize("name", INTACT)
-def test_intact_packs_and_lattices_within_2_percent(capsys, name):
+def ratios(modelled: dict[str, float], key: str) -> dict[str, float]:
+    """The computed value over that of resolved flow, of each pack."""
+    return {name: value / float(TRUTH[name][key]) for name, value in modelled.items()}
+
+
+def root_mean_square(ratio: dict[str, float]) -> float:
+    return math.sqrt(sum(math.log(value) ** 2 for value in ratio.values()) / len(ratio))
+
+
+def test_intact_packs_and_lattices_within_2_percent_and_3_in_the_mean_square(capsys):
     """Porosity 0.30 (overlapping) to 0.45, radii 1:1 to 1:3, SC, BCC, FCC; nothing is fitted."""
-    assert run(capsys, name)["k_initial_m2"] == pytest.approx(
-        float(TRUTH[name]["k_mm2"]) * 1e-6, rel=0.02 + error(name)
-    )
+    ratio = ratios({name: run(capsys, name)["k_initial_m2"] * 1e6 for name in INTACT}, "k_mm2")
+    assert not {name: at for name, at in ratio.items() if abs(at - 1) > 0.02 + error(name)}
+    assert root_mean_square(ratio) < 0.03
 
 
-@pytest.mark.parametrize("name", FILLED)
-def test_loss_by_fines_within_10_percent(capsys, name):
+def test_loss_by_fines_within_10_percent_and_5_in_the_mean_square(capsys):
     """k/k0 from 0.89 down to 0.0175, fines 1/5 and 1/10, even and in layers."""
-    result = run(capsys, name)
-    assert 1 - result["k_reduction"] == pytest.approx(
-        float(TRUTH[name]["k_over_k0"]), rel=0.10 + error(name)
-    )
-    assert result["porosity_damaged"] < result["porosity_initial"]
-
-
-def test_root_mean_square_errors_are_within_the_goals(capsys):
-    """Intact 3 %, loss by fines 5 %."""
-    for names, key, goal in ((INTACT, "k_mm2", 0.03), (FILLED, "k_over_k0", 0.05)):
-        result = [run(capsys, name) for name in names]
-        model = [
-            one["k_initial_m2"] * 1e6 if key == "k_mm2" else 1 - one["k_reduction"]
-            for one in result
-        ]
-        logs = [
-            math.log(value / float(TRUTH[name][key]))
-            for value, name in zip(model, names, strict=True)
-        ]
-        assert math.sqrt(sum(log * log for log in logs) / len(logs)) < goal
+    result = {name: run(capsys, name) for name in FILLED}
+    kept = {name: 1 - one["k_reduction"] for name, one in result.items()}
+    ratio = ratios(kept, "k_over_k0")
+    assert not {name: at for name, at in ratio.items() if abs(at - 1) > 0.10 + error(name)}
+    assert root_mean_square(ratio) < 0.05
+    assert all(one["porosity_damaged"] < one["porosity_initial"] for one in result.values())
 
 
 def test_names_offered_are_the_laws_there_are():
