@@ -176,9 +176,9 @@ def test_it_prints_in_the_units_of_the_field(run):
     assert f"fdnet run tiny in {run.path}" in text
     assert f"{summary['k_initial_m2']:.3g} -> {summary['k_damaged_m2']:.3g} m2" in text
     assert f"{100 * summary['k_reduction']:.1f} % lost" in text
-    found = re.search(r"\npermeability +([\d,]+) ->", text)
-    assert found
-    millidarcy = float(found[1].replace(",", ""))
+    line = re.search(r"\npermeability +([\d,]+) ->", text)
+    assert line
+    millidarcy = float(line[1].replace(",", ""))
     assert text.splitlines()[1].startswith("95 % of the fines that entered lie within")
     assert millidarcy == pytest.approx(summary["k_initial_m2"] / 9.869233e-16, rel=1e-3, abs=0)
     assert max(len(line) for line in text.split("warning", maxsplit=1)[0].splitlines()) <= 120

@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 
 from fdnet.campaign.result.comparison import Comparison, is_number
+from fdnet.report.units import MILLIDARCY
 from fdnet.spheres.snapshot import Array
 from fdnet.statistics.pairs import student_band
-
-DARCY_M2 = 9.869233e-13
-"""API RP 27 (1952)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -20,10 +18,10 @@ class DepthCurve:
 
     Attributes:
         edges: (S + 1,) m.
-        intact: (S,) darcy.
-        damaged: (S,) darcy.
-        low: (S,) darcy, lower end of the 95 % band of `damaged`; None for a single run.
-        high: (S,) darcy, its upper end.
+        intact: (S,) mD.
+        damaged: (S,) mD.
+        low: (S,) mD, lower end of the 95 % band of `damaged`; None for a single run.
+        high: (S,) mD, its upper end.
     """
 
     edges: Array
@@ -65,10 +63,10 @@ def _edges(rows: list[dict[str, Any]]) -> list[float]:
 
 
 def _values(runs: list[list[dict[str, Any]]], key: str) -> Array:
-    """(R, S) darcy; nan where a run has none."""
+    """(R, S) mD; nan where a run has none."""
     return np.array(
         [
-            [row[key] / DARCY_M2 if is_number(row.get(key)) else np.nan for row in rows]
+            [row[key] / MILLIDARCY if is_number(row.get(key)) else np.nan for row in rows]
             for rows in runs
         ]
     )

@@ -93,7 +93,7 @@ def _depth(comparison: Comparison) -> tuple[str, str] | None:
         assert curve is not None
         _draw_curve(axes, name, curve, COLOURS[index % len(COLOURS)])
     axes.set_xlabel("depth (mm)")
-    axes.set_ylabel("permeability in place (darcy)")
+    axes.set_ylabel("permeability in place (mD)")
     axes.set_ylim(bottom=0)
     axes.grid(lw=0.4, color="0.85")
     axes.legend(fontsize=8, framealpha=0.9)

@@ -5,6 +5,7 @@ import re
 from collections.abc import Sequence
 
 from fdnet.campaign.result.comparison import SHARES, Comparison, described
+from fdnet.report.units import MILLIDARCY
 from fdnet.statistics.bands import Band
 from fdnet.statistics.pairs import MOST_SEEDS, Pair
 
@@ -22,7 +23,7 @@ LABELS = {
 """Quantities of a summary in words."""
 MOST_NAMED = 3
 """Most variants that a sentence names."""
-_UNITS = ((re.compile(r"_m2$"), 1 / 9.869233e-13, "darcy"), (re.compile(r"_m$"), 1e3, "mm"))
+_UNITS = ((re.compile(r"_m2$"), 1 / MILLIDARCY, "mD"), (re.compile(r"_m$"), 1e3, "mm"))
 
 
 def label(quantity: str) -> str:
@@ -46,7 +47,7 @@ def value_text(quantity: str, value: float) -> str:
 
 
 def _digits(value: float) -> str:
-    text = f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}"
+    text = f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
     return text.replace("-", "\u2212")
 
 
