@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fdnet.spheres.arrays import Array, one_line
+from fdnet.statistics.shares import wilson_interval
 
 if TYPE_CHECKING:
     from fdnet.network.analysis import Analysis
@@ -22,8 +23,6 @@ RATIOS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, math.inf)
 CLOGGED = 0.1
 """Share of the clean conductance below which a throat counts as clogged."""
 _COUNTS = ("throats", "with_fines", "covered", "clogged", "blocked")
-_Z = 1.959963984540054
-"""Standard normal deviate of a two-sided band of 95 %."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -131,7 +130,7 @@ def _row(
     blocked: int,
     arrived: float,
 ) -> dict[str, Any]:
-    low, high = wilson(blocked, throats)
+    low, high = wilson_interval(blocked, throats)
     return {
         "concentration": concentration,
         "ratio_lo": ratio[0],
@@ -146,13 +145,3 @@ def _row(
         "share_high": high,
         "arrived_mean": arrived / throats,
     }
-
-
-def wilson(hits: int, trials: int) -> tuple[float, float]:
-    """Lower and upper end of Wilson's 95 % band of a share `hits` of `trials`."""
-    if trials <= 0:
-        return 0.0, 1.0
-    share, weight = hits / trials, _Z**2 / trials
-    middle = (share + weight / 2.0) / (1.0 + weight)
-    half = _Z / (1.0 + weight) * math.sqrt(share * (1 - share) / trials + weight / (4.0 * trials))
-    return max(0.0, min(share, middle - half)), min(1.0, max(share, middle + half))

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from fdnet.run.bridging import Throats, bridging_rows, pooled, wilson
+from fdnet.run.bridging import Throats, bridging_rows, pooled
+from fdnet.statistics.shares import wilson_interval
 
 
 def throats(ratio, blocked):
@@ -28,7 +29,7 @@ def throats(ratio, blocked):
 )
 def test_wilsons_band(hits, trials, low, high):
     """Values of Brown, Cai and DasGupta (2001), and Newcombe (1998) for 81 of 263."""
-    assert wilson(hits, trials) == pytest.approx((low, high), abs=5e-5)
+    assert wilson_interval(hits, trials) == pytest.approx((low, high), abs=5e-5)
 
 
 def test_throats_fall_into_their_classes_and_runs_add_up():

@@ -18,7 +18,8 @@ from scipy.spatial import Delaunay
 from fdnet.dem.scene import box_of
 from fdnet.errors import CaseError
 from fdnet.spheres.snapshot import Kind, resting
-from fdnet.studies.thesis.numbers.deposition import deposition, wilson_interval, write_deposition
+from fdnet.statistics.shares import wilson_interval
+from fdnet.studies.thesis.numbers.deposition import deposition, write_deposition
 from fdnet.studies.thesis.numbers.examine import DEFAULT_PAIR, THESIS_PAIR, Examined, examine
 from fdnet.studies.thesis.numbers.first_millimetre import first_millimetre
 from fdnet.studies.thesis.numbers.grains_alone import sizes_of_grains_alone

@@ -67,18 +67,23 @@ def deposit_on_sides(network: Network, fines: Snapshot) -> tuple[Array, Array]:
         pore; 0 where the power centre lies on the facet, negative where it lies behind.
     """
     filled = np.zeros((len(network.throat_pores), 2, 2))
-    facet = network.throat_corner
     for side in (0, 1):
+        real, corner = side_corners(network, side)
         height = network.throat_heights[:, side]
-        real = np.flatnonzero(np.abs(height) > THIN_SIDE * network.grain_radius)
-        apex = network.pore_power_centre[network.throat_pores[real, side]]
-        if side == 1:
-            apex = apex + network.throat_shift[real] * np.ptp(network.box, axis=1)
-        corner = np.concatenate([apex[:, None], facet[real]], axis=1)
         inside = _filled(network, corner, fines, np.zeros((len(fines), 0)))
         signed_share = np.copysign(network.throat_share[real], height[real])
         filled[real, side] = inside / signed_share[:, None]
     return filled[..., 0], filled[..., 1]
+
+
+def side_corners(network: Network, side: int) -> tuple[Array, Array]:
+    """Throats (R,) whose side 0 or 1 is no sliver, and the corners (R, 4, 3) m of these sides."""
+    height = network.throat_heights[:, side]
+    real = np.flatnonzero(np.abs(height) > THIN_SIDE * network.grain_radius)
+    apex = network.pore_power_centre[network.throat_pores[real, side]]
+    if side == 1:
+        apex = apex + network.throat_shift[real] * np.ptp(network.box, axis=1)
+    return real, np.concatenate([apex[:, None], network.throat_corner[real]], axis=1)
 
 
 def _filled(network: Network, corner: Array, fines: Snapshot, value: Array) -> Array:

@@ -11,8 +11,8 @@ import numpy as np
 
 from fdnet.network.fines.ball import pieces
 from fdnet.network.fines.deposit import (
-    THIN_SIDE,
     means_in_pores,
+    side_corners,
     size_classes,
     wall_distance,
 )
@@ -49,15 +49,12 @@ def holders_of(network: Network) -> Holders:
     """The holders of a network, cut at the faces of its box."""
     corners, owners, shares = [network.pore_corner], [np.arange(len(network.pore_position))], []
     shares.append(network.pore_share)
-    facet, first = network.throat_corner, len(network.pore_position)
+    first = len(network.pore_position)
     for side in (0, 1):
+        real, corner = side_corners(network, side)
+        corners.append(corner)
         height = network.throat_heights[:, side]
-        real = np.flatnonzero(np.abs(height) > THIN_SIDE * network.grain_radius)
-        apex = network.pore_power_centre[network.throat_pores[real, side]]
-        if side == 1:
-            apex = apex + network.throat_shift[real] * np.ptp(network.box, axis=1)
-        corners.append(np.concatenate([apex[:, None], facet[real]], axis=1))
-        owners.append(first + side * len(facet) + real)
+        owners.append(first + side * len(network.throat_pores) + real)
         shares.append(np.copysign(network.throat_share, height))
     piece, which = clip_to_box(np.concatenate(corners), network.box, network.periodic)
     return Holders(

@@ -16,6 +16,7 @@ import numpy as np
 
 from fdnet.network.laws.damage import CLOGGING, DEPOSITION
 from fdnet.spheres.snapshot import Array
+from fdnet.statistics.shares import wilson_interval
 from fdnet.studies.engine.csv_rows import write_flat
 from fdnet.studies.thesis.numbers.examine import Examined
 from fdnet.studies.thesis.numbers.first_millimetre import FirstMillimetre, first_millimetre
@@ -23,7 +24,6 @@ from fdnet.studies.thesis.numbers.statistics import share, within
 from fdnet.studies.thesis.numbers.values import DepositionClaim, specimen_number, thesis_values
 
 HALFWAY, WALL = 0.5, 1.0
-Z_95 = 1.959963984540054
 DEPOSITION_SPECIMEN = "5"
 """The specimen Figures 56 and 57 are of."""
 
@@ -120,20 +120,6 @@ def fines_in_class(section: FirstMillimetre, between: tuple[float, float]) -> Th
         weight=section.throat_weight[throat],
         throat=throat,
     )
-
-
-def wilson_interval(part: float, total: float) -> tuple[float, float]:
-    """The 95 % interval of a binomial share `part` / `total`; nan without trials.
-
-    Source: Wilson 1927, J. Am. Stat. Assoc. 22, 209.
-    """
-    if total <= 0:
-        return math.nan, math.nan
-    square = Z_95**2 / total
-    share = part / total
-    spread = Z_95 * math.sqrt(part * (total - part) / total + 0.25 * Z_95**2) / total
-    low, high = share + 0.5 * square - spread, share + 0.5 * square + spread
-    return low / (1.0 + square), high / (1.0 + square)
 
 
 def write_deposition(path: Path, rows: Sequence[DepositionRow]) -> Path:
