@@ -80,10 +80,14 @@ def cleaned_state(folder: Path, row: Cleaned, flow: BackFlow, grains: Snapshot) 
 
 
 def keep_record(folder: Path, row: Cleaned, digest: str, *, ranks: int) -> None:
-    """Record a checkpoint whose files are whole, and keep the two newest restarts."""
+    """Record a checkpoint whose files are whole, and keep its restart and the one before.
+
+    LIGGGHTS may have written later checkpoints meanwhile, which are recorded in their turn.
+    """
     record = _record(folder, row, digest) | {"ranks": ranks}
     write_text(_record_path(folder, row), json.dumps(record, indent=1) + "\n")
-    for old in read_cleaned(folder)[:-2]:
+    before = [one for one in read_cleaned(folder) if one.step < row.step]
+    for old in before[:-1]:
         (folder / restart_name(old.step)).unlink(missing_ok=True)
 
 

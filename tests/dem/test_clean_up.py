@@ -13,6 +13,14 @@ from builders import tiny
 from fdnet.case.file import case_from
 from fdnet.dem.clean_up import Start, clean_up, fines_to_clean
 from fdnet.dem.clean_up_deck import Beginning, render_clean_up, turned_drag
+from fdnet.dem.clean_up_states import (
+    CLEANED_HEADER,
+    Cleaned,
+    dump_name,
+    keep_record,
+    newest_whole,
+    restart_name,
+)
 from fdnet.dem.liggghts import Launch
 from fdnet.errors import CaseError
 from fdnet.network.fines.invaded import measure_invaded
@@ -134,6 +142,25 @@ def test_a_cut_clean_up_goes_on_bit_for_bit(start, tmp_path, binary):
         assert np.array_equal(getattr(rest.state, column), getattr(whole.state, column))
     with pytest.raises(CaseError, match="begun with --np 1"):
         again(start, flow, tmp_path / "cut", binary, ranks=2)
+
+
+def test_a_record_keeps_restarts_of_later_checkpoints(tmp_path):
+    """LIGGGHTS may be some checkpoints ahead of fdnet when one is recorded."""
+    (tmp_path / "post").mkdir()
+    rows = [
+        Cleaned(chunk=k, step=100 * k, inside=9, ahead=0, out=k, passed=0, quiet=0)
+        for k in range(1, 6)
+    ]
+    lines = [CLEANED_HEADER, *(row.line() for row in rows)]
+    (tmp_path / "history.csv").write_text("\n".join(lines) + "\n")
+    for row in rows:
+        for name in (dump_name(row.step), restart_name(row.step)):
+            (tmp_path / name).write_text(name)
+    for row in rows[:3]:
+        keep_record(tmp_path, row, "case", ranks=1)
+    left = {path.name for path in (tmp_path / "post").glob("*.restart")}
+    assert left == {f"clean_{step}.restart" for step in (200, 300, 400, 500)}
+    assert newest_whole(tmp_path, "case", ranks=1) == rows[2]
 
 
 def test_friction_decides_what_stays(start, tmp_path, binary):
