@@ -17,13 +17,18 @@ def add_case(parser: argparse.ArgumentParser) -> None:
 def add_file_and_set(parser: argparse.ArgumentParser) -> None:
     """Adds the case file, --seed and --set to a parser."""
     parser.add_argument("case", type=path_option, metavar="CASE.toml", help="the case file")
+    add_overrides(parser, example="fines.count=500")
+
+
+def add_overrides(parser: argparse.ArgumentParser, *, example: str) -> None:
+    """Adds --seed and --set to a parser; the help of --set shows `example`."""
     parser.add_argument("--seed", type=int, help="overrides the seed of the case")
     parser.add_argument(
         "--set",
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="overrides a key, e.g. fines.count=500",
+        help=f"overrides a key, e.g. {example}",
     )
 
 
@@ -77,5 +82,10 @@ def case_of(options: argparse.Namespace) -> Any:
     """The case that the options name, with --set and --seed applied."""
     from fdnet.case.file import read_case
 
+    return read_case(options.case, assignments=overrides_of(options))
+
+
+def overrides_of(options: argparse.Namespace) -> list[str]:
+    """The assignments of --set, then that of --seed."""
     seed = [] if options.seed is None else [f"seed={options.seed}"]
-    return read_case(options.case, assignments=[*options.set, *seed])
+    return [*options.set, *seed]

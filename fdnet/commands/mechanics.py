@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from fdnet.commands.case_options import add_overrides, overrides_of
 from fdnet.errors import CaseError
 from fdnet.files.paths import path_option
 
@@ -20,14 +21,7 @@ def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "source", type=path_option, metavar="CASE.toml", help="the case file, or a run folder"
     )
-    parser.add_argument("--seed", type=int, help="overrides the seed of the case")
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="overrides a key, e.g. bonds.radius_ratio=0.5",
-    )
+    add_overrides(parser, example="bonds.radius_ratio=0.5")
     parser.add_argument(
         "--out", type=path_option, help="run folder of a case file (default runs/NAME)"
     )
@@ -65,14 +59,13 @@ def _mechanics(options: argparse.Namespace) -> int:
 
     pressure = _pressure(options.confining_MPa)
     _check_test(options)
-    seed = [] if options.seed is None else [f"seed={options.seed}"]
     chosen = RunOptions(
         out=options.out or Path("runs"),
         liggghts=options.liggghts,
         show_progress=not options.quiet,
         command=options.command_line,
     )
-    packed = packed_case(options.source, chosen, [*options.set, *seed])
+    packed = packed_case(options.source, chosen, overrides_of(options))
     numbers = measure_elastic(packed, pressure)
     if options.triaxial:
         numbers["triaxial"] = _triaxial(options, packed, pressure or 0.0)

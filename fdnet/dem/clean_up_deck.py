@@ -6,13 +6,12 @@ from typing import Any
 import numpy as np
 
 from fdnet.dem.clean_up_states import Cleaned
-from fdnet.dem.contact_lines import contact_variables
 from fdnet.dem.coupled_parts import coupled_parts, dumped_group
 from fdnet.dem.deck import Deck, LeftOut, number, render_text
 from fdnet.dem.drag import BELOW_ZERO, drag_variables, forces_left_out
 from fdnet.dem.gravity import gravity_variables
-from fdnet.dem.invade_deck import neighbour_skin
-from fdnet.dem.scene import header_variables, wall_variables
+from fdnet.dem.invade_deck import moving_variables
+from fdnet.dem.scene import header_variables
 from fdnet.scales.clean_up import BackFlow
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.dump import COLUMNS, FORMAT
@@ -36,10 +35,6 @@ class Beginning:
 def render_clean_up(flow: BackFlow, digest: str, begin: Beginning, *, ranks: int = 1) -> Deck:
     """The deck of a clean-up, at the end of the invasion or continued from a checkpoint."""
     case, scales = flow.case, flow.scales
-    mobile = case.grains.motion == "mobile"
-    frictional = [c for name, c in scales.contacts.items() if "fine" in name or mobile]
-    friction = any(c.friction > 0 for c in frictional)
-    wall_friction = any(c.friction > 0 for c in frictional if "wall" in c.pair)
     gravity, left_out = gravity_variables(case, scales)
     left_out += forces_left_out(case)
     if begin.face < 0:
@@ -50,24 +45,17 @@ def render_clean_up(flow: BackFlow, digest: str, begin: Beginning, *, ranks: int
     text = render_text(
         "clean_up.in.j2",
         header
+        | moving_variables(case, scales)
         | {
             "stage": "clean_up",
             "digest": digest,
             "going_on": begin.row is not None,
             "restart": begin.restart,
-            "skin": number(neighbour_skin(case)),
-            "neighbour_bin": number(case.run.neighbour_bin_m) if case.run.neighbour_bin_m else "",
-            "contacts": contact_variables(case, scales, "invade", friction=friction),
-            "time_step": number(scales.time_step),
-            "walls": wall_variables(case, "invade", friction=wall_friction),
-            "fixed_grains": not mobile,
-            "moving": "all" if mobile else "fines",
             "gravity": gravity,
             "drag": turned_drag(flow),
             "resume": False,
             "regions": _regions(flow, begin.face),
             "ahead": begin.face < 0,
-            "thermo_steps": max(1, scales.checkpoint_steps // 4),
             "start": _start(begin.row),
             "chunks": flow.chunks,
             "chunk_steps": scales.checkpoint_steps,

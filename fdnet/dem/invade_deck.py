@@ -2,6 +2,7 @@
 
 from functools import reduce
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -128,31 +129,21 @@ def render_invade(
     resume: Checkpoint | None = None,
 ) -> Deck:
     """The invasion deck, fresh or continued from a checkpoint's restart."""
-    mobile = case.grains.motion == "mobile"
-    frictional = [c for name, c in scales.contacts.items() if "fine" in name or mobile]
-    friction = any(c.friction > 0 for c in frictional)
-    wall_friction = any(c.friction > 0 for c in frictional if "wall" in c.pair)
+    friction = _friction(case, scales)
     gravity, left_out = gravity_variables(case, scales)
     left_out += [*forces_left_out(case), *_left_out(case, friction=friction, ranks=ranks)]
     text = render_text(
         "invade.in.j2",
         header_variables(case, "invade", left_out, ranks)
+        | moving_variables(case, scales)
         | {
-            "resume": _restart(resume) if resume else None,
-            "skin": number(neighbour_skin(case)),
-            "neighbour_bin": number(case.run.neighbour_bin_m) if case.run.neighbour_bin_m else "",
-            "contacts": contact_variables(case, scales, "invade", friction=friction),
-            "time_step": number(scales.time_step),
-            "walls": wall_variables(case, "invade", friction=wall_friction),
-            "fixed_grains": not mobile,
-            "moving": "all" if mobile else "fines",
             "gravity": gravity,
+            "resume": _restart(resume) if resume else None,
             "dump_group": dumped_group(case),
             "start_velocity": number(scales.upstream_velocity),
             "drag": drag_variables(case, scales),
             "overlap": watch_variables(case, scales),
             "regions": _regions(case, scales, grains),
-            "thermo_steps": max(1, scales.checkpoint_steps // 4),
             "quiet_checkpoints": quiet_chunks(scales),
             "empty_checkpoints": empty_chunks(case, scales),
             "allowance": plug_allowance(case, scales),
@@ -169,7 +160,30 @@ def render_invade(
     return Deck(text=text, stage="invade", digest=case.digest("invade"), left_out=tuple(left_out))
 
 
-def neighbour_skin(case: InvasionCase) -> float:
+def moving_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]:
+    """The variables of any deck in which fines move among grains: contacts, walls, neighbours."""
+    mobile = case.grains.motion == "mobile"
+    walls = _friction(case, scales, walls_only=True)
+    return {
+        "skin": number(_neighbour_skin(case)),
+        "neighbour_bin": number(case.run.neighbour_bin_m) if case.run.neighbour_bin_m else "",
+        "contacts": contact_variables(case, scales, "invade", friction=_friction(case, scales)),
+        "time_step": number(scales.time_step),
+        "walls": wall_variables(case, "invade", friction=walls),
+        "fixed_grains": not mobile,
+        "moving": "all" if mobile else "fines",
+        "thermo_steps": max(1, scales.checkpoint_steps // 4),
+    }
+
+
+def _friction(case: InvasionCase, scales: InvasionScales, *, walls_only: bool = False) -> bool:
+    """Whether any contact that can slip has friction, of all pairs or of those with a wall."""
+    mobile = case.grains.motion == "mobile"
+    slipping = [c for name, c in scales.contacts.items() if "fine" in name or mobile]
+    return any(c.friction > 0 for c in slipping if "wall" in c.pair or not walls_only)
+
+
+def _neighbour_skin(case: InvasionCase) -> float:
     """The neighbour skin, m: given, or the radius of the smallest fine.
 
     A skin of 0.3 to 0.8 of its diameter was measured to be fastest.

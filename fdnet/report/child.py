@@ -25,17 +25,7 @@ def render_spheres_png(
     """
     try:
         with replacing(path) as part:
-            done = subprocess.run(
-                [*_command(spheres_vtp, box), str(part.absolute())],
-                capture_output=True,
-                text=True,
-                errors="replace",
-                timeout=seconds,
-                check=False,
-                stdin=subprocess.DEVNULL,
-                env=_child_environment(),
-            )
-            _refuse_failure(done)
+            _run([*_command(spheres_vtp, box), str(part.absolute())], seconds)
             _refuse_half(part)
     except subprocess.TimeoutExpired:
         return f"the 3-D picture was given up after {seconds:g} s"
@@ -50,22 +40,27 @@ def draw_frames(arguments: Sequence[str], *, seconds: float) -> str:
     Returns "" or the reason why there are no frames.
     """
     try:
-        done = subprocess.run(
-            [*_python(), "-m", "fdnet.report.movie_frames", *arguments],
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=seconds,
-            check=False,
-            stdin=subprocess.DEVNULL,
-            env=_child_environment(),
-        )
-        _refuse_failure(done)
+        _run([*_python(), "-m", "fdnet.report.movie_frames", *arguments], seconds)
     except subprocess.TimeoutExpired:
         return f"the drawing was given up after {seconds:g} s"
     except OSError as error:
         return str(error)
     return ""
+
+
+def _run(words: Sequence[str], seconds: float) -> None:
+    """Run a child process. Raises TimeoutExpired after `seconds`, OSError when it fails."""
+    done = subprocess.run(
+        words,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        timeout=seconds,
+        check=False,
+        stdin=subprocess.DEVNULL,
+        env=_child_environment(),
+    )
+    _refuse_failure(done)
 
 
 def _command(spheres_vtp: str | Path, box: Array) -> list[str]:

@@ -2,7 +2,9 @@
 
 from typing import Any
 
-MILLIDARCY = 9.869233e-16
+from fdnet.case.fluid import M2_PER_MD
+
+MILLIDARCY = M2_PER_MD
 """One millidarcy in m2: a darcy is 1 cP cm/s under 1 atm/cm (API RP 27, 1952)."""
 
 
