@@ -74,6 +74,40 @@ def test_scaling_keeps_ratios_of_stiffness(specimen1):
     ].normal_stiffness == pytest.approx(94.3e9)
 
 
+FOLLOWED = ("drag.field=network", "drag.upstream=darcy", "fines.supply=slab", "fines.count=100")
+
+
+@pytest.mark.parametrize("model", ["hooke", "hertz"])
+def test_stiffness_auto_is_the_least_that_keeps_overlaps_small(model):
+    keys = (*FOLLOWED, "drag.scheme=implicit", f"contact.model={model}", "fluid.velocity_m_s=5")
+    auto = scales_of(tiny(*keys, "run.stiffness_N_m=auto"))
+    deepest = [auto.impact_overlap, auto.drag_overlap, auto.deposit_overlap]
+    assert max(deepest) == pytest.approx(0.03, rel=0.1)
+    assert max(deepest) <= 0.03
+    number = max(c.normal_stiffness for c in auto.contacts.values() if "fine" in c.pair)
+    stiffness = max(c.normal_stiffness for c in auto.contacts.values())
+    chosen = stiffness if model == "hooke" else number
+    same = scales_of(tiny(*keys, f"run.stiffness_N_m={chosen!r}"))
+    assert same.deposit_overlap == pytest.approx(auto.deposit_overlap, rel=1e-9)
+    assert not any("overlap" in warning for warning in auto.warnings)
+
+
+def test_stiffness_auto_is_the_default_where_overlaps_are_small():
+    slow = ("fluid.velocity_m_s=1e-3", "run.stiffness_N_m=auto")
+    assert max(c.normal_stiffness for c in scales_of(tiny(*slow)).contacts.values()) == (
+        pytest.approx(1e4)
+    )
+
+
+def test_a_pack_of_stiffness_auto_depends_on_what_decides_it():
+    one, other = (
+        tiny("run.stiffness_N_m=auto", f"fluid.velocity_m_s={v!r}").digest("pack")
+        for v in (1e-3, 9.0)
+    )
+    assert one != other
+    assert len({tiny(f"fluid.velocity_m_s={v!r}").digest("pack") for v in (1e-3, 9.0)}) == 1
+
+
 def test_damping_rate_gives_the_damping_ratio():
     case = tiny("fines.damping_ratio=0.3", "grains.damping_ratio=0.3")
     contact = scales_of(case).contacts["fine-fine"]

@@ -146,7 +146,8 @@ class Case(Part):
     def digest(self, stage: str = "analyse") -> str:
         """Hash of what `stage` depends on.
 
-        "pack" ignores fines, fluid and analysis; "invade" ignores the analysis and the clean-up,
+        "pack" ignores fines, fluid and analysis, unless the stiffness follows from them
+        (`run.stiffness_N_m` = "auto"); "invade" ignores the analysis and the clean-up,
         "clean_up" the analysis. No result depends on `POLICIES` or on the bonds, which mechanics
         alone reads, so no digest does. A key that was added later counts only where its value
         differs from what a case meant before (`fdnet.case.added`).
@@ -160,7 +161,7 @@ class Case(Part):
             data.pop("name")
         if stage == "invade":
             data.pop("clean_up", None)
-        if stage == "pack":
+        if stage == "pack" and self.run.stiffness_N_m != "auto":
             data["grains"].pop("motion")
             fines = data.get("fines", {}).get("normal_stiffness_N_m")
             scaling = {"stiffness": self.run.stiffness_N_m, "fines_stiffness": fines}

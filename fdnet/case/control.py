@@ -6,6 +6,9 @@ from pydantic import Field
 
 from fdnet.case.values import CONTACT_STEP_LIMIT, Fraction, Part, Positive, scaled
 
+DEFAULT_STIFFNESS = 1.0e4
+"""N/m, of the stiffest contact."""
+
 
 class Run(Part):
     """Run control: contact stiffness, time step, when to stop and what to refuse.
@@ -15,12 +18,14 @@ class Run(Part):
     they differ from those of the simulation with `drag.drive_velocity_m_s`.
     """
 
-    stiffness_N_m: Positive | Literal["nominal"] = Field(
-        1.0e4,
+    stiffness_N_m: Positive | Literal["nominal", "auto"] = Field(
+        DEFAULT_STIFFNESS,
         description="Stiffness of the stiffest contact; all others keep their ratio to it. With "
         'contact.model = "hertz": force over overlap of the stiffest contact of a fine, at an '
         "overlap of 1 % of its diameter. "
-        '"nominal" keeps the materials\' own stiffness, which needs a far smaller time step.',
+        '"nominal" keeps the materials\' own stiffness, which needs a far smaller time step. '
+        '"auto" takes the least that keeps the predicted overlaps of a fine at 3 % of its '
+        "diameter, and at least the default.",
     )
     max_hours: Positive = Field(
         24.0, description="A case that is expected to run longer is refused before it starts."
@@ -62,6 +67,11 @@ class Run(Part):
         None,
         description="Share of the first rate below which the invasion counts as plugged, where "
         'drag.field is "network" at constant pressure.',
+    )
+    stop_pore_volumes: Positive | None = Field(
+        None,
+        description="The invasion ends when so much fluid has passed the specimen, in volumes of "
+        'its intact pores, where drag.field is "network".',
     )
     cap_ms: Positive | None = Field(
         None,

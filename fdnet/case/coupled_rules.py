@@ -49,6 +49,15 @@ def stop_rate(run: Run, drag: Drag) -> Iterator[str]:
         )
 
 
+def stop_volume(run: Run, drag: Drag) -> Iterator[str]:
+    """The uniform field keeps no account of the volume: it is the rate times the time."""
+    if run.stop_pore_volumes is not None and drag.field != "network":
+        yield (
+            f"run.stop_pore_volumes: {run.stop_pore_volumes:g} needs drag.field = 'network', but "
+            f"it is {drag.field!r}; set run.duration_ms, since the uniform field keeps its rate"
+        )
+
+
 def crowd_scheme(drag: Drag) -> Iterator[str]:
     """One damping for all fines cannot carry a coefficient of each."""
     if drag.coupled and drag.scheme == "viscous":

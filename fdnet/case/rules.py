@@ -17,6 +17,7 @@ from fdnet.case.coupled_rules import (
     network_grains,
     network_supply,
     stop_rate,
+    stop_volume,
     update_travel,
 )
 from fdnet.case.flow_rules import FLOW_RULES
@@ -257,6 +258,7 @@ RULES = (
     Rule(("drag.field", "drag.crowd", "drag.inertia"), coupled_inertia),
     Rule(("drag.field", "drag.drive", "fines.supply"), network_supply),
     Rule(("run.stop_rate", "drag.field", "drag.drive"), stop_rate),
+    Rule(("run.stop_pore_volumes", "drag.field"), stop_volume),
     Rule(("drag.scheme", "drag.crowd", "drag.field"), crowd_scheme),
     Rule(("drag.update_travel", "drag.crowd", "drag.field"), update_travel),
     Rule(("drag.scheme", "drag.refresh_steps"), _refresh),

@@ -46,7 +46,7 @@ from fdnet.dem.overlap import (
     refuse_overlap,
 )
 from fdnet.dem.supply import batches_of
-from fdnet.dem.updates import UPDATES, rate_is_low, read_updates
+from fdnet.dem.updates import UPDATES, rate_is_low, read_updates, volume_has_passed
 from fdnet.dem.verdict import SCREEN
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.files.atomic import write_text
@@ -63,7 +63,8 @@ class Invasion:
     Attributes:
         damaged: grains and remaining fines at the end, those upstream too.
         history: one row a checkpoint.
-        stop_reason: "plugged", "supply_exhausted", "duration" or "cap".
+        stop_reason: "plugged", "supply_exhausted", "duration" (the time or volume that the
+            case asks for) or "cap".
         supplied: number of fines that took part: all, or those of the batches that had come.
         overlap: largest overlap of a fine with any sphere.
         step_s: s, time step.
@@ -216,6 +217,8 @@ def _over(
         return False
     if last.chunk >= chunks_of(case, scales) or rate_is_low(folder, case, last.step):
         return True
+    if volume_has_passed(folder, case, scales, last.step):
+        return True
     return case.run.duration_s is None and quiet_enough(case, scales, last)
 
 
@@ -264,7 +267,7 @@ def _ending(
     warnings = []
     if rate_is_low(folder, case, last.step):
         reason = "plugged"
-    elif case.run.duration_s is not None:
+    elif case.run.duration_s is not None or volume_has_passed(folder, case, scales, last.step):
         reason = "duration"
     elif quiet_enough(case, scales, last):
         reason = "plugged" if waiting > 0 else "supply_exhausted"

@@ -1,12 +1,14 @@
 """The record of updates of a coupled invasion, updates.csv: one row for each."""
 
 import hashlib
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fdnet.case.case import InvasionCase
 from fdnet.errors import LiggghtsError
 from fdnet.files.atomic import write_text
+from fdnet.scales.scales import InvasionScales
 
 UPDATES = "updates.csv"
 
@@ -74,5 +76,19 @@ def rate_is_low(folder: Path, case: InvasionCase, step: int) -> bool:
     """Whether the rate before `step` was below `run.stop_rate` of the first one."""
     if case.run.stop_rate is None:
         return False
+    last = _last_before(folder, step)
+    return last is not None and last["rate_over_initial"] < case.run.stop_rate
+
+
+def volume_has_passed(folder: Path, case: InvasionCase, scales: InvasionScales, step: int) -> bool:
+    """Whether the fluid that passed before `step` is `run.stop_pore_volumes` or more."""
+    if case.run.stop_pore_volumes is None:
+        return False
+    last, pores = _last_before(folder, step), scales.porosity * math.prod(case.size_m)
+    return last is not None and last["filtrate_m3"] >= case.run.stop_pore_volumes * pores
+
+
+def _last_before(folder: Path, step: int) -> Mapping[str, float] | None:
+    """The last update before `step`, if there is one."""
     rows = [row for row in read_updates(folder) if row["step"] < step]
-    return bool(rows) and rows[-1]["rate_over_initial"] < case.run.stop_rate
+    return rows[-1] if rows else None

@@ -19,6 +19,7 @@ from fdnet.scales.springs import (
     mass_range,
     pair_radius,
     pairs_of,
+    stiffness_of,
 )
 
 
@@ -36,7 +37,7 @@ def hertz_factor(case: Case) -> float:
     if case.run.stiffness_N_m == "nominal":
         return 1.0
     pairs = [pair for pair in pairs_of(case) if "fine" in pair] or pairs_of(case)
-    return case.run.stiffness_N_m / max(_stiffness(case, pair, 1.0) for pair in pairs)
+    return stiffness_of(case) / max(_stiffness(case, pair, 1.0) for pair in pairs)
 
 
 def material_of(case: Case, name: str, factor: float) -> tuple[float, float]:

@@ -95,7 +95,7 @@ def _deposit_warnings(case: InvasionCase, overlap: float) -> list[str]:
     remedy = (
         "; the materials are too soft for this pressure"
         if given == "nominal"
-        else f": set run.stiffness_N_m = {_two_digits_up(raised * given):g}"
+        else f": set run.stiffness_N_m = {two_digits_up(raised * given):g}, or 'auto'"
     )
     return [
         f"predicted overlap of fines that hold the whole pressure is {100 * overlap:.2g} % of a "
@@ -103,7 +103,7 @@ def _deposit_warnings(case: InvasionCase, overlap: float) -> list[str]:
     ]
 
 
-def _two_digits_up(value: float) -> float:
+def two_digits_up(value: float) -> float:
     """The next number of two digits that is not below `value`, above 0."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 1)
     return math.ceil(value / unit - 1e-9) * unit
@@ -121,6 +121,6 @@ def _refuse_deep(overlaps: Overlaps) -> None:
         if overlap > MOST_OVERLAP:
             raise CaseError(
                 f"run.stiffness_N_m: {name} alone would press a fine {100 * overlap:.3g} % of its "
-                f"diameter into a grain (limit {100 * MOST_OVERLAP:.0f} %); raise it, or lower "
-                f"{remedy}"
+                f"diameter into a grain (limit {100 * MOST_OVERLAP:.0f} %); set it to "
+                f"'auto', raise it, or lower {remedy}"
             )

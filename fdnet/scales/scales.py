@@ -8,26 +8,26 @@ from fdnet.case.case import Case, InvasionCase
 from fdnet.errors import CaseError
 from fdnet.scales.cohesion import cohesion_warnings
 from fdnet.scales.contacts import contacts_of, stiffness_factor
-from fdnet.scales.drive import Drive, drive_of, drive_warnings
+from fdnet.scales.drive import Drive, drive_warnings
 from fdnet.scales.forces.push import Push, push_of
 from fdnet.scales.forces.throat import throat_width
 from fdnet.scales.forces.warnings import reynolds_warnings, throat_warnings
 from fdnet.scales.grain_pack import pack_step, target_porosity
-from fdnet.scales.overlaps import Overlaps, deposit_force, overlap_warnings, overlaps_of
+from fdnet.scales.overlaps import overlap_warnings
 from fdnet.scales.sizes import size_warnings
 from fdnet.scales.slab import slab_of, slab_warnings
 from fdnet.scales.springs import Contact
 from fdnet.scales.sticking import Sticking, sticking_of, sticking_warnings
+from fdnet.scales.stiff_enough import drive_in, pressed_in, relaxation_times, stiff_enough
 from fdnet.scales.stop_times import chunk_refreshes, plug_warnings, stop_times
 from fdnet.scales.time_step import (
     coefficient_steps,
     densest_factor,
     drag_warnings,
     hold_steps,
-    relaxation_time,
     time_step,
 )
-from fdnet.scales.velocity import Velocity, driving_pressure, velocity_of, velocity_warnings
+from fdnet.scales.velocity import Velocity, velocity_of, velocity_warnings
 
 MOST_STEPS = 2**31 - 1
 """LIGGGHTS counts the steps of a run in 32 bits."""
@@ -135,12 +135,13 @@ def scales_of(case: Case) -> Scales:
     overflows.
     """
     try:
+        case = stiff_enough(case)
         velocity = velocity_of(case, target_porosity(case))
         shared = _shared(case, velocity)
         if not isinstance(case, InvasionCase):
             return shared
         doubts = [*shared.warnings, *velocity_warnings(case, shared.porosity, velocity)]
-        return _invasion(case, replace(shared, warnings=tuple(doubts)))
+        return _invasion(case, velocity, replace(shared, warnings=tuple(doubts)))
     except (OverflowError, ZeroDivisionError) as error:
         raise CaseError(
             f"case {case.name}: a formula leaves the range of numbers ({error}); check units and "
@@ -164,12 +165,11 @@ def _shared(case: Case, velocity: Velocity) -> Scales:
     )
 
 
-def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
-    slab, relaxation = slab_of(case), _relaxation_times(case)
+def _invasion(case: InvasionCase, flow: Velocity, shared: Scales) -> InvasionScales:
+    slab, relaxation = slab_of(case), relaxation_times(case)
     reynolds, throat = _reynolds(case, shared.interstitial_velocity), _throat_ratio(case, shared)
-    drive = _drive(case, shared, relaxation[1])
-    velocity = drive.velocity
-    push = push_of(case, velocity, shared.pressure_gradient, factor=drive.factor)
+    drive = drive_in(case, flow)
+    push = push_of(case, drive.velocity, shared.pressure_gradient, factor=drive.factor)
     upstream = _upstream(case, shared, drive)
     shortest = relaxation[0] * push.relaxation_share(case.fines.radius_range_m[0])
     step = time_step(case, shared.contacts, shortest)
@@ -177,7 +177,8 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     hold = hold_steps(case, step, shortest / densest_factor(case), times.chunk)
     unit = hold * coefficient_steps(case, step, shortest)
     chunk_steps = chunk_refreshes(case, times.chunk, step * unit) * unit
-    contact, overlaps = shared.contacts["grain-fine"], _overlaps(case, shared, push, drive.factor)
+    contact = shared.contacts["grain-fine"]
+    overlaps = pressed_in(case, flow, drive, contact)
     sticking = sticking_of(case, contact, push, step)
     _refuse_long_chunk(step, chunk_steps)
     warnings = [
@@ -195,7 +196,7 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
     return InvasionScales(
         **{item.name: getattr(shared, item.name) for item in fields(shared)}
         | {"warnings": tuple(warnings)},
-        drive_velocity=velocity,
+        drive_velocity=drive.velocity,
         force_factor=drive.factor,
         upstream_velocity=upstream,
         supplied_count=slab.count,
@@ -207,12 +208,12 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
         cap_time=times.cap,
         checkpoint_steps=chunk_steps,
         reynolds=reynolds,
-        stokes=relaxation[1] * velocity / (2 * case.grains.mean_radius_m),
+        stokes=relaxation[1] * drive.velocity / (2 * case.grains.mean_radius_m),
         impact_stokes=drive.impact_stokes,
         gravity_over_drag=_gravity_over_drag(case, shared.interstitial_velocity),
         gradient_over_drag=_gradient_over_drag(case, shared),
         push=push,
-        drift_velocity=velocity + push.drift(case.fines.radius_range_m[1]),
+        drift_velocity=drive.velocity + push.drift(case.fines.radius_range_m[1]),
         throat_ratio=throat,
         impact_overlap=overlaps.impact,
         drag_overlap=overlaps.drag,
@@ -224,35 +225,6 @@ def _invasion(case: InvasionCase, shared: Scales) -> InvasionScales:
 def _upstream(case: InvasionCase, shared: Scales, drive: Drive) -> float:
     interstitial = case.drag.upstream == "interstitial"
     return drive.velocity if interstitial else shared.darcy_velocity * drive.factor
-
-
-def _drive(case: InvasionCase, shared: Scales, relaxation: float) -> Drive:
-    """How fast the simulation is driven; a free fine outruns the fluid by its drift."""
-    own = push_of(case, shared.interstitial_velocity, shared.pressure_gradient)
-    free = own.velocity + own.drift(case.fines.radius_range_m[1])
-    return drive_of(case, own.velocity, relaxation, free=free)
-
-
-def _relaxation_times(case: InvasionCase) -> tuple[float, float]:
-    """The shortest and the longest of the fines, s; with one material smallest and largest."""
-    viscosity, multiplier = case.fluid.viscosity_Pa_s, case.drag.multiplier
-    if not case.fines.measured:
-        ends = [(radius, case.fines.density_kg_m3) for radius in case.fines.radius_range_m]
-    else:
-        ends = [
-            (0.5 * diameter, one.density)
-            for one in case.fines.components
-            for diameter in (one.curve.low, one.curve.high)
-        ]
-    times = [relaxation_time(radius, density, viscosity, multiplier) for radius, density in ends]
-    return min(times), max(times)
-
-
-def _overlaps(case: InvasionCase, shared: Scales, push: Push, factor: float) -> Overlaps:
-    """The overlaps of fines; forces are `factor` times those of the fluid itself."""
-    pressure = factor * driving_pressure(case, shared.pressure_gradient)
-    plug = deposit_force(case, pressure, throat_width(shared.porosity, shared.permeability))
-    return overlaps_of(case, shared.contacts["grain-fine"], push, shared.porosity, deposit=plug)
 
 
 def _reynolds(case: InvasionCase, velocity: float) -> float:

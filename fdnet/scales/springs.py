@@ -96,12 +96,19 @@ def pairs_of(case: Case) -> list[tuple[str, str]]:
     return [pair for pair in PAIRS if set(pair) <= {*case.spheres, "wall"}]
 
 
+def stiffness_of(case: Case) -> float:
+    """`run.stiffness_N_m` where it is a number; `stiff_enough` has put one for "auto"."""
+    given = case.run.stiffness_N_m
+    assert not isinstance(given, str)
+    return given
+
+
 def hooke_factor(case: Case) -> float:
     """Factor on all contact stiffnesses: run.stiffness_N_m over that of the stiffest pair."""
     if case.run.stiffness_N_m == "nominal":
         return 1.0
     nominal = _nominal(case)
-    return case.run.stiffness_N_m / max(
+    return stiffness_of(case) / max(
         series(nominal[a][0], nominal[b][0]) for a, b in pairs_of(case)
     )
 

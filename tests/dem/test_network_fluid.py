@@ -320,6 +320,20 @@ def test_a_rate_below_the_asked_share_ends_the_run(binary, fluid, done, tmp_path
     assert result.updates == done.updates[: len(result.updates)]
 
 
+def test_the_volume_that_is_asked_for_ends_the_run(binary, fluid, done, tmp_path):
+    pores = fluid.scales.porosity * np.prod(fluid.case.size_m)
+    asked = float(0.5 * done.updates[-1]["filtrate_m3"] / pores)
+    other = with_case(fluid, f"run.stop_pore_volumes={asked!r}")
+    result = invade(
+        other.case, other.scales, other.grains, tmp_path, Launch(binary=binary), fluid=other
+    )
+    assert result.stop_reason == "duration"
+    assert 0 < len(result.history) < len(done.history)
+    assert result.updates == done.updates[: len(result.updates)]
+    before = [row for row in result.updates if row["step"] < result.history[-2].step]
+    assert before[-1]["filtrate_m3"] < asked * pores <= result.updates[-1]["filtrate_m3"]
+
+
 def test_a_slab_at_constant_rate_raises_the_pressure(binary, fluid, tmp_path):
     """The mud comes on as at the start, the filtrate is rate times time, the pressure grows."""
     other = with_case(fluid, "drag.drive=rate", "run.cap_ms=0.3")
@@ -341,7 +355,7 @@ def asked_stiffness(case) -> float:
     """What the warnings of a case ask for."""
     text = " ".join(scales_of(case).warnings)
     return float(
-        re.search(r"hold the whole pressure.*set run\.stiffness_N_m = (\S+?);? ", text + " ")[1]
+        re.search(r"hold the whole pressure.*set run\.stiffness_N_m = (\S+?)[,;]? ", text + " ")[1]
     )
 
 
@@ -382,6 +396,10 @@ def test_no_warning_of_throats_where_the_balance_of_momentum_sees_them():
         (["fines.supply=batches"], r"fines\.supply: 'batches' come on as fast as at the start"),
         (["drag.field=uniform", "drag.drive=rate"], r"drag\.drive: 'rate' belongs to"),
         (["drag.drive=rate", "run.stop_rate=0.1"], r"run\.stop_rate: 0\.1 needs a rate that"),
+        (
+            ["drag.field=uniform", "run.stop_pore_volumes=2"],
+            r"run\.stop_pore_volumes: 2 needs drag\.field = 'network'",
+        ),
         (
             ["drag.crowd=none", "drag.inertia=schiller-naumann"],
             r"drag\.inertia: 'schiller-naumann'",
