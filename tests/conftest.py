@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from fdnet.dem.binary import Binary, find_binary
+from fdnet.run.finished import FinishedRun
 
 sys.path.insert(0, str(Path(__file__).parent))
 ROOT = Path(__file__).resolve().parents[1]
@@ -36,3 +37,14 @@ def root() -> Path:
 def binary() -> Binary:
     """The real LIGGGHTS; the suite needs it (scripts/setup.sh installs it)."""
     return find_binary()
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> FinishedRun:
+    """A tiny run of all stages: fixed grains, periodic sides. Tests leave its folder as it is."""
+    from builders import tiny
+
+    from fdnet.run.open_run import run_case
+
+    out = tmp_path_factory.mktemp("fixed") / "run"
+    return run_case(tiny("run.cap_ms=0.35", "box.sides=periodic"), out)

@@ -77,6 +77,7 @@ DOORS = {
     },
     "pandas": {"spheres/dump", "spheres/csv_file", "report/tables", "report/read_tables"},
     "pyvista": {
+        "report/flow_frames",
         "report/meshes",
         "report/movie_frames",
         "report/picture",

@@ -17,10 +17,9 @@ pytestmark = pytest.mark.liggghts
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory) -> FinishedRun:
+def run(finished) -> FinishedRun:
     """Fixed grains, periodic sides."""
-    out = tmp_path_factory.mktemp("fixed") / "run"
-    return fdnet.run_case(tiny("run.cap_ms=0.35", "box.sides=periodic"), out)
+    return finished
 
 
 @pytest.fixture(scope="module")

@@ -34,13 +34,13 @@ def render_spheres_png(
     return ""
 
 
-def draw_frames(arguments: Sequence[str], *, seconds: float) -> str:
-    """Run `fdnet.report.movie_frames` with `arguments` in a child process.
+def draw_frames(module: str, arguments: Sequence[str], *, seconds: float) -> str:
+    """Run `module` (`movie_frames` or `flow_frames` of `fdnet.report`) in a child process.
 
     Returns "" or the reason why there are no frames.
     """
     try:
-        _run([*_python(), "-m", "fdnet.report.movie_frames", *arguments], seconds)
+        _run([*_python(), "-m", f"fdnet.report.{module}", *arguments], seconds)
     except subprocess.TimeoutExpired:
         return f"the drawing was given up after {seconds:g} s"
     except OSError as error:

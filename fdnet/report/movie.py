@@ -1,4 +1,4 @@
-"""The invasion as a movie: the states of a run drawn one after the other, as GIF or MP4."""
+"""States of a run as a movie, one after the other (GIF or MP4), or below each other (PNG)."""
 
 import tempfile
 from collections.abc import Sequence
@@ -13,59 +13,91 @@ from fdnet.spheres.snapshot import Array
 
 SECONDS_PER_FRAME = 30.0
 """Time that drawing one state may take."""
-SIZE = (960, 608)
-"""Pixels of a movie; both even, as MP4 wants them."""
+WIDTH, PANEL_WIDTH = 880, 1200
+"""Pixels of a movie, and of pictures below each other, across."""
+TITLE = 44
+"""Pixels above each of the pictures below each other."""
 LAST_FRAMES = 6
 """How long the last state stays, in frames."""
+COLOURS, GIF_COLOURS = 256, 128
+INK = (20, 20, 20)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class MovieFrame:
-    """One state: its file of spheres (.vtp), and what stands above it."""
+    """One state: its file of spheres (.vtp), what stands above it, and its flow (.vtp) if any."""
 
     spheres: Path
     words: str
+    lines: Path | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Scene:
+    """What all frames share.
+
+    Attributes:
+        grains: spheres_initial.vtp; states may hold the fines alone.
+        box: (3, 2) m.
+        title: of the colours of the flow; "" where no flow is shown.
+        limits: of these colours.
+    """
+
+    grains: Path
+    box: Array
+    title: str = ""
+    limits: tuple[float, float] = (0.0, 0.0)
 
 
 def write_movie(
-    target: Path, grains: Path, frames: Sequence[MovieFrame], *, box: Array, per_second: float
+    target: Path, frames: Sequence[MovieFrame], scene: Scene, *, per_second: float
 ) -> Path:
     """Draw the states in a child process and write them as one file.
 
     Args:
-        target: the movie; its suffix .gif or .mp4 says which kind.
-        grains: spheres_initial.vtp, for states that hold the fines alone.
+        target: the movie, .gif or .mp4, or a picture of all states below each other, .png.
         frames: at least one, in order.
-        box: (3, 2) m.
+        scene: what all frames share.
         per_second: frames a second.
 
     Raises:
         CaseError: another suffix, nothing could be drawn, or MP4 without imageio-ffmpeg.
     """
     write = _writer(target)
+    still = target.suffix.lower() == ".png"
     with tempfile.TemporaryDirectory() as folder:
-        files = [str(frame.spheres.absolute()) for frame in frames]
-        arguments = [str(grains.absolute()), f"--box={box_text(box)}", folder, *files]
-        reason = draw_frames(arguments, seconds=60 + SECONDS_PER_FRAME * len(frames))
+        module, arguments = _drawing(frames, scene, folder)
+        reason = draw_frames(module, arguments, seconds=60 + SECONDS_PER_FRAME * len(frames))
         if reason:
             raise CaseError(
-                f"{target}: no movie, because {reason}; the set-up installs software OpenGL, and "
+                f"{target}: not drawn, because {reason}; the set-up installs software OpenGL, and "
                 "invasion.pvd opens in ParaView without it"
             )
-        pictures = [
-            _captioned(Path(folder, f"{number:04d}.png"), frame.words)
-            for number, frame in enumerate(frames)
-        ]
+        files = [Path(folder, f"{number:04d}.png") for number in range(len(frames))]
+        words = [frame.words for frame in frames]
+        pictures = list(map(_titled if still else _captioned, files, words))
         with replacing(target) as part:
-            write(part, pictures + [pictures[-1]] * LAST_FRAMES, per_second)
+            write(part, pictures, per_second)
     return target
 
 
+def _drawing(frames: Sequence[MovieFrame], scene: Scene, folder: str) -> tuple[str, list[str]]:
+    """The module that draws the frames into a folder, and its arguments."""
+    common = [str(scene.grains.absolute()), f"--box={box_text(scene.box)}"]
+    if not scene.title:
+        return "movie_frames", [*common, folder, *(str(one.spheres.absolute()) for one in frames)]
+    low, high = scene.limits
+    scale = [f"--title={scene.title}", f"--limits={low!r},{high!r}"]
+    pairs = [(str(one.spheres.absolute()), str(one.lines)) for one in frames]
+    return "flow_frames", [*common, *scale, folder, *(name for pair in pairs for name in pair)]
+
+
 def _writer(target: Path) -> Any:
-    if target.suffix.lower() == ".gif":
-        return _write_gif
+    simple = {".gif": _write_gif, ".png": _write_panels}
+    if target.suffix.lower() in simple:
+        return simple[target.suffix.lower()]
     if target.suffix.lower() != ".mp4":
-        raise CaseError(f"{target}: ends in {target.suffix!r}, expected .gif or .mp4")
+        raise CaseError(f"{target}: ends in {target.suffix!r}, expected .gif, .mp4 or .png")
     try:
         import imageio_ffmpeg  # noqa: F401
     except ModuleNotFoundError as error:
@@ -77,18 +109,47 @@ def _writer(target: Path) -> Any:
 
 
 def _captioned(path: Path, words: str) -> Any:
-    from PIL import Image, ImageDraw, ImageFont
+    """A frame of a movie, with words on it; both sides are even, as MP4 wants them."""
+    from PIL import Image, ImageDraw
 
     with Image.open(path) as picture:
-        drawn = picture.convert("RGB").resize(SIZE)
-    font = ImageFont.load_default(size=22)
-    ImageDraw.Draw(drawn).text((16, 12), words, fill=(20, 20, 20), font=font)
+        height = 2 * round(0.5 * WIDTH * picture.height / picture.width)
+        drawn = picture.convert("RGB").resize((WIDTH, height))
+    ImageDraw.Draw(drawn).text((16, 12), words, fill=INK, font=_font(22))
     return drawn
 
 
+def _titled(path: Path, words: str) -> Any:
+    """A picture with a title above it."""
+    from PIL import Image, ImageDraw
+
+    with Image.open(path) as picture:
+        height = round(PANEL_WIDTH * picture.height / picture.width)
+        drawn = Image.new("RGB", (PANEL_WIDTH, height + TITLE), "white")
+        drawn.paste(picture.convert("RGB").resize((PANEL_WIDTH, height)), (0, TITLE))
+    ImageDraw.Draw(drawn).text((16, 12), words, fill=INK, font=_font(26))
+    return drawn
+
+
+def _font(size: int) -> Any:
+    from PIL import ImageFont
+
+    return ImageFont.load_default(size=size)
+
+
+def _write_panels(path: Path, pictures: Sequence[Any], _: float) -> None:
+    from PIL import Image
+
+    heights = [picture.height for picture in pictures]
+    whole = Image.new("RGB", (PANEL_WIDTH, sum(heights)), "white")
+    for number, picture in enumerate(pictures):
+        whole.paste(picture, (0, sum(heights[:number])))
+    whole.quantize(COLOURS).save(path, "PNG", optimize=True)
+
+
 def _write_gif(path: Path, pictures: Sequence[Any], per_second: float) -> None:
-    colours = pictures[-1].quantize(256)
-    small = [picture.quantize(palette=colours, dither=0) for picture in pictures]
+    colours = pictures[-1].quantize(GIF_COLOURS)
+    small = [picture.quantize(palette=colours, dither=0) for picture in _lingering(pictures)]
     milliseconds = round(1000 / per_second)
     small[0].save(
         path, "GIF", save_all=True, append_images=small[1:], duration=milliseconds, loop=0
@@ -103,6 +164,11 @@ def _write_mp4(path: Path, pictures: Sequence[Any], per_second: float) -> None:
         str(path), pictures[0].size, fps=per_second, output_params=extra
     )
     stream.send(None)
-    for picture in pictures:
+    for picture in _lingering(pictures):
         stream.send(picture.tobytes())
     stream.close()
+
+
+def _lingering(pictures: Sequence[Any]) -> list[Any]:
+    """The pictures of a movie, which stays on the last."""
+    return [*pictures, *[pictures[-1]] * LAST_FRAMES]

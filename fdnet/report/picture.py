@@ -5,6 +5,7 @@ The bounds are in m. See `fdnet.report.child.render_spheres_png`.
 """
 
 import sys
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ FACETS = (
     6e5  # about half the triangles all fines together may have: memory and time of the picture
 )
 FACE_COLOUR = "#0072B2"
+OBLIQUE = (-1.1, -1.9, 0.9)
+"""Where the view is from, as seen from the middle of the box."""
 
 
 def render(source: str, box: Array, target: str) -> None:
@@ -41,7 +44,7 @@ def render(source: str, box: Array, target: str) -> None:
     plotter.close()
 
 
-def _balls(spheres: Any, mask: Array, resolution: int) -> Any:
+def balls(spheres: Any, mask: Array, resolution: int) -> Any:
     """Spheres as triangles in mm, carrying `radius` in um and `depth` in mm."""
     import pyvista as pv
 
@@ -61,7 +64,7 @@ def add_grains(plotter: Any, spheres: Any, bounds: Array) -> None:
     )
     if far.any():
         plotter.add_mesh(
-            _balls(spheres, far, 32), color="#E2E2E2", smooth_shading=True, ambient=0.15
+            balls(spheres, far, 32), color="#E2E2E2", smooth_shading=True, ambient=0.15
         )
 
 
@@ -70,7 +73,7 @@ def colours_of(spheres: Any, bounds: Array) -> tuple[str, str, list[float]]:
 
     Returns the name of the array, the title of the scale and its limits; `bounds` are in mm.
     """
-    mask = _shown_fines(spheres, bounds)
+    mask = shown_fines(spheres, bounds)
     radius = spheres.point_data["radius_m"][mask] if spheres.n_points else np.zeros(0)
     if len(radius) and np.ptp(radius) >= 0.02 * radius.max():
         limits = [radius.min() * MICRON, radius.max() * MICRON]
@@ -81,7 +84,8 @@ def colours_of(spheres: Any, bounds: Array) -> tuple[str, str, list[float]]:
     return "depth_mm", "fines, depth (mm)", limits
 
 
-def _shown_fines(spheres: Any, bounds: Array) -> Array:
+def shown_fines(spheres: Any, bounds: Array) -> Array:
+    """Which of the spheres are fines that are not far upstream; `bounds` are in mm."""
     if not spheres.n_points:
         return np.zeros(0, bool)
     shown = spheres.points[:, 0] * MM > bounds[0, 0] - UPSTREAM_SHOWN * np.ptp(bounds[0])
@@ -92,10 +96,10 @@ def add_fines(
     plotter: Any, spheres: Any, bounds: Array, colours: tuple[str, str, list[float]]
 ) -> None:
     """Fines that are not far upstream, coloured as `colours_of` says; `bounds` are in mm."""
-    mask, (name, title, limits) = _shown_fines(spheres, bounds), colours
+    mask, (name, title, limits) = shown_fines(spheres, bounds), colours
     if not mask.any():
         return
-    balls = _balls(spheres, mask, int(np.clip(np.sqrt(FACETS / mask.sum()), 5, 16)))
+    drawn = balls(spheres, mask, int(np.clip(np.sqrt(FACETS / mask.sum()), 5, 16)))
     bar = {
         "title": f"{title}\n",
         "color": "black",
@@ -110,12 +114,12 @@ def add_fines(
         "height": 0.65,
     }
     plotter.add_mesh(
-        balls, scalars=name, clim=limits, cmap="plasma", smooth_shading=True, scalar_bar_args=bar
+        drawn, scalars=name, clim=limits, cmap="plasma", smooth_shading=True, scalar_bar_args=bar
     )
 
 
-def add_frame(plotter: Any, bounds: Array) -> None:
-    """The box with its scales (mm), and the formation face."""
+def add_frame(plotter: Any, bounds: Array, *, depth_only: bool = False) -> None:
+    """The box with its scales (mm), or that of the depth alone, and the formation face."""
     import pyvista as pv
 
     (x0, x1), (y0, y1), (z0, z1) = bounds
@@ -150,9 +154,10 @@ def add_frame(plotter: Any, bounds: Array) -> None:
     plotter.show_bounds(
         bounds=(x0, x1, y0, y1, z0, z1),
         xtitle="x (mm)",
-        ytitle=f"y: {y0:.3g} to {y1:.3g} mm",
+        ytitle=" " if depth_only else f"y: {y0:.3g} to {y1:.3g} mm",
         show_ylabels=False,
-        ztitle="z (mm)",
+        show_zlabels=not depth_only,
+        ztitle=" " if depth_only else "z (mm)",
         color="black",
         font_size=18,
         location="outer",
@@ -164,23 +169,29 @@ def add_frame(plotter: Any, bounds: Array) -> None:
     )
 
 
-def look(plotter: Any, bounds: Array) -> None:
-    """Look from the front, a little from upstream and above.
+def look(
+    plotter: Any,
+    bounds: Array,
+    *,
+    toward: tuple[float, float, float] = OBLIQUE,
+    window: Sequence[int] = WINDOW,
+) -> None:
+    """Look from the direction `toward`, by default the front, a little from upstream and above.
 
-    The projected box fills the window left of the scalar bar.
+    The projected box fills the `window` (pixels) left of the scalar bar.
     """
-    toward = np.array([-1.1, -1.9, 0.9]) / np.linalg.norm([-1.1, -1.9, 0.9])
-    right = np.cross([0.0, 0.0, 1.0], toward)
+    eye = np.array(toward) / np.linalg.norm(toward)
+    right = np.cross([0.0, 0.0, 1.0], eye)
     right /= np.linalg.norm(right)
-    up = np.cross(toward, right)
+    up = np.cross(eye, right)
     corners = np.stack(np.meshgrid(*bounds), axis=-1).reshape(-1, 3) - bounds.mean(axis=1)
     width, height = np.ptp(corners @ right), np.ptp(corners @ up)
     scale = max(
-        0.62 * height, 0.7 * width * WINDOW[1] / WINDOW[0]
+        0.62 * height, 0.7 * width * window[1] / window[0]
     )  # half the height of the window, mm
-    focus = bounds.mean(axis=1) + 0.08 * scale * WINDOW[0] / WINDOW[1] * right - 0.05 * scale * up
+    focus = bounds.mean(axis=1) + 0.08 * scale * window[0] / window[1] * right - 0.05 * scale * up
     distance = 4.6 * scale  # the axis labels grow with it
-    plotter.camera_position = [tuple(focus + distance * toward), tuple(focus), (0, 0, 1)]
+    plotter.camera_position = [tuple(focus + distance * eye), tuple(focus), (0, 0, 1)]
     plotter.enable_parallel_projection()
     plotter.camera.parallel_scale = scale
     plotter.reset_camera_clipping_range()

@@ -189,3 +189,29 @@ def _of_ends(values: Array, source: Array, faces: tuple[float, float]) -> Array:
     ends = np.where(source == -1, *faces)
     ends[source >= 0] = np.asarray(values)[source[source >= 0]]
     return ends
+
+
+def write_flux_vtp(path: str | Path, network: Any, values: Array) -> Path:
+    """The throats of a network as lines, m, with `values` (T,) as `value`, for a picture."""
+    import pyvista as pv
+
+    drawing = _drawing(network)
+    mesh = pv.PolyData(drawing.points, lines=np.insert(drawing.lines, 0, 2, axis=1).ravel())
+    mesh.cell_data["value"] = np.asarray(values, float)
+    return _save(path, mesh)
+
+
+def write_lines_vtp(path: str | Path, lines: Sequence[tuple[Array, Array]]) -> Path:
+    """Lines of points (M, 3) m, each with its values (M,) as `value`, for a picture."""
+    import pyvista as pv
+
+    counts = [len(points) for points, _ in lines]
+    if not counts:
+        return _save(path, pv.PolyData())
+    first = np.cumsum([0, *counts[:-1]])
+    cells = [np.append(n, at + np.arange(n)) for n, at in zip(counts, first, strict=True)]
+    mesh = pv.PolyData(
+        np.concatenate([points for points, _ in lines]), lines=np.concatenate(cells)
+    )
+    mesh.point_data["value"] = np.concatenate([values for _, values in lines])
+    return _save(path, mesh)
