@@ -45,6 +45,7 @@ SETTINGS = (
     "drag.pressure_gradient=true",
     "fluid.velocity_m_s=5.4",
     "run.duration_ms=2.0",
+    "run.stiffness_N_m=1e4",
     "analysis.law=lubrication",
     "analysis.damage_law=side-kozeny",
 )
