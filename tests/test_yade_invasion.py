@@ -114,7 +114,7 @@ def test_a_missing_yade_is_refused_before_anything_is_written(tmp_path, monkeypa
 def test_a_fine_rebounds_in_yade_as_a_damped_spring_does(tmp_path):
     """exp(-pi z / sqrt(1 - z^2)) = 0.527 of its velocity; a contact that may not pull ends it
     when the force is gone, at sqrt(1 - z^2) t = atan2(2 z sqrt(1 - z^2), 2 z^2 - 1), so that
-    exp(-z t) = 0.575 is left (Schwager and Poeschel 2007)."""
+    exp(-z t) = 0.572 is left (Schwager and Poeschel 2007)."""
     job = one_fine_at_one_grain()
     answer = yade_invasion.run_yade(job, "a", tmp_path, yade_invasion.require_yade())
     assert answer.steps == job.steps

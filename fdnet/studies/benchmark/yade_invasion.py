@@ -14,7 +14,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from fdnet.errors import CaseError, FdnetError
 from fdnet.files.atomic import write_text
 from fdnet.run.finished import FinishedRun
 from fdnet.run.open_run import open_run
+from fdnet.spheres.readers import read_spheres
 from fdnet.spheres.snapshot import Snapshot
 from fdnet.studies.benchmark.yade_exchange import (
     Answer,
@@ -83,7 +84,9 @@ class Pair:
         cost: of fdnet's packing and invasion.
         job: what Yade was given.
         answer: where it ended.
-        flux: m3/s, by Yade's flow engine, through the spheres "intact", "fdnet" and "yade".
+        flux: m3/s, by Yade's flow engine, through the spheres "intact", "fdnet" and "Yade", and
+            "fdnet then" where Yade was cut.
+        then: where Yade was cut, step and spheres of fdnet's last checkpoint before it.
     """
 
     fines: int
@@ -93,6 +96,7 @@ class Pair:
     job: Job
     answer: Answer
     flux: Mapping[str, float]
+    then: tuple[int, Snapshot] | None
 
     @property
     def yade_end(self) -> Snapshot:
@@ -205,14 +209,47 @@ def make_pair(
     run, cost = run_fdnet(case, fines, seed, folder)
     job = invasion_job(run, limit_s=limit_s, travel=travel)
     answer = run_yade(job, f"yade-{travel:g}", folder, yade)
+    then = state_before(run, answer.steps) if answer.steps < job.steps else None
     spheres = {
         "intact": run.spheres("initial"),
         "fdnet": run.spheres(),
-        "yade": end_state(job, answer, run.spheres("initial").box),
+        "Yade": end_state(job, answer, run.spheres("initial").box),
     }
+    if then:
+        spheres["fdnet then"] = then[1]
     flux = {}
     for name, one in spheres.items():
         still = still_job(job, one, limit_s=STILL_LIMIT)
-        label = f"still-{name}" if name != "yade" else f"still-yade-{travel:g}"
+        label = f"still-{name.replace(' ', '-')}" + (f"-{travel:g}" if name == "Yade" else "")
         flux[name] = run_yade(still, label, folder, yade).outflow
-    return Pair(fines=fines, seed=seed, run=run, cost=cost, job=job, answer=answer, flux=flux)
+    return Pair(
+        fines=fines,
+        seed=seed,
+        run=run,
+        cost=cost,
+        job=job,
+        answer=answer,
+        flux=flux,
+        then=then,
+    )
+
+
+def state_before(run: FinishedRun, step: int) -> tuple[int, Snapshot]:
+    """Step and spheres of the last checkpoint of a run up to `step`.
+
+    Raises:
+        CaseError: there is none.
+    """
+    dumps = {int(path.stem.split("_")[1]): path for path in _dumps(run)}
+    steps = [one for one in dumps if one <= step]
+    if not steps:
+        raise CaseError(
+            f"{run.path}: no checkpoint up to step {step}, so nothing to compare Yade with; "
+            "give it more CPU seconds with --limit"
+        )
+    last = max(steps)
+    return last, read_spheres(dumps[last], box=run.spheres("initial").box)
+
+
+def _dumps(run: FinishedRun) -> Iterable[Path]:
+    return (run.path / "invade" / "post").glob("invade_*.dump")
