@@ -235,7 +235,7 @@ def make_pair(
 
 
 def state_before(run: FinishedRun, step: int) -> tuple[int, Snapshot]:
-    """Step and spheres of the last checkpoint of a run up to `step`.
+    """Step and spheres of the last checkpoint of a run of fixed grains up to `step`.
 
     Raises:
         CaseError: there is none.
@@ -248,7 +248,8 @@ def state_before(run: FinishedRun, step: int) -> tuple[int, Snapshot]:
             "give it more CPU seconds with --limit"
         )
     last = max(steps)
-    return last, read_spheres(dumps[last], box=run.spheres("initial").box)
+    grains = run.spheres("initial")
+    return last, grains.joined(read_spheres(dumps[last], box=grains.box).fines())
 
 
 def _dumps(run: FinishedRun) -> Iterable[Path]:
