@@ -11,8 +11,9 @@ import pytest
 from fdnet.errors import CaseError, FdnetError
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Kind
-from fdnet.studies.benchmark import yade_exchange, yade_invasion
+from fdnet.studies.benchmark import yade_exchange, yade_invasion, yade_invasion_rows
 from fdnet.studies.benchmark.yade_exchange import FINE, GRAIN, HISTORY, Job
+from fdnet.studies.engine.csv_rows import read_named
 from tests.builders import tiny
 
 STIFFNESS, DAMPING_RATIO, DENSITY, RADIUS = 1e4, 0.2, 2000.0, 5e-5
@@ -137,3 +138,9 @@ def test_what_flows_into_the_spheres_of_yade_flows_out(tmp_path):
     answer = yade_invasion.run_yade(still, "b", tmp_path, yade_invasion.require_yade())
     assert answer.inflow == pytest.approx(answer.outflow, rel=1e-6)
     assert answer.inflow > 0
+
+
+def test_the_page_shows_the_rows_of_its_table(root):
+    rows = read_named(root / "docs/validation/yade_invasion.csv")
+    page = (root / "docs/validation/yade-invasion.md").read_text(encoding="utf-8")
+    assert yade_invasion_rows.comparison_table(rows) in page
