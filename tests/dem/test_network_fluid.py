@@ -223,7 +223,7 @@ def test_the_fines_take_the_share_of_the_pressure_that_resolved_flow_gives_them(
     inside = standing.where((depth > 5e-5) & (depth < fluid.pack.length))
     pressed = carried_with(fluid, inside)[0].pressed
     network = pressed.groups[:, 0].sum() / (pressed.groups[:, 0].sum() + pressed.grains[0])
-    field = velocity_field(fluid.grains, periodic="yz", fines=inside, cells=12)
+    field = velocity_field(fluid.grains, periodic="yz", fines=inside, cells=16)
     resolved = field.fine_force[:, 0].sum()
     resolved /= resolved + field.grain_force[:, 0].sum()
     assert network == pytest.approx(resolved, rel=0.5)

@@ -32,6 +32,8 @@ class Holders:
     Attributes:
         network: whose pores and sides they are.
         piece: (K, 4, 3) m, tetrahedra inside the box.
+        low: (K, 3) m, their lower corners.
+        high: (K, 3) m, their upper corners.
         owner: (K,) index of the holder that each is a part of.
         share: (P + 2 T,) by which what the parts hold is divided: the part of the holder inside
             the box, with the sign of the side.
@@ -39,6 +41,8 @@ class Holders:
 
     network: Network
     piece: Array
+    low: Array
+    high: Array
     owner: Array
     share: Array
 
@@ -60,6 +64,8 @@ def holders_of(network: Network) -> Holders:
     return Holders(
         network=network,
         piece=frozen(np.ascontiguousarray(piece)),
+        low=frozen(piece.min(axis=1)),
+        high=frozen(piece.max(axis=1)),
         owner=frozen(np.concatenate(owners)[which]),
         share=frozen(np.concatenate(shares)),
     )
@@ -155,7 +161,7 @@ def measured_deposit(holders: Holders, fines: Snapshot) -> KeptDeposit:
 def _pieces_of(holders: Holders, fines: Snapshot) -> tuple[Array, Array, Array]:
     """Holder, fine and (volume, surface) of each piece of `fines`."""
     parts = [(np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros((0, 2)))]
-    low, high = holders.piece.min(axis=1), holders.piece.max(axis=1)
+    low, high = holders.low, holders.high
     for some in size_classes(fines.radius) if len(fines) else []:
         radius = fines.radius[some]
         largest = float(radius.max())

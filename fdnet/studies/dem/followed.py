@@ -1,0 +1,175 @@
+"""The specimens of the thesis with a flow that follows the deposit, next to the uniform flow.
+
+The uniform runs are those of `fdnet study thesis`, whose table is read.
+"""
+
+import csv
+import math
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from fdnet.case.case import Case
+from fdnet.case.file import read_case
+from fdnet.case.shipped import case_path
+from fdnet.files.atomic import write_text
+from fdnet.run.finished import FinishedRun
+from fdnet.run.open_run import open_run, run_case
+from fdnet.studies.engine.runner import child_core_seconds
+
+SUPPLIED = {"specimen1": 1000, "specimen5": 7500, "specimen7": 12_000, "specimen8": 12_000}
+"""Fines in the slab of each specimen: more than enter and more than its cake holds."""
+FOLLOWED = (
+    "drag.field=network",
+    "drag.upstream=darcy",
+    "drag.crowd=beetstra",
+    "drag.scheme=implicit",
+    "drag.pressure_gradient=true",
+    "fines.supply=slab",
+    "run.stiffness_N_m=auto",
+    "run.plug_rate=0.02",
+    "analysis.law=lubrication",
+    "analysis.damage_law=auto",
+)
+"""What differs from the case of the thesis, besides the number of fines supplied."""
+SECTIONS = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FollowedRow:
+    """One run of a specimen. Losses of k are 1 - k/k0.
+
+    Attributes:
+        specimen: name of the case.
+        seed: of the case.
+        flow: "uniform" or "followed".
+        invaded: number of fines inside at the end.
+        first_mm: number of them in the first millimetre.
+        mean_depth_mm: of their centres.
+        p95_depth_mm: depth above which 95 % of them lie.
+        porosity_loss_first_mm: porosity that the first millimetre lost.
+        k_lost: by the whole specimen.
+        k_lost_by_mm: by each millimetre, cut out of the specimen.
+        rate: last rate over the first; 1 in the uniform flow.
+        stop_reason: why the run ended.
+        time_ms: simulated time.
+        overlap: largest overlap of a fine, over the smaller diameter.
+        liggghts_core_s: CPU seconds of LIGGGHTS, packing included; nan where the run was read.
+        fdnet_core_s: CPU seconds of fdnet, from the case to the analysis; nan likewise.
+    """
+
+    specimen: str
+    seed: int
+    flow: str
+    invaded: int
+    first_mm: int
+    mean_depth_mm: float
+    p95_depth_mm: float
+    porosity_loss_first_mm: float
+    k_lost: float
+    k_lost_by_mm: tuple[float, ...]
+    rate: float
+    stop_reason: str
+    time_ms: float
+    overlap: float
+    liggghts_core_s: float
+    fdnet_core_s: float
+
+
+def followed_rows(
+    specimens: Iterable[str], seeds: Sequence[int], folder: Path
+) -> list[FollowedRow]:
+    """Run specimens with each seed; runs that are finished in `folder` are read.
+
+    Raises what `run_case` raises.
+    """
+    return [
+        _followed(name, seed, folder / f"{name}-followed-{seed}")
+        for name in specimens
+        for seed in seeds
+    ]
+
+
+def _followed(name: str, seed: int, out: Path) -> FollowedRow:
+    keys = [*FOLLOWED, f"fines.count={SUPPLIED[name]}", f"seed={seed}"]
+    case, spent = read_case(case_path(name), assignments=keys), (math.nan, math.nan)
+    if not (out / "manifest.json").exists():
+        before = child_core_seconds(), time.process_time()
+        stages = ("pack", "invade", "analyse")
+        run_case(case, out, stages=stages, resume=out.exists(), progress=False)
+        spent = child_core_seconds() - before[0], time.process_time() - before[1]
+    return _row(case, open_run(out), spent)
+
+
+def _row(case: Case, run: FinishedRun, spent: tuple[float, float]) -> FollowedRow:
+    summary, record, fines = run.summary, run.manifest["invade"], run.spheres().fines()
+    depth = fines.position[:, 0]
+    inside = depth[(depth >= 0) & (depth < case.size_m[0])]
+    parts = summary["sections"]
+    return FollowedRow(
+        specimen=case.name,
+        seed=case.seed,
+        flow="followed",
+        invaded=summary["invaded_count"],
+        first_mm=int(np.sum(inside < 1e-3)),
+        mean_depth_mm=1e3 * float(np.mean(inside)) if len(inside) else 0.0,
+        p95_depth_mm=1e3 * summary["invasion_depth_p95_m"],
+        porosity_loss_first_mm=parts[0]["porosity_initial"] - parts[0]["porosity_damaged"],
+        k_lost=summary["k_reduction"],
+        k_lost_by_mm=tuple(part["k_reduction"] for part in parts),
+        rate=summary["rate_over_initial"],
+        stop_reason=summary["stop_reason"],
+        time_ms=1e3 * record["steps"] * record["dt_s"],
+        overlap=summary["max_overlap_fraction"],
+        liggghts_core_s=spent[0],
+        fdnet_core_s=spent[1],
+    )
+
+
+def uniform_rows(table: Path, specimens: Iterable[str]) -> list[FollowedRow]:
+    """The rows of specimens in the table of `fdnet study thesis`, by fdnet's own laws."""
+    with table.open(encoding="utf-8", newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["law"] == "lubrication"]
+    return [_uniform(row) for name in specimens for row in rows if row["id"] == name]
+
+
+def _uniform(row: Mapping[str, str]) -> FollowedRow:
+    return FollowedRow(
+        specimen=row["id"],
+        seed=int(row["seed"]),
+        flow="uniform",
+        invaded=int(row["invaded_count"]),
+        first_mm=int(row["count_first_mm"]),
+        mean_depth_mm=float(row["mean_depth_mm"]),
+        p95_depth_mm=float(row["invasion_depth_p95_mm"]),
+        porosity_loss_first_mm=float(row["porosity_loss_first_mm"]),
+        k_lost=float(row["k_reduction"]),
+        k_lost_by_mm=tuple(float(row[f"k_reduction_{k + 1}"]) for k in range(SECTIONS)),
+        rate=1.0,
+        stop_reason=row["stop_reason"],
+        time_ms=float(row["time_ms"]),
+        overlap=float(row["max_overlap"]),
+        liggghts_core_s=math.nan,
+        fdnet_core_s=math.nan,
+    )
+
+
+def write_followed(path: Path, rows: Sequence[FollowedRow]) -> None:
+    """Write the rows as CSV, numbers with four digits; each millimetre has a column."""
+    names = [item.name for item in fields(FollowedRow)]
+    lines = [",".join(names).replace("k_lost_by_mm", ",".join(map(_column, range(SECTIONS))))]
+    lines += [",".join(_text(value) for value in asdict(row).values()) for row in rows]
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def _column(section: int) -> str:
+    return f"k_lost_{section + 1}"
+
+
+def _text(value: object) -> str:
+    if isinstance(value, tuple):
+        return ",".join(map(_text, value))
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
