@@ -22,6 +22,13 @@ def test_packs_are_tiles_with_fines_on_the_grains():
     assert nearest == pytest.approx(np.full(500, 1.1 * radius), rel=2e-4)
 
 
+def test_spheres_are_those_of_a_known_pack_with_fines():
+    spheres = steps.tiled_spheres(2000, np.random.default_rng(1))
+    fines, grains = spheres.fines(), spheres.grains()
+    assert (len(grains), len(fines)) == (80, 2166)
+    assert fines.radius == pytest.approx(np.full(2166, 0.2 * grains.radius[0]))
+
+
 def test_a_child_ends_ok_or_failed_or_over_time():
     run = network.child
     assert run([sys.executable, "-c", "print('noise'); print('RESULT {\"k\": 2}')"], 60) == {
@@ -45,6 +52,15 @@ def test_growth_is_the_exponent_of_the_time():
     network.set_growth(rows)
     assert "growth" not in rows[0]
     assert [row["growth"] for row in rows[1:]] == pytest.approx([1.5, 1.5])
+
+
+def test_the_size_of_networks_of_all_spheres_is_their_number():
+    rows = [
+        {"tool": "t", "case": "spheres", "step": "s", "grains": n, "fines": 27 * n, "cpu_s": n}
+        for n in (10, 360, 3600)
+    ]
+    network.set_growth(rows)
+    assert [row.get("growth") for row in rows] == [None, pytest.approx(1.0), pytest.approx(1.0)]
 
 
 def test_small_run_of_all_steps(tmp_path, root, monkeypatch):

@@ -8,9 +8,11 @@ import pytest
 from fdnet.errors import CaseError, NetworkError
 from fdnet.network.flow.depth import Solved, depth_pressures, layer_edges
 from fdnet.network.flow.slabs import whole_permeability
-from fdnet.network.laws.fourth_grain import share_left
+from fdnet.network.laws.corner_rays import aim_at_fourth, aim_corners, corner_room
+from fdnet.network.laws.fourth_grain import depth_within, share_left
 from fdnet.network.laws.lubrication import half_resistances
-from fdnet.network.laws.outside import share_around
+from fdnet.network.laws.outside import bundles, meet, share_around
+from fdnet.network.laws.section_rays import aim, sides_of
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse
@@ -139,10 +141,12 @@ def test_auto_takes_the_two_scale_law_in_light_sections_alone(pack):
 
 def test_spheres_around_a_facet_leave_all_some_or_nothing():
     """Of a section whose third corner's sphere has ended."""
-    disc, room = np.array([0.3, 0.3, 1e-3]), (np.empty((5, 3)), ratio_table())
+    disc, side = np.array([0.3, 0.3, 1e-3]), sides_of(BASE)
 
     def left(*spheres):
-        return share_around(BASE, disc, 0.5, np.array(spheres), room)
+        rays, seen = bundles(3 + len(spheres))
+        count = meet(disc, BASE, 0.5, np.array(spheres), seen)
+        return share_around(BASE, side, (count, seen), rays, ratio_table())
 
     far, near, over = (0.3, 9.0, 0.5, 0.5, 1.0), (0.3, 1.2, 0.5, 0.5, 1.0), (0.4, 0.4, 0.5, 2.0, 1)
     assert left(far) == left((*near[:2], 1.1, *near[3:])) == 1.0
@@ -234,12 +238,16 @@ def test_spheres_that_make_no_network_are_refused_or_left_to_the_other_law(pack)
 
 
 def test_a_fourth_disc_takes_all_some_or_nothing():
-    disc, table = np.array([0.3, 0.2, 0.25]), ratio_table()
+    disc, side, corners = np.array([0.3, 0.2, 0.25]), sides_of(BASE), corner_room()
+    own, room = np.empty((6, 36)), np.empty(36)
+    aim_corners(BASE, corners)
 
     def left(x, y, radius):
-        return share_left(BASE, disc, x, y, radius, table)
+        aim_at_fourth(BASE, x, y, corners)
+        rays = own, aim(BASE, side, x, y, own)
+        return share_left(disc, (x, y, radius), corners, rays, (BASE, room, ratio_table()))
 
-    assert left(0.5, -1.0, 0.9) == 1.0
+    assert depth_within(BASE, side, 0.5, -1.0) == pytest.approx(-1.0)
     assert left(0.4, 0.3, 2.0) == 0.0
     shares = [left(0.45, 0.3, radius) for radius in (0.02, 0.05, 0.1, 0.2)]
     assert np.all(np.diff(shares) < 0)

@@ -16,18 +16,24 @@ the triangle before a line midway or the opposite side.
 
 import numpy as np
 
-from fdnet.network.compiled import compiled
+from fdnet.network.compiled import compiled, compiled_for_loops
+from fdnet.network.laws.corner_rays import (
+    CornerRoom,
+    aim_corners,
+    corner_flux,
+    corner_reaches,
+    corner_room,
+)
+from fdnet.network.laws.elementary import QUARTER, angle_of, log_of, sine_of
+from fdnet.network.laws.rays import POINTS, WEIGHTS, flux_on_ray
 from fdnet.network.laws.wedge import (
-    ratio_in_row,
+    DISCS,
     ray_flux,
     ray_parts,
     shear_ratio,
     table_row,
 )
 from fdnet.spheres.snapshot import Array
-
-POINTS, WEIGHTS = np.polynomial.legendre.leggauss(6)
-FINE_POINTS, FINE_WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
 @compiled
@@ -58,18 +64,51 @@ def even_flux(wedge: Array, disc: float, table: Array) -> float:
 
     It is not positive where the sum of the signed wedges fails.
     """
-    total, log_disc = 0.0, np.log(disc)
+    flux, discs = np.empty(1), np.full(1, disc)
+    even_fluxes(wedge, discs, (even_room(1), table), flux)
+    return flux[0]
+
+
+@compiled
+def even_room(sections: int) -> tuple[Array, Array]:
+    """Room for so many sections in `even_fluxes`, and for a row of the table of `shear_ratio`."""
+    return np.empty((2, sections)), np.empty(len(DISCS))
+
+
+@compiled_for_loops
+def even_fluxes(
+    wedge: Array, discs: Array, room: tuple[tuple[Array, Array], Array], flux: Array
+) -> None:
+    """Writes the flux (K,) m4 of `even_flux` for the radii `discs` (K,) m of K sections.
+
+    `room` is what `even_room` gives, and the table of `shear_ratio`.
+    """
+    (lanes, ratio), table = room
+    log_disc, rays = lanes[0], lanes[1]
+    for k in range(len(discs)):
+        log_disc[k] = log_of(discs[k])
+        flux[k] = 0.0
     for i in range(3):
         half, slope, angle = wedge[i, 0], abs(wedge[i, 1]), abs(wedge[i, 2])
-        x = disc / half
-        if x <= 1.0:
-            rays = wedge[i, 3] - wedge[i, 4] * (log_disc - wedge[i, 5])
-            rays += x * x * (4.0 * slope - x * x * angle) / 16.0
-        else:
-            rays = ray_flux(angle, slope, x)
-        flux = half**4 * rays * ratio_in_row(wedge[i, 6], x, table)
-        total += 2.0 * flux if wedge[i, 1] > 0.0 else -2.0 * flux
-    return total
+        constant, of_log, log_half = wedge[i, 3], wedge[i, 4], wedge[i, 5]
+        factor = 2.0 * half**4 if wedge[i, 1] > 0.0 else -2.0 * half**4
+        row = min(int(wedge[i, 6]), len(table) - 2)
+        part = wedge[i, 6] - row
+        low, high = table[row], table[row + 1]
+        for j in range(len(ratio)):
+            ratio[j] = (1.0 - part) * low[j] + part * high[j]
+        for k in range(len(discs)):
+            x = discs[k] / half
+            square = x * x
+            whole = constant - of_log * (log_disc[k] - log_half)
+            rays[k] = factor * (whole + square * (4.0 * slope - square * angle) / 16.0)
+        for k in range(len(discs)):
+            x = discs[k] / half
+            if x > 1.0:
+                rays[k] = factor * ray_flux(angle, slope, x)
+            column = min(x, 1.0) * (len(ratio) - 1)
+            j = min(int(column), len(ratio) - 2)
+            flux[k] += rays[k] * (ratio[j] + (column - j) * (ratio[j + 1] - ratio[j]))
 
 
 @compiled
@@ -79,13 +118,110 @@ def uneven_flux(base: Array, disc: Array, table: Array) -> float:
     The first corner is the origin, the second lies on the x axis; `disc` (3,) m are the radii. The
     flux is 0 where the discs close the triangle.
     """
-    flux = _uneven(base, disc, table)
-    if not flux > 0.0:
-        flux = _shadowed(base, disc, table)
-    return flux
+    flux, discs = np.empty(1), np.empty((1, 3))
+    discs[0] = disc
+    uneven_fluxes(base, discs, (uneven_room(1), corner_room(), table), flux)
+    return flux[0]
 
 
 @compiled
+def uneven_room(sections: int) -> Array:
+    """Room for the wedges of so many sections in `uneven_fluxes`."""
+    return np.empty((7, 6 * sections))
+
+
+@compiled_for_loops
+def uneven_fluxes(
+    base: Array, discs: Array, room: tuple[Array, CornerRoom, Array], flux: Array
+) -> None:
+    """Writes the flux (K,) m4 of `uneven_flux` for the radii `discs` (K, 3) m of K sections.
+
+    `room` is what `uneven_room` and `corner_room` give for this triangle, and the table of
+    `shear_ratio`.
+    """
+    wedge, corners, table = room
+    touching_fluxes(base, discs, (wedge, table), flux)
+    for k in range(len(discs)):
+        if not flux[k] > 0.0:
+            aim_corners(base, corners)
+            corner_reaches(corners, discs[k])
+            flux[k] = corner_flux(corners, discs[k], table)
+
+
+@compiled_for_loops
+def touching_fluxes(base: Array, discs: Array, room: tuple[Array, Array], flux: Array) -> None:
+    """Writes the flux (K,) m4 where a circle touches all three discs, else 0."""
+    wedge, table = room
+    count = 6 * len(discs)
+    edges = _edges(base)
+    for k in range(len(discs)):
+        flux[k] = 1.0 if _set_wedges(edges, base, discs[k], wedge[:, 6 * k : 6 * k + 6]) else 0.0
+    _sum_wedges(wedge, count)
+    total = wedge[6]
+    for k in range(len(discs)):
+        if flux[k] > 0.0:
+            flux[k] = 0.0
+            for m in range(6 * k, 6 * k + 6):
+                disc_of_gap = wedge[5, m] / (0.5 * (wedge[2, m] - wedge[0, m]))
+                flux[k] += total[m] * shear_ratio(abs(wedge[4, m]), disc_of_gap, table)
+
+
+@compiled_for_loops
+def _edges(base: Array) -> Array:
+    """From each corner to the two others (6, 4): unit vector, length m, sense of the third."""
+    edges = np.empty((6, 4))
+    for i in range(3):
+        for step in (1, 2):
+            j, k = (i + step) % 3, (i + 3 - step) % 3
+            ex, ey = base[j, 0] - base[i, 0], base[j, 1] - base[i, 1]
+            a = np.sqrt(ex * ex + ey * ey)
+            turned = ex * (base[k, 1] - base[i, 1]) - ey * (base[k, 0] - base[i, 0])
+            edges[2 * i + step - 1] = ex / a, ey / a, a, 1.0 if turned > 0.0 else -1.0
+    return edges
+
+
+@compiled_for_loops
+def _set_wedges(edges: Array, base: Array, disc: Array, wedge: Array) -> bool:
+    """Writes the six wedges (7, 6) of a section; whether a circle touches its three discs.
+
+    The rows are the excess of the radius of the other disc, half the gap squared, the distance of
+    the centres, the place of the circle along their line and across it, and the own radius.
+    """
+    cx, cy, radius = _inscribed(base, disc)
+    touches = not np.isnan(radius)
+    if not touches:
+        cx, cy = 0.0, 0.0
+    for i in range(3):
+        vx, vy = cx - base[i, 0], cy - base[i, 1]
+        away = np.sqrt(vx * vx + vy * vy)
+        for m in (2 * i, 2 * i + 1):
+            a, wider = edges[m, 2], disc[(i + 1 + m - 2 * i) % 3] - disc[i]
+            along = edges[m, 0] * vx + edges[m, 1] * vy
+            wedge[0, m], wedge[1, m], wedge[2, m] = wider, 0.5 * (a * a - wider * wider), a
+            wedge[3, m] = along
+            wedge[4, m] = edges[m, 3] * (edges[m, 0] * vy - edges[m, 1] * vx)
+            wedge[5, m] = disc[i]
+            touches = touches and a > wider and a * along + wider * away > 0.0
+    return touches
+
+
+@compiled_for_loops
+def _sum_wedges(wedge: Array, count: int) -> None:
+    """Turns the places of the circles into angles rad, and sums the flux m4 on rays up to them."""
+    wider, gap, apart, along = wedge[0], wedge[1], wedge[2], wedge[3]
+    turn, own, total = wedge[4], wedge[5], wedge[6]
+    for m in range(count):
+        turn[m] = angle_of(turn[m], along[m])
+        total[m] = 0.0
+    for p in range(len(POINTS)):
+        part, weight = 0.5 * (1.0 + POINTS[p]), 0.5 * WEIGHTS[p]
+        for m in range(count):
+            cosine = -sine_of(part * abs(turn[m]) - QUARTER)
+            reach = gap[m] / (apart[m] * cosine + wider[m])
+            total[m] += weight * turn[m] * flux_on_ray(reach, own[m])
+
+
+@compiled_for_loops
 def _inscribed(base: Array, disc: Array) -> tuple[float, float, float]:
     """Centre and radius m of the circle that touches three discs; NaN where there is none."""
     a, px, py = base[1, 0], base[2, 0], base[2, 1]
@@ -107,89 +243,3 @@ def _inscribed(base: Array, disc: Array) -> tuple[float, float, float]:
     if radius <= -min(r0, r1, r2):
         return 0.0, 0.0, np.nan
     return ax + bx * radius, ay + by * radius, radius
-
-
-@compiled
-def ray(reach: float, disc: float) -> float:
-    """Flux m4 per angle on a ray from the rim of a disc to the distance `reach` m from its centre.
-
-    Shear between neighbouring rays is neglected; `disc` m is the radius of the disc.
-    """
-    if reach <= disc:
-        return 0.0
-    d2, r2 = reach * reach, disc * disc
-    return (4.0 * d2 * d2 * np.log(reach / disc) - 3.0 * d2 * d2 + 4.0 * d2 * r2 - r2 * r2) / 16.0
-
-
-@compiled
-def midway(apart: float, wider: float, turn: float) -> float:
-    """Distance m from the centre of a disc to the line midway between its rim and that of another.
-
-    The ray has the angle `turn` rad from the line between the centres, which are `apart` m; the
-    radius of the other disc is larger by `wider` m. Infinite where the ray never meets the line.
-    """
-    below = apart * np.cos(turn) + wider
-    return max(0.5 * (apart * apart - wider * wider) / below, 0.0) if below > 0.0 else np.inf
-
-
-@compiled
-def _uneven(base: Array, disc: Array, table: Array) -> float:
-    """The flux where a circle touches all three discs, else 0."""
-    cx, cy, radius = _inscribed(base, disc)
-    if np.isnan(radius):
-        return 0.0
-    total = 0.0
-    for i in range(3):
-        for step in (1, 2):
-            j, k = (i + step) % 3, (i + 3 - step) % 3
-            ex, ey = base[j, 0] - base[i, 0], base[j, 1] - base[i, 1]
-            vx, vy = cx - base[i, 0], cy - base[i, 1]
-            a = np.hypot(ex, ey)
-            side = (
-                1.0
-                if ex * (base[k, 1] - base[i, 1]) - ey * (base[k, 0] - base[i, 0]) > 0.0
-                else -1.0
-            )
-            angle = np.arctan2(side * (ex * vy - ey * vx) / a, (ex * vx + ey * vy) / a)
-            apart = disc[j] - disc[i]
-            half = 0.5 * (a - apart)
-            if half <= 0.0 or a * np.cos(angle) + apart <= 0.0:
-                return 0.0
-            flux = 0.0
-            # numba knows no strict zip
-            for point, weight in zip(POINTS, WEIGHTS):  # noqa: B905
-                turn = 0.5 * angle * (1.0 + point)
-                flux += weight * 0.5 * angle * ray(midway(a, apart, turn), disc[i])
-            total += flux * shear_ratio(abs(angle), disc[i] / half, table)
-    return total
-
-
-@compiled
-def _shadowed(base: Array, disc: Array, table: Array) -> float:
-    """The flux where one disc lies in the shadow of the others."""
-    total = 0.0
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        jx, jy = base[j, 0] - base[i, 0], base[j, 1] - base[i, 1]
-        kx, ky = base[k, 0] - base[i, 0], base[k, 1] - base[i, 1]
-        aj, ak = np.hypot(jx, jy), np.hypot(kx, ky)
-        twice = abs(jx * ky - jy * kx)
-        opening = np.arctan2(twice, jx * kx + jy * ky)
-        across = np.hypot(kx - jx, ky - jy)
-        height = twice / across
-        foot = np.arctan2(-(jx * (kx - jx) + jy * (ky - jy)) / across, height)
-        flux, nearest = 0.0, np.inf
-        # numba knows no strict zip
-        for point, weight in zip(FINE_POINTS, FINE_WEIGHTS):  # noqa: B905
-            turn = 0.5 * opening * (1.0 + point)
-            reach = height / max(np.cos(turn - foot), 1e-3)
-            reach = min(
-                reach,
-                midway(aj, disc[j] - disc[i], turn),
-                midway(ak, disc[k] - disc[i], opening - turn),
-            )
-            flux += weight * 0.5 * opening * ray(reach, disc[i])
-            nearest = min(nearest, reach)
-        if flux > 0.0:
-            total += flux * shear_ratio(0.5 * opening, disc[i] / nearest, table)
-    return total

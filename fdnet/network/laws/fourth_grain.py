@@ -12,12 +12,23 @@ the share is at most 1.
 
 import numpy as np
 
-from fdnet.network import geometry
-from fdnet.network.compiled import compiled
-from fdnet.network.laws.cross_section import FINE_POINTS, FINE_WEIGHTS, midway, ray
-from fdnet.network.laws.section_rays import disc_flux
-from fdnet.network.laws.wedge import shear_ratio
+from fdnet.network.compiled import compiled_for_loops
+from fdnet.network.laws.corner_rays import (
+    CornerRoom,
+    corner_flux,
+    corner_reaches,
+    fourth_reaches,
+)
+from fdnet.network.laws.section_rays import (
+    SWALLOWED,
+    UNTOUCHED,
+    flux_on_rays,
+    inwards,
+    narrow,
+)
 from fdnet.network.network import Network
+from fdnet.network.tessellation.tetrahedron import along as inner
+from fdnet.network.tessellation.tetrahedron import less, times
 from fdnet.spheres.snapshot import Array
 
 
@@ -29,109 +40,113 @@ def fourth_grains(network: Network, part: slice) -> tuple[Array, Array]:
         place: (K, 2, 3) m, along the first edge of the facet, across it towards the third corner,
             and its height above the facet, of the centre of that image from the first corner.
     """
-    size, pores = np.ptp(network.box, axis=1), network.throat_pores[part]
-    wrap = network.pore_wrap[pores[:, 0]] * size
-    facet = network.image_position[network.throat_images[part]] - wrap[:, None]
-    along = facet[:, 1] - facet[:, 0]
-    along /= np.linalg.norm(along, axis=1)[:, None]
-    normal = geometry.cross(along, facet[:, 2] - facet[:, 0])
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
-    across = geometry.cross(normal, along)
-    rows = np.arange(len(pores))
+    pores = network.throat_pores[part]
     image, place = np.empty(pores.shape, int), np.empty((*pores.shape, 3))
-    for side in (0, 1):
-        pore = pores[:, side]
-        moved = network.throat_shift[part] * side - network.pore_wrap[pore]
-        corner = network.image_position[network.pore_images[pore]] + (moved * size)[:, None]
-        apart = np.linalg.norm(corner[:, :, None] - facet[:, None], axis=3).min(axis=2)
-        apex = np.argmax(apart, axis=1)
-        image[:, side] = network.pore_images[pore, apex]
-        away = corner[rows, apex] - facet[:, 0]
-        place[:, side, 0] = geometry.dot(away, along)
-        place[:, side, 1] = geometry.dot(away, across)
-        place[:, side, 2] = np.abs(geometry.dot(away, normal))
+    _find_fourth(
+        (network.image_position, np.ptp(network.box, axis=1)),
+        (network.throat_images[part], pores, network.throat_shift[part]),
+        (network.pore_images, network.pore_wrap),
+        (image, place),
+    )
     return image, place
 
 
-@compiled
-def share_left(base: Array, disc: Array, x: float, y: float, fourth: float, table: Array) -> float:
+@compiled_for_loops
+def _find_fourth(
+    points: tuple[Array, Array],
+    throats: tuple[Array, Array, Array],
+    tetrahedra: tuple[Array, Array],
+    out: tuple[Array, Array],
+) -> None:
+    """Sets the images and places of `fourth_grains`; the arguments are parts of the network.
+
+    The fourth corner of a tetrahedron is the one farthest from the nearest corner of the facet.
+    """
+    position, size = points
+    facets, pores, shift = throats
+    vertex, wrap = tetrahedra
+    image, place = out
+    facet, apex, best = np.empty((3, 3)), np.empty(3), np.empty(3)
+    for t in range(len(facets)):
+        for k in range(3):
+            for axis in range(3):
+                turn = wrap[pores[t, 0], axis] * size[axis]
+                facet[k, axis] = position[facets[t, k], axis] - turn
+        for side in range(2):
+            pore, farthest = pores[t, side], -1.0
+            for corner in range(4):
+                for axis in range(3):
+                    turn = shift[t, axis] * side - wrap[pore, axis]
+                    apex[axis] = position[vertex[pore, corner], axis] + turn * size[axis]
+                nearest = np.inf
+                for k in range(3):
+                    square = 0.0
+                    for axis in range(3):
+                        square += (apex[axis] - facet[k, axis]) ** 2
+                    nearest = min(nearest, square)
+                if nearest > farthest:
+                    farthest, image[t, side] = nearest, vertex[pore, corner]
+                    best[:] = apex
+            _set_place(facet, best, place[t, side])
+
+
+@compiled_for_loops
+def _set_place(facet: Array, apex: Array, place: Array) -> None:
+    """Sets the `place` (3,) m of an apex (3,) m as `fourth_grains` gives it."""
+    along, up = less(facet, 1, 0), less(facet, 2, 0)
+    away = (apex[0] - facet[0, 0], apex[1] - facet[0, 1], apex[2] - facet[0, 2])
+    long = np.sqrt(inner(along, along))
+    normal = times(along, up)
+    across = times(normal, along)
+    wide = np.sqrt(inner(normal, normal))
+    place[0] = inner(away, along) / long
+    place[1] = inner(away, across) / (wide * long)
+    place[2] = abs(inner(away, normal)) / wide
+
+
+@compiled_for_loops
+def share_left(
+    disc: Array,
+    fourth: tuple[float, float, float],
+    corners: CornerRoom,
+    rays: tuple[Array, int],
+    more: tuple[Array, Array, Array],
+) -> float:
     """Share of the flux through a triangle with discs that a fourth disc leaves, 0 to 1.
 
-    `base` (3, 2) m are the corners, `disc` (3,) m the radii on them; the fourth disc has the
-    centre `x`, `y` m and the radius `fourth` m.
+    Args:
+        disc: (3,) m, the radii of the discs on the corners.
+        fourth: the centre x, y and the radius m of the fourth disc.
+        corners: the rays of the corners, aimed at the fourth disc (`aim_at_fourth`).
+        rays: the rays (6, 36) of the fourth disc, and their number (`section_rays.aim`).
+        more: the corners (3, 2) m, room for 36 numbers, and the table of `shear_ratio`.
     """
-    if not _reaches(base, x, y, fourth):
-        return 1.0
-    clear = _corner_shares(base, disc, x, y, 0.0, table)
+    own, count = rays
+    base, room, table = more
+    corner_reaches(corners, disc)
+    clear = corner_flux(corners, disc, table)
     if not clear > 0.0:
         return 1.0
-    left = _corner_shares(base, disc, x, y, fourth, table)
-    discs = np.empty((4, 3))
+    fourth_reaches(corners, disc, fourth[2])
+    left = corner_flux(corners, disc, table)
+    end, reach = own[2], own[5]
+    for p in range(count):
+        reach[p] = end[p]
+    done = UNTOUCHED
     for i in range(3):
-        discs[i] = base[i, 0], base[i, 1], disc[i]
-    discs[3] = x, y, fourth
-    left += disc_flux(base, discs, 4, 3, table)
+        if done != SWALLOWED:
+            done = narrow(own, count, fourth, (base[i, 0], base[i, 1], disc[i]))
+    if done != SWALLOWED:
+        left += flux_on_rays(own, count, fourth[2], (room, table))
     return min(left / clear, 1.0)
 
 
-@compiled
-def _inward(base: Array, side: int) -> tuple[float, float]:
-    """Unit normal of the side from corner `side` to the next, towards the third corner."""
-    j, k = (side + 1) % 3, (side + 2) % 3
-    ex, ey = base[j, 0] - base[side, 0], base[j, 1] - base[side, 1]
-    length = np.hypot(ex, ey)
-    nx, ny = -ey / length, ex / length
-    if nx * (base[k, 0] - base[side, 0]) + ny * (base[k, 1] - base[side, 1]) < 0.0:
-        return -nx, -ny
-    return nx, ny
+@compiled_for_loops
+def depth_within(base: Array, side: Array, x: float, y: float) -> float:
+    """How far m a place lies within a triangle, from the nearest side line; negative outside.
 
-
-@compiled
-def _reaches(base: Array, x: float, y: float, disc: float) -> bool:
-    """Whether a disc reaches into the triangle, side line by side line."""
-    for i in range(3):
-        nx, ny = _inward(base, i)
-        if nx * (x - base[i, 0]) + ny * (y - base[i, 1]) <= -disc:
-            return False
-    return True
-
-
-@compiled
-def _corner_shares(
-    base: Array, disc: Array, x: float, y: float, fourth: float, table: Array
-) -> float:
-    """Flux m4 on the rays of the three discs; without a fourth disc if its radius is 0."""
-    total = 0.0
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        jx, jy = base[j, 0] - base[i, 0], base[j, 1] - base[i, 1]
-        kx, ky = base[k, 0] - base[i, 0], base[k, 1] - base[i, 1]
-        qx, qy = x - base[i, 0], y - base[i, 1]
-        aj, ak, aq = np.hypot(jx, jy), np.hypot(kx, ky), np.hypot(qx, qy)
-        if fourth > 0.0 and aq <= fourth - disc[i]:
-            continue
-        turned = jx * ky - jy * kx
-        sense = 1.0 if turned > 0.0 else -1.0
-        opening = np.arctan2(abs(turned), jx * kx + jy * ky)
-        across = np.hypot(kx - jx, ky - jy)
-        height = abs(turned) / across
-        foot = np.arctan2(-(jx * (kx - jx) + jy * (ky - jy)) / across, height)
-        towards = np.arctan2(sense * (jx * qy - jy * qx), jx * qx + jy * qy)
-        flux, nearest = 0.0, np.inf
-        # numba knows no strict zip
-        for point, weight in zip(FINE_POINTS, FINE_WEIGHTS):  # noqa: B905
-            turn = 0.5 * opening * (1.0 + point)
-            reach = height / max(np.cos(turn - foot), 1e-3)
-            reach = min(
-                reach,
-                midway(aj, disc[j] - disc[i], turn),
-                midway(ak, disc[k] - disc[i], opening - turn),
-            )
-            if fourth > 0.0:
-                reach = min(reach, midway(aq, fourth - disc[i], turn - towards))
-            flux += weight * 0.5 * opening * ray(reach, disc[i])
-            nearest = min(nearest, reach)
-        if flux > 0.0:
-            closest = min(disc[i] / nearest, 1.0) if nearest > 0.0 else 1.0
-            total += flux * shear_ratio(0.5 * opening, closest, table)
-    return total
+    A disc that is no larger than its place is far outside does not reach in.
+    """
+    return min(
+        inwards(base, side, 0, x, y), inwards(base, side, 1, x, y), inwards(base, side, 2, x, y)
+    )

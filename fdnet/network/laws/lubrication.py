@@ -22,10 +22,18 @@ tetrahedron where that reaches in (`fourth_grain`).
 import numpy as np
 
 from fdnet.network import geometry
-from fdnet.network.compiled import compiled
-from fdnet.network.laws.cross_section import even_flux, uneven_flux, wedges
-from fdnet.network.laws.fourth_grain import fourth_grains, share_left
-from fdnet.network.laws.outside import Neighbourhood, share_around
+from fdnet.network.compiled import compiled_for_loops
+from fdnet.network.laws.cross_section import wedges
+from fdnet.network.laws.fourth_grain import fourth_grains
+from fdnet.network.laws.open_sections import (
+    STEPS,
+    SectionRoom,
+    forget,
+    open_fluxes,
+    section_room,
+    set_discs,
+)
+from fdnet.network.laws.outside import Neighbourhood
 from fdnet.network.laws.wall_cross_section import wall_cuts, wall_flux
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import LENGTH_FLOOR, Network
@@ -33,10 +41,6 @@ from fdnet.spheres.snapshot import Array
 
 WIDENING = 8.0 / 3.0
 """Factor of da^2 in the resistance above."""
-STEPS = 8
-"""Steps in height between the facet and a power centre."""
-TIP = 1e-2
-"""Smallest radius of the disc that a grain shows in a section, in radii of the grain."""
 THROATS = 20_000
 """Throats that are worked off at once."""
 EQUAL = 1e-9
@@ -118,7 +122,7 @@ def _outside(around: Neighbourhood | None, part: slice, corner: Array) -> tuple[
     return np.concatenate([near.place, radius, flatness], axis=1), near.first
 
 
-@compiled
+@compiled_for_loops
 def _halves(
     corner: Array,
     discs: tuple[Array, Array],
@@ -132,98 +136,68 @@ def _halves(
     floor, widening = given
     beside, around, first, table = more
     resistance = np.zeros((len(corner), 2))
-    most = np.max(first[1:] - first[:-1]) if len(corner) else 0
-    room = np.empty((most + 3, 3))
+    room = section_room(np.max(first[1:] - first[:-1]) if len(corner) else 0)
     for t in range(len(corner)):
-        outside = around[first[t] : first[t + 1]].copy()
         low, high = -heights[t, 0], heights[t, 1]
         high = max(high, low + floor)
         even = np.max(radius[t]) - np.min(radius[t]) <= EQUAL * radius[t, 0]
         even = even and np.max(flatness[t]) - np.min(flatness[t]) <= EQUAL
         wedge = wedges(corner[t]) if even else np.empty((0, 7))
+        throat = (corner[t], radius[t], flatness[t], wedge)
         wall = (order[t], place[t], part[t])
-        grains = (radius[t], flatness[t])
+        outside = around[first[t] : first[t + 1]]
+        forget(room, len(outside))
         if high > 0.0:
-            resistance[t, 1] = _resistance(
-                corner[t],
-                grains,
-                wedge,
-                wall,
-                (max(low, 0.0), high, widening),
-                (beside[t, 1], outside, room, table),
-            )
+            span, others = (max(low, 0.0), high, 1.0), (beside[t, 1], outside)
+            resistance[t, 1] = _resistance(throat, wall, (span, widening), others, (room, table))
         if low < 0.0:
-            outside[:, 2] *= -1.0
-            resistance[t, 0] = _resistance(
-                corner[t],
-                grains,
-                wedge,
-                wall,
-                (max(-high, 0.0), -low, widening),
-                (beside[t, 0], outside, room, table),
-            )
+            span, others = (max(-high, 0.0), -low, -1.0), (beside[t, 0], outside)
+            resistance[t, 0] = _resistance(throat, wall, (span, widening), others, (room, table))
     return resistance
 
 
-@compiled
+@compiled_for_loops
 def _resistance(
-    base: Array,
-    grains: tuple[Array, Array],
-    wedge: Array,
+    throat: tuple[Array, Array, Array, Array],
     wall: tuple[Array, Array, float],
-    span: tuple[float, float, float],
-    more: tuple[Array, Array, Array, Array],
+    span: tuple[tuple[float, float, float], float],
+    others: tuple[Array, Array],
+    more: tuple[SectionRoom, Array],
 ) -> float:
     """Integral of dR between two heights, 1/m3.
 
     1/a is linear within a step; the integral is extrapolated from STEPS and STEPS / 2 steps.
     """
-    radius, flatness = grains
-    low, high, widening = span
-    fourth, outside, room, table = more
+    (low, high, sense), widening = span
     step = (high - low) / STEPS
-    narrow = np.empty(STEPS + 1)
-    disc = np.empty(3)
+    room, table = more
+    set_discs(throat, low, step, room)
     order, place, part = wall
-    for k in range(STEPS + 1):
-        z, beyond = low + k * step, False
-        for i in range(3):
-            square = radius[i] ** 2 - flatness[i] * z * z
-            disc[i] = np.sqrt(max(square, (TIP * radius[i]) ** 2))
-            beyond = beyond or square <= 0.0
-        if order[0] >= 0:
-            flux = part * wall_flux(place, disc[order[0]], disc[order[1]], table)
-        else:
-            flux = part * _slipping_flux(base, disc, wedge, table)
-            square = fourth[3] ** 2 - fourth[4] * (fourth[2] - z) ** 2
-            share = 1.0
-            if square > 0.0 and flux > 0.0:
-                share = share_left(base, disc, fourth[0], fourth[1], np.sqrt(square), table)
-            if beyond and len(outside) and flux > 0.0:
-                share = min(share, share_around(base, disc, z, outside, (room, table)))
-            flux *= share
-        if not flux > 0.0:
+    flux, discs = room[0], room[1]
+    if order[0] >= 0:
+        for k in range(STEPS + 1):
+            flux[k] = wall_flux(place, discs[order[0], k], discs[order[1], k], table)
+    else:
+        open_fluxes(throat, (low, step, sense), others, room, table)
+    for k in range(len(flux)):
+        if not part * flux[k] > 0.0:
             return np.inf
-        narrow[k] = 1.0 / np.sqrt(np.sqrt(8.0 * flux / np.pi))
-    return (4.0 * summed(narrow, step, 1, widening) - summed(narrow, step, 2, widening)) / 3.0
+    for k in range(len(flux)):
+        flux[k] = 1.0 / np.sqrt(np.sqrt(8.0 / np.pi * part * flux[k]))
+    return (4.0 * summed(flux, step, 1, widening) - summed(flux, step, 2, widening)) / 3.0
 
 
-@compiled
-def _slipping_flux(base: Array, disc: Array, wedge: Array, table: Array) -> float:
-    flux = even_flux(wedge, disc[0], table) if len(wedge) else 0.0
-    return flux if flux > 0.0 else uneven_flux(base, disc, table)
-
-
-@compiled
+@compiled_for_loops
 def summed(narrow: Array, step: float, every: int, widening: float) -> float:
     """Resistance 1/m3 between sections of 1/a = `narrow` (K,) 1/m that lie `step` m apart.
 
     It is the sum of dR over the intervals between every `every`-th of them.
     """
-    total = 0.0
+    total, shear = 0.0, np.sqrt(widening) / 3.0
     for k in range(every, len(narrow), every):
         a, b = narrow[k - every], narrow[k]
-        straight = every * step * (a**4 + a**3 * b + a**2 * b**2 + a * b**3 + b**4) / 5.0
-        sideways = np.sqrt(widening) * abs(b**3 - a**3) / 3.0
-        total += 8.0 / np.pi * np.hypot(straight, sideways)
+        a2, b2 = a * a, b * b
+        straight = 0.2 * every * step * (a2 * (a2 + a * b + b2) + b2 * (a * b + b2))
+        sideways = shear * (b - a) * (a2 + a * b + b2)
+        total += 8.0 / np.pi * np.sqrt(straight * straight + sideways * sideways)
     return total

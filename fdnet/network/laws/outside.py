@@ -16,8 +16,15 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fdnet.network import geometry
-from fdnet.network.compiled import compiled
-from fdnet.network.laws.section_rays import discs_flux
+from fdnet.network.compiled import compiled, compiled_for_loops
+from fdnet.network.laws.section_rays import (
+    RAYS,
+    SWALLOWED,
+    UNTOUCHED,
+    aim,
+    flux_on_rays,
+    narrow,
+)
 from fdnet.network.network import Network
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
@@ -114,31 +121,106 @@ def _from_facet(
     return np.stack([geometry.dot(apart, one[row]) for one in (along, across, normal)], axis=1)
 
 
-@compiled
-def share_around(
-    base: Array, disc: Array, z: float, around: Array, room: tuple[Array, Array]
-) -> float:
-    """Share of the flux at the height `z` m that the spheres `around` a facet leave, 0 to 1.
+Bundles = tuple[Array, Array, Array, Array]
+"""Rays (S, 6, 36) of discs (`section_rays.aim`), their numbers (S,) or -1 before they are aimed,
+the farthest end (S,) m of each, and room for 36 numbers."""
+Seen = tuple[Array, Array]
+"""Numbers (S,) of the discs that a section meets, and x, y and radius (S, 3) m of them."""
 
-    Args:
-        base: (3, 2) m, corners of the facet.
-        disc: (3,) m, radii of the discs on them at this height.
-        z: m above the facet.
-        around: (N, 5): place (3) m, radius m and flatness (`lubrication`), heights as `z`.
-        room: at least N + 3 rows of three, which are written to, and the table of `shear_ratio`.
+
+@compiled
+def bundles(most: int) -> tuple[Bundles, Seen]:
+    """Room for the rays of `most` discs."""
+    rays = np.empty((most, 6, 3 * RAYS)), np.full(most, -1), np.empty(most), np.empty(3 * RAYS)
+    return rays, (np.empty(most, np.int64), np.empty((most, 3)))
+
+
+@compiled_for_loops
+def meet(disc: Array, base: Array, z: float, around: Array, seen: Seen) -> int:
+    """Sets the discs that the section at the height `z` m meets, and gives their number.
+
+    They are those of radius `disc` (3,) m on the corners `base` (3, 2) m, and those of the spheres
+    `around` (N, 5): place (3) m, radius m and flatness (`lubrication`), heights as `z`.
     """
-    discs, table = room
-    count = 3
+    which, place = seen
     for i in range(3):
-        discs[i] = base[i, 0], base[i, 1], disc[i]
+        which[i] = i
+        place[i] = base[i, 0], base[i, 1], disc[i]
+    count = 3
     for i in range(len(around)):
         square = around[i, 3] ** 2 - around[i, 4] * (around[i, 2] - z) ** 2
         if square > 0.0:
-            discs[count] = around[i, 0], around[i, 1], np.sqrt(square)
+            which[count] = 3 + i
+            place[count] = around[i, 0], around[i, 1], np.sqrt(square)
             count += 1
+    return count
+
+
+@compiled_for_loops
+def share_around(
+    base: Array, side: Array, discs: tuple[int, Seen], bundle: Bundles, table: Array
+) -> float:
+    """Share of the flux through a section that the spheres around its facet leave, 0 to 1.
+
+    Args:
+        base: (3, 2) m, corners of the facet.
+        side: what `section_rays.sides_of` gives for it.
+        discs: how many discs the section meets, and which (`meet`).
+        bundle: the rays of all discs of the facet, or room for them.
+        table: the table of `shear_ratio`.
+    """
+    count, seen = discs
     if count == 3:
         return 1.0
-    clear = discs_flux(base, discs, 3, table)
-    if not clear > 0.0:
-        return 1.0
-    return min(discs_flux(base, discs, count, table) / clear, 1.0)
+    clear, left = 0.0, 0.0
+    for number in range(count):
+        own, one = _flux_of_disc(base, side, (number, count, seen), bundle, table)
+        clear += own
+        left += one
+    return min(left / clear, 1.0) if clear > 0.0 else 1.0
+
+
+@compiled_for_loops
+def _flux_of_disc(
+    base: Array, side: Array, discs: tuple[int, int, Seen], bundle: Bundles, table: Array
+) -> tuple[float, float]:
+    """Fluxes m4 on the rays of one disc: between the discs on the corners alone, and among all.
+
+    The first is 0 for a disc that is not on a corner.
+    """
+    number, count, (which, place) = discs
+    disc = (place[number, 0], place[number, 1], place[number, 2])
+    slot = which[number]
+    rays, room = bundle[0][slot], (bundle[3], table)
+    many = _aimed(base, side, (slot, disc[0], disc[1]), bundle)
+    longest, end, reach = bundle[2][slot], rays[2], rays[5]
+    for p in range(many):
+        reach[p] = end[p]
+    clear, done = 0.0, UNTOUCHED
+    for k in range(count):
+        if k == 3 and number < 3:
+            clear = flux_on_rays(rays, many, disc[2], room) if done != SWALLOWED else 0.0
+            done = UNTOUCHED if done != SWALLOWED else SWALLOWED
+        apart = np.sqrt((place[k, 0] - disc[0]) ** 2 + (place[k, 1] - disc[1]) ** 2)
+        # the nearest point midway is on the line between the centres
+        if k == number or done == SWALLOWED or apart - place[k, 2] + disc[2] >= 2.0 * longest:
+            continue
+        done = max(done, narrow(rays, many, disc, (place[k, 0], place[k, 1], place[k, 2])))
+    if done == SWALLOWED:
+        return clear, 0.0
+    if done == UNTOUCHED and number < 3:
+        return clear, clear
+    return clear, flux_on_rays(rays, many, disc[2], room)
+
+
+@compiled_for_loops
+def _aimed(base: Array, side: Array, disc: tuple[int, float, float], bundle: Bundles) -> int:
+    """The number of rays of a disc, which are aimed when they are first asked for."""
+    rays, number, longest, _ = bundle
+    i, x, y = disc
+    if number[i] < 0:
+        number[i] = aim(base, side, x, y, rays[i])
+        longest[i] = 0.0
+        for p in range(number[i]):
+            longest[i] = max(longest[i], rays[i, 2, p])
+    return number[i]

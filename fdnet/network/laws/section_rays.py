@@ -3,13 +3,15 @@
 Every disc keeps what its rays see inside the triangle, from its rim or from where they enter the
 triangle to the far side, or to the line midway to the rim of another disc (`cross_section`). The
 rays end in Gauss's points on the far sides, so the sum does not depend on the order of the corners
-and is the same for a mirrored triangle.
+and is the same for a mirrored triangle. The directions of the rays do not change with the radii of
+the discs, so they are set up once for all sections of a throat.
 """
 
 import numpy as np
 
-from fdnet.network.compiled import compiled
-from fdnet.network.laws.cross_section import FINE_POINTS, FINE_WEIGHTS
+from fdnet.network.compiled import compiled_for_loops
+from fdnet.network.laws.elementary import log_of
+from fdnet.network.laws.rays import FINE_POINTS, FINE_WEIGHTS, midway
 from fdnet.network.laws.wedge import shear_ratio
 from fdnet.spheres.snapshot import Array
 
@@ -17,107 +19,128 @@ SECTOR = np.pi / 3.0
 """Half angle, rad, between two of the three rims that surround a disc."""
 ON_SIDE = 1e-9
 """A disc centred nearer to a side than this share of the side lies on it."""
+RAYS = len(FINE_POINTS)
+"""Rays to each side."""
+UNTOUCHED, NARROWED, SWALLOWED = 0, 1, 2
+"""What another disc does to the rays of a disc."""
 
 
-@compiled
-def discs_flux(base: Array, discs: Array, count: int, table: Array) -> float:
-    """Flux m4 on the rays of the first `count` of `discs` (N, 3), x, y and radius m.
-
-    `base` (3, 2) m are the corners of the triangle.
-    """
-    total = 0.0
-    for number in range(count):
-        total += disc_flux(base, discs, count, number, table)
-    return total
-
-
-@compiled
-def disc_flux(base: Array, discs: Array, count: int, number: int, table: Array) -> float:
-    """Flux m4 on the rays of the disc `number` among the first `count` of `discs`."""
-    x, y, own = discs[number, 0], discs[number, 1], discs[number, 2]
-    side = _sides(base, x, y)
-    flux, nearest = 0.0, np.inf
-    for far in range(3):
-        if side[far, 2] <= 0.0:
-            continue
-        after = (far + 1) % 3
-        ex, ey = base[after, 0] - base[far, 0], base[after, 1] - base[far, 1]
-        length = np.hypot(ex, ey)
-        # numba knows no strict zip
-        for point, weight in zip(FINE_POINTS, FINE_WEIGHTS):  # noqa: B905
-            along = 0.5 * (1.0 + point)
-            vx, vy = base[far, 0] + along * ex - x, base[far, 1] + along * ey - y
-            end = np.hypot(vx, vy)
-            ux, uy = vx / end, vy / end
-            start = max(_entry(side, ux, uy), own)
-            if end <= start:
-                continue
-            reach = _midway_to_others(discs, count, number, (ux, uy), (start, end))
-            if reach > start:
-                turn = 0.5 * weight * length * side[far, 2] / (end * end)
-                flux += turn * part_of_ray(start, reach, own)
-                nearest = min(nearest, reach)
-    return flux * shear_ratio(SECTOR, min(own / nearest, 1.0), table) if flux > 0.0 else 0.0
-
-
-@compiled
-def _sides(base: Array, x: float, y: float) -> Array:
-    """Of each side (3, 3) the unit normal inwards, and how far a place lies inwards of it, m."""
+@compiled_for_loops
+def sides_of(base: Array) -> Array:
+    """Of each side (3, 3) of a triangle `base` (3, 2) m its unit normal inwards and length m."""
     side = np.empty((3, 3))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         ex, ey = base[j, 0] - base[i, 0], base[j, 1] - base[i, 1]
-        length = np.hypot(ex, ey)
+        length = np.sqrt(ex * ex + ey * ey)
         nx, ny = -ey / length, ex / length
         if nx * (base[k, 0] - base[i, 0]) + ny * (base[k, 1] - base[i, 1]) < 0.0:
             nx, ny = -nx, -ny
-        inwards = nx * (x - base[i, 0]) + ny * (y - base[i, 1])
-        side[i] = nx, ny, inwards if abs(inwards) > ON_SIDE * length else 0.0
+        side[i] = nx, ny, length
     return side
 
 
-@compiled
-def _entry(side: Array, ux: float, uy: float) -> float:
-    """Where a ray of the direction u enters the triangle, m; 0 from a place inside."""
-    start = 0.0
-    for i in range(3):
-        if side[i, 2] < 0.0:
-            speed = side[i, 0] * ux + side[i, 1] * uy
-            if speed <= 0.0:
-                return np.inf
-            start = max(start, -side[i, 2] / speed)
-    return start
+@compiled_for_loops
+def inwards(base: Array, side: Array, i: int, x: float, y: float) -> float:
+    """How far m the place `x`, `y` m lies inwards of the side `i`."""
+    return side[i, 0] * (x - base[i, 0]) + side[i, 1] * (y - base[i, 1])
 
 
-@compiled
-def _midway_to_others(
-    discs: Array, count: int, number: int, u: tuple[float, float], span: tuple[float, float]
-) -> float:
-    """Where a ray between `span` m meets the first line midway to the rim of another disc, m."""
-    start, reach = span
-    for other in range(count):
-        if other == number:
-            continue
-        qx, qy = discs[other, 0] - discs[number, 0], discs[other, 1] - discs[number, 1]
-        wider = discs[other, 2] - discs[number, 2]
-        square = qx * qx + qy * qy
-        if wider > 0.0 and square <= wider * wider:
-            return 0.0
-        below = qx * u[0] + qy * u[1] + wider
-        if below > 0.0:
-            reach = min(reach, max(0.5 * (square - wider * wider) / below, 0.0))
-            if reach <= start:
-                return 0.0
-    return reach
+@compiled_for_loops
+def aim(base: Array, side: Array, x: float, y: float, rays: Array) -> int:
+    """Sets up the rays of a disc centred at `x`, `y` m, and gives their number.
 
-
-@compiled
-def part_of_ray(start: float, reach: float, disc: float) -> float:
-    """Flux m4 per angle on a ray between `start` and `reach` m from the centre of its disc.
-
-    It is what `cross_section.ray` sums from the rim, where there is no shear at `reach`.
+    `side` is what `sides_of` gives. The rows of `rays` (6, 36) are the direction, where a ray
+    meets the far side and where it enters the triangle, m, its angle rad, and room.
     """
-    d2, t2, r2 = reach * reach, start * start, disc * disc
-    whole = d2 * d2 * (0.25 * np.log(reach / disc) - 3.0 / 16.0) + r2 * d2 / 8.0
-    before = d2 * t2 * (0.25 * np.log(start / disc) - 1.0 / 8.0) - t2 * t2 / 16.0 + r2 * t2 / 8.0
-    return whole - before
+    depth = np.empty(3)
+    for i in range(3):
+        depth[i] = inwards(base, side, i, x, y)
+        if abs(depth[i]) <= ON_SIDE * side[i, 2]:
+            depth[i] = 0.0
+    count = 0
+    for far in range(3):
+        if depth[far] > 0.0:
+            _aim_at_side(base, side, (x, y, far, count), depth, rays)
+            count += RAYS
+    return count
+
+
+@compiled_for_loops
+def _aim_at_side(
+    base: Array, side: Array, given: tuple[float, float, int, int], depth: Array, rays: Array
+) -> None:
+    """The 12 rays to a side; `given` are the place of the disc, the side and the first ray."""
+    x, y, far, first = given
+    one, two = (far + 1) % 3, (far + 2) % 3
+    ex, ey = base[one, 0] - base[far, 0], base[one, 1] - base[far, 1]
+    vx, vy = base[far, 0] - x, base[far, 1] - y
+    of_turn = 0.5 * side[far, 2] * depth[far]
+    ux, uy, end = rays[0, first:], rays[1, first:], rays[2, first:]
+    entry, turn = rays[3, first:], rays[4, first:]
+    for p in range(min(RAYS, len(entry))):
+        along = 0.5 * (1.0 + FINE_POINTS[p])
+        rx, ry = vx + along * ex, vy + along * ey
+        long = np.sqrt(rx * rx + ry * ry)
+        ux[p], uy[p], end[p] = rx / long, ry / long, long
+        entry[p] = 0.0
+        turn[p] = of_turn * FINE_WEIGHTS[p] / (long * long)
+    for i in (one, two):
+        if depth[i] < 0.0:
+            nx, ny, away = side[i, 0], side[i, 1], -depth[i]
+            for p in range(min(RAYS, len(entry))):
+                speed = nx * ux[p] + ny * uy[p]
+                begin = away / speed if speed > 0.0 else np.inf
+                entry[p] = max(entry[p], begin)
+
+
+@compiled_for_loops
+def narrow(
+    rays: Array,
+    count: int,
+    disc: tuple[float, float, float],
+    other: tuple[float, float, float],
+) -> int:
+    """Ends the first `count` rays of a disc midway to another one; x, y and radius m of both.
+
+    The last row of `rays` (6, 36) holds where they end. Returns what the other disc does.
+    """
+    qx, qy, wider = other[0] - disc[0], other[1] - disc[1], other[2] - disc[2]
+    square = qx * qx + qy * qy
+    if wider > 0.0 and square <= wider * wider:
+        return SWALLOWED
+    half = 0.5 * (square - wider * wider)
+    ux, uy, reach = rays[0], rays[1], rays[5]
+    for p in range(count):
+        reach[p] = min(reach[p], midway(half, qx * ux[p] + qy * uy[p] + wider))
+    return NARROWED
+
+
+@compiled_for_loops
+def flux_on_rays(rays: Array, count: int, own: float, room: tuple[Array, Array]) -> float:
+    """Flux m4 on the first `count` rays of a disc of radius `own` m, to where they end.
+
+    `rays` (6, 36) is what `aim` and `narrow` set, `room` are 36 numbers, which are written to, and
+    the table of `shear_ratio`. A ray that enters the triangle outside its disc carries the part
+    from there of what `rays.flux_on_ray` sums from the rim.
+    """
+    part, table = room
+    entry, turn, reach = rays[3], rays[4], rays[5]
+    r2, farthest = own * own, 0.0
+    for p in range(count):
+        start = max(entry[p], own)
+        d2, t2 = reach[p] * reach[p], start * start
+        whole = d2 * d2 * (0.25 * log_of(reach[p] / own) - 3.0 / 16.0) + r2 * d2 / 8.0
+        part[p] = whole + d2 * t2 / 8.0 + t2 * t2 / 16.0 - r2 * t2 / 8.0
+    for p in range(count):
+        farthest = max(farthest, entry[p])
+    if farthest > own:
+        for p in range(count):
+            start = max(entry[p], own)
+            part[p] -= 0.25 * (reach[p] * start) ** 2 * log_of(start / own)
+    total, nearest = 0.0, np.inf
+    for p in range(count):
+        if reach[p] > max(entry[p], own):
+            total += turn[p] * part[p]
+            nearest = min(nearest, reach[p])
+    return total * shear_ratio(SECTOR, min(own / nearest, 1.0), table) if total > 0.0 else 0.0

@@ -17,12 +17,12 @@ nearest of these lines or of the sides of the trapezoid: no share is negative, n
 import numpy as np
 
 from fdnet.network.compiled import compiled
-from fdnet.network.laws.cross_section import (
+from fdnet.network.laws.rays import (
     FINE_POINTS,
     FINE_WEIGHTS,
     POINTS,
     WEIGHTS,
-    ray,
+    flux_on_ray,
 )
 from fdnet.network.laws.wedge import shear_ratio
 from fdnet.network.network import Network
@@ -150,7 +150,7 @@ def _share(
         below = apart * (upright * cosine + along * sine) + wider
         if below > 0.0:
             reach = min(reach, max(half_gap / below, 0.0))
-        flux += weight * 0.5 * (high - low) * ray(reach, disc)
+        flux += weight * 0.5 * (high - low) * flux_on_ray(reach, disc)
     return flux
 
 

@@ -5,10 +5,11 @@ of a tenth of the radius at random on the grains (they may overlap each other). 
 and the flow goes between planes across x. The case `walled` is the same grains alone in a box of
 walls that hold the fluid. Every size and tool has a process of its own with a time limit; imports,
 compiled kernels and file reading come before the clock starts. Peak memory is that of the process
-during the step. OpenPNM solves the same networks: intact; stiff, that is with conductances spread
-over 12 decades; and clogged, with a tenth of the throats closed as well. Yade tessellates the same
-grains, periodic and in a box of walls, and treats fines like grains. The case `specimen` is 1400
-grains with 200,000 fines. Truth is resolved Stokes flow.
+during the step. The case `spheres` is the network of all spheres (`all-spheres`): pack H with 1083
+fines of a fifth of the radius, tiled in the same way. OpenPNM solves the same networks: intact;
+stiff, that is with conductances spread over 12 decades; and clogged, with a tenth of the throats
+closed as well. Yade tessellates the same grains, periodic and in a box of walls, and treats fines
+like grains. The case `specimen` is 1400 grains with 200,000 fines. Truth is resolved Stokes flow.
 """
 
 import json
@@ -47,6 +48,9 @@ COLUMNS = (
 )
 SPECIMEN = (1400, 200_000)
 """Grains and fines of the case `specimen`."""
+SIZED = ("tiled", "walled", "spheres")
+"""Cases that come in several sizes."""
+MOST_SPHERES_OF_PEERS = 200_000
 OWN_LIMIT, LARGEST_LIMIT = 5, 10
 """Limits of fdnet's own processes over those of the peers, and of its largest size."""
 Row = dict[str, Any]
@@ -60,7 +64,9 @@ class Options:
         sizes: numbers of grains.
         fines: fines for each grain.
         largest: another size, without fines and by fdnet alone; None for none.
+        spheres: numbers of spheres for the case `spheres`.
         limit: CPU seconds that a process of a peer may take.
+        times_only: without the errors against the truth and the case `specimen`.
         truth: folder of the packs of known permeability.
         openpnm_python: a Python that has OpenPNM; None without one.
     """
@@ -69,6 +75,8 @@ class Options:
     fines: float
     largest: int | None
     limit: float
+    spheres: Sequence[int] = ()
+    times_only: bool = False
     truth: Path = DATA
     openpnm_python: str | None = None
 
@@ -129,6 +137,17 @@ def fdnet_rows(grains: int, fines: int, folder: Path, limit: float) -> list[Row]
     ]
 
 
+def spheres_rows(wanted: int, folder: Path, limit: float) -> list[Row]:
+    """One row for each step of the network of all spheres; the spheres go to `folder`."""
+    result = child(
+        [sys.executable, str(HERE / "steps.py"), "--spheres", str(wanted), str(folder)], limit
+    )
+    counts = {name: result.get(name) for name in ("grains", "fines", "pores")}
+    common = {"tool": "fdnet", "case": "spheres", "status": result["status"], **counts}
+    steps = result.get("steps", {"total spheres": {}})
+    return [common | {"step": step} | values for step, values in steps.items()]
+
+
 def openpnm_rows(python: str, folder: Path, base: Row, limit: float) -> list[Row]:
     """OpenPNM on the networks of fdnet by Pardiso and by conjugate gradients."""
     rows = []
@@ -177,11 +196,14 @@ def error_rows(
 
 
 def set_growth(rows: list[Row]) -> None:
-    """Exponent of CPU time against grains, by least squares over the sizes from 5000 grains on."""
+    """Exponent of CPU time against size, by least squares over the sizes from 5000 grains on.
+
+    The size of the case `spheres` is the number of spheres.
+    """
     groups: dict[tuple[str, str, str], list[Row]] = {}
     for row in rows:
-        tiled = row["case"] in ("tiled", "walled")
-        if tiled and row.get("cpu_s") and (row["grains"] or 0) > 5000:
+        spheres = (row["grains"] or 0) + (row.get("fines") or 0) * (row["case"] == "spheres")
+        if row["case"] in SIZED and row.get("cpu_s") and spheres > 5000:
             groups.setdefault((row["tool"], row["case"], row["step"]), []).append(row)
     for group in groups.values():
         x, y = ([math.log(row[name]) for row in group] for name in ("grains", "cpu_s"))
@@ -233,13 +255,14 @@ def measure(options: Options) -> list[Row]:
     show([dict(zip(COLUMNS, COLUMNS, strict=True))])
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        rows = error_rows(
-            options.truth, folder, options.limit, with_yade=with_yade, truth=DATA / OWN_TRUTH
-        )
+        rows: list[Row] = []
+        if not options.times_only:
+            truth, data = DATA / OWN_TRUTH, options.truth
+            rows = error_rows(data, folder, options.limit, with_yade=with_yade, truth=truth)
         show(rows)
         runs = [(grains, round(grains * options.fines)) for grains in options.sizes]
         runs += [(options.largest, 0)] if options.largest else []
-        for grains, fines in [*runs, SPECIMEN]:
+        for grains, fines in [*runs, *([] if options.times_only else [SPECIMEN])]:
             most = LARGEST_LIMIT if grains == options.largest else OWN_LIMIT
             new = fdnet_rows(grains, fines, folder, most * options.limit)
             base = {name: new[0][name] for name in ("case", "grains", "pores")}
@@ -250,6 +273,13 @@ def measure(options: Options) -> list[Row]:
                     new.append(yade_row(folder / "spheres.npz", sides, base, options.limit))
             if grains == SPECIMEN[0]:
                 new = [row | {"case": "specimen"} for row in new if row["case"] == "tiled"]
+            show(new)
+            rows += new
+        for wanted in options.spheres:
+            new = spheres_rows(wanted, folder, LARGEST_LIMIT * options.limit)
+            base = {name: new[0][name] for name in ("case", "grains", "fines")}
+            if with_yade and new[0]["status"] == "ok" and wanted <= MOST_SPHERES_OF_PEERS:
+                new.append(yade_row(folder / "spheres.npz", "box", base, options.limit))
             show(new)
             rows += new
     set_growth(rows)

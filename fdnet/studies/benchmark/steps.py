@@ -4,6 +4,7 @@
 
     steps.py GRAINS FINES FOLDER      a tiled pack; spheres and networks for the peers go to FOLDER
     steps.py --pack PACK.csv FOLDER   k of a truth pack, periodic all round
+    steps.py --spheres COUNT FOLDER   grains and fines of a tiled truth pack in one network
 
 It prints one line `RESULT {json}`.
 """
@@ -25,12 +26,13 @@ from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, LAWS
 from fdnet.network.permeability import analyse
+from fdnet.network.resolved.all_spheres import all_conductances, as_grains
 from fdnet.spheres.porosity import measure_porosity
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
 from fdnet.studies.truth import packs
 from fdnet.studies.truth.packs import read_pack, shaken, truth_folder
 
-TILE = "packH_40_eps40.csv"
+TILE, TILE_WITH_FINES = "packH_40_eps40.csv", "packH_r5_d13.csv"
 SHAKE = 0.02
 FINE = 0.1
 SIDES, BOX = (False, True, True), (False, False, False)
@@ -220,6 +222,36 @@ def tiled_result(wanted: int, fine_count: int, folder: Path) -> dict[str, Any]:
     return {"grains": len(grains), "pores": count, "steps": clock.steps, "walled": walled}
 
 
+def run_spheres(spheres: Snapshot) -> tuple[Clock, int]:
+    """The steps of the network of all `spheres`, and the number of its pores."""
+    clock = Clock()
+    network = build_timed(clock, spheres, SIDES)
+    conductance = clock.timed("conductance", lambda: all_conductances(network))
+    clock.timed("solve", lambda: solve_flow(network, conductance))
+    clock.steps["total spheres"] = clock.total(list(clock.steps))
+    return clock, len(network.pore_share)
+
+
+def tiled_spheres(wanted: int, rng: np.random.Generator) -> Snapshot:
+    """About `wanted` spheres: grains and fines of a truth pack, tiled and moved as in `tiled`."""
+    pack, _ = read_pack(truth_folder() / TILE_WITH_FINES)
+    across = max(round((wanted / len(pack)) ** (1 / 3)), 1)
+    times = np.array([max(round(wanted / len(pack) / across**2), 1), across, across])
+    return shaken(packs.tiled(pack, times), SHAKE, rng)
+
+
+def spheres_result(wanted: int, folder: Path) -> dict[str, Any]:
+    """Seconds and memory of every step of the law `all-spheres` on a tiled pack."""
+    rng = np.random.default_rng(1)
+    run_spheres(as_grains(tiled_spheres(COMPILING, rng)))  # compiles and loads
+    run_spheres(as_grains(tiled_spheres(8 * COMPILING, rng)))
+    spheres = tiled_spheres(wanted, rng)
+    clock, pores = run_spheres(as_grains(spheres))
+    leave_spheres(folder, spheres)
+    counts = {"grains": len(spheres.grains()), "fines": len(spheres.fines())}
+    return {**counts, "pores": pores, "steps": clock.steps}
+
+
 def pack_result(path: Path, folder: Path) -> dict[str, Any]:
     """k (mm2) of one truth pack by the default laws."""
     pack, _ = read_pack(path)
@@ -238,6 +270,8 @@ def main() -> None:
     folder = Path(sys.argv[3])
     if sys.argv[1] == "--pack":
         result = pack_result(Path(sys.argv[2]), folder)
+    elif sys.argv[1] == "--spheres":
+        result = spheres_result(int(sys.argv[2]), folder)
     else:
         result = tiled_result(int(sys.argv[1]), int(sys.argv[2]), folder)
     print("RESULT", json.dumps(result))
