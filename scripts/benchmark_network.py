@@ -23,11 +23,7 @@ number = {"type": int, "metavar": "GRAINS"}
 parser.add_argument("--sizes", nargs="+", default=[1000, 10_000, 100_000], **number)
 parser.add_argument("--fines", type=float, default=10.0, help="fines per grain (default 10)")
 parser.add_argument("--largest", help="also this size, without fines and by fdnet only", **number)
-parser.add_argument(
-    "--spheres", nargs="*", type=int, default=[], help="also networks of so many grains and fines"
-)
 parser.add_argument("--limit", type=float, default=600.0, help=LIMIT)
-parser.add_argument("--times-only", action="store_true", help="no errors and no case specimen")
 parser.add_argument("--truth", type=path_option, default=DATA, help="packs with truth")
 parser.add_argument("--openpnm-python", help="a Python that has OpenPNM")
 parser.add_argument("--csv", type=path_option, help="also write the table here")

@@ -5,11 +5,11 @@ of a tenth of the radius at random on the grains (they may overlap each other). 
 and the flow goes between planes across x. The case `walled` is the same grains alone in a box of
 walls that hold the fluid. Every size and tool has a process of its own with a time limit; imports,
 compiled kernels and file reading come before the clock starts. Peak memory is that of the process
-during the step. The case `spheres` is the network of all spheres (`all-spheres`): pack H with 1083
-fines of a fifth of the radius, tiled in the same way. OpenPNM solves the same networks: intact;
-stiff, that is with conductances spread over 12 decades; and clogged, with a tenth of the throats
-closed as well. Yade tessellates the same grains, periodic and in a box of walls, and treats fines
-like grains. The case `specimen` is 1400 grains with 200,000 fines. Truth is resolved Stokes flow.
+during the step. OpenPNM solves the same networks: intact; stiff, that is with conductances spread
+over 12 decades; and clogged, with a tenth of the throats closed as well. Yade tessellates the same
+grains, periodic and in a box of walls, and treats fines like grains. The case `specimen` is 1400
+grains with 200,000 fines. Truth is resolved Stokes flow. The module `walled` has the case
+`spheres`, the network of grains and fines together.
 """
 
 import json
@@ -50,7 +50,6 @@ SPECIMEN = (1400, 200_000)
 """Grains and fines of the case `specimen`."""
 SIZED = ("tiled", "walled", "spheres")
 """Cases that come in several sizes."""
-MOST_SPHERES_OF_PEERS = 200_000
 OWN_LIMIT, LARGEST_LIMIT = 5, 10
 """Limits of fdnet's own processes over those of the peers, and of its largest size."""
 Row = dict[str, Any]
@@ -64,9 +63,7 @@ class Options:
         sizes: numbers of grains.
         fines: fines for each grain.
         largest: another size, without fines and by fdnet alone; None for none.
-        spheres: numbers of spheres for the case `spheres`.
         limit: CPU seconds that a process of a peer may take.
-        times_only: without the errors against the truth and the case `specimen`.
         truth: folder of the packs of known permeability.
         openpnm_python: a Python that has OpenPNM; None without one.
     """
@@ -75,8 +72,6 @@ class Options:
     fines: float
     largest: int | None
     limit: float
-    spheres: Sequence[int] = ()
-    times_only: bool = False
     truth: Path = DATA
     openpnm_python: str | None = None
 
@@ -135,17 +130,6 @@ def fdnet_rows(grains: int, fines: int, folder: Path, limit: float) -> list[Row]
         common | walled | {"step": step} | values
         for step, values in result.get("walled", {}).items()
     ]
-
-
-def spheres_rows(wanted: int, folder: Path, limit: float) -> list[Row]:
-    """One row for each step of the network of all spheres; the spheres go to `folder`."""
-    result = child(
-        [sys.executable, str(HERE / "steps.py"), "--spheres", str(wanted), str(folder)], limit
-    )
-    counts = {name: result.get(name) for name in ("grains", "fines", "pores")}
-    common = {"tool": "fdnet", "case": "spheres", "status": result["status"], **counts}
-    steps = result.get("steps", {"total spheres": {}})
-    return [common | {"step": step} | values for step, values in steps.items()]
 
 
 def openpnm_rows(python: str, folder: Path, base: Row, limit: float) -> list[Row]:
@@ -255,14 +239,13 @@ def measure(options: Options) -> list[Row]:
     show([dict(zip(COLUMNS, COLUMNS, strict=True))])
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        rows: list[Row] = []
-        if not options.times_only:
-            truth, data = DATA / OWN_TRUTH, options.truth
-            rows = error_rows(data, folder, options.limit, with_yade=with_yade, truth=truth)
+        rows = error_rows(
+            options.truth, folder, options.limit, with_yade=with_yade, truth=DATA / OWN_TRUTH
+        )
         show(rows)
         runs = [(grains, round(grains * options.fines)) for grains in options.sizes]
         runs += [(options.largest, 0)] if options.largest else []
-        for grains, fines in [*runs, *([] if options.times_only else [SPECIMEN])]:
+        for grains, fines in [*runs, SPECIMEN]:
             most = LARGEST_LIMIT if grains == options.largest else OWN_LIMIT
             new = fdnet_rows(grains, fines, folder, most * options.limit)
             base = {name: new[0][name] for name in ("case", "grains", "pores")}
@@ -273,13 +256,6 @@ def measure(options: Options) -> list[Row]:
                     new.append(yade_row(folder / "spheres.npz", sides, base, options.limit))
             if grains == SPECIMEN[0]:
                 new = [row | {"case": "specimen"} for row in new if row["case"] == "tiled"]
-            show(new)
-            rows += new
-        for wanted in options.spheres:
-            new = spheres_rows(wanted, folder, LARGEST_LIMIT * options.limit)
-            base = {name: new[0][name] for name in ("case", "grains", "fines")}
-            if with_yade and new[0]["status"] == "ok" and wanted <= MOST_SPHERES_OF_PEERS:
-                new.append(yade_row(folder / "spheres.npz", "box", base, options.limit))
             show(new)
             rows += new
     set_growth(rows)

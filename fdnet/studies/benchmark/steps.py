@@ -4,6 +4,7 @@
 
     steps.py GRAINS FINES FOLDER      a tiled pack; spheres and networks for the peers go to FOLDER
     steps.py --pack PACK.csv FOLDER   k of a truth pack, periodic all round
+    steps.py --walled GRAINS FOLDER   grains of a tiled pack in a box of walls
     steps.py --spheres COUNT FOLDER   grains and fines of a tiled truth pack in one network
 
 It prints one line `RESULT {json}`.
@@ -222,6 +223,16 @@ def tiled_result(wanted: int, fine_count: int, folder: Path) -> dict[str, Any]:
     return {"grains": len(grains), "pores": count, "steps": clock.steps, "walled": walled}
 
 
+def walled_result(wanted: int, folder: Path) -> dict[str, Any]:
+    """Seconds and memory of every step on a tiled pack in a box of walls."""
+    rng = np.random.default_rng(1)
+    for count in (40, COMPILING):  # compiles and loads
+        run_walled(tiled(count, rng))
+    grains = tiled(wanted, rng)
+    leave_spheres(folder, grains)
+    return {"grains": len(grains), "fines": 0, "steps": run_walled(grains).steps}
+
+
 def run_spheres(spheres: Snapshot) -> tuple[Clock, int]:
     """The steps of the network of all `spheres`, and the number of its pores."""
     clock = Clock()
@@ -266,12 +277,15 @@ def pack_result(path: Path, folder: Path) -> dict[str, Any]:
     return {"k": analysis.k_damaged * 1e6, **counts}
 
 
+SIZED = {"--walled": walled_result, "--spheres": spheres_result}
+
+
 def main() -> None:
     folder = Path(sys.argv[3])
     if sys.argv[1] == "--pack":
         result = pack_result(Path(sys.argv[2]), folder)
-    elif sys.argv[1] == "--spheres":
-        result = spheres_result(int(sys.argv[2]), folder)
+    elif sys.argv[1] in SIZED:
+        result = SIZED[sys.argv[1]](int(sys.argv[2]), folder)
     else:
         result = tiled_result(int(sys.argv[1]), int(sys.argv[2]), folder)
     print("RESULT", json.dumps(result))
