@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """The same invasion by fdnet and by Yade's flow engine: deposit, k/k0, time and memory.
 
-    .venv/bin/python scripts/yade_invasion.py cases/quick/specimen5.toml --out runs/yade \\
-        --csv docs/validation/yade_invasion.csv --figure docs/validation/yade_invasion.png
+    .venv/bin/python scripts/yade_invasion.py cases/quick/specimen5.toml --fines 2000 \\
+        --out runs/yade --csv docs/validation/yade_invasion_2000.csv \\
+        --figure docs/validation/yade_invasion_2000.png
 
 Yade must be installed (Debian: apt install yade). Every number of fines and seed has a folder
 below --out; what is finished there is read, so the command can be cut and repeated. Yade ends
@@ -24,7 +25,7 @@ parser = argparse.ArgumentParser(
 )
 parser.add_argument("case", type=path_option, metavar="CASE.toml")
 parser.add_argument("--fines", type=int, nargs="+", default=[2000], help="default 2000")
-parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="default 1 2 3")
+parser.add_argument("--seeds", type=int, nargs="+", default=[1], help="default 1")
 parser.add_argument("--limit", type=float, default=1500.0, help="CPU seconds of Yade (1500)")
 parser.add_argument("--travel", type=float, default=0.5, help="way between meshes (0.5 diameters)")
 parser.add_argument("--out", type=path_option, default=Path("runs/yade"))

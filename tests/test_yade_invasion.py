@@ -140,7 +140,8 @@ def test_what_flows_into_the_spheres_of_yade_flows_out(tmp_path):
     assert answer.inflow > 0
 
 
-def test_the_page_shows_the_rows_of_its_table(root):
-    rows = read_named(root / "docs/validation/yade_invasion.csv")
+@pytest.mark.parametrize("fines", [2000, 10_000])
+def test_the_page_shows_the_rows_of_its_tables(root, fines):
+    rows = read_named(root / f"docs/validation/yade_invasion_{fines}.csv")
     page = (root / "docs/validation/yade-invasion.md").read_text(encoding="utf-8")
     assert yade_invasion_rows.comparison_table(rows) in page

@@ -20,18 +20,25 @@ PALE = "#DDDDDD"
 
 
 def draw_pair(pair: Pair, path: Path) -> Path:
-    """Both deposits from the side, and what they do, as PNG."""
+    """Both deposits from the side, and what they do, as PNG.
+
+    Where Yade was cut, fdnet's deposit is that of its last checkpoint before.
+    """
     import matplotlib as mpl
 
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    ends = (pair.run.spheres(), pair.yade_end)
+    step, then = pair.then or (pair.job.steps, pair.run.spheres())
+    ends = (then, pair.yade_end)
+    times = [1e3 * one * pair.job.time_step for one in (step, pair.answer.steps)]
     analyses = [judged(pair, end)[0] for end in ends]
     figure = plt.figure(figsize=(12, 8.4), constrained_layout=True)
     grid = figure.add_gridspec(3, 3, height_ratios=(1.0, 1.0, 1.15))
-    for row, (name, end) in enumerate(zip(TOOLS, ends, strict=True)):
-        _draw_side(figure.add_subplot(grid[row, :]), end, name, pair.job.length)
+    for row, (name, end, time) in enumerate(zip(TOOLS, ends, times, strict=True)):
+        axes = figure.add_subplot(grid[row, :])
+        _draw_side(axes, end, name, pair.job.length)
+        axes.set_title(f"{name}: fines at {time:.2f} ms", loc="left", fontsize=10)
     below = [figure.add_subplot(grid[2, column]) for column in range(3)]
     _draw_porosity(below[0], analyses)
     _draw_sections(below[1], analyses)
@@ -76,7 +83,6 @@ def _draw_side(axes: Any, end: Snapshot, name: str, length: float) -> None:
     axes.axvline(0, color=GREY, lw=0.8)
     width = 1e3 * float(end.box[2, 1])
     axes.set(xlim=(-0.75, 1e3 * length + 0.25), ylim=(0, width), aspect="equal", ylabel="z, mm")
-    axes.set_title(f"{name}: fines at the end", loc="left", fontsize=10)
     axes.set_xlabel("depth, mm")
 
 
