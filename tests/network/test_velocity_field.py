@@ -242,6 +242,17 @@ def test_tracers_are_intercepted_as_in_happels_cell(cells):
     assert intercepted(even, pack(), 0.05, tracers=800).efficiency > 4.0 * expected
 
 
+def test_small_tracers_do_not_gather_at_the_walls_of_a_coarse_grid():
+    """Happel's cell once more, at a touching distance of 0.08 spacings.
+
+    A velocity across the wall that is not what the velocity along it asks for makes sinks there.
+    """
+    current = fdnet.velocity_field(pack(), periodic="xyz", cells=8.0)
+    caught = intercepted(current.at, pack(), 0.02, tracers=4000)
+    assert caught.unfinished == 0
+    assert 1.0 / 1.4 < caught.efficiency / happel(0.42, 0.02) < 1.4
+
+
 def test_happels_cell_at_the_porosity_of_the_issue():
     assert happel(0.40, 0.02) == pytest.approx(0.0228, abs=5e-5)
     assert happel(0.40, 0.01) == pytest.approx(0.0057, abs=5e-5)

@@ -3,18 +3,20 @@
 Fluid that cannot slip and keeps its volume approaches a wall like the square of the distance d.
 Nearer than PROBE to a sphere, velocity / phi is therefore taken at the distance PROBE on the same
 normal; between two spheres nearer than that the probe stays on this side of the middle. The part
-of the velocity across the wall is replaced by
+of the velocity across the wall is replaced by what keeps the volume of the part along it,
 
-    w^2 (velocity across as sampled) - (1 - w) d / 2 (divergence along the sphere)
+    - (divergence along the sphere) (integral of phi from 0 to d) / phi(d),
 
-with w = d / PROBE; the divergence is that of the velocity along the sphere at the same distance,
-by central differences. The last term is what keeps the volume of a velocity that is linear in d.
+which is d (R - d / 3) / (2 R - d) times the divergence for the profile phi = d (2 R - d) / R^2 of
+one wall. The divergence is that of the velocity along the sphere at the distance d, by central
+differences. Any share of the velocity across as sampled would make sources and sinks here, which
+gather what the fluid carries at the walls.
 """
 
 from math import cos, floor, sin, sqrt
 
 from fdnet.network.compiled import compiled
-from fdnet.network.field.nearby import Place, wall_profile
+from fdnet.network.field.nearby import REACH, Place, wall_profile
 from fdnet.spheres.snapshot import Array
 
 PROBE = 0.8
@@ -160,7 +162,7 @@ def sample_points(point: Array, grid: Frame, nearby: Walls, smooth: Parts, resul
             sampled = u * p + v * q + w * r
             radius = near[1] + place[near[3], 3]
             spread = _spreading(inside, (normal, radius, STEP), grid, nearby, smooth)
-            balanced = -0.5 * near[1] * spread
-            across = share * share * sampled + (1.0 - share) * balanced - sampled
+            depth = near[1] * (REACH - near[1] / 3.0) / (2.0 * REACH - near[1])
+            across = -depth * spread - sampled
             u, v, w = u + across * p, v + across * q, w + across * r
         result[s, 0], result[s, 1], result[s, 2] = u, v, w
