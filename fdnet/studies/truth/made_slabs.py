@@ -18,6 +18,15 @@ BOX_MM = (2.5, 1.2, 1.2)
 DARCY_LENGTH_MM = 8.0
 SECTIONS = 5
 GRAIN_RANGE = [0.2, 0.3]
+UNIFORM = {"upstream": "interstitial", "pressure_gradient": False}
+FOLLOWED = {
+    "field": "network",
+    "upstream": "darcy",
+    "crowd": "beetstra",
+    "pressure_gradient": True,
+    "scheme": "implicit",
+}
+STIFF = {"stiffness_N_m": 1e5}
 Radius = float | list[float]
 
 
@@ -33,6 +42,8 @@ class Specimen:
         pack: porosity of the grains, or their number where no whole number of grains meets the
             porosity within fdnet's bound of 0.003.
         grain_mm: radius of the grains, or smallest and largest, mm.
+        followed: whether the flow follows the deposit (`drag.field = "network"`), with contacts
+            ten times as stiff, so that its larger forces press no fine far into another.
     """
 
     seed: int
@@ -41,6 +52,7 @@ class Specimen:
     friction: float
     pack: float | int
     grain_mm: Radius = 0.25
+    followed: bool = False
 
     def case(self, name: str) -> Case:
         """The case of the specimen, with the default of every key that is not named here."""
@@ -59,8 +71,8 @@ class Specimen:
                     "friction": self.friction,
                 },
                 "fluid": {"darcy_length_mm": DARCY_LENGTH_MM},
-                "drag": {"upstream": "interstitial", "pressure_gradient": False},
-                "run": {"time_step_factor": 0.1},
+                "drag": FOLLOWED if self.followed else UNIFORM,
+                "run": {"time_step_factor": 0.1} | (STIFF if self.followed else {}),
                 "analysis": {"sections": SECTIONS},
             }
         )
@@ -117,11 +129,27 @@ SPECIMENS = {
         grain_mm=GRAIN_RANGE,
     ),
     "slabW_r8_light": Specimen(seed=301, fine_mm=0.03125, supplied=700, friction=0.55, pack=34),
+    "slabX_r10": Specimen(seed=302, fine_mm=0.025, supplied=1800, friction=0.55, pack=35),
     "slabY_r5_mu0": Specimen(seed=303, fine_mm=0.05, supplied=180, friction=0.0, pack=33),
     "slabZ_r3": Specimen(seed=304, fine_mm=0.0833, supplied=40, friction=0.55, pack=36),
+    "slabAA_r8_mu0": Specimen(seed=305, fine_mm=0.03125, supplied=2000, friction=0.0, pack=36),
+    "slabAB_r10_range": Specimen(
+        seed=306, fine_mm=[0.022, 0.03], supplied=1600, friction=0.55, pack=0.36
+    ),
+    "slabAC_r5_followed": Specimen(
+        seed=307, fine_mm=0.05, supplied=400, friction=0.55, pack=0.40, followed=True
+    ),
+    "slabAD_r8_cake": Specimen(seed=308, fine_mm=0.03125, supplied=1700, friction=0.55, pack=32),
+    "slabAE_r8_cake": Specimen(seed=309, fine_mm=0.03125, supplied=2400, friction=0.55, pack=0.38),
+    "slabAF_r5_followed_cake": Specimen(
+        seed=310, fine_mm=0.05, supplied=700, friction=0.55, pack=34, followed=True
+    ),
+    "slabAG_r3_range_followed_cake": Specimen(
+        seed=311, fine_mm=[0.07, 0.095], supplied=150, friction=0.55, pack=36, followed=True
+    ),
 }
 """The specimens by name: r5 are fines of a fifth of a grain, mu0 is no friction, a range is one of
-radii (ranges: of grains too), a cake remains upstream of the face."""
+radii (ranges: of grains too), a cake remains upstream of the face; followed: by the flow."""
 
 COARSE, MIDDLE, FINE = (60, 72, 96), (72, 96, 120), (84, 96, 120)
 FINEST = (96, 120, 144)
@@ -155,9 +183,19 @@ CUTS: tuple[tuple[str, tuple[float, float], tuple[int, ...], str], ...] = (
     ("slabU_r10_range_cake", FACE, FINEST, YES),
     ("slabU_r10_range_cake", DEEP, FINE, YES),
     ("slabV_r5_ranges_cake", FACE, MIDDLE, YES),
-    ("slabW_r8_light", FACE, FINE, NO),
-    ("slabY_r5_mu0", FACE, MIDDLE, NO),
-    ("slabZ_r3", TWICE, MIDDLE, NO),
+    ("slabW_r8_light", FACE, FINE, YES),
+    ("slabX_r10", FACE, FINEST, NO),
+    ("slabY_r5_mu0", FACE, MIDDLE, YES),
+    ("slabZ_r3", TWICE, MIDDLE, YES),
+    ("slabAA_r8_mu0", FACE, FINE, NO),
+    ("slabAB_r10_range", FACE, FINEST, NO),
+    ("slabAB_r10_range", DEEP, FINE, NO),
+    ("slabAC_r5_followed", TWICE, MIDDLE, NO),
+    ("slabAD_r8_cake", FACE, FINEST, NO),
+    ("slabAD_r8_cake", DEEP, FINE, NO),
+    ("slabAE_r8_cake", FACE, FINEST, NO),
+    ("slabAF_r5_followed_cake", FACE, MIDDLE, NO),
+    ("slabAG_r3_range_followed_cake", FACE, MIDDLE, NO),
 )
 """Specimen, slab, grids, and whether its truth was known when the laws were shaped."""
 SLABS = {
