@@ -41,6 +41,8 @@ class Network:
             and less for the half ellipsoid (semi-axes h along x and (r^3 / h)^(1/2) across, with
             the radius r of the half sphere of its volume) that stands for the cap of a grain
             centred beyond an x face.
+        image_outward: (M,) m, from the place of such an image along x to the centre of its grain,
+            which lies beyond the face; 0 for all others.
         pore_images: (P, 4) images at the corners of the tetrahedron.
         pore_wrap: (P, 3) whole periods by which these images lie beyond the place of the pore.
         pore_position: (P, 3) m, centre of the sphere that touches the four grains; the centroid
@@ -78,6 +80,7 @@ class Network:
     image_position: Array
     image_radius: Array
     image_height: Array
+    image_outward: Array
     pore_images: Array
     pore_wrap: Array
     pore_position: Array
@@ -207,6 +210,8 @@ def _assembled(
 ) -> Network:
     """The network of these parts, its arrays read-only."""
     points = tessellation.tetrahedra.points
+    outward = placed.outward[points.owner]
+    beyond_low = points.position[:, 0] < tessellation.box[0].mean()
     network = Network(
         box=tessellation.box,
         periodic=tessellation.periodic,
@@ -216,6 +221,7 @@ def _assembled(
         image_position=points.position,
         image_radius=points.radius,
         image_height=placed.height[points.owner],
+        image_outward=np.where(beyond_low, -outward, outward),
         pore_images=pores.vertex,
         pore_wrap=pores.wrap,
         pore_position=pores.position,

@@ -94,7 +94,7 @@ def test_fines_upstream_count_as_far_as_they_reach_in(pack):
 
 
 def test_renumbering_mirror_shift_and_scale_leave_k(pack, analysis):
-    """Within 0.1 %: prisms that a face cuts are split either way, which changes their fourth."""
+    """Within 0.2 %: prisms that a face cuts are split either way, which changes their fourth."""
     order = np.random.default_rng(5).permutation(len(pack))
     numbered = pack.where(order)
     mirrored, shifted = pack.position.copy(), pack.position.copy()
@@ -110,7 +110,7 @@ def test_renumbering_mirror_shift_and_scale_leave_k(pack, analysis):
         result = analyse(other, periodic=SIDES, sections=2, damage_law="all-spheres")
         assert result.k_damaged == pytest.approx(factor * analysis.k_damaged, rel=3e-4)
         for one, own in zip(result.sections, analysis.sections, strict=True):
-            assert one.k_damaged == pytest.approx(factor * own.k_damaged, rel=1e-3)
+            assert one.k_damaged == pytest.approx(factor * own.k_damaged, rel=2e-3)
 
 
 def test_a_mirrored_periodic_pack_has_the_same_throats(pack):

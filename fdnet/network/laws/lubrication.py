@@ -15,7 +15,8 @@ orifice (Happel and Brenner 1965, section 4-29).
 
 Where side walls hold the fluid (`Network.walls` "no-slip"), the sections that they cut are those
 of `wall_cross_section`. The cap of a grain centred beyond an x face shows the discs of a half
-ellipsoid (`Network.image_height`). With `fourth`, a section is narrowed by the fourth grain of the
+ellipsoid (`Network.image_height`), and the flux is corrected for where the disc of the grain
+itself lies (`cut_grains`). With `fourth`, a section is narrowed by the fourth grain of the
 tetrahedron where that reaches in (`fourth_grain`).
 """
 
@@ -24,6 +25,7 @@ import numpy as np
 from fdnet.network import geometry
 from fdnet.network.compiled import compiled_for_loops
 from fdnet.network.laws.cross_section import wedges
+from fdnet.network.laws.cut_grains import cut_corners, share_of_cut
 from fdnet.network.laws.fourth_grain import fourth_grains
 from fdnet.network.laws.open_sections import (
     STEPS,
@@ -78,6 +80,7 @@ def half_resistances(
             (order[part], place[part], share[part]),
             (floor, float(widening)),
             (beside, *outside, table),
+            cut_corners(network, part, corner),
         )
     capped = np.any(network.throat_corner_height < network.throat_corner_radius, axis=1)
     resistance[(network.throat_radius <= 0) & ~capped] = np.inf
@@ -130,6 +133,7 @@ def _halves(
     cuts: tuple[Array, Array, Array],
     given: tuple[float, float],
     more: tuple[Array, Array, Array, Array],
+    cut: Array,
 ) -> Array:
     radius, flatness = discs
     order, place, part = cuts
@@ -144,22 +148,22 @@ def _halves(
         even = even and np.max(flatness[t]) - np.min(flatness[t]) <= EQUAL
         wedge = wedges(corner[t]) if even else np.empty((0, 7))
         throat = (corner[t], radius[t], flatness[t], wedge)
-        wall = (order[t], place[t], part[t])
+        faces = (order[t], place[t], part[t], cut[t])
         outside = around[first[t] : first[t + 1]]
         forget(room, len(outside))
         if high > 0.0:
             span, others = (max(low, 0.0), high, 1.0), (beside[t, 1], outside)
-            resistance[t, 1] = _resistance(throat, wall, (span, widening), others, (room, table))
+            resistance[t, 1] = _resistance(throat, faces, (span, widening), others, (room, table))
         if low < 0.0:
             span, others = (max(-high, 0.0), -low, -1.0), (beside[t, 0], outside)
-            resistance[t, 0] = _resistance(throat, wall, (span, widening), others, (room, table))
+            resistance[t, 0] = _resistance(throat, faces, (span, widening), others, (room, table))
     return resistance
 
 
 @compiled_for_loops
 def _resistance(
     throat: tuple[Array, Array, Array, Array],
-    wall: tuple[Array, Array, float],
+    faces: tuple[Array, Array, float, Array],
     span: tuple[tuple[float, float, float], float],
     others: tuple[Array, Array],
     more: tuple[SectionRoom, Array],
@@ -172,13 +176,18 @@ def _resistance(
     step = (high - low) / STEPS
     room, table = more
     set_discs(throat, low, step, room)
-    order, place, part = wall
+    order, place, part, cut = faces
     flux, discs = room[0], room[1]
     if order[0] >= 0:
         for k in range(STEPS + 1):
             flux[k] = wall_flux(place, discs[order[0], k], discs[order[1], k], table)
     else:
         open_fluxes(throat, (low, step, sense), others, room, table)
+        if np.max(cut[:, 3]) > 0.0:
+            rays = (room[5], room[4][0][3], table)
+            for k in range(STEPS + 1):
+                z, disc = sense * (low + k * step), discs[:, k].copy()
+                flux[k] *= share_of_cut(throat[0], disc, z, cut, rays)
     for k in range(len(flux)):
         if not part * flux[k] > 0.0:
             return np.inf

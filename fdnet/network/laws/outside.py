@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from fdnet.network import geometry
 from fdnet.network.compiled import compiled, compiled_for_loops
+from fdnet.network.laws.facet_axes import facet_axes
 from fdnet.network.laws.section_rays import (
     RAYS,
     SWALLOWED,
@@ -108,17 +109,9 @@ def _from_facet(
 ) -> Array:
     """Places (N, 3) m of images from the first corner of their `facet` (K, 3, 3) m."""
     open_row, row, image = of_row
-    along = facet[:, 1] - facet[:, 0]
-    along /= np.linalg.norm(along, axis=1)[:, None]
-    normal = geometry.cross(along, facet[:, 2] - facet[:, 0])
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
-    across = geometry.cross(normal, along)
-    pore = network.pore_images[network.throat_pores[part][open_row, 0]]
-    away = geometry.dot(network.image_position[pore] - facet[:, :1], normal[:, None])
-    apex = np.take_along_axis(away, np.argmax(np.abs(away), axis=1)[:, None], axis=1)
-    normal *= -np.sign(apex)
+    axes = facet_axes(network, part.start + open_row, facet)
     apart = network.image_position[image] - facet[row, 0]
-    return np.stack([geometry.dot(apart, one[row]) for one in (along, across, normal)], axis=1)
+    return np.stack([geometry.dot(apart, one[row]) for one in axes], axis=1)
 
 
 Bundles = tuple[Array, Array, Array, Array]

@@ -39,6 +39,7 @@ class PlacedGrains:
 
     grains: Snapshot
     height: Array
+    outward: Array
     index: Array
     periodic: tuple[bool, bool, bool]
     scale: float
@@ -64,9 +65,11 @@ def place_grains(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Plac
     inside = grains.where(index)
     placed, beyond = onto_walls(inside, periodic)
     _refuse_coincident(placed, periodic)
+    outward = _outward(inside, periodic)
     return PlacedGrains(
         grains=placed,
-        height=_heights_along_x(inside, placed, periodic),
+        height=_heights_along_x(inside, placed, outward),
+        outward=outward,
         index=index,
         periodic=periodic,
         scale=float(inside.radius.mean()),
@@ -150,20 +153,27 @@ def _same_cap(radius: Array, height: Array, depth: float) -> Array:
     return np.maximum(same, depth)
 
 
-def _heights_along_x(given: Snapshot, placed: Snapshot, periodic: tuple[bool, ...]) -> Array:
-    """Semi-axis along x (n,) m of the half ellipsoids that stand for caps at the x faces.
+def _outward(given: Snapshot, periodic: tuple[bool, ...]) -> Array:
+    """How far beyond an x face (n,) m the grains are centred that show the box a flat cap.
 
-    Of a grain centred beyond an x face, a cap of height h on a disc of radius a is in the box. The
-    half ellipsoid on that disc with the volume of the cap has the height h (3 a^2 + h^2) / (4
-    a^2); `placed` has the radius of the half sphere of that volume. All other grains are spheres,
-    those that lie beyond a side wall as well among them: their height is their radius.
+    It is 0 for all other grains, those that lie beyond a side wall as well among them.
     """
     beyond = np.maximum(given.box[:, 0] - given.position, given.position - given.box[:, 1])
     outside = (beyond > ON_FACE_TOLERANCE * float(given.radius.mean())) & ~np.array(periodic)
-    cap = outside[:, 0] & ~outside[:, 1:].any(axis=1)
-    tall = np.where(cap, given.radius - beyond[:, 0], given.radius)
+    return np.where(outside[:, 0] & ~outside[:, 1:].any(axis=1), beyond[:, 0], 0.0)
+
+
+def _heights_along_x(given: Snapshot, placed: Snapshot, outward: Array) -> Array:
+    """Semi-axis along x (n,) m of the half ellipsoids that stand for caps at the x faces.
+
+    Of a grain centred beyond an x face, by `outward` (n,) m, a cap of height h on a disc of radius
+    a is in the box. The half ellipsoid on that disc with the volume of the cap has the height
+    h (3 a^2 + h^2) / (4 a^2); `placed` has the radius of the half sphere of that volume. All other
+    grains are spheres: their height is their radius.
+    """
+    tall = given.radius - outward
     base = tall * (2.0 * given.radius - tall)
-    return np.where(cap, tall * (3.0 * base + tall**2) / (4.0 * base), placed.radius)
+    return np.where(outward > 0.0, tall * (3.0 * base + tall**2) / (4.0 * base), placed.radius)
 
 
 def _refuse_coincident(grains: Snapshot, periodic: tuple[bool, ...]) -> None:
