@@ -134,7 +134,7 @@ SPECIMENS = {
     "slabZ_r3": Specimen(seed=304, fine_mm=0.0833, supplied=40, friction=0.55, pack=36),
     "slabAA_r8_mu0": Specimen(seed=305, fine_mm=0.03125, supplied=2000, friction=0.0, pack=36),
     "slabAB_r10_range": Specimen(
-        seed=306, fine_mm=[0.022, 0.03], supplied=1600, friction=0.55, pack=0.36
+        seed=306, fine_mm=[0.022, 0.03], supplied=1600, friction=0.55, pack=35
     ),
     "slabAC_r5_followed": Specimen(
         seed=307, fine_mm=0.05, supplied=400, friction=0.55, pack=0.40, followed=True
