@@ -165,7 +165,7 @@ def test_laws_on_a_slab(tmp_path):
     [row] = slab_rows(tmp_path, [YES], [pair, finest])
     assert slab_rows(tmp_path, [NO], [pair]) == []
     assert row[pair] == pytest.approx(1.0, abs=0.1)
-    assert row[finest] == pytest.approx(1.0, abs=0.15)
+    assert row[finest] == pytest.approx(1.0, abs=0.2)
     assert row[f"{pair}: k0"] == pytest.approx(1.0, abs=0.15)
     assert row[f"{pair}: k"] == pytest.approx(row[pair] * row[f"{pair}: k0"], rel=1e-3)
     assert row["k_over_k0"] == pytest.approx(

@@ -1,8 +1,8 @@
 """Deposits of the Stokes truth that LIGGGHTS makes, and the slabs cut from them.
 
 Every specimen is a run of fdnet's own chain: a pack in a box whose sides are periodic, then an
-invasion under a uniform drag. The seeds are those of the specimens, so that a specimen is made
-again by one command (docs/stokes.md).
+invasion under a uniform drag, or by a flow that follows the deposit. The seeds are those of the
+specimens, so that a specimen is made again by one command (docs/stokes.md).
 """
 
 from collections.abc import Sequence
@@ -133,9 +133,6 @@ SPECIMENS = {
     "slabY_r5_mu0": Specimen(seed=303, fine_mm=0.05, supplied=180, friction=0.0, pack=33),
     "slabZ_r3": Specimen(seed=304, fine_mm=0.0833, supplied=40, friction=0.55, pack=36),
     "slabAA_r8_mu0": Specimen(seed=305, fine_mm=0.03125, supplied=2000, friction=0.0, pack=36),
-    "slabAB_r10_range": Specimen(
-        seed=306, fine_mm=[0.022, 0.03], supplied=1600, friction=0.55, pack=35
-    ),
     "slabAC_r5_followed": Specimen(
         seed=307, fine_mm=0.05, supplied=400, friction=0.55, pack=0.40, followed=True
     ),
@@ -188,8 +185,6 @@ CUTS: tuple[tuple[str, tuple[float, float], tuple[int, ...], str], ...] = (
     ("slabY_r5_mu0", FACE, MIDDLE, YES),
     ("slabZ_r3", TWICE, MIDDLE, YES),
     ("slabAA_r8_mu0", FACE, FINE, NO),
-    ("slabAB_r10_range", FACE, FINEST, NO),
-    ("slabAB_r10_range", DEEP, FINE, NO),
     ("slabAC_r5_followed", TWICE, MIDDLE, NO),
     ("slabAD_r8_cake", FACE, FINEST, NO),
     ("slabAD_r8_cake", DEEP, FINE, NO),
