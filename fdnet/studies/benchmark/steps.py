@@ -226,7 +226,7 @@ def tiled_result(wanted: int, fine_count: int, folder: Path) -> dict[str, Any]:
 def walled_result(wanted: int, folder: Path) -> dict[str, Any]:
     """Seconds and memory of every step on a tiled pack in a box of walls."""
     rng = np.random.default_rng(1)
-    for count in (40, COMPILING):  # compiles and loads
+    for count in (40, 4 * COMPILING):  # compiles and loads
         run_walled(tiled(count, rng))
     grains = tiled(wanted, rng)
     leave_spheres(folder, grains)
