@@ -4,8 +4,6 @@ The uniform runs are those of `fdnet study thesis`, whose table is read.
 """
 
 import csv
-import math
-import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -18,7 +16,6 @@ from fdnet.case.shipped import case_path
 from fdnet.files.atomic import write_text
 from fdnet.run.finished import FinishedRun
 from fdnet.run.open_run import open_run, run_case
-from fdnet.studies.engine.runner import child_core_seconds
 
 SUPPLIED = {"specimen1": 1000, "specimen5": 7500, "specimen7": 12_000, "specimen8": 12_000}
 """Fines in the slab of each specimen: more than enter and more than its cake holds."""
@@ -57,8 +54,6 @@ class FollowedRow:
         stop_reason: why the run ended.
         time_ms: simulated time.
         overlap: largest overlap of a fine, over the smaller diameter.
-        liggghts_core_s: CPU seconds of LIGGGHTS, packing included; nan where the run was read.
-        fdnet_core_s: CPU seconds of fdnet, from the case to the analysis; nan likewise.
     """
 
     specimen: str
@@ -75,8 +70,6 @@ class FollowedRow:
     stop_reason: str
     time_ms: float
     overlap: float
-    liggghts_core_s: float
-    fdnet_core_s: float
 
 
 def followed_rows(
@@ -95,16 +88,14 @@ def followed_rows(
 
 def _followed(name: str, seed: int, out: Path) -> FollowedRow:
     keys = [*FOLLOWED, f"fines.count={SUPPLIED[name]}", f"seed={seed}"]
-    case, spent = read_case(case_path(name), assignments=keys), (math.nan, math.nan)
+    case = read_case(case_path(name), assignments=keys)
     if not (out / "manifest.json").exists():
-        before = child_core_seconds(), time.process_time()
         stages = ("pack", "invade", "analyse")
         run_case(case, out, stages=stages, resume=out.exists(), progress=False)
-        spent = child_core_seconds() - before[0], time.process_time() - before[1]
-    return _row(case, open_run(out), spent)
+    return _row(case, open_run(out))
 
 
-def _row(case: Case, run: FinishedRun, spent: tuple[float, float]) -> FollowedRow:
+def _row(case: Case, run: FinishedRun) -> FollowedRow:
     summary, record, fines = run.summary, run.manifest["invade"], run.spheres().fines()
     depth = fines.position[:, 0]
     inside = depth[(depth >= 0) & (depth < case.size_m[0])]
@@ -124,8 +115,6 @@ def _row(case: Case, run: FinishedRun, spent: tuple[float, float]) -> FollowedRo
         stop_reason=summary["stop_reason"],
         time_ms=1e3 * record["steps"] * record["dt_s"],
         overlap=summary["max_overlap_fraction"],
-        liggghts_core_s=spent[0],
-        fdnet_core_s=spent[1],
     )
 
 
@@ -152,8 +141,6 @@ def _uniform(row: Mapping[str, str]) -> FollowedRow:
         stop_reason=row["stop_reason"],
         time_ms=float(row["time_ms"]),
         overlap=float(row["max_overlap"]),
-        liggghts_core_s=math.nan,
-        fdnet_core_s=math.nan,
     )
 
 

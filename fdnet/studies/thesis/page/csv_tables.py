@@ -2,7 +2,7 @@
 
 import csv
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from fdnet.studies.engine.markdown import NONE, figure, markdown_table
@@ -31,6 +31,18 @@ TETRAHEDRA_COLUMNS = {
     "tetrahedra_all": "tetrahedra of all spheres",
     "tetrahedra_grains": "of the grains alone",
     "ratio": "ratio",
+}
+FOLLOWED_COLUMNS = {
+    ("invaded", 1.0): "fines inside",
+    ("first_mm", 1.0): "in the first mm",
+    ("mean_depth_mm", 1.0): "mean depth, mm",
+    ("p95_depth_mm", 1.0): "depth of 95 %, mm",
+    ("porosity_loss_first_mm", 100.0): "porosity lost, first mm, points",
+    ("k_lost_1", 100.0): "k lost, first mm, %",
+    ("k_lost_2", 100.0): "second mm, %",
+    ("k_lost", 100.0): "whole, %",
+    ("rate", 1.0): "last rate over first",
+    ("overlap", 100.0): "overlap, %",
 }
 READINGS = {WHOLE: "whole pores", CUT: "and cut ones", ALONE: "the section alone"}
 
@@ -62,6 +74,26 @@ def statistics_table(path: Path) -> str:
     ]
     header = ["run", "where in the thesis", "quantity", "thesis", *READINGS.values()]
     return markdown_table(header, lines)
+
+
+def followed_table(path: Path) -> str:
+    """Specimens in the uniform flow and in one that follows the deposit; ranges over the seeds."""
+    rows = _rows(path)
+    names = dict.fromkeys((row["specimen"], row["flow"]) for row in rows)
+    lines = []
+    for specimen, flow in names:
+        runs = [row for row in rows if (row["specimen"], row["flow"]) == (specimen, flow)]
+        cells = [_range([row[name] for row in runs], scale) for name, scale in FOLLOWED_COLUMNS]
+        ends = ", ".join(dict.fromkeys(row["stop_reason"].replace("_", " ") for row in runs))
+        lines.append([specimen.removeprefix("specimen"), flow, str(len(runs)), *cells, ends])
+    header = ["specimen", "flow", "seeds", *FOLLOWED_COLUMNS.values(), "ended by"]
+    return markdown_table(header, lines)
+
+
+def _range(texts: Sequence[str], scale: float) -> str:
+    """The least and the greatest of some numbers, or the one number."""
+    ends = sorted(scale * float(text) for text in texts)
+    return figure(ends[0]) if len(ends) == 1 else f"{figure(ends[0])} to {figure(ends[-1])}"
 
 
 def figures(path: Path) -> str:

@@ -15,6 +15,8 @@ from fdnet.studies.thesis.outputs import CAPTIONS, DEPOSITION, STATISTICS, TETRA
 from fdnet.studies.thesis.page import csv_tables, run_tables
 
 PAGE, SOURCE, TABLES = "thesis.md", "thesis.md.in", "thesis"
+FOLLOWED = "followed.csv"
+"""The table of scripts/followed.py."""
 
 
 def write_page(docs: Path) -> Path:
@@ -59,6 +61,7 @@ def page_parts(folder: Path) -> dict[str, str]:
         "statistics": csv_tables.statistics_table(folder / STATISTICS),
         "deposition": csv_tables.deposition_table(folder / DEPOSITION),
         "tetrahedra": csv_tables.tetrahedra_table(folder / TETRAHEDRA),
+        "followed": csv_tables.followed_table(folder / FOLLOWED),
         "figures": csv_tables.figures(folder / CAPTIONS),
     }
 
