@@ -128,6 +128,26 @@ def test_the_first_screen_holds_the_results(rows, prose):
     assert f"{min(lost):.0f} to {max(lost):.0f} points for all but specimen 1" in prose
 
 
+def test_the_followed_flow_holds_its_table(root, prose):
+    rows = [row for row in csv_rows(root / "docs/thesis/followed.csv") if "5" in row["specimen"]]
+    by_flow = {
+        flow: [row for row in rows if row["flow"] == flow] for flow in ("followed", "uniform")
+    }
+
+    def ends(flow, name):
+        values = [100 * float(row[name]) for row in by_flow[flow]]
+        return f"{min(values):.0f} to {max(values):.0f}"
+
+    for name in ("k_lost_1", "k_lost_2", "k_lost"):
+        assert f"{ends('followed', name)} %" in prose
+        assert f"instead of {ends('uniform', name)} %" in prose
+    depth = [
+        np.mean([float(row["mean_depth_mm"]) for row in by_flow[flow]])
+        for flow in ("followed", "uniform")
+    ]
+    assert 2 < depth[0] / depth[1] < 3
+
+
 def test_how_far_to_trust_it_holds_the_results(rows, prose):
     single = [run for run in SPECIMENS if len(values(rows, run, "seed")) == 1]
     assert single == ["specimen3", "specimen6", "specimen7", "specimen8"]

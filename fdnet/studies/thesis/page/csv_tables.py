@@ -81,7 +81,7 @@ def followed_table(path: Path) -> str:
     rows = _rows(path)
     names = dict.fromkeys((row["specimen"], row["flow"]) for row in rows)
     lines = []
-    for specimen, flow in names:
+    for specimen, flow in sorted(names, key=lambda name: name[0]):
         runs = [row for row in rows if (row["specimen"], row["flow"]) == (specimen, flow)]
         cells = [_range([row[name] for row in runs], scale) for name, scale in FOLLOWED_COLUMNS]
         ends = ", ".join(dict.fromkeys(row["stop_reason"].replace("_", " ") for row in runs))
