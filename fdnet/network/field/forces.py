@@ -61,18 +61,15 @@ class Problem:
     def spread(self, force: Array) -> list[Array]:
         """Forces (M,) on their nodes: three grids, overwritten at the next call."""
         for grid, node, part in zip(self.grids, self.nodes, self.parts, strict=True):
-            grid.reshape(-1)[node] = force[part]
+            put(grid.reshape(-1), node, force[part])
         return self.grids
 
     def apply(self, scaled: Array) -> Array:
         """A times `scaled` (M,)."""
-        rows = list(zip(self.nodes, self.parts, strict=True))
-        for grid, (node, part) in zip(self.grids, rows, strict=True):
-            put(grid.reshape(-1), node, self.weight[part], scaled[part])
-        flows = self.response.velocity(self.grids)
+        flows = self.response.velocity(self.spread(self.weight * scaled))
         moved = [
             moved_at(flow.reshape(-1), node, self.slack[part], self.weight[part], scaled[part])
-            for flow, (node, part) in zip(flows, rows, strict=True)
+            for flow, node, part in zip(flows, self.nodes, self.parts, strict=True)
         ]
         return np.concatenate(moved)
 

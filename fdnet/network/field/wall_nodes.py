@@ -37,10 +37,10 @@ def differences(value: Array, near: Array, weight: float) -> Array:
 
 
 @compiled
-def put(grid: Array, node: Array, weight: Array, scaled: Array) -> None:
-    """Sets a flat `grid` to weight times scaled (M,) at the nodes."""
+def put(grid: Array, node: Array, force: Array) -> None:
+    """Sets a flat `grid` to the `force` (M,) at the nodes."""
     for one in range(len(node)):
-        grid[node[one]] = weight[one] * scaled[one]
+        grid[node[one]] = force[one]
 
 
 @compiled

@@ -3,19 +3,18 @@
 It is not a study with a knee: it shows what a coupled drag changes and what it costs.
 """
 
-import csv
 import math
 import re
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
 from fdnet.case.file import read_case
-from fdnet.files.atomic import write_text
 from fdnet.run.open_run import open_run, run_case
+from fdnet.studies.engine.csv_rows import write_named
 from fdnet.studies.engine.runner import child_core_seconds
 
 LAWS = ("analysis.law=lubrication", "analysis.damage_law=side-kozeny")
@@ -76,9 +75,6 @@ class CouplingRow:
     fdnet_core_s: float
 
 
-COLUMNS = tuple(CouplingRow.__dataclass_fields__)
-
-
 def coupling_rows(
     case: Path, fluids: Iterable[str], seeds: Iterable[int], folder: Path
 ) -> list[CouplingRow]:
@@ -126,15 +122,4 @@ def _row(path: Path, fluid: str, seed: int, out: Path) -> CouplingRow:
 
 def write_rows(path: Path, rows: Sequence[CouplingRow]) -> None:
     """Write the rows as CSV, numbers with four digits."""
-    lines = [",".join(COLUMNS)]
-    for row in rows:
-        cells = [getattr(row, name) for name in COLUMNS]
-        texts = [f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in cells]
-        lines.append(",".join(f'"{text}"' if "," in text else text for text in texts))
-    write_text(path, "\n".join(lines) + "\n")
-
-
-def read_rows(path: Path) -> list[dict[str, str]]:
-    """The rows of such a CSV file, as text."""
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+    write_named(path, [asdict(row) for row in rows], digits=4)

@@ -3,9 +3,8 @@
 The uniform runs are those of `fdnet study thesis`, whose table is read.
 """
 
-import csv
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +12,9 @@ import numpy as np
 from fdnet.case.case import Case
 from fdnet.case.file import read_case
 from fdnet.case.shipped import case_path
-from fdnet.files.atomic import write_text
 from fdnet.run.finished import FinishedRun
 from fdnet.run.open_run import open_run, run_case
+from fdnet.studies.engine.csv_rows import read_named, write_named
 
 SUPPLIED = {"specimen1": 1000, "specimen5": 7500, "specimen7": 12_000, "specimen8": 12_000}
 """Fines in the slab of each specimen: more than enter and more than its cake holds."""
@@ -120,8 +119,7 @@ def _row(case: Case, run: FinishedRun) -> FollowedRow:
 
 def uniform_rows(table: Path, specimens: Iterable[str]) -> list[FollowedRow]:
     """The rows of specimens in the table of `fdnet study thesis`, by fdnet's own laws."""
-    with table.open(encoding="utf-8", newline="") as file:
-        rows = [row for row in csv.DictReader(file) if row["law"] == "lubrication"]
+    rows = [row for row in read_named(table) if row["law"] == "lubrication"]
     return [_uniform(row) for name in specimens for row in rows if row["id"] == name]
 
 
@@ -146,17 +144,15 @@ def _uniform(row: Mapping[str, str]) -> FollowedRow:
 
 def write_followed(path: Path, rows: Sequence[FollowedRow]) -> None:
     """Write the rows as CSV, numbers with four digits; each millimetre has a column."""
-    names = [item.name for item in fields(FollowedRow)]
-    lines = [",".join(names).replace("k_lost_by_mm", ",".join(map(_column, range(SECTIONS))))]
-    lines += [",".join(_text(value) for value in asdict(row).values()) for row in rows]
-    write_text(path, "\n".join(lines) + "\n")
+    write_named(path, [_named(row) for row in rows], digits=4)
 
 
-def _column(section: int) -> str:
-    return f"k_lost_{section + 1}"
-
-
-def _text(value: object) -> str:
-    if isinstance(value, tuple):
-        return ",".join(map(_text, value))
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+def _named(row: FollowedRow) -> dict[str, object]:
+    """The values of a row by column."""
+    values: dict[str, object] = {}
+    for name, value in asdict(row).items():
+        if name == "k_lost_by_mm":
+            values |= {f"k_lost_{k + 1}": lost for k, lost in enumerate(value)}
+        else:
+            values[name] = value
+    return values
