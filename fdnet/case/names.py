@@ -17,7 +17,7 @@ AUTO: DamageLawName = "auto"
 ALL_SPHERES: DamageLawName = "all-spheres"
 DEFAULT_DAMAGE_LAW: DamageLawName = "side-kozeny"
 """The most accurate damage law of the network of the grains."""
-MOST_SPHERES = 20_000
+MOST_SPHERES = 100_000
 """Grains and fines up to which the default takes `all-spheres`."""
 MOST_SECTIONS = 1000
 

@@ -19,9 +19,9 @@ from fdnet.scales.forces.crowd import (
     Crowd,
     bed_factor,
     drag_factor,
-    sauter_mean,
     size_factor,
 )
+from fdnet.spheres.arrays import sauter_mean
 
 TUTORIAL = Bed(diameter=1e-3, porosity=0.451335, viscosity=1.5e-3, density=10.0)
 """CFDEMcoupling's ErgunTestMPI, as its totalPressureDrop.m has it."""

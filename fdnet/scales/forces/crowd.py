@@ -112,8 +112,3 @@ def drag_factor(crowd: Crowd, *, gradient_apart: bool) -> Array:
         crowd.porosity, crowd.reynolds
     )
     return total * np.asarray(crowd.porosity, float) if gradient_apart else total
-
-
-def sauter_mean(diameter: Array) -> float:
-    """Sum of d^3 over sum of d^2 of the diameters (N,), m."""
-    return float(np.sum(diameter**3) / np.sum(diameter**2))

@@ -144,6 +144,28 @@ SPECIMENS = {
     "slabAG_r3_range_followed_cake": Specimen(
         seed=311, fine_mm=[0.07, 0.095], supplied=150, friction=0.55, pack=36, followed=True
     ),
+    "slabAH_r8": Specimen(seed=312, fine_mm=0.03125, supplied=1200, friction=0.55, pack=33),
+    "slabAI_r10": Specimen(seed=313, fine_mm=0.025, supplied=2000, friction=0.55, pack=34),
+    "slabAJ_r5": Specimen(seed=314, fine_mm=0.05, supplied=160, friction=0.55, pack=35),
+    "slabAK_r4": Specimen(seed=315, fine_mm=0.0625, supplied=130, friction=0.55, pack=34),
+    "slabAL_r4_mu0_cake": Specimen(
+        seed=316, fine_mm=0.0625, supplied=350, friction=0.0, pack=0.38
+    ),
+    "slabAM_r8_ranges": Specimen(
+        seed=317,
+        fine_mm=[0.025, 0.0375],
+        supplied=1200,
+        friction=0.3,
+        pack=0.36,
+        grain_mm=GRAIN_RANGE,
+    ),
+    "slabAN_r6": Specimen(seed=318, fine_mm=0.04167, supplied=350, friction=0.55, pack=0.40),
+    "slabAO_r8_followed": Specimen(
+        seed=319, fine_mm=0.03125, supplied=1200, friction=0.55, pack=34, followed=True
+    ),
+    "slabAP_r3": Specimen(seed=320, fine_mm=0.0833, supplied=60, friction=0.55, pack=0.36),
+    "slabAQ_r5_mu0": Specimen(seed=321, fine_mm=0.05, supplied=280, friction=0.0, pack=34),
+    "slabAR_r10_mu0": Specimen(seed=322, fine_mm=0.025, supplied=3000, friction=0.0, pack=37),
 }
 """The specimens by name: r5 are fines of a fifth of a grain, mu0 is no friction, a range is one of
 radii (ranges: of grains too), a cake remains upstream of the face; followed: by the flow."""
@@ -191,6 +213,18 @@ CUTS: tuple[tuple[str, tuple[float, float], tuple[int, ...], str], ...] = (
     ("slabAE_r8_cake", FACE, FINEST, NO),
     ("slabAF_r5_followed_cake", FACE, MIDDLE, NO),
     ("slabAG_r3_range_followed_cake", FACE, MIDDLE, NO),
+    ("slabAH_r8", FACE, FINEST, NO),
+    ("slabAH_r8", DEEP, FINE, NO),
+    ("slabAI_r10", FACE, FINEST, NO),
+    ("slabAJ_r5", FACE, MIDDLE, NO),
+    ("slabAK_r4", FACE, MIDDLE, NO),
+    ("slabAL_r4_mu0_cake", TWICE, MIDDLE, NO),
+    ("slabAM_r8_ranges", FACE, FINEST, NO),
+    ("slabAN_r6", TWICE, MIDDLE, NO),
+    ("slabAO_r8_followed", FACE, FINEST, NO),
+    ("slabAP_r3", TWICE, MIDDLE, NO),
+    ("slabAQ_r5_mu0", TWICE, MIDDLE, NO),
+    ("slabAR_r10_mu0", FACE, FINEST, NO),
 )
 """Specimen, slab, grids, and whether its truth was known when the laws were shaped."""
 SLABS = {
