@@ -15,7 +15,7 @@ from fdnet.case.values import (
     Vector,
 )
 
-UPDATE_TRAVEL, MOST_TRAVEL = 0.5, 10.0
+CROWD_TRAVEL, FLOW_TRAVEL, MOST_TRAVEL = 0.5, 1.0, 10.0
 """Diameters of the smallest fine between two updates: by default, and at most."""
 
 
@@ -111,8 +111,8 @@ class Drag(Part):
     update_travel: Annotated[float, Field(gt=0, le=MOST_TRAVEL)] | None = Field(
         None,
         description="How far the fluid carries a fine, in diameters of the smallest fine, before "
-        "the forces in a crowd are computed anew. When absent: "
-        f"{UPDATE_TRAVEL:g}.",
+        "the forces on all fines are computed anew. When absent: "
+        f'{FLOW_TRAVEL:g} where the field is "network", else {CROWD_TRAVEL:g}.',
     )
 
     @property
@@ -123,7 +123,8 @@ class Drag(Part):
     @property
     def travel_diameters(self) -> float:
         """Diameters of the smallest fine between two updates of a coupled invasion."""
-        return UPDATE_TRAVEL if self.update_travel is None else self.update_travel
+        usual = FLOW_TRAVEL if self.field == "network" else CROWD_TRAVEL
+        return usual if self.update_travel is None else self.update_travel
 
 
 class Gravity(Part):

@@ -13,6 +13,7 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import read_case
+from fdnet.case.parts import FLOW_TRAVEL
 from fdnet.case.shipped import case_path
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
@@ -135,5 +136,5 @@ STUDY = Study(
     inputs=inputs,
     needs_liggghts=True,
     panels=tuple(Panel(quantity=name, title=title) for name, title in _WORDS.items()),
-    defaults={TRAVEL: 0.5, SOLVED: RENEWED, STOOD: STANDING},
+    defaults={TRAVEL: FLOW_TRAVEL, SOLVED: RENEWED, STOOD: STANDING},
 )

@@ -16,7 +16,14 @@ from fdnet.run.finished import FinishedRun
 from fdnet.run.open_run import open_run, run_case
 from fdnet.studies.engine.csv_rows import read_named, write_named
 
-SUPPLIED = {"specimen1": 1000, "specimen5": 7500, "specimen7": 12_000, "specimen8": 12_000}
+SUPPLIED = {
+    "specimen1": 1000,
+    "specimen3": 25_000,
+    "specimen5": 7500,
+    "specimen6": 25_000,
+    "specimen7": 12_000,
+    "specimen8": 12_000,
+}
 """Fines in the slab of each specimen: more than enter and more than its cake holds."""
 FOLLOWED = (
     "drag.field=network",
