@@ -23,10 +23,11 @@ from pathlib import Path
 from fdnet.files.paths import path_option
 from fdnet.studies.truth.grids import Solve, make, solve
 from fdnet.studies.truth.made_packs import PACKS
-from fdnet.studies.truth.made_slabs import SLABS, SPECIMENS, make_specimens
+from fdnet.studies.truth.made_slabs import SLABS, make_specimens
 from fdnet.studies.truth.packs import DATA, OWN_GRIDS, OWN_TRUTH
 from fdnet.studies.truth.slab_grids import slab_table, solve_slabs
 from fdnet.studies.truth.slabs import SLAB_FOLDER
+from fdnet.studies.truth.specimens import SPECIMENS
 
 parser = argparse.ArgumentParser(
     description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter

@@ -17,7 +17,7 @@ from fdnet.network.flow.slabs import SlabK
 from fdnet.network.laws.damage import CLEAN, Damage
 from fdnet.network.laws.named import LAWS
 from fdnet.network.resolved.all_spheres import AllSpheres
-from fdnet.network.resolved.chosen import by_section, light_sections, light_share
+from fdnet.network.resolved.chosen import by_section, light_sections
 from fdnet.network.resolved.measured import Measured
 from fdnet.network.resolved.slab import Sides
 from fdnet.network.resolved.state import Log, State, capped, solved
@@ -159,8 +159,7 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
     more: dict[str, int] = {}
     if final is not clean and (whole is None or auto):
         slabs = measured.damaged_slabs(final, options, name, log)
-    share = light_share(specimen.fines, specimen.grains[1])
-    light = light_sections(clean_slabs, slabs, share)
+    light = light_sections(clean_slabs, slabs)
     taken = None if auto and np.all(light) else whole
     if taken is not None:
         k_damaged, resolved, more = _resolved(taken, base, (clean_slabs, specimen), log)

@@ -126,7 +126,7 @@ def test_a_mirrored_periodic_pack_has_the_same_throats(pack):
 
 def test_auto_takes_the_two_scale_law_in_light_sections_alone(pack):
     """All fines lie in the first half; the second keeps what it has without fines."""
-    crowd = with_fines(pack.grains(), 150, 0.3)
+    crowd = with_fines(pack.grains(), 300, 0.2)
     half = crowd.where((crowd.kind == Kind.GRAIN) | (crowd.position[:, 0] < 0.35 * pack.box[0, 1]))
     result = {
         law: analyse(half, periodic=SIDES, sections=2, damage_law=law)
@@ -137,16 +137,6 @@ def test_auto_takes_the_two_scale_law_in_light_sections_alone(pack):
     assert result["auto"].counts["sections_two_scale"] == 1
     inplace = [one.k_damaged_inplace for one in result["auto"].sections]
     assert result["auto"].k_damaged == pytest.approx(2.0 / np.sum(np.divide(1.0, inplace)))
-    left = k["side-kozeny"][0] / result["auto"].sections[0].k_initial
-    assert chosen.LIGHT_OF_SMALL < left < chosen.LIGHT
-
-
-def test_small_fines_are_a_light_deposit_down_to_a_smaller_share(pack):
-    grains = pack.grains()
-    for ratio, share in ((0.2, chosen.LIGHT_OF_SMALL), (0.3, chosen.LIGHT)):
-        fines = with_fines(grains, 20, ratio).fines()
-        assert chosen.light_share(fines, grains) == share
-    assert chosen.light_share(None, grains) == chosen.light_share(fines.where([]), grains)
 
 
 def test_spheres_around_a_facet_leave_all_some_or_nothing():
@@ -192,7 +182,7 @@ def test_layers_are_as_thick_as_a_fine_and_fill_the_first_millimetre():
 
 
 def test_the_default_takes_all_spheres_up_to_a_number_of_them(pack, monkeypatch):
-    monkeypatch.setattr(chosen, "LIGHT_OF_SMALL", 1.0)
+    monkeypatch.setattr(chosen, "LIGHT", 1.0)
     small = analyse(pack, periodic=SIDES)
     assert (small.damage_law, small.damage_law_used) == ("auto", "all-spheres")
     assert small.layers is not None

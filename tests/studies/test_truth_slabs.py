@@ -10,7 +10,7 @@ from fdnet.spheres.snapshot import Kind, resting
 from fdnet.studies.accuracy.slabs import slab_rows, slab_summary
 from fdnet.studies.engine.csv_rows import read_named, write_named
 from fdnet.studies.stokes.stokes import StokesFlow, solve_slab
-from fdnet.studies.truth.made_slabs import SLABS, SPECIMENS
+from fdnet.studies.truth.made_slabs import SLABS
 from fdnet.studies.truth.slab_grids import (
     DEPOSIT,
     GRAINS,
@@ -28,6 +28,7 @@ from fdnet.studies.truth.slabs import (
     read_specimen,
     write_specimen,
 )
+from fdnet.studies.truth.specimens import SPECIMENS
 
 
 def flow(cells: int, k: float) -> StokesFlow:

@@ -3,42 +3,22 @@
 import numpy as np
 
 from fdnet.network.flow.slabs import SlabK
-from fdnet.spheres.arrays import sauter_mean
-from fdnet.spheres.snapshot import Array, Snapshot, frozen
+from fdnet.spheres.snapshot import Array, frozen
 
-LIGHT, LIGHT_OF_SMALL = 0.5, 0.15
-"""Share of the permeability above which "auto" takes `side-kozeny`: of large and of small fines.
+LIGHT = 0.8
+"""Share of the permeability above which "auto" takes `side-kozeny`.
 
 The error of `all-spheres` is a share of the permeability, that of `side-kozeny` a share of what
-the fines take, so the one is better under heavy damage and the other under light damage. Small
-fines in a pore are a porous bed, which is what `side-kozeny` knows. Where they are few, the
-network of all spheres cuts wide pores into narrow ones. Large fines are not a bed.
-"""
-SMALL = 0.26
-"""Radius of fines over that of the grains below which they are small.
-
-It is the geometric mean of 1/3 and 1/5, the two ratios between which the deposits of
-docs/accuracy.md tell the laws apart.
+the fines take, so the one is better under heavy damage and the other under light damage.
 """
 
 
-def light_share(fines: Snapshot | None, grains: Snapshot) -> float:
-    """Share of the permeability above which `fines` among `grains` are a light deposit.
-
-    The radii that are compared are Sauter's means, the sum of r^3 over that of r^2.
-    """
-    if fines is None or not len(fines):
-        return LIGHT
-    ratio = sauter_mean(fines.radius) / sauter_mean(grains.radius)
-    return LIGHT_OF_SMALL if ratio < SMALL else LIGHT
-
-
-def light_sections(before: SlabK, after: SlabK, share: float) -> Array:
-    """Whether (S,) the fines leave more than `share` of the permeability of a section cut out.
+def light_sections(before: SlabK, after: SlabK) -> Array:
+    """Whether (S,) the fines leave more than `LIGHT` of the permeability of a section cut out.
 
     `before` is without fines and `after` with them, by a law of the network of the grains.
     """
-    return np.asarray(after.cut_out > share * before.cut_out)
+    return np.asarray(after.cut_out > LIGHT * before.cut_out)
 
 
 def by_section(

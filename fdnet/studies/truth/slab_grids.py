@@ -15,9 +15,10 @@ from fdnet.studies.engine.csv_rows import read_named, write_named
 from fdnet.studies.engine.markdown import markdown_table
 from fdnet.studies.stokes.stokes import StokesFlow, extrapolate, solve_slab
 from fdnet.studies.truth.grids import flow_of
-from fdnet.studies.truth.made_slabs import SLABS, SPECIMENS
+from fdnet.studies.truth.made_slabs import SLABS
 from fdnet.studies.truth.packs import MM
 from fdnet.studies.truth.slabs import SLAB_GRIDS, SLAB_TRUTH, read_specimen
+from fdnet.studies.truth.specimens import SPECIMENS
 
 GRAINS, DEPOSIT = "grains", "deposit"
 TOLERANCE = 5e-4
