@@ -18,7 +18,7 @@ parser = argparse.ArgumentParser(
     description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
 )
 parser.add_argument("specimens", nargs="*", metavar="SPECIMEN", help=f"of {', '.join(SUPPLIED)}")
-parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
+parser.add_argument("--seeds", type=int, nargs="+", help="of each (default: 1, or 1 to 3)")
 parser.add_argument("--out", type=path_option, default=Path("runs/followed"))
 parser.add_argument("--uniform", type=path_option, default=TABLE, help="table of the thesis study")
 parser.add_argument("--csv", type=path_option, required=True, help="write the table here")

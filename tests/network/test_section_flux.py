@@ -43,3 +43,24 @@ def test_unequal_discs(
     base, discs = np.array([[0.0, 0.0], [edge, 0.0], apex]), np.array(disc)
     flux = section.uneven_flux(base, discs, ratio_table())
     assert flux / resolved_flux(base, discs) == pytest.approx(ratio, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("apex", "disc", "signed", "ratio"),
+    [
+        ((1.098, 0.706), (0.560, 0.374, 0.184), 0.01, 0.96),
+        ((1.000, 0.513), (0.601, 0.309, 0.058), 0.07, 0.98),
+        ((1.172, 0.252), (0.463, 0.077, 0.079), 0.13, 0.93),
+        ((1.142, 0.305), (0.754, 0.182, 0.144), 0.16, 0.94),
+        ((1.144, 0.308), (0.420, 0.141, 0.118), 0.18, 0.93),
+    ],
+)
+def test_sections_whose_signed_shares_cancel_are_summed_over_rays(
+    apex: tuple[float, float], disc: tuple[float, float, float], signed: float, ratio: float
+) -> None:
+    """Signed shares and the law over finite elements."""
+    base, discs, table = np.array([[0.0, 0.0], [1.0, 0.0], apex]), np.array(disc), ratio_table()
+    exact, shares = resolved_flux(base, discs, 400), np.empty(1)
+    section.touching_fluxes(base, discs[None], (section.uneven_room(1), table), shares)
+    assert shares[0] / exact == pytest.approx(signed, abs=0.04)
+    assert section.uneven_flux(base, discs, table) / exact == pytest.approx(ratio, abs=0.02)

@@ -38,8 +38,8 @@ from fdnet.network.laws.wedge import (
 from fdnet.spheres.snapshot import Array
 
 SOUND = 0.25
-"""Least flux of signed shares over that on the rays. Against finite elements, signed shares give
-0.01 to 0.20 of the flux of a section, or 0.7 and more (tests/network/test_section_flux.py)."""
+"""Least flux of signed shares over that on the rays. Where it is less, finite elements agree with
+the rays (tests/network/test_section_flux.py)."""
 
 
 @compiled
