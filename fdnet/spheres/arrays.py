@@ -18,11 +18,6 @@ def frozen(values: Any, dtype: Any = None) -> Array:
     return array
 
 
-def sauter_mean(size: Array) -> float:
-    """Sum of d^3 over sum of d^2 of sizes (N,), such as diameters, m."""
-    return float(np.sum(size**3) / np.sum(size**2))
-
-
 def one_line(owner: Any) -> str:
     """The data class `owner` on one line: numbers as they are, arrays by their shape alone."""
     shown = (f"{field.name}={_short(getattr(owner, field.name))}" for field in fields(owner))
