@@ -16,7 +16,13 @@ from fdnet.studies.accuracy.benchmark_tables import NO_BENCHMARK, benchmark_tabl
 from fdnet.studies.accuracy.boundary_tables import tiled_table
 from fdnet.studies.accuracy.choices import refitted_series, section_by_area
 from fdnet.studies.accuracy.goals import ratio, reached, rms, worst
-from fdnet.studies.accuracy.measurement import DEFAULT, network_of, permeability, resolved
+from fdnet.studies.accuracy.measurement import (
+    DEFAULT,
+    RESOLVED,
+    network_of,
+    permeability,
+    resolved,
+)
 from fdnet.studies.accuracy.numbers import page_numbers
 from fdnet.studies.accuracy.results import read_results
 from fdnet.studies.accuracy.rows import RULES, damaged_row, intact_row
@@ -87,13 +93,14 @@ def test_goal_adds_truths_error_above_two_percent_only():
 
 
 def test_laws_on_two_packs(cases):
-    """The default is within its goals on SC and on pack C with fines."""
+    """The default is within its goals on SC and on pack C with fines; all spheres are high."""
     intact = intact_row(cases["SC_touching"])
     assert set(LAWS) < set(intact)
     assert intact["lubrication"] == pytest.approx(1.0, abs=0.01)
     damaged = damaged_row(cases["C_r5_d2"])
     for name in RULES[2:]:
-        assert damaged[name] == pytest.approx(1.0, abs=0.06)
+        goal = 0.2 if name == RESOLVED else 0.06
+        assert damaged[name] == pytest.approx(1.0, abs=goal)
         assert damaged[f"{name}: k"] == pytest.approx(damaged[name], abs=0.01)
     text = damage_table([damaged], absolute=False)
     assert f"{damaged[DEFAULT]:.3f}" in text

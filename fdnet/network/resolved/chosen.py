@@ -5,7 +5,7 @@ import numpy as np
 from fdnet.network.flow.slabs import SlabK
 from fdnet.spheres.snapshot import Array, frozen
 
-LIGHT = 0.8
+LIGHT = 0.5
 """Share of the permeability above which "auto" takes `side-kozeny`.
 
 The error of `all-spheres` is a share of the permeability, that of `side-kozeny` a share of what
