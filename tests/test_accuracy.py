@@ -10,7 +10,7 @@ import pytest
 
 from fdnet.network.laws.conductance import lubrication_law, series_law
 from fdnet.network.laws.named import LAWS
-from fdnet.spheres.snapshot import Kind
+from fdnet.network.permeability import analyse
 from fdnet.studies.accuracy import measurement, page
 from fdnet.studies.accuracy.benchmark_tables import NO_BENCHMARK, benchmark_tables
 from fdnet.studies.accuracy.boundary_tables import tiled_table
@@ -27,11 +27,11 @@ from fdnet.studies.accuracy.numbers import page_numbers
 from fdnet.studies.accuracy.results import read_results
 from fdnet.studies.accuracy.rows import RULES, damaged_row, intact_row
 from fdnet.studies.accuracy.tables import damage_table
+from fdnet.studies.accuracy.vanishing import vanishing_rows
 from fdnet.studies.truth.cases import (
     EQUAL,
     LATTICE,
     LOOSE_SOLIDS,
-    all_grains,
     read_cases,
 )
 from fdnet.studies.truth.packs import DATA
@@ -76,7 +76,6 @@ def test_turned_packs_have_the_axis_as_x(cases):
     volumes = [np.linalg.det(one.position[1:4] - one.position[0]) for one in (pack, rotated)]
     assert abs(volumes[0]) > 0
     assert volumes[1] == pytest.approx(volumes[0], rel=1e-9)
-    assert set(all_grains(pack).kind) == {Kind.GRAIN}
 
 
 def test_mean_and_worst_are_of_logarithms():
@@ -99,11 +98,25 @@ def test_laws_on_two_packs(cases):
     assert intact["lubrication"] == pytest.approx(1.0, abs=0.01)
     damaged = damaged_row(cases["C_r5_d2"])
     for name in RULES[2:]:
-        goal = 0.2 if name == RESOLVED else 0.06
+        goal = 0.09 if name == RESOLVED else 0.06
         assert damaged[name] == pytest.approx(1.0, abs=goal)
         assert damaged[f"{name}: k"] == pytest.approx(damaged[name], abs=0.01)
     text = damage_table([damaged], absolute=False)
     assert f"{damaged[DEFAULT]:.3f}" in text
+
+
+def test_the_network_of_all_spheres_is_the_one_that_runs_take(cases):
+    pack = cases["C_r5_d2"].pack
+    result = analyse(pack, periodic="xyz", walls="slip", damage_law="all-spheres")
+    assert resolved(pack) == pytest.approx(result.k_damaged)
+
+
+def test_a_fine_that_vanishes_changes_nothing():
+    """Without the fourth sphere and those around a section the mean is 1 % too high."""
+    row = vanishing_rows(DATA, ratios=(0.005,), every=3)[0]
+    assert row["places"] == 14
+    assert abs(row["mean"]) < 2e-3
+    assert -0.01 < row["least"] < row["most"] < 0.01
 
 
 def test_too_many_spheres_are_not_resolved_and_shown_as_such(cases, monkeypatch):

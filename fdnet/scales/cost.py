@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from fdnet.case.case import Case, InvasionCase
+from fdnet.case.names import MOST_SPHERES
 from fdnet.errors import CaseError
 from fdnet.scales.forces.warnings import BRIDGING
 from fdnet.scales.grain_pack import (
@@ -37,8 +38,8 @@ the box in which single fines still enter, where these count (`run.plug_rate` = 
 START_SECONDS, REPORT_SECONDS, SPHERE_SECONDS = 3.0, 8.0, 6.0e-4
 """Seconds of the Python half: to start, for the report, for each sphere that is analysed."""
 BYTES_PER_SPHERE = 600
-REPORT_BYTES, NETWORK_BYTES, MOST_RESOLVED = 6.0e8, 3.0e4, 20_000
-"""Memory of the report, and of the network for each of up to so many spheres."""
+REPORT_BYTES, NETWORK_BYTES = 6.0e8, 8.0e3
+"""Memory of the report, and of the network for each of up to `MOST_SPHERES` spheres."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,7 +137,7 @@ def peak_memory(case: Case, scales: Scales) -> float:
     The network of all spheres takes most, up to the number that it is used for.
     """
     fines = scales.supplied_count if isinstance(scales, InvasionScales) else 0
-    return REPORT_BYTES + NETWORK_BYTES * min(grain_count(case) + fines, MOST_RESOLVED)
+    return REPORT_BYTES + NETWORK_BYTES * min(grain_count(case) + fines, MOST_SPHERES)
 
 
 def memory_bytes(case: Case, scales: Scales) -> float:

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.flow.slabs import whole_permeability
-from fdnet.network.laws.conductance import lubrication_law
 from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, LAWS
 from fdnet.network.network import Network, build_network
+from fdnet.network.resolved.all_spheres import all_conductances, as_grains
 from fdnet.spheres.snapshot import Array, Snapshot
-from fdnet.studies.truth.cases import all_grains
 
 PERIODIC = (True, True, True)
 DEFAULT = f"{DEFAULT_LAW} + {DEFAULT_DAMAGE_LAW}"
@@ -22,7 +21,7 @@ PAIRS = (
 """The pairs of a conductance law and a damage law that are compared."""
 RESOLVED = "all spheres as grains"
 """The network of grains and fines alike, at the scale of the fines; it has no damage law."""
-RESOLVED_LIMIT = 2000
+RESOLVED_LIMIT = 20_000
 """Spheres above which that network is left out."""
 
 
@@ -71,11 +70,11 @@ def by_pair(network: Network, occupancy: Occupancy, pair: str) -> float:
 
 
 def resolved(pack: Snapshot) -> float:
-    """k (m2) with grains and fines tessellated alike; nan above `RESOLVED_LIMIT` spheres."""
+    """k (m2) by the network of all spheres that runs take; nan above `RESOLVED_LIMIT` spheres."""
     if len(pack) > RESOLVED_LIMIT:
         return float("nan")
-    network = network_of(all_grains(pack))
-    return permeability(network, lubrication_law(network))
+    network = network_of(as_grains(pack))
+    return permeability(network, all_conductances(network))
 
 
 def measure_loss(pack: Snapshot, network: Network, *, whole: bool = True) -> Loss:

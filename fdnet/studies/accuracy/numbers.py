@@ -49,6 +49,7 @@ def page_numbers(results: Results, validation: Path) -> dict[str, str]:
         **_damaged(results.damage),
         **_deposits(results),
         **_slabs(results.slabs),
+        **_vanishing(results.vanishing),
         **_choices(results),
         **_boundaries(validation),
         **_walls(validation),
@@ -108,6 +109,7 @@ def _damaged(rows: Sequence[Row]) -> dict[str, str]:
         "off_later_damage": percent(_farthest(later, DEFAULT), 0),
         "resolved_summary": summary(list(rows), RESOLVED),
         "worst_resolved": _worst(resolved, RESOLVED),
+        "off_resolved": percent(_farthest(resolved, RESOLVED), 0),
         "least_ratio": f"{min(ratios):.4f}",
         "most_ratio": f"{max(ratios):.2f}",
         "thesis_loss": span(thesis, 1),
@@ -129,6 +131,14 @@ def _deposits(results: Results) -> dict[str, str]:
         "bed_formula": f"{porosity / porosity**1.5:.1f}",
         "fines_a_pore": f"{fifth['fines'] / fifth['pores']:.0f}",
         "large_fine_span": span((row[DEFAULT] / row[RESOLVED] for row in results.large_fines), 2),
+    }
+
+
+def _vanishing(rows: Sequence[Row]) -> dict[str, str]:
+    smallest = min(rows, key=lambda row: row["ratio"])
+    return {
+        "vanishing_mean": f"{100 * smallest['mean']:+.2f} %",
+        "vanishing_most": percent(max(-smallest["least"], smallest["most"])),
     }
 
 

@@ -9,6 +9,7 @@ from fdnet.studies.accuracy.choices import choice_rows, refitted_series
 from fdnet.studies.accuracy.deposits import bed_rows, large_fine_rows
 from fdnet.studies.accuracy.rows import damaged_row, intact_row, polydisperse_rows
 from fdnet.studies.accuracy.slabs import slab_rows
+from fdnet.studies.accuracy.vanishing import vanishing_rows
 from fdnet.studies.engine.csv_rows import DIGITS, read_named, write_named
 from fdnet.studies.truth.cases import Case
 from fdnet.studies.truth.slabs import NO, SLAB_FOLDER, YES
@@ -30,6 +31,7 @@ class Results:
         large_fines: k/k0 of every pair of laws with fines of a third of a grain.
         beds: k/k0 of every pair of laws with all pores full of fines, and of the bed.
         slabs: k/k0, k and k0 of every pair of laws over truth on slabs of real deposits.
+        vanishing: what one fine changes of k by the network of all spheres, by its size.
     """
 
     intact: Sequence[Row]
@@ -40,6 +42,7 @@ class Results:
     large_fines: Sequence[Row]
     beds: Sequence[Row]
     slabs: Sequence[Row]
+    vanishing: Sequence[Row]
 
 
 def compute_results(cases: list[Case], folder: Path) -> Results:
@@ -54,6 +57,7 @@ def compute_results(cases: list[Case], folder: Path) -> Results:
         large_fines=large_fine_rows(folder),
         beds=bed_rows(folder),
         slabs=slab_rows(SLAB_FOLDER, (YES, NO)),
+        vanishing=vanishing_rows(folder),
     )
 
 

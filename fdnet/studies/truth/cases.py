@@ -2,7 +2,7 @@
 
 import csv
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -123,8 +123,3 @@ def simple_cubic(solid: float, repeat: int = 3) -> Snapshot:
     return snapshot(
         place * edge, np.full(repeat**3, RADIUS), repeat * edge, np.full(repeat**3, Kind.GRAIN)
     )
-
-
-def all_grains(pack: Snapshot) -> Snapshot:
-    """The same spheres, all of them of the kind grain."""
-    return replace(pack, kind=np.full(len(pack), Kind.GRAIN))
