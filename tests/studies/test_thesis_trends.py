@@ -30,7 +30,12 @@ from fdnet.studies.thesis.compare.trend_quantities import (
     sample_of,
     slope_per_decade,
 )
-from fdnet.studies.thesis.compare.trend_table import caveats, trends_table, verdict_of
+from fdnet.studies.thesis.compare.trend_table import (
+    caveats,
+    flows_table,
+    trends_table,
+    verdict_of,
+)
 from fdnet.studies.thesis.compare.trends import (
     FAILS,
     FULL_SCALE,
@@ -410,6 +415,24 @@ def test_the_table_of_trends_tells_the_numbers():
     assert "mean depth, mm: 6 − 5: 2.0 ± 0.39*;" in line
     assert "4 − 85" not in line
     assert "holds in part" in line
+
+
+def test_both_flows_are_judged_by_their_own_quick_forms():
+    """The table of the flows knows the quick forms alone."""
+
+    def deeper(by: float) -> list[ResultRow]:
+        rows = rows_of("quick-specimen5", "mean_depth_mm", around(1, 0.1))
+        return rows + rows_of("quick-specimen6", "mean_depth_mm", around(1 + by, 0.1))
+
+    full = [row("specimen5", mean_depth_mm=1.0), row("specimen6", mean_depth_mm=0.1)]
+    uniform, followed = (compare_trends([*full, *deeper(by)]) for by in (2.0, -0.5))
+    line = flows_table(uniform, followed).splitlines()[2]
+    trend, one, other, numbers = line.strip("| ").split(" | ")
+    assert trend == f"1. {TRENDS[0]}"
+    assert one.startswith("holds in part (1 of ")
+    assert other.startswith("does not hold (1 of ")
+    # 2.7764 times the root of 2 * 0.1^2 / 3
+    assert "mean depth, mm: 6 − 5: −0.50 ± 0.23 (no)" in numbers
 
 
 def test_verdict_of_several():

@@ -26,6 +26,9 @@ SUPPLIED = {
 }
 """Fines in the slab of each specimen. In 1, 5, 7 and 8 they are more than enter and more than the
 cake holds. The fines of 3 and 6, a tenth of the grains, enter as long as they come."""
+FEWER = ("specimen3", "specimen6")
+"""Specimens with fewer fines here than in their uniform runs, which are run uniform as well."""
+SAME_SUPPLY = "uniform, same supply"
 SEEDS, ONE = {"specimen1": (1, 2, 3), "specimen5": (1, 2, 3)}, (1,)
 """Seeds of the specimens that take minutes, and of the others."""
 FOLLOWED = (
@@ -51,7 +54,7 @@ class FollowedRow:
     Attributes:
         specimen: name of the case.
         seed: of the case.
-        flow: "uniform" or "followed".
+        flow: "uniform", "followed" or `SAME_SUPPLY`.
         invaded: number of fines inside at the end.
         first_mm: number of them in the first millimetre.
         mean_depth_mm: of their centres.
@@ -86,25 +89,33 @@ def followed_rows(
 ) -> list[FollowedRow]:
     """Run specimens with each seed, those of `SEEDS` by default; finished runs are read.
 
+    Those of `FEWER` run in the uniform flow too, with the same number of fines.
+
     Raises what `run_case` raises.
     """
-    return [
-        _followed(name, seed, folder / f"{name}-followed-{seed}")
-        for name in specimens
-        for seed in (SEEDS.get(name, ONE) if seeds is None else seeds)
-    ]
+    rows = []
+    for name in specimens:
+        for seed in SEEDS.get(name, ONE) if seeds is None else seeds:
+            run = f"{name}-followed-{seed}"
+            rows.append(_read_or_run(name, seed, "followed", folder / run))
+            if name in FEWER:
+                run = f"{name}-uniform-{seed}"
+                rows.append(_read_or_run(name, seed, SAME_SUPPLY, folder / run))
+    return rows
 
 
-def _followed(name: str, seed: int, out: Path) -> FollowedRow:
-    keys = [*FOLLOWED, f"fines.count={SUPPLIED[name]}", f"seed={seed}"]
+def _read_or_run(name: str, seed: int, flow: str, out: Path) -> FollowedRow:
+    same = [key for key in FOLLOWED if key.startswith("analysis.")]
+    keys = list(FOLLOWED) if flow == "followed" else same
+    keys += [f"fines.count={SUPPLIED[name]}", f"seed={seed}"]
     case = read_case(case_path(name), assignments=keys)
     if not (out / "manifest.json").exists():
         stages = ("pack", "invade", "analyse")
         run_case(case, out, stages=stages, resume=out.exists(), progress=False)
-    return _row(case, open_run(out))
+    return _row(case, flow, open_run(out))
 
 
-def _row(case: Case, run: FinishedRun) -> FollowedRow:
+def _row(case: Case, flow: str, run: FinishedRun) -> FollowedRow:
     summary, record, fines = run.summary, run.manifest["invade"], run.spheres().fines()
     depth = fines.position[:, 0]
     inside = depth[(depth >= 0) & (depth < case.size_m[0])]
@@ -112,7 +123,7 @@ def _row(case: Case, run: FinishedRun) -> FollowedRow:
     return FollowedRow(
         specimen=case.name,
         seed=case.seed,
-        flow="followed",
+        flow=flow,
         invaded=summary["invaded_count"],
         first_mm=int(np.sum(inside < 1e-3)),
         mean_depth_mm=1e3 * float(np.mean(inside)) if len(inside) else 0.0,
@@ -120,7 +131,7 @@ def _row(case: Case, run: FinishedRun) -> FollowedRow:
         porosity_loss_first_mm=parts[0]["porosity_initial"] - parts[0]["porosity_damaged"],
         k_lost=summary["k_reduction"],
         k_lost_by_mm=tuple(part["k_reduction"] for part in parts),
-        rate=summary["rate_over_initial"],
+        rate=1.0 if flow == SAME_SUPPLY else summary["rate_over_initial"],
         stop_reason=summary["stop_reason"],
         time_ms=1e3 * record["steps"] * record["dt_s"],
         overlap=summary["max_overlap_fraction"],

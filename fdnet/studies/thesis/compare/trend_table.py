@@ -43,6 +43,31 @@ def trends_table(comparisons: Sequence[Comparison]) -> str:
     )
 
 
+def flows_table(uniform: Sequence[Comparison], followed: Sequence[Comparison]) -> str:
+    """One line for each trend of the quick forms, by the thesis's laws, in both flows.
+
+    The columns are the verdict where the flow is uniform, the one where it follows the deposit,
+    and the differences there with half of their 95 % intervals.
+    """
+    header = ("trend", "uniform flow", "flow that follows", "differences (95 %) where it follows")
+    lines = []
+    for number, text in enumerate(TRENDS, start=1):
+        both = [_of_quick_forms(number, flow) for flow in (uniform, followed)]
+        verdicts = [verdict_of(one) for one in both]
+        lines.append([f"{number}. {text}", *verdicts, _numbers(_with_runs(both[1]))])
+    return markdown_table(header, lines)
+
+
+def _of_quick_forms(number: int, comparisons: Sequence[Comparison]) -> list[Comparison]:
+    """The comparisons of a trend in the quick forms, by the thesis's laws where laws matter."""
+    return [
+        one
+        for one in comparisons
+        if (one.trend, one.scale) == (number, QUICK_FORMS)
+        and one.laws in ("", ", ".join(THESIS_PAIR))
+    ]
+
+
 def caveats(comparisons: Sequence[Comparison], scale: str = FULL_SCALE) -> list[str]:
     """What weakens the comparisons of that scale; each remark stands once."""
     notes = [

@@ -8,15 +8,15 @@ from string import Template
 from fdnet.errors import CaseError
 from fdnet.studies.thesis.collection import RESULTS
 from fdnet.studies.thesis.compare.tables import thesis_tables
-from fdnet.studies.thesis.compare.trend_table import caveats, trends_table
+from fdnet.studies.thesis.compare.trend_table import caveats, flows_table, trends_table
 from fdnet.studies.thesis.compare.trends import compare_trends
 from fdnet.studies.thesis.numbers.results import read_results
 from fdnet.studies.thesis.outputs import CAPTIONS, DEPOSITION, STATISTICS, TETRAHEDRA
 from fdnet.studies.thesis.page import csv_tables, run_tables
 
 PAGE, SOURCE, TABLES = "thesis.md", "thesis.md.in", "thesis"
-FOLLOWED = "followed.csv"
-"""The table of scripts/followed.py."""
+FOLLOWED, FOLLOWED_TRENDS = "followed.csv", "followed_trends.csv"
+"""The tables of scripts/followed.py and scripts/followed_trends.py."""
 
 
 def write_page(docs: Path) -> Path:
@@ -62,6 +62,9 @@ def page_parts(folder: Path) -> dict[str, str]:
         "deposition": csv_tables.deposition_table(folder / DEPOSITION),
         "tetrahedra": csv_tables.tetrahedra_table(folder / TETRAHEDRA),
         "followed": csv_tables.followed_table(folder / FOLLOWED),
+        "followed_trends": flows_table(
+            comparisons, compare_trends(read_results(folder / FOLLOWED_TRENDS))
+        ),
         "figures": csv_tables.figures(folder / CAPTIONS),
     }
 
