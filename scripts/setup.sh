@@ -286,6 +286,9 @@ make_venv() {
         { [ ! -e "$stamp" ] || grep -qxF "at $root" "$stamp"; }; then
         return
     fi
+    [ ! -L "$venv" ] ||
+        fail "$venv is a link to $(readlink -f "$venv"), and making .venv would empty that folder:" \
+            "remove the link"
     say "making .venv with $(command -v "$python") ($("$python" --version))"
     if "$python" -c 'import ensurepip' 2>/dev/null; then
         quietly "$python" -m venv --clear "$venv" ||

@@ -1,6 +1,7 @@
 """The wheel carries everything: installed elsewhere it renders a deck and runs a case."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -109,3 +110,23 @@ def test_a_wheel_installed_elsewhere_runs_a_case(installed, binary, tmp_path):
     assert file.startswith(str(installed))
     assert (fast, rows) == ("[]", "3")
     assert float(ratio) == 1.0
+
+
+def test_setup_empties_no_folder_that_its_venv_links_to(root, tmp_path, binary):
+    """`python -m venv --clear` follows a link and removes all that is there."""
+    other = tmp_path / "other"
+    (tmp_path / "project/scripts").mkdir(parents=True)
+    other.mkdir()
+    (other / "kept.txt").write_text("kept")
+    (tmp_path / "project/.venv").symlink_to(other)
+    shutil.copy(root / "scripts/setup.sh", tmp_path / "project/scripts")
+    done = subprocess.run(
+        ["bash", str(tmp_path / "project/scripts/setup.sh")],
+        env=os.environ | {"FDNET_LIGGGHTS": str(binary.path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode != 0
+    assert "is a link to" in done.stderr + done.stdout
+    assert (other / "kept.txt").read_text() == "kept"
