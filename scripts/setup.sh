@@ -287,8 +287,8 @@ make_venv() {
         return
     fi
     [ ! -L "$venv" ] ||
-        fail "$venv is a link to $(readlink -f "$venv"), and making .venv would empty that folder:" \
-            "remove the link"
+        fail "$venv is a link to $(readlink -f "$venv");" \
+            "making .venv would empty that folder: remove the link"
     say "making .venv with $(command -v "$python") ($("$python" --version))"
     if "$python" -c 'import ensurepip' 2>/dev/null; then
         quietly "$python" -m venv --clear "$venv" ||
