@@ -88,6 +88,10 @@ def refusal(answer: Answer) -> str | None:
     return {2: "refused", 3: "refused (3)", 4: "degenerate"}[answer.code]
 
 
+DECKS = {"in.pack", "pack.data", "in.invade", "ask.in", "fluid.in", "held.in", "checkpoint.in"}
+"""What `fdnet render` may write; the last four belong to a coupled invasion."""
+
+
 def judge_case(data: bytes, folder: Path, _: Random, *, command: Command) -> str:
     """`fdnet render`: decks that are whole, or nothing."""
     case, out = folder / "case.toml", folder / "decks"
@@ -97,7 +101,7 @@ def judge_case(data: bytes, folder: Path, _: Random, *, command: Command) -> str
     if refused:
         return fault(f"{refused}, yet {written[0].name} was written") if written else refused
     names = {path.name for path in written}
-    if not {"in.pack", "pack.data"} <= names <= {"in.pack", "pack.data", "in.invade"}:
+    if not {"in.pack", "pack.data"} <= names <= DECKS:
         return fault(f"decks {sorted(names)}")
     words = [word for path in written for word in path.read_text().split() if len(word) < 10]
     return (
