@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from fdnet.files.paths import path_option
-from fdnet.studies.dem.followed import FOLLOWED
+from fdnet.studies.dem.followed import FLOW
 from fdnet.studies.thesis.collection import collect
 from fdnet.studies.thesis.numbers.results import write_results
 from fdnet.studies.thesis.runs.carry_out import carry_out
@@ -27,14 +27,13 @@ parser.add_argument("--csv", type=path_option, required=True, help="write the ta
 
 
 def followed_plan() -> list[Planned]:
-    """The quick forms and their scans of the drag, with the settings of `FOLLOWED`.
+    """The quick forms and their scans of the drag, with the settings of `FLOW`.
 
     Names, seeds and numbers of fines are those of the study of the thesis, so that its trends can
     be computed from these runs too.
     """
-    flow = tuple(setting for setting in FOLLOWED if not setting.startswith("analysis."))
     return [
-        replace(item, consequences=flow)
+        replace(item, consequences=FLOW)
         for item in planned(quick=False)
         if item.group in ("quick", "drag")
     ]

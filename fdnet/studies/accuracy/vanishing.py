@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.network.resolved.all_spheres import all_conductances, as_grains
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
-from fdnet.studies.accuracy.measurement import network_of, permeability
+from fdnet.studies.accuracy.measurement import resolved
 from fdnet.studies.truth.packs import MM, read_pack, snapshot
 
 Row = dict[str, Any]
@@ -28,22 +27,16 @@ def vanishing_rows(folder: Path, ratios: tuple[float, ...] = RATIOS, every: int 
     """
     pack, edge = read_pack(folder / f"{PLACES}.csv")
     grains, places = pack.grains(), pack.fines().position[::every]
-    network = network_of(grains)
-    k0 = permeability(network, all_conductances(network))
+    k0 = resolved(grains)
     rows = []
     for ratio in ratios:
         changes = [
-            _k_of_all(grains.joined(_touching(grains, place, ratio, edge))) / k0 - 1.0
+            resolved(grains.joined(_touching(grains, place, ratio, edge))) / k0 - 1.0
             for place in places
         ]
         ends = {"mean": np.mean(changes), "least": min(changes), "most": max(changes)}
         rows.append({"ratio": ratio, "places": len(places)} | ends)
     return rows
-
-
-def _k_of_all(spheres: Snapshot) -> float:
-    network = network_of(as_grains(spheres))
-    return permeability(network, all_conductances(network))
 
 
 def _touching(grains: Snapshot, place: Array, ratio: float, edge: float) -> Snapshot:

@@ -31,7 +31,7 @@ FEWER = ("specimen3", "specimen6")
 SAME_SUPPLY = "uniform, same supply"
 SEEDS, ONE = {"specimen1": (1, 2, 3), "specimen5": (1, 2, 3)}, (1,)
 """Seeds of the specimens that take minutes, and of the others."""
-FOLLOWED = (
+FLOW = (
     "drag.field=network",
     "drag.upstream=darcy",
     "drag.crowd=beetstra",
@@ -40,10 +40,10 @@ FOLLOWED = (
     "fines.supply=slab",
     "run.stiffness_N_m=auto",
     "run.plug_rate=0.02",
-    "analysis.law=lubrication",
-    "analysis.damage_law=auto",
 )
-"""What differs from the case of the thesis, besides the number of fines supplied."""
+"""What makes the flow of a case of the thesis follow the deposit."""
+LAWS = ("analysis.law=lubrication", "analysis.damage_law=auto")
+"""The laws by which all of these runs are analysed."""
 SECTIONS = 8
 
 
@@ -105,9 +105,9 @@ def followed_rows(
 
 
 def _read_or_run(name: str, seed: int, flow: str, out: Path) -> FollowedRow:
-    same = [key for key in FOLLOWED if key.startswith("analysis.")]
-    keys = list(FOLLOWED) if flow == "followed" else same
-    keys += [f"fines.count={SUPPLIED[name]}", f"seed={seed}"]
+    keys = [*LAWS, f"fines.count={SUPPLIED[name]}", f"seed={seed}"]
+    if flow == "followed":
+        keys += FLOW
     case = read_case(case_path(name), assignments=keys)
     if not (out / "manifest.json").exists():
         stages = ("pack", "invade", "analyse")

@@ -52,20 +52,10 @@ def flows_table(uniform: Sequence[Comparison], followed: Sequence[Comparison]) -
     header = ("trend", "uniform flow", "flow that follows", "differences (95 %) where it follows")
     lines = []
     for number, text in enumerate(TRENDS, start=1):
-        both = [_of_quick_forms(number, flow) for flow in (uniform, followed)]
+        both = [_of_trend(number, flow, QUICK_FORMS, THESIS_PAIR) for flow in (uniform, followed)]
         verdicts = [verdict_of(one) for one in both]
         lines.append([f"{number}. {text}", *verdicts, _numbers(_with_runs(both[1]))])
     return markdown_table(header, lines)
-
-
-def _of_quick_forms(number: int, comparisons: Sequence[Comparison]) -> list[Comparison]:
-    """The comparisons of a trend in the quick forms, by the thesis's laws where laws matter."""
-    return [
-        one
-        for one in comparisons
-        if (one.trend, one.scale) == (number, QUICK_FORMS)
-        and one.laws in ("", ", ".join(THESIS_PAIR))
-    ]
 
 
 def caveats(comparisons: Sequence[Comparison], scale: str = FULL_SCALE) -> list[str]:
@@ -95,15 +85,12 @@ def verdict_of(comparisons: Sequence[Comparison]) -> str:
 
 
 def _line(number: int, text: str, comparisons: Sequence[Comparison]) -> list[str]:
-    trend = [one for one in comparisons if one.trend == number]
-    full, quick = (
-        [one for one in trend if one.scale == scale] for scale in (FULL_SCALE, QUICK_FORMS)
+    by_thesis, by_default = (
+        _of_trend(number, comparisons, FULL_SCALE, pair) for pair in (THESIS_PAIR, DEFAULT_PAIR)
     )
-    by_thesis = [one for one in full if one.laws in ("", ", ".join(THESIS_PAIR))]
-    by_default = [one for one in full if one.laws in ("", ", ".join(DEFAULT_PAIR))]
-    quick = [one for one in quick if one.laws in ("", ", ".join(THESIS_PAIR))]
+    quick = _of_trend(number, comparisons, QUICK_FORMS, THESIS_PAIR)
     measured = _with_runs(by_thesis) or _with_runs(quick)
-    same = not any(one.laws for one in trend)
+    same = not any(one.laws for one in comparisons if one.trend == number)
     other = "the same" if same else verdict_of(by_default)
     return [
         f"{number}. {text}",
@@ -111,6 +98,17 @@ def _line(number: int, text: str, comparisons: Sequence[Comparison]) -> list[str
         verdict_of(quick),
         other,
         _numbers(measured),
+    ]
+
+
+def _of_trend(
+    number: int, comparisons: Sequence[Comparison], scale: str, pair: tuple[str, str]
+) -> list[Comparison]:
+    """The comparisons of a trend at a scale, by a pair of laws where laws matter."""
+    return [
+        one
+        for one in comparisons
+        if (one.trend, one.scale) == (number, scale) and one.laws in ("", ", ".join(pair))
     ]
 
 
