@@ -6,7 +6,9 @@ This module imports nothing heavy, so that `fdnet --help` answers at once.
 from typing import Literal, get_args
 
 LawName = Literal["thesis", "effective", "hydraulic", "series", "lubrication"]
-DamageLawName = Literal["auto", "all-spheres", "thesis", "thesis-code", "kozeny", "side-kozeny"]
+DamageLawName = Literal[
+    "auto", "all-spheres", "thesis", "thesis-code", "kozeny", "side-kozeny", "section-archie"
+]
 WallName = Literal["no-slip", "slip"]
 LAW_NAMES: tuple[LawName, ...] = get_args(LawName)
 DAMAGE_LAW_NAMES: tuple[DamageLawName, ...] = get_args(DamageLawName)

@@ -261,7 +261,8 @@ def test_another_pack_after_the_invasion_is_refused(pack):
 
 def test_laws_named_by_the_contract_exist():
     assert set(LAWS) == {"thesis", "effective", "hydraulic", "series", "lubrication"}
-    assert set(DAMAGE_LAWS) == {"thesis", "thesis-code", "kozeny", "side-kozeny"}
+    two_scale = {"thesis", "thesis-code", "kozeny", "side-kozeny", "section-archie"}
+    assert set(DAMAGE_LAWS) == two_scale
 
 
 def test_fines_all_outside_the_box_are_told_of(pack):

@@ -107,9 +107,8 @@ class KeptDeposit:
         rows = (volume, self.measure[:, 1], volume * whole, volume * away, volume * square)
         sums = np.array([np.bincount(self.holder, row, count) for row in rows])
         solid, surface = sums[:2, pores:].reshape(2, 2, throats)
-        return occupancy_of_deposit(
-            network, means_in_pores(network, sums[:, :pores]), (solid.T, surface.T)
-        )
+        means = means_in_pores(network, sums[:, :pores])
+        return occupancy_of_deposit(network, self.fines, means, (solid.T, surface.T))
 
     @property
     def by_pore(self) -> tuple[Array, Array, Array]:

@@ -44,6 +44,7 @@ class Occupancy:
             the throat.
         pair_radius: (K,) m, radius of the fine.
         pair_volume: (K,) m3 of the fine in the throat.
+        fines: those whose spheres reach into the box.
         counts: how many fines lie outside the box, how many porosities are negative.
     """
 
@@ -64,6 +65,7 @@ class Occupancy:
     pair_distance: Array
     pair_radius: Array
     pair_volume: Array
+    fines: Snapshot
     counts: Mapping[str, int]
 
     def __repr__(self) -> str:
@@ -120,7 +122,8 @@ def measure_occupancy(
         "throat_porosity_negative": int(np.sum(fields["throat_porosity"] < 0)),
         "pore_porosity_negative": _overfilled(network, fields["pore_solid_volume"]),
     }
-    return Occupancy(counts=counts, **{name: frozen(value) for name, value in fields.items()})
+    values = {name: frozen(value) for name, value in fields.items()}
+    return Occupancy(fines=reaching, counts=counts, **values)
 
 
 def measure_deposit(network: Network, fines: Snapshot) -> Occupancy:
@@ -130,15 +133,14 @@ def measure_deposit(network: Network, fines: Snapshot) -> Occupancy:
     """
     refuse_wide(network, fines)
     reaching = fines.where(reaching_inside(network, fines))
-    return occupancy_of_deposit(
-        network, deposit_in_pores(network, reaching), deposit_on_sides(network, reaching)
-    )
+    pores, sides = deposit_in_pores(network, reaching), deposit_on_sides(network, reaching)
+    return occupancy_of_deposit(network, reaching, pores, sides)
 
 
 def occupancy_of_deposit(
-    network: Network, pores: tuple[Array, ...], sides: tuple[Array, Array]
+    network: Network, fines: Snapshot, pores: tuple[Array, ...], sides: tuple[Array, Array]
 ) -> Occupancy:
-    """The occupancy of a deposit with the values of `deposit_in_pores` and `deposit_on_sides`."""
+    """The occupancy by `fines` with the values of `deposit_in_pores` and `deposit_on_sides`."""
     throats = len(network.throat_radius)
     zero, none = np.zeros(throats), np.zeros(0)
     fields = _fields_of_deposit(network, pores, sides) | {
@@ -154,7 +156,8 @@ def occupancy_of_deposit(
         "pair_volume": none,
     }
     counts = {"pore_porosity_negative": _overfilled(network, pores[0])}
-    return Occupancy(counts=counts, **{name: frozen(value) for name, value in fields.items()})
+    values = {name: frozen(value) for name, value in fields.items()}
+    return Occupancy(fines=fines, counts=counts, **values)
 
 
 def refuse_wide(network: Network, fines: Snapshot) -> None:

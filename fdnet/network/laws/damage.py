@@ -9,12 +9,13 @@ from fdnet.network.network import Network
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
-CLEAN, DEPOSITION, CLOGGING, BLOCKED, KOZENY = (
+CLEAN, DEPOSITION, CLOGGING, BLOCKED, KOZENY, SECTIONS = (
     "clean",
     "deposition",
     "clogging",
     "blocked",
     "kozeny",
+    "sections",
 )
 
 
@@ -24,7 +25,8 @@ class Damage:
 
     Attributes:
         conductance: (T,) m3, never above that of the clean throat.
-        law_used: (T,) which rule applied: clean, deposition, clogging, blocked or kozeny.
+        law_used: (T,) which rule applied: clean, deposition, clogging, blocked, kozeny or
+            sections.
         counts: how many throats, pores or sides were capped or closed.
     """
 

@@ -28,7 +28,6 @@ from fdnet.network.laws.cross_section import wedges
 from fdnet.network.laws.cut_grains import cut_corners, share_of_cut
 from fdnet.network.laws.fourth_grain import fourth_grains
 from fdnet.network.laws.open_sections import (
-    STEPS,
     SectionRoom,
     forget,
     open_fluxes,
@@ -47,6 +46,9 @@ THROATS = 20_000
 """Throats that are worked off at once."""
 EQUAL = 1e-9
 """Radii that differ by at most this share are equal."""
+Faces = tuple[Array, Array, float, Array]
+"""What the faces of the box cut of a throat: of side walls (`wall_cuts`) the order of its corners,
+their places, and its share in the box; of x faces the corners (3, 4) of `cut_corners`."""
 
 
 def half_resistances(
@@ -64,27 +66,41 @@ def half_resistances(
         fourth: whether the fourth grain of a tetrahedron, and those around, narrow the sections.
     """
     floor, table = LENGTH_FLOOR * network.grain_radius, ratio_table()
-    order, place, share = wall_cuts(network)
+    every = wall_cuts(network)
     resistance = np.empty((len(network.throat_pores), 2))
     around = Neighbourhood(network) if fourth else None
     for part in geometry.slices(len(resistance), THROATS):
-        images = network.throat_images[part]
-        corner = network.image_position[images]
-        radius, flatness = _discs(network, images, corner)
-        beside = _beside(network, part, corner) if fourth else np.zeros((len(corner), 2, 5))
-        outside = _outside(around, part, corner)
+        corner, radius, flatness, cuts, cut = prepared(network, part, every)
+        facet = network.image_position[network.throat_images[part]]
+        beside = _beside(network, part, facet) if fourth else np.zeros((len(corner), 2, 5))
+        outside = _outside(around, part, facet)
         resistance[part] = _halves(
-            geometry.flat(corner),
+            corner,
             (radius, flatness),
             np.ascontiguousarray(network.throat_heights[part]),
-            (order[part], place[part], share[part]),
+            cuts,
             (floor, float(widening)),
             (beside, *outside, table),
-            cut_corners(network, part, corner),
+            cut,
         )
     capped = np.any(network.throat_corner_height < network.throat_corner_radius, axis=1)
     resistance[(network.throat_radius <= 0) & ~capped] = np.inf
     return resistance
+
+
+Prepared = tuple[Array, Array, Array, tuple[Array, Array, Array], Array]
+"""Corners (K, 3, 2) m of facets in their own planes, radii (K, 3) m of the discs in them and their
+flatness, what side walls cut (`wall_cuts`) and what x faces cut (`cut_corners`)."""
+
+
+def prepared(network: Network, part: slice, walls: tuple[Array, Array, Array]) -> Prepared:
+    """What the sections of the throats `part` (K) need; `walls` is what `wall_cuts` gives."""
+    images = network.throat_images[part]
+    facet = network.image_position[images]
+    radius, flatness = _discs(network, images, facet)
+    order, place, share = (one[part] for one in walls)
+    cut = cut_corners(network, part, facet)
+    return geometry.flat(facet), radius, flatness, (order, place, share), cut
 
 
 def _discs(network: Network, images: Array, corner: Array) -> tuple[Array, Array]:
@@ -163,31 +179,64 @@ def _halves(
 @compiled_for_loops
 def _resistance(
     throat: tuple[Array, Array, Array, Array],
-    faces: tuple[Array, Array, float, Array],
+    faces: Faces,
     span: tuple[tuple[float, float, float], float],
     others: tuple[Array, Array],
     more: tuple[SectionRoom, Array],
 ) -> float:
-    """Integral of dR between two heights, 1/m3.
+    """Integral of dR between two heights, 1/m3."""
+    heights, widening = span
+    set_fluxes(throat, faces, heights, others, more)
+    flux = more[0][0]
+    step = (heights[1] - heights[0]) / (len(flux) - 1)
+    return resistance_of(flux, (faces[2], step, widening))
 
-    1/a is linear within a step; the integral is extrapolated from STEPS and STEPS / 2 steps.
+
+@compiled_for_loops
+def set_fluxes(
+    throat: tuple[Array, Array, Array, Array],
+    faces: Faces,
+    span: tuple[float, float, float],
+    others: tuple[Array, Array],
+    more: tuple[SectionRoom, Array],
+) -> None:
+    """Sets the fluxes m4 of laplacian(w) = -1 through the sections of one side of a throat.
+
+    Args:
+        throat: its facet (`open_sections.Throat`).
+        faces: what the faces of the box cut of it.
+        span: lowest and highest section, m from the facet, and 1 for the side of the second pore
+            or -1 for that of the first.
+        others: as in `open_fluxes`.
+        more: room for the sections, where `forget` was called, and the table of `shear_ratio`.
     """
-    (low, high, sense), widening = span
-    step = (high - low) / STEPS
+    low, high, sense = span
     room, table = more
-    set_discs(throat, low, step, room)
-    order, place, part, cut = faces
     flux, discs = room[0], room[1]
+    step = (high - low) / (len(flux) - 1)
+    set_discs(throat, low, step, room)
+    order, place, _, cut = faces
     if order[0] >= 0:
-        for k in range(STEPS + 1):
+        for k in range(len(flux)):
             flux[k] = wall_flux(place, discs[order[0], k], discs[order[1], k], table)
     else:
         open_fluxes(throat, (low, step, sense), others, room, table)
         if np.max(cut[:, 3]) > 0.0:
             rays = (room[5], room[4][0][3], table)
-            for k in range(STEPS + 1):
+            for k in range(len(flux)):
                 z, disc = sense * (low + k * step), discs[:, k].copy()
                 flux[k] *= share_of_cut(throat[0], disc, z, cut, rays)
+
+
+@compiled_for_loops
+def resistance_of(flux: Array, given: tuple[float, float, float]) -> float:
+    """Integral of dR, 1/m3, over sections of the fluxes `flux` (K,) m4, which are written over.
+
+    `given` are the share of the sections inside the box, m between two of them, and the factor of
+    da^2. 1/a is linear within a step; the integral is extrapolated from all and from half of the
+    steps.
+    """
+    part, step, widening = given
     for k in range(len(flux)):
         if not part * flux[k] > 0.0:
             return np.inf

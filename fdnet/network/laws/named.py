@@ -15,6 +15,7 @@ from fdnet.network.laws.conductance import (
 )
 from fdnet.network.laws.damage import DamageLaw
 from fdnet.network.laws.kozeny_damage import kozeny_damage, side_kozeny_damage
+from fdnet.network.laws.section_archie import section_archie_damage
 from fdnet.network.laws.thesis_damage import CODE_THRESHOLD, TEXT_THRESHOLD, thesis_damage
 
 __all__ = ["DAMAGE_LAWS", "DEFAULT_DAMAGE_LAW", "DEFAULT_LAW", "LAWS"]
@@ -41,13 +42,14 @@ DAMAGE_LAWS: Mapping[str, DamageLaw] = {
     "thesis-code": partial(thesis_damage, clogging_threshold=CODE_THRESHOLD),
     "kozeny": kozeny_damage,
     "side-kozeny": side_kozeny_damage,
+    "section-archie": section_archie_damage,
 }
 """Damage laws by name: functions that lower the clean conductance (T,) m3 of throats with fines.
 
 Examples:
     >>> import fdnet
     >>> sorted(fdnet.DAMAGE_LAWS)
-    ['kozeny', 'side-kozeny', 'thesis', 'thesis-code']
+    ['kozeny', 'section-archie', 'side-kozeny', 'thesis', 'thesis-code']
 """
 
 

@@ -33,17 +33,16 @@ SectionRoom = tuple[
     tuple[Bundles, Seen],
     Array,
 ]
-"""Fluxes (9,) m4, radii of discs (3, 9) m, room for `even_fluxes`, the radii (9, 3) m and room
-for `uneven_fluxes`, room for `share_around`, and the rays (6, 36) of a fourth disc."""
+"""Fluxes (K,) m4 of K sections, radii of discs (3, K) m, room for `even_fluxes`, the radii (K, 3)
+m and room for `uneven_fluxes`, room for `share_around`, and the rays (6, 36) of a fourth disc."""
 Throat = tuple[Array, Array, Array, Array]
 """Corners (3, 2) m of the facet, radii (3,) m of the discs in it, their flatness (3,), and the
 wedges of a throat with equal discs (`wedges`), else no row."""
 
 
 @compiled
-def section_room(around: int) -> SectionRoom:
-    """Room for a throat with up to `around` spheres around it."""
-    count = STEPS + 1
+def section_room(around: int, count: int = STEPS + 1) -> SectionRoom:
+    """Room for `count` sections of a throat with up to `around` spheres around it."""
     return (
         np.empty(count),
         np.empty((3, count)),

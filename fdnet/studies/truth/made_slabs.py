@@ -75,6 +75,19 @@ CUTS: tuple[tuple[str, tuple[float, float], tuple[int, ...], str], ...] = (
     ("slabBB_r3_range_mu0", TWICE, MIDDLE, NO),
     ("slabBC_r8_ranges", FACE, FINEST, NO),
     ("slabBD_r4", TWICE, MIDDLE, NO),
+    ("slabBE_r8", FACE, FINEST, NO),
+    ("slabBE_r8", DEEP, FINE, NO),
+    ("slabBF_r10", FACE, FINEST, NO),
+    ("slabBG_r5", FACE, MIDDLE, NO),
+    ("slabBH_r5_range", TWICE, MIDDLE, NO),
+    ("slabBI_r3", TWICE, MIDDLE, NO),
+    ("slabBJ_r8_mu0", FACE, FINEST, NO),
+    ("slabBK_r6", FACE, MIDDLE, NO),
+    ("slabBL_r10_followed", FACE, FINEST, NO),
+    ("slabBM_r5_followed", FACE, MIDDLE, NO),
+    ("slabBN_r3_range_mu0", TWICE, MIDDLE, NO),
+    ("slabBO_r8_ranges", FACE, FINEST, NO),
+    ("slabBP_r4", TWICE, MIDDLE, NO),
 )
 """Specimen, slab, grids, and whether its truth was known when the laws were shaped."""
 SLABS = {

@@ -190,6 +190,33 @@ SPECIMENS = {
         grain_mm=GRAIN_RANGE,
     ),
     "slabBD_r4": Specimen(seed=334, fine_mm=0.0625, supplied=250, friction=0.55, pack=38),
+    "slabBE_r8": Specimen(seed=341, fine_mm=0.03125, supplied=1400, friction=0.55, pack=34),
+    "slabBF_r10": Specimen(seed=342, fine_mm=0.025, supplied=1700, friction=0.55, pack=35),
+    "slabBG_r5": Specimen(seed=343, fine_mm=0.05, supplied=240, friction=0.55, pack=36),
+    "slabBH_r5_range": Specimen(
+        seed=344, fine_mm=[0.04, 0.06], supplied=260, friction=0.55, pack=33
+    ),
+    "slabBI_r3": Specimen(seed=345, fine_mm=0.0833, supplied=60, friction=0.55, pack=37),
+    "slabBJ_r8_mu0": Specimen(seed=353, fine_mm=0.03125, supplied=2500, friction=0.0, pack=39),
+    "slabBK_r6": Specimen(seed=347, fine_mm=0.04167, supplied=420, friction=0.55, pack=34),
+    "slabBL_r10_followed": Specimen(
+        seed=348, fine_mm=0.025, supplied=1600, friction=0.55, pack=36, followed=True
+    ),
+    "slabBM_r5_followed": Specimen(
+        seed=349, fine_mm=0.05, supplied=260, friction=0.55, pack=34, followed=True
+    ),
+    "slabBN_r3_range_mu0": Specimen(
+        seed=350, fine_mm=[0.07, 0.095], supplied=80, friction=0.0, pack=36
+    ),
+    "slabBO_r8_ranges": Specimen(
+        seed=351,
+        fine_mm=[0.025, 0.0375],
+        supplied=1100,
+        friction=0.3,
+        pack=0.40,
+        grain_mm=GRAIN_RANGE,
+    ),
+    "slabBP_r4": Specimen(seed=352, fine_mm=0.0625, supplied=200, friction=0.55, pack=35),
 }
 """The specimens by name: r5 are fines of a fifth of a grain, mu0 is no friction, a range is one of
 radii (ranges: of grains too), a cake remains upstream of the face; followed: by the flow."""

@@ -1,0 +1,98 @@
+"""Which fines reach into the sections of a throat, and where they lie as seen from its facet."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fdnet.network.compiled import compiled
+from fdnet.network.fines.deposit import size_classes
+from fdnet.network.fines.fine_images import mirrored_images
+from fdnet.network.fines.point_search import points_in_boxes
+from fdnet.network.geometry import dot, flat
+from fdnet.network.laws.facet_axes import facet_axes
+from fdnet.network.laws.section_rays import inwards, sides_of
+from fdnet.network.network import Network
+from fdnet.spheres.arrays import one_line
+from fdnet.spheres.snapshot import Array, Snapshot, frozen
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class FinesBeside:
+    """Fines that reach into the prisms of K throats, from power centre to power centre.
+
+    Attributes:
+        first: (K+1,) the first fine of each throat, and their number N at the end.
+        place: (N, 5) m, along the first edge of the facet, across it towards the third corner,
+            and height above the facet towards the second pore, of its centre from the first
+            corner; its radius m, and 1 (a sphere is not flat).
+    """
+
+    first: Array
+    place: Array
+
+    __repr__ = one_line
+
+
+class FineImages:
+    """Fines of a network with their images near its throats, shifted or mirrored.
+
+    A fine that is centred on or beyond a face that is not periodic has no mirror image there: its
+    body inside the box is that of the sphere itself.
+    """
+
+    def __init__(self, network: Network, fines: Snapshot) -> None:
+        self.network = network
+        corner = network.image_position[np.unique(network.throat_images)]
+        low, high = corner.min(axis=0), corner.max(axis=0)
+        self._classes: list[tuple[Array, Array]] = []
+        for some in size_classes(fines.radius) if len(fines) else []:
+            radius = fines.radius[some]
+            position, owner = mirrored_images(
+                network, fines.position[some], low, high, float(radius.max())
+            )
+            self._classes.append((position, radius[owner]))
+
+    def beside(self, part: slice) -> FinesBeside:
+        """The fines that reach into the prisms of the throats `part` (K)."""
+        network = self.network
+        facet = network.image_position[network.throat_images[part]]
+        axes = facet_axes(network, np.arange(part.start, part.stop), facet)
+        height = network.throat_heights[part] * (-1.0, 1.0)
+        ends = (facet[:, None] + (height[:, :, None] * axes[2][:, None])[:, :, None]).reshape(
+            len(facet), 6, 3
+        )
+        low, high = ends.min(axis=1), ends.max(axis=1)
+        throats, places = [np.zeros(0, np.intp)], [np.zeros((0, 5))]
+        for position, radius in self._classes:
+            widest = float(radius.max())
+            throat, image = points_in_boxes(position, low - widest, high + widest)
+            away = position[image] - facet[throat, 0]
+            place = np.ones((len(throat), 5))
+            for k, axis in enumerate(axes):
+                place[:, k] = dot(away, axis[throat])
+            place[:, 3] = radius[image]
+            real = _reaching(flat(facet), np.sort(height, axis=1), throat, place)
+            throats.append(throat[real])
+            places.append(place[real])
+        throat, place = np.concatenate(throats), np.concatenate(places)
+        order = np.argsort(throat, kind="stable")
+        first = np.searchsorted(throat[order], np.arange(len(facet) + 1))
+        return FinesBeside(first=frozen(first), place=frozen(place[order]))
+
+
+@compiled
+def _reaching(base: Array, height: Array, throat: Array, place: Array) -> Array:
+    """Whether spheres (N) reach between two heights (K, 2) m and within the lines of a triangle.
+
+    The triangles are `base` (K, 3, 2) m, `throat` (N,) says which, and `place` (N, 5) is that of
+    `FinesBeside`.
+    """
+    real = np.empty(len(throat), np.bool_)
+    for n in range(len(throat)):
+        t, x, y, z, r = throat[n], place[n, 0], place[n, 1], place[n, 2], place[n, 3]
+        real[n] = height[t, 0] - r < z < height[t, 1] + r
+        if real[n]:
+            side = sides_of(base[t])
+            for i in range(3):
+                real[n] = real[n] and inwards(base[t], side, i, x, y) > -r
+    return real

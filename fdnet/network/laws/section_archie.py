@@ -1,0 +1,167 @@
+"""Damage by the share that the fines leave of each section of a throat.
+
+The sections of a throat are those of `lubrication`, with discs of the three grains. Every fine
+that reaches into the throat shows a disc in the sections that it meets. Together they leave the
+share s of the flux through the section, summed over rays (`outside.share_around`). The section
+then carries s^m of its clean flux.
+
+With m = 1 every section would be a straight tube of this section. But the fluid between fines is
+on a winding way: it must turn from the gaps of one section to those of the next. Archie (1942,
+Trans. AIME 146, 54) measured what such a way costs an electric current: the resistance of
+unconsolidated sand grows as porosity to the power -1.3. The same power is taken here.
+
+The factor of the widening tube (`lubrication`) is that of the narrowed sections.
+"""
+
+import numpy as np
+
+from fdnet.network import geometry
+from fdnet.network.compiled import compiled_for_loops
+from fdnet.network.fines.occupancy import Occupancy, ratio
+from fdnet.network.laws.beside_throats import FineImages
+from fdnet.network.laws.cross_section import wedges
+from fdnet.network.laws.damage import BLOCKED, CLEAN, SECTIONS, Damage
+from fdnet.network.laws.lubrication import (
+    EQUAL,
+    THROATS,
+    WIDENING,
+    Prepared,
+    prepared,
+    resistance_of,
+    set_fluxes,
+)
+from fdnet.network.laws.open_sections import SectionRoom, forget, section_room
+from fdnet.network.laws.outside import meet, share_around
+from fdnet.network.laws.section_rays import sides_of
+from fdnet.network.laws.wall_cross_section import wall_cuts
+from fdnet.network.laws.wedge import ratio_table
+from fdnet.network.network import LENGTH_FLOOR, Network
+from fdnet.spheres.snapshot import Array, Snapshot, frozen
+
+EXPONENT = 1.3
+"""Power of the share that the fines leave: Archie's for unconsolidated sand."""
+STEP = 1.0 / 8.0
+"""Greatest step between two sections, in radii of the smallest fine in the throat."""
+LEAST_STEPS = 8
+"""Smallest number of steps between a facet and a power centre."""
+
+
+def section_archie_damage(network: Network, occupancy: Occupancy, clean: Array) -> Damage:
+    """Conductance of throats whose sections carry s^1.3 of their clean flux.
+
+    s is the share of the flux that the fines leave of a section; see this module. The clean
+    conductance is multiplied by the ratio of the resistances without and with fines.
+    """
+    without, with_fines = fine_resistances(network, occupancy.fines)
+    whole, raised = without.sum(axis=1), with_fines.sum(axis=1)
+    factor = np.where(np.isfinite(whole), 0.0, 1.0)
+    still = np.isfinite(raised)
+    factor[still] = ratio(whole[still], raised[still])
+    law = np.where(factor >= 1.0, CLEAN, np.where(factor == 0.0, BLOCKED, SECTIONS)).astype("<U10")
+    counts = {
+        "throats_closed": int(np.sum(factor == 0.0)),
+        "throats_capped": int(np.sum(factor > 1.0)),
+    }
+    return Damage(
+        conductance=frozen(clean * np.minimum(factor, 1.0)), law_used=frozen(law), counts=counts
+    )
+
+
+def fine_resistances(network: Network, fines: Snapshot) -> tuple[Array, Array]:
+    """Resistances (T, 2) 1/m3 of the sides of throats without and with `fines`.
+
+    Both are summed over the same sections. Those of throats without fines are 1 and 1, and 0 for a
+    side that a throat does not have.
+    """
+    images, table = FineImages(network, fines), ratio_table()
+    floor = LENGTH_FLOOR * network.grain_radius
+    walls = wall_cuts(network)
+    both = np.ones((2, len(network.throat_pores), 2))
+    for part in geometry.slices(len(network.throat_pores), THROATS):
+        beside = images.beside(part)
+        height = network.throat_heights[part]
+        some, steps = _steps(beside.first, beside.place, np.abs(height).max(axis=1))
+        if not len(some):
+            continue
+        given = prepared(network, part, walls)
+        for count in np.unique(steps):
+            chosen = some[steps == count]
+            both[:, part.start + chosen] = _resistances(
+                (chosen, int(count) + 1),
+                given,
+                np.ascontiguousarray(height),
+                (floor, WIDENING, EXPONENT),
+                (beside.first, beside.place, table),
+            )
+    return both[0], both[1]
+
+
+def _steps(first: Array, place: Array, height: Array) -> tuple[Array, Array]:
+    """Throats (K,) with fines, and the number of steps of each of their sides, a power of two."""
+    some = np.flatnonzero(np.diff(first))
+    if not len(some):
+        return some, some
+    smallest = np.minimum.reduceat(place[:, 3], first[some])
+    wanted = np.maximum(height[some] / (STEP * smallest), LEAST_STEPS)
+    return some, 2 ** np.ceil(np.log2(wanted)).astype(int)
+
+
+@compiled_for_loops
+def _resistances(
+    which: tuple[Array, int],
+    given: Prepared,
+    heights: Array,
+    numbers: tuple[float, float, float],
+    fines: tuple[Array, Array, Array],
+) -> Array:
+    chosen, count = which
+    corner, radius, flatness, cuts, cut = given
+    order, place, part = cuts
+    floor, widening, power = numbers
+    first, spheres, table = fines
+    most = 0
+    for t in chosen:
+        most = max(most, first[t + 1] - first[t])
+    room, clear = section_room(most, count), (np.zeros(5), np.empty((0, 5)))
+    resistance = np.zeros((2, len(chosen), 2))
+    for n in range(len(chosen)):
+        t = chosen[n]
+        low, high = -heights[t, 0], heights[t, 1]
+        high = max(high, low + floor)
+        even = np.max(radius[t]) - np.min(radius[t]) <= EQUAL * radius[t, 0]
+        even = even and np.max(flatness[t]) - np.min(flatness[t]) <= EQUAL
+        wedge = wedges(corner[t]) if even else np.empty((0, 7))
+        throat = (corner[t], radius[t], flatness[t], wedge)
+        faces = (order[t], place[t], part[t], cut[t])
+        inside = spheres[first[t] : first[t + 1]]
+        forget(room, len(inside))
+        for side in range(2):
+            sense = 2.0 * side - 1.0
+            span = (max(low, 0.0), high, sense) if side == 1 else (max(-high, 0.0), -low, sense)
+            if span[1] > 0.0:
+                set_fluxes(throat, faces, span, clear, (room, table))
+                resistance[:, n, side] = _both(
+                    corner[t], span, (inside, part[t], widening, power), (room, table)
+                )
+    return resistance
+
+
+@compiled_for_loops
+def _both(
+    base: Array,
+    span: tuple[float, float, float],
+    given: tuple[Array, float, float, float],
+    more: tuple[SectionRoom, Array],
+) -> tuple[float, float]:
+    """Resistances 1/m3 of one side without and with fines, from the clean fluxes in the room."""
+    fines, part, widening, power = given
+    room, table = more
+    flux, discs, (rays, seen) = room[0], room[1], room[4]
+    step = (span[1] - span[0]) / (len(flux) - 1)
+    clear, side = flux.copy(), sides_of(base)
+    for k in range(len(flux)):
+        z = span[2] * (span[0] + k * step)
+        count = meet(discs[:, k].copy(), base, z, fines, seen)
+        flux[k] *= share_around(base, side, (count, seen), rays, table) ** power
+    given_step = (part, step, widening)
+    return resistance_of(clear, given_step), resistance_of(flux, given_step)
