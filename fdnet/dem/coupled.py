@@ -12,11 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fdnet.case.case import InvasionCase
-from fdnet.dem.checkpoint import Checkpoint, chunks_of, read_history
+from fdnet.dem.checkpoint import Checkpoint, chunks_of, entered_by, read_history
 from fdnet.dem.feed import Feed
 from fdnet.dem.fluid import STATE, Fluid, FluidForces, Moment, largest_share, write_forces
-from fdnet.dem.invade_deck import SUPPLY, batch_chunks
+from fdnet.dem.invade_deck import SUPPLY
 from fdnet.dem.scene import snapshot_of
+from fdnet.dem.supply import Batches, batches_of
 from fdnet.dem.updates import Updates
 from fdnet.errors import LiggghtsError
 from fdnet.scales.scales import InvasionScales
@@ -59,17 +60,33 @@ class Coupling:
         show its spheres, and what the fluid raises.
         """
         step, chunk = (self.last.step, self.last.chunk) if self.last else (0, 0)
-        updates = Updates(self.folder, self.fluid.measured, upto=step)
+        updates, batches = (
+            Updates(self.folder, self.fluid.measured, upto=step),
+            batches_of(self.case, self.scales),
+        )
+        entered = entered_by(self.case, batches, self.last) if self.last else batches.entered_at(1)
         feed(f"include {self.deck}")
-        batches = batch_chunks(self.case, self.scales)
         while chunk < chunks_of(self.case, self.scales):
             chunk += 1
-            if chunk in batches:
-                feed(f"include {SUPPLY}/batch_{chunk}.in")
+            due = self._due(batches, chunk, step, updates)
+            for number in range(entered, due):
+                feed(f"include {SUPPLY}/batch_{number}.in")
+            entered = max(entered, due)
             step = self.chunk(feed, updates, step)
             feed("include checkpoint.in")
             if self.over(read_history(self.folder)[-1]):
                 return
+
+    def _due(self, batches: Batches, chunk: int, step: int, updates: Updates) -> int:
+        """Batches that are in the simulation in a chunk which begins at `step`."""
+        if not self.case.drag.slowed:
+            return batches.entered_at(chunk)
+        last = updates.last
+        if last is None:
+            return batches.entered_at(1)
+        since = step * self.scales.time_step - last["time_s"]
+        area = self.case.size_m[1] * self.case.size_m[2]
+        return batches.entered_after(last["filtrate_m3"] / area + last["velocity_m_s"] * since)
 
     def chunk(self, feed: Feed, updates: Updates, step: int) -> int:
         """A chunk of steps from `step`; returns its last one."""

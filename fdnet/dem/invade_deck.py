@@ -72,7 +72,7 @@ def write_invade_inputs(
 def write_batches(
     case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path
 ) -> Snapshot:
-    """Write supply/batch_N.data and .in, which are read before chunk N.
+    """Write supply/batch_N.data and .in, which are read before chunk N of undisturbed mud.
 
     Returns the fines that are there from the start.
     """

@@ -5,6 +5,10 @@ the start of a chunk, where the fluid would have carried it by then. The length 
 the suspension moves in a chunk of time t against a cake that grows towards it, to a thickness
 h = c (u t + h) / phi with the concentration c, the velocity u and phi = `LOOSEST_CAKE`. So no cake
 overtakes a batch as long as one more batch is present than needed.
+
+Where the deposit slows the mud down (`Drag.slowed`), a batch enters at the start of the first
+chunk by which the mud has covered the way that it would have covered by the batch's chunk at the
+first velocity. It enters at the same place, so it comes late by less than the way of one chunk.
 """
 
 import math
@@ -26,6 +30,8 @@ LOOSEST_CAKE = 0.5
 (Onoda & Liniger 1990)."""
 AT_ONCE = 2
 """Batches present from the start: the one that arrives in the first chunk, and the next."""
+ROUNDING = 1e-9
+"""Share of the way in a chunk that rounding may take from the mud's way."""
 SURE_CROWDING = 0.2
 """Up to this `crowding` every fine gets a place. Random sequential addition of equal spheres
 saturates at 0.38 (Talbot et al. 1991), and none of 8,465 draws at 0.2 failed (docs/physics.md).
@@ -135,9 +141,26 @@ class Batches:
         later = max(0, len(self.counts) - AT_ONCE)
         return min(AT_ONCE, len(self.counts)) * self.length + later * (self.length - self.travel)
 
-    def supplied_at(self, chunk: int) -> int:
-        """Fines supplied by the end of a chunk (numbered from 1)."""
-        return sum(self.counts[: chunk + AT_ONCE - 1])
+    def entered_at(self, chunk: int) -> int:
+        """Batches that are in the simulation in a chunk (numbered from 1) of undisturbed mud."""
+        return min(len(self.counts), chunk + AT_ONCE - 1)
+
+    def entered_after(self, way: float) -> int:
+        """Batches that are in the simulation once the mud has covered a `way` of so many m."""
+        return self.entered_at(1 + math.floor(way / self.travel + ROUNDING))
+
+    def entered_with(self, fines: int) -> int:
+        """The smallest number of batches that hold so many `fines`, and at least the first ones.
+
+        They are all batches where not even these hold so many.
+        """
+        totals = np.cumsum(self.counts)
+        needed = int(np.searchsorted(totals, fines)) + 1
+        return min(len(totals), max(needed, self.entered_at(1)))
+
+    def supplied(self, entered: int) -> int:
+        """Fines in the first batches, `entered` of them."""
+        return sum(self.counts[:entered])
 
 
 def batches_of(case: InvasionCase, scales: InvasionScales) -> Batches:
