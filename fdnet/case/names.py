@@ -18,9 +18,11 @@ AUTO: DamageLawName = "auto"
 """The damage law of the default: the most accurate that its cost allows."""
 ALL_SPHERES: DamageLawName = "all-spheres"
 DEFAULT_DAMAGE_LAW: DamageLawName = "side-kozeny"
-"""The most accurate damage law of the network of the grains."""
+"""The damage law that "auto" takes for sections whose damage is light."""
+SECTION_ARCHIE: DamageLawName = "section-archie"
+"""The damage law that it takes for more than `MOST_SPHERES` spheres."""
 MOST_SPHERES = 100_000
-"""Grains and fines up to which the default takes `all-spheres`."""
+"""Grains and fines up to which "auto" takes `all-spheres`."""
 MOST_SECTIONS = 1000
 
 

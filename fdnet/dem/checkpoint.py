@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.case.case import InvasionCase
+from fdnet.dem.batches import Batches, batches_of
 from fdnet.dem.digests import dump_is_changed
 from fdnet.dem.scene import snapshot_of
-from fdnet.dem.supply import Batches, batches_of
 from fdnet.errors import DumpError, LiggghtsError
 from fdnet.scales.scales import InvasionScales
 from fdnet.scales.slab import arrival_time

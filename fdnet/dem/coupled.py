@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fdnet.case.case import InvasionCase
+from fdnet.dem.batches import Batches, batches_of
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, entered_by, read_history
 from fdnet.dem.feed import Feed
 from fdnet.dem.fluid import STATE, Fluid, FluidForces, Moment, largest_share, write_forces
 from fdnet.dem.invade_deck import SUPPLY
 from fdnet.dem.scene import snapshot_of
-from fdnet.dem.supply import Batches, batches_of
 from fdnet.dem.updates import Updates
 from fdnet.errors import LiggghtsError
 from fdnet.scales.scales import InvasionScales

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from fdnet.case.case import InvasionCase
+from fdnet.dem.batches import AT_ONCE, batches_of
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, plug_allowance, quiet_chunks
 from fdnet.dem.contact_lines import contact_variables, left_out_of_contacts
 from fdnet.dem.coupled_parts import dumped_group, write_coupled_parts
@@ -16,7 +17,7 @@ from fdnet.dem.gravity import gravity_variables
 from fdnet.dem.measured_fines import densities
 from fdnet.dem.overlap import is_watched, watch_variables
 from fdnet.dem.scene import header_variables, wall_variables, write_data
-from fdnet.dem.supply import AT_ONCE, batches_of, place_batches, place_fines, slab_end
+from fdnet.dem.supply import place_batches, place_fines, slab_end
 from fdnet.errors import CaseError
 from fdnet.files.atomic import write_text
 from fdnet.scales.scales import InvasionScales

@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from fdnet.case.case import InvasionCase
+from fdnet.dem.batches import batches_of
 from fdnet.dem.checkpoint import (
     HISTORY,
     HISTORY_HEADER,
@@ -46,7 +47,6 @@ from fdnet.dem.overlap import (
     read_watch,
     refuse_overlap,
 )
-from fdnet.dem.supply import batches_of
 from fdnet.dem.updates import UPDATES, rate_is_low, read_updates, volume_has_passed
 from fdnet.dem.verdict import SCREEN
 from fdnet.errors import CaseError, LiggghtsError

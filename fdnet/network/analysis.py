@@ -26,7 +26,7 @@ class Analysis:
         damage_law: name of the damage law that was asked for.
         damage_law_used: the one that `k_damaged` and the sections are from, where "auto" was asked
             for the one that it took; None without fines.
-        damage_law_other: name of the other of `all-spheres` and `side-kozeny`, where it was
+        damage_law_other: name of the other of the two laws that "auto" chooses from, where it was
             computed as well; else None. Values by pore and throat are of the network of the
             grains, so with `all-spheres` they are those of this law.
         k_damaged_other: permeability with fines by that law, m2; else None. The difference to
@@ -107,20 +107,21 @@ APART = 1.25
 """Ratio of two laws' permeabilities from which a warning says that they differ."""
 
 
-def laws_apart(k: float, other: float, name: str) -> Iterator[str]:
-    """A warning where the k of `all-spheres` and that by the law `name` differ by much, m2."""
-    low, high = min(k, other), max(k, other)
-    if high > APART * low:
-        times = f"{high / low:.2f} times" if low > 0 else "above"
-        more = "above" if other > k else "below"
+def laws_apart(taken: tuple[str, float], other: tuple[str, float]) -> Iterator[str]:
+    """A warning where the k (m2) of two laws, each with its name, differ by much."""
+    (name, k), (second, k_second) = taken, other
+    low, high = min(k, k_second), max(k, k_second)
+    if high <= APART * low:
+        return
+    start = f"two ways of measuring the damage differ: {second} gives {k_second:.4g} m2"
+    if low > 0:
+        more = "above" if k_second > k else "below"
         yield (
-            f"two ways of measuring the damage differ: {name} gives {other:.4g} m2, {more} the "
-            f"{k:.4g} m2 of all-spheres (the larger is {times} the smaller); take the difference "
-            "as the error of the damaged permeability"
-            if low > 0
-            else f"two ways of measuring the damage differ: {name} gives {other:.4g} m2, "
-            f"all-spheres {k:.4g} m2; one of them finds no open path"
+            f"{start}, {more} the {k:.4g} m2 of {name} (the larger is {high / low:.2f} times the "
+            "smaller); take the difference as the error of the damaged permeability"
         )
+    else:
+        yield f"{start}, {name} {k:.4g} m2; one of them finds no open path"
 
 
 def worst_solve(flows: Sequence[Flow]) -> dict[str, str | float | None]:

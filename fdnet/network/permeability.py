@@ -16,11 +16,11 @@ from fdnet.network.flow.sections import Section, make_profile, make_sections, re
 from fdnet.network.flow.slabs import SlabK
 from fdnet.network.laws.damage import CLEAN, Damage
 from fdnet.network.laws.named import LAWS
-from fdnet.network.resolved.all_spheres import AllSpheres
+from fdnet.network.resolved.accurate import AccurateLaw, accurate_law
 from fdnet.network.resolved.chosen import by_section, light_sections
 from fdnet.network.resolved.measured import Measured
 from fdnet.network.resolved.slab import Sides
-from fdnet.network.resolved.state import Log, State, capped, solved
+from fdnet.network.resolved.state import Log, State, solved
 from fdnet.network.specimen.specimen import (
     Specimen,
     measure_specimen,
@@ -28,7 +28,7 @@ from fdnet.network.specimen.specimen import (
     specimen_doubts,
 )
 from fdnet.spheres.directions import Directions, periodic_axes
-from fdnet.spheres.snapshot import Snapshot, frozen
+from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
 
 @with_visible_choices
@@ -151,30 +151,29 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
     specimen, law = measured.specimen, options.law
     clean, clean_slabs = measured.clean(law, log)
     base = measured.base(law, log)
-    whole = measured.wanted(options, log)
-    auto, name = options.damage_law == AUTO, options.damage_law
-    name = DEFAULT_DAMAGE_LAW if name in (AUTO, ALL_SPHERES) else name
+    best = accurate_law(measured, options, clean_slabs, log)
+    auto, whole = options.damage_law == AUTO, options.damage_law in (AUTO, ALL_SPHERES)
+    name = DEFAULT_DAMAGE_LAW if whole else options.damage_law
     final, damage = measured.damaged(options, name, log)
     k_damaged, slabs = final.k, clean_slabs
     more: dict[str, int] = {}
-    if final is not clean and (whole is None or auto):
+    resolved = None if best is None else best.solved
+    mixed = auto and resolved is not None
+    if final is not clean and (best is None or mixed):
         slabs = measured.damaged_slabs(final, options, name, log)
     light = light_sections(clean_slabs, slabs)
-    taken = None if auto and np.all(light) else whole
+    taken = None if mixed and np.all(light) else best
     if taken is not None:
-        k_damaged, resolved, more = _resolved(taken, base, (clean_slabs, specimen), log)
-        if auto and np.any(light):
-            slabs, in_series = by_section(light, slabs, resolved, specimen.edges)
-            k_damaged, more["sections_two_scale"] = min(in_series, base.k), int(light.sum())
-        else:
-            slabs = resolved
-    pair = clean_slabs, slabs
-    sections = make_sections(specimen.edges, specimen.porosity, pair, specimen.depth)
-    _warn(log, (clean, final if taken is None else taken.solved), sections)
+        k_damaged, slabs, more = _taken(taken, light & mixed, slabs, (specimen, base))
+        log.warnings += taken.refused
+    sections = make_sections(
+        specimen.edges, specimen.porosity, (clean_slabs, slabs), specimen.depth
+    )
+    _warn(log, clean, (final if taken is None else taken).flow, sections)
     log.warnings += specimen_doubts(specimen, clean.k, options.walls)
-    other, k_other = _other(whole, taken, (base, final), name)
-    if whole is not None:
-        log.warnings += laws_apart(min(whole.k, base.k), final.k, name)
+    other, k_other = _other(best, taken, final.k, name)
+    if best is not None:
+        log.warnings += laws_apart((best.name, best.k), (name, final.k))
     law_used = np.full(len(final.conductance), CLEAN) if damage is None else damage.law_used
     flows = [clean.flow, base.flow, final.flow, *clean_slabs.flows, *slabs.flows]
     return Analysis(
@@ -195,13 +194,25 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
         k_moved=base.k if specimen.moved else None,
         k_reduction=reduction(clean.k, k_damaged),
         sections=sections,
-        layers=None if whole is None else _layers(specimen, clean, whole),
-        solver=worst_solve(flows if whole is None else [*flows, whole.solved.flow]),
+        layers=None if resolved is None else _layers(specimen, clean, resolved),
+        solver=worst_solve(flows if best is None else [*flows, best.flow]),
         counts=_counts(base, specimen.occupancy, damage, final.flow) | more,
         warnings=tuple(log.warnings),
         seconds=log.seconds,
         **_without_laws(specimen),
     )
+
+
+def _taken(
+    best: AccurateLaw, light: Array, slabs: SlabK, where: tuple[Specimen, State]
+) -> tuple[float, SlabK, dict[str, int]]:
+    """k m2, sections and counts by the most accurate law, and by `slabs` where `light` (S,)."""
+    specimen, base = where
+    if not np.any(light):
+        return best.k, best.slabs, dict(best.counts)
+    slabs, in_series = by_section(light, slabs, best.slabs, specimen.edges)
+    more = dict(best.counts) | {"sections_two_scale": int(light.sum())}
+    return min(in_series, base.k), slabs, more
 
 
 def _without_laws(specimen: Specimen) -> dict[str, Any]:
@@ -221,67 +232,38 @@ def _without_laws(specimen: Specimen) -> dict[str, Any]:
     }
 
 
-def _resolved(
-    whole: AllSpheres, base: State, before: tuple[SlabK, Specimen], log: Log
-) -> tuple[float, SlabK, dict[str, int]]:
-    """Permeability m2 and sections by the network of all spheres, and its counts.
-
-    Fines never raise the permeability. Where few of them make the network of all spheres finer,
-    its k may be above that of the grains by the difference of two errors; it is then set to that
-    of the grains, and counted. `before` are the sections without fines, and the specimen.
-    """
-    clean_slabs, specimen = before
-    slabs, above = whole.slabs, 0
-    if not specimen.moved:
-        slabs, above = capped(clean_slabs, whole.slabs, specimen.empty_sections())
-    log.warnings += whole.refused
-    counts = whole.solved.network.counts
-    return (
-        min(whole.k, base.k),
-        slabs,
-        {
-            "all_spheres_pores": len(whole.solved.network.pore_radius),
-            "all_spheres_throats": len(whole.solved.network.throat_radius),
-            "all_spheres_hidden": counts["grains_hidden"],
-            "all_spheres_above_grains": int(whole.k > base.k),
-            "all_spheres_sections_above_grains": above,
-        },
-    )
-
-
 def _other(
-    whole: AllSpheres | None, taken: AllSpheres | None, states: tuple[State, State], name: str
+    best: AccurateLaw | None, taken: AccurateLaw | None, k: float, name: str
 ) -> tuple[str | None, float | None]:
     """Name and k (m2) of the law that was computed and not taken, if there is one.
 
-    `states` are the grains without and with fines by the law `name`.
+    `k` is that by the law `name`.
     """
-    if whole is None:
+    if best is None:
         return None, None
-    return (ALL_SPHERES, min(whole.k, states[0].k)) if taken is None else (name, states[1].k)
+    return (best.name, best.k) if taken is None else (name, k)
 
 
-def _used(specimen: Specimen, whole: AllSpheres | None, name: str) -> str | None:
+def _used(specimen: Specimen, taken: AccurateLaw | None, name: str) -> str | None:
     if specimen.fines is None or not len(specimen.fines):
         return None
-    return name if whole is None else ALL_SPHERES
+    return name if taken is None else taken.name
 
 
-def _layers(specimen: Specimen, clean: State, whole: AllSpheres) -> Layers | None:
+def _layers(specimen: Specimen, clean: State, resolved: Solved) -> Layers | None:
     """Layers of the mean diameter of a fine, from the network that resolves them."""
     initial, fines = solved(clean), specimen.fines
     if initial is None or fines is None:
         return None
     edges = layer_edges(clean.network.box, 2.0 * float(fines.radius.mean()))
-    return make_layers(initial, whole.solved, edges=edges, depth=specimen.depth)
+    return make_layers(initial, resolved, edges=edges, depth=specimen.depth)
 
 
-def _warn(log: Log, states: tuple[State, State | Solved], sections: tuple[Section, ...]) -> None:
-    for name, state in zip(("k_initial", "k_damaged"), states, strict=True):
-        if state.flow.reason:
-            log.warnings.append(f"{name} = 0: {state.flow.reason}")
-    network = states[0].network
-    log.warnings += thin_slabs(sections, 2.0 * network.grain_radius)
+def _warn(log: Log, clean: State, damaged: Flow, sections: tuple[Section, ...]) -> None:
+    for name, flow in (("k_initial", clean.flow), ("k_damaged", damaged)):
+        if flow.reason:
+            log.warnings.append(f"{name} = 0: {flow.reason}")
+    log.warnings += thin_slabs(sections, 2.0 * clean.network.grain_radius)
 
 
 def _counts(

@@ -13,6 +13,7 @@ from fdnet.case.names import (
     LAW_NAMES,
     MOST_SECTIONS,
     MOST_SPHERES,
+    SECTION_ARCHIE,
     WALL_NAMES,
 )
 from fdnet.errors import CaseError
@@ -61,8 +62,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--damage-law",
         choices=DAMAGE_LAW_NAMES,
-        help=f"damage law (default {AUTO}: all-spheres up to {MOST_SPHERES} spheres, else "
-        f"{DEFAULT_DAMAGE_LAW})",
+        metavar="NAME",
+        help=f"damage law: {', '.join(DAMAGE_LAW_NAMES)} (default {AUTO}: up to {MOST_SPHERES} "
+        f"spheres all-spheres, or {DEFAULT_DAMAGE_LAW} where the damage is light; "
+        f"above {SECTION_ARCHIE})",
     )
     parser.add_argument(
         "--compare-laws", action="store_true", help="all laws with all damage laws as a table"

@@ -55,12 +55,12 @@ def _law_lines(results: Sequence[Row], *, fines: bool) -> Iterator[str]:
     pairs = fines or len({row["damage_law"] for row in results}) > 1
     yield (
         f"{'law':<11} "
-        + (f"{'damage law':<11} " if pairs else "")
+        + (f"{'damage law':<14} " if pairs else "")
         + ("axis " if axes else "")
         + _names(fines=fines)
     )
     for row in results:
-        laws = f"{row['law']:<11} " + (f"{row['damage_law']:<11} " if pairs else "")
+        laws = f"{row['law']:<11} " + (f"{row['damage_law']:<14} " if pairs else "")
         for axis in axes:
             values = row[f"k_{axis}_m2"], row[f"k_{axis}_damaged_m2"]
             yield f"{laws}{axis:<4} {_values(*values, fines=fines)}"

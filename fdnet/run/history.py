@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 
 from fdnet.case.case import InvasionCase
+from fdnet.dem.batches import batches_of
 from fdnet.dem.checkpoint import Checkpoint, entered_by
-from fdnet.dem.supply import batches_of
 from fdnet.scales.scales import InvasionScales
 
 FLOW_COLUMNS = (

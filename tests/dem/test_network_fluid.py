@@ -10,11 +10,11 @@ from builders import tiny
 from cut_and_continue import differences
 from scipy.integrate import quad
 
+from fdnet.dem.batches import batches_of
 from fdnet.dem.fluid import Moment
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
-from fdnet.dem.supply import batches_of
 from fdnet.errors import CaseError
 from fdnet.network.field.of_pack import velocity_field
 from fdnet.run.fluid.fluid_of import fluid_of

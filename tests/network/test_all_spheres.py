@@ -189,8 +189,9 @@ def test_the_default_takes_all_spheres_up_to_a_number_of_them(pack, monkeypatch)
     assert small.layers.fines_count.sum() <= small.invaded_count
     monkeypatch.setattr(measured, "MOST_SPHERES", len(pack) - 1)
     large = analyse(pack, periodic=SIDES)
-    assert (large.damage_law_used, large.k_damaged_other) == ("side-kozeny", None)
-    assert large.k_damaged == pytest.approx(small.k_damaged_other)
+    assert (large.damage_law_used, large.damage_law_other) == ("section-archie", "side-kozeny")
+    assert large.k_damaged_other == pytest.approx(small.k_damaged_other)
+    assert large.k_damaged == analyse(pack, periodic=SIDES, damage_law="section-archie").k_damaged
     monkeypatch.undo()
     light = analyse(pack, periodic=SIDES)
     assert light.k_damaged_other == pytest.approx(small.k_damaged)
@@ -233,7 +234,7 @@ def test_spheres_that_make_no_network_are_refused_or_left_to_the_other_law(pack)
     with pytest.raises(NetworkError, match=r"all-spheres.*coincide.*side-kozeny"):
         analyse(double, periodic=SIDES, damage_law="all-spheres")
     default = analyse(double, periodic=SIDES)
-    assert default.damage_law_used == "side-kozeny"
+    assert default.damage_law_used == "section-archie"
     assert any("coincide" in text for text in default.warnings)
 
 

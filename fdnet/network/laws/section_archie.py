@@ -59,7 +59,7 @@ def section_archie_damage(network: Network, occupancy: Occupancy, clean: Array) 
     factor[still] = ratio(whole[still], raised[still])
     law = np.where(factor >= 1.0, CLEAN, np.where(factor == 0.0, BLOCKED, SECTIONS)).astype("<U10")
     counts = {
-        "throats_closed": int(np.sum(factor == 0.0)),
+        "throats_filled": int(np.sum(factor == 0.0)),
         "throats_capped": int(np.sum(factor > 1.0)),
     }
     return Damage(

@@ -4,7 +4,13 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from fdnet.case.analysis import AnalysisChoices
-from fdnet.case.names import ALL_SPHERES, AUTO, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, MOST_SPHERES
+from fdnet.case.names import (
+    ALL_SPHERES,
+    AUTO,
+    DEFAULT_LAW,
+    MOST_SPHERES,
+    SECTION_ARCHIE,
+)
 from fdnet.errors import FlowError, NetworkError
 from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.flow.slabs import SlabK
@@ -92,7 +98,7 @@ class Measured:
         try:
             return self.all_spheres(log)
         except (NetworkError, FlowError) as error:
-            log.warnings.append(f"the damage law {DEFAULT_DAMAGE_LAW} was taken: {error}")
+            log.warnings.append(f"the damage law {SECTION_ARCHIE} was taken: {error}")
             return None
 
     def _damaged_conductance(self, choices: AnalysisChoices, name: str, network: Network) -> Array:

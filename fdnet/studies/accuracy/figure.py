@@ -12,6 +12,7 @@ from fdnet.studies.accuracy.goals import DAMAGE_GOAL, GOALS, Row
 from fdnet.studies.accuracy.rows import RULES
 from fdnet.studies.engine.palette import (
     NEARLY_BLACK,
+    ORANGE,
     PALE_BLUE,
     PALE_GREEN,
     RED,
@@ -20,7 +21,14 @@ from fdnet.studies.engine.palette import (
 )
 
 LAW_STYLES = ((RED, "v"), (SALMON, "^"), (PALE_BLUE, "s"), (VIOLET, "D"), (NEARLY_BLACK, "o"))
-RULE_STYLES = ((RED, "v"), (SALMON, "1"), (PALE_BLUE, "s"), (NEARLY_BLACK, "o"), (VIOLET, "x"))
+RULE_STYLES = (
+    (RED, "v"),
+    (SALMON, "1"),
+    (PALE_BLUE, "s"),
+    (NEARLY_BLACK, "o"),
+    (ORANGE, "d"),
+    (VIOLET, "x"),
+)
 """Colour and marker of each of `LAWS` and of each of `RULES`."""
 
 

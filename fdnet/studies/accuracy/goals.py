@@ -68,3 +68,22 @@ def summary(rows: list[Row], name: str) -> str:
     """Root mean square of ln, and the ratio furthest from 1, of a column."""
     ratios = values(rows, name)
     return f"{percent(rms(ratios))}, {ratio(worst(ratios))}" if ratios else "-"
+
+
+def truth_errors(rows: Iterable[Row]) -> str:
+    """Least and largest error of the truth of rows."""
+    errors = sorted(row["truth_error"] for row in rows)
+    return f"{100 * errors[0]:.2g} to {100 * errors[-1]:.2g} %"
+
+
+def worst_case(rows: Iterable[Row], name: str) -> str:
+    """The case that is farthest from truth by the law `name`, and its ratio."""
+    known = [row for row in rows if not np.isnan(row[name])]
+    row = max(known, key=lambda row: abs(np.log(row[name])))
+    return f"{row['case']}, {row[name]:.3f}"
+
+
+def summed_up(ratios: Iterable[float]) -> str:
+    """rms and worst of ratios, as text."""
+    ratios = list(ratios)
+    return f"rms {percent(rms(ratios))}, worst {worst(ratios):.3f}"

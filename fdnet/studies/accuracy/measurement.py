@@ -1,6 +1,6 @@
 """What the laws make of a periodic pack: the one place that measures laws against Stokes truth."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
@@ -17,6 +17,7 @@ PAIRS = (
     "thesis + thesis-code",
     "lubrication + kozeny",
     "lubrication + side-kozeny",
+    "lubrication + section-archie",
 )
 """The pairs of a conductance law and a damage law that are compared."""
 RESOLVED = "all spheres as grains"
@@ -77,11 +78,13 @@ def resolved(pack: Snapshot) -> float:
     return permeability(network, all_conductances(network))
 
 
-def measure_loss(pack: Snapshot, network: Network, *, whole: bool = True) -> Loss:
-    """Permeabilities of a pack by all `PAIRS`, and by `RESOLVED` if `whole`."""
+def measure_loss(
+    pack: Snapshot, network: Network, *, pairs: Sequence[str] = PAIRS, whole: bool = True
+) -> Loss:
+    """Permeabilities of a pack by `pairs` of laws, and by `RESOLVED` if `whole`."""
     occupancy = measure_occupancy(network, pack.fines())
-    damaged = {pair: by_pair(network, occupancy, pair) for pair in PAIRS}
+    damaged = {pair: by_pair(network, occupancy, pair) for pair in pairs}
     return Loss(
-        intact={law: by_law(network, law) for law in dict.fromkeys(map(law_of, PAIRS))},
+        intact={law: by_law(network, law) for law in dict.fromkeys(map(law_of, pairs))},
         damaged=damaged | ({RESOLVED: resolved(pack)} if whole else {}),
     )

@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.case.names import MOST_SPHERES
+from fdnet.case.names import MOST_SPHERES, SECTION_ARCHIE
 from fdnet.network.laws.named import DEFAULT_DAMAGE_LAW, DEFAULT_LAW
 from fdnet.studies.accuracy.choices import CHOICES
 from fdnet.studies.accuracy.deposits import BED_SHARE
+from fdnet.studies.accuracy.full_size import full_size_numbers
 from fdnet.studies.accuracy.goals import (
     ALL_SPHERES_GOAL,
     DAMAGE_GOAL,
@@ -18,24 +19,24 @@ from fdnet.studies.accuracy.goals import (
     rms,
     span,
     summary,
+    summed_up,
+    truth_errors,
     values,
     worst,
+    worst_case,
 )
 from fdnet.studies.accuracy.measurement import DEFAULT, PAIRS, RESOLVED
 from fdnet.studies.accuracy.results import Results
-from fdnet.studies.accuracy.slabs import CHOSEN, FINEST
+from fdnet.studies.accuracy.slab_numbers import slab_numbers
 from fdnet.studies.accuracy.tables import KNOWN
 from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.truth.cases import EQUAL, LATTICE, LOOSE, UNEQUAL
-from fdnet.studies.truth.slabs import NO
 
 FAR = 10.0
 """Widths, in grain diameters, from which the excess of walled packs is proportional to 1/W."""
 WIDE_PORES = ("A_200_eps40", "C_80_eps40", "F_80_eps45", "H_40_eps40", "I_80_eps45", "J_80_eps42")
 """Random packs of equal grains of porosity 0.40 and more."""
 THESIS = PAIRS[:2]
-FINE_RATIOS = (8, 10)
-"""Grains over fines in the names of the slabs with fine fines."""
 
 
 def page_numbers(results: Results, validation: Path) -> dict[str, str]:
@@ -43,16 +44,18 @@ def page_numbers(results: Results, validation: Path) -> dict[str, str]:
     return {
         "default_law": DEFAULT_LAW,
         "default_damage_law": DEFAULT_DAMAGE_LAW,
+        "section_law": SECTION_ARCHIE,
         "most_spheres": f"{MOST_SPHERES:,}",
         **_goals(),
         **_intact(results.intact),
         **_damaged(results.damage),
         **_deposits(results),
-        **_slabs(results.slabs),
+        **slab_numbers(results.slabs),
         **_vanishing(results.vanishing),
         **_choices(results),
         **_boundaries(validation),
         **_walls(validation),
+        **full_size_numbers(validation),
     }
 
 
@@ -77,12 +80,12 @@ def _intact(rows: Sequence[Row]) -> dict[str, str]:
     lattices = [row for row in rows if row["group"] == LATTICE]
     loose = [row for row in rows if row["group"] == LOOSE]
     return {
-        "errors_intact": _truth_errors(counted),
+        "errors_intact": truth_errors(counted),
         "packs": str(len(packs)),
         "lattices": str(len(lattices)),
         "off_intact": percent(_farthest(counted, DEFAULT_LAW)),
-        "worst_intact": _worst(counted, DEFAULT_LAW),
-        "worst_loose": _worst(loose, DEFAULT_LAW),
+        "worst_intact": worst_case(counted, DEFAULT_LAW),
+        "worst_loose": worst_case(loose, DEFAULT_LAW),
         "thesis_intact": span((row["thesis"] for row in packs), 2),
         "thesis_too_low": span((1.0 / row["thesis"] for row in packs), 1),
         "hydraulic_lattices": percent(_farthest(lattices, "hydraulic"), 0),
@@ -99,16 +102,16 @@ def _damaged(rows: Sequence[Row]) -> dict[str, str]:
     ratios = [row["k_over_k0"] for row in rows]
     resolved = [row for row in rows if not np.isnan(row[RESOLVED])]
     return {
-        "errors_damage": _truth_errors(rows),
+        "errors_damage": truth_errors(rows),
         "deposits": str(len(rows)),
         "rms_damage": percent(rms(values(rows, DEFAULT))),
         "off_damage": percent(_farthest(rows, DEFAULT), 0),
-        "worst_damage": _worst(rows, DEFAULT),
+        "worst_damage": worst_case(rows, DEFAULT),
         "later_damage": str(len(later)),
         "rms_later_damage": percent(rms(values(later, DEFAULT))),
         "off_later_damage": percent(_farthest(later, DEFAULT), 0),
         "resolved_summary": summary(list(rows), RESOLVED),
-        "worst_resolved": _worst(resolved, RESOLVED),
+        "worst_resolved": worst_case(resolved, RESOLVED),
         "off_resolved": percent(_farthest(resolved, RESOLVED), 0),
         "least_ratio": f"{min(ratios):.4f}",
         "most_ratio": f"{max(ratios):.2f}",
@@ -142,34 +145,6 @@ def _vanishing(rows: Sequence[Row]) -> dict[str, str]:
     }
 
 
-def _slabs(rows: Sequence[Row]) -> dict[str, str]:
-    aside = [row for row in rows if row["known_before"] == NO]
-    known = [row for row in rows if row["known_before"] != NO]
-    pairs = {"default": CHOSEN, "finest": FINEST, "two_scale": DEFAULT}
-    fine = [row for row in rows if any(f"_r{size}" in row["case"] for size in FINE_RATIOS)]
-    coarse = [row for row in rows if row not in fine]
-    return {
-        "slabs": str(len(rows)),
-        "slabs_aside": str(len(aside)),
-        "slabs_known": str(len(known)),
-        **{f"slabs_aside_{key}": summary(aside, name) for key, name in pairs.items()},
-        **{f"slabs_known_{key}": summary(known, name) for key, name in pairs.items()},
-        "slabs_default_rms": percent(rms(values(aside, CHOSEN)), 0),
-        "slabs_default_worst": f"{worst(values(aside, CHOSEN)):.3f}",
-        "slabs_default_case": _worst(aside, CHOSEN).split(",")[0],
-        "slabs_two_scale_rms": percent(rms(values(aside, DEFAULT))),
-        "slabs_two_scale_known": percent(rms(values(known, DEFAULT)), 0),
-        "slabs_coarse": str(len(coarse)),
-        "slabs_coarse_k": _summed_up(row[f"{FINEST}: k"] for row in coarse),
-        "slabs_fine": str(len(fine)),
-        "slabs_fine_k": _summed_up(row[f"{FINEST}: k"] for row in fine),
-        "slabs_intact": _summed_up(row[f"{DEFAULT}: k0"] for row in rows),
-        "slabs_least": f"{min(row['k_over_k0'] for row in rows):.3f}",
-        "slabs_most": f"{max(row['k_over_k0'] for row in rows):.2f}",
-        "slabs_errors": _truth_errors(rows),
-    }
-
-
 def _choices(results: Results) -> dict[str, str]:
     own, sampson, _, by_area = (
         next(row for row in results.choices if row["choice"] == name) for name in CHOICES
@@ -185,11 +160,11 @@ def _choices(results: Results) -> dict[str, str]:
         "delaunay_off": _most(
             other[DEFAULT_LAW] / power[DEFAULT_LAW] - 1.0 for power, other in pairs
         ),
-        "series_shipped": _summed_up(row["series"] for row in equal),
+        "series_shipped": summed_up(row["series"] for row in equal),
         "series_weight": f"{refit[0]['weight']:.3f}",
-        "series_fitted": _summed_up(row["fitted"] for row in refit),
+        "series_fitted": summed_up(row["fitted"] for row in refit),
         "series_weights": span(weights),
-        "series_held_out": _summed_up(row["held_out"] for row in refit),
+        "series_held_out": summed_up(row["held_out"] for row in refit),
     }
 
 
@@ -231,19 +206,8 @@ def _walls(validation: Path) -> dict[str, str]:
     }
 
 
-def _truth_errors(rows: Iterable[Row]) -> str:
-    errors = sorted(row["truth_error"] for row in rows)
-    return f"{100 * errors[0]:.2g} to {100 * errors[-1]:.2g} %"
-
-
 def _farthest(rows: Iterable[Row], name: str) -> float:
     return abs(worst(values(rows, name)) - 1.0)
-
-
-def _worst(rows: Iterable[Row], name: str) -> str:
-    known = [row for row in rows if not np.isnan(row[name])]
-    row = max(known, key=lambda row: abs(np.log(row[name])))
-    return f"{row['case']}, {row[name]:.3f}"
 
 
 def _of(rows: Iterable[Row], name: str, cases: Sequence[str]) -> str:
@@ -258,8 +222,3 @@ def _percents(shares: Iterable[float]) -> str:
 
 def _most(shares: Iterable[float]) -> str:
     return percent(max(map(abs, shares)))
-
-
-def _summed_up(ratios: Iterable[float]) -> str:
-    ratios = list(ratios)
-    return f"rms {percent(rms(ratios))}, worst {worst(ratios):.3f}"

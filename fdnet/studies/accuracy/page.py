@@ -9,6 +9,7 @@ from fdnet.network.laws.named import DEFAULT_LAW
 from fdnet.studies.accuracy import boundary_tables, tables
 from fdnet.studies.accuracy.benchmark_tables import benchmark_tables
 from fdnet.studies.accuracy.figure import draw_accuracy
+from fdnet.studies.accuracy.full_size import full_size_table
 from fdnet.studies.accuracy.goals import DAMAGE_GOAL, GOALS
 from fdnet.studies.accuracy.measurement import DEFAULT
 from fdnet.studies.accuracy.numbers import page_numbers
@@ -75,6 +76,7 @@ def page_tables(results: Results, validation: Path) -> dict[str, str]:
         "bed_table": tables.bed_table(list(results.beds)),
         "polydisperse_table": tables.polydisperse_table(list(results.polydisperse)),
         "deposit_slabs": slab_summary(list(results.slabs)),
+        "full_size_table": full_size_table(validation),
         "tiled_table": boundary_tables.tiled_table(validation / "boundary_tiled.csv"),
         "slab_table": boundary_tables.slab_table(validation / "boundary_slabs.csv"),
         "walled_table": boundary_tables.walled_table(validation / "boundary_walled.csv"),

@@ -12,7 +12,7 @@ from fdnet.studies.accuracy.slabs import slab_rows
 from fdnet.studies.accuracy.vanishing import vanishing_rows
 from fdnet.studies.engine.csv_rows import DIGITS, read_named, write_named
 from fdnet.studies.truth.cases import Case
-from fdnet.studies.truth.slabs import NO, SLAB_FOLDER, YES
+from fdnet.studies.truth.slabs import LATER, NO, SLAB_FOLDER, YES
 
 Row = dict[str, Any]
 _TEXT = ("case", "group", "known_before", "choice", "tessellation")
@@ -56,7 +56,7 @@ def compute_results(cases: list[Case], folder: Path) -> Results:
         refit=refitted_series(cases),
         large_fines=large_fine_rows(folder),
         beds=bed_rows(folder),
-        slabs=slab_rows(SLAB_FOLDER, (YES, NO)),
+        slabs=slab_rows(SLAB_FOLDER, (YES, NO, LATER)),
         vanishing=vanishing_rows(folder),
     )
 

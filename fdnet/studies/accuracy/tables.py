@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from fdnet.network.laws.named import LAWS
+from fdnet.studies.accuracy.deposits import BED_PAIRS
 from fdnet.studies.accuracy.goals import (
     DAMAGE_GOAL,
     GOALS,
@@ -16,7 +17,6 @@ from fdnet.studies.accuracy.goals import (
     summary,
     worst,
 )
-from fdnet.studies.accuracy.measurement import PAIRS
 from fdnet.studies.accuracy.rows import RULES
 from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.engine.markdown import markdown_table
@@ -125,10 +125,10 @@ def bed_table(rows: list[Row]) -> str:
     """k/k0 with all pores full of fines; over the estimate of the bed in brackets."""
     lines = [
         [f"1/{row['ratio']:g}", str(row["fines"]), f"{row['bed']:.2e}"]
-        + [f"{row[name]:.2e} ({ratio(row[name] / row['bed'], 2)})" for name in PAIRS]
+        + [f"{row[name]:.2e} ({ratio(row[name] / row['bed'], 2)})" for name in BED_PAIRS]
         for row in rows
     ]
-    return markdown_table(["fine", "fines", "k/k0 of the bed", *PAIRS], lines)
+    return markdown_table(["fine", "fines", "k/k0 of the bed", *BED_PAIRS], lines)
 
 
 def polydisperse_table(rows: list[Row]) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fdnet.run.open_run import run_case
-from fdnet.studies.truth.slabs import NO, YES, Slab, write_specimen
+from fdnet.studies.truth.slabs import LATER, NO, YES, Slab, write_specimen
 from fdnet.studies.truth.specimens import SPECIMENS
 
 COARSE, MIDDLE, FINE = (60, 72, 96), (72, 96, 120), (84, 96, 120)
@@ -75,19 +75,19 @@ CUTS: tuple[tuple[str, tuple[float, float], tuple[int, ...], str], ...] = (
     ("slabBB_r3_range_mu0", TWICE, MIDDLE, NO),
     ("slabBC_r8_ranges", FACE, FINEST, NO),
     ("slabBD_r4", TWICE, MIDDLE, NO),
-    ("slabBE_r8", FACE, FINEST, NO),
-    ("slabBE_r8", DEEP, FINE, NO),
-    ("slabBF_r10", FACE, FINEST, NO),
-    ("slabBG_r5", FACE, MIDDLE, NO),
-    ("slabBH_r5_range", TWICE, MIDDLE, NO),
-    ("slabBI_r3", TWICE, MIDDLE, NO),
-    ("slabBJ_r8_mu0", FACE, FINEST, NO),
-    ("slabBK_r6", FACE, MIDDLE, NO),
-    ("slabBL_r10_followed", FACE, FINEST, NO),
-    ("slabBM_r5_followed", FACE, MIDDLE, NO),
-    ("slabBN_r3_range_mu0", TWICE, MIDDLE, NO),
-    ("slabBO_r8_ranges", FACE, FINEST, NO),
-    ("slabBP_r4", TWICE, MIDDLE, NO),
+    ("slabBE_r8", FACE, FINEST, LATER),
+    ("slabBE_r8", DEEP, FINE, LATER),
+    ("slabBF_r10", FACE, FINEST, LATER),
+    ("slabBG_r5", FACE, MIDDLE, LATER),
+    ("slabBH_r5_range", TWICE, MIDDLE, LATER),
+    ("slabBI_r3", TWICE, MIDDLE, LATER),
+    ("slabBJ_r8_mu0", FACE, FINEST, LATER),
+    ("slabBK_r6", FACE, MIDDLE, LATER),
+    ("slabBL_r10_followed", FACE, FINEST, LATER),
+    ("slabBM_r5_followed", FACE, MIDDLE, LATER),
+    ("slabBN_r3_range_mu0", TWICE, MIDDLE, LATER),
+    ("slabBO_r8_ranges", FACE, FINEST, LATER),
+    ("slabBP_r4", TWICE, MIDDLE, LATER),
 )
 """Specimen, slab, grids, and whether its truth was known when the laws were shaped."""
 SLABS = {

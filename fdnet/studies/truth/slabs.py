@@ -11,7 +11,7 @@ from fdnet.studies.truth.packs import DATA, MM
 
 SLAB_FOLDER = DATA / "slabs"
 SLAB_GRIDS, SLAB_TRUTH = "grids.csv", "truth.csv"
-YES, NO = "yes", "no"
+YES, NO, LATER = "yes", "no", "later"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,8 +24,9 @@ class Slab:
         x_lo_mm: where it begins; the formation face is at 0.
         x_hi_mm: where it ends.
         cells: of the grids on which it is solved, on its longest edge.
-        known_before: "yes" where the laws may have been shaped on its truth, "no" where it was put
-            aside before it was solved and before the laws were last touched.
+        known_before: "yes" where the laws may have been shaped on its truth; "no" where it was put
+            aside before the laws that "auto" took for it were last touched; "later" where that
+            holds for the law `section-archie` as well.
     """
 
     name: str

@@ -213,7 +213,7 @@ SPECIMENS = {
         fine_mm=[0.025, 0.0375],
         supplied=1100,
         friction=0.3,
-        pack=0.40,
+        pack=33,
         grain_mm=GRAIN_RANGE,
     ),
     "slabBP_r4": Specimen(seed=352, fine_mm=0.0625, supplied=200, friction=0.55, pack=35),

@@ -1,0 +1,89 @@
+"""The numbers in the prose on slabs of the accuracy page."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fdnet.case.names import DEFAULT_LAW, SECTION_ARCHIE
+from fdnet.studies.accuracy.goals import (
+    Row,
+    percent,
+    rms,
+    summary,
+    summed_up,
+    truth_errors,
+    values,
+    worst,
+    worst_case,
+)
+from fdnet.studies.accuracy.measurement import DEFAULT
+from fdnet.studies.accuracy.slabs import CHOSEN, FINEST
+from fdnet.studies.truth.slabs import LATER, YES
+
+ARCHIE = f"{DEFAULT_LAW} + {SECTION_ARCHIE}"
+FINE_RATIOS = (8, 10)
+"""Grains over fines in the names of the slabs with fine fines."""
+
+
+def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
+    """Every number of the prose on slabs by its name in docs/accuracy.md.in."""
+    aside = [row for row in rows if row["known_before"] != YES]
+    fresh = [row for row in rows if row["known_before"] == LATER]
+    known = [row for row in rows if row["known_before"] == YES]
+    pairs = {"default": CHOSEN, "finest": FINEST, "two_scale": DEFAULT, "archie": ARCHIE}
+    fine = [row for row in rows if any(f"_r{size}" in row["case"] for size in FINE_RATIOS)]
+    coarse = [row for row in rows if row not in fine]
+    return {
+        "slabs": str(len(rows)),
+        "slabs_aside": str(len(aside)),
+        "slabs_fresh": str(len(fresh)),
+        "slabs_known": str(len(known)),
+        **{f"slabs_aside_{key}": summary(aside, name) for key, name in pairs.items()},
+        **{f"slabs_fresh_{key}": summary(fresh, name) for key, name in pairs.items()},
+        **{f"slabs_known_{key}": summary(known, name) for key, name in pairs.items()},
+        "slabs_default_rms": percent(rms(values(aside, CHOSEN)), 0),
+        "slabs_default_worst": f"{worst(values(aside, CHOSEN)):.3f}",
+        "slabs_default_case": worst_case(aside, CHOSEN).split(",")[0],
+        "slabs_two_scale_rms": percent(rms(values(aside, DEFAULT))),
+        "slabs_archie_rms": percent(rms(values(aside, ARCHIE))),
+        **_apart(rows),
+        **_heavy_and_fine(rows),
+        "slabs_coarse": str(len(coarse)),
+        "slabs_coarse_k": summed_up(row[f"{FINEST}: k"] for row in coarse),
+        "slabs_fine": str(len(fine)),
+        "slabs_fine_k": summed_up(row[f"{FINEST}: k"] for row in fine),
+        "slabs_intact": summed_up(row[f"{DEFAULT}: k0"] for row in rows),
+        "slabs_least": f"{min(row['k_over_k0'] for row in rows):.3f}",
+        "slabs_most": f"{max(row['k_over_k0'] for row in rows):.2f}",
+        "slabs_errors": truth_errors(rows),
+    }
+
+
+def _apart(rows: Sequence[Row]) -> dict[str, str]:
+    """rms of both laws of the network of the grains, by how far apart they are on a slab."""
+    apart = [abs(np.log(row[DEFAULT] / row[ARCHIE])) for row in rows]
+    numbers: dict[str, str] = {}
+    for name, low, high in (("near", 0.0, 0.1), ("apart", 0.1, 0.25), ("far", 0.25, np.inf)):
+        some = [row for row, one in zip(rows, apart, strict=True) if low <= one < high]
+        numbers |= {
+            f"slabs_{name}": str(len(some)),
+            f"slabs_{name}_two_scale": percent(rms(values(some, DEFAULT)), 0),
+            f"slabs_{name}_archie": percent(rms(values(some, ARCHIE)), 0),
+        }
+    return numbers
+
+
+def _heavy_and_fine(rows: Sequence[Row]) -> dict[str, str]:
+    """Mean error of both laws where fines of 1/8 and 1/10 leave less than a tenth of k."""
+    some = [
+        row
+        for row in rows
+        if row["k_over_k0"] < 0.1 and any(f"_r{size}" in row["case"] for size in FINE_RATIOS)
+    ]
+    mean = {
+        key: float(np.exp(np.mean(np.log(values(some, name)))) - 1.0)
+        for key, name in (("two_scale", DEFAULT), ("archie", ARCHIE))
+    }
+    return {"slabs_heavy": str(len(some))} | {
+        f"slabs_heavy_{key}": f"{100 * one:+.0f} %" for key, one in mean.items()
+    }
