@@ -7,8 +7,8 @@ h = c (u t + h) / phi with the concentration c, the velocity u and phi = `LOOSES
 overtakes a batch as long as one more batch is present than needed.
 
 Where the deposit slows the mud down (`Drag.slowed`), a batch enters at the start of the first
-chunk by which the mud has covered the way that it would have covered by the batch's chunk at the
-first velocity. It enters at the same place, so it comes late by less than the way of one chunk.
+chunk by which the mud has moved as far as it would have moved by the batch's chunk at the first
+velocity. It enters at the same place, so it lags by less than the mud moves in one chunk.
 """
 
 import math
@@ -26,7 +26,7 @@ LOOSEST_CAKE = 0.5
 AT_ONCE = 2
 """Batches present from the start: the one that arrives in the first chunk, and the next."""
 ROUNDING = 1e-9
-"""Share of the way in a chunk that rounding may take from the mud's way."""
+"""Share of a chunk's travel that rounding may take from the distance of the mud."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,9 +53,9 @@ class Batches:
         """Batches that are in the simulation in a chunk (numbered from 1) of undisturbed mud."""
         return min(len(self.counts), chunk + AT_ONCE - 1)
 
-    def entered_after(self, way: float) -> int:
-        """Batches that are in the simulation once the mud has covered a `way` of so many m."""
-        return self.entered_at(1 + math.floor(way / self.travel + ROUNDING))
+    def entered_after(self, distance: float) -> int:
+        """Batches that are in the simulation once the mud has moved by a `distance`, m."""
+        return self.entered_at(1 + math.floor(distance / self.travel + ROUNDING))
 
     def entered_with(self, fines: int) -> int:
         """The smallest number of batches that hold so many `fines`, and at least the first ones.

@@ -60,10 +60,8 @@ class Coupling:
         show its spheres, and what the fluid raises.
         """
         step, chunk = (self.last.step, self.last.chunk) if self.last else (0, 0)
-        updates, batches = (
-            Updates(self.folder, self.fluid.measured, upto=step),
-            batches_of(self.case, self.scales),
-        )
+        updates = Updates(self.folder, self.fluid.measured, upto=step)
+        batches = batches_of(self.case, self.scales)
         entered = entered_by(self.case, batches, self.last) if self.last else batches.entered_at(1)
         feed(f"include {self.deck}")
         while chunk < chunks_of(self.case, self.scales):

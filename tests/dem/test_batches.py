@@ -88,11 +88,11 @@ def test_supplied_counts_the_batches_that_have_come():
     assert batches.supplied(batches.entered_at(10_000)) == 900
 
 
-def test_batches_follow_the_way_of_the_mud_where_it_slows_down():
-    """After the way of n chunks of undisturbed mud the batches of chunk n + 1 are there."""
+def test_batches_follow_the_mud_where_it_slows_down():
+    """After the travel of n chunks of undisturbed mud the batches of chunk n + 1 are there."""
     batches = batches_of(tiny(*BATCHED), scales_of(tiny(*BATCHED)))
-    way = batches.travel * np.array([0.0, 0.99, 1.0, 1.5, 2.0, 1e6])
-    assert [batches.entered_after(one) for one in way] == [2, 2, 3, 3, 4, len(batches.counts)]
+    moved = batches.travel * np.array([0.0, 0.99, 1.0, 1.5, 2.0, 1e6])
+    assert [batches.entered_after(one) for one in moved] == [2, 2, 3, 3, 4, len(batches.counts)]
     for entered in (2, 3, len(batches.counts)):
         assert batches.entered_with(batches.supplied(entered)) == entered
         assert batches.entered_with(batches.supplied(entered) - 1) == entered

@@ -98,7 +98,7 @@ def test_a_continued_invasion_is_the_uncut_one(binary, fluid, tmp_path):
 
 
 def test_batches_come_as_the_mud_that_slows_down_carries_them(binary, fluid, tmp_path):
-    """The way of the mud is the filtrate over the face; a batch waits until it has covered its."""
+    """The mud has moved by the filtrate over the face; a batch waits for its distance."""
     keys = ("fines.supply=batches", "fines.count=600", "run.checkpoint_ms=0.02", "run.cap_ms=0.3")
     other = with_case(fluid, *keys)
     result = invade(

@@ -30,7 +30,7 @@ class AccurateLaw:
         slabs: of each section, cut out and in place.
         flow: through the whole specimen.
         solved: the network of all spheres, where that was solved.
-        counts: of that network.
+        counts: of that network, or of the damage law.
         refused: sections whose spheres make no network of their own, one sentence each.
     """
 
@@ -59,14 +59,14 @@ def accurate_law(
     fines = measured.specimen.fines
     if fines is None or not len(fines) or choices.damage_law != AUTO or choices.law != DEFAULT_LAW:
         return None
-    state, _ = measured.damaged(choices, SECTION_ARCHIE, log)
+    state, damage = measured.damaged(choices, SECTION_ARCHIE, log)
     return AccurateLaw(
         name=SECTION_ARCHIE,
         k=min(state.k, base.k),
         slabs=measured.damaged_slabs(state, choices, SECTION_ARCHIE, log),
         flow=state.flow,
         solved=None,
-        counts={},
+        counts={} if damage is None else damage.counts,
         refused=(),
     )
 

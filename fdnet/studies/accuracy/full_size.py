@@ -36,7 +36,7 @@ def full_size_rows(runs: Iterable[Path]) -> list[Row]:
         run = open_run(path)
         edges = [*(MM * one for one in EDGES_MM), run.case.size_m[0]]
         names = (ALL_SPHERES, *TWO_SCALE)
-        found = list(
+        results = list(
             compare(
                 run.spheres(),
                 periodic=run.case.periodic,
@@ -44,7 +44,7 @@ def full_size_rows(runs: Iterable[Path]) -> list[Row]:
                 sections=edges,
             )
         )
-        rows += _rows(run.case.name, dict(zip(names, found, strict=True)))
+        rows += _rows(run.case.name, dict(zip(names, results, strict=True)))
     return rows
 
 
