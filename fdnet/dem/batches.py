@@ -8,7 +8,7 @@ overtakes a batch as long as one more batch is present than needed.
 
 Where the deposit slows the mud down (`Drag.slowed`), a batch enters at the start of the first
 chunk by which the mud has moved as far as it would have moved by the batch's chunk at the first
-velocity. It enters at the same place, so it lags by less than the mud moves in one chunk.
+velocity. It is put where the mud has carried it by then, at the mud's velocity.
 """
 
 import math
@@ -65,6 +65,10 @@ class Batches:
         totals = np.cumsum(self.counts)
         needed = int(np.searchsorted(totals, fines)) + 1
         return min(len(totals), max(needed, self.entered_at(1)))
+
+    def distance_of(self, number: int) -> float:
+        """Distance m by which the mud has moved when batch `number` (from 0) is due."""
+        return max(0, number + 1 - AT_ONCE) * self.travel
 
     def supplied(self, entered: int) -> int:
         """Fines in the first batches, `entered` of them."""

@@ -66,25 +66,45 @@ class Coupling:
         feed(f"include {self.deck}")
         while chunk < chunks_of(self.case, self.scales):
             chunk += 1
-            due = self._due(batches, chunk, step, updates)
-            for number in range(entered, due):
-                feed(f"include {SUPPLY}/batch_{number}.in")
-            entered = max(entered, due)
+            entered = self._supply(feed, updates, (chunk, step), (batches, entered))
             step = self.chunk(feed, updates, step)
             feed("include checkpoint.in")
             if self.over(read_history(self.folder)[-1]):
                 return
 
-    def _due(self, batches: Batches, chunk: int, step: int, updates: Updates) -> int:
-        """Batches that are in the simulation in a chunk which begins at `step`."""
+    def _supply(
+        self, feed: Feed, updates: Updates, at: tuple[int, int], supply: tuple[Batches, int]
+    ) -> int:
+        """Feed the batches that are due `at` a chunk and its first step.
+
+        `supply` are the batches, and the number of those that have entered; returns the new one.
+        """
+        (chunk, step), (batches, entered) = at, supply
         if not self.case.drag.slowed:
-            return batches.entered_at(chunk)
+            due = batches.entered_at(chunk)
+            for number in range(entered, due):
+                feed(f"include {SUPPLY}/batch_{number}.in")
+            return due
+        moved, velocity = self._mud(updates, step)
+        due = max(entered, batches.entered_after(moved))
+        for number in range(entered, due):
+            beyond = moved - batches.distance_of(number)
+            feed(
+                f"variable beyond string {beyond!r}",
+                f"variable mud string {velocity!r}",
+                f"include {SUPPLY}/batch_{number}.in",
+            )
+        return due
+
+    def _mud(self, updates: Updates, step: int) -> tuple[float, float]:
+        """By how much the mud has moved at `step`, m, and its velocity upstream, m/s."""
         last = updates.last
         if last is None:
-            return batches.entered_at(1)
+            return 0.0, self.scales.upstream_velocity
         since = step * self.scales.time_step - last["time_s"]
         area = self.case.size_m[1] * self.case.size_m[2]
-        return batches.entered_after(last["filtrate_m3"] / area + last["velocity_m_s"] * since)
+        velocity = float(last["velocity_m_s"])
+        return float(last["filtrate_m3"]) / area + velocity * since, velocity
 
     def chunk(self, feed: Feed, updates: Updates, step: int) -> int:
         """A chunk of steps from `step`; returns its last one."""

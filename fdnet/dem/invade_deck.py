@@ -80,6 +80,7 @@ def write_batches(
     batches, bounds = list(place_batches(case, scales, grains)), _bounds(case, scales, grains)
     shared = {
         "start_velocity": number(scales.upstream_velocity),
+        "slowed": case.drag.slowed,
         "drag": drag_variables(case, scales),
     }
     density, first = densities(case, batches_of(case, scales).counts), int(grains.id.max()) + 1

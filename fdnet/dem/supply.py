@@ -10,7 +10,7 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase
 from fdnet.case.size_rules import concentration_text
-from fdnet.dem.batches import AT_ONCE, Batches, batches_of
+from fdnet.dem.batches import Batches, batches_of
 from fdnet.dem.measured_fines import drawn_fines
 from fdnet.dem.size_classes import CLEARANCE, ROUNDS, places_by_size
 from fdnet.errors import CaseError
@@ -114,11 +114,11 @@ def place_batches(
     The ids are numbered through all batches. A batch does not depend on how many follow, but for
     measured sizes, of which each batch gets its part of the whole.
     """
-    travel, first = batches_of(case, scales).travel, int(grains.id.max()) + 1
+    batches, first = batches_of(case, scales), int(grains.id.max()) + 1
     for number, (position, radius) in enumerate(
-        _draw_batches(case, scales, end=slab_end(case, grains)), 1
+        _draw_batches(case, scales, end=slab_end(case, grains))
     ):
-        carried = np.array([max(0, number - AT_ONCE) * travel, 0.0, 0.0])
+        carried = np.array([batches.distance_of(number), 0.0, 0.0])
         yield _moving(case, scales, grains, position + carried, radius, first=first)
         first += len(radius)
 

@@ -10,11 +10,13 @@ from builders import tiny
 from cut_and_continue import differences
 from scipy.integrate import quad
 
-from fdnet.dem.batches import batches_of
+from fdnet.dem.batches import AT_ONCE, batches_of
+from fdnet.dem.checkpoint import state_at
 from fdnet.dem.fluid import Moment
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
+from fdnet.dem.supply import place_batches
 from fdnet.errors import CaseError
 from fdnet.network.field.of_pack import velocity_field
 from fdnet.run.fluid.fluid_of import fluid_of
@@ -115,6 +117,19 @@ def test_batches_come_as_the_mud_that_slows_down_carries_them(binary, fluid, tmp
     assert 3 < entered[-1] < undisturbed[-1]
     last = result.history[-1]
     assert result.supplied == last.upstream + last.invaded + last.passed
+    placed = list(place_batches(other.case, other.scales, other.grains))
+    for before, row, now in zip(entered, result.history[1:], entered[1:], strict=False):
+        for number in range(before, now):
+            state = state_at(tmp_path / "a", row, other.case, other.scales, other.grains).fines()
+            _, one, other_one = np.intersect1d(state.id, placed[number].id, return_indices=True)
+            far = state.position[one, 0] < -2e-4  # upstream of what stands before the face
+            went = state.position[one, 0][far] - placed[number].position[other_one, 0][far]
+            after = [line for line in result.updates if line["step"] < row.step][-1]
+            moved = after["filtrate_m3"] / area + after["velocity_m_s"] * (
+                row.step * other.scales.time_step - after["time_s"]
+            )
+            asked = (number + 1 - AT_ONCE) * batches.travel
+            assert np.median(went) == pytest.approx(moved - asked, abs=0.3 * batches.travel)
     assert differences(other.case, other.grains, tmp_path, binary) == []
 
 
