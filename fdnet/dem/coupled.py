@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fdnet.case.case import InvasionCase
-from fdnet.dem.batches import Batches, batches_of
-from fdnet.dem.checkpoint import Checkpoint, chunks_of, entered_by, read_history
+from fdnet.dem.checkpoint import Checkpoint, chunks_of, read_history
 from fdnet.dem.feed import Feed
 from fdnet.dem.fluid import STATE, Fluid, FluidForces, Moment, largest_share, write_forces
-from fdnet.dem.invade_deck import SUPPLY
+from fdnet.dem.invade_deck import SUPPLY, batch_chunks
 from fdnet.dem.scene import snapshot_of
 from fdnet.dem.updates import Updates
 from fdnet.errors import LiggghtsError
@@ -61,50 +60,16 @@ class Coupling:
         """
         step, chunk = (self.last.step, self.last.chunk) if self.last else (0, 0)
         updates = Updates(self.folder, self.fluid.measured, upto=step)
-        batches = batches_of(self.case, self.scales)
-        entered = entered_by(self.case, batches, self.last) if self.last else batches.entered_at(1)
         feed(f"include {self.deck}")
+        batches = batch_chunks(self.case, self.scales)
         while chunk < chunks_of(self.case, self.scales):
             chunk += 1
-            entered = self._supply(feed, updates, (chunk, step), (batches, entered))
+            if chunk in batches:
+                feed(f"include {SUPPLY}/batch_{chunk}.in")
             step = self.chunk(feed, updates, step)
             feed("include checkpoint.in")
             if self.over(read_history(self.folder)[-1]):
                 return
-
-    def _supply(
-        self, feed: Feed, updates: Updates, at: tuple[int, int], supply: tuple[Batches, int]
-    ) -> int:
-        """Feed the batches that are due `at` a chunk and its first step.
-
-        `supply` are the batches, and the number of those that have entered; returns the new one.
-        """
-        (chunk, step), (batches, entered) = at, supply
-        if not self.case.drag.slowed:
-            due = batches.entered_at(chunk)
-            for number in range(entered, due):
-                feed(f"include {SUPPLY}/batch_{number}.in")
-            return due
-        moved, velocity = self._mud(updates, step)
-        due = max(entered, batches.entered_after(moved))
-        for number in range(entered, due):
-            beyond = moved - batches.distance_of(number)
-            feed(
-                f"variable beyond string {beyond!r}",
-                f"variable mud string {velocity!r}",
-                f"include {SUPPLY}/batch_{number}.in",
-            )
-        return due
-
-    def _mud(self, updates: Updates, step: int) -> tuple[float, float]:
-        """By how much the mud has moved at `step`, m, and its velocity upstream, m/s."""
-        last = updates.last
-        if last is None:
-            return 0.0, self.scales.upstream_velocity
-        since = step * self.scales.time_step - last["time_s"]
-        area = self.case.size_m[1] * self.case.size_m[2]
-        velocity = float(last["velocity_m_s"])
-        return float(last["filtrate_m3"]) / area + velocity * since, velocity
 
     def chunk(self, feed: Feed, updates: Updates, step: int) -> int:
         """A chunk of steps from `step`; returns its last one."""

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from fdnet.case.case import InvasionCase
-from fdnet.dem.batches import AT_ONCE, batches_of
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, plug_allowance, quiet_chunks
 from fdnet.dem.contact_lines import contact_variables, left_out_of_contacts
 from fdnet.dem.coupled_parts import dumped_group, write_coupled_parts
@@ -17,7 +16,7 @@ from fdnet.dem.gravity import gravity_variables
 from fdnet.dem.measured_fines import densities
 from fdnet.dem.overlap import is_watched, watch_variables
 from fdnet.dem.scene import header_variables, wall_variables, write_data
-from fdnet.dem.supply import place_batches, place_fines, slab_end
+from fdnet.dem.supply import AT_ONCE, batches_of, place_batches, place_fines, slab_end
 from fdnet.errors import CaseError
 from fdnet.files.atomic import write_text
 from fdnet.scales.scales import InvasionScales
@@ -73,14 +72,13 @@ def write_invade_inputs(
 def write_batches(
     case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path
 ) -> Snapshot:
-    """Write supply/batch_N.data and .in, which are read before chunk N of undisturbed mud.
+    """Write supply/batch_N.data and .in, which are read before chunk N.
 
     Returns the fines that are there from the start.
     """
     batches, bounds = list(place_batches(case, scales, grains)), _bounds(case, scales, grains)
     shared = {
         "start_velocity": number(scales.upstream_velocity),
-        "slowed": case.drag.slowed,
         "drag": drag_variables(case, scales),
     }
     density, first = densities(case, batches_of(case, scales).counts), int(grains.id.max()) + 1

@@ -10,13 +10,10 @@ from builders import tiny
 from cut_and_continue import differences
 from scipy.integrate import quad
 
-from fdnet.dem.batches import AT_ONCE, batches_of
-from fdnet.dem.checkpoint import state_at
 from fdnet.dem.fluid import Moment
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
-from fdnet.dem.supply import place_batches
 from fdnet.errors import CaseError
 from fdnet.network.field.of_pack import velocity_field
 from fdnet.run.fluid.fluid_of import fluid_of
@@ -97,40 +94,6 @@ def deposit_of(done) -> Snapshot:
 
 def test_a_continued_invasion_is_the_uncut_one(binary, fluid, tmp_path):
     assert differences(fluid.case, fluid.grains, tmp_path, binary) == []
-
-
-def test_batches_come_as_the_mud_that_slows_down_carries_them(binary, fluid, tmp_path):
-    """The mud has moved by the filtrate over the face; a batch waits for its distance."""
-    keys = ("fines.supply=batches", "fines.count=600", "run.checkpoint_ms=0.02", "run.cap_ms=0.3")
-    other = with_case(fluid, *keys)
-    result = invade(
-        other.case, other.scales, other.grains, tmp_path / "a", Launch(binary=binary), fluid=other
-    )
-    batches, area = batches_of(other.case, other.scales), fluid.pack.network.area
-    table = history_rows(other.case, other.scales, result.history, result.updates)
-    starts = [0, *(row.step for row in result.history[:-1])]
-    began = {row["step"]: row for row in result.updates}
-    entered = [batches.entered_after(began[step]["filtrate_m3"] / area) for step in starts]
-    assert [line["supplied_count"] for line in table] == [batches.supplied(n) for n in entered]
-    undisturbed = [batches.entered_at(row.chunk) for row in result.history]
-    assert all(late <= one for late, one in zip(entered, undisturbed, strict=True))
-    assert 3 < entered[-1] < undisturbed[-1]
-    last = result.history[-1]
-    assert result.supplied == last.upstream + last.invaded + last.passed
-    placed = list(place_batches(other.case, other.scales, other.grains))
-    for before, row, now in zip(entered, result.history[1:], entered[1:], strict=False):
-        for number in range(before, now):
-            state = state_at(tmp_path / "a", row, other.case, other.scales, other.grains).fines()
-            _, one, other_one = np.intersect1d(state.id, placed[number].id, return_indices=True)
-            far = state.position[one, 0] < -2e-4  # upstream of what stands before the face
-            went = state.position[one, 0][far] - placed[number].position[other_one, 0][far]
-            after = [line for line in result.updates if line["step"] < row.step][-1]
-            moved = after["filtrate_m3"] / area + after["velocity_m_s"] * (
-                row.step * other.scales.time_step - after["time_s"]
-            )
-            asked = (number + 1 - AT_ONCE) * batches.travel
-            assert np.median(went) == pytest.approx(moved - asked, abs=0.3 * batches.travel)
-    assert differences(other.case, other.grains, tmp_path, binary) == []
 
 
 def carried_with(fluid, deposit):
@@ -433,6 +396,7 @@ def test_no_warning_of_throats_where_the_balance_of_momentum_sees_them():
     [
         (["drag.upstream=interstitial"], r"drag\.upstream: 'interstitial', but with drag\.field"),
         (["grains.motion=mobile"], r"grains\.motion: 'mobile' with drag\.field 'network'"),
+        (["fines.supply=batches"], r"fines\.supply: 'batches' come on as fast as at the start"),
         (["drag.field=uniform", "drag.drive=rate"], r"drag\.drive: 'rate' belongs to"),
         (["drag.drive=rate", "run.stop_rate=0.1"], r"run\.stop_rate: 0\.1 needs a rate that"),
         (

@@ -19,12 +19,12 @@ from fdnet.studies.engine.csv_rows import read_named, write_named
 SUPPLIED = {
     "specimen1": 1000,
     "specimen3": 25_000,
-    "specimen5": 12_000,
+    "specimen5": 7500,
     "specimen6": 25_000,
     "specimen7": 12_000,
     "specimen8": 12_000,
 }
-"""Fines supplied to each specimen. In 1, 5, 7 and 8 they are more than enter and more than the
+"""Fines in the slab of each specimen. In 1, 5, 7 and 8 they are more than enter and more than the
 cake holds. The fines of 3 and 6, a tenth of the grains, enter as long as they come."""
 FEWER = ("specimen3", "specimen6")
 """Specimens with fewer fines here than in their uniform runs, which are run uniform as well."""
@@ -37,6 +37,7 @@ FLOW = (
     "drag.crowd=beetstra",
     "drag.scheme=implicit",
     "drag.pressure_gradient=true",
+    "fines.supply=slab",
     "run.stiffness_N_m=auto",
     "run.plug_rate=0.02",
 )
