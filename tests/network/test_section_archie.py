@@ -87,6 +87,16 @@ def test_a_fine_that_vanishes_changes_nothing(pack):
     assert lost[2] < 1e-3
 
 
+def test_a_fine_that_is_too_small_for_the_sections_is_counted(network, pack):
+    """A radius of 1e-300 would ask for more sections than a number counts."""
+    fines = pack.fines()
+    radius = np.where(np.arange(len(fines)) == 3, 1e-300, fines.radius)
+    _, damage = conductances(network, replace(fines, radius=radius))
+    assert damage.counts["throats_coarse"] > 0
+    _, usual = conductances(network, fines)
+    assert usual.counts["throats_coarse"] == 0
+
+
 def test_a_fine_as_wide_as_the_throat_all_but_closes_it():
     """In the gap of four grains of a simple cubic lattice; the corners of the gap stay open."""
     grains = simple_cubic(3)

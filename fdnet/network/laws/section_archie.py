@@ -44,6 +44,9 @@ STEP = 1.0 / 8.0
 """Greatest step between two sections, in radii of the smallest fine in the throat."""
 LEAST_STEPS = 8
 """Smallest number of steps between a facet and a power centre."""
+MOST_STEPS = 512
+"""Largest number of them, enough for fines of a fiftieth of a grain. Throats with smaller fines
+are counted."""
 
 
 def section_archie_damage(network: Network, occupancy: Occupancy, clean: Array) -> Damage:
@@ -52,7 +55,7 @@ def section_archie_damage(network: Network, occupancy: Occupancy, clean: Array) 
     s is the share of the flux that the fines leave of a section; see this module. The clean
     conductance is multiplied by the ratio of the resistances without and with fines.
     """
-    without, with_fines = fine_resistances(network, occupancy.fines)
+    without, with_fines, coarse = fine_resistances(network, occupancy.fines)
     whole, raised = without.sum(axis=1), with_fines.sum(axis=1)
     factor = np.where(np.isfinite(whole), 0.0, 1.0)
     still = np.isfinite(raised)
@@ -61,21 +64,24 @@ def section_archie_damage(network: Network, occupancy: Occupancy, clean: Array) 
     counts = {
         "throats_filled": int(np.sum(factor == 0.0)),
         "throats_capped": int(np.sum(factor > 1.0)),
+        "throats_coarse": coarse,
     }
     return Damage(
         conductance=frozen(clean * np.minimum(factor, 1.0)), law_used=frozen(law), counts=counts
     )
 
 
-def fine_resistances(network: Network, fines: Snapshot) -> tuple[Array, Array]:
+def fine_resistances(network: Network, fines: Snapshot) -> tuple[Array, Array, int]:
     """Resistances (T, 2) 1/m3 of the sides of throats without and with `fines`.
 
     Both are summed over the same sections. Those of throats without fines are 1 and 1, and 0 for a
-    side that a throat does not have.
+    side that a throat does not have. The third value is the number of throats with fines too small
+    for `MOST_STEPS`.
     """
     images, table = FineImages(network, fines), ratio_table()
     floor = LENGTH_FLOOR * network.grain_radius
     walls = wall_cuts(network)
+    coarse = 0
     both = np.ones((2, len(network.throat_pores), 2))
     for part in geometry.slices(len(network.throat_pores), THROATS):
         beside = images.beside(part)
@@ -83,6 +89,8 @@ def fine_resistances(network: Network, fines: Snapshot) -> tuple[Array, Array]:
         some, steps = _steps(beside.first, beside.place, np.abs(height).max(axis=1))
         if not len(some):
             continue
+        coarse += int(np.sum(steps > MOST_STEPS))
+        steps = np.minimum(steps, MOST_STEPS)
         given = prepared(network, part, walls)
         for count in np.unique(steps):
             chosen = some[steps == count]
@@ -93,16 +101,19 @@ def fine_resistances(network: Network, fines: Snapshot) -> tuple[Array, Array]:
                 (floor, WIDENING, EXPONENT),
                 (beside.first, beside.place, table),
             )
-    return both[0], both[1]
+    return both[0], both[1], coarse
 
 
 def _steps(first: Array, place: Array, height: Array) -> tuple[Array, Array]:
-    """Throats (K,) with fines, and the number of steps of each of their sides, a power of two."""
+    """Throats (K,) with fines, and the steps of each of their sides, a power of two.
+
+    Where more than `MOST_STEPS` are wanted, they are twice as many.
+    """
     some = np.flatnonzero(np.diff(first))
     if not len(some):
         return some, some
     smallest = np.minimum.reduceat(place[:, 3], first[some])
-    wanted = np.maximum(height[some] / (STEP * smallest), LEAST_STEPS)
+    wanted = np.clip(height[some] / (STEP * smallest), LEAST_STEPS, 2 * MOST_STEPS)
     return some, 2 ** np.ceil(np.log2(wanted)).astype(int)
 
 
