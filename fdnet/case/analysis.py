@@ -57,7 +57,7 @@ class AnalysisChoices(Part):
         AUTO,
         description="How fines lower the permeability: a law that damages the throats between "
         'grains, or "all-spheres", the network of grains and fines together. "auto" takes the '
-        "most accurate one that its cost allows, section by section.",
+        "most accurate one that its cost allows.",
     )
     clogging_threshold: Fraction | None = Field(
         None,

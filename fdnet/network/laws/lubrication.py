@@ -29,6 +29,7 @@ from fdnet.network.laws.cut_grains import cut_corners, share_of_cut
 from fdnet.network.laws.fourth_grain import fourth_grains
 from fdnet.network.laws.open_sections import (
     SectionRoom,
+    Throat,
     forget,
     open_fluxes,
     section_room,
@@ -46,6 +47,9 @@ THROATS = 20_000
 """Throats that are worked off at once."""
 EQUAL = 1e-9
 """Radii that differ by at most this share are equal."""
+Span = tuple[float, float, float]
+"""Lowest and highest section, m from the facet, and 1 for the side of the second pore or -1 for
+that of the first."""
 Faces = tuple[Array, Array, float, Array]
 """What the faces of the box cut of a throat: of side walls (`wall_cuts`) the order of its corners,
 their places, and its share in the box; of x faces the corners (3, 4) of `cut_corners`."""
@@ -70,18 +74,15 @@ def half_resistances(
     resistance = np.empty((len(network.throat_pores), 2))
     around = Neighbourhood(network) if fourth else None
     for part in geometry.slices(len(resistance), THROATS):
-        corner, radius, flatness, cuts, cut = prepared(network, part, every)
+        given = prepared(network, part, every)
         facet = network.image_position[network.throat_images[part]]
-        beside = _beside(network, part, facet) if fourth else np.zeros((len(corner), 2, 5))
+        beside = _beside(network, part, facet) if fourth else np.zeros((len(facet), 2, 5))
         outside = _outside(around, part, facet)
         resistance[part] = _halves(
-            corner,
-            (radius, flatness),
+            given,
             np.ascontiguousarray(network.throat_heights[part]),
-            cuts,
             (floor, float(widening)),
             (beside, *outside, table),
-            cut,
         )
     capped = np.any(network.throat_corner_height < network.throat_corner_radius, axis=1)
     resistance[(network.throat_radius <= 0) & ~capped] = np.inf
@@ -143,44 +144,55 @@ def _outside(around: Neighbourhood | None, part: slice, corner: Array) -> tuple[
 
 @compiled_for_loops
 def _halves(
-    corner: Array,
-    discs: tuple[Array, Array],
+    given: Prepared,
     heights: Array,
-    cuts: tuple[Array, Array, Array],
-    given: tuple[float, float],
+    numbers: tuple[float, float],
     more: tuple[Array, Array, Array, Array],
-    cut: Array,
 ) -> Array:
-    radius, flatness = discs
-    order, place, part = cuts
-    floor, widening = given
+    floor, widening = numbers
     beside, around, first, table = more
-    resistance = np.zeros((len(corner), 2))
-    room = section_room(np.max(first[1:] - first[:-1]) if len(corner) else 0)
-    for t in range(len(corner)):
-        low, high = -heights[t, 0], heights[t, 1]
-        high = max(high, low + floor)
-        even = np.max(radius[t]) - np.min(radius[t]) <= EQUAL * radius[t, 0]
-        even = even and np.max(flatness[t]) - np.min(flatness[t]) <= EQUAL
-        wedge = wedges(corner[t]) if even else np.empty((0, 7))
-        throat = (corner[t], radius[t], flatness[t], wedge)
-        faces = (order[t], place[t], part[t], cut[t])
+    resistance = np.zeros((len(heights), 2))
+    room = section_room(np.max(first[1:] - first[:-1]) if len(heights) else 0)
+    for t in range(len(heights)):
+        throat, faces = throat_at(given, t)
+        spans = spans_of(heights[t], floor)
         outside = around[first[t] : first[t + 1]]
         forget(room, len(outside))
-        if high > 0.0:
-            span, others = (max(low, 0.0), high, 1.0), (beside[t, 1], outside)
-            resistance[t, 1] = _resistance(throat, faces, (span, widening), others, (room, table))
-        if low < 0.0:
-            span, others = (max(-high, 0.0), -low, -1.0), (beside[t, 0], outside)
-            resistance[t, 0] = _resistance(throat, faces, (span, widening), others, (room, table))
+        for side in range(2):
+            if spans[side][1] > 0.0:
+                span, others = (spans[side], widening), (beside[t, side], outside)
+                resistance[t, side] = _resistance(throat, faces, span, others, (room, table))
     return resistance
 
 
 @compiled_for_loops
+def throat_at(given: Prepared, t: int) -> tuple[Throat, Faces]:
+    """The throat `t` of those that were prepared, and what the faces of the box cut of it."""
+    corner, radius, flatness, (order, place, part), cut = given
+    even = np.max(radius[t]) - np.min(radius[t]) <= EQUAL * radius[t, 0]
+    even = even and np.max(flatness[t]) - np.min(flatness[t]) <= EQUAL
+    wedge = wedges(corner[t]) if even else np.empty((0, 7))
+    throat = (corner[t], radius[t], flatness[t], wedge)
+    return throat, (order[t], place[t], part[t], cut[t])
+
+
+@compiled_for_loops
+def spans_of(heights: Array, floor: float) -> tuple[Span, Span]:
+    """The spans (`set_fluxes`) of the sides of the first and the second pore.
+
+    `heights` (2,) m are those of the power centres above the facet, each on its side. Their sum is
+    taken as `floor` m where it is less. A side that the throat does not have ends at 0 or below.
+    """
+    low, high = -heights[0], heights[1]
+    high = max(high, low + floor)
+    return (max(-high, 0.0), -low, -1.0), (max(low, 0.0), high, 1.0)
+
+
+@compiled_for_loops
 def _resistance(
-    throat: tuple[Array, Array, Array, Array],
+    throat: Throat,
     faces: Faces,
-    span: tuple[tuple[float, float, float], float],
+    span: tuple[Span, float],
     others: tuple[Array, Array],
     more: tuple[SectionRoom, Array],
 ) -> float:
@@ -194,19 +206,18 @@ def _resistance(
 
 @compiled_for_loops
 def set_fluxes(
-    throat: tuple[Array, Array, Array, Array],
+    throat: Throat,
     faces: Faces,
-    span: tuple[float, float, float],
+    span: Span,
     others: tuple[Array, Array],
     more: tuple[SectionRoom, Array],
 ) -> None:
     """Sets the fluxes m4 of laplacian(w) = -1 through the sections of one side of a throat.
 
     Args:
-        throat: its facet (`open_sections.Throat`).
+        throat: its facet.
         faces: what the faces of the box cut of it.
-        span: lowest and highest section, m from the facet, and 1 for the side of the second pore
-            or -1 for that of the first.
+        span: of the sections.
         others: as in `open_fluxes`.
         more: room for the sections, where `forget` was called, and the table of `shear_ratio`.
     """

@@ -5,10 +5,10 @@ that reaches into the throat shows a disc in the sections that it meets. Togethe
 share s of the flux through the section, summed over rays (`outside.share_around`). The section
 then carries s^m of its clean flux.
 
-With m = 1 every section would be a straight tube of this section. But the fluid between fines is
-on a winding way: it must turn from the gaps of one section to those of the next. Archie (1942,
-Trans. AIME 146, 54) measured what such a way costs an electric current: the resistance of
-unconsolidated sand grows as porosity to the power -1.3. The same power is taken here.
+With m = 1 the fluid would go straight through the gaps between the fines. But the gaps of one
+section do not lie behind those of the next, so its path winds. Archie (1942, Trans. AIME 146, 54)
+measured the same for an electric current in unconsolidated sand: its resistance grows as porosity
+to the power -1.3. The same power is taken here.
 
 The factor of the widening tube (`lubrication`) is that of the narrowed sections.
 """
@@ -19,16 +19,17 @@ from fdnet.network import geometry
 from fdnet.network.compiled import compiled_for_loops
 from fdnet.network.fines.occupancy import Occupancy, ratio
 from fdnet.network.laws.beside_throats import FineImages
-from fdnet.network.laws.cross_section import wedges
 from fdnet.network.laws.damage import BLOCKED, CLEAN, SECTIONS, Damage
 from fdnet.network.laws.lubrication import (
-    EQUAL,
     THROATS,
     WIDENING,
     Prepared,
+    Span,
     prepared,
     resistance_of,
     set_fluxes,
+    spans_of,
+    throat_at,
 )
 from fdnet.network.laws.open_sections import SectionRoom, forget, section_room
 from fdnet.network.laws.outside import meet, share_around
@@ -125,9 +126,8 @@ def _resistances(
     numbers: tuple[float, float, float],
     fines: tuple[Array, Array, Array],
 ) -> Array:
+    """Resistances (2, K, 2) 1/m3 of the throats `which` (K) without and with `fines`."""
     chosen, count = which
-    corner, radius, flatness, cuts, cut = given
-    order, place, part = cuts
     floor, widening, power = numbers
     first, spheres, table = fines
     most = 0
@@ -137,22 +137,15 @@ def _resistances(
     resistance = np.zeros((2, len(chosen), 2))
     for n in range(len(chosen)):
         t = chosen[n]
-        low, high = -heights[t, 0], heights[t, 1]
-        high = max(high, low + floor)
-        even = np.max(radius[t]) - np.min(radius[t]) <= EQUAL * radius[t, 0]
-        even = even and np.max(flatness[t]) - np.min(flatness[t]) <= EQUAL
-        wedge = wedges(corner[t]) if even else np.empty((0, 7))
-        throat = (corner[t], radius[t], flatness[t], wedge)
-        faces = (order[t], place[t], part[t], cut[t])
+        throat, faces = throat_at(given, t)
+        spans = spans_of(heights[t], floor)
         inside = spheres[first[t] : first[t + 1]]
         forget(room, len(inside))
         for side in range(2):
-            sense = 2.0 * side - 1.0
-            span = (max(low, 0.0), high, sense) if side == 1 else (max(-high, 0.0), -low, sense)
-            if span[1] > 0.0:
-                set_fluxes(throat, faces, span, clear, (room, table))
+            if spans[side][1] > 0.0:
+                set_fluxes(throat, faces, spans[side], clear, (room, table))
                 resistance[:, n, side] = _both(
-                    corner[t], span, (inside, part[t], widening, power), (room, table)
+                    throat[0], spans[side], (inside, faces[2], widening, power), (room, table)
                 )
     return resistance
 
@@ -160,7 +153,7 @@ def _resistances(
 @compiled_for_loops
 def _both(
     base: Array,
-    span: tuple[float, float, float],
+    span: Span,
     given: tuple[Array, float, float, float],
     more: tuple[SectionRoom, Array],
 ) -> tuple[float, float]:

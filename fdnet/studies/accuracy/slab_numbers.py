@@ -31,7 +31,7 @@ def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
     fresh = [row for row in rows if row["known_before"] == LATER]
     known = [row for row in rows if row["known_before"] == YES]
     pairs = {"default": CHOSEN, "finest": FINEST, "two_scale": DEFAULT, "archie": ARCHIE}
-    fine = [row for row in rows if any(f"_r{size}" in row["case"] for size in FINE_RATIOS)]
+    fine = _with_fine_fines(rows)
     coarse = [row for row in rows if row not in fine]
     return {
         "slabs": str(len(rows)),
@@ -47,7 +47,7 @@ def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
         "slabs_two_scale_rms": percent(rms(values(aside, DEFAULT))),
         "slabs_archie_rms": percent(rms(values(aside, ARCHIE))),
         **_apart(rows),
-        **_heavy_and_fine(rows),
+        **_heavy(fine),
         "slabs_coarse": str(len(coarse)),
         "slabs_coarse_k": summed_up(row[f"{FINEST}: k"] for row in coarse),
         "slabs_fine": str(len(fine)),
@@ -73,13 +73,13 @@ def _apart(rows: Sequence[Row]) -> dict[str, str]:
     return numbers
 
 
-def _heavy_and_fine(rows: Sequence[Row]) -> dict[str, str]:
-    """Mean error of both laws where fines of 1/8 and 1/10 leave less than a tenth of k."""
-    some = [
-        row
-        for row in rows
-        if row["k_over_k0"] < 0.1 and any(f"_r{size}" in row["case"] for size in FINE_RATIOS)
-    ]
+def _with_fine_fines(rows: Sequence[Row]) -> list[Row]:
+    return [row for row in rows if any(f"_r{size}" in row["case"] for size in FINE_RATIOS)]
+
+
+def _heavy(rows: Sequence[Row]) -> dict[str, str]:
+    """Mean error of both laws on the rows whose fines leave less than a tenth of k."""
+    some = [row for row in rows if row["k_over_k0"] < 0.1]
     mean = {
         key: float(np.exp(np.mean(np.log(values(some, name)))) - 1.0)
         for key, name in (("two_scale", DEFAULT), ("archie", ARCHIE))
