@@ -9,6 +9,7 @@ from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.flow.slabs import whole_permeability
 from fdnet.network.laws import section_archie
 from fdnet.network.laws.beside_throats import FineImages
+from fdnet.network.laws.kept_sections import measured_sections
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
 from fdnet.network.network import build_network
@@ -158,3 +159,24 @@ def test_the_power_of_the_share_is_the_one_constant(network, pack, monkeypatch):
     monkeypatch.setattr(section_archie, "EXPONENT", 0.0)
     _, damage = conductances(network, pack.fines())
     assert set(damage.law_used) == {"clean"}
+
+
+def test_fines_that_come_leave_and_move_renew_the_throats_they_reach(network, pack):
+    """Bit for bit what all throats give when they are summed anew."""
+    rng, fines = np.random.default_rng(8), pack.fines()
+    place = np.array(fines.position)
+    place[::15] += rng.normal(0.0, 0.1, place[::15].shape)
+    before, after = fines.where(np.arange(len(fines)) > 3), replace(fines, position=place)
+    after = after.where(np.arange(len(fines)) < len(fines) - 3)
+    grown, full = (
+        measured_sections(network, before).changed_to(after),
+        measured_sections(network, after),
+    )
+    assert 0 < grown.renewed < 0.6 * full.renewed
+    assert np.array_equal(grown.raised, full.raised)
+    assert np.array_equal(grown.without, full.without)
+    clean, damage = conductances(network, after)
+    raised = np.sum(full.without / np.maximum(full.factor, 1e-12), axis=1)
+    kept = full.without.sum(axis=1) / raised
+    lost = damage.conductance[clean > 0] / clean[clean > 0]
+    assert kept[clean > 0] == pytest.approx(lost, abs=0.01)

@@ -134,13 +134,6 @@ def measure_deposit(network: Network, fines: Snapshot) -> Occupancy:
     refuse_wide(network, fines)
     reaching = fines.where(reaching_inside(network, fines))
     pores, sides = deposit_in_pores(network, reaching), deposit_on_sides(network, reaching)
-    return occupancy_of_deposit(network, reaching, pores, sides)
-
-
-def occupancy_of_deposit(
-    network: Network, fines: Snapshot, pores: tuple[Array, ...], sides: tuple[Array, Array]
-) -> Occupancy:
-    """The occupancy by `fines` with the values of `deposit_in_pores` and `deposit_on_sides`."""
     throats = len(network.throat_radius)
     zero, none = np.zeros(throats), np.zeros(0)
     fields = _fields_of_deposit(network, pores, sides) | {
@@ -157,7 +150,7 @@ def occupancy_of_deposit(
     }
     counts = {"pore_porosity_negative": _overfilled(network, pores[0])}
     values = {name: frozen(value) for name, value in fields.items()}
-    return Occupancy(fines=fines, counts=counts, **values)
+    return Occupancy(fines=reaching, counts=counts, **values)
 
 
 def refuse_wide(network: Network, fines: Snapshot) -> None:

@@ -110,11 +110,6 @@ def side_kozeny_damage(
     return Damage(conductance=frozen(clean * kept), law_used=law, counts=counts)
 
 
-def side_factors(network: Network, occupancy: Occupancy, sides: Sides) -> Array:
-    """Factor (T, 2) on the conductance of each side, 0 where closed; see `side_kozeny_damage`."""
-    return _side_factors(network, occupancy, sides)[0]
-
-
 def _side_factors(
     network: Network, occupancy: Occupancy, sides: Sides
 ) -> tuple[Array, Array, dict[str, int]]:

@@ -72,12 +72,14 @@ def section_archie_damage(network: Network, occupancy: Occupancy, clean: Array) 
     )
 
 
-def fine_resistances(network: Network, fines: Snapshot) -> tuple[Array, Array, int]:
+def fine_resistances(
+    network: Network, fines: Snapshot, *, among: Array | None = None
+) -> tuple[Array, Array, int]:
     """Resistances (T, 2) 1/m3 of the sides of throats without and with `fines`.
 
     Both are summed over the same sections. Those of throats without fines are 1 and 1, and 0 for a
     side that a throat does not have. The third value is the number of throats with fines too small
-    for `MOST_STEPS`.
+    for `MOST_STEPS`. Where `among` (T,) is given, throats where it is False are left at 1 and 1.
     """
     images, table = FineImages(network, fines), ratio_table()
     floor = LENGTH_FLOOR * network.grain_radius
@@ -88,6 +90,9 @@ def fine_resistances(network: Network, fines: Snapshot) -> tuple[Array, Array, i
         beside = images.beside(part)
         height = network.throat_heights[part]
         some, steps = _steps(beside.first, beside.place, np.abs(height).max(axis=1))
+        if among is not None:
+            steps = steps[among[part][some]]
+            some = some[among[part][some]]
         if not len(some):
             continue
         coarse += int(np.sum(steps > MOST_STEPS))

@@ -16,9 +16,10 @@ from fdnet.network.field.field import VelocityField
 from fdnet.network.field.of_pack import velocity_field
 from fdnet.network.fines.fine_images import reaching_inside
 from fdnet.network.fines.kept_deposit import Holders, KeptDeposit, holders_of, measured_deposit
-from fdnet.network.fines.occupancy import Occupancy, ratio
+from fdnet.network.fines.occupancy import ratio
 from fdnet.network.flow.flow import Flow, solve_flow
-from fdnet.network.laws.kozeny_damage import Sides, side_factors, sides_of
+from fdnet.network.laws.kept_sections import KeptSections, measured_sections
+from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import Network, build_network
 from fdnet.run.fluid.pressed import Facets, Pressed, facets_of, pressed_by
@@ -64,9 +65,9 @@ class PackFlow:
     Attributes:
         network: pores and throats of the grains.
         clean: (T,) m3, conductances.
-        sides: of the clean throats, with their resistances.
+        halves: (T, 2) 1/m3, resistances of the sides of the clean throats; 0 where infinite.
         facets: of the throats.
-        holders: pores and sides, which hold the deposit.
+        holders: the pores, which hold the deposit.
         flow: through the clean network.
         through: (P,) share of the inflow that each pore carries.
         shape: resolved velocity field of the grains.
@@ -75,7 +76,7 @@ class PackFlow:
 
     network: Network
     clean: Array
-    sides: Sides
+    halves: Array
     facets: Facets
     holders: Holders
     flow: Flow
@@ -98,11 +99,14 @@ class PackFlow:
         """The network's resistance over that of the coarse resolved field."""
         return self.length / self.permeability / self.shape.resistance
 
-    def carried(self, occupancy: Occupancy) -> Carried:
-        """What the pores carry with the fines of an `occupancy` among the grains."""
-        factor = np.maximum(side_factors(self.network, occupancy, self.sides), LEAK)
-        raised = np.sum(self.sides.resistance / factor, axis=1)
-        left = ratio(self.sides.resistance.sum(axis=1), raised)
+    def carried(self, kept: Array, fines: Array) -> Carried:
+        """What the pores carry when the sides have `kept` (T, 2) of their clean conductances.
+
+        `fines` (P,) m3 is the volume of the fines in each pore.
+        """
+        factor = np.maximum(kept, LEAK)
+        raised = np.sum(self.halves / factor, axis=1)
+        left = ratio(self.halves.sum(axis=1), raised)
         flow = solve_flow(self.network, self.clean * left)
         usual = STAGNANT * float(np.mean(self.through))
         moving = self.through > usual
@@ -111,7 +115,7 @@ class PackFlow:
             k_over_k0=flow.inflow / self.flow.inflow,
             ratio=np.divide(share, self.through, out=np.ones_like(share), where=moving),
             stagnant=int(np.sum(~moving)),
-            pressed=pressed_by(self.network, self.facets, self.sides, factor, flow),
+            pressed=pressed_by(self.network, self.facets, (self.halves, factor), flow, fines),
         )
 
     def pore_of(self, position: Array) -> Array:
@@ -127,10 +131,11 @@ def pack_flow(grains: Snapshot, periodic: tuple[bool, bool, bool], walls: str) -
     network = build_network(grains, periodic=periodic, walls=walls)
     clean = LAWS[DEFAULT_LAW](network)
     flow = solve_flow(network, clean)
+    halves = half_resistances(network)
     return PackFlow(
         network=network,
         clean=clean,
-        sides=sides_of(network),
+        halves=np.where(np.isfinite(halves), halves, 0.0),
         facets=facets_of(network),
         holders=holders_of(network),
         flow=flow,
@@ -166,6 +171,7 @@ class Renewal:
         renewed: share of the deposit that may change before the network is solved anew.
         solved: the fines of the last solve; None before the first.
         deposit: the fines as they were measured last.
+        sections: of the throats, as they were at the last solve.
         carried: what the last solve gave.
         solves: number of solves.
     """
@@ -174,6 +180,7 @@ class Renewal:
     renewed: float = RENEWED
     solved: Snapshot | None = None
     deposit: KeptDeposit | None = None
+    sections: KeptSections | None = None
     carried: Carried | None = None
     solves: int = 0
 
@@ -181,11 +188,18 @@ class Renewal:
         """What the pores carry with standing `fines`; all is done anew where `anew` asks."""
         inside = fines.where(reaching_inside(self.pack.network, fines))
         if anew or self.deposit is None:
-            self.deposit, self.carried = measured_deposit(self.pack.holders, inside), None
+            self.deposit = measured_deposit(self.pack.holders, inside)
+            self.sections = self.carried = None
         else:
             self.deposit = self.deposit.changed_to(inside, tolerance=MOVED)
         if self.carried is None or changed_share(self.solved, inside) > self.renewed:
-            self.carried = self.pack.carried(self.deposit.occupancy)
+            fines = self.deposit.fines
+            self.sections = (
+                measured_sections(self.pack.network, fines)
+                if self.sections is None
+                else self.sections.changed_to(fines)
+            )
+            self.carried = self.pack.carried(self.sections.factor, self.deposit.in_pores)
             self.solved, self.solves = inside, self.solves + 1
         return self.carried, self.deposit
 

@@ -25,7 +25,6 @@ import numpy as np
 from fdnet.network import geometry
 from fdnet.network.fines.kept_deposit import KeptDeposit
 from fdnet.network.flow.flow import Flow
-from fdnet.network.laws.kozeny_damage import Sides
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array, frozen
 
@@ -81,17 +80,34 @@ class Pressed:
 
 
 def pressed_by(
-    network: Network, facets: Facets, sides: Sides, factor: Array, flow: Flow
+    network: Network, facets: Facets, sides: tuple[Array, Array], flow: Flow, fines: Array
 ) -> Pressed:
-    """The forces in a `flow` whose sides keep the share `factor` (T, 2), above 0, of the clean."""
+    """The forces in a `flow` on grains, and on fines in the pores.
+
+    What the fines add to a side acts on those in its pore. A fine also narrows sides whose pores
+    it does not reach: that acts on the fines in the pore behind the throat, and on the grains
+    where that has none either.
+
+    Args:
+        network: pores and throats.
+        facets: of the throats.
+        sides: their clean resistances (T, 2) 1/m3, and the shares (T, 2), above 0, that they keep
+            of their conductances.
+        flow: through the damaged network.
+        fines: (P,) m3, volume of the fines in each pore.
+    """
+    halves, factor = sides
     first, second = flow.pore_pressure[network.throat_pores].T
     drop = np.nan_to_num(first - second)
-    raised = sides.resistance / factor
+    raised = halves / factor
     whole = raised.sum(axis=1, keepdims=True)
-    added = (raised - sides.resistance) / np.where(whole > 0, whole, 1.0)
+    added = (raised - halves) / np.where(whole > 0, whole, 1.0)
     on_fines = (drop[:, None] * added * facets.section)[..., None] * facets.area[:, None]
     group = network.pore_group[network.throat_pores]
     count = int(network.pore_group.max()) + 1
+    holding = np.bincount(network.pore_group, fines, count) > 0
+    group = np.where(holding[group], group, group[:, ::-1])
+    on_fines *= holding[group][..., None]
     groups = np.stack(
         [np.bincount(group.ravel(), on_fines[..., axis].ravel(), count) for axis in range(3)],
         axis=1,
@@ -105,10 +121,11 @@ def on_each_fine(pressed: Pressed, deposit: KeptDeposit) -> Array:
 
     A pore without fines leaves its force to nobody; so does one whose fines left since the solve.
     """
-    pore, fine, volume = deposit.by_pore
-    group = deposit.holders.network.pore_group[pore]
-    held = np.bincount(group, volume, len(pressed.groups))
-    share = volume / held[group]
+    group = deposit.holders.network.pore_group[deposit.pore]
+    held = np.bincount(group, deposit.volume, len(pressed.groups))
+    share = deposit.volume / held[group]
     force = pressed.groups[group] * share[:, None]
     count = len(deposit.fines)
-    return np.stack([np.bincount(fine, force[:, axis], count) for axis in range(3)], axis=1)
+    return np.stack(
+        [np.bincount(deposit.fine, force[:, axis], count) for axis in range(3)], axis=1
+    )
