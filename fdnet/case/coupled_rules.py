@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from fdnet.case.control import Run
-from fdnet.case.particles import Fines, Grains
+from fdnet.case.particles import Grains
 from fdnet.case.parts import Drag
 
 
@@ -30,19 +30,9 @@ def network_grains(drag: Drag, grains: Grains) -> Iterator[str]:
         )
 
 
-def network_supply(drag: Drag, fines: Fines) -> Iterator[str]:
-    """Batches come on at the first rate."""
-    slowed = drag.field == "network" and drag.drive != "rate"
-    if slowed and fines.supply == "batches":
-        yield (
-            "fines.supply: 'batches' come on as fast as at the start, but at constant pressure "
-            "the mud slows down; take fines.supply = 'slab', or drag.drive = 'rate'"
-        )
-
-
 def stop_rate(run: Run, drag: Drag) -> Iterator[str]:
     """Only a rate that falls can end a run."""
-    if run.stop_rate is not None and (drag.field != "network" or drag.drive == "rate"):
+    if run.stop_rate is not None and not drag.slowed:
         yield (
             f"run.stop_rate: {run.stop_rate:g} needs a rate that falls; leave it out, or set "
             "drag.field = 'network' with drag.drive = 'pressure'"

@@ -121,6 +121,11 @@ class Drag(Part):
         return self.crowd != "none" or self.field == "network"
 
     @property
+    def slowed(self) -> bool:
+        """Whether the deposit slows the mud down."""
+        return self.field == "network" and self.drive != "rate"
+
+    @property
     def travel_diameters(self) -> float:
         """Diameters of the smallest fine between two updates of a coupled invasion."""
         usual = FLOW_TRAVEL if self.field == "network" else CROWD_TRAVEL

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.case.case import InvasionCase
+from fdnet.dem.batches import Batches, batches_of
 from fdnet.dem.digests import dump_is_changed
 from fdnet.dem.scene import snapshot_of
-from fdnet.dem.supply import batches_of
 from fdnet.errors import DumpError, LiggghtsError
 from fdnet.scales.scales import InvasionScales
 from fdnet.scales.slab import arrival_time
@@ -93,6 +93,16 @@ def quiet_enough(case: InvasionCase, scales: InvasionScales, row: Checkpoint) ->
 def csv_row(row: Checkpoint) -> str:
     """The checkpoint as a line of history.csv."""
     return ",".join(str(getattr(row, name)) for name in HISTORY_HEADER.split(","))
+
+
+def entered_by(case: InvasionCase, batches: Batches, row: Checkpoint) -> int:
+    """Batches of fines that had entered by a checkpoint.
+
+    In mud that the deposit slows down, their number follows from that of the fines.
+    """
+    if case.drag.slowed:
+        return batches.entered_with(row.upstream + row.invaded + row.passed)
+    return batches.entered_at(row.chunk)
 
 
 def read_history(folder: Path) -> tuple[Checkpoint, ...]:
@@ -183,7 +193,7 @@ def readable_states(
             if row == history[-1]:
                 raise
             continue
-        check_counts(folder, row, state, batches.supplied_at(row.chunk))
+        check_counts(folder, row, state, batches.supplied(entered_by(case, batches, row)))
         yield row, state
 
 

@@ -12,11 +12,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fdnet.case.case import InvasionCase
-from fdnet.dem.checkpoint import Checkpoint, chunks_of, read_history
+from fdnet.dem.batch_files import SUPPLY
+from fdnet.dem.batches import Batches, batches_of
+from fdnet.dem.checkpoint import Checkpoint, chunks_of, entered_by, read_history
 from fdnet.dem.feed import Feed
 from fdnet.dem.fluid import STATE, Fluid, FluidForces, Moment, largest_share, write_forces
-from fdnet.dem.invade_deck import SUPPLY, batch_chunks
+from fdnet.dem.invade_deck import batch_files
 from fdnet.dem.scene import snapshot_of
+from fdnet.dem.supply import later_batch
 from fdnet.dem.updates import Updates
 from fdnet.errors import LiggghtsError
 from fdnet.scales.scales import InvasionScales
@@ -60,16 +63,50 @@ class Coupling:
         """
         step, chunk = (self.last.step, self.last.chunk) if self.last else (0, 0)
         updates = Updates(self.folder, self.fluid.measured, upto=step)
+        batches = batches_of(self.case, self.scales)
+        entered = entered_by(self.case, batches, self.last) if self.last else batches.entered_at(1)
         feed(f"include {self.deck}")
-        batches = batch_chunks(self.case, self.scales)
         while chunk < chunks_of(self.case, self.scales):
             chunk += 1
-            if chunk in batches:
-                feed(f"include {SUPPLY}/batch_{chunk}.in")
+            entered = self._supply(feed, updates, (chunk, step), (batches, entered))
             step = self.chunk(feed, updates, step)
             feed("include checkpoint.in")
             if self.over(read_history(self.folder)[-1]):
                 return
+
+    def _supply(
+        self, feed: Feed, updates: Updates, at: tuple[int, int], supply: tuple[Batches, int]
+    ) -> int:
+        """Feed the batches that are due `at` a chunk and its first step.
+
+        `supply` are the batches, and the number of those that have entered; returns the new one.
+        """
+        (chunk, step), (batches, entered) = at, supply
+        if not self.case.drag.slowed:
+            due = batches.entered_at(chunk)
+            for number in range(entered, due):
+                feed(f"include {SUPPLY}/batch_{number}.in")
+            return due
+        time = step * self.scales.time_step
+        moved, velocity = self._mud(updates, time)
+        ahead = velocity * self.scales.checkpoint_steps * self.scales.time_step
+        due = max(entered, batches.entered_after(moved + ahead))
+        files = batch_files(self.case, self.scales, self.grains, self.folder)
+        for number in range(entered, due):
+            feed("include ask.in")
+            fines = later_batch(self.case, self.scales, self._spheres(time), number, moved)
+            feed(f"include {files.write(number, fines, velocity)}")
+        return due
+
+    def _mud(self, updates: Updates, time: float) -> tuple[float, float]:
+        """By how much the mud has moved at the `time` s, m, and its velocity upstream, m/s."""
+        last = updates.last
+        if last is None:
+            return 0.0, self.scales.upstream_velocity
+        since = time - last["time_s"]
+        area = self.case.size_m[1] * self.case.size_m[2]
+        velocity = float(last["velocity_m_s"])
+        return float(last["filtrate_m3"]) / area + velocity * since, velocity
 
     def chunk(self, feed: Feed, updates: Updates, step: int) -> int:
         """A chunk of steps from `step`; returns its last one."""

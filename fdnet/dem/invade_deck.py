@@ -1,12 +1,15 @@
 """The invasion deck and its data file."""
 
 from functools import reduce
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fdnet.case.case import InvasionCase
+from fdnet.dem.batch_files import SUPPLY, BatchFiles
+from fdnet.dem.batches import AT_ONCE, batches_of
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, empty_chunks, plug_allowance, quiet_chunks
 from fdnet.dem.contact_lines import contact_variables, left_out_of_contacts
 from fdnet.dem.coupled_parts import dumped_group, write_coupled_parts
@@ -16,16 +19,13 @@ from fdnet.dem.gravity import gravity_variables
 from fdnet.dem.measured_fines import densities
 from fdnet.dem.overlap import is_watched, watch_variables
 from fdnet.dem.scene import header_variables, wall_variables, write_data
-from fdnet.dem.supply import AT_ONCE, batches_of, place_batches, place_fines, slab_end
+from fdnet.dem.supply import place_batches, place_fines, slab_end
 from fdnet.errors import CaseError
 from fdnet.files.atomic import write_text
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.contacts import touching_pairs
 from fdnet.spheres.dump import COLUMNS, FORMAT
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
-
-SUPPLY = "supply"
-"""Folder of the batches, inside that of the invasion."""
 
 SCRATCH = "post/contacts.restart"
 """File that a continued deck writes only to store the contacts with the spheres."""
@@ -72,24 +72,31 @@ def write_invade_inputs(
 def write_batches(
     case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path
 ) -> Snapshot:
-    """Write supply/batch_N.data and .in, which are read before chunk N.
+    """Write the batches that are read before later chunks.
 
+    Where the deposit slows the mud down they are written when they are due (`later_batch`).
     Returns the fines that are there from the start.
     """
-    batches, bounds = list(place_batches(case, scales, grains)), _bounds(case, scales, grains)
-    shared = {
-        "start_velocity": number(scales.upstream_velocity),
-        "drag": drag_variables(case, scales),
-    }
-    density, first = densities(case, batches_of(case, scales).counts), int(grains.id.max()) + 1
-    (folder / SUPPLY).mkdir(exist_ok=True)
-    for chunk, fines in enumerate(batches[AT_ONCE:], AT_ONCE):
-        name = f"{SUPPLY}/batch_{chunk}"
-        own_density = density[fines.id.astype(int) - first]
-        write_data(folder / f"{name}.data", fines, bounds=bounds, density=own_density, types=3)
-        own = {"name": name, "first": int(fines.id[0]), "last": int(fines.id[-1])}
-        write_text(folder / f"{name}.in", render_text("batch.in.j2", shared | own))
-    return reduce(Snapshot.joined, batches[:AT_ONCE])
+    batches, files = place_batches(case, scales, grains), batch_files(case, scales, grains, folder)
+    first = list(islice(batches, AT_ONCE))
+    if not case.drag.slowed:
+        for number, fines in enumerate(batches, AT_ONCE):
+            files.write(number, fines, scales.upstream_velocity)
+    return reduce(Snapshot.joined, first)
+
+
+def batch_files(
+    case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path
+) -> BatchFiles:
+    """The files of the batches of an invasion in `folder`."""
+    return BatchFiles(
+        case=case,
+        folder=folder,
+        counts=batches_of(case, scales).counts,
+        first=int(grains.id.max()) + 1,
+        bounds=_bounds(case, scales, grains),
+        drag=drag_variables(case, scales),
+    )
 
 
 def batch_chunks(case: InvasionCase, scales: InvasionScales) -> range:
@@ -98,7 +105,10 @@ def batch_chunks(case: InvasionCase, scales: InvasionScales) -> range:
 
 
 def _feeding(case: InvasionCase, scales: InvasionScales) -> dict[str, int] | None:
-    """First and last chunk that take in a batch; None when all fines are there from the start."""
+    """First and last chunk that take in a batch; None when all fines are there from the start.
+
+    In mud that slows down they take in the same batches, but later ones.
+    """
     chunks = batch_chunks(case, scales)
     return {"first": chunks[0], "last": chunks[-1]} if chunks else None
 
@@ -114,7 +124,10 @@ def _bounds(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> Arr
 
     It extends beyond the outlet and upstream of the slab, where fines are removed.
     """
-    start = slab_end(case, grains) - batches_of(case, scales).reach
+    batches = batches_of(case, scales)
+    start = slab_end(case, grains) - batches.reach
+    if case.drag.slowed:  # a batch enters a chunk early, and may be twice as long (`later_batch`)
+        start -= batches.travel + batches.length
     margin = _margin(case, scales)
     size = case.size_m
     return np.array([[start - 2 * margin, size[0] + 2 * margin], [0.0, size[1]], [0.0, size[2]]])
@@ -149,6 +162,7 @@ def render_invade(
             "allowance": plug_allowance(case, scales),
             "start": _start(resume),
             "feeding": _feeding(case, scales),
+            "slowed": case.drag.slowed,
             "supply": SUPPLY,
             "chunks": chunks_of(case, scales),
             "chunk_steps": scales.checkpoint_steps,

@@ -9,12 +9,14 @@ from functools import partial
 from pathlib import Path
 
 from fdnet.case.case import InvasionCase
+from fdnet.dem.batches import batches_of
 from fdnet.dem.checkpoint import (
     HISTORY,
     HISTORY_HEADER,
     Checkpoint,
     chunks_of,
     csv_row,
+    entered_by,
     quiet_chunks,
     quiet_enough,
     read_history,
@@ -45,7 +47,6 @@ from fdnet.dem.overlap import (
     read_watch,
     refuse_overlap,
 )
-from fdnet.dem.supply import batches_of
 from fdnet.dem.updates import UPDATES, rate_is_low, read_updates, volume_has_passed
 from fdnet.dem.verdict import SCREEN
 from fdnet.errors import CaseError, LiggghtsError
@@ -113,7 +114,7 @@ def invade(
     (folder / "post").mkdir(parents=True, exist_ok=True)
     refuse_other_ranks(folder, case, launch.ranks)
     deck, run = _drive(case, scales, grains, folder, launch, fluid)
-    history = read_history(folder)
+    history, batches = read_history(folder), batches_of(case, scales)
     overlaps, damaged = [], grains
     for _, damaged in readable_states(folder, history, case, scales, grains):
         overlaps.append(overlap_in(case, damaged))
@@ -129,7 +130,7 @@ def invade(
         damaged=damaged,
         history=history,
         stop_reason=reason,
-        supplied=batches_of(case, scales).supplied_at(history[-1].chunk),
+        supplied=batches.supplied(entered_by(case, batches, history[-1])),
         overlap=deepest_of([*overlaps, *read_watch(folder)]),
         step_s=scales.time_step,
         left_out=deck.left_out,

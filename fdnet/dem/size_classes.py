@@ -20,10 +20,18 @@ _CLASS, _MOST = 2**0.25, 50_000
 """Largest ratio of radii in a class, and most spheres that are drawn at once."""
 
 Indices = NDArray[np.int64]
+NOBODY = (np.empty((0, 3)), np.empty(0))
+"""Places and radii of no sphere."""
 
 
 def places_by_size(
-    radius: Array, low: Array, high: Array, size: Array, *, rng: np.random.Generator
+    radius: Array,
+    low: Array,
+    high: Array,
+    size: Array,
+    *,
+    rng: np.random.Generator,
+    others: tuple[Array, Array] = NOBODY,
 ) -> tuple[Array, int]:
     """Random places that touch nothing, by random sequential addition of whole classes.
 
@@ -33,12 +41,16 @@ def places_by_size(
         high: (N, 3) m, largest ones.
         size: (3,) m, period along each axis, 0 where there is none.
         rng: gives the places.
+        others: places (M, 3) m and radii (M,) m of spheres that are there already.
 
     Returns:
         Places (N, 3) m, and how many spheres got none; those places mean nothing then.
     """
-    place, done = np.empty((len(radius), 3)), np.zeros(len(radius), bool)
-    for members in _classes(radius):
+    count = len(radius)
+    place = np.concatenate([np.empty((count, 3)), others[0]])
+    done = np.arange(len(place)) >= count
+    radius = np.concatenate([radius, others[1]])
+    for members in _classes(radius[:count]):
         waiting = members
         for _ in range(ROUNDS):
             if not len(waiting):
@@ -48,8 +60,8 @@ def places_by_size(
             done[waiting[clear]] = True
             waiting = waiting[~clear]
         if len(waiting):
-            return place, int(np.sum(~done))
-    return place, 0
+            return place[:count], int(np.sum(~done))
+    return place[:count], 0
 
 
 def _classes(radius: Array) -> Iterator[Indices]:

@@ -1,31 +1,23 @@
 """The slab of fines upstream of the face: random, at the given concentration, touching nothing.
 
-With `fines.supply` = "batches" the slab is cut across the flow. A batch enters the simulation at
-the start of a chunk, where the fluid would have carried it by then. The length of a batch is what
-the suspension moves in a chunk of time t against a cake that grows towards it, to a thickness
-h = c (u t + h) / phi with the concentration c, the velocity u and phi = `LOOSEST_CAKE`. So no cake
-overtakes a batch as long as one more batch is present than needed.
+With `fines.supply` = "batches" it comes in batches (`batches`).
 """
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from fdnet.case.case import InvasionCase
 from fdnet.case.size_rules import concentration_text
+from fdnet.dem.batches import Batches, batches_of
 from fdnet.dem.measured_fines import drawn_fines
 from fdnet.dem.size_classes import CLEARANCE, ROUNDS, places_by_size
 from fdnet.errors import CaseError
 from fdnet.scales.scales import InvasionScales
+from fdnet.spheres.images import wrapped
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 
-LOOSEST_CAKE = 0.5
-"""Volume fraction of the loosest cake that batches leave room for. Random loose packing has 0.55
-(Onoda & Liniger 1990)."""
-AT_ONCE = 2
-"""Batches present from the start: the one that arrives in the first chunk, and the next."""
 SURE_CROWDING = 0.2
 """Up to this `crowding` every fine gets a place. Random sequential addition of equal spheres
 saturates at 0.38 (Talbot et al. 1991), and none of 8,465 draws at 0.2 failed (docs/physics.md).
@@ -115,51 +107,6 @@ def _moving(
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Batches:
-    """How a slab is cut.
-
-    Attributes:
-        counts: number of fines in each batch.
-        length: m, of each batch along the flow.
-        travel: m, that the suspension moves in a chunk.
-    """
-
-    counts: tuple[int, ...]
-    length: float
-    travel: float
-
-    @property
-    def reach(self) -> float:
-        """Largest distance, m, of a fine to the slab's end when it enters the simulation."""
-        later = max(0, len(self.counts) - AT_ONCE)
-        return min(AT_ONCE, len(self.counts)) * self.length + later * (self.length - self.travel)
-
-    def supplied_at(self, chunk: int) -> int:
-        """Fines supplied by the end of a chunk (numbered from 1)."""
-        return sum(self.counts[: chunk + AT_ONCE - 1])
-
-
-def batches_of(case: InvasionCase, scales: InvasionScales) -> Batches:
-    """The batches of a case: of equal length, with the slab's fines shared out evenly.
-
-    A slab that is fed at once is one batch, and so is one of so few fines that some batch would be
-    empty. No batch is thinner than a fine, so that each must clear only the one next to it.
-    """
-    travel = scales.upstream_velocity * scales.checkpoint_steps * scales.time_step
-    apart = 1.01 * CLEARANCE * 2 * case.fines.radius_range_m[1]
-    length = max(travel / (1 - case.fines.placed_fraction / LOOSEST_CAKE), apart)
-    whole = Batches(counts=(scales.supplied_count,), length=scales.slab_length, travel=travel)
-    if case.fines.supply == "slab" or scales.slab_length <= AT_ONCE * length:
-        return whole
-    number = math.ceil(scales.slab_length / length - 1e-9)
-    share = np.minimum(np.arange(1, number + 1) * length / scales.slab_length, 1.0)
-    counts = np.diff(np.round(share * scales.supplied_count).astype(int), prepend=0)
-    if not counts.all():
-        return whole
-    return Batches(counts=tuple(int(count) for count in counts), length=length, travel=travel)
-
-
 def place_batches(
     case: InvasionCase, scales: InvasionScales, grains: Snapshot
 ) -> Iterator[Snapshot]:
@@ -168,13 +115,46 @@ def place_batches(
     The ids are numbered through all batches. A batch does not depend on how many follow, but for
     measured sizes, of which each batch gets its part of the whole.
     """
-    travel, first = batches_of(case, scales).travel, int(grains.id.max()) + 1
+    batches, first = batches_of(case, scales), int(grains.id.max()) + 1
     for number, (position, radius) in enumerate(
-        _draw_batches(case, scales, end=slab_end(case, grains)), 1
+        _draw_batches(case, scales, end=slab_end(case, grains))
     ):
-        carried = np.array([max(0, number - AT_ONCE) * travel, 0.0, 0.0])
+        carried = np.array([batches.distance_of(number), 0.0, 0.0])
         yield _moving(case, scales, grains, position + carried, radius, first=first)
         first += len(radius)
+
+
+def later_batch(
+    case: InvasionCase, scales: InvasionScales, spheres: Snapshot, number: int, moved: float
+) -> Snapshot:
+    """Batch `number` (from 0), where mud that has moved by `moved` m has carried it.
+
+    It is clear of the fines among the `spheres` that are there. Where these leave too little room,
+    it reaches further upstream, up to twice its length. Raises CaseError where that is too little.
+    """
+    batches, grains, there = batches_of(case, scales), spheres.grains(), spheres.fines()
+    rng = np.random.default_rng([case.seed, 11, number])
+    if case.fines.measured:
+        radius = drawn_fines(case, batches.counts)[number].radius
+    else:
+        radius = rng.uniform(*case.fines.radius_range_m, batches.counts[number])
+    size, high = np.array(case.size_m), slab_end(case, grains) + moved - number * batches.length
+    near = high + 2.5 * case.fines.radius_range_m[1]
+    some = there.where(there.position[:, 0] < near)
+    period, place = np.where(case.periodic, size, 0.0), some.position
+    place = wrapped(place, spheres.box, case.periodic)
+    # rounding may leave a wrapped place at the size itself
+    others = (np.where((period > 0) & (place >= period), 0.0, place), some.radius)
+    margin = np.where(period > 0, 0.0, radius[:, None]) * np.array([0.0, 1.0, 1.0])
+    lost, length = 0, batches.length
+    for length in np.linspace(1.0, 2.0, 5) * batches.length:
+        low, most = margin.copy(), np.tile(size, (len(radius), 1)) - margin
+        low[:, 0], most[:, 0] = high - length, high
+        place, lost = places_by_size(radius, low, most, period, rng=rng, others=others)
+        if not lost:
+            first = int(grains.id.max()) + 1 + batches.supplied(number)
+            return _moving(case, scales, grains, place, radius, first=first)
+    raise _no_place(case, lost, len(radius), length)
 
 
 def _draw_batches(

@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 
 from fdnet.case.case import InvasionCase
-from fdnet.dem.checkpoint import Checkpoint
-from fdnet.dem.supply import batches_of
+from fdnet.dem.batches import batches_of
+from fdnet.dem.checkpoint import Checkpoint, entered_by
 from fdnet.scales.scales import InvasionScales
 
 FLOW_COLUMNS = (
@@ -39,7 +39,7 @@ def history_rows(
         {
             "time_s": row.step * scales.time_step,
             "physical_time_s": row.step * scales.time_step * scales.force_factor,
-            "supplied_count": batches.supplied_at(row.chunk),
+            "supplied_count": batches.supplied(entered_by(case, batches, row)),
             "invaded_count": row.invaded,
             "passed_count": row.passed,
             "upstream_count": row.upstream,

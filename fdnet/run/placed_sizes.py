@@ -9,8 +9,8 @@ import numpy as np
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.spheres import Spheres
+from fdnet.dem.batches import batches_of
 from fdnet.dem.measured_fines import drawn_fines
-from fdnet.dem.supply import batches_of
 from fdnet.scales.scales import InvasionScales, scales_of
 from fdnet.scales.sizes import SHARES, diameter_at
 from fdnet.sizes.curve import SizeCurve

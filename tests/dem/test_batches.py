@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from builders import resting_spheres, tiny
 
+from fdnet.dem.batches import AT_ONCE, LOOSEST_CAKE, batches_of
 from fdnet.dem.invade_deck import render_invade, write_batches
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
 from fdnet.dem.scene import box_of
-from fdnet.dem.supply import AT_ONCE, CLEARANCE, LOOSEST_CAKE, batches_of, place_batches, slab_end
+from fdnet.dem.supply import CLEARANCE, place_batches, slab_end
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Kind
 
@@ -83,9 +84,20 @@ def test_a_batch_enters_before_it_could_meet_the_cake(concentration):
 def test_supplied_counts_the_batches_that_have_come():
     case = tiny(*BATCHED)
     batches = batches_of(case, scales_of(case))
-    assert batches.supplied_at(1) == sum(batches.counts[:2])
-    assert batches.supplied_at(2) == sum(batches.counts[:3])
-    assert batches.supplied_at(10_000) == 900
+    assert [batches.entered_at(chunk) for chunk in (1, 2, 5)] == [2, 3, 6]
+    assert batches.supplied(batches.entered_at(10_000)) == 900
+
+
+def test_batches_follow_the_mud_where_it_slows_down():
+    """After the travel of n chunks of undisturbed mud the batches of chunk n + 1 are there."""
+    batches = batches_of(tiny(*BATCHED), scales_of(tiny(*BATCHED)))
+    moved = batches.travel * np.array([0.0, 0.99, 1.0, 1.5, 2.0, 1e6])
+    assert [batches.entered_after(one) for one in moved] == [2, 2, 3, 3, 4, len(batches.counts)]
+    for entered in (2, 3, len(batches.counts)):
+        assert batches.entered_with(batches.supplied(entered)) == entered
+        assert batches.entered_with(batches.supplied(entered) - 1) == entered
+    assert batches.entered_with(0) == 2
+    assert batches.entered_with(10_000) == len(batches.counts)
 
 
 def test_thin_chunks_make_no_batch_thinner_than_a_fine():
@@ -170,7 +182,7 @@ def test_a_batched_invasion_accounts_for_every_fine_and_resumes(binary, tmp_path
     assert len(batches.counts) > 5
     assert (
         whole.supplied
-        == batches.supplied_at(last.chunk)
+        == batches.supplied(batches.entered_at(last.chunk))
         == last.upstream + last.invaded + last.passed
     )
     assert whole.max_overlap < (0.15 if forces else 0.1)

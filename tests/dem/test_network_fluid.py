@@ -10,10 +10,12 @@ from builders import tiny
 from cut_and_continue import differences
 from scipy.integrate import quad
 
+from fdnet.dem.batches import batches_of
 from fdnet.dem.fluid import Moment
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
+from fdnet.dem.supply import CLEARANCE, later_batch, place_batches, slab_end
 from fdnet.errors import CaseError
 from fdnet.network.field.of_pack import velocity_field
 from fdnet.run.fluid.fluid_of import fluid_of
@@ -94,6 +96,52 @@ def deposit_of(done) -> Snapshot:
 
 def test_a_continued_invasion_is_the_uncut_one(binary, fluid, tmp_path):
     assert differences(fluid.case, fluid.grains, tmp_path, binary) == []
+
+
+def test_batches_come_as_the_mud_that_slows_down_carries_them(binary, fluid, tmp_path):
+    """The mud has moved by the filtrate over the face; a batch enters before it is needed."""
+    keys = ("fines.supply=batches", "fines.count=600", "run.checkpoint_ms=0.02", "run.cap_ms=0.3")
+    other = with_case(fluid, *keys)
+    result = invade(
+        other.case, other.scales, other.grains, tmp_path / "a", Launch(binary=binary), fluid=other
+    )
+    batches, area = batches_of(other.case, other.scales), fluid.pack.network.area
+    table = history_rows(other.case, other.scales, result.history, result.updates)
+    entered = [batches.entered_with(line["supplied_count"]) for line in table]
+    assert [line["supplied_count"] for line in table] == [batches.supplied(n) for n in entered]
+    last = result.history[-1]
+    assert result.supplied == last.upstream + last.invaded + last.passed
+    undisturbed = [batches.entered_at(row.chunk + 1) for row in result.history]
+    assert all(late <= one for late, one in zip(entered, undisturbed, strict=True))
+    assert 4 < entered[-1] < undisturbed[-1]
+    for row, count in zip(result.history, entered, strict=True):
+        filtrate = [line["filtrate_m3"] for line in result.updates if line["step"] < row.step][-1]
+        assert count >= batches.entered_after(filtrate / area)
+    assert differences(other.case, other.grains, tmp_path, binary) == []
+
+
+@pytest.mark.parametrize("sizes", [(), ("fines.radius_mm=[0.02,0.07]",)])
+def test_a_batch_is_clear_of_what_is_there(fluid, sizes):
+    """Fines that lag behind the mud lie where the batch comes; others ahead of it."""
+    keys = ("fines.supply=batches", "fines.count=600", "run.checkpoint_ms=0.02")
+    case = small(*keys, *sizes)
+    scales = scales_of(case)
+    batches, grains = batches_of(case, scales), fluid.grains
+    there = list(itertools.islice(place_batches(case, scales, grains), 2))
+    spheres = grains.joined(there[0]).joined(
+        replace(there[1], position=there[1].position - np.array([0.5 * batches.length, 1e-3, 0]))
+    )
+    batch = later_batch(case, scales, spheres, 2, batches.travel)
+    assert len(batch) == batches.counts[2]
+    assert batch.id.min() == spheres.id.max() + 1
+    high = slab_end(case, grains) + batches.travel - 2 * batches.length
+    assert np.all((batch.position[:, 0] < high) & (batch.position[:, 0] > high - batches.length))
+    every = spheres.fines().joined(batch)
+    gap = every.position[:, None] - every.position
+    gap[..., 1:] -= 1e-3 * np.round(gap[..., 1:] / 1e-3)
+    apart = np.linalg.norm(gap, axis=2) / (every.radius[:, None] + every.radius)
+    new = every.id >= batch.id.min()
+    assert np.sum(apart[new] < CLEARANCE) == new.sum()  # each with itself alone
 
 
 def carried_with(fluid, deposit):
@@ -398,7 +446,6 @@ def test_no_warning_of_throats_where_the_balance_of_momentum_sees_them():
     [
         (["drag.upstream=interstitial"], r"drag\.upstream: 'interstitial', but with drag\.field"),
         (["grains.motion=mobile"], r"grains\.motion: 'mobile' with drag\.field 'network'"),
-        (["fines.supply=batches"], r"fines\.supply: 'batches' come on as fast as at the start"),
         (["drag.field=uniform", "drag.drive=rate"], r"drag\.drive: 'rate' belongs to"),
         (["drag.drive=rate", "run.stop_rate=0.1"], r"run\.stop_rate: 0\.1 needs a rate that"),
         (

@@ -11,17 +11,11 @@ from scipy.spatial import cKDTree
 from fdnet.case.case import InvasionCase
 from fdnet.case.file import case_from, read_case
 from fdnet.case.size_file import parse_sizes
+from fdnet.dem.batches import AT_ONCE, batches_of
 from fdnet.dem.measured_fines import densities, drawn_fines
 from fdnet.dem.pack_deck import draw_radii
 from fdnet.dem.scene import box_of
-from fdnet.dem.supply import (
-    AT_ONCE,
-    CLEARANCE,
-    batches_of,
-    crowding,
-    place_batches,
-    slab_end,
-)
+from fdnet.dem.supply import CLEARANCE, crowding, place_batches, slab_end
 from fdnet.errors import CaseError
 from fdnet.scales.scales import scales_of
 from fdnet.scales.sizes import diameter_at, size_rows

@@ -11,9 +11,7 @@ It prints one line `RESULT {json}`.
 """
 
 import json
-import resource
 import sys
-import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -22,6 +20,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from fdnet.case.names import DamageLawName
 from fdnet.network import network as tessellation
 from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.flow.flow import solve_flow
@@ -30,6 +29,7 @@ from fdnet.network.permeability import analyse
 from fdnet.network.resolved.all_spheres import all_conductances, as_grains
 from fdnet.spheres.porosity import measure_porosity
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
+from fdnet.studies.benchmark.clock import Clock
 from fdnet.studies.truth import packs
 from fdnet.studies.truth.packs import read_pack, shaken, truth_folder
 
@@ -38,6 +38,8 @@ SHAKE = 0.02
 FINE = 0.1
 SIDES, BOX = (False, True, True), (False, False, False)
 """Sides of the periodic packs, and of the same in a box of walls."""
+TWO_SCALE: tuple[DamageLawName, ...] = ("side-kozeny", "section-archie")
+"""Laws on the network of the grains that are timed next to that of all spheres."""
 DECADES, CLOSED = 12, 0.1
 MOST_GRAINS_STIFF = 200_000
 COMPILING = 600
@@ -69,46 +71,6 @@ def seated(grains: Snapshot, count: int, rng: np.random.Generator) -> Snapshot:
         place = np.minimum(place % size, size * (1 - 1e-15))
         centres = np.concatenate([centres, place[tree.query(place)[0] > big + 0.999 * small]])
     return resting(centres[:count], small, grains.box, Kind.FINE)
-
-
-class Clock:
-    """Seconds and peak memory of steps, in order."""
-
-    def __init__(self) -> None:
-        self.steps: dict[str, dict[str, float]] = {}
-
-    def timed(self, step: str, work: Callable[[], Any]) -> Any:
-        """The result of `work`; its seconds are added to `step`, and its peak memory is kept."""
-        _forget_peak()
-        cpu, wall = time.process_time(), time.perf_counter()
-        result = work()
-        values = self.steps.setdefault(step, {"cpu_s": 0.0, "wall_s": 0.0, "peak_MB": 0.0})
-        values["cpu_s"] += time.process_time() - cpu
-        values["wall_s"] += time.perf_counter() - wall
-        values["peak_MB"] = max(values["peak_MB"], _peak())
-        return result
-
-    def total(self, names: list[str]) -> dict[str, float]:
-        """Sum of the seconds and largest peak of the steps `names`."""
-        steps = [self.steps[name] for name in names]
-        sums = {key: sum(step[key] for step in steps) for key in ("cpu_s", "wall_s")}
-        return sums | {"peak_MB": max(step["peak_MB"] for step in steps)}
-
-
-def _forget_peak() -> None:
-    """Linux starts the process's peak memory anew; elsewhere it stays that of all steps so far."""
-    try:
-        Path("/proc/self/clear_refs").write_text("5")
-    except OSError:
-        return
-
-
-def _peak() -> float:
-    try:
-        status = Path("/proc/self/status").read_text()
-        return int(status.split("VmHWM:")[1].split()[0]) / 1024
-    except (OSError, IndexError):
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def _timed_call(clock: Clock, work: Callable[..., Any], *given: Any, **named: Any) -> Any:
@@ -234,13 +196,25 @@ def walled_result(wanted: int, folder: Path) -> dict[str, Any]:
 
 
 def run_spheres(spheres: Snapshot) -> tuple[Clock, int]:
-    """The steps of the network of all `spheres`, and the number of its pores."""
+    """The steps of the network of all `spheres`, and the number of its pores.
+
+    Whole analyses on the network of the grains, by each of `TWO_SCALE`, come last.
+    """
     clock = Clock()
+    pores = _run_together(clock, as_grains(spheres))
+    for law in TWO_SCALE:
+        work = partial(analyse, spheres, periodic=SIDES, damage_law=law)
+        clock.timed(f"total {law}", work)
+    return clock, pores
+
+
+def _run_together(clock: Clock, spheres: Snapshot) -> int:
+    """The steps of the network of all `spheres`; returns the number of its pores."""
     network = build_timed(clock, spheres, SIDES)
     conductance = clock.timed("conductance", lambda: all_conductances(network))
     clock.timed("solve", lambda: solve_flow(network, conductance))
     clock.steps["total spheres"] = clock.total(list(clock.steps))
-    return clock, len(network.pore_share)
+    return len(network.pore_share)
 
 
 def tiled_spheres(wanted: int, rng: np.random.Generator) -> Snapshot:
@@ -252,12 +226,12 @@ def tiled_spheres(wanted: int, rng: np.random.Generator) -> Snapshot:
 
 
 def spheres_result(wanted: int, folder: Path) -> dict[str, Any]:
-    """Seconds and memory of every step of the law `all-spheres` on a tiled pack."""
+    """Seconds and memory of every step of `all-spheres` on a tiled pack, and of `TWO_SCALE`."""
     rng = np.random.default_rng(1)
-    run_spheres(as_grains(tiled_spheres(COMPILING, rng)))  # compiles and loads
-    run_spheres(as_grains(tiled_spheres(8 * COMPILING, rng)))
+    run_spheres(tiled_spheres(COMPILING, rng))  # compiles and loads
+    run_spheres(tiled_spheres(8 * COMPILING, rng))
     spheres = tiled_spheres(wanted, rng)
-    clock, pores = run_spheres(as_grains(spheres))
+    clock, pores = run_spheres(spheres)
     leave_spheres(folder, spheres)
     counts = {"grains": len(spheres.grains()), "fines": len(spheres.fines())}
     return {**counts, "pores": pores, "steps": clock.steps}

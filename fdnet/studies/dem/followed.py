@@ -16,18 +16,10 @@ from fdnet.run.finished import FinishedRun
 from fdnet.run.open_run import open_run, run_case
 from fdnet.studies.engine.csv_rows import read_named, write_named
 
-SUPPLIED = {
-    "specimen1": 1000,
-    "specimen3": 25_000,
-    "specimen5": 7500,
-    "specimen6": 25_000,
-    "specimen7": 12_000,
-    "specimen8": 12_000,
-}
-"""Fines in the slab of each specimen. In 1, 5, 7 and 8 they are more than enter and more than the
-cake holds. The fines of 3 and 6, a tenth of the grains, enter as long as they come."""
-FEWER = ("specimen3", "specimen6")
-"""Specimens with fewer fines here than in their uniform runs, which are run uniform as well."""
+SPECIMENS = ("specimen1", "specimen3", "specimen5", "specimen6", "specimen7", "specimen8")
+FEWER = {"specimen3": 25_000, "specimen6": 25_000}
+"""Fines supplied to specimens that get fewer than in their uniform runs, and so are run uniform as
+well. Theirs, a tenth of the grains, enter as long as they come."""
 SAME_SUPPLY = "uniform, same supply"
 SEEDS, ONE = {"specimen1": (1, 2, 3), "specimen5": (1, 2, 3)}, (1,)
 """Seeds of the specimens that take minutes, and of the others."""
@@ -37,7 +29,6 @@ FLOW = (
     "drag.crowd=beetstra",
     "drag.scheme=implicit",
     "drag.pressure_gradient=true",
-    "fines.supply=slab",
     "run.stiffness_N_m=auto",
     "run.plug_rate=0.02",
 )
@@ -105,7 +96,9 @@ def followed_rows(
 
 
 def _read_or_run(name: str, seed: int, flow: str, out: Path) -> FollowedRow:
-    keys = [*LAWS, f"fines.count={SUPPLIED[name]}", f"seed={seed}"]
+    keys = [*LAWS, f"seed={seed}"]
+    if name in FEWER:
+        keys.append(f"fines.count={FEWER[name]}")
     if flow == "followed":
         keys += FLOW
     case = read_case(case_path(name), assignments=keys)
