@@ -11,13 +11,13 @@ import argparse
 from pathlib import Path
 
 from fdnet.files.paths import path_option
-from fdnet.studies.dem.followed import SPECIMENS, followed_rows, uniform_rows, write_followed
+from fdnet.studies.dem.followed import SUPPLIED, followed_rows, uniform_rows, write_followed
 
 TABLE = Path(__file__).resolve().parents[1] / "docs" / "thesis" / "results.csv"
 parser = argparse.ArgumentParser(
     description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
 )
-parser.add_argument("specimens", nargs="*", metavar="SPECIMEN", help=f"of {', '.join(SPECIMENS)}")
+parser.add_argument("specimens", nargs="*", metavar="SPECIMEN", help=f"of {', '.join(SUPPLIED)}")
 parser.add_argument("--seeds", type=int, nargs="+", help="of each (default: 1, or 1 to 3)")
 parser.add_argument("--out", type=path_option, default=Path("runs/followed"))
 parser.add_argument("--uniform", type=path_option, default=TABLE, help="table of the thesis study")
@@ -25,6 +25,6 @@ parser.add_argument("--csv", type=path_option, required=True, help="write the ta
 
 if __name__ == "__main__":
     options = parser.parse_args()
-    names = options.specimens or list(SPECIMENS)
+    names = options.specimens or list(SUPPLIED)
     rows = followed_rows(names, options.seeds, options.out)
     write_followed(options.csv, [*uniform_rows(options.uniform, names), *rows])

@@ -16,10 +16,18 @@ from fdnet.run.finished import FinishedRun
 from fdnet.run.open_run import open_run, run_case
 from fdnet.studies.engine.csv_rows import read_named, write_named
 
-SPECIMENS = ("specimen1", "specimen3", "specimen5", "specimen6", "specimen7", "specimen8")
-FEWER = {"specimen3": 25_000, "specimen6": 25_000}
-"""Fines supplied to specimens that get fewer than in their uniform runs, and so are run uniform as
-well. Theirs, a tenth of the grains, enter as long as they come."""
+SUPPLIED = {
+    "specimen1": 3000,
+    "specimen3": 25_000,
+    "specimen5": 12_000,
+    "specimen6": 25_000,
+    "specimen7": 12_000,
+    "specimen8": 12_000,
+}
+"""Fines supplied to each specimen. The more there are, the thicker the cake and the slower the
+flow at the end, so a run is compared with a uniform one of the same supply."""
+FEWER = ("specimen3", "specimen6", "specimen7", "specimen8")
+"""Specimens with fewer fines here than in their uniform runs, which are run uniform as well."""
 SAME_SUPPLY = "uniform, same supply"
 SEEDS, ONE = {"specimen1": (1, 2, 3), "specimen5": (1, 2, 3)}, (1,)
 """Seeds of the specimens that take minutes, and of the others."""
@@ -96,9 +104,7 @@ def followed_rows(
 
 
 def _read_or_run(name: str, seed: int, flow: str, out: Path) -> FollowedRow:
-    keys = [*LAWS, f"seed={seed}"]
-    if name in FEWER:
-        keys.append(f"fines.count={FEWER[name]}")
+    keys = [*LAWS, f"fines.count={SUPPLIED[name]}", f"seed={seed}"]
     if flow == "followed":
         keys += FLOW
     case = read_case(case_path(name), assignments=keys)
