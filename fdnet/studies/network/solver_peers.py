@@ -107,7 +107,7 @@ def _iterated(
         return precondition(missing)
 
     most, right = ITERATIVE[method], source * scale
-    within = tolerance * float(np.linalg.norm(right))
+    within = tolerance * float(np.abs(right).sum())
     pressure = conjugate_gradients(matrix, right, counted, within=within, steps=most) * scale
     if np.any(np.isnan(pressure)):
         raise FlowError(
