@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from fdnet.case.case import InvasionCase
+from fdnet.case.names import SECTION_ARCHIE
 from fdnet.dem.checkpoint import HISTORY, Checkpoint, csv_row, read_history
 from fdnet.dem.digests import (
     CheckpointRecord,
@@ -32,13 +33,19 @@ def overlap_digest(rows: Sequence[Deepest]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+def case_digest(case: InvasionCase) -> str:
+    """What the checkpoints of a case depend on: its digest and the law of a flow that follows."""
+    digest = case.digest("invade")
+    return f"{digest} {SECTION_ARCHIE}" if case.drag.field == "network" else digest
+
+
 def write_record(
     folder: Path, row: Checkpoint, case: InvasionCase, *, ranks: int, overlaps: Sequence[Deepest]
 ) -> None:
     """Record a checkpoint whose files are whole; `overlaps` are those since the one before."""
     post = folder / "post"
     record = CheckpointRecord(
-        case=case.digest("invade"),
+        case=case_digest(case),
         ranks=ranks,
         row=csv_row(row),
         overlap=overlap_digest(overlaps),
@@ -59,7 +66,7 @@ def recorded_rows(folder: Path, case: InvasionCase) -> list[tuple[Checkpoint, Ch
     except LiggghtsError:
         return []
     _refuse_missing_rows(folder, rows, case)
-    digest, result = case.digest("invade"), []
+    digest, result = case_digest(case), []
     for row, overlaps in zip(rows, _parts(read_watch(folder), rows), strict=False):
         record = read_record(folder, row.step)
         if record is None or record.case != digest or record.overlap != overlap_digest(overlaps):
@@ -81,7 +88,7 @@ def _refuse_missing_rows(folder: Path, rows: Sequence[Checkpoint], case: Invasio
     lines = {row.step: csv_row(row) for row in rows}
     for step, path in checkpoint_files(folder):
         record = read_record(folder, step) if path.suffix == ".record" else None
-        if record is None or step > rows[-1].step or record.case != case.digest("invade"):
+        if record is None or step > rows[-1].step or record.case != case_digest(case):
             continue
         if lines.get(step) != record.row:
             raise LiggghtsError(
@@ -166,7 +173,7 @@ def refuse_other_ranks(folder: Path, case: InvasionCase, ranks: int) -> None:
     """Raises CaseError when the cut invasion in `folder` ran on another number of MPI ranks."""
     for step, path in checkpoint_files(folder):
         record = read_record(folder, step) if path.suffix == ".record" else None
-        if record and record.case == case.digest("invade") and record.ranks != ranks:
+        if record and record.case == case_digest(case) and record.ranks != ranks:
             raise CaseError(
                 f"{folder}: this invasion was begun with --np {record.ranks}, and --np {ranks} "
                 f"would give neither result; continue with --np {record.ranks}, or start over "

@@ -99,18 +99,14 @@ def batch_files(
     )
 
 
-def batch_chunks(case: InvasionCase, scales: InvasionScales) -> range:
-    """The chunks that take in a batch; empty when all fines are there from the start."""
-    return range(AT_ONCE, max(AT_ONCE, len(batches_of(case, scales).counts)))
-
-
 def _feeding(case: InvasionCase, scales: InvasionScales) -> dict[str, int] | None:
     """First and last chunk that take in a batch; None when all fines are there from the start.
 
-    In mud that slows down they take in the same batches, but later ones.
+    They hold for mud of constant velocity. In mud that slows down only whether there are any
+    matters: the chunks follow from the distance that the mud has moved.
     """
-    chunks = batch_chunks(case, scales)
-    return {"first": chunks[0], "last": chunks[-1]} if chunks else None
+    count = len(batches_of(case, scales).counts)
+    return {"first": AT_ONCE, "last": count - 1} if count > AT_ONCE else None
 
 
 def _margin(case: InvasionCase, scales: InvasionScales) -> float:
@@ -126,7 +122,8 @@ def _bounds(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> Arr
     """
     batches = batches_of(case, scales)
     start = slab_end(case, grains) - batches.reach
-    if case.drag.slowed:  # a batch enters a chunk early, and may be twice as long (`later_batch`)
+    if case.drag.slowed and len(batches.counts) > 1:
+        # a batch enters a chunk early, and may be twice as long (`later_batch`)
         start -= batches.travel + batches.length
     margin = _margin(case, scales)
     size = case.size_m

@@ -130,7 +130,8 @@ def later_batch(
     """Batch `number` (from 0), where mud that has moved by `moved` m has carried it.
 
     It is clear of the fines among the `spheres` that are there. Where these leave too little room,
-    it reaches further upstream, up to twice its length. Raises CaseError where that is too little.
+    it reaches further upstream, up to twice the length of a batch. Raises CaseError where that is
+    too little.
     """
     batches, grains, there = batches_of(case, scales), spheres.grains(), spheres.fines()
     rng = np.random.default_rng([case.seed, 11, number])
@@ -146,15 +147,20 @@ def later_batch(
     # rounding may leave a wrapped place at the size itself
     others = (np.where((period > 0) & (place >= period), 0.0, place), some.radius)
     margin = np.where(period > 0, 0.0, radius[:, None]) * np.array([0.0, 1.0, 1.0])
-    lost, length = 0, batches.length
-    for length in np.linspace(1.0, 2.0, 5) * batches.length:
+    own = min(batches.length, scales.slab_length - number * batches.length)
+    lost = 0
+    for length in np.linspace(own, 2.0 * batches.length, 5):
         low, most = margin.copy(), np.tile(size, (len(radius), 1)) - margin
         low[:, 0], most[:, 0] = high - length, high
         place, lost = places_by_size(radius, low, most, period, rng=rng, others=others)
         if not lost:
             first = int(grains.id.max()) + 1 + batches.supplied(number)
             return _moving(case, scales, grains, place, radius, first=first)
-    raise _no_place(case, lost, len(radius), length)
+    raise CaseError(
+        f"{concentration_text(case.fines)}: {lost} of the {len(radius)} fines of batch "
+        f"{number + 1} find no room among the fines that wait upstream, over "
+        f"{2e3 * batches.length:.3g} mm; lower it, or set fines.supply = 'slab'"
+    )
 
 
 def _draw_batches(

@@ -11,6 +11,8 @@ from cut_and_continue import differences
 from scipy.integrate import quad
 
 from fdnet.dem.batches import batches_of
+from fdnet.dem.checkpoint_record import last_checkpoint
+from fdnet.dem.digests import read_record, store_record
 from fdnet.dem.fluid import Moment
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
@@ -108,7 +110,8 @@ def test_batches_come_as_the_mud_that_slows_down_carries_them(binary, fluid, tmp
     batches, area = batches_of(other.case, other.scales), fluid.pack.network.area
     table = history_rows(other.case, other.scales, result.history, result.updates)
     entered = [batches.entered_with(line["supplied_count"]) for line in table]
-    assert [line["supplied_count"] for line in table] == [batches.supplied(n) for n in entered]
+    counted = [row.upstream + row.invaded + row.passed for row in result.history]
+    assert [line["supplied_count"] for line in table] == counted
     last = result.history[-1]
     assert result.supplied == last.upstream + last.invaded + last.passed
     undisturbed = [batches.entered_at(row.chunk + 1) for row in result.history]
@@ -118,6 +121,13 @@ def test_batches_come_as_the_mud_that_slows_down_carries_them(binary, fluid, tmp
         filtrate = [line["filtrate_m3"] for line in result.updates if line["step"] < row.step][-1]
         assert count >= batches.entered_after(filtrate / area)
     assert differences(other.case, other.grains, tmp_path, binary) == []
+    newest = last_checkpoint(tmp_path / "a", other.case)
+    assert newest is not None
+    assert newest.step == last.step
+    record = read_record(tmp_path / "a", last.step)
+    store_record(tmp_path / "a", last.step, replace(record, case=other.case.digest("invade")))
+    older = last_checkpoint(tmp_path / "a", other.case)  # that one was made by another law
+    assert older is None or older.step < last.step
 
 
 @pytest.mark.parametrize("sizes", [(), ("fines.radius_mm=[0.02,0.07]",)])
@@ -142,6 +152,28 @@ def test_a_batch_is_clear_of_what_is_there(fluid, sizes):
     apart = np.linalg.norm(gap, axis=2) / (every.radius[:, None] + every.radius)
     new = every.id >= batch.id.min()
     assert np.sum(apart[new] < CLEARANCE) == new.sum()  # each with itself alone
+
+
+def test_the_last_batch_is_as_crowded_as_the_others(fluid):
+    case = small("fines.supply=batches", "fines.count=600", "run.checkpoint_ms=0.02")
+    scales = scales_of(case)
+    batches, end = batches_of(case, scales), slab_end(case, fluid.grains)
+    number = len(batches.counts) - 1
+    rest = scales.slab_length - number * batches.length
+    assert rest < 0.9 * batches.length
+    place = later_batch(case, scales, fluid.grains, number, 0.0).position[:, 0]
+    assert end - scales.slab_length < place.min() < end - scales.slab_length + 0.2 * rest
+
+
+def test_a_batch_without_room_is_refused_by_number(fluid):
+    case = small("fines.supply=batches", "fines.count=600", "run.checkpoint_ms=0.02")
+    scales = scales_of(case)
+    batches, end = batches_of(case, scales), slab_end(case, fluid.grains)
+    some = 1e-4 * np.indices((20, 10, 10)).reshape(3, -1).T  # as dense as they can stand
+    corner = np.array([end - 3 * batches.length, 0.0, 0.0])
+    there = fines(some + corner, 5e-5, fluid.grains.box)
+    with pytest.raises(CaseError, match="of batch 3 find no room"):
+        later_batch(case, scales, fluid.grains.joined(there), 2, batches.length)
 
 
 def carried_with(fluid, deposit):

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fdnet.network.fines.deposit import deposit_in_pores
 from fdnet.network.fines.fine_images import reaching_inside
 from fdnet.network.fines.kept_deposit import holders_of, measured_deposit
-from fdnet.network.fines.occupancy import measure_deposit
 from fdnet.network.network import build_network
 from fdnet.spheres.snapshot import Kind, Snapshot
 
@@ -37,7 +37,7 @@ def test_fines_that_come_leave_and_move_give_the_full_measure(periodic):
     kept = measured_deposit(holders_of(network), before)
     grown = kept.changed_to(after, tolerance=0.0)
     assert 0 < grown.renewed < 60
-    want = measure_deposit(network, after).pore_solid_volume
+    want = deposit_in_pores(network, after)[0]
     assert grown.in_pores == pytest.approx(want, rel=1e-9, abs=1e-12 * want.max())
 
 

@@ -161,9 +161,16 @@ def test_the_power_of_the_share_is_the_one_constant(network, pack, monkeypatch):
     assert set(damage.law_used) == {"clean"}
 
 
-def test_fines_that_come_leave_and_move_renew_the_throats_they_reach(network, pack):
-    """Bit for bit what all throats give when they are summed anew."""
+@pytest.mark.parametrize(("periodic", "spread"), [("yz", 1.0), ("", 1.0), ("", 10.0)])
+def test_fines_that_come_leave_and_move_renew_the_throats_they_reach(pack, periodic, spread):
+    """Bit for bit what all throats give when they are summed anew.
+
+    Radii differ by up to the factor `spread`.
+    """
+    network = build_network(pack.grains(), periodic=periodic)
     rng, fines = np.random.default_rng(8), pack.fines()
+    radius = fines.radius * spread ** -rng.uniform(size=len(fines))
+    fines = replace(fines, radius=radius)
     place = np.array(fines.position)
     place[::15] += rng.normal(0.0, 0.1, place[::15].shape)
     before, after = fines.where(np.arange(len(fines)) > 3), replace(fines, position=place)
@@ -175,6 +182,8 @@ def test_fines_that_come_leave_and_move_renew_the_throats_they_reach(network, pa
     assert 0 < grown.renewed < 0.6 * full.renewed
     assert np.array_equal(grown.raised, full.raised)
     assert np.array_equal(grown.without, full.without)
+    with np.errstate(invalid="raise", divide="raise"):
+        assert np.all((full.factor >= 0.0) & (full.factor <= 1.0))
     clean, damage = conductances(network, after)
     raised = np.sum(full.without / np.maximum(full.factor, 1e-12), axis=1)
     kept = full.without.sum(axis=1) / raised

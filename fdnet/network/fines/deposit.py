@@ -38,10 +38,10 @@ def deposit_in_pores(network: Network, fines: Snapshot) -> tuple[Array, Array, A
         axis=1,
     )
     inside = _filled(network, network.pore_corner, fines, value)
-    return means_in_pores(network, (inside / network.pore_share[:, None]).T)
+    return _means_in_pores(network, (inside / network.pore_share[:, None]).T)
 
 
-def means_in_pores(network: Network, sums: Array) -> tuple[Array, Array, Array, Array]:
+def _means_in_pores(network: Network, sums: Array) -> tuple[Array, Array, Array, Array]:
     """What `deposit_in_pores` returns, of the sums (5, P) over the fines in each pore.
 
     They are the volume and the surface; then volume times that of the whole fine, times its
@@ -68,7 +68,7 @@ def deposit_on_sides(network: Network, fines: Snapshot) -> tuple[Array, Array]:
     """
     filled = np.zeros((len(network.throat_pores), 2, 2))
     for side in (0, 1):
-        real, corner = side_corners(network, side)
+        real, corner = _side_corners(network, side)
         height = network.throat_heights[:, side]
         inside = _filled(network, corner, fines, np.zeros((len(fines), 0)))
         signed_share = np.copysign(network.throat_share[real], height[real])
@@ -76,7 +76,7 @@ def deposit_on_sides(network: Network, fines: Snapshot) -> tuple[Array, Array]:
     return filled[..., 0], filled[..., 1]
 
 
-def side_corners(network: Network, side: int) -> tuple[Array, Array]:
+def _side_corners(network: Network, side: int) -> tuple[Array, Array]:
     """Throats (R,) whose side 0 or 1 is no sliver, and the corners (R, 4, 3) m of these sides."""
     height = network.throat_heights[:, side]
     real = np.flatnonzero(np.abs(height) > THIN_SIDE * network.grain_radius)

@@ -126,33 +126,6 @@ def measure_occupancy(
     return Occupancy(fines=reaching, counts=counts, **values)
 
 
-def measure_deposit(network: Network, fines: Snapshot) -> Occupancy:
-    """As `measure_occupancy`, without what the fines fill of the throats.
-
-    The fields by throat say "no fines", and there are no pairs: enough for the law `side-kozeny`.
-    """
-    refuse_wide(network, fines)
-    reaching = fines.where(reaching_inside(network, fines))
-    pores, sides = deposit_in_pores(network, reaching), deposit_on_sides(network, reaching)
-    throats = len(network.throat_radius)
-    zero, none = np.zeros(throats), np.zeros(0)
-    fields = _fields_of_deposit(network, pores, sides) | {
-        "throat_solid_volume": zero,
-        "throat_porosity": np.ones(throats),
-        "throat_fine_radius": zero,
-        "throat_fines": np.zeros(throats, int),
-        "blocked": np.zeros(throats, bool),
-        "pair_throat": np.zeros(0, int),
-        "pair_fine": np.zeros(0, int),
-        "pair_distance": none,
-        "pair_radius": none,
-        "pair_volume": none,
-    }
-    counts = {"pore_porosity_negative": _overfilled(network, pores[0])}
-    values = {name: frozen(value) for name, value in fields.items()}
-    return Occupancy(fines=reaching, counts=counts, **values)
-
-
 def refuse_wide(network: Network, fines: Snapshot) -> None:
     """Raise NetworkError on fines that would meet their own image across a periodic side."""
     side = np.where(network.periodic, np.ptp(network.box, axis=1), np.inf)
@@ -188,15 +161,8 @@ def _throat_fields(network: Network, throats: FinesInThroats) -> dict[str, Array
 
 def _pore_fields(network: Network, reaching: Snapshot) -> dict[str, Array]:
     """The fields by pore and by side of a throat, from the fines that reach into the box."""
-    return _fields_of_deposit(
-        network, deposit_in_pores(network, reaching), deposit_on_sides(network, reaching)
-    )
-
-
-def _fields_of_deposit(
-    network: Network, pores: tuple[Array, ...], sides: tuple[Array, Array]
-) -> dict[str, Array]:
-    solid, surface, fine_volume, layer = pores
+    solid, surface, fine_volume, layer = deposit_in_pores(network, reaching)
+    sides = deposit_on_sides(network, reaching)
     return {
         "pore_solid_volume": solid,
         "pore_solid_surface": surface,

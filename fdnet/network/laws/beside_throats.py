@@ -66,6 +66,11 @@ class FineImages:
         for position, radius in self._classes:
             widest = float(radius.max())
             throat, image = points_in_boxes(position, low - widest, high + widest)
+            reach = radius[image, None]  # its own, whatever other fines are in the class
+            near = (position[image] >= low[throat] - reach) & (
+                position[image] <= high[throat] + reach
+            )
+            throat, image = (one[near.all(axis=1)] for one in (throat, image))
             away = position[image] - facet[throat, 0]
             place = np.ones((len(throat), 5))
             for k, axis in enumerate(axes):
@@ -75,7 +80,7 @@ class FineImages:
             throats.append(throat[real])
             places.append(place[real])
         throat, place = np.concatenate(throats), np.concatenate(places)
-        order = np.argsort(throat, kind="stable")
+        order = np.lexsort((*place[:, 2::-1].T, throat))  # whatever order the search has
         first = np.searchsorted(throat[order], np.arange(len(facet) + 1))
         return FinesBeside(first=frozen(first), place=frozen(place[order]))
 

@@ -41,7 +41,8 @@ class KeptSections:
     @property
     def factor(self) -> Array:
         """Share (T, 2) of its clean conductance that each side keeps, at most 1."""
-        left = np.where(np.isfinite(self.raised), ratio(self.without, self.raised), 0.0)
+        finite = np.where(np.isfinite(self.raised), self.raised, 0.0)
+        left = ratio(self.without, finite)  # 0 where the fines close a side
         return np.where(self.raised > self.without, left, 1.0)
 
     def changed_to(self, fines: Snapshot) -> "KeptSections":
