@@ -15,6 +15,8 @@ ROWS = [row for path in truth_tables() for row in csv.DictReader(path.open()) if
 TRUTH = {f"{row['case']}-{row['axis']}": row for row in ROWS if (DATA / row["file"]).exists()}
 INTACT = [name for name, row in TRUTH.items() if not row["k_over_k0"]]
 FILLED = [name for name, row in TRUTH.items() if row["k_over_k0"]]
+LONG = {"packC_r10_d5-x", "packC_r10_d8-x"}
+"""Packs of thousands of fines, which `scripts/accuracy.py` compares too."""
 
 
 def error(name: str) -> float:
@@ -55,9 +57,16 @@ def test_intact_packs_and_lattices_within_2_percent_and_3_in_the_mean_square(cap
     assert root_mean_square(ratio) < 0.03
 
 
-def test_loss_by_fines_within_10_percent_and_5_in_the_mean_square(capsys):
+@pytest.mark.parametrize(
+    "names",
+    [
+        pytest.param([name for name in FILLED if name not in LONG], id="without the two longest"),
+        pytest.param(FILLED, id="all", marks=pytest.mark.slow),
+    ],
+)
+def test_loss_by_fines_within_10_percent_and_5_in_the_mean_square(capsys, names):
     """k/k0 from 0.89 down to 0.0175, fines 1/5 and 1/10, even and in layers."""
-    result = {name: run(capsys, name) for name in FILLED}
+    result = {name: run(capsys, name) for name in names}
     kept = {name: 1 - one["k_reduction"] for name, one in result.items()}
     ratio = ratios(kept, "k_over_k0")
     assert not {name: at for name, at in ratio.items() if abs(at - 1) > 0.10 + error(name)}
