@@ -76,7 +76,7 @@ class Balances:
         if self._solve is None:
             self._solve = (direct if self._direct else multigrid)(self._matrix)
         source = source / self._unit
-        within = CG_TOLERANCE * float(np.abs(source).sum())
+        within = CG_TOLERANCE * total(source)
         if imbalance is not None:
             within = imbalance / self._unit
         pressure = self._solve(source, within)
@@ -202,24 +202,30 @@ def ruge_stuben(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
     return lambda source: corrected(source, 0)
 
 
+def total(values: Array) -> float:
+    """Sum of the absolute values."""
+    return float(np.abs(values).sum())
+
+
 def conjugate_gradients(
     matrix: sparse.csr_matrix,
     source: Array,
     precondition: Callable[[Array], Array],
     *,
     within: float,
+    size: Callable[[Array], float] = total,
     steps: int | None = None,
 ) -> Array:
-    """Solution (n,) whose residuals add up to at most `within` (Hestenes and Stiefel 1952).
+    """Solution (n,) whose residual has at most the `size` `within` (Hestenes and Stiefel 1952).
 
-    The sum is of absolute values. The solution is NaN when `steps` steps (None: 100) do not
+    The solution is NaN when `steps` steps (None: 100) do not
     suffice. Dot products are taken without BLAS, whose threads would change the last digits and
     wait for each other.
     """
     solution, missing = np.zeros(len(source)), source.copy()
     along, before = np.zeros(len(source)), 1.0
     for _ in range(steps or CG_STEPS):
-        if np.abs(missing).sum() <= within:
+        if size(missing) <= within:
             return solution
         better = precondition(missing)
         gain = _dot(missing, better)

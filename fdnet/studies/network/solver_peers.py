@@ -107,13 +107,19 @@ def _iterated(
         return precondition(missing)
 
     most, right = ITERATIVE[method], source * scale
-    within = tolerance * float(np.abs(right).sum())
-    pressure = conjugate_gradients(matrix, right, counted, within=within, steps=most) * scale
+    within = tolerance * _norm(right)
+    pressure = scale * conjugate_gradients(
+        matrix, right, counted, within=within, size=_norm, steps=most
+    )
     if np.any(np.isnan(pressure)):
         raise FlowError(
             f"{method}: residual not below {tolerance:g} of the source in {most} steps"
         )
     return pressure, float(steps)
+
+
+def _norm(values: Array) -> float:
+    return float(np.linalg.norm(values))
 
 
 def _preconditioner(method: str, matrix: sparse.csr_matrix) -> Precondition:
