@@ -80,8 +80,8 @@ class AnalysisChoices(Part):
     )
     walls: WallName = Field(
         "no-slip",
-        description="Whether side walls hold the fluid or let it slip; known to the laws "
-        '"lubrication" and "side-kozeny".',
+        description="Whether side walls hold the fluid or let it slip; known to "
+        '"lubrication", "side-kozeny", "section-archie" and "all-spheres".',
     )
 
     def refusals(self) -> Iterator[str]:

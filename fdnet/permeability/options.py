@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=WALL_NAMES,
         default="no-slip",
         help="side walls hold the fluid, or it slips along them: slip for spheres cut out of a "
-        "larger pack (default no-slip; known to the lubrication and side-kozeny laws)",
+        "larger pack (default no-slip; known to lubrication and its damage laws)",
     )
     parser.add_argument(
         "--sections", type=_count, default=1, metavar="N", help="slabs along the flow (default 1)"
