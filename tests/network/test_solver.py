@@ -1,6 +1,7 @@
 """Direct and multigrid give the same answer; what neither can solve is refused."""
 
 import numpy as np
+import pyamg
 import pytest
 
 from fdnet.errors import FlowError
@@ -37,6 +38,22 @@ def test_both_methods_satisfy_every_balance(monkeypatch, limit, unit):
     net = np.bincount(pair[:, 0], flux, len(tied)) - np.bincount(pair[:, 1], flux, len(tied))
     assert net + tied * p == pytest.approx(source, abs=1e-8)
     assert balances.method == (MULTIGRID if limit == 0 else DIRECT)
+
+
+def test_a_cycle_is_pyamgs_own_and_symmetric(monkeypatch):
+    """pyamg's, without the norms that it computes next to it."""
+    made, build = [], pyamg.ruge_stuben_solver
+
+    def kept(*given, **named):
+        made.append(build(*given, **named))
+        return made[0]
+
+    monkeypatch.setattr(solver.pyamg, "ruge_stuben_solver", kept)
+    pair, g, tied, source = links()
+    cycle, other = solver.ruge_stuben(solver.laplacian(pair, g, tied)), np.roll(source, 7)
+    assert len(made[0].levels) > 2
+    assert np.array_equal(cycle(source), made[0].aspreconditioner() @ source)
+    assert source @ cycle(other) == pytest.approx(other @ cycle(source), rel=1e-12)
 
 
 @pytest.mark.parametrize("periodic", [(False, True, True), (True, True, True)])
