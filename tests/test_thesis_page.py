@@ -239,8 +239,9 @@ def test_a_kept_state_gives_its_rows_again(root, rows, name):
             known.invaded_count,
             known.stop_reason,
         )
-        # The last bit decides whether a section between spheres that almost touch is closed or
-        # open. Two sets of processor instructions have differed by 1.1e-4 of k by all spheres.
-        one_bit = 1e-3 if row.damage_law == AUTO else 1e-6
+        # Spheres centred on a plane have their mirror images some 1e-8 m away. The flat throats
+        # between such pairs depend on the last bit: two sets of processor instructions have
+        # differed by 1.1e-4 of k by all spheres.
+        one_bit = 3e-4 if row.damage_law == AUTO else 1e-6
         assert row.k_reductions == pytest.approx(known.k_reductions, rel=one_bit, abs=1e-9)
         assert row.porosity_damaged == pytest.approx(known.porosity_damaged, rel=1e-6)

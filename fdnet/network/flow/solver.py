@@ -76,9 +76,7 @@ class Balances:
         if self._solve is None:
             self._solve = (direct if self._direct else multigrid)(self._matrix)
         source = source / self._unit
-        within = CG_TOLERANCE * total(source)
-        if imbalance is not None:
-            within = imbalance / self._unit
+        within = CG_TOLERANCE * total(source) if imbalance is None else imbalance / self._unit
         pressure = self._solve(source, within)
         if not self._direct and not np.all(np.isfinite(pressure)):
             _check_memory(len(source))
@@ -216,11 +214,11 @@ def conjugate_gradients(
     size: Callable[[Array], float] = total,
     steps: int | None = None,
 ) -> Array:
-    """Solution (n,) whose residual has at most the `size` `within` (Hestenes and Stiefel 1952).
+    """Solution (n,) whose residual is at most `within` (Hestenes and Stiefel 1952).
 
-    The solution is NaN when `steps` steps (None: 100) do not
-    suffice. Dot products are taken without BLAS, whose threads would change the last digits and
-    wait for each other.
+    The residual is measured by `size`, the sum of its absolute values or a norm. The solution is
+    NaN when `steps` steps (None: 100) do not suffice. Dot products are taken without BLAS, whose
+    threads would change the last digits and wait for each other.
     """
     solution, missing = np.zeros(len(source)), source.copy()
     along, before = np.zeros(len(source)), 1.0

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.case.file import read_case
-from fdnet.studies.dem.kept_run import is_finished, kept_run
+from fdnet.run.mark import MANIFEST
+from fdnet.run.open_run import run_case
 from fdnet.studies.engine.csv_rows import write_named
 from fdnet.studies.engine.runner import child_core_seconds
 
@@ -80,7 +81,7 @@ def coupling_rows(
 ) -> list[CouplingRow]:
     """Run a case with each fluid and seed; runs that are finished in `folder` are read.
 
-    Raises what `kept_run` raises.
+    Raises what `run_case` raises.
     """
     return [
         _row(case, fluid, seed, folder / f"{case.stem}-{re.sub('[^a-z]+', '-', fluid)}-{seed}")
@@ -92,9 +93,10 @@ def coupling_rows(
 def _row(path: Path, fluid: str, seed: int, out: Path) -> CouplingRow:
     case = read_case(path, assignments=[*LAWS, *FLUIDS[fluid], f"seed={seed}"])
     liggghts = fdnet = math.nan
-    new, before = not is_finished(out), (child_core_seconds(), time.process_time())
-    run = kept_run(case, out)
-    if new:
+    known, before = (out / MANIFEST).exists(), (child_core_seconds(), time.process_time())
+    stages = ("pack", "invade", "analyse")
+    run = run_case(case, out, stages=stages, resume=out.exists(), progress=False)
+    if not known:
         liggghts, fdnet = child_core_seconds() - before[0], time.process_time() - before[1]
     summary, fines = run.summary, run.spheres().fines()
     depth = fines.position[:, 0]

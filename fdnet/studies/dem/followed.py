@@ -13,7 +13,7 @@ from fdnet.case.case import Case
 from fdnet.case.file import read_case
 from fdnet.case.shipped import case_path
 from fdnet.run.finished import FinishedRun
-from fdnet.studies.dem.kept_run import kept_run
+from fdnet.run.open_run import run_case
 from fdnet.studies.engine.csv_rows import read_named, write_named
 
 SUPPLIED = {
@@ -90,7 +90,7 @@ def followed_rows(
 
     Those of `FEWER` run in the uniform flow too, with the same number of fines.
 
-    Raises what `kept_run` raises.
+    Raises what `run_case` raises.
     """
     rows = []
     for name in specimens:
@@ -108,7 +108,9 @@ def _read_or_run(name: str, seed: int, flow: str, out: Path) -> FollowedRow:
     if flow == "followed":
         keys += FLOW
     case = read_case(case_path(name), assignments=keys)
-    return _row(case, flow, kept_run(case, out))
+    stages = ("pack", "invade", "analyse")
+    run = run_case(case, out, stages=stages, resume=out.exists(), progress=False)
+    return _row(case, flow, run)
 
 
 def _row(case: Case, flow: str, run: FinishedRun) -> FollowedRow:
