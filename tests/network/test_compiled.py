@@ -6,6 +6,7 @@ import sys
 import tempfile
 
 import numba
+import numpy as np
 import pytest
 
 from fdnet.network import compiled as module
@@ -124,3 +125,14 @@ def test_a_full_disk_under_the_cache_is_reported_once(tmp_path, monkeypatch, cap
     assert text.count("\n") == 1
     assert str(tmp_path) in text
     assert "No space left" in text
+
+
+@module.compiled_in_place
+def _first_of_new(numbers):
+    return np.zeros(len(numbers))[0]
+
+
+def test_a_function_in_place_may_not_make_an_array():
+    """Nobody would count who holds it, so it would never be given back."""
+    with pytest.raises(numba.core.errors.NumbaError, match="array"):
+        _first_of_new(np.ones(3))

@@ -6,7 +6,7 @@ import pytest
 from fdnet import Snapshot, build_network
 from fdnet.network.flow.slabs import whole_permeability
 from fdnet.network.laws.cross_section import uneven_flux
-from fdnet.network.laws.cut_grains import cut_corners, share_of_cut
+from fdnet.network.laws.cut_grains import cut_corners, cut_room, share_of_cut
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.section_rays import RAYS
 from fdnet.network.laws.wedge import ratio_table
@@ -16,7 +16,7 @@ from fdnet.studies.truth.packs import MM
 from fdnet.studies.truth.slabs import SLAB_FOLDER, SLAB_TRUTH, read_specimen
 from tests.network.section_flux import resolved_flux
 
-ROOM = np.empty((6, 3 * RAYS)), np.empty(3 * RAYS), ratio_table()
+ROOM = cut_room(), np.empty(3 * RAYS), ratio_table()
 BASE = np.array([[0.0, 0.0], [1.0, 0.0], [0.45, 0.85]])
 
 

@@ -18,7 +18,7 @@ radii they may take away all but a hundredth of the flux.
 
 import numpy as np
 
-from fdnet.network.compiled import compiled, compiled_for_loops
+from fdnet.network.compiled import compiled, compiled_in_place
 from fdnet.network.laws.corner_rays import (
     CornerRoom,
     aim_corners,
@@ -51,6 +51,13 @@ def wedges(base: Array) -> Array:
     alone, and the row of the table of `shear_ratio`.
     """
     rows = np.empty((3, 7))
+    set_wedges(base, rows)
+    return rows
+
+
+@compiled_in_place
+def set_wedges(base: Array, rows: Array) -> None:
+    """Sets `rows` (3, 7) to what `wedges` gives."""
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         ex, ey = base[j, 0] - base[i, 0], base[j, 1] - base[i, 1]
@@ -61,7 +68,6 @@ def wedges(base: Array) -> Array:
         half, angle = 0.5 * np.hypot(ex, ey), np.arctan(slope)
         constant, of_log = ray_parts(abs(angle), abs(slope))
         rows[i] = half, slope, angle, constant, of_log, np.log(half), table_row(abs(angle))
-    return rows
 
 
 @compiled
@@ -81,7 +87,7 @@ def even_room(sections: int) -> tuple[Array, Array]:
     return np.empty((2, sections)), np.empty(len(DISCS))
 
 
-@compiled_for_loops
+@compiled_in_place
 def even_fluxes(
     wedge: Array, discs: Array, room: tuple[tuple[Array, Array], Array], flux: Array
 ) -> None:
@@ -131,24 +137,31 @@ def uneven_flux(base: Array, disc: Array, table: Array) -> float:
 
 
 @compiled
-def uneven_room(sections: int) -> Array:
-    """Room for the wedges of so many sections in `uneven_fluxes`."""
-    return np.empty((7, 6 * sections))
+def uneven_room(sections: int) -> tuple[Array, Array]:
+    """Room for the wedges of so many sections, and for the edges, in `uneven_fluxes`."""
+    return np.empty((7, 6 * sections)), np.empty((6, 4))
 
 
-@compiled_for_loops
+@compiled_in_place
 def uneven_fluxes(
-    base: Array, discs: Array, room: tuple[Array, CornerRoom, Array], flux: Array
+    base: Array,
+    discs: Array,
+    room: tuple[tuple[Array, Array], CornerRoom, Array],
+    flux: Array,
 ) -> None:
     """Writes the flux (K,) m4 of `uneven_flux` for the radii `discs` (K, 3) m of K sections.
 
     `room` is what `uneven_room` and `corner_room` give for this triangle, and the table of
     `shear_ratio`.
     """
-    wedge, corners, table = room
-    touching_fluxes(base, discs, (wedge, table), flux)
+    lanes, corners, table = room
+    wedge = lanes[0]
+    touching_fluxes(base, discs, (lanes, table), flux)
     for k in range(len(discs)):
-        if not flux[k] > 0.0 or np.min(wedge[4, 6 * k : 6 * k + 6]) < 0.0:
+        beyond = not flux[k] > 0.0
+        for m in range(6 * k, 6 * k + 6):
+            beyond = beyond or wedge[4, m] < 0.0
+        if beyond:
             aim_corners(base, corners)
             corner_reaches(corners, discs[k])
             seen = corner_flux(corners, discs[k], table)
@@ -156,15 +169,17 @@ def uneven_fluxes(
                 flux[k] = seen
 
 
-@compiled_for_loops
-def touching_fluxes(base: Array, discs: Array, room: tuple[Array, Array], flux: Array) -> None:
+@compiled_in_place
+def touching_fluxes(
+    base: Array, discs: Array, room: tuple[tuple[Array, Array], Array], flux: Array
+) -> None:
     """Writes the flux (K,) m4 where a circle touches all three discs, else 0.
 
     Shares are negative where the circle lies beyond an edge of the triangle.
     """
-    wedge, table = room
+    (wedge, edges), table = room
     count = 6 * len(discs)
-    edges = _edges(base)
+    _set_edges(base, edges)
     for k in range(len(discs)):
         flux[k] = 1.0 if _set_wedges(edges, base, discs[k], wedge[:, 6 * k : 6 * k + 6]) else 0.0
     _sum_wedges(wedge, count)
@@ -177,10 +192,9 @@ def touching_fluxes(base: Array, discs: Array, room: tuple[Array, Array], flux: 
                 flux[k] += total[m] * shear_ratio(abs(wedge[4, m]), disc_of_gap, table)
 
 
-@compiled_for_loops
-def _edges(base: Array) -> Array:
+@compiled_in_place
+def _set_edges(base: Array, edges: Array) -> None:
     """From each corner to the two others (6, 4): unit vector, length m, sense of the third."""
-    edges = np.empty((6, 4))
     for i in range(3):
         for step in (1, 2):
             j, k = (i + step) % 3, (i + 3 - step) % 3
@@ -188,10 +202,9 @@ def _edges(base: Array) -> Array:
             a = np.sqrt(ex * ex + ey * ey)
             turned = ex * (base[k, 1] - base[i, 1]) - ey * (base[k, 0] - base[i, 0])
             edges[2 * i + step - 1] = ex / a, ey / a, a, 1.0 if turned > 0.0 else -1.0
-    return edges
 
 
-@compiled_for_loops
+@compiled_in_place
 def _set_wedges(edges: Array, base: Array, disc: Array, wedge: Array) -> bool:
     """Writes the six wedges (7, 6) of a section; whether a circle touches its three discs.
 
@@ -216,7 +229,7 @@ def _set_wedges(edges: Array, base: Array, disc: Array, wedge: Array) -> bool:
     return touches
 
 
-@compiled_for_loops
+@compiled_in_place
 def _sum_wedges(wedge: Array, count: int) -> None:
     """Turns the places of the circles into angles rad, and sums the flux m4 on rays up to them."""
     wider, gap, apart, along = wedge[0], wedge[1], wedge[2], wedge[3]
@@ -232,7 +245,7 @@ def _sum_wedges(wedge: Array, count: int) -> None:
             total[m] += weight * turn[m] * flux_on_ray(reach, own[m])
 
 
-@compiled_for_loops
+@compiled_in_place
 def _inscribed(base: Array, disc: Array) -> tuple[float, float, float]:
     """Centre and radius m of the circle that touches three discs; NaN where there is none."""
     a, px, py = base[1, 0], base[2, 0], base[2, 1]

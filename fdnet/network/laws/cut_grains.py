@@ -13,21 +13,32 @@ with those on the corners. Only what lies in the triangle counts, as a ray begin
 
 import numpy as np
 
-from fdnet.network.compiled import compiled_for_loops
+from fdnet.network.compiled import compiled, compiled_in_place
 from fdnet.network.laws.facet_axes import facet_axes
 from fdnet.network.laws.section_rays import (
+    RAYS,
     SWALLOWED,
     UNTOUCHED,
     aim,
     flux_on_rays,
     narrow,
-    sides_of,
+    set_sides,
 )
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array
 
 LEAST = 1e-2
 """Smallest radius of the disc of a cut grain in a section, in radii of the grain."""
+
+CutRoom = tuple[Array, Array, Array]
+"""Room for the sides (3, 3) of a facet (`sides_of`), the rays (6, 36) of a disc, and for two times
+three discs (2, 3, 3)."""
+
+
+@compiled
+def cut_room() -> CutRoom:
+    """Room for `share_of_cut`."""
+    return np.empty((3, 3)), np.empty((6, 3 * RAYS)), np.empty((2, 3, 3))
 
 
 def cut_corners(network: Network, part: slice, facet: Array) -> Array:
@@ -52,9 +63,9 @@ def cut_corners(network: Network, part: slice, facet: Array) -> Array:
     return cut
 
 
-@compiled_for_loops
+@compiled_in_place
 def share_of_cut(
-    base: Array, disc: Array, z: float, cut: Array, room: tuple[Array, Array, Array]
+    base: Array, disc: Array, z: float, cut: Array, room: tuple[CutRoom, Array, Array]
 ) -> float:
     """Flux at the height `z` m with the discs of cut grains, over that with discs on the corners.
 
@@ -63,12 +74,14 @@ def share_of_cut(
         disc: (3,) m, radii of the discs on them at this height.
         z: m above the facet, towards the second pore.
         cut: (3, 4) m of `cut_corners`.
-        room: rays (6, 36) and 36 numbers, which are written to, and the table of `shear_ratio`.
+        room: `CutRoom` and 36 numbers, which are written to, and the table of `shear_ratio`.
     """
-    own, moved = np.empty((3, 3)), np.empty((3, 3))
+    (side, _, places), _, _ = room
+    own, moved = places[0], places[1]
+    set_sides(base, side)
     for i in range(3):
         moved[i] = base[i, 0], base[i, 1], disc[i]
-        own[i] = moved[i]
+        own[i] = base[i, 0], base[i, 1], disc[i]
         if cut[i, 3] > 0.0:
             square = cut[i, 3] ** 2 - (z - cut[i, 2]) ** 2
             least = LEAST * cut[i, 3]
@@ -80,11 +93,11 @@ def share_of_cut(
     return _flux_between(base, own, room) / corner if corner > 0.0 else 1.0
 
 
-@compiled_for_loops
-def _flux_between(base: Array, discs: Array, room: tuple[Array, Array, Array]) -> float:
+@compiled_in_place
+def _flux_between(base: Array, discs: Array, room: tuple[CutRoom, Array, Array]) -> float:
     """Flux m4 on the rays of three discs (3, 3), x, y and radius m, within the triangle."""
-    rays, part, table = room
-    side, total = sides_of(base), 0.0
+    (side, rays, _), part, table = room
+    total = 0.0
     for i in range(3):
         disc = (discs[i, 0], discs[i, 1], discs[i, 2])
         count, done = aim(base, side, disc[0], disc[1], rays), UNTOUCHED

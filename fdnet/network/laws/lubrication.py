@@ -23,8 +23,8 @@ tetrahedron where that reaches in (`fourth_grain`).
 import numpy as np
 
 from fdnet.network import geometry
-from fdnet.network.compiled import compiled_for_loops
-from fdnet.network.laws.cross_section import wedges
+from fdnet.network.compiled import compiled_for_loops, compiled_in_place, compiled_inline
+from fdnet.network.laws.cross_section import set_wedges
 from fdnet.network.laws.cut_grains import cut_corners, share_of_cut
 from fdnet.network.laws.fourth_grain import fourth_grains
 from fdnet.network.laws.open_sections import (
@@ -149,12 +149,24 @@ def _halves(
     numbers: tuple[float, float],
     more: tuple[Array, Array, Array, Array],
 ) -> Array:
-    floor, widening = numbers
-    beside, around, first, table = more
-    resistance = np.zeros((len(heights), 2))
+    first, resistance = more[2], np.zeros((len(heights), 2))
     room = section_room(np.max(first[1:] - first[:-1]) if len(heights) else 0)
+    _set_halves(resistance, given, heights, numbers, (room, *more))
+    return resistance
+
+
+@compiled_in_place
+def _set_halves(
+    resistance: Array,
+    given: Prepared,
+    heights: Array,
+    numbers: tuple[float, float],
+    more: tuple[SectionRoom, Array, Array, Array, Array],
+) -> None:
+    floor, widening = numbers
+    room, beside, around, first, table = more
     for t in range(len(heights)):
-        throat, faces = throat_at(given, t)
+        throat, faces = throat_at(given, t, room)
         spans = spans_of(heights[t], floor)
         outside = around[first[t] : first[t + 1]]
         forget(room, len(outside))
@@ -162,21 +174,27 @@ def _halves(
             if spans[side][1] > 0.0:
                 span, others = (spans[side], widening), (beside[t, side], outside)
                 resistance[t, side] = _resistance(throat, faces, span, others, (room, table))
-    return resistance
 
 
-@compiled_for_loops
-def throat_at(given: Prepared, t: int) -> tuple[Throat, Faces]:
+@compiled_in_place
+def _spread(three: Array) -> float:
+    """Difference between the largest and the smallest of three numbers."""
+    first, second, third = three[0], three[1], three[2]
+    return max(first, second, third) - min(first, second, third)
+
+
+@compiled_inline
+def throat_at(given: Prepared, t: int, room: SectionRoom) -> tuple[Throat, Faces]:
     """The throat `t` of those that were prepared, and what the faces of the box cut of it."""
     corner, radius, flatness, (order, place, part), cut = given
-    even = np.max(radius[t]) - np.min(radius[t]) <= EQUAL * radius[t, 0]
-    even = even and np.max(flatness[t]) - np.min(flatness[t]) <= EQUAL
-    wedge = wedges(corner[t]) if even else np.empty((0, 7))
-    throat = (corner[t], radius[t], flatness[t], wedge)
-    return throat, (order[t], place[t], part[t], cut[t])
+    even = _spread(radius[t]) <= EQUAL * radius[t, 0] and _spread(flatness[t]) <= EQUAL
+    wedge = room[6][: 3 if even else 0]
+    if even:
+        set_wedges(corner[t], wedge)
+    return (corner[t], radius[t], flatness[t], wedge), (order[t], place[t], part[t], cut[t])
 
 
-@compiled_for_loops
+@compiled_in_place
 def spans_of(heights: Array, floor: float) -> tuple[Span, Span]:
     """The spans (`set_fluxes`) of the sides of the first and the second pore.
 
@@ -188,7 +206,7 @@ def spans_of(heights: Array, floor: float) -> tuple[Span, Span]:
     return (max(-high, 0.0), -low, -1.0), (max(low, 0.0), high, 1.0)
 
 
-@compiled_for_loops
+@compiled_in_place
 def _resistance(
     throat: Throat,
     faces: Faces,
@@ -204,7 +222,7 @@ def _resistance(
     return resistance_of(flux, (faces[2], step, widening))
 
 
-@compiled_for_loops
+@compiled_in_place
 def set_fluxes(
     throat: Throat,
     faces: Faces,
@@ -232,14 +250,14 @@ def set_fluxes(
             flux[k] = wall_flux(place, discs[order[0], k], discs[order[1], k], table)
     else:
         open_fluxes(throat, (low, step, sense), others, room, table)
-        if np.max(cut[:, 3]) > 0.0:
+        if max(cut[0, 3], cut[1, 3], cut[2, 3]) > 0.0:
             rays = (room[5], room[4][0][3], table)
             for k in range(len(flux)):
-                z, disc = sense * (low + k * step), discs[:, k].copy()
-                flux[k] *= share_of_cut(throat[0], disc, z, cut, rays)
+                z = sense * (low + k * step)
+                flux[k] *= share_of_cut(throat[0], room[3][0][k], z, cut, rays)
 
 
-@compiled_for_loops
+@compiled_in_place
 def resistance_of(flux: Array, given: tuple[float, float, float]) -> float:
     """Integral of dR, 1/m3, over sections of the fluxes `flux` (K,) m4, which are written over.
 
@@ -256,7 +274,7 @@ def resistance_of(flux: Array, given: tuple[float, float, float]) -> float:
     return (4.0 * summed(flux, step, 1, widening) - summed(flux, step, 2, widening)) / 3.0
 
 
-@compiled_for_loops
+@compiled_in_place
 def summed(narrow: Array, step: float, every: int, widening: float) -> float:
     """Resistance 1/m3 between sections of 1/a = `narrow` (K,) 1/m that lie `step` m apart.
 

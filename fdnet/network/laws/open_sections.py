@@ -7,18 +7,18 @@ section to section, such as the directions of rays, is set up once for all secti
 
 import numpy as np
 
-from fdnet.network.compiled import compiled, compiled_for_loops
+from fdnet.network.compiled import compiled, compiled_in_place
 from fdnet.network.laws.corner_rays import CornerRoom, aim_at_fourth, aim_corners, corner_room
 from fdnet.network.laws.cross_section import (
     even_fluxes,
     even_room,
-    uneven_flux,
     uneven_fluxes,
     uneven_room,
 )
+from fdnet.network.laws.cut_grains import CutRoom, cut_room
 from fdnet.network.laws.fourth_grain import depth_within, share_left
 from fdnet.network.laws.outside import Bundles, Seen, bundles, meet, share_around
-from fdnet.network.laws.section_rays import RAYS, aim, sides_of
+from fdnet.network.laws.section_rays import aim, set_sides
 from fdnet.spheres.snapshot import Array
 
 STEPS = 8
@@ -29,12 +29,14 @@ SectionRoom = tuple[
     Array,
     Array,
     tuple[Array, Array],
-    tuple[Array, Array, CornerRoom],
+    tuple[Array, tuple[Array, Array], CornerRoom],
     tuple[Bundles, Seen],
+    CutRoom,
     Array,
 ]
 """Fluxes (K,) m4 of K sections, radii of discs (3, K) m, room for `even_fluxes`, the radii (K, 3)
-m and room for `uneven_fluxes`, room for `share_around`, and the rays (6, 36) of a fourth disc."""
+m and room for `uneven_fluxes`, room for `share_around`, room for a fourth disc or those of cut
+grains, and room for `wedges`."""
 Throat = tuple[Array, Array, Array, Array]
 """Corners (3, 2) m of the facet, radii (3,) m of the discs in it, their flatness (3,), and the
 wedges of a throat with equal discs (`wedges`), else no row."""
@@ -49,11 +51,12 @@ def section_room(around: int, count: int = STEPS + 1) -> SectionRoom:
         even_room(count),
         (np.empty((count, 3)), uneven_room(count), corner_room()),
         bundles(around + 3),
-        np.empty((6, 3 * RAYS)),
+        cut_room(),
+        np.empty((3, 7)),
     )
 
 
-@compiled_for_loops
+@compiled_in_place
 def forget(room: SectionRoom, around: int) -> None:
     """Makes `room` that of another throat, which has `around` spheres around it."""
     room[3][2][3][0] = False
@@ -61,19 +64,21 @@ def forget(room: SectionRoom, around: int) -> None:
         room[4][0][1][i] = -1
 
 
-@compiled_for_loops
+@compiled_in_place
 def set_discs(throat: Throat, low: float, step: float, room: SectionRoom) -> None:
     """Sets the radii of the discs in the sections from the height `low` m on, `step` m apart."""
-    _, radius, flatness, _ = throat
+    radius, flatness, rows = throat[1], throat[2], room[3][0]
     for i in range(3):
         discs, square = room[1][i], radius[i] * radius[i]
         least, flat = TIP * TIP * square, flatness[i]
         for k in range(len(discs)):
             z = low + k * step
             discs[k] = np.sqrt(max(square - flat * z * z, least))
+        for k in range(len(discs)):
+            rows[k, i] = discs[k]
 
 
-@compiled_for_loops
+@compiled_in_place
 def open_fluxes(
     throat: Throat,
     span: tuple[float, float, float],
@@ -100,18 +105,15 @@ def open_fluxes(
         even_fluxes(wedge, discs[0], (room[2], table), flux)
         for k in range(len(flux)):
             if not flux[k] > 0.0:
-                flux[k] = uneven_flux(base, discs[:, k].copy(), table)
+                one = slice(k, k + 1)
+                uneven_fluxes(base, rows[one], (lanes, corners, table), flux[one])
     else:
-        for i in range(3):
-            rows[:, i] = discs[i]
         uneven_fluxes(base, rows, (lanes, corners, table), flux)
     if others[0][3] > 0.0:
-        for i in range(3):
-            rows[:, i] = discs[i]
         _narrow(throat, span, others, room, table)
 
 
-@compiled_for_loops
+@compiled_in_place
 def _narrow(
     throat: Throat,
     span: tuple[float, float, float],
@@ -123,8 +125,9 @@ def _narrow(
     base, radius, flatness, _ = throat
     low, step, sense = span
     fourth, around = others
-    flux, _, _, (discs, _, corners), (rays, seen), own = room
-    side, number = sides_of(base), -1
+    flux, (discs, _, corners), (rays, seen), (side, own, _) = room[0], room[3], room[4], room[5]
+    number = -1
+    set_sides(base, side)
     depth = depth_within(base, side, fourth[0], fourth[1])
     for k in range(len(flux)):
         z, share = low + k * step, 1.0

@@ -16,7 +16,7 @@ The factor of the widening tube (`lubrication`) is that of the narrowed sections
 import numpy as np
 
 from fdnet.network import geometry
-from fdnet.network.compiled import compiled_for_loops
+from fdnet.network.compiled import compiled_for_loops, compiled_in_place
 from fdnet.network.fines.occupancy import Occupancy, ratio
 from fdnet.network.laws.beside_throats import FineImages
 from fdnet.network.laws.damage import BLOCKED, CLEAN, SECTIONS, Damage
@@ -33,7 +33,7 @@ from fdnet.network.laws.lubrication import (
 )
 from fdnet.network.laws.open_sections import SectionRoom, forget, section_room
 from fdnet.network.laws.outside import meet, share_around
-from fdnet.network.laws.section_rays import sides_of
+from fdnet.network.laws.section_rays import set_sides
 from fdnet.network.laws.wall_cross_section import wall_cuts
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import LENGTH_FLOOR, Network
@@ -133,29 +133,43 @@ def _resistances(
 ) -> Array:
     """Resistances (2, K, 2) 1/m3 of the throats `which` (K) without and with `fines`."""
     chosen, count = which
-    floor, widening, power = numbers
-    first, spheres, table = fines
-    most = 0
+    first, most = fines[0], 0
     for t in chosen:
         most = max(most, first[t + 1] - first[t])
     room, clear = section_room(most, count), (np.zeros(5), np.empty((0, 5)))
     resistance = np.zeros((2, len(chosen), 2))
+    _set_sides(resistance, (chosen, given), heights, numbers, (clear, room, *fines))
+    return resistance
+
+
+@compiled_in_place
+def _set_sides(
+    resistance: Array,
+    which: tuple[Array, Prepared],
+    heights: Array,
+    numbers: tuple[float, float, float],
+    more: tuple[tuple[Array, Array], SectionRoom, Array, Array, Array],
+) -> None:
+    """Sets the `resistance` (2, K, 2) 1/m3 of `_resistances`."""
+    chosen, given = which
+    floor, widening, power = numbers
+    clear, room, first, spheres, table = more
     for n in range(len(chosen)):
         t = chosen[n]
-        throat, faces = throat_at(given, t)
+        throat, faces = throat_at(given, t, room)
         spans = spans_of(heights[t], floor)
         inside = spheres[first[t] : first[t + 1]]
         forget(room, len(inside))
         for side in range(2):
             if spans[side][1] > 0.0:
                 set_fluxes(throat, faces, spans[side], clear, (room, table))
-                resistance[:, n, side] = _both(
+                both = _both(
                     throat[0], spans[side], (inside, faces[2], widening, power), (room, table)
                 )
-    return resistance
+                resistance[0, n, side], resistance[1, n, side] = both
 
 
-@compiled_for_loops
+@compiled_in_place
 def _both(
     base: Array,
     span: Span,
@@ -165,12 +179,13 @@ def _both(
     """Resistances 1/m3 of one side without and with fines, from the clean fluxes in the room."""
     fines, part, widening, power = given
     room, table = more
-    flux, discs, (rays, seen) = room[0], room[1], room[4]
+    flux, clear, rows, (rays, seen), side = room[0], room[2][0][0], room[3][0], room[4], room[5][0]
     step = (span[1] - span[0]) / (len(flux) - 1)
-    clear, side = flux.copy(), sides_of(base)
+    set_sides(base, side)
     for k in range(len(flux)):
+        clear[k] = flux[k]
         z = span[2] * (span[0] + k * step)
-        count = meet(discs[:, k].copy(), base, z, fines, seen)
+        count = meet(rows[k], base, z, fines, seen)
         flux[k] *= share_around(base, side, (count, seen), rays, table) ** power
     given_step = (part, step, widening)
     return resistance_of(clear, given_step), resistance_of(flux, given_step)

@@ -9,7 +9,7 @@ the discs, so they are set up once for all sections of a throat.
 
 import numpy as np
 
-from fdnet.network.compiled import compiled_for_loops
+from fdnet.network.compiled import compiled_for_loops, compiled_in_place
 from fdnet.network.laws.elementary import log_of
 from fdnet.network.laws.rays import FINE_POINTS, FINE_WEIGHTS, midway
 from fdnet.network.laws.wedge import shear_ratio
@@ -29,6 +29,13 @@ UNTOUCHED, NARROWED, SWALLOWED = 0, 1, 2
 def sides_of(base: Array) -> Array:
     """Of each side (3, 3) of a triangle `base` (3, 2) m its unit normal inwards and length m."""
     side = np.empty((3, 3))
+    set_sides(base, side)
+    return side
+
+
+@compiled_in_place
+def set_sides(base: Array, side: Array) -> None:
+    """Sets `side` (3, 3) to what `sides_of` gives."""
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         ex, ey = base[j, 0] - base[i, 0], base[j, 1] - base[i, 1]
@@ -37,27 +44,22 @@ def sides_of(base: Array) -> Array:
         if nx * (base[k, 0] - base[i, 0]) + ny * (base[k, 1] - base[i, 1]) < 0.0:
             nx, ny = -nx, -ny
         side[i] = nx, ny, length
-    return side
 
 
-@compiled_for_loops
+@compiled_in_place
 def inwards(base: Array, side: Array, i: int, x: float, y: float) -> float:
     """How far m the place `x`, `y` m lies inwards of the side `i`."""
     return side[i, 0] * (x - base[i, 0]) + side[i, 1] * (y - base[i, 1])
 
 
-@compiled_for_loops
+@compiled_in_place
 def aim(base: Array, side: Array, x: float, y: float, rays: Array) -> int:
     """Sets up the rays of a disc centred at `x`, `y` m, and gives their number.
 
     `side` is what `sides_of` gives. The rows of `rays` (6, 36) are the direction, where a ray
     meets the far side and where it enters the triangle, m, its angle rad, and room.
     """
-    depth = np.empty(3)
-    for i in range(3):
-        depth[i] = inwards(base, side, i, x, y)
-        if abs(depth[i]) <= ON_SIDE * side[i, 2]:
-            depth[i] = 0.0
+    depth = (_depth(base, side, 0, x, y), _depth(base, side, 1, x, y), _depth(base, side, 2, x, y))
     count = 0
     for far in range(3):
         if depth[far] > 0.0:
@@ -66,9 +68,20 @@ def aim(base: Array, side: Array, x: float, y: float, rays: Array) -> int:
     return count
 
 
-@compiled_for_loops
+@compiled_in_place
+def _depth(base: Array, side: Array, i: int, x: float, y: float) -> float:
+    """How far m a place lies inwards of the side `i`, 0 where it lies on it."""
+    depth = inwards(base, side, i, x, y)
+    return 0.0 if abs(depth) <= ON_SIDE * side[i, 2] else depth
+
+
+@compiled_in_place
 def _aim_at_side(
-    base: Array, side: Array, given: tuple[float, float, int, int], depth: Array, rays: Array
+    base: Array,
+    side: Array,
+    given: tuple[float, float, int, int],
+    depth: tuple[float, float, float],
+    rays: Array,
 ) -> None:
     """The 12 rays to a side; `given` are the place of the disc, the side and the first ray."""
     x, y, far, first = given
@@ -94,7 +107,7 @@ def _aim_at_side(
                 entry[p] = max(entry[p], begin)
 
 
-@compiled_for_loops
+@compiled_in_place
 def narrow(
     rays: Array,
     count: int,
@@ -116,7 +129,7 @@ def narrow(
     return NARROWED
 
 
-@compiled_for_loops
+@compiled_in_place
 def flux_on_rays(rays: Array, count: int, own: float, room: tuple[Array, Array]) -> float:
     """Flux m4 on the first `count` rays of a disc of radius `own` m, to where they end.
 
