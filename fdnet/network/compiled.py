@@ -28,6 +28,7 @@ __all__ = [
     "compiled_for_loops",
     "compiled_in_place",
     "compiled_inline",
+    "loops_in_place",
     "number_of",
 ]
 
@@ -164,17 +165,22 @@ def compiled_for_loops(function: Any) -> Any:
 
 
 def compiled_in_place(function: Any) -> Any:
-    """`compiled_for_loops` for a function that writes into the arrays that it is given.
+    """`compiled` for a function that writes into the arrays that it is given.
 
     It may neither make an array nor return one. Then nobody has to count who still holds which
     array, which numba otherwise does for each array of a tuple at each call (numba issue 2345):
     half of the time of a short function.
     """
+    return compiled(function, _nrt=False)
+
+
+def loops_in_place(function: Any) -> Any:
+    """`compiled_for_loops` for a function that may do what `compiled_in_place` says."""
     return compiled(function, error_model="numpy", fastmath={"contract"}, _nrt=False)
 
 
 def compiled_inline(function: Any) -> Any:
-    """`compiled_in_place` for a function whose text takes the place of each call of it.
+    """`loops_in_place` for a function whose text takes the place of each call of it.
 
     So it may return parts of the arrays that it is given.
     """

@@ -137,18 +137,17 @@ class Network:
     @property
     def throat_corner(self) -> Array:
         """Corners (T, 3, 3) m of the facet at the place of the first pore."""
-        wrap = self.pore_wrap[self.throat_pores[:, 0]] * np.ptp(self.box, axis=1)
-        return self.image_position[self.throat_images] - wrap[:, None]
+        return self.corners_of(slice(None))
+
+    def corners_of(self, throats: Array | slice) -> Array:
+        """Corners (K, 3, 3) m of the facets of some `throats`, as in `throat_corner`."""
+        wrap = self.pore_wrap[self.throat_pores[throats, 0]] * np.ptp(self.box, axis=1)
+        return self.image_position[self.throat_images[throats]] - wrap[:, None]
 
     @property
     def throat_corner_radius(self) -> Array:
         """Radii (T, 3) m of the grains at the corners of the facet."""
         return self.image_radius[self.throat_images]
-
-    @property
-    def throat_corner_height(self) -> Array:
-        """Heights along x (T, 3) m of the grains at the corners of the facet."""
-        return self.image_height[self.throat_images]
 
     @property
     def throat_ends(self) -> Array:

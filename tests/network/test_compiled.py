@@ -127,7 +127,7 @@ def test_a_full_disk_under_the_cache_is_reported_once(tmp_path, monkeypatch, cap
     assert "No space left" in text
 
 
-@module.compiled_in_place
+@module.loops_in_place
 def _first_of_new(numbers):
     return np.zeros(len(numbers))[0]
 

@@ -103,7 +103,8 @@ def _cut_links(network: Network, conductance: Array, low: float, high: float) ->
     """Open throats with a part between the planes; those that cross a plane are cut there."""
     turned = np.flatnonzero(network.throat_shift[:, 0] != 0)
     throat = np.concatenate([np.arange(len(conductance)), turned])
-    x = network.throat_ends[throat, :, 0]
+    x = network.pore_position[:, 0][network.throat_pores[throat]]
+    x[:, 1] += network.throat_shift[throat, 0] * (network.box[0, 1] - network.box[0, 0])
     # a throat across a periodic x face appears at both ends of the box
     x[len(conductance) :] -= (
         network.throat_shift[turned, 0] * (network.box[0, 1] - network.box[0, 0])

@@ -7,7 +7,7 @@ are set up once for all sections of a throat. A fourth disc may reach into the t
 
 import numpy as np
 
-from fdnet.network.compiled import compiled, compiled_in_place
+from fdnet.network.compiled import compiled, loops_in_place
 from fdnet.network.laws.elementary import QUARTER, cosine_of, sine_of
 from fdnet.network.laws.rays import FINE_POINTS, FINE_WEIGHTS, flux_on_ray, midway
 from fdnet.network.laws.wedge import shear_ratio
@@ -31,7 +31,7 @@ def corner_room() -> CornerRoom:
     return np.empty((3, 4)), np.empty((3, 4, RAYS)), np.empty((3, 2, RAYS)), aimed
 
 
-@compiled_in_place
+@loops_in_place
 def aim_corners(base: Array, room: CornerRoom) -> None:
     """Sets up the rays of the corners of a triangle `base` (3, 2) m, if that is not yet done."""
     corner, ray, _, aimed = room
@@ -57,7 +57,7 @@ def aim_corners(base: Array, room: CornerRoom) -> None:
             to_k[p] = (cosine * inner + sine * twice) / (aj * ak)
 
 
-@compiled_in_place
+@loops_in_place
 def aim_at_fourth(base: Array, x: float, y: float, room: CornerRoom) -> None:
     """Sets up the angles to a fourth disc centred at `x`, `y` m, after `aim_corners`."""
     corner, ray, _, _ = room
@@ -79,7 +79,7 @@ def aim_at_fourth(base: Array, x: float, y: float, room: CornerRoom) -> None:
             to_q[p] = cosine_of(turn) * across - sine_of(turn) * along
 
 
-@compiled_in_place
+@loops_in_place
 def corner_reaches(room: CornerRoom, disc: Array) -> None:
     """Sets where the rays end between discs of the radii `disc` (3,) m."""
     corner, ray, out, _ = room
@@ -93,7 +93,7 @@ def corner_reaches(room: CornerRoom, disc: Array) -> None:
             reach[p] = min(far[p], before[0], before[1])
 
 
-@compiled_in_place
+@loops_in_place
 def fourth_reaches(room: CornerRoom, disc: Array, fourth: float) -> None:
     """Ends the rays midway to a fourth disc of the radius `fourth` m, where that is nearer."""
     corner, ray, out, _ = room
@@ -107,7 +107,7 @@ def fourth_reaches(room: CornerRoom, disc: Array, fourth: float) -> None:
             reach[p] = 0.0 if hidden else end
 
 
-@compiled_in_place
+@loops_in_place
 def corner_flux(room: CornerRoom, disc: Array, table: Array) -> float:
     """Flux m4 on the rays from discs of the radii `disc` (3,) m to where they end."""
     corner, _, out, _ = room

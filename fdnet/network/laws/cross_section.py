@@ -18,7 +18,7 @@ radii they may take away all but a hundredth of the flux.
 
 import numpy as np
 
-from fdnet.network.compiled import compiled, compiled_in_place
+from fdnet.network.compiled import compiled, loops_in_place
 from fdnet.network.laws.corner_rays import (
     CornerRoom,
     aim_corners,
@@ -55,7 +55,7 @@ def wedges(base: Array) -> Array:
     return rows
 
 
-@compiled_in_place
+@loops_in_place
 def set_wedges(base: Array, rows: Array) -> None:
     """Sets `rows` (3, 7) to what `wedges` gives."""
     for i in range(3):
@@ -87,7 +87,7 @@ def even_room(sections: int) -> tuple[Array, Array]:
     return np.empty((2, sections)), np.empty(len(DISCS))
 
 
-@compiled_in_place
+@loops_in_place
 def even_fluxes(
     wedge: Array, discs: Array, room: tuple[tuple[Array, Array], Array], flux: Array
 ) -> None:
@@ -142,7 +142,7 @@ def uneven_room(sections: int) -> tuple[Array, Array]:
     return np.empty((7, 6 * sections)), np.empty((6, 4))
 
 
-@compiled_in_place
+@loops_in_place
 def uneven_fluxes(
     base: Array,
     discs: Array,
@@ -169,7 +169,7 @@ def uneven_fluxes(
                 flux[k] = seen
 
 
-@compiled_in_place
+@loops_in_place
 def touching_fluxes(
     base: Array, discs: Array, room: tuple[tuple[Array, Array], Array], flux: Array
 ) -> None:
@@ -192,7 +192,7 @@ def touching_fluxes(
                 flux[k] += total[m] * shear_ratio(abs(wedge[4, m]), disc_of_gap, table)
 
 
-@compiled_in_place
+@loops_in_place
 def _set_edges(base: Array, edges: Array) -> None:
     """From each corner to the two others (6, 4): unit vector, length m, sense of the third."""
     for i in range(3):
@@ -204,7 +204,7 @@ def _set_edges(base: Array, edges: Array) -> None:
             edges[2 * i + step - 1] = ex / a, ey / a, a, 1.0 if turned > 0.0 else -1.0
 
 
-@compiled_in_place
+@loops_in_place
 def _set_wedges(edges: Array, base: Array, disc: Array, wedge: Array) -> bool:
     """Writes the six wedges (7, 6) of a section; whether a circle touches its three discs.
 
@@ -229,7 +229,7 @@ def _set_wedges(edges: Array, base: Array, disc: Array, wedge: Array) -> bool:
     return touches
 
 
-@compiled_in_place
+@loops_in_place
 def _sum_wedges(wedge: Array, count: int) -> None:
     """Turns the places of the circles into angles rad, and sums the flux m4 on rays up to them."""
     wider, gap, apart, along = wedge[0], wedge[1], wedge[2], wedge[3]
@@ -245,7 +245,7 @@ def _sum_wedges(wedge: Array, count: int) -> None:
             total[m] += weight * turn[m] * flux_on_ray(reach, own[m])
 
 
-@compiled_in_place
+@loops_in_place
 def _inscribed(base: Array, disc: Array) -> tuple[float, float, float]:
     """Centre and radius m of the circle that touches three discs; NaN where there is none."""
     a, px, py = base[1, 0], base[2, 0], base[2, 1]

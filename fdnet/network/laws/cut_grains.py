@@ -13,7 +13,7 @@ with those on the corners. Only what lies in the triangle counts, as a ray begin
 
 import numpy as np
 
-from fdnet.network.compiled import compiled, compiled_in_place
+from fdnet.network.compiled import compiled, loops_in_place
 from fdnet.network.laws.facet_axes import facet_axes
 from fdnet.network.laws.section_rays import (
     RAYS,
@@ -63,7 +63,7 @@ def cut_corners(network: Network, part: slice, facet: Array) -> Array:
     return cut
 
 
-@compiled_in_place
+@loops_in_place
 def share_of_cut(
     base: Array, disc: Array, z: float, cut: Array, room: tuple[CutRoom, Array, Array]
 ) -> float:
@@ -93,7 +93,7 @@ def share_of_cut(
     return _flux_between(base, own, room) / corner if corner > 0.0 else 1.0
 
 
-@compiled_in_place
+@loops_in_place
 def _flux_between(base: Array, discs: Array, room: tuple[CutRoom, Array, Array]) -> float:
     """Flux m4 on the rays of three discs (3, 3), x, y and radius m, within the triangle."""
     (side, rays, _), part, table = room

@@ -12,7 +12,7 @@ the share is at most 1.
 
 import numpy as np
 
-from fdnet.network.compiled import compiled_for_loops, compiled_in_place
+from fdnet.network.compiled import compiled_for_loops, loops_in_place
 from fdnet.network.laws.corner_rays import (
     CornerRoom,
     corner_flux,
@@ -90,7 +90,7 @@ def _find_fourth(
             _set_place(facet, best, place[t, side])
 
 
-@compiled_in_place
+@loops_in_place
 def _set_place(facet: Array, apex: Array, place: Array) -> None:
     """Sets the `place` (3,) m of an apex (3,) m as `fourth_grains` gives it."""
     along, up = less(facet, 1, 0), less(facet, 2, 0)
@@ -104,7 +104,7 @@ def _set_place(facet: Array, apex: Array, place: Array) -> None:
     place[2] = abs(inner(away, normal)) / wide
 
 
-@compiled_in_place
+@loops_in_place
 def share_left(
     disc: Array,
     fourth: tuple[float, float, float],
@@ -141,7 +141,7 @@ def share_left(
     return min(left / clear, 1.0)
 
 
-@compiled_in_place
+@loops_in_place
 def depth_within(base: Array, side: Array, x: float, y: float) -> float:
     """How far m a place lies within a triangle, from the nearest side line; negative outside.
 

@@ -23,7 +23,7 @@ tetrahedron where that reaches in (`fourth_grain`).
 import numpy as np
 
 from fdnet.network import geometry
-from fdnet.network.compiled import compiled_for_loops, compiled_in_place, compiled_inline
+from fdnet.network.compiled import compiled_for_loops, compiled_inline, loops_in_place
 from fdnet.network.laws.cross_section import set_wedges
 from fdnet.network.laws.cut_grains import cut_corners, share_of_cut
 from fdnet.network.laws.fourth_grain import fourth_grains
@@ -84,8 +84,9 @@ def half_resistances(
             (floor, float(widening)),
             (beside, *outside, table),
         )
-    capped = np.any(network.throat_corner_height < network.throat_corner_radius, axis=1)
-    resistance[(network.throat_radius <= 0) & ~capped] = np.inf
+    shut = np.flatnonzero(network.throat_radius <= 0)
+    flat = (network.image_height < network.image_radius)[network.throat_images[shut]]
+    resistance[shut[~np.any(flat, axis=1)]] = np.inf
     return resistance
 
 
@@ -155,7 +156,7 @@ def _halves(
     return resistance
 
 
-@compiled_in_place
+@loops_in_place
 def _set_halves(
     resistance: Array,
     given: Prepared,
@@ -176,7 +177,7 @@ def _set_halves(
                 resistance[t, side] = _resistance(throat, faces, span, others, (room, table))
 
 
-@compiled_in_place
+@loops_in_place
 def _spread(three: Array) -> float:
     """Difference between the largest and the smallest of three numbers."""
     first, second, third = three[0], three[1], three[2]
@@ -194,7 +195,7 @@ def throat_at(given: Prepared, t: int, room: SectionRoom) -> tuple[Throat, Faces
     return (corner[t], radius[t], flatness[t], wedge), (order[t], place[t], part[t], cut[t])
 
 
-@compiled_in_place
+@loops_in_place
 def spans_of(heights: Array, floor: float) -> tuple[Span, Span]:
     """The spans (`set_fluxes`) of the sides of the first and the second pore.
 
@@ -206,7 +207,7 @@ def spans_of(heights: Array, floor: float) -> tuple[Span, Span]:
     return (max(-high, 0.0), -low, -1.0), (max(low, 0.0), high, 1.0)
 
 
-@compiled_in_place
+@loops_in_place
 def _resistance(
     throat: Throat,
     faces: Faces,
@@ -222,7 +223,7 @@ def _resistance(
     return resistance_of(flux, (faces[2], step, widening))
 
 
-@compiled_in_place
+@loops_in_place
 def set_fluxes(
     throat: Throat,
     faces: Faces,
@@ -257,7 +258,7 @@ def set_fluxes(
                 flux[k] *= share_of_cut(throat[0], room[3][0][k], z, cut, rays)
 
 
-@compiled_in_place
+@loops_in_place
 def resistance_of(flux: Array, given: tuple[float, float, float]) -> float:
     """Integral of dR, 1/m3, over sections of the fluxes `flux` (K,) m4, which are written over.
 
@@ -274,7 +275,7 @@ def resistance_of(flux: Array, given: tuple[float, float, float]) -> float:
     return (4.0 * summed(flux, step, 1, widening) - summed(flux, step, 2, widening)) / 3.0
 
 
-@compiled_in_place
+@loops_in_place
 def summed(narrow: Array, step: float, every: int, widening: float) -> float:
     """Resistance 1/m3 between sections of 1/a = `narrow` (K,) 1/m that lie `step` m apart.
 

@@ -7,7 +7,7 @@ section to section, such as the directions of rays, is set up once for all secti
 
 import numpy as np
 
-from fdnet.network.compiled import compiled, compiled_in_place
+from fdnet.network.compiled import compiled, loops_in_place
 from fdnet.network.laws.corner_rays import CornerRoom, aim_at_fourth, aim_corners, corner_room
 from fdnet.network.laws.cross_section import (
     even_fluxes,
@@ -56,7 +56,7 @@ def section_room(around: int, count: int = STEPS + 1) -> SectionRoom:
     )
 
 
-@compiled_in_place
+@loops_in_place
 def forget(room: SectionRoom, around: int) -> None:
     """Makes `room` that of another throat, which has `around` spheres around it."""
     room[3][2][3][0] = False
@@ -64,7 +64,7 @@ def forget(room: SectionRoom, around: int) -> None:
         room[4][0][1][i] = -1
 
 
-@compiled_in_place
+@loops_in_place
 def set_discs(throat: Throat, low: float, step: float, room: SectionRoom) -> None:
     """Sets the radii of the discs in the sections from the height `low` m on, `step` m apart."""
     radius, flatness, rows = throat[1], throat[2], room[3][0]
@@ -78,7 +78,7 @@ def set_discs(throat: Throat, low: float, step: float, room: SectionRoom) -> Non
             rows[k, i] = discs[k]
 
 
-@compiled_in_place
+@loops_in_place
 def open_fluxes(
     throat: Throat,
     span: tuple[float, float, float],
@@ -113,7 +113,7 @@ def open_fluxes(
         _narrow(throat, span, others, room, table)
 
 
-@compiled_in_place
+@loops_in_place
 def _narrow(
     throat: Throat,
     span: tuple[float, float, float],

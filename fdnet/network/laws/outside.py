@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fdnet.network import geometry
-from fdnet.network.compiled import compiled, compiled_in_place
+from fdnet.network.compiled import compiled, loops_in_place
 from fdnet.network.laws.facet_axes import facet_axes
 from fdnet.network.laws.section_rays import (
     RAYS,
@@ -128,7 +128,7 @@ def bundles(most: int) -> tuple[Bundles, Seen]:
     return rays, (np.empty(most, np.int64), np.empty((most, 3)))
 
 
-@compiled_in_place
+@loops_in_place
 def meet(disc: Array, base: Array, z: float, around: Array, seen: Seen) -> int:
     """Sets the discs that the section at the height `z` m meets, and gives their number.
 
@@ -149,7 +149,7 @@ def meet(disc: Array, base: Array, z: float, around: Array, seen: Seen) -> int:
     return count
 
 
-@compiled_in_place
+@loops_in_place
 def share_around(
     base: Array, side: Array, discs: tuple[int, Seen], bundle: Bundles, table: Array
 ) -> float:
@@ -173,7 +173,7 @@ def share_around(
     return min(left / clear, 1.0) if clear > 0.0 else 1.0
 
 
-@compiled_in_place
+@loops_in_place
 def _flux_of_disc(
     base: Array, side: Array, discs: tuple[int, int, Seen], bundle: Bundles, table: Array
 ) -> tuple[float, float]:
@@ -206,7 +206,7 @@ def _flux_of_disc(
     return clear, flux_on_rays(rays, many, disc[2], room)
 
 
-@compiled_in_place
+@loops_in_place
 def _aimed(base: Array, side: Array, disc: tuple[int, float, float], bundle: Bundles) -> int:
     """The number of rays of a disc, which are aimed when they are first asked for."""
     rays, number, longest, _ = bundle

@@ -16,7 +16,7 @@ The factor of the widening tube (`lubrication`) is that of the narrowed sections
 import numpy as np
 
 from fdnet.network import geometry
-from fdnet.network.compiled import compiled_for_loops, compiled_in_place
+from fdnet.network.compiled import compiled_for_loops, loops_in_place
 from fdnet.network.fines.occupancy import Occupancy, ratio
 from fdnet.network.laws.beside_throats import FineImages
 from fdnet.network.laws.damage import BLOCKED, CLEAN, SECTIONS, Damage
@@ -142,7 +142,7 @@ def _resistances(
     return resistance
 
 
-@compiled_in_place
+@loops_in_place
 def _set_sides(
     resistance: Array,
     which: tuple[Array, Prepared],
@@ -169,7 +169,7 @@ def _set_sides(
                 resistance[0, n, side], resistance[1, n, side] = both
 
 
-@compiled_in_place
+@loops_in_place
 def _both(
     base: Array,
     span: Span,

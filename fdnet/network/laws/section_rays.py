@@ -9,7 +9,7 @@ the discs, so they are set up once for all sections of a throat.
 
 import numpy as np
 
-from fdnet.network.compiled import compiled_for_loops, compiled_in_place
+from fdnet.network.compiled import compiled_for_loops, loops_in_place
 from fdnet.network.laws.elementary import log_of
 from fdnet.network.laws.rays import FINE_POINTS, FINE_WEIGHTS, midway
 from fdnet.network.laws.wedge import shear_ratio
@@ -33,7 +33,7 @@ def sides_of(base: Array) -> Array:
     return side
 
 
-@compiled_in_place
+@loops_in_place
 def set_sides(base: Array, side: Array) -> None:
     """Sets `side` (3, 3) to what `sides_of` gives."""
     for i in range(3):
@@ -46,13 +46,13 @@ def set_sides(base: Array, side: Array) -> None:
         side[i] = nx, ny, length
 
 
-@compiled_in_place
+@loops_in_place
 def inwards(base: Array, side: Array, i: int, x: float, y: float) -> float:
     """How far m the place `x`, `y` m lies inwards of the side `i`."""
     return side[i, 0] * (x - base[i, 0]) + side[i, 1] * (y - base[i, 1])
 
 
-@compiled_in_place
+@loops_in_place
 def aim(base: Array, side: Array, x: float, y: float, rays: Array) -> int:
     """Sets up the rays of a disc centred at `x`, `y` m, and gives their number.
 
@@ -68,14 +68,14 @@ def aim(base: Array, side: Array, x: float, y: float, rays: Array) -> int:
     return count
 
 
-@compiled_in_place
+@loops_in_place
 def _depth(base: Array, side: Array, i: int, x: float, y: float) -> float:
     """How far m a place lies inwards of the side `i`, 0 where it lies on it."""
     depth = inwards(base, side, i, x, y)
     return 0.0 if abs(depth) <= ON_SIDE * side[i, 2] else depth
 
 
-@compiled_in_place
+@loops_in_place
 def _aim_at_side(
     base: Array,
     side: Array,
@@ -107,7 +107,7 @@ def _aim_at_side(
                 entry[p] = max(entry[p], begin)
 
 
-@compiled_in_place
+@loops_in_place
 def narrow(
     rays: Array,
     count: int,
@@ -129,7 +129,7 @@ def narrow(
     return NARROWED
 
 
-@compiled_in_place
+@loops_in_place
 def flux_on_rays(rays: Array, count: int, own: float, room: tuple[Array, Array]) -> float:
     """Flux m4 on the first `count` rays of a disc of radius `own` m, to where they end.
 

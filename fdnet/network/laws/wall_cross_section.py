@@ -54,8 +54,8 @@ def wall_cuts(network: Network) -> tuple[Array, Array, Array]:
         return order, place, part
     part[cut] = NARROWED
     single = cut[network.throat_share[cut] == 0.5]
-    corner, tolerance = network.throat_corner[single], TOLERANCE * network.grain_radius
-    own = network.throat_grains[single]
+    corner, tolerance = network.corners_of(single), TOLERANCE * network.grain_radius
+    own = network.image_grain[network.throat_images[single]]
     sides = [axis for axis in (1, 2) if not network.periodic[axis]]
     for i, image, j in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         apart = corner[:, image] - corner[:, i]
@@ -83,7 +83,7 @@ def wall_flux(place: Array, first: float, second: float, table: Array) -> float:
     `place` (3,) m are the heights of their centres above the wall and their distance along it.
     """
     along, above = _meeting(place, first, second)
-    total = 0.0
+    apart, total = np.hypot(place[2], place[0] - place[1]), 0.0
     for i in range(2):
         height, other, x = place[0], place[1], along
         disc, next_disc = first, second
@@ -92,8 +92,8 @@ def wall_flux(place: Array, first: float, second: float, table: Array) -> float:
             disc, next_disc = second, first
         edge = np.arctan2(place[2], height - other)
         split = min(max(np.arctan2(x, height - above), 0.0), edge)
-        gap = np.hypot(place[2], height - other) - next_disc + disc
-        across = (height, other, place[2])
+        gap = apart - next_disc + disc
+        across = (height, place[2], apart, (height - other) / apart)
         total += shear_ratio(split, 2.0 * disc / (height + disc), table) * _share(
             across, disc, next_disc, 0.0, split
         )
@@ -126,26 +126,26 @@ def _meeting(place: Array, first: float, second: float) -> tuple[float, float]:
 
 @compiled
 def _share(
-    across: tuple[float, float, float], disc: float, other: float, low: float, high: float
+    across: tuple[float, float, float, float], disc: float, other: float, low: float, high: float
 ) -> float:
     """Flux m4 on the rays of a disc at angles `low` to `high` rad from the normal of the wall.
 
     A ray ends at the nearest line midway, or at the far side of the trapezoid. `disc` and `other`
-    m are the radii; `across` m is the height of the disc, that of the other, and their distance
-    along the wall.
+    m are the radii; `across` m is the height of the disc, its distance from the other along the
+    wall and in all, and how much higher it is over the latter.
     """
     flux = 0.0
     if not high > low:
         return flux
-    apart = np.hypot(across[2], across[0] - across[1])
-    along, upright = across[2] / apart, (across[0] - across[1]) / apart
+    height, far, apart, upright = across
+    along = far / apart
     wider = other - disc
     half_gap = 0.5 * (apart * apart - wider * wider)
     # numba knows no strict zip
     for point, weight in zip(POINTS, WEIGHTS):  # noqa: B905
         turn = low + 0.5 * (high - low) * (1.0 + point)
         cosine, sine = np.cos(turn), np.sin(turn)
-        reach = min((across[0] + disc) / (1.0 + cosine), across[2] / max(sine, TOLERANCE))
+        reach = min((height + disc) / (1.0 + cosine), far / max(sine, TOLERANCE))
         # the line midway to the other disc, at the angle between the ray and the two centres
         below = apart * (upright * cosine + along * sine) + wider
         if below > 0.0:

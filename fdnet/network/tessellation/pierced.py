@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fdnet.network.compiled import compiled
+from fdnet.network.compiled import compiled, compiled_in_place
 from fdnet.network.tessellation.delaunay import Tetrahedra
 from fdnet.network.tessellation.facets import Facets
 from fdnet.network.tessellation.tessellation import Tessellation
@@ -60,9 +60,22 @@ def _pierced(
     size: Array,
 ) -> Array:
     """As `pierced_facets`, with the parts of `Tetrahedra`, `_apexes_beyond` and `Facets`."""
+    pierced = np.zeros(len(open_facet), np.bool_)
+    _set_pierced(spheres, tetrahedra, facets, (open_facet, size), pierced)
+    return pierced
+
+
+@compiled_in_place
+def _set_pierced(
+    spheres: tuple[Array, Array],
+    tetrahedra: tuple[Array, Array, Array],
+    facets: tuple[Array, Array, Array, Array],
+    more: tuple[Array, Array],
+    pierced: Array,
+) -> None:
     vertex, beyond, turn = tetrahedra
     corner, pore, opposite, shift = facets
-    pierced = np.zeros(len(corner), np.bool_)
+    open_facet, size = more
     for t in range(len(corner)):
         if not open_facet[t]:
             continue
@@ -84,21 +97,9 @@ def _pierced(
                     )
                 moved = (x * size[0], y * size[1], z * size[2])
                 pierced[t] = _pierces(spheres, corner[t], other, moved)
-    return pierced
 
 
-@compiled
-def _moved(shift: Array, turn: Array, factors: tuple[int, int], size: Array) -> Vector:
-    """So many periods `shift` (3,) and so many `turn` (3,), m; `size` (3,) m are the periods."""
-    one, other = factors
-    return (
-        (one * shift[0] + other * turn[0]) * size[0],
-        (one * shift[1] + other * turn[1]) * size[1],
-        (one * shift[2] + other * turn[2]) * size[2],
-    )
-
-
-@compiled
+@compiled_in_place
 def _pierces(spheres: tuple[Array, Array], corner: Array, other: int, moved: Vector) -> bool:
     """Whether the grain `other`, `moved` by a vector m, covers part of an open section."""
     points, grain = spheres
@@ -124,13 +125,13 @@ def _pierces(spheres: tuple[Array, Array], corner: Array, other: int, moved: Vec
     return _covers((one, two, place), (grain[a], grain[b], grain[c], radius))
 
 
-@compiled
+@compiled_in_place
 def _outside(side: Vector, normal: Vector, place: Vector, size: float) -> float:
     """How far m `place` lies to the right of a side of a triangle; `size` m2 is that of normal."""
     return along(place, times(side, normal)) / (size * np.sqrt(along(side, side)))
 
 
-@compiled
+@compiled_in_place
 def _covers(
     places: tuple[Vector, Vector, Vector], radii: tuple[float, float, float, float]
 ) -> bool:

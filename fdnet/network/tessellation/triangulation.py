@@ -14,7 +14,7 @@ the caller takes Qhull's.
 
 import numpy as np
 
-from fdnet.network.compiled import compiled
+from fdnet.network.compiled import compiled_in_place
 from fdnet.network.tessellation.curve import insertion_order
 from fdnet.network.tessellation.predicates import in_sphere, side_of_plane
 from fdnet.spheres.snapshot import Array
@@ -101,7 +101,7 @@ def _doubled(one: Array) -> Array:
     return np.concatenate([one, np.full_like(one, -1 if one.ndim == 2 else 0)])
 
 
-@compiled
+@compiled_in_place
 def _insert(
     points: Array, weight: Array, order: Array, mesh: Mesh, room: Room, state: Array
 ) -> int:
@@ -131,7 +131,7 @@ def _insert(
     return 0
 
 
-@compiled
+@compiled_in_place
 def _strictly_within(points: Array, corner: tuple[int, int, int, int], new: int) -> bool:
     """Whether `new` is certain to lie in a tetrahedron."""
     certain = True
@@ -140,7 +140,7 @@ def _strictly_within(points: Array, corner: tuple[int, int, int, int], new: int)
     return certain
 
 
-@compiled
+@compiled_in_place
 def _side(points: Array, corner: tuple[int, int, int, int], i: int, new: int) -> int:
     """1 where `new` lies on the side of corner `i` of the facet opposite to it, -1 beyond."""
     return side_of_plane(
@@ -152,7 +152,7 @@ def _side(points: Array, corner: tuple[int, int, int, int], i: int, new: int) ->
     )
 
 
-@compiled
+@compiled_in_place
 def _containing(points: Array, mesh: Mesh, start: int, new: int) -> int:
     """The tetrahedron in which `new` lies, by steps from `start` across facets towards it."""
     vertex, neighbour = mesh[0], mesh[1]
@@ -173,7 +173,7 @@ def _containing(points: Array, mesh: Mesh, start: int, new: int) -> int:
         before, at = at, step
 
 
-@compiled
+@compiled_in_place
 def _hole(
     points: Array, weight: Array, mesh: Mesh, room: Room, given: tuple[int, int, int]
 ) -> tuple[int, int]:
@@ -212,7 +212,7 @@ def _hole(
     return count, facets
 
 
-@compiled
+@compiled_in_place
 def _fill(mesh: Mesh, room: Room, given: tuple[int, int, int], state: Array) -> None:
     """Joins a point to the facets of its hole, and frees what was in it.
 
@@ -255,7 +255,7 @@ def _fill(mesh: Mesh, room: Room, given: tuple[int, int, int], state: Array) -> 
         state[2] += 1
 
 
-@compiled
+@compiled_in_place
 def _join(
     vertex: Array, neighbour: Array, number: Array, edge: Array, made: int, apex: int
 ) -> None:
