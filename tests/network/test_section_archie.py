@@ -8,7 +8,7 @@ import pytest
 from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.flow.slabs import whole_permeability
 from fdnet.network.laws import section_archie
-from fdnet.network.laws.beside_throats import FineImages
+from fdnet.network.laws.beside_throats import FineImages, prisms_of
 from fdnet.network.laws.kept_sections import measured_sections
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
@@ -44,7 +44,7 @@ def test_a_throat_meets_the_fines_whose_bodies_reach_into_its_prism(network, pac
     """Places in the prisms are tried one by one, against all images of all fines."""
     fines, size = pack.fines(), np.ptp(network.box, axis=1)
     part, rng = slice(0, 25), np.random.default_rng(3)
-    beside = FineImages(network, fines).beside(part)
+    beside = FineImages(network, fines.position, fines.radius).beside(prisms_of(network, part))
     sides = [np.array([0.0, y, z]) * size for y in (-1, 0, 1) for z in (-1, 0, 1)]
     mirrored = [fines.position * (-1.0, 1.0, 1.0) + (2.0 * x, 0, 0) for x in network.box[0]]
     image = np.concatenate([one + side for one in (fines.position, *mirrored) for side in sides])

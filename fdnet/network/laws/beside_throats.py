@@ -13,7 +13,7 @@ from fdnet.network.laws.facet_axes import facet_axes
 from fdnet.network.laws.section_rays import inwards, sides_of
 from fdnet.network.network import Network
 from fdnet.spheres.arrays import one_line
-from fdnet.spheres.snapshot import Array, Snapshot, frozen
+from fdnet.spheres.snapshot import Array, frozen
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -33,55 +33,89 @@ class FinesBeside:
     __repr__ = one_line
 
 
-class FineImages:
-    """Fines of a network with their images near its throats, shifted or mirrored.
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Prisms:
+    """The prisms of K throats, from power centre to power centre.
 
-    A fine that is centred on or beyond a face that is not periodic has no mirror image there: its
-    body inside the box is that of the sphere itself.
+    Attributes:
+        origin: (K, 3) m, the first corner of each facet.
+        axes: unit vectors (K, 3) of `facet_axes`.
+        base: (K, 3, 2) m, corners of the facets in their own planes.
+        height: (K, 2) m above the facets, of the lower and the upper end.
+        low: (K, 3) m, lower corners of the boxes around them.
+        high: (K, 3) m, their upper corners.
     """
 
-    def __init__(self, network: Network, fines: Snapshot) -> None:
-        self.network = network
-        corner = network.image_position[np.unique(network.throat_images)]
+    origin: Array
+    axes: tuple[Array, Array, Array]
+    base: Array
+    height: Array
+    low: Array
+    high: Array
+
+    __repr__ = one_line
+
+
+def prisms_of(network: Network, part: slice) -> Prisms:
+    """The prisms of the throats `part`."""
+    facet = network.image_position[network.throat_images[part]]
+    axes = facet_axes(network, np.arange(part.start, part.stop), facet)
+    height = network.throat_heights[part] * (-1.0, 1.0)
+    ends = (facet[:, None] + (height[:, :, None] * axes[2][:, None])[:, :, None]).reshape(
+        len(facet), 6, 3
+    )
+    return Prisms(
+        origin=facet[:, 0],
+        axes=axes,
+        base=flat(facet),
+        height=np.sort(height, axis=1),
+        low=ends.min(axis=1),
+        high=ends.max(axis=1),
+    )
+
+
+class FineImages:
+    """Spheres at `position` (N, 3) m of `radius` (N,) m, with their images near all throats.
+
+    The images are shifted or mirrored. A fine that is centred on or beyond a face that is not
+    periodic has no mirror image there: its body inside the box is that of the sphere itself.
+    """
+
+    def __init__(self, network: Network, position: Array, radius: Array) -> None:
+        used = np.zeros(len(network.image_position), bool)
+        used[network.throat_images] = True
+        corner = network.image_position[used]
         low, high = corner.min(axis=0), corner.max(axis=0)
         self._classes: list[tuple[Array, Array]] = []
-        for some in size_classes(fines.radius) if len(fines) else []:
-            radius = fines.radius[some]
-            position, owner = mirrored_images(
-                network, fines.position[some], low, high, float(radius.max())
-            )
-            self._classes.append((position, radius[owner]))
+        for some in size_classes(radius) if len(radius) else []:
+            own = radius[some]
+            place, owner = mirrored_images(network, position[some], low, high, float(own.max()))
+            self._classes.append((place, own[owner]))
 
-    def beside(self, part: slice) -> FinesBeside:
-        """The fines that reach into the prisms of the throats `part` (K)."""
-        network = self.network
-        facet = network.image_position[network.throat_images[part]]
-        axes = facet_axes(network, np.arange(part.start, part.stop), facet)
-        height = network.throat_heights[part] * (-1.0, 1.0)
-        ends = (facet[:, None] + (height[:, :, None] * axes[2][:, None])[:, :, None]).reshape(
-            len(facet), 6, 3
-        )
-        low, high = ends.min(axis=1), ends.max(axis=1)
+    def beside(self, prisms: Prisms, rows: Array | None = None) -> FinesBeside:
+        """The fines that reach into the prisms (K), or into those of some `rows` alone."""
+        low, high = prisms.low, prisms.high
+        if rows is not None:
+            low, high = low[rows], high[rows]
         throats, places = [np.zeros(0, np.intp)], [np.zeros((0, 5))]
         for position, radius in self._classes:
             widest = float(radius.max())
-            throat, image = points_in_boxes(position, low - widest, high + widest)
+            row, image = points_in_boxes(position, low - widest, high + widest)
             reach = radius[image, None]  # its own, whatever other fines are in the class
-            near = (position[image] >= low[throat] - reach) & (
-                position[image] <= high[throat] + reach
-            )
-            throat, image = (one[near.all(axis=1)] for one in (throat, image))
-            away = position[image] - facet[throat, 0]
+            near = (position[image] >= low[row] - reach) & (position[image] <= high[row] + reach)
+            row, image = (one[near.all(axis=1)] for one in (row, image))
+            throat = row if rows is None else rows[row]
+            away = position[image] - prisms.origin[throat]
             place = np.ones((len(throat), 5))
-            for k, axis in enumerate(axes):
+            for k, axis in enumerate(prisms.axes):
                 place[:, k] = dot(away, axis[throat])
             place[:, 3] = radius[image]
-            real = _reaching(flat(facet), np.sort(height, axis=1), throat, place)
+            real = _reaching(prisms.base, prisms.height, throat, place)
             throats.append(throat[real])
             places.append(place[real])
         throat, place = np.concatenate(throats), np.concatenate(places)
         order = np.lexsort((*place[:, 2::-1].T, throat))  # whatever order the search has
-        first = np.searchsorted(throat[order], np.arange(len(facet) + 1))
+        first = np.searchsorted(throat[order], np.arange(len(prisms.low) + 1))
         return FinesBeside(first=frozen(first), place=frozen(place[order]))
 
 

@@ -4,15 +4,14 @@ The resistances of a throat depend on the fines that reach into it and on nothin
 throats that a changed fine reaches, at its former place or at its new one, are summed anew.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fdnet.network import geometry
 from fdnet.network.fines.occupancy import ratio
 from fdnet.network.laws.beside_throats import FineImages
-from fdnet.network.laws.lubrication import THROATS
-from fdnet.network.laws.section_archie import fine_resistances
+from fdnet.network.laws.section_archie import Part, fine_resistances, parts_of
 from fdnet.network.network import Network
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
@@ -24,6 +23,7 @@ class KeptSections:
 
     Attributes:
         network: pores and throats.
+        parts: its throats, ready for fines.
         fines: at the places for which the resistances hold.
         without: (T, 2) 1/m3, without the fines; see `fine_resistances`.
         raised: (T, 2) 1/m3, with them.
@@ -31,6 +31,7 @@ class KeptSections:
     """
 
     network: Network
+    parts: Sequence[Part]
     fines: Snapshot
     without: Array
     raised: Array
@@ -53,36 +54,43 @@ class KeptSections:
         same = np.all(fines.position[new] == self.fines.position[old], axis=1)
         gone, come = np.ones(len(self.fines), bool), np.ones(len(fines), bool)
         gone[old[same]] = come[new[same]] = False
-        reached = throats_beside(self.network, self.fines.where(gone))
-        reached |= throats_beside(self.network, fines.where(come))
-        both = fine_resistances(self.network, fines, among=reached)[:2]
+        reached = self._throats_beside(
+            np.concatenate([self.fines.position[gone], fines.position[come]]),
+            np.concatenate([self.fines.radius[gone], fines.radius[come]]),
+        )
+        both = fine_resistances(self.network, fines, among=reached, parts=self.parts)[:2]
         without, raised = (
             np.where(reached[:, None], now, before)
             for now, before in zip(both, (self.without, self.raised), strict=True)
         )
         return KeptSections(
             network=self.network,
+            parts=self.parts,
             fines=fines,
             without=frozen(without),
             raised=frozen(raised),
             renewed=int(reached.sum()),
         )
 
+    def _throats_beside(self, position: Array, radius: Array) -> Array:
+        """Whether spheres at `position` (N, 3) m of `radius` (N,) m reach into each throat."""
+        images = FineImages(self.network, position, radius)
+        return np.concatenate(
+            [np.diff(images.beside(part.prisms).first) > 0 for part in self.parts]
+        )
 
-def measured_sections(network: Network, fines: Snapshot) -> KeptSections:
-    """The resistances among `fines`, those of all throats summed."""
-    without, raised, _ = fine_resistances(network, fines)
+
+def measured_sections(
+    network: Network, fines: Snapshot, *, parts: Sequence[Part] | None = None
+) -> KeptSections:
+    """The resistances among `fines`, those of all throats summed; `parts` of the network."""
+    parts = tuple(parts_of(network)) if parts is None else parts
+    without, raised, _ = fine_resistances(network, fines, parts=parts)
     return KeptSections(
         network=network,
+        parts=parts,
         fines=fines,
         without=frozen(without),
         raised=frozen(raised),
         renewed=len(without),
     )
-
-
-def throats_beside(network: Network, fines: Snapshot) -> Array:
-    """Whether any of the fines reaches into each throat (T,)."""
-    images = FineImages(network, fines)
-    parts = geometry.slices(len(network.throat_pores), THROATS)
-    return np.concatenate([np.diff(images.beside(part).first) > 0 for part in parts])

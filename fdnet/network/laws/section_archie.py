@@ -13,12 +13,15 @@ to the power -1.3. The same power is taken here.
 The factor of the widening tube (`lubrication`) is that of the narrowed sections.
 """
 
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
 import numpy as np
 
 from fdnet.network import geometry
 from fdnet.network.compiled import compiled_for_loops, loops_in_place
 from fdnet.network.fines.occupancy import Occupancy, ratio
-from fdnet.network.laws.beside_throats import FineImages
+from fdnet.network.laws.beside_throats import FineImages, Prisms, prisms_of
 from fdnet.network.laws.damage import BLOCKED, CLEAN, SECTIONS, Damage
 from fdnet.network.laws.lubrication import (
     THROATS,
@@ -37,6 +40,7 @@ from fdnet.network.laws.section_rays import set_sides
 from fdnet.network.laws.wall_cross_section import wall_cuts
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import LENGTH_FLOOR, Network
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
 EXPONENT = 1.3
@@ -72,38 +76,67 @@ def section_archie_damage(network: Network, occupancy: Occupancy, clean: Array) 
     )
 
 
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Part:
+    """Throats (K) that are worked off at once, without fines.
+
+    Attributes:
+        throats: their place among all throats.
+        prisms: in which fines are looked for.
+        given: what their sections need.
+        heights: (K, 2) m of the power centres above the facets.
+    """
+
+    throats: slice
+    prisms: Prisms
+    given: Prepared
+    heights: Array
+
+    __repr__ = one_line
+
+
+def parts_of(network: Network) -> Iterator[Part]:
+    """All throats of a network, part by part."""
+    walls = wall_cuts(network)
+    for part in geometry.slices(len(network.throat_pores), THROATS):
+        yield Part(
+            throats=part,
+            prisms=prisms_of(network, part),
+            given=prepared(network, part, walls),
+            heights=np.ascontiguousarray(network.throat_heights[part]),
+        )
+
+
 def fine_resistances(
-    network: Network, fines: Snapshot, *, among: Array | None = None
+    network: Network,
+    fines: Snapshot,
+    *,
+    among: Array | None = None,
+    parts: Iterable[Part] | None = None,
 ) -> tuple[Array, Array, int]:
     """Resistances (T, 2) 1/m3 of the sides of throats without and with `fines`.
 
     Both are summed over the same sections. Those of throats without fines are 1 and 1, and 0 for a
     side that a throat does not have. The third value is the number of throats with fines too small
     for `MOST_STEPS`. Where `among` (T,) is given, throats where it is False are left at 1 and 1.
+    `parts` are those of the network (`parts_of`), made here without them.
     """
-    images, table = FineImages(network, fines), ratio_table()
+    images, table = FineImages(network, fines.position, fines.radius), ratio_table()
     floor = LENGTH_FLOOR * network.grain_radius
-    walls = wall_cuts(network)
     coarse = 0
     both = np.ones((2, len(network.throat_pores), 2))
-    for part in geometry.slices(len(network.throat_pores), THROATS):
-        beside = images.beside(part)
-        height = network.throat_heights[part]
-        some, steps = _steps(beside.first, beside.place, np.abs(height).max(axis=1))
-        if among is not None:
-            steps = steps[among[part][some]]
-            some = some[among[part][some]]
-        if not len(some):
-            continue
+    for part in parts_of(network) if parts is None else parts:
+        rows = None if among is None else np.flatnonzero(among[part.throats])
+        beside = images.beside(part.prisms, rows)
+        some, steps = _steps(beside.first, beside.place, np.abs(part.heights).max(axis=1))
         coarse += int(np.sum(steps > MOST_STEPS))
         steps = np.minimum(steps, MOST_STEPS)
-        given = prepared(network, part, walls)
         for count in np.unique(steps):
             chosen = some[steps == count]
-            both[:, part.start + chosen] = _resistances(
+            both[:, part.throats.start + chosen] = _resistances(
                 (chosen, int(count) + 1),
-                given,
-                np.ascontiguousarray(height),
+                part.given,
+                part.heights,
                 (floor, WIDENING, EXPONENT),
                 (beside.first, beside.place, table),
             )

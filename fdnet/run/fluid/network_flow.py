@@ -6,6 +6,7 @@ much of it each pore still carries. In a pore the velocity is that of the intact
 ratio of the damaged to the clean flux, both at the same rate through the specimen.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +22,7 @@ from fdnet.network.flow.flow import Flow, solve_flow
 from fdnet.network.laws.kept_sections import KeptSections, measured_sections
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.named import LAWS
+from fdnet.network.laws.section_archie import Part
 from fdnet.network.network import Network, build_network
 from fdnet.run.fluid.pressed import Facets, Pressed, facets_of, pressed_by
 from fdnet.spheres.images import neighbour_tree, wrapped
@@ -171,6 +173,7 @@ class Renewal:
         renewed: share of the deposit that may change before the network is solved anew.
         solved: the fines of the last solve; None before the first.
         deposit: the fines as they were measured last.
+        parts: of the throats, ready for fines; None before the first solve.
         sections: of the throats, as they were at the last solve.
         carried: what the last solve gave.
         solves: number of solves.
@@ -180,6 +183,7 @@ class Renewal:
     renewed: float = RENEWED
     solved: Snapshot | None = None
     deposit: KeptDeposit | None = None
+    parts: Sequence[Part] | None = None
     sections: KeptSections | None = None
     carried: Carried | None = None
     solves: int = 0
@@ -195,10 +199,11 @@ class Renewal:
         if self.carried is None or changed_share(self.solved, inside) > self.renewed:
             fines = self.deposit.fines
             self.sections = (
-                measured_sections(self.pack.network, fines)
+                measured_sections(self.pack.network, fines, parts=self.parts)
                 if self.sections is None
                 else self.sections.changed_to(fines)
             )
+            self.parts = self.sections.parts
             self.carried = self.pack.carried(self.sections.factor, self.deposit.in_pores)
             self.solved, self.solves = inside, self.solves + 1
         return self.carried, self.deposit
