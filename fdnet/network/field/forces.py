@@ -23,7 +23,7 @@ import numpy as np
 
 from fdnet.errors import FlowError
 from fdnet.network.field.response import Response
-from fdnet.network.field.wall_nodes import differences, moved_at, neighbours_of, put
+from fdnet.network.field.wall_nodes import advance, differences, moved_at, neighbours_of, put, turn
 from fdnet.network.field.walls import Walls
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
@@ -53,7 +53,7 @@ class Problem:
         self.grids = [np.zeros(response.shape, np.float32) for _ in range(3)]
         self.neighbours = np.concatenate(
             [
-                neighbours_of(node, response.shape, part.start)
+                neighbours_of(node, response.shape, part.start, len(self.slack))
                 for node, part in zip(self.nodes, self.parts, strict=True)
             ]
         )
@@ -149,12 +149,10 @@ def hold(
             )
         moved = problem.project(problem.apply(step))
         length = product / float(step @ moved)
-        scaled += length * step
-        residual -= length * moved
+        advance(scaled, residual, length, step, moved)
         turned = problem.smoothed(residual)
         before, product = product, float(residual @ turned)
-        step *= product / before
-        step += turned
+        turn(step, product / before, turned)
     return _finished(problem, right, (scaled, iteration))
 
 

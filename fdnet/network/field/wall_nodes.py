@@ -6,15 +6,16 @@ from fdnet.network.compiled import compiled
 from fdnet.spheres.snapshot import Array
 
 
-def neighbours_of(node: Array, shape: tuple[int, int, int], first: int) -> Array:
-    """The six neighbours of each node (M,), as rows (M, 6) counted from `first`; -1 for none.
+def neighbours_of(node: Array, shape: tuple[int, int, int], first: int, none: int) -> Array:
+    """The six neighbours of each node (M,), as rows (M, 6) counted from `first`; `none` for none.
 
     Args:
         node: flat indices of the nodes on the grid.
         shape: of the grid, which repeats along all axes.
         first: row of the first node.
+        none: number of rows of all components.
     """
-    row = np.full(shape, -1, np.int32)
+    row = np.full(shape, none, np.int32)
     row.reshape(-1)[node] = np.arange(first, first + len(node), dtype=np.int32)
     near = np.empty((len(node), 6), np.int32)
     for axis in range(3):
@@ -26,14 +27,31 @@ def neighbours_of(node: Array, shape: tuple[int, int, int], first: int) -> Array
 @compiled
 def differences(value: Array, near: Array, weight: float) -> Array:
     """value + weight (6 value - sum over the neighbours), (M,); one that is missing counts 0."""
-    result = np.empty_like(value)
+    result, known = np.empty_like(value), np.append(value, 0.0)
     for one in range(len(value)):
         total = 6.0 * value[one]
         for side in range(6):
-            if near[one, side] >= 0:
-                total -= value[near[one, side]]
+            total -= known[near[one, side]]
         result[one] = value[one] + weight * total
     return result
+
+
+@compiled
+def advance(solution: Array, residual: Array, length: float, along: Array, moved: Array) -> None:
+    """Adds `length` times `along` to the solution, and takes as much of `moved` off the residual.
+
+    All are (M,).
+    """
+    for one in range(len(solution)):
+        solution[one] += length * along[one]
+        residual[one] -= length * moved[one]
+
+
+@compiled
+def turn(along: Array, share: float, residual: Array) -> None:
+    """`share` of the direction `along` (M,), plus the `residual` (M,), in place of the former."""
+    for one in range(len(along)):
+        along[one] = share * along[one] + residual[one]
 
 
 @compiled
