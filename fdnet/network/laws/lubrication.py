@@ -36,7 +36,7 @@ from fdnet.network.laws.open_sections import (
     set_discs,
 )
 from fdnet.network.laws.outside import Neighbourhood
-from fdnet.network.laws.wall_cross_section import wall_cuts, wall_flux
+from fdnet.network.laws.wall_cross_section import wall_cuts, wall_fluxes
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import LENGTH_FLOOR, Network
 from fdnet.spheres.snapshot import Array
@@ -189,7 +189,7 @@ def throat_at(given: Prepared, t: int, room: SectionRoom) -> tuple[Throat, Faces
     """The throat `t` of those that were prepared, and what the faces of the box cut of it."""
     corner, radius, flatness, (order, place, part), cut = given
     even = _spread(radius[t]) <= EQUAL * radius[t, 0] and _spread(flatness[t]) <= EQUAL
-    wedge = room[6][: 3 if even else 0]
+    wedge = room[6][0][: 3 if even else 0]
     if even:
         set_wedges(corner[t], wedge)
     return (corner[t], radius[t], flatness[t], wedge), (order[t], place[t], part[t], cut[t])
@@ -247,8 +247,7 @@ def set_fluxes(
     set_discs(throat, low, step, room)
     order, place, _, cut = faces
     if order[0] >= 0:
-        for k in range(len(flux)):
-            flux[k] = wall_flux(place, discs[order[0], k], discs[order[1], k], table)
+        wall_fluxes(place, (discs[order[0]], discs[order[1]]), (room[6][1], table), flux)
     else:
         open_fluxes(throat, (low, step, sense), others, room, table)
         if max(cut[0, 3], cut[1, 3], cut[2, 3]) > 0.0:

@@ -19,6 +19,7 @@ from fdnet.network.laws.cut_grains import CutRoom, cut_room
 from fdnet.network.laws.fourth_grain import depth_within, share_left
 from fdnet.network.laws.outside import Bundles, Seen, bundles, meet, share_around
 from fdnet.network.laws.section_rays import aim, set_sides
+from fdnet.network.laws.wall_cross_section import LANES
 from fdnet.spheres.snapshot import Array
 
 STEPS = 8
@@ -32,11 +33,11 @@ SectionRoom = tuple[
     tuple[Array, tuple[Array, Array], CornerRoom],
     tuple[Bundles, Seen],
     CutRoom,
-    Array,
+    tuple[Array, Array],
 ]
 """Fluxes (K,) m4 of K sections, radii of discs (3, K) m, room for `even_fluxes`, the radii (K, 3)
 m and room for `uneven_fluxes`, room for `share_around`, room for a fourth disc or those of cut
-grains, and room for `wedges`."""
+grains, and room for `wedges` and for `wall_fluxes`."""
 Throat = tuple[Array, Array, Array, Array]
 """Corners (3, 2) m of the facet, radii (3,) m of the discs in it, their flatness (3,), and the
 wedges of a throat with equal discs (`wedges`), else no row."""
@@ -52,7 +53,7 @@ def section_room(around: int, count: int = STEPS + 1) -> SectionRoom:
         (np.empty((count, 3)), uneven_room(count), corner_room()),
         bundles(around + 3),
         cut_room(),
-        np.empty((3, 7)),
+        (np.empty((3, 7)), np.empty((LANES, count))),
     )
 
 

@@ -16,13 +16,15 @@ nearest of these lines or of the sides of the trapezoid: no share is negative, n
 
 import numpy as np
 
-from fdnet.network.compiled import compiled
+from fdnet.network.compiled import compiled, loops_in_place
+from fdnet.network.laws.elementary import QUARTER, angle_of, cosine_of, sine_of
 from fdnet.network.laws.rays import (
     FINE_POINTS,
     FINE_WEIGHTS,
     POINTS,
     WEIGHTS,
     flux_on_ray,
+    midway,
 )
 from fdnet.network.laws.wedge import shear_ratio
 from fdnet.network.network import Network
@@ -32,6 +34,8 @@ NARROWED = 0.25
 """Part of the slipping flux that a throat carries where two walls cut it."""
 TOLERANCE = 1e-9
 """Lengths up to this many mean grain radii are 0, and sines up to this are taken as this."""
+LANES = 6
+"""Numbers a section for which `wall_fluxes` needs room."""
 
 
 def wall_cuts(network: Network) -> tuple[Array, Array, Array]:
@@ -82,87 +86,117 @@ def wall_flux(place: Array, first: float, second: float, table: Array) -> float:
 
     `place` (3,) m are the heights of their centres above the wall and their distance along it.
     """
-    along, above = _meeting(place, first, second)
-    apart, total = np.hypot(place[2], place[0] - place[1]), 0.0
+    flux = np.empty(1)
+    discs = (np.full(1, first), np.full(1, second))
+    wall_fluxes(place, discs, (np.empty((LANES, 1)), table), flux)
+    return flux[0]
+
+
+@loops_in_place
+def wall_fluxes(
+    place: Array, discs: tuple[Array, Array], room: tuple[Array, Array], flux: Array
+) -> None:
+    """Writes the flux (K,) m4 of `wall_flux` for the radii `discs` (K,) m of K sections.
+
+    `room` is room for `LANES` numbers a section, and the table of `shear_ratio`.
+    """
+    lanes, table = room
+    along, above, split, share = lanes[0], lanes[1], lanes[2], lanes[3]
+    first, last = lanes[4], lanes[5]
+    apart = np.hypot(place[2], place[0] - place[1])
+    _set_meeting(place, discs, lanes)
+    for k in range(len(flux)):
+        flux[k] = 0.0
     for i in range(2):
-        height, other, x = place[0], place[1], along
-        disc, next_disc = first, second
-        if i == 1:
-            height, other, x = place[1], place[0], place[2] - along
-            disc, next_disc = second, first
+        height, other = place[i], place[1 - i]
+        disc, next_disc = discs[i], discs[1 - i]
         edge = np.arctan2(place[2], height - other)
-        split = min(max(np.arctan2(x, height - above), 0.0), edge)
-        gap = apart - next_disc + disc
         across = (height, place[2], apart, (height - other) / apart)
-        total += shear_ratio(split, 2.0 * disc / (height + disc), table) * _share(
-            across, disc, next_disc, 0.0, split
-        )
-        ratio = shear_ratio(edge - split, min(2.0 * disc / max(gap, disc), 1.0), table)
-        total += ratio * _share(across, disc, next_disc, split, edge)
-    turn = min(max(along, 0.0), place[2])
-    return (
-        total
-        + _film(place, first, second, 0.0, turn)
-        + _film(place, first, second, turn, place[2])
-    )
+        for k in range(len(flux)):
+            x = along[k] if i == 0 else place[2] - along[k]
+            split[k] = min(max(angle_of(x, height - above[k]), 0.0), edge)
+            first[k], last[k] = 0.0, edge
+        _set_shares(across, (disc, next_disc), (first, split), share)
+        for k in range(len(flux)):
+            flux[k] += share[k] * shear_ratio(split[k], 2.0 * disc[k] / (height + disc[k]), table)
+        _set_shares(across, (disc, next_disc), (split, last), share)
+        for k in range(len(flux)):
+            gap = max(apart - next_disc[k] + disc[k], disc[k])
+            ratio = shear_ratio(edge - split[k], min(2.0 * disc[k] / gap, 1.0), table)
+            flux[k] += share[k] * ratio
+    for k in range(len(flux)):
+        first[k], split[k], last[k] = 0.0, min(max(along[k], 0.0), place[2]), place[2]
+    _add_film(place, discs, (first, split), flux)
+    _add_film(place, discs, (split, last), flux)
 
 
-@compiled
-def _meeting(place: Array, first: float, second: float) -> tuple[float, float]:
-    """Where the two parabolas meet: m along the wall from the first foot, and m above the wall.
+@loops_in_place
+def _set_meeting(place: Array, discs: tuple[Array, Array], lanes: Array) -> None:
+    """Sets where the two parabolas meet: m along the wall from the first foot, and m above it.
 
     That is the centre of the circle that touches both discs and the wall. Where the parabolas do
     not meet, it is the place midway along the wall.
     """
-    one, two = place[0] + first, place[1] + second
-    near, far = place[0] ** 2 - first**2, place[1] ** 2 - second**2
-    middle = one * place[2]
-    rest = two * near - one * (place[2] ** 2 + far)
-    along = 0.5 * place[2]
-    if middle**2 >= (two - one) * rest:
-        along = -rest / (middle + np.sqrt(middle**2 - (two - one) * rest))
-    return along, 0.5 * (along**2 + near) / one
+    along, above = lanes[0], lanes[1]
+    first, second = discs
+    for k in range(len(along)):
+        one, two = place[0] + first[k], place[1] + second[k]
+        near, far = place[0] ** 2 - first[k] ** 2, place[1] ** 2 - second[k] ** 2
+        middle = one * place[2]
+        rest = two * near - one * (place[2] ** 2 + far)
+        square = middle**2 - (two - one) * rest
+        meeting = -rest / (middle + np.sqrt(max(square, 0.0)))
+        along[k] = meeting if square >= 0.0 else 0.5 * place[2]
+        above[k] = 0.5 * (along[k] ** 2 + near) / one
 
 
-@compiled
-def _share(
-    across: tuple[float, float, float, float], disc: float, other: float, low: float, high: float
-) -> float:
-    """Flux m4 on the rays of a disc at angles `low` to `high` rad from the normal of the wall.
+@loops_in_place
+def _set_shares(
+    across: tuple[float, float, float, float],
+    discs: tuple[Array, Array],
+    turns: tuple[Array, Array],
+    share: Array,
+) -> None:
+    """Sets the flux (K,) m4 on the rays of a disc between two angles from the normal of the wall.
 
-    A ray ends at the nearest line midway, or at the far side of the trapezoid. `disc` and `other`
-    m are the radii; `across` m is the height of the disc, its distance from the other along the
-    wall and in all, and how much higher it is over the latter.
+    A ray ends at the nearest line midway, or at the far side of the trapezoid. `discs` (K,) m are
+    the radii, `turns` (K,) rad the angles; `across` m is the height of the disc, its distance from
+    the other along the wall and in all, and how much higher it is over the latter.
     """
-    flux = 0.0
-    if not high > low:
-        return flux
     height, far, apart, upright = across
+    disc, other = discs
+    low, high = turns
     along = far / apart
-    wider = other - disc
-    half_gap = 0.5 * (apart * apart - wider * wider)
-    # numba knows no strict zip
-    for point, weight in zip(POINTS, WEIGHTS):  # noqa: B905
-        turn = low + 0.5 * (high - low) * (1.0 + point)
-        cosine, sine = np.cos(turn), np.sin(turn)
-        reach = min((height + disc) / (1.0 + cosine), far / max(sine, TOLERANCE))
-        # the line midway to the other disc, at the angle between the ray and the two centres
-        below = apart * (upright * cosine + along * sine) + wider
-        if below > 0.0:
-            reach = min(reach, max(half_gap / below, 0.0))
-        flux += weight * 0.5 * (high - low) * flux_on_ray(reach, disc)
-    return flux
+    for k in range(len(share)):
+        share[k] = 0.0
+    for p in range(len(POINTS)):
+        part, weight = 0.5 * (1.0 + POINTS[p]), 0.5 * WEIGHTS[p]
+        for k in range(len(share)):
+            width = max(high[k] - low[k], 0.0)
+            turn = low[k] + part * width - QUARTER
+            cosine, sine = -sine_of(turn), cosine_of(turn)
+            wider = other[k] - disc[k]
+            reach = min((height + disc[k]) / (1.0 + cosine), far / max(sine, TOLERANCE))
+            # the line midway to the other disc, at the angle between the ray and the two centres
+            below = apart * (upright * cosine + along * sine) + wider
+            reach = min(reach, midway(0.5 * (apart * apart - wider * wider), below))
+            share[k] += weight * width * flux_on_ray(reach, disc[k])
 
 
-@compiled
-def _film(place: Array, first: float, second: float, low: float, high: float) -> float:
-    """Share of the wall, m4, between the distances `low` and `high` m from the first foot."""
-    flux = 0.0
-    # numba knows no strict zip
-    for point, weight in zip(FINE_POINTS, FINE_WEIGHTS):  # noqa: B905
-        x = low + 0.5 * (high - low) * (1.0 + point)
-        one = (x**2 + place[0] ** 2 - first**2) / (2.0 * (place[0] + first))
-        two = ((place[2] - x) ** 2 + place[1] ** 2 - second**2) / (2.0 * (place[1] + second))
-        edge = place[0] + (place[1] - place[0]) * x / place[2]
-        flux += weight * 0.5 * (high - low) * max(min(one, two, edge), 0.0) ** 3 / 3.0
-    return flux
+@loops_in_place
+def _add_film(
+    place: Array, discs: tuple[Array, Array], ends: tuple[Array, Array], flux: Array
+) -> None:
+    """Adds the share of the wall, m4, between two distances (K,) m from the first foot."""
+    first, second = discs
+    low, high = ends
+    for p in range(len(FINE_POINTS)):
+        part, weight = 0.5 * (1.0 + FINE_POINTS[p]), 0.5 * FINE_WEIGHTS[p]
+        for k in range(len(flux)):
+            width = high[k] - low[k]
+            x = low[k] + part * width
+            one = (x**2 + place[0] ** 2 - first[k] ** 2) / (2.0 * (place[0] + first[k]))
+            rest = place[2] - x
+            two = (rest**2 + place[1] ** 2 - second[k] ** 2) / (2.0 * (place[1] + second[k]))
+            edge = place[0] + (place[1] - place[0]) * x / place[2]
+            flux[k] += weight * width * max(min(one, two, edge), 0.0) ** 3 / 3.0
