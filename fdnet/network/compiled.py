@@ -143,7 +143,8 @@ def compiled(function: Any, **options: Any) -> Any:
     `options` are those of numba's compiler.
     """
     try:
-        options = {"_nrt": True} | options  # not that of the function which calls this one
+        # where it is not given, numba takes it from the function that calls this one
+        options = {"_nrt": True} | options
         result: Any = numba.njit(cache=True, **options)(function)
         files = result._cache._cache_file
         result._cache._cache_file = _CheckedFile(

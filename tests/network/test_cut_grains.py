@@ -5,7 +5,6 @@ import pytest
 
 from fdnet import Snapshot, build_network
 from fdnet.network.flow.slabs import whole_permeability
-from fdnet.network.laws.cross_section import uneven_flux
 from fdnet.network.laws.cut_grains import cut_corners, cut_room, share_of_cut
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.section_rays import RAYS
@@ -14,6 +13,7 @@ from fdnet.network.resolved.slab import cut_out
 from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.truth.packs import MM
 from fdnet.studies.truth.slabs import SLAB_FOLDER, SLAB_TRUTH, read_specimen
+from tests.network.one_section import uneven_flux
 from tests.network.section_flux import resolved_flux
 
 ROOM = cut_room(), np.empty(3 * RAYS), ratio_table()

@@ -6,6 +6,7 @@ import pytest
 from fdnet.network.laws import cross_section as section
 from fdnet.network.laws import lubrication, wedge
 from fdnet.network.laws.wedge import ratio_table
+from tests.network.one_section import even_flux, uneven_flux
 
 
 @pytest.mark.parametrize(
@@ -35,26 +36,20 @@ def triangle(*side: float) -> np.ndarray:
 def test_equilateral_section_is_six_exact_wedges() -> None:
     base = triangle(2.0, 2.0, 2.0)
     exact = 6.0 * wedge.exact_flux(np.pi / 6.0, 0.9)
-    assert section.even_flux(section.wedges(base), 0.9, ratio_table()) == pytest.approx(
-        exact, rel=1e-4
-    )
+    assert even_flux(base, 0.9, ratio_table()) == pytest.approx(exact, rel=1e-4)
 
 
 def test_half_a_square_is_four_exact_wedges() -> None:
     base = triangle(2.0, 2.0, np.sqrt(8.0))
     exact = 4.0 * wedge.exact_flux(np.pi / 4.0, 0.95)
-    assert section.even_flux(section.wedges(base), 0.95, ratio_table()) == pytest.approx(
-        exact, rel=2e-3
-    )
+    assert even_flux(base, 0.95, ratio_table()) == pytest.approx(exact, rel=2e-3)
 
 
 @pytest.mark.parametrize("side", [(2.0, 2.1, 2.3), (2.0, 2.0, 2.7), (2.0, 2.0, 2.9)])
 def test_unequal_rule_with_equal_discs_is_the_equal_rule(side: tuple[float, float, float]) -> None:
     base, disc = triangle(*side), 0.93
-    even = section.even_flux(section.wedges(base), disc, ratio_table())
-    assert section.uneven_flux(base, np.full(3, disc), ratio_table()) == pytest.approx(
-        even, rel=1e-4
-    )
+    even = even_flux(base, disc, ratio_table())
+    assert uneven_flux(base, np.full(3, disc), ratio_table()) == pytest.approx(even, rel=1e-4)
 
 
 def test_a_disc_in_the_shadow_of_two_still_leaves_a_flux() -> None:
@@ -66,14 +61,14 @@ def test_a_disc_in_the_shadow_of_two_still_leaves_a_flux() -> None:
     flux, room = np.empty(1), (section.uneven_room(1), ratio_table())
     section.touching_fluxes(base, disc[None], room, flux)
     assert flux[0] <= 0.0
-    assert 0.0 < section.uneven_flux(base, disc, ratio_table()) < 1e-2
+    assert 0.0 < uneven_flux(base, disc, ratio_table()) < 1e-2
 
 
 def test_a_very_obtuse_facet_of_equal_discs_still_leaves_a_flux() -> None:
     base = triangle(2.0, 2.0, 3.2)
-    assert section.even_flux(section.wedges(base), 0.93, ratio_table()) < 0.0
-    assert 0.0 < section.uneven_flux(base, np.full(3, 0.93), ratio_table()) < 2e-2
+    assert even_flux(base, 0.93, ratio_table()) < 0.0
+    assert 0.0 < uneven_flux(base, np.full(3, 0.93), ratio_table()) < 2e-2
 
 
 def test_closed_section_carries_nothing() -> None:
-    assert section.uneven_flux(triangle(2.0, 2.0, 2.0), np.full(3, 1.2), ratio_table()) == 0.0
+    assert uneven_flux(triangle(2.0, 2.0, 2.0), np.full(3, 1.2), ratio_table()) == 0.0

@@ -6,6 +6,7 @@ import pytest
 from fdnet.network.laws import cross_section as section
 from fdnet.network.laws import wedge
 from fdnet.network.laws.wedge import ratio_table
+from tests.network.one_section import even_flux, uneven_flux
 from tests.network.section_flux import resolved_flux
 
 RIGHT_ISOSCELES = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]])
@@ -20,7 +21,7 @@ def test_finite_elements_give_the_exact_wedges() -> None:
 
 @pytest.mark.parametrize("disc", [0.3, 0.7, 0.93])
 def test_equal_discs(disc: float) -> None:
-    flux = section.even_flux(section.wedges(ACUTE), disc, ratio_table())
+    flux = even_flux(ACUTE, disc, ratio_table())
     assert flux == pytest.approx(resolved_flux(ACUTE, np.full(3, disc)), rel=0.01)
 
 
@@ -41,7 +42,7 @@ def test_unequal_discs(
     """The law over finite elements; the last is its known limit (docs/physics_network.md)."""
     edge = {0.5: 1.0, 0.35: 0.7}.get(apex[0], 1.2)
     base, discs = np.array([[0.0, 0.0], [edge, 0.0], apex]), np.array(disc)
-    flux = section.uneven_flux(base, discs, ratio_table())
+    flux = uneven_flux(base, discs, ratio_table())
     assert flux / resolved_flux(base, discs) == pytest.approx(ratio, abs=0.01)
 
 
@@ -63,4 +64,4 @@ def test_sections_whose_signed_shares_cancel_are_summed_over_rays(
     exact, shares = resolved_flux(base, discs, 400), np.empty(1)
     section.touching_fluxes(base, discs[None], (section.uneven_room(1), table), shares)
     assert shares[0] / exact == pytest.approx(signed, abs=0.04)
-    assert section.uneven_flux(base, discs, table) / exact == pytest.approx(ratio, abs=0.02)
+    assert uneven_flux(base, discs, table) / exact == pytest.approx(ratio, abs=0.02)

@@ -8,13 +8,13 @@ from scipy.sparse.linalg import spsolve
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.errors import CaseError, NetworkError
 from fdnet.network.flow.flow import solve_flow
-from fdnet.network.laws.cross_section import uneven_flux
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.named import LAWS
-from fdnet.network.laws.wall_cross_section import wall_cuts, wall_flux
+from fdnet.network.laws.wall_cross_section import wall_cuts
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse
+from tests.network.one_section import uneven_flux, wall_flux
 from tests.network.packs import random_pack, simple_cubic, snapshot, with_fines
 
 NONE = (False,) * 3

@@ -24,7 +24,6 @@ from fdnet.network.laws.corner_rays import (
     aim_corners,
     corner_flux,
     corner_reaches,
-    corner_room,
 )
 from fdnet.network.laws.elementary import QUARTER, angle_of, log_of, sine_of
 from fdnet.network.laws.rays import POINTS, WEIGHTS, flux_on_ray
@@ -42,22 +41,14 @@ SOUND = 0.25
 the rays (tests/network/test_section_flux.py)."""
 
 
-@compiled
-def wedges(base: Array) -> Array:
-    """The six wedges of a triangle `base` (3, 2) m with equal discs, for `even_flux`.
-
-    There are two of each row of the result (3, 7): half edge m, tangent and angle rad, both
-    negative where the circumcentre lies beyond that edge; what of `ray_flux` depends on these
-    alone, and the row of the table of `shear_ratio`.
-    """
-    rows = np.empty((3, 7))
-    set_wedges(base, rows)
-    return rows
-
-
 @loops_in_place
 def set_wedges(base: Array, rows: Array) -> None:
-    """Sets `rows` (3, 7) to what `wedges` gives."""
+    """Sets the six wedges of a triangle `base` (3, 2) m with equal discs, for `even_fluxes`.
+
+    There are two of each of the `rows` (3, 7): half edge m, tangent and angle rad, both negative
+    where the circumcentre lies beyond that edge; what of `ray_flux` depends on these alone, and
+    the row of the table of `shear_ratio`.
+    """
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         ex, ey = base[j, 0] - base[i, 0], base[j, 1] - base[i, 1]
@@ -71,17 +62,6 @@ def set_wedges(base: Array, rows: Array) -> None:
 
 
 @compiled
-def even_flux(wedge: Array, disc: float, table: Array) -> float:
-    """Flux m4 of laplacian(w) = -1 through the section of `wedges` with discs of radius `disc` m.
-
-    It is not positive where the sum of the signed wedges fails.
-    """
-    flux, discs = np.empty(1), np.full(1, disc)
-    even_fluxes(wedge, discs, (even_room(1), table), flux)
-    return flux[0]
-
-
-@compiled
 def even_room(sections: int) -> tuple[Array, Array]:
     """Room for so many sections in `even_fluxes`, and for a row of the table of `shear_ratio`."""
     return np.empty((2, sections)), np.empty(len(DISCS))
@@ -91,7 +71,10 @@ def even_room(sections: int) -> tuple[Array, Array]:
 def even_fluxes(
     wedge: Array, discs: Array, room: tuple[tuple[Array, Array], Array], flux: Array
 ) -> None:
-    """Writes the flux (K,) m4 of `even_flux` for the radii `discs` (K,) m of K sections.
+    """Writes the flux (K,) m4 of laplacian(w) = -1 for the radii `discs` (K,) m of K sections.
+
+    `wedge` is what `set_wedges` sets. A flux is not positive where the sum of the signed wedges
+    fails.
 
     `room` is what `even_room` gives, and the table of `shear_ratio`.
     """
@@ -124,19 +107,6 @@ def even_fluxes(
 
 
 @compiled
-def uneven_flux(base: Array, disc: Array, table: Array) -> float:
-    """Flux m4 of laplacian(w) = -1 through a triangle `base` (3, 2) m with unequal discs.
-
-    The first corner is the origin, the second lies on the x axis; `disc` (3,) m are the radii. The
-    flux is 0 where the discs close the triangle.
-    """
-    flux, discs = np.empty(1), np.empty((1, 3))
-    discs[0] = disc
-    uneven_fluxes(base, discs, (uneven_room(1), corner_room(), table), flux)
-    return flux[0]
-
-
-@compiled
 def uneven_room(sections: int) -> tuple[Array, Array]:
     """Room for the wedges of so many sections, and for the edges, in `uneven_fluxes`."""
     return np.empty((7, 6 * sections)), np.empty((6, 4))
@@ -149,7 +119,10 @@ def uneven_fluxes(
     room: tuple[tuple[Array, Array], CornerRoom, Array],
     flux: Array,
 ) -> None:
-    """Writes the flux (K,) m4 of `uneven_flux` for the radii `discs` (K, 3) m of K sections.
+    """Writes the flux (K,) m4 of laplacian(w) = -1 for the radii `discs` (K, 3) m of K sections.
+
+    The first corner of the triangle `base` (3, 2) m is the origin, the second lies on the x axis.
+    The flux is 0 where the discs close the triangle.
 
     `room` is what `uneven_room` and `corner_room` give for this triangle, and the table of
     `shear_ratio`.

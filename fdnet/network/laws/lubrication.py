@@ -164,6 +164,7 @@ def _set_halves(
     numbers: tuple[float, float],
     more: tuple[SectionRoom, Array, Array, Array, Array],
 ) -> None:
+    """Sets the `resistance` (K, 2) 1/m3 of the sides of throats; 0 where there is none."""
     floor, widening = numbers
     room, beside, around, first, table = more
     for t in range(len(heights)):

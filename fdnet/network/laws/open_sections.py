@@ -37,10 +37,10 @@ SectionRoom = tuple[
 ]
 """Fluxes (K,) m4 of K sections, radii of discs (3, K) m, room for `even_fluxes`, the radii (K, 3)
 m and room for `uneven_fluxes`, room for `share_around`, room for a fourth disc or those of cut
-grains, and room for `wedges` and for `wall_fluxes`."""
+grains, and room for `set_wedges` and for `wall_fluxes`."""
 Throat = tuple[Array, Array, Array, Array]
 """Corners (3, 2) m of the facet, radii (3,) m of the discs in it, their flatness (3,), and the
-wedges of a throat with equal discs (`wedges`), else no row."""
+wedges of a throat with equal discs (`set_wedges`), else no row."""
 
 
 @compiled

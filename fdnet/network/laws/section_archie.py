@@ -212,7 +212,8 @@ def _both(
     """Resistances 1/m3 of one side without and with fines, from the clean fluxes in the room."""
     fines, part, widening, power = given
     room, table = more
-    flux, clear, rows, (rays, seen), side = room[0], room[2][0][0], room[3][0], room[4], room[5][0]
+    flux, rows, (rays, seen), side = room[0], room[3][0], room[4], room[5][0]
+    clear = room[2][0][0]  # what the clean fluxes needed is free now
     step = (span[1] - span[0]) / (len(flux) - 1)
     set_sides(base, side)
     for k in range(len(flux)):

@@ -16,7 +16,7 @@ nearest of these lines or of the sides of the trapezoid: no share is negative, n
 
 import numpy as np
 
-from fdnet.network.compiled import compiled, loops_in_place
+from fdnet.network.compiled import loops_in_place
 from fdnet.network.laws.elementary import QUARTER, angle_of, cosine_of, sine_of
 from fdnet.network.laws.rays import (
     FINE_POINTS,
@@ -80,25 +80,15 @@ def wall_cuts(network: Network) -> tuple[Array, Array, Array]:
     return order, place, part
 
 
-@compiled
-def wall_flux(place: Array, first: float, second: float, table: Array) -> float:
-    """Flux m4 of laplacian(w) = -1 between the wall and discs of radius `first` and `second` m.
-
-    `place` (3,) m are the heights of their centres above the wall and their distance along it.
-    """
-    flux = np.empty(1)
-    discs = (np.full(1, first), np.full(1, second))
-    wall_fluxes(place, discs, (np.empty((LANES, 1)), table), flux)
-    return flux[0]
-
-
 @loops_in_place
 def wall_fluxes(
     place: Array, discs: tuple[Array, Array], room: tuple[Array, Array], flux: Array
 ) -> None:
-    """Writes the flux (K,) m4 of `wall_flux` for the radii `discs` (K,) m of K sections.
+    """Writes the flux (K,) m4 of laplacian(w) = -1 between the wall and two discs in K sections.
 
-    `room` is room for `LANES` numbers a section, and the table of `shear_ratio`.
+    `place` (3,) m are the heights of their centres above the wall and their distance along it,
+    `discs` (K,) m their radii. `room` is that for `LANES` numbers a section, and the table of
+    `shear_ratio`.
     """
     lanes, table = room
     along, above, split, share = lanes[0], lanes[1], lanes[2], lanes[3]
