@@ -143,8 +143,8 @@ def compiled(function: Any, **options: Any) -> Any:
     `options` are those of numba's compiler.
     """
     try:
-        # where it is not given, numba takes it from the function that calls this one
-        options = {"_nrt": True} | options
+        # where they are not given, numba takes them from the function that calls this one first
+        options = {"_nrt": True, "error_model": "python", "fastmath": False} | options
         result: Any = numba.njit(cache=True, **options)(function)
         files = result._cache._cache_file
         result._cache._cache_file = _CheckedFile(
@@ -169,8 +169,7 @@ def compiled_in_place(function: Any) -> Any:
     """`compiled` for a function that writes into the arrays that it is given.
 
     It may neither make an array nor return one. Then nobody has to count who still holds which
-    array, which numba otherwise does for each array of a tuple at each call (numba issue 2345):
-    half of the time of a short function.
+    array, which numba otherwise does for each array of a tuple at each call (numba issue 2345).
     """
     return compiled(function, _nrt=False)
 
@@ -183,7 +182,7 @@ def loops_in_place(function: Any) -> Any:
 def compiled_inline(function: Any) -> Any:
     """`loops_in_place` for a function whose text takes the place of each call of it.
 
-    So it may return parts of the arrays that it is given.
+    So it may return parts of the arrays that it is given. Only functions in place may call it.
     """
     return compiled(
         function, error_model="numpy", fastmath={"contract"}, _nrt=False, inline="always"

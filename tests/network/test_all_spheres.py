@@ -12,7 +12,7 @@ from fdnet.network.laws.corner_rays import aim_at_fourth, aim_corners, corner_ro
 from fdnet.network.laws.fourth_grain import depth_within, share_left
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.outside import bundles, meet, share_around
-from fdnet.network.laws.section_rays import aim, sides_of
+from fdnet.network.laws.section_rays import aim, set_sides
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse
@@ -24,6 +24,13 @@ from tests.network.packs import random_pack, with_fines
 
 SIDES = "yz"
 BASE = np.array([[0.0, 0.0], [1.0, 0.0], [0.3, 0.9]])
+
+
+def sides():
+    """The sides of the triangle."""
+    side = np.empty((3, 3))
+    set_sides(BASE, side)
+    return side
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +148,7 @@ def test_auto_takes_the_two_scale_law_in_light_sections_alone(pack):
 
 def test_spheres_around_a_facet_leave_all_some_or_nothing():
     """Of a section whose third corner's sphere has ended."""
-    disc, side = np.array([0.3, 0.3, 1e-3]), sides_of(BASE)
+    disc, side = np.array([0.3, 0.3, 1e-3]), sides()
 
     def left(*spheres):
         rays, seen = bundles(3 + len(spheres))
@@ -239,7 +246,7 @@ def test_spheres_that_make_no_network_are_refused_or_left_to_the_other_law(pack)
 
 
 def test_a_fourth_disc_takes_all_some_or_nothing():
-    disc, side, corners = np.array([0.3, 0.2, 0.25]), sides_of(BASE), corner_room()
+    disc, side, corners = np.array([0.3, 0.2, 0.25]), sides(), corner_room()
     own, room = np.empty((6, 36)), np.empty(36)
     aim_corners(BASE, corners)
 

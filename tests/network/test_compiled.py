@@ -1,5 +1,6 @@
 """Compiled code is kept apart for every state of the sources."""
 
+import ast
 import os
 import subprocess
 import sys
@@ -136,3 +137,31 @@ def test_a_function_in_place_may_not_make_an_array():
     """Nobody would count who holds it, so it would never be given back."""
     with pytest.raises(numba.core.errors.NumbaError, match="array"):
         _first_of_new(np.ones(3))
+
+
+@module.compiled
+def _product_less(one, two, three):
+    return one * two - three
+
+
+@module.loops_in_place
+def _asked_by_loops(one, two, three):
+    return _product_less(one, two, three)
+
+
+def test_a_function_is_compiled_the_same_whoever_calls_it_first():
+    """Else it would keep the rounding of that caller, here and in later processes."""
+    one = 1.0 + 2.0**-30
+    rounded = one * one
+    assert _asked_by_loops(one, one, rounded) == 0.0
+    assert _product_less(one, one, rounded) == 0.0
+
+
+def test_no_function_in_place_returns_an_array(root):
+    """A caller that counts references would give it back too early."""
+    for path in (root / "fdnet/network").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                marks = {getattr(mark, "id", "") for mark in node.decorator_list}
+                if marks & {"compiled_in_place", "loops_in_place"}:
+                    assert "Array" not in ast.unparse(node.returns), f"{path.name}: {node.name}"

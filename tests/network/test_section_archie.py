@@ -189,3 +189,19 @@ def test_fines_that_come_leave_and_move_renew_the_throats_they_reach(pack, perio
     kept = full.without.sum(axis=1) / raised
     lost = damage.conductance[clean > 0] / clean[clean > 0]
     assert kept[clean > 0] == pytest.approx(lost, abs=0.01)
+
+
+def test_throats_in_several_parts_and_parts_kept_from_before_change_nothing(pack, monkeypatch):
+    network, fines = build_network(pack.grains(), periodic="yz"), pack.fines()
+    moved = replace(fines, position=fines.position + 0.05)
+    whole = measured_sections(network, fines)
+    monkeypatch.setattr(section_archie, "THROATS", 37)
+    kept = measured_sections(network, moved)
+    assert len(kept.parts) > 3
+    again = measured_sections(network, fines, parts=kept.parts)
+    for other in (again, kept.changed_to(fines), whole.changed_to(fines)):
+        assert np.array_equal(other.raised, whole.raised)
+        assert np.array_equal(other.without, whole.without)
+    assert whole.changed_to(fines).renewed == 0
+    none = kept.changed_to(fines.where(np.zeros(len(fines), bool)))
+    assert np.all(none.factor == 1.0)

@@ -10,7 +10,7 @@ from fdnet.errors import CaseError, NetworkError
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.named import LAWS
-from fdnet.network.laws.wall_cross_section import wall_cuts
+from fdnet.network.laws.wall_cross_section import LANES, wall_cuts, wall_fluxes
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse
@@ -212,3 +212,13 @@ def test_fines_beside_walls_that_hold_the_fluid_leave_less_of_it():
     pack = with_fines(random_pack(60, 0.5, periodic=False), 150, 0.2)
     analysis = analyse(pack.grains(), pack, periodic=NONE, options=AnalysisChoices.of_pack())
     assert 0.0 < analysis.k_damaged < analysis.k_initial
+
+
+def test_many_sections_at_once_are_those_asked_for_one_by_one():
+    """Whatever stands in the room before."""
+    place, table = np.array([1.0, 1.6, 2.1]), ratio_table()
+    discs = np.linspace(0.2, 1.0, 9), np.linspace(0.9, 0.1, 9)
+    flux = np.empty(9)
+    wall_fluxes(place, discs, (np.full((LANES, 9), np.nan), table), flux)
+    single = [wall_flux(place, *pair, table) for pair in zip(*discs, strict=True)]
+    assert flux == pytest.approx(single, rel=1e-13)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fdnet.network.compiled import compiled
+from fdnet.network.compiled import compiled, compiled_in_place
 from fdnet.spheres.snapshot import Array
 
 
@@ -36,7 +36,7 @@ def differences(value: Array, near: Array, weight: float) -> Array:
     return result
 
 
-@compiled
+@compiled_in_place
 def advance(solution: Array, residual: Array, length: float, along: Array, moved: Array) -> None:
     """Adds `length` times `along` to the solution, and takes as much of `moved` off the residual.
 
@@ -47,14 +47,14 @@ def advance(solution: Array, residual: Array, length: float, along: Array, moved
         residual[one] -= length * moved[one]
 
 
-@compiled
+@compiled_in_place
 def turn(along: Array, share: float, residual: Array) -> None:
     """`share` of the direction `along` (M,), plus the `residual` (M,), in place of the former."""
     for one in range(len(along)):
         along[one] = share * along[one] + residual[one]
 
 
-@compiled
+@compiled_in_place
 def put(grid: Array, node: Array, force: Array) -> None:
     """Sets a flat `grid` to the `force` (M,) at the nodes."""
     for one in range(len(node)):

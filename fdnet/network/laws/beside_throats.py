@@ -10,7 +10,7 @@ from fdnet.network.fines.fine_images import mirrored_images
 from fdnet.network.fines.point_search import points_in_boxes
 from fdnet.network.geometry import dot, flat
 from fdnet.network.laws.facet_axes import facet_axes
-from fdnet.network.laws.section_rays import inwards, sides_of
+from fdnet.network.laws.section_rays import inwards, set_sides
 from fdnet.network.network import Network
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, frozen
@@ -65,7 +65,7 @@ def prisms_of(network: Network, part: slice) -> Prisms:
         len(facet), 6, 3
     )
     return Prisms(
-        origin=facet[:, 0],
+        origin=facet[:, 0].copy(),
         axes=axes,
         base=flat(facet),
         height=np.sort(height, axis=1),
@@ -126,12 +126,12 @@ def _reaching(base: Array, height: Array, throat: Array, place: Array) -> Array:
     The triangles are `base` (K, 3, 2) m, `throat` (N,) says which, and `place` (N, 5) is that of
     `FinesBeside`.
     """
-    real = np.empty(len(throat), np.bool_)
+    real, side = np.empty(len(throat), np.bool_), np.empty((3, 3))
     for n in range(len(throat)):
         t, x, y, z, r = throat[n], place[n, 0], place[n, 1], place[n, 2], place[n, 3]
         real[n] = height[t, 0] - r < z < height[t, 1] + r
         if real[n]:
-            side = sides_of(base[t])
+            set_sides(base[t], side)
             for i in range(3):
                 real[n] = real[n] and inwards(base[t], side, i, x, y) > -r
     return real

@@ -167,7 +167,10 @@ def touching_fluxes(
 
 @loops_in_place
 def _set_edges(base: Array, edges: Array) -> None:
-    """From each corner to the two others (6, 4): unit vector, length m, sense of the third."""
+    """Sets `edges` (6, 4), from each corner to the two others: unit vector, length m, sense.
+
+    The sense is 1 where the third corner lies to the left, else -1.
+    """
     for i in range(3):
         for step in (1, 2):
             j, k = (i + step) % 3, (i + 3 - step) % 3

@@ -31,13 +31,13 @@ LEAST = 1e-2
 """Smallest radius of the disc of a cut grain in a section, in radii of the grain."""
 
 CutRoom = tuple[Array, Array, Array]
-"""Room for the sides (3, 3) of a facet (`sides_of`), the rays (6, 36) of a disc, and for two times
-three discs (2, 3, 3)."""
+"""Room for the sides (3, 3) of a facet (`set_sides`), the rays (6, 36) of a disc, and for twice
+three discs (2, 3, 3). Whoever uses it sets it first: its numbers do not last from call to call."""
 
 
 @compiled
 def cut_room() -> CutRoom:
-    """Room for `share_of_cut`."""
+    """Room for the discs of cut grains, for a fourth disc, or for discs of fines."""
     return np.empty((3, 3)), np.empty((6, 3 * RAYS)), np.empty((2, 3, 3))
 
 

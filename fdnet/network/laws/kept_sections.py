@@ -23,7 +23,7 @@ class KeptSections:
 
     Attributes:
         network: pores and throats.
-        parts: its throats, ready for fines.
+        parts: what does not depend on the fines, of its throats.
         fines: at the places for which the resistances hold.
         without: (T, 2) 1/m3, without the fines; see `fine_resistances`.
         raised: (T, 2) 1/m3, with them.

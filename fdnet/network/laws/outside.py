@@ -157,7 +157,7 @@ def share_around(
 
     Args:
         base: (3, 2) m, corners of the facet.
-        side: what `section_rays.sides_of` gives for it.
+        side: what `section_rays.set_sides` sets for it.
         discs: how many discs the section meets, and which (`meet`).
         bundle: the rays of all discs of the facet, or room for them.
         table: the table of `shear_ratio`.

@@ -9,7 +9,7 @@ the discs, so they are set up once for all sections of a throat.
 
 import numpy as np
 
-from fdnet.network.compiled import compiled_for_loops, loops_in_place
+from fdnet.network.compiled import loops_in_place
 from fdnet.network.laws.elementary import log_of
 from fdnet.network.laws.rays import FINE_POINTS, FINE_WEIGHTS, midway
 from fdnet.network.laws.wedge import shear_ratio
@@ -25,17 +25,12 @@ UNTOUCHED, NARROWED, SWALLOWED = 0, 1, 2
 """What another disc does to the rays of a disc."""
 
 
-@compiled_for_loops
-def sides_of(base: Array) -> Array:
-    """Of each side (3, 3) of a triangle `base` (3, 2) m its unit normal inwards and length m."""
-    side = np.empty((3, 3))
-    set_sides(base, side)
-    return side
-
-
 @loops_in_place
 def set_sides(base: Array, side: Array) -> None:
-    """Sets `side` (3, 3) to what `sides_of` gives."""
+    """Sets `side` (3, 3): of each side of a triangle `base` (3, 2) m its normal inwards, length m.
+
+    The normal is a unit vector.
+    """
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         ex, ey = base[j, 0] - base[i, 0], base[j, 1] - base[i, 1]
@@ -56,7 +51,7 @@ def inwards(base: Array, side: Array, i: int, x: float, y: float) -> float:
 def aim(base: Array, side: Array, x: float, y: float, rays: Array) -> int:
     """Sets up the rays of a disc centred at `x`, `y` m, and gives their number.
 
-    `side` is what `sides_of` gives. The rows of `rays` (6, 36) are the direction, where a ray
+    `side` is what `set_sides` sets. The rows of `rays` (6, 36) are the direction, where a ray
     meets the far side and where it enters the triangle, m, its angle rad, and room.
     """
     depth = (_depth(base, side, 0, x, y), _depth(base, side, 1, x, y), _depth(base, side, 2, x, y))

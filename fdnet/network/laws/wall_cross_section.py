@@ -87,7 +87,7 @@ def wall_fluxes(
     """Writes the flux (K,) m4 of laplacian(w) = -1 between the wall and two discs in K sections.
 
     `place` (3,) m are the heights of their centres above the wall and their distance along it,
-    `discs` (K,) m their radii. `room` is that for `LANES` numbers a section, and the table of
+    `discs` (K,) m their radii. `room` is that (`LANES`, K) for the sections, and the table of
     `shear_ratio`.
     """
     lanes, table = room
@@ -124,6 +124,7 @@ def wall_fluxes(
 def _set_meeting(place: Array, discs: tuple[Array, Array], lanes: Array) -> None:
     """Sets where the two parabolas meet: m along the wall from the first foot, and m above it.
 
+    These are the first two rows of `lanes` (`LANES`, K).
     That is the centre of the circle that touches both discs and the wall. Where the parabolas do
     not meet, it is the place midway along the wall.
     """
@@ -150,8 +151,8 @@ def _set_shares(
     """Sets the flux (K,) m4 on the rays of a disc between two angles from the normal of the wall.
 
     A ray ends at the nearest line midway, or at the far side of the trapezoid. `discs` (K,) m are
-    the radii, `turns` (K,) rad the angles; `across` m is the height of the disc, its distance from
-    the other along the wall and in all, and how much higher it is over the latter.
+    the radii, `turns` (K,) rad the angles. `across` is the height m of the disc, its distance m
+    from the other along the wall and in all, and the sine of the slope from the other up to it.
     """
     height, far, apart, upright = across
     disc, other = discs

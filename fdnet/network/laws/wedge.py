@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.network.compiled import compiled
+from fdnet.network.compiled import loops_in_place
 from fdnet.spheres.snapshot import Array
 
 TABLE = Path(__file__).with_name("wedge.csv")
@@ -30,7 +30,7 @@ THINNEST = 0.02
 """Smallest disc, rho / h, for which the ratio is computed."""
 
 
-@compiled
+@loops_in_place
 def ray_flux(angle: float, slope: float, disc: float) -> float:
     """Flux over h^4 of a wedge of `angle` rad with the tangent `slope`, for `disc` = rho / h.
 
@@ -47,14 +47,14 @@ def ray_flux(angle: float, slope: float, disc: float) -> float:
     return whole - _antiderivative(first, np.sqrt(disc * disc - 1.0), disc)
 
 
-@compiled
+@loops_in_place
 def _antiderivative(angle: float, slope: float, disc: float) -> float:
     constant, of_log = ray_parts(angle, slope)
     square = disc * disc
     return constant - of_log * np.log(disc) + square * (4.0 * slope - square * angle) / 16.0
 
 
-@compiled
+@loops_in_place
 def ray_parts(angle: float, slope: float) -> tuple[float, float]:
     """The parts C and D of a flux over h^4 for rho <= h, which depend on the wedge alone.
 
@@ -67,19 +67,19 @@ def ray_parts(angle: float, slope: float) -> tuple[float, float]:
     return (4.0 * spread - 3.0 * secant4) / 16.0, 0.25 * secant4
 
 
-@compiled
+@loops_in_place
 def shear_ratio(angle: float, disc: float, table: Array) -> float:
     """exact_flux / ray_flux, bilinear in `table`; steeper wedges take its last row."""
     return ratio_in_row(table_row(angle), disc, table)
 
 
-@compiled
+@loops_in_place
 def table_row(angle: float) -> float:
     """The row of the table of `shear_ratio` for an angle, with its fraction."""
     return min(angle / STEEPEST, 1.0) * (len(ANGLES) - 1)
 
 
-@compiled
+@loops_in_place
 def ratio_in_row(row: float, disc: float, table: Array) -> float:
     """The ratio of `shear_ratio` at a row that `table_row` gives."""
     rows, columns = table.shape

@@ -73,6 +73,7 @@ def _set_pierced(
     more: tuple[Array, Array],
     pierced: Array,
 ) -> None:
+    """Sets which open facets (T,) a grain of their two tetrahedra or of a neighbour pierces."""
     vertex, beyond, turn = tetrahedra
     corner, pore, opposite, shift = facets
     open_facet, size = more

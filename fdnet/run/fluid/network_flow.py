@@ -173,7 +173,7 @@ class Renewal:
         renewed: share of the deposit that may change before the network is solved anew.
         solved: the fines of the last solve; None before the first.
         deposit: the fines as they were measured last.
-        parts: of the throats, ready for fines; None before the first solve.
+        parts: what does not depend on the fines, of the throats; None before the first solve.
         sections: of the throats, as they were at the last solve.
         carried: what the last solve gave.
         solves: number of solves.

@@ -98,6 +98,7 @@ def _time_step(table: Lookup) -> dict[str, str]:
         "energy_drift": percent(longest.error, 2),
         "step_means": str(len(invaded)),
         "step_standing_out": str(len(standing_out(invaded))),
+        "step_by_chance": f"{0.05 * len(invaded):.1g}",
     }
 
 
