@@ -137,14 +137,17 @@ class _CheckedFile(IndexDataCacheFile):
         return hashlib.sha256(name.encode() + b"\0" + body).digest()
 
 
+_PLAIN: dict[str, Any] = {"_nrt": True, "error_model": "python", "fastmath": False}
+"""Where these are not given, numba takes them from the function that makes the first call."""
+
+
 def compiled(function: Any, **options: Any) -> Any:
     """The function, compiled by numba when it is first called, with its code kept on disk.
 
     `options` are those of numba's compiler.
     """
     try:
-        # where they are not given, numba takes them from the function that calls this one first
-        options = {"_nrt": True, "error_model": "python", "fastmath": False} | options
+        options = _PLAIN | options
         result: Any = numba.njit(cache=True, **options)(function)
         files = result._cache._cache_file
         result._cache._cache_file = _CheckedFile(
