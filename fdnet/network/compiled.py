@@ -139,6 +139,7 @@ class _CheckedFile(IndexDataCacheFile):
 
 _PLAIN: dict[str, Any] = {"_nrt": True, "error_model": "python", "fastmath": False}
 """Where these are not given, numba takes them from the function that makes the first call."""
+_LOOPS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 
 
 def compiled(function: Any, **options: Any) -> Any:
@@ -146,8 +147,8 @@ def compiled(function: Any, **options: Any) -> Any:
 
     `options` are those of numba's compiler.
     """
+    options = _PLAIN | options
     try:
-        options = _PLAIN | options
         result: Any = numba.njit(cache=True, **options)(function)
         files = result._cache._cache_file
         result._cache._cache_file = _CheckedFile(
@@ -165,7 +166,7 @@ def compiled_for_loops(function: Any) -> Any:
     A division by 0 gives an infinite number or none and does not end the function, and a product
     that is added may be rounded once instead of twice.
     """
-    return compiled(function, error_model="numpy", fastmath={"contract"})
+    return compiled(function, **_LOOPS)
 
 
 def compiled_in_place(function: Any) -> Any:
@@ -179,7 +180,7 @@ def compiled_in_place(function: Any) -> Any:
 
 def loops_in_place(function: Any) -> Any:
     """`compiled_for_loops` for a function that may do what `compiled_in_place` says."""
-    return compiled(function, error_model="numpy", fastmath={"contract"}, _nrt=False)
+    return compiled(function, **_LOOPS, _nrt=False)
 
 
 def compiled_inline(function: Any) -> Any:
@@ -187,9 +188,7 @@ def compiled_inline(function: Any) -> Any:
 
     So it may return parts of the arrays that it is given. Only functions in place may call it.
     """
-    return compiled(
-        function, error_model="numpy", fastmath={"contract"}, _nrt=False, inline="always"
-    )
+    return compiled(function, **_LOOPS, _nrt=False, inline="always")
 
 
 def _bits_of(_: Any, number: Any) -> Any:

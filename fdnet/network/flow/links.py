@@ -103,12 +103,11 @@ def _cut_links(network: Network, conductance: Array, low: float, high: float) ->
     """Open throats with a part between the planes; those that cross a plane are cut there."""
     turned = np.flatnonzero(network.throat_shift[:, 0] != 0)
     throat = np.concatenate([np.arange(len(conductance)), turned])
+    length = network.box[0, 1] - network.box[0, 0]
     x = network.pore_position[:, 0][network.throat_pores[throat]]
-    x[:, 1] += network.throat_shift[throat, 0] * (network.box[0, 1] - network.box[0, 0])
+    x[:, 1] += network.throat_shift[throat, 0] * length
     # a throat across a periodic x face appears at both ends of the box
-    x[len(conductance) :] -= (
-        network.throat_shift[turned, 0] * (network.box[0, 1] - network.box[0, 0])
-    )[:, None]
+    x[len(conductance) :] -= (network.throat_shift[turned, 0] * length)[:, None]
     place = _places(network, x, low, high)
     group = network.pore_group[network.throat_pores[throat]]
     on_planes = place != BETWEEN

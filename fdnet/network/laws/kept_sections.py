@@ -5,7 +5,7 @@ throats that a changed fine reaches, at its former place or at its new one, are 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -63,9 +63,8 @@ class KeptSections:
             np.where(reached[:, None], now, before)
             for now, before in zip(both, (self.without, self.raised), strict=True)
         )
-        return KeptSections(
-            network=self.network,
-            parts=self.parts,
+        return replace(
+            self,
             fines=fines,
             without=frozen(without),
             raised=frozen(raised),

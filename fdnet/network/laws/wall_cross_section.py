@@ -124,9 +124,9 @@ def wall_fluxes(
 def _set_meeting(place: Array, discs: tuple[Array, Array], lanes: Array) -> None:
     """Sets where the two parabolas meet: m along the wall from the first foot, and m above it.
 
-    These are the first two rows of `lanes` (`LANES`, K).
     That is the centre of the circle that touches both discs and the wall. Where the parabolas do
-    not meet, it is the place midway along the wall.
+    not meet, it is the place midway along the wall. The two numbers are the first two rows of
+    `lanes` (`LANES`, K).
     """
     along, above = lanes[0], lanes[1]
     first, second = discs

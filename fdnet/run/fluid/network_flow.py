@@ -22,7 +22,7 @@ from fdnet.network.flow.flow import Flow, solve_flow
 from fdnet.network.laws.kept_sections import KeptSections, measured_sections
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.named import LAWS
-from fdnet.network.laws.section_archie import Part
+from fdnet.network.laws.section_archie import Part, parts_of
 from fdnet.network.network import Network, build_network
 from fdnet.run.fluid.pressed import Facets, Pressed, facets_of, pressed_by
 from fdnet.spheres.images import neighbour_tree, wrapped
@@ -70,6 +70,7 @@ class PackFlow:
         halves: (T, 2) 1/m3, resistances of the sides of the clean throats; 0 where infinite.
         facets: of the throats.
         holders: the pores, which hold the deposit.
+        parts: what the damage of the throats needs and does not depend on the fines.
         flow: through the clean network.
         through: (P,) share of the inflow that each pore carries.
         shape: resolved velocity field of the grains.
@@ -81,6 +82,7 @@ class PackFlow:
     halves: Array
     facets: Facets
     holders: Holders
+    parts: Sequence[Part]
     flow: Flow
     through: Array
     shape: VelocityField
@@ -140,6 +142,7 @@ def pack_flow(grains: Snapshot, periodic: tuple[bool, bool, bool], walls: str) -
         halves=np.where(np.isfinite(halves), halves, 0.0),
         facets=facets_of(network),
         holders=holders_of(network),
+        parts=tuple(parts_of(network)),
         flow=flow,
         through=pore_through(network, flow),
         shape=velocity_field(grains, periodic=periodic, cells=CELLS, tolerance=SLIP),
@@ -173,7 +176,6 @@ class Renewal:
         renewed: share of the deposit that may change before the network is solved anew.
         solved: the fines of the last solve; None before the first.
         deposit: the fines as they were measured last.
-        parts: what does not depend on the fines, of the throats; None before the first solve.
         sections: of the throats, as they were at the last solve.
         carried: what the last solve gave.
         solves: number of solves.
@@ -183,7 +185,6 @@ class Renewal:
     renewed: float = RENEWED
     solved: Snapshot | None = None
     deposit: KeptDeposit | None = None
-    parts: Sequence[Part] | None = None
     sections: KeptSections | None = None
     carried: Carried | None = None
     solves: int = 0
@@ -199,11 +200,10 @@ class Renewal:
         if self.carried is None or changed_share(self.solved, inside) > self.renewed:
             fines = self.deposit.fines
             self.sections = (
-                measured_sections(self.pack.network, fines, parts=self.parts)
+                measured_sections(self.pack.network, fines, parts=self.pack.parts)
                 if self.sections is None
                 else self.sections.changed_to(fines)
             )
-            self.parts = self.sections.parts
             self.carried = self.pack.carried(self.sections.factor, self.deposit.in_pores)
             self.solved, self.solves = inside, self.solves + 1
         return self.carried, self.deposit
