@@ -12,6 +12,7 @@ from fdnet.network.laws.beside_throats import FineImages, prisms_of
 from fdnet.network.laws.kept_sections import measured_sections
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
+from fdnet.network.laws.nodes import node_heights
 from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse
 from fdnet.spheres.snapshot import Kind
@@ -44,7 +45,9 @@ def test_a_throat_meets_the_fines_whose_bodies_reach_into_its_prism(network, pac
     """Places in the prisms are tried one by one, against all images of all fines."""
     fines, size = pack.fines(), np.ptp(network.box, axis=1)
     part, rng = slice(0, 25), np.random.default_rng(3)
-    beside = FineImages(network, fines.position, fines.radius).beside(prisms_of(network, part))
+    beside = FineImages(network, fines.position, fines.radius).beside(
+        prisms_of(network, part, node_heights(network)[part])
+    )
     sides = [np.array([0.0, y, z]) * size for y in (-1, 0, 1) for z in (-1, 0, 1)]
     mirrored = [fines.position * (-1.0, 1.0, 1.0) + (2.0 * x, 0, 0) for x in network.box[0]]
     image = np.concatenate([one + side for one in (fines.position, *mirrored) for side in sides])
@@ -53,7 +56,7 @@ def test_a_throat_meets_the_fines_whose_bodies_reach_into_its_prism(network, pac
         corner = network.image_position[network.throat_images[t]]
         normal = np.cross(corner[1] - corner[0], corner[2] - corner[0])
         normal /= np.linalg.norm(normal)
-        height = rng.uniform(*np.sort(network.throat_heights[t] * (-1.0, 1.0)), 1500)
+        height = rng.uniform(*np.sort(node_heights(network)[t] * (-1.0, 1.0)), 1500)
         near = np.linalg.norm(image - corner.mean(axis=0), axis=1) < 4.0
         own = beside.place[beside.first[t] : beside.first[t + 1], 2]
         both = []

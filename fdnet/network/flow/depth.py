@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.network.flow.flow import Flow
+from fdnet.network.laws.nodes import node_heights, pore_nodes
 from fdnet.network.network import Network
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, frozen
@@ -53,7 +54,7 @@ def layer_edges(box: Array, thickness: float) -> Array:
 def depth_pressures(network: Network, flow: Flow, halves: Array, planes: Array) -> Array:
     """Flux-weighted mean pressure (n,) on `planes` (n,) m: 1 on the low x face, 0 on the high.
 
-    The pressure falls from the first power centre to the facet by the first of the resistances
+    The pressure falls from the first node (`nodes`) to the facet by the first of the resistances
     `halves` (T, 2) 1/m3 of a throat, and from there to the second by the other. Most of a throat's
     drop is in its neck, so this places it where it is; `slabs.plane_pressures` spreads it evenly.
     Where x is periodic the pressure is 1 on the low face and falls by 1 per period.
@@ -77,11 +78,11 @@ def depth_pressures(network: Network, flow: Flow, halves: Array, planes: Array) 
 def _pieces(network: Network, flow: Flow, halves: Array) -> tuple[Array, Array, Array]:
     """The two pieces of each throat with flux: ends (K, 2) m along x, pressures (K, 2), flux (K,).
 
-    Both ends of a throat whose power centres lie on one side of its facet make one piece.
+    Both ends of a throat whose nodes lie on one side of its facet make one piece.
     """
     use = np.flatnonzero(flow.throat_flux != 0)
-    pores, heights = network.throat_pores[use], network.throat_heights[use]
-    x = network.pore_power_centre[pores, 0]
+    pores, heights = network.throat_pores[use], node_heights(network)[use]
+    x = pore_nodes(network)[0][pores, 0]
     x[:, 1] += network.throat_shift[use, 0] * float(np.ptp(network.box[0]))
     if not network.periodic[0]:
         x = np.clip(x, *network.box[0])

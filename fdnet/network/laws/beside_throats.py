@@ -18,7 +18,7 @@ from fdnet.spheres.snapshot import Array, frozen
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class FinesBeside:
-    """Fines that reach into the prisms of K throats, from power centre to power centre.
+    """Fines that reach into the prisms of K throats, from node to node.
 
     Attributes:
         first: (K+1,) the first fine of each throat, and their number N at the end.
@@ -35,7 +35,7 @@ class FinesBeside:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Prisms:
-    """The prisms of K throats, from power centre to power centre.
+    """The prisms of K throats, from node to node.
 
     Attributes:
         origin: (K, 3) m, the first corner of each facet.
@@ -56,11 +56,11 @@ class Prisms:
     __repr__ = one_line
 
 
-def prisms_of(network: Network, part: slice) -> Prisms:
-    """The prisms of the throats `part`."""
+def prisms_of(network: Network, part: slice, heights: Array) -> Prisms:
+    """The prisms of the throats `part` (K), whose nodes are `heights` (K, 2) m above the facet."""
     facet = network.image_position[network.throat_images[part]]
     axes = facet_axes(network, np.arange(part.start, part.stop), facet)
-    height = network.throat_heights[part] * (-1.0, 1.0)
+    height = heights * (-1.0, 1.0)
     ends = (facet[:, None] + (height[:, :, None] * axes[2][:, None])[:, :, None]).reshape(
         len(facet), 6, 3
     )

@@ -84,7 +84,7 @@ def series_law(network: Network, *, weight: float = INSCRIBED_WEIGHT) -> Array:
 
 
 def lubrication_law(network: Network) -> Array:
-    """One over the resistance between the power centres, by extended lubrication theory.
+    """One over the resistance between the nodes of pores, by extended lubrication theory.
 
     No constant is fitted; see `lubrication` for the theory and its sources.
     """

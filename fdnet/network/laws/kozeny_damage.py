@@ -47,7 +47,7 @@ class Sides:
         wall: (T, 2) m2, grain surface likewise.
         single: (T,) whether both power centres lie on one side of the facet.
         own: (T, 2) whether the side can be taken by itself.
-        resistance: (T, 2) 1/m3, from the facet to the power centre; 0 where it is infinite.
+        resistance: (T, 2) 1/m3, from the facet to the node; 0 where it is infinite.
         tube: m, twice the hydraulic radius of the pack.
     """
 
@@ -82,9 +82,9 @@ def side_kozeny_damage(
 ) -> Damage:
     """Local Kozeny factor of each side of a throat: f = (1 - s v)^3 / (1 + a)^2.
 
-    The sides are the pyramids from the facet to the power centres. Their clean resistances are R1
-    and R2 (`half_resistances`), so the throat keeps (R1 + R2) / (R1 / f1 + R2 / f2) of its clean
-    conductance. Nothing is fitted.
+    The sides are the pyramids from the facet to the power centres. The clean resistances to the
+    nodes on either side are R1 and R2 (`half_resistances`), so the throat keeps
+    (R1 + R2) / (R1 / f1 + R2 / f2) of its clean conductance. Nothing is fitted.
 
     v and a are volume and surface of the fines over those of void and grains, as in
     `kozeny_damage`. They are taken in the side where a fine is much smaller than a quarter of the

@@ -27,6 +27,7 @@ from fdnet.network.compiled import compiled_for_loops, compiled_inline, loops_in
 from fdnet.network.laws.cross_section import set_wedges
 from fdnet.network.laws.cut_grains import cut_corners, share_of_cut
 from fdnet.network.laws.fourth_grain import fourth_grains
+from fdnet.network.laws.nodes import node_heights
 from fdnet.network.laws.open_sections import (
     SectionRoom,
     Throat,
@@ -58,11 +59,11 @@ their places, and its share in the box; of x faces the corners (3, 4) of `cut_co
 def half_resistances(
     network: Network, *, widening: float = WIDENING, fourth: bool = False
 ) -> Array:
-    """Resistance (T, 2) 1/m3 of each throat from its facet to the power centre on either side.
+    """Resistance (T, 2) 1/m3 of each throat from its facet to the node on either side.
 
-    Viscosity is factored out. A throat with both centres on one side of its facet is a resistance
-    on that side alone. A closed throat has an infinite one. Heights whose sum is below 1e-3 mean
-    grain radii are taken as that.
+    Viscosity is factored out. Where a node lies on the facet (`nodes`), the throat is a resistance
+    on the other side alone, and so it is where both nodes lie on one side. A closed throat has an
+    infinite one. Heights whose sum is below 1e-3 mean grain radii are taken as that.
 
     Args:
         network: pores and throats.
@@ -70,17 +71,17 @@ def half_resistances(
         fourth: whether the fourth grain of a tetrahedron, and those around, narrow the sections.
     """
     floor, table = LENGTH_FLOOR * network.grain_radius, ratio_table()
-    every = wall_cuts(network)
+    every, heights = wall_cuts(network), node_heights(network)
     resistance = np.empty((len(network.throat_pores), 2))
     around = Neighbourhood(network) if fourth else None
     for part in geometry.slices(len(resistance), THROATS):
         given = prepared(network, part, every)
         facet = network.image_position[network.throat_images[part]]
         beside = _beside(network, part, facet) if fourth else np.zeros((len(facet), 2, 5))
-        outside = _outside(around, part, facet)
+        outside = _outside(around, part, heights[part], facet)
         resistance[part] = _halves(
             given,
-            np.ascontiguousarray(network.throat_heights[part]),
+            np.ascontiguousarray(heights[part]),
             (floor, float(widening)),
             (beside, *outside, table),
         )
@@ -133,11 +134,13 @@ def _beside(network: Network, part: slice, corner: Array) -> Array:
     return np.concatenate([place, radius[..., None], flatness[..., None]], axis=2)
 
 
-def _outside(around: Neighbourhood | None, part: slice, corner: Array) -> tuple[Array, Array]:
+def _outside(
+    around: Neighbourhood | None, part: slice, heights: Array, corner: Array
+) -> tuple[Array, Array]:
     """The grains around (N, 5), as in `_beside`, and the first (K+1,) of each throat."""
     if around is None:
         return np.empty((0, 5)), np.zeros(len(corner) + 1, int)
-    near = around.near_facets(part)
+    near = around.near_facets(part, heights)
     throat = np.repeat(np.arange(len(corner)), np.diff(near.first))
     radius, flatness = _discs(around.network, near.image[:, None], corner[throat])
     return np.concatenate([near.place, radius, flatness], axis=1), near.first
@@ -200,7 +203,7 @@ def throat_at(given: Prepared, t: int, room: SectionRoom) -> tuple[Throat, Faces
 def spans_of(heights: Array, floor: float) -> tuple[Span, Span]:
     """The spans (`set_fluxes`) of the sides of the first and the second pore.
 
-    `heights` (2,) m are those of the power centres above the facet, each on its side. Their sum is
+    `heights` (2,) m are those of the nodes above the facet, each on its side. Their sum is
     taken as `floor` m where it is less. A side that the throat does not have ends at 0 or below.
     """
     low, high = -heights[0], heights[1]

@@ -23,7 +23,7 @@ from fdnet.network.laws.wall_cross_section import LANES
 from fdnet.spheres.snapshot import Array
 
 STEPS = 8
-"""Steps in height between the facet and a power centre."""
+"""Steps in height between the facet and a node."""
 TIP = 1e-2
 """Smallest radius of the disc that a grain shows in a section, in radii of the grain."""
 SectionRoom = tuple[

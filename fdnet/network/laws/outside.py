@@ -1,9 +1,9 @@
 """The spheres around the facet of a throat, for the sections that one of its spheres misses.
 
-Among unequal spheres a power centre often lies farther from a facet than its smallest sphere
-reaches. Sections between the two have no disc on that corner, so the triangle is open there: no
-sphere of the facet holds the fluid on that side, but the spheres around it do. Without them the
-throats of a light deposit of fine fines carry 2 to 16 times too much.
+Among unequal spheres a node often lies farther from a facet than its smallest sphere reaches.
+Sections between the two have no disc on that corner, so the triangle is open there: no sphere of
+the facet holds the fluid on that side, but the spheres around it do. Without them the throats of a
+light deposit of fine fines carry 2 to 16 times too much.
 
 The flow through such a section is multiplied by the share that the spheres around leave of it.
 Both fluxes are summed over rays (`section_rays`). Adding a solid never adds flow, so the share is
@@ -62,14 +62,14 @@ class Neighbourhood:
         self._kinds = [np.nonzero(size == one)[0] for one in np.unique(size)]
         self._trees = [cKDTree(network.image_position[kind]) for kind in self._kinds]
 
-    def near_facets(self, part: slice) -> Around:
+    def near_facets(self, part: slice, heights: Array) -> Around:
         """The spheres around the throats `part` (K) that have sections beyond a sphere's reach.
 
-        They are those nearer to the centroid of the facet than its farthest corner or power
-        centre. The spheres of the facet are not among them.
+        They are those nearer to the centroid of the facet than its farthest corner or node, which
+        are `heights` (K, 2) m above it. The spheres of the facet are not among them.
         """
         network = self.network
-        images, heights = network.throat_images[part], network.throat_heights[part]
+        images = network.throat_images[part]
         low = np.minimum(network.image_radius, network.image_height)[images].min(axis=1)
         open_row = np.nonzero(low < np.abs(heights).max(axis=1))[0]
         facet = network.image_position[images[open_row]]

@@ -34,6 +34,7 @@ from fdnet.network.laws.lubrication import (
     spans_of,
     throat_at,
 )
+from fdnet.network.laws.nodes import node_heights
 from fdnet.network.laws.open_sections import SectionRoom, forget, section_room
 from fdnet.network.laws.outside import meet, share_around
 from fdnet.network.laws.section_rays import set_sides
@@ -48,7 +49,7 @@ EXPONENT = 1.3
 STEP = 1.0 / 8.0
 """Greatest step between two sections, in radii of the smallest fine in the throat."""
 LEAST_STEPS = 8
-"""Smallest number of steps between a facet and a power centre."""
+"""Smallest number of steps between a facet and a node."""
 MOST_STEPS = 512
 """Largest number of them, enough for fines of a fiftieth of a grain. Throats with smaller fines
 are counted."""
@@ -86,7 +87,7 @@ class Part:
         throats: their place among all throats.
         prisms: in which fines are looked for.
         given: of their sections, as `prepared` gives it.
-        heights: (K, 2) m of the power centres above the facets.
+        heights: (K, 2) m of the nodes above the facets.
     """
 
     throats: slice
@@ -99,13 +100,13 @@ class Part:
 
 def parts_of(network: Network) -> Iterator[Part]:
     """All throats of a network, part by part."""
-    walls = wall_cuts(network)
+    walls, heights = wall_cuts(network), node_heights(network)
     for part in geometry.slices(len(network.throat_pores), THROATS):
         yield Part(
             throats=part,
-            prisms=prisms_of(network, part),
+            prisms=prisms_of(network, part, heights[part]),
             given=prepared(network, part, walls),
-            heights=np.ascontiguousarray(network.throat_heights[part]),
+            heights=np.ascontiguousarray(heights[part]),
         )
 
 

@@ -1,0 +1,155 @@
+"""Nodes: the places from which the resistances of a pore's throats are counted.
+
+The node of a pore is its power centre, where that lies in the tetrahedron of the pore. Where it
+lies outside, the node is the point of the tetrahedron that is nearest to it. So the way of the
+fluid from node to node leads through the facet, and each section in which it runs lies on the
+side of the tetrahedron that it runs through. Between power centres it does not: where both lie on
+one side of a facet, the way between them leaves the facet out. Along a chain of such tetrahedra,
+which a hole in a deposit is, the flow then meets next to no resistance.
+
+Pores of one polyhedron, such as those that a face of the box cuts, keep its power centre.
+"""
+
+import numpy as np
+
+from fdnet.network.compiled import compiled_for_loops, loops_in_place
+from fdnet.network.network import Network
+from fdnet.network.tessellation.tetrahedron import along, less, times
+from fdnet.spheres.snapshot import Array, frozen
+
+CORNERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])
+"""The corners of the facets of a tetrahedron, each facet opposite to one corner."""
+
+
+def pore_nodes(network: Network) -> tuple[Array, Array]:
+    """The places (P, 3) m of the nodes, and whether (P,) each was moved from the power centre."""
+    alone = np.bincount(network.pore_group)[network.pore_group] == 1
+    node, moved = np.array(network.pore_power_centre), np.zeros(len(alone), bool)
+    _move_inside(
+        (network.image_position, np.ptp(network.box, axis=1)),
+        (network.pore_images, network.pore_wrap, alone),
+        (node, moved),
+    )
+    return frozen(node), frozen(moved)
+
+
+def node_heights(network: Network) -> Array:
+    """Distances (T, 2) m of the nodes of both pores from the facet of each throat.
+
+    They are positive on the pore's own side of the facet. Only pores of a polyhedron with several
+    tetrahedra can have a negative one.
+    """
+    node, moved = pore_nodes(network)
+    height = np.array(network.throat_heights)
+    _set_heights(
+        (network.image_position, np.ptp(network.box, axis=1)),
+        (network.throat_images, network.throat_pores, network.throat_shift, network.pore_wrap),
+        (node, moved),
+        height,
+    )
+    return frozen(height)
+
+
+@compiled_for_loops
+def _move_inside(
+    points: tuple[Array, Array], pores: tuple[Array, Array, Array], out: tuple[Array, Array]
+) -> None:
+    """Moves the nodes of pores that stand alone into their tetrahedra, and marks the moved."""
+    position, size = points
+    vertex, wrap, alone = pores
+    node, moved = out
+    corner, best, place = np.empty((4, 3)), np.empty(3), np.empty(3)
+    for p in range(len(node)):
+        if not alone[p]:
+            continue
+        for k in range(4):
+            for axis in range(3):
+                corner[k, axis] = position[vertex[p, k], axis] - wrap[p, axis] * size[axis]
+        nearest = np.inf
+        for k in range(4):
+            if _behind(corner, k, node[p]):
+                square = _set_nearest(corner, k, node[p], place)
+                if square < nearest:
+                    nearest = square
+                    best[:] = place
+        if nearest < np.inf:
+            moved[p] = True
+            node[p] = best
+
+
+@loops_in_place
+def _behind(corner: Array, k: int, place: Array) -> bool:
+    """Whether a place (3,) m and the corner `k` lie on different sides of the facet opposite."""
+    a, b, c = CORNERS[k, 0], CORNERS[k, 1], CORNERS[k, 2]
+    normal = times(less(corner, b, a), less(corner, c, a))
+    own = along(normal, less(corner, k, a))
+    to_place = (place[0] - corner[a, 0], place[1] - corner[a, 1], place[2] - corner[a, 2])
+    return along(normal, to_place) * own <= 0.0
+
+
+@loops_in_place
+def _set_nearest(corner: Array, k: int, place: Array, nearest: Array) -> float:
+    """Sets the point (3,) of a facet that is `nearest` to a place (3,) m; gives the distance m2.
+
+    The facet is the one opposite to the corner `k`. In the weights v and w of its second and third
+    corner, the regions of corners and edges are told apart by signs (Ericson 2005, section 5.1.5).
+    """
+    i, j, m = CORNERS[k, 0], CORNERS[k, 1], CORNERS[k, 2]
+    ab, ac = less(corner, j, i), less(corner, m, i)
+    ap = (place[0] - corner[i, 0], place[1] - corner[i, 1], place[2] - corner[i, 2])
+    bp = (place[0] - corner[j, 0], place[1] - corner[j, 1], place[2] - corner[j, 2])
+    cp = (place[0] - corner[m, 0], place[1] - corner[m, 1], place[2] - corner[m, 2])
+    d1, d2, d3 = along(ab, ap), along(ac, ap), along(ab, bp)
+    d4, d5, d6 = along(ac, bp), along(ab, cp), along(ac, cp)
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    if d1 <= 0.0 and d2 <= 0.0:
+        v, w = 0.0, 0.0
+    elif d3 >= 0.0 and d4 <= d3:
+        v, w = 1.0, 0.0
+    elif d6 >= 0.0 and d5 <= d6:
+        v, w = 0.0, 1.0
+    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        v, w = d1 / (d1 - d3), 0.0
+    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        v, w = 0.0, d2 / (d2 - d6)
+    elif va <= 0.0 and d4 >= d3 and d5 >= d6:
+        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+        v = 1.0 - w
+    else:
+        v, w = vb / (va + vb + vc), vc / (va + vb + vc)
+    square = 0.0
+    for axis in range(3):
+        nearest[axis] = corner[i, axis] + v * ab[axis] + w * ac[axis]
+        square += (nearest[axis] - place[axis]) ** 2
+    return square
+
+
+@compiled_for_loops
+def _set_heights(
+    points: tuple[Array, Array],
+    throats: tuple[Array, Array, Array, Array],
+    nodes: tuple[Array, Array],
+    height: Array,
+) -> None:
+    """Sets the heights (T, 2) m of nodes that were moved."""
+    position, size = points
+    facets, pores, shift, wrap = throats
+    node, moved = nodes
+    facet = np.empty((3, 3))
+    for t in range(len(facets)):
+        if not (moved[pores[t, 0]] or moved[pores[t, 1]]):
+            continue
+        for k in range(3):
+            for axis in range(3):
+                turn = wrap[pores[t, 0], axis] * size[axis]
+                facet[k, axis] = position[facets[t, k], axis] - turn
+        normal = times(less(facet, 1, 0), less(facet, 2, 0))
+        long = np.sqrt(along(normal, normal))
+        for side in range(2):
+            pore = pores[t, side]
+            if moved[pore]:
+                total = 0.0
+                for axis in range(3):
+                    turn = shift[t, axis] * side * size[axis]
+                    total += normal[axis] * (node[pore, axis] + turn - facet[0, axis])
+                height[t, side] = abs(total) / long
