@@ -88,6 +88,16 @@ CUTS: tuple[tuple[str, tuple[float, float], tuple[int, ...], str], ...] = (
     ("slabBN_r3_range_mu0", TWICE, MIDDLE, LATER),
     ("slabBO_r8_ranges", FACE, FINEST, LATER),
     ("slabBP_r4", TWICE, MIDDLE, LATER),
+    ("slabBQ_r5_followed", FACE, MIDDLE, LATER),
+    ("slabBR_r8", FACE, FINEST, LATER),
+    ("slabBS_r8_ranges", FACE, FINEST, LATER),
+    ("slabBT_r10", FACE, FINEST, LATER),
+    ("slabBU_r6", FACE, MIDDLE, LATER),
+    ("slabBV_r5_range", TWICE, MIDDLE, LATER),
+    ("slabBW_r3", TWICE, MIDDLE, LATER),
+    ("slabBX_r8_followed", FACE, FINEST, LATER),
+    ("slabBY_r5_mu0", TWICE, MIDDLE, LATER),
+    ("slabBZ_r4", TWICE, MIDDLE, LATER),
 )
 """Specimen, slab, grids, and whether its truth was known when the laws were shaped."""
 SLABS = {

@@ -217,6 +217,29 @@ SPECIMENS = {
         grain_mm=GRAIN_RANGE,
     ),
     "slabBP_r4": Specimen(seed=352, fine_mm=0.0625, supplied=200, friction=0.55, pack=35),
+    "slabBQ_r5_followed": Specimen(
+        seed=354, fine_mm=0.05, supplied=260, friction=0.55, pack=35, followed=True
+    ),
+    "slabBR_r8": Specimen(seed=355, fine_mm=0.03125, supplied=1000, friction=0.55, pack=36),
+    "slabBS_r8_ranges": Specimen(
+        seed=356,
+        fine_mm=[0.025, 0.0375],
+        supplied=1000,
+        friction=0.55,
+        pack=34,
+        grain_mm=GRAIN_RANGE,
+    ),
+    "slabBT_r10": Specimen(seed=357, fine_mm=0.025, supplied=1200, friction=0.55, pack=34),
+    "slabBU_r6": Specimen(seed=358, fine_mm=0.04167, supplied=350, friction=0.55, pack=36),
+    "slabBV_r5_range": Specimen(
+        seed=359, fine_mm=[0.04, 0.06], supplied=220, friction=0.3, pack=35
+    ),
+    "slabBW_r3": Specimen(seed=360, fine_mm=0.0833, supplied=70, friction=0.55, pack=35),
+    "slabBX_r8_followed": Specimen(
+        seed=361, fine_mm=0.03125, supplied=1000, friction=0.55, pack=35, followed=True
+    ),
+    "slabBY_r5_mu0": Specimen(seed=362, fine_mm=0.05, supplied=200, friction=0.0, pack=37),
+    "slabBZ_r4": Specimen(seed=363, fine_mm=0.0625, supplied=160, friction=0.55, pack=34),
 }
 """The specimens by name: r5 are fines of a fifth of a grain, mu0 is no friction, a range is one of
 radii (ranges: of grains too), a cake remains upstream of the face; followed: by the flow."""
