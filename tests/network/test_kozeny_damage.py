@@ -194,7 +194,7 @@ def test_fines_of_many_sizes_fill_as_each_alone(network, pack):
 
 
 def test_resistance_lies_on_the_side_of_the_centres_and_closed_throats_have_none(network):
-    resistance = half_resistances(network)
+    resistance = half_resistances(network, heights=network.throat_heights)
     for side in (0, 1):
         behind = network.throat_heights[:, side] < 0
         assert behind.any()

@@ -47,7 +47,7 @@ class Sides:
         wall: (T, 2) m2, grain surface likewise.
         single: (T,) whether both power centres lie on one side of the facet.
         own: (T, 2) whether the side can be taken by itself.
-        resistance: (T, 2) 1/m3, from the facet to the node; 0 where it is infinite.
+        resistance: (T, 2) 1/m3, from the facet to the power centre; 0 where it is infinite.
         tube: m, twice the hydraulic radius of the pack.
     """
 
@@ -61,11 +61,11 @@ class Sides:
     __repr__ = one_line
 
 
-def sides_of(network: Network, *, halves: Array | None = None) -> Sides:
-    """The sides of the throats; `halves` are their resistances (T, 2) where they are known."""
+def sides_of(network: Network) -> Sides:
+    """The sides of the throats."""
     single = np.any(network.throat_heights <= 0, axis=1)
     void, wall = (_joined(network, part, single) for part in side_voids(network))
-    clean = half_resistances(network) if halves is None else halves
+    clean = half_resistances(network, heights=network.throat_heights)
     cut = _on_pressure_plane(network)[network.throat_pores]
     return Sides(
         void=frozen(void),
@@ -77,14 +77,13 @@ def sides_of(network: Network, *, halves: Array | None = None) -> Sides:
     )
 
 
-def side_kozeny_damage(
-    network: Network, occupancy: Occupancy, clean: Array, *, halves: Array | None = None
-) -> Damage:
+def side_kozeny_damage(network: Network, occupancy: Occupancy, clean: Array) -> Damage:
     """Local Kozeny factor of each side of a throat: f = (1 - s v)^3 / (1 + a)^2.
 
-    The sides are the pyramids from the facet to the power centres. The clean resistances to the
-    nodes on either side are R1 and R2 (`half_resistances`), so the throat keeps
-    (R1 + R2) / (R1 / f1 + R2 / f2) of its clean conductance. Nothing is fitted.
+    The sides are the pyramids from the facet to the power centres. Their clean resistances are R1
+    and R2: `half_resistances` with the heights of these centres, so that they belong to the same
+    sides as the fines. The throat keeps (R1 + R2) / (R1 / f1 + R2 / f2) of its clean conductance.
+    Nothing is fitted.
 
     v and a are volume and surface of the fines over those of void and grains, as in
     `kozeny_damage`. They are taken in the side where a fine is much smaller than a quarter of the
@@ -100,10 +99,9 @@ def side_kozeny_damage(
     deeper inside a grain than their radius make no layer (`layers_within_grains`, t = 0) and count
     by their surface alone.
 
-    A side or pore that its fines fill (v >= 1) is closed and counted. `halves` are the clean
-    resistances (T, 2) of the sides where they are known already.
+    A side or pore that its fines fill (v >= 1) is closed and counted.
     """
-    sides = sides_of(network, halves=halves)
+    sides = sides_of(network)
     factor, volume, counts = _side_factors(network, occupancy, sides)
     kept = _kept(sides.resistance, factor)
     law = _law_used(np.any(volume > 0, axis=1), kept)

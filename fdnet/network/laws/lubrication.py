@@ -57,7 +57,11 @@ their places, and its share in the box; of x faces the corners (3, 4) of `cut_co
 
 
 def half_resistances(
-    network: Network, *, widening: float = WIDENING, fourth: bool = False
+    network: Network,
+    *,
+    widening: float = WIDENING,
+    fourth: bool = False,
+    heights: Array | None = None,
 ) -> Array:
     """Resistance (T, 2) 1/m3 of each throat from its facet to the node on either side.
 
@@ -69,9 +73,10 @@ def half_resistances(
         network: pores and throats.
         widening: the factor of da^2 in the formula of this module.
         fourth: whether the fourth grain of a tetrahedron, and those around, narrow the sections.
+        heights: (T, 2) m, of where the sides end above the facet; of the nodes if None.
     """
     floor, table = LENGTH_FLOOR * network.grain_radius, ratio_table()
-    every, heights = wall_cuts(network), node_heights(network)
+    every, heights = wall_cuts(network), node_heights(network) if heights is None else heights
     resistance = np.empty((len(network.throat_pores), 2))
     around = Neighbourhood(network) if fourth else None
     for part in geometry.slices(len(resistance), THROATS):
