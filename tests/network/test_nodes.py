@@ -8,8 +8,8 @@ from scipy.optimize import minimize
 
 from fdnet.network.flow.slabs import whole_permeability
 from fdnet.network.laws.lubrication import half_resistances
-from fdnet.network.laws.nodes import node_heights, pore_nodes
 from fdnet.network.network import build_network
+from fdnet.network.nodes import node_heights, pore_nodes
 from tests.network.packs import random_pack, simple_cubic
 
 ALL = (True,) * 3

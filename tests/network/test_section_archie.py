@@ -12,8 +12,8 @@ from fdnet.network.laws.beside_throats import FineImages, prisms_of
 from fdnet.network.laws.kept_sections import measured_sections
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
-from fdnet.network.laws.nodes import node_heights
 from fdnet.network.network import build_network
+from fdnet.network.nodes import node_heights
 from fdnet.network.permeability import analyse
 from fdnet.spheres.snapshot import Kind
 from tests.network.packs import random_pack, simple_cubic, snapshot, with_fines

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.network.flow.flow import Flow
-from fdnet.network.laws.nodes import node_heights, pore_nodes
 from fdnet.network.network import Network
+from fdnet.network.nodes import node_heights, pore_nodes
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, frozen
 

@@ -27,7 +27,6 @@ from fdnet.network.compiled import compiled_for_loops, compiled_inline, loops_in
 from fdnet.network.laws.cross_section import set_wedges
 from fdnet.network.laws.cut_grains import cut_corners, share_of_cut
 from fdnet.network.laws.fourth_grain import fourth_grains
-from fdnet.network.laws.nodes import node_heights
 from fdnet.network.laws.open_sections import (
     SectionRoom,
     Throat,
@@ -40,6 +39,7 @@ from fdnet.network.laws.outside import Neighbourhood
 from fdnet.network.laws.wall_cross_section import wall_cuts, wall_fluxes
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import LENGTH_FLOOR, Network
+from fdnet.network.nodes import node_heights
 from fdnet.spheres.snapshot import Array
 
 WIDENING = 8.0 / 3.0

@@ -34,13 +34,13 @@ from fdnet.network.laws.lubrication import (
     spans_of,
     throat_at,
 )
-from fdnet.network.laws.nodes import node_heights
 from fdnet.network.laws.open_sections import SectionRoom, forget, section_room
 from fdnet.network.laws.outside import meet, share_around
 from fdnet.network.laws.section_rays import set_sides
 from fdnet.network.laws.wall_cross_section import wall_cuts
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import LENGTH_FLOOR, Network
+from fdnet.network.nodes import node_heights
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
 

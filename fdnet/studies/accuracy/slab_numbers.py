@@ -18,7 +18,7 @@ from fdnet.studies.accuracy.goals import (
 )
 from fdnet.studies.accuracy.measurement import DEFAULT
 from fdnet.studies.accuracy.slabs import CHOSEN, FINEST
-from fdnet.studies.truth.slabs import LATER, YES
+from fdnet.studies.truth.slabs import YES
 
 ARCHIE = f"{DEFAULT_LAW} + {SECTION_ARCHIE}"
 FINE_RATIOS = (8, 10)
@@ -28,7 +28,6 @@ FINE_RATIOS = (8, 10)
 def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
     """Every number of the prose on slabs by its name in docs/accuracy.md.in."""
     aside = [row for row in rows if row["known_before"] != YES]
-    fresh = [row for row in rows if row["known_before"] == LATER]
     known = [row for row in rows if row["known_before"] == YES]
     pairs = {"default": CHOSEN, "finest": FINEST, "two_scale": DEFAULT, "archie": ARCHIE}
     fine = _with_fine_fines(rows)
@@ -36,19 +35,17 @@ def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
     return {
         "slabs": str(len(rows)),
         "slabs_aside": str(len(aside)),
-        "slabs_fresh": str(len(fresh)),
         "slabs_known": str(len(known)),
         **{f"slabs_aside_{key}": summary(aside, name) for key, name in pairs.items()},
-        **{f"slabs_fresh_{key}": summary(fresh, name) for key, name in pairs.items()},
         **{f"slabs_known_{key}": summary(known, name) for key, name in pairs.items()},
         "slabs_default_rms": percent(rms(values(aside, CHOSEN)), 0),
+        "slabs_finest_rms": percent(rms(values(aside, FINEST))),
         "slabs_default_worst": f"{worst(values(aside, CHOSEN)):.3f}",
         "slabs_default_case": worst_case(aside, CHOSEN).split(",")[0],
-        "slabs_two_scale_rms": percent(rms(values(fresh, DEFAULT))),
-        "slabs_archie_rms": percent(rms(values(fresh, ARCHIE))),
+        "slabs_two_scale_rms": percent(rms(values(aside, DEFAULT))),
+        "slabs_archie_rms": percent(rms(values(aside, ARCHIE))),
         "slabs_thesis_most": f"{max(values(rows, 'thesis + thesis')):.0f}",
         **_apart(rows),
-        **_heavy(fine),
         "slabs_coarse": str(len(coarse)),
         "slabs_coarse_k": summed_up(row[f"{FINEST}: k"] for row in coarse),
         "slabs_fine": str(len(fine)),
@@ -76,15 +73,3 @@ def _apart(rows: Sequence[Row]) -> dict[str, str]:
 
 def _with_fine_fines(rows: Sequence[Row]) -> list[Row]:
     return [row for row in rows if any(f"_r{size}" in row["case"] for size in FINE_RATIOS)]
-
-
-def _heavy(rows: Sequence[Row]) -> dict[str, str]:
-    """Mean error of both laws on the rows whose fines leave less than a tenth of k."""
-    some = [row for row in rows if row["k_over_k0"] < 0.1]
-    mean = {
-        key: float(np.exp(np.mean(np.log(values(some, name)))) - 1.0)
-        for key, name in (("two_scale", DEFAULT), ("archie", ARCHIE))
-    }
-    return {"slabs_heavy": str(len(some))} | {
-        f"slabs_heavy_{key}": f"{100 * one:+.0f} %" for key, one in mean.items()
-    }

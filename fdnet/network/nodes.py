@@ -91,8 +91,8 @@ def _behind(corner: Array, k: int, place: Array) -> bool:
 def _set_nearest(corner: Array, k: int, place: Array, nearest: Array) -> float:
     """Sets the point (3,) of a facet that is `nearest` to a place (3,) m; gives the distance m2.
 
-    The facet is the one opposite to the corner `k`. In the weights v and w of its second and third
-    corner, the regions of corners and edges are told apart by signs (Ericson 2005, section 5.1.5).
+    The facet is the one opposite to the corner `k`. v and w are the weights of its second and
+    third corner; signs say whether a corner or an edge is nearest (Ericson 2005, section 5.1.5).
     """
     i, j, m = CORNERS[k, 0], CORNERS[k, 1], CORNERS[k, 2]
     ab, ac = less(corner, j, i), less(corner, m, i)
