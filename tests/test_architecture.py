@@ -27,6 +27,7 @@ NETWORK_LAYERS = [
     ["field"],
     ["tessellation"],
     ["network"],
+    ["nodes"],
     ["fines", "flow"],
     ["laws", "specimen", "analysis"],
     ["resolved"],
