@@ -19,6 +19,8 @@ from fdnet.spheres.snapshot import Array, frozen
 
 CORNERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])
 """The corners of the facets of a tetrahedron, each facet opposite to one corner."""
+ON_FACET = 1e-9
+"""A node that is nearer to a facet, in lengths of the facet, lies on it: its height is 0."""
 
 
 def pore_nodes(network: Network) -> tuple[Array, Array]:
@@ -152,4 +154,5 @@ def _set_heights(
                 for axis in range(3):
                     turn = shift[t, axis] * side * size[axis]
                     total += normal[axis] * (node[pore, axis] + turn - facet[0, axis])
-                height[t, side] = abs(total) / long
+                above = abs(total) / long
+                height[t, side] = above if above > ON_FACET * np.sqrt(long) else 0.0

@@ -37,7 +37,7 @@ SETTINGS = {
         "128 160 1935 2 42 3 408",
         "4. Walls, cut planes, size": "1 1.5 2 3 8 10 11 20",
         "5. Unequal grains": "1 2 3",
-        "7. What remains wrong, and why": "0.30 0.4 0.40 1/10 1/3 1/8 3",
+        "7. What remains wrong, and why": "0.30 0.4 0.40 1 1/10 1/3 1/8 3",
     },
 }
 """What was chosen, not found: values of knobs, sizes, times, years, sections; by page, section."""
