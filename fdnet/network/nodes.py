@@ -10,46 +10,52 @@ which a hole in a deposit is, the flow then meets next to no resistance.
 Pores of one polyhedron, such as those that a face of the box cuts, keep its power centre.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from fdnet.network.compiled import compiled_for_loops, loops_in_place
+from fdnet.network.geometry import FACETS
 from fdnet.network.network import Network
 from fdnet.network.tessellation.tetrahedron import along, less, times
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, frozen
 
-CORNERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])
-"""The corners of the facets of a tetrahedron, each facet opposite to one corner."""
+CENTRE = 4
+"""The row of the power centre, after those of the four corners of a tetrahedron."""
 ON_FACET = 1e-9
 """A node that is nearer to a facet, in lengths of the facet, lies on it: its height is 0."""
 
 
-def pore_nodes(network: Network) -> tuple[Array, Array]:
-    """The places (P, 3) m of the nodes, and whether (P,) each was moved from the power centre."""
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Nodes:
+    """The nodes of the pores (P) of a network, above the facets of its throats (T).
+
+    Attributes:
+        position: (P, 3) m.
+        moved: (P,) whether a node is not the power centre.
+        heights: (T, 2) m, distances of the nodes of both pores from the facet of a throat. They
+            are positive on the pore's own side of it. Only pores of a polyhedron with several
+            tetrahedra can have a negative one.
+    """
+
+    position: Array
+    moved: Array
+    heights: Array
+
+    __repr__ = one_line
+
+
+def nodes_of(network: Network) -> Nodes:
+    """The nodes of all pores."""
     alone = np.bincount(network.pore_group)[network.pore_group] == 1
     node, moved = np.array(network.pore_power_centre), np.zeros(len(alone), bool)
-    _move_inside(
-        (network.image_position, np.ptp(network.box, axis=1)),
-        (network.pore_images, network.pore_wrap, alone),
-        (node, moved),
-    )
-    return frozen(node), frozen(moved)
-
-
-def node_heights(network: Network) -> Array:
-    """Distances (T, 2) m of the nodes of both pores from the facet of each throat.
-
-    They are positive on the pore's own side of the facet. Only pores of a polyhedron with several
-    tetrahedra can have a negative one.
-    """
-    node, moved = pore_nodes(network)
+    points = (network.image_position, np.ptp(network.box, axis=1))
+    _move_inside(points, (network.pore_images, network.pore_wrap, alone), (node, moved))
     height = np.array(network.throat_heights)
-    _set_heights(
-        (network.image_position, np.ptp(network.box, axis=1)),
-        (network.throat_images, network.throat_pores, network.throat_shift, network.pore_wrap),
-        (node, moved),
-        height,
-    )
-    return frozen(height)
+    throats = network.throat_images, network.throat_pores, network.throat_shift, network.pore_wrap
+    _set_heights(points, throats, (node, moved), height)
+    return Nodes(position=frozen(node), moved=frozen(moved), heights=frozen(height))
 
 
 @compiled_for_loops
@@ -60,17 +66,18 @@ def _move_inside(
     position, size = points
     vertex, wrap, alone = pores
     node, moved = out
-    corner, best, place = np.empty((4, 3)), np.empty(3), np.empty(3)
+    corner, best, place = np.empty((5, 3)), np.empty(3), np.empty(3)
     for p in range(len(node)):
         if not alone[p]:
             continue
         for k in range(4):
             for axis in range(3):
                 corner[k, axis] = position[vertex[p, k], axis] - wrap[p, axis] * size[axis]
+        corner[CENTRE] = node[p]
         nearest = np.inf
         for k in range(4):
-            if _behind(corner, k, node[p]):
-                square = _set_nearest(corner, k, node[p], place)
+            if _behind(corner, k):
+                square = _set_nearest(corner, k, place)
                 if square < nearest:
                     nearest = square
                     best[:] = place
@@ -80,27 +87,23 @@ def _move_inside(
 
 
 @loops_in_place
-def _behind(corner: Array, k: int, place: Array) -> bool:
-    """Whether a place (3,) m and the corner `k` lie on different sides of the facet opposite."""
-    a, b, c = CORNERS[k, 0], CORNERS[k, 1], CORNERS[k, 2]
+def _behind(corner: Array, k: int) -> bool:
+    """Whether the power centre and corner `k` lie on different sides of the facet opposite."""
+    a, b, c = FACETS[k, 0], FACETS[k, 1], FACETS[k, 2]
     normal = times(less(corner, b, a), less(corner, c, a))
-    own = along(normal, less(corner, k, a))
-    to_place = (place[0] - corner[a, 0], place[1] - corner[a, 1], place[2] - corner[a, 2])
-    return along(normal, to_place) * own <= 0.0
+    return along(normal, less(corner, CENTRE, a)) * along(normal, less(corner, k, a)) <= 0.0
 
 
 @loops_in_place
-def _set_nearest(corner: Array, k: int, place: Array, nearest: Array) -> float:
-    """Sets the point (3,) of a facet that is `nearest` to a place (3,) m; gives the distance m2.
+def _set_nearest(corner: Array, k: int, nearest: Array) -> float:
+    """Sets the point (3,) of a facet that is `nearest` to the power centre; gives the distance m2.
 
     The facet is the one opposite to the corner `k`. v and w are the weights of its second and
     third corner; signs say whether a corner or an edge is nearest (Ericson 2005, section 5.1.5).
     """
-    i, j, m = CORNERS[k, 0], CORNERS[k, 1], CORNERS[k, 2]
+    i, j, m = FACETS[k, 0], FACETS[k, 1], FACETS[k, 2]
     ab, ac = less(corner, j, i), less(corner, m, i)
-    ap = (place[0] - corner[i, 0], place[1] - corner[i, 1], place[2] - corner[i, 2])
-    bp = (place[0] - corner[j, 0], place[1] - corner[j, 1], place[2] - corner[j, 2])
-    cp = (place[0] - corner[m, 0], place[1] - corner[m, 1], place[2] - corner[m, 2])
+    ap, bp, cp = less(corner, CENTRE, i), less(corner, CENTRE, j), less(corner, CENTRE, m)
     d1, d2, d3 = along(ab, ap), along(ac, ap), along(ab, bp)
     d4, d5, d6 = along(ac, bp), along(ab, cp), along(ac, cp)
     va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
@@ -122,7 +125,7 @@ def _set_nearest(corner: Array, k: int, place: Array, nearest: Array) -> float:
     square = 0.0
     for axis in range(3):
         nearest[axis] = corner[i, axis] + v * ab[axis] + w * ac[axis]
-        square += (nearest[axis] - place[axis]) ** 2
+        square += (nearest[axis] - corner[CENTRE, axis]) ** 2
     return square
 
 

@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 from fdnet.network.flow.slabs import whole_permeability
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.network import build_network
-from fdnet.network.nodes import node_heights, pore_nodes
+from fdnet.network.nodes import nodes_of
 from tests.network.packs import random_pack, simple_cubic
 
 ALL = (True,) * 3
@@ -38,7 +38,8 @@ def inside(corner, place):
 
 
 def test_a_node_is_the_point_of_its_tetrahedron_nearest_to_the_power_centre(network):
-    node, moved = pore_nodes(network)
+    nodes = nodes_of(network)
+    node, moved = nodes.position, nodes.moved
     corner, centre = network.pore_corner, network.pore_power_centre
     assert 0.1 < moved.mean() < 0.5
     for p in np.flatnonzero(moved)[:60]:
@@ -51,8 +52,9 @@ def test_a_node_is_the_point_of_its_tetrahedron_nearest_to_the_power_centre(netw
 
 
 def test_heights_are_those_of_the_nodes_above_the_facets(network):
-    node, moved = pore_nodes(network)
-    height, corner = node_heights(network), network.throat_corner
+    nodes = nodes_of(network)
+    node, moved = nodes.position, nodes.moved
+    height, corner = nodes.heights, network.throat_corner
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     for side in (0, 1):
@@ -69,10 +71,10 @@ def test_heights_are_those_of_the_nodes_above_the_facets(network):
 def test_pores_of_one_polyhedron_keep_its_power_centre():
     """The cells of a cubic lattice are split into tetrahedra with one centre outside of some."""
     cubic = build_network(simple_cubic(), periodic=ALL)
-    node, moved = pore_nodes(cubic)
-    assert not moved.any()
-    assert np.all(node == cubic.pore_power_centre)
-    assert np.all(node_heights(cubic) == cubic.throat_heights)
+    nodes = nodes_of(cubic)
+    assert not nodes.moved.any()
+    assert np.all(nodes.position == cubic.pore_power_centre)
+    assert np.all(nodes.heights == cubic.throat_heights)
 
 
 def test_nodes_follow_the_spheres_without_a_jump():

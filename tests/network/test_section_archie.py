@@ -13,7 +13,7 @@ from fdnet.network.laws.kept_sections import measured_sections
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
 from fdnet.network.network import build_network
-from fdnet.network.nodes import node_heights
+from fdnet.network.nodes import nodes_of
 from fdnet.network.permeability import analyse
 from fdnet.spheres.snapshot import Kind
 from tests.network.packs import random_pack, simple_cubic, snapshot, with_fines
@@ -46,7 +46,7 @@ def test_a_throat_meets_the_fines_whose_bodies_reach_into_its_prism(network, pac
     fines, size = pack.fines(), np.ptp(network.box, axis=1)
     part, rng = slice(0, 25), np.random.default_rng(3)
     beside = FineImages(network, fines.position, fines.radius).beside(
-        prisms_of(network, part, node_heights(network)[part])
+        prisms_of(network, part, nodes_of(network).heights[part])
     )
     sides = [np.array([0.0, y, z]) * size for y in (-1, 0, 1) for z in (-1, 0, 1)]
     mirrored = [fines.position * (-1.0, 1.0, 1.0) + (2.0 * x, 0, 0) for x in network.box[0]]
@@ -56,7 +56,7 @@ def test_a_throat_meets_the_fines_whose_bodies_reach_into_its_prism(network, pac
         corner = network.image_position[network.throat_images[t]]
         normal = np.cross(corner[1] - corner[0], corner[2] - corner[0])
         normal /= np.linalg.norm(normal)
-        height = rng.uniform(*np.sort(node_heights(network)[t] * (-1.0, 1.0)), 1500)
+        height = rng.uniform(*np.sort(nodes_of(network).heights[t] * (-1.0, 1.0)), 1500)
         near = np.linalg.norm(image - corner.mean(axis=0), axis=1) < 4.0
         own = beside.place[beside.first[t] : beside.first[t + 1], 2]
         both = []

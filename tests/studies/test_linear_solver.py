@@ -86,13 +86,14 @@ def test_errors_follow_the_tolerance_and_stay_below_the_residual(rows, method, d
 
 
 def test_the_norm_of_the_residual_says_little_about_the_worst_throat(rows):
-    """1e-8 of the source's norm leaves several times as much of the inflow and more.
+    """1e-8 of the source's norm leaves 5e-8 in equal throats, 1e-6 and more in unequal ones.
 
     This is why fdnet stops by the sum of imbalances.
     """
-    assert all(
-        errors(rows, JACOBI, decades, "worst throat")[1e-8] > 1e-8 for decades in (0, 8, 16)
-    )
+    left = {decades: errors(rows, JACOBI, decades, "worst throat")[1e-8] for decades in (0, 8, 16)}
+    assert left[0] > 4e-8
+    assert left[8] > 1e-6
+    assert left[16] > 1e-6
 
 
 def test_beyond_the_exact_size_methods_agree(rows):

@@ -6,7 +6,7 @@ import numpy as np
 
 from fdnet.network.flow.flow import Flow
 from fdnet.network.network import Network
-from fdnet.network.nodes import node_heights, pore_nodes
+from fdnet.network.nodes import nodes_of
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, frozen
 
@@ -81,8 +81,8 @@ def _pieces(network: Network, flow: Flow, halves: Array) -> tuple[Array, Array, 
     Both ends of a throat whose nodes lie on one side of its facet make one piece.
     """
     use = np.flatnonzero(flow.throat_flux != 0)
-    pores, heights = network.throat_pores[use], node_heights(network)[use]
-    x = pore_nodes(network)[0][pores, 0]
+    nodes, pores = nodes_of(network), network.throat_pores[use]
+    heights, x = nodes.heights[use], nodes.position[pores, 0]
     x[:, 1] += network.throat_shift[use, 0] * float(np.ptp(network.box[0]))
     if not network.periodic[0]:
         x = np.clip(x, *network.box[0])

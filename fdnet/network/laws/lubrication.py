@@ -39,7 +39,7 @@ from fdnet.network.laws.outside import Neighbourhood
 from fdnet.network.laws.wall_cross_section import wall_cuts, wall_fluxes
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import LENGTH_FLOOR, Network
-from fdnet.network.nodes import node_heights
+from fdnet.network.nodes import nodes_of
 from fdnet.spheres.snapshot import Array
 
 WIDENING = 8.0 / 3.0
@@ -76,7 +76,7 @@ def half_resistances(
         heights: (T, 2) m, of where the sides end above the facet; of the nodes if None.
     """
     floor, table = LENGTH_FLOOR * network.grain_radius, ratio_table()
-    every, heights = wall_cuts(network), node_heights(network) if heights is None else heights
+    every, heights = wall_cuts(network), nodes_of(network).heights if heights is None else heights
     resistance = np.empty((len(network.throat_pores), 2))
     around = Neighbourhood(network) if fourth else None
     for part in geometry.slices(len(resistance), THROATS):

@@ -40,7 +40,7 @@ from fdnet.network.laws.section_rays import set_sides
 from fdnet.network.laws.wall_cross_section import wall_cuts
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import LENGTH_FLOOR, Network
-from fdnet.network.nodes import node_heights
+from fdnet.network.nodes import nodes_of
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
@@ -100,7 +100,7 @@ class Part:
 
 def parts_of(network: Network) -> Iterator[Part]:
     """All throats of a network, part by part."""
-    walls, heights = wall_cuts(network), node_heights(network)
+    walls, heights = wall_cuts(network), nodes_of(network).heights
     for part in geometry.slices(len(network.throat_pores), THROATS):
         yield Part(
             throats=part,
