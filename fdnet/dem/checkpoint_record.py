@@ -23,6 +23,9 @@ from fdnet.dem.updates import UPDATES, updates_digest
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.files.atomic import write_text
 
+FOLLOWED = f"{SECTION_ARCHIE} between nodes, fines placed"
+"""What a flow that follows the deposit is computed by. A run that another way left unfinished
+starts over: whoever changes the way changes these words."""
 DOUBTS = "doubts.txt"
 """Warnings of the sessions that went on from an earlier checkpoint than they could."""
 
@@ -34,9 +37,9 @@ def overlap_digest(rows: Sequence[Deepest]) -> str:
 
 
 def case_digest(case: InvasionCase) -> str:
-    """What the checkpoints of a case depend on: its digest and the law of a flow that follows."""
+    """What checkpoints of a case depend on: its digest, and how a flow that follows is made."""
     digest = case.digest("invade")
-    return f"{digest} {SECTION_ARCHIE}" if case.drag.field == "network" else digest
+    return f"{digest} {FOLLOWED}" if case.drag.field == "network" else digest
 
 
 def write_record(

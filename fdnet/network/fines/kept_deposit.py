@@ -1,10 +1,11 @@
 """The deposit of a pack measured fine by fine, so that only fines that moved are measured anew.
 
 The volume of each fine in each pore is kept as a piece. When fines come, leave or move, their
-pieces are replaced. Fines that moved less than the tolerance keep theirs.
+pieces are replaced. The order of the pieces does not depend on which were kept, and so neither do
+sums over them, to the last digit.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -57,9 +58,9 @@ class KeptDeposit:
 
     Attributes:
         holders: of the network.
-        fines: as they were measured, each at the place where that was done.
+        fines: as they were measured.
         pore: (K,) that holds the piece.
-        fine: (K,) index of the fine.
+        fine: (K,) index of the fine; pieces are sorted by the number of the fine, then by pore.
         volume: (K,) m3 of the fine in the pore, over the share of the pore inside the box.
         renewed: number of fines that the last change measured.
     """
@@ -78,41 +79,37 @@ class KeptDeposit:
         """Volume (P,) m3 of the fines in each pore."""
         return np.bincount(self.pore, self.volume, len(self.holders.network.pore_position))
 
-    def changed_to(self, fines: Snapshot, *, tolerance: float) -> "KeptDeposit":
-        """The deposit of other `fines`; those within `tolerance` radii of their place are kept."""
+    def changed_to(self, fines: Snapshot) -> "KeptDeposit":
+        """The deposit of other `fines`; the pieces of those at the same place are kept."""
         _, new, old = np.intersect1d(
             fines.id, self.fines.id, assume_unique=True, return_indices=True
         )
-        way = np.linalg.norm(fines.position[new] - self.fines.position[old], axis=1)
-        same = way <= tolerance * fines.radius[new]
+        same = np.all(fines.position[new] == self.fines.position[old], axis=1)
         new, old = new[same], old[same]
         moved = np.setdiff1d(np.arange(len(fines)), new, assume_unique=True)
-        place = np.array(fines.position)
-        place[new] = self.fines.position[old]
         now = np.full(len(self.fines), -1)
         now[old] = new
         stays = now[self.fine] >= 0
         pore, fine, volume = _pieces_of(self.holders, fines.where(moved))
-        return KeptDeposit(
-            holders=self.holders,
-            fines=replace(fines, position=frozen(place)),
-            pore=frozen(np.concatenate([self.pore[stays], pore])),
-            fine=frozen(np.concatenate([now[self.fine[stays]], moved[fine]])),
-            volume=frozen(np.concatenate([self.volume[stays], volume])),
-            renewed=len(moved),
-        )
+        pore = np.concatenate([self.pore[stays], pore])
+        fine = np.concatenate([now[self.fine[stays]], moved[fine]])
+        volume = np.concatenate([self.volume[stays], volume])
+        return _sorted(self.holders, fines, (pore, fine, volume), renewed=len(moved))
 
 
 def measured_deposit(holders: Holders, fines: Snapshot) -> KeptDeposit:
     """The deposit of `fines`, each reaching into the box, all measured."""
-    pore, fine, volume = _pieces_of(holders, fines)
+    return _sorted(holders, fines, _pieces_of(holders, fines), renewed=len(fines))
+
+
+def _sorted(
+    holders: Holders, fines: Snapshot, parts: tuple[Array, Array, Array], *, renewed: int
+) -> KeptDeposit:
+    """The deposit with its pieces (pore, fine, volume) sorted."""
+    order = np.lexsort((parts[0], fines.id[parts[1]]))
+    pore, fine, volume = (frozen(column[order]) for column in parts)
     return KeptDeposit(
-        holders=holders,
-        fines=fines,
-        pore=frozen(pore),
-        fine=frozen(fine),
-        volume=frozen(volume),
-        renewed=len(fines),
+        holders=holders, fines=fines, pore=pore, fine=fine, volume=volume, renewed=renewed
     )
 
 

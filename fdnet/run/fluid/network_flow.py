@@ -6,13 +6,13 @@ much of it each pore still carries. In a pore the velocity is that of the intact
 ratio of the damaged to the clean flux, both at the same rate through the specimen.
 """
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from fdnet.case.names import DEFAULT_LAW
 from fdnet.network.field.field import VelocityField
 from fdnet.network.field.of_pack import velocity_field
 from fdnet.network.fines.fine_images import reaching_inside
@@ -21,19 +21,18 @@ from fdnet.network.fines.occupancy import ratio
 from fdnet.network.flow.flow import Flow, solve_flow
 from fdnet.network.laws.kept_sections import KeptSections, measured_sections
 from fdnet.network.laws.lubrication import half_resistances
-from fdnet.network.laws.named import LAWS
 from fdnet.network.laws.section_archie import Part, parts_of
 from fdnet.network.network import Network, build_network
 from fdnet.run.fluid.pressed import Facets, Pressed, facets_of, pressed_by
 from fdnet.spheres.images import neighbour_tree, wrapped
-from fdnet.spheres.snapshot import Array, Snapshot
+from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
 STAGNANT = 1e-2
 """A pore that carries less than this share of the mean flux of a pore, clean, keeps ratio 1."""
 RENEWED = 0.02
 """Share of the deposit by volume that may change before the network is solved anew."""
 MOVED = 0.01
-"""Way in radii within which a fine is taken to be where it was."""
+"""Way in radii within which a fine that moves is taken to be at one place (`placed`)."""
 LEAK = 1e-6
 """Share of its clean conductance that a side keeps at least, so that pressures are known beyond
 what the fines close."""
@@ -133,9 +132,9 @@ class PackFlow:
 def pack_flow(grains: Snapshot, periodic: tuple[bool, bool, bool], walls: str) -> PackFlow:
     """The flow through an intact pack. Raises NetworkError or FlowError where there is none."""
     network = build_network(grains, periodic=periodic, walls=walls)
-    clean = LAWS[DEFAULT_LAW](network)
-    flow = solve_flow(network, clean)
     halves = half_resistances(network)
+    clean = 1.0 / halves.sum(axis=1)
+    flow = solve_flow(network, clean)
     return PackFlow(
         network=network,
         clean=clean,
@@ -175,7 +174,7 @@ class Renewal:
         pack: the intact pack.
         renewed: share of the deposit that may change before the network is solved anew.
         solved: the fines of the last solve; None before the first.
-        deposit: the fines as they were measured last.
+        deposit: the fines as they are measured.
         sections: of the throats, as they were at the last solve.
         carried: what the last solve gave.
         solves: number of solves.
@@ -190,23 +189,35 @@ class Renewal:
     solves: int = 0
 
     def of(self, fines: Snapshot, *, anew: bool) -> tuple[Carried, KeptDeposit]:
-        """What the pores carry with standing `fines`; all is done anew where `anew` asks."""
+        """What the pores carry with standing `fines`, which are `placed`.
+
+        The network is solved when enough of them changed, and where `anew` asks. What a solve
+        gives does not depend on earlier ones, to the last digit.
+        """
         inside = fines.where(reaching_inside(self.pack.network, fines))
-        if anew or self.deposit is None:
-            self.deposit = measured_deposit(self.pack.holders, inside)
-            self.sections = self.carried = None
-        else:
-            self.deposit = self.deposit.changed_to(inside, tolerance=MOVED)
-        if self.carried is None or changed_share(self.solved, inside) > self.renewed:
-            fines = self.deposit.fines
+        self.deposit = (
+            measured_deposit(self.pack.holders, inside)
+            if self.deposit is None
+            else self.deposit.changed_to(inside)
+        )
+        if anew or self.carried is None or changed_share(self.solved, inside) > self.renewed:
             self.sections = (
-                measured_sections(self.pack.network, fines, parts=self.pack.parts)
+                measured_sections(self.pack.network, inside, parts=self.pack.parts)
                 if self.sections is None
-                else self.sections.changed_to(fines)
+                else self.sections.changed_to(inside)
             )
             self.carried = self.pack.carried(self.sections.factor, self.deposit.in_pores)
             self.solved, self.solves = inside, self.solves + 1
         return self.carried, self.deposit
+
+
+def placed(fines: Snapshot) -> Snapshot:
+    """The fines at the nearest places of a grid, each at most `MOVED` radii from its own place.
+
+    What is measured there follows from the place alone, and is kept while a fine trembles.
+    """
+    spacing = 2.0 / math.sqrt(3.0) * MOVED * fines.radius[:, None]
+    return replace(fines, position=frozen(np.round(fines.position / spacing) * spacing))
 
 
 def changed_share(former: Snapshot | None, fines: Snapshot) -> float:

@@ -21,12 +21,12 @@ from fdnet.dem.fluid import FluidForces, Moment
 from fdnet.network.fines.crowding import Neighbourhood, local_porosity
 from fdnet.run.fluid.fine_forces import Deposit, FineForces, forces_on
 from fdnet.run.fluid.network_flow import (
-    MOVED,
     RENEWED,
     Carried,
     PackFlow,
     Renewal,
     pack_flow,
+    placed,
 )
 from fdnet.run.fluid.pressed import on_each_fine
 from fdnet.run.fluid.sampled_places import Sampled, nowhere
@@ -47,10 +47,9 @@ class Kept:
     renewal: Renewal
     places: Sampled
 
-    def sampled(self, fines: Snapshot, pack: PackFlow, *, anew: bool) -> Sampled:
-        """The intact pack's flow at the fines; taken anew at all of them where `anew` asks."""
-        former = nowhere() if anew else self.places
-        self.places = former.at(fines, pack.shape, tolerance=MOVED)
+    def sampled(self, fines: Snapshot, pack: PackFlow) -> Sampled:
+        """The intact pack's flow at the fines, which are `placed`."""
+        self.places = self.places.at(fines, pack.shape)
         return self.places
 
 
@@ -84,7 +83,6 @@ class NetworkFluid:
             "porosity_capped",
             "pores_stagnant",
             "fines_standing",
-            "fines_measured",
             "fines_share",
             "crowd_over_network",
         )
@@ -121,10 +119,11 @@ class NetworkFluid:
         fines, pack = spheres.fines(), self.pack
         depth = fines.position[:, 0]
         within = (depth >= 0) & (depth < pack.length)
-        place = self._kept.sampled(fines, pack, anew=moment.fresh)
+        measured = placed(fines)
+        place = self._kept.sampled(measured, pack)
         before = self.first_velocity if moment.before is None else moment.before["velocity_m_s"]
         standing = _speed(fines.velocity) < self.standing * before * _speed(place.velocity)
-        carried, deposit = self._kept.renewal.of(fines.where(standing), anew=moment.fresh)
+        carried, deposit = self._kept.renewal.of(measured.where(standing), anew=moment.fresh)
         near = local_porosity(spheres, self.case.periodic)
         share = np.ones(len(fines))
         share[within] = carried.ratio[pack.pore_of(fines.position[within])]
@@ -166,7 +165,6 @@ class NetworkFluid:
                 "cake_thickness_m": self._thickness(fines.radius[caked], near, caked),
                 "pores_stagnant": carried.stagnant,
                 "fines_standing": int(np.sum(standing & within)),
-                "fines_measured": deposit.renewed,
             },
         )
 

@@ -24,19 +24,17 @@ class Sampled:
     velocity: Array
     gradient: Array
 
-    def at(self, fines: Snapshot, shape: VelocityField, *, tolerance: float) -> "Sampled":
-        """The same at other `fines`, those within `tolerance` radii of their place as before."""
+    def at(self, fines: Snapshot, shape: VelocityField) -> "Sampled":
+        """The same at other `fines`; it is kept for those at the same place."""
         _, new, old = np.intersect1d(fines.id, self.id, assume_unique=True, return_indices=True)
-        way = np.linalg.norm(fines.position[new] - self.position[old], axis=1)
-        same = way <= tolerance * fines.radius[new]
+        same = np.all(fines.position[new] == self.position[old], axis=1)
         new, old = new[same], old[same]
         moved = np.setdiff1d(np.arange(len(fines)), new, assume_unique=True)
-        position, velocity, gradient = (np.empty((len(fines), 3)) for _ in range(3))
-        position[new], position[moved] = self.position[old], fines.position[moved]
+        velocity, gradient = (np.empty((len(fines), 3)) for _ in range(2))
         velocity[new], velocity[moved] = self.velocity[old], shape.at(fines.position[moved])
         gradient[new] = self.gradient[old]
         gradient[moved] = shape.pressure_gradient_at(fines.position[moved])
-        return Sampled(id=fines.id, position=position, velocity=velocity, gradient=gradient)
+        return Sampled(id=fines.id, position=fines.position, velocity=velocity, gradient=gradient)
 
 
 def nowhere() -> Sampled:
