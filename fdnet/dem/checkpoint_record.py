@@ -24,8 +24,8 @@ from fdnet.errors import CaseError, LiggghtsError
 from fdnet.files.atomic import write_text
 
 FOLLOWED = f"{SECTION_ARCHIE} between nodes, fines placed"
-"""What a flow that follows the deposit is computed by. A run that another way left unfinished
-starts over: whoever changes the way changes these words."""
+"""How the fluid's forces are computed where the flow follows the deposit. Change these words when
+that changes: then a run that an earlier version left unfinished starts over."""
 DOUBTS = "doubts.txt"
 """Warnings of the sessions that went on from an earlier checkpoint than they could."""
 

@@ -33,14 +33,12 @@ class Nodes:
 
     Attributes:
         position: (P, 3) m.
-        moved: (P,) whether a node is not the power centre.
         heights: (T, 2) m, distances of the nodes of both pores from the facet of a throat. They
             are positive on the pore's own side of it. Only pores of a polyhedron with several
             tetrahedra can have a negative one.
     """
 
     position: Array
-    moved: Array
     heights: Array
 
     __repr__ = one_line
@@ -55,7 +53,7 @@ def nodes_of(network: Network) -> Nodes:
     height = np.array(network.throat_heights)
     throats = network.throat_images, network.throat_pores, network.throat_shift, network.pore_wrap
     _set_heights(points, throats, (node, moved), height)
-    return Nodes(position=frozen(node), moved=frozen(moved), heights=frozen(height))
+    return Nodes(position=frozen(node), heights=frozen(height))
 
 
 @compiled_for_loops

@@ -249,3 +249,13 @@ def grain_box(position: Array, radius: Array, kind: Array) -> Array:
         raise CaseError("box: missing, and there is no grain to take it from; give the box")
     place, reach = position[grains], radius[grains][:, None]
     return np.column_stack([np.min(place - reach, axis=0), np.max(place + reach, axis=0)])
+
+
+def unmoved(now: tuple[Array, Array], before: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Indices of the spheres that are where they were: among those of `now`, and of `before`.
+
+    Each is the numbers (N,) of spheres and their places (N, 3) m.
+    """
+    _, new, old = np.intersect1d(now[0], before[0], assume_unique=True, return_indices=True)
+    same = np.all(now[1][new] == before[1][old], axis=1)
+    return new[same], old[same]

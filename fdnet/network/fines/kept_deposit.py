@@ -16,7 +16,7 @@ from fdnet.network.fines.inside import clip_to_box
 from fdnet.network.fines.point_search import points_in_boxes
 from fdnet.network.network import Network
 from fdnet.spheres.arrays import one_line
-from fdnet.spheres.snapshot import Array, Snapshot, frozen
+from fdnet.spheres.snapshot import Array, Snapshot, frozen, unmoved
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -81,11 +81,7 @@ class KeptDeposit:
 
     def changed_to(self, fines: Snapshot) -> "KeptDeposit":
         """The deposit of other `fines`; the pieces of those at the same place are kept."""
-        _, new, old = np.intersect1d(
-            fines.id, self.fines.id, assume_unique=True, return_indices=True
-        )
-        same = np.all(fines.position[new] == self.fines.position[old], axis=1)
-        new, old = new[same], old[same]
+        new, old = unmoved((fines.id, fines.position), (self.fines.id, self.fines.position))
         moved = np.setdiff1d(np.arange(len(fines)), new, assume_unique=True)
         now = np.full(len(self.fines), -1)
         now[old] = new

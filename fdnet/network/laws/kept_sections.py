@@ -14,7 +14,7 @@ from fdnet.network.laws.beside_throats import FineImages
 from fdnet.network.laws.section_archie import Part, fine_resistances, parts_of
 from fdnet.network.network import Network
 from fdnet.spheres.arrays import one_line
-from fdnet.spheres.snapshot import Array, Snapshot, frozen
+from fdnet.spheres.snapshot import Array, Snapshot, frozen, unmoved
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -48,12 +48,9 @@ class KeptSections:
 
     def changed_to(self, fines: Snapshot) -> "KeptSections":
         """The resistances among other `fines`; those at the same place are taken as unchanged."""
-        _, new, old = np.intersect1d(
-            fines.id, self.fines.id, assume_unique=True, return_indices=True
-        )
-        same = np.all(fines.position[new] == self.fines.position[old], axis=1)
+        new, old = unmoved((fines.id, fines.position), (self.fines.id, self.fines.position))
         gone, come = np.ones(len(self.fines), bool), np.ones(len(fines), bool)
-        gone[old[same]] = come[new[same]] = False
+        gone[old] = come[new] = False
         reached = self._throats_beside(
             np.concatenate([self.fines.position[gone], fines.position[come]]),
             np.concatenate([self.fines.radius[gone], fines.radius[come]]),

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.network.field.field import VelocityField
-from fdnet.spheres.snapshot import Array, Snapshot
+from fdnet.spheres.snapshot import Array, Snapshot, unmoved
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -26,9 +26,7 @@ class Sampled:
 
     def at(self, fines: Snapshot, shape: VelocityField) -> "Sampled":
         """The same at other `fines`; it is kept for those at the same place."""
-        _, new, old = np.intersect1d(fines.id, self.id, assume_unique=True, return_indices=True)
-        same = np.all(fines.position[new] == self.position[old], axis=1)
-        new, old = new[same], old[same]
+        new, old = unmoved((fines.id, fines.position), (self.id, self.position))
         moved = np.setdiff1d(np.arange(len(fines)), new, assume_unique=True)
         velocity, gradient = (np.empty((len(fines), 3)) for _ in range(2))
         velocity[new], velocity[moved] = self.velocity[old], shape.at(fines.position[moved])
