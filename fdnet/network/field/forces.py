@@ -14,6 +14,7 @@ Forces on a plane that vary with the wave number q along it move the plane by 1 
 of themselves, with q2 = 4 sin2(q/2), so S damps the short waves. The seven-point differences of
 the same forces, 0 off the plane, are 2 + q2 times them. Both together are within 6 % of each other
 for short waves, so the differences, with a share of the forces themselves, are the preconditioner.
+What they make of forces that vary slowly from grain to grain is taken out (`collective`).
 """
 
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from itertools import pairwise
 import numpy as np
 
 from fdnet.errors import FlowError
+from fdnet.network.field.collective import Collective
 from fdnet.network.field.response import Response
 from fdnet.network.field.wall_nodes import advance, differences, moved_at, neighbours_of, put, turn
 from fdnet.network.field.walls import Walls
@@ -41,7 +43,7 @@ DIFFERENCES = 10.0
 class Problem:
     """The scaled operator A = W (S + D) W over the wall nodes."""
 
-    def __init__(self, walls: list[Walls], response: Response) -> None:
+    def __init__(self, walls: list[Walls], response: Response, reach: float) -> None:
         ends = np.cumsum([0, *(len(wall.node) for wall in walls)])
         self.parts = [slice(int(a), int(b)) for a, b in pairwise(ends)]
         self.nodes = [wall.node for wall in walls]
@@ -57,6 +59,8 @@ class Problem:
                 for node, part in zip(self.nodes, self.parts, strict=True)
             ]
         )
+
+        self.collective = Collective(self.nodes, self.weight, response, self._differences, reach)
 
     def spread(self, force: Array) -> list[Array]:
         """Forces (M,) on their nodes: three grids, overwritten at the next call."""
@@ -75,7 +79,11 @@ class Problem:
 
     def smoothed(self, residual: Array) -> Array:
         """The preconditioner times a `residual` (M,), projected."""
-        return self.project(differences(residual, self.neighbours, DIFFERENCES / 6.0))
+        weighed = self._differences(residual)
+        return self.project(weighed - self.collective.taken(weighed))
+
+    def _differences(self, value: Array) -> Array:
+        return differences(value, self.neighbours, DIFFERENCES / 6.0)
 
     def project(self, scaled: Array) -> Array:
         """`scaled` without the part that carries a net force sideways, changed in place."""

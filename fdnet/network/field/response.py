@@ -32,19 +32,26 @@ class Response:
     Attributes:
         shape: cells.
         walled: whether the sides across x, y, z are slip planes.
+        scale: (3,) cells' edges along x over those along each axis.
         difference: symbol g of the backward difference along each axis, complex (n,).
     """
 
     shape: tuple[int, int, int]
     walled: tuple[bool, bool, bool]
+    scale: Array
     difference: tuple[Array, Array, Array]
 
     __repr__ = one_line
 
-    def velocity(self, force: list[Array]) -> list[Array]:
-        """Velocity, three arrays of the grid's shape with mean 0, of such forces."""
+    def velocity(self, force: list[Array], kept: Array | None = None) -> list[Array]:
+        """Velocity, three arrays of the grid's shape with mean 0, of such forces.
+
+        Each wave is multiplied by what is `kept` of it, where that is given.
+        """
         waves = [self._forward(part, d) for d, part in enumerate(force)]
         _respond(waves[0], waves[1], waves[2], *self.difference)
+        if kept is not None:
+            waves = [wave * kept for wave in waves]
         return [self._back(wave, d) for d, wave in enumerate(waves)]
 
     def pressure(self, force: list[Array]) -> Array:
@@ -74,21 +81,29 @@ class Response:
 
 def build_response(lattice: Lattice) -> Response:
     """The flow of forces on a grid."""
-    scale = lattice.unit / lattice.spacing
-    last = max(axis for axis in range(3) if not lattice.walled[axis])
-    symbols = []
-    for axis, n in enumerate(lattice.shape):
-        if lattice.walled[axis]:
+    scale = frozen(lattice.unit / lattice.spacing)
+    return Response(
+        shape=lattice.shape,
+        walled=lattice.walled,
+        scale=scale,
+        difference=symbols(lattice.shape, lattice.walled, scale),
+    )
+
+
+def symbols(
+    shape: tuple[int, ...], walled: tuple[bool, bool, bool], scale: Array
+) -> tuple[Array, Array, Array]:
+    """Symbols of the backward difference along each axis, times its `scale` (3,)."""
+    last = max(axis for axis in range(3) if not walled[axis])
+    along = []
+    for axis, n in enumerate(shape):
+        if walled[axis]:
             symbol = -2.0 * np.sin(0.5 * np.pi * np.arange(n) / n) + 0j
         else:
             waves = fft.rfftfreq(n) if axis == last else fft.fftfreq(n)
             symbol = 1.0 - np.exp(-2j * np.pi * waves)
-        symbols.append(frozen(scale[axis] * symbol, np.complex64))
-    return Response(
-        shape=lattice.shape,
-        walled=lattice.walled,
-        difference=(symbols[0], symbols[1], symbols[2]),
-    )
+        along.append(frozen(scale[axis] * symbol, np.complex64))
+    return along[0], along[1], along[2]
 
 
 def _odd(part: Array, axis: int) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 
 from fdnet.errors import NetworkError
 from fdnet.network.field.forces import Held, Problem, hold
-from fdnet.network.field.lattice import Lattice
+from fdnet.network.field.lattice import LEAST_CELLS, Lattice
 from fdnet.network.field.response import Response, build_response
 from fdnet.network.field.walls import SIDE_WALL, Marks, clear_marks, find_walls, mark
 from fdnet.spheres.arrays import one_line
@@ -110,7 +110,7 @@ def solve(
             f"velocity field: no wall on the grid of {lattice.shape} cells, expected grains in "
             "the box; give grains or a finer grid"
         )
-    problem = Problem(walls, skeleton.response)
+    problem = Problem(walls, skeleton.response, _reach(skeleton))
     start = None
     if former is not None:
         pairs = zip(former.force, walls, strict=True)
@@ -119,6 +119,12 @@ def solve(
     target = None if velocity is None else _targets(owner, count, velocity)
     held = hold(problem, tolerance, start=start, target=target)
     return _result(problem, held, (owner, lattice, count + len(fines[1])), solid)
+
+
+def _reach(skeleton: Skeleton) -> float:
+    """The mean radius of the grains in cells along x; a few cells where there is no grain."""
+    radius = skeleton.grains[1]
+    return float(radius.mean()) / skeleton.lattice.unit if len(radius) else float(LEAST_CELLS)
 
 
 def _targets(owner: list[Array], count: int, velocity: Array) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 
 from fdnet.network.fines.occupancy import ratio
 from fdnet.network.laws.beside_throats import FineImages
-from fdnet.network.laws.section_archie import Part, fine_resistances, parts_of
+from fdnet.network.laws.section_archie import STEP, Part, fine_resistances, parts_of
 from fdnet.network.network import Network
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, Snapshot, frozen, unmoved
@@ -24,6 +24,7 @@ class KeptSections:
     Attributes:
         network: pores and throats.
         parts: what does not depend on the fines, of its throats.
+        step: greatest between two sections, in radii of the smallest fine in the throat.
         fines: at the places for which the resistances hold.
         without: (T, 2) 1/m3, without the fines; see `fine_resistances`.
         raised: (T, 2) 1/m3, with them.
@@ -32,6 +33,7 @@ class KeptSections:
 
     network: Network
     parts: Sequence[Part]
+    step: float
     fines: Snapshot
     without: Array
     raised: Array
@@ -55,7 +57,9 @@ class KeptSections:
             np.concatenate([self.fines.position[gone], fines.position[come]]),
             np.concatenate([self.fines.radius[gone], fines.radius[come]]),
         )
-        both = fine_resistances(self.network, fines, among=reached, parts=self.parts)[:2]
+        both = fine_resistances(
+            self.network, fines, among=reached, parts=self.parts, step=self.step
+        )[:2]
         without, raised = (
             np.where(reached[:, None], now, before)
             for now, before in zip(both, (self.without, self.raised), strict=True)
@@ -77,14 +81,19 @@ class KeptSections:
 
 
 def measured_sections(
-    network: Network, fines: Snapshot, *, parts: Sequence[Part] | None = None
+    network: Network,
+    fines: Snapshot,
+    *,
+    parts: Sequence[Part] | None = None,
+    step: float = STEP,
 ) -> KeptSections:
     """The resistances among `fines`, those of all throats summed; `parts` of the network."""
     parts = tuple(parts_of(network)) if parts is None else parts
-    without, raised, _ = fine_resistances(network, fines, parts=parts)
+    without, raised, _ = fine_resistances(network, fines, parts=parts, step=step)
     return KeptSections(
         network=network,
         parts=parts,
+        step=step,
         fines=fines,
         without=frozen(without),
         raised=frozen(raised),

@@ -116,6 +116,7 @@ def fine_resistances(
     *,
     among: Array | None = None,
     parts: Iterable[Part] | None = None,
+    step: float = STEP,
 ) -> tuple[Array, Array, int]:
     """Resistances (T, 2) 1/m3 of the sides of throats without and with `fines`.
 
@@ -123,6 +124,7 @@ def fine_resistances(
     side that a throat does not have. The third value is the number of throats with fines too small
     for `MOST_STEPS`. Where `among` (T,) is given, throats where it is False are left at 1 and 1,
     and are not counted. `parts` is what `parts_of` gives for the network, made anew without it.
+    `step` is as `STEP`.
     """
     images, table = FineImages(network, fines.position, fines.radius), ratio_table()
     floor = LENGTH_FLOOR * network.grain_radius
@@ -131,7 +133,8 @@ def fine_resistances(
     for part in parts_of(network) if parts is None else parts:
         rows = None if among is None else np.flatnonzero(among[part.throats])
         beside = images.beside(part.prisms, rows)
-        some, steps = _steps(beside.first, beside.place, np.abs(part.heights).max(axis=1))
+        height = np.abs(part.heights).max(axis=1)
+        some, steps = _steps(beside.first, beside.place, height, step)
         coarse += int(np.sum(steps > MOST_STEPS))
         steps = np.minimum(steps, MOST_STEPS)
         for count in np.unique(steps):
@@ -146,16 +149,17 @@ def fine_resistances(
     return both[0], both[1], coarse
 
 
-def _steps(first: Array, place: Array, height: Array) -> tuple[Array, Array]:
+def _steps(first: Array, place: Array, height: Array, step: float) -> tuple[Array, Array]:
     """Throats (K,) with fines, and the steps of each of their sides, a power of two.
 
-    Where more than `MOST_STEPS` are wanted, they are twice as many.
+    None is longer than `step` radii of the smallest fine in the throat. Where more than
+    `MOST_STEPS` are wanted, they are twice as many.
     """
     some = np.flatnonzero(np.diff(first))
     if not len(some):
         return some, some
     smallest = np.minimum.reduceat(place[:, 3], first[some])
-    wanted = np.clip(height[some] / (STEP * smallest), LEAST_STEPS, 2 * MOST_STEPS)
+    wanted = np.clip(height[some] / (step * smallest), LEAST_STEPS, 2 * MOST_STEPS)
     return some, 2 ** np.ceil(np.log2(wanted)).astype(int)
 
 

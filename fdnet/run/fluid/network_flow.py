@@ -29,8 +29,12 @@ from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
 STAGNANT = 1e-2
 """A pore that carries less than this share of the mean flux of a pore, clean, keeps ratio 1."""
-RENEWED = 0.02
-"""Share of the deposit by volume that may change before the network is solved anew."""
+RENEWED = 0.1
+"""Share of the deposit by volume that may change before the network is solved anew
+(`fdnet study flow-updates`)."""
+STEP = 1.0 / 4.0
+"""Greatest step between two sections of a throat, in radii of its smallest fine. That of the
+analysis is half of it, for twice the time."""
 MOVED = 0.01
 """Way in radii within which a fine that moves is taken to be at one place (`placed`)."""
 LEAK = 1e-6
@@ -202,7 +206,7 @@ class Renewal:
         )
         if anew or self.carried is None or changed_share(self.solved, inside) > self.renewed:
             self.sections = (
-                measured_sections(self.pack.network, inside, parts=self.pack.parts)
+                measured_sections(self.pack.network, inside, parts=self.pack.parts, step=STEP)
                 if self.sections is None
                 else self.sections.changed_to(inside)
             )

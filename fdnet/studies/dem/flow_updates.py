@@ -29,7 +29,7 @@ from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study
 TRAVEL, SOLVED, STOOD = "way between updates", "deposit changed before a solve", "standing below"
 TRIED: Mapping[str, tuple[float, ...]] = {
     TRAVEL: (0.125, 0.25, 0.5, 1.0, 2.0),
-    SOLVED: (0.0, RENEWED, 0.1, 0.3),
+    SOLVED: (0.0, 0.02, RENEWED, 0.3),
     STOOD: (0.25, STANDING, 0.75),
 }
 """Diameters of a fine; share of the deposit by volume; share of the intact pack's flow."""
