@@ -73,6 +73,7 @@ def _child(
     signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     with contextlib.suppress(KeyboardInterrupt):
         work(*arguments, sender.send)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)  # nothing is left to unwind
 
 
 def _stop(*_: Any) -> NoReturn:
