@@ -41,7 +41,8 @@ def test_streamlines_begin_in_the_mud_and_stay_in_the_box_and_off_the_grains(fin
     size = np.ptp(box, axis=1)[1:]
     apart = places[:, None] - grains.position[None]
     apart[..., 1:] -= size * np.round(apart[..., 1:] / size)
-    assert np.all(np.linalg.norm(apart, axis=2) > grains.radius[None])
+    # the field keeps its spheres in single precision
+    assert np.all(np.linalg.norm(apart, axis=2) > (1.0 - 1e-6) * grains.radius[None])
     speed = np.asarray(lines.point_data["value"])
     upstream = places[:, 0] < box[0, 0] - 0.4 * grains.radius.mean()
     assert np.median(speed[upstream]) == pytest.approx(0.25, rel=0.5), "the rate times 1"
