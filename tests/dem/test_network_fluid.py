@@ -271,6 +271,22 @@ def test_forces_on_fines_and_grains_add_up_to_the_drop_of_pressure(fluid, done):
     assert 0.5 < forces.measures["crowd_over_network"] < 2.0
 
 
+@pytest.mark.parametrize("pace", [0.0, 2.0])
+def test_the_balance_holds_while_fines_move_at_another_pace_than_the_fluid(fluid, pace):
+    """Many fines in the pack that are slower or faster than it: exact, for drag is linear."""
+    place = np.random.default_rng(2).random((150, 3)) * np.array([1.5e-3, 1e-3, 1e-3])
+    speed = pace * fluid.first_velocity / fluid.scales.porosity
+    moving = fines(place, 2e-5, fluid.grains.box, velocity=(speed, 0.0, 0.0))
+    before = {"velocity_m_s": 0.6 * fluid.first_velocity, "time_s": 0.0}
+    moment = replace(FIRST, before=before | {"rate_m3_s": 0.0, "filtrate_m3": 0.0})
+    found = replace(fluid, standing=0.0).forces(fluid.grains.joined(moving), moment).measures
+    assert found["fines_standing"] == 0
+    assert found["momentum_defect"] < 1e-9
+    whole = fluid.pack.length * fluid.first_velocity * fluid._viscosity / fluid.pack.permeability
+    assert found["pressure_pack_Pa"] == pytest.approx(whole, rel=1e-6)
+    assert (found["rate_over_initial"] < 1.0) == (pace < 1.0)
+
+
 def test_each_pore_gives_all_its_force_to_the_fines_in_it(fluid, done):
     """So the fines of any part of the pack take up what the network loses to them there."""
     carried, deposit = carried_with(fluid, deposit_of(done))
@@ -392,12 +408,10 @@ def test_the_ledger_adds_up_and_momentum_closes(fluid, done):
     assert rows[-1]["rate_over_initial"] < 0.95
     area, whole = fluid.pack.network.area, rows[0]
     total = whole["pressure_pack_Pa"] + whole["pressure_cake_Pa"]
-    for before, row in zip([whole, *rows], rows, strict=False):
+    for row in rows:
         assert row["pressure_pack_Pa"] + row["pressure_cake_Pa"] == pytest.approx(total, rel=1e-6)
         assert row["rate_m3_s"] == pytest.approx(row["velocity_m_s"] * area, rel=1e-12)
-        # the drag of moving fines is that at the former rate, so a jump of the rate leaves more
-        jump = abs(row["velocity_m_s"] / before["velocity_m_s"] - 1.0)
-        assert row["momentum_defect"] <= 0.01 + 0.05 * jump
+        assert row["momentum_defect"] <= 0.01
     table = history_rows(fluid.case, fluid.scales, done.history, rows)
     assert [line["step"] for line in table] == [row.step for row in done.history]
     assert table[-1]["filtrate_m3"] == rows[-1]["filtrate_m3"]

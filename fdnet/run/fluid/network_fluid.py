@@ -7,8 +7,8 @@ network's pressure does there (`pressed`), and G. Upstream of the face the mud m
 over the cross-section, and fines that stand there feel the drag of the crowd.
 
 The rate U follows from the resistances in series: the pack with its deposit (network), the cake
-(the drag on the fines that stand upstream) and the rest of the way on which the overbalance is
-lost, which stays as it is.
+(the drag on the fines that stand upstream), the drag on fines that move in the pack, and the rest
+of the way on which the overbalance is lost, which stays as it is.
 """
 
 from dataclasses import dataclass
@@ -136,10 +136,10 @@ class NetworkFluid:
         held = standing & within & np.any(pressed != 0.0, axis=1)
         area = pack.network.area
         cake = float(crowd[caked] @ shape[caked, 0]) / area
-        slip = before * shape[:, 0] - fines.velocity[:, 0]
-        loose = float(crowd @ np.where(within & ~held, slip, 0.0)) / (area * before)
-        speed = self._velocity(carried, cake + loose)
-        drop = self._drop(carried, speed)
+        moving = np.where(within & ~held, crowd, 0.0) / area
+        slow, gain = float(moving @ shape[:, 0]), float(moving @ fines.velocity[:, 0])
+        speed = self._velocity(carried, cake + slow, gain)
+        loose, drop = slow * speed - gain, self._drop(carried, speed)
         made = forces_on(
             fines,
             Deposit(held=held, pressed=drop * pressed),
@@ -159,7 +159,7 @@ class NetworkFluid:
             | self._ledger(speed, moment)
             | _crowd(factor, near)
             | self._momentum(
-                made, fines, within, drop * float(carried.pressed.grains[0]), drop + loose * speed
+                made, fines, within, drop * float(carried.pressed.grains[0]), drop + loose
             )
             | {
                 "cake_thickness_m": self._thickness(fines.radius[caked], near, caked),
@@ -194,16 +194,19 @@ class NetworkFluid:
         slip = np.linalg.norm(velocity - fines.velocity, axis=1)
         return crowd_factor(self.scales, near, fines.radius, slip)
 
-    def _velocity(self, carried: Carried, cake: float) -> float:
-        """Superficial velocity, m/s, with a cake and moving fines of `cake` Pa s/m.
+    def _velocity(self, carried: Carried, more: float, gain: float = 0.0) -> float:
+        """Superficial velocity U, m/s.
 
-        At constant pressure U / U0 = (1 + rest) / (k0 / k + rest + cake k0 / (mu L)).
+        Cake and moving fines resist with `more` Pa s/m, and the motion of the fines gives back
+        `gain` Pa. At constant pressure, with the resistance R0 = mu L / k0 of the intact pack,
+
+            U = (U0 (1 + rest) + gain / R0) / (k0 / k + rest + more / R0).
         """
         if self.case.drag.drive == "rate":
             return self.first_velocity
         intact = self._viscosity * self.pack.length / self.pack.permeability
-        resistance = 1.0 / carried.k_over_k0 + self.rest + cake / intact
-        return self.first_velocity * (1.0 + self.rest) / resistance
+        resistance = 1.0 / carried.k_over_k0 + self.rest + more / intact
+        return (self.first_velocity * (1.0 + self.rest) + gain / intact) / resistance
 
     @property
     def _viscosity(self) -> float:
@@ -219,12 +222,15 @@ class NetworkFluid:
     def _pressures(
         self, carried: Carried, cake: float, loose: float, speed: float
     ) -> dict[str, float]:
-        """Drops of pressure of the fluid itself, Pa, and the permeability."""
+        """Drops of pressure of the fluid itself, Pa, and the permeability.
+
+        `loose` Pa is what moving fines take.
+        """
         factor = self.scales.force_factor
         return {
             "k_over_k0": carried.k_over_k0,
             "pressure_cake_Pa": cake * speed / factor,
-            "pressure_pack_Pa": (self._drop(carried, speed) + loose * speed) / factor,
+            "pressure_pack_Pa": (self._drop(carried, speed) + loose) / factor,
         }
 
     def _drop(self, carried: Carried, speed: float) -> float:
