@@ -1,7 +1,9 @@
-"""Updates of the flow that follows its deposit: how often, what counts as deposit, when to solve.
+"""What makes a flow that follows its deposit cheaper: fewer updates and solves, heavier fines.
 
 A run with more updates is nearer to a flow that follows at every moment, and costs more. What
-counts as standing has no exact value; there the study shows how much hangs on it.
+counts as standing has no exact value; there the study shows how much hangs on it. Fines of m times
+their mass take a time step that is longer by the root of m; their way is the same as far as their
+inertia does not matter.
 """
 
 import shutil
@@ -12,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.case.case import InvasionCase, with_fines
-from fdnet.case.file import read_case
+from fdnet.case.file import case_from, read_case, set_keys
 from fdnet.case.parts import FLOW_TRAVEL
 from fdnet.case.shipped import case_path
 from fdnet.dem.invasion import invade
@@ -27,13 +29,22 @@ from fdnet.studies.engine.runner import child_core_seconds
 from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study
 
 TRAVEL, SOLVED, STOOD = "way between updates", "deposit changed before a solve", "standing below"
+FIFTH, TENTH = "mass over its own, fines of 1/5", "mass over its own, fines of 1/10"
 TRIED: Mapping[str, tuple[float, ...]] = {
     TRAVEL: (0.125, 0.25, 0.5, 1.0, 2.0),
     SOLVED: (0.0, 0.02, RENEWED, 0.3),
     STOOD: (0.25, STANDING, 0.75),
+    FIFTH: (1.0, 2.0, 4.0, 16.0),
+    TENTH: (1.0, 2.0, 4.0),
 }
-"""Diameters of a fine; share of the deposit by volume; share of the intact pack's flow."""
-REFERENCE: Mapping[str, float] = {TRAVEL: 0.125, SOLVED: 0.0, STOOD: STANDING}
+"""Diameters of a fine; share of the deposit by volume; share of the intact flow; factors."""
+REFERENCE: Mapping[str, float] = {
+    TRAVEL: 0.125,
+    SOLVED: 0.0,
+    STOOD: STANDING,
+    FIFTH: 1.0,
+    TENTH: 1.0,
+}
 OBSERVED = ("filtrate", "rate", "invaded", "mean_depth")
 _WORDS: Mapping[str, str] = {
     "filtrate": "filtrate",
@@ -67,12 +78,26 @@ def points(quick: bool) -> list[Point]:
 def case_of(point: Point) -> InvasionCase:
     """The quick specimen 5 in the flow of the network, with half its fines for half its time."""
     travel = point.value if point.series == TRAVEL else 0.5
-    keys = (*FLUIDS["network"], *_SIZES[str(point.settings["size"])], f"seed={point.seed}")
-    return with_fines(
-        read_case(
-            case_path("quick-specimen5"), assignments=[*keys, f"drag.update_travel={travel}"]
-        )
-    )
+    keys = [
+        *FLUIDS["network"],
+        *_SIZES[str(point.settings["size"])],
+        f"seed={point.seed}",
+        f"drag.update_travel={travel}",
+    ]
+    plain = with_fines(read_case(case_path("quick-specimen5"), assignments=keys))
+    return _heavier(plain, point) if point.series in (FIFTH, TENTH) else plain
+
+
+def _heavier(plain: InvasionCase, point: Point) -> InvasionCase:
+    """The case with heavier fines and springs as stiff as specimens of full size have.
+
+    Of fines of 1/10 there are four times as many, half of the volume.
+    """
+    density = float(point.value) * plain.fines.density_kg_m3
+    keys = [f"fines.density_kg_m3={density!r}", "run.stiffness_N_m=auto"]
+    if point.series == TENTH:
+        keys += ["fines.radius_mm=0.025", f"fines.count={4 * (plain.fines.count or 0)}"]
+    return with_fines(case_from(set_keys(plain.data(), keys)))
 
 
 def measure(point: Point, work: Path) -> Mapping[str, float]:
@@ -136,5 +161,5 @@ STUDY = Study(
     inputs=inputs,
     needs_liggghts=True,
     panels=tuple(Panel(quantity=name, title=title) for name, title in _WORDS.items()),
-    defaults={TRAVEL: FLOW_TRAVEL, SOLVED: RENEWED, STOOD: STANDING},
+    defaults={TRAVEL: FLOW_TRAVEL, SOLVED: RENEWED, STOOD: STANDING, FIFTH: 1.0, TENTH: 1.0},
 )
