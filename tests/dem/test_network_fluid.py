@@ -279,12 +279,12 @@ def test_the_balance_holds_while_fines_move_at_another_pace_than_the_fluid(fluid
     moving = fines(place, 2e-5, fluid.grains.box, velocity=(speed, 0.0, 0.0))
     before = {"velocity_m_s": 0.6 * fluid.first_velocity, "time_s": 0.0}
     moment = replace(FIRST, before=before | {"rate_m3_s": 0.0, "filtrate_m3": 0.0})
-    found = replace(fluid, standing=0.0).forces(fluid.grains.joined(moving), moment).measures
-    assert found["fines_standing"] == 0
-    assert found["momentum_defect"] < 1e-9
+    row = replace(fluid, standing=0.0).forces(fluid.grains.joined(moving), moment).measures
+    assert row["fines_standing"] == 0
+    assert row["momentum_defect"] < 1e-9
     whole = fluid.pack.length * fluid.first_velocity * fluid._viscosity / fluid.pack.permeability
-    assert found["pressure_pack_Pa"] == pytest.approx(whole, rel=1e-6)
-    assert (found["rate_over_initial"] < 1.0) == (pace < 1.0)
+    assert row["pressure_pack_Pa"] == pytest.approx(whole, rel=1e-6)
+    assert (row["rate_over_initial"] < 1.0) == (pace < 1.0)
 
 
 def test_each_pore_gives_all_its_force_to_the_fines_in_it(fluid, done):

@@ -160,6 +160,10 @@ STUDY = Study(
     judge=judge,
     inputs=inputs,
     needs_liggghts=True,
-    panels=tuple(Panel(quantity=name, title=title) for name, title in _WORDS.items()),
+    panels=tuple(
+        Panel(quantity=name, title=title, series=series)
+        for series in ((TRAVEL, SOLVED, STOOD), (FIFTH, TENTH))
+        for name, title in _WORDS.items()
+    ),
     defaults={TRAVEL: FLOW_TRAVEL, SOLVED: RENEWED, STOOD: STANDING, FIFTH: 1.0, TENTH: 1.0},
 )
