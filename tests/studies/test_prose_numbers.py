@@ -27,7 +27,7 @@ SETTINGS = {
         "11. Velocity between the grains": "0.30 20",
         "12. Defaults of an invasion": "0.5 1 2 5 6 4,000",
         "13. Fines that are driven faster than the fluid": "1 3 3.5 5 9 18 95 100 108",
-        "14. How often the flow follows its deposit": "5 95",
+        "14. How often the flow follows its deposit": "1/5 1/10 5 95",
     },
     "accuracy": {
         "": "1 3 7",
@@ -46,6 +46,7 @@ MEASURED_APART = {
         "4. Frozen or mobile grains, neighbour lists, MPI": "7 9",
         "9. Economies of full-scale invasions": "1 7 17,446 17,625 18,667 25,833 26,417",
         "10. Size ratio of fines and grains": "5 229 238 6 816 822",
+        "14. How often the flow follows its deposit": "2,469 2,789 3,064",
     },
     "accuracy": {"3. With fines": "6 12 18 23 0.7 1.2 4.9 5.6 0.93 0.96 10.3 11.0"},
 }
