@@ -91,7 +91,7 @@ def case_of(point: Point) -> InvasionCase:
 def _heavier(plain: InvasionCase, point: Point) -> InvasionCase:
     """The case with heavier fines and springs as stiff as specimens of full size have.
 
-    Of fines of 1/10 there are four times as many, half of the volume.
+    Fines of 1/10 are four times as many, and have half the volume in all.
     """
     density = float(point.value) * plain.fines.density_kg_m3
     keys = [f"fines.density_kg_m3={density!r}", "run.stiffness_N_m=auto"]
