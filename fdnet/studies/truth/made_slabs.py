@@ -98,6 +98,18 @@ CUTS: tuple[tuple[str, tuple[float, float], tuple[int, ...], str], ...] = (
     ("slabBX_r8_followed", FACE, FINEST, LATER),
     ("slabBY_r5_mu0", TWICE, MIDDLE, LATER),
     ("slabBZ_r4", TWICE, MIDDLE, LATER),
+    ("slabCA_r5", FACE, MIDDLE, LATER),
+    ("slabCB_r8", FACE, FINEST, LATER),
+    ("slabCC_r10", FACE, FINEST, LATER),
+    ("slabCD_r5_followed", FACE, MIDDLE, LATER),
+    ("slabCE_r8_followed", FACE, FINEST, LATER),
+    ("slabCF_r6", TWICE, MIDDLE, LATER),
+    ("slabCG_r8_ranges", FACE, FINEST, LATER),
+    ("slabCH_r5_range", TWICE, MIDDLE, LATER),
+    ("slabCI_r3", TWICE, MIDDLE, LATER),
+    ("slabCJ_r4", FACE, MIDDLE, LATER),
+    ("slabCK_r8_mu0", FACE, FINEST, LATER),
+    ("slabCL_r10", FACE, FINEST, LATER),
 )
 """Specimen, slab, grids, and whether its truth was known when the laws were shaped."""
 SLABS = {

@@ -240,6 +240,31 @@ SPECIMENS = {
     ),
     "slabBY_r5_mu0": Specimen(seed=362, fine_mm=0.05, supplied=200, friction=0.0, pack=37),
     "slabBZ_r4": Specimen(seed=363, fine_mm=0.0625, supplied=160, friction=0.55, pack=34),
+    "slabCA_r5": Specimen(seed=371, fine_mm=0.05, supplied=230, friction=0.55, pack=35),
+    "slabCB_r8": Specimen(seed=372, fine_mm=0.03125, supplied=900, friction=0.3, pack=35),
+    "slabCC_r10": Specimen(seed=373, fine_mm=0.025, supplied=1300, friction=0.55, pack=36),
+    "slabCD_r5_followed": Specimen(
+        seed=374, fine_mm=0.05, supplied=250, friction=0.55, pack=36, followed=True
+    ),
+    "slabCE_r8_followed": Specimen(
+        seed=375, fine_mm=0.03125, supplied=900, friction=0.55, pack=34, followed=True
+    ),
+    "slabCF_r6": Specimen(seed=376, fine_mm=0.04167, supplied=330, friction=0.55, pack=35),
+    "slabCG_r8_ranges": Specimen(
+        seed=377,
+        fine_mm=[0.025, 0.0375],
+        supplied=1100,
+        friction=0.55,
+        pack=33,
+        grain_mm=GRAIN_RANGE,
+    ),
+    "slabCH_r5_range": Specimen(
+        seed=378, fine_mm=[0.04, 0.06], supplied=250, friction=0.55, pack=34
+    ),
+    "slabCI_r3": Specimen(seed=379, fine_mm=0.0833, supplied=65, friction=0.55, pack=36),
+    "slabCJ_r4": Specimen(seed=380, fine_mm=0.0625, supplied=180, friction=0.55, pack=36),
+    "slabCK_r8_mu0": Specimen(seed=381, fine_mm=0.03125, supplied=2000, friction=0.0, pack=38),
+    "slabCL_r10": Specimen(seed=382, fine_mm=0.025, supplied=1000, friction=0.55, pack=35),
 }
 """The specimens by name: r5 are fines of a fifth of a grain, mu0 is no friction, a range is one of
 radii (ranges: of grains too), a cake remains upstream of the face; followed: by the flow."""
