@@ -6,6 +6,7 @@ import pytest
 import fdnet
 from fdnet.network.field import collective, of_pack
 from fdnet.network.field.forces import Problem
+from fdnet.network.field.wall_nodes import dot
 from fdnet.network.field.walls import find_walls
 
 
@@ -25,16 +26,18 @@ def test_the_preconditioner_is_symmetric_and_positive_definite(periodic: str) ->
     skeleton = of_pack._skeleton(_grains(), sides, (8.0, 1e-3))
     walls = [find_walls(one, skeleton.lattice, d) for d, one in enumerate(skeleton.marks)]
     problem = Problem(walls, skeleton.response, 4.0)
-    one, two = np.random.default_rng(2).standard_normal((2, len(problem.weight)))
+    walled = problem.weight > 0
+    one, two = np.random.default_rng(2).standard_normal((2, *walled.shape)).astype("f") * walled
     slow = np.zeros_like(one)  # along x, once to and fro across the box: most of it is taken out
-    across = np.unravel_index(problem.nodes[0], skeleton.lattice.shape)[1]
-    wave = np.cos(2.0 * np.pi * (across + 0.5) / skeleton.lattice.shape[1])
-    slow[problem.parts[0]] = problem.weight[problem.parts[0]] * wave
+    across = (np.arange(walled.shape[2]) + 0.5) / walled.shape[2]
+    slow[0] = problem.weight[0] * np.cos(2.0 * np.pi * across)[:, None]
     one, two = problem.project(one), problem.project(two)
-    assert one @ problem.smoothed(two) == pytest.approx(two @ problem.smoothed(one), rel=1e-4)
+    assert dot(one, problem.smoothed(two)) == pytest.approx(
+        dot(two, problem.smoothed(one)), rel=1e-4
+    )
     for force in (one, two, slow):
-        assert force @ problem.smoothed(force) > 0.0
-    assert slow @ problem.smoothed(slow) < 0.8 * float(slow @ problem._differences(slow))
+        assert dot(force, problem.smoothed(force)) > 0.0
+    assert dot(slow, problem.smoothed(slow)) < 0.7 * dot(slow, problem._differences(slow))
 
 
 def test_fewer_iterations_give_the_same_flow(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -43,5 +46,5 @@ def test_fewer_iterations_give_the_same_flow(monkeypatch: pytest.MonkeyPatch) ->
         monkeypatch.setattr(collective, "SHARE", share)
         fields.append(fdnet.velocity_field(_grains(), periodic="yz", cells=10.0, tolerance=0.01))
     without, taken = fields
-    assert taken.solved.iterations < 0.85 * without.solved.iterations
+    assert taken.solved.iterations < 0.66 * without.solved.iterations
     assert taken.resistance == pytest.approx(without.resistance, rel=1e-4)
