@@ -57,7 +57,7 @@ class Problem:
         self.collective = Collective(self.weight, response, self._differences, radius)
 
     def apply(self, scaled: Array, force: Array) -> Array:
-        """A times `scaled`, whose `force` is weight times it and is overwritten."""
+        """A times `scaled`, whose `force` is weight times it."""
         flows, moved = self.response.velocity(list(force)), np.empty_like(scaled)
         for flow, *rest in zip(flows, self.weight, self.own, scaled, moved, strict=True):
             moved_at(flow.reshape(-1), *(part.reshape(-1) for part in rest))
@@ -152,7 +152,7 @@ def _finished(problem: Problem, right: Array, solved: tuple[Array, int]) -> Held
     """Drift and true slip by one fresh application."""
     scaled, iterations = solved
     force = problem.weight * scaled
-    rest = right - problem.apply(scaled, force.copy())
+    rest = right - problem.apply(scaled, force)
     drift = np.array([1.0, 0.0, 0.0])
     for component in problem.drifting:
         if problem.norms[component]:
