@@ -23,7 +23,10 @@ from fdnet.dem.updates import UPDATES, updates_digest
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.files.atomic import write_text
 
-FOLLOWED = f"{SECTION_ARCHIE} between nodes, fines placed, quarter steps, drag at the new rate"
+FOLLOWED = (
+    f"{SECTION_ARCHIE} between nodes, fines placed, quarter steps, drag at the new rate, "
+    "field to 0.09"
+)
 """How the fluid's forces are computed where the flow follows the deposit. Change these words when
 that changes: then a run that an earlier version left unfinished starts over."""
 DOUBTS = "doubts.txt"

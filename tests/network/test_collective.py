@@ -6,6 +6,7 @@ import pytest
 import fdnet
 from fdnet.network.field import collective, of_pack
 from fdnet.network.field.forces import Problem
+from fdnet.network.field.wall_nodes import differences, dot
 from fdnet.network.field.walls import find_walls
 
 
@@ -19,22 +20,47 @@ def _grains() -> fdnet.Snapshot:
     )
 
 
-@pytest.mark.parametrize("periodic", ["yz", "z", ""])
-def test_the_preconditioner_is_symmetric_and_positive_definite(periodic: str) -> None:
+def _problem(periodic: str) -> Problem:
     sides = ("x" in periodic, "y" in periodic, "z" in periodic)
     skeleton = of_pack._skeleton(_grains(), sides, (8.0, 1e-3))
     walls = [find_walls(one, skeleton.lattice, d) for d, one in enumerate(skeleton.marks)]
-    problem = Problem(walls, skeleton.response, 4.0)
-    one, two = np.random.default_rng(2).standard_normal((2, len(problem.weight)))
+    return Problem(walls, skeleton.response, 4.0)
+
+
+def test_differences_are_those_with_the_six_neighbours_at_the_walls_alone() -> None:
+    numbers = np.random.default_rng(3)
+    weight = np.maximum(numbers.random((3, 5, 6, 7)) - 0.5, 0.0).astype("f")
+    value = numbers.standard_normal(weight.shape).astype("f") * (weight > 0)
+    beside = sum(np.roll(value, step, axis) for axis in (1, 2, 3) for step in (1, -1))
+    expected = np.where(weight > 0, value + 0.5 * (6.0 * value - beside), 0.0)
+    assert differences(value, weight, 0.5) == pytest.approx(expected, abs=1e-5)
+
+
+def test_the_greatest_eigenvalue_is_known_to_half_a_percent(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """More steps of the process of Lanczos can only raise it."""
+    slow = _problem("").collective
+    few = slow._greatest()
+    monkeypatch.setattr(collective, "PROBED", 60)
+    assert few == pytest.approx(slow._greatest(), rel=5e-3)
+
+
+@pytest.mark.parametrize("periodic", ["yz", "z", ""])
+def test_the_preconditioner_is_symmetric_and_positive_definite(periodic: str) -> None:
+    problem = _problem(periodic)
+    walled = problem.weight > 0
+    one, two = np.random.default_rng(2).standard_normal((2, *walled.shape)).astype("f") * walled
     slow = np.zeros_like(one)  # along x, once to and fro across the box: most of it is taken out
-    across = np.unravel_index(problem.nodes[0], skeleton.lattice.shape)[1]
-    wave = np.cos(2.0 * np.pi * (across + 0.5) / skeleton.lattice.shape[1])
-    slow[problem.parts[0]] = problem.weight[problem.parts[0]] * wave
+    across = (np.arange(walled.shape[2]) + 0.5) / walled.shape[2]
+    slow[0] = problem.weight[0] * np.cos(2.0 * np.pi * across)[:, None]
     one, two = problem.project(one), problem.project(two)
-    assert one @ problem.smoothed(two) == pytest.approx(two @ problem.smoothed(one), rel=1e-4)
+    assert dot(one, problem.smoothed(two)) == pytest.approx(
+        dot(two, problem.smoothed(one)), rel=1e-4
+    )
     for force in (one, two, slow):
-        assert force @ problem.smoothed(force) > 0.0
-    assert slow @ problem.smoothed(slow) < 0.8 * float(slow @ problem._differences(slow))
+        assert dot(force, problem.smoothed(force)) > 0.0
+    assert dot(slow, problem.smoothed(slow)) < 0.7 * dot(slow, problem._differences(slow))
 
 
 def test_fewer_iterations_give_the_same_flow(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -43,5 +69,5 @@ def test_fewer_iterations_give_the_same_flow(monkeypatch: pytest.MonkeyPatch) ->
         monkeypatch.setattr(collective, "SHARE", share)
         fields.append(fdnet.velocity_field(_grains(), periodic="yz", cells=10.0, tolerance=0.01))
     without, taken = fields
-    assert taken.solved.iterations < 0.85 * without.solved.iterations
+    assert taken.solved.iterations < 0.66 * without.solved.iterations
     assert taken.resistance == pytest.approx(without.resistance, rel=1e-4)

@@ -18,14 +18,13 @@ What they make of forces that vary slowly from grain to grain is taken out (`col
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from fdnet.errors import FlowError
 from fdnet.network.field.collective import Collective
 from fdnet.network.field.response import Response
-from fdnet.network.field.wall_nodes import advance, differences, moved_at, neighbours_of, put, turn
+from fdnet.network.field.wall_nodes import advance, differences, dot, moved_at, turn
 from fdnet.network.field.walls import Walls
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
@@ -41,64 +40,49 @@ DIFFERENCES = 10.0
 
 
 class Problem:
-    """The scaled operator A = W (S + D) W over the wall nodes."""
+    """The scaled operator A = W (S + D) W over the wall nodes.
 
-    def __init__(self, walls: list[Walls], response: Response, reach: float) -> None:
-        ends = np.cumsum([0, *(len(wall.node) for wall in walls)])
-        self.parts = [slice(int(a), int(b)) for a, b in pairwise(ends)]
-        self.nodes = [wall.node for wall in walls]
-        self.slack = np.concatenate([wall.slack for wall in walls])
-        self.weight = 1.0 / np.sqrt(OWN_RESPONSE + self.slack)
-        self.response = response
+    Numbers at the nodes are grids (3, n0, n1, n2) of single precision, 0 where there is no wall.
+    """
+
+    def __init__(self, walls: list[Walls], response: Response, radius: float) -> None:
+        self.walls, self.response = walls, response
+        self.weight, self.own = (np.zeros((3, *response.shape), np.float32) for _ in range(2))
+        for wall, weight, own in zip(walls, self.weight, self.own, strict=True):
+            square = 1.0 / (OWN_RESPONSE + wall.slack)
+            weight.reshape(-1)[wall.node] = np.sqrt(square)
+            own.reshape(-1)[wall.node] = wall.slack * square
         self.drifting = [d for d in (1, 2) if not response.walled[d]]
-        self.norms = [float(self.weight[part] @ self.weight[part]) for part in self.parts]
-        self.grids = [np.zeros(response.shape, np.float32) for _ in range(3)]
-        self.neighbours = np.concatenate(
-            [
-                neighbours_of(node, response.shape, part.start, len(self.slack))
-                for node, part in zip(self.nodes, self.parts, strict=True)
-            ]
-        )
+        self.norms = [dot(part, part) for part in self.weight]
+        self.collective = Collective(self.weight, response, self._differences, radius)
 
-        self.collective = Collective(self.nodes, self.weight, response, self._differences, reach)
-
-    def spread(self, force: Array) -> list[Array]:
-        """Forces (M,) on their nodes: three grids, overwritten at the next call."""
-        for grid, node, part in zip(self.grids, self.nodes, self.parts, strict=True):
-            put(grid.reshape(-1), node, force[part])
-        return self.grids
-
-    def apply(self, scaled: Array) -> Array:
-        """A times `scaled` (M,)."""
-        flows = self.response.velocity(self.spread(self.weight * scaled))
-        moved = [
-            moved_at(flow.reshape(-1), node, self.slack[part], self.weight[part], scaled[part])
-            for flow, node, part in zip(flows, self.nodes, self.parts, strict=True)
-        ]
-        return np.concatenate(moved)
+    def apply(self, scaled: Array, force: Array) -> Array:
+        """A times `scaled`, whose `force` is weight times it."""
+        flows, moved = self.response.velocity(list(force)), np.empty_like(scaled)
+        for flow, *rest in zip(flows, self.weight, self.own, scaled, moved, strict=True):
+            moved_at(flow.reshape(-1), *(part.reshape(-1) for part in rest))
+        return moved
 
     def smoothed(self, residual: Array) -> Array:
-        """The preconditioner times a `residual` (M,), projected."""
-        weighed = self._differences(residual)
-        return self.project(weighed - self.collective.taken(weighed))
+        """The preconditioner times a `residual`, projected."""
+        return self.project(self._differences(self.collective.reduced(residual)))
 
     def _differences(self, value: Array) -> Array:
-        return differences(value, self.neighbours, DIFFERENCES / 6.0)
+        return differences(value, self.weight, DIFFERENCES / 6.0)
 
     def project(self, scaled: Array) -> Array:
         """`scaled` without the part that carries a net force sideways, changed in place."""
         for component in self.drifting:
-            part = self.parts[component]
-            load = self.weight[part]
+            load, part = self.weight[component], scaled[component]
             if self.norms[component]:
-                scaled[part] -= load * float(load @ scaled[part] / self.norms[component])
+                part -= load * np.float32(dot(load, part) / self.norms[component])
         return scaled
 
     def right(self, target: Array | None) -> Array:
-        """Right-hand side for a unit velocity along x and walls that move with `target` (M,)."""
-        right = np.zeros(len(self.weight)) if target is None else target.copy()
-        right[self.parts[0]] -= 1.0
-        return self.weight * right
+        """Right-hand side for a unit velocity along x and walls that move with `target`."""
+        right = np.zeros_like(self.weight) if target is None else target * self.weight
+        right[0] -= self.weight[0]
+        return right
 
     def slip(self, square: float) -> float:
         """Rms wall velocity that is left over the superficial one, from a squared residual."""
@@ -110,7 +94,7 @@ class Held:
     """Solved wall forces.
 
     Attributes:
-        force: (M,) on the fluid at each node, over viscosity and superficial velocity.
+        force: (3, n0, n1, n2) on the fluid at each node, over viscosity and superficial velocity.
         drift: (3,) mean velocity, 1 along x.
         slip: rms velocity left at the walls over the superficial one.
         iterations: of the conjugate gradients.
@@ -132,51 +116,52 @@ def hold(
     Args:
         problem: the operator.
         tolerance: the slip at which the solve ends.
-        start: (M,) forces to start from.
-        target: (M,) velocities of the walls.
+        start: forces (3, n0, n1, n2) to start from; those off the walls are left out.
+        target: velocities (3, n0, n1, n2) of the walls.
 
     Raises:
         FlowError: the iterations run out.
     """
-    right = problem.right(target)
-    scaled = np.zeros(len(right))
-    residual = right.copy()
+    right, weight = problem.right(target), problem.weight
+    scaled, residual = np.zeros_like(right), right.copy()
     if start is not None:
-        scaled = problem.project(start / problem.weight)
-        residual -= problem.apply(scaled)
+        np.divide(start, weight, out=scaled, where=weight > 0)
+        problem.project(scaled)
+        residual -= problem.apply(scaled, weight * scaled)
     problem.project(residual)
     step = problem.smoothed(residual)
-    product, iteration = float(residual @ step), 0
-    while problem.slip(float(residual @ residual)) > tolerance:
+    force = weight * step
+    product, square, iteration = dot(residual, step), dot(residual, residual), 0
+    while problem.slip(square) > tolerance:
         iteration += 1
         if iteration > ITERATIONS:
             raise FlowError(
-                f"velocity field: a slip of {problem.slip(float(residual @ residual)):.3g} of "
+                f"velocity field: a slip of {problem.slip(square):.3g} of "
                 f"the superficial velocity is left at the walls after {ITERATIONS} iterations, "
                 f"expected {tolerance:g}; is the pore space closed? Otherwise raise the tolerance"
             )
-        moved = problem.project(problem.apply(step))
-        length = product / float(step @ moved)
-        advance(scaled, residual, length, step, moved)
+        moved = problem.project(problem.apply(step, force))
+        square = advance(scaled, residual, product / dot(step, moved), (step, moved))
         turned = problem.smoothed(residual)
-        before, product = product, float(residual @ turned)
-        turn(step, product / before, turned)
+        before, product = product, dot(residual, turned)
+        turn(step, product / before, turned, (weight, force))
     return _finished(problem, right, (scaled, iteration))
 
 
 def _finished(problem: Problem, right: Array, solved: tuple[Array, int]) -> Held:
     """Drift and true slip by one fresh application."""
     scaled, iterations = solved
-    rest = right - problem.apply(scaled)
+    force = problem.weight * scaled
+    rest = right - problem.apply(scaled, force)
     drift = np.array([1.0, 0.0, 0.0])
     for component in problem.drifting:
-        part = problem.parts[component]
         if problem.norms[component]:
-            drift[component] = problem.weight[part] @ rest[part] / problem.norms[component]
+            load = dot(problem.weight[component], rest[component])
+            drift[component] = load / problem.norms[component]
     problem.project(rest)
     return Held(
-        force=problem.weight * scaled,
+        force=force,
         drift=drift,
-        slip=problem.slip(float(rest @ rest)),
+        slip=problem.slip(dot(rest, rest)),
         iterations=iterations,
     )

@@ -13,6 +13,7 @@ planes the velocity across them is odd (sine transform DST-I, n - 1 nodes), all 
 to rounding. Transforms are in single precision: see docs/stokes.md for what that costs.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -64,18 +65,29 @@ class Response:
     def _wrapping(self) -> tuple[int, ...]:
         return tuple(axis for axis in range(3) if not self.walled[axis])
 
+    @property
+    def _between_walls(self) -> tuple[int, ...]:
+        return tuple(axis for axis in range(3) if self.walled[axis])
+
     def _forward(self, part: Array, component: int) -> Array:
-        for axis in range(3):
-            if self.walled[axis]:
-                part = _odd(part, axis) if axis == component else fft.dct(part, axis=axis)
+        part = part.copy()  # the only one: what follows may work in place
+        for axis in self._between_walls:
+            part = (
+                _inside(fft.dst, part, axis)
+                if axis == component
+                else fft.dct(part, axis=axis, overwrite_x=True)
+            )
         return fft.rfftn(part, axes=self._wrapping, workers=1)
 
     def _back(self, wave: Array, component: int) -> Array:
         size = [self.shape[axis] for axis in self._wrapping]
         part = fft.irfftn(wave, s=size, axes=self._wrapping, workers=1, overwrite_x=True)
-        for axis in range(3):
-            if self.walled[axis]:
-                part = _odd_back(part, axis) if axis == component else fft.idct(part, axis=axis)
+        for axis in self._between_walls:
+            part = (
+                _inside(fft.idst, part, axis)
+                if axis == component
+                else fft.idct(part, axis=axis, overwrite_x=True)
+            )
         return part
 
 
@@ -106,16 +118,16 @@ def symbols(
     return along[0], along[1], along[2]
 
 
-def _odd(part: Array, axis: int) -> Array:
-    """Sine transform of the nodes between two walls; node 0, on the wall, has no mode."""
-    wave = np.zeros_like(part)
-    np.moveaxis(wave, axis, 0)[1:] = fft.dst(np.moveaxis(part, axis, 0)[1:], type=1, axis=0)
-    return wave
+def _inside(transform: Callable[..., Array], part: Array, axis: int) -> Array:
+    """A sine transform of the nodes between two walls; node 0, on the wall, has no mode.
 
-
-def _odd_back(wave: Array, axis: int) -> Array:
-    part = np.zeros_like(wave)
-    np.moveaxis(part, axis, 0)[1:] = fft.idst(np.moveaxis(wave, axis, 0)[1:], type=1, axis=0)
+    `part` is overwritten.
+    """
+    nodes = np.moveaxis(part, axis, 0)
+    done = transform(nodes[1:], type=1, axis=0, overwrite_x=True)
+    if not np.may_share_memory(done, part):
+        nodes[1:] = done
+    nodes[0] = 0.0
     return part
 
 

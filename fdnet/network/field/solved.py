@@ -8,7 +8,7 @@ from fdnet.errors import NetworkError
 from fdnet.network.field.forces import Held, Problem, hold
 from fdnet.network.field.lattice import LEAST_CELLS, Lattice
 from fdnet.network.field.response import Response, build_response
-from fdnet.network.field.walls import SIDE_WALL, Marks, clear_marks, find_walls, mark
+from fdnet.network.field.walls import SIDE_WALL, Marks, Walls, clear_marks, find_walls, mark
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, frozen
 
@@ -110,47 +110,45 @@ def solve(
             f"velocity field: no wall on the grid of {lattice.shape} cells, expected grains in "
             "the box; give grains or a finer grid"
         )
-    problem = Problem(walls, skeleton.response, _reach(skeleton))
-    start = None
-    if former is not None:
-        pairs = zip(former.force, walls, strict=True)
-        start = np.concatenate([grid.reshape(-1)[wall.node] for grid, wall in pairs])
-    owner = [wall.owner for wall in walls]
-    target = None if velocity is None else _targets(owner, count, velocity)
+    problem = Problem(walls, skeleton.response, _radius(skeleton))
+    start = None if former is None else np.stack(former.force)
+    target = None if velocity is None else _targets(walls, (count, lattice.shape), velocity)
     held = hold(problem, tolerance, start=start, target=target)
-    return _result(problem, held, (owner, lattice, count + len(fines[1])), solid)
+    return _result(walls, held, (lattice, count + len(fines[1])), solid)
 
 
-def _reach(skeleton: Skeleton) -> float:
+def _radius(skeleton: Skeleton) -> float:
     """The mean radius of the grains in cells along x; a few cells where there is no grain."""
     radius = skeleton.grains[1]
     return float(radius.mean()) / skeleton.lattice.unit if len(radius) else float(LEAST_CELLS)
 
 
-def _targets(owner: list[Array], count: int, velocity: Array) -> Array:
-    """Velocity (M,) of the walls at their nodes."""
-    parts = []
-    for component, who in enumerate(owner):
-        part = np.zeros(len(who))
-        moving = who >= count
-        part[moving] = velocity[who[moving] - count, component]
-        parts.append(part)
-    return np.concatenate(parts)
+def _targets(
+    walls: list[Walls], given: tuple[int, tuple[int, int, int]], velocity: Array
+) -> Array:
+    """Velocity (3, n0, n1, n2) of the walls; `given` are the number of grains and the shape."""
+    count, shape = given
+    target = np.zeros((3, *shape), np.float32)
+    for component, (wall, grid) in enumerate(zip(walls, target, strict=True)):
+        moving = wall.owner >= count
+        grid.reshape(-1)[wall.node[moving]] = velocity[wall.owner[moving] - count, component]
+    return target
 
 
 def _result(
-    problem: Problem, held: Held, nodes: tuple[list[Array], Lattice, int], solid: list[Array]
+    walls: list[Walls], held: Held, given: tuple[Lattice, int], solid: list[Array]
 ) -> Solved:
-    owner, lattice, count = nodes
+    """What the forces do to all spheres; `given` are the grid and the number of spheres."""
+    lattice, count = given
     # a node's force is per volume of a cell, in units of the spacing along x
     scale = -np.prod(lattice.spacing) / lattice.unit**2
     on_spheres, on_walls = np.zeros((count, 3)), np.zeros(3)
-    for component, (who, part) in enumerate(zip(owner, problem.parts, strict=True)):
-        force = scale * held.force[part]
+    for component, (wall, grid) in enumerate(zip(walls, held.force, strict=True)):
+        force, who = scale * grid.reshape(-1)[wall.node].astype(float), wall.owner
         spheres = who >= 0
         on_spheres[:, component] = np.bincount(who[spheres], force[spheres], minlength=count)
         on_walls[component] = force[who == SIDE_WALL].sum()
-    grids = [frozen(grid) for grid in problem.spread(held.force)]
+    grids = [frozen(grid) for grid in held.force]
     return Solved(
         force=(grids[0], grids[1], grids[2]),
         drift=frozen(held.drift),

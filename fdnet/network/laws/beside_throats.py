@@ -1,5 +1,6 @@
 """Which fines reach into the sections of a throat, and where they lie as seen from its facet."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,10 +95,27 @@ class FineImages:
 
     def beside(self, prisms: Prisms, rows: Array | None = None) -> FinesBeside:
         """The fines that reach into the prisms (K), or into those of some `rows` alone."""
+        throats, places = [np.zeros(0, np.intp)], [np.zeros((0, 5))]
+        for throat, place in self._reaching(prisms, rows):
+            throats.append(throat)
+            places.append(place)
+        throat, place = np.concatenate(throats), np.concatenate(places)
+        order = np.lexsort((*place[:, 2::-1].T, throat))  # whatever order the search has
+        first = np.searchsorted(throat[order], np.arange(len(prisms.low) + 1))
+        return FinesBeside(first=frozen(first), place=frozen(place[order]))
+
+    def reached(self, prisms: Prisms) -> Array:
+        """Whether a fine reaches into each of the prisms (K,)."""
+        some = np.zeros(len(prisms.low), bool)
+        for throat, _ in self._reaching(prisms, None):
+            some[throat] = True
+        return some
+
+    def _reaching(self, prisms: Prisms, rows: Array | None) -> Iterator[tuple[Array, Array]]:
+        """The throat (N,) and `place` (N, 5) of fines of one size after the other, not sorted."""
         low, high = prisms.low, prisms.high
         if rows is not None:
             low, high = low[rows], high[rows]
-        throats, places = [np.zeros(0, np.intp)], [np.zeros((0, 5))]
         for position, radius in self._classes:
             widest = float(radius.max())
             row, image = points_in_boxes(position, low - widest, high + widest)
@@ -111,12 +129,7 @@ class FineImages:
                 place[:, k] = dot(away, axis[throat])
             place[:, 3] = radius[image]
             real = _reaching(prisms.base, prisms.height, throat, place)
-            throats.append(throat[real])
-            places.append(place[real])
-        throat, place = np.concatenate(throats), np.concatenate(places)
-        order = np.lexsort((*place[:, 2::-1].T, throat))  # whatever order the search has
-        first = np.searchsorted(throat[order], np.arange(len(prisms.low) + 1))
-        return FinesBeside(first=frozen(first), place=frozen(place[order]))
+            yield throat[real], place[real]
 
 
 @compiled

@@ -75,9 +75,7 @@ class KeptSections:
     def _throats_beside(self, position: Array, radius: Array) -> Array:
         """Whether spheres at `position` (N, 3) m of `radius` (N,) m reach into each throat."""
         images = FineImages(self.network, position, radius)
-        return np.concatenate(
-            [np.diff(images.beside(part.prisms).first) > 0 for part in self.parts]
-        )
+        return np.concatenate([images.reached(part.prisms) for part in self.parts])
 
 
 def measured_sections(

@@ -40,7 +40,7 @@ MOVED = 0.01
 LEAK = 1e-6
 """Share of its clean conductance that a side keeps at least, so that pressures are known beyond
 what the fines close."""
-CELLS, SLIP = 10.0, 0.1
+CELLS, SLIP = 10.0, 0.09
 """Cells of the resolved field across a grain (`fdnet study velocity-field`), and the rms velocity
 over the superficial one that it leaves at the walls. The default of `velocity_field` takes a
 quarter more iterations, for an error that is smaller by 0.003 of the mean speed."""
