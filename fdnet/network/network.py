@@ -12,7 +12,7 @@ from fdnet.network.tessellation.pores import Pores, measure_pores
 from fdnet.network.tessellation.tessellation import Tessellation, tessellate
 from fdnet.network.tessellation.throats import LENGTH_FLOOR, Throats, measure_throats
 from fdnet.spheres.directions import Directions, periodic_axes
-from fdnet.spheres.snapshot import Array, Snapshot
+from fdnet.spheres.snapshot import Array, Kind, Snapshot
 
 __all__ = ["LENGTH_FLOOR", "WALLS", "Network", "build_network"]
 
@@ -35,6 +35,8 @@ class Network:
         grain_radius: m, mean.
         area: m2, cross-section of the box.
         image_grain: (M,) index of the grain.
+        image_fine: (M,) whether the image is one of a fine (`Snapshot.kind`), where grains and
+            fines are tessellated alike.
         image_position: (M, 3) m.
         image_radius: (M,) m.
         image_height: (M,) m, how far the image reaches from its centre along x. It is the radius,
@@ -77,6 +79,7 @@ class Network:
     grain_radius: float
     area: float
     image_grain: Array
+    image_fine: Array
     image_position: Array
     image_radius: Array
     image_height: Array
@@ -169,7 +172,8 @@ def build_network(
     box are left out and counted.
 
     Args:
-        grains: the spheres that carry the skeleton, m; fines are not part of the network.
+        grains: the spheres that carry the skeleton, m; those of the kind fine are taken as grains
+            are, and marked (`image_fine`).
         periodic: the sides that are periodic, letters such as "yz" or three truth values.
         walls: "no-slip", the default as in `analyse`, or "slip".
 
@@ -217,6 +221,7 @@ def _assembled(
         grain_radius=tessellation.scale,
         area=float(tessellation.size[1] * tessellation.size[2]),
         image_grain=placed.index[points.owner],
+        image_fine=(placed.grains.kind == Kind.FINE)[points.owner],
         image_position=points.position,
         image_radius=points.radius,
         image_height=placed.height[points.owner],

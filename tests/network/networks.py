@@ -24,6 +24,7 @@ def network_of(
         "grain_radius": 1.0,
         "area": float(np.prod(np.ptp(box[1:], axis=1))),
         "image_grain": np.zeros(1, int),
+        "image_fine": np.zeros(1, bool),
         "image_position": np.zeros((1, 3)),
         "image_radius": np.ones(1),
         "image_height": np.ones(1),

@@ -9,6 +9,7 @@ from fdnet.errors import CaseError, NetworkError
 from fdnet.network.flow.depth import Solved, depth_pressures, layer_edges
 from fdnet.network.flow.slabs import whole_permeability
 from fdnet.network.laws.corner_rays import aim_at_fourth, aim_corners, corner_room
+from fdnet.network.laws.deposit_resistances import deposit_resistances
 from fdnet.network.laws.fourth_grain import depth_within, share_left
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.outside import bundles, meet, share_around
@@ -17,7 +18,6 @@ from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse
 from fdnet.network.resolved import chosen, measured
-from fdnet.network.resolved.all_spheres import as_grains
 from fdnet.spheres.snapshot import Kind, Snapshot
 from fdnet.studies.truth.packs import read_pack, truth_folder
 from tests.network.packs import random_pack, with_fines
@@ -44,8 +44,8 @@ def analysis(pack):
 
 
 def test_k_is_that_of_the_network_of_all_spheres(pack, analysis):
-    network = build_network(as_grains(pack), periodic=SIDES)
-    conductance = 1.0 / half_resistances(network, fourth=True).sum(axis=1)
+    network = build_network(pack, periodic=SIDES)
+    conductance = 1.0 / deposit_resistances(network).sum(axis=1)
     assert analysis.k_damaged == pytest.approx(whole_permeability(network, conductance)[0])
     assert analysis.damage_law_used == "all-spheres"
     two_scale = analyse(pack, periodic=SIDES, damage_law="side-kozeny")
@@ -125,7 +125,7 @@ def test_a_mirrored_periodic_pack_has_the_same_throats(pack):
     place = pack.position.copy()
     place[:, 1] = pack.box[1].sum() - place[:, 1]
     both = [
-        np.sort(half_resistances(build_network(as_grains(one), periodic="xyz"), fourth=True), None)
+        np.sort(deposit_resistances(build_network(one, periodic="xyz")), None)
         for one in (pack, replace(pack, position=place))
     ]
     assert both[0] == pytest.approx(both[1], rel=1e-9)

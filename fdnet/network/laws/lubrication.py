@@ -62,6 +62,7 @@ def half_resistances(
     widening: float = WIDENING,
     fourth: bool = False,
     heights: Array | None = None,
+    but: Array | None = None,
 ) -> Array:
     """Resistance (T, 2) 1/m3 of each throat from its facet to the node on either side.
 
@@ -74,7 +75,9 @@ def half_resistances(
         widening: the factor of da^2 in the formula of this module.
         fourth: whether the fourth grain of a tetrahedron, and those around, narrow the sections.
         heights: (T, 2) m, of where the sides end above the facet; of the nodes if None.
+        but: (T,) whether a throat is left out; its resistance is 0. None leaves out none.
     """
+    but = np.zeros(len(network.throat_pores), bool) if but is None else but
     floor, table = LENGTH_FLOOR * network.grain_radius, ratio_table()
     every, heights = wall_cuts(network), nodes_of(network).heights if heights is None else heights
     resistance = np.empty((len(network.throat_pores), 2))
@@ -83,10 +86,10 @@ def half_resistances(
         given = prepared(network, part, every)
         facet = network.image_position[network.throat_images[part]]
         beside = _beside(network, part, facet) if fourth else np.zeros((len(facet), 2, 5))
-        outside = _outside(around, part, heights[part], facet)
+        outside = _outside(around, part, np.where(but[part, None], 0.0, heights[part]), facet)
         resistance[part] = _halves(
             given,
-            np.ascontiguousarray(heights[part]),
+            (np.ascontiguousarray(heights[part]), but[part]),
             (floor, float(widening)),
             (beside, *outside, table),
         )
@@ -154,13 +157,13 @@ def _outside(
 @compiled_for_loops
 def _halves(
     given: Prepared,
-    heights: Array,
+    sides: tuple[Array, Array],
     numbers: tuple[float, float],
     more: tuple[Array, Array, Array, Array],
 ) -> Array:
-    first, resistance = more[2], np.zeros((len(heights), 2))
-    room = section_room(np.max(first[1:] - first[:-1]) if len(heights) else 0)
-    _set_halves(resistance, given, heights, numbers, (room, *more))
+    first, resistance = more[2], np.zeros((len(sides[0]), 2))
+    room = section_room(np.max(first[1:] - first[:-1]) if len(resistance) else 0)
+    _set_halves(resistance, given, sides, numbers, (room, *more))
     return resistance
 
 
@@ -168,14 +171,20 @@ def _halves(
 def _set_halves(
     resistance: Array,
     given: Prepared,
-    heights: Array,
+    sides: tuple[Array, Array],
     numbers: tuple[float, float],
     more: tuple[SectionRoom, Array, Array, Array, Array],
 ) -> None:
-    """Sets the `resistance` (K, 2) 1/m3 of the sides of throats; 0 where there is none."""
+    """Sets the `resistance` (K, 2) 1/m3 of the sides of throats; 0 where there is none.
+
+    `sides` are the heights (K, 2) m of the nodes, and whether a throat is left out.
+    """
+    heights, but = sides
     floor, widening = numbers
     room, beside, around, first, table = more
     for t in range(len(heights)):
+        if but[t]:
+            continue
         throat, faces = throat_at(given, t, room)
         spans = spans_of(heights[t], floor)
         outside = around[first[t] : first[t + 1]]

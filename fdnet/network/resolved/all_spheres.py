@@ -8,19 +8,17 @@ with what they have inside, as grains do.
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import dataclass
 
 from fdnet.errors import NetworkError
 from fdnet.network.flow.depth import Solved, depth_permeability
 from fdnet.network.flow.flow import Flow
 from fdnet.network.flow.slabs import SlabK, whole_permeability
-from fdnet.network.laws.lubrication import half_resistances
+from fdnet.network.laws.deposit_resistances import deposit_resistances
 from fdnet.network.network import Network, build_network
 from fdnet.network.resolved.slab import Sides, cut_networks, slab_permeabilities
 from fdnet.spheres.arrays import one_line
-from fdnet.spheres.snapshot import Array, Kind, Snapshot, frozen
+from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
 Timed = Callable[[str], AbstractContextManager[None]]
 
@@ -44,14 +42,9 @@ class AllSpheres:
     __repr__ = one_line
 
 
-def as_grains(spheres: Snapshot) -> Snapshot:
-    """The same spheres, all of them of the kind grain."""
-    return replace(spheres, kind=np.full(len(spheres), Kind.GRAIN))
-
-
 def all_conductances(network: Network) -> Array:
     """Conductance (T,) m3 of the throats between spheres of any size."""
-    return 1.0 / half_resistances(network, fourth=True).sum(axis=1)
+    return 1.0 / deposit_resistances(network).sum(axis=1)
 
 
 def measure_all_spheres(
@@ -62,17 +55,16 @@ def measure_all_spheres(
     `timed` takes the name of the stage that its block belongs to. Raises NetworkError where grains
     and fines make no network (`build_network`), and FlowError as `solve_flow` does.
     """
-    grains = as_grains(spheres)
     with timed("tessellate"):
         try:
-            network = build_network(grains, periodic=sides.periodic, walls=sides.walls)
+            network = build_network(spheres, periodic=sides.periodic, walls=sides.walls)
         except NetworkError as error:
             raise NetworkError(
                 f"all-spheres: grains and fines together make no network: {error}; use "
                 "analysis.damage_law = 'side-kozeny'"
             ) from error
     with timed("conductance"):
-        halves = half_resistances(network, fourth=True)
+        halves = deposit_resistances(network)
     conductance = 1.0 / halves.sum(axis=1)
     with timed("solve"):
         k, flow = whole_permeability(network, conductance)
@@ -81,7 +73,7 @@ def measure_all_spheres(
     refused: tuple[str, ...] = ()
     if len(edges) > 2 or sides.periodic[0]:  # else one slab is the whole box
         with timed("tessellate"):
-            slabs = cut_networks(grains, edges, sides)
+            slabs = cut_networks(spheres, edges, sides)
         with timed("solve"):
             parts = slab_permeabilities(slabs, all_conductances, (network, conductance))
         refused = slabs.refused

@@ -7,7 +7,7 @@ from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.flow.slabs import whole_permeability
 from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, LAWS
 from fdnet.network.network import Network, build_network
-from fdnet.network.resolved.all_spheres import all_conductances, as_grains
+from fdnet.network.resolved.all_spheres import all_conductances
 from fdnet.spheres.snapshot import Array, Snapshot
 
 PERIODIC = (True, True, True)
@@ -74,7 +74,7 @@ def resolved(pack: Snapshot) -> float:
     """k (m2) by the network of all spheres that runs take; nan above `RESOLVED_LIMIT` spheres."""
     if len(pack) > RESOLVED_LIMIT:
         return float("nan")
-    network = network_of(as_grains(pack))
+    network = build_network(pack, periodic=PERIODIC, walls="slip")
     return permeability(network, all_conductances(network))
 
 

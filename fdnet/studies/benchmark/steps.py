@@ -26,7 +26,7 @@ from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, LAWS
 from fdnet.network.permeability import analyse
-from fdnet.network.resolved.all_spheres import all_conductances, as_grains
+from fdnet.network.resolved.all_spheres import all_conductances
 from fdnet.spheres.porosity import measure_porosity
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
 from fdnet.studies.benchmark.clock import Clock
@@ -201,7 +201,7 @@ def run_spheres(spheres: Snapshot) -> tuple[Clock, int]:
     Whole analyses on the network of the grains, by each of `TWO_SCALE`, come last.
     """
     clock = Clock()
-    pores = _run_together(clock, as_grains(spheres))
+    pores = _run_together(clock, spheres)
     for law in TWO_SCALE:
         work = partial(analyse, spheres, periodic=SIDES, damage_law=law)
         clock.timed(f"total {law}", work)

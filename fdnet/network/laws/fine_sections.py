@@ -1,0 +1,364 @@
+"""Resistance of throats that a fine bounds.
+
+Where a fine and grains bound a throat, its sections (`lubrication`) are open on the side on which
+the fine has ended, and what holds the fluid there is whatever stands beyond the triangle. So the
+flux through a section is summed over points of the triangle. A point belongs to the nearest rim,
+at the distance s from it. On the ray from the centre of that disc, of radius rho, through the
+point the speed is largest midway to the next rim, at the distance d from the centre, whichever
+disc that is and wherever it stands. The speed is the geometric mean of those in an annulus without
+shear at d (Happel 1959, AIChE J. 5, 174) and between two plates,
+
+    w0 = d^2 / 2 ln(r / rho) - (r^2 - rho^2) / 4,  w1 = s (2 (d - rho) - s) / 2,  r = rho + s.
+
+Against finite elements the first is too large, most of all where a small disc stands among large
+ones, and the second too small around a small disc.
+
+A plane of constant pressure holds the fluid along it as a wall does. With the component n of the
+normal of the facet along x, the flux is n^2 M + (1 - n^2) M_wall, where M_wall has the planes as
+discs of huge radius.
+"""
+
+import numpy as np
+
+from fdnet.network import geometry
+from fdnet.network.compiled import compiled_for_loops, loops_in_place
+from fdnet.network.laws.elementary import log_of
+from fdnet.network.laws.facet_axes import facet_axes
+from fdnet.network.laws.fourth_grain import depth_within
+from fdnet.network.laws.lubrication import THROATS, WIDENING, resistance_of, spans_of
+from fdnet.network.laws.open_sections import TIP
+from fdnet.network.laws.section_rays import set_sides
+from fdnet.network.laws.solids import Cells, set_near, solids_of
+from fdnet.network.laws.wall_cross_section import wall_cuts
+from fdnet.network.network import LENGTH_FLOOR, Network
+from fdnet.network.nodes import nodes_of
+from fdnet.spheres.snapshot import Array
+
+NARROW = 0.1
+"""Inscribed radius over longest edge below which the points are too few for a section: between
+three equal discs they give 15 % too much at 0.1, and 1 % too little at 0.18."""
+STEPS = 4
+"""Steps in height between the facet and a node; with 8, k of slabs changes by 0.2 % on average."""
+DIVISIONS = 6
+"""Parts of each side of the triangle; their square is the number of points."""
+REACH = 1.0
+"""Spheres around a facet are those nearer to its centroid than this, in units of the distance of
+its farthest corner, or than its farther node."""
+SQUARE = 1e-6
+"""Square of the sine of the angle to x up to which the normal of a facet lies along x."""
+HUGE = 1e3
+"""Radius of the disc that stands for a plane, in lengths of the facet."""
+ROOM = 64
+"""Spheres around a facet for which there is room at first."""
+
+
+def bounded_by_fines(network: Network) -> Array:
+    """Whether throats (T,) have the sections of this module.
+
+    A fine is at one corner of them, they are not `NARROW`, and no side wall cuts them.
+    """
+    facet = network.image_position[network.throat_images]
+    edge = np.linalg.norm(facet - np.roll(facet, 1, axis=1), axis=2).max(axis=1)
+    fine = network.image_fine[network.throat_images].any(axis=1)
+    return fine & (network.throat_radius > NARROW * edge) & ~_walled(network)
+
+
+def mixed_pores(network: Network) -> Array:
+    """Whether polyhedra (G,), numbered as `pore_group`, are bounded by grains and by fines."""
+    group = network.pore_group
+    fine = network.image_fine[network.pore_images]
+    count = int(group.max()) + 1
+    some = np.bincount(group, weights=fine.any(axis=1), minlength=count) > 0
+    grains = np.bincount(group, weights=~fine.all(axis=1), minlength=count) > 0
+    return some & grains
+
+
+def _walled(network: Network) -> Array:
+    return wall_cuts(network)[0][:, 0] >= 0
+
+
+def fine_resistances(network: Network, throats: Array, whole: Array) -> tuple[Array, Array]:
+    """Resistance (K, 2) 1/m3 of the sides of `throats` (K,), and how narrow they are at the ends.
+
+    The second is 1/a (K, 3) 1/m at both nodes and at the facet, where a is the radius of the round
+    tube that carries as much; nan where the throat has no such section, or a closed one. A
+    resistance is 0 where the throat has no side, and infinite where a section is closed. It is
+    that of the `whole` (K,) throats alone.
+    """
+    nodes, places = nodes_of(network).heights, []
+    for part in geometry.slices(len(throats), THROATS):
+        places.append(_near_facets(network, throats[part], nodes))
+    middle, reach = np.concatenate([p[0] for p in places]), np.concatenate([p[1] for p in places])
+    solids = solids_of(network, middle, reach)
+    planes = (-np.inf, np.inf) if network.periodic[0] else tuple(network.box[0])
+    numbers = float(planes[0]), float(planes[1]), LENGTH_FLOOR * network.grain_radius
+    points = parts_of_triangle(DIVISIONS)
+    out, ends = np.zeros((len(throats), 2)), np.full((len(throats), 3), np.nan)
+    for part in geometry.slices(len(throats), THROATS):
+        own = throats[part]
+        facet = network.image_position[network.throat_images[own]]
+        axes, height = np.array(facet_axes(network, own, facet)), np.ascontiguousarray(nodes[own])
+        _set_resistances(
+            (geometry.flat(facet), axes, np.ascontiguousarray(facet[:, 0]), height, whole[part]),
+            (solids.body, solids.cells, middle[part], reach[part]),
+            (points, network.throat_corner_radius[own]),
+            numbers,
+            (out[part], ends[part]),
+        )
+    return out, ends
+
+
+def _near_facets(network: Network, throats: Array, nodes: Array) -> tuple[Array, Array]:
+    """Centroids (K, 3) m of the facets of `throats` (K,), and how far (K,) m spheres count."""
+    facet = network.image_position[network.throat_images[throats]]
+    middle = facet.mean(axis=1)
+    corner = np.linalg.norm(facet - middle[:, None], axis=2).max(axis=1)
+    height = np.maximum(nodes[throats].max(axis=1), 0.0)
+    return middle, np.hypot(REACH * corner, height)
+
+
+def parts_of_triangle(divisions: int) -> Array:
+    """Weights (2, n) of the second and third corner at the centroids of equal parts of a triangle.
+
+    They are the same seen from each of its corners.
+    """
+    rows = range(divisions)
+    up = [((i + 1 / 3), (j + 1 / 3)) for i in rows for j in range(divisions - i)]
+    down = [((i + 2 / 3), (j + 2 / 3)) for i in rows for j in range(divisions - i - 1)]
+    return np.ascontiguousarray(np.transpose(up + down)) / divisions
+
+
+@compiled_for_loops
+def _set_resistances(
+    throats: tuple[Array, Array, Array, Array, Array],
+    solids: tuple[Array, Cells, Array, Array],
+    shape: tuple[Array, Array],
+    numbers: tuple[float, float, float],
+    out: tuple[Array, Array],
+) -> None:
+    """Sets the resistances (K, 2) 1/m3 and 1/a (K, 3) 1/m of `out`."""
+    base, axes, origin, height, whole = throats
+    body, cells, middle, reach = solids
+    points, corner_radius = shape
+    low_plane, high_plane, floor = numbers
+    resistance, ends = out
+    near, local = np.empty(ROOM, np.int64), np.empty((ROOM, 4))
+    discs, flux = np.empty((ROOM + 5, 4)), np.empty(STEPS + 1)
+    side_lines = np.empty((3, 3))
+    lanes = np.empty((7, points.shape[1]))
+    for t in range(len(base)):
+        place = (middle[t, 0], middle[t, 1], middle[t, 2])
+        count = set_near(place, reach[t], (body, cells), near)
+        if count > len(near):
+            near, local = np.empty(2 * count, np.int64), np.empty((2 * count, 4))
+            discs = np.empty((2 * count + 5, 4))
+            count = set_near(place, reach[t], (body, cells), near)
+        _measure(body, near[:count], origin[t], axes[:, t], local)
+        planes = (
+            (origin[t, 0] - low_plane, high_plane - origin[t, 0]),
+            (axes[0, t, 0], axes[1, t, 0], axes[2, t, 0]),
+        )
+        spans = spans_of(height[t], floor)
+        set_sides(base[t], side_lines)
+        facet = (base[t], corner_radius[t], side_lines)
+        facet_flux = np.nan
+        for side in range(2):
+            low, high, sense = spans[side]
+            if not high > 0.0:
+                continue
+            step = (high - low) / STEPS
+            # the section at the facet stands for the node where the throat has one side alone
+            every = 1 if whole[t] else STEPS
+            first = 0 if whole[t] or not spans[1 - side][1] > 0.0 else STEPS
+            for k in range(first, STEPS + 1, every):
+                z = sense * (low + k * step)
+                if z == 0.0 and not np.isnan(facet_flux):
+                    flux[k] = facet_flux
+                    continue
+                many = _meet(local, count, facet, z, discs)
+                flux[k] = _flux(base[t], discs, many, points, lanes, planes, z)
+                if z == 0.0:
+                    facet_flux = flux[k]
+            ends[t, side] = _narrowness(flux[STEPS])
+            if whole[t]:
+                resistance[t, side] = resistance_of(flux, (1.0, step, WIDENING))
+        ends[t, 2] = _narrowness(facet_flux)
+
+
+@loops_in_place
+def _narrowness(flux: float) -> float:
+    """1/a 1/m of the round tube that carries the `flux` m4; nan if that is not positive."""
+    return (8.0 / np.pi * flux) ** -0.25 if flux > 0.0 else np.nan
+
+
+@loops_in_place
+def _measure(body: Array, near: Array, origin: Array, axes: Array, local: Array) -> None:
+    """Sets places and radii (N, 4) m of the bodies `near`, along the three `axes` of a facet."""
+    for i in range(len(near)):
+        dx = body[near[i], 0] - origin[0]
+        dy = body[near[i], 1] - origin[1]
+        dz = body[near[i], 2] - origin[2]
+        for a in range(3):
+            local[i, a] = axes[a, 0] * dx + axes[a, 1] * dy + axes[a, 2] * dz
+        local[i, 3] = body[near[i], 3]
+
+
+@loops_in_place
+def _meet(
+    local: Array, count: int, facet: tuple[Array, Array, Array], z: float, discs: Array
+) -> int:
+    """Sets the `discs` (n, 4) of a section at `z` m, and gives their number.
+
+    They are x, y and radius, and how far the rim at least is from the triangle, m. `facet` are the
+    corners, the radii of their spheres, and the sides of the triangle (`section_rays.set_sides`).
+    A section that meets no sphere has discs of 1 % of these radii on its corners.
+    """
+    base, radius, side = facet
+    wide = 0.0
+    x, y = (base[0, 0] + base[1, 0] + base[2, 0]) / 3, (base[0, 1] + base[1, 1] + base[2, 1]) / 3
+    for i in range(3):
+        wide = max(wide, (base[i, 0] - x) ** 2 + (base[i, 1] - y) ** 2)
+    wide, many = REACH * np.sqrt(wide), 0
+    for i in range(count):
+        square = local[i, 3] ** 2 - (local[i, 2] - z) ** 2
+        if square > 0.0:
+            disc, px, py = np.sqrt(square), local[i, 0], local[i, 1]
+            if (px - x) ** 2 + (py - y) ** 2 < (wide + disc) ** 2:
+                outside = -depth_within(base, side, px, py)
+                discs[many] = px, py, disc, outside - disc
+                many += 1
+    if many == 0:
+        for i in range(3):
+            discs[i] = base[i, 0], base[i, 1], TIP * radius[i], 0.0
+        many = 3
+    return many
+
+
+@loops_in_place
+def _flux(
+    base: Array,
+    discs: Array,
+    many: int,
+    points: Array,
+    lanes: Array,
+    planes: tuple[tuple[float, float], tuple[float, float, float]],
+    z: float,
+) -> float:
+    """Flux m4 through a section at `z` m, which planes of pressure may hold.
+
+    `planes` are the distances m of both planes from the first corner of the facet, and the
+    components along x of the axes of the facet.
+    """
+    open_flux = points_flux(base, discs, many, points, lanes)
+    gap, (ux, uy, uz) = planes
+    across = ux * ux + uy * uy
+    if across <= SQUARE:
+        return open_flux
+    slope, long, most = np.sqrt(across), 0.0, 0.0
+    for p in range(len(lanes[6])):
+        most = max(most, lanes[6, p])
+    for i in range(3):
+        long = max(long, abs(base[i, 0]), abs(base[i, 1]))
+    held, huge = many, HUGE * long
+    for side in range(2):
+        sense = 1.0 - 2.0 * side
+        first = gap[side] + sense * z * uz
+        least = first
+        for i in range(3):
+            least = min(least, first + sense * (base[i, 0] * ux + base[i, 1] * uy))
+        if least < 2.0 * most * slope:
+            away = -sense * (first / slope + huge)
+            discs[held] = ux / slope * away, uy / slope * away, huge, least / slope
+            held += 1
+    if held == many:
+        return open_flux
+    return (1.0 - across) * open_flux + across * points_flux(base, discs, held, points, lanes)
+
+
+@loops_in_place
+def points_flux(base: Array, discs: Array, many: int, points: Array, lanes: Array) -> float:
+    """Flux m4 of laplacian(w) = -1 through a triangle among the first `many` discs.
+
+    Where a ray meets no line midway to another disc, the longest side is taken as the way to it.
+
+    Args:
+        base: (3, 2) m, its corners.
+        discs: (n, 4) m, centres, radii, and how far the rims at least are from the triangle.
+        many: how many of them count.
+        points: (2, p) of `parts_of_triangle`.
+        lanes: (7, p) room.
+    """
+    ex, ey = base[1, 0] - base[0, 0], base[1, 1] - base[0, 1]
+    fx, fy = base[2, 0] - base[0, 0], base[2, 1] - base[0, 1]
+    gx, gy = ex - fx, ey - fy
+    longest = np.sqrt(max(ex * ex + ey * ey, fx * fx + fy * fy, gx * gx + gy * gy))
+    x, y, least = lanes[0], lanes[1], lanes[2]
+    number = len(x)
+    for p in range(number):
+        x[p] = base[0, 0] + points[0, p] * ex + points[1, p] * fx
+        y[p] = base[0, 1] + points[0, p] * ey + points[1, p] * fy
+        least[p] = np.inf
+    _set_nearest_rims(discs, many, lanes)
+    _set_midways(discs, many, longest, lanes)
+    rho, way = lanes[5], lanes[6]
+    total = 0.0
+    for p in range(number):
+        s = max(least[p], 0.0)
+        r = rho[p] + s
+        d = max(rho[p] + way[p], r)
+        annulus = 0.5 * d * d * log_of(r / rho[p]) - 0.25 * (r * r - rho[p] * rho[p])
+        plates = 0.5 * s * (2.0 * (d - rho[p]) - s)
+        total += np.sqrt(max(annulus * plates, 0.0))
+    return total * 0.5 * abs(ex * fy - ey * fx) / number
+
+
+@loops_in_place
+def _set_nearest_rims(discs: Array, many: int, lanes: Array) -> None:
+    """Sets the distance of the nearest rim, and centre and radius of its disc, for each point."""
+    x, y, least, nearest = lanes[0], lanes[1], lanes[2], lanes[6]
+    farthest = np.inf
+    for q in range(many):
+        if discs[q, 3] >= farthest:
+            continue
+        qx, qy, radius, number = discs[q, 0], discs[q, 1], discs[q, 2], float(q)
+        for p in range(len(x)):
+            dx, dy = qx - x[p], qy - y[p]
+            away = np.sqrt(dx * dx + dy * dy) - radius
+            nearest[p] = number if away < least[p] else nearest[p]
+            least[p] = min(away, least[p])
+        farthest = 0.0
+        for p in range(len(x)):
+            farthest = max(farthest, least[p])
+    for p in range(len(x)):
+        q = int(nearest[p])
+        lanes[3, p], lanes[4, p], lanes[5, p] = discs[q, 0], discs[q, 1], discs[q, 2]
+
+
+@loops_in_place
+def _set_midways(discs: Array, many: int, longest: float, lanes: Array) -> None:
+    """Sets the way from the rim of a point's disc to the line midway to the next rim, d - rho.
+
+    It is measured on the ray through the point. The directions of the rays take the place of the
+    points. A disc whose rim is farther than twice this way from a point cannot end its ray.
+    """
+    ux, uy, least = lanes[0], lanes[1], lanes[2]
+    own_x, own_y, rho, way = lanes[3], lanes[4], lanes[5], lanes[6]
+    for p in range(len(ux)):
+        r = rho[p] + least[p]
+        ux[p] = (ux[p] - own_x[p]) / r
+        uy[p] = (uy[p] - own_y[p]) / r
+        way[p] = longest
+    most = longest
+    for q in range(many):
+        if discs[q, 3] >= 2.0 * most:
+            continue
+        x, y, radius = discs[q, 0], discs[q, 1], discs[q, 2]
+        for p in range(len(ux)):
+            qx, qy, wider = x - own_x[p], y - own_y[p], radius - rho[p]
+            below = qx * ux[p] + qy * uy[p] + wider
+            half = 0.5 * (qx * qx + qy * qy - wider * wider)
+            one = half / below - rho[p]
+            way[p] = min(way[p], one if half > 0.0 and below > 0.0 else np.inf)
+        most = 0.0
+        for p in range(len(ux)):
+            most = max(most, way[p])
