@@ -47,7 +47,7 @@ class Start:
         invasion: folder of the invasion.
         cake: thickness of the cake, m.
         digest: of the case's clean-up.
-        slows: the cake that stays; None where it does not slow the fluid down.
+        slows: the cake that stays in a uniform field; None without one.
     """
 
     grains: Snapshot
@@ -56,11 +56,6 @@ class Start:
     cake: float
     digest: str
     slows: KeptCake | None = None
-
-    @property
-    def mark(self) -> str:
-        """What checkpoints depend on. One whose cake did not slow the fluid is started over."""
-        return self.digest if self.slows is None else f"{self.digest} cake in series"
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -95,11 +90,11 @@ def clean_up(
     fails or fines are lost, CaseError when the restart of the invasion is not there.
     """
     (folder / "post").mkdir(parents=True, exist_ok=True)
-    last = newest_whole(folder, start.mark, ranks=launch.ranks)
+    last = newest_whole(folder, mark_of(flow, start), ranks=launch.ranks)
     deck, begin = _prepare(flow, start, folder, last, ranks=launch.ranks)
     runs: tuple[Run, ...] = ()
     if not is_over(flow, last):
-        keeper = _Keeper(folder, start.mark, launch)
+        keeper = _Keeper(folder, mark_of(flow, start), launch)
         runs = (_run(flow, begin, start, folder, replace(launch, follow=keeper), fluid),)
     history = read_cleaned(folder)
     state = cleaned_state(folder, history[-1], flow, start.grains)
@@ -124,6 +119,12 @@ def out_plane(flow: BackFlow, cake: float) -> float:
     if flow.choices.lift_cake or cake <= 0:
         return 0.0
     return -(cake + 2 * flow.case.fines.radius_range_m[1])
+
+
+def mark_of(flow: BackFlow, start: Start) -> str:
+    """What checkpoints depend on. One whose cake did not slow the fluid down starts over."""
+    kept = out_plane(flow, start.cake) < 0
+    return f"{start.digest} cake in series" if kept else start.digest
 
 
 def fines_to_clean(flow: BackFlow, start: Start) -> Snapshot:

@@ -7,7 +7,7 @@ import numpy as np
 
 from fdnet.dem.clean_up_states import Cleaned
 from fdnet.dem.coupled_parts import coupled_parts, dumped_group
-from fdnet.dem.deck import Deck, LeftOut, number, render_text
+from fdnet.dem.deck import Deck, number, render_text
 from fdnet.dem.drag import BELOW_ZERO, drag_variables, forces_left_out
 from fdnet.dem.gravity import gravity_variables
 from fdnet.dem.invade_deck import moving_variables
@@ -26,7 +26,7 @@ class Beginning:
         restart: path of the restart file, from the folder of the deck.
         row: the checkpoint of the clean-up that it holds; None at the end of the invasion.
         face: x (m), at most 0, upstream of which a fine has come out.
-        slows: the cake that stays; None where it does not slow the fluid down.
+        slows: the cake that stays in a uniform field; None without one.
     """
 
     restart: str
@@ -40,10 +40,6 @@ def render_clean_up(flow: BackFlow, digest: str, begin: Beginning, *, ranks: int
     case, scales = flow.case, flow.scales
     gravity, left_out = gravity_variables(case, scales)
     left_out += forces_left_out(case)
-    if begin.face < 0 and begin.slows is None:
-        left_out.append(
-            LeftOut(what="resistance of the cake", why="the fluid is not slowed by it")
-        )
     header = header_variables(case, "invade", left_out, ranks)
     drag, slows = turned_drag(flow), begin.slows
     text = render_text(

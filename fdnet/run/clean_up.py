@@ -1,6 +1,6 @@
 """The stage clean_up of a run: the flow is turned back, and what it gives is measured."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +23,7 @@ from fdnet.run.dem_stages import invaded, is_done, packed_grains
 from fdnet.run.fluid.behind_cake import BehindCake
 from fdnet.run.fluid.fluid_of import fluid_of
 from fdnet.run.fluid.mirrored import Mirrored, mirrored
+from fdnet.run.fluid.network_fluid import NetworkFluid
 from fdnet.run.fluid.uniform import UniformCrowd
 from fdnet.run.made_files import START_OVER, check_files, digests_of
 from fdnet.run.mark import RECORD_FORMAT
@@ -50,16 +51,19 @@ def clean_up_stage(session: Session, case: InvasionCase) -> None:
     with session.timed(STAGE), progress:
         launch = session.launch(progress)
         start = _start(session, case, flow, grains, before)
-        fluid = _fluid(flow, grains, start.slows)
+        fluid = _fluid(flow, grains, start)
         result = clean_up(flow, start, folder, launch, fluid=fluid)
     record = _record(session, case, flow, result, folder) | _begun(case, start)
     session.folder.finish(STAGE, record)
 
 
-def _fluid(flow: BackFlow, grains: Snapshot, slows: KeptCake | None) -> Fluid | None:
+def _fluid(flow: BackFlow, grains: Snapshot, start: Start) -> Fluid | None:
+    """The fluid of a coupled clean-up, turned back; a cake that stays is in series with it."""
     fluid = fluid_of(flow.case, flow.scales, mirrored(grains))
-    if isinstance(fluid, UniformCrowd) and slows is not None:
-        return BehindCake(fluid=fluid, cake=slows)
+    if isinstance(fluid, UniformCrowd) and start.slows is not None:
+        return BehindCake(fluid=fluid, cake=start.slows)
+    if isinstance(fluid, NetworkFluid):
+        fluid = replace(fluid, cake_beyond=out_plane(flow, start.cake) < 0)
     return None if fluid is None else Mirrored(fluid=fluid)
 
 
