@@ -122,9 +122,15 @@ def out_plane(flow: BackFlow, cake: float) -> float:
 
 
 def mark_of(flow: BackFlow, start: Start) -> str:
-    """What checkpoints depend on. One whose cake did not slow the fluid down starts over."""
-    kept = out_plane(flow, start.cake) < 0
-    return f"{start.digest} cake in series" if kept else start.digest
+    """What checkpoints depend on.
+
+    One that an earlier version made otherwise starts over: its cake did not slow the fluid down,
+    or a crowd in the uniform field had the upstream velocity at the wrong end.
+    """
+    kept, drag = out_plane(flow, start.cake) < 0, flow.case.drag
+    crowd = drag.coupled and drag.field == "uniform" and drag.upstream == "darcy"
+    made = {"cake in series": kept, "mud side upstream": crowd}
+    return " ".join([start.digest, *(words for words, named in made.items() if named)])
 
 
 def fines_to_clean(flow: BackFlow, start: Start) -> Snapshot:

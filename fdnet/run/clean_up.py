@@ -51,17 +51,19 @@ def clean_up_stage(session: Session, case: InvasionCase) -> None:
     with session.timed(STAGE), progress:
         launch = session.launch(progress)
         start = _start(session, case, flow, grains, before)
-        fluid = _fluid(flow, grains, start)
+        fluid = fluid_turned_back(flow, grains, start)
         result = clean_up(flow, start, folder, launch, fluid=fluid)
     record = _record(session, case, flow, result, folder) | _begun(case, start)
     session.folder.finish(STAGE, record)
 
 
-def _fluid(flow: BackFlow, grains: Snapshot, start: Start) -> Fluid | None:
+def fluid_turned_back(flow: BackFlow, grains: Snapshot, start: Start) -> Fluid | None:
     """The fluid of a coupled clean-up, turned back; a cake that stays is in series with it."""
     fluid = fluid_of(flow.case, flow.scales, mirrored(grains))
-    if isinstance(fluid, UniformCrowd) and start.slows is not None:
-        return BehindCake(fluid=fluid, cake=start.slows)
+    if isinstance(fluid, UniformCrowd):
+        fluid = replace(fluid, mud_beyond=True)
+        if start.slows is not None:
+            return BehindCake(fluid=fluid, cake=start.slows)
     if isinstance(fluid, NetworkFluid):
         fluid = replace(fluid, cake_beyond=out_plane(flow, start.cake) < 0)
     return None if fluid is None else Mirrored(fluid=fluid)

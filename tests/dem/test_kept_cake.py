@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from fdnet.dem.fluid import Moment
 from fdnet.dem.kept_cake import kept_cake
 from fdnet.dem.liggghts import Launch
 from fdnet.network.fines.invaded import measure_invaded
+from fdnet.run.clean_up import fluid_turned_back
 from fdnet.run.dem_stages import invaded, packed_grains
 from fdnet.run.fluid.behind_cake import BehindCake
 from fdnet.run.fluid.mirrored import Mirrored
@@ -137,6 +139,30 @@ def test_the_uniform_field_with_a_crowd_is_slower_behind_the_cake():
     assert slow.pace == free.pace
 
 
+@pytest.mark.parametrize("stays", [False, True])
+def test_the_mud_side_has_the_upstream_velocity_in_a_crowd_turned_back(stays):
+    """As in the deck of lone fines: Darcy's upstream of the face, that of the pores elsewhere."""
+    keys = ("drag.crowd=beetstra", "drag.scheme=implicit", "drag.upstream=darcy")
+    flow = back_flow(small(*keys, f"clean_up.lift_cake={str(not stays).lower()}"))
+    spheres = cake_of(flow, [-2e-4, -1e-6, 1e-6, 6e-4, 1.999e-3, 2.1e-3], 0.0)
+    cake = kept_cake(flow, spheres, -5e-4, 3e7, density=np.full(6, 2000.0)) if stays else None
+    start = Start(
+        grains=spheres.grains(),
+        invaded=spheres,
+        invasion=Path("invade"),
+        cake=4e-4,
+        digest="test",
+        slows=cake,
+    )
+    fluid = fluid_turned_back(flow, spheres.grains(), start)
+    moment = Moment(step=0, time=0.0, before=None, first=None, fresh=True)
+    made = fluid.forces(spheres, moment).velocity[:, 0]
+    rate, scales = cake.rate(spheres) if stays else 1.0, flow.scales
+    assert scales.upstream_velocity < 0.6 * scales.drive_velocity
+    assert made[:2] == pytest.approx(-rate * scales.upstream_velocity, rel=1e-12)
+    assert made[2:] == pytest.approx(-rate * scales.drive_velocity, rel=1e-12)
+
+
 def test_a_cake_that_is_lifted_leaves_the_deck_alone():
     flow = back_flow(small("clean_up.lift_cake=true"))
     begin = Beginning(restart="../invade/post/invade_1.restart", row=None, face=0.0)
@@ -248,3 +274,14 @@ def test_a_checkpoint_without_the_cake_in_series_is_not_continued(start):
     """What an earlier version left unfinished starts over."""
     assert mark_of(back_flow(small("clean_up.lift_cake=true")), start) == start.digest
     assert mark_of(back_flow(small()), start) != start.digest
+
+
+def test_a_checkpoint_of_a_crowd_with_the_ends_exchanged_is_not_continued(tmp_path):
+    spheres = cake_of(back_flow(small()), [6e-4], 0.0)
+    start = Start(
+        grains=spheres.grains(), invaded=spheres, invasion=tmp_path, cake=0.0, digest="test"
+    )
+    crowd = ("drag.crowd=beetstra", "drag.scheme=implicit")
+    assert mark_of(back_flow(small(*crowd, "drag.upstream=darcy")), start) != "test"
+    assert mark_of(back_flow(small(*crowd)), start) == "test"
+    assert mark_of(back_flow(small("drag.scheme=held", "drag.upstream=darcy")), start) == "test"
