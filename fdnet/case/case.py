@@ -148,7 +148,8 @@ class Case(Part):
 
         "pack" ignores fines, fluid and analysis, unless the stiffness follows from them
         (`run.stiffness_N_m` = "auto"); "invade" ignores the analysis and the clean-up,
-        "clean_up" the analysis. No result depends on `POLICIES` or on the bonds, which mechanics
+        "clean_up" the analysis, but for side walls that let a fluid slip which is made with them
+        (`walls_of_the_fluid`). No result depends on `POLICIES` or on the bonds, which mechanics
         alone reads, so no digest does. A key that was added later counts only where its value
         differs from what a case meant before (`fdnet.case.added`).
         """
@@ -157,6 +158,7 @@ class Case(Part):
         data.pop("bonds", None)
         data["run"] = {key: value for key, value in data["run"].items() if key not in POLICIES}
         if stage in LIGGGHTS_STAGES:
+            data |= walls_of_the_fluid(stage, data)
             data.pop("analysis")
             data.pop("name")
         if stage == "invade":
@@ -212,6 +214,24 @@ class InvasionCase(Case):
     def stages(self) -> tuple[Stage, ...]:
         """The stages that a run of this case consists of."""
         return tuple(stage for stage in STAGES if stage != "clean_up" or self.clean_up)
+
+
+def walls_of_the_fluid(stage: str, data: Mapping[str, Any]) -> dict[str, str]:
+    """The key of the analysis that the fluid of `stage` depends on, if it does.
+
+    The network of `drag.field` = "network" and that of a cake that stays in a clean-up are made
+    with `analysis.walls`. Walls that hold the fluid are not named, so that the digests of cases
+    without that key are as they were.
+
+    Args:
+        stage: "pack", "invade" or "clean_up".
+        data: the tables of a case.
+    """
+    kept = stage == "clean_up" and not data.get("clean_up", {}).get("lift_cake", True)
+    network = stage != "pack" and data["drag"]["field"] == "network"
+    walls = data["analysis"]["walls"]
+    named = data["box"]["sides"] == "walls" and walls == "slip" and (kept or network)
+    return {"walls": walls} if named else {}
 
 
 def case_type(data: Mapping[str, Any]) -> type[Case]:

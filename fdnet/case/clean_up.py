@@ -23,8 +23,8 @@ class CleanUp(Part):
     lift_cake: bool = Field(
         True,
         description="Whether the cake and the mud upstream of the formation face are taken away "
-        "before the flow is turned back. With `false` the cake stays, and the returning fluid "
-        "pushes it off.",
+        "before the flow is turned back. With `false` the cake stays and slows the returning "
+        "fluid down, until this pushes it off.",
     )
     duration_ms: Positive | None = Field(
         None,

@@ -26,6 +26,7 @@ from fdnet.dem.deck import Deck, LeftOut
 from fdnet.dem.drag import BELOW_ZERO
 from fdnet.dem.feed import Feed, run_fed
 from fdnet.dem.fluid import Fluid
+from fdnet.dem.kept_cake import KeptCake
 from fdnet.dem.liggghts import Launch, Run, run_deck
 from fdnet.dem.updates import UPDATES, Updates
 from fdnet.errors import LiggghtsError
@@ -46,6 +47,7 @@ class Start:
         invasion: folder of the invasion.
         cake: thickness of the cake, m.
         digest: of the case's clean-up.
+        slows: the cake that stays in a uniform field; None without one.
     """
 
     grains: Snapshot
@@ -53,6 +55,7 @@ class Start:
     invasion: Path
     cake: float
     digest: str
+    slows: KeptCake | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -87,11 +90,11 @@ def clean_up(
     fails or fines are lost, CaseError when the restart of the invasion is not there.
     """
     (folder / "post").mkdir(parents=True, exist_ok=True)
-    last = newest_whole(folder, start.digest, ranks=launch.ranks)
+    last = newest_whole(folder, mark_of(flow, start), ranks=launch.ranks)
     deck, begin = _prepare(flow, start, folder, last, ranks=launch.ranks)
     runs: tuple[Run, ...] = ()
     if not is_over(flow, last):
-        keeper = _Keeper(folder, start.digest, launch)
+        keeper = _Keeper(folder, mark_of(flow, start), launch)
         runs = (_run(flow, begin, start, folder, replace(launch, follow=keeper), fluid),)
     history = read_cleaned(folder)
     state = cleaned_state(folder, history[-1], flow, start.grains)
@@ -118,6 +121,18 @@ def out_plane(flow: BackFlow, cake: float) -> float:
     return -(cake + 2 * flow.case.fines.radius_range_m[1])
 
 
+def mark_of(flow: BackFlow, start: Start) -> str:
+    """What checkpoints depend on.
+
+    One that an earlier version made otherwise starts over: its cake did not slow the fluid down,
+    or a crowd in the uniform field had the upstream velocity at the wrong end.
+    """
+    kept, drag = out_plane(flow, start.cake) < 0, flow.case.drag
+    crowd = drag.coupled and drag.field == "uniform" and drag.upstream == "darcy"
+    made = {"cake in series": kept, "mud side upstream": crowd}
+    return " ".join([start.digest, *(words for words, named in made.items() if named)])
+
+
 def fines_to_clean(flow: BackFlow, start: Start) -> Snapshot:
     """The fines that take part: those inside, and those of a cake that stays."""
     fines = start.invaded.fines()
@@ -139,7 +154,7 @@ def _prepare(
         restart = f"../{start.invasion.name}/post/{path.name}"
     else:
         restart = restart_name(last.step)
-    begin = Beginning(restart=restart, row=last, face=face)
+    begin = Beginning(restart=restart, row=last, face=face, slows=start.slows)
     rows = [row.line() for row in read_cleaned(folder) if last and row.step <= last.step]
     write_text(folder / HISTORY, "\n".join([CLEANED_HEADER, *rows]) + "\n")
     deck = render_clean_up(flow, start.digest, begin, ranks=ranks)

@@ -7,10 +7,11 @@ import numpy as np
 
 from fdnet.dem.clean_up_states import Cleaned
 from fdnet.dem.coupled_parts import coupled_parts, dumped_group
-from fdnet.dem.deck import Deck, LeftOut, number, render_text
+from fdnet.dem.deck import Deck, number, render_text
 from fdnet.dem.drag import BELOW_ZERO, drag_variables, forces_left_out
 from fdnet.dem.gravity import gravity_variables
 from fdnet.dem.invade_deck import moving_variables
+from fdnet.dem.kept_cake import KeptCake, slowed_drag, slowed_variables
 from fdnet.dem.scene import header_variables
 from fdnet.scales.clean_up import BackFlow
 from fdnet.scales.scales import InvasionScales
@@ -25,11 +26,13 @@ class Beginning:
         restart: path of the restart file, from the folder of the deck.
         row: the checkpoint of the clean-up that it holds; None at the end of the invasion.
         face: x (m), at most 0, upstream of which a fine has come out.
+        slows: the cake that stays in a uniform field; None without one.
     """
 
     restart: str
     row: Cleaned | None
     face: float
+    slows: KeptCake | None = None
 
 
 def render_clean_up(flow: BackFlow, digest: str, begin: Beginning, *, ranks: int = 1) -> Deck:
@@ -37,11 +40,8 @@ def render_clean_up(flow: BackFlow, digest: str, begin: Beginning, *, ranks: int
     case, scales = flow.case, flow.scales
     gravity, left_out = gravity_variables(case, scales)
     left_out += forces_left_out(case)
-    if begin.face < 0:
-        left_out.append(
-            LeftOut(what="resistance of the cake", why="the fluid is not slowed by it")
-        )
     header = header_variables(case, "invade", left_out, ranks)
+    drag, slows = turned_drag(flow), begin.slows
     text = render_text(
         "clean_up.in.j2",
         header
@@ -52,7 +52,8 @@ def render_clean_up(flow: BackFlow, digest: str, begin: Beginning, *, ranks: int
             "going_on": begin.row is not None,
             "restart": begin.restart,
             "gravity": gravity,
-            "drag": turned_drag(flow),
+            "drag": drag if slows is None else slowed_drag(drag),
+            "cake": None if slows is None or drag["coupled"] else slowed_variables(slows),
             "resume": False,
             "regions": _regions(flow, begin.face),
             "ahead": begin.face < 0,

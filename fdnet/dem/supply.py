@@ -12,7 +12,7 @@ from fdnet.case.case import InvasionCase
 from fdnet.case.size_rules import concentration_text
 from fdnet.dem.batches import Batches, batches_of
 from fdnet.dem.measured_fines import drawn_fines
-from fdnet.dem.size_classes import CLEARANCE, ROUNDS, places_by_size
+from fdnet.dem.size_classes import CLEARANCE, ROUNDS, few, last_places, places_by_size
 from fdnet.errors import CaseError
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.images import wrapped
@@ -148,11 +148,14 @@ def later_batch(
     others = (np.where((period > 0) & (place >= period), 0.0, place), some.radius)
     margin = np.where(period > 0, 0.0, radius[:, None]) * np.array([0.0, 1.0, 1.0])
     own = min(batches.length, scales.slab_length - number * batches.length)
-    lost = 0
-    for length in np.linspace(own, 2.0 * batches.length, 5):
+    lost, lengths = 0, np.linspace(own, 2.0 * batches.length, 5)
+    # the last fines of a batch that has its full length are drawn many more times
+    for length, patient in [*((one, False) for one in lengths), (lengths[-1], True)]:
         low, most = margin.copy(), np.tile(size, (len(radius), 1)) - margin
         low[:, 0], most[:, 0] = high - length, high
-        place, lost = places_by_size(radius, low, most, period, rng=rng, others=others)
+        place, lost = places_by_size(
+            radius, low, most, period, rng=rng, others=others, patient=patient
+        )
         if not lost:
             first = int(grains.id.max()) + 1 + batches.supplied(number)
             return _moving(case, scales, grains, place, radius, first=first)
@@ -225,7 +228,8 @@ def _add_sequentially(
     """Places (N, 3) m by random sequential addition, largest first, between the x of `slab`, m.
 
     It goes in rounds: of two fines that overlap the later one is drawn again. `others` are places
-    (M, 3) and radii (M,) m of spheres to keep clear of. Raises CaseError after `ROUNDS` rounds.
+    (M, 3) and radii (M,) m of spheres to keep clear of. After `ROUNDS` rounds the last ones are
+    drawn many more times, one by one. Raises CaseError where one has no place even then.
     """
     size = np.array([slab[1] - slab[0], *case.size_m[1:]])
     period = np.where(case.periodic, size, 0.0)
@@ -252,7 +256,15 @@ def _add_sequentially(
             np.concatenate([placed, drawn[free]]),
         )
         waiting = waiting[~free]
-    raise _no_place(case, len(waiting), len(radius), size[0])
+    if few(len(waiting), len(radius)):
+        margin = np.where(period > 0, 0.0, radius[waiting][:, None]) * np.array([0.0, 1.0, 1.0])
+        span = margin, size - margin
+        last = last_places(radius[waiting], span, period, rng=rng, others=(placed, done))
+        position[waiting[: len(last)]] = last
+        waiting = waiting[len(last) :]
+    if len(waiting):
+        raise _no_place(case, len(waiting), len(radius), size[0])
+    return position + corner
 
 
 def _free(points: Array, radius: Array, placed: int, period: Array) -> Array:

@@ -57,6 +57,11 @@ class Cake:
         """Of the whole cake, m."""
         return float(self.edges[-1] - self.edges[0])
 
+    @property
+    def best_resistance(self) -> float:
+        """By the network where it is resolved, else by Carman and Kozeny, 1/m."""
+        return self.resistance(self.k_kozeny if self.k_network is None else self.k_network)
+
     def resistance(self, permeability: Array) -> float:
         """Of the slices in series, 1/m."""
         with np.errstate(divide="ignore"):
@@ -168,7 +173,7 @@ def cake_summary(cake: Cake | None, pack: float, known: Sequence[str] = ()) -> M
         "share_kozeny": resistance_share(kozeny, pack),
         "share_network": None if network is None else resistance_share(network, pack),
     }
-    best = shares["share_kozeny"] if network is None else shares["share_network"]
+    best = resistance_share(cake.best_resistance, pack)
     table = {
         "fines": int(cake.count.sum()),
         "slices": len(cake.count),

@@ -63,6 +63,7 @@ class NetworkFluid:
         grains: of the pack, fixed.
         standing: share of the intact pack's flow below which a fine belongs to the deposit.
         renewed: share of the deposit that may change before the network is solved anew.
+        cake_beyond: whether the cake is at the other end: that of a clean-up, mirrored.
     """
 
     case: InvasionCase
@@ -70,6 +71,7 @@ class NetworkFluid:
     grains: Snapshot
     standing: float = STANDING
     renewed: float = RENEWED
+    cake_beyond: bool = False
 
     @property
     def measured(self) -> tuple[str, ...]:
@@ -128,7 +130,8 @@ class NetworkFluid:
         share = np.ones(len(fines))
         share[within] = carried.ratio[pack.pore_of(fines.position[within])]
         shape = place.velocity * share[:, None]
-        caked = standing & (depth < 0)
+        beyond = (depth >= pack.length) if self.cake_beyond else np.zeros(len(fines), bool)
+        caked = standing & ((depth < 0) | beyond)
         factor = self._factor(near, fines, before * shape)
         crowd = self.scales.push.coefficient * fines.radius * factor
         pressed = np.zeros((len(fines), 3))

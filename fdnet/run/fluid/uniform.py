@@ -27,10 +27,17 @@ from fdnet.spheres.snapshot import Array, Snapshot
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UniformCrowd:
-    """The uniform field, with drag by the crowd around each fine."""
+    """The uniform field, with drag by the crowd around each fine.
+
+    Attributes:
+        case: what is run.
+        scales: of the case.
+        mud_beyond: whether the mud is at the other end: that of a clean-up, mirrored.
+    """
 
     case: InvasionCase
     scales: InvasionScales
+    mud_beyond: bool = False
 
     @property
     def measured(self) -> tuple[str, ...]:
@@ -42,7 +49,8 @@ class UniformCrowd:
         fines, scales = spheres.fines(), self.scales
         depth = fines.position[:, 0]
         velocity, push = np.zeros((2, len(fines), 3))
-        velocity[:, 0] = np.where(depth < 0, scales.upstream_velocity, scales.drive_velocity)
+        mud = depth > self.case.size_m[0] if self.mud_beyond else depth < 0
+        velocity[:, 0] = np.where(mud, scales.upstream_velocity, scales.drive_velocity)
         volume = 4.0 / 3.0 * np.pi * fines.radius**3
         within = (depth >= 0) & (depth < self.case.size_m[0])
         push[:, 0] = np.where(within, volume * scales.push.gradient, 0.0)
