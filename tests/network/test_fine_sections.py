@@ -6,6 +6,8 @@ import pytest
 from fdnet.network.laws import fine_sections as fine
 from fdnet.network.laws.deposit_resistances import deposit_resistances, node_resistances
 from fdnet.network.laws.lubrication import half_resistances
+from fdnet.network.laws.point_sections import parts_of_triangle
+from fdnet.network.laws.point_sections import points_flux as points_flux_of
 from fdnet.network.laws.solids import set_near, solids_of
 from fdnet.network.network import build_network
 from fdnet.network.resolved.slab import cut_out
@@ -19,9 +21,9 @@ EQUAL_SIDES = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, np.sqrt(0.75)]])
 
 
 def points_flux(base, discs, divisions=fine.DIVISIONS):
-    points = np.array(fine.parts_of_triangle(divisions))
+    points = np.array(parts_of_triangle(divisions))
     discs = np.column_stack([np.array(discs, float), np.full(len(discs), -np.inf)])
-    return fine.points_flux(base, discs, len(discs), points, np.empty((7, points.shape[1])))
+    return points_flux_of(base, discs, len(discs), points, np.empty((7, points.shape[1])))
 
 
 def lattice(radii):
@@ -144,7 +146,7 @@ def test_more_steps_and_points_change_little(network, monkeypatch):
 
 def test_a_plane_of_pressure_holds_the_fluid_along_it():
     """As walls do, but for the part of the flow that is square to it."""
-    points = np.array(fine.parts_of_triangle(fine.DIVISIONS))
+    points = np.array(parts_of_triangle(fine.DIVISIONS))
     discs, room = lattice((0.05, 0.05, 0.05)), np.empty((7, points.shape[1]))
     some = np.zeros((len(discs) + 2, 4))
     some[: len(discs), :3] = discs

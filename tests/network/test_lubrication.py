@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fdnet.network.laws import cross_section as section
-from fdnet.network.laws import lubrication, wedge
+from fdnet.network.laws import tube, wedge
 from fdnet.network.laws.wedge import ratio_table
 from tests.network.one_section import even_flux, uneven_flux
 
@@ -22,7 +22,7 @@ def test_tube_rule_against_the_exact_hyperboloid(opening: float, bound: float) -
     narrow = 1.0 / (neck * np.sqrt(1.0 + (z / opening) ** 2))
     total = 0.0
     for a, b, step in zip(narrow, narrow[1:], np.diff(z), strict=False):
-        total += lubrication.summed(np.array([a, b]), step, 1, lubrication.WIDENING)
+        total += tube.summed(np.array([a, b]), step, 1, tube.WIDENING)
     exact = 3.0 / ((1.0 - opening) ** 2 * (1.0 + 2.0 * opening))
     assert 2.0 * total == pytest.approx(exact, rel=bound)
 

@@ -21,7 +21,8 @@ from fdnet.network.laws.fine_sections import (
     fine_resistances,
     mixed_pores,
 )
-from fdnet.network.laws.lubrication import WIDENING, half_resistances
+from fdnet.network.laws.lubrication import half_resistances
+from fdnet.network.laws.tube import WIDENING
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array
 

@@ -36,14 +36,13 @@ from fdnet.network.laws.open_sections import (
     set_discs,
 )
 from fdnet.network.laws.outside import Neighbourhood
+from fdnet.network.laws.tube import WIDENING, resistance_of
 from fdnet.network.laws.wall_cross_section import wall_cuts, wall_fluxes
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import LENGTH_FLOOR, Network
 from fdnet.network.nodes import nodes_of
 from fdnet.spheres.snapshot import Array
 
-WIDENING = 8.0 / 3.0
-"""Factor of da^2 in the resistance above."""
 THROATS = 20_000
 """Throats that are worked off at once."""
 EQUAL = 1e-9
@@ -273,36 +272,3 @@ def set_fluxes(
             for k in range(len(flux)):
                 z = sense * (low + k * step)
                 flux[k] *= share_of_cut(throat[0], room[3][0][k], z, cut, rays)
-
-
-@loops_in_place
-def resistance_of(flux: Array, given: tuple[float, float, float]) -> float:
-    """Integral of dR, 1/m3, over sections of the fluxes `flux` (K,) m4, which are written over.
-
-    `given` are the share of the sections inside the box, m between two of them, and the factor of
-    da^2. 1/a is linear within a step; the integral is extrapolated from all and from half of the
-    steps.
-    """
-    part, step, widening = given
-    for k in range(len(flux)):
-        if not part * flux[k] > 0.0:
-            return np.inf
-    for k in range(len(flux)):
-        flux[k] = 1.0 / np.sqrt(np.sqrt(8.0 / np.pi * part * flux[k]))
-    return (4.0 * summed(flux, step, 1, widening) - summed(flux, step, 2, widening)) / 3.0
-
-
-@loops_in_place
-def summed(narrow: Array, step: float, every: int, widening: float) -> float:
-    """Resistance 1/m3 between sections of 1/a = `narrow` (K,) 1/m that lie `step` m apart.
-
-    It is the sum of dR over the intervals between every `every`-th of them.
-    """
-    total, shear = 0.0, np.sqrt(widening) / 3.0
-    for k in range(every, len(narrow), every):
-        a, b = narrow[k - every], narrow[k]
-        a2, b2 = a * a, b * b
-        straight = 0.2 * every * step * (a2 * (a2 + a * b + b2) + b2 * (a * b + b2))
-        sideways = shear * (b - a) * (a2 + a * b + b2)
-        total += 8.0 / np.pi * np.sqrt(straight * straight + sideways * sideways)
-    return total

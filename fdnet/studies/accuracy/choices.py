@@ -9,8 +9,9 @@ from scipy.interpolate import CubicSpline
 
 from fdnet.network import geometry
 from fdnet.network.laws.conductance import Law, lubrication_law, series_law
-from fdnet.network.laws.lubrication import WIDENING, half_resistances, summed
+from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.open_sections import TIP
+from fdnet.network.laws.tube import WIDENING, summed
 from fdnet.network.network import LENGTH_FLOOR, Network
 from fdnet.spheres.snapshot import Array
 from fdnet.studies.accuracy.measurement import network_of, permeability

@@ -40,6 +40,8 @@ def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
         **{f"slabs_known_{key}": summary(known, name) for key, name in pairs.items()},
         "slabs_default_rms": percent(rms(values(aside, CHOSEN)), 0),
         "slabs_finest_rms": percent(rms(values(aside, FINEST))),
+        "slabs_aside_k": percent(rms([row[f"{FINEST}: k"] for row in aside])),
+        "slabs_aside_k0": percent(rms([row[f"{DEFAULT}: k0"] for row in aside])),
         "slabs_default_worst": f"{worst(values(aside, CHOSEN)):.3f}",
         "slabs_default_case": worst_case(aside, CHOSEN).split(",")[0],
         "slabs_two_scale_rms": percent(rms(values(aside, DEFAULT))),
