@@ -239,10 +239,11 @@ def _add_sequentially(
     position = np.empty((len(radius), 3))
     waiting = order
     done = others[1]
+    margins = np.where(period > 0, 0.0, radius[:, None]) * np.array([0.0, 1.0, 1.0])
     for _ in range(ROUNDS):
         if not len(waiting):
-            return position + corner
-        margin = np.where(period > 0, 0.0, radius[waiting][:, None]) * np.array([0.0, 1.0, 1.0])
+            break
+        margin = margins[waiting]
         drawn = margin + rng.random((len(waiting), 3)) * (size - 2 * margin)
         free = _free(
             np.concatenate([placed, drawn]),
@@ -257,8 +258,7 @@ def _add_sequentially(
         )
         waiting = waiting[~free]
     if few(len(waiting), len(radius)):
-        margin = np.where(period > 0, 0.0, radius[waiting][:, None]) * np.array([0.0, 1.0, 1.0])
-        span = margin, size - margin
+        span = margins[waiting], size - margins[waiting]
         last = last_places(radius[waiting], span, period, rng=rng, others=(placed, done))
         position[waiting[: len(last)]] = last
         waiting = waiting[len(last) :]

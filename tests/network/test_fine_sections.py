@@ -10,6 +10,7 @@ from fdnet.network.laws.point_sections import parts_of_triangle
 from fdnet.network.laws.point_sections import points_flux as points_flux_of
 from fdnet.network.laws.solids import set_near, solids_of
 from fdnet.network.network import build_network
+from fdnet.network.nodes import nodes_of
 from fdnet.network.resolved.slab import cut_out
 from fdnet.spheres.images import make_images
 from fdnet.spheres.snapshot import Kind
@@ -133,10 +134,10 @@ def test_throats_without_a_fine_and_narrow_ones_keep_theirs(network):
 
 def test_more_steps_and_points_change_little(network, monkeypatch):
     throats = np.flatnonzero(fine.bounded_by_fines(network))
-    whole = np.ones(len(throats), bool)
-    coarse = fine.fine_resistances(network, throats, whole)[0].sum(axis=1)
+    whole, heights = np.ones(len(throats), bool), nodes_of(network).heights[throats]
+    coarse = fine.fine_resistances(network, throats, whole, heights)[0].sum(axis=1)
     monkeypatch.setattr(fine, "DIVISIONS", 24)
-    more = fine.fine_resistances(network, throats, whole)[0].sum(axis=1)
+    more = fine.fine_resistances(network, throats, whole, heights)[0].sum(axis=1)
     open_ = np.isfinite(coarse) & np.isfinite(more)
     assert open_.mean() > 0.9
     ratio = np.log(coarse[open_] / more[open_])

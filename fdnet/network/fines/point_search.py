@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fdnet.network.compiled import compiled
+from fdnet.network.compiled import compiled, compiled_in_place
 from fdnet.spheres.snapshot import Array
 
 
@@ -52,6 +52,18 @@ def grid_of(point: Array, edge: float | None = None) -> tuple[Grid, Array]:
     return (start, edge, shape, first), order
 
 
+@compiled_in_place
+def cells_between(
+    low: float, high: float, start: float, edge: float, number: int
+) -> tuple[int, int]:
+    """The first cell along an axis between `low` and `high` m, and the one after the last.
+
+    The `number` cells begin at `start` m, and each is `edge` m long.
+    """
+    lower, upper = (low - start) / edge, (high - start) / edge + 1.0
+    return int(min(max(lower, 0.0), float(number))), int(min(max(upper, 0.0), float(number)))
+
+
 @compiled
 def _search(grid: Grid, point: Array, low: Array, high: Array, inside: Array) -> Array:
     """Number of points (M,) in each box; writes their indices to `inside` where that has room."""
@@ -63,10 +75,9 @@ def _search(grid: Grid, point: Array, low: Array, high: Array, inside: Array) ->
         x, y, z = low[box, 0], low[box, 1], low[box, 2]
         u, v, w = high[box, 0], high[box, 1], high[box, 2]
         for axis in range(3):
-            lower = (low[box, axis] - start[axis]) / edge
-            upper = (high[box, axis] - start[axis]) / edge + 1.0
-            cell[axis, 0] = int(min(max(lower, 0.0), float(shape[axis])))
-            cell[axis, 1] = int(min(max(upper, 0.0), float(shape[axis])))
+            cell[axis, 0], cell[axis, 1] = cells_between(
+                low[box, axis], high[box, axis], start[axis], edge, shape[axis]
+            )
         before = total
         for i in range(cell[0, 0], cell[0, 1]):
             for j in range(cell[1, 0], cell[1, 1]):

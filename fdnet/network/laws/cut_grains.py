@@ -56,11 +56,16 @@ def cut_corners(network: Network, part: slice, facet: Array) -> Array:
         axes = facet_axes(network, part.start + row, facet[row])
         for i, axis in enumerate(axes):
             cut[row, :, i] = outward[row] * axis[:, :1]
-        # a half ellipsoid of semi-axes h and a has the volume of a half sphere of r^3 = a^2 h
-        base = network.image_radius[images[row]] ** 3 / network.image_height[images[row]]
-        radius = np.sqrt(base + outward[row] ** 2)
-        cut[row, :, 3] = np.where(outward[row] != 0.0, radius, 0.0)
+        cut[row, :, 3] = np.where(outward[row] != 0.0, own_radius(network, images[row]), 0.0)
     return cut
+
+
+def own_radius(network: Network, images: Array) -> Array:
+    """Radius (...) m of the grains themselves that `images` (...) are, those of caps included."""
+    radius, outward = network.image_radius[images], network.image_outward[images]
+    # a half ellipsoid of semi-axes h and a has the volume of a half sphere of r^3 = a^2 h
+    base = radius**3 / network.image_height[images]
+    return np.where(outward != 0.0, np.sqrt(base + outward**2), radius)
 
 
 @loops_in_place

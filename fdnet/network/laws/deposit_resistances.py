@@ -24,6 +24,7 @@ from fdnet.network.laws.fine_sections import (
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.tube import WIDENING
 from fdnet.network.network import Network
+from fdnet.network.nodes import nodes_of
 from fdnet.spheres.snapshot import Array
 
 
@@ -33,12 +34,13 @@ def deposit_resistances(network: Network) -> Array:
     As `half_resistances` gives it, for a network of grains and fines (`Network.image_fine`).
     """
     bounded, mixed = bounded_by_fines(network), mixed_pores(network)
-    halves = half_resistances(network, fourth=True, but=bounded)
+    heights = nodes_of(network).heights
+    halves = half_resistances(network, fourth=True, heights=heights, but=bounded)
     near = mixed[network.pore_group[network.throat_pores]].any(axis=1)
     throats = np.flatnonzero(bounded | (near & np.isfinite(halves.sum(axis=1))))
     if not len(throats):
         return halves
-    own, ends = fine_resistances(network, throats, bounded[throats])
+    own, ends = fine_resistances(network, throats, bounded[throats], heights[throats])
     halves[bounded] = own[bounded[throats]]
     halves[throats] += node_resistances(network, throats, halves[throats], (ends, mixed))
     return halves

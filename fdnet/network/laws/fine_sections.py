@@ -23,7 +23,6 @@ from fdnet.network.laws.solids import Cells, set_near, solids_of
 from fdnet.network.laws.tube import WIDENING, resistance_of
 from fdnet.network.laws.wall_cross_section import wall_cuts
 from fdnet.network.network import LENGTH_FLOOR, Network
-from fdnet.network.nodes import nodes_of
 from fdnet.spheres.snapshot import Array
 
 NARROW = 0.1
@@ -51,12 +50,13 @@ def bounded_by_fines(network: Network) -> Array:
     A fine is at one corner of them, they are not `NARROW`, and no side wall cuts them. A bed of
     fines alone, such as a cake, is a pack like others and has none.
     """
+    if network.image_fine.all():
+        return np.zeros(len(network.throat_radius), bool)
     facet = network.image_position[network.throat_images]
     edge = np.linalg.norm(facet - np.roll(facet, 1, axis=1), axis=2).max(axis=1)
     fine = network.image_fine[network.throat_images].any(axis=1)
-    if network.image_fine.all():
-        return np.zeros(len(network.throat_radius), bool)
-    return fine & (network.throat_radius > NARROW * edge) & ~_walled(network)
+    walled = wall_cuts(network)[0][:, 0] >= 0
+    return fine & (network.throat_radius > NARROW * edge) & ~walled
 
 
 def mixed_pores(network: Network) -> Array:
@@ -69,21 +69,20 @@ def mixed_pores(network: Network) -> Array:
     return some & grains
 
 
-def _walled(network: Network) -> Array:
-    return wall_cuts(network)[0][:, 0] >= 0
-
-
-def fine_resistances(network: Network, throats: Array, whole: Array) -> tuple[Array, Array]:
+def fine_resistances(
+    network: Network, throats: Array, whole: Array, heights: Array
+) -> tuple[Array, Array]:
     """Resistance (K, 2) 1/m3 of the sides of `throats` (K,), and how narrow they are at the ends.
 
     The second is 1/a (K, 3) 1/m at both nodes and at the facet, where a is the radius of the round
     tube that carries as much; nan where the throat has no such section, or a closed one. A
     resistance is 0 where the throat has no side, and infinite where a section is closed. It is
-    that of the `whole` (K,) throats alone.
+    that of the `whole` (K,) throats alone. `heights` (K, 2) m are those of their nodes.
     """
-    nodes, places = nodes_of(network).heights, []
-    for part in geometry.slices(len(throats), THROATS):
-        places.append(_near_facets(network, throats[part], nodes))
+    places = [
+        _near_facets(network, throats[part], heights[part])
+        for part in geometry.slices(len(throats), THROATS)
+    ]
     middle, reach = np.concatenate([p[0] for p in places]), np.concatenate([p[1] for p in places])
     solids = solids_of(network, middle, reach)
     planes = (-np.inf, np.inf) if network.periodic[0] else tuple(network.box[0])
@@ -93,7 +92,7 @@ def fine_resistances(network: Network, throats: Array, whole: Array) -> tuple[Ar
     for part in geometry.slices(len(throats), THROATS):
         own = throats[part]
         facet = network.image_position[network.throat_images[own]]
-        axes, height = np.array(facet_axes(network, own, facet)), np.ascontiguousarray(nodes[own])
+        axes, height = np.array(facet_axes(network, own, facet)), heights[part]
         _set_resistances(
             (geometry.flat(facet), axes, np.ascontiguousarray(facet[:, 0]), height, whole[part]),
             (solids.body, solids.cells, middle[part], reach[part]),
@@ -104,13 +103,12 @@ def fine_resistances(network: Network, throats: Array, whole: Array) -> tuple[Ar
     return out, ends
 
 
-def _near_facets(network: Network, throats: Array, nodes: Array) -> tuple[Array, Array]:
+def _near_facets(network: Network, throats: Array, heights: Array) -> tuple[Array, Array]:
     """Centroids (K, 3) m of the facets of `throats` (K,), and how far (K,) m spheres count."""
     facet = network.image_position[network.throat_images[throats]]
     middle = facet.mean(axis=1)
     corner = np.linalg.norm(facet - middle[:, None], axis=2).max(axis=1)
-    height = np.maximum(nodes[throats].max(axis=1), 0.0)
-    return middle, np.hypot(REACH * corner, height)
+    return middle, np.hypot(REACH * corner, np.maximum(heights.max(axis=1), 0.0))
 
 
 @compiled_for_loops
@@ -162,8 +160,7 @@ def _set_resistances(
                     continue
                 many = _meet(local, count, facet, z, discs)
                 flux[k] = _flux(base[t], discs, many, points, lanes, planes, z)
-                if z == 0.0:
-                    facet_flux = flux[k]
+                facet_flux = flux[k] if z == 0.0 else facet_flux
             ends[t, side] = _narrowness(flux[STEPS])
             if whole[t]:
                 resistance[t, side] = resistance_of(flux, (1.0, step, WIDENING))

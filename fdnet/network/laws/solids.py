@@ -10,10 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.network.compiled import compiled_in_place
-from fdnet.network.fines.point_search import grid_of
+from fdnet.network.fines.deposit import size_classes
+from fdnet.network.fines.fine_images import mirrored_images
+from fdnet.network.fines.point_search import cells_between, grid_of
+from fdnet.network.laws.cut_grains import own_radius
 from fdnet.network.network import Network
 from fdnet.spheres.arrays import one_line
-from fdnet.spheres.images import make_images
 from fdnet.spheres.snapshot import Array, frozen
 
 Cells = tuple[Array, Array, Array, Array, Array]
@@ -40,33 +42,23 @@ class Solids:
 def solids_of(network: Network, place: Array, reach: Array) -> Solids:
     """The spheres of a network and all images within `reach` (K,) m of places (K, 3) m."""
     position, radius = _spheres(network)
-    low, high = network.box[:, 0], network.box[:, 1]
-    beyond = np.maximum(low - place, place - high).max(axis=1, initial=0.0)
-    margin = float((beyond + reach).max(initial=0.0) + radius.max())
-    images = make_images(
-        position,
-        network.box,
-        periodic=network.periodic,
-        margin=np.full(3, margin),
-        tolerance=0.0,
-    )
-    body = np.column_stack([images.position, radius[images.owner]])
-    size = np.round(np.log2(body[:, 3] / body[:, 3].min()))
+    low, high = (place - reach[:, None]).min(axis=0), (place + reach[:, None]).max(axis=0)
     parts, corner, edge, shape, first, largest = [], [], [], [], [], []
     before = sphere = 0
-    for one in np.unique(size):
-        own = body[size == one]
-        across = float(np.ptp(own[:, :3], axis=0).max())
+    for some in size_classes(radius):
+        widest = float(radius[some].max())
+        centre, owner = mirrored_images(network, position[some], low, high, widest)
+        across = float(np.ptp(centre, axis=0).max())
         # as many cells as spheres along a side, none of them narrower than a sphere
-        wide = max(2.0 * float(own[:, 3].max()), across / len(own) ** (1.0 / 3.0))
-        (start, width, number, begin), order = grid_of(own[:, :3], wide)
-        parts.append(own[order])
+        wide = max(2.0 * widest, across / len(centre) ** (1.0 / 3.0))
+        (start, width, number, begin), order = grid_of(centre, wide)
+        parts.append(np.column_stack([centre, radius[some][owner]])[order])
         corner.append(start)
         edge.append(width)
         shape.append([*number, before])
         first.append(begin + sphere)
-        largest.append(own[:, 3].max())
-        before, sphere = before + len(begin), sphere + len(own)
+        largest.append(widest)
+        before, sphere = before + len(begin), sphere + len(centre)
     return Solids(
         body=frozen(np.concatenate(parts)),
         cells=(
@@ -93,11 +85,7 @@ def _spheres(network: Network) -> tuple[Array, Array]:
         if axis == 0:
             outward = np.where(beyond == 0, outward, -outward)
     position[:, 0] += outward
-    flat = outward != 0.0
-    square = network.image_radius[image] ** 2
-    # a half ellipsoid of semi-axes h and a has the volume of a half sphere of r^3 = a^2 h
-    cap = square * network.image_radius[image] / network.image_height[image] + outward**2
-    return position, np.sqrt(np.where(flat, cap, square))
+    return position, own_radius(network, image)
 
 
 @compiled_in_place
@@ -113,9 +101,9 @@ def set_near(
     count = 0
     for s in range(len(edge)):
         far = reach + largest[s]
-        i0, i1 = _cells(x - corner[s, 0], far, edge[s], shape[s, 0])
-        j0, j1 = _cells(y - corner[s, 1], far, edge[s], shape[s, 1])
-        k0, k1 = _cells(z - corner[s, 2], far, edge[s], shape[s, 2])
+        i0, i1 = cells_between(x - far, x + far, corner[s, 0], edge[s], shape[s, 0])
+        j0, j1 = cells_between(y - far, y + far, corner[s, 1], edge[s], shape[s, 1])
+        k0, k1 = cells_between(z - far, z + far, corner[s, 2], edge[s], shape[s, 2])
         for i in range(i0, i1):
             for j in range(j0, j1):
                 row = shape[s, 3] + (i * shape[s, 1] + j) * shape[s, 2]
@@ -127,11 +115,3 @@ def set_near(
                             near[count] = b
                         count += 1
     return count
-
-
-@compiled_in_place
-def _cells(place: float, far: float, edge: float, number: int) -> tuple[int, int]:
-    """First cell along an axis within `far` m of a `place` m, and the one after the last."""
-    low = min(max((place - far) / edge, 0.0), float(number))
-    high = min(max((place + far) / edge + 1.0, 0.0), float(number))
-    return int(low), int(high)
