@@ -112,7 +112,7 @@ def _damaged(rows: Sequence[Row]) -> dict[str, str]:
         "off_later_damage": percent(_farthest(later, DEFAULT), 0),
         "resolved_summary": summary(list(rows), RESOLVED),
         "worst_resolved": worst_case(resolved, RESOLVED),
-        "off_resolved": percent(_farthest(resolved, RESOLVED), 0),
+        "high_resolved": percent(max(values(resolved, RESOLVED)) - 1.0, 0),
         "least_ratio": f"{min(ratios):.4f}",
         "most_ratio": f"{max(ratios):.2f}",
         "thesis_loss": span(thesis, 1),
