@@ -85,7 +85,7 @@ def test_every_problem_is_listed_at_once():
         ("drag", {"field": "network"}, "drag.upstream: 'interstitial', but with drag.field"),
         ("run", {"stop_rate": 0.1}, "run.stop_rate: 0.1 needs a rate that falls"),
         ("drag", {"scheme": "every_step", "refresh_steps": 5}, "belongs to drag.scheme 'held'"),
-        ("run", {"time_step_factor": 0.3}, "run.time_step_factor: 0.3"),
+        ("run", {"time_step_factor": 0.4}, "run.time_step_factor: 0.4"),
         ("run", {"skin_mm": 1e-5}, "run.skin_mm: 1e-05 mm, expected 0.0005"),
         ("run", {"skin_mm": 0.26}, "to 0.25 (a grain's radius)"),
         ("run", {"neighbour_bin_mm": 0.009}, "run.neighbour_bin_mm: 0.009 mm, expected 0.00916"),

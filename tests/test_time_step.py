@@ -37,10 +37,30 @@ def explicit(step: float, scheme: str) -> Case:
 @pytest.mark.parametrize("scheme", ["every_step", "held", "implicit", "viscous"])
 def test_the_contact_bound_holds_for_every_scheme(scheme):
     for factor in (0.9999, 1.0):
-        case = tiny(f"run.time_step_s={0.2 * factor * bound()!r}", f"drag.scheme={scheme}")
-        assert scales_of(case).time_step == 0.2 * factor * bound()
+        case = tiny(f"run.time_step_s={0.3 * factor * bound()!r}", f"drag.scheme={scheme}")
+        assert scales_of(case).time_step == 0.3 * factor * bound()
     with pytest.raises(CaseError, match="contact bound"):
-        scales_of(tiny(f"run.time_step_s={0.2001 * bound()!r}", f"drag.scheme={scheme}"))
+        scales_of(tiny(f"run.time_step_s={0.3001 * bound()!r}", f"drag.scheme={scheme}"))
+
+
+@pytest.mark.parametrize(
+    ("keys", "largest"),
+    [
+        (["fines.damping_ratio=0.4"], 0.3),
+        (["fines.damping_ratio=0.5"], math.sqrt(1.0) - math.sqrt(0.5)),
+        (["fines.damping_ratio=0.7"], math.sqrt(1.48) - 0.7 * math.sqrt(2)),
+        (["fines.damping_ratio=0.9"], 0.2),
+        (["grains.damping_ratio=0.9"], math.sqrt(1.105) - 0.55 * math.sqrt(2)),
+        (["contact.rolling_friction=0.1"], 0.2),
+        (["contact.model=hertz"], 0.2),
+    ],
+)
+def test_a_long_step_is_accepted_as_far_as_the_contacts_leave_it_stable(keys, largest):
+    largest = round(largest - 5e-4, 3) if largest not in (0.2, 0.3) else largest
+    scales_of(tiny(*keys, f"run.time_step_factor={largest}"))
+    if largest < 0.3:
+        with pytest.raises(CaseError, match=f"the largest that is stable.*at most {largest:g}"):
+            scales_of(tiny(*keys, f"run.time_step_factor={largest + 0.005}"))
 
 
 @pytest.mark.parametrize("scheme", ["every_step", "held", "viscous"])

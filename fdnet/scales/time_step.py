@@ -17,6 +17,8 @@ be as large as the scatter between seeds."""
 DRAG_WARNING, DRAG_LIMIT = 0.1, 1.0
 """Time for which drag is constant over tau: above the first value fdnet warns, above the second it
 refuses the case."""
+SAFE_FACTOR = 0.2
+"""Time step over sqrt(m/k) that is accepted with any contact."""
 RANDOM_CLOSE = 0.36
 """Porosity of random close packing of equal spheres (Scott and Kilgour 1969)."""
 _ROUNDING = 1 + 1e-12
@@ -34,24 +36,52 @@ def relaxation_time(
 
 def contact_step(case: Case, contacts: dict[str, Contact]) -> float:
     """sqrt(m/k), s, of the lightest moving sphere and the stiffest of its contacts."""
+    return min(contact.step_limit for contact in _moving(case, contacts))
+
+
+def _moving(case: Case, contacts: dict[str, Contact]) -> list[Contact]:
     mobile = case.grains.motion == "mobile"
-    return min(c.step_limit for name, c in contacts.items() if "fine" in name or mobile)
+    return [contact for name, contact in contacts.items() if "fine" in name or mobile]
+
+
+def largest_factor(case: Case, contacts: dict[str, Contact]) -> float:
+    """Largest time step over sqrt(m/k) that stays stable in a deposit.
+
+    LIGGGHTS damps with the velocity of half a step ago, so a mode of the squared frequency w^2 and
+    the damping rate g is stable while w^2 dt^2 + 2 g dt < 4 (Jury's criterion of the leapfrog
+    step). The fastest mode of equal spheres with 12 linear contacts each, a face-centred cubic
+    lattice, has w^2 = 8 k/m and g = 8 c/m, c = 2 z sqrt(k m/2) for the damping ratio z. That gives
+    f^2 + 2 sqrt(2) z f = 1/2 for the largest factor f. It is cut to `CONTACT_STEP_LIMIT`. Hertz
+    contacts and rolling friction stiffen with the force; they keep `SAFE_FACTOR`.
+    """
+    if case.contact.model != "hooke" or case.contact.rolling_friction is not None:
+        return SAFE_FACTOR
+    damping = max(contact.damping_ratio for contact in _moving(case, contacts))
+    stable = math.sqrt(2 * damping**2 + 0.5) - math.sqrt(2) * damping
+    return max(SAFE_FACTOR, min(stable, CONTACT_STEP_LIMIT))
 
 
 def time_step(case: Case, contacts: dict[str, Contact], tau: float) -> float:
     """The step, s: the one given, or `run.time_step_factor` of sqrt(m/k).
 
-    With explicit drag the derived step is at most 0.1 tau. Raises CaseError when a given step
-    breaks the contact bound, or exceeds tau while drag is explicit.
+    With explicit drag the derived step is at most 0.1 tau. Raises CaseError when the step or its
+    factor breaks the contact bound, or a given step exceeds tau while drag is explicit.
     """
     bound, given = contact_step(case, contacts), case.run.time_step_s
+    largest = largest_factor(case, contacts)
     if given is None:
+        if case.run.time_step_factor > largest:
+            raise CaseError(
+                f"run.time_step_factor: {case.run.time_step_factor:g} is above {largest:.3g}, the "
+                "largest that is stable with these contacts (damping_ratio, contact.model, "
+                f"contact.rolling_friction); take at most {math.floor(largest * 1e3) / 1e3:g}"
+            )
         derived = case.run.time_step_factor * bound
         return derived if case.drag.scheme == "implicit" else min(derived, DRAG_WARNING * tau)
-    if given > CONTACT_STEP_LIMIT * bound * _ROUNDING:
+    if given > largest * bound * _ROUNDING:
         raise CaseError(
-            f"run.time_step_s: {given:g} s is above the contact bound {CONTACT_STEP_LIMIT:g} "
-            f"sqrt(m/k) = {CONTACT_STEP_LIMIT * bound:.3g} s; lower it or run.stiffness_N_m"
+            f"run.time_step_s: {given:g} s is above the contact bound {largest:.3g} "
+            f"sqrt(m/k) = {largest * bound:.3g} s; lower it or run.stiffness_N_m"
         )
     if case.drag.scheme != "implicit" and given > DRAG_LIMIT * tau * _ROUNDING:
         raise CaseError(

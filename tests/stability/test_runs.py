@@ -21,9 +21,11 @@ from fdnet.dem.deck import number, render_text
 from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.scene import write_data
 from fdnet.scales.scales import scales_of
+from fdnet.scales.time_step import largest_factor
 from fdnet.spheres.contacts import touching_pairs
 from fdnet.spheres.dump import Frame, read_dump
 from fdnet.spheres.snapshot import Kind, Snapshot, resting
+from fdnet.studies.dem.collisions import energy_run
 
 pytestmark = pytest.mark.liggghts
 RADIUS = 0.05e-3
@@ -74,7 +76,7 @@ def check_bounds(folder: Path, summary: dict[str, Any]) -> None:
         ("porosity 0.60", ["grains.count=47"]),
         ("radii 1:4", ["grains.radius_mm=[0.1, 0.4]", "grains.count=50", "fines.radius_mm=0.04"]),
         ("inviscid", ["fluid.viscosity_cP=1e-12"]),
-        ("the contact bound", ["run.time_step_factor=0.2"]),
+        ("the contact bound", ["run.time_step_factor=0.3"]),
         ("mobile grains", ["grains.motion='mobile'", "fines.count=100"]),
         (
             "supply of more than the void",
@@ -103,7 +105,7 @@ def test_a_hard_case_runs_and_keeps_its_bounds(tmp_path, name, assignments):
             contact.step_limit
             for contact in scales_of(read_case(tmp_path / "case.toml")).contacts.values()
         ]
-        assert summary["dem_dt_s"] == pytest.approx(0.2 * min(limits), rel=1e-6)
+        assert summary["dem_dt_s"] == pytest.approx(0.3 * min(limits), rel=1e-6)
     if name == "porosity 0.30":
         assert any("denser than rigid spheres get" in one for one in summary["warnings"])
 
@@ -264,12 +266,12 @@ def energy(frame: Frame, stiffness: float, mass: float) -> float:
     return float(0.5 * mass * np.sum(velocity**2) + 0.5 * stiffness * np.sum(overlap**2))
 
 
-@pytest.mark.parametrize("factor", [0.1, 0.2])
+@pytest.mark.parametrize("factor", [0.1, 0.3])
 def test_an_undamped_closed_system_gains_no_energy(binary, tmp_path, factor):
     """Velocity Verlet on linear springs keeps energy to (w dt)^2 / 8 of what a contact holds.
 
     w^2 = 2 k / m. The errors at the start and end of each contact add up like a random walk.
-    Stated bound over 40,000 steps: 1 % (factor 0.1), 2 % (factor 0.2). Momentum is kept to the
+    Stated bound over 40,000 steps: 0.6 % (factor 0.1), 5.4 % (factor 0.3). Momentum is kept to the
     rounding of sums.
     """
     case = undamped()
@@ -282,10 +284,25 @@ def test_an_undamped_closed_system_gains_no_energy(binary, tmp_path, factor):
     assert len(frames) == 101
     turned = frames[-1].column("vx") - frames[0].column("vx")
     assert np.mean(np.abs(turned) > 0.1) > 0.9  # nearly all have collided
-    assert np.max(np.abs(energies / energies[0] - 1.0)) < 0.1 * factor
+    assert np.max(np.abs(energies / energies[0] - 1.0)) < 0.6 * factor**2
     for name in ("vx", "vy", "vz"):
         drift = [abs(float(np.sum(frame.column(name)))) for frame in frames]
         assert max(drift) < 1e-10 * np.sum(np.abs(frames[0].column(name)))
+
+
+@pytest.mark.parametrize("damping", [0.5, 0.7])
+def test_a_damped_pack_comes_to_rest_up_to_the_largest_step_and_not_far_above(tmp_path, damping):
+    """Grains with 6 to 8 contacts each, at porosity 0.30; the bound is that of 12."""
+    case = tiny(*(f"{part}.damping_ratio={damping}" for part in ("grains", "fines")))
+    largest = largest_factor(case, scales_of(case).contacts)
+    left = [
+        energy_run(
+            tmp_path, str(share), factor=share * largest, seed=1, spans=150, damping=damping
+        )
+        for share in (1.0, 1.5)
+    ]
+    assert left[0]["kinetic_left"] < 1e-6
+    assert left[1]["kinetic_left"] > 1e-4
 
 
 def test_momentum_of_a_free_oblique_collision_is_conserved(binary, tmp_path):

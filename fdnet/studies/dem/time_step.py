@@ -29,7 +29,7 @@ def points(quick: bool) -> list[Point]:
     chosen = _ladder(COLLISION, (0.8, 0.4, 0.2, 0.1, 0.05, 0.025, 0.0125, 0.00625), 1)
     chosen += _ladder(ENERGY, (1.2, 0.8, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.05, 0.025, 0.0125), 3)
     chosen += _ladder(DRAG, (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002), 1)
-    return chosen + _ladder(INVASION, (0.2, 0.14, 0.1, 0.07, 0.05, 0.025, 0.0125), 6)
+    return chosen + _ladder(INVASION, (0.3, 0.2, 0.14, 0.1, 0.07, 0.05, 0.025, 0.0125), 6)
 
 
 def _ladder(series: str, values: Sequence[float], seeds: int, size: str = "whole") -> list[Point]:
