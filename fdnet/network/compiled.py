@@ -138,8 +138,13 @@ class _CheckedFile(IndexDataCacheFile):
 
 
 _PLAIN: dict[str, Any] = {"_nrt": True, "error_model": "python", "fastmath": False}
-"""Where these are not given, numba takes them from the function that makes the first call."""
-_LOOPS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+"""Where these are not given, numba takes them from the function that makes the first call.
+
+No function may round other than written (`fastmath`). A function that several others call has a
+copy in the code of each. LLVM would round each copy in its own way, and which copy runs depends on
+what the process loaded or compiled before.
+"""
+_LOOPS: dict[str, Any] = {"error_model": "numpy"}
 
 
 def compiled(function: Any, **options: Any) -> Any:
@@ -163,8 +168,7 @@ def compiled(function: Any, **options: Any) -> Any:
 def compiled_for_loops(function: Any) -> Any:
     """`compiled` so that the processor works on several numbers of a loop at once.
 
-    A division by 0 gives an infinite number or none and does not end the function, and a product
-    that is added may be rounded once instead of twice.
+    A division by 0 gives an infinite number or none and does not end the function.
     """
     return compiled(function, **_LOOPS)
 

@@ -157,6 +157,17 @@ def test_a_function_is_compiled_the_same_whoever_calls_it_first():
     assert _product_less(one, one, rounded) == 0.0
 
 
+@module.compiled_for_loops
+def _product_less_in_loops(one, two, three):
+    return one * two - three
+
+
+def test_no_function_rounds_other_than_written():
+    """A fused product and sum would not be 0, and which copy is fused depends on the process."""
+    one = 1.0 + 2.0**-30
+    assert _product_less_in_loops(one, one, one * one) == 0.0
+
+
 def test_no_function_in_place_returns_an_array(root):
     """A caller that counts references would give it back too early."""
     for path in (root / "fdnet/network").rglob("*.py"):
