@@ -71,10 +71,11 @@ def time_step(case: Case, contacts: dict[str, Contact], tau: float) -> float:
     largest = largest_factor(case, contacts)
     if given is None:
         if case.run.time_step_factor > largest:
+            most = math.floor(largest * 1e3) / 1e3
             raise CaseError(
                 f"run.time_step_factor: {case.run.time_step_factor:g} is above {largest:.3g}, the "
-                "largest that is stable with these contacts (damping_ratio, contact.model, "
-                f"contact.rolling_friction); take at most {math.floor(largest * 1e3) / 1e3:g}"
+                "largest that is stable with the damping_ratio, contact.model and "
+                f"contact.rolling_friction of this case; take at most {most:g}"
             )
         derived = case.run.time_step_factor * bound
         return derived if case.drag.scheme == "implicit" else min(derived, DRAG_WARNING * tau)

@@ -1,6 +1,6 @@
 """Time step: over sqrt(m/k) in contacts, over the relaxation time tau in Stokes drag."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from fdnet.case.case import Run as RunControl
@@ -10,6 +10,8 @@ from fdnet.studies.engine.error_rows import against_reference, sizes
 from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study, Value, ladder
 
 COLLISION, ENERGY, INVASION, DRAG = "collision", "undamped pack", "invasion", "drag relaxation"
+LONGEST = "invasion, 24 seeds"
+"""The longest step and the default with more seeds, against a step of 0.1."""
 _SPAN, _SPANS = 1e-5, 300.0
 _STIFFNESS = 1e4
 _INVASION_STIFFNESS = 1e3
@@ -29,12 +31,13 @@ def points(quick: bool) -> list[Point]:
     chosen = _ladder(COLLISION, (0.8, 0.4, 0.2, 0.1, 0.05, 0.025, 0.0125, 0.00625), 1)
     chosen += _ladder(ENERGY, (1.2, 0.8, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.05, 0.025, 0.0125), 3)
     chosen += _ladder(DRAG, (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002), 1)
-    return chosen + _ladder(INVASION, (0.3, 0.2, 0.14, 0.1, 0.07, 0.05, 0.025, 0.0125), 6)
+    chosen += _ladder(INVASION, (0.3, 0.2, 0.14, 0.1, 0.07, 0.05, 0.025, 0.0125), 6)
+    return chosen + _ladder(LONGEST, (0.3, 0.2, 0.1), 24)
 
 
 def _ladder(series: str, values: Sequence[float], seeds: int, size: str = "whole") -> list[Point]:
     knob = "dt_over_tau" if series == DRAG else "dt_over_sqrt_m_k"
-    settings: dict[str, Value] = {"size": size} if series == INVASION else {}
+    settings: dict[str, Value] = {"size": size} if series in (INVASION, LONGEST) else {}
     return ladder(series, knob, values, seeds=seeds, settings=settings)
 
 
@@ -77,7 +80,7 @@ def _worst_collision(point: Point, work: Path) -> Mapping[str, float]:
 
 
 def judge(measured: Sequence[Measured]) -> list[Row]:
-    """Closed forms for the small systems; invasions against the smallest step."""
+    """Closed forms for the small systems; invasions against the smallest step of their series."""
 
     def of(series: str) -> list[Measured]:
         return [run for run in measured if run.point.series == series]
@@ -89,12 +92,19 @@ def judge(measured: Sequence[Measured]) -> list[Row]:
         (DRAG, ("relaxation_error",)),
     ):
         rows += [row for name in names for row in sizes(of(series), name)]
-    finest = min(float(run.point.value) for run in of(INVASION))
-    return rows + [
-        row
-        for name in OBSERVED
-        for row in against_reference(of(INVASION), name, lambda run: run.point.value == finest)
-    ]
+    for series in (INVASION, LONGEST):
+        finest = min((run.point.value for run in of(series)), default=None)
+        rows += [
+            row
+            for name in OBSERVED
+            if finest is not None
+            for row in against_reference(of(series), name, _has(finest))
+        ]
+    return rows
+
+
+def _has(value: Value) -> Callable[[Measured], bool]:
+    return lambda run: run.point.value == value
 
 
 _FACTOR = RunControl().time_step_factor
@@ -124,5 +134,5 @@ STUDY = Study(
         Panel(quantity="invaded", title="invasion: fines inside"),
         Panel(quantity="k_ratio_first", title="invasion: k/k0 of the first millimetre"),
     ),
-    defaults={COLLISION: _FACTOR, ENERGY: _FACTOR, INVASION: _FACTOR},
+    defaults={COLLISION: _FACTOR, ENERGY: _FACTOR, INVASION: _FACTOR, LONGEST: _FACTOR},
 )

@@ -92,7 +92,12 @@ def _time_step(table: Lookup) -> dict[str, str]:
         for level in table.levels(time_step.INVASION, name)
         if not level.reference
     ]
+    depth, inside = (
+        table.level(time_step.LONGEST, name, 0.3) for name in ("mean_depth", "invaded")
+    )
     return {
+        "longest_depth": with_band(depth),
+        "longest_inside": f"{percent(inside.size, 1)} ± {percent(inside.half_width, 1)}",
         "collision_order": f"{order(collision):.1f}",
         "energy_order": f"{order(energy):.1f}",
         "energy_drift": percent(longest.error, 2),
