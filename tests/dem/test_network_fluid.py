@@ -381,6 +381,10 @@ def test_the_network_is_solved_anew_when_the_deposit_changed(fluid, done):
     assert renewal.solves == 3
 
 
+def test_no_two_columns_of_the_record_have_one_name(fluid):
+    assert len(set(fluid.measured)) == len(fluid.measured)
+
+
 def test_a_fine_is_measured_within_a_hundredth_of_its_radius(fluid, done):
     standing = deposit_of(done)
     near = placed(standing)

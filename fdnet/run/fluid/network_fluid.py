@@ -85,8 +85,6 @@ class NetworkFluid:
             "porosity_capped",
             "pores_stagnant",
             "fines_standing",
-            "fines_share",
-            "crowd_over_network",
         )
 
     @cached_property
