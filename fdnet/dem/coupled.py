@@ -16,7 +16,14 @@ from fdnet.dem.batch_files import SUPPLY
 from fdnet.dem.batches import Batches, batches_of
 from fdnet.dem.checkpoint import Checkpoint, chunks_of, entered_by, read_history
 from fdnet.dem.feed import Feed
-from fdnet.dem.fluid import STATE, Fluid, FluidForces, Moment, largest_share, write_forces
+from fdnet.dem.fluid import (
+    Fluid,
+    FluidForces,
+    Moment,
+    largest_share,
+    read_state,
+    write_forces,
+)
 from fdnet.dem.invade_deck import batch_files
 from fdnet.dem.scene import snapshot_of
 from fdnet.dem.supply import later_batch
@@ -24,7 +31,6 @@ from fdnet.dem.updates import Updates
 from fdnet.errors import LiggghtsError
 from fdnet.scales.scales import InvasionScales
 from fdnet.scales.time_step import DRAG_LIMIT
-from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Snapshot
 
 
@@ -135,7 +141,7 @@ class Coupling:
         return steps_between(self.case, self.scales, forces.pace)
 
     def _spheres(self, time: float) -> Snapshot:
-        moved = snapshot_of(read_frame(self.folder / STATE), self.case, time_s=time)
+        moved = snapshot_of(read_state(self.folder), self.case, time_s=time)
         return moved if self.case.grains.motion == "mobile" else self.grains.joined(moved)
 
     def _refuse_overshoot(self, spheres: Snapshot, forces: FluidForces) -> None:

@@ -22,14 +22,15 @@ def coupled_parts(case: InvasionCase, scales: InvasionScales) -> dict[str, str]:
     """Name and text of each file that a coupled deck is continued by; empty when it is not."""
     if not case.drag.coupled:
         return {}
-    shown = {"dump_columns": COLUMNS, "dump_format": FORMAT, "dump_group": dumped_group(case)}
+    shown = {"dump_columns": COLUMNS, "dump_group": dumped_group(case)}
     coefficient = "Ksl" if case.drag.scheme == "implicit" else "cd"
     drag = drag_variables(case, scales)
     parts = {
         "ask.in": render_text("ask.in.j2", shown | {"state": STATE}),
         "fluid.in": render_text("fluid.in.j2", {"coefficient": coefficient}),
         "checkpoint.in": render_text(
-            "checkpoint.in.j2", shown | {"allowance": plug_allowance(case, scales)}
+            "checkpoint.in.j2",
+            shown | {"dump_format": FORMAT, "allowance": plug_allowance(case, scales)},
         ),
     }
     if drag["hold_steps"]:

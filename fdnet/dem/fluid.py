@@ -13,10 +13,12 @@ from typing import Protocol
 import numpy as np
 
 from fdnet.spheres.arrays import Array
+from fdnet.spheres.binary_dump import read_binary_frame
+from fdnet.spheres.dump import COLUMNS, Frame
 from fdnet.spheres.snapshot import Snapshot
 
-STATE = "post/fluid.dump"
-"""File in which LIGGGHTS shows the spheres when it asks for the fluid."""
+STATE = "post/fluid.bin"
+"""File in which LIGGGHTS shows the spheres when it asks for the fluid, all digits of them."""
 _FILES = ("cd", "ux", "uy", "uz")
 
 
@@ -57,6 +59,11 @@ class Moment:
     before: Mapping[str, float] | None
     first: Mapping[str, float] | None
     fresh: bool
+
+
+def read_state(folder: Path) -> Frame:
+    """The spheres that LIGGGHTS shows. Raises DumpError when it did not write all of them."""
+    return read_binary_frame(folder / STATE, tuple(COLUMNS.split()))
 
 
 class Fluid(Protocol):

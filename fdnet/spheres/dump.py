@@ -2,6 +2,7 @@
 
 import io
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -64,15 +65,22 @@ def read_dump(path: Path) -> list[Frame]:
 
 def read_frame(path: Path) -> Frame:
     """The only frame of a dump file. Raises DumpError, also when there are none or several."""
-    try:
+    with full_disk_named(path.parent):
         frames = read_dump(path)
         if len(frames) != 1:
             raise DumpError(f"{path}: {len(frames)} frames, expected one. {CUT}")
+    return frames[0]
+
+
+@contextmanager
+def full_disk_named(folder: Path) -> Iterator[None]:
+    """Adds to a DumpError that the disk of the `folder` is full, where it is."""
+    try:
+        yield
     except DumpError as error:
-        if path.parent.exists() and disk_is_full(path.parent):
+        if folder.exists() and disk_is_full(folder):
             raise DumpError(f"{error} Make room first: the disk is full.") from error
         raise
-    return frames[0]
 
 
 def parse_dump(data: bytes, source: str) -> Iterator[Frame]:

@@ -20,7 +20,7 @@ from fdnet.dem.checkpoint_record import last_checkpoint
 from fdnet.dem.coupled import steps_between
 from fdnet.dem.coupled_parts import write_coupled_parts
 from fdnet.dem.feed import run_fed
-from fdnet.dem.fluid import STATE, Moment, write_forces
+from fdnet.dem.fluid import Moment, read_state, write_forces
 from fdnet.dem.invade_deck import render_invade
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
@@ -297,7 +297,7 @@ def applied_force(case, fines, folder, binary) -> np.ndarray:
         show = 'write_dump fines custom post/{}.dump id fx modify sort id format "%d %.17g"'
         feed("include in.invade", "velocity fines set 0.0 0.0 0.0")
         feed("run 0", show.format("without"), "include ask.in")
-        shown = snapshot_of(read_frame(folder / STATE), case, time_s=0.0)
+        shown = snapshot_of(read_state(folder), case, time_s=0.0)
         assert np.array_equal(shown.id, fines.id)
         moment = Moment(step=0, time=0.0, before=None, first=None, fresh=True)
         write_forces(folder, shown, fluid_of(case, scales, grain).forces(shown, moment))

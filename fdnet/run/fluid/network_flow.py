@@ -29,7 +29,7 @@ from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
 STAGNANT = 1e-2
 """A pore that carries less than this share of the mean flux of a pore, clean, keeps ratio 1."""
-RENEWED = 0.1
+RENEWED = 0.2
 """Share of the deposit by volume that may change before the network is solved anew
 (`fdnet study flow-updates`)."""
 STEP = 1.0 / 4.0

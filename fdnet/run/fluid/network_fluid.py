@@ -42,9 +42,8 @@ STANDING = 0.5
 
 @dataclass(slots=True, eq=False)
 class Kept:
-    """What is kept from one update to the next: the damaged pack, and the flow at the fines."""
+    """What is kept from one update to the next: the flow of the intact pack at the fines."""
 
-    renewal: Renewal
     places: Sampled
 
     def sampled(self, fines: Snapshot, pack: PackFlow) -> Sampled:
@@ -93,8 +92,13 @@ class NetworkFluid:
         return pack_flow(self.grains, self.case.periodic, self.case.analysis.walls)
 
     @cached_property
+    def renewal(self) -> Renewal:
+        """The damaged pack, from one update to the next."""
+        return Renewal(self.pack, renewed=self.renewed)
+
+    @cached_property
     def _kept(self) -> Kept:
-        return Kept(Renewal(self.pack, renewed=self.renewed), nowhere())
+        return Kept(nowhere())
 
     @property
     def first_velocity(self) -> float:
@@ -123,7 +127,7 @@ class NetworkFluid:
         place = self._kept.sampled(measured, pack)
         before = self.first_velocity if moment.before is None else moment.before["velocity_m_s"]
         standing = _speed(fines.velocity) < self.standing * before * _speed(place.velocity)
-        carried, deposit = self._kept.renewal.of(measured.where(standing), anew=moment.fresh)
+        carried, deposit = self.renewal.of(measured.where(standing), anew=moment.fresh)
         near = local_porosity(spheres, self.case.periodic)
         share = np.ones(len(fines))
         share[within] = carried.ratio[pack.pore_of(fines.position[within])]

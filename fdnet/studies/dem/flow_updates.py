@@ -32,7 +32,7 @@ TRAVEL, SOLVED, STOOD = "way between updates", "deposit changed before a solve",
 FIFTH, TENTH = "mass over its own, fines of 1/5", "mass over its own, fines of 1/10"
 TRIED: Mapping[str, tuple[float, ...]] = {
     TRAVEL: (0.125, 0.25, 0.5, 1.0, 2.0),
-    SOLVED: (0.0, 0.02, RENEWED, 0.3),
+    SOLVED: (0.0, 0.02, 0.1, RENEWED, 0.3),
     STOOD: (0.25, STANDING, 0.75),
     FIFTH: (1.0, 2.0, 4.0, 16.0),
     TENTH: (1.0, 2.0, 4.0),
