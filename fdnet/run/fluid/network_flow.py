@@ -31,19 +31,19 @@ STAGNANT = 1e-2
 """A pore that carries less than this share of the mean flux of a pore, clean, keeps ratio 1."""
 RENEWED = 0.2
 """Share of the deposit by volume that may change before the network is solved anew
-(`fdnet study flow-updates`)."""
-STEP = 1.0 / 4.0
-"""Greatest step between two sections of a throat, in radii of its smallest fine. That of the
-analysis is half of it, for twice the time."""
+(`scripts/solve_lag.py`, `fdnet study flow-updates`)."""
+STEP = 1.0 / 3.0
+"""Greatest step between two sections of a throat, in radii of its smallest fine. The analysis
+takes an eighth (`scripts/solve_lag.py`)."""
 MOVED = 0.01
 """Way in radii within which a fine that moves is taken to be at one place (`placed`)."""
 LEAK = 1e-6
 """Share of its clean conductance that a side keeps at least, so that pressures are known beyond
 what the fines close."""
-CELLS, SLIP = 10.0, 0.09
+CELLS, SLIP = 10.0, 0.15
 """Cells of the resolved field across a grain (`fdnet study velocity-field`), and the rms velocity
-over the superficial one that it leaves at the walls. The default of `velocity_field` takes a
-quarter more iterations, for an error that is smaller by 0.003 of the mean speed."""
+over the superficial one that it leaves at the walls. The default of `velocity_field` takes half as
+many iterations again (docs/velocity_field.md)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
