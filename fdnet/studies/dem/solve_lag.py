@@ -1,8 +1,8 @@
 """How far a network that is solved now and then lags behind one that is solved at every update.
 
 One invasion is followed. At each of its updates the network is solved for the deposit that is
-there, and compared with what it was when as much of the deposit as a threshold allows had not yet
-changed. So every threshold sees the same deposits, and no chance is in the differences.
+there, and compared with the last solve that each threshold would have made. So every threshold
+sees the same deposits, and no chance is in the differences.
 """
 
 from collections.abc import Iterator, Sequence
