@@ -2,7 +2,7 @@
 """How far a network that is solved now and then lags behind one solved at every update.
 
     .venv/bin/python scripts/solve_lag.py cases/quick/specimen5.toml --work lag --csv lag.csv \\
-        --set drag.field=network
+        --set drag.field=network --set drag.upstream=darcy --set drag.scheme=implicit
 
 The flow of the case must follow its deposit.
 """

@@ -40,3 +40,23 @@ def resting_spheres(
         radius=np.full(count, radius),
         velocity=np.zeros((count, 3)),
     )
+
+
+def followed(*more, way="fluid.velocity_m_s=5.0"):
+    """A flow that follows its deposit: 15 grains, 150 fines, five checkpoints with updates."""
+    return tiny(
+        "drag.field=network",
+        "drag.crowd=beetstra",
+        "drag.scheme=implicit",
+        "drag.upstream=darcy",
+        way,
+        "run.time_step_factor=0.2",
+        "box.sides=periodic",
+        "box.size_mm=[1.6,1.0,1.0]",
+        "grains.count=15",
+        "fines.count=150",
+        "fines.concentration=0.2",
+        "run.cap_ms=0.5",
+        "run.checkpoint_ms=0.1",
+        *more,
+    )

@@ -1,6 +1,6 @@
-"""LIGGGHTS binary dumps of one frame, which take it a tenth of the time of text.
+"""Binary dumps of one frame, which LIGGGHTS writes in a tenth of the time of text.
 
-The file has no names of columns: who wrote the deck knows them.
+The file does not name its columns, so the caller gives them.
 """
 
 from pathlib import Path
@@ -9,7 +9,7 @@ import numpy as np
 
 from fdnet.errors import DumpError
 from fdnet.spheres.arrays import Array, frozen
-from fdnet.spheres.dump import CUT, Frame, full_disk_named
+from fdnet.spheres.dump import CUT, Frame, bytes_of, full_disk_named
 
 _HEADER = np.dtype(
     [
@@ -33,13 +33,7 @@ def read_binary_frame(path: Path, columns: tuple[str, ...]) -> Frame:
     holds other columns, a slanted box, or a number that is not finite.
     """
     with full_disk_named(path.parent):
-        try:
-            data = path.read_bytes()
-        except OSError as error:
-            raise DumpError(
-                f"{path}: cannot be read: {error.strerror}; the run did not write it"
-            ) from error
-        return _frame(data, columns, str(path))
+        return _frame(bytes_of(path), columns, str(path))
 
 
 def _frame(data: bytes, columns: tuple[str, ...], source: str) -> Frame:
@@ -50,7 +44,8 @@ def _frame(data: bytes, columns: tuple[str, ...], source: str) -> Frame:
     if header["slanted"] or width != len(columns) or header["count"] < 0:
         raise DumpError(
             f"{source}: step {step}: {width} columns of {header['count']} atoms, slanted box "
-            f"{header['slanted']}; expected {len(columns)} columns ({' '.join(columns)}) and 0"
+            f"{header['slanted']}; expected {len(columns)} columns ({' '.join(columns)}) "
+            "and slanted box 0, which has its sides along the axes"
         )
     values = _values(data, int(header["blocks"]), f"{source}: step {step}")
     if len(values) != header["count"] * width:

@@ -54,13 +54,17 @@ def read_dump(path: Path) -> list[Frame]:
 
     Raises DumpError that names path, line and step where it is malformed or cut.
     """
+    return list(parse_dump(bytes_of(path), str(path)))
+
+
+def bytes_of(path: Path) -> bytes:
+    """What a dump file holds. Raises DumpError where it cannot be read."""
     try:
-        data = path.read_bytes()
+        return path.read_bytes()
     except OSError as error:
         raise DumpError(
             f"{path}: cannot be read: {error.strerror}; the run did not write it"
         ) from error
-    return list(parse_dump(data, str(path)))
 
 
 def read_frame(path: Path) -> Frame:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import tiny
+from builders import followed
 from cut_and_continue import differences
 from scipy.integrate import quad
 
@@ -33,29 +33,9 @@ pytestmark = pytest.mark.liggghts
 FIRST = Moment(step=0, time=0.0, before=None, first=None, fresh=True)
 
 
-def small(*more, way="fluid.velocity_m_s=5.0"):
-    """Some 20 grains and 150 fines, five checkpoints with a few updates each."""
-    return tiny(
-        "drag.field=network",
-        "drag.crowd=beetstra",
-        "drag.scheme=implicit",
-        "drag.upstream=darcy",
-        way,
-        "run.time_step_factor=0.2",
-        "box.sides=periodic",
-        "box.size_mm=[1.6,1.0,1.0]",
-        "grains.count=15",
-        "fines.count=150",
-        "fines.concentration=0.2",
-        "run.cap_ms=0.5",
-        "run.checkpoint_ms=0.1",
-        *more,
-    )
-
-
 @pytest.fixture(scope="module")
 def fluid(binary, tmp_path_factory) -> NetworkFluid:
-    case, folder = small(), tmp_path_factory.mktemp("pack")
+    case, folder = followed(), tmp_path_factory.mktemp("pack")
     grains = make_pack(case, scales_of(case), folder, Launch(binary=binary)).grains
     made = fluid_of(case, scales_of(case), grains)
     assert isinstance(made, NetworkFluid)
@@ -86,7 +66,7 @@ def fines(position, radius, box, velocity=(0.0, 0.0, 0.0)) -> Snapshot:
 
 def with_case(fluid, *more, **way):
     """The same pack in a case with other settings; the pack is not solved again."""
-    case = small(*more, **way)
+    case = followed(*more, **way)
     other = replace(fluid, case=case, scales=scales_of(case))
     other.__dict__["pack"] = fluid.pack
     return other
@@ -155,7 +135,7 @@ def test_batches_come_as_the_mud_that_slows_down_carries_them(binary, fluid, tmp
 def test_a_batch_is_clear_of_what_is_there(fluid, sizes):
     """Fines that lag behind the mud lie where the batch comes; others ahead of it."""
     keys = ("fines.supply=batches", "fines.count=600", "run.checkpoint_ms=0.02")
-    case = small(*keys, *sizes)
+    case = followed(*keys, *sizes)
     scales = scales_of(case)
     batches, grains = batches_of(case, scales), fluid.grains
     there = list(itertools.islice(place_batches(case, scales, grains), 2))
@@ -176,7 +156,7 @@ def test_a_batch_is_clear_of_what_is_there(fluid, sizes):
 
 
 def test_the_last_batch_is_as_crowded_as_the_others(fluid):
-    case = small("fines.supply=batches", "fines.count=600", "run.checkpoint_ms=0.02")
+    case = followed("fines.supply=batches", "fines.count=600", "run.checkpoint_ms=0.02")
     scales = scales_of(case)
     batches, end = batches_of(case, scales), slab_end(case, fluid.grains)
     number = len(batches.counts) - 1
@@ -187,7 +167,7 @@ def test_the_last_batch_is_as_crowded_as_the_others(fluid):
 
 
 def test_a_batch_without_room_is_refused_by_number(fluid):
-    case = small("fines.supply=batches", "fines.count=600", "run.checkpoint_ms=0.02")
+    case = followed("fines.supply=batches", "fines.count=600", "run.checkpoint_ms=0.02")
     scales = scales_of(case)
     batches, end = batches_of(case, scales), slab_end(case, fluid.grains)
     some = 1e-4 * np.indices((20, 10, 10)).reshape(3, -1).T  # as dense as they can stand
@@ -513,12 +493,12 @@ def test_the_stiffness_that_a_deposit_needs_is_named_and_holds(binary, fluid, tm
 
 def test_a_deposit_that_would_be_pressed_through_a_grain_is_refused():
     with pytest.raises(CaseError, match="deposit alone would press"):
-        scales_of(small("run.stiffness_N_m=50", "run.max_overlap=0.4"))
+        scales_of(followed("run.stiffness_N_m=50", "run.max_overlap=0.4"))
 
 
 def test_no_warning_of_throats_where_the_balance_of_momentum_sees_them():
-    assert not [text for text in scales_of(small()).warnings if "throats" in text]
-    uniform = small("drag.field=uniform")
+    assert not [text for text in scales_of(followed()).warnings if "throats" in text]
+    uniform = followed("drag.field=uniform")
     assert [text for text in scales_of(uniform).warnings if "throats" in text]
 
 
@@ -542,4 +522,4 @@ def test_no_warning_of_throats_where_the_balance_of_momentum_sees_them():
 )
 def test_what_does_not_go_with_the_network_is_refused(settings, message):
     with pytest.raises(CaseError, match=message):
-        small(*settings)
+        followed(*settings)

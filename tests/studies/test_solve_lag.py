@@ -1,7 +1,7 @@
 from itertools import pairwise
 
 import pytest
-from builders import tiny
+from builders import followed
 
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
@@ -11,26 +11,12 @@ from fdnet.scales.scales import scales_of
 from fdnet.studies.dem.solve_lag import LagOf, WatchedFluid
 
 pytestmark = pytest.mark.liggghts
-FOLLOWED = (
-    "seed=3",
-    "drag.field=network",
-    "drag.scheme=implicit",
-    "drag.upstream=darcy",
-    "fluid.velocity_m_s=5.0",
-    "box.sides=periodic",
-    "box.size_mm=[1.6,1.0,1.0]",
-    "grains.count=15",
-    "fines.count=150",
-    "fines.concentration=0.2",
-    "run.cap_ms=0.5",
-    "run.checkpoint_ms=0.1",
-)
 
 
 @pytest.fixture(scope="module")
 def watched(binary, tmp_path_factory):
     """A fluid watched with four thresholds through a small invasion, and its updates."""
-    case, folder = tiny(*FOLLOWED), tmp_path_factory.mktemp("lag")
+    case, folder = followed("seed=3"), tmp_path_factory.mktemp("lag")
     scales, launch = scales_of(case), Launch(binary=binary)
     grains = make_pack(case, scales, folder / "pack", launch).grains
     runs = []

@@ -106,6 +106,12 @@ class PackFlow:
         """The network's resistance over that of the coarse resolved field."""
         return self.length / self.permeability / self.shape.resistance
 
+    def sections(self, fines: Snapshot, former: KeptSections | None) -> KeptSections:
+        """The sections of the throats among `fines`, from a `former` state where there is one."""
+        if former is not None:
+            return former.changed_to(fines)
+        return measured_sections(self.network, fines, parts=self.parts, step=STEP)
+
     def carried(self, kept: Array, fines: Array) -> Carried:
         """What the pores carry when the sides have `kept` (T, 2) of their clean conductances.
 
@@ -205,11 +211,7 @@ class Renewal:
             else self.deposit.changed_to(inside)
         )
         if anew or self.carried is None or changed_share(self.solved, inside) > self.renewed:
-            self.sections = (
-                measured_sections(self.pack.network, inside, parts=self.pack.parts, step=STEP)
-                if self.sections is None
-                else self.sections.changed_to(inside)
-            )
+            self.sections = self.pack.sections(inside, self.sections)
             self.carried = self.pack.carried(self.sections.factor, self.deposit.in_pores)
             self.solved, self.solves = inside, self.solves + 1
         return self.carried, self.deposit

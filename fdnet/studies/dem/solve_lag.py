@@ -18,7 +18,7 @@ from fdnet.dem.liggghts import Launch
 from fdnet.network.fines.kept_deposit import KeptDeposit
 from fdnet.network.laws.kept_sections import KeptSections, measured_sections
 from fdnet.network.laws.section_archie import STEP as STEP_OF_ANALYSIS
-from fdnet.run.fluid.network_flow import STEP, Carried, changed_share
+from fdnet.run.fluid.network_flow import Carried, changed_share
 from fdnet.run.fluid.network_fluid import NetworkFluid
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.arrays import one_line
@@ -101,14 +101,11 @@ class WatchedFluid:
         deposit = self.fluid.renewal.deposit
         if deposit is not None and len(deposit.fines):
             fines, self._deposit = deposit.fines, deposit
-            self._sections = (
-                measured_sections(pack.network, fines, parts=pack.parts, step=STEP)
-                if self._sections is None
-                else self._sections.changed_to(fines)
-            )
+            self._sections = pack.sections(fines, self._sections)
             now = pack.carried(self._sections.factor, deposit.in_pores)
+            weight = pack.through / pack.through.sum()
             for lag in self.lags:
-                lag.see(fines, now, pack.through / pack.through.sum(), anew=moment.fresh)
+                lag.see(fines, now, weight, anew=moment.fresh)
         return answer
 
     def finer_sections(self) -> float:
