@@ -24,8 +24,8 @@ from fdnet.errors import CaseError, LiggghtsError
 from fdnet.files.atomic import write_text
 
 FOLLOWED = (
-    f"{SECTION_ARCHIE} between nodes, fines placed, quarter steps, drag at the new rate, "
-    "field to 0.09"
+    f"{SECTION_ARCHIE} between nodes, fines placed, sections a third apart, solved at a fifth, "
+    "drag at the new rate, field to 0.15, fluid on the way ahead"
 )
 """How the fluid's forces are computed where the flow follows the deposit. Change these words when
 that changes: then a run that an earlier version left unfinished starts over."""

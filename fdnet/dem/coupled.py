@@ -118,20 +118,29 @@ class Coupling:
         """A chunk of steps from `step`; returns its last one."""
         end, fresh = step + self.scales.checkpoint_steps, True
         while step < end:
-            steps = min(self._update(feed, updates, step, fresh), end - step)
+            steps = min(self._update(feed, updates, (step, end), fresh), end - step)
             if fresh and self.case.drag.scheme == "held" and self.scales.hold_steps > 1:
                 feed("include held.in")
             feed(f"run {steps}" + ("" if fresh else " pre no post no"))
             step, fresh = step + steps, False
         return step
 
-    def _update(self, feed: Feed, updates: Updates, step: int, fresh: bool) -> int:
-        """Compute the fluid's forces for the state at `step`; returns the steps they hold for."""
+    def _update(self, feed: Feed, updates: Updates, at: tuple[int, int], fresh: bool) -> int:
+        """Compute the fluid's forces for the state `at` a step of a chunk with its last one.
+
+        Returns the steps they hold for.
+        """
         feed("include ask.in")
+        step, end = at
         time = step * self.scales.time_step
         spheres = self._spheres(time)
         moment = Moment(
-            step=step, time=time, before=updates.last, first=updates.first, fresh=fresh
+            step=step,
+            time=time,
+            before=updates.last,
+            first=updates.first,
+            fresh=fresh,
+            left=(end - step) * self.scales.time_step,
         )
         forces = self.fluid.forces(spheres, moment)
         self._refuse_overshoot(spheres, forces)

@@ -5,6 +5,7 @@ the fluid at it, and P a force that does not depend on v, such as its volume tim
 pressure. LIGGGHTS is given C and w = u + P / C, since F = C (w - v).
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,6 +53,7 @@ class Moment:
         first: the row of the first update; None for the first.
         fresh: whether a chunk begins. What is answered then must follow from the spheres and the
             two rows alone, so that a run that was cut gives the same.
+        left: s, until the chunk ends, when they are looked at again in any case.
     """
 
     step: int
@@ -59,6 +61,7 @@ class Moment:
     before: Mapping[str, float] | None
     first: Mapping[str, float] | None
     fresh: bool
+    left: float = math.inf
 
 
 def read_state(folder: Path) -> Frame:

@@ -131,6 +131,17 @@ class PackFlow:
             pressed=pressed_by(self.network, self.facets, (self.halves, factor), flow, fines),
         )
 
+    def share_at(self, position: Array, carried: Carried) -> Array:
+        """Flux (N,) of the pores at (N, 3) m over that when intact; 1 before and beyond them."""
+        depth, share = position[:, 0], np.ones(len(position))
+        within = (depth >= 0) & (depth < self.length)
+        share[within] = carried.ratio[self.pore_of(position[within])]
+        return share
+
+    def shape_at(self, position: Array, carried: Carried) -> Array:
+        """Velocity of the fluid over U, (N, 3), at places (N, 3) m; 0 where none is."""
+        return self.shape.at(position) * self.share_at(position, carried)[:, None]
+
     def pore_of(self, position: Array) -> Array:
         """The pore (N,) whose place is nearest to each position (N, 3) m."""
         box, periodic = self.network.box, self.network.periodic

@@ -17,6 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from fdnet.case.case import InvasionCase
+from fdnet.dem.coupled import steps_between
 from fdnet.dem.fluid import FluidForces, Moment
 from fdnet.network.fines.crowding import Neighbourhood, local_porosity
 from fdnet.run.fluid.fine_forces import Deposit, FineForces, forces_on
@@ -29,8 +30,9 @@ from fdnet.run.fluid.network_flow import (
     placed,
 )
 from fdnet.run.fluid.pressed import on_each_fine
-from fdnet.run.fluid.sampled_places import Sampled, nowhere
+from fdnet.run.fluid.sampled_places import Places
 from fdnet.run.fluid.uniform import crowd_factor
+from fdnet.run.fluid.way_ahead import Movers, mean_ahead
 from fdnet.run.history import FLOW_COLUMNS
 from fdnet.scales.scales import InvasionScales
 from fdnet.scales.velocity import path_of
@@ -38,18 +40,6 @@ from fdnet.spheres.snapshot import Array, Snapshot
 
 STANDING = 0.5
 """A fine belongs to the deposit when it moves slower than this share of the intact pack's flow."""
-
-
-@dataclass(slots=True, eq=False)
-class Kept:
-    """What is kept from one update to the next: the flow of the intact pack at the fines."""
-
-    places: Sampled
-
-    def sampled(self, fines: Snapshot, pack: PackFlow) -> Sampled:
-        """The intact pack's flow at the fines, which are `placed`."""
-        self.places = self.places.at(fines, pack.shape)
-        return self.places
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -97,8 +87,8 @@ class NetworkFluid:
         return Renewal(self.pack, renewed=self.renewed)
 
     @cached_property
-    def _kept(self) -> Kept:
-        return Kept(nowhere())
+    def _places(self) -> Places:
+        return Places()
 
     @property
     def first_velocity(self) -> float:
@@ -124,18 +114,19 @@ class NetworkFluid:
         depth = fines.position[:, 0]
         within = (depth >= 0) & (depth < pack.length)
         measured = placed(fines)
-        place = self._kept.sampled(measured, pack)
-        before = self.first_velocity if moment.before is None else moment.before["velocity_m_s"]
+        place = self._places.at(measured, pack.shape)
+        before = self._before(moment)
         standing = _speed(fines.velocity) < self.standing * before * _speed(place.velocity)
         carried, deposit = self.renewal.of(measured.where(standing), anew=moment.fresh)
         near = local_porosity(spheres, self.case.periodic)
-        share = np.ones(len(fines))
-        share[within] = carried.ratio[pack.pore_of(fines.position[within])]
+        share = pack.share_at(fines.position, carried)
         shape = place.velocity * share[:, None]
         beyond = (depth >= pack.length) if self.cake_beyond else np.zeros(len(fines), bool)
         caked = standing & ((depth < 0) | beyond)
         factor = self._factor(near, fines, before * shape)
         crowd = self.scales.push.coefficient * fines.radius * factor
+        goes = ~standing
+        shape[goes] = self._ahead(fines.where(goes), crowd[goes], carried, moment)
         pressed = np.zeros((len(fines), 3))
         pressed[_rows(fines, deposit.fines)] = on_each_fine(carried.pressed, deposit)
         held = standing & within & np.any(pressed != 0.0, axis=1)
@@ -172,6 +163,21 @@ class NetworkFluid:
                 "fines_standing": int(np.sum(standing & within)),
             },
         )
+
+    def _before(self, moment: Moment) -> float:
+        """Superficial velocity up to this moment, m/s."""
+        return self.first_velocity if moment.before is None else moment.before["velocity_m_s"]
+
+    def _ahead(self, fines: Snapshot, crowd: Array, carried: Carried, moment: Moment) -> Array:
+        """Velocity (N, 3) of the fluid over U on the way of `fines` that move."""
+        pace = self._before(moment)
+        if pace <= 0:
+            return self.pack.shape_at(fines.position, carried)
+        steps = steps_between(self.case, self.scales, pace / self.scales.porosity)
+        time = min(steps * self.scales.time_step, moment.left)
+        mass = self.case.fines.density_kg_m3 * 4.0 / 3.0 * np.pi * fines.radius**3
+        movers = Movers(position=fines.position, velocity=fines.velocity, rate=crowd / mass)
+        return mean_ahead(movers, lambda at: pace * self.pack.shape_at(at, carried), time) / pace
 
     def _momentum(
         self, made: FineForces, fines: Snapshot, within: Array, grains: float, drop: float

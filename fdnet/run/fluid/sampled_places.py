@@ -35,7 +35,14 @@ class Sampled:
         return Sampled(id=fines.id, position=fines.position, velocity=velocity, gradient=gradient)
 
 
-def nowhere() -> Sampled:
-    """No fine yet."""
-    none = np.zeros((0, 3))
-    return Sampled(id=np.zeros(0, int), position=none, velocity=none, gradient=none)
+class Places:
+    """What is kept from one update to the next: the flow at the fines."""
+
+    def __init__(self) -> None:
+        none = np.zeros((0, 3))
+        self._last = Sampled(id=np.zeros(0, int), position=none, velocity=none, gradient=none)
+
+    def at(self, fines: Snapshot, shape: VelocityField) -> Sampled:
+        """The flow of the intact pack, `shape`, at the fines."""
+        self._last = self._last.at(fines, shape)
+        return self._last

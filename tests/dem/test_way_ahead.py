@@ -1,0 +1,103 @@
+"""What fines meet on the way until the next update."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders import followed
+
+from fdnet.dem.coupled import steps_between
+from fdnet.dem.fluid import Moment
+from fdnet.dem.liggghts import Launch
+from fdnet.dem.packing import make_pack
+from fdnet.run.fluid.network_fluid import NetworkFluid
+from fdnet.run.fluid.way_ahead import Movers, mean_ahead
+from fdnet.scales.scales import scales_of
+from fdnet.spheres.snapshot import Kind, Snapshot
+
+TRACER = 1e9
+
+
+def movers(place, rate, velocity=(0.0, 0.0, 0.0)) -> Movers:
+    return Movers(position=np.array([place]), velocity=np.array([velocity]), rate=np.array([rate]))
+
+
+def test_drag_takes_up_the_slip_exactly():
+    """v = u + (v0 - u) exp(-a t), and its integral."""
+    fluid = np.array([[2.0, -1.0, 0.0]])
+    one = movers((1.0, 0.0, 0.0), 3.0, (0.0, 0.0, 5.0)).after(0.4, fluid)
+    left = np.exp(-1.2)
+    assert one.velocity[0] == pytest.approx([2 - 2 * left, -1 + left, 5 * left])
+    share = (1 - left) / 3.0
+    assert one.position[0] == pytest.approx([1.8 - 2 * share, -0.4 + share, 5 * share])
+
+
+def test_the_mean_over_the_way_in_a_flow_that_speeds_up():
+    """A tracer in u = a x goes to x exp(a T). The fluid where it begins is 1.7 times as slow."""
+    a, time, start = 5.0, 0.2, 0.3
+    mean = mean_ahead(movers((start, 0.0, 0.0), TRACER), lambda at: a * at, time)
+    assert mean[0, 0] == pytest.approx(start * (np.exp(a * time) - 1) / time, rel=0.02)
+    assert mean[0, 1:] == pytest.approx(0.0)
+
+
+def test_a_fine_that_drag_hardly_moves_meets_the_fluid_at_its_place():
+    mean = mean_ahead(movers((0.3, 0.0, 0.0), 1e-9), lambda at: 5.0 * at, 0.2)
+    assert mean[0] == pytest.approx([1.5, 0.0, 0.0])
+
+
+def test_a_way_that_leads_into_a_grain_ends_before_it():
+    """The grain begins at x = 1; the fluid before it has the velocity 1 at 0 and 2 at 1."""
+
+    def fluid(at):
+        assert np.all(np.isfinite(at))
+        return np.where(at[:, :1] < 1.0, (1.0 + at[:, :1]) * np.array([1.0, 0.0, 0.0]), 0.0)
+
+    near = mean_ahead(movers((0.0, 0.0, 0.0), TRACER), fluid, 100.0)
+    assert 1.0 <= near[0, 0] < 2.0
+    assert mean_ahead(movers((1.5, 0.0, 0.0), TRACER), fluid, 1.0)[0] == pytest.approx(0.0)
+
+
+@pytest.mark.liggghts
+def test_updates_at_every_diameter_carry_fines_as_far_as_sixteen_times_as_many(binary, tmp_path):
+    """Fines of 1/20 of a grain cross a pack; the fluid at their place alone holds them back."""
+    case = followed("fines.radius_mm=0.0125")
+    scales = scales_of(case)
+    grains = make_pack(case, scales, tmp_path, Launch(binary=binary)).grains
+    fluid = NetworkFluid(case=case, scales=scales, grains=grains, standing=0.0)
+    seldom, often = gone(fluid, 1.0), gone(fluid, 0.0625)
+    assert seldom == pytest.approx(often, rel=0.05)
+
+
+def gone(fluid: NetworkFluid, travel: float) -> float:
+    """Mean way of fines through a pack with updates at each `travel` diameters."""
+    case = fluid.case.model_copy(
+        update={"drag": fluid.case.drag.model_copy(update={"update_travel": travel})}
+    )
+    other = replace(fluid, case=case)
+    other.__dict__["pack"] = fluid.pack
+    place = np.random.default_rng(3).random((400, 3)) * 1e-3
+    place[:, 0] = 0.0
+    speed = np.tile((fluid.first_velocity, 0.0, 0.0), (400, 1))
+    now, time, end = place, 0.0, 4e-4 / fluid.first_velocity
+    moment = Moment(step=0, time=0.0, before=None, first=None, fresh=False)
+    while time < end:
+        fines = Snapshot(
+            step=0,
+            time_s=0.0,
+            box=fluid.grains.box,
+            id=np.arange(10_000, 10_400),
+            kind=np.full(400, Kind.FINE),
+            position=now,
+            radius=np.full(400, 1.25e-5),
+            velocity=speed,
+        )
+        forces = other.forces(fluid.grains.joined(fines), moment)
+        left = steps_between(case, fluid.scales, forces.pace) * fluid.scales.time_step
+        rate = forces.coefficient / (case.fines.density_kg_m3 * 4 / 3 * np.pi * 1.25e-5**3)
+        met = forces.velocity + forces.push / forces.coefficient[:, None]
+        step = min(left, end - time)
+        after = Movers(position=now, velocity=speed, rate=rate).after(step, met)
+        free = np.any(fluid.pack.shape.at(after.position) != 0.0, axis=1)[:, None]
+        now, speed = np.where(free, after.position, now), np.where(free, after.velocity, 0.0)
+        time += left
+    return float(now[:, 0].mean())
