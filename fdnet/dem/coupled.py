@@ -20,6 +20,7 @@ from fdnet.dem.fluid import (
     Fluid,
     FluidForces,
     Moment,
+    given_speed,
     largest_share,
     read_state,
     write_forces,
@@ -31,6 +32,7 @@ from fdnet.dem.updates import Updates
 from fdnet.errors import LiggghtsError
 from fdnet.scales.scales import InvasionScales
 from fdnet.scales.time_step import DRAG_LIMIT
+from fdnet.spheres.dump import Frame
 from fdnet.spheres.snapshot import Snapshot
 
 
@@ -100,7 +102,8 @@ class Coupling:
         files = batch_files(self.case, self.scales, self.grains, self.folder)
         for number in range(entered, due):
             feed("include ask.in")
-            fines = later_batch(self.case, self.scales, self._spheres(time), number, moved)
+            spheres = self._spheres(read_state(self.folder, self.case), time)
+            fines = later_batch(self.case, self.scales, spheres, number, moved)
             feed(f"include {files.write(number, fines, velocity)}")
         return due
 
@@ -133,7 +136,8 @@ class Coupling:
         feed("include ask.in")
         step, end = at
         time = step * self.scales.time_step
-        spheres = self._spheres(time)
+        frame = read_state(self.folder, self.case)
+        spheres = self._spheres(frame, time)
         moment = Moment(
             step=step,
             time=time,
@@ -141,6 +145,7 @@ class Coupling:
             first=updates.first,
             fresh=fresh,
             left=(end - step) * self.scales.time_step,
+            given=given_speed(frame),
         )
         forces = self.fluid.forces(spheres, moment)
         self._refuse_overshoot(spheres, forces)
@@ -149,8 +154,8 @@ class Coupling:
         feed("include fluid.in")
         return steps_between(self.case, self.scales, forces.pace)
 
-    def _spheres(self, time: float) -> Snapshot:
-        moved = snapshot_of(read_state(self.folder), self.case, time_s=time)
+    def _spheres(self, frame: Frame, time: float) -> Snapshot:
+        moved = snapshot_of(frame, self.case, time_s=time)
         return moved if self.case.grains.motion == "mobile" else self.grains.joined(moved)
 
     def _refuse_overshoot(self, spheres: Snapshot, forces: FluidForces) -> None:

@@ -6,7 +6,7 @@ from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import plug_allowance
 from fdnet.dem.deck import render_text
 from fdnet.dem.drag import drag_variables
-from fdnet.dem.fluid import STATE
+from fdnet.dem.fluid import STATE, shown_columns
 from fdnet.files.atomic import write_text
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.dump import COLUMNS, FORMAT
@@ -26,7 +26,9 @@ def coupled_parts(case: InvasionCase, scales: InvasionScales) -> dict[str, str]:
     coefficient = "Ksl" if case.drag.scheme == "implicit" else "cd"
     drag = drag_variables(case, scales)
     parts = {
-        "ask.in": render_text("ask.in.j2", shown | {"state": STATE}),
+        "ask.in": render_text(
+            "ask.in.j2", shown | {"dump_columns": shown_columns(case), "state": STATE}
+        ),
         "fluid.in": render_text("fluid.in.j2", {"coefficient": coefficient}),
         "checkpoint.in": render_text(
             "checkpoint.in.j2",

@@ -13,6 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
+from fdnet.case.case import InvasionCase
 from fdnet.spheres.arrays import Array
 from fdnet.spheres.binary_dump import read_binary_frame
 from fdnet.spheres.dump import COLUMNS, Frame
@@ -21,6 +22,7 @@ from fdnet.spheres.snapshot import Snapshot
 STATE = "post/fluid.bin"
 """File in which LIGGGHTS shows the spheres when it asks for the fluid, all digits of them."""
 _FILES = ("cd", "ux", "uy", "uz")
+_GIVEN = ("f_uf[1]", "f_uf[2]", "f_uf[3]")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -42,7 +44,7 @@ class FluidForces:
     measures: Mapping[str, float]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Moment:
     """When the fines are looked at.
 
@@ -54,6 +56,8 @@ class Moment:
         fresh: whether a chunk begins. What is answered then must follow from the spheres and the
             two rows alone, so that a run that was cut gives the same.
         left: s, until the chunk ends, when they are looked at again in any case.
+        given: (N,) m/s, speed w at which each of the N fines would go by the forces that it has
+            now, in their order; 0 where it has none yet. None where it is not known.
     """
 
     step: int
@@ -62,11 +66,24 @@ class Moment:
     first: Mapping[str, float] | None
     fresh: bool
     left: float = math.inf
+    given: Array | None = None
 
 
-def read_state(folder: Path) -> Frame:
+def shown_columns(case: InvasionCase) -> str:
+    """The columns that LIGGGHTS shows; where the flow follows the deposit with the w given."""
+    return f"{COLUMNS} {' '.join(_GIVEN)}" if case.drag.field == "network" else COLUMNS
+
+
+def read_state(folder: Path, case: InvasionCase) -> Frame:
     """The spheres that LIGGGHTS shows. Raises DumpError when it did not write all of them."""
-    return read_binary_frame(folder / STATE, tuple(COLUMNS.split()))
+    return read_binary_frame(folder / STATE, tuple(shown_columns(case).split()))
+
+
+def given_speed(frame: Frame) -> Array | None:
+    """The speed w (N,) m/s that each sphere of a state was given, None where that is not shown."""
+    if _GIVEN[0] not in frame.columns:
+        return None
+    return np.linalg.norm([frame.column(name) for name in _GIVEN], axis=0)
 
 
 class Fluid(Protocol):

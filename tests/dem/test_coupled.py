@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import TINY, tiny
+from builders import TINY, followed, tiny
 from cut_and_continue import StopError, differences
 
 from fdnet.case.file import case_from
@@ -214,6 +214,9 @@ def test_render_shows_the_coupled_parts_with_what_it_is_fed(tmp_path):
         assert f"include {name}" in deck
         assert (tmp_path / "invade" / name).is_file()
     assert "set group fines property/atom cd v_cd" in (tmp_path / "invade/fluid.in").read_text()
+    assert "f_uf" not in (tmp_path / "invade/ask.in").read_text()
+    render_decks(followed(), tmp_path / "followed")
+    assert "f_uf[3]" in (tmp_path / "followed/invade/ask.in").read_text()
     render_decks(tiny(), tmp_path / "plain")
     assert [path.name for path in (tmp_path / "plain" / "invade").iterdir()] == ["in.invade"]
 
@@ -297,7 +300,7 @@ def applied_force(case, fines, folder, binary) -> np.ndarray:
         show = 'write_dump fines custom post/{}.dump id fx modify sort id format "%d %.17g"'
         feed("include in.invade", "velocity fines set 0.0 0.0 0.0")
         feed("run 0", show.format("without"), "include ask.in")
-        shown = snapshot_of(read_state(folder), case, time_s=0.0)
+        shown = snapshot_of(read_state(folder, case), case, time_s=0.0)
         assert np.array_equal(shown.id, fines.id)
         moment = Moment(step=0, time=0.0, before=None, first=None, fresh=True)
         write_forces(folder, shown, fluid_of(case, scales, grain).forces(shown, moment))

@@ -523,3 +523,40 @@ def test_no_warning_of_throats_where_the_balance_of_momentum_sees_them():
 def test_what_does_not_go_with_the_network_is_refused(settings, message):
     with pytest.raises(CaseError, match=message):
         followed(*settings)
+
+
+def test_a_fine_stands_when_it_is_slower_than_half_of_what_it_was_given(fluid):
+    """One that left a fast throat is slow for its place, but as fast as its forces make it."""
+    points = np.random.default_rng(4).random((500, 3)) * np.array([1.6e-3, 1e-3, 1e-3])
+    place = points[np.linalg.norm(fluid.pack.shape.at(points), axis=1) > 0.5][:3]
+    speed = 1e-3 * fluid.first_velocity
+    slow = fluid.grains.joined(fines(place, 2e-5, fluid.grains.box, (speed, 0.0, 0.0)))
+    given = np.array([1.5 * speed, 4.0 * speed, 0.0])
+    assert fluid.forces(slow, FIRST).measures["fines_standing"] == 3
+    known = fluid.forces(slow, replace(FIRST, given=given))
+    assert known.measures["fines_standing"] == 2  # the last was given nothing yet
+
+
+class Watched:
+    """A fluid whose answers are compared with what LIGGGHTS shows at the next update."""
+
+    def __init__(self, fluid):
+        self.fluid, self.measured, self.answer, self.compared = fluid, fluid.measured, {}, 0
+
+    def forces(self, spheres, moment):
+        known = [self.answer.get(one, 0.0) for one in spheres.fines().id]
+        assert moment.given == pytest.approx(known, rel=1e-9)
+        self.compared += np.count_nonzero(known)
+        made = self.fluid.forces(spheres, moment)
+        went = np.linalg.norm(made.velocity + made.push / made.coefficient[:, None], axis=1)
+        self.answer = dict(zip(spheres.fines().id, went, strict=True))
+        return made
+
+
+@pytest.mark.parametrize("scheme", ["implicit", "held"])
+def test_liggghts_shows_the_velocity_that_each_fine_was_given(binary, fluid, tmp_path, scheme):
+    keys = (f"drag.scheme={scheme}", "fines.supply=batches", "fines.count=600", "run.cap_ms=0.15")
+    other = with_case(fluid, *keys)
+    watched = Watched(other)
+    invade(other.case, other.scales, other.grains, tmp_path, Launch(binary=binary), fluid=watched)
+    assert watched.compared > 1000

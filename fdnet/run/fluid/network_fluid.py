@@ -39,7 +39,7 @@ from fdnet.scales.velocity import path_of
 from fdnet.spheres.snapshot import Array, Snapshot
 
 STANDING = 0.5
-"""A fine belongs to the deposit when it moves slower than this share of the intact pack's flow."""
+"""A fine belongs to the deposit when it is slower than this share of the velocity given to it."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -50,7 +50,7 @@ class NetworkFluid:
         case: what is run.
         scales: of the case.
         grains: of the pack, fixed.
-        standing: share of the intact pack's flow below which a fine belongs to the deposit.
+        standing: share of the velocity given below which a fine belongs to the deposit.
         renewed: share of the deposit that may change before the network is solved anew.
         cake_beyond: whether the cake is at the other end: that of a clean-up, mirrored.
     """
@@ -116,7 +116,7 @@ class NetworkFluid:
         measured = placed(fines)
         place = self._places.at(measured, pack.shape)
         before = self._before(moment)
-        standing = _speed(fines.velocity) < self.standing * before * _speed(place.velocity)
+        standing = self._stands(fines, before * _speed(place.velocity), moment)
         carried, deposit = self.renewal.of(measured.where(standing), anew=moment.fresh)
         near = local_porosity(spheres, self.case.periodic)
         share = pack.share_at(fines.position, carried)
@@ -163,6 +163,15 @@ class NetworkFluid:
                 "fines_standing": int(np.sum(standing & within)),
             },
         )
+
+    def _stands(self, fines: Snapshot, flow: Array, moment: Moment) -> Array:
+        """Which fines (N,) belong to the deposit; the intact `flow` (N,) m/s is at their place.
+
+        Their forces carry them at the speed that was given. A fine that comes out of a throat has
+        that speed and is slow for its place.
+        """
+        given = flow if moment.given is None else np.where(moment.given > 0, moment.given, flow)
+        return _speed(fines.velocity) < self.standing * given
 
     def _before(self, moment: Moment) -> float:
         """Superficial velocity up to this moment, m/s."""

@@ -37,7 +37,7 @@ TRIED: Mapping[str, tuple[float, ...]] = {
     FIFTH: (1.0, 2.0, 4.0, 16.0),
     TENTH: (1.0, 2.0, 4.0),
 }
-"""Diameters of a fine; share of the deposit by volume; share of the intact flow; factors."""
+"""Diameters of a fine; share of the deposit by volume; share of the velocity given; factors."""
 REFERENCE: Mapping[str, float] = {
     TRAVEL: 0.125,
     SOLVED: 0.0,
