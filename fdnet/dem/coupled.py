@@ -101,8 +101,7 @@ class Coupling:
         due = max(entered, batches.entered_after(moved + ahead))
         files = batch_files(self.case, self.scales, self.grains, self.folder)
         for number in range(entered, due):
-            feed("include ask.in")
-            spheres = self._spheres(read_state(self.folder, self.case), time)
+            spheres = self._spheres(self._shown(feed), time)
             fines = later_batch(self.case, self.scales, spheres, number, moved)
             feed(f"include {files.write(number, fines, velocity)}")
         return due
@@ -133,10 +132,8 @@ class Coupling:
 
         Returns the steps they hold for.
         """
-        feed("include ask.in")
         step, end = at
-        time = step * self.scales.time_step
-        frame = read_state(self.folder, self.case)
+        time, frame = step * self.scales.time_step, self._shown(feed)
         spheres = self._spheres(frame, time)
         moment = Moment(
             step=step,
@@ -153,6 +150,11 @@ class Coupling:
         updates.add(step, time, forces.measures)
         feed("include fluid.in")
         return steps_between(self.case, self.scales, forces.pace)
+
+    def _shown(self, feed: Feed) -> Frame:
+        """The state that LIGGGHTS shows when it is asked."""
+        feed("include ask.in")
+        return read_state(self.folder, self.case)
 
     def _spheres(self, frame: Frame, time: float) -> Snapshot:
         moved = snapshot_of(frame, self.case, time_s=time)

@@ -114,5 +114,12 @@ def largest_share(spheres: Snapshot, forces: FluidForces, density: float, time: 
     """`time` s over the shortest relaxation time m / C of a fine of `density` kg/m3."""
     if not len(forces.coefficient):
         return 0.0
-    mass = density * 4.0 / 3.0 * np.pi * spheres.fines().radius ** 3
-    return float(np.max(forces.coefficient / mass)) * time
+    return float(np.max(drag_rate(spheres.fines(), forces.coefficient, density))) * time
+
+
+def drag_rate(fines: Snapshot, coefficient: Array, density: float) -> Array:
+    """C / m (N,) 1/s, at which drag takes up the slip of N `fines` of `density` kg/m3.
+
+    `coefficient` (N,) N s/m is C.
+    """
+    return coefficient / (density * 4.0 / 3.0 * np.pi * fines.radius**3)

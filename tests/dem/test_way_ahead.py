@@ -7,7 +7,7 @@ import pytest
 from builders import followed
 
 from fdnet.dem.coupled import steps_between
-from fdnet.dem.fluid import Moment
+from fdnet.dem.fluid import Moment, drag_rate
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
 from fdnet.run.fluid.network_fluid import NetworkFluid
@@ -15,7 +15,7 @@ from fdnet.run.fluid.way_ahead import Movers, mean_ahead
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Kind, Snapshot
 
-TRACER = 1e9
+TRACER, FINE = 1e9, "fines.radius_mm=0.0125"
 
 
 def movers(place, rate, velocity=(0.0, 0.0, 0.0)) -> Movers:
@@ -60,7 +60,7 @@ def test_a_way_that_leads_into_a_grain_ends_before_it():
 @pytest.mark.liggghts
 def test_updates_at_every_diameter_carry_fines_as_far_as_sixteen_times_as_many(binary, tmp_path):
     """Fines of 1/20 of a grain cross a pack; the fluid at their place alone holds them back."""
-    case = followed("fines.radius_mm=0.0125")
+    case = followed(FINE)
     scales = scales_of(case)
     grains = make_pack(case, scales, tmp_path, Launch(binary=binary)).grains
     fluid = NetworkFluid(case=case, scales=scales, grains=grains, standing=0.0)
@@ -70,34 +70,26 @@ def test_updates_at_every_diameter_carry_fines_as_far_as_sixteen_times_as_many(b
 
 def gone(fluid: NetworkFluid, travel: float) -> float:
     """Mean way of fines through a pack with updates at each `travel` diameters."""
-    case = fluid.case.model_copy(
-        update={"drag": fluid.case.drag.model_copy(update={"update_travel": travel})}
-    )
+    case = followed(FINE, f"drag.update_travel={travel}")
     other = replace(fluid, case=case)
     other.__dict__["pack"] = fluid.pack
-    place = np.random.default_rng(3).random((400, 3)) * 1e-3
-    place[:, 0] = 0.0
-    speed = np.tile((fluid.first_velocity, 0.0, 0.0), (400, 1))
-    now, time, end = place, 0.0, 4e-4 / fluid.first_velocity
+    place = np.random.default_rng(3).random((400, 3)) * np.array([0.0, 1e-3, 1e-3])
+    start = Snapshot.from_arrays(place, 1.25e-5, box=fluid.grains.box, kind=Kind.FINE)
+    now = replace(start, velocity=np.tile((fluid.first_velocity, 0.0, 0.0), (400, 1)))
+    time, end = 0.0, 4e-4 / fluid.first_velocity
     moment = Moment(step=0, time=0.0, before=None, first=None, fresh=False)
     while time < end:
-        fines = Snapshot(
-            step=0,
-            time_s=0.0,
-            box=fluid.grains.box,
-            id=np.arange(10_000, 10_400),
-            kind=np.full(400, Kind.FINE),
-            position=now,
-            radius=np.full(400, 1.25e-5),
-            velocity=speed,
-        )
-        forces = other.forces(fluid.grains.joined(fines), moment)
-        left = steps_between(case, fluid.scales, forces.pace) * fluid.scales.time_step
-        rate = forces.coefficient / (case.fines.density_kg_m3 * 4 / 3 * np.pi * 1.25e-5**3)
+        forces = other.forces(fluid.grains.joined(now), moment)
+        rate = drag_rate(now, forces.coefficient, case.fines.density_kg_m3)
         met = forces.velocity + forces.push / forces.coefficient[:, None]
-        step = min(left, end - time)
-        after = Movers(position=now, velocity=speed, rate=rate).after(step, met)
+        left = steps_between(case, fluid.scales, forces.pace) * fluid.scales.time_step
+        movers = Movers(position=now.position, velocity=now.velocity, rate=rate)
+        after = movers.after(min(left, end - time), met)
         free = np.any(fluid.pack.shape.at(after.position) != 0.0, axis=1)[:, None]
-        now, speed = np.where(free, after.position, now), np.where(free, after.velocity, 0.0)
+        now = replace(
+            now,
+            position=np.where(free, after.position, now.position),
+            velocity=np.where(free, after.velocity, 0.0),
+        )
         time += left
-    return float(now[:, 0].mean())
+    return float(now.position[:, 0].mean())

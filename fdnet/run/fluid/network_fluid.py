@@ -18,7 +18,7 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase
 from fdnet.dem.coupled import steps_between
-from fdnet.dem.fluid import FluidForces, Moment
+from fdnet.dem.fluid import FluidForces, Moment, drag_rate
 from fdnet.network.fines.crowding import Neighbourhood, local_porosity
 from fdnet.run.fluid.fine_forces import Deposit, FineForces, forces_on
 from fdnet.run.fluid.network_flow import (
@@ -184,8 +184,8 @@ class NetworkFluid:
             return self.pack.shape_at(fines.position, carried)
         steps = steps_between(self.case, self.scales, pace / self.scales.porosity)
         time = min(steps * self.scales.time_step, moment.left)
-        mass = self.case.fines.density_kg_m3 * 4.0 / 3.0 * np.pi * fines.radius**3
-        movers = Movers(position=fines.position, velocity=fines.velocity, rate=crowd / mass)
+        rate = drag_rate(fines, crowd, self.case.fines.density_kg_m3)
+        movers = Movers(position=fines.position, velocity=fines.velocity, rate=rate)
         return mean_ahead(movers, lambda at: pace * self.pack.shape_at(at, carried), time) / pace
 
     def _momentum(

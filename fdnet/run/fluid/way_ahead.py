@@ -46,16 +46,17 @@ def mean_ahead(movers: Movers, fluid: Callable[[Array], Array], time: float) -> 
     where the way leads into a grain or a wall, where no fluid is, a fine stays before it.
     """
     here, met = fluid(movers.position), np.zeros_like(movers.position)
-    for _ in range(PARTS):
+    for left in reversed(range(PARTS)):
         half = fluid(movers.after(0.5 * time / PARTS, here).position)
         there = np.where(_wet(half), half, here)
         met += there / PARTS
-        further = movers.after(time / PARTS, there)
-        beyond = fluid(further.position)
-        free = _wet(beyond)
-        here = np.where(free, beyond, here)
-        place = np.where(free, further.position, movers.position)
-        movers = Movers(position=place, velocity=further.velocity, rate=movers.rate)
+        if left:
+            further = movers.after(time / PARTS, there)
+            beyond = fluid(further.position)
+            free = _wet(beyond)
+            here = np.where(free, beyond, here)
+            place = np.where(free, further.position, movers.position)
+            movers = Movers(position=place, velocity=further.velocity, rate=movers.rate)
     return met
 
 
