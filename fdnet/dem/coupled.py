@@ -26,6 +26,7 @@ from fdnet.dem.fluid import (
     write_forces,
 )
 from fdnet.dem.invade_deck import batch_files
+from fdnet.dem.overlap import WATCHED, is_watched
 from fdnet.dem.scene import snapshot_of
 from fdnet.dem.supply import later_batch
 from fdnet.dem.updates import Updates
@@ -77,6 +78,8 @@ class Coupling:
         while chunk < chunks_of(self.case, self.scales):
             chunk += 1
             entered = self._supply(feed, updates, (chunk, step), (batches, entered))
+            if is_watched(self.case):
+                feed(f"include {WATCHED}")
             step = self.chunk(feed, updates, step)
             feed("include checkpoint.in")
             if self.over(read_history(self.folder)[-1]):

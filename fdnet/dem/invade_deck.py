@@ -17,7 +17,7 @@ from fdnet.dem.deck import Deck, LeftOut, number, render_text
 from fdnet.dem.drag import BELOW_ZERO, drag_variables, forces_left_out
 from fdnet.dem.gravity import gravity_variables
 from fdnet.dem.measured_fines import densities
-from fdnet.dem.overlap import is_watched, watch_variables
+from fdnet.dem.overlap import is_watched, watch_variables, write_watch_parts
 from fdnet.dem.scene import header_variables, wall_variables, write_data
 from fdnet.dem.supply import place_batches, place_fines, slab_end
 from fdnet.errors import CaseError
@@ -65,8 +65,16 @@ def write_invade_inputs(
     )
     deck = render_invade(case, scales, grains, ranks=ranks)
     write_text(folder / "in.invade", deck.text)
-    write_coupled_parts(case, scales, folder)
+    write_parts(case, scales, grains, folder)
     return deck
+
+
+def write_parts(
+    case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path
+) -> None:
+    """Write the files that a deck of the invasion includes, apart from the batches."""
+    write_coupled_parts(case, scales, folder)
+    write_watch_parts(case, grains, folder)
 
 
 def write_batches(
@@ -152,7 +160,7 @@ def render_invade(
             "dump_group": dumped_group(case),
             "start_velocity": number(scales.upstream_velocity),
             "drag": drag_variables(case, scales),
-            "overlap": watch_variables(case, scales),
+            "overlap": watch_variables(case, scales, grains),
             "regions": _regions(case, scales, grains),
             "quiet_checkpoints": quiet_chunks(scales),
             "empty_checkpoints": empty_chunks(case, scales),

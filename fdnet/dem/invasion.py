@@ -30,12 +30,17 @@ from fdnet.dem.checkpoint_record import (
     refuse_other_ranks,
 )
 from fdnet.dem.coupled import Coupling
-from fdnet.dem.coupled_parts import write_coupled_parts
 from fdnet.dem.deck import Deck, LeftOut
 from fdnet.dem.digests import checkpoint_files
 from fdnet.dem.feed import run_fed
 from fdnet.dem.fluid import Fluid
-from fdnet.dem.invade_deck import SCRATCH, render_invade, write_batches, write_invade_inputs
+from fdnet.dem.invade_deck import (
+    SCRATCH,
+    render_invade,
+    write_batches,
+    write_invade_inputs,
+    write_parts,
+)
 from fdnet.dem.keeper import CheckpointKeeper
 from fdnet.dem.liggghts import Launch, Run, run_deck
 from fdnet.dem.overlap import (
@@ -250,7 +255,7 @@ def _prepare(
             path.unlink()
     if case.fines.supply == "batches":
         write_batches(case, scales, grains, folder)
-    write_coupled_parts(case, scales, folder)
+    write_parts(case, scales, grains, folder)
     deck = render_invade(case, scales, grains, ranks=ranks, resume=last)
     write_text(folder / "in.invade.resume", deck.text)
     return deck

@@ -10,14 +10,20 @@ from typing import Any
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, readable_states
-from fdnet.dem.deck import number
+from fdnet.dem.deck import number, render_text
 from fdnet.errors import LiggghtsError
 from fdnet.files.atomic import write_text
 from fdnet.scales.scales import InvasionScales
-from fdnet.spheres.contacts import max_overlap
+from fdnet.spheres.contacts import groups_apart, max_overlap
 from fdnet.spheres.snapshot import Snapshot
 
 WATCH = "overlap.csv"
+GRAINS_APART = "grains_apart.txt"
+"""File with the group of each grain; no two grains of a group touch."""
+
+WATCHED = "watched.in"
+"""File by which a coupled deck changes the grains that are watched."""
+
 _MOST_DIGITS = 19
 EVERY, MOST_ROWS = 50, 200
 """Steps between two measurements by the deck, and most measurements in a chunk. Each costs about a
@@ -40,18 +46,38 @@ class Deepest:
 def is_watched(case: InvasionCase) -> bool:
     """Whether the deck can watch the overlap of fines.
 
-    LIGGGHTS takes the largest overlap, in m, of all pairs. So grains must not touch each other,
-    and fines must have one diameter.
+    LIGGGHTS takes the largest overlap, in m, of all pairs of a group. So it must be known which
+    grains touch each other, and fines must have one diameter.
     """
     return case.grains.motion == "fixed" and case.fines.one_size
 
 
-def watch_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any] | None:
+def watch_variables(
+    case: InvasionCase, scales: InvasionScales, grains: Snapshot
+) -> dict[str, Any] | None:
     """Variables of `_overlap.in.j2`; None where the dumps alone must do."""
     if not is_watched(case):
         return None
-    every = max(EVERY, scales.checkpoint_steps // MOST_ROWS)
-    return {"every": every, "diameter": number(2 * case.fines.radius_range_m[1]), "file": WATCH}
+    turns = int(groups_apart(grains, case.periodic).max())
+    return {
+        "every": max(EVERY, scales.checkpoint_steps // MOST_ROWS),
+        "diameter": number(2 * case.fines.radius_range_m[1]),
+        "file": WATCH,
+        "groups": range(1, turns + 1),
+        "turns": turns,
+        "grains": GRAINS_APART,
+    }
+
+
+def write_watch_parts(case: InvasionCase, grains: Snapshot, folder: Path) -> None:
+    """Write the files by which a deck watches the overlap; nothing where it does not."""
+    if not is_watched(case):
+        return
+    groups = groups_apart(grains, case.periodic)
+    rows = [f"{grain:.0f} {group}" for grain, group in zip(grains.id, groups, strict=True)]
+    write_text(folder / GRAINS_APART, "\n".join([str(len(rows)), *rows, ""]))
+    if case.drag.coupled:
+        write_text(folder / WATCHED, render_text("watched.in.j2", {}))
 
 
 def read_watch(folder: Path) -> Iterator[Deepest]:

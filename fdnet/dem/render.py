@@ -7,8 +7,7 @@ import numpy as np
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.stages import LIGGGHTS_STAGES
-from fdnet.dem.coupled_parts import write_coupled_parts
-from fdnet.dem.invade_deck import render_invade
+from fdnet.dem.invade_deck import render_invade, write_parts
 from fdnet.dem.pack_deck import write_pack_inputs
 from fdnet.dem.scene import box_of
 from fdnet.errors import CaseError
@@ -40,9 +39,10 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
     folder = decks["pack"].parent
     write_pack_inputs(case, scales, folder, count=grain_count(case), ranks=ranks)
     if isinstance(case, InvasionCase):
-        deck = render_invade(case, scales_of(case), _expected_grains(case), ranks=ranks)
+        grains = _expected_grains(case)
+        deck = render_invade(case, scales_of(case), grains, ranks=ranks)
         decks["invade"].write_text(deck.text, encoding="utf-8")
-        write_coupled_parts(case, scales_of(case), decks["invade"].parent)
+        write_parts(case, scales_of(case), grains, decks["invade"].parent)
     return list(decks.values())
 
 

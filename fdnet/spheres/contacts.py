@@ -1,5 +1,6 @@
 """Which spheres touch: pairs, overlaps, and the largest of them."""
 
+from itertools import count
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -8,6 +9,9 @@ from fdnet.spheres.snapshot import Array, Kind, Snapshot
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
+
+_ROUNDING = 1e-6
+"""Gap over the smaller diameter below which two spheres may touch, to LIGGGHTS's rounding."""
 
 
 def touching_pairs(
@@ -53,6 +57,23 @@ def _pairs(
     limit = -2 * gap * radius[pairs].min(axis=1)
     keep = (overlap > limit) & ((pairs[:, 0] < pairs[:, 1]) | (trees[0] is not trees[1]))
     return pairs[keep], overlap[keep]
+
+
+def groups_apart(spheres: Snapshot, periodic: tuple[bool, bool, bool]) -> Array:
+    """The group (N,) of each sphere, from 1; no two spheres of a group touch.
+
+    Greedy colouring of the graph of contacts, those with most contacts first (Welsh and Powell
+    1967). It takes at most one group more than a sphere has contacts.
+    """
+    pairs, _ = touching_pairs(spheres, periodic, gap=_ROUNDING)
+    ends = np.concatenate([pairs, pairs[:, ::-1]])
+    ends = ends[np.argsort(ends[:, 0], kind="stable")]
+    starts = np.searchsorted(ends[:, 0], np.arange(len(spheres) + 1))
+    group = np.zeros(len(spheres), int)
+    for sphere in np.argsort(-np.diff(starts), kind="stable"):
+        taken = set(group[ends[starts[sphere] : starts[sphere + 1], 1]].tolist())
+        group[sphere] = next(number for number in count(1) if number not in taken)
+    return group
 
 
 def max_overlap(

@@ -18,10 +18,9 @@ from cut_and_continue import StopError, differences
 from fdnet.case.file import case_from
 from fdnet.dem.checkpoint_record import last_checkpoint
 from fdnet.dem.coupled import steps_between
-from fdnet.dem.coupled_parts import write_coupled_parts
 from fdnet.dem.feed import run_fed
 from fdnet.dem.fluid import Moment, read_state, write_forces
-from fdnet.dem.invade_deck import render_invade
+from fdnet.dem.invade_deck import render_invade, write_parts
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
@@ -210,7 +209,7 @@ def test_render_shows_the_coupled_parts_with_what_it_is_fed(tmp_path):
     render_decks(small("held"), tmp_path)
     deck = (tmp_path / "invade" / "in.invade").read_text()
     assert "jump" not in deck
-    for name in ("ask.in", "fluid.in", "checkpoint.in"):
+    for name in ("watched.in", "ask.in", "fluid.in", "checkpoint.in"):
         assert f"include {name}" in deck
         assert (tmp_path / "invade" / name).is_file()
     assert "set group fines property/atom cd v_cd" in (tmp_path / "invade/fluid.in").read_text()
@@ -218,7 +217,8 @@ def test_render_shows_the_coupled_parts_with_what_it_is_fed(tmp_path):
     render_decks(followed(), tmp_path / "followed")
     assert "f_uf[3]" in (tmp_path / "followed/invade/ask.in").read_text()
     render_decks(tiny(), tmp_path / "plain")
-    assert [path.name for path in (tmp_path / "plain" / "invade").iterdir()] == ["in.invade"]
+    plain = {path.name for path in (tmp_path / "plain" / "invade").iterdir()}
+    assert plain == {"in.invade", "grains_apart.txt"}
 
 
 def bed_of_fines(binary, folder) -> Snapshot:
@@ -294,7 +294,7 @@ def applied_force(case, fines, folder, binary) -> np.ndarray:
     )
     (folder / "in.invade").write_text(render_invade(case, scales, grain).text)
     (folder / "post").mkdir()
-    write_coupled_parts(case, scales, folder)
+    write_parts(case, scales, grain, folder)
 
     def play(feed):
         show = 'write_dump fines custom post/{}.dump id fx modify sort id format "%d %.17g"'

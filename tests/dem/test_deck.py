@@ -144,12 +144,12 @@ def test_the_pressure_gradient_acts_on_the_volume_of_each_fine_inside_the_pack()
     assert has(many, r"^fix gradient fines addforce v_gx 0.0 0.0 region pores$")
 
 
-def test_fixed_grains_have_no_mutual_contacts_and_mobile_ones_are_held_by_planes():
+def test_fixed_grains_are_frozen_and_mobile_ones_are_held_by_planes():
     fixed, mobile = invade_text(), invade_text("grains.motion=mobile")
-    assert has(fixed, r"^neigh_modify exclude group grains grains")
+    assert has(fixed, r"^fix still grains freeze$")
     assert not has(fixed, "xplane")
     assert has(fixed, r"^fix integ fines nve/sphere")
-    assert not has(mobile, "exclude")
+    assert not has(mobile, "freeze")
     assert has(mobile, r"^fix wx0 grains wall/gran .*xplane 0.0")
     assert has(mobile, r"^fix integ all nve/sphere")
 

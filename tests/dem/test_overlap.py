@@ -10,14 +10,22 @@ from builders import resting_spheres, tiny
 from fdnet.dem import invade_deck, invasion, keeper
 from fdnet.dem.contact_lines import contact_variables
 from fdnet.dem.deck import number, render_text
-from fdnet.dem.invade_deck import render_invade
+from fdnet.dem.invade_deck import render_invade, write_invade_inputs
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch, run_deck
-from fdnet.dem.overlap import Deepest, cut_watch, deepest_of, read_watch, watch_variables
+from fdnet.dem.overlap import (
+    Deepest,
+    cut_watch,
+    deepest_of,
+    read_watch,
+    watch_variables,
+    write_watch_parts,
+)
 from fdnet.dem.packing import make_pack
 from fdnet.dem.scene import box_of, write_data
 from fdnet.errors import LiggghtsError
 from fdnet.scales.scales import scales_of
+from fdnet.spheres.contacts import touching_pairs
 from fdnet.spheres.snapshot import Kind
 
 LIMIT = 0.03
@@ -34,8 +42,11 @@ def grains(binary, tmp_path_factory):
 
 def deck_of(*assignments: str):
     case = tiny(*assignments)
-    grain = resting_spheres([[2e-4, 8e-4, 8e-4]], 2.5e-4, box_of(case), kind=Kind.GRAIN)
-    return render_invade(case, scales_of(case), grain)
+    return render_invade(case, scales_of(case), grain_of(case))
+
+
+def grain_of(case):
+    return resting_spheres([[2e-4, 8e-4, 8e-4]], 2.5e-4, box_of(case), kind=Kind.GRAIN)
 
 
 def test_the_deck_watches_where_it_can_and_says_where_it_cannot():
@@ -55,7 +66,7 @@ def test_the_deck_watches_where_it_can_and_says_where_it_cannot():
 def test_the_watch_never_writes_more_than_some_hundred_rows_a_chunk():
     for case in (tiny(), tiny("run.stiffness_N_m=nominal")):
         scales = scales_of(case)
-        watch = watch_variables(case, scales)
+        watch = watch_variables(case, scales, grain_of(case))
         assert scales.checkpoint_steps / watch["every"] < 210
 
 
@@ -78,19 +89,50 @@ def test_what_was_seen_is_read_line_by_line(tmp_path):
 
 
 @pytest.mark.liggghts
+def test_in_turn_every_grain_is_watched_with_the_fines_and_none_that_it_touches(
+    binary, grains, tmp_path
+):
+    """LIGGGHTS writes which spheres are watched in two rounds of chunks."""
+    case = tiny("run.cap_ms=0.2")
+    groups = watch_variables(case, scales_of(case), grains)["turns"]
+    deck = write_invade_inputs(case, scales_of(case), grains, tmp_path).text
+    text = deck[: deck.index("region specimen")] + "run 0\n"
+    for chunk in range(1, 2 * groups + 1):
+        text += f"variable chunk equal {chunk}\n" + render_text("watched.in.j2", {})
+        text += f"write_dump watched custom {chunk}.dump id type\n"
+    (tmp_path / "in.turns").write_text(text + 'print "DECK_DONE"\n')
+    run_deck(tmp_path, "in.turns", Launch(binary=binary))
+    pairs, _ = touching_pairs(grains, case.periodic)
+    assert len(pairs) > len(grains)
+    rounds: list[list[int]] = [[], []]
+    for chunk in range(1, 2 * groups + 1):
+        table = np.loadtxt(tmp_path / f"{chunk}.dump", skiprows=9, dtype=int)
+        seen = table[table[:, 1] == 1, 0]
+        assert np.sum(table[:, 1] == 2) == case.fines.count
+        assert not np.any(np.isin(grains.id[pairs], seen).all(axis=1))
+        rounds[(chunk - 1) // groups] += seen.tolist()
+    for watched in rounds:
+        assert sorted(watched) == sorted(grains.id.tolist())
+
+
+@pytest.mark.liggghts
 def test_the_deck_sees_the_overlap_of_an_impact(binary, tmp_path):
-    """v sqrt(m/k) of an undamped spring, over the fine's diameter; before and after it nothing."""
+    """v sqrt(m/k) of an undamped spring, over the fine's diameter; before and after it nothing.
+
+    The grain that is hit overlaps another one by a third, which is no overlap of a fine.
+    """
     case = tiny("fines.damping_ratio=0.0", "grains.damping_ratio=0.0", "fines.friction=0.0")
     scales, radius, speed = scales_of(case), 0.05e-3, 2.0
-    grain = resting_spheres([[2e-3, 8e-4, 8e-4]], 2.5e-4, box_of(case), kind=Kind.GRAIN)
+    places = [[2e-3, 8e-4, 8e-4], [2e-3 + 3.3e-4, 8e-4, 8e-4]]
+    pair = resting_spheres(places, 2.5e-4, box_of(case), kind=Kind.GRAIN)
     fine = resting_spheres(
-        [[2e-3 - 3.05e-4, 8e-4, 8e-4]], radius, box_of(case), kind=Kind.FINE, first=2
+        [[2e-3 - 3.05e-4, 8e-4, 8e-4]], radius, box_of(case), kind=Kind.FINE, first=3
     )
     write_data(
         tmp_path / "hit.data",
-        grain.joined(fine),
+        pair.joined(fine),
         bounds=box_of(case),
-        density=np.array([2650.0, 2146.0]),
+        density=np.array([2650.0, 2650.0, 2146.0]),
         types=3,
     )
     header = {
@@ -109,11 +151,14 @@ def test_the_deck_sees_the_overlap_of_an_impact(binary, tmp_path):
     text += render_text(
         "_contacts.in.j2", {"contacts": contacts, "time_step": number(scales.time_step / 5)}
     )
-    text += "group fines type 2\nfix integ fines nve/sphere\n"
+    text += "group grains type 1\ngroup fines type 2\n"
+    text += "fix still grains freeze\nfix integ fines nve/sphere\n"
     text += f"velocity fines set {speed} 0 0 units box\n"
+    write_watch_parts(case, pair, tmp_path)
     text += render_text(
-        "_overlap.in.j2", {"overlap": watch_variables(case, scales) | {"every": 2}}
+        "_overlap.in.j2", {"overlap": watch_variables(case, scales, pair) | {"every": 2}}
     )
+    text += "variable chunk equal 1\n" + render_text("watched.in.j2", {})
     (tmp_path / "in.hit").write_text(text + 'run 2000\nprint "DECK_DONE"\n')
     run_deck(tmp_path, "in.hit", Launch(binary=binary))
     seen = list(read_watch(tmp_path))

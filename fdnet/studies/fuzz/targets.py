@@ -88,8 +88,11 @@ def refusal(answer: Answer) -> str | None:
     return {2: "refused", 3: "refused (3)", 4: "degenerate"}[answer.code]
 
 
-DECKS = {"in.pack", "pack.data", "in.invade", "ask.in", "fluid.in", "held.in", "checkpoint.in"}
-"""What `fdnet render` may write; the last four belong to a coupled invasion."""
+DECKS = {
+    *("in.pack", "pack.data", "in.invade", "grains_apart.txt"),
+    *("watched.in", "ask.in", "fluid.in", "held.in", "checkpoint.in"),
+}
+"""What `fdnet render` may write; the second line belongs to a coupled invasion."""
 
 
 def judge_case(data: bytes, folder: Path, _: Random, *, command: Command) -> str:
