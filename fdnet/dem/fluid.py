@@ -98,16 +98,16 @@ class Fluid(Protocol):
 
 
 def write_forces(folder: Path, spheres: Snapshot, forces: FluidForces) -> None:
-    """Write the files that the deck reads: the number of fines, then id and value of each.
+    """Write the files that the deck reads: the number of rows, then id and value of a fine each.
 
-    Values have twelve digits.
+    Values have twelve digits. To LIGGGHTS the value of a fine that has no row is 0.
     """
     fines = spheres.fines()
     carried = forces.velocity + forces.push / forces.coefficient[:, None]
-    form = f"{len(fines)}\n" + "%d %.12g\n" * len(fines)
     for name, value in zip(_FILES, (forces.coefficient, *carried.T), strict=True):
-        rows = np.column_stack([fines.id, value]).ravel().tolist()
-        (folder / "post" / f"fluid.{name}").write_text(form % tuple(rows))
+        some = value != 0.0
+        form = f"{np.sum(some)}\n" + "".join([f"{one} %.12g\n" for one in fines.id[some].tolist()])
+        (folder / "post" / f"fluid.{name}").write_text(form % tuple(value[some].tolist()))
 
 
 def largest_share(spheres: Snapshot, forces: FluidForces, density: float, time: float) -> float:

@@ -12,20 +12,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import TINY, followed, tiny
+from builders import TINY, followed, resting_spheres, tiny
 from cut_and_continue import StopError, differences
 
 from fdnet.case.file import case_from
 from fdnet.dem.checkpoint_record import last_checkpoint
 from fdnet.dem.coupled import steps_between
 from fdnet.dem.feed import run_fed
-from fdnet.dem.fluid import Moment, read_state, write_forces
+from fdnet.dem.fluid import FluidForces, Moment, read_state, write_forces
 from fdnet.dem.invade_deck import render_invade, write_parts
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
 from fdnet.dem.render import render_decks
-from fdnet.dem.scene import snapshot_of, write_data
+from fdnet.dem.scene import box_of, snapshot_of, write_data
 from fdnet.dem.updates import UPDATES, read_updates
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.run.fluid.fluid_of import fluid_of
@@ -280,8 +280,37 @@ def test_a_standing_bed_of_fines_takes_up_its_pressure_drop(binary, tmp_path):
     assert float(share @ total) == pytest.approx(gradient * length * area, rel=0.01)
 
 
-def applied_force(case, fines, folder, binary) -> np.ndarray:
-    """Force (N,) N along x that LIGGGHTS puts on standing fines beside that of their contacts."""
+def test_a_fine_without_a_row_is_given_0(binary, tmp_path):
+    """No number of the first forces is left in LIGGGHTS after the second ones."""
+    case = tiny("drag.crowd=beetstra", "drag.scheme=implicit")
+    box, place = box_of(case), [[2e-4, 5e-4, 5e-4], [6e-4, 5e-4, 5e-4]]
+    fines = resting_spheres(place, 5e-5, box, kind=Kind.FINE, first=2)
+    write_scene(case, fines, tmp_path)
+    given = np.array([[[1.0, 2.0, -3.0], [4.0, 5.0, 6.0]], [[7.0, 0.0, 0.0], [0.0, -8.0, 0.0]]])
+
+    def play(feed):
+        feed("include in.invade")
+        for number, velocity in enumerate(given):
+            forces = FluidForces(
+                coefficient=np.ones(2),
+                velocity=velocity,
+                push=np.zeros((2, 3)),
+                pace=1.0,
+                measures={},
+            )
+            write_forces(tmp_path, fines, forces)
+            show = f"write_dump fines custom post/{number}.dump id f_uf[1] f_uf[2] f_uf[3]"
+            feed("include fluid.in", f"{show} modify sort id")
+
+    run_fed(tmp_path, "in.invade", Launch(binary=binary), play)
+    for number, velocity in enumerate(given):
+        frame = read_frame(tmp_path / "post" / f"{number}.dump")
+        shown = np.column_stack([frame.column(f"f_uf[{axis}]") for axis in (1, 2, 3)])
+        assert np.array_equal(shown, velocity)
+
+
+def write_scene(case, fines, folder) -> Snapshot:
+    """Write the deck of `fines` that a coupled invasion begins with; returns its one grain."""
     scales = scales_of(case)
     grain = Snapshot.from_arrays([[-1e-3, 1e-3, 1e-3]], 3e-4, box=fines.box)
     beyond = np.array([[-2e-3, 1e-3], [0.0, 0.0], [0.0, 0.0]])
@@ -295,6 +324,12 @@ def applied_force(case, fines, folder, binary) -> np.ndarray:
     (folder / "in.invade").write_text(render_invade(case, scales, grain).text)
     (folder / "post").mkdir()
     write_parts(case, scales, grain, folder)
+    return grain
+
+
+def applied_force(case, fines, folder, binary) -> np.ndarray:
+    """Force (N,) N along x that LIGGGHTS puts on standing fines beside that of their contacts."""
+    scales, grain = scales_of(case), write_scene(case, fines, folder)
 
     def play(feed):
         show = 'write_dump fines custom post/{}.dump id fx modify sort id format "%d %.17g"'

@@ -57,6 +57,28 @@ def test_a_way_that_leads_into_a_grain_ends_before_it():
     assert mean_ahead(movers((1.5, 0.0, 0.0), TRACER), fluid, 1.0)[0] == pytest.approx(0.0)
 
 
+def test_a_fine_that_stays_where_the_fluid_is_even_meets_it_there():
+    """Before x = 0 the velocity is 1, from there on 1 + x: only fines that get there are asked."""
+    asked = []
+
+    def fluid(at):
+        asked.append(len(at))
+        return (1.0 + np.maximum(at[:, :1], 0.0)) * np.array([1.0, 0.0, 0.0])
+
+    place = np.array([[-5.0, 0.0, 0.0], [-0.5, 0.0, 0.0], [-2.5, 0.0, 0.0], [0.5, 0.0, 0.0]])
+    four = Movers(
+        position=place,
+        velocity=np.array([[1.0, 0.0, 0.0]] * 2 + [[3.0, 0.0, 0.0], [1.0, 0.0, 0.0]]),
+        rate=np.array([TRACER, TRACER, 1e-9, TRACER]),
+    )
+    everywhere = mean_ahead(four, fluid, 1.0)
+    asked.clear()
+    assert np.array_equal(mean_ahead(four, fluid, 1.0, even_to=0.0), everywhere)
+    assert asked == [4] + [3] * 7
+    assert everywhere[0, 0] == 1.0
+    assert np.all(everywhere[1:, 0] > 1.0)
+
+
 @pytest.mark.liggghts
 def test_updates_at_every_diameter_carry_fines_as_far_as_sixteen_times_as_many(binary, tmp_path):
     """Fines of 1/20 of a grain cross a pack; the fluid at their place alone holds them back."""

@@ -30,13 +30,18 @@ class Gradient:
     __repr__ = one_line
 
     def at(self, points: Array) -> Array:
-        """Gradient (N, 3) 1/m2 at points (N, 3) m, linear between the faces."""
-        place = np.ascontiguousarray((points - self.lattice.low) / self.lattice.spacing)
-        result = np.zeros(points.shape)
-        _sample(place, np.array(self.lattice.walled), self.parts, result)
+        """Gradient (N, 3) 1/m2 at points (N, 3) m, linear between the faces.
+
+        It is 0 before and beyond a grid that does not repeat along x.
+        """
+        result, inside = np.zeros(points.shape), np.ones(len(points), bool)
         if not self.lattice.repeats:
-            high = self.lattice.high[0]
-            result[(points[:, 0] < self.lattice.low[0]) | (points[:, 0] >= high)] = 0.0
+            inside = points[:, 0] >= self.lattice.low[0]
+            inside &= points[:, 0] < self.lattice.high[0]
+        place = np.ascontiguousarray((points[inside] - self.lattice.low) / self.lattice.spacing)
+        sampled = np.zeros(place.shape)
+        _sample(place, np.array(self.lattice.walled), self.parts, sampled)
+        result[inside] = sampled
         return result
 
 

@@ -31,7 +31,7 @@ from fdnet.run.fluid.network_flow import (
 )
 from fdnet.run.fluid.pressed import on_each_fine
 from fdnet.run.fluid.sampled_places import Places
-from fdnet.run.fluid.uniform import crowd_factor
+from fdnet.run.fluid.uniform import CROWD_COLUMNS, crowd_factor, crowd_measures
 from fdnet.run.fluid.way_ahead import Movers, mean_ahead
 from fdnet.run.history import FLOW_COLUMNS
 from fdnet.scales.scales import InvasionScales
@@ -68,10 +68,7 @@ class NetworkFluid:
         return (
             "velocity_m_s",
             *FLOW_COLUMNS,
-            "factor_mean",
-            "factor_most",
-            "porosity_least",
-            "porosity_capped",
+            *CROWD_COLUMNS,
             "pores_stagnant",
             "fines_standing",
         )
@@ -153,7 +150,7 @@ class NetworkFluid:
             pace=speed / self.scales.porosity,
             measures=self._pressures(carried, cake, loose, speed)
             | self._ledger(speed, moment)
-            | _crowd(factor, near)
+            | crowd_measures(factor, near)
             | self._momentum(
                 made, fines, within, drop * float(carried.pressed.grains[0]), drop + loose
             )
@@ -186,7 +183,11 @@ class NetworkFluid:
         time = min(steps * self.scales.time_step, moment.left)
         rate = drag_rate(fines, crowd, self.case.fines.density_kg_m3)
         movers = Movers(position=fines.position, velocity=fines.velocity, rate=rate)
-        return mean_ahead(movers, lambda at: pace * self.pack.shape_at(at, carried), time) / pace
+        field = float(self.pack.shape.lattice.low[0])
+        mean = mean_ahead(
+            movers, lambda at: pace * self.pack.shape_at(at, carried), time, even_to=field
+        )
+        return mean / pace
 
     def _momentum(
         self, made: FineForces, fines: Snapshot, within: Array, grains: float, drop: float
@@ -289,12 +290,3 @@ def _rows(fines: Snapshot, some: Snapshot) -> Array:
 
 def _speed(velocity: Array) -> Array:
     return np.linalg.norm(velocity, axis=1)
-
-
-def _crowd(factor: Array, near: Neighbourhood) -> dict[str, float]:
-    return {
-        "factor_mean": float(np.mean(factor)) if len(factor) else 1.0,
-        "factor_most": float(np.max(factor, initial=1.0)),
-        "porosity_least": float(np.min(near.porosity, initial=1.0)),
-        "porosity_capped": near.capped,
-    }

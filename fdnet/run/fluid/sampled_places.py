@@ -27,7 +27,8 @@ class Sampled:
     def at(self, fines: Snapshot, shape: VelocityField) -> "Sampled":
         """The same at other `fines`; it is kept for those at the same place."""
         new, old = unmoved((fines.id, fines.position), (self.id, self.position))
-        moved = np.setdiff1d(np.arange(len(fines)), new, assume_unique=True)
+        moved = np.ones(len(fines), bool)
+        moved[new] = False
         velocity, gradient = (np.empty((len(fines), 3)) for _ in range(2))
         velocity[new], velocity[moved] = self.velocity[old], shape.at(fines.position[moved])
         gradient[new] = self.gradient[old]

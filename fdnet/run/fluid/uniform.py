@@ -24,6 +24,9 @@ from fdnet.scales.forces.crowd import Crowd, drag_factor
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array, Snapshot
 
+CROWD_COLUMNS = ("factor_mean", "factor_most", "porosity_least", "porosity_capped")
+"""Mean and largest factor on the drag, least porosity, fines whose porosity was capped."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UniformCrowd:
@@ -41,8 +44,8 @@ class UniformCrowd:
 
     @property
     def measured(self) -> tuple[str, ...]:
-        """Mean and largest factor on the drag, least porosity, fines whose porosity was capped."""
-        return ("factor_mean", "factor_most", "porosity_least", "porosity_capped")
+        """What a row of the record holds."""
+        return CROWD_COLUMNS
 
     def forces(self, spheres: Snapshot, moment: Moment) -> FluidForces:
         """What acts on the fines of `spheres`, in their order."""
@@ -62,12 +65,7 @@ class UniformCrowd:
             velocity=velocity,
             push=push,
             pace=scales.drive_velocity,
-            measures={
-                "factor_mean": float(np.mean(factor)) if len(fines) else 1.0,
-                "factor_most": float(np.max(factor, initial=1.0)),
-                "porosity_least": float(np.min(near.porosity, initial=1.0)),
-                "porosity_capped": near.capped,
-            },
+            measures=crowd_measures(factor, near),
         )
 
 
@@ -80,3 +78,14 @@ def crowd_factor(scales: InvasionScales, near: Neighbourhood, radius: Array, sli
     reynolds = scales.push.reynolds_slope * radius / near.size_ratio * slip
     crowd = Crowd(porosity=near.porosity, size_ratio=near.size_ratio, reynolds=reynolds)
     return drag_factor(crowd, gradient_apart=False) / near.porosity
+
+
+def crowd_measures(factor: Array, near: Neighbourhood) -> dict[str, float]:
+    """`CROWD_COLUMNS`, from the `factor` (N,) on the drag of fines."""
+    values = (
+        float(np.mean(factor)) if len(factor) else 1.0,
+        float(np.max(factor, initial=1.0)),
+        float(np.min(near.porosity, initial=1.0)),
+        near.capped,
+    )
+    return dict(zip(CROWD_COLUMNS, values, strict=True))

@@ -38,14 +38,31 @@ class Movers:
         way = fluid * time + slip * (1.0 - kept) / self.rate[:, None]
         return Movers(position=self.position + way, velocity=fluid + slip * kept, rate=self.rate)
 
+    def where(self, some: Array) -> "Movers":
+        """Those of them for which `some` (N,) is true."""
+        return Movers(
+            position=self.position[some], velocity=self.velocity[some], rate=self.rate[some]
+        )
 
-def mean_ahead(movers: Movers, fluid: Callable[[Array], Array], time: float) -> Array:
+
+def mean_ahead(
+    movers: Movers, fluid: Callable[[Array], Array], time: float, *, even_to: float = -np.inf
+) -> Array:
     """Mean velocity (N, 3) m/s of the `fluid` over the way of the `movers` in `time` s.
 
-    `fluid` gives the velocity (N, 3) m/s at places (N, 3) m. Other spheres are not looked at, but
-    where the way leads into a grain or a wall, where no fluid is, a fine stays before it.
+    `fluid` gives the velocity (N, 3) m/s at places (N, 3) m. Before the depth `even_to` m it is
+    the same everywhere. Other spheres are not looked at, but where the way leads into a grain or a
+    wall, where no fluid is, a fine stays before it.
     """
-    here, met = fluid(movers.position), np.zeros_like(movers.position)
+    mean = fluid(movers.position)
+    fastest = np.maximum(movers.velocity[:, 0], mean[:, 0])
+    some = movers.position[:, 0] + fastest * time >= even_to
+    mean[some] = _mean(movers.where(some), fluid, time, mean[some])
+    return mean
+
+
+def _mean(movers: Movers, fluid: Callable[[Array], Array], time: float, here: Array) -> Array:
+    met = np.zeros_like(movers.position)
     for left in reversed(range(PARTS)):
         half = fluid(movers.after(0.5 * time / PARTS, here).position)
         there = np.where(_wet(half), half, here)
