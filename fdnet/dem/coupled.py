@@ -20,6 +20,7 @@ from fdnet.dem.fluid import (
     Fluid,
     FluidForces,
     Moment,
+    fine_density,
     given_speed,
     largest_share,
     read_state,
@@ -34,7 +35,7 @@ from fdnet.errors import LiggghtsError
 from fdnet.scales.scales import InvasionScales
 from fdnet.scales.time_step import DRAG_LIMIT
 from fdnet.spheres.dump import Frame
-from fdnet.spheres.snapshot import Snapshot
+from fdnet.spheres.snapshot import Array, Snapshot
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -137,7 +138,7 @@ class Coupling:
         """
         step, end = at
         time, frame = step * self.scales.time_step, self._shown(feed)
-        spheres = self._spheres(frame, time)
+        spheres, density = self._spheres(frame, time), fine_density(frame)
         moment = Moment(
             step=step,
             time=time,
@@ -146,9 +147,10 @@ class Coupling:
             fresh=fresh,
             left=(end - step) * self.scales.time_step,
             given=given_speed(frame),
+            density=density,
         )
         forces = self.fluid.forces(spheres, moment)
-        self._refuse_overshoot(spheres, forces)
+        self._refuse_overshoot(spheres, forces, density)
         write_forces(self.folder, spheres, forces)
         updates.add(step, time, forces.measures)
         feed("include fluid.in")
@@ -163,9 +165,9 @@ class Coupling:
         moved = snapshot_of(frame, self.case, time_s=time)
         return moved if self.case.grains.motion == "mobile" else self.grains.joined(moved)
 
-    def _refuse_overshoot(self, spheres: Snapshot, forces: FluidForces) -> None:
+    def _refuse_overshoot(self, spheres: Snapshot, forces: FluidForces, density: Array) -> None:
         held = self.scales.time_step * self.scales.hold_steps
-        share = largest_share(spheres, forces, self.case.fines.density_kg_m3, held)
+        share = largest_share(spheres, forces, density, held)
         if self.case.drag.scheme != "implicit" and share > DRAG_LIMIT:
             raise LiggghtsError(
                 f"{self.folder}: at step {spheres.step} drag is constant for {share:.3g} "

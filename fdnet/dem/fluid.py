@@ -17,7 +17,7 @@ from fdnet.case.case import InvasionCase
 from fdnet.spheres.arrays import Array
 from fdnet.spheres.binary_dump import read_binary_frame
 from fdnet.spheres.dump import COLUMNS, Frame
-from fdnet.spheres.snapshot import Snapshot
+from fdnet.spheres.snapshot import Kind, Snapshot
 
 STATE = "post/fluid.bin"
 """File in which LIGGGHTS shows the spheres when it asks for the fluid, all digits of them."""
@@ -58,6 +58,8 @@ class Moment:
         left: s, until the chunk ends, when they are looked at again in any case.
         given: (N,) m/s, speed w at which each of the N fines would go by the forces that it has
             now, in their order; 0 where it has none yet. None where it is not known.
+        density: (N,) kg/m3 of each of the N fines, in their order. None where all have that of the
+            case.
     """
 
     step: int
@@ -67,11 +69,13 @@ class Moment:
     fresh: bool
     left: float = math.inf
     given: Array | None = None
+    density: Array | None = None
 
 
 def shown_columns(case: InvasionCase) -> str:
     """The columns that LIGGGHTS shows; where the flow follows the deposit with the w given."""
-    return f"{COLUMNS} {' '.join(_GIVEN)}" if case.drag.field == "network" else COLUMNS
+    given = _GIVEN if case.drag.field == "network" else ()
+    return " ".join((COLUMNS, "density", *given))
 
 
 def read_state(folder: Path, case: InvasionCase) -> Frame:
@@ -84,6 +88,11 @@ def given_speed(frame: Frame) -> Array | None:
     if _GIVEN[0] not in frame.columns:
         return None
     return np.linalg.norm([frame.column(name) for name in _GIVEN], axis=0)
+
+
+def fine_density(frame: Frame) -> Array:
+    """The density (N,) kg/m3 of each fine of a state."""
+    return frame.column("density")[frame.column("type") == Kind.FINE]
 
 
 class Fluid(Protocol):
@@ -110,16 +119,16 @@ def write_forces(folder: Path, spheres: Snapshot, forces: FluidForces) -> None:
         (folder / "post" / f"fluid.{name}").write_text(form % tuple(value[some].tolist()))
 
 
-def largest_share(spheres: Snapshot, forces: FluidForces, density: float, time: float) -> float:
-    """`time` s over the shortest relaxation time m / C of a fine of `density` kg/m3."""
+def largest_share(spheres: Snapshot, forces: FluidForces, density: Array, time: float) -> float:
+    """`time` s over the shortest relaxation time m / C of a fine of `density` (N,) kg/m3."""
     if not len(forces.coefficient):
         return 0.0
     return float(np.max(drag_rate(spheres.fines(), forces.coefficient, density))) * time
 
 
-def drag_rate(fines: Snapshot, coefficient: Array, density: float) -> Array:
-    """C / m (N,) 1/s, at which drag takes up the slip of N `fines` of `density` kg/m3.
+def drag_rate(fines: Snapshot, coefficient: Array, density: Array | float) -> Array:
+    """C / m (N,) 1/s, at which drag takes up the slip of N `fines`.
 
-    `coefficient` (N,) N s/m is C.
+    `coefficient` (N,) N s/m is C. `density` kg/m3 is that of each fine (N,), or of all.
     """
     return coefficient / (density * 4.0 / 3.0 * np.pi * fines.radius**3)

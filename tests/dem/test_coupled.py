@@ -19,7 +19,7 @@ from fdnet.case.file import case_from
 from fdnet.dem.checkpoint_record import last_checkpoint
 from fdnet.dem.coupled import steps_between
 from fdnet.dem.feed import run_fed
-from fdnet.dem.fluid import FluidForces, Moment, read_state, write_forces
+from fdnet.dem.fluid import FluidForces, Moment, fine_density, read_state, write_forces
 from fdnet.dem.invade_deck import render_invade, write_parts
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
@@ -280,16 +280,17 @@ def test_a_standing_bed_of_fines_takes_up_its_pressure_drop(binary, tmp_path):
     assert float(share @ total) == pytest.approx(gradient * length * area, rel=0.01)
 
 
-def test_a_fine_without_a_row_is_given_0(binary, tmp_path):
-    """No number of the first forces is left in LIGGGHTS after the second ones."""
+def test_what_passes_between_fdnet_and_liggghts_is_exact(binary, tmp_path):
+    """The density of each fine, and forces; no number of the first is left after the second."""
     case = tiny("drag.crowd=beetstra", "drag.scheme=implicit")
     box, place = box_of(case), [[2e-4, 5e-4, 5e-4], [6e-4, 5e-4, 5e-4]]
     fines = resting_spheres(place, 5e-5, box, kind=Kind.FINE, first=2)
-    write_scene(case, fines, tmp_path)
+    write_scene(case, fines, tmp_path, density=[2650.0, 2650.0, 1100.5])
     given = np.array([[[1.0, 2.0, -3.0], [4.0, 5.0, 6.0]], [[7.0, 0.0, 0.0], [0.0, -8.0, 0.0]]])
 
     def play(feed):
-        feed("include in.invade")
+        feed("include in.invade", "include ask.in")
+        assert np.array_equal(fine_density(read_state(tmp_path, case)), [2650.0, 1100.5])
         for number, velocity in enumerate(given):
             forces = FluidForces(
                 coefficient=np.ones(2),
@@ -309,8 +310,11 @@ def test_a_fine_without_a_row_is_given_0(binary, tmp_path):
         assert np.array_equal(shown, velocity)
 
 
-def write_scene(case, fines, folder) -> Snapshot:
-    """Write the deck of `fines` that a coupled invasion begins with; returns its one grain."""
+def write_scene(case, fines, folder, *, density) -> Snapshot:
+    """Write the deck of `fines` that a coupled invasion begins with; returns its one grain.
+
+    `density` kg/m3 is that of the grain and of each fine.
+    """
     scales = scales_of(case)
     grain = Snapshot.from_arrays([[-1e-3, 1e-3, 1e-3]], 3e-4, box=fines.box)
     beyond = np.array([[-2e-3, 1e-3], [0.0, 0.0], [0.0, 0.0]])
@@ -318,7 +322,7 @@ def write_scene(case, fines, folder) -> Snapshot:
         folder / "invade.data",
         grain.joined(fines),
         bounds=fines.box + beyond,
-        density=np.full(len(fines) + 1, 2650.0),
+        density=np.array(density),
         types=3,
     )
     (folder / "in.invade").write_text(render_invade(case, scales, grain).text)
@@ -329,7 +333,10 @@ def write_scene(case, fines, folder) -> Snapshot:
 
 def applied_force(case, fines, folder, binary) -> np.ndarray:
     """Force (N,) N along x that LIGGGHTS puts on standing fines beside that of their contacts."""
-    scales, grain = scales_of(case), write_scene(case, fines, folder)
+    scales, grain = (
+        scales_of(case),
+        write_scene(case, fines, folder, density=[2650.0] * (len(fines) + 1)),
+    )
 
     def play(feed):
         show = 'write_dump fines custom post/{}.dump id fx modify sort id format "%d %.17g"'

@@ -64,16 +64,39 @@ def fines(position, radius, box, velocity=(0.0, 0.0, 0.0)) -> Snapshot:
     )
 
 
-def with_case(fluid, *more, **way):
-    """The same pack in a case with other settings; the pack is not solved again."""
+def with_case(fluid, *more, scales=None, **way):
+    """The same pack in a case with other settings; the pack is not solved again.
+
+    The `scales` are those of that case unless they are given.
+    """
     case = followed(*more, **way)
-    other = replace(fluid, case=case, scales=scales_of(case))
+    other = replace(fluid, case=case, scales=scales or scales_of(case))
     other.__dict__["pack"] = fluid.pack
     return other
 
 
 def deposit_of(done) -> Snapshot:
     return replace(done.damaged.fines(), velocity=np.zeros((len(done.damaged.fines()), 3)))
+
+
+def test_the_way_of_each_fine_follows_its_own_density(fluid):
+    """Light and heavy fines go as in muds of their own kind."""
+    velocity = (3.0 * fluid.first_velocity, fluid.first_velocity, 0.0)
+    place = np.random.default_rng(1).random((40, 3)) * 1e-3
+    moving = fluid.grains.joined(fines(place, 1e-5, fluid.grains.box, velocity))
+    density = np.repeat([500.0, 8000.0], 20)
+    mixed = way_of(fluid.forces(moving, replace(FIRST, density=density)))
+    light, heavy = (
+        way_of(with_case(fluid, key, scales=fluid.scales).forces(moving, FIRST))
+        for key in ("fines.density_kg_m3=500.0", "fines.density_kg_m3=8000.0")
+    )
+    assert mixed == pytest.approx(np.concatenate([light[:20], heavy[20:]]), rel=1e-9, abs=1e-9)
+    assert not np.allclose(light, heavy, rtol=0.1)
+
+
+def way_of(forces) -> np.ndarray:
+    """The fluid on the way of each fine, over the superficial velocity."""
+    return forces.velocity / forces.measures["velocity_m_s"]
 
 
 def test_a_continued_invasion_is_the_uncut_one(binary, fluid, tmp_path):

@@ -122,8 +122,8 @@ class NetworkFluid:
         caked = standing & ((depth < 0) | beyond)
         factor = self._factor(near, fines, before * shape)
         crowd = self.scales.push.coefficient * fines.radius * factor
-        goes = ~standing
-        shape[goes] = self._ahead(fines.where(goes), crowd[goes], carried, moment)
+        goes, rate = ~standing, self._drag_rate(fines, crowd, moment)
+        shape[goes] = self._ahead(fines.where(goes), rate[goes], carried, moment)
         pressed = np.zeros((len(fines), 3))
         pressed[_rows(fines, deposit.fines)] = on_each_fine(carried.pressed, deposit)
         held = standing & within & np.any(pressed != 0.0, axis=1)
@@ -174,14 +174,21 @@ class NetworkFluid:
         """Superficial velocity up to this moment, m/s."""
         return self.first_velocity if moment.before is None else moment.before["velocity_m_s"]
 
-    def _ahead(self, fines: Snapshot, crowd: Array, carried: Carried, moment: Moment) -> Array:
-        """Velocity (N, 3) of the fluid over U on the way of `fines` that move."""
+    def _drag_rate(self, fines: Snapshot, crowd: Array, moment: Moment) -> Array:
+        """How fast the drag `crowd` (N,) N s/m takes up the slip of the fines, (N,) 1/s."""
+        known = moment.density
+        return drag_rate(fines, crowd, self.case.fines.density_kg_m3 if known is None else known)
+
+    def _ahead(self, fines: Snapshot, rate: Array, carried: Carried, moment: Moment) -> Array:
+        """Velocity (N, 3) of the fluid over U on the way of `fines` that move.
+
+        Drag takes up their slip at the `rate` (N,) 1/s.
+        """
         pace = self._before(moment)
         if pace <= 0:
             return self.pack.shape_at(fines.position, carried)
         steps = steps_between(self.case, self.scales, pace / self.scales.porosity)
         time = min(steps * self.scales.time_step, moment.left)
-        rate = drag_rate(fines, crowd, self.case.fines.density_kg_m3)
         movers = Movers(position=fines.position, velocity=fines.velocity, rate=rate)
         field = float(self.pack.shape.lattice.low[0])
         mean = mean_ahead(
