@@ -17,7 +17,7 @@ from fdnet.dem.deck import Deck, LeftOut, number, render_text
 from fdnet.dem.drag import BELOW_ZERO, drag_variables, forces_left_out
 from fdnet.dem.gravity import gravity_variables
 from fdnet.dem.measured_fines import densities
-from fdnet.dem.overlap import is_watched, watch_variables, write_watch_parts
+from fdnet.dem.overlap import watch_left_out, watch_variables, write_watch_parts
 from fdnet.dem.scene import header_variables, wall_variables, write_data
 from fdnet.dem.supply import place_batches, place_fines, slab_end
 from fdnet.errors import CaseError
@@ -145,11 +145,16 @@ def render_invade(
     *,
     ranks: int = 1,
     resume: Checkpoint | None = None,
+    packed: bool = True,
 ) -> Deck:
-    """The invasion deck, fresh or continued from a checkpoint's restart."""
+    """The invasion deck, fresh or continued from a checkpoint's restart.
+
+    Grains that are not `packed` stand for those of a pack that is not made yet.
+    """
     friction = _friction(case, scales)
     gravity, left_out = gravity_variables(case, scales)
     left_out += [*forces_left_out(case), *_left_out(case, friction=friction, ranks=ranks)]
+    left_out += watch_left_out(case, packed=packed)
     text = render_text(
         "invade.in.j2",
         header_variables(case, "invade", left_out, ranks)
@@ -160,7 +165,7 @@ def render_invade(
             "dump_group": dumped_group(case),
             "start_velocity": number(scales.upstream_velocity),
             "drag": drag_variables(case, scales),
-            "overlap": watch_variables(case, scales, grains),
+            "overlap": watch_variables(case, scales, grains) if packed else None,
             "regions": _regions(case, scales, grains),
             "quiet_checkpoints": quiet_chunks(scales),
             "empty_checkpoints": empty_chunks(case, scales),
@@ -241,21 +246,12 @@ def _regions(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> di
 def _left_out(case: InvasionCase, *, friction: bool, ranks: int) -> list[LeftOut]:
     left_out = []
     if case.grains.motion == "fixed":
-        left_out.append(
-            LeftOut(what="contacts between grains, end planes", why="grains are fixed")
-        )
+        left_out.append(LeftOut(what="motion of grains, end planes", why="grains are fixed"))
     if not friction:
         left_out.append(LeftOut(what="tangential history", why="no pair has friction"))
     left_out += left_out_of_contacts(case)
     if case.box.sides == "periodic":
         left_out.append(LeftOut(what="side walls", why="sides are periodic"))
-    if not is_watched(case):
-        why = (
-            "pairs of grains overlap too"
-            if case.grains.motion == "mobile"
-            else "fines are of unequal size"
-        )
-        left_out.append(LeftOut(what="overlap between checkpoints", why=why))
     if case.fines.supply == "batches":
         left_out.append(
             LeftOut(

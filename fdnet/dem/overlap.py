@@ -10,7 +10,7 @@ from typing import Any
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, readable_states
-from fdnet.dem.deck import number, render_text
+from fdnet.dem.deck import LeftOut, number, render_text
 from fdnet.errors import LiggghtsError
 from fdnet.files.atomic import write_text
 from fdnet.scales.scales import InvasionScales
@@ -32,7 +32,7 @@ fifth of a step with contacts."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Deepest:
-    """The largest overlap of a fine with any sphere.
+    """The largest overlap of a fine with another sphere that was seen.
 
     Attributes:
         step: when it was measured.
@@ -67,6 +67,19 @@ def watch_variables(
         "turns": turns,
         "grains": GRAINS_APART,
     }
+
+
+def watch_left_out(case: InvasionCase, *, packed: bool) -> list[LeftOut]:
+    """Why a deck does not watch the overlap, for grains that are `packed` or not yet."""
+    if is_watched(case) and packed:
+        return []
+    if case.grains.motion == "mobile":
+        why = "pairs of grains overlap too"
+    elif not case.fines.one_size:
+        why = "fines are of unequal size"
+    else:
+        why = "which grains touch is known once they are packed"
+    return [LeftOut(what="overlap between checkpoints", why=why)]
 
 
 def write_watch_parts(case: InvasionCase, grains: Snapshot, folder: Path) -> None:

@@ -7,7 +7,8 @@ import numpy as np
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.stages import LIGGGHTS_STAGES
-from fdnet.dem.invade_deck import render_invade, write_parts
+from fdnet.dem.coupled_parts import coupled_parts, write_coupled_parts
+from fdnet.dem.invade_deck import render_invade
 from fdnet.dem.pack_deck import write_pack_inputs
 from fdnet.dem.scene import box_of
 from fdnet.errors import CaseError
@@ -21,7 +22,8 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
     """Write the decks of a case without LIGGGHTS: the pack with its data file, and the invasion.
 
     The data file of the invasion needs a finished pack, so `fdnet run` writes it. The deck of the
-    invasion is written for grains that stand out beyond the face as those of a dense pack do.
+    invasion is written for grains that stand out beyond the face as those of a dense pack do. It
+    leaves out the watch of overlaps, which depends on the contacts of the grains.
 
     Raises CaseError when a file that would be written is there already.
     """
@@ -30,7 +32,8 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
     decks = {
         stage: out / stage / f"in.{stage}" for stage in case.stages if stage in LIGGGHTS_STAGES
     }
-    files = (*decks.values(), out / "pack" / "pack.data")
+    parts = coupled_parts(case, scales_of(case)) if isinstance(case, InvasionCase) else {}
+    files = (*decks.values(), out / "pack" / "pack.data", *(out / "invade" / one for one in parts))
     there = [path for path in files if os.path.lexists(path)]
     if there:
         raise CaseError(f"{there[0]}: is there already; give another --out (nothing was changed)")
@@ -40,9 +43,9 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
     write_pack_inputs(case, scales, folder, count=grain_count(case), ranks=ranks)
     if isinstance(case, InvasionCase):
         grains = _expected_grains(case)
-        deck = render_invade(case, scales_of(case), grains, ranks=ranks)
+        deck = render_invade(case, scales_of(case), grains, ranks=ranks, packed=False)
         decks["invade"].write_text(deck.text, encoding="utf-8")
-        write_parts(case, scales_of(case), grains, decks["invade"].parent)
+        write_coupled_parts(case, scales_of(case), decks["invade"].parent)
     return list(decks.values())
 
 

@@ -10,6 +10,7 @@ from fdnet.case.case import InvasionCase
 from fdnet.dem.binary import Binary
 from fdnet.dem.invasion import Invasion, invade
 from fdnet.dem.liggghts import Launch
+from fdnet.dem.overlap import read_watch
 from fdnet.run.fluid.fluid_of import fluid_of
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Snapshot
@@ -48,8 +49,8 @@ def differences(
 ) -> list[str]:
     """What differs between the uncut and the continued invasion; empty when nothing does.
 
-    Both are run below `folder`. All counts of the history, and every column of the spheres at the
-    end, are compared bit for bit.
+    Both are run below `folder`. All counts of the history, all overlaps that were watched, and
+    every column of the spheres at the end, are compared bit for bit.
     """
     launch = Launch(binary=binary, ranks=ranks)
     scales = scales_of(case)
@@ -67,6 +68,8 @@ def differences(
         different.append("history")
     if again.updates != whole.updates:
         different.append("updates")
+    if list(read_watch(folder / "cut")) != list(read_watch(folder / "whole")):
+        different.append("overlaps")
     return different
 
 

@@ -16,13 +16,22 @@ from builders import TINY, followed, resting_spheres, tiny
 from cut_and_continue import StopError, differences
 
 from fdnet.case.file import case_from
+from fdnet.dem.batches import batches_of
 from fdnet.dem.checkpoint_record import last_checkpoint
 from fdnet.dem.coupled import steps_between
 from fdnet.dem.feed import run_fed
-from fdnet.dem.fluid import FluidForces, Moment, fine_density, read_state, write_forces
+from fdnet.dem.fluid import (
+    FluidForces,
+    Moment,
+    fine_density,
+    largest_share,
+    read_state,
+    write_forces,
+)
 from fdnet.dem.invade_deck import render_invade, write_parts
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
+from fdnet.dem.measured_fines import densities
 from fdnet.dem.packing import make_pack
 from fdnet.dem.render import render_decks
 from fdnet.dem.scene import box_of, snapshot_of, write_data
@@ -195,6 +204,55 @@ def test_explicit_drag_that_would_overshoot_is_refused(binary, grains, tmp_path)
         run(case, grains, tmp_path, Launch(binary=binary))
 
 
+def several(light: float):
+    """Fines of two materials: one of the density `light` kg/m3, the other twice as dense."""
+    sizes = {"D10_mm": 0.09, "D90_mm": 0.11}
+    materials = [
+        {"name": name, "share": density, "density_kg_m3": density, "sizes": sizes}
+        for name, density in (("light", light), ("heavy", 2 * light))
+    ]
+    data = small("every_step").data()
+    data["fines"] = {"count": 400, "supply": "batches", "materials": materials}
+    return case_from(data)
+
+
+def test_the_fluid_is_asked_with_the_density_of_each_fine(binary, grains, tmp_path):
+    case, seen = several(1100.0), []
+    scales = scales_of(case)
+    fluid = fluid_of(case, scales, grains)
+
+    class Asked:
+        measured = fluid.measured
+
+        def forces(self, spheres, moment):
+            seen.append((spheres.fines(), moment.density))
+            return fluid.forces(spheres, moment)
+
+    invade(case, scales, grains, tmp_path, Launch(binary=binary), fluid=Asked())
+    everyone = densities(case, batches_of(case, scales).counts)
+    assert len(seen) > 5
+    for fines, density in seen:
+        assert np.array_equal(density, everyone[fines.id.astype(int) - 1 - int(grains.id.max())])
+        assert set(density) == {1100.0, 2200.0}
+
+
+def test_explicit_drag_is_judged_by_the_fine_that_follows_the_fluid_fastest():
+    """C t / m of the lighter one of two equal fines: m = 4/3 pi r^3 rho."""
+    two = resting_spheres(
+        [[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0]], 5e-5, box_of(tiny()), kind=Kind.FINE
+    )
+    forces = FluidForces(
+        coefficient=np.array([2e-6, 2e-6]),
+        velocity=np.zeros((2, 3)),
+        push=np.zeros((2, 3)),
+        pace=1.0,
+        measures={},
+    )
+    mass = 4 / 3 * np.pi * 5e-5**3 * 500.0
+    share = largest_share(two, forces, np.array([2000.0, 500.0]), 1e-5)
+    assert share == pytest.approx(2e-6 * 1e-5 / mass)
+
+
 def test_what_cannot_carry_a_crowd_is_refused():
     with pytest.raises(CaseError, match=r"drag\.scheme: 'viscous' has one damping for all fines"):
         small("viscous")
@@ -209,16 +267,28 @@ def test_render_shows_the_coupled_parts_with_what_it_is_fed(tmp_path):
     render_decks(small("held"), tmp_path)
     deck = (tmp_path / "invade" / "in.invade").read_text()
     assert "jump" not in deck
-    for name in ("watched.in", "ask.in", "fluid.in", "checkpoint.in"):
+    for name in ("ask.in", "fluid.in", "checkpoint.in"):
         assert f"include {name}" in deck
         assert (tmp_path / "invade" / name).is_file()
+        assert name in refusal_over(tmp_path / "theirs" / name, f"invade/{name}")
+    assert "watched.in" not in deck
     assert "set group fines property/atom cd v_cd" in (tmp_path / "invade/fluid.in").read_text()
     assert "f_uf" not in (tmp_path / "invade/ask.in").read_text()
     render_decks(followed(), tmp_path / "followed")
     assert "f_uf[3]" in (tmp_path / "followed/invade/ask.in").read_text()
     render_decks(tiny(), tmp_path / "plain")
     plain = {path.name for path in (tmp_path / "plain" / "invade").iterdir()}
-    assert plain == {"in.invade", "grains_apart.txt"}
+    assert plain == {"in.invade"}
+
+
+def refusal_over(folder: Path, name: str) -> str:
+    """What is said when decks would replace the file `name` of a folder; it stays as it is."""
+    (folder / name).parent.mkdir(parents=True)
+    (folder / name).write_text("mine")
+    with pytest.raises(CaseError, match="is there already") as caught:
+        render_decks(small("held"), folder)
+    assert [path.read_text() for path in folder.rglob("*") if path.is_file()] == ["mine"]
+    return str(caught.value)
 
 
 def bed_of_fines(binary, folder) -> Snapshot:

@@ -147,6 +147,7 @@ def test_the_pressure_gradient_acts_on_the_volume_of_each_fine_inside_the_pack()
 def test_fixed_grains_are_frozen_and_mobile_ones_are_held_by_planes():
     fixed, mobile = invade_text(), invade_text("grains.motion=mobile")
     assert has(fixed, r"^fix still grains freeze$")
+    assert not has(fixed, "^neigh_modify.*exclude")
     assert not has(fixed, "xplane")
     assert has(fixed, r"^fix integ fines nve/sphere")
     assert not has(mobile, "freeze")

@@ -135,7 +135,7 @@ def drive(
     text += render_text(
         "_contacts.in.j2", {"contacts": contacts, "time_step": number(scales.time_step)}
     )
-    text += "neigh_modify exclude group grains grains\nfix integ fines nve/sphere\n"
+    text += "fix integ fines nve/sphere\n"
     text += drag_text(case, scales) + f"dump d fines custom {every} d.dump {COLUMNS}\n"
     text += 'dump_modify d format "%d %d %.17g %.17g %.17g %.17g %.17g %.17g %.17g"\n'
     text += f'run {steps}\nprint "DECK_DONE"\n'

@@ -56,11 +56,17 @@ def test_the_deck_watches_where_it_can_and_says_where_it_cannot():
         ("fines.radius_mm=[0.04,0.05]", "unequal"),
     ):
         deck = deck_of(assignment)
-        assert "compute" not in deck.text
-        assert any(
-            item.what == "overlap between checkpoints" and why in item.why
-            for item in deck.left_out
-        )
+        refuses_the_watch(deck, why)
+    case = tiny()
+    deck = render_invade(case, scales_of(case), grain_of(case), packed=False)
+    refuses_the_watch(deck, "once they are packed")
+
+
+def refuses_the_watch(deck, why):
+    assert "compute" not in deck.text
+    assert any(
+        item.what == "overlap between checkpoints" and why in item.why for item in deck.left_out
+    )
 
 
 def test_the_watch_never_writes_more_than_some_hundred_rows_a_chunk():

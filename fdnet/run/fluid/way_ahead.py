@@ -56,7 +56,7 @@ def mean_ahead(
     """
     mean = fluid(movers.position)
     fastest = np.maximum(movers.velocity[:, 0], mean[:, 0])
-    some = movers.position[:, 0] + fastest * time >= even_to
+    some = movers.position[:, 0] + np.maximum(fastest, 0.0) * time >= even_to
     mean[some] = _mean(movers.where(some), fluid, time, mean[some])
     return mean
 

@@ -89,8 +89,8 @@ def refusal(answer: Answer) -> str | None:
 
 
 DECKS = {
-    *("in.pack", "pack.data", "in.invade", "grains_apart.txt"),
-    *("watched.in", "ask.in", "fluid.in", "held.in", "checkpoint.in"),
+    *("in.pack", "pack.data", "in.invade"),
+    *("ask.in", "fluid.in", "held.in", "checkpoint.in"),
 }
 """What `fdnet render` may write; the second line belongs to a coupled invasion."""
 
