@@ -7,7 +7,7 @@ import numpy as np
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.stages import LIGGGHTS_STAGES
-from fdnet.dem.coupled_parts import coupled_parts, write_coupled_parts
+from fdnet.dem.coupled_parts import coupled_parts
 from fdnet.dem.invade_deck import render_invade
 from fdnet.dem.pack_deck import write_pack_inputs
 from fdnet.dem.scene import box_of
@@ -32,8 +32,9 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
     decks = {
         stage: out / stage / f"in.{stage}" for stage in case.stages if stage in LIGGGHTS_STAGES
     }
-    parts = coupled_parts(case, scales_of(case)) if isinstance(case, InvasionCase) else {}
-    files = (*decks.values(), out / "pack" / "pack.data", *(out / "invade" / one for one in parts))
+    texts = _invasion_files(case, ranks) if isinstance(case, InvasionCase) else {}
+    invasion = {out / "invade" / name: text for name, text in texts.items()}
+    files = (decks["pack"], out / "pack" / "pack.data", *invasion)
     there = [path for path in files if os.path.lexists(path)]
     if there:
         raise CaseError(f"{there[0]}: is there already; give another --out (nothing was changed)")
@@ -41,12 +42,16 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
         path.parent.mkdir(parents=True, exist_ok=True)
     folder = decks["pack"].parent
     write_pack_inputs(case, scales, folder, count=grain_count(case), ranks=ranks)
-    if isinstance(case, InvasionCase):
-        grains = _expected_grains(case)
-        deck = render_invade(case, scales_of(case), grains, ranks=ranks, packed=False)
-        decks["invade"].write_text(deck.text, encoding="utf-8")
-        write_coupled_parts(case, scales_of(case), decks["invade"].parent)
+    for path, text in invasion.items():
+        path.write_text(text, encoding="utf-8")
     return list(decks.values())
+
+
+def _invasion_files(case: InvasionCase, ranks: int) -> dict[str, str]:
+    """Name and text of the invasion's deck and of the files that it is continued by."""
+    scales = scales_of(case)
+    deck = render_invade(case, scales, _expected_grains(case), ranks=ranks, packed=False)
+    return {"in.invade": deck.text, **coupled_parts(case, scales)}
 
 
 def _expected_grains(case: Case) -> Snapshot:
