@@ -159,6 +159,18 @@ def test_lines_fit_a_screen(root):
     assert not long, "\n".join(long)
 
 
+def test_no_line_of_a_page_is_a_comment(root):
+    """MyST leaves out lines that begin with a percent sign; "%%bash" begins a cell."""
+    unseen = [
+        f"{path.relative_to(root)}:{number}: {line}"
+        for path in pages(root)
+        if ".md" in path.suffixes
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
+        if line.lstrip().startswith("%") and not line.startswith("%%")
+    ]
+    assert not unseen, "\n".join(unseen)
+
+
 def test_pages_have_no_private_words(root):
     private = [
         f"{path.relative_to(root)}:{number}: {line.strip()}"

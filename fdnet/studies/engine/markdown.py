@@ -10,7 +10,7 @@ NONE = "–"
 WIDTH = 99
 _UNBREAKABLE = re.compile(r"!?\[[^\]]*\]\([^)]*\)\S*|(?:[^\s`]*`[^`]*`)+[^\s`]*|\S+")
 _MARKER = re.compile(r"(\s*)([-*+]|\d+\.)\s+")
-_STARTS_BLOCK = re.compile(r"([-*+=#]+|\d+[.)])$|[|><]")
+_STARTS_BLOCK = re.compile(r"([-*+=#]+|\d+[.)])$|[|><%]")
 _FENCES = ("```", "$$", ":::")
 
 
@@ -96,7 +96,7 @@ def _filled(block: Sequence[str], width: int) -> list[str]:
 
 
 def _words(text: str) -> list[str]:
-    """The words; one that would start a list or a table at the start of a line is glued on."""
+    """The words; one that would start a list, a table or a comment in a line is glued on."""
     words: list[str] = []
     for word in _UNBREAKABLE.findall(text):
         if words and _STARTS_BLOCK.match(word):

@@ -1,15 +1,13 @@
 """Tables and figures of the page on the thesis that are made from the study's CSV files."""
 
 import csv
-import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from fdnet.studies.engine.markdown import NONE, figure, markdown_table
+from fdnet.studies.engine.markdown import NONE, figure, markdown_table, wrapped
 from fdnet.studies.thesis.numbers.statistics import ALONE, CUT, WHOLE
 from fdnet.studies.thesis.runs.plan import SPECIMENS
 
-WIDTH = 98
 DEPOSITION_COLUMNS = {
     "id": "run",
     "low": "throat porosity from",
@@ -102,14 +100,14 @@ def figures(path: Path) -> str:
     drawn = [_figure(row["figure"], row["caption"]) for row in rows if not row["missing"]]
     left = [f"{row['figure']} (needs {row['missing']})" for row in rows if row["missing"]]
     if left:
-        drawn.append(textwrap.fill("Not drawn: " + ", ".join(left) + ".", WIDTH))
+        drawn.append(wrapped("Not drawn: " + ", ".join(left) + "."))
     return "\n\n".join(drawn)
 
 
 def _figure(name: str, caption: str) -> str:
     """An image with its caption below; the alternative text is the caption's head."""
     head = caption.split(":", maxsplit=1)[0]
-    return f"![{head}](thesis/{name})\n\n" + textwrap.fill(f"*{caption}*", WIDTH)
+    return f"![{head}](thesis/{name})\n\n" + wrapped(f"*{caption}*")
 
 
 def _table(path: Path, columns: Mapping[str, str]) -> str:

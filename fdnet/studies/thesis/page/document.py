@@ -1,11 +1,11 @@
 """docs/thesis.md, made of its source docs/thesis.md.in and the tables of the study."""
 
 import re
-import textwrap
 from pathlib import Path
 from string import Template
 
 from fdnet.errors import CaseError
+from fdnet.studies.engine.markdown import wrapped
 from fdnet.studies.thesis.collection import RESULTS
 from fdnet.studies.thesis.compare.tables import thesis_tables
 from fdnet.studies.thesis.compare.trend_table import caveats, flows_table, trends_table
@@ -70,4 +70,4 @@ def page_parts(folder: Path) -> dict[str, str]:
 
 
 def _item(line: str) -> str:
-    return textwrap.fill(f"- {line}", csv_tables.WIDTH, subsequent_indent="  ")
+    return wrapped(f"- {line}")
