@@ -265,6 +265,35 @@ SPECIMENS = {
     "slabCJ_r4": Specimen(seed=380, fine_mm=0.0625, supplied=180, friction=0.55, pack=36),
     "slabCK_r8_mu0": Specimen(seed=381, fine_mm=0.03125, supplied=2000, friction=0.0, pack=38),
     "slabCL_r10": Specimen(seed=382, fine_mm=0.025, supplied=1000, friction=0.55, pack=35),
+    "slabDA_r5": Specimen(seed=391, fine_mm=0.05, supplied=260, friction=0.55, pack=36),
+    "slabDB_r8": Specimen(seed=392, fine_mm=0.03125, supplied=800, friction=0.55, pack=34),
+    "slabDC_r10": Specimen(seed=393, fine_mm=0.025, supplied=1200, friction=0.3, pack=35),
+    "slabDD_r5_followed": Specimen(
+        seed=394, fine_mm=0.05, supplied=220, friction=0.55, pack=34, followed=True
+    ),
+    "slabDE_r8_followed": Specimen(
+        seed=395, fine_mm=0.03125, supplied=1000, friction=0.55, pack=35, followed=True
+    ),
+    "slabDF_r6": Specimen(seed=396, fine_mm=0.04167, supplied=300, friction=0.55, pack=36),
+    "slabDG_r8_ranges": Specimen(
+        seed=397,
+        fine_mm=[0.025, 0.0375],
+        supplied=900,
+        friction=0.55,
+        pack=34,
+        grain_mm=GRAIN_RANGE,
+    ),
+    "slabDH_r5_range": Specimen(
+        seed=398, fine_mm=[0.04, 0.06], supplied=220, friction=0.55, pack=36
+    ),
+    "slabDI_r3": Specimen(seed=399, fine_mm=0.0833, supplied=75, friction=0.55, pack=35),
+    "slabDJ_r4": Specimen(seed=400, fine_mm=0.0625, supplied=150, friction=0.55, pack=35),
+    "slabDK_r8_mu0": Specimen(seed=401, fine_mm=0.03125, supplied=1600, friction=0.0, pack=37),
+    "slabDL_r10": Specimen(seed=402, fine_mm=0.025, supplied=900, friction=0.55, pack=36),
+    "slabDM_r3_range_mu0": Specimen(
+        seed=403, fine_mm=[0.07, 0.095], supplied=75, friction=0.0, pack=37
+    ),
+    "slabDN_r6_cake": Specimen(seed=404, fine_mm=0.04167, supplied=900, friction=0.55, pack=34),
 }
 """The specimens by name: r5 are fines of a fifth of a grain, mu0 is no friction, a range is one of
 radii (ranges: of grains too), a cake remains upstream of the face; followed: by the flow."""
