@@ -1,7 +1,10 @@
 """Sections of throats that a fine bounds, and what they add up to."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_trapezoid
 
 from fdnet.network.laws import fine_sections as fine
 from fdnet.network.laws.deposit_resistances import deposit_resistances, node_resistances
@@ -9,6 +12,7 @@ from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.point_sections import parts_of_triangle
 from fdnet.network.laws.point_sections import points_flux as points_flux_of
 from fdnet.network.laws.solids import set_near, solids_of
+from fdnet.network.laws.tube import OPEN_WIDENING
 from fdnet.network.network import build_network
 from fdnet.network.nodes import nodes_of
 from fdnet.network.resolved.slab import cut_out
@@ -168,17 +172,61 @@ def test_a_plane_of_pressure_holds_the_fluid_along_it():
 
 
 def test_what_spreading_behind_a_node_adds():
-    """Three throats of one mixed pore with 1/a of 1, 2 and 4, and one conductance."""
+    """Three throats of one mixed pore with 1/a of 1, 2 and 4, and one conductance.
+
+    Their corners are three, two and no grains.
+    """
     pairs = np.array([[0, 1], [0, 2], [0, 3]])
-    position = np.zeros((4, 3))
-    network = network_of(position, pairs, [[0, 1], [0, 1], [0, 1]])
+    images = np.array([[0, 1, 2], [0, 1, 3], [3, 4, 5]])
+    network = replace(
+        network_of(np.zeros((4, 3)), pairs, [[0, 1], [0, 1], [0, 1]]),
+        throat_images=images,
+        image_fine=np.array([False, False, False, True, True, True]),
+    )
     ends = np.array([[1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [4.0, np.nan, 4.0]])
     mixed = np.array([True, False, False, False])
     added = node_resistances(network, np.arange(3), np.full((3, 2), 5.0), (ends, mixed))
-    mean = (1.0 + 8.0 + 64.0) / 3.0
-    by_hand = 8.0 / (3.0 * np.pi) * np.sqrt(8.0 / 3.0) * (64.0 - mean)
-    assert added[:, 0] == pytest.approx([0.0, 0.0, by_hand])
+    wide = 3.0 / (1.0 + 1.0 / 8.0 + 1.0 / 64.0)
+    each = 0.6 * 8.0 / (3.0 * np.pi) * np.sqrt(8.0 / 3.0)
+    assert added[:, 0] == pytest.approx([0.0, 2.0 * each * (8.0 - wide), 0.0])
     assert not added[:, 1].any()
+
+
+@pytest.mark.parametrize("narrow", [0.3, 0.4, 0.5, 0.6, 0.65])
+def test_widening_of_an_open_section(narrow):
+    """Fluid in the cell of a cylinder whose radius varies along it, without shear at its edge.
+
+    The velocity along the cell is that of Happel (1959). What flows sideways makes up for its
+    change, and its dissipation is what the resistance has more, to second order.
+    """
+    assert sideways(narrow) == pytest.approx(OPEN_WIDENING / 2.0, rel=0.12)
+
+
+def sideways(rho, step=1e-4):
+    """More resistance over (da/dz)^2, in parts; the cell has the radius 1."""
+    r = np.linspace(rho, 1.0, 4001)
+
+    def along(radius):
+        """Velocity over the flux, at r."""
+        fine = np.linspace(radius, 1.0, 8001)
+        return speed(r, radius) / np.trapezoid(speed(fine, radius) * 2.0 * np.pi * fine, fine)
+
+    def speed(at, radius):
+        return np.where(at > radius, 0.5 * np.log(at / radius) - (at**2 - radius**2) / 4.0, 0.0)
+
+    def width(radius):
+        """Radius a of the tube that carries as much as the half of a cell, a triangle's share."""
+        fine = np.linspace(radius, 1.0, 8001)
+        half = 0.5 * np.trapezoid(speed(fine, radius) * 2.0 * np.pi * fine, fine)
+        return (8.0 * half / np.pi) ** 0.25
+
+    # what the flow along the cell gains between the rim and r comes in sideways through r
+    change = (along(rho + step) - along(rho)) / step
+    inward = -cumulative_trapezoid(change * r, r, initial=0.0) / r
+    sheared = np.trapezoid(2.0 * (np.gradient(inward, r) ** 2 + (inward / r) ** 2) * r, r)
+    straight = np.trapezoid(np.gradient(along(rho), r) ** 2 * r, r)
+    slope = (width(rho + step) - width(rho - step)) / (2.0 * step)
+    return sheared / straight / slope**2
 
 
 def test_kinds_mark_the_images(pack, network):

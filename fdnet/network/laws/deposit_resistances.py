@@ -5,13 +5,15 @@ Throats that a fine bounds have the sections of `fine_sections`, all others thos
 
 In a pore between grains and fines the throats are of very different width, and the fluid goes on
 spreading behind the node, from the section of a throat at the node to the width of the pore. Its
-sideways shear is that of a tube that widens (`lubrication`, dR = 8 / (pi a^4) (8/3)^(1/2) |da|),
-which adds
+sideways shear is that of a tube that widens (`lubrication`, dR = 8 / (pi a^4) (8/3)^(1/2) |da|).
+It spreads along the grains at the corners of the throat, and hardly along fines, which end behind
+it. With g grains at the corners this adds
 
-    R = 8 / (3 pi) (8/3)^(1/2) (1 / a^3 - <1 / a^3>)
+    R = 0.6 g 8 / (3 pi) (8/3)^(1/2) (1 / a^3 - 1 / <a^3>)
 
 where that is positive. a is the radius of the round tube that carries as much as the section at
-the node, and < > the mean over the throats of the pore, weighted with their conductances.
+the node, and < > the mean over the throats of the pore, weighted with their conductances. The
+number 0.6 is fitted to resolved flow (docs/accuracy.md, section 3).
 """
 
 import numpy as np
@@ -26,6 +28,9 @@ from fdnet.network.laws.tube import WIDENING
 from fdnet.network.network import Network
 from fdnet.network.nodes import nodes_of
 from fdnet.spheres.snapshot import Array
+
+SPREAD = 0.6
+"""Spreading behind a throat for each grain at its corners, fitted to resolved flow."""
 
 
 def deposit_resistances(network: Network) -> Array:
@@ -64,9 +69,10 @@ def node_resistances(
     whole = halves.sum(axis=1, keepdims=True)
     real = np.isfinite(cube) & np.isfinite(whole) & (pores[:, :1] != pores[:, 1:])
     weight = np.where(real, 1.0 / whole, 0.0)
-    cube = np.where(real, cube, 0.0)
     total = np.bincount(pores.ravel(), weights=weight.ravel(), minlength=len(mixed))
-    summed = np.bincount(pores.ravel(), weights=(weight * cube).ravel(), minlength=len(mixed))
-    mean = np.divide(summed, total, out=np.zeros(len(mixed)), where=total > 0.0)
-    excess = np.where(mixed[pores] & real, np.maximum(cube - mean[pores], 0.0), 0.0)
-    return 8.0 / (3.0 * np.pi) * np.sqrt(WIDENING) * excess
+    room = np.divide(weight, cube, out=np.zeros(cube.shape), where=real)
+    summed = np.bincount(pores.ravel(), weights=room.ravel(), minlength=len(mixed))
+    wide = np.divide(total, summed, out=np.zeros(len(mixed)), where=summed > 0.0)
+    excess = np.where(mixed[pores] & real, np.maximum(cube - wide[pores], 0.0), 0.0)
+    grains = np.sum(~network.image_fine[network.throat_images[throats]], axis=1)
+    return SPREAD * grains[:, None] * 8.0 / (3.0 * np.pi) * np.sqrt(WIDENING) * excess

@@ -20,7 +20,7 @@ from fdnet.network.laws.open_sections import TIP
 from fdnet.network.laws.point_sections import parts_of_triangle, points_flux
 from fdnet.network.laws.section_rays import set_sides
 from fdnet.network.laws.solids import Cells, set_near, solids_of
-from fdnet.network.laws.tube import WIDENING, resistance_of
+from fdnet.network.laws.tube import OPEN_WIDENING, resistance_of
 from fdnet.network.laws.wall_cross_section import wall_cuts
 from fdnet.network.network import LENGTH_FLOOR, Network
 from fdnet.spheres.snapshot import Array
@@ -163,7 +163,7 @@ def _set_resistances(
                 facet_flux = flux[k] if z == 0.0 else facet_flux
             ends[t, side] = _narrowness(flux[STEPS])
             if whole[t]:
-                resistance[t, side] = resistance_of(flux, (1.0, step, WIDENING))
+                resistance[t, side] = resistance_of(flux, (1.0, step, OPEN_WIDENING))
         ends[t, 2] = _narrowness(facet_flux)
 
 
