@@ -54,12 +54,15 @@ def test_k_is_that_of_the_network_of_all_spheres(pack, analysis):
     assert len(analysis.conductance_damaged) == len(analysis.network.throat_radius)
 
 
-@pytest.mark.parametrize(("name", "ratio"), [("packH_r5_d1", 0.8866), ("packC_r10_d2", 0.4796)])
-def test_few_fines_lower_k_as_resolved_flow_does(name, ratio):
-    """Random deposits come out 3 and 8 % high (docs/accuracy.md)."""
+@pytest.mark.parametrize(
+    ("name", "ratio"),
+    [("packH_r5_d1", 0.8866), ("packC_r10_d2", 0.4804), ("packC_r10_d5", 0.2126)],
+)
+def test_fines_lower_k_as_resolved_flow_does(name, ratio):
+    """Random deposits come out 1 and 3 % high, and 4 % low (docs/accuracy.md)."""
     spheres = read_pack(truth_folder() / f"{name}.csv")[0]
     result = analyse(spheres, periodic="xyz", walls="slip", damage_law="all-spheres")
-    assert result.k_damaged / result.k_initial == pytest.approx(ratio, rel=0.08)
+    assert result.k_damaged / result.k_initial == pytest.approx(ratio, rel=0.06)
 
 
 def test_a_section_is_the_specimen_of_its_own_spheres(pack, analysis):

@@ -49,8 +49,8 @@ MEASURED_APART = {
         "14. How often the flow follows its deposit": "2,469 2,789 3,064",
     },
     "accuracy": {
-        "3. With fines": "6 12 18 23 0.7 1.2 4.9 5.6 0.93 0.96 10.3 11.0 "
-        "3.5 4.4 5.1 6.1 6.4 25 75 1.077",
+        "3. With fines": "6 12 18 23 0.3 0.7 1.1 1.2 4.9 5.6 0.93 0.96 10.3 11.0 "
+        "4.1 4.4 5.1 6.1 25 0.52 0.6 0.65 10 34",
         "7. What remains wrong, and why": "25",
     },
 }

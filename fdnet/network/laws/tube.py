@@ -5,8 +5,8 @@
 where a is the radius of the round tube that carries as much as the section (`lubrication`).
 
 An open section stands among discs and has no wall around it, so the fluid has less far to go
-sideways. Between parallel cylinders whose radius varies along them the exact addition to second
-order is 0.52 to 0.66 of that one, as long as they fill 0.04 to 0.5 of the section
+sideways. In the cell of a cylinder whose radius varies along it (Happel 1959) the exact addition
+to second order is 0.52 to 0.65 of that one, as long as the cylinder fills 0.04 to 0.5 of the cell
 (docs/physics_network.md, section 8). So 0.6 times 8/3 stands for 8/3 there.
 """
 

@@ -25,8 +25,8 @@ class Slab:
         x_hi_mm: where it ends.
         cells: of the grids on which it is solved, on its longest edge.
         known_before: "yes" where the laws may have been shaped on its truth; "no" where it was put
-            aside before the laws that "auto" took for it were last touched; "later" where that
-            holds for the law `section-archie` as well.
+            aside before the laws that "auto" took for it were last touched; "later" where it was
+            put aside before any of the laws were.
     """
 
     name: str
