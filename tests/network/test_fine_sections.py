@@ -209,7 +209,7 @@ def test_widening_of_an_open_section(narrow, share):
 
 
 def sideways(rho, step=1e-4):
-    """More resistance over (da/dz)^2, in parts; the cell has the radius 1."""
+    """What the resistance has more, over (da/dz)^2 and that of a straight cell of radius 1."""
     r = np.linspace(rho, 1.0, 4001)
 
     def along(radius):
@@ -227,10 +227,11 @@ def sideways(rho, step=1e-4):
         return (8.0 * half / np.pi) ** 0.25
 
     # what the flow along the cell gains between the rim and r comes in sideways through r
-    change = (along(rho + step) - along(rho)) / step
+    here = along(rho)
+    change = (along(rho + step) - here) / step
     inward = -cumulative_trapezoid(change * r, r, initial=0.0) / r
     sheared = np.trapezoid(2.0 * (np.gradient(inward, r) ** 2 + (inward / r) ** 2) * r, r)
-    straight = np.trapezoid(np.gradient(along(rho), r) ** 2 * r, r)
+    straight = np.trapezoid(np.gradient(here, r) ** 2 * r, r)
     slope = (width(rho + step) - width(rho - step)) / (2.0 * step)
     return sheared / straight / slope**2
 

@@ -6,8 +6,8 @@ Throats that a fine bounds have the sections of `fine_sections`, all others thos
 In a pore between grains and fines the throats are of very different width, and the fluid goes on
 spreading behind the node, from the section of a throat at the node to the width of the pore. Its
 sideways shear is that of a tube that widens (`lubrication`, dR = 8 / (pi a^4) (8/3)^(1/2) |da|).
-It spreads along the grains at the corners of the throat, and hardly along fines, which end behind
-it. With g grains at the corners this adds
+The fluid spreads along the grains at the corners of the throat, and hardly along fines, which end
+behind it. With g grains at the corners this adds
 
     R = 0.6 g 8 / (3 pi) (8/3)^(1/2) (1 / a^3 - 1 / <a^3>)
 
@@ -30,7 +30,7 @@ from fdnet.network.nodes import nodes_of
 from fdnet.spheres.snapshot import Array
 
 SPREAD = 0.6
-"""Spreading behind a throat for each grain at its corners, fitted to resolved flow."""
+"""Share of that shear for each grain at the corners of a throat, fitted to resolved flow."""
 
 
 def deposit_resistances(network: Network) -> Array:
@@ -70,9 +70,9 @@ def node_resistances(
     real = np.isfinite(cube) & np.isfinite(whole) & (pores[:, :1] != pores[:, 1:])
     weight = np.where(real, 1.0 / whole, 0.0)
     total = np.bincount(pores.ravel(), weights=weight.ravel(), minlength=len(mixed))
-    room = np.divide(weight, cube, out=np.zeros(cube.shape), where=real)
-    summed = np.bincount(pores.ravel(), weights=room.ravel(), minlength=len(mixed))
-    wide = np.divide(total, summed, out=np.zeros(len(mixed)), where=summed > 0.0)
-    excess = np.where(mixed[pores] & real, np.maximum(cube - wide[pores], 0.0), 0.0)
+    volume = np.divide(weight, cube, out=np.zeros(cube.shape), where=real)
+    summed = np.bincount(pores.ravel(), weights=volume.ravel(), minlength=len(mixed))
+    inverse = np.divide(total, summed, out=np.zeros(len(mixed)), where=summed > 0.0)
+    excess = np.where(mixed[pores] & real, np.maximum(cube - inverse[pores], 0.0), 0.0)
     grains = np.sum(~network.image_fine[network.throat_images[throats]], axis=1)
     return SPREAD * grains[:, None] * 8.0 / (3.0 * np.pi) * np.sqrt(WIDENING) * excess

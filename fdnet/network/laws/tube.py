@@ -4,10 +4,10 @@
 
 where a is the radius of the round tube that carries as much as the section (`lubrication`).
 
-An open section stands among discs and has no wall around it, so the fluid has less far to go
-sideways. In the cell of a cylinder whose radius varies along it (Happel 1959) the exact addition
-to second order is 0.52 to 0.65 of that one, as long as the cylinder fills 0.04 to 0.5 of the cell
-(docs/physics_network.md, section 8). So 0.6 times 8/3 stands for 8/3 there.
+An open section lies between the discs of spheres and has no wall around it, so the fluid moves a
+shorter way sideways. In the cell of a cylinder whose radius varies along it (Happel 1959) the
+exact addition to second order is 0.52 to 0.65 of that one, as long as the cylinder fills 0.04 to
+0.5 of the cell (docs/physics_network.md, section 8). So 0.6 times 8/3 stands for 8/3 there.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ from fdnet.spheres.snapshot import Array
 WIDENING = 8.0 / 3.0
 """Factor of da^2 in the resistance above."""
 OPEN_WIDENING = 0.6 * WIDENING
-"""The same in an open section."""
+"""Factor of da^2 in an open section."""
 
 
 @loops_in_place
