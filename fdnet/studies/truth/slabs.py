@@ -10,7 +10,7 @@ from fdnet.spheres.snapshot import KIND_NAMES, Kind, Snapshot
 from fdnet.studies.truth.packs import DATA, MM
 
 SLAB_FOLDER = DATA / "slabs"
-SLAB_GRIDS, SLAB_TRUTH = "grids.csv", "truth.csv"
+SLAB_GRIDS, SLAB_TRUTH, SLAB_SPECIMENS = "grids.csv", "truth.csv", "specimens.csv"
 YES, NO, LATER = "yes", "no", "later"
 
 
