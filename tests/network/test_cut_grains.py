@@ -76,5 +76,5 @@ def test_thin_slabs_of_grains_against_stokes(name):
     sides = (False, True, True)
     network = build_network(cut_out(grains, span, sides), periodic=sides)
     k = whole_permeability(network, 1.0 / half_resistances(network).sum(axis=1))[0]
-    tolerance = {"slabL_r10": 0.1, "slabQ_r5_mu0_light": 0.03}.get(name, 0.05)
-    assert k == pytest.approx(float(row["k0_mm2"]) * MM**2, rel=tolerance)
+    tolerance = {"slabL_r10": 0.09, "slabM_r5_ranges_cake": 0.07, "slabQ_r5_mu0_light": 0.03}
+    assert k == pytest.approx(float(row["k0_mm2"]) * MM**2, rel=tolerance.get(name, 0.05))

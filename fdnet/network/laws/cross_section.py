@@ -3,17 +3,21 @@
 The section is a triangle with a disc of each grain on its corners. Every disc slows the fluid
 between its rim and the line midway to the next rim; these shares are cut into wedges (`wedge`).
 
-Equal discs: six right-angled wedges about the circumcentre, in closed form.
+Equal discs in a triangle that holds its circumcentre: six right-angled wedges about it, in closed
+form.
 
 Unequal discs: the line midway between two rims is a hyperbola. From the centre of a disc it lies
 at the distance d(t) = (a^2 - e^2) / (2 (a cos t + e)) on the ray at the angle t from the line
 between the centres, with the difference e of the radii and the distance a of the centres. The
-shares meet in the centre of the inscribed circle. The flux on rays is summed by Gauss points, and
-the shear between rays is that of the wedge of the same angle and half gap. Where no circle touches
-all three discs (one disc lies in the shadow of the others), each disc keeps what its rays see of
-the triangle before a line midway or the opposite side. So it does where the circle lies beyond an
-edge and the negative shares there leave less than `SOUND` of that: between discs of very different
-radii they may take away all but a hundredth of the flux.
+shares meet in the centre of the circle that touches all three discs. The flux on rays is summed by
+Gauss points, and the shear between rays is that of the wedge of the same angle and half gap.
+
+Where that circle lies beyond an edge, as in every obtuse triangle with equal discs, the shares
+there are negative, and they take away too much: all of the flux between touching discs at an angle
+of 98 degrees. Where no circle touches all three discs (one disc lies in the shadow of the others),
+there is no such sum. In both cases each disc keeps what its rays see of the triangle before a line
+midway or the opposite side, if that is more. So that the flux does not jump, the rays take over
+while the centre moves beyond the edge by `TURN`, as seen from the centre of a disc.
 """
 
 import numpy as np
@@ -36,9 +40,9 @@ from fdnet.network.laws.wedge import (
 )
 from fdnet.spheres.snapshot import Array
 
-SOUND = 0.25
-"""Least flux of signed shares over that on the rays. Where it is less, finite elements agree with
-the rays (tests/network/test_section_flux.py)."""
+TURN = 0.05
+"""Angle beyond an edge, rad, from which on the rays alone give a flux that the signed shares make
+less. Finite elements agree with the rays there (tests/network/test_section_flux.py)."""
 
 
 @loops_in_place
@@ -131,15 +135,14 @@ def uneven_fluxes(
     wedge = lanes[0]
     touching_fluxes(base, discs, (lanes, table), flux)
     for k in range(len(discs)):
-        beyond = not flux[k] > 0.0
+        beyond = 0.0 if flux[k] > 0.0 else TURN
         for m in range(6 * k, 6 * k + 6):
-            beyond = beyond or wedge[4, m] < 0.0
-        if beyond:
+            beyond = max(beyond, -wedge[4, m])
+        if beyond > 0.0:
             aim_corners(base, corners)
             corner_reaches(corners, discs[k])
-            seen = corner_flux(corners, discs[k], table)
-            if not flux[k] > SOUND * seen:
-                flux[k] = seen
+            more = corner_flux(corners, discs[k], table) - flux[k]
+            flux[k] += min(beyond / TURN, 1.0) * max(more, 0.0)
 
 
 @loops_in_place

@@ -47,6 +47,8 @@ THROATS = 20_000
 """Throats that are worked off at once."""
 EQUAL = 1e-9
 """Radii that differ by at most this share are equal."""
+OBTUSE = 1e-6
+"""Tangent of the least angle by which the circumcentre of an obtuse facet lies beyond an edge."""
 Span = tuple[float, float, float]
 """Lowest and highest section, m from the facet, and 1 for the side of the second pore or -1 for
 that of the first."""
@@ -209,6 +211,8 @@ def throat_at(given: Prepared, t: int, room: SectionRoom) -> tuple[Throat, Faces
     wedge = room[6][0][: 3 if even else 0]
     if even:
         set_wedges(corner[t], wedge)
+        if min(wedge[0, 1], wedge[1, 1], wedge[2, 1]) < -OBTUSE:
+            wedge = wedge[:0]
     return (corner[t], radius[t], flatness[t], wedge), (order[t], place[t], part[t], cut[t])
 
 

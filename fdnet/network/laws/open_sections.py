@@ -40,7 +40,7 @@ m and room for `uneven_fluxes`, room for `share_around`, room for a fourth disc 
 grains, and room for `set_wedges` and for `wall_fluxes`."""
 Throat = tuple[Array, Array, Array, Array]
 """Corners (3, 2) m of the facet, radii (3,) m of the discs in it, their flatness (3,), and the
-wedges of a throat with equal discs (`set_wedges`), else no row."""
+wedges (`set_wedges`) of a throat with equal discs that is not obtuse, else no row."""
 
 
 @compiled
