@@ -137,6 +137,18 @@ CUTS: tuple[tuple[str, tuple[float, float], tuple[int, ...], str], ...] = (
     ("slabEJ_r4", FACE, MIDDLE, LATER),
     ("slabEK_r8_mu0", FACE, FINEST, LATER),
     ("slabEL_r10", FACE, FINEST, LATER),
+    ("slabFA_r5", FACE, MIDDLE, LATER),
+    ("slabFB_r8", FACE, FINEST, LATER),
+    ("slabFC_r10", FACE, FINEST, LATER),
+    ("slabFD_r5_followed", FACE, MIDDLE, LATER),
+    ("slabFE_r8_followed", FACE, FINEST, LATER),
+    ("slabFF_r6", TWICE, MIDDLE, LATER),
+    ("slabFG_r8_ranges", FACE, FINEST, LATER),
+    ("slabFH_r5_range", TWICE, MIDDLE, LATER),
+    ("slabFI_r3", TWICE, MIDDLE, LATER),
+    ("slabFJ_r4", FACE, MIDDLE, LATER),
+    ("slabFK_r8_mu0", FACE, FINEST, LATER),
+    ("slabFL_r10", FACE, FINEST, LATER),
 )
 """Specimen, slab, grids, and whether its truth was known when the laws were shaped."""
 SLABS = {
