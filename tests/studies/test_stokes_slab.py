@@ -120,6 +120,16 @@ def test_a_direct_solve_of_the_whole_mirrored_cell_gives_the_same():
     assert k == pytest.approx(tensor[0, 0], rel=1e-4)
 
 
+def test_a_sphere_that_both_planes_cut_is_no_pipe():
+    """Spheres buried in it close whatever its shell leaves open, and change nothing."""
+    box = np.array([[0.0, 8.0], [0.0, 16.0], [0.0, 16.0]])
+    place, buried = np.array([[4.0, 8.0, 8.0]]), np.arange(0.5, 5.0, 0.5)
+    nested = np.repeat(place, len(buried) + 1, axis=0)
+    one = solve_slab(resting(place, np.array([5.0]), box), 0.0, 8.0, cells=32)
+    many = solve_slab(resting(nested, np.array([5.0, *buried]), box), 0.0, 8.0, cells=32)
+    assert one.k == pytest.approx(many.k, rel=1e-3)
+
+
 def test_half_of_a_cell_is_the_whole():
     """Spheres that no plane cuts, with their images on the periodic grid."""
     rng = np.random.default_rng(4)

@@ -14,7 +14,9 @@ the other two axes.
 
 The grid is periodic along y and z. Along x it is periodic too, or it is the slab 0 <= x <= n of
 spheres that may reach out of it, mirrored at both of these planes: what lies outside is no solid,
-and the neighbour of a node beyond a plane is the image of the one before it.
+and the neighbour of a node beyond a plane is the image of the one before it. A plane cuts a sphere
+open, so all of its nodes on that plane carry u = 0: else a sphere that both planes cut would be a
+pipe from one to the other.
 """
 
 from dataclasses import dataclass
@@ -108,7 +110,10 @@ def _stamp(point: Array, r: float, marks: _Marks) -> None:
     square = apart[0][:, None, None] ** 2 + apart[1][:, None] ** 2 + apart[2] ** 2
     wrapped = [axis.astype(np.int64) % n for axis, n in zip(axes, solid.shape, strict=True)]
     inside = np.nonzero(square <= r * r)
-    solid[tuple(w[i] for w, i in zip(wrapped, inside, strict=True))] = True
+    within = tuple(w[i] for w, i in zip(wrapped, inside, strict=True))
+    solid[within] = True
+    if marks.on_planes:
+        shell[within] |= (within[0] == 0) | (within[0] == solid.shape[0] - 1)
     near = np.nonzero((square < (r + 1.0) ** 2) & (square > max(r - 1.0, 0.0) ** 2 - (r < 1.0)))
     power = square[near] - r * r
     node = np.ravel_multi_index(
