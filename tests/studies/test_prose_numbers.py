@@ -34,7 +34,7 @@ SETTINGS = {
         "1. What is compared": "1 1/5 2 13",
         "2. Intact": "0.22 0.30 0.35 0.45 0.55 0.70 3.12 8/3",
         "3. With fines": "0.30 0.40 0.45 1 1.5 5 7 8 9 13 26 30 1/10 1/3 1/40 1/5 1/6 "
-        "128 160 1935 2 42 3 408",
+        "128 160 1935 2 42 3 408 98",
         "4. Walls, cut planes, size": "1 1.5 2 3 8 10 11 20",
         "5. Unequal grains": "1 2 3",
         "7. What remains wrong, and why": "0.30 0.4 0.40 1 1/10 1/3 1/8 3 8",
@@ -49,7 +49,7 @@ MEASURED_APART = {
         "14. How often the flow follows its deposit": "2,469 2,789 3,064",
     },
     "accuracy": {
-        "3. With fines": "6 12 18 23 0.3 0.7 1.1 1.2 4.9 5.6 0.93 0.96 10.3 11.0 "
+        "3. With fines": "6 12 18 23 0.2 0.3 0.5 0.7 1.1 1.8 4.9 5.6 0.93 0.96 10.3 11.0 "
         "4.1 4.4 5.1 6.1 25 0.52 0.6 0.65 10 34",
         "7. What remains wrong, and why": "25",
     },
@@ -111,12 +111,12 @@ READ_OFF_BY_HAND = {
     "planes_clogged": "61",
     "exact_clogged": "222",
     "exact_clogged_k": "0.081",
-    "law_times": "2.3",
-    "resolved_error": "2.5 ± 0.9",
-    "kozeny_error": "3.9 ± 1.9",
-    "one_64_times": "300",
-    "two_72_times": "580",
-    "fines_72_times": "780",
+    "law_times": "2.0",
+    "resolved_error": "2.2 ± 0.9",
+    "kozeny_error": "3.9 ± 1.8",
+    "one_64_times": "240",
+    "two_72_times": "480",
+    "fines_72_times": "410",
     "million": "6, 10, 22",
     "aggregation_steps": "94 and 884",
     "unit_steps": "135",
