@@ -28,7 +28,7 @@ def test_equal_discs(disc: float) -> None:
 @pytest.mark.parametrize("disc", [0.6, 0.9, 0.98])
 @pytest.mark.parametrize("edge", [2.85, 2.9, 3.0, 3.1])
 def test_equal_discs_in_an_obtuse_triangle(edge: float, disc: float) -> None:
-    """Its circumcentre lies beyond the long edge: signed shares alone leave -97 to 97 %."""
+    """Its circumcentre lies beyond the long edge: signed shares alone give -97 to 97 %."""
     base = np.array([[0.0, 0.0], [edge, 0.0], [edge / 2, np.sqrt(4.0 - edge**2 / 4)]])
     discs, table = np.full(3, disc), ratio_table()
     exact = resolved_flux(base, discs)

@@ -49,7 +49,7 @@ MEASURED_APART = {
         "14. How often the flow follows its deposit": "2,469 2,789 3,064",
     },
     "accuracy": {
-        "3. With fines": "6 12 18 23 0.2 0.3 0.5 0.7 1.1 1.8 4.9 5.6 0.93 0.96 10.3 11.0 "
+        "3. With fines": "6 12 18 23 0.2 0.3 0.5 0.7 1.1 4.9 5.6 0.93 0.96 10.3 11.0 "
         "4.1 4.4 5.1 6.1 25 0.52 0.6 0.65 10 34",
         "7. What remains wrong, and why": "25",
     },

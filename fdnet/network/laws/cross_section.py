@@ -41,8 +41,8 @@ from fdnet.network.laws.wedge import (
 from fdnet.spheres.snapshot import Array
 
 TURN = 0.05
-"""Angle beyond an edge, rad, from which on the rays alone give a flux that the signed shares make
-less. Finite elements agree with the rays there (tests/network/test_section_flux.py)."""
+"""Angle, rad, seen from the centre of a disc: where the centre of the circle lies so far beyond an
+edge, the rays have taken over. Finite elements agree with them there (test_section_flux.py)."""
 
 
 @loops_in_place
@@ -77,8 +77,8 @@ def even_fluxes(
 ) -> None:
     """Writes the flux (K,) m4 of laplacian(w) = -1 for the radii `discs` (K,) m of K sections.
 
-    `wedge` is what `set_wedges` sets. A flux is not positive where the sum of the signed wedges
-    fails.
+    `wedge` is what `set_wedges` sets. In an obtuse triangle the sum of the signed wedges is too
+    small, and `uneven_fluxes` does it.
 
     `room` is what `even_room` gives, and the table of `shear_ratio`.
     """

@@ -104,10 +104,6 @@ def open_fluxes(
     rows, lanes, corners = room[3]
     if len(wedge):
         even_fluxes(wedge, discs[0], (room[2], table), flux)
-        for k in range(len(flux)):
-            if not flux[k] > 0.0:
-                one = slice(k, k + 1)
-                uneven_fluxes(base, rows[one], (lanes, corners, table), flux[one])
     else:
         uneven_fluxes(base, rows, (lanes, corners, table), flux)
     if others[0][3] > 0.0:

@@ -32,6 +32,7 @@ def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
     pairs = {"default": CHOSEN, "finest": FINEST, "two_scale": DEFAULT, "archie": ARCHIE}
     fine = _with_fine_fines(rows)
     coarse = [row for row in rows if row not in fine]
+    known_k0 = [row[f"{DEFAULT}: k0"] for row in known]
     return {
         "slabs": str(len(rows)),
         "slabs_aside": str(len(aside)),
@@ -52,6 +53,8 @@ def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
         "slabs_coarse_k": summed_up(row[f"{FINEST}: k"] for row in coarse),
         "slabs_fine": str(len(fine)),
         "slabs_fine_k": summed_up(row[f"{FINEST}: k"] for row in fine),
+        "slabs_known_k0": f"{percent(rms(known_k0))}, {worst(known_k0):.3f}",
+        "slabs_known_k0_mean": percent(float(np.mean(np.log(known_k0)))),
         "slabs_intact": summed_up(row[f"{DEFAULT}: k0"] for row in rows),
         "slabs_least": f"{min(row['k_over_k0'] for row in rows):.3f}",
         "slabs_most": f"{max(row['k_over_k0'] for row in rows):.2f}",

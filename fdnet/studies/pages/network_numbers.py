@@ -99,7 +99,7 @@ def _laws(table: Lookup, validation: Path) -> dict[str, str]:
     intact, damaged = (f"{pack}: networks" for pack in (laws.INTACT, laws.DAMAGED))
     one, two = laws.GRID, laws.TWO_GRIDS
     times = [level.cost for level in table.levels(intact, "k")]
-    errors = [level.size for level in table.levels(intact, "k")]
+    errors = [level.bound for level in table.levels(intact, "k")]
     own = table.cost(intact, "k", DEFAULT_LAW)
     with_fines = table.cost(damaged, "k", DEFAULT)
     fifth, tenth = laws.FINES["_r5_"], laws.FINES["_r10_"]
