@@ -26,6 +26,7 @@ from fdnet.commands import (
     permeability,
     render,
     run,
+    stokes,
     study,
     sweep,
 )
@@ -34,7 +35,7 @@ from fdnet.permeability.options import joined_box
 
 COMMANDS = (
     *(init, cases, check, run, ensemble, sweep, compare, design),
-    *(render, permeability, mechanics, movie, study),
+    *(render, permeability, stokes, mechanics, movie, study),
 )
 """Modules of the commands, in the order that `fdnet --help` shows."""
 

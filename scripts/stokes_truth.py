@@ -6,11 +6,13 @@
     .venv/bin/python scripts/stokes_truth.py make-slabs
     .venv/bin/python scripts/stokes_truth.py solve-slabs
     .venv/bin/python scripts/stokes_truth.py list-slabs
+    .venv/bin/python scripts/stokes_truth.py two-grids
 
 `make [NAME ...]` writes periodic packs from their seeds. `solve` runs pack files grid by grid: a
 finished grid is a row of --grids and is not run again. `make-slabs [NAME ...]` lets LIGGGHTS make
 the specimens of the slabs and keeps their run folders in --runs; `solve-slabs [NAME ...]` solves
-the slabs cut from them, grid by grid too; `list-slabs` prints what they are. Method and checks:
+the slabs cut from them, grid by grid too; `list-slabs` prints what they are, and
+`two-grids` how far the error of `fdnet stokes` holds on them. Method and checks:
 docs/stokes.md.
 """
 
@@ -28,6 +30,7 @@ from fdnet.studies.truth.packs import DATA, OWN_GRIDS, OWN_TRUTH
 from fdnet.studies.truth.slab_grids import slab_table, solve_slabs
 from fdnet.studies.truth.slabs import SLAB_FOLDER
 from fdnet.studies.truth.specimens import SPECIMENS
+from fdnet.studies.truth.two_grids import two_grids_table
 
 parser = argparse.ArgumentParser(
     description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -53,6 +56,8 @@ slab_solver.add_argument("--cells", nargs="+", type=int, default=[])
 slab_solver.add_argument("--slabs", type=path_option, default=SLAB_FOLDER)
 slab_lister = verbs.add_parser("list-slabs", help="what the slabs are, as a Markdown table")
 slab_lister.add_argument("--slabs", type=path_option, default=SLAB_FOLDER)
+pair_lister = verbs.add_parser("two-grids", help="errors of two grids, as a Markdown table")
+pair_lister.add_argument("--slabs", type=path_option, default=SLAB_FOLDER)
 
 if __name__ == "__main__":
     given = vars(parser.parse_args())
@@ -66,6 +71,8 @@ if __name__ == "__main__":
         solve_slabs(given["names"], given["slabs"], given["cells"])
     elif verb == "list-slabs":
         print(slab_table(given["slabs"]))
+    elif verb == "two-grids":
+        print(two_grids_table(given["slabs"]))
     else:
         command = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
         for path in given.pop("files"):

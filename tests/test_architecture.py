@@ -12,7 +12,7 @@ LAYERS = [
     ["files"],
     ["sizes", "statistics"],
     ["spheres", "case"],
-    ["scales", "network"],
+    ["scales", "network", "stokes"],
     ["mechanics"],
     ["dem", "report"],
     ["run"],
@@ -34,7 +34,7 @@ NETWORK_LAYERS = [
     ["permeability"],
 ]
 STUDIES_LAYERS = [
-    ["engine", "stokes", "fuzz", "chaos"],
+    ["engine", "fuzz", "chaos"],
     ["truth"],
     ["accuracy", "benchmark", "dem", "thesis"],
     ["network", "outside"],

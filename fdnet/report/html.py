@@ -56,6 +56,7 @@ class ReportParts:
         versions: version of each program.
         commands: the command lines as they were typed.
         tables: further tables (`fdnet.report.added.PageTable`), in order.
+        stokes: the section on resolved Stokes flow, as HTML.
         mechanics: the section on the mechanics of the pack, as HTML.
     """
 
@@ -67,6 +68,7 @@ class ReportParts:
     versions: Mapping[str, Any] = field(default_factory=dict)
     commands: Sequence[str] = ()
     tables: Sequence[Any] = ()
+    stokes: str = ""
     mechanics: str = ""
 
 

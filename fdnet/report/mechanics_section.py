@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from fdnet.files.atomic import write_text
+from fdnet.report.later_sections import put_section
 
-BEGIN, END = "<!-- mechanics begins -->", "<!-- mechanics ends -->"
+NAME = "mechanics"
 _ROWS = (
     ("young_modulus_Pa", "Young's modulus", 1e-9, "GPa"),
     ("poisson_ratio", "Poisson's ratio", 1.0, ""),
@@ -56,13 +56,9 @@ def section_html(folder: Path) -> str:
     return "\n".join(parts)
 
 
-def put_section(report: Path, folder: Path) -> None:
-    """Put the section into a report that is written, in the place that its page keeps for it."""
-    text = report.read_text(encoding="utf-8")
-    before, begin, rest = text.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if begin and end:
-        write_text(report, f"{before}{BEGIN}\n{section_html(folder)}\n{END}{after}")
+def put_mechanics(report: Path, folder: Path) -> None:
+    """Put the section into a report that is written."""
+    put_section(report, NAME, section_html(folder))
 
 
 def _table(numbers: dict[str, Any], rows: tuple[tuple[str, str, float, str], ...]) -> str:

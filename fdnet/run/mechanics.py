@@ -16,7 +16,7 @@ from fdnet.mechanics.numbers import elastic_numbers, triaxial_numbers, triaxial_
 from fdnet.mechanics.of_case import elastic_moduli, material_of, warnings_of
 from fdnet.mechanics.rest import Row, Triaxial
 from fdnet.mechanics.triaxial import Sheared, triaxial
-from fdnet.report.mechanics_section import put_section
+from fdnet.report.mechanics_section import put_mechanics
 from fdnet.run.made_files import START_OVER, check_files
 from fdnet.run.mark import CASE, is_run_folder
 from fdnet.run.record_files import read_record
@@ -159,5 +159,5 @@ def write_mechanics(packed: Packed, numbers: dict[str, Any]) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     path = write_text(folder / NUMBERS, json.dumps(numbers, indent=2) + "\n")
     if (packed.folder / "report.html").is_file():
-        put_section(packed.folder / "report.html", folder)
+        put_mechanics(packed.folder / "report.html", folder)
     return path

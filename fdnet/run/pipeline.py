@@ -32,6 +32,7 @@ from fdnet.run.outputs import Results, draw_figures, write_paraview, write_table
 from fdnet.run.placed_sizes import placed_sizes, size_summary
 from fdnet.run.records import record_warnings, stage_seconds, versions
 from fdnet.run.session import RunOptions, Session
+from fdnet.run.stokes_sections import report_section
 from fdnet.run.summary import summarise
 from fdnet.scales.clean_up import back_flow
 from fdnet.scales.cost import refuse_long
@@ -257,6 +258,7 @@ def _write_summary(
             versions=versions(pack),
             commands=[session.options.command] if session.options.command else [],
             tables=[one.page for one in results.added if one.page is not None],
+            stokes=report_section(session.path, summary["sections"]),
             mechanics=section_html(session.path / "mechanics"),
         )
         html.write_report(session.path / "report.html", summary, parts=parts)

@@ -13,7 +13,7 @@ from fdnet.run.mark import MANIFEST, RECORD_FORMAT, RECORDS
 
 OUTPUTS = {
     "pack": ("pack", "mechanics"),
-    "invade": ("invade",),
+    "invade": ("invade", "stokes"),
     "clean_up": ("clean_up",),
     "analyse": (
         "spheres_initial.csv",

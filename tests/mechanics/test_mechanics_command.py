@@ -7,7 +7,7 @@ import pytest
 from fdnet.case.file import case_from, recorded_case
 from fdnet.cli import main
 from fdnet.errors import CaseError
-from fdnet.report.mechanics_section import BEGIN, END, put_section
+from fdnet.report.mechanics_section import put_mechanics
 
 CASE = """
 name = "sand"
@@ -85,8 +85,10 @@ def test_hertz_contacts_stiffen_with_the_third_root_of_pressure(packed):
 @pytest.mark.liggghts
 def test_the_report_gets_its_section(packed, tmp_path):
     page = tmp_path / "report.html"
-    page.write_text(f"<p>one</p>\n{BEGIN}\nold\n{END}\n<p>two</p>")
-    put_section(page, packed / "mechanics")
+    page.write_text(
+        "<p>one</p>\n<!-- mechanics begins -->\nold\n<!-- mechanics ends -->\n<p>two</p>"
+    )
+    put_mechanics(page, packed / "mechanics")
     text = page.read_text()
     assert "Young&#x27;s modulus" in text
     assert "old" not in text

@@ -7,9 +7,9 @@ import pytest
 
 from fdnet.errors import CaseError
 from fdnet.spheres.snapshot import Kind, resting
+from fdnet.stokes.stokes import StokesFlow, solve_slab
 from fdnet.studies.accuracy.slabs import slab_rows, slab_summary
 from fdnet.studies.engine.csv_rows import read_named, write_named
-from fdnet.studies.stokes.stokes import StokesFlow, solve_slab
 from fdnet.studies.truth.made_slabs import SLABS
 from fdnet.studies.truth.slab_grids import (
     DEPOSIT,
@@ -145,7 +145,7 @@ def test_stored_truth_of_a_slab_lies_below_a_coarse_grid():
     for pack, k in ((spheres.grains(), row["k0_mm2"]), (spheres, row["k_mm2"])):
         end = limit(
             [
-                flow(n, 1e6 * solve_slab(pack, 0.0, 5e-4, cells=n, tolerance=1e-3).k)
+                flow(n, 1e6 * solve_slab(pack, (0.0, 5e-4), cells=n, tolerance=1e-3).k)
                 for n in (36, 48)
             ]
         )

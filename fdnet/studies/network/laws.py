@@ -8,6 +8,7 @@ from pathlib import Path
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.laws.named import DEFAULT_LAW, LAWS
 from fdnet.network.network import Network
+from fdnet.stokes.stokes import extrapolate, solve_stokes
 from fdnet.studies.accuracy.measurement import (
     DEFAULT,
     PAIRS,
@@ -21,7 +22,6 @@ from fdnet.studies.accuracy.measurement import (
 )
 from fdnet.studies.engine.study import DONE, Measured, Panel, Point, Row, Study, row_of
 from fdnet.studies.engine.timing import least_time
-from fdnet.studies.stokes.stokes import extrapolate, solve_stokes
 from fdnet.studies.truth.cases import EQUAL, LATTICE, LOOSE, UNEQUAL, Case, read_cases
 from fdnet.studies.truth.packs import truth_folder, truth_tables
 

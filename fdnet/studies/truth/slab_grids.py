@@ -11,9 +11,9 @@ from scipy.optimize import brentq
 
 from fdnet.spheres.porosity import measure_porosity
 from fdnet.spheres.snapshot import Snapshot
+from fdnet.stokes.stokes import StokesFlow, extrapolate, solve_slab
 from fdnet.studies.engine.csv_rows import read_named, write_named
 from fdnet.studies.engine.markdown import markdown_table
-from fdnet.studies.stokes.stokes import StokesFlow, extrapolate, solve_slab
 from fdnet.studies.truth.grids import flow_of
 from fdnet.studies.truth.made_slabs import SLABS
 from fdnet.studies.truth.packs import MM
@@ -72,8 +72,7 @@ def solve_slabs(names: Sequence[str], folder: Path, cells: Sequence[int] = ()) -
                     continue
                 flow = solve_slab(
                     pack,
-                    slab.x_lo_mm * MM,
-                    slab.x_hi_mm * MM,
+                    (slab.x_lo_mm * MM, slab.x_hi_mm * MM),
                     cells=count,
                     tolerance=TOLERANCE,
                 )

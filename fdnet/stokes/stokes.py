@@ -21,12 +21,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fdnet.errors import CaseError, FlowError
-from fdnet.spheres.snapshot import Array, Snapshot
-from fdnet.studies.stokes.forces import LARGEST_SLIP, Axes, Problem, minimise
-from fdnet.studies.stokes.green import Shape, build_green, build_mirrored_green
-from fdnet.studies.stokes.walls import find_walls
-
-EDGE_MISMATCH = 1e-6
+from fdnet.spheres.snapshot import Snapshot
+from fdnet.stokes.forces import LARGEST_SLIP, Axes, Problem, minimise
+from fdnet.stokes.green import build_green
+from fdnet.stokes.staggered import OPEN, Closed, stagger
+from fdnet.stokes.walls import find_walls
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -86,75 +85,79 @@ def solve_stokes(
             permeability tensor K; if not, it is 1 / (K^-1)_aa, which is somewhat lower.
 
     Raises:
-        CaseError: the edges are no multiples of the spacing, or there is no wall.
+        CaseError: the grid is too coarse, or there is no wall.
         FlowError: the iterations run out.
     """
     if axis not in (0, 1, 2):
         raise CaseError(f"stokes: axis {axis!r}, expected 0, 1 or 2 (x, y or z)")
-    way = _Way(axis=axis, balanced=(0, 1, 2) if transverse else (axis,), mirrored=False)
+    way = _Way(axis=axis, balanced=(0, 1, 2) if transverse else (axis,))
     return _solved(spheres, cells, way, tolerance)
 
 
 def solve_slab(
-    spheres: Snapshot, x_lo: float, x_hi: float, *, cells: int, tolerance: float = 1e-4
+    spheres: Snapshot,
+    span: tuple[float, float],
+    *,
+    cells: int,
+    tolerance: float = 1e-4,
+    closed: Closed = OPEN,
 ) -> StokesFlow:
-    """Permeability along x of the slab from `x_lo` to `x_hi` (m) between planes of one pressure.
+    """Permeability along x of a slab between planes of one pressure.
 
     The slab and its mirror image make a periodic cell. Under a uniform force its planes of
     symmetry have a constant pressure and no velocity along them, so half of the cell is solved.
-    The sides y and z of `spheres.box` are periodic.
+    The sides y and z of `spheres.box` are periodic, or walls that hold the fluid.
 
     Args:
         spheres: the solid; what lies outside the slab is no part of it, but the bodies of spheres
             centred outside count as far as they reach in.
-        x_lo: lower plane, m.
-        x_hi: upper plane, m.
+        span: lower and upper plane, x in m.
         cells: on the longest of the slab's edges.
         tolerance: as of `solve_stokes`.
+        closed: whether the sides across x (never), y and z are walls.
 
     Raises:
-        CaseError: the edges are no multiples of the spacing, or there is no wall.
+        CaseError: the grid is too coarse, or there is no wall.
         FlowError: the iterations run out.
     """
-    box = np.array([[x_lo, x_hi], *spheres.box[1:]])
-    way = _Way(axis=0, balanced=(0,), mirrored=True)
+    box = np.array([span, *spheres.box[1:]])
+    way = _Way(axis=0, balanced=(0,), mirrored=True, closed=closed)
     return _solved(replace(spheres, box=box), cells, way, tolerance)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Way:
-    """How the fluid is driven: axis, components without net force, mirrored or periodic."""
+    """How the fluid is driven: axis, components without net force, mirrored or not, walls."""
 
     axis: int
     balanced: Axes
-    mirrored: bool
+    mirrored: bool = False
+    closed: Closed = OPEN
 
 
 def _solved(spheres: Snapshot, cells: int, way: _Way, tolerance: float) -> StokesFlow:
     start = time.monotonic()
-    shape, spacing = _grid(spheres.box, cells)
-    centre, radius = (spheres.position - spheres.box[:, 0]) / spacing, spheres.radius / spacing
-    walls = [
-        find_walls(centre, radius, shape, component=d, mirrored=way.mirrored) for d in range(3)
-    ]
+    edges = np.diff(spheres.box, axis=1)[:, 0]
+    grid, unit = stagger(edges, cells, mirrored=way.mirrored, closed=way.closed)
+    centre, radius = (spheres.position - spheres.box[:, 0]) / unit, spheres.radius / unit
+    walls = [find_walls(centre, radius, grid, component=d) for d in range(3)]
     if not all(len(wall.node) for wall in walls):
         raise CaseError(
-            f"stokes: no wall on the grid of {shape} cells, expected spheres; "
+            f"stokes: no wall on the grid of {grid.shape} cells, expected spheres; "
             "add some or refine the grid"
         )
-    green = build_mirrored_green(shape) if way.mirrored else build_green(shape)
-    problem = Problem(walls, green, axis=way.axis, balanced=way.balanced)
+    problem = Problem(walls, build_green(grid), axis=way.axis, balanced=way.balanced)
     forces, iterations = minimise(problem, tolerance)
     k, slip = problem.permeability(forces)
     if not (k > 0.0 and slip < 2.0 * LARGEST_SLIP):
         raise FlowError(
-            f"stokes: k {k * spacing**2:.3g} m2 and a slip of {slip:.3g} of the mean velocity "
+            f"stokes: k {k * unit**2:.3g} m2 and a slip of {slip:.3g} of the mean velocity "
             f"by a fresh application after {iterations} iterations, expected below "
             f"{LARGEST_SLIP}: rounding has taken over; refine the grid"
         )
     took = time.monotonic() - start
     return StokesFlow(
-        k=k * spacing**2,
+        k=k * unit**2 / grid.share,
         iterations=iterations,
         residual=slip,
         seconds=took,
@@ -176,23 +179,3 @@ def extrapolate(coarse: StokesFlow, fine: StokesFlow, *, order: float = 2.0) -> 
         )
     step = (fine.k - coarse.k) / ((fine.cells / coarse.cells) ** order - 1.0)
     return Extrapolated(k=fine.k + step, relative_error=abs(step) / 3.0 / (fine.k + step))
-
-
-def _grid(box: Array, cells: int) -> tuple[Shape, float]:
-    """Cells along the edges and their spacing (m)."""
-    edges = box[:, 1] - box[:, 0]
-    if cells < 4 or not np.all(edges > 0.0):
-        raise CaseError(
-            f"stokes: {cells} cells on edges {edges.tolist()} m, "
-            "expected at least 4 and positive edges"
-        )
-    spacing = float(edges.max()) / cells
-    counts = np.rint(edges / spacing).astype(int)
-    if np.any(counts < 2) or np.any(
-        np.abs(counts * spacing - edges) > EDGE_MISMATCH * edges.max()
-    ):
-        raise CaseError(
-            f"stokes: edges {edges.tolist()} m are no multiples of {spacing:.6g} m "
-            f"({cells} cells on the longest); choose cells so that all edges are"
-        )
-    return (int(counts[0]), int(counts[1]), int(counts[2])), spacing

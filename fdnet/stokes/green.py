@@ -1,8 +1,8 @@
-"""Flow of point forces in a periodic box on a staggered (MAC) grid, spacing and viscosity 1.
+"""Flow of point forces in a periodic box on a staggered grid, volume of a cell and viscosity 1.
 
 The discrete Stokes equations, -Laplace(u) + grad(p) = f and div(u) = 0 with the 7-point Laplacian,
-are diagonal under the Fourier transform. With g_d = 1 - exp(-i k_d), the symbol of the backward
-difference, and lambda = sum |g_d|^2, the velocity is
+are diagonal under the Fourier transform. With g_d = (1 - exp(-i k_d)) / s_d, the symbol of the
+backward difference over a step s_d, and lambda = sum |g_d|^2, the velocity is
 
     u_d = (f_d - g_d sum_e(conj(g_e) f_e) / lambda) / lambda,        mean velocity 0
 
@@ -14,8 +14,8 @@ memory.
 A periodic box that is its own mirror image about the planes x = 0 and x = n needs only its half of
 n cells (`MirroredGreen`). The velocity across the planes is even and has nodes on both of them
 (n + 1 nodes, cosine transform DCT-I); the velocities along them are odd (n nodes, sine transform
-DST-II). The backward difference along x then has the real symbol 2 sin(pi i / 2n), and the rest is
-as above.
+DST-II). The backward difference along x then has the real symbol 2 sin(pi i / 2n) / s_0, and the
+rest is as above.
 """
 
 from dataclasses import dataclass
@@ -25,8 +25,7 @@ import numpy as np
 from scipy import fft
 
 from fdnet.spheres.snapshot import Array, frozen
-
-Shape = tuple[int, int, int]
+from fdnet.stokes.staggered import Shape, Staggered
 
 
 class Grid(Protocol):
@@ -130,28 +129,29 @@ class MirroredGreen:
         ]
 
 
-def build_green(shape: Shape) -> Green:
-    """The Green's function of a periodic grid of `shape` cells."""
-    difference, inverse = _symbols(1.0 - np.exp(-2j * np.pi * fft.fftfreq(shape[0])), shape)
-    return Green(shape=shape, difference=difference, inverse_laplace=inverse)
+def build_green(grid: Staggered) -> Green | MirroredGreen:
+    """The Green's function of a grid, of half of a mirrored box where it is mirrored."""
+    n = grid.shape[0]
+    if grid.mirrored:
+        along = 2.0 * np.sin(0.5 * np.pi * np.arange(n + 1) / n)
+        difference, inverse = _symbols(along, grid)
+        return MirroredGreen(shape=grid.shape, difference=difference, inverse_laplace=inverse)
+    difference, inverse = _symbols(1.0 - np.exp(-2j * np.pi * fft.fftfreq(n)), grid)
+    return Green(shape=grid.shape, difference=difference, inverse_laplace=inverse)
 
 
-def build_mirrored_green(shape: Shape) -> MirroredGreen:
-    """The Green's function of a mirrored box whose half has `shape` cells."""
-    along = 2.0 * np.sin(0.5 * np.pi * np.arange(shape[0] + 1) / shape[0])
-    difference, inverse = _symbols(along, shape)
-    return MirroredGreen(shape=shape, difference=difference, inverse_laplace=inverse)
-
-
-def _symbols(along: Array, shape: Shape) -> tuple[tuple[Array, Array, Array], Array]:
-    """Symbols of the differences and 1 / lambda, from the symbol `along` x."""
-    g1, g2 = (
-        1.0 - np.exp(-2j * np.pi * waves)
-        for waves in (fft.fftfreq(shape[1]), fft.rfftfreq(shape[2]))
+def _symbols(along: Array, grid: Staggered) -> tuple[tuple[Array, Array, Array], Array]:
+    """Symbols of the differences and 1 / lambda, from that of the differences `along` x."""
+    waves = (fft.fftfreq(grid.shape[1]), fft.rfftfreq(grid.shape[2]))
+    g0, g1, g2 = (
+        one / step
+        for one, step in zip(
+            (along, *(1.0 - np.exp(-2j * np.pi * wave) for wave in waves)), grid.step, strict=True
+        )
     )
-    laplace = (np.abs(along) ** 2)[:, None, None] + (np.abs(g1) ** 2)[:, None] + np.abs(g2) ** 2
+    laplace = (np.abs(g0) ** 2)[:, None, None] + (np.abs(g1) ** 2)[:, None] + np.abs(g2) ** 2
     laplace[0, 0, 0] = np.inf
-    symbols = (frozen(along, np.complex64), frozen(g1, np.complex64), frozen(g2, np.complex64))
+    symbols = (frozen(g0, np.complex64), frozen(g1, np.complex64), frozen(g2, np.complex64))
     return symbols, frozen(1.0 / laplace, np.float32)
 
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from fdnet.errors import FlowError
 from fdnet.spheres.snapshot import Array
-from fdnet.studies.stokes.green import Grid
-from fdnet.studies.stokes.walls import Walls
+from fdnet.stokes.green import Grid
+from fdnet.stokes.walls import Walls
 
 LOG = logging.getLogger(__name__)
 OWN_RESPONSE = 2.0 / 3.0 * 0.252731

@@ -1,0 +1,82 @@
+"""`fdnet stokes`: sections of a finished run by resolved Stokes flow."""
+
+import argparse
+import json
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+from fdnet.files.paths import path_option
+
+
+def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Adds the command to the command line."""
+    parser = commands.add_parser(
+        "stokes",
+        parents=[common],
+        help="sections of a finished run by resolved flow, to check the network",
+    )
+    parser.add_argument("run", type=path_option, help="run folder")
+    parser.add_argument(
+        "--section",
+        type=int,
+        action="append",
+        metavar="N",
+        help="number of a section, 1 at the face (default 1); may be given again",
+    )
+    parser.add_argument(
+        "--across",
+        type=float,
+        metavar="CELLS",
+        help="cells across the mean radius of a fine, on the finer of two grids (default 3.5)",
+    )
+    parser.add_argument("--json", action="store_true", help="print the numbers as JSON")
+    parser.add_argument("--quiet", action="store_true", help="no progress")
+    parser.set_defaults(action=_stokes)
+
+
+def _stokes(options: argparse.Namespace) -> int:
+    from fdnet.run.stokes_grids import ACROSS_A_FINE
+    from fdnet.run.stokes_sections import stokes_sections
+
+    def follow(line: str) -> None:
+        if not options.quiet:
+            print(line, file=sys.stderr, flush=True)
+
+    across = ACROSS_A_FINE if options.across is None else options.across
+    numbers = options.section or (1,)
+    rows = stokes_sections(options.run, numbers, across=across, follow=follow)
+    if options.json:
+        print(json.dumps(rows, indent=2))
+    else:
+        print("\n\n".join(map(_text, rows)))
+    return 0
+
+
+def _text(row: Mapping[str, Any]) -> str:
+    from fdnet.report.units import in_millidarcy
+
+    lines = [
+        f"section {row['section']}, {1e3 * row['x_lo_m']:g} to {1e3 * row['x_hi_m']:g} mm, "
+        "cut out",
+        _line("", "before, mD", "after, mD", "lost"),
+    ]
+    for name, prefix in (("resolved flow", ""), ("network", "network_")):
+        before, after, lost = (
+            row[f"{prefix}{key}"] for key in ("k_initial_m2", "k_damaged_m2", "k_reduction")
+        )
+        shown = "-" if lost is None else f"{lost:.1%}"
+        lines.append(_line(name, in_millidarcy(before), in_millidarcy(after), shown))
+    errors = (f"{row[f'{key}_error']:.1%}" for key in ("k_initial", "k_damaged"))
+    lines.append(_line("error of the flow", *errors))
+    over = (f"{_over(row, key):+.1%}" for key in ("k_initial_m2", "k_damaged_m2"))
+    lines.append(_line("network over flow", *over))
+    return "\n".join(lines)
+
+
+def _line(name: str, before: str, after: str, lost: str = "") -> str:
+    return f"{name:<18}{before:>14}{after:>14}{lost:>10}".rstrip()
+
+
+def _over(row: Mapping[str, Any], key: str) -> float:
+    return float(row[f"network_{key}"] / row[key] - 1.0)

@@ -1,0 +1,203 @@
+"""Sections of a finished run by resolved Stokes flow, beside what the network gives.
+
+Resolved flow needs no law of throats. It takes minutes where the network takes seconds, so it is
+computed for the sections that a user names, mostly the first.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from fdnet.case.case import Case
+from fdnet.errors import CaseError
+from fdnet.files.atomic import write_text
+from fdnet.report.later_sections import put_section
+from fdnet.report.stokes_section import NAME, section_html
+from fdnet.run.finished import FinishedRun
+from fdnet.run.open_run import open_run
+from fdnet.run.stokes_grids import (
+    ACROSS_A_FINE,
+    Follow,
+    KeptGrids,
+    Slab,
+    permeability_of,
+    refuse_large,
+)
+from fdnet.stokes.staggered import OPEN, Closed
+from fdnet.stokes.two_grids import Estimate
+
+FOLDER, GRIDS, TABLE = "stokes", "grids.json", "sections.csv"
+"""Folder in the run folder, the file of the solved grids, the table of the sections."""
+INITIAL, DAMAGED = "initial", "damaged"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StokesSection:
+    """A section, cut out, by resolved flow.
+
+    Attributes:
+        x_lo_m: where it begins, m.
+        x_hi_m: where it ends, m.
+        k_initial_m2: without fines, m2.
+        k_initial_error: share of it.
+        k_damaged_m2: with fines, m2.
+        k_damaged_error: share of it.
+        k_reduction: 1 - k_damaged_m2 / k_initial_m2.
+    """
+
+    x_lo_m: float
+    x_hi_m: float
+    k_initial_m2: float
+    k_initial_error: float
+    k_damaged_m2: float
+    k_damaged_error: float
+    k_reduction: float
+
+
+def stokes_sections(
+    folder: Path,
+    numbers: Sequence[int] = (1,),
+    *,
+    across: float = ACROSS_A_FINE,
+    follow: Follow = lambda line: None,
+) -> list[dict[str, Any]]:
+    """Sections of a finished run by resolved Stokes flow and by the network, each cut out.
+
+    They are written to the folder `FOLDER` of the run and to its report. Every solved grid is kept
+    there, so a cut computation goes on behind the last of them.
+
+    Args:
+        folder: of the run.
+        numbers: of the sections, from 1 at the face.
+        across: cells across the mean radius of a fine, on the finer of two grids.
+        follow: takes a line on each grid before it is solved.
+
+    Returns:
+        For each section its number, the fields of `StokesSection`, and the permeabilities (m2) and
+        the reduction by the network.
+
+    Raises:
+        CaseError: there is no such section, the side walls let the fluid slip, the grid would be
+            too large, or `folder` holds no finished run.
+        FlowError: a solve fails its checks.
+    """
+    if not 1.0 <= across <= 20.0:
+        raise CaseError(
+            f"--across: {across:g}, expected 1 to 20 cells across the radius of a fine"
+        )
+    run = open_run(folder)
+    slabs = {number: _slabs(run, number) for number in numbers}
+    for pair in slabs.values():
+        for slab in pair:
+            refuse_large(slab, across)
+    kept = KeptGrids(run.path / FOLDER / GRIDS)
+    table = run.path / FOLDER / TABLE
+    for pair in slabs.values():
+        by_state = {slab.state: permeability_of(slab, across, kept, follow) for slab in pair}
+        row = _row(pair[0].span, by_state[INITIAL], by_state.get(DAMAGED, by_state[INITIAL]))
+        _write(table, [one for one in read_sections(table) if not _same(one, row)] + [row])
+    rows = beside_network(read_sections(table), run.summary["sections"])
+    if (run.path / "report.html").is_file():
+        put_section(run.path / "report.html", NAME, section_html(rows))
+    return [row for row in rows if row["section"] in slabs]
+
+
+def report_section(folder: Path, sections: Sequence[Mapping[str, Any]]) -> str:
+    """The section of the report as HTML; "" where no flow was resolved.
+
+    `sections` are those of the summary of the run in `folder`.
+    """
+    rows = beside_network(read_sections(folder / FOLDER / TABLE), sections)
+    return section_html(rows) if rows else ""
+
+
+def beside_network(
+    resolved: Sequence[StokesSection], sections: Sequence[Mapping[str, Any]]
+) -> list[dict[str, Any]]:
+    """The resolved sections that are `sections` of the summary, with what the network gives."""
+    rows = []
+    for section in sections:
+        for one in resolved:
+            if one.x_lo_m == section["x_lo_m"] and one.x_hi_m == section["x_hi_m"]:
+                names = ("k_initial_m2", "k_damaged_m2", "k_reduction")
+                network = {f"network_{name}": section[name] for name in names}
+                rows.append({"section": section["section"]} | asdict(one) | network)
+    return rows
+
+
+def _slabs(run: FinishedRun, number: int) -> list[Slab]:
+    """The section before and, where fines reach into it or grains moved, after the invasion."""
+    sections = run.summary["sections"]
+    if not 1 <= number <= len(sections):
+        raise CaseError(
+            f"--section: {number}, expected 1 to {len(sections)}, the sections of the run"
+        )
+    span = (sections[number - 1]["x_lo_m"], sections[number - 1]["x_hi_m"])
+    before, after = (_slab(run, span, state) for state in (INITIAL, DAMAGED))
+    changed = len(after.spheres.fines()) or "k_moved_m2" in run.summary
+    return [before, after] if changed else [before]
+
+
+def _slab(run: FinishedRun, span: tuple[float, float], state: str) -> Slab:
+    spheres = run.spheres("damaged" if state == DAMAGED else "initial")
+    x, r = spheres.position[:, 0], spheres.radius
+    return Slab(
+        spheres=spheres.where((x + r > span[0]) & (x - r < span[1])),
+        span=span,
+        closed=_closed(run.case),
+        state=state,
+        digest=str(run.manifest.get("files", {}).get(f"spheres_{state}.csv", "")),
+    )
+
+
+def _closed(case: Case) -> Closed:
+    if all(case.periodic[1:]):
+        return OPEN
+    if case.analysis.walls == "slip":
+        raise CaseError(
+            "analysis.walls: 'slip', but resolved flow knows only side walls that hold the fluid; "
+            "analyse the run with analysis.walls = 'no-slip' first"
+        )
+    return False, not case.periodic[1], not case.periodic[2]
+
+
+def _row(span: tuple[float, float], before: Estimate, after: Estimate) -> StokesSection:
+    return StokesSection(
+        x_lo_m=span[0],
+        x_hi_m=span[1],
+        k_initial_m2=before.k,
+        k_initial_error=before.error,
+        k_damaged_m2=after.k,
+        k_damaged_error=after.error,
+        k_reduction=1.0 - after.k / before.k,
+    )
+
+
+def _same(one: StokesSection, other: StokesSection) -> bool:
+    return (one.x_lo_m, one.x_hi_m) == (other.x_lo_m, other.x_hi_m)
+
+
+def _write(path: Path, rows: Sequence[StokesSection]) -> None:
+    names = [one.name for one in fields(StokesSection)]
+    ordered = sorted(rows, key=lambda row: row.x_lo_m)
+    lines = [",".join(repr(value) for value in asdict(row).values()) for row in ordered]
+    write_text(path, "\n".join([",".join(names), *lines]) + "\n")
+
+
+def read_sections(path: Path) -> list[StokesSection]:
+    """The resolved sections in a table; none where it does not exist.
+
+    Raises CaseError where it has other columns or no numbers.
+    """
+    if not path.is_file():
+        return []
+    header, *lines = path.read_text(encoding="utf-8").split()
+    names = [one.name for one in fields(StokesSection)]
+    try:
+        rows = [dict(zip(names, map(float, line.split(",")), strict=True)) for line in lines]
+    except ValueError as error:
+        raise CaseError(f"{path}: {error}; remove it and call fdnet stokes again") from error
+    if header.split(",") != names:
+        raise CaseError(f"{path}: columns {header}, expected {','.join(names)}; remove the file")
+    return [StokesSection(**row) for row in rows]

@@ -1,0 +1,133 @@
+"""Sections of a run by resolved Stokes flow: what is kept, refused, and shown in the report."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+import fdnet
+from fdnet.cli import main
+from fdnet.errors import CaseError
+from fdnet.report.stokes_section import section_html
+from fdnet.run import stokes_grids
+from fdnet.run.stokes_sections import (
+    beside_network,
+    read_sections,
+    report_section,
+    stokes_sections,
+)
+from fdnet.stokes.stokes import StokesFlow
+from fdnet.stokes.two_grids import estimate
+
+ROUGH, ROUGH_GRAIN = 1.0, 7.0
+"""Cells across the radius of a fine and of a grain that keep the tests short."""
+
+
+def grid(cells: int, k: float) -> StokesFlow:
+    return StokesFlow(k=k, iterations=1, residual=0.0, seconds=0.0, cells=cells, unknowns=1)
+
+
+@pytest.mark.parametrize("order", [1.5, 1.75, 2.0])
+def test_the_error_covers_the_orders_of_deposits(order):
+    flows = [grid(n, 1e-12 * (1.0 + 90.0 * n**-order)) for n in (40, 60)]
+    end = estimate(*flows, with_fines=True)
+    assert abs(end.k / 1e-12 - 1.0) <= end.error
+    assert abs(flows[1].k / 1e-12 - 1.0) > end.error
+
+
+def test_packs_without_fines_are_of_second_order():
+    flows = [grid(n, 1e-12 * (1.0 + 5.0 * n**-2)) for n in (40, 60)]
+    assert estimate(*flows, with_fines=False).k == pytest.approx(1e-12, rel=1e-9)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def rough():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stokes_grids, "ACROSS_A_GRAIN", ROUGH_GRAIN)
+        yield
+
+
+@pytest.fixture(scope="module")
+def resolved(finished, tmp_path_factory) -> Path:
+    """A copy of the tiny run whose first section is resolved."""
+    folder = tmp_path_factory.mktemp("stokes") / "run"
+    shutil.copytree(finished.path, folder)
+    stokes_sections(folder, (1,), across=ROUGH)
+    return folder
+
+
+@pytest.mark.liggghts
+def test_the_network_agrees_with_the_flow_between_the_spheres(resolved):
+    (row,) = beside_network(
+        read_sections(resolved / "stokes" / "sections.csv"),
+        fdnet.open_run(resolved).summary["sections"],
+    )
+    assert row["section"] == 1
+    for key in ("k_initial", "k_damaged"):
+        off = row[f"network_{key}_m2"] / row[f"{key}_m2"] - 1.0
+        assert abs(off) < 0.1 + row[f"{key}_error"]
+    assert row["k_damaged_m2"] < 0.9 * row["k_initial_m2"]
+    assert row["k_reduction"] == pytest.approx(1.0 - row["k_damaged_m2"] / row["k_initial_m2"])
+
+
+@pytest.mark.liggghts
+def test_a_cut_computation_goes_on_behind_its_last_grid(resolved, tmp_path, monkeypatch):
+    folder = Path(shutil.copytree(resolved, tmp_path / "run"))
+    grids, table = folder / "stokes" / "grids.json", folder / "stokes" / "sections.csv"
+    before = read_sections(table)
+    table.unlink()
+    kept = json.loads(grids.read_text())
+    grids.write_text(json.dumps(kept[:-1]))
+    solved = []
+    solve = stokes_grids.solve_slab
+    monkeypatch.setattr(
+        stokes_grids,
+        "solve_slab",
+        lambda *given, **more: solved.append(1) or solve(*given, **more),
+    )
+    stokes_sections(folder, (1,), across=ROUGH)
+    assert (len(kept), len(solved)) == (4, 1)
+    assert read_sections(table) == before
+
+
+@pytest.mark.liggghts
+def test_the_command_prints_both_and_the_report_shows_them(resolved, capsys):
+    assert main(["stokes", str(resolved), "--across", f"{ROUGH}", "--quiet"]) == 0
+    shown = capsys.readouterr().out
+    assert "resolved flow" in shown
+    assert "network over flow" in shown
+    assert main(["stokes", str(resolved), "--across", f"{ROUGH}", "--json", "--quiet"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)
+    page = (resolved / "report.html").read_text()
+    assert section_html([row]) in page
+    assert page.count("Sections by resolved Stokes flow") == 1
+    sections = fdnet.open_run(resolved).summary["sections"]
+    assert report_section(resolved, sections) == section_html([row])
+    assert report_section(resolved / "elsewhere", sections) == ""
+
+
+@pytest.mark.liggghts
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--section", "9"], "--section: 9, expected 1 to 3"),
+        (["--across", "0.5"], "--across: 0.5, expected 1 to 20"),
+        (["--across", "20"], "million cells, expected at most"),
+    ],
+)
+def test_what_cannot_be_solved_is_refused_at_once(finished, arguments, words, capsys):
+    assert main(["stokes", str(finished.path), *arguments]) == 2
+    assert words in capsys.readouterr().err
+    assert not (finished.path / "stokes").exists()
+
+
+@pytest.mark.liggghts
+def test_kept_grids_that_cannot_be_read_are_named(resolved, tmp_path):
+    folder = Path(shutil.copytree(resolved, tmp_path / "run"))
+    (folder / "stokes" / "grids.json").write_text("{")
+    with pytest.raises(CaseError, match=r"grids\.json: cannot be read"):
+        stokes_sections(folder, (1,), across=ROUGH)
+    (folder / "stokes" / "sections.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(CaseError, match=r"sections\.csv: .*call fdnet stokes again"):
+        read_sections(folder / "stokes" / "sections.csv")
