@@ -15,6 +15,7 @@ from fdnet.studies.accuracy import measurement, page
 from fdnet.studies.accuracy.benchmark_tables import NO_BENCHMARK, benchmark_tables
 from fdnet.studies.accuracy.boundary_tables import tiled_table
 from fdnet.studies.accuracy.choices import refitted_series, section_by_area
+from fdnet.studies.accuracy.face import face_numbers
 from fdnet.studies.accuracy.goals import ratio, reached, rms, worst
 from fdnet.studies.accuracy.measurement import (
     DEFAULT,
@@ -202,3 +203,14 @@ def test_the_numbers_of_the_first_screen_are_those_of_the_tables(numbers, root):
     assert numbers["later_damage"] == str(len(later))
     assert numbers["rms_later_damage"] == f"{100 * math.sqrt(np.mean(np.log(later) ** 2)):.1f} %"
     assert numbers["thesis_most"] == f"{max(float(r['thesis + thesis-code']) for r in rows):.0f}"
+
+
+def test_the_recipe_has_the_spans_of_its_table(root):
+    """docs/how-to/check_the_face.md against docs/validation/stokes_sections.csv."""
+    page = (root / "docs/how-to/check_the_face.md").read_text(encoding="utf-8")
+    numbers = face_numbers(root / "docs/validation")
+    for name in ("face_periodic_before", "face_periodic_after"):
+        assert numbers[name] in page
+    rows = [line for line in page.splitlines() if "| walls |" in line]
+    spans = [float(part) for row in rows for part in row.split("|")[4].split(" to ")]
+    assert f"{min(spans):.3f} to {max(spans):.3f}" == numbers["face_walls_after"]

@@ -12,7 +12,7 @@ LAYERS = [
     ["files"],
     ["sizes", "statistics"],
     ["spheres", "case"],
-    ["scales", "network", "stokes"],
+    ["scales", "network"],
     ["mechanics"],
     ["dem", "report"],
     ["run"],
@@ -23,7 +23,7 @@ LAYERS = [
 """Rooms of the package from the bottom up; a room imports from lower lines only."""
 
 NETWORK_LAYERS = [
-    ["geometry", "compiled"],
+    ["geometry", "compiled", "stokes"],
     ["field"],
     ["tessellation"],
     ["network"],

@@ -9,16 +9,16 @@ import pytest
 import fdnet
 from fdnet.cli import main
 from fdnet.errors import CaseError
+from fdnet.network.stokes.stokes import StokesFlow
+from fdnet.network.stokes.two_grids import estimate
 from fdnet.report.stokes_section import section_html
 from fdnet.run import stokes_grids
 from fdnet.run.stokes_sections import (
-    beside_network,
     read_sections,
     report_section,
     stokes_sections,
+    with_network,
 )
-from fdnet.stokes.stokes import StokesFlow
-from fdnet.stokes.two_grids import estimate
 
 ROUGH, ROUGH_GRAIN = 1.0, 7.0
 """Cells across the radius of a fine and of a grain that keep the tests short."""
@@ -59,7 +59,7 @@ def resolved(finished, tmp_path_factory) -> Path:
 
 @pytest.mark.liggghts
 def test_the_network_agrees_with_the_flow_between_the_spheres(resolved):
-    (row,) = beside_network(
+    (row,) = with_network(
         read_sections(resolved / "stokes" / "sections.csv"),
         fdnet.open_run(resolved).summary["sections"],
     )

@@ -272,7 +272,7 @@ def test_the_commands_of_the_readme_are_understood(root):
 
     text = (root / "README.md").read_text(encoding="utf-8")
     commands = re.findall(r"^fdnet (.+?)(?:\s+#.*)?$", text, re.MULTILINE)
-    assert len(commands) == 5
+    assert len(commands) == 6
     for command in commands:
         assert _parser().parse_args(command.split())
 

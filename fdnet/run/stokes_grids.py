@@ -13,11 +13,11 @@ from scipy import fft
 
 from fdnet.errors import CaseError
 from fdnet.files.atomic import write_text
+from fdnet.network.stokes.staggered import Closed, stagger
+from fdnet.network.stokes.stokes import StokesFlow, solve_slab
+from fdnet.network.stokes.two_grids import Estimate, estimate
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, Snapshot
-from fdnet.stokes.staggered import Closed, stagger
-from fdnet.stokes.stokes import StokesFlow, solve_slab
-from fdnet.stokes.two_grids import Estimate, estimate
 
 ACROSS_A_GRAIN, ACROSS_A_FINE = 15.0, 3.5
 """Cells of the finer grid across the mean radius of the grains, and of the fines."""

@@ -1,4 +1,4 @@
-"""Sections of a finished run by resolved Stokes flow, beside what the network gives.
+"""Sections of a finished run by resolved Stokes flow, and what the network gives for them.
 
 Resolved flow needs no law of throats. It takes minutes where the network takes seconds, so it is
 computed for the sections that a user names, mostly the first.
@@ -12,6 +12,8 @@ from typing import Any
 from fdnet.case.case import Case
 from fdnet.errors import CaseError
 from fdnet.files.atomic import write_text
+from fdnet.network.stokes.staggered import OPEN, Closed
+from fdnet.network.stokes.two_grids import Estimate
 from fdnet.report.later_sections import put_section
 from fdnet.report.stokes_section import NAME, section_html
 from fdnet.run.finished import FinishedRun
@@ -24,8 +26,6 @@ from fdnet.run.stokes_grids import (
     permeability_of,
     refuse_large,
 )
-from fdnet.stokes.staggered import OPEN, Closed
-from fdnet.stokes.two_grids import Estimate
 
 FOLDER, GRIDS, TABLE = "stokes", "grids.json", "sections.csv"
 """Folder in the run folder, the file of the solved grids, the table of the sections."""
@@ -97,7 +97,7 @@ def stokes_sections(
         by_state = {slab.state: permeability_of(slab, across, kept, follow) for slab in pair}
         row = _row(pair[0].span, by_state[INITIAL], by_state.get(DAMAGED, by_state[INITIAL]))
         _write(table, [one for one in read_sections(table) if not _same(one, row)] + [row])
-    rows = beside_network(read_sections(table), run.summary["sections"])
+    rows = with_network(read_sections(table), run.summary["sections"])
     if (run.path / "report.html").is_file():
         put_section(run.path / "report.html", NAME, section_html(rows))
     return [row for row in rows if row["section"] in slabs]
@@ -108,11 +108,11 @@ def report_section(folder: Path, sections: Sequence[Mapping[str, Any]]) -> str:
 
     `sections` are those of the summary of the run in `folder`.
     """
-    rows = beside_network(read_sections(folder / FOLDER / TABLE), sections)
+    rows = with_network(read_sections(folder / FOLDER / TABLE), sections)
     return section_html(rows) if rows else ""
 
 
-def beside_network(
+def with_network(
     resolved: Sequence[StokesSection], sections: Sequence[Mapping[str, Any]]
 ) -> list[dict[str, Any]]:
     """The resolved sections that are `sections` of the summary, with what the network gives."""

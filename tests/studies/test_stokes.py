@@ -9,12 +9,12 @@ import pytest
 from direct_stokes import direct_tensor
 
 from fdnet.errors import CaseError, FlowError
+from fdnet.network.stokes import forces
+from fdnet.network.stokes.green import build_green
+from fdnet.network.stokes.staggered import Staggered, stagger
+from fdnet.network.stokes.stokes import extrapolate, solve_stokes
+from fdnet.network.stokes.walls import find_walls
 from fdnet.spheres.snapshot import Array, Snapshot
-from fdnet.stokes import forces
-from fdnet.stokes.green import build_green
-from fdnet.stokes.staggered import Staggered, stagger
-from fdnet.stokes.stokes import extrapolate, solve_stokes
-from fdnet.stokes.walls import find_walls
 from fdnet.studies.truth.packs import DATA, OWN_TRUTH
 
 SC = [[0.31, 0.17, 0.43]]

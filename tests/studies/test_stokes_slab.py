@@ -8,11 +8,11 @@ import pytest
 from direct_stokes import direct_tensor
 
 from fdnet.errors import CaseError
+from fdnet.network.stokes.green import build_green
+from fdnet.network.stokes.staggered import Staggered
+from fdnet.network.stokes.stokes import extrapolate, solve_slab, solve_stokes
+from fdnet.network.stokes.walls import find_walls
 from fdnet.spheres.snapshot import Array, Snapshot, resting
-from fdnet.stokes.green import build_green
-from fdnet.stokes.staggered import Staggered
-from fdnet.stokes.stokes import extrapolate, solve_slab, solve_stokes
-from fdnet.stokes.walls import find_walls
 
 EDGES = (7, 8, 9)
 HALF = Staggered(shape=EDGES, mirrored=True)

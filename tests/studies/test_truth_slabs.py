@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fdnet.errors import CaseError
+from fdnet.network.stokes.stokes import StokesFlow, solve_slab
 from fdnet.spheres.snapshot import Kind, resting
-from fdnet.stokes.stokes import StokesFlow, solve_slab
 from fdnet.studies.accuracy.slabs import slab_rows, slab_summary
 from fdnet.studies.engine.csv_rows import read_named, write_named
 from fdnet.studies.truth.made_slabs import SLABS
@@ -29,6 +29,7 @@ from fdnet.studies.truth.slabs import (
     write_specimen,
 )
 from fdnet.studies.truth.specimens import SPECIMENS
+from fdnet.studies.truth.two_grids import two_grids_table
 
 
 def flow(cells: int, k: float) -> StokesFlow:
@@ -174,3 +175,10 @@ def test_laws_on_a_slab(tmp_path):
     )
     assert row["fines"] >= 26
     assert f"| {name} | {row['fines']} |" in slab_summary([row], [pair])
+
+
+def test_the_page_has_the_table_of_two_grids(root):
+    """`scripts/stokes_truth.py two-grids` prints it."""
+    table = two_grids_table(SLAB_FOLDER)
+    assert table.strip() in (root / "docs/how-to/check_the_face.md").read_text()
+    assert "| 3 to 3.5 |" in table

@@ -9,6 +9,7 @@ from fdnet.case.names import MOST_SPHERES, SECTION_ARCHIE
 from fdnet.network.laws.named import DEFAULT_DAMAGE_LAW, DEFAULT_LAW
 from fdnet.studies.accuracy.choices import CHOICES
 from fdnet.studies.accuracy.deposits import BED_SHARE
+from fdnet.studies.accuracy.face import face_numbers
 from fdnet.studies.accuracy.full_size import full_size_numbers
 from fdnet.studies.accuracy.goals import (
     ALL_SPHERES_GOAL,
@@ -55,6 +56,7 @@ def page_numbers(results: Results, validation: Path) -> dict[str, str]:
         **_choices(results),
         **_boundaries(validation),
         **_walls(validation),
+        **face_numbers(validation),
         **full_size_numbers(validation),
     }
 

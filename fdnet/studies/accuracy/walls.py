@@ -13,9 +13,9 @@ import numpy as np
 from fdnet.network.flow.slabs import whole_permeability
 from fdnet.network.laws.named import DEFAULT_LAW, LAWS
 from fdnet.network.network import WALLS, build_network
+from fdnet.network.stokes.stokes import extrapolate, solve_stokes
 from fdnet.spheres.porosity import measure_porosity
 from fdnet.spheres.snapshot import Array, Snapshot, resting
-from fdnet.stokes.stokes import extrapolate, solve_stokes
 
 CELL = 10.0
 SHEET = CELL / 48

@@ -8,7 +8,7 @@ from pathlib import Path
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.laws.named import DEFAULT_LAW, LAWS
 from fdnet.network.network import Network
-from fdnet.stokes.stokes import extrapolate, solve_stokes
+from fdnet.network.stokes.stokes import extrapolate, solve_stokes
 from fdnet.studies.accuracy.measurement import (
     DEFAULT,
     PAIRS,

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
+from fdnet.network.stokes.stokes import StokesFlow, extrapolate, solve_slab
 from fdnet.spheres.porosity import measure_porosity
 from fdnet.spheres.snapshot import Snapshot
-from fdnet.stokes.stokes import StokesFlow, extrapolate, solve_slab
 from fdnet.studies.engine.csv_rows import read_named, write_named
 from fdnet.studies.engine.markdown import markdown_table
 from fdnet.studies.truth.grids import flow_of

@@ -3,12 +3,12 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, pairwise
 from pathlib import Path
 
 import numpy as np
 
-from fdnet.stokes.two_grids import estimate
+from fdnet.network.stokes.two_grids import estimate
 from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.engine.markdown import markdown_table
 from fdnet.studies.truth.grids import flow_of
@@ -53,7 +53,7 @@ def pairs_of_grids(folder: Path) -> Iterator[Pair]:
 def two_grids_table(folder: Path) -> str:
     """Stated and true errors by cells across a fine, in Markdown, from the files in `folder`."""
     pairs, lines = list(pairs_of_grids(folder)), []
-    for low, high in zip(BOUNDS, BOUNDS[1:], strict=False):
+    for low, high in pairwise(BOUNDS):
         some = [pair for pair in pairs if low < pair.across <= high]
         if some:
             true = [pair.true for pair in some]
@@ -67,6 +67,6 @@ def two_grids_table(folder: Path) -> str:
                     f"{100 * np.mean([pair.true <= pair.stated for pair in some]):.0f} %",
                 ]
             )
-    header = ["cells across a fine's radius", "pairs of grids", "stated error, mean"]
-    header += ["true error, rms", "true error, largest", "within the stated error"]
+    header = ["cells across", "pairs of grids", "stated error"]
+    header += ["true, rms", "true, largest", "within the stated"]
     return markdown_table(header, lines)

@@ -6,9 +6,9 @@ from itertools import pairwise
 import numpy as np
 
 from fdnet.errors import FlowError
+from fdnet.network.stokes.green import Grid
+from fdnet.network.stokes.walls import Walls
 from fdnet.spheres.snapshot import Array
-from fdnet.stokes.green import Grid
-from fdnet.stokes.walls import Walls
 
 LOG = logging.getLogger(__name__)
 OWN_RESPONSE = 2.0 / 3.0 * 0.252731

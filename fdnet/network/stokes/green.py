@@ -24,8 +24,9 @@ from typing import Protocol
 import numpy as np
 from scipy import fft
 
+from fdnet.network.stokes.staggered import Shape, Staggered
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, frozen
-from fdnet.stokes.staggered import Shape, Staggered
 
 
 class Grid(Protocol):
@@ -59,6 +60,8 @@ class Green:
     shape: Shape
     difference: tuple[Array, Array, Array]
     inverse_laplace: Array
+
+    __repr__ = one_line
 
     @property
     def shapes(self) -> tuple[Shape, Shape, Shape]:
@@ -94,6 +97,8 @@ class MirroredGreen:
     shape: Shape
     difference: tuple[Array, Array, Array]
     inverse_laplace: Array
+
+    __repr__ = one_line
 
     @property
     def shapes(self) -> tuple[Shape, Shape, Shape]:

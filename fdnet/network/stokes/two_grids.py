@@ -9,7 +9,7 @@ difference.
 
 from dataclasses import dataclass
 
-from fdnet.stokes.stokes import StokesFlow, extrapolate
+from fdnet.network.stokes.stokes import StokesFlow, extrapolate
 
 ORDERS = (1.5, 2.0)
 LEAST_ERROR = 3e-3

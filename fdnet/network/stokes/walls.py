@@ -24,8 +24,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fdnet.network.stokes.staggered import Staggered
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, frozen
-from fdnet.stokes.staggered import Staggered
 
 LEAST_DISTANCE = 1e-9
 LEAST_DRAG = 1e-6
@@ -43,6 +44,8 @@ class Walls:
 
     node: Array
     slack: Array
+
+    __repr__ = one_line
 
 
 def find_walls(centre: Array, radius: Array, grid: Staggered, *, component: int) -> Walls:

@@ -21,11 +21,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fdnet.errors import CaseError, FlowError
+from fdnet.network.stokes.forces import LARGEST_SLIP, Axes, Problem, minimise
+from fdnet.network.stokes.green import build_green
+from fdnet.network.stokes.staggered import OPEN, Closed, stagger
+from fdnet.network.stokes.walls import find_walls
 from fdnet.spheres.snapshot import Snapshot
-from fdnet.stokes.forces import LARGEST_SLIP, Axes, Problem, minimise
-from fdnet.stokes.green import build_green
-from fdnet.stokes.staggered import OPEN, Closed, stagger
-from fdnet.stokes.walls import find_walls
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
