@@ -123,9 +123,10 @@ def test_what_cannot_be_solved_is_refused_at_once(finished, arguments, words, ca
 
 
 @pytest.mark.liggghts
-def test_kept_grids_that_cannot_be_read_are_named(resolved, tmp_path):
+@pytest.mark.parametrize("text", ["{", "[1, 2]", '{"a": 1}', '[{"state": "initial"}]'])
+def test_kept_grids_that_cannot_be_read_are_named(resolved, tmp_path, text):
     folder = Path(shutil.copytree(resolved, tmp_path / "run"))
-    (folder / "stokes" / "grids.json").write_text("{")
+    (folder / "stokes" / "grids.json").write_text(text)
     with pytest.raises(CaseError, match=r"grids\.json: cannot be read"):
         stokes_sections(folder, (1,), across=ROUGH)
     (folder / "stokes" / "sections.csv").write_text("a,b\n1,2\n")

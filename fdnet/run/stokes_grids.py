@@ -95,8 +95,11 @@ class KeptGrids:
         self.path = path
         self.rows: list[dict[str, Any]] = []
         if path.is_file():
+            names = {one.name for one in fields(StokesFlow)}
             try:
                 self.rows = [dict(row) for row in json.loads(path.read_text(encoding="utf-8"))]
+                if not all(names <= row.keys() for row in self.rows):
+                    raise ValueError(f"a grid lacks one of {', '.join(sorted(names))}")
             except (ValueError, TypeError) as error:
                 raise CaseError(
                     f"{path}: cannot be read as solved grids ({error}); remove it, and its grids "
