@@ -184,3 +184,21 @@ def test_walls_hold_the_fluid_as_in_a_duct(closed):
     flows = (solve_slab(buried, (0.0, 0.5), cells=n, closed=closed) for n in (20, 32))
     expected = 0.035144 if closed[1] else 1.0 / 12.0
     assert extrapolate(*flows).k == pytest.approx(expected, rel=0.002)
+
+
+def test_the_drag_of_a_wall_on_cells_of_unequal_edges():
+    """Along each axis (1/t - 1) over the square of the edge, for a free share t of the step."""
+    step, place, r = np.array([0.8, 1.25, 1.0]), np.array([4.1, 5.3, 4.4]), 2.2
+    grid = Staggered(shape=(11, 8, 9), step=step)
+    walls = find_walls(place[None], np.array([r]), grid, component=0)
+    free = walls.slack > 0.0
+    for node, slack in zip(walls.node[free], walls.slack[free], strict=True):
+        away = place - ([*np.array(np.unravel_index(node, grid.shape)), 0, 0.5, 0.5]) * step
+        drag = 0.0
+        for axis in range(3):
+            ahead, aside = abs(away[axis]), away @ away - away[axis] ** 2
+            inside = (ahead - step[axis]) ** 2 + aside <= r * r
+            gap = ahead - np.sqrt(max(r * r - aside, 0.0))
+            drag += (step[axis] / gap - 1.0) / step[axis] ** 2 if inside else 0.0
+        assert 1.0 / slack == pytest.approx(drag, rel=1e-4)
+    assert free.sum() > 40
