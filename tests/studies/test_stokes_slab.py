@@ -191,9 +191,10 @@ def test_the_drag_of_a_wall_on_cells_of_unequal_edges():
     step, place, r = np.array([0.8, 1.25, 1.0]), np.array([4.1, 5.3, 4.4]), 2.2
     grid = Staggered(shape=(11, 8, 9), step=step)
     walls = find_walls(place[None], np.array([r]), grid, component=0)
-    free = walls.slack > 0.0
+    free, offset = walls.slack > 0.0, np.array([0.0, 0.5, 0.5])
     for node, slack in zip(walls.node[free], walls.slack[free], strict=True):
-        away = place - ([*np.array(np.unravel_index(node, grid.shape)), 0, 0.5, 0.5]) * step
+        number = np.array(np.unravel_index(node, grid.shape))
+        away = place - (number + offset) * step
         drag = 0.0
         for axis in range(3):
             ahead, aside = abs(away[axis]), away @ away - away[axis] ** 2
