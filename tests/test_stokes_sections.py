@@ -2,9 +2,11 @@
 
 import json
 import shutil
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
+from builders import tiny
 
 import fdnet
 from fdnet.cli import main
@@ -14,6 +16,7 @@ from fdnet.network.stokes.two_grids import estimate
 from fdnet.report.stokes_section import section_html
 from fdnet.run import stokes_grids
 from fdnet.run.stokes_sections import (
+    StokesSection,
     read_sections,
     report_section,
     stokes_sections,
@@ -22,6 +25,10 @@ from fdnet.run.stokes_sections import (
 
 ROUGH, ROUGH_GRAIN = 1.0, 7.0
 """Cells across the radius of a fine and of a grain that keep the tests short."""
+
+HEAD = b",".join(one.name.encode() for one in fields(StokesSection)) + b"\n1,1\n"
+"""A table whose row has too few numbers."""
+NOT_FINITE = HEAD.replace(b"\n1,1", b"\n" + b",".join([b"nan"] * len(fields(StokesSection))))
 
 
 def grid(cells: int, k: float) -> StokesFlow:
@@ -102,9 +109,11 @@ def test_the_command_prints_both_and_the_report_shows_them(resolved, capsys):
     page = (resolved / "report.html").read_text()
     assert section_html([row]) in page
     assert page.count("Sections by resolved Stokes flow") == 1
-    sections = fdnet.open_run(resolved).summary["sections"]
-    assert report_section(resolved, sections) == section_html([row])
-    assert report_section(resolved / "elsewhere", sections) == ""
+    case, sections = tiny("box.sides=walls"), fdnet.open_run(resolved).summary["sections"]
+    assert report_section(resolved, case, sections) == section_html([row])
+    assert report_section(resolved / "elsewhere", case, sections) == ""
+    slipping = tiny("box.sides=walls", "analysis.walls=slip")
+    assert report_section(resolved, slipping, sections) == ""
 
 
 @pytest.mark.liggghts
@@ -129,6 +138,13 @@ def test_kept_grids_that_cannot_be_read_are_named(resolved, tmp_path, text):
     (folder / "stokes" / "grids.json").write_text(text)
     with pytest.raises(CaseError, match=r"grids\.json: cannot be read"):
         stokes_sections(folder, (1,), across=ROUGH)
-    (folder / "stokes" / "sections.csv").write_text("a,b\n1,2\n")
+
+
+@pytest.mark.parametrize("text", [b"", b"a,b\n1,2\n", b"\xff", HEAD, NOT_FINITE])
+def test_a_table_that_cannot_be_read_is_named_and_stops_no_report(tmp_path, text):
+    table = tmp_path / "stokes" / "sections.csv"
+    table.parent.mkdir()
+    table.write_bytes(text)
     with pytest.raises(CaseError, match=r"sections\.csv: .*call fdnet stokes again"):
-        read_sections(folder / "stokes" / "sections.csv")
+        read_sections(table)
+    assert "call fdnet stokes again" in report_section(tmp_path, tiny(), [])

@@ -4,8 +4,10 @@ Resolved flow needs no law of throats. It takes minutes where the network takes 
 computed for the sections that a user names, mostly the first.
 """
 
+import html
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +95,7 @@ def stokes_sections(
             refuse_large(slab, across)
     kept = KeptGrids(run.path / FOLDER / GRIDS)
     table = run.path / FOLDER / TABLE
+    read_sections(table)  # refuses a broken table before hours of solving
     for pair in slabs.values():
         by_state = {slab.state: permeability_of(slab, across, kept, follow) for slab in pair}
         row = _row(pair[0].span, by_state[INITIAL], by_state.get(DAMAGED, by_state[INITIAL]))
@@ -103,12 +106,21 @@ def stokes_sections(
     return [row for row in rows if row["section"] in slabs]
 
 
-def report_section(folder: Path, sections: Sequence[Mapping[str, Any]]) -> str:
+def report_section(folder: Path, case: Case, sections: Sequence[Mapping[str, Any]]) -> str:
     """The section of the report as HTML; "" where no flow was resolved.
 
-    `sections` are those of the summary of the run in `folder`.
+    There is none either where the network was analysed with walls that slip, for those of the
+    flow do not. A table that cannot be read is named there. `sections` are those of the summary of
+    the run in `folder`.
     """
-    rows = with_network(read_sections(folder / FOLDER / TABLE), sections)
+    try:
+        _closed(case)
+    except CaseError:
+        return ""
+    try:
+        rows = with_network(read_sections(folder / FOLDER / TABLE), sections)
+    except CaseError as error:
+        return f'<p class="note">{html.escape(str(error))}</p>'
     return section_html(rows) if rows else ""
 
 
@@ -192,12 +204,14 @@ def read_sections(path: Path) -> list[StokesSection]:
     """
     if not path.is_file():
         return []
-    header, *lines = path.read_text(encoding="utf-8").split()
     names = [one.name for one in fields(StokesSection)]
     try:
-        rows = [dict(zip(names, map(float, line.split(",")), strict=True)) for line in lines]
-    except ValueError as error:
+        lines = [line.split(",") for line in path.read_text(encoding="utf-8").split()]
+        if lines[:1] != [names]:
+            raise ValueError(f"expected the columns {','.join(names)}")
+        rows = [dict(zip(names, map(float, line), strict=True)) for line in lines[1:]]
+        if not all(isfinite(value) for row in rows for value in row.values()):
+            raise ValueError("a number is not finite")
+    except (OSError, ValueError) as error:
         raise CaseError(f"{path}: {error}; remove it and call fdnet stokes again") from error
-    if header.split(",") != names:
-        raise CaseError(f"{path}: columns {header}, expected {','.join(names)}; remove the file")
     return [StokesSection(**row) for row in rows]
