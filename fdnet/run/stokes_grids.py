@@ -4,7 +4,6 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from math import ceil
-from os import sched_getaffinity
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from fdnet.files.atomic import write_text
 from fdnet.network.stokes.staggered import Closed, stagger
 from fdnet.network.stokes.stokes import StokesFlow, solve_slab
 from fdnet.network.stokes.two_grids import Estimate, estimate
+from fdnet.run.session import cores
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, Snapshot
 
@@ -61,7 +61,7 @@ class Slab:
     @property
     def words(self) -> str:
         """The slab in words."""
-        state = "with fines" if self.state == "damaged" else "without fines"
+        state = "after the invasion" if self.state == "damaged" else "before it"
         return f"{1e3 * self.span[0]:g} to {1e3 * self.span[1]:g} mm, {state}"
 
     def cells(self, across: float) -> tuple[int, int]:
@@ -148,9 +148,8 @@ def _flow(slab: Slab, cells: int, kept: KeptGrids, follow: Follow) -> StokesFlow
     }
     flow = kept.find(key)
     if flow is None:
-        cores = len(sched_getaffinity(0))
-        follow(_expected(slab, slab.size(cells), cores))
-        with fft.set_workers(cores):
+        follow(_expected(slab, slab.size(cells)))
+        with fft.set_workers(cores()):
             flow = solve_slab(
                 slab.spheres, slab.span, cells=cells, tolerance=TOLERANCE, closed=slab.closed
             )
@@ -158,8 +157,8 @@ def _flow(slab: Slab, cells: int, kept: KeptGrids, follow: Follow) -> StokesFlow
     return flow
 
 
-def _expected(slab: Slab, size: int, cores: int) -> str:
-    seconds = max(1.0, SECONDS[slab.state] * size / cores**0.5)
+def _expected(slab: Slab, size: int) -> str:
+    seconds = max(1.0, SECONDS[slab.state] * size / cores() ** 0.5)
     took = f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
     memory = BYTES * size / 2**30
     return f"{slab.words}: {size / 1e6:.1f} million cells, about {took} and {memory:.1f} GiB"

@@ -14,7 +14,7 @@ from typing import Any
 from fdnet.case.case import Case
 from fdnet.errors import CaseError
 from fdnet.files.atomic import write_text
-from fdnet.network.stokes.staggered import OPEN, Closed
+from fdnet.network.resolved.slab import cut_out
 from fdnet.network.stokes.two_grids import Estimate
 from fdnet.report.later_sections import put_section
 from fdnet.report.stokes_section import NAME, section_html
@@ -28,6 +28,7 @@ from fdnet.run.stokes_grids import (
     permeability_of,
     refuse_large,
 )
+from fdnet.spheres.snapshot import Snapshot
 
 FOLDER, GRIDS, TABLE = "stokes", "grids.json", "sections.csv"
 """Folder in the run folder, the file of the solved grids, the table of the sections."""
@@ -89,7 +90,8 @@ def stokes_sections(
             f"--across: {across:g}, expected 1 to 20 cells across the radius of a fine"
         )
     run = open_run(folder)
-    slabs = {number: _slabs(run, number) for number in numbers}
+    spheres = {INITIAL: run.spheres("initial"), DAMAGED: run.spheres("damaged")}
+    slabs = {number: _slabs(run, spheres, number) for number in numbers}
     for pair in slabs.values():
         for slab in pair:
             refuse_large(slab, across)
@@ -113,9 +115,7 @@ def report_section(folder: Path, case: Case, sections: Sequence[Mapping[str, Any
     flow do not. A table that cannot be read is named there. `sections` are those of the summary of
     the run in `folder`.
     """
-    try:
-        _closed(case)
-    except CaseError:
+    if _slips(case):
         return ""
     try:
         rows = with_network(read_sections(folder / FOLDER / TABLE), sections)
@@ -138,40 +138,38 @@ def with_network(
     return rows
 
 
-def _slabs(run: FinishedRun, number: int) -> list[Slab]:
+def _slabs(run: FinishedRun, spheres: Mapping[str, Snapshot], number: int) -> list[Slab]:
     """The section before and, where fines reach into it or grains moved, after the invasion."""
     sections = run.summary["sections"]
     if not 1 <= number <= len(sections):
         raise CaseError(
             f"--section: {number}, expected 1 to {len(sections)}, the sections of the run"
         )
+    if _slips(run.case):
+        raise CaseError(
+            "analysis.walls: 'slip', but resolved flow knows only side walls that hold the fluid; "
+            "analyse the run with analysis.walls = 'no-slip' first"
+        )
     span = (sections[number - 1]["x_lo_m"], sections[number - 1]["x_hi_m"])
-    before, after = (_slab(run, span, state) for state in (INITIAL, DAMAGED))
+    before, after = (_slab(run, state, one, span) for state, one in spheres.items())
     changed = len(after.spheres.fines()) or "k_moved_m2" in run.summary
     return [before, after] if changed else [before]
 
 
-def _slab(run: FinishedRun, span: tuple[float, float], state: str) -> Slab:
-    spheres = run.spheres("damaged" if state == DAMAGED else "initial")
-    x, r = spheres.position[:, 0], spheres.radius
+def _slab(run: FinishedRun, state: str, spheres: Snapshot, span: tuple[float, float]) -> Slab:
+    _, y, z = run.case.periodic
     return Slab(
-        spheres=spheres.where((x + r > span[0]) & (x - r < span[1])),
+        spheres=cut_out(spheres, span, run.case.periodic),
         span=span,
-        closed=_closed(run.case),
+        closed=(False, not y, not z),
         state=state,
         digest=str(run.manifest.get("files", {}).get(f"spheres_{state}.csv", "")),
     )
 
 
-def _closed(case: Case) -> Closed:
-    if all(case.periodic[1:]):
-        return OPEN
-    if case.analysis.walls == "slip":
-        raise CaseError(
-            "analysis.walls: 'slip', but resolved flow knows only side walls that hold the fluid; "
-            "analyse the run with analysis.walls = 'no-slip' first"
-        )
-    return False, not case.periodic[1], not case.periodic[2]
+def _slips(case: Case) -> bool:
+    """Whether the network has side walls that let the fluid slip; resolved flow has none."""
+    return not all(case.periodic[1:]) and case.analysis.walls == "slip"
 
 
 def _row(span: tuple[float, float], before: Estimate, after: Estimate) -> StokesSection:

@@ -91,8 +91,8 @@ def test_the_mirrored_response_is_that_of_the_doubled_grid():
     rng = np.random.default_rng(2)
     half = build_green(Staggered(shape=shape, mirrored=True))
     doubled = build_green(Staggered(shape=(10, 6, 7)))
-    parts = [rng.normal(size=s).astype(np.float32) for s in half.shapes]
-    full = [np.zeros(doubled.shape, np.float32) for _ in range(3)]
+    parts = [rng.normal(size=s).astype(np.float32) for s in half.grid.shapes]
+    full = [np.zeros(doubled.grid.shape, np.float32) for _ in range(3)]
     places = [whole(np.arange(part.size), shape, d) for d, part in enumerate(parts)]
     for d, (part, place) in enumerate(zip(parts, places, strict=True)):
         full[d].reshape(-1)[place[0]] = part.reshape(-1)

@@ -42,7 +42,7 @@ class Problem:
         self.norms = [float(self.load[part] @ self.load[part]) for part in self.parts]
         self.volume = green.volume
         self.green = green
-        self.grids = [np.zeros(shape, np.float32) for shape in green.shapes]
+        self.grids = [np.zeros(shape, np.float32) for shape in green.grid.shapes]
 
     def apply(self, scaled: Array) -> Array:
         """A times `scaled` (M,)."""
@@ -76,7 +76,7 @@ class Problem:
         return float(np.sqrt(square / self.norms[self.axis]) * self.volume / energy)
 
     def permeability(self, scaled: Array) -> tuple[float, float]:
-        """k in squared spacings and the slip, from one fresh application."""
+        """k in squared units of the grid and the slip, from one fresh application."""
         moved = self.apply(scaled)
         energy = float(scaled @ moved)
         residual = self.project(moved)

@@ -24,7 +24,7 @@ from typing import Protocol
 import numpy as np
 from scipy import fft
 
-from fdnet.network.stokes.staggered import Shape, Staggered
+from fdnet.network.stokes.staggered import Staggered
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, frozen
 
@@ -33,8 +33,8 @@ class Grid(Protocol):
     """What a grid offers to the forces on it."""
 
     @property
-    def shapes(self) -> tuple[Shape, Shape, Shape]:
-        """Nodes of each velocity component."""
+    def grid(self) -> Staggered:
+        """Where its nodes are."""
 
     @property
     def volume(self) -> float:
@@ -44,7 +44,7 @@ class Grid(Protocol):
         """How many nodes of the whole box each of the flat indices `node` stands for, (M,)."""
 
     def velocity(self, force: list[Array]) -> list[Array]:
-        """Velocity, three arrays of `shapes`, of the forces `force`, three such arrays."""
+        """Velocity, three arrays of `grid.shapes`, of the forces `force`, three such arrays."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -52,26 +52,21 @@ class Green:
     """Symbols of one grid under the Fourier transform.
 
     Attributes:
-        shape: (3,) cells of the grid, n0, n1, n2.
+        grid: of n0, n1, n2 cells.
         difference: symbol g_d of the backward difference along each axis, complex.
         inverse_laplace: (n0, n1, n2 // 2 + 1), 1 / lambda.
     """
 
-    shape: Shape
+    grid: Staggered
     difference: tuple[Array, Array, Array]
     inverse_laplace: Array
 
     __repr__ = one_line
 
     @property
-    def shapes(self) -> tuple[Shape, Shape, Shape]:
-        """Nodes of each velocity component."""
-        return self.shape, self.shape, self.shape
-
-    @property
     def volume(self) -> float:
         """Cells of the box."""
-        return float(np.prod(self.shape))
+        return float(np.prod(self.grid.shape))
 
     def copies(self, component: int, node: Array) -> Array:
         """One (M,): every node stands for itself."""
@@ -81,7 +76,7 @@ class Green:
         """Velocity, three arrays of the grid's shape, of the forces `force`, three such arrays."""
         waves = [fft.rfftn(part, workers=1) for part in force]
         _respond(waves, self.difference, self.inverse_laplace)
-        return [fft.irfftn(wave, s=self.shape, workers=1, overwrite_x=True) for wave in waves]
+        return [fft.irfftn(wave, s=self.grid.shape, workers=1, overwrite_x=True) for wave in waves]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -89,35 +84,30 @@ class MirroredGreen:
     """Symbols of the half of a mirrored box under cosine, sine and Fourier transforms.
 
     Attributes:
-        shape: (3,) cells of the half, n0, n1, n2; the box has 2 n0 along x.
+        grid: of n0, n1, n2 cells, the half; the box has 2 n0 along x.
         difference: symbol g_d of the backward difference along each axis, real along x.
         inverse_laplace: (n0 + 1, n1, n2 // 2 + 1), 1 / lambda.
     """
 
-    shape: Shape
+    grid: Staggered
     difference: tuple[Array, Array, Array]
     inverse_laplace: Array
 
     __repr__ = one_line
 
     @property
-    def shapes(self) -> tuple[Shape, Shape, Shape]:
-        """Nodes of each velocity component."""
-        return (self.shape[0] + 1, *self.shape[1:]), self.shape, self.shape
-
-    @property
     def volume(self) -> float:
         """Cells of the box and its mirror image."""
-        return 2.0 * float(np.prod(self.shape))
+        return 2.0 * float(np.prod(self.grid.shape))
 
     def copies(self, component: int, node: Array) -> Array:
         """Two (M,), for a node and its image, and one for nodes on the planes."""
-        along = node // (self.shape[1] * self.shape[2])
-        on_plane = (component == 0) & ((along == 0) | (along == self.shape[0]))
+        along = node // (self.grid.shape[1] * self.grid.shape[2])
+        on_plane = (component == 0) & ((along == 0) | (along == self.grid.shape[0]))
         return np.where(on_plane, 1.0, 2.0)
 
     def velocity(self, force: list[Array]) -> list[Array]:
-        """Velocity, three arrays of `shapes`, of the forces `force`, three such arrays."""
+        """Velocity, three arrays of `grid.shapes`, of the forces `force`, three such arrays."""
         waves = [fft.rfftn(fft.dct(force[0], type=1, axis=0), axes=(1, 2))]
         for part in force[1:]:
             wave = np.zeros(self.inverse_laplace.shape, np.complex64)
@@ -125,7 +115,7 @@ class MirroredGreen:
             waves.append(wave)
         _respond(waves, self.difference, self.inverse_laplace)
         flows = [
-            fft.irfftn(wave, s=self.shape[1:], axes=(1, 2))
+            fft.irfftn(wave, s=self.grid.shape[1:], axes=(1, 2))
             for wave in (waves[0], waves[1][1:], waves[2][1:])
         ]
         return [
@@ -140,9 +130,9 @@ def build_green(grid: Staggered) -> Green | MirroredGreen:
     if grid.mirrored:
         along = 2.0 * np.sin(0.5 * np.pi * np.arange(n + 1) / n)
         difference, inverse = _symbols(along, grid)
-        return MirroredGreen(shape=grid.shape, difference=difference, inverse_laplace=inverse)
+        return MirroredGreen(grid=grid, difference=difference, inverse_laplace=inverse)
     difference, inverse = _symbols(1.0 - np.exp(-2j * np.pi * fft.fftfreq(n)), grid)
-    return Green(shape=grid.shape, difference=difference, inverse_laplace=inverse)
+    return Green(grid=grid, difference=difference, inverse_laplace=inverse)
 
 
 def _symbols(along: Array, grid: Staggered) -> tuple[tuple[Array, Array, Array], Array]:

@@ -54,9 +54,10 @@ class Staggered:
         """Volume of the specimen over that of the grid."""
         return float(np.prod(self.fluid_cells) / np.prod(self.shape))
 
-    def nodes(self, component: int) -> Shape:
-        """Nodes of a velocity component along the axes."""
-        return (self.shape[0] + (self.mirrored and component == 0), *self.shape[1:])
+    @property
+    def shapes(self) -> tuple[Shape, Shape, Shape]:
+        """Nodes of each velocity component along the axes."""
+        return (self.shape[0] + self.mirrored, *self.shape[1:]), self.shape, self.shape
 
 
 def stagger(
@@ -79,11 +80,12 @@ def stagger(
     counts = np.maximum(np.rint(edges / cube).astype(int), 2)
     for axis in np.flatnonzero(np.abs(counts * cube - edges) > WHOLE * edges.max()):
         counts[axis] = fft.next_fast_len(int(counts[axis]), real=True)
-    walled = [fft.next_fast_len(int(n) + 1, real=True) if wall else int(n)
-              for n, wall in zip(counts, closed, strict=True)]  # fmt: skip
+    whole = counts.copy()
+    for axis in np.flatnonzero(closed):
+        whole[axis] = fft.next_fast_len(int(counts[axis]) + 1, real=True)
     unit = float(np.prod(edges / counts)) ** (1.0 / 3.0)
     grid = Staggered(
-        shape=(walled[0], walled[1], walled[2]),
+        shape=(int(whole[0]), int(whole[1]), int(whole[2])),
         step=edges / counts / unit,
         mirrored=mirrored,
         closed=closed,

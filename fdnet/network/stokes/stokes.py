@@ -1,4 +1,4 @@
-"""Resolved Stokes flow through a periodic cell of spheres: the test oracle of the pore network.
+"""Resolved Stokes flow through a cell or a slab of spheres: the reference of the pore network.
 
 The formulation is our own and is derived in docs/stokes.md. A uniform body force G drives the
 fluid. All of space is taken as fluid, and the walls push back with forces F at wall nodes, so that

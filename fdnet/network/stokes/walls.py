@@ -59,7 +59,7 @@ def find_walls(centre: Array, radius: Array, grid: Staggered, *, component: int)
     """
     offset = np.full(3, 0.5)
     offset[component] = 0.0
-    nodes = grid.nodes(component)
+    nodes = grid.shapes[component]
     marks = _Marks(
         shell=np.zeros(nodes, bool),
         solid=np.zeros(nodes, bool),
@@ -165,7 +165,7 @@ def _close(marks: _Marks, axis: int, *, across: bool) -> None:
 
 
 def _extra_drag(marks: _Marks) -> Array:
-    """Sum of (1/t - 1) over the six directions in which a fluid node has a solid neighbour."""
+    """Sum of (1/t - 1) / step^2 over the ways on which a fluid node has a solid neighbour."""
     solid, reach, grid = marks.solid, marks.reach, marks.grid
     if marks.on_planes:
         reach[0, 1, 0], reach[0, 0, -1] = reach[0, 0, 0], reach[0, 1, -1]

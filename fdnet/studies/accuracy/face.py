@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from fdnet.studies.accuracy.goals import span
 from fdnet.studies.engine.csv_rows import read_named
 
 TABLE = "stokes_sections.csv"
@@ -17,7 +18,7 @@ def face_numbers(validation: Path) -> dict[str, str]:
         for state, name in (("initial", "before"), ("damaged", "after")):
             key = f"k_{state}_m2"
             ratios = [float(row[f"network_{key}"]) / float(row[key]) for row in some]
-            numbers[f"face_{sides}_{name}"] = f"{min(ratios):.3f} to {max(ratios):.3f}"
+            numbers[f"face_{sides}_{name}"] = span(ratios)
         points = [float(row["k_reduction"]) - float(row["network_k_reduction"]) for row in some]
         numbers[f"face_{sides}_points"] = f"{100 * max(points):.1f}"
     return numbers
