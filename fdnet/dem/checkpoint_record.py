@@ -26,7 +26,7 @@ from fdnet.files.atomic import write_text
 FOLLOWED = (
     f"{SECTION_ARCHIE} between nodes, fines placed, sections a third apart, solved at a fifth, "
     "drag at the new rate, field to 0.15, fluid on the way ahead, "
-    "standing by the velocity given, each fine of its own density"
+    "standing by the velocity given, each fine of its own density, edges of the box resolved"
 )
 """How the fluid's forces are computed where the flow follows the deposit. Change these words when
 that changes: then a run that an earlier version left unfinished starts over."""

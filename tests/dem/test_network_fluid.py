@@ -20,6 +20,9 @@ from fdnet.dem.packing import make_pack
 from fdnet.dem.supply import CLEARANCE, later_batch, place_batches, slab_end
 from fdnet.errors import CaseError
 from fdnet.network.field.of_pack import velocity_field
+from fdnet.network.flow.flow import solve_flow
+from fdnet.network.laws.named import LAWS
+from fdnet.network.network import build_network
 from fdnet.run.fluid.fluid_of import fluid_of
 from fdnet.run.fluid.network_flow import MOVED, Renewal, changed_share, placed, pore_through
 from fdnet.run.fluid.network_fluid import NetworkFluid
@@ -28,6 +31,7 @@ from fdnet.run.history import history_rows
 from fdnet.scales.scales import scales_of
 from fdnet.scales.table import scale_rows
 from fdnet.spheres.snapshot import Kind, Snapshot
+from tests.network.packs import random_pack
 
 pytestmark = pytest.mark.liggghts
 FIRST = Moment(step=0, time=0.0, before=None, first=None, fresh=True)
@@ -224,8 +228,24 @@ def test_pores_carry_what_enters_them(fluid):
     for plane in (0.4e-3, 0.8e-3, 1.2e-3):
         crossing = (x[first] - plane) * (x[second] - plane) < 0
         sign = np.sign(x[second] - x[first])
-        flux = (pack.flow.throat_flux * network.throat_share * sign)[crossing].sum()
+        flux = (pack.flow.throat_flux * sign)[crossing].sum()
         assert flux == pytest.approx(pack.flow.inflow, rel=1e-6)
+
+
+def test_pores_at_walls_carry_half_of_all_that_crosses_their_throats():
+    """As much comes in as goes out, also where a throat has one half or one quarter in the box."""
+    pack = random_pack(60, 0.5, periodic=False)
+    network = build_network(pack, periodic=(False,) * 3, walls="no-slip")
+    flow = solve_flow(network, LAWS["lubrication"](network))
+    pair = network.pore_group[network.throat_pores]
+    passed = np.where(pair[:, 0] == pair[:, 1], 0.0, 0.5 * np.abs(flow.throat_flux))
+    half = sum(np.bincount(pair[:, end], passed, len(network.pore_group)) for end in (0, 1))
+    at_wall = np.zeros(len(network.pore_group), bool)
+    at_wall[pair[network.throat_share < 1.0]] = True
+    some = at_wall[network.pore_group] & (np.abs(flow.pore_pressure - 0.5) < 0.49)
+    assert np.count_nonzero(some) > 50
+    through = half[network.pore_group] / flow.inflow
+    assert pore_through(network, flow)[some] == pytest.approx(through[some], rel=1e-6)
 
 
 def test_the_deposit_turns_the_flow_and_lowers_the_rate(fluid, done):

@@ -28,7 +28,8 @@ EQUAL_SIDES = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, np.sqrt(0.75)]])
 def points_flux(base, discs, divisions=fine.DIVISIONS):
     points = np.array(parts_of_triangle(divisions))
     discs = np.column_stack([np.array(discs, float), np.full(len(discs), -np.inf)])
-    return points_flux_of(base, discs, len(discs), points, np.empty((7, points.shape[1])))
+    walls = np.empty((0, 3)), 0
+    return points_flux_of(base, (discs, len(discs)), walls, points, np.empty((7, points.shape[1])))
 
 
 def lattice(radii):
@@ -147,28 +148,6 @@ def test_more_steps_and_points_change_little(network, monkeypatch):
     ratio = np.log(coarse[open_] / more[open_])
     assert abs(np.median(ratio)) < 0.02
     assert np.quantile(np.abs(ratio), 0.9) < 0.2
-
-
-def test_a_plane_of_pressure_holds_the_fluid_along_it():
-    """As walls do, but for the part of the flow that is square to it."""
-    points = np.array(parts_of_triangle(fine.DIVISIONS))
-    discs, room = lattice((0.05, 0.05, 0.05)), np.empty((7, points.shape[1]))
-    some = np.zeros((len(discs) + 2, 4))
-    some[: len(discs), :3] = discs
-
-    def flux(axes, below):
-        planes = ((below, 1e3), axes)
-        return fine._flux(EQUAL_SIDES, some.copy(), len(discs), points, room, planes, 0.0)
-
-    open_flux = points_flux(EQUAL_SIDES, discs)
-    assert flux((0.0, 0.0, 1.0), 0.1) == open_flux
-    assert flux((0.0, 1.0, 0.0), 99.0) == open_flux
-    along = flux((0.0, 1.0, 0.0), 0.0)
-    assert 0.1 < along / open_flux < 0.8
-    slope = np.sqrt(0.5)
-    assert along < flux((0.0, slope, slope), 0.0) < open_flux
-    half = 0.5 * (open_flux + along)
-    assert flux((0.0, slope, slope), 0.0) == pytest.approx(half, rel=0.02)
 
 
 def test_what_spreading_behind_a_node_adds():

@@ -2,56 +2,25 @@
 
 import numpy as np
 import pytest
-from scipy.sparse import coo_matrix
-from scipy.sparse.linalg import spsolve
 
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.errors import CaseError, NetworkError
 from fdnet.network.flow.flow import solve_flow
+from fdnet.network.laws import lubrication
+from fdnet.network.laws.cut_grains import cut_corners
+from fdnet.network.laws.edge_cross_section import edge_fluxes
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.named import LAWS
 from fdnet.network.laws.wall_cross_section import LANES, wall_cuts, wall_fluxes
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse
+from fdnet.network.resolved.slab import cut_out
 from tests.network.one_section import uneven_flux, wall_flux
 from tests.network.packs import random_pack, simple_cubic, snapshot, with_fines
+from tests.network.walled_section import resolved_flux
 
 NONE = (False,) * 3
-
-
-def resolved_flux(place, disc, cells=200):
-    """Flux of laplacian(w) = -1 in a trapezoid, by finite differences.
-
-    w = 0 on the wall and on two discs; the other sides carry no shear.
-    """
-    step = place[2] / cells
-    x, y = np.meshgrid(
-        (np.arange(cells) + 0.5) * step, np.arange(step / 2, max(place[:2]), step), indexing="ij"
-    )
-    first = x**2 + (y - place[0]) ** 2 < disc[0] ** 2
-    solid = first | ((x - place[2]) ** 2 + (y - place[1]) ** 2 < disc[1] ** 2)
-    inside = y < place[0] + (place[1] - place[0]) * x / place[2]
-    fluid = np.pad(inside & ~solid, 1)
-    held = np.pad(inside & solid, 1)
-    held[:, 0] = True
-    index = np.full(fluid.shape, -1)
-    index[fluid] = np.arange(fluid.sum())
-    own, rows, columns = np.zeros(fluid.sum()), [], []
-    for axis, shift in ((0, 1), (0, -1), (1, 1), (1, -1)):
-        neighbour = np.roll(index, shift, axis=axis)[fluid]
-        wall = 2.0 if (axis, shift) == (1, 1) else 1.0
-        near_wall = np.nonzero(fluid)[1] == 1
-        own += (neighbour >= 0) + np.roll(held, shift, axis=axis)[fluid] * np.where(
-            near_wall, wall, 1.0
-        )
-        rows.append(np.flatnonzero(neighbour >= 0))
-        columns.append(neighbour[neighbour >= 0])
-    row, column = np.concatenate(rows), np.concatenate(columns)
-    count = len(own)
-    system = coo_matrix((-np.ones(len(row)), (row, column)), shape=(count, count)).tolil()
-    system.setdiag(own)
-    return spsolve(system.tocsc(), np.full(count, step**2)).sum() * step**2
 
 
 @pytest.mark.parametrize(
@@ -78,6 +47,24 @@ def resolved_flux(place, disc, cells=200):
 def test_half_section_against_finite_differences(place, disc):
     flux = wall_flux(np.array(place), *disc, ratio_table())
     assert flux == pytest.approx(resolved_flux(place, disc), rel=0.06)
+
+
+@pytest.mark.parametrize("disc", [1.0, 0.8, 0.5, 0.2])
+@pytest.mark.parametrize("far", [1.0, 1.5, 2.0])
+def test_quarter_section_of_an_edge_against_finite_differences(far, disc):
+    flux = np.empty(1)
+    room = np.empty((LANES, 1)), ratio_table()
+    edge_fluxes(np.array([1.0, far]), np.array([disc]), room, flux)
+    exact = resolved_flux((1.0, 1.0, far), (disc, 0.0), edge=True)
+    assert flux[0] == pytest.approx(exact, rel=0.06)
+
+
+def test_a_disc_over_the_edge_of_the_box_leaves_nothing():
+    flux = np.empty(2)
+    discs = np.array([1.5, 1.4])
+    edge_fluxes(np.array([1.0, 1.0]), discs, (np.empty((LANES, 2)), ratio_table()), flux)
+    assert flux[0] == 0.0
+    assert flux[1] > 0.0
 
 
 def test_two_thin_discs_far_apart_leave_a_channel_with_one_wall():
@@ -131,13 +118,29 @@ def test_every_throat_cut_by_one_wall_is_a_grain_its_image_and_another(pack):
     free = ends[:, 0] != ends[:, 1]
     half = free & (network.throat_share == 0.5)
     assert np.all(order[half] >= 0)
-    assert np.all(part[free & (network.throat_share == 0.25)] == 0.25)
     assert np.all(part[network.throat_share == 1] == 1)
     wall = network.box[1:].ravel()
     for t in np.flatnonzero(half)[:50]:
         side = network.throat_corner[t][:, 1:]
         heights = np.abs(np.repeat(side, 2, axis=1) - wall)
         assert np.any(np.all(np.isclose(heights[order[t]], place[t, :2, None], atol=1e-9), axis=0))
+
+
+@pytest.mark.parametrize("pack", PACKS)
+def test_every_throat_along_an_edge_is_a_grain_and_two_images(pack):
+    network = build_network(PACKS[pack](), periodic=NONE, walls="no-slip")
+    order, place, part = wall_cuts(network)
+    ends = network.pore_group[network.throat_pores]
+    edge = np.flatnonzero((ends[:, 0] != ends[:, 1]) & (network.throat_share == 0.25))
+    assert len(edge) > 20
+    assert np.all(order[edge, 0] >= 0)
+    assert np.all(order[edge, 1] == -1)
+    assert np.all(part[edge] == 2.0)
+    wall = network.box[1:]
+    for t in edge:
+        grain = network.throat_corner[t][order[t, 0], 1:]
+        heights = np.abs(grain[:, None] - wall).min(axis=1)
+        assert heights == pytest.approx(place[t, :2], abs=1e-9 * network.grain_radius)
 
 
 def test_a_throat_cut_by_a_wall_carries_less_than_half_of_one_that_slips():
@@ -186,6 +189,26 @@ def test_half_resistances_are_those_of_the_law():
     assert LAWS["lubrication"](network) == pytest.approx(
         1.0 / half_resistances(network).sum(axis=1)
     )
+
+
+def test_throats_that_walls_cut_are_narrowed_and_cut_by_pressure_planes_as_others(monkeypatch):
+    """The same of them change as where walls slip."""
+    pack = random_pack(100, 0.5, periodic=False)
+    third = np.ptp(pack.box[0]) / 3.0
+    slab = cut_out(pack, (pack.box[0, 0] + third, pack.box[0, 1] - third), NONE)
+    narrowed, cut = [], []
+    for walls in ("slip", "no-slip"):
+        network = build_network(slab, periodic=NONE, walls=walls)
+        ends = network.pore_group[network.throat_pores]
+        some = (ends[:, 0] != ends[:, 1]) & (network.throat_share < 1.0)
+        plain, fourth = (half_resistances(network, fourth=one)[some] for one in (False, True))
+        narrowed.append(plain != fourth)
+        with monkeypatch.context() as without:
+            without.setattr(lubrication, "cut_corners", lambda *given: 0.0 * cut_corners(*given))
+            cut.append(half_resistances(network)[some] != plain)
+    for slips, holds in (narrowed, cut):
+        assert np.count_nonzero(slips) > 20
+        assert np.mean(slips != holds) < 0.02
 
 
 def test_unknown_walls_are_refused():

@@ -37,8 +37,8 @@ class Flow:
     Attributes:
         pore_pressure: (P,) over the pressure drop: 1 at the inlet plane, 0 at the outlet plane,
             NaN where the pore is not connected to both planes.
-        throat_flux: (T,) m3, from the first to the second pore: flux times viscosity over the
-            pressure drop.
+        throat_flux: (T,) m3, from the first to the second pore: flux inside the box times
+            viscosity over the pressure drop.
         method: how the system was solved.
         residual: sum of the imbalances of the pores over the inflow, which bounds the relative
             error of the inflow.

@@ -4,9 +4,7 @@ Where a fine and grains bound a throat, its sections (`lubrication`) are open on
 the fine has ended, and what holds the fluid there is whatever stands beyond the triangle. The
 flux through a section is that of `point_sections`, among all discs that it meets.
 
-A plane of constant pressure holds the fluid along it as a wall does. With the component n of the
-normal of the facet along x, the flux is n^2 M + (1 - n^2) M_wall, where M_wall has the planes as
-discs of huge radius.
+Side walls that hold the fluid and planes of constant pressure hold it too (`held_sections`).
 """
 
 import numpy as np
@@ -15,13 +13,13 @@ from fdnet.network import geometry
 from fdnet.network.compiled import compiled_for_loops, loops_in_place
 from fdnet.network.laws.facet_axes import facet_axes
 from fdnet.network.laws.fourth_grain import depth_within
+from fdnet.network.laws.held_sections import MOST_PLANES, held_flux, planes_of, turned_inside
 from fdnet.network.laws.lubrication import THROATS, spans_of
 from fdnet.network.laws.open_sections import TIP
-from fdnet.network.laws.point_sections import parts_of_triangle, points_flux
+from fdnet.network.laws.point_sections import parts_of_triangle
 from fdnet.network.laws.section_rays import set_sides
 from fdnet.network.laws.solids import Cells, set_near, solids_of
 from fdnet.network.laws.tube import OPEN_WIDENING, resistance_of
-from fdnet.network.laws.wall_cross_section import wall_cuts
 from fdnet.network.network import LENGTH_FLOOR, Network
 from fdnet.spheres.snapshot import Array
 
@@ -36,10 +34,6 @@ DIVISIONS = 6
 REACH = 1.0
 """Spheres around a facet are those nearer to its centroid than this, in units of the distance of
 its farthest corner, or than its farther node."""
-SQUARE = 1e-6
-"""Square of the sine of the angle to x up to which the normal of a facet lies along x."""
-HUGE = 1e3
-"""Radius of the disc that stands for a plane, in lengths of the facet."""
 ROOM = 64
 """Spheres around a facet for which there is room at first."""
 
@@ -47,16 +41,15 @@ ROOM = 64
 def bounded_by_fines(network: Network) -> Array:
     """Whether throats (T,) have the sections of this module.
 
-    A fine is at one corner of them, they are not `NARROW`, and no side wall cuts them. A bed of
-    fines alone, such as a cake, is a pack like others and has none.
+    A fine is at one corner of them, and they are not `NARROW`. A bed of fines alone, such as a
+    cake, is a pack like others and has none.
     """
     if network.image_fine.all():
         return np.zeros(len(network.throat_radius), bool)
     facet = network.image_position[network.throat_images]
     edge = np.linalg.norm(facet - np.roll(facet, 1, axis=1), axis=2).max(axis=1)
     fine = network.image_fine[network.throat_images].any(axis=1)
-    walled = wall_cuts(network)[0][:, 0] >= 0
-    return fine & (network.throat_radius > NARROW * edge) & ~walled
+    return fine & (network.throat_radius > NARROW * edge)
 
 
 def mixed_pores(network: Network) -> Array:
@@ -79,33 +72,36 @@ def fine_resistances(
     resistance is 0 where the throat has no side, and infinite where a section is closed. It is
     that of the `whole` (K,) throats alone. `heights` (K, 2) m are those of their nodes.
     """
+    parts = list(geometry.slices(len(throats), THROATS))
+    facets = [_facets(network, throats[part]) for part in parts]
     places = [
-        _near_facets(network, throats[part], heights[part])
-        for part in geometry.slices(len(throats), THROATS)
+        _near_facets(facet, heights[part]) for (facet, _), part in zip(facets, parts, strict=True)
     ]
     middle, reach = np.concatenate([p[0] for p in places]), np.concatenate([p[1] for p in places])
     solids = solids_of(network, middle, reach)
-    planes = (-np.inf, np.inf) if network.periodic[0] else tuple(network.box[0])
-    numbers = float(planes[0]), float(planes[1]), LENGTH_FLOOR * network.grain_radius
+    numbers = planes_of(network), LENGTH_FLOOR * network.grain_radius
     points = parts_of_triangle(DIVISIONS)
     out, ends = np.zeros((len(throats), 2)), np.full((len(throats), 3), np.nan)
-    for part in geometry.slices(len(throats), THROATS):
-        own = throats[part]
-        facet = network.image_position[network.throat_images[own]]
-        axes, height = np.array(facet_axes(network, own, facet)), heights[part]
+    for (facet, axes), part in zip(facets, parts, strict=True):
+        first, height = np.ascontiguousarray(facet[:, 0]), heights[part]
         _set_resistances(
-            (geometry.flat(facet), axes, np.ascontiguousarray(facet[:, 0]), height, whole[part]),
+            (geometry.flat(facet), axes, first, height, whole[part]),
             (solids.body, solids.cells, middle[part], reach[part]),
-            (points, network.throat_corner_radius[own]),
+            (points, network.throat_corner_radius[throats[part]]),
             numbers,
             (out[part], ends[part]),
         )
     return out, ends
 
 
-def _near_facets(network: Network, throats: Array, heights: Array) -> tuple[Array, Array]:
-    """Centroids (K, 3) m of the facets of `throats` (K,), and how far (K,) m spheres count."""
+def _facets(network: Network, throats: Array) -> tuple[Array, Array]:
+    """Corners (K, 3, 3) m of the facets of `throats` (K,), and their axes (3, K, 3)."""
     facet = network.image_position[network.throat_images[throats]]
+    return turned_inside(network, facet, np.array(facet_axes(network, throats, facet)))
+
+
+def _near_facets(facet: Array, heights: Array) -> tuple[Array, Array]:
+    """Centroids (K, 3) m of facets (K, 3, 3) m, and how far (K,) m spheres count."""
     middle = facet.mean(axis=1)
     corner = np.linalg.norm(facet - middle[:, None], axis=2).max(axis=1)
     return middle, np.hypot(REACH * corner, np.maximum(heights.max(axis=1), 0.0))
@@ -116,31 +112,27 @@ def _set_resistances(
     throats: tuple[Array, Array, Array, Array, Array],
     solids: tuple[Array, Cells, Array, Array],
     shape: tuple[Array, Array],
-    numbers: tuple[float, float, float],
+    numbers: tuple[Array, float],
     out: tuple[Array, Array],
 ) -> None:
     """Sets the resistances (K, 2) 1/m3 and 1/a (K, 3) 1/m of `out`."""
     base, axes, origin, height, whole = throats
     body, cells, middle, reach = solids
     points, corner_radius = shape
-    low_plane, high_plane, floor = numbers
+    planes, floor = numbers
     resistance, ends = out
     near, local = np.empty(ROOM, np.int64), np.empty((ROOM, 4))
-    discs, flux = np.empty((ROOM + 5, 4)), np.empty(STEPS + 1)
+    discs, flux = np.empty((ROOM + MOST_PLANES + 3, 4)), np.empty(STEPS + 1)
     side_lines = np.empty((3, 3))
-    lanes = np.empty((7, points.shape[1]))
+    lanes, lines = np.empty((7, points.shape[1])), np.empty((MOST_PLANES, 3))
     for t in range(len(base)):
         place = (middle[t, 0], middle[t, 1], middle[t, 2])
         count = set_near(place, reach[t], (body, cells), near)
         if count > len(near):
             near, local = np.empty(2 * count, np.int64), np.empty((2 * count, 4))
-            discs = np.empty((2 * count + 5, 4))
+            discs = np.empty((2 * count + MOST_PLANES + 3, 4))
             count = set_near(place, reach[t], (body, cells), near)
         _measure(body, near[:count], origin[t], axes[:, t], local)
-        planes = (
-            (origin[t, 0] - low_plane, high_plane - origin[t, 0]),
-            (axes[0, t, 0], axes[1, t, 0], axes[2, t, 0]),
-        )
         spans = spans_of(height[t], floor)
         set_sides(base[t], side_lines)
         facet = (base[t], corner_radius[t], side_lines)
@@ -159,7 +151,8 @@ def _set_resistances(
                     flux[k] = facet_flux
                     continue
                 many = _meet(local, count, facet, z, discs)
-                flux[k] = _flux(base[t], discs, many, points, lanes, planes, z)
+                section = (base[t], points, lanes, lines)
+                flux[k] = held_flux(section, (discs, many), (planes, origin[t], axes[:, t], z))
                 facet_flux = flux[k] if z == 0.0 else facet_flux
             ends[t, side] = _narrowness(flux[STEPS])
             if whole[t]:
@@ -214,44 +207,3 @@ def _meet(
             discs[i] = base[i, 0], base[i, 1], TIP * radius[i], 0.0
         many = 3
     return many
-
-
-@loops_in_place
-def _flux(
-    base: Array,
-    discs: Array,
-    many: int,
-    points: Array,
-    lanes: Array,
-    planes: tuple[tuple[float, float], tuple[float, float, float]],
-    z: float,
-) -> float:
-    """Flux m4 through a section at `z` m, which planes of pressure may hold.
-
-    `planes` are the distances m of both planes from the first corner of the facet, and the
-    components along x of the axes of the facet.
-    """
-    open_flux = points_flux(base, discs, many, points, lanes)
-    gap, (ux, uy, uz) = planes
-    across = ux * ux + uy * uy
-    if across <= SQUARE:
-        return open_flux
-    slope, long, most = np.sqrt(across), 0.0, 0.0
-    for p in range(len(lanes[6])):
-        most = max(most, lanes[6, p])
-    for i in range(3):
-        long = max(long, abs(base[i, 0]), abs(base[i, 1]))
-    held, huge = many, HUGE * long
-    for side in range(2):
-        sense = 1.0 - 2.0 * side
-        first = gap[side] + sense * z * uz
-        least = first
-        for i in range(3):
-            least = min(least, first + sense * (base[i, 0] * ux + base[i, 1] * uy))
-        if least < 2.0 * most * slope:
-            away = -sense * (first / slope + huge)
-            discs[held] = ux / slope * away, uy / slope * away, huge, least / slope
-            held += 1
-    if held == many:
-        return open_flux
-    return (1.0 - across) * open_flux + across * points_flux(base, discs, held, points, lanes)

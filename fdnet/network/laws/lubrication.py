@@ -14,10 +14,10 @@ It is within 7.5 % of the exact flow through every hyperboloid from a long tube 
 orifice (Happel and Brenner 1965, section 4-29).
 
 Where side walls hold the fluid (`Network.walls` "no-slip"), the sections that they cut are those
-of `wall_cross_section`. The cap of a grain centred beyond an x face shows the discs of a half
-ellipsoid (`Network.image_height`), and the flux is corrected for where the disc of the grain
-itself lies (`cut_grains`). With `fourth`, a section is narrowed by the fourth grain of the
-tetrahedron where that reaches in (`fourth_grain`).
+of `wall_cross_section` and `edge_cross_section`. The cap of a grain centred beyond an x face shows
+the discs of a half ellipsoid (`Network.image_height`), and the flux is corrected for where the
+disc of the grain itself lies (`cut_grains`). With `fourth`, a section is narrowed by the fourth
+grain of the tetrahedron where that reaches in (`fourth_grain`).
 """
 
 import numpy as np
@@ -26,11 +26,13 @@ from fdnet.network import geometry
 from fdnet.network.compiled import compiled_for_loops, compiled_inline, loops_in_place
 from fdnet.network.laws.cross_section import set_wedges
 from fdnet.network.laws.cut_grains import cut_corners, share_of_cut
+from fdnet.network.laws.edge_cross_section import edge_fluxes
 from fdnet.network.laws.fourth_grain import fourth_grains
 from fdnet.network.laws.open_sections import (
     SectionRoom,
     Throat,
     forget,
+    narrow,
     open_fluxes,
     section_room,
     set_discs,
@@ -258,7 +260,7 @@ def set_fluxes(
         throat: its facet.
         faces: what the faces of the box cut of it.
         span: of the sections.
-        others: as in `open_fluxes`.
+        others: as in `narrow`; without a fourth grain no sphere narrows the sections.
         more: room for the sections, where `forget` was called, and the table of `shear_ratio`.
     """
     low, high, sense = span
@@ -267,12 +269,16 @@ def set_fluxes(
     step = (high - low) / (len(flux) - 1)
     set_discs(throat, low, step, room)
     order, place, _, cut = faces
-    if order[0] >= 0:
+    if order[1] >= 0:
         wall_fluxes(place, (discs[order[0]], discs[order[1]]), (room[6][1], table), flux)
+    elif order[0] >= 0:
+        edge_fluxes(place, discs[order[0]], (room[6][1], table), flux)
     else:
-        open_fluxes(throat, (low, step, sense), others, room, table)
-        if max(cut[0, 3], cut[1, 3], cut[2, 3]) > 0.0:
-            rays = (room[5], room[4][0][3], table)
-            for k in range(len(flux)):
-                z = sense * (low + k * step)
-                flux[k] *= share_of_cut(throat[0], room[3][0][k], z, cut, rays)
+        open_fluxes(throat, room, table)
+    if others[0][3] > 0.0:
+        narrow(throat, (low, step, sense), others, room, table)
+    if max(cut[0, 3], cut[1, 3], cut[2, 3]) > 0.0:
+        rays = (room[5], room[4][0][3], table)
+        for k in range(len(flux)):
+            z = sense * (low + k * step)
+            flux[k] *= share_of_cut(throat[0], room[3][0][k], z, cut, rays)

@@ -80,14 +80,30 @@ def set_discs(throat: Throat, low: float, step: float, room: SectionRoom) -> Non
 
 
 @loops_in_place
-def open_fluxes(
+def open_fluxes(throat: Throat, room: SectionRoom, table: Array) -> None:
+    """Sets the fluxes m4 of laplacian(w) = -1 among the three discs of the sections of a throat.
+
+    `room` is of `section_room`, where `set_discs` has been called, and `table` that of
+    `shear_ratio`.
+    """
+    base, _, _, wedge = throat
+    flux, discs = room[0], room[1]
+    rows, lanes, corners = room[3]
+    if len(wedge):
+        even_fluxes(wedge, discs[0], (room[2], table), flux)
+    else:
+        uneven_fluxes(base, rows, (lanes, corners, table), flux)
+
+
+@loops_in_place
+def narrow(
     throat: Throat,
     span: tuple[float, float, float],
     others: tuple[Array, Array],
     room: SectionRoom,
     table: Array,
 ) -> None:
-    """Sets the fluxes m4 of laplacian(w) = -1 through the sections of one side of a throat.
+    """Multiplies the fluxes by the shares that a fourth grain and the spheres around leave.
 
     Args:
         throat: its facet.
@@ -99,26 +115,6 @@ def open_fluxes(
         room: of `section_room`, where `forget` and `set_discs` have been called.
         table: the table of `shear_ratio`.
     """
-    base, _, _, wedge = throat
-    flux, discs = room[0], room[1]
-    rows, lanes, corners = room[3]
-    if len(wedge):
-        even_fluxes(wedge, discs[0], (room[2], table), flux)
-    else:
-        uneven_fluxes(base, rows, (lanes, corners, table), flux)
-    if others[0][3] > 0.0:
-        _narrow(throat, span, others, room, table)
-
-
-@loops_in_place
-def _narrow(
-    throat: Throat,
-    span: tuple[float, float, float],
-    others: tuple[Array, Array],
-    room: SectionRoom,
-    table: Array,
-) -> None:
-    """Multiplies the fluxes by the shares that a fourth grain and the spheres around leave."""
     base, radius, flatness, _ = throat
     low, step, sense = span
     fourth, around = others

@@ -31,18 +31,28 @@ def parts_of_triangle(divisions: int) -> Array:
 
 
 @loops_in_place
-def points_flux(base: Array, discs: Array, many: int, points: Array, lanes: Array) -> float:
-    """Flux m4 of laplacian(w) = -1 through a triangle among the first `many` discs.
+def points_flux(
+    base: Array,
+    solid: tuple[Array, int],
+    walls: tuple[Array, int],
+    points: Array,
+    lanes: Array,
+) -> float:
+    """Flux m4 of laplacian(w) = -1 through a triangle among the first discs of `solid`.
 
     Where a ray meets no line midway to another disc, the longest side is taken as the way to it.
+    A wall that cuts the triangle is the mirror of what lies beyond it.
 
     Args:
         base: (3, 2) m, its corners.
-        discs: (n, 4) m, centres, radii, and how far the rims at least are from the triangle.
-        many: how many of them count.
+        solid: (n, 4) m, centres, radii, and how far the rims at least are from the triangle; and
+            how many of them count.
+        walls: (n, 3) unit normal into the box and distance m from the origin, of the lines in
+            which walls cut the section; and how many of them count.
         points: (2, p) of `parts_of_triangle`.
         lanes: (7, p) room.
     """
+    discs, many = solid
     ex, ey = base[1, 0] - base[0, 0], base[1, 1] - base[0, 1]
     fx, fy = base[2, 0] - base[0, 0], base[2, 1] - base[0, 1]
     gx, gy = ex - fx, ey - fy
@@ -53,6 +63,12 @@ def points_flux(base: Array, discs: Array, many: int, points: Array, lanes: Arra
         x[p] = base[0, 0] + points[0, p] * ex + points[1, p] * fx
         y[p] = base[0, 1] + points[0, p] * ey + points[1, p] * fy
         least[p] = np.inf
+    for w in range(walls[1]):
+        nx, ny, gap = walls[0][w, 0], walls[0][w, 1], walls[0][w, 2]
+        for p in range(number):
+            beyond = 2.0 * min(gap + nx * x[p] + ny * y[p], 0.0)
+            x[p] -= beyond * nx
+            y[p] -= beyond * ny
     _set_nearest_rims(discs, many, lanes)
     _set_midways(discs, many, longest, lanes)
     rho, way = lanes[5], lanes[6]

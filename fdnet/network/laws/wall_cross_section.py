@@ -31,7 +31,7 @@ from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array
 
 NARROWED = 0.25
-"""Part of the slipping flux that a throat carries where two walls cut it."""
+"""Part of the slipping flux that a throat carries which two walls cut between several grains."""
 TOLERANCE = 1e-9
 """Lengths up to this many mean grain radii are 0, and sines up to this are taken as this."""
 LANES = 6
@@ -42,34 +42,29 @@ def wall_cuts(network: Network) -> tuple[Array, Array, Array]:
     """How walls that hold the fluid cut each throat.
 
     A trapezoid is two triangles, each with share 1/2, so each carries the half-section; a triangle
-    with j on the wall is alone and carries two. A throat that two walls cut carries a quarter of
-    the slipping flux, as a narrow gap does.
+    with j on the wall is alone and carries two. The rectangle of an edge (`edge_cross_section`) is
+    two triangles, each with share 1/4, so each carries two quarter-sections. Only grains centred
+    on walls have other edges; their throats carry `NARROWED` of the slipping flux.
 
     Returns:
-        order: (T, 2) which corners of the facet are i and j; -1 where not exactly one wall cuts
-        it. place: (T, 3) m, heights of i and j above the wall, and their distance along it. part:
-        (T,) factor from the flux of the half-section (order >= 0), or of the slipping
-            section, to the flux of the whole throat.
+        order: (T, 2) which corners of the facet are i and j. On an edge j is -1, and both are -1
+        where no wall cuts the throat. place: (T, 3) m, heights of i and j above the wall, and
+        their distance along it; on an edge heights of i above both walls, and 0. part: (T,)
+        flux of the whole throat over that of the half-section, quarter-section, or slipping
+            section.
     """
     count = len(network.throat_share)
     order, place, part = np.full((count, 2), -1), np.zeros((count, 3)), np.ones(count)
-    cut = np.flatnonzero(network.throat_share < 1.0)
-    if network.walls == "slip" or not len(cut):
+    if network.walls == "slip":
         return order, place, part
-    part[cut] = NARROWED
-    single = cut[network.throat_share[cut] == 0.5]
+    single, double = (np.flatnonzero(network.throat_share == share) for share in (0.5, 0.25))
     corner, tolerance = network.corners_of(single), TOLERANCE * network.grain_radius
     own = network.image_grain[network.throat_images[single]]
     sides = [axis for axis in (1, 2) if not network.periodic[axis]]
     for i, image, j in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         apart = corner[:, image] - corner[:, i]
         for axis in sides:
-            rest = np.delete(apart, axis, axis=1)
-            pair = (
-                (own[:, i] == own[:, image])
-                & np.all(np.abs(rest) <= tolerance, axis=1)
-                & (np.abs(apart[:, axis]) > tolerance)
-            )
+            pair = (own[:, i] == own[:, image]) & _mirrored(apart, axis, tolerance)
             t = single[pair]
             across = corner[pair, j] - 0.5 * (corner[pair, i] + corner[pair, image])
             height = np.abs(across[:, axis])
@@ -77,7 +72,27 @@ def wall_cuts(network: Network) -> tuple[Array, Array, Array]:
             place[t, 0], place[t, 1] = 0.5 * np.abs(apart[pair, axis]), height
             place[t, 2] = np.linalg.norm(np.delete(across, axis, axis=1), axis=1)
             part[t] = np.where(height <= tolerance, 2.0, 1.0)
+    _set_edges(network, double, (order, place, part))
     return order, place, part
+
+
+def _mirrored(apart: Array, axis: int, tolerance: float) -> Array:
+    """Whether steps (K, 3) m lead across a wall normal to an axis, and along no other one."""
+    rest = np.delete(apart, axis, axis=1)
+    return np.all(np.abs(rest) <= tolerance, axis=1) & (np.abs(apart[:, axis]) > tolerance)
+
+
+def _set_edges(network: Network, double: Array, cuts: tuple[Array, Array, Array]) -> None:
+    """Sets what `wall_cuts` returns of the throats `double` (K,), which two walls cut."""
+    order, place, part = cuts
+    part[double] = NARROWED
+    corner, tolerance = network.corners_of(double), TOLERANCE * network.grain_radius
+    for i, j, k in ((0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)):
+        one, two = corner[:, j] - corner[:, i], corner[:, k] - corner[:, i]
+        right = _mirrored(one, 1, tolerance) & _mirrored(two, 2, tolerance)
+        t = double[right]
+        order[t, 0], part[t] = i, 2.0
+        place[t, 0], place[t, 1] = 0.5 * np.abs(one[right, 1]), 0.5 * np.abs(two[right, 2])
 
 
 @loops_in_place

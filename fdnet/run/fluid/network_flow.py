@@ -180,7 +180,7 @@ def pore_through(network: Network, flow: Flow) -> Array:
         return np.zeros(len(network.pore_group))
     group, count = network.pore_group, int(network.pore_group.max()) + 1
     first, second = group[network.throat_pores].T
-    flux = np.where(first == second, 0.0, flow.throat_flux * network.throat_share)
+    flux = np.where(first == second, 0.0, flow.throat_flux)
     forth, back = np.maximum(flux, 0.0), np.maximum(-flux, 0.0)
     into = np.bincount(second, forth, count) + np.bincount(first, back, count)
     out = np.bincount(first, forth, count) + np.bincount(second, back, count)
