@@ -28,6 +28,7 @@ from fdnet.studies.accuracy.numbers import page_numbers
 from fdnet.studies.accuracy.results import read_results
 from fdnet.studies.accuracy.rows import RULES, damaged_row, intact_row
 from fdnet.studies.accuracy.tables import damage_table
+from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.accuracy.vanishing import vanishing_rows
 from fdnet.studies.truth.cases import (
     EQUAL,
@@ -214,3 +215,5 @@ def test_the_recipe_has_the_spans_of_its_table(root):
     rows = [line for line in page.splitlines() if "| walls |" in line]
     spans = [float(part) for row in rows for part in row.split("|")[4].split(" to ")]
     assert f"{min(spans):.3f} to {max(spans):.3f}" == numbers["face_walls_after"]
+    table = read_named(root / "docs/validation/stokes_sections.csv")
+    assert {row["network_damage_law"] for row in table} == {"all-spheres"}

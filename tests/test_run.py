@@ -405,7 +405,7 @@ def test_two_runs_cannot_write_the_same_folder(tmp_path):
     refused = fdnet("run", case, "--out", out)
     os.close(lock)
     assert refused.returncode == 2
-    assert "another fdnet run is writing here" in refused.stderr
+    assert "another fdnet run, or fdnet stokes, is writing here" in refused.stderr
 
 
 def test_bad_input_writes_nothing_and_ends_with_2(tmp_path):

@@ -15,6 +15,7 @@ from fdnet.network.stokes.stokes import StokesFlow
 from fdnet.network.stokes.two_grids import estimate
 from fdnet.report.stokes_section import section_html
 from fdnet.run import stokes_grids
+from fdnet.run.folder import locked
 from fdnet.run.stokes_sections import (
     StokesSection,
     read_sections,
@@ -67,8 +68,7 @@ def resolved(finished, tmp_path_factory) -> Path:
 @pytest.mark.liggghts
 def test_the_network_agrees_with_the_flow_between_the_spheres(resolved):
     (row,) = with_network(
-        read_sections(resolved / "stokes" / "sections.csv"),
-        fdnet.open_run(resolved).summary["sections"],
+        read_sections(resolved / "stokes" / "sections.csv"), fdnet.open_run(resolved).summary
     )
     assert row["section"] == 1
     for key in ("k_initial", "k_damaged"):
@@ -109,11 +109,11 @@ def test_the_command_prints_both_and_the_report_shows_them(resolved, capsys):
     page = (resolved / "report.html").read_text()
     assert section_html([row]) in page
     assert page.count("Sections by resolved Stokes flow") == 1
-    case, sections = tiny("box.sides=walls"), fdnet.open_run(resolved).summary["sections"]
-    assert report_section(resolved, case, sections) == section_html([row])
-    assert report_section(resolved / "elsewhere", case, sections) == ""
+    case, summary = tiny("box.sides=walls"), fdnet.open_run(resolved).summary
+    assert report_section(resolved, case, summary) == section_html([row])
+    assert report_section(resolved / "elsewhere", case, summary) == ""
     slipping = tiny("box.sides=walls", "analysis.walls=slip")
-    assert report_section(resolved, slipping, sections) == ""
+    assert report_section(resolved, slipping, summary) == ""
 
 
 @pytest.mark.liggghts
@@ -132,12 +132,48 @@ def test_what_cannot_be_solved_is_refused_at_once(finished, arguments, words, ca
 
 
 @pytest.mark.liggghts
-@pytest.mark.parametrize("text", ["{", "[1, 2]", '{"a": 1}', '[{"state": "initial"}]'])
+@pytest.mark.parametrize("text", ["{", "[1, 2]", "{}", '[{"state": "initial"}]'])
 def test_kept_grids_that_cannot_be_read_are_named(resolved, tmp_path, text):
     folder = Path(shutil.copytree(resolved, tmp_path / "run"))
     (folder / "stokes" / "grids.json").write_text(text)
     with pytest.raises(CaseError, match=r"grids\.json: cannot be read"):
         stokes_sections(folder, (1,), across=ROUGH)
+
+
+@pytest.mark.liggghts
+@pytest.mark.parametrize("k", [float("nan"), -1.0, None])
+def test_kept_grids_with_impossible_numbers_are_named(resolved, tmp_path, k):
+    folder = Path(shutil.copytree(resolved, tmp_path / "run"))
+    grids = folder / "stokes" / "grids.json"
+    rows = json.loads(grids.read_text())
+    rows[1]["k"] = k
+    grids.write_text(json.dumps(rows))
+    with pytest.raises(CaseError, match=r"grids\.json: cannot be read"):
+        stokes_sections(folder, (1,), across=ROUGH)
+
+
+@pytest.mark.liggghts
+def test_nothing_else_writes_meanwhile(resolved):
+    with locked(resolved), pytest.raises(CaseError, match="fdnet stokes, is writing here"):
+        stokes_sections(resolved, (1,), across=ROUGH)
+    stokes_sections(resolved, (1,), across=ROUGH)
+
+
+@pytest.mark.liggghts
+def test_the_table_says_how_fine_the_grids_were(resolved, tmp_path):
+    """Another solve takes the place of the former, and shows how fine or rough it is."""
+    folder = Path(shutil.copytree(resolved, tmp_path / "run"))
+    (before,) = read_sections(folder / "stokes" / "sections.csv")
+    (row,) = stokes_sections(folder, (1,), across=1.6 * ROUGH)
+    spheres = fdnet.open_run(folder).spheres("damaged")
+    assert row["cell_damaged_m"] == pytest.approx(
+        spheres.fines().radius.mean() / (1.6 * ROUGH), rel=0.1
+    )
+    assert row["cell_damaged_m"] < before.cell_damaged_m
+    assert row["cell_initial_m"] == pytest.approx(
+        spheres.grains().radius.mean() / ROUGH_GRAIN, rel=0.1
+    )
+    assert row["network_damage_law"] == "all-spheres"
 
 
 @pytest.mark.parametrize("text", [b"", b"a,b\n1,2\n", b"\xff", HEAD, NOT_FINITE])
@@ -147,4 +183,4 @@ def test_a_table_that_cannot_be_read_is_named_and_stops_no_report(tmp_path, text
     table.write_bytes(text)
     with pytest.raises(CaseError, match=r"sections\.csv: .*call fdnet stokes again"):
         read_sections(table)
-    assert "call fdnet stokes again" in report_section(tmp_path, tiny(), [])
+    assert "call fdnet stokes again" in report_section(tmp_path, tiny(), {})

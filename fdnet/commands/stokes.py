@@ -58,7 +58,7 @@ def _text(row: Mapping[str, Any]) -> str:
 
     lines = [
         f"section {row['section']}, {1e3 * row['x_lo_m']:g} to {1e3 * row['x_hi_m']:g} mm, "
-        "cut out",
+        f"cut out; damage law of the network: {row['network_damage_law']}",
         _line("", "before, mD", "after, mD", "lost"),
     ]
     for name, prefix in (("resolved flow", ""), ("network", "network_")):
@@ -69,13 +69,15 @@ def _text(row: Mapping[str, Any]) -> str:
         lines.append(_line(name, in_millidarcy(before), in_millidarcy(after), shown))
     errors = (f"{row[f'{key}_error']:.1%}" for key in ("k_initial", "k_damaged"))
     lines.append(_line("error of the flow", *errors))
+    cells = (f"{1e6 * row[f'cell_{state}_m']:.3g}" for state in ("initial", "damaged"))
+    lines.append(_line("its finer cells, µm", *cells))
     over = (f"{_over(row, key):+.1%}" for key in ("k_initial_m2", "k_damaged_m2"))
     lines.append(_line("network over flow", *over))
     return "\n".join(lines)
 
 
 def _line(name: str, before: str, after: str, lost: str = "") -> str:
-    return f"{name:<18}{before:>14}{after:>14}{lost:>10}".rstrip()
+    return f"{name:<20}{before:>14}{after:>14}{lost:>10}".rstrip()
 
 
 def _over(row: Mapping[str, Any], key: str) -> float:

@@ -14,11 +14,13 @@ _HEAD = (
     "after, network (mD)",
     "lost, flow",
     "lost, network",
+    "cells of the flow (&micro;m)",
 )
 _NOTE = (
     "Resolved flow solves the Stokes equations between all spheres on two grids and needs no law "
     "of throats. The error behind &plusmn; is its own. The rest of this report is by the network; "
-    "where the two differ by more than that error, the difference is the error of the network."
+    "where the two differ by more than that error, the difference is the error of the network. "
+    "Cells are those of the finer grid, before and after. The damage law of the network is {}."
 )
 
 
@@ -29,7 +31,7 @@ def section_html(rows: Sequence[Mapping[str, Any]]) -> str:
     return (
         "<h2>Sections by resolved Stokes flow</h2>\n"
         f'<div class="scroll"><table>\n<tr>{head}</tr>\n{body}\n</table></div>\n'
-        f'<p class="note">{_NOTE}</p>'
+        f'<p class="note">{_NOTE.format(rows[0]["network_damage_law"])}</p>'
     )
 
 
@@ -42,6 +44,7 @@ def _cells(row: Mapping[str, Any]) -> str:
         in_millidarcy(row["network_k_damaged_m2"]),
         _share(row["k_reduction"]),
         _share(row["network_k_reduction"]),
+        f"{1e6 * row['cell_initial_m']:.3g}, {1e6 * row['cell_damaged_m']:.3g}",
     ]
     return "".join(f'<td class="number">{text}</td>' for text in texts)
 

@@ -3,6 +3,8 @@
 import fcntl
 import os
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -146,7 +148,7 @@ def open_folder(
         ) from error
     folder = RunFolder(path=path, lock=lock, was_empty=was_empty, made=made)
     try:
-        _take_lock(folder)
+        _take_lock(path, lock)
         if was_empty:
             mark_folder(path)
         remove_half_written(path)
@@ -158,12 +160,30 @@ def open_folder(
     return folder
 
 
-def _take_lock(folder: RunFolder) -> None:
+@contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """Holds the lock of the run folder `path` while the block runs.
+
+    Raises CaseError when another command is writing there, or the folder cannot be written.
+    """
     try:
-        fcntl.flock(folder.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        lock = os.open(path / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+    except OSError as error:
+        raise CaseError(f"{path}: cannot be written: {error.strerror}") from error
+    try:
+        _take_lock(path, lock)
+        yield
+    finally:
+        os.close(lock)
+
+
+def _take_lock(path: Path, lock: int) -> None:
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
         raise CaseError(
-            f"{folder.path}: another fdnet run is writing here; wait for it or give another --out"
+            f"{path}: another fdnet run, or fdnet stokes, is writing here; wait for it, or give "
+            "another --out to a run"
         ) from error
 
 

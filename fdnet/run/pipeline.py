@@ -258,7 +258,7 @@ def _write_summary(
             versions=versions(pack),
             commands=[session.options.command] if session.options.command else [],
             tables=[one.page for one in results.added if one.page is not None],
-            stokes=report_section(session.path, case, summary["sections"]),
+            stokes=report_section(session.path, case, summary),
             mechanics=section_html(session.path / "mechanics"),
         )
         html.write_report(session.path / "report.html", summary, parts=parts)

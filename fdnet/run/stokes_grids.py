@@ -77,6 +77,10 @@ class Slab:
         fine = ceil(float(self.edges.max()) * max(wanted))
         return ceil(fine / COARSER), fine
 
+    def cell(self, across: float) -> float:
+        """Edge of a cell of the finer grid, m."""
+        return float(self.edges.max()) / self.cells(across)[1]
+
     def size(self, cells: int) -> int:
         """Cells of the grid with `cells` on the longest edge."""
         return int(np.prod(stagger(self.edges, cells, closed=self.closed)[0].shape))
@@ -97,9 +101,14 @@ class KeptGrids:
         if path.is_file():
             names = {one.name for one in fields(StokesFlow)}
             try:
-                self.rows = [dict(row) for row in json.loads(path.read_text(encoding="utf-8"))]
+                rows = json.loads(path.read_text(encoding="utf-8"))
+                if not isinstance(rows, list):
+                    raise ValueError(f"{type(rows).__name__}, expected a list")
+                self.rows = [dict(row) for row in rows]
                 if not all(names <= row.keys() for row in self.rows):
                     raise ValueError(f"a grid lacks one of {', '.join(sorted(names))}")
+                if not all(0.0 < float(row["k"]) < np.inf for row in self.rows):
+                    raise ValueError("a permeability k is not positive and finite")
             except (ValueError, TypeError) as error:
                 raise CaseError(
                     f"{path}: cannot be read as solved grids ({error}); remove it, and its grids "

@@ -19,6 +19,7 @@ from fdnet.network.stokes.two_grids import Estimate
 from fdnet.report.later_sections import put_section
 from fdnet.report.stokes_section import NAME, section_html
 from fdnet.run.finished import FinishedRun
+from fdnet.run.folder import locked
 from fdnet.run.open_run import open_run
 from fdnet.run.stokes_grids import (
     ACROSS_A_FINE,
@@ -47,6 +48,8 @@ class StokesSection:
         k_damaged_m2: with fines, m2.
         k_damaged_error: share of it.
         k_reduction: 1 - k_damaged_m2 / k_initial_m2.
+        cell_initial_m: edge of a cell of the finer grid without fines, m.
+        cell_damaged_m: edge of a cell of the finer grid with fines, m.
     """
 
     x_lo_m: float
@@ -56,6 +59,8 @@ class StokesSection:
     k_damaged_m2: float
     k_damaged_error: float
     k_reduction: float
+    cell_initial_m: float
+    cell_damaged_m: float
 
 
 def stokes_sections(
@@ -77,19 +82,25 @@ def stokes_sections(
         follow: takes a line on each grid before it is solved.
 
     Returns:
-        For each section its number, the fields of `StokesSection`, and the permeabilities (m2) and
-        the reduction by the network.
+        For each section its number, the fields of `StokesSection`, and by the network the
+        permeabilities (m2), the reduction and the damage law.
 
     Raises:
         CaseError: there is no such section, the side walls let the fluid slip, the grid would be
-            too large, or `folder` holds no finished run.
+            too large, `folder` holds no finished run, or another command is writing there.
         FlowError: a solve fails its checks.
     """
     if not 1.0 <= across <= 20.0:
         raise CaseError(
             f"--across: {across:g}, expected 1 to 20 cells across the radius of a fine"
         )
-    run = open_run(folder)
+    with locked(open_run(folder).path):
+        return _resolved(open_run(folder), numbers, across, follow)
+
+
+def _resolved(
+    run: FinishedRun, numbers: Sequence[int], across: float, follow: Follow
+) -> list[dict[str, Any]]:
     spheres = {INITIAL: run.spheres("initial"), DAMAGED: run.spheres("damaged")}
     slabs = {number: _slabs(run, spheres, number) for number in numbers}
     for pair in slabs.values():
@@ -100,41 +111,49 @@ def stokes_sections(
     read_sections(table)  # refuses a broken table before hours of solving
     for pair in slabs.values():
         by_state = {slab.state: permeability_of(slab, across, kept, follow) for slab in pair}
-        row = _row(pair[0].span, by_state[INITIAL], by_state.get(DAMAGED, by_state[INITIAL]))
+        cells = {slab.state: slab.cell(across) for slab in pair}
+        row = StokesSection(
+            x_lo_m=pair[0].span[0],
+            x_hi_m=pair[0].span[1],
+            **_of(INITIAL, by_state[INITIAL], cells[INITIAL]),
+            **_of(DAMAGED, by_state[pair[-1].state], cells[pair[-1].state]),
+            k_reduction=1.0 - by_state[pair[-1].state].k / by_state[INITIAL].k,
+        )
         _write(table, [one for one in read_sections(table) if not _same(one, row)] + [row])
-    rows = with_network(read_sections(table), run.summary["sections"])
+    rows = with_network(read_sections(table), run.summary)
     if (run.path / "report.html").is_file():
         put_section(run.path / "report.html", NAME, section_html(rows))
     return [row for row in rows if row["section"] in slabs]
 
 
-def report_section(folder: Path, case: Case, sections: Sequence[Mapping[str, Any]]) -> str:
+def report_section(folder: Path, case: Case, summary: Mapping[str, Any]) -> str:
     """The section of the report as HTML; "" where no flow was resolved.
 
     There is none either where the network was analysed with walls that slip, for those of the
-    flow do not. A table that cannot be read is named there. `sections` are those of the summary of
-    the run in `folder`.
+    flow do not. A table that cannot be read is named there. `summary` is that of the run in
+    `folder`.
     """
     if _slips(case):
         return ""
     try:
-        rows = with_network(read_sections(folder / FOLDER / TABLE), sections)
+        rows = with_network(read_sections(folder / FOLDER / TABLE), summary)
     except CaseError as error:
         return f'<p class="note">{html.escape(str(error))}</p>'
     return section_html(rows) if rows else ""
 
 
 def with_network(
-    resolved: Sequence[StokesSection], sections: Sequence[Mapping[str, Any]]
+    resolved: Sequence[StokesSection], summary: Mapping[str, Any]
 ) -> list[dict[str, Any]]:
-    """The resolved sections that are `sections` of the summary, with what the network gives."""
+    """The resolved sections that are sections of the `summary`, with what the network gives."""
     rows = []
-    for section in sections:
+    law = {"network_damage_law": summary.get("damage_law_used") or summary["damage_law"]}
+    for section in summary["sections"]:
         for one in resolved:
             if one.x_lo_m == section["x_lo_m"] and one.x_hi_m == section["x_hi_m"]:
                 names = ("k_initial_m2", "k_damaged_m2", "k_reduction")
                 network = {f"network_{name}": section[name] for name in names}
-                rows.append({"section": section["section"]} | asdict(one) | network)
+                rows.append({"section": section["section"]} | asdict(one) | network | law)
     return rows
 
 
@@ -172,16 +191,8 @@ def _slips(case: Case) -> bool:
     return not all(case.periodic[1:]) and case.analysis.walls == "slip"
 
 
-def _row(span: tuple[float, float], before: Estimate, after: Estimate) -> StokesSection:
-    return StokesSection(
-        x_lo_m=span[0],
-        x_hi_m=span[1],
-        k_initial_m2=before.k,
-        k_initial_error=before.error,
-        k_damaged_m2=after.k,
-        k_damaged_error=after.error,
-        k_reduction=1.0 - after.k / before.k,
-    )
+def _of(state: str, flow: Estimate, cell: float) -> dict[str, float]:
+    return {f"k_{state}_m2": flow.k, f"k_{state}_error": flow.error, f"cell_{state}_m": cell}
 
 
 def _same(one: StokesSection, other: StokesSection) -> bool:

@@ -186,6 +186,29 @@ def test_walls_hold_the_fluid_as_in_a_duct(closed):
     assert extrapolate(*flows).k == pytest.approx(expected, rel=0.002)
 
 
+def test_walls_with_spheres_between_them_are_sheets_of_overlapping_spheres():
+    """Sheets, flat to 0.002 of the width, fill the rest of the periodic cell along y and z."""
+    place = np.array([[0.1, 0.3, 0.6], [0.45, 0.72, 0.25], [0.3, 0.5, 0.95]])
+    radius, thick = np.array([0.3, 0.28, 0.2]), 0.25
+    box = np.array([[0.0, 0.5], [0.0, 1.0], [0.0, 1.0]])
+    steps = np.arange(0.0, 1.0 + thick, thick / 8)
+    sheets = [np.meshgrid(steps[:16], steps, [1.0 + thick / 2], indexing="ij")]
+    sheets.append([sheets[0][0], sheets[0][2], sheets[0][1]])
+    flat = np.concatenate([np.stack(sheet, axis=-1).reshape(-1, 3) for sheet in sheets])
+    walled = resting(
+        np.concatenate([place, flat]),
+        np.concatenate([radius, np.full(len(flat), thick / 2)]),
+        box + np.array([[0.0, 0.0], [0.0, thick], [0.0, thick]]),
+    )
+    inside = resting(place, radius, box)
+    sheeted = extrapolate(*(solve_slab(walled, (0.0, 0.5), cells=n) for n in (25, 40))).k
+    closed = (False, True, True)
+    flows = (solve_slab(inside, (0.0, 0.5), cells=n, closed=closed) for n in (20, 32))
+    k = extrapolate(*flows).k
+    assert k == pytest.approx(sheeted * (1.0 + thick) ** 2, rel=0.015)
+    assert k < 0.9 * solve_slab(inside, (0.0, 0.5), cells=20).k
+
+
 def test_the_drag_of_a_wall_on_cells_of_unequal_edges():
     """Along each axis (1/t - 1) over the square of the edge, for a free share t of the step."""
     step, place, r = np.array([0.8, 1.25, 1.0]), np.array([4.1, 5.3, 4.4]), 2.2
