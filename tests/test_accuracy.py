@@ -28,8 +28,8 @@ from fdnet.studies.accuracy.numbers import page_numbers
 from fdnet.studies.accuracy.results import read_results
 from fdnet.studies.accuracy.rows import RULES, damaged_row, intact_row
 from fdnet.studies.accuracy.tables import damage_table
-from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.accuracy.vanishing import vanishing_rows
+from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.truth.cases import (
     EQUAL,
     LATTICE,
