@@ -58,7 +58,8 @@ def _text(row: Mapping[str, Any]) -> str:
 
     lines = [
         f"section {row['section']}, {1e3 * row['x_lo_m']:g} to {1e3 * row['x_hi_m']:g} mm, "
-        f"cut out; damage law of the network: {row['network_damage_law']}",
+        "cut out",
+        f"damage law of the network: {row['network_damage_law']}",
         _line("", "before, mD", "after, mD", "lost"),
     ]
     for name, prefix in (("resolved flow", ""), ("network", "network_")):
