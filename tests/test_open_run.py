@@ -95,7 +95,7 @@ def test_its_network_is_the_one_of_its_tables(run):
     assert network.pore_position == pytest.approx(places, rel=1e-7, abs=1e-12)
     flow = fdnet.solve_flow(network, run.conductance())
     k = flow.inflow * float(np.ptp(network.box[0])) / network.area
-    assert run.summary["damage_law_used"] == "all-spheres"
+    assert run.summary["damage_law_used"] == "combined"
     assert k == pytest.approx(run.summary["k_damaged_other_m2"], rel=1e-7, abs=0)
 
 

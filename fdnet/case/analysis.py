@@ -8,10 +8,10 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag, ValidationError
 
 from fdnet.case.names import (
-    ALL_SPHERES,
     AUTO,
     DEFAULT_LAW,
     MOST_SECTIONS,
+    OWN_NETWORK,
     DamageLawName,
     LawName,
     WallName,
@@ -56,8 +56,9 @@ class AnalysisChoices(Part):
     damage_law: DamageLawName = Field(
         AUTO,
         description="How fines lower the permeability: a law that damages the throats between "
-        'grains, or "all-spheres", the network of grains and fines together. "auto" takes the '
-        "most accurate one that its cost allows.",
+        'grains, "all-spheres", the network of grains and fines together, or "combined", a mean '
+        'of that and of "section-archie". "auto" takes the most accurate one that its cost '
+        "allows.",
     )
     clogging_threshold: Fraction | None = Field(
         None,
@@ -81,15 +82,15 @@ class AnalysisChoices(Part):
     walls: WallName = Field(
         "no-slip",
         description="Whether side walls hold the fluid or let it slip; known to "
-        '"lubrication", "side-kozeny", "section-archie" and "all-spheres".',
+        '"lubrication", "side-kozeny", "section-archie", "all-spheres" and "combined".',
     )
 
     def refusals(self) -> Iterator[str]:
         """Why laws do not go together, one sentence each."""
-        if self.damage_law == ALL_SPHERES and self.law != DEFAULT_LAW:
+        if self.damage_law in OWN_NETWORK and self.law != DEFAULT_LAW:
             yield (
-                f"analysis.damage_law: {ALL_SPHERES!r} is a network of its own with the law "
-                f"{DEFAULT_LAW!r}, analysis.law is {self.law!r}; take analysis.law = "
+                f"analysis.damage_law: {self.damage_law!r} needs a network of all spheres, whose "
+                f"law is {DEFAULT_LAW!r}, analysis.law is {self.law!r}; take analysis.law = "
                 f"{DEFAULT_LAW!r}, or another damage law"
             )
 

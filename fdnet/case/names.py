@@ -7,7 +7,14 @@ from typing import Literal, get_args
 
 LawName = Literal["thesis", "effective", "hydraulic", "series", "lubrication"]
 DamageLawName = Literal[
-    "auto", "all-spheres", "thesis", "thesis-code", "kozeny", "side-kozeny", "section-archie"
+    "auto",
+    "combined",
+    "all-spheres",
+    "thesis",
+    "thesis-code",
+    "kozeny",
+    "side-kozeny",
+    "section-archie",
 ]
 WallName = Literal["no-slip", "slip"]
 LAW_NAMES: tuple[LawName, ...] = get_args(LawName)
@@ -16,21 +23,25 @@ WALL_NAMES: tuple[WallName, ...] = get_args(WallName)
 DEFAULT_LAW: LawName = "lubrication"
 AUTO: DamageLawName = "auto"
 """The damage law of the default: the most accurate that its cost allows."""
+COMBINED: DamageLawName = "combined"
+"""The damage law that "auto" takes for up to `MOST_SPHERES` spheres."""
 ALL_SPHERES: DamageLawName = "all-spheres"
-DEFAULT_DAMAGE_LAW: DamageLawName = "side-kozeny"
-"""The damage law that "auto" takes for sections whose damage is light."""
 SECTION_ARCHIE: DamageLawName = "section-archie"
-"""The damage law that it takes for more than `MOST_SPHERES` spheres."""
+"""The damage law that it takes for more of them."""
+DEFAULT_DAMAGE_LAW: DamageLawName = "side-kozeny"
+"""The damage law that it takes with conductance laws other than `DEFAULT_LAW`."""
 MOST_SPHERES = 100_000
-"""Grains and fines up to which "auto" takes `all-spheres`."""
+"""Grains and fines up to which "auto" takes `combined`."""
+OWN_NETWORK: tuple[DamageLawName, ...] = (COMBINED, ALL_SPHERES)
+"""Damage laws that need the network of all spheres, and with it `DEFAULT_LAW`."""
 MOST_SECTIONS = 1000
 
 
 def law_pairs() -> list[tuple[LawName, DamageLawName]]:
     """All pairs of a conductance law and a damage law that go together.
 
-    `all-spheres` is a network of its own, whose law is `lubrication`.
+    Those of `OWN_NETWORK` go with `lubrication` alone.
     """
-    two_scale = [name for name in DAMAGE_LAW_NAMES if name not in (AUTO, ALL_SPHERES)]
+    two_scale = [name for name in DAMAGE_LAW_NAMES if name not in (AUTO, *OWN_NETWORK)]
     pairs = [(law, damage_law) for law in LAW_NAMES for damage_law in two_scale]
-    return [*pairs, (DEFAULT_LAW, ALL_SPHERES)]
+    return [*pairs, *((DEFAULT_LAW, name) for name in OWN_NETWORK)]

@@ -7,17 +7,17 @@ from typing import Any, Unpack
 import numpy as np
 
 from fdnet.case.analysis import AnalysisChoices, AnalysisKeys, with_visible_choices
-from fdnet.case.names import ALL_SPHERES, AUTO, DEFAULT_DAMAGE_LAW, law_pairs
+from fdnet.case.names import ALL_SPHERES, AUTO, DEFAULT_DAMAGE_LAW, OWN_NETWORK, law_pairs
 from fdnet.network.analysis import Analysis, laws_apart, worst_solve
 from fdnet.network.fines.occupancy import Occupancy
-from fdnet.network.flow.depth import Layers, Solved, layer_edges, make_layers
+from fdnet.network.flow.depth import Layers, layer_edges, make_layers, scaled_layers
 from fdnet.network.flow.flow import Flow
 from fdnet.network.flow.sections import Section, make_profile, make_sections, reduction, thin_slabs
 from fdnet.network.flow.slabs import SlabK
 from fdnet.network.laws.damage import CLEAN, Damage
 from fdnet.network.laws.named import LAWS
-from fdnet.network.resolved.accurate import AccurateLaw, accurate_law
-from fdnet.network.resolved.chosen import by_section, light_sections
+from fdnet.network.resolved.accurate import AccurateLaw, Permeabilities, accurate_law
+from fdnet.network.resolved.combined import over
 from fdnet.network.resolved.measured import Measured
 from fdnet.network.resolved.slab import Sides
 from fdnet.network.resolved.state import Log, State, solved
@@ -151,50 +151,47 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
     specimen, law = measured.specimen, options.law
     clean, clean_slabs = measured.clean(law, log)
     base = measured.base(law, log)
-    best = accurate_law(measured, options, clean_slabs, log)
-    auto, whole = options.damage_law == AUTO, options.damage_law in (AUTO, ALL_SPHERES)
-    name = DEFAULT_DAMAGE_LAW if whole else options.damage_law
+    best = accurate_law(measured, options, log)
+    name = options.damage_law if best is None else best.second
+    if name in (AUTO, *OWN_NETWORK):  # no fines, or a law of throats that "auto" has no better for
+        name = DEFAULT_DAMAGE_LAW
     final, damage = measured.damaged(options, name, log)
-    k_damaged, slabs = final.k, clean_slabs
-    more: dict[str, int] = {}
-    resolved = None if best is None else best.solved
-    mixed = auto and resolved is not None
-    if final is not clean and (best is None or mixed):
-        slabs = measured.damaged_slabs(final, options, name, log)
-    light = light_sections(clean_slabs, slabs)
-    taken = None if mixed and np.all(light) else best
-    if taken is not None:
-        k_damaged, slabs, more = _taken(taken, light & mixed, slabs, (specimen, base))
-        log.warnings += taken.refused
-    sections = make_sections(
-        specimen.edges, specimen.porosity, (clean_slabs, slabs), specimen.depth
-    )
-    _warn(log, clean, (final if taken is None else taken).flow, sections)
-    log.warnings += specimen_doubts(specimen, clean.k, options.walls)
-    other, k_other = _other(best, taken, final.k, name)
+    before = Permeabilities(k=clean.k, slabs=clean_slabs)
+    after = before
     if best is not None:
-        log.warnings += laws_apart((best.name, best.k), (name, final.k))
+        before, after = best.before, best.after
+        log.warnings += best.refused
+        log.warnings += laws_apart(_finest(best), (name, final.k))
+    elif final is not clean:
+        slabs = measured.damaged_slabs(final, options, name, log)
+        after = Permeabilities(k=final.k, slabs=slabs)
+    sections = make_sections(
+        specimen.edges, specimen.porosity, (before.slabs, after.slabs), specimen.depth
+    )
+    _warn(log, clean, (final if best is None else best).flow, sections)
+    log.warnings += specimen_doubts(specimen, clean.k, options.walls)
     law_used = np.full(len(final.conductance), CLEAN) if damage is None else damage.law_used
-    flows = [clean.flow, base.flow, final.flow, *clean_slabs.flows, *slabs.flows]
+    flows = [clean.flow, base.flow, final.flow, *clean_slabs.flows, *after.slabs.flows]
+    more = {} if best is None else dict(best.counts)
     return Analysis(
         network=base.network,
         occupancy=specimen.occupancy,
         law=law,
         damage_law=options.damage_law,
-        damage_law_used=_used(specimen, taken, name),
-        damage_law_other=other,
-        k_damaged_other=k_other,
+        damage_law_used=_used(specimen, best, name),
+        damage_law_other=None if best is None else name,
+        k_damaged_other=None if best is None else final.k,
         conductance_initial=base.conductance,
         conductance_damaged=final.conductance,
         law_used=frozen(law_used),
         flow_initial=base.flow,
         flow_damaged=final.flow,
-        k_initial=clean.k,
-        k_damaged=k_damaged,
+        k_initial=before.k,
+        k_damaged=after.k,
         k_moved=base.k if specimen.moved else None,
-        k_reduction=reduction(clean.k, k_damaged),
+        k_reduction=reduction(before.k, after.k),
         sections=sections,
-        layers=None if resolved is None else _layers(specimen, clean, resolved),
+        layers=None if best is None else _layers(specimen, (clean, clean_slabs), best),
         solver=worst_solve(flows if best is None else [*flows, best.flow]),
         counts=_counts(base, specimen.occupancy, damage, final.flow) | more,
         warnings=tuple(log.warnings),
@@ -203,16 +200,11 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
     )
 
 
-def _taken(
-    best: AccurateLaw, light: Array, slabs: SlabK, where: tuple[Specimen, State]
-) -> tuple[float, SlabK, dict[str, int]]:
-    """k m2, sections and counts by the most accurate law, and by `slabs` where `light` (S,)."""
-    specimen, base = where
-    if not np.any(light):
-        return best.k, best.slabs, dict(best.counts)
-    slabs, in_series = by_section(light, slabs, best.slabs, specimen.edges)
-    more = dict(best.counts) | {"sections_two_scale": int(light.sum())}
-    return min(in_series, base.k), slabs, more
+def _finest(best: AccurateLaw) -> tuple[str, float]:
+    """Name and k (m2) of what stands against the second law: all spheres, or the law itself."""
+    if best.all_spheres is None:
+        return best.name, best.after.k
+    return ALL_SPHERES, best.all_spheres.k
 
 
 def _without_laws(specimen: Specimen) -> dict[str, Any]:
@@ -232,31 +224,32 @@ def _without_laws(specimen: Specimen) -> dict[str, Any]:
     }
 
 
-def _other(
-    best: AccurateLaw | None, taken: AccurateLaw | None, k: float, name: str
-) -> tuple[str | None, float | None]:
-    """Name and k (m2) of the law that was computed and not taken, if there is one.
-
-    `k` is that by the law `name`.
-    """
-    if best is None:
-        return None, None
-    return (best.name, best.k) if taken is None else (name, k)
-
-
-def _used(specimen: Specimen, taken: AccurateLaw | None, name: str) -> str | None:
+def _used(specimen: Specimen, best: AccurateLaw | None, name: str) -> str | None:
     if specimen.fines is None or not len(specimen.fines):
         return None
-    return name if taken is None else taken.name
+    return name if best is None else best.name
 
 
-def _layers(specimen: Specimen, clean: State, resolved: Solved) -> Layers | None:
-    """Layers of the mean diameter of a fine, from the network that resolves them."""
-    initial, fines = solved(clean), specimen.fines
-    if initial is None or fines is None:
+def _layers(specimen: Specimen, clean: tuple[State, SlabK], best: AccurateLaw) -> Layers | None:
+    """Layers of the mean diameter of a fine, from the network that resolves them.
+
+    They are scaled section by section, so that they agree with the sections.
+    """
+    state, slabs = clean
+    initial, fines = solved(state), specimen.fines
+    if initial is None or fines is None or best.solved is None or best.all_spheres is None:
         return None
-    edges = layer_edges(clean.network.box, 2.0 * float(fines.radius.mean()))
-    return make_layers(initial, resolved, edges=edges, depth=specimen.depth)
+    edges = layer_edges(state.network.box, 2.0 * float(fines.radius.mean()))
+    layers = make_layers(initial, best.solved, edges=edges, depth=specimen.depth)
+    own = Permeabilities(k=state.k, slabs=slabs)
+    before, after = _factors(own, best.before), _factors(best.all_spheres, best.after)
+    return scaled_layers(layers, specimen.edges, before, after)
+
+
+def _factors(own: Permeabilities, wanted: Permeabilities) -> tuple[Array, float]:
+    """What turns the sections (S,) in place, and the whole, into those that are wanted."""
+    whole = wanted.k / own.k if own.k > 0.0 else 1.0
+    return over(wanted.slabs.inplace, own.slabs.inplace), whole
 
 
 def _warn(log: Log, clean: State, damaged: Flow, sections: tuple[Section, ...]) -> None:

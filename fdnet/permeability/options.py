@@ -7,8 +7,8 @@ from pathlib import Path
 
 from fdnet.case.names import (
     AUTO,
+    COMBINED,
     DAMAGE_LAW_NAMES,
-    DEFAULT_DAMAGE_LAW,
     DEFAULT_LAW,
     LAW_NAMES,
     MOST_SECTIONS,
@@ -64,8 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=DAMAGE_LAW_NAMES,
         metavar="NAME",
         help=f"damage law: {', '.join(DAMAGE_LAW_NAMES)} (default {AUTO}: up to {MOST_SPHERES} "
-        f"spheres all-spheres, or {DEFAULT_DAMAGE_LAW} where the damage is light; "
-        f"above {SECTION_ARCHIE})",
+        f"spheres {COMBINED}, above {SECTION_ARCHIE})",
     )
     parser.add_argument(
         "--compare-laws", action="store_true", help="all laws with all damage laws as a table"

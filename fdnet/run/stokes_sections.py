@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from fdnet.case.case import Case
-from fdnet.case.names import ALL_SPHERES, AUTO, DEFAULT_DAMAGE_LAW
 from fdnet.errors import CaseError
 from fdnet.files.atomic import write_text
 from fdnet.network.resolved.slab import cut_out
@@ -148,7 +147,7 @@ def with_network(
 ) -> list[dict[str, Any]]:
     """The resolved sections that are sections of the `summary`, with what the network gives."""
     rows = []
-    law = {"network_damage_law": _damage_law(summary)}
+    law = {"network_damage_law": str(summary.get("damage_law_used") or summary["damage_law"])}
     for section in summary["sections"]:
         for one in resolved:
             if one.x_lo_m == section["x_lo_m"] and one.x_hi_m == section["x_hi_m"]:
@@ -190,14 +189,6 @@ def _slab(run: FinishedRun, state: str, spheres: Snapshot, span: tuple[float, fl
 def _slips(case: Case) -> bool:
     """Whether the network has side walls that let the fluid slip; resolved flow has none."""
     return not all(case.periodic[1:]) and case.analysis.walls == "slip"
-
-
-def _damage_law(summary: Mapping[str, Any]) -> str:
-    """The damage law of the network, in words."""
-    used = str(summary.get("damage_law_used") or summary["damage_law"])
-    if summary["damage_law"] == AUTO and used == ALL_SPHERES:
-        return f"{used} ({DEFAULT_DAMAGE_LAW} where the damage is light)"
-    return used
 
 
 def _of(state: str, flow: Estimate, cell: float) -> dict[str, float]:

@@ -17,7 +17,6 @@ from fdnet.network.laws.section_rays import aim, set_sides
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse
-from fdnet.network.resolved import chosen, measured
 from fdnet.spheres.snapshot import Kind, Snapshot
 from fdnet.studies.truth.packs import read_pack, truth_folder
 from tests.network.packs import random_pack, with_fines
@@ -48,8 +47,8 @@ def test_k_is_that_of_the_network_of_all_spheres(pack, analysis):
     conductance = 1.0 / deposit_resistances(network).sum(axis=1)
     assert analysis.k_damaged == pytest.approx(whole_permeability(network, conductance)[0])
     assert analysis.damage_law_used == "all-spheres"
-    two_scale = analyse(pack, periodic=SIDES, damage_law="side-kozeny")
-    assert analysis.damage_law_other == two_scale.damage_law_used == "side-kozeny"
+    two_scale = analyse(pack, periodic=SIDES, damage_law="section-archie")
+    assert analysis.damage_law_other == two_scale.damage_law_used == "section-archie"
     assert analysis.k_damaged_other == pytest.approx(two_scale.k_damaged)
     assert len(analysis.conductance_damaged) == len(analysis.network.throat_radius)
 
@@ -134,21 +133,6 @@ def test_a_mirrored_periodic_pack_has_the_same_throats(pack):
     assert both[0] == pytest.approx(both[1], rel=1e-9)
 
 
-def test_auto_takes_the_two_scale_law_in_light_sections_alone(pack):
-    """All fines lie in the first half; the second keeps what it has without fines."""
-    crowd = with_fines(pack.grains(), 300, 0.2)
-    half = crowd.where((crowd.kind == Kind.GRAIN) | (crowd.position[:, 0] < 0.35 * pack.box[0, 1]))
-    result = {
-        law: analyse(half, periodic=SIDES, sections=2, damage_law=law)
-        for law in ("auto", "all-spheres", "side-kozeny")
-    }
-    k = {law: [one.k_damaged for one in full.sections] for law, full in result.items()}
-    assert k["auto"] == pytest.approx([k["all-spheres"][0], k["side-kozeny"][1]])
-    assert result["auto"].counts["sections_two_scale"] == 1
-    inplace = [one.k_damaged_inplace for one in result["auto"].sections]
-    assert result["auto"].k_damaged == pytest.approx(2.0 / np.sum(np.divide(1.0, inplace)))
-
-
 def test_spheres_around_a_facet_leave_all_some_or_nothing():
     """Of a section whose third corner's sphere has ended."""
     disc, side = np.array([0.3, 0.3, 1e-3]), sides()
@@ -191,27 +175,6 @@ def test_layers_are_as_thick_as_a_fine_and_fill_the_first_millimetre():
     assert layer_edges(box, 1e-4) == pytest.approx([0, 1e-4, 2e-4])
 
 
-def test_the_default_takes_all_spheres_up_to_a_number_of_them(pack, monkeypatch):
-    monkeypatch.setattr(chosen, "LIGHT", 1.0)
-    small = analyse(pack, periodic=SIDES)
-    assert (small.damage_law, small.damage_law_used) == ("auto", "all-spheres")
-    assert small.layers is not None
-    assert small.layers.fines_count.sum() <= small.invaded_count
-    monkeypatch.setattr(measured, "MOST_SPHERES", len(pack) - 1)
-    large = analyse(pack, periodic=SIDES)
-    assert (large.damage_law_used, large.damage_law_other) == ("section-archie", "side-kozeny")
-    assert large.k_damaged_other == pytest.approx(small.k_damaged_other)
-    assert large.k_damaged == analyse(pack, periodic=SIDES, damage_law="section-archie").k_damaged
-    monkeypatch.undo()
-    light = analyse(pack, periodic=SIDES)
-    assert light.k_damaged_other == pytest.approx(small.k_damaged)
-    assert (light.damage_law_used, light.damage_law_other) == ("side-kozeny", "all-spheres")
-    assert light.k_damaged == pytest.approx(small.k_damaged_other)
-    intact = analyse(pack.grains(), periodic=SIDES)
-    assert intact.damage_law_used is None
-    assert intact.k_damaged == intact.k_initial
-
-
 def test_fines_never_raise_k(pack):
     """One small fine makes the network finer, and its k may come out above that of the grains."""
     fines = pack.fines()
@@ -234,9 +197,10 @@ def test_a_section_without_fines_loses_nothing(pack):
     assert result.sections[1].k_reduction == 0.0
 
 
-def test_all_spheres_goes_with_its_own_law_alone(pack):
-    with pytest.raises(CaseError, match=r"analysis\.damage_law: 'all-spheres'.*'thesis'"):
-        analyse(pack, periodic=SIDES, law="thesis", damage_law="all-spheres")
+@pytest.mark.parametrize("name", ["all-spheres", "combined"])
+def test_all_spheres_goes_with_its_own_law_alone(pack, name):
+    with pytest.raises(CaseError, match=rf"analysis\.damage_law: '{name}'.*'thesis'"):
+        analyse(pack, periodic=SIDES, law="thesis", damage_law=name)
 
 
 def test_spheres_that_make_no_network_are_refused_or_left_to_the_other_law(pack):

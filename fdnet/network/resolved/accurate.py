@@ -1,23 +1,42 @@
-"""The most accurate law of damage that "auto" can afford.
+"""The most accurate law of damage that "auto" can afford, and the two that it is made of.
 
-That is the network of all spheres, up to the number of spheres that its cost allows. Above that
-number it is the damage law `section-archie` of the network of the grains, which comes nearest to
-it in specimens of full size (docs/accuracy.md).
+That is `combined` up to the number of spheres that its cost allows: the mean of the network of all
+spheres and of the damage law `section-archie` of the network of the grains. Above that number it
+is `section-archie` alone, which comes nearest to it in specimens of full size (docs/accuracy.md).
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from fdnet.case.analysis import AnalysisChoices
-from fdnet.case.names import ALL_SPHERES, AUTO, DEFAULT_LAW, SECTION_ARCHIE
+from fdnet.case.names import (
+    ALL_SPHERES,
+    AUTO,
+    COMBINED,
+    DEFAULT_DAMAGE_LAW,
+    DEFAULT_LAW,
+    SECTION_ARCHIE,
+)
 from fdnet.network.flow.depth import Solved
 from fdnet.network.flow.flow import Flow
 from fdnet.network.flow.slabs import SlabK
 from fdnet.network.resolved.all_spheres import AllSpheres
+from fdnet.network.resolved.combined import combined_slabs, in_series, over, scaled
 from fdnet.network.resolved.measured import Measured
-from fdnet.network.resolved.state import Log, State, capped
-from fdnet.network.specimen.specimen import Specimen
+from fdnet.network.resolved.state import Log, capped
 from fdnet.spheres.arrays import one_line
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Permeabilities:
+    """Of one state of a specimen: k of the whole, m2, and of its sections."""
+
+    k: float
+    slabs: SlabK
+
+    __repr__ = one_line
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -26,69 +45,80 @@ class AccurateLaw:
 
     Attributes:
         name: of the law.
-        k: m2, at most that of the grains.
-        slabs: of each section, cut out and in place.
+        second: name of the damage law of the network of the grains that is given next to it.
+        before: without fines.
+        after: with fines, at most that of the grains.
         flow: through the whole specimen.
         solved: the network of all spheres, where that was solved.
+        all_spheres: with fines, by that network alone; None without it.
         counts: of that network, or of the damage law.
         refused: sections whose spheres make no network of their own, one sentence each.
     """
 
     name: str
-    k: float
-    slabs: SlabK
+    second: str
+    before: Permeabilities
+    after: Permeabilities
     flow: Flow
     solved: Solved | None
+    all_spheres: Permeabilities | None
     counts: Mapping[str, int]
     refused: tuple[str, ...]
 
     __repr__ = one_line
 
 
-def accurate_law(
-    measured: Measured, choices: AnalysisChoices, before: SlabK, log: Log
-) -> AccurateLaw | None:
-    """The most accurate law where the damage law of `choices` asks for it, else None.
-
-    `before` are the sections without fines.
-    """
-    base = measured.base(choices.law, log)
+def accurate_law(measured: Measured, choices: AnalysisChoices, log: Log) -> AccurateLaw | None:
+    """The most accurate law where the damage law of `choices` asks for it, else None."""
     whole = measured.wanted(choices, log)
     if whole is not None:
-        return _of_all_spheres(whole, base, (before, measured.specimen))
+        finest = _of_all_spheres(measured, whole, choices, log)
+        alone = choices.damage_law == ALL_SPHERES
+        return finest if alone else _combined(measured, finest, choices, log)
     fines = measured.specimen.fines
     if fines is None or not len(fines) or choices.damage_law != AUTO or choices.law != DEFAULT_LAW:
         return None
     state, damage = measured.damaged(choices, SECTION_ARCHIE, log)
+    clean, slabs = measured.clean(choices.law, log)
     return AccurateLaw(
         name=SECTION_ARCHIE,
-        k=min(state.k, base.k),
-        slabs=measured.damaged_slabs(state, choices, SECTION_ARCHIE, log),
+        second=DEFAULT_DAMAGE_LAW,
+        before=Permeabilities(k=clean.k, slabs=slabs),
+        after=Permeabilities(
+            k=min(state.k, measured.base(choices.law, log).k),
+            slabs=measured.damaged_slabs(state, choices, SECTION_ARCHIE, log),
+        ),
         flow=state.flow,
         solved=None,
+        all_spheres=None,
         counts={} if damage is None else damage.counts,
         refused=(),
     )
 
 
-def _of_all_spheres(whole: AllSpheres, base: State, before: tuple[SlabK, Specimen]) -> AccurateLaw:
+def _of_all_spheres(
+    measured: Measured, whole: AllSpheres, choices: AnalysisChoices, log: Log
+) -> AccurateLaw:
     """The network of all spheres, at most the permeability of the grains.
 
     Fines never raise the permeability. Where few of them make the network of all spheres finer,
     its k may be above that of the grains by the difference of two errors; it is then set to that
-    of the grains, and counted. `before` are the sections without fines, and the specimen.
+    of the grains, and counted.
     """
-    clean_slabs, specimen = before
+    specimen, base = measured.specimen, measured.base(choices.law, log)
+    clean, clean_slabs = measured.clean(choices.law, log)
     slabs, above = whole.slabs, 0
     if not specimen.moved:
         slabs, above = capped(clean_slabs, whole.slabs, specimen.empty_sections())
-    network = whole.solved.network
+    network, after = whole.solved.network, Permeabilities(k=min(whole.k, base.k), slabs=slabs)
     return AccurateLaw(
         name=ALL_SPHERES,
-        k=min(whole.k, base.k),
-        slabs=slabs,
+        second=SECTION_ARCHIE,
+        before=Permeabilities(k=clean.k, slabs=clean_slabs),
+        after=after,
         flow=whole.solved.flow,
         solved=whole.solved,
+        all_spheres=after,
         counts={
             "all_spheres_pores": len(network.pore_radius),
             "all_spheres_throats": len(network.throat_radius),
@@ -97,4 +127,32 @@ def _of_all_spheres(whole: AllSpheres, base: State, before: tuple[SlabK, Specime
             "all_spheres_sections_above_grains": above,
         },
         refused=whole.refused,
+    )
+
+
+def _combined(
+    measured: Measured, finest: AccurateLaw, choices: AnalysisChoices, log: Log
+) -> AccurateLaw:
+    """The mean of all spheres (`finest`) and `section-archie`, section by section.
+
+    The sections without fines are by resolved flow where that is cheap and no grain moved.
+    """
+    specimen, clean = measured.specimen, finest.before.slabs
+    state, _ = measured.damaged(choices, SECTION_ARCHIE, log)
+    two_scale = measured.damaged_slabs(state, choices, SECTION_ARCHIE, log)
+    intact = measured.intact(log)
+    known = np.isfinite(intact) & (clean.cut_out > 0.0)
+    first = scaled(clean, np.where(known, over(intact, clean.cut_out), 1.0))
+    slabs = combined_slabs(clean, first, finest.after.slabs, two_scale)
+    k_first = limit = in_series(first.inplace, specimen.edges) if any(known) else finest.before.k
+    if specimen.moved:
+        limit = measured.base(choices.law, log).k
+    else:
+        slabs, _ = capped(first, slabs, specimen.empty_sections())
+    return replace(
+        finest,
+        name=COMBINED,
+        before=Permeabilities(k=k_first, slabs=first),
+        after=Permeabilities(k=min(in_series(slabs.inplace, specimen.edges), limit), slabs=slabs),
+        counts={**finest.counts, "sections_resolved": int(known.sum())},
     )

@@ -3,12 +3,14 @@
 from dataclasses import dataclass, field
 from functools import partial
 
+import numpy as np
+
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.names import (
-    ALL_SPHERES,
     AUTO,
     DEFAULT_LAW,
     MOST_SPHERES,
+    OWN_NETWORK,
     SECTION_ARCHIE,
 )
 from fdnet.errors import FlowError, NetworkError
@@ -18,6 +20,7 @@ from fdnet.network.laws.damage import Damage, DamageLaw
 from fdnet.network.laws.named import LAWS, damage_law
 from fdnet.network.network import Network
 from fdnet.network.resolved.all_spheres import AllSpheres, measure_all_spheres
+from fdnet.network.resolved.intact import resolved_intact
 from fdnet.network.resolved.slab import CutNetworks, Sides, cut_networks
 from fdnet.network.resolved.state import Log, State, clean_halves, make_state, state_slabs
 from fdnet.network.specimen.specimen import Specimen
@@ -34,6 +37,8 @@ class Measured:
     _final: dict[str, State] = field(default_factory=dict)
     _cut: dict[bool, CutNetworks] = field(default_factory=dict)
     _all: AllSpheres | None = None
+    _damaged: dict[tuple[str, str], tuple[State, Damage | None]] = field(default_factory=dict)
+    _intact: Array | None = None
 
     def clean(self, law: str, log: Log) -> tuple[State, SlabK]:
         """The first grains without fines by a conductance law, and its sections."""
@@ -59,9 +64,26 @@ class Measured:
         base, occupancy = self.base(choices.law, log), self.specimen.occupancy
         if occupancy is None:
             return base, None
-        with log.timed("conductance"):
-            damage = _law(choices, name)(base.network, occupancy, base.conductance)
-        return make_state(base.network, damage.conductance, log, halves=base.halves), damage
+        if (choices.law, name) not in self._damaged:
+            with log.timed("conductance"):
+                damage = _law(choices, name)(base.network, occupancy, base.conductance)
+            state = make_state(base.network, damage.conductance, log, halves=base.halves)
+            self._damaged[choices.law, name] = state, damage
+        return self._damaged[choices.law, name]
+
+    def intact(self, log: Log) -> Array:
+        """The sections (S,) without fines by resolved flow, m2; not a number where it is dear.
+
+        Grains that the invasion moved have no such values.
+        """
+        if self._intact is None:
+            edges, unsolved = self.specimen.edges, len(self.specimen.edges) - 1
+            if self.specimen.moved:
+                return np.full(unsolved, np.nan)
+            with log.timed("solve"):
+                self._intact, refused = resolved_intact(self.specimen.grains[0], edges, self.sides)
+            log.warnings += refused
+        return self._intact
 
     def damaged_slabs(self, state: State, choices: AnalysisChoices, name: str, log: Log) -> SlabK:
         """The sections of `damaged`; their own networks hold their own part of the fines."""
@@ -89,9 +111,9 @@ class Measured:
         warning, where these make no network.
         """
         fines, name = self.specimen.fines, choices.damage_law
-        if fines is None or not len(fines) or name not in (AUTO, ALL_SPHERES):
+        if fines is None or not len(fines) or name not in (AUTO, *OWN_NETWORK):
             return None
-        if name == ALL_SPHERES:
+        if name in OWN_NETWORK:
             return self.all_spheres(log)
         if choices.law != DEFAULT_LAW or len(fines) + len(self.specimen.grains[1]) > MOST_SPHERES:
             return None
