@@ -27,6 +27,7 @@ from fdnet.network.resolved.combined import combined_slabs, in_series, over, sca
 from fdnet.network.resolved.measured import Measured
 from fdnet.network.resolved.state import Log, capped
 from fdnet.spheres.arrays import one_line
+from fdnet.spheres.snapshot import frozen
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -143,7 +144,10 @@ def _combined(
     intact = measured.intact(log)
     known = np.isfinite(intact) & (clean.cut_out > 0.0)
     first = scaled(clean, np.where(known, over(intact, clean.cut_out), 1.0))
-    slabs = combined_slabs(clean, first, finest.after.slabs, two_scale)
+    whole = finest.after.slabs
+    if not specimen.moved:  # fines do not raise k of a section in place either
+        whole = replace(whole, inplace=frozen(np.minimum(whole.inplace, clean.inplace)))
+    slabs = combined_slabs(clean, first, whole, two_scale)
     k_first = limit = in_series(first.inplace, specimen.edges) if any(known) else finest.before.k
     if specimen.moved:
         limit = measured.base(choices.law, log).k

@@ -11,6 +11,7 @@ from itertools import pairwise
 from math import ceil
 
 import numpy as np
+from scipy.fft import next_fast_len
 
 from fdnet.errors import CaseError, FlowError
 from fdnet.network.resolved.slab import Sides, cut_out
@@ -20,8 +21,8 @@ from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
 ACROSS = (12.0, 20.0)
 """Cells of the two grids across the mean grain of a section."""
-MOST_CELLS = 150_000
-"""Cells of the finer grids of all sections together; one or two seconds on one core."""
+MOST_CELLS = 250_000
+"""Cells of the finer grids of all sections together; some three seconds on one core."""
 LARGEST_ERROR = 0.05
 """Estimated error, as a share of k, above which a section keeps the value of the network."""
 TOLERANCE = 1e-3
@@ -61,9 +62,9 @@ def resolved_intact(grains: Snapshot, edges: Array, sides: Sides) -> tuple[Array
 
 
 def _cells(slab: Snapshot) -> Iterator[int]:
-    """Cells of the two grids on the longest edge."""
-    longest = float(np.diff(slab.box, axis=1).max())
-    return (ceil(0.5 * across * longest / float(slab.radius.mean())) for across in ACROSS)
+    """Cells of the two grids on the longest edge, numbers whose Fourier transform is fast."""
+    longest = float(np.diff(slab.box, axis=1).max()) / float(slab.radius.mean())
+    return (next_fast_len(ceil(0.5 * across * longest)) for across in ACROSS)
 
 
 def _size(slab: Snapshot) -> int:
