@@ -23,9 +23,16 @@ from fdnet.network.flow.depth import Solved
 from fdnet.network.flow.flow import Flow
 from fdnet.network.flow.slabs import SlabK
 from fdnet.network.resolved.all_spheres import AllSpheres
-from fdnet.network.resolved.combined import combined_slabs, in_series, over, scaled
+from fdnet.network.resolved.combined import (
+    carried_slabs,
+    combined_slabs,
+    in_series,
+    over,
+    scaled,
+)
 from fdnet.network.resolved.measured import Measured
 from fdnet.network.resolved.state import Log, capped
+from fdnet.network.specimen.specimen import Specimen
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import frozen
 
@@ -108,24 +115,32 @@ def _of_all_spheres(
     """
     specimen, base = measured.specimen, measured.base(choices.law, log)
     clean, clean_slabs = measured.clean(choices.law, log)
-    slabs, above = whole.slabs, 0
+    own, above = whole.slabs, 0
     if not specimen.moved:
-        slabs, above = capped(clean_slabs, whole.slabs, specimen.empty_sections())
-    network, after = whole.solved.network, Permeabilities(k=min(whole.k, base.k), slabs=slabs)
+        own, above = capped(clean_slabs, whole.slabs, specimen.empty_sections())
+    raw = after = Permeabilities(k=min(whole.k, base.k), slabs=own)
+    before = Permeabilities(k=clean.k, slabs=clean_slabs)
+    known = np.isfinite(measured.intact(log)) & (clean_slabs.cut_out > 0.0)
+    if np.any(known):
+        factor = np.where(known, over(measured.intact(log), clean_slabs.cut_out), 1.0)
+        before = _in_series(scaled(clean_slabs, factor), specimen)
+        after = _in_series(carried_slabs(clean_slabs, before.slabs, own), specimen, before.k)
+    network = whole.solved.network
     return AccurateLaw(
         name=ALL_SPHERES,
         second=SECTION_ARCHIE,
-        before=Permeabilities(k=clean.k, slabs=clean_slabs),
+        before=before,
         after=after,
         flow=whole.solved.flow,
         solved=whole.solved,
-        all_spheres=after,
+        all_spheres=raw,
         counts={
             "all_spheres_pores": len(network.pore_radius),
             "all_spheres_throats": len(network.throat_radius),
             "all_spheres_hidden": network.counts["grains_hidden"],
             "all_spheres_above_grains": int(whole.k > base.k),
             "all_spheres_sections_above_grains": above,
+            "sections_resolved": int(known.sum()),
         },
         refused=whole.refused,
     )
@@ -134,29 +149,20 @@ def _of_all_spheres(
 def _combined(
     measured: Measured, finest: AccurateLaw, choices: AnalysisChoices, log: Log
 ) -> AccurateLaw:
-    """The mean of all spheres (`finest`) and `section-archie`, section by section.
-
-    The sections without fines are by resolved flow where that is cheap and no grain moved.
-    """
-    specimen, clean = measured.specimen, finest.before.slabs
+    """The mean of all spheres (`finest`) and `section-archie`, section by section."""
+    specimen, first, whole = measured.specimen, finest.before.slabs, finest.after.slabs
+    clean = measured.clean(choices.law, log)[1]
     state, _ = measured.damaged(choices, SECTION_ARCHIE, log)
     two_scale = measured.damaged_slabs(state, choices, SECTION_ARCHIE, log)
-    intact = measured.intact(log)
-    known = np.isfinite(intact) & (clean.cut_out > 0.0)
-    first = scaled(clean, np.where(known, over(intact, clean.cut_out), 1.0))
-    whole = finest.after.slabs
+    limit = finest.before.k if not specimen.moved else measured.base(choices.law, log).k
     if not specimen.moved:  # fines do not raise k of a section in place either
-        whole = replace(whole, inplace=frozen(np.minimum(whole.inplace, clean.inplace)))
-    slabs = combined_slabs(clean, first, whole, two_scale)
-    k_first = limit = in_series(first.inplace, specimen.edges) if any(known) else finest.before.k
-    if specimen.moved:
-        limit = measured.base(choices.law, log).k
-    else:
+        whole = replace(whole, inplace=frozen(np.minimum(whole.inplace, first.inplace)))
+    slabs = combined_slabs(first, whole, scaled(two_scale, over(first.cut_out, clean.cut_out)))
+    if not specimen.moved:
         slabs, _ = capped(first, slabs, specimen.empty_sections())
-    return replace(
-        finest,
-        name=COMBINED,
-        before=Permeabilities(k=k_first, slabs=first),
-        after=Permeabilities(k=min(in_series(slabs.inplace, specimen.edges), limit), slabs=slabs),
-        counts={**finest.counts, "sections_resolved": int(known.sum())},
-    )
+    return replace(finest, name=COMBINED, after=_in_series(slabs, specimen, limit))
+
+
+def _in_series(slabs: SlabK, specimen: Specimen, most: float = np.inf) -> Permeabilities:
+    """The sections, and the whole from those in place, at most `most` m2."""
+    return Permeabilities(k=min(in_series(slabs.inplace, specimen.edges), most), slabs=slabs)

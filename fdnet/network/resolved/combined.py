@@ -6,6 +6,8 @@ under light damage and the worse one under heavy damage. Their errors are indepe
 other, so the mean of the logarithms with weights 1 / error^2 is better than either.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from fdnet.network.flow.slabs import SlabK
@@ -17,25 +19,22 @@ ERROR_SECTION_ARCHIE = 0.13
 """Error of ln k/k0 by `section-archie` over ln k/k0 itself, on the same slabs."""
 
 
-def combined(network: Array, intact: Array, all_spheres: Array, section_archie: Array) -> Array:
-    """Permeability (S,) m2 of sections with fines, from two of them with fines.
+def combined(intact: Array, all_spheres: Array, section_archie: Array) -> Array:
+    """Permeability (S,) m2 of sections with fines, from two of them.
 
     Args:
-        network: (S,) m2, without fines, by the network of the grains.
-        intact: (S,) m2, without fines, as accurately as it is known; 0 only where `network` is.
+        intact: (S,) m2, without fines.
         all_spheres: (S,) m2, with fines, by the network of all spheres.
         section_archie: (S,) m2, with fines, by the network of the grains.
     """
-    whole = carried_over(network, intact, all_spheres)
-    two_scale = intact * over(section_archie, network)
-    both = (whole > 0.0) & (two_scale > 0.0)
-    log_whole, log_two, log_intact = (
-        np.log(np.where(both, k, 1.0)) for k in (whole, two_scale, intact)
+    both = (intact > 0.0) & (all_spheres > 0.0) & (section_archie > 0.0)
+    log_intact, log_whole, log_two = (
+        np.log(np.where(both, k, 1.0)) for k in (intact, all_spheres, section_archie)
     )
     taken = (log_whole - log_intact) ** 2
     weight = taken / (taken + (ERROR_ALL_SPHERES / ERROR_SECTION_ARCHIE) ** 2)
     mean = np.exp(weight * log_whole + (1.0 - weight) * log_two)
-    return frozen(np.where(both, mean, whole))
+    return frozen(np.where(both, mean, all_spheres))
 
 
 def carried_over(network: Array, intact: Array, all_spheres: Array) -> Array:
@@ -44,18 +43,33 @@ def carried_over(network: Array, intact: Array, all_spheres: Array) -> Array:
     Where the fines leave most of the permeability, the networks of the grains and of all spheres
     err alike, and k changes by the factor of the grains. Where they leave little, the throats that
     count are between fines, and it keeps its value. The exponent in between is the share left.
+
+    Args:
+        network: (S,) m2, without fines, by the network of the grains.
+        intact: (S,) m2, without fines, as accurately as it is known.
+        all_spheres: (S,) m2, with fines, by the network of all spheres.
     """
     left = np.minimum(over(all_spheres, network), 1.0)
-    return np.asarray(all_spheres * over(intact, network) ** left)
+    return frozen(all_spheres * over(intact, network) ** left)
 
 
-def combined_slabs(network: SlabK, intact: SlabK, whole: SlabK, two_scale: SlabK) -> SlabK:
-    """`combined` of sections cut out and in place; `whole` are those by all spheres."""
+def combined_slabs(intact: SlabK, all_spheres: SlabK, section_archie: SlabK) -> SlabK:
+    """`combined` of sections cut out and in place."""
+    return _of_both(combined, intact, all_spheres, section_archie)
+
+
+def carried_slabs(network: SlabK, intact: SlabK, all_spheres: SlabK) -> SlabK:
+    """`carried_over` of sections cut out and in place."""
+    return _of_both(carried_over, network, intact, all_spheres)
+
+
+def _of_both(law: Callable[..., Array], *slabs: SlabK) -> SlabK:
     cut_out, inplace = (
-        combined(*(getattr(slabs, name) for slabs in (network, intact, whole, two_scale)))
-        for name in ("cut_out", "inplace")
+        law(*(getattr(one, name) for one in slabs)) for name in ("cut_out", "inplace")
     )
-    return SlabK(cut_out=cut_out, inplace=inplace, flows=(*whole.flows, *two_scale.flows))
+    return SlabK(
+        cut_out=cut_out, inplace=inplace, flows=tuple(flow for one in slabs for flow in one.flows)
+    )
 
 
 def scaled(slabs: SlabK, factor: Array) -> SlabK:
