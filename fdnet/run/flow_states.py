@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.case.names import AUTO, DEFAULT_DAMAGE_LAW, OWN_NETWORK
+from fdnet.case.names import DEFAULT_DAMAGE_LAW
 from fdnet.network.field.of_pack import velocity_field
 from fdnet.network.field.streamlines import streamlines
 from fdnet.network.fines.invaded import cake_of
@@ -50,9 +50,9 @@ FlowOf = Callable[[Snapshot, float | None], FlowState]
 def flux_of(run: FinishedRun) -> FlowOf:
     """The flux of each throat in percent of the first flow through the specimen.
 
-    The laws are those of the run; "auto", "combined" and "all-spheres", which need all spheres,
-    give way to the default law of throats. Where no rate is known it is the one at the first
-    pressure drop. Fines that still move count as deposit.
+    The laws are those of the run; where it measured the damage in two ways, that of the throats.
+    Where no rate is known it is the one at the first pressure drop. Fines that still move count
+    as deposit.
     """
     from fdnet.report.vtk import write_flux_vtp
 
@@ -71,9 +71,9 @@ def flux_of(run: FinishedRun) -> FlowOf:
         )
 
     def _damaged(fines: Snapshot) -> Array:
-        name = choices.damage_law
+        names = (run.summary.get(f"damage_law_{which}") for which in ("other", "used"))
         law = damage_law(
-            DEFAULT_DAMAGE_LAW if name in (AUTO, *OWN_NETWORK) else name,
+            next((name for name in names if name), DEFAULT_DAMAGE_LAW),
             clogging_threshold=choices.clogging_threshold,
             middle_band=choices.middle_band,
         )

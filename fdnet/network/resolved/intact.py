@@ -55,8 +55,8 @@ def resolved_intact(grains: Snapshot, edges: Array, sides: Sides) -> tuple[Array
             unknown[number] = _permeability(slab, spans[number], closed)
         except (CaseError, FlowError) as error:
             refused.append(
-                f"the permeability of section {number + 1} without fines is that of the network, "
-                f"for resolved flow was not accurate enough: {error}"
+                f"section {number + 1} without fines was left to the network, for resolved flow "
+                f"on coarse grids is not accurate there: {error}"
             )
     return frozen(unknown), refused
 

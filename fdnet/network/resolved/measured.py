@@ -24,6 +24,7 @@ from fdnet.network.resolved.intact import resolved_intact
 from fdnet.network.resolved.slab import CutNetworks, Sides, cut_networks
 from fdnet.network.resolved.state import Log, State, clean_halves, make_state, state_slabs
 from fdnet.network.specimen.specimen import Specimen
+from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, frozen
 
 
@@ -39,6 +40,8 @@ class Measured:
     _all: AllSpheres | None = None
     _damaged: dict[tuple[str, str], tuple[State, Damage | None]] = field(default_factory=dict)
     _intact: Array | None = None
+
+    __repr__ = one_line
 
     def clean(self, law: str, log: Log) -> tuple[State, SlabK]:
         """The first grains without fines by a conductance law, and its sections."""

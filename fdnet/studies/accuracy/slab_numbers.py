@@ -40,6 +40,8 @@ def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
         **{f"slabs_aside_{key}": summary(aside, name) for key, name in pairs.items()},
         **{f"slabs_known_{key}": summary(known, name) for key, name in pairs.items()},
         "slabs_default_rms": percent(rms(values(aside, CHOSEN))),
+        "slabs_aside_k_default": percent(rms([row[f"{CHOSEN}: k"] for row in aside])),
+        "slabs_default_k0": percent(rms([row[f"{CHOSEN}: k0"] for row in rows])),
         "slabs_aside_k": percent(rms([row[f"{FINEST}: k"] for row in aside])),
         "slabs_aside_k_worst": f"{worst([row[f'{FINEST}: k'] for row in aside]):.3f}",
         "slabs_aside_k0": percent(rms([row[f"{DEFAULT}: k0"] for row in aside])),
