@@ -21,7 +21,7 @@ from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
 ACROSS = (12.0, 20.0)
 """Cells of the two grids across the mean grain of a section."""
-MOST_CELLS = 250_000
+MOST_CELLS = 200_000
 """Cells of the finer grids of all sections together; some three seconds on one core."""
 LARGEST_ERROR = 0.05
 """Estimated error, as a share of k, above which a section keeps the value of the network."""
@@ -55,8 +55,8 @@ def resolved_intact(grains: Snapshot, edges: Array, sides: Sides) -> tuple[Array
             unknown[number] = _permeability(slab, spans[number], closed)
         except (CaseError, FlowError) as error:
             refused.append(
-                f"section {number + 1} without fines was left to the network, for resolved flow "
-                f"on coarse grids is not accurate there: {error}"
+                f"section {number + 1} without fines was left to the network: resolved flow is "
+                f"too coarse there, {error}"
             )
     return frozen(unknown), refused
 

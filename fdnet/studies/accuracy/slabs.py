@@ -1,6 +1,6 @@
 """The laws on slabs of deposits that LIGGGHTS made: one row for each slab, model over truth."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from fdnet.case.names import ALL_SPHERES, AUTO
 from fdnet.network.laws.named import DEFAULT_LAW
-from fdnet.network.permeability import analyse
+from fdnet.network.permeability import compare
 from fdnet.spheres.snapshot import Array, Snapshot
 from fdnet.studies.accuracy.goals import percent, ratio, summary
 from fdnet.studies.accuracy.measurement import DEFAULT, PAIRS
@@ -54,9 +54,7 @@ def _row(line: dict[str, str], spheres: Snapshot, names: Sequence[str]) -> Row:
         "known_before": line["known_before"],
         "k_over_k0": float(line["k_over_k0"]),
     }
-    for name in names:
-        law, damage_law = name.split(" + ")
-        k0, k = _cut_out(spheres, planes, law=law, damage_law=damage_law)
+    for name, (k0, k) in zip(names, _cut_out(spheres, planes, names), strict=True):
         row |= {
             name: k / k0 / row["k_over_k0"],
             f"{name}: k0": k0 / truth["k0"],
@@ -72,15 +70,14 @@ def _inside(spheres: Snapshot, planes: Array) -> Array:
 
 
 def _cut_out(
-    spheres: Snapshot, planes: Array, *, law: str, damage_law: str
-) -> tuple[float, float]:
-    """k (m2) between the planes without and with the fines."""
-    edges = np.unique([*spheres.box[0], *planes])
-    result = analyse(
-        spheres, periodic="yz", sections=edges.tolist(), law=law, damage_law=damage_law
-    )
-    section = next(s for s in result.sections if s.x_lo == planes[0])
-    return section.k_initial, section.k_damaged
+    spheres: Snapshot, planes: Array, names: Sequence[str]
+) -> Iterator[tuple[float, float]]:
+    """k (m2) between the planes without and with the fines, by each pair of laws."""
+    edges = np.unique([*spheres.box[0], *planes]).tolist()
+    pairs = [(law, damage_law) for law, damage_law in (name.split(" + ") for name in names)]
+    for result in compare(spheres, periodic="yz", sections=edges, laws=pairs):
+        section = next(s for s in result.sections if s.x_lo == planes[0])
+        yield section.k_initial, section.k_damaged
 
 
 def slab_summary(rows: list[Row], names: Sequence[str] = SLAB_PAIRS) -> str:
