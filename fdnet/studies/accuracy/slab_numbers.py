@@ -55,7 +55,6 @@ def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
         "slabs_coarse_k": summed_up(row[f"{FINEST}: k"] for row in coarse),
         "slabs_fine": str(len(fine)),
         "slabs_fine_k": summed_up(row[f"{FINEST}: k"] for row in fine),
-        "slabs_known_k0": f"{percent(rms(known_k0))}, {worst(known_k0):.3f}",
         "slabs_known_k0_mean": percent(float(np.mean(np.log(known_k0)))),
         "slabs_intact": summed_up(row[f"{DEFAULT}: k0"] for row in rows),
         "slabs_least": f"{min(row['k_over_k0'] for row in rows):.3f}",
