@@ -7,6 +7,7 @@ import numpy as np
 
 from fdnet.case.names import MOST_SPHERES, SECTION_ARCHIE
 from fdnet.network.laws.named import DEFAULT_DAMAGE_LAW, DEFAULT_LAW
+from fdnet.network.resolved.combined import combined
 from fdnet.studies.accuracy.choices import CHOICES
 from fdnet.studies.accuracy.deposits import BED_SHARE
 from fdnet.studies.accuracy.face import face_numbers
@@ -28,7 +29,7 @@ from fdnet.studies.accuracy.goals import (
 )
 from fdnet.studies.accuracy.measurement import DEFAULT, PAIRS, RESOLVED
 from fdnet.studies.accuracy.results import Results
-from fdnet.studies.accuracy.slab_numbers import slab_numbers
+from fdnet.studies.accuracy.slab_numbers import ARCHIE, slab_numbers
 from fdnet.studies.accuracy.tables import KNOWN
 from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.truth.cases import EQUAL, LATTICE, LOOSE, UNEQUAL
@@ -114,6 +115,7 @@ def _damaged(rows: Sequence[Row]) -> dict[str, str]:
         "off_later_damage": percent(_farthest(later, DEFAULT), 0),
         "resolved_summary": summary(list(rows), RESOLVED),
         "worst_resolved": worst_case(resolved, RESOLVED),
+        "combined_summary": summed_up(map(_combined, resolved)),
         "high_resolved": percent(max(values(resolved, RESOLVED)) - 1.0, 0),
         "least_ratio": f"{min(ratios):.4f}",
         "most_ratio": f"{max(ratios):.2f}",
@@ -125,6 +127,13 @@ def _damaged(rows: Sequence[Row]) -> dict[str, str]:
         "default_dense": _of(rows, DEFAULT, ("E_r5_d4",)),
         "resolved_dense": _of(rows, RESOLVED, ("E_r5_d4",)),
     }
+
+
+def _combined(row: Row) -> float:
+    """k/k0 by the law `combined`, over the true one."""
+    left = [row["k_over_k0"] * row[name] for name in (RESOLVED, ARCHIE)]
+    parts = (np.array([min(one, 1.0)]) for one in left)
+    return float(combined(np.ones(1), *parts)[0] / row["k_over_k0"])
 
 
 def _deposits(results: Results) -> dict[str, str]:
