@@ -26,11 +26,11 @@ class Analysis:
         damage_law: name of the damage law that was asked for.
         damage_law_used: the one that `k_damaged` and the sections are from, where "auto" was asked
             for the one that it took; None without fines.
-        damage_law_other: name of the other of the two laws that "auto" chooses from, where it was
-            computed as well; else None. Values by pore and throat are of the network of the
-            grains, so with `all-spheres` they are those of this law.
+        damage_law_other: name of the second damage law, of the network of the grains, where it
+            was computed as well; else None. Values by pore and throat are then by it.
         k_damaged_other: permeability with fines by that law, m2; else None. The difference to
-            `k_damaged` is a measure of the error.
+            `k_damaged` is a measure of the error. It is by the network alone, also where
+            `k_initial` is by resolved flow in part.
         conductance_initial: (T,) clean conductance of each throat, m3 (flux times viscosity over
             pressure drop).
         conductance_damaged: (T,) the same with fines, m3.

@@ -17,7 +17,7 @@ from fdnet.network.flow.slabs import SlabK
 from fdnet.network.laws.damage import CLEAN, Damage
 from fdnet.network.laws.named import LAWS
 from fdnet.network.resolved.accurate import AccurateLaw, Permeabilities, accurate_law
-from fdnet.network.resolved.combined import over
+from fdnet.network.resolved.combined import in_series, over
 from fdnet.network.resolved.measured import Measured
 from fdnet.network.resolved.slab import Sides
 from fdnet.network.resolved.state import Log, State, solved
@@ -241,15 +241,20 @@ def _layers(specimen: Specimen, clean: tuple[State, SlabK], best: AccurateLaw) -
         return None
     edges = layer_edges(state.network.box, 2.0 * float(fines.radius.mean()))
     layers = make_layers(initial, best.solved, edges=edges, depth=specimen.depth)
-    own = Permeabilities(k=state.k, slabs=slabs)
-    before, after = _factors(own, best.before), _factors(best.all_spheres, best.after)
+    before, after = (
+        _factors(own.inplace, wanted.inplace, specimen.edges)
+        for own, wanted in (
+            (slabs, best.before.slabs),
+            (best.all_spheres.slabs, best.after.slabs),
+        )
+    )
     return scaled_layers(layers, specimen.edges, before, after)
 
 
-def _factors(own: Permeabilities, wanted: Permeabilities) -> tuple[Array, float]:
-    """What turns the sections (S,) in place, and the whole, into those that are wanted."""
-    whole = wanted.k / own.k if own.k > 0.0 else 1.0
-    return over(wanted.slabs.inplace, own.slabs.inplace), whole
+def _factors(own: Array, wanted: Array, edges: Array) -> tuple[Array, float]:
+    """What turns the sections (S,) in place into those that are wanted, and their series."""
+    whole, start = in_series(wanted, edges), in_series(own, edges)
+    return over(wanted, own), whole / start if start > 0.0 else 1.0
 
 
 def _warn(log: Log, clean: State, damaged: Flow, sections: tuple[Section, ...]) -> None:

@@ -201,7 +201,7 @@ def clean_up_rows(first: "Analysis", after: Returned) -> list[dict[str, Any]]:
                 "k_damaged_inplace_m2": damaged.k_damaged_inplace,
                 "k_returned_inplace_m2": back.k_damaged_inplace,
                 "damaged_k_over_k0": ratio(damaged.k_damaged, damaged.k_initial),
-                "return_k_over_k0": ratio(back.k_damaged, damaged.k_initial),
+                "return_k_over_k0": ratio(back.k_damaged, back.k_initial),
                 "fines_before": int(within.sum()),
                 "fines_left_it": int(np.sum(within & ~after.stayed)),
                 "fines_after": back.fines_count,
@@ -219,7 +219,7 @@ def clean_up_summary(first: "Analysis", after: Returned, record: dict[str, Any])
     """The keys that a clean-up adds to summary.json."""
     stayed = int(after.stayed.sum())
     return {
-        "return_k_over_k0": ratio(after.analysis.k_damaged, first.k_initial),
+        "return_k_over_k0": ratio(after.analysis.k_damaged, after.analysis.k_initial),
         "k_returned_m2": after.analysis.k_damaged,
         "clean_up": {
             "stop_reason": record["stop_reason"],

@@ -128,8 +128,8 @@ class FinishedRun:
     def conductance(self, state: State = "damaged") -> Array:
         """(T,) conductance of each throat, m3 (flux times viscosity over pressure drop).
 
-        With fines it is that of the two-scale damage law, also where `k_damaged_m2` of the summary
-        comes from the network of all spheres; then it belongs to `k_damaged_other_m2`.
+        With fines it is by the law `damage_law_other` of the summary, whose permeability is
+        `k_damaged_other_m2`; where there is none, by `damage_law_used`.
         """
         _check_state(state)
         return self.throats[f"conductance_{state}_m3"].to_numpy()

@@ -13,7 +13,7 @@ from fdnet.network.field.streamlines import streamlines
 from fdnet.network.fines.invaded import cake_of
 from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.flow.flow import Flow, solve_flow
-from fdnet.network.laws.named import LAWS, damage_law
+from fdnet.network.laws.named import DAMAGE_LAWS, LAWS, damage_law
 from fdnet.run.finished import FinishedRun
 from fdnet.spheres.images import wrapped
 from fdnet.spheres.snapshot import Array, Snapshot
@@ -71,9 +71,9 @@ def flux_of(run: FinishedRun) -> FlowOf:
         )
 
     def _damaged(fines: Snapshot) -> Array:
-        names = (run.summary.get(f"damage_law_{which}") for which in ("other", "used"))
+        names = (str(run.summary.get(f"damage_law_{which}")) for which in ("other", "used"))
         law = damage_law(
-            next((name for name in names if name), DEFAULT_DAMAGE_LAW),
+            next((name for name in names if name in DAMAGE_LAWS), str(DEFAULT_DAMAGE_LAW)),
             clogging_threshold=choices.clogging_threshold,
             middle_band=choices.middle_band,
         )

@@ -11,7 +11,7 @@ from fdnet.network.resolved import intact, measured
 from fdnet.network.resolved.combined import carried_over, combined, in_series
 from fdnet.network.resolved.intact import resolved_intact
 from fdnet.network.resolved.slab import Sides, cut_out
-from fdnet.network.stokes.stokes import extrapolate, solve_slab
+from fdnet.network.stokes.stokes import StokesFlow, extrapolate, solve_slab
 from fdnet.spheres.snapshot import Kind, Snapshot
 from tests.network.packs import random_pack, with_fines
 
@@ -139,12 +139,36 @@ def test_grids_that_disagree_leave_the_network(pack, monkeypatch):
     assert result.k_initial == plain.k_initial
 
 
-def test_moved_grains_keep_the_network(pack):
-    grains = pack.grains()
-    moved = replace(pack, position=pack.position + 1e-7 * (pack.kind == Kind.GRAIN)[:, None])
-    result = analyse(grains, moved, periodic=SIDES, sections=2)
+def test_moved_grains_keep_the_network_and_weigh_the_fines_alone(pack):
+    """All spheres come 1.2 times closer along x, and fines are weighed by the closer grains."""
+    closer = pack.position * [1.0 / 1.2, 1.0, 1.0]
+    result, whole, two_scale = compare(
+        pack.grains(),
+        replace(pack, position=closer),
+        periodic=SIDES,
+        laws=[("lubrication", name) for name in ("combined", "all-spheres", "section-archie")],
+    )
     assert result.damage_law_used == "combined"
     assert result.counts["sections_resolved"] == 0
+    k = (result.k_moved, whole.k_damaged, two_scale.k_damaged)
+    assert result.k_damaged == pytest.approx(float(combined(*one(*k))[0]))
+    assert result.k_moved < 0.9 * result.k_initial
+
+
+def test_a_coarse_grid_far_above_the_fine_one_leaves_the_network(pack, monkeypatch):
+    """The extrapolation would be negative."""
+    flows = iter([3.0, 1.0, 3.0, 1.0])
+    monkeypatch.setattr(
+        intact,
+        "solve_slab",
+        lambda *_, cells, **__: StokesFlow(
+            k=next(flows), iterations=1, residual=0.0, seconds=0.0, cells=cells, unknowns=1
+        ),
+    )
+    sides = Sides(periodic=(False, True, True), walls="no-slip")
+    k, refused = resolved_intact(pack.grains(), np.linspace(*pack.box[0], 3), sides)
+    assert np.all(np.isnan(k))
+    assert len(refused) == 1  # the other section takes more cells than are left
 
 
 def test_many_spheres_have_section_archie_alone(pack, monkeypatch):
@@ -168,7 +192,11 @@ def test_fines_in_the_open_that_the_finer_network_counts_as_gain_still_cost():
         kind=np.repeat([Kind.GRAIN, Kind.FINE], [len(grains), len(fines)]),
         box=1e-3 * np.array([[0, 3], [0, 4], [0, 4]]),
     )
+    lattice = replace(
+        lattice, **{n: 0.3 * getattr(lattice, n) for n in ("position", "radius", "box")}
+    )
     result = analyse(lattice, periodic=SIDES)
     assert result.counts["all_spheres_above_grains"] == 1
+    assert result.layers.drop_damaged.sum() == pytest.approx(1.0)  # 0.9 mm are the specimen
     assert result.k_damaged == pytest.approx(result.k_damaged_other)
     assert result.k_damaged < 0.99 * result.k_initial

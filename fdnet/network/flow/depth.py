@@ -176,6 +176,11 @@ def scaled_layers(
         layers,
         k_initial=frozen(layers.k_initial * first[inside]),
         k_damaged=frozen(layers.k_damaged * last[inside]),
-        drop_initial=frozen(layers.drop_initial * first_whole / first[inside]),
-        drop_damaged=frozen(layers.drop_damaged * last_whole / last[inside]),
+        drop_initial=frozen(_share(layers.drop_initial * first_whole, first[inside])),
+        drop_damaged=frozen(_share(layers.drop_damaged * last_whole, last[inside])),
     )
+
+
+def _share(drop: Array, factor: Array) -> Array:
+    """`drop` over `factor`; NaN where that is 0, as nothing flows."""
+    return np.divide(drop, factor, out=np.full_like(drop, np.nan), where=factor > 0.0)

@@ -1,8 +1,8 @@
-"""The most accurate law of damage that "auto" can afford, and the two that it is made of.
+"""The most accurate law of damage that "auto" can afford.
 
 That is `combined` up to the number of spheres that its cost allows: the mean of the network of all
 spheres and of the damage law `section-archie` of the network of the grains. Above that number it
-is `section-archie` alone, which comes nearest to it in specimens of full size (docs/accuracy.md).
+is `section-archie` alone, the nearest to all spheres in specimens of full size (docs/accuracy.md).
 """
 
 from collections.abc import Mapping
@@ -54,11 +54,12 @@ class AccurateLaw:
     Attributes:
         name: of the law.
         second: name of the damage law of the network of the grains that is given next to it.
-        before: without fines.
+        before: without fines, by resolved flow where that is known.
         after: with fines, at most that of the grains.
         flow: through the whole specimen.
         solved: the network of all spheres, where that was solved.
-        all_spheres: with fines, by that network alone; None without it.
+        all_spheres: with fines, by that network alone, at most that of the grains; None without
+            it.
         counts: of that network, or of the damage law.
         refused: sections whose spheres make no network of their own, one sentence each.
     """
@@ -120,9 +121,10 @@ def _of_all_spheres(
         own, above = capped(clean_slabs, whole.slabs, specimen.empty_sections())
     raw = after = Permeabilities(k=min(whole.k, base.k), slabs=own)
     before = Permeabilities(k=clean.k, slabs=clean_slabs)
-    known = np.isfinite(measured.intact(log)) & (clean_slabs.cut_out > 0.0)
+    intact, unsolved = measured.intact(log)
+    known = np.isfinite(intact) & (clean_slabs.cut_out > 0.0)
     if np.any(known):
-        factor = np.where(known, over(measured.intact(log), clean_slabs.cut_out), 1.0)
+        factor = np.where(known, over(intact, clean_slabs.cut_out), 1.0)
         before = _in_series(scaled(clean_slabs, factor), specimen)
         after = _in_series(carried_slabs(clean_slabs, before.slabs, own), specimen, before.k)
     network = whole.solved.network
@@ -142,7 +144,7 @@ def _of_all_spheres(
             "all_spheres_sections_above_grains": above,
             "sections_resolved": int(known.sum()),
         },
-        refused=whole.refused,
+        refused=(*whole.refused, *unsolved),
     )
 
 
@@ -154,10 +156,13 @@ def _combined(
     clean = measured.clean(choices.law, log)[1]
     state, _ = measured.damaged(choices, SECTION_ARCHIE, log)
     two_scale = measured.damaged_slabs(state, choices, SECTION_ARCHIE, log)
-    limit = finest.before.k if not specimen.moved else measured.base(choices.law, log).k
-    if not specimen.moved:  # fines do not raise k of a section in place either
+    limit = finest.before.k
+    if specimen.moved:  # the fines are weighed by what the grains have where they ended
+        first, limit = measured.base_slabs(choices.law, log), measured.base(choices.law, log).k
+    else:  # all spheres in place may be above the grains, which is no gain
         whole = replace(whole, inplace=frozen(np.minimum(whole.inplace, first.inplace)))
-    slabs = combined_slabs(first, whole, scaled(two_scale, over(first.cut_out, clean.cut_out)))
+    factor = over(finest.before.slabs.cut_out, clean.cut_out)
+    slabs = combined_slabs(first, whole, scaled(two_scale, factor))
     if not specimen.moved:
         slabs, _ = capped(first, slabs, specimen.empty_sections())
     return replace(finest, name=COMBINED, after=_in_series(slabs, specimen, limit))

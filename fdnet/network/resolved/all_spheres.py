@@ -61,7 +61,7 @@ def measure_all_spheres(
         except NetworkError as error:
             raise NetworkError(
                 f"all-spheres: grains and fines together make no network: {error}; use "
-                "analysis.damage_law = 'side-kozeny'"
+                "analysis.damage_law = 'section-archie'"
             ) from error
     with timed("conductance"):
         halves = deposit_resistances(network)

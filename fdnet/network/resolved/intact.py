@@ -55,8 +55,8 @@ def resolved_intact(grains: Snapshot, edges: Array, sides: Sides) -> tuple[Array
             unknown[number] = _permeability(slab, spans[number], closed)
         except (CaseError, FlowError) as error:
             refused.append(
-                f"section {number + 1} without fines was left to the network: resolved flow is "
-                f"too coarse there, {error}"
+                f"section {number + 1} without fines was left to the network: resolved flow gave "
+                f"no value there, {error}"
             )
     return frozen(unknown), refused
 
@@ -80,9 +80,9 @@ def _permeability(slab: Snapshot, span: tuple[float, float], closed: Closed) -> 
         for cells in _cells(slab)
     )
     end = extrapolate(coarse, fine)
-    if not end.relative_error <= LARGEST_ERROR:
+    if not (end.k > 0.0 and 0.0 <= end.relative_error <= LARGEST_ERROR):
         raise FlowError(
             f"stokes: two grids give {coarse.k:.4g} and {fine.k:.4g} m2, an error of "
-            f"{end.relative_error:.1%}, expected at most {LARGEST_ERROR:.0%}"
+            f"{abs(end.relative_error):.1%}, expected at most {LARGEST_ERROR:.0%}"
         )
     return end.k

@@ -39,7 +39,7 @@ class Measured:
     _cut: dict[bool, CutNetworks] = field(default_factory=dict)
     _all: AllSpheres | None = None
     _damaged: dict[tuple[str, str], tuple[State, Damage | None]] = field(default_factory=dict)
-    _intact: Array | None = None
+    _intact: tuple[Array, list[str]] | None = None
 
     __repr__ = one_line
 
@@ -74,18 +74,25 @@ class Measured:
             self._damaged[choices.law, name] = state, damage
         return self._damaged[choices.law, name]
 
-    def intact(self, log: Log) -> Array:
-        """The sections (S,) without fines by resolved flow, m2; not a number where it is dear.
+    def base_slabs(self, law: str, log: Log) -> SlabK:
+        """The sections of `base`."""
+        if not self.specimen.moved:
+            return self.clean(law, log)[1]
+        cut = self._own_slabs(law, log, final=True)
+        parts = None if cut is None else (cut, LAWS[law])
+        return state_slabs(self.base(law, log), self.specimen.edges, log, cut=parts)
 
-        Grains that the invasion moved have no such values.
+    def intact(self, log: Log) -> tuple[Array, list[str]]:
+        """The sections (S,) without fines by resolved flow, m2, and why some could not be solved.
+
+        They are not a number where that is dear, and where the invasion moved the grains.
         """
+        if self.specimen.moved:
+            return np.full(len(self.specimen.edges) - 1, np.nan), []
         if self._intact is None:
-            edges, unsolved = self.specimen.edges, len(self.specimen.edges) - 1
-            if self.specimen.moved:
-                return np.full(unsolved, np.nan)
+            grains, edges = self.specimen.grains[0], self.specimen.edges
             with log.timed("solve"):
-                self._intact, refused = resolved_intact(self.specimen.grains[0], edges, self.sides)
-            log.warnings += refused
+                self._intact = resolved_intact(grains, edges, self.sides)
         return self._intact
 
     def damaged_slabs(self, state: State, choices: AnalysisChoices, name: str, log: Log) -> SlabK:
