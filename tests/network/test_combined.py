@@ -11,6 +11,7 @@ from fdnet.network.resolved import intact, measured
 from fdnet.network.resolved.combined import carried_over, combined, in_series
 from fdnet.network.resolved.intact import resolved_intact
 from fdnet.network.resolved.slab import Sides, cut_out
+from fdnet.network.stokes.staggered import OPEN
 from fdnet.network.stokes.stokes import StokesFlow, extrapolate, solve_slab
 from fdnet.spheres.snapshot import Kind, Snapshot
 from tests.network.packs import random_pack, with_fines
@@ -117,7 +118,7 @@ def test_drops_of_scaled_layers_add_up_to_the_whole():
 
 def test_the_sections_at_the_face_are_solved_first(pack, monkeypatch):
     edges, sides = np.linspace(*pack.box[0], 3), Sides(periodic=(False, True, True), walls="slip")
-    size = intact._size(cut_out(pack.grains(), (edges[0], edges[1]), sides.periodic))
+    size = intact._size(cut_out(pack.grains(), (edges[0], edges[1]), sides.periodic), OPEN)
     monkeypatch.setattr(intact, "MOST_CELLS", int(1.5 * size))
     k, refused = resolved_intact(pack.grains(), edges, sides)
     assert np.isfinite(k).tolist() == [True, False]

@@ -15,7 +15,7 @@ from scipy.fft import next_fast_len
 
 from fdnet.errors import CaseError, FlowError
 from fdnet.network.resolved.slab import Sides, cut_out
-from fdnet.network.stokes.staggered import Closed
+from fdnet.network.stokes.staggered import Closed, stagger
 from fdnet.network.stokes.stokes import extrapolate, solve_slab
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
@@ -48,10 +48,10 @@ def resolved_intact(grains: Snapshot, edges: Array, sides: Sides) -> tuple[Array
     for number, slab in enumerate(slabs):
         if not len(slab):
             continue
-        left -= _size(slab)
-        if left < 0:
-            break
         try:
+            left -= _size(slab, closed)
+            if left < 0:
+                break
             unknown[number] = _permeability(slab, spans[number], closed)
         except (CaseError, FlowError) as error:
             refused.append(
@@ -67,10 +67,10 @@ def _cells(slab: Snapshot) -> Iterator[int]:
     return (next_fast_len(ceil(0.5 * across * longest)) for across in ACROSS)
 
 
-def _size(slab: Snapshot) -> int:
+def _size(slab: Snapshot, closed: Closed) -> int:
+    """Cells of the finer grid."""
     *_, finer = _cells(slab)
-    edges = np.diff(slab.box, axis=1)[:, 0]
-    return int(np.prod(np.ceil(finer * edges / edges.max())))
+    return int(np.prod(stagger(np.diff(slab.box, axis=1)[:, 0], finer, closed=closed)[0].shape))
 
 
 def _permeability(slab: Snapshot, span: tuple[float, float], closed: Closed) -> float:

@@ -47,9 +47,7 @@ class Measured:
         """The first grains without fines by a conductance law, and its sections."""
         if law not in self._first:
             state = _clean_state(self.specimen.first, law, log)
-            cut = self._own_slabs(law, log, final=False)
-            parts = None if cut is None else (cut, LAWS[law])
-            self._first[law] = state, state_slabs(state, self.specimen.edges, log, cut=parts)
+            self._first[law] = state, self._clean_slabs(state, law, log, final=False)
         return self._first[law]
 
     def base(self, law: str, log: Log) -> State:
@@ -78,9 +76,7 @@ class Measured:
         """The sections of `base`."""
         if not self.specimen.moved:
             return self.clean(law, log)[1]
-        cut = self._own_slabs(law, log, final=True)
-        parts = None if cut is None else (cut, LAWS[law])
-        return state_slabs(self.base(law, log), self.specimen.edges, log, cut=parts)
+        return self._clean_slabs(self.base(law, log), law, log, final=True)
 
     def intact(self, log: Log) -> tuple[Array, list[str]]:
         """The sections (S,) without fines by resolved flow, m2, and why some could not be solved.
@@ -140,6 +136,12 @@ class Measured:
         occupancy = measure_occupancy(network, fines, overlap=choices.throat_overlap)
         clean = LAWS[choices.law](network)
         return _law(choices, name)(network, occupancy, clean).conductance
+
+    def _clean_slabs(self, state: State, law: str, log: Log, *, final: bool) -> SlabK:
+        """The sections of the grains without fines, as they were or where they ended."""
+        cut = self._own_slabs(law, log, final=final)
+        parts = None if cut is None else (cut, LAWS[law])
+        return state_slabs(state, self.specimen.edges, log, cut=parts)
 
     def _own_slabs(self, law: str, log: Log, *, final: bool) -> CutNetworks | None:
         """The networks of the sections for the law `lubrication`; None for other laws.
