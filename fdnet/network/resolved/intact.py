@@ -2,8 +2,8 @@
 
 The throats of a section of some thirty grains are too few for their errors to cancel: its
 permeability by the network is off by 4 % (rms), and so is k/k0. Grains need no fine grid. With 12
-and 20 cells across the mean grain, extrapolated to no spacing, their permeability is within 1 %
-(docs/accuracy.md), in about the time that the network of all spheres takes.
+and 20 cells across the mean grain, extrapolated to no spacing, their permeability is off by 1.1 %
+(rms; docs/accuracy.md), in about the time that the network of all spheres takes.
 """
 
 from collections.abc import Iterator
