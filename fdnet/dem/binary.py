@@ -9,6 +9,7 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
+from fdnet.dem.environment import environment
 from fdnet.errors import CaseError, LiggghtsError
 
 KNOWN_VERSION = "3.8.0"
@@ -141,6 +142,7 @@ def _version(path: Path) -> str:
             check=False,
             stdin=subprocess.DEVNULL,
             cwd="/tmp",
+            env=environment(1),
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise LiggghtsError(

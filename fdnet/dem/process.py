@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO
 
+from fdnet.dem.environment import environment
 from fdnet.dem.verdict import SCREEN
 from fdnet.errors import LiggghtsError
 
@@ -44,7 +45,7 @@ def started(
             stdin=stdin,
             stdout=stdout,
             stderr=subprocess.STDOUT,
-            env=_environment(),
+            env=environment(ranks),
             start_new_session=True,
             pass_fds=(lock,),
             preexec_fn=_prepare_child(ranks, before),
@@ -88,14 +89,6 @@ def _locked(lock: int) -> bool:
     except OSError:
         return False
     return True
-
-
-def _environment() -> dict[str, str]:
-    return os.environ | {
-        "OMP_NUM_THREADS": "1",
-        "OMPI_ALLOW_RUN_AS_ROOT": "1",
-        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    }
 
 
 def _prepare_child(ranks: int, mask: set[int]) -> Callable[[], None]:

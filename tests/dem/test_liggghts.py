@@ -187,3 +187,12 @@ def test_lines_are_followed_whole(fake, tmp_path):
     lines: list[str] = []
     run(fake, tmp_path, "slowly", follow=lines.append)
     assert lines[-3:] == ["one line in two parts", "   100   20   1.5", "DECK_DONE"]
+
+
+def test_one_rank_sets_up_no_daemon_and_no_folder(tmp_path, monkeypatch):
+    """Open MPI takes a third of a second for them, and processes would share the folders."""
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "tmp"))
+    (tmp_path / "tmp").mkdir()
+    (tmp_path / "in.own").write_text('shell ls tmp > seen\nprint "DECK_DONE"\n')
+    run_deck(tmp_path, "in.own", Launch(binary=find_binary()))
+    assert not (tmp_path / "seen").read_text()
