@@ -18,8 +18,8 @@ from fdnet.studies.accuracy.choices import refitted_series, section_by_area
 from fdnet.studies.accuracy.face import face_numbers
 from fdnet.studies.accuracy.goals import ratio, reached, rms, worst
 from fdnet.studies.accuracy.measurement import (
-    DEFAULT,
     RESOLVED,
+    SIDE_KOZENY,
     network_of,
     permeability,
     resolved,
@@ -104,7 +104,7 @@ def test_laws_on_two_packs(cases):
         assert damaged[name] == pytest.approx(1.0, abs=goal)
         assert damaged[f"{name}: k"] == pytest.approx(damaged[name], abs=0.01)
     text = damage_table([damaged], absolute=False)
-    assert f"{damaged[DEFAULT]:.3f}" in text
+    assert f"{damaged[SIDE_KOZENY]:.3f}" in text
 
 
 def test_the_network_of_all_spheres_is_the_one_that_runs_take(cases):
@@ -197,7 +197,7 @@ def test_the_numbers_of_the_first_screen_are_those_of_the_tables(numbers, root):
     folder = root / "docs" / "validation"
     with (folder / "accuracy_damage.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    off = np.array([float(row[DEFAULT]) for row in rows])
+    off = np.array([float(row[SIDE_KOZENY]) for row in rows])
     assert numbers["rms_damage"] == f"{100 * math.sqrt(np.mean(np.log(off) ** 2)):.1f} %"
     assert numbers["off_damage"] == f"{100 * max(1 - off.min(), off.max() - 1):.0f} %"
     later = off[[row["known_before"] != "yes" for row in rows]]

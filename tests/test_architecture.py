@@ -24,7 +24,7 @@ LAYERS = [
 
 NETWORK_LAYERS = [
     ["geometry", "compiled", "stokes"],
-    ["field"],
+    ["field", "cores"],
     ["tessellation"],
     ["network"],
     ["nodes"],

@@ -30,8 +30,11 @@ SECTION_ARCHIE: DamageLawName = "section-archie"
 """The damage law that it takes for more of them."""
 DEFAULT_DAMAGE_LAW: DamageLawName = "side-kozeny"
 """The damage law that it takes with conductance laws other than `DEFAULT_LAW`."""
-MOST_SPHERES = 100_000
-"""Grains and fines up to which "auto" takes `combined`."""
+MOST_SPHERES = 300_000
+"""Grains and fines up to which "auto" takes `combined`.
+
+So many take 260 s of one core and 2.1 GB in eight sections (docs/benchmark_spheres.csv).
+"""
 OWN_NETWORK: tuple[DamageLawName, ...] = (COMBINED, ALL_SPHERES)
 """Damage laws that need the network of all spheres, and with it `DEFAULT_LAW`."""
 MOST_SECTIONS = 1000

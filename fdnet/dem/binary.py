@@ -113,8 +113,8 @@ def _refuse_surroundings() -> None:
     folder = os.environ.get("TMPDIR")
     if folder and not (os.path.isdir(folder) and os.access(folder, os.W_OK | os.X_OK)):
         raise LiggghtsError(
-            f"TMPDIR: {folder} is no folder that can be written to, and MPI needs one; set TMPDIR "
-            "to such a folder, or unset it"
+            f"TMPDIR: {folder} is no folder that can be written to, and temporary files go there; "
+            "set TMPDIR to such a folder, or unset it"
         )
     handles = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
     if 0 <= handles < FEWEST_HANDLES:

@@ -65,8 +65,8 @@ def started(
 def only_writer(folder: Path) -> Iterator[int]:
     """A lock on the folder of a stage that LIGGGHTS inherits.
 
-    It holds until the last process that inherited it has ended. Open MPI's daemon of a serial run
-    outlives it by a moment, so this waits for a lock that is taken.
+    It holds until the last process that inherited it has ended. One that MPI started may outlive
+    LIGGGHTS by a moment, so this waits for a lock that is taken.
     """
     lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
     deadline = time.monotonic() + LOCK_PATIENCE

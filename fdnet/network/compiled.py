@@ -2,8 +2,10 @@
 
 numba keeps compiled functions next to their own file and does not notice when a function that they
 call changes in another module. Here the cache lies in a folder named after a digest of all sources
-of this package, so old code never runs for a changed file. It also works where the folder of the
-package cannot be written. NUMBA_CACHE_DIR, when set, is used instead.
+of this package, of the versions that compile them and of numba's settings, so old code never runs
+for a changed file. All installations with the same digest share it, wherever they lie, so only the
+first one compiles. It also works where the folder of the package cannot be written.
+NUMBA_CACHE_DIR, when set, is used instead, as numba uses it.
 """
 
 import contextlib
@@ -13,6 +15,7 @@ import pickle
 import stat
 import sys
 import tempfile
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -28,17 +31,31 @@ __all__ = [
     "compiled_for_loops",
     "compiled_in_place",
     "compiled_inline",
+    "cores_of_numba",
     "loops_in_place",
     "number_of",
 ]
 
 
+_SETTINGS = (
+    *("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "USING_SVML"),
+    *("BOUNDSCHECK", "DEBUGINFO_DEFAULT"),
+)
+"""Settings of numba that change the code and that its own index does not tell apart."""
+
+
 def cache_folder(sources: Path, root: Path) -> Path:
     """Folder below `root` for the code that is compiled from all modules in `sources`."""
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(repr(_compiler()).encode())
     for path in sorted(sources.rglob("*.py")):
         digest.update(str(path.relative_to(sources)).encode() + b"\0" + path.read_bytes())
     return root / f"numba-{digest.hexdigest()[:16]}"
+
+
+def _compiler() -> tuple[Any, ...]:
+    """What decides, with the sources, which code numba makes and whether it runs elsewhere."""
+    versions = (version(name) for name in ("numba", "llvmlite", "numpy"))
+    return (*versions, *(getattr(config, name, None) for name in _SETTINGS))
 
 
 def _writable_root() -> Path:
@@ -66,9 +83,12 @@ def _own_folder(wanted: Path) -> Path:
     return Path(tempfile.mkdtemp(prefix="fdnet-"))
 
 
+_PACKAGE = Path(__file__).parent
+_SHARED: Path | None = None
+"""The folder of the cache; None where the user's NUMBA_CACHE_DIR is taken."""
 if not config.CACHE_DIR:  # type: ignore[attr-defined]
-    _folder = cache_folder(Path(__file__).parent, _writable_root())
-    config.CACHE_DIR = str(_folder)  # type: ignore[attr-defined]
+    _SHARED = cache_folder(_PACKAGE, _writable_root())
+    config.CACHE_DIR = str(_SHARED)  # type: ignore[attr-defined]
 
 _said: set[str] = set()
 
@@ -91,7 +111,13 @@ class _CheckedFile(IndexDataCacheFile):
     def load(self, key: Any) -> Any:
         """The compiled code for a signature, or None."""
         try:
-            return super().load(key)
+            kept = super().load(key)
+            if kept is None:
+                return None
+            own, data = kept
+            if own != key:  # two processes took one name for the codes of two signatures
+                raise ValueError("it is the code of another signature")
+            return data
         except Exception as error:
             _say_once(self._cache_path, "was bad and is made anew", error)
             with contextlib.suppress(OSError):
@@ -101,7 +127,7 @@ class _CheckedFile(IndexDataCacheFile):
     def save(self, key: Any, data: Any) -> None:
         """Keep the compiled code for a signature, if it can be written."""
         try:
-            super().save(key, data)
+            super().save(key, (key, data))
         except Exception as error:
             _say_once(self._cache_path, "cannot be written and is done without", error)
 
@@ -137,6 +163,20 @@ class _CheckedFile(IndexDataCacheFile):
         return hashlib.sha256(name.encode() + b"\0" + body).digest()
 
 
+def _checked(function: Any, files: IndexDataCacheFile) -> _CheckedFile:
+    """The files of a function, which numba would keep by the place and the age of its source.
+
+    In the shared folder both are of no account, for its name changes with the sources.
+    """
+    name, source = files._index_name.removesuffix(".nbi"), Path(function.__code__.co_filename)
+    folder = Path(files._cache_path)
+    if _SHARED and folder.is_relative_to(_SHARED) and source.is_relative_to(_PACKAGE):
+        folder = _SHARED / source.parent.relative_to(_PACKAGE)
+        folder.mkdir(parents=True, exist_ok=True)
+        return _CheckedFile(str(folder), name, "")
+    return _CheckedFile(str(folder), name, files._source_stamp)
+
+
 _PLAIN: dict[str, Any] = {"_nrt": True, "error_model": "python", "fastmath": False}
 """Where these are not given, numba takes them from the function that makes the first call.
 
@@ -144,7 +184,7 @@ No function may round other than written (`fastmath`). A function that several o
 copy in the code of each. LLVM would round each copy in its own way, and which copy runs depends on
 what the process loaded or compiled before.
 """
-_LOOPS: dict[str, Any] = {"error_model": "numpy"}
+_LOOPS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 
 
 def compiled(function: Any, **options: Any) -> Any:
@@ -155,10 +195,7 @@ def compiled(function: Any, **options: Any) -> Any:
     options = _PLAIN | options
     try:
         result: Any = numba.njit(cache=True, **options)(function)
-        files = result._cache._cache_file
-        result._cache._cache_file = _CheckedFile(
-            files._cache_path, files._index_name.removesuffix(".nbi"), files._source_stamp
-        )
+        result._cache._cache_file = _checked(function, result._cache._cache_file)
     except (RuntimeError, OSError, AttributeError) as error:
         _say_once(str(config.CACHE_DIR), "cannot be used", error)  # type: ignore[attr-defined]
         return numba.njit(function, **options)
@@ -193,6 +230,11 @@ def compiled_inline(function: Any) -> Any:
     So it may return parts of the arrays that it is given. Only functions in place may call it.
     """
     return compiled(function, **_LOOPS, _nrt=False, inline="always")
+
+
+def cores_of_numba() -> int:
+    """All cores of this process, or as many as the environment variable NUMBA_NUM_THREADS says."""
+    return int(config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
 
 
 def _bits_of(_: Any, number: Any) -> Any:

@@ -2,6 +2,7 @@
 
 import ast
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -41,6 +42,28 @@ def test_a_folder_that_others_may_have_filled_is_not_used(tmp_path, monkeypatch)
         assert _own_folder(tmp_path / name) not in (tmp_path / name, own)
 
 
+def test_an_installation_in_another_place_uses_the_same_code(tmp_path, root):
+    """Else every environment with the same sources would compile for a minute."""
+    ask = (
+        "from fdnet.network.fines.crowding import weighted_volume as one\n"
+        "import fdnet\n"
+        "print(fdnet.__file__, one(1.0, 0.5, 2.0), sum(one.stats.cache_hits.values()))"
+    )
+    shutil.copytree(root / "fdnet", tmp_path / "fdnet", ignore=shutil.ignore_patterns("data"))
+    for path in (tmp_path / "fdnet/network").rglob("*.py"):
+        os.utime(path, (1e9, 1e9))  # numba before 0.68 asks for the age of the source
+    answers = []
+    for place in (root, tmp_path):
+        said = call([sys.executable, "-P", "-c", ask], tmp_path, PYTHONPATH=str(place))
+        answers.append(said.stdout.split() or said.stderr)
+    (first, value, compiled), (second, same, read) = answers
+    assert (first, second) == (
+        str(root / "fdnet/__init__.py"),
+        str(tmp_path / "fdnet/__init__.py"),
+    )
+    assert (value, compiled, read) == (same, "0", "1")
+
+
 SOURCE = """
 import sys
 from fdnet.network.fines import point_search
@@ -58,18 +81,23 @@ print(twice(int(sys.argv[1])), twice.stats.cache_hits and 1 or 0)
 def cached(tmp_path):
     """A program with one compiled function, run once: command and folder of its cache."""
     (tmp_path / "program.py").write_text(SOURCE)
-    first = call(tmp_path)
+    first = call_program(tmp_path)
     assert (first.stdout.split(), first.stderr) == (["42", "0"], "")
-    second = call(tmp_path)
+    second = call_program(tmp_path)
     assert second.stdout.split() == ["42", "1"]
     return tmp_path
 
 
-def call(folder):
-    environment = os.environ | {"XDG_CACHE_HOME": str(folder / "cache")}
+def call_program(folder):
+    return call([sys.executable, str(folder / "program.py"), "21"], folder)
+
+
+def call(command, folder, **settings):
+    environment = os.environ | {"XDG_CACHE_HOME": str(folder / "cache")} | settings
     environment.pop("NUMBA_CACHE_DIR", None)
-    command = [sys.executable, str(folder / "program.py"), "21"]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120)
+    return subprocess.run(
+        command, env=environment, cwd=folder, capture_output=True, text=True, timeout=120
+    )
 
 
 def flipped(content: bytes) -> bytes:
@@ -91,11 +119,11 @@ def test_a_bad_cache_is_left_aside_and_made_anew(cached, kind, how):
     files = list(cached.rglob(f"program.twice*.{kind}"))
     assert len(files) == 1
     files[0].write_bytes(SPOILT[how](files[0].read_bytes()))
-    again = call(cached)
+    again = call_program(cached)
     assert again.stdout.split() == ["42", "0"], again.stderr
     assert again.stderr.count("\n") == 1
     assert str(files[0].parent) in again.stderr
-    mended = call(cached)
+    mended = call_program(cached)
     assert (mended.stdout.split(), mended.stderr) == (["42", "1"], "")
 
 
@@ -106,7 +134,7 @@ def test_a_cache_that_cannot_be_written_is_done_without(cached):
         path.mkdir()
         (path / "x").write_text("")
         path.with_name(path.name + ".bad").write_text("")
-    again = call(cached)
+    again = call_program(cached)
     assert again.stdout.split() == ["42", "0"], again.stderr
     assert 1 <= again.stderr.count("\n") <= 2
     assert "Traceback" not in again.stderr
@@ -126,6 +154,25 @@ def test_a_full_disk_under_the_cache_is_reported_once(tmp_path, monkeypatch, cap
     assert text.count("\n") == 1
     assert str(tmp_path) in text
     assert "No space left" in text
+
+
+def test_code_of_another_signature_is_not_run(tmp_path, capsys):
+    """Two processes that save at the same moment may take one name for their codes."""
+    module._said.clear()
+    file = module._CheckedFile(str(tmp_path), "name", "stamp")
+    for key in ("a", "b"):
+        file.save(key, f"code of {key}")
+    assert file.load("a") == "code of a"
+    file._save_index({"a": file._data_name(2), "b": file._data_name(2)})
+    assert file.load("a") is None
+    assert "another signature" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("setting", ["OPT", "USING_SVML"])
+def test_code_by_other_settings_of_numba_lies_apart(tmp_path, monkeypatch, setting):
+    before = cache_folder(tmp_path, tmp_path)
+    monkeypatch.setattr(numba.config, setting, "other")
+    assert cache_folder(tmp_path, tmp_path) != before
 
 
 @module.loops_in_place

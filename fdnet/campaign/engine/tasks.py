@@ -10,8 +10,7 @@ from pathlib import Path
 from fdnet.campaign.plan.folder import CASES, LOGS, PACKS, RUNS
 from fdnet.campaign.plan.job import Job, Plan, shared_packs
 from fdnet.campaign.plan.state import is_done, pack_is_done
-
-THREADS = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+from fdnet.run.one_core import ONE_CORE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,7 +85,7 @@ def tasks_of(path: Path, plan: Plan, how: HowToRun) -> list[Task]:
 
 def environment() -> Mapping[str, str]:
     """The environment of a job: one thread of its own for each process."""
-    return os.environ | dict.fromkeys(THREADS, "1")
+    return os.environ | ONE_CORE
 
 
 def _pack(digest: str, job: Job, plan: Plan, how: HowToRun) -> Task:

@@ -11,6 +11,7 @@ import numpy as np
 
 from fdnet.network import geometry
 from fdnet.network.compiled import compiled_for_loops, loops_in_place
+from fdnet.network.cores import on_all_cores
 from fdnet.network.laws.facet_axes import facet_axes
 from fdnet.network.laws.fourth_grain import depth_within
 from fdnet.network.laws.held_sections import MOST_PLANES, held_flux, planes_of, turned_inside
@@ -82,7 +83,9 @@ def fine_resistances(
     numbers = planes_of(network), LENGTH_FLOOR * network.grain_radius
     points = parts_of_triangle(DIVISIONS)
     out, ends = np.zeros((len(throats), 2)), np.full((len(throats), 3), np.nan)
-    for (facet, axes), part in zip(facets, parts, strict=True):
+
+    def measure(which: int) -> None:
+        part, (facet, axes) = parts[which], facets[which]
         first, height = np.ascontiguousarray(facet[:, 0]), heights[part]
         _set_resistances(
             (geometry.flat(facet), axes, first, height, whole[part]),
@@ -91,6 +94,8 @@ def fine_resistances(
             numbers,
             (out[part], ends[part]),
         )
+
+    on_all_cores(measure, range(len(parts)))
     return out, ends
 
 

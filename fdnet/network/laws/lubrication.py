@@ -24,6 +24,7 @@ import numpy as np
 
 from fdnet.network import geometry
 from fdnet.network.compiled import compiled_for_loops, compiled_inline, loops_in_place
+from fdnet.network.cores import on_all_cores
 from fdnet.network.laws.cross_section import set_wedges
 from fdnet.network.laws.cut_grains import cut_corners, share_of_cut
 from fdnet.network.laws.edge_cross_section import edge_fluxes
@@ -85,7 +86,8 @@ def half_resistances(
     every, heights = wall_cuts(network), nodes_of(network).heights if heights is None else heights
     resistance = np.empty((len(network.throat_pores), 2))
     around = Neighbourhood(network) if fourth else None
-    for part in geometry.slices(len(resistance), THROATS):
+
+    def measure(part: slice) -> None:
         given = prepared(network, part, every)
         facet = network.image_position[network.throat_images[part]]
         beside = _beside(network, part, facet) if fourth else np.zeros((len(facet), 2, 5))
@@ -96,6 +98,8 @@ def half_resistances(
             (floor, float(widening)),
             (beside, *outside, table),
         )
+
+    on_all_cores(measure, geometry.slices(len(resistance), THROATS))
     shut = np.flatnonzero(network.throat_radius <= 0)
     flat = (network.image_height < network.image_radius)[network.throat_images[shut]]
     resistance[shut[~np.any(flat, axis=1)]] = np.inf

@@ -44,7 +44,7 @@ def full_size_rows(runs: Iterable[Path]) -> list[Row]:
                 sections=edges,
             )
         )
-        rows += _rows(run.case.name, dict(zip(names, results, strict=True)))
+        rows += _rows(path.name, dict(zip(names, results, strict=True)))
     return rows
 
 
@@ -77,12 +77,14 @@ def write_full_size(runs: Sequence[Path], validation: Path) -> str:
 
 
 def full_size_table(validation: Path) -> str:
-    """The written table: model over all spheres."""
+    """Of the written table, the first section and the whole of each run: law over all spheres."""
     columns = [column for law in TWO_SCALE for column in (law, f"{law}: in place")]
+    rows = read_named(validation / FULL_SIZE)
     lines = [
         [row["case"], row["section"], ratio(float(row["k_over_k0"]))]
         + [ratio(float(row[column])) for column in columns]
-        for row in read_named(validation / FULL_SIZE)
+        for row in rows
+        if row["section"] in (rows[0]["section"], WHOLE)
     ]
     return markdown_table(["run", "section", "k/k0, all spheres", *columns], lines)
 

@@ -3,15 +3,19 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from fdnet.case.names import COMBINED, SECTION_ARCHIE
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.flow.slabs import whole_permeability
 from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, LAWS
 from fdnet.network.network import Network, build_network
 from fdnet.network.resolved.all_spheres import all_conductances
+from fdnet.network.resolved.combined import combined
 from fdnet.spheres.snapshot import Array, Snapshot
 
 PERIODIC = (True, True, True)
-DEFAULT = f"{DEFAULT_LAW} + {DEFAULT_DAMAGE_LAW}"
+SIDE_KOZENY = f"{DEFAULT_LAW} + {DEFAULT_DAMAGE_LAW}"
 PAIRS = (
     "thesis + thesis",
     "thesis + thesis-code",
@@ -22,6 +26,8 @@ PAIRS = (
 """The pairs of a conductance law and a damage law that are compared."""
 RESOLVED = "all spheres as grains"
 """The network of grains and fines alike, at the scale of the fines; it has no damage law."""
+ARCHIE, MEAN = f"{DEFAULT_LAW} + {SECTION_ARCHIE}", f"{DEFAULT_LAW} + {COMBINED}"
+"""The pair of laws whose mean with `RESOLVED` is `combined`, and that mean."""
 RESOLVED_LIMIT = 20_000
 """Spheres above which that network is left out."""
 
@@ -76,6 +82,12 @@ def resolved(pack: Snapshot) -> float:
         return float("nan")
     network = build_network(pack, periodic=PERIODIC, walls="slip")
     return permeability(network, all_conductances(network))
+
+
+def mean_of(intact: float, whole: float, archie: float) -> float:
+    """k with fines by `MEAN`, from k without fines, by `RESOLVED` and by `ARCHIE`, in one unit."""
+    parts = (np.array([min(k, intact)]) for k in (whole, archie))
+    return float(combined(np.array([intact]), *parts)[0])
 
 
 def measure_loss(

@@ -7,7 +7,6 @@ import numpy as np
 
 from fdnet.case.names import MOST_SPHERES, SECTION_ARCHIE
 from fdnet.network.laws.named import DEFAULT_DAMAGE_LAW, DEFAULT_LAW
-from fdnet.network.resolved.combined import combined
 from fdnet.studies.accuracy.choices import CHOICES
 from fdnet.studies.accuracy.deposits import BED_SHARE
 from fdnet.studies.accuracy.face import face_numbers
@@ -27,9 +26,9 @@ from fdnet.studies.accuracy.goals import (
     worst,
     worst_case,
 )
-from fdnet.studies.accuracy.measurement import DEFAULT, PAIRS, RESOLVED
+from fdnet.studies.accuracy.measurement import ARCHIE, PAIRS, RESOLVED, SIDE_KOZENY, mean_of
 from fdnet.studies.accuracy.results import Results
-from fdnet.studies.accuracy.slab_numbers import ARCHIE, slab_numbers
+from fdnet.studies.accuracy.slab_numbers import slab_numbers
 from fdnet.studies.accuracy.tables import KNOWN
 from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.truth.cases import EQUAL, LATTICE, LOOSE, UNEQUAL
@@ -107,12 +106,12 @@ def _damaged(rows: Sequence[Row]) -> dict[str, str]:
     return {
         "errors_damage": truth_errors(rows),
         "deposits": str(len(rows)),
-        "rms_damage": percent(rms(values(rows, DEFAULT))),
-        "off_damage": percent(_farthest(rows, DEFAULT), 0),
-        "worst_damage": worst_case(rows, DEFAULT),
+        "rms_damage": percent(rms(values(rows, SIDE_KOZENY))),
+        "off_damage": percent(_farthest(rows, SIDE_KOZENY), 0),
+        "worst_damage": worst_case(rows, SIDE_KOZENY),
         "later_damage": str(len(later)),
-        "rms_later_damage": percent(rms(values(later, DEFAULT))),
-        "off_later_damage": percent(_farthest(later, DEFAULT), 0),
+        "rms_later_damage": percent(rms(values(later, SIDE_KOZENY))),
+        "off_later_damage": percent(_farthest(later, SIDE_KOZENY), 0),
         "resolved_summary": summary(list(rows), RESOLVED),
         "worst_resolved": worst_case(resolved, RESOLVED),
         "combined_summary": summed_up(map(_combined, resolved)),
@@ -123,17 +122,16 @@ def _damaged(rows: Sequence[Row]) -> dict[str, str]:
         "thesis_most": f"{max(thesis):.0f}",
         "thesis_absolute": span(absolute, 2),
         "kozeny_fine": _of(rows, "lubrication + kozeny", ("C_r10_d8", "H_r10_d10")),
-        "side_kozeny_fine": _of(rows, DEFAULT, ("C_r10_d8", "H_r10_d10")),
-        "default_dense": _of(rows, DEFAULT, ("E_r5_d4",)),
+        "side_kozeny_fine": _of(rows, SIDE_KOZENY, ("C_r10_d8", "H_r10_d10")),
+        "default_dense": _of(rows, SIDE_KOZENY, ("E_r5_d4",)),
         "resolved_dense": _of(rows, RESOLVED, ("E_r5_d4",)),
     }
 
 
 def _combined(row: Row) -> float:
     """k/k0 by the law `combined`, over the true one."""
-    left = [row["k_over_k0"] * row[name] for name in (RESOLVED, ARCHIE)]
-    parts = (np.array([min(one, 1.0)]) for one in left)
-    return float(combined(np.ones(1), *parts)[0] / row["k_over_k0"])
+    whole, archie = (row["k_over_k0"] * row[name] for name in (RESOLVED, ARCHIE))
+    return mean_of(1.0, whole, archie) / float(row["k_over_k0"])
 
 
 def _deposits(results: Results) -> dict[str, str]:
@@ -141,10 +139,12 @@ def _deposits(results: Results) -> dict[str, str]:
     porosity = 1.0 - BED_SHARE
     return {
         "bed_percent": f"{100 * BED_SHARE:.0f}",
-        "bed_span": span((row[DEFAULT] / row["bed"] for row in results.beds), 2),
+        "bed_span": span((row[SIDE_KOZENY] / row["bed"] for row in results.beds), 2),
         "bed_formula": f"{porosity / porosity**1.5:.1f}",
         "fines_a_pore": f"{fifth['fines'] / fifth['pores']:.0f}",
-        "large_fine_span": span((row[DEFAULT] / row[RESOLVED] for row in results.large_fines), 2),
+        "large_fine_span": span(
+            (row[SIDE_KOZENY] / row[RESOLVED] for row in results.large_fines), 2
+        ),
     }
 
 

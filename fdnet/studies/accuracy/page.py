@@ -11,7 +11,7 @@ from fdnet.studies.accuracy.benchmark_tables import benchmark_tables
 from fdnet.studies.accuracy.figure import draw_accuracy
 from fdnet.studies.accuracy.full_size import full_size_table
 from fdnet.studies.accuracy.goals import DAMAGE_GOAL, GOALS
-from fdnet.studies.accuracy.measurement import DEFAULT
+from fdnet.studies.accuracy.measurement import SIDE_KOZENY
 from fdnet.studies.accuracy.numbers import page_numbers
 from fdnet.studies.accuracy.results import Results, compute_results, read_results, write_results
 from fdnet.studies.accuracy.rows import RULES
@@ -87,4 +87,4 @@ def page_tables(results: Results, validation: Path) -> dict[str, str]:
 def _own_errors(results: Results) -> dict[str, float]:
     """k of the default laws over truth by case, with fines where the pack has fines."""
     intact = {row["case"]: row[DEFAULT_LAW] for row in results.intact}
-    return intact | {row["case"]: row[f"{DEFAULT}: k"] for row in results.damage}
+    return intact | {row["case"]: row[f"{SIDE_KOZENY}: k"] for row in results.damage}

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fdnet.case.names import DEFAULT_LAW, SECTION_ARCHIE
 from fdnet.studies.accuracy.goals import (
     Row,
     percent,
@@ -16,11 +15,10 @@ from fdnet.studies.accuracy.goals import (
     worst,
     worst_case,
 )
-from fdnet.studies.accuracy.measurement import DEFAULT
+from fdnet.studies.accuracy.measurement import ARCHIE, SIDE_KOZENY
 from fdnet.studies.accuracy.slabs import CHOSEN, FINEST
 from fdnet.studies.truth.slabs import YES
 
-ARCHIE = f"{DEFAULT_LAW} + {SECTION_ARCHIE}"
 FINE_RATIOS = (8, 10)
 """Grains over fines in the names of the slabs with fine fines."""
 
@@ -29,10 +27,10 @@ def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
     """Every number of the prose on slabs by its name in docs/accuracy.md.in."""
     aside = [row for row in rows if row["known_before"] != YES]
     known = [row for row in rows if row["known_before"] == YES]
-    pairs = {"default": CHOSEN, "finest": FINEST, "two_scale": DEFAULT, "archie": ARCHIE}
+    pairs = {"default": CHOSEN, "finest": FINEST, "two_scale": SIDE_KOZENY, "archie": ARCHIE}
     fine = _with_fine_fines(rows)
     coarse = [row for row in rows if row not in fine]
-    known_k0 = [row[f"{DEFAULT}: k0"] for row in known]
+    known_k0 = [row[f"{SIDE_KOZENY}: k0"] for row in known]
     return {
         "slabs": str(len(rows)),
         "slabs_aside": str(len(aside)),
@@ -44,10 +42,10 @@ def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
         "slabs_default_k0": percent(rms([row[f"{CHOSEN}: k0"] for row in rows])),
         "slabs_aside_k": percent(rms([row[f"{FINEST}: k"] for row in aside])),
         "slabs_aside_k_worst": f"{worst([row[f'{FINEST}: k'] for row in aside]):.3f}",
-        "slabs_aside_k0": percent(rms([row[f"{DEFAULT}: k0"] for row in aside])),
+        "slabs_aside_k0": percent(rms([row[f"{SIDE_KOZENY}: k0"] for row in aside])),
         "slabs_default_worst": f"{worst(values(aside, CHOSEN)):.3f}",
         "slabs_default_case": worst_case(aside, CHOSEN).split(",")[0],
-        "slabs_two_scale_rms": percent(rms(values(aside, DEFAULT))),
+        "slabs_two_scale_rms": percent(rms(values(aside, SIDE_KOZENY))),
         "slabs_archie_rms": percent(rms(values(aside, ARCHIE))),
         "slabs_thesis_most": f"{max(values(rows, 'thesis + thesis')):.0f}",
         **_apart(rows),
@@ -56,7 +54,7 @@ def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
         "slabs_fine": str(len(fine)),
         "slabs_fine_k": summed_up(row[f"{FINEST}: k"] for row in fine),
         "slabs_known_k0_mean": percent(float(np.mean(np.log(known_k0)))),
-        "slabs_intact": summed_up(row[f"{DEFAULT}: k0"] for row in rows),
+        "slabs_intact": summed_up(row[f"{SIDE_KOZENY}: k0"] for row in rows),
         "slabs_least": f"{min(row['k_over_k0'] for row in rows):.3f}",
         "slabs_most": f"{max(row['k_over_k0'] for row in rows):.2f}",
         "slabs_errors": truth_errors(rows),
@@ -65,13 +63,13 @@ def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
 
 def _apart(rows: Sequence[Row]) -> dict[str, str]:
     """rms of both laws of the network of the grains, by how far apart they are on a slab."""
-    apart = [abs(np.log(row[DEFAULT] / row[ARCHIE])) for row in rows]
+    apart = [abs(np.log(row[SIDE_KOZENY] / row[ARCHIE])) for row in rows]
     numbers: dict[str, str] = {}
     for name, low, high in (("near", 0.0, 0.1), ("apart", 0.1, 0.25), ("far", 0.25, np.inf)):
         some = [row for row, one in zip(rows, apart, strict=True) if low <= one < high]
         numbers |= {
             f"slabs_{name}": str(len(some)),
-            f"slabs_{name}_two_scale": percent(rms(values(some, DEFAULT)), 0),
+            f"slabs_{name}_two_scale": percent(rms(values(some, SIDE_KOZENY)), 0),
             f"slabs_{name}_archie": percent(rms(values(some, ARCHIE)), 0),
         }
     return numbers

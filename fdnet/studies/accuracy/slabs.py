@@ -11,7 +11,7 @@ from fdnet.network.laws.named import DEFAULT_LAW
 from fdnet.network.permeability import compare
 from fdnet.spheres.snapshot import Array, Snapshot
 from fdnet.studies.accuracy.goals import percent, ratio, summary
-from fdnet.studies.accuracy.measurement import DEFAULT, PAIRS
+from fdnet.studies.accuracy.measurement import PAIRS, SIDE_KOZENY
 from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.engine.markdown import markdown_table
 from fdnet.studies.truth.packs import MM
@@ -82,7 +82,7 @@ def _cut_out(
 
 def slab_summary(rows: list[Row], names: Sequence[str] = SLAB_PAIRS) -> str:
     """Model over truth of k0 by the default law, and of k/k0 by each pair of laws."""
-    intact = f"{DEFAULT if DEFAULT in names else names[0]}: k0"
+    intact = f"{SIDE_KOZENY if SIDE_KOZENY in names else names[0]}: k0"
     lines = [
         [
             row["case"],

@@ -26,6 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fdnet.run.one_core import ONE_CORE
 from fdnet.studies.engine.csv_rows import read_named, write_named
 from fdnet.studies.truth.packs import DATA, OWN_TRUTH
 
@@ -94,7 +95,7 @@ def child(command: list[str], limit: float, **settings: str) -> Row:
             text=True,
             timeout=10 * limit,
             preexec_fn=set_limit,
-            env={**os.environ, "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", **settings},
+            env={**os.environ, **ONE_CORE, **settings},
         )
     except subprocess.TimeoutExpired:
         return {"status": f"stopped after {10 * limit:g} s by the clock"}

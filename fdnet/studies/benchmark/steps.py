@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fdnet.case.names import DamageLawName
+from fdnet.case.names import COMBINED, DamageLawName
 from fdnet.network import network as tessellation
 from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.flow.flow import solve_flow
@@ -40,6 +40,8 @@ SIDES, BOX = (False, True, True), (False, False, False)
 """Sides of the periodic packs, and of the same in a box of walls."""
 TWO_SCALE: tuple[DamageLawName, ...] = ("side-kozeny", "section-archie")
 """Laws on the network of the grains that are timed next to that of all spheres."""
+SECTIONS = 8
+"""Sections of the analysis by `combined`, those of a case by default."""
 DECADES, CLOSED = 12, 0.1
 MOST_GRAINS_STIFF = 200_000
 COMPILING = 600
@@ -198,13 +200,16 @@ def walled_result(wanted: int, folder: Path) -> dict[str, Any]:
 def run_spheres(spheres: Snapshot) -> tuple[Clock, int]:
     """The steps of the network of all `spheres`, and the number of its pores.
 
-    Whole analyses on the network of the grains, by each of `TWO_SCALE`, come last.
+    Whole analyses on the network of the grains, by each of `TWO_SCALE`, and one by `combined` in
+    `SECTIONS` sections come last.
     """
     clock = Clock()
     pores = _run_together(clock, spheres)
+    whole = partial(analyse, spheres, periodic=SIDES)
     for law in TWO_SCALE:
-        work = partial(analyse, spheres, periodic=SIDES, damage_law=law)
-        clock.timed(f"total {law}", work)
+        clock.timed(f"total {law}", partial(whole, damage_law=law))
+    in_sections = partial(whole, damage_law=COMBINED, sections=SECTIONS)
+    clock.timed(f"total {COMBINED}, {SECTIONS} sections", in_sections)
     return clock, pores
 
 

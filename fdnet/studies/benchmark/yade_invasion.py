@@ -21,6 +21,7 @@ from pathlib import Path
 from fdnet.errors import CaseError, FdnetError
 from fdnet.files.atomic import write_text
 from fdnet.run.finished import FinishedRun
+from fdnet.run.one_core import ONE_CORE
 from fdnet.run.open_run import open_run
 from fdnet.spheres.readers import read_spheres
 from fdnet.spheres.snapshot import Snapshot
@@ -126,10 +127,9 @@ def measured(command: Sequence[str], log: Path, **settings: str) -> Cost:
         FdnetError: it ended with another code than 0; the message names its output.
     """
     start = time.monotonic()
-    one = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
     with log.open("w") as file:
         process = subprocess.Popen(
-            command, stdout=file, stderr=file, env={**os.environ, **one, **settings}
+            command, stdout=file, stderr=file, env={**os.environ, **ONE_CORE, **settings}
         )
         _, status, used = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)

@@ -16,6 +16,8 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, NoReturn, TypeVar
 
+from fdnet.run.one_core import ONE_CORE
+
 PATIENCE = 1.0
 """Seconds that children may take to end themselves before they are killed."""
 _PR_SET_PDEATHSIG = 1
@@ -41,8 +43,10 @@ class Child:
 def start_child(work: Callable[..., None], *arguments: Any) -> Child:
     """Call `work(*arguments, send)` in a new process; what it sends is received in `answers`.
 
-    SIGINT and SIGTERM wait while the process is being started, so that no child is left unknown.
+    It works on one core, as all processes do that this one starts from now on. SIGINT and SIGTERM
+    wait while the process is being started, so that no child is left unknown.
     """
+    os.environ.update(ONE_CORE)  # read when the new process loads numpy and numba
     context = mp.get_context("spawn")
     answers, sender = context.Pipe(duplex=False)
     before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
@@ -70,8 +74,10 @@ def _child(
         os._exit(1)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _stop)
-    signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     with contextlib.suppress(KeyboardInterrupt):
+        signal.pthread_sigmask(
+            signal.SIG_SETMASK, mask
+        )  # a signal that came meanwhile ends it here
         work(*arguments, sender.send)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)  # nothing is left to unwind
 

@@ -10,13 +10,15 @@ from fdnet.network.laws.named import DEFAULT_LAW, LAWS
 from fdnet.network.network import Network
 from fdnet.network.stokes.stokes import extrapolate, solve_stokes
 from fdnet.studies.accuracy.measurement import (
-    DEFAULT,
+    ARCHIE,
+    MEAN,
     PAIRS,
     RESOLVED,
     RESOLVED_LIMIT,
     by_law,
     by_pair,
     law_of,
+    mean_of,
     network_of,
     resolved,
 )
@@ -53,7 +55,7 @@ def points(quick: bool) -> list[Point]:
 def _law_points(case: Case) -> Iterator[Point]:
     names = list(LAWS)
     if case.ratio is not None:
-        names = [*PAIRS, *([RESOLVED] if len(case.pack) <= RESOLVED_LIMIT else [])]
+        names = [*PAIRS, *([RESOLVED, MEAN] if len(case.pack) <= RESOLVED_LIMIT else [])]
     for name in names:
         yield Point(series=series_of(case), knob="law", value=name, settings={"pack": case.name})
 
@@ -103,11 +105,25 @@ def _by_law(case: Case, name: str) -> tuple[dict[str, float], float]:
         return {"k": k}, build + seconds
     k0 = by_law(network, law_of(name))
     if name == RESOLVED:
-        k, seconds = least_time(partial(resolved, case.pack))
-        return {"k": k, "k/k0": k / k0}, seconds
-    occupancy, occupied = _occupancy(case.name)
-    k, seconds = least_time(partial(by_pair, network, occupancy, name))
-    return {"k": k, "k/k0": k / k0}, build + occupied + seconds
+        k, seconds = _whole(case.name)
+    elif name == MEAN:
+        (whole, first), (archie, second) = _whole(case.name), _of_pair(case.name, ARCHIE)
+        k, seconds = mean_of(k0, whole, archie), first + second
+    else:
+        k, seconds = _of_pair(case.name, name)
+    return {"k": k, "k/k0": k / k0}, seconds
+
+
+@cache
+def _whole(name: str) -> tuple[float, float]:
+    return least_time(partial(resolved, cases()[name].pack))
+
+
+@cache
+def _of_pair(name: str, pair: str) -> tuple[float, float]:
+    (network, build), (occupancy, occupied) = _network(name), _occupancy(name)
+    k, seconds = least_time(partial(by_pair, network, occupancy, pair))
+    return k, build + occupied + seconds
 
 
 @cache
@@ -170,6 +186,6 @@ STUDY = Study(
         ),
     ),
     defaults=dict.fromkeys([*GROUPS, f"{INTACT}: networks"], DEFAULT_LAW)
-    | dict.fromkeys([*SIZES, f"{DAMAGED}: networks"], DEFAULT),
+    | dict.fromkeys([*SIZES, f"{DAMAGED}: networks"], MEAN),
     isolated=lambda point: point.knob == "cells",
 )

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.network.laws.named import DEFAULT_LAW
-from fdnet.studies.accuracy.measurement import DEFAULT, PAIRS, RESOLVED
+from fdnet.studies.accuracy.measurement import MEAN, PAIRS, RESOLVED, SIDE_KOZENY
 from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.engine.study import DONE
 from fdnet.studies.network import laws, linear_solver, solver_peers, throat_occupancy
@@ -101,7 +101,7 @@ def _laws(table: Lookup, validation: Path) -> dict[str, str]:
     times = [level.cost for level in table.levels(intact, "k")]
     errors = [level.bound for level in table.levels(intact, "k")]
     own = table.cost(intact, "k", DEFAULT_LAW)
-    with_fines = table.cost(damaged, "k", DEFAULT)
+    with_fines = table.cost(damaged, "k", SIDE_KOZENY)
     fifth, tenth = laws.FINES["_r5_"], laws.FINES["_r10_"]
     size = laws.SIZE.format("k/k0")
     thesis = [
@@ -127,10 +127,16 @@ def _laws(table: Lookup, validation: Path) -> dict[str, str]:
         "law_left": percents(left, 1),
         "law_loose": percent(max(map(abs, loose))),
         "thesis_damage": between(thesis),
-        "side_kozeny": percents(table.error(series, size, DEFAULT) for series in (fifth, tenth)),
-        "resolved_times": f"{cost[RESOLVED] / cost[DEFAULT]:.0f}",
+        "side_kozeny": percents(
+            table.error(series, size, SIDE_KOZENY) for series in (fifth, tenth)
+        ),
+        "resolved_times": f"{cost[RESOLVED] / cost[SIDE_KOZENY]:.0f}",
         "resolved_error": _tenths(table, fifth, size, RESOLVED),
-        "kozeny_error": _tenths(table, fifth, size, DEFAULT),
+        "kozeny_error": _tenths(table, fifth, size, SIDE_KOZENY),
+        "mean_errors": " and ".join(
+            _tenths(table, series, size, MEAN) for series in (fifth, tenth)
+        ),
+        "mean_times": f"{cost[MEAN] / cost[SIDE_KOZENY]:.0f}",
     }
     for name, (pack, series, cells, network) in {
         "one_64": (laws.INTACT, one, 64.0, own),
