@@ -18,7 +18,7 @@ SETTINGS = {
         "3. Drag": "0.05 0.1 1 2 4 10 20,000 95",
         "4. Frozen or mobile grains, neighbour lists, MPI": "0.1 0.5 2,000 20,000",
         "5. Fines in throats": "0.40 4 10 12 20 1e5",
-        "6. Conductance and damage laws": "1 4 1/5 10 20 32 40 48 64 72 95 200",
+        "6. Conductance and damage laws": "1 3 4 1/5 1/10 10 20 32 40 48 64 72 95 200",
         "7. Linear solver": "1.41 2 4 6 8 12 16 55 80 100 200 300 1,000 2,000 3,000 5,000 9,000 "
         "10,000 20,000 30,000 100,000",
         "8. Specimen size and seed": "5",
@@ -49,7 +49,7 @@ MEASURED_APART = {
         "14. How often the flow follows its deposit": "2,469 2,789 3,064",
     },
     "accuracy": {
-        "3. With fines": "6 12 18 23 0.2 0.3 0.5 0.7 1.1 4.9 5.6 0.93 0.96 10.3 11.0 "
+        "3. With fines": "6 12 18 23 0.2 0.3 0.5 0.7 4.9 5.6 0.93 0.96 10.3 11.0 "
         "4.1 4.4 5.1 6.1 25 0.52 0.6 0.65 10 34",
         "7. What remains wrong, and why": "25",
     },
