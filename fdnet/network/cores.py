@@ -1,5 +1,6 @@
 """Work on several processor cores at once, in the threads of this process."""
 
+import threading
 from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -8,28 +9,35 @@ from typing import TypeVar
 from fdnet.network.compiled import cores_of_numba
 
 Part = TypeVar("Part")
+Result = TypeVar("Result")
 MOST_CORES = 8
 """More would hardly help, for some of the work runs on one core, and each takes some 80 MB."""
+_here = threading.local()
 
 
-def on_all_cores(work: Callable[[Part], None], parts: Iterable[Part]) -> None:
-    """Does `work` on each of the `parts`, on up to `MOST_CORES` of the cores that numba may use.
+def on_all_cores(work: Callable[[Part], Result], parts: Iterable[Part]) -> list[Result]:
+    """What `work` gives for each of the `parts`, on up to `MOST_CORES` of the cores.
 
-    These are all cores, or as many as the environment variable NUMBA_NUM_THREADS says. Only
-    functions that are `compiled_for_loops` run side by side, so most of the work should be in
-    them. No part may write to what another one reads or writes, so the result does not depend on
-    the number of cores. The first error of a part is raised.
+    The cores are all of this process, or as many as the environment variable NUMBA_NUM_THREADS
+    says. Only functions that are `compiled_for_loops` run side by side, so most of the work should
+    be in them. No part may write to what another one reads or writes, so the result does not
+    depend on the number of cores. Work that is such a part itself does its own parts one after
+    the other. The first error of a part is raised.
     """
-    cores = min(cores_of_numba(), MOST_CORES)
+    cores = 1 if getattr(_here, "is_part", False) else min(cores_of_numba(), MOST_CORES)
     if cores <= 1:
-        for part in parts:
-            work(part)
-        return
-    begun: deque[Future[None]] = deque()
-    with ThreadPoolExecutor(cores) as pool:
+        return [work(part) for part in parts]
+    results: list[Result] = []
+    begun: deque[Future[Result]] = deque()
+    with ThreadPoolExecutor(cores, initializer=_mark) as pool:
         for part in parts:  # made one by one, as they are needed
             begun.append(pool.submit(work, part))
             if len(begun) > cores:
-                begun.popleft().result()
-        for one in begun:
-            one.result()
+                results.append(begun.popleft().result())
+        results += [one.result() for one in begun]
+    return results
+
+
+def _mark() -> None:
+    """Marks this thread as one of those that do parts."""
+    _here.is_part = True

@@ -11,6 +11,7 @@ from fdnet.network.laws import fine_sections, lubrication
 from fdnet.network.laws.deposit_resistances import deposit_resistances
 from fdnet.network.laws.fine_sections import bounded_by_fines
 from fdnet.network.network import build_network
+from fdnet.network.permeability import analyse
 from tests.network.packs import random_pack, with_fines
 
 
@@ -19,16 +20,27 @@ def pack():
     return with_fines(random_pack(40), 150, 0.2)
 
 
-def test_every_part_is_done_once_on_several_threads(monkeypatch):
+def test_parts_are_done_side_by_side_and_their_results_are_in_order(monkeypatch):
     monkeypatch.setattr(config, "NUMBA_NUM_THREADS", 3)
-    meet, seen = threading.Barrier(3, timeout=30), np.zeros(12, int)
+    meet, done = threading.Barrier(3, timeout=30), []
 
     def work(part):
         meet.wait()  # three at a time, or this breaks
-        seen[part] += 1
+        done.append(part)
+        return 10 * part
 
-    on_all_cores(work, iter(range(12)))
-    assert seen.tolist() == [1] * 12
+    assert on_all_cores(work, iter(range(12))) == [10 * part for part in range(12)]
+    assert sorted(done) == list(range(12))
+
+
+def test_a_part_takes_no_more_cores_of_its_own(monkeypatch):
+    monkeypatch.setattr(config, "NUMBA_NUM_THREADS", 2)
+
+    def work(_):
+        return on_all_cores(lambda _: threading.get_ident(), range(8))
+
+    for inner in on_all_cores(work, range(4)):
+        assert len(set(inner)) == 1
 
 
 @pytest.mark.parametrize("cores", [1, 4])
@@ -54,3 +66,12 @@ def test_resistances_on_several_cores_are_those_on_one(monkeypatch, pack):
         results.append(np.concatenate([deposit_resistances(together), plain]))
     assert bounded_by_fines(together).sum() > 4 * 60  # several parts for each of the two laws
     np.testing.assert_array_equal(*results)
+
+
+def test_sections_on_several_cores_are_those_on_one(monkeypatch, pack):
+    results = []
+    for cores in (1, 4):
+        monkeypatch.setattr(config, "NUMBA_NUM_THREADS", cores)
+        analysis = analyse(pack, periodic="yz", sections=3, damage_law="section-archie")
+        results.append([(one.k_initial, one.k_damaged) for one in analysis.sections])
+    assert results[0] == results[1]

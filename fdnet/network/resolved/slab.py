@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from fdnet.errors import NetworkError
+from fdnet.network.cores import on_all_cores
 from fdnet.network.flow.flow import Flow
 from fdnet.network.flow.slabs import slab_permeability, whole_permeability
 from fdnet.network.network import Network, build_network
@@ -86,18 +87,22 @@ def cut_out(spheres: Snapshot, span: tuple[float, float], periodic: Sequence[boo
 def cut_networks(spheres: Snapshot, edges: Array, sides: Sides) -> CutNetworks:
     """The network of each slab between `edges` (S+1,) m, whose skeleton is all of `spheres`."""
     around = (False, *sides.periodic[1:])
-    networks: list[Network | None] = []
-    refused = []
-    for number, (low, high) in enumerate(pairwise(edges)):
-        alone = cut_out(spheres, (float(low), float(high)), sides.periodic)
+
+    def cut(span: tuple[float, float]) -> Network | NetworkError:
         try:
-            networks.append(build_network(alone, periodic=around, walls=sides.walls))
+            alone = cut_out(spheres, span, sides.periodic)
+            return build_network(alone, periodic=around, walls=sides.walls)
         except NetworkError as error:
-            networks.append(None)
-            refused.append(
-                f"section {number + 1} is no specimen of its own, so it was cut out of the "
-                f"network of the whole, which is less accurate: {error}"
-            )
+            return error
+
+    results = on_all_cores(cut, pairwise(map(float, edges)))
+    refused = [
+        f"section {number + 1} is no specimen of its own, so it was cut out of the network of the "
+        f"whole, which is less accurate: {error}"
+        for number, error in enumerate(results)
+        if isinstance(error, NetworkError)
+    ]
+    networks = (None if isinstance(one, NetworkError) else one for one in results)
     return CutNetworks(edges=edges, networks=tuple(networks), refused=tuple(refused))
 
 
@@ -109,9 +114,12 @@ def slab_permeabilities(
     The throats of a slab have the conductance `conduct`. A slab without a network of its own is
     cut out of that of the `whole` specimen, which is given with its conductances (T,) m3.
     """
-    return [
-        slab_permeability(*whole, (float(low), float(high)))
-        if network is None
-        else whole_permeability(network, conduct(network))
-        for network, (low, high) in zip(slabs.networks, pairwise(slabs.edges), strict=True)
-    ]
+
+    def one(slab: tuple[Network | None, tuple[float, float]]) -> tuple[float, Flow]:
+        network, span = slab
+        if network is None:
+            return slab_permeability(*whole, span)
+        return whole_permeability(network, conduct(network))
+
+    spans = pairwise(map(float, slabs.edges))
+    return on_all_cores(one, zip(slabs.networks, spans, strict=True))
