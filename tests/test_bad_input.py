@@ -7,7 +7,7 @@ from builders import tiny
 
 from fdnet.case.difference import difference_text
 from fdnet.case.file import case_from, set_keys
-from fdnet.cli import main
+from fdnet.cli import COMMANDS, main
 from fdnet.run.mark import mark_folder
 
 SAND_AND_MUD = """
@@ -117,3 +117,13 @@ def test_what_differs_between_two_cases_is_named_by_key():
     many = tiny(*(f"fluid.{key}=2.0" for key in ("viscosity_cP", "density_kg_m3")), "seed=9",
                 "fines.count=7", "grains.count=50", "analysis.sections=2")  # fmt: skip
     assert difference_text(many, tiny().data()).endswith(", and 2 more keys")
+
+
+@pytest.mark.parametrize("command", [module.__name__.split(".")[-1] for module in COMMANDS])
+def test_every_command_explains_itself(capsys, command):
+    with pytest.raises(SystemExit) as ended:
+        main([command, "--help"])
+    assert ended.value.code == 0
+    screen = capsys.readouterr().out
+    assert f"fdnet {command}" in screen
+    assert "%%" not in screen

@@ -42,5 +42,5 @@ def _name(action: argparse.Action) -> str:
 
 
 def _meaning(action: argparse.Action) -> str:
-    text = re.sub(r"(?<![\w-])--[a-z-]+", r"`\g<0>`", str(action.help))
+    text = re.sub(r"(?<![\w-])--[a-z-]+", r"`\g<0>`", str(action.help).replace("%%", "%"))
     return text[0].upper() + text[1:] + ("" if text.endswith(".") else ".")

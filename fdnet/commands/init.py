@@ -25,7 +25,8 @@ def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
     )
     for question in QUESTIONS:
         flag = f"--{question.key.replace('_', '-')}"
-        init.add_argument(flag, metavar="TEXT", help=f'{question.text}, e.g. "{question.example}"')
+        asked = f'{question.text}, e.g. "{question.example}"'.replace("%", "%%")
+        init.add_argument(flag, metavar="TEXT", help=asked)
     for group, what in (("sand", "sieve"), ("mud", "laser")):
         init.add_argument(
             f"--{group}-file",

@@ -67,7 +67,8 @@ def _read(options: argparse.Namespace, periodic: tuple[bool, bool, bool]) -> "Sp
     grains = len(given.spheres.grains())
     if grains < 4:
         raise CaseError(
-            f"{options.spheres}: {grains} grains, expected at least 4 for a tetrahedron; if "
+            f"{options.spheres}: {grains} grains, expected at least 4 for a tetrahedron; the dump "
+            "of an invasion holds fines alone (give the run's spheres_damaged.csv instead); if "
             "grains and fines were taken for each other, use --fines-below or --types"
         )
     if given.around_grains and any(periodic):

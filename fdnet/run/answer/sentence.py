@@ -31,7 +31,7 @@ def _depth(summary: Mapping[str, Any]) -> str:
     if summary["final"] is False:
         return (
             f"So far {p95}, but the run was cut at its cap and this is not final: raise "
-            "run.cap_ms or resume it before you use these numbers."
+            "run.cap_ms and run it again (--force) before you use these numbers."
         )
     if not damage["zone_depth_m"]:
         return f"{p95}, and no layer loses 5 % of its permeability: the damage is negligible."

@@ -17,14 +17,14 @@ NO_BENCHMARK = (
 def benchmark_tables(path: Path, own: dict[str, float]) -> str:
     """Errors, and costs, of every tool in the network benchmark; a sentence without its file.
 
-    `own`: model over truth of the default laws by case, as computed for the page.
+    `own`: model over truth by case, as computed for the page.
     """
     if not path.exists():
         return NO_BENCHMARK
     rows = read_named(path)
     return (
-        "Model over truth, with fines where the pack has fines. The column of fdnet holds the "
-        "default laws and the numbers of this page.\n\n"
+        "Model over truth, with fines where the pack has fines. The column of fdnet is by "
+        "`lubrication` and, with fines, `side-kozeny`.\n\n"
         + _error_table(rows, own)
         + "\n\nCPU seconds on one core and peak memory in MB of the same tools "
         f'(`{path.name}`, as its command left it). The steps "solve" are the solve alone, on the '

@@ -85,6 +85,6 @@ def page_tables(results: Results, validation: Path) -> dict[str, str]:
 
 
 def _own_errors(results: Results) -> dict[str, float]:
-    """k of the default laws over truth by case, with fines where the pack has fines."""
+    """k by `SIDE_KOZENY` over truth by case, with fines where the pack has fines."""
     intact = {row["case"]: row[DEFAULT_LAW] for row in results.intact}
     return intact | {row["case"]: row[f"{SIDE_KOZENY}: k"] for row in results.damage}
