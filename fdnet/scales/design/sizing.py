@@ -35,7 +35,7 @@ GAP = 0.95
 MOST_COARSE = 0.35
 """Share of the coarsest solids that may be left out."""
 PATIENCE = 1.5
-"""Cap over the expected time."""
+"""Cap over the expected time, and over that in which all of the mud arrives."""
 
 
 def designed(answers: Answers, budget: Budget, *, folder: Path) -> Design:
@@ -126,7 +126,8 @@ def _design(answers: Answers, choice: Choice, budget: Budget, folder: Path) -> D
     case = _case(answers, choice, folder)
     scales = scales_of(case)
     cost = cost_of(case, scales)
-    cap = _up(PATIENCE * cost.duration * scales.force_factor)
+    arrival = scales.slab_length / scales.upstream_velocity
+    cap = _up(PATIENCE * max(cost.duration, arrival) * scales.force_factor)
     choice = replace(choice, cap=cap)
     case = _case(answers, choice, folder)
     return Design(
