@@ -75,9 +75,7 @@ def _child(
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _stop)
     with contextlib.suppress(KeyboardInterrupt):
-        signal.pthread_sigmask(
-            signal.SIG_SETMASK, mask
-        )  # a signal that came meanwhile ends it here
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)  # one that came meanwhile is heard here
         work(*arguments, sender.send)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)  # nothing is left to unwind
 
