@@ -1,9 +1,8 @@
 """Work on several processor cores at once, in the threads of this process."""
 
 import threading
-from collections import deque
 from collections.abc import Callable, Iterable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
 from fdnet.network.compiled import cores_of_numba
@@ -24,18 +23,12 @@ def on_all_cores(work: Callable[[Part], Result], parts: Iterable[Part]) -> list[
     depend on the number of cores. Work that is such a part itself does its own parts one after
     the other. The first error of a part is raised.
     """
-    cores = 1 if getattr(_here, "is_part", False) else min(cores_of_numba(), MOST_CORES)
-    if cores <= 1:
-        return [work(part) for part in parts]
-    results: list[Result] = []
-    begun: deque[Future[Result]] = deque()
+    every = list(parts)
+    cores = min(cores_of_numba(), MOST_CORES, len(every))
+    if cores <= 1 or getattr(_here, "is_part", False):
+        return [work(part) for part in every]
     with ThreadPoolExecutor(cores, initializer=_mark) as pool:
-        for part in parts:  # made one by one, as they are needed
-            begun.append(pool.submit(work, part))
-            if len(begun) > cores:
-                results.append(begun.popleft().result())
-        results += [one.result() for one in begun]
-    return results
+        return list(pool.map(work, every))
 
 
 def _mark() -> None:

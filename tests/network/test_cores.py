@@ -43,6 +43,17 @@ def test_a_part_takes_no_more_cores_of_its_own(monkeypatch):
         assert len(set(inner)) == 1
 
 
+def test_a_single_part_stays_in_this_thread_and_may_take_all_cores(monkeypatch):
+    monkeypatch.setattr(config, "NUMBA_NUM_THREADS", 2)
+    meet = threading.Barrier(2, timeout=30)
+
+    def work(_):
+        on_all_cores(lambda _: meet.wait(), range(2))  # side by side, or this breaks
+        return threading.get_ident()
+
+    assert on_all_cores(work, range(1)) == [threading.get_ident()]
+
+
 @pytest.mark.parametrize("cores", [1, 4])
 def test_the_error_of_a_part_is_raised(monkeypatch, cores):
     monkeypatch.setattr(config, "NUMBA_NUM_THREADS", cores)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from fdnet.campaign.engine.tasks import HowToRun, Task
 from fdnet.files.atomic import write_text
+from fdnet.run.one_core import ONE_CORE
 
 PACKS, RUNS, SUBMIT = "packs.sbatch", "runs.sbatch", "submit.bash"
 
@@ -49,4 +50,5 @@ def _script(name: str, folder: str, tasks: Sequence[Task], how: HowToRun, ranks:
         jobs=how.jobs,
         ranks=ranks,
         options=[one.lstrip("-") for one in how.resources],
+        one_core=" ".join(f"{variable}={value}" for variable, value in ONE_CORE.items()),
     )
