@@ -30,6 +30,7 @@ NETWORK_LAYERS = [
     ["nodes"],
     ["fines", "flow"],
     ["laws", "specimen", "analysis"],
+    ["upscaling"],
     ["resolved"],
     ["permeability"],
 ]

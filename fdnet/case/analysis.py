@@ -56,9 +56,9 @@ class AnalysisChoices(Part):
     damage_law: DamageLawName = Field(
         AUTO,
         description="How fines lower the permeability: a law that damages the throats between "
-        'grains, "all-spheres", the network of grains and fines together, or "combined", a mean '
-        'of that and of "section-archie". "auto" takes the most accurate one that its cost '
-        "allows.",
+        'grains, of which "upscaled" solves the flow around each of them; "all-spheres", the '
+        'network of grains and fines together; or "combined", a mean of that and of '
+        '"section-archie". "auto" takes the most accurate one that its cost allows.',
     )
     clogging_threshold: Fraction | None = Field(
         None,
@@ -82,7 +82,8 @@ class AnalysisChoices(Part):
     walls: WallName = Field(
         "no-slip",
         description="Whether side walls hold the fluid or let it slip; known to "
-        '"lubrication", "side-kozeny", "section-archie", "all-spheres" and "combined".',
+        '"lubrication", "side-kozeny", "section-archie", "upscaled", "all-spheres" and '
+        '"combined".',
     )
 
     def refusals(self) -> Iterator[str]:

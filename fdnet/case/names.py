@@ -10,6 +10,7 @@ DamageLawName = Literal[
     "auto",
     "combined",
     "all-spheres",
+    "upscaled",
     "thesis",
     "thesis-code",
     "kozeny",
@@ -26,6 +27,8 @@ AUTO: DamageLawName = "auto"
 COMBINED: DamageLawName = "combined"
 """The damage law that "auto" takes for up to `MOST_SPHERES` spheres."""
 ALL_SPHERES: DamageLawName = "all-spheres"
+UPSCALED: DamageLawName = "upscaled"
+"""The damage law of the throats between grains that solves the flow around each of them."""
 SECTION_ARCHIE: DamageLawName = "section-archie"
 """The damage law that it takes for more of them."""
 DEFAULT_DAMAGE_LAW: DamageLawName = "side-kozeny"
@@ -35,7 +38,7 @@ MOST_SPHERES = 300_000
 
 So many take 260 s of one core and 2.1 GB in eight sections (docs/benchmark_spheres.csv).
 """
-OWN_NETWORK: tuple[DamageLawName, ...] = (COMBINED, ALL_SPHERES)
+OWN_NETWORK: tuple[DamageLawName, ...] = (COMBINED, ALL_SPHERES, UPSCALED)
 """Damage laws that need the network of all spheres, and with it `DEFAULT_LAW`."""
 MOST_SECTIONS = 1000
 

@@ -152,8 +152,8 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
     clean, clean_slabs = measured.clean(law, log)
     base = measured.base(law, log)
     best = accurate_law(measured, options, log)
-    name = options.damage_law if best is None else best.second
-    if name in (AUTO, *OWN_NETWORK):  # no fines, or a law of throats that "auto" has no better for
+    name = options.damage_law if best is None else best.second or best.name
+    if best is None and name in (AUTO, *OWN_NETWORK):  # no fines, or "auto" with another law
         name = DEFAULT_DAMAGE_LAW
     final, damage = measured.damaged(options, name, log)
     before = Permeabilities(k=clean.k, slabs=clean_slabs)
@@ -161,7 +161,8 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
     if best is not None:
         before, after = best.before, best.after
         log.warnings += best.refused
-        log.warnings += laws_apart(_finest(best), (name, final.k))
+        if best.second is not None:
+            log.warnings += laws_apart(_finest(best), (name, final.k))
     elif final is not clean:
         slabs = measured.damaged_slabs(final, options, name, log)
         after = Permeabilities(k=final.k, slabs=slabs)
@@ -179,8 +180,8 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
         law=law,
         damage_law=options.damage_law,
         damage_law_used=_used(specimen, best, name),
-        damage_law_other=None if best is None else name,
-        k_damaged_other=None if best is None else final.k,
+        damage_law_other=None if best is None else best.second,
+        k_damaged_other=None if best is None or best.second is None else final.k,
         conductance_initial=base.conductance,
         conductance_damaged=final.conductance,
         law_used=frozen(law_used),

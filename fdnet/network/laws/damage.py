@@ -9,13 +9,14 @@ from fdnet.network.network import Network
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
-CLEAN, DEPOSITION, CLOGGING, BLOCKED, KOZENY, SECTIONS = (
+CLEAN, DEPOSITION, CLOGGING, BLOCKED, KOZENY, SECTIONS, UPSCALED = (
     "clean",
     "deposition",
     "clogging",
     "blocked",
     "kozeny",
     "sections",
+    "upscaled",
 )
 
 
@@ -24,9 +25,9 @@ class Damage:
     """Conductance of throats (T) with fines.
 
     Attributes:
-        conductance: (T,) m3, never above that of the clean throat.
-        law_used: (T,) which rule applied: clean, deposition, clogging, blocked, kozeny or
-            sections.
+        conductance: (T,) m3, never above that of the clean throat but by `upscaled_damage`.
+        law_used: (T,) which rule applied: clean, deposition, clogging, blocked, kozeny, sections
+            or upscaled.
         counts: how many throats, pores or sides were capped or closed.
     """
 

@@ -18,6 +18,7 @@ from fdnet.case.names import (
     DEFAULT_DAMAGE_LAW,
     DEFAULT_LAW,
     SECTION_ARCHIE,
+    UPSCALED,
 )
 from fdnet.network.flow.depth import Solved
 from fdnet.network.flow.flow import Flow
@@ -53,7 +54,8 @@ class AccurateLaw:
 
     Attributes:
         name: of the law.
-        second: name of the damage law of the network of the grains that is given next to it.
+        second: name of the damage law of the network of the grains that is given next to it; None
+            where the law itself is of that network.
         before: without fines, by resolved flow where that is known.
         after: with fines, at most that of the grains.
         flow: through the whole specimen.
@@ -65,7 +67,7 @@ class AccurateLaw:
     """
 
     name: str
-    second: str
+    second: str | None
     before: Permeabilities
     after: Permeabilities
     flow: Flow
@@ -85,7 +87,11 @@ def accurate_law(measured: Measured, choices: AnalysisChoices, log: Log) -> Accu
         alone = choices.damage_law == ALL_SPHERES
         return finest if alone else _combined(measured, finest, choices, log)
     fines = measured.specimen.fines
-    if fines is None or not len(fines) or choices.damage_law != AUTO or choices.law != DEFAULT_LAW:
+    if fines is None or not len(fines):
+        return None
+    if choices.damage_law == UPSCALED:
+        return _upscaled(measured, choices, log)
+    if choices.damage_law != AUTO or choices.law != DEFAULT_LAW:
         return None
     state, damage = measured.damaged(choices, SECTION_ARCHIE, log)
     clean, slabs = measured.clean(choices.law, log)
@@ -108,7 +114,80 @@ def accurate_law(measured: Measured, choices: AnalysisChoices, log: Log) -> Accu
 def _of_all_spheres(
     measured: Measured, whole: AllSpheres, choices: AnalysisChoices, log: Log
 ) -> AccurateLaw:
-    """The network of all spheres, at most the permeability of the grains.
+    """The network of all spheres, at most the permeability of the grains."""
+    known = _known(measured, Permeabilities(k=whole.k, slabs=whole.slabs), choices, log)
+    network = whole.solved.network
+    return AccurateLaw(
+        name=ALL_SPHERES,
+        second=SECTION_ARCHIE,
+        before=known.before,
+        after=known.after,
+        flow=whole.solved.flow,
+        solved=whole.solved,
+        all_spheres=known.own,
+        counts={
+            "all_spheres_pores": len(network.pore_radius),
+            "all_spheres_throats": len(network.throat_radius),
+            "all_spheres_hidden": network.counts["grains_hidden"],
+            "all_spheres_above_grains": known.above,
+            "all_spheres_sections_above_grains": known.sections_above,
+            "sections_resolved": known.resolved,
+        },
+        refused=(*whole.refused, *known.refused),
+    )
+
+
+def _upscaled(measured: Measured, choices: AnalysisChoices, log: Log) -> AccurateLaw:
+    """The network of the grains with upscaled throats, at most the permeability of the grains."""
+    state, _ = measured.damaged(choices, UPSCALED, log)
+    slabs = measured.damaged_slabs(state, choices, UPSCALED, log)
+    known = _known(measured, Permeabilities(k=state.k, slabs=slabs), choices, log)
+    return AccurateLaw(
+        name=UPSCALED,
+        second=None,
+        before=known.before,
+        after=known.after,
+        flow=state.flow,
+        solved=None,
+        all_spheres=None,
+        counts={
+            "upscaled_above_grains": known.above,
+            "upscaled_sections_above_grains": known.sections_above,
+            "sections_resolved": known.resolved,
+        },
+        refused=known.refused,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Known:
+    """Permeabilities with fines by a network of their own, once the grains are known better.
+
+    Attributes:
+        before: without fines, by resolved flow where that is known.
+        own: with fines, by their network alone, at most that of the grains.
+        after: with fines, carried over to `before`.
+        above: 1 where their network had more than the grains as a whole, else 0.
+        sections_above: in how many sections it had more.
+        resolved: how many sections are known by resolved flow.
+        refused: sections that could not be solved, one sentence each.
+    """
+
+    before: Permeabilities
+    own: Permeabilities
+    after: Permeabilities
+    above: int
+    sections_above: int
+    resolved: int
+    refused: tuple[str, ...]
+
+    __repr__ = one_line
+
+
+def _known(
+    measured: Measured, damaged: Permeabilities, choices: AnalysisChoices, log: Log
+) -> _Known:
+    """Permeabilities with fines, at most those of the grains, and carried over to resolved flow.
 
     Fines never raise the permeability. Where few of them make the network of all spheres finer,
     its k may be above that of the grains by the difference of two errors; it is then set to that
@@ -116,35 +195,25 @@ def _of_all_spheres(
     """
     specimen, base = measured.specimen, measured.base(choices.law, log)
     clean, clean_slabs = measured.clean(choices.law, log)
-    own, above = whole.slabs, 0
+    slabs, sections_above = damaged.slabs, 0
     if not specimen.moved:
-        own, above = capped(clean_slabs, whole.slabs, specimen.empty_sections())
-    raw = after = Permeabilities(k=min(whole.k, base.k), slabs=own)
+        slabs, sections_above = capped(clean_slabs, damaged.slabs, specimen.empty_sections())
+    own = after = Permeabilities(k=min(damaged.k, base.k), slabs=slabs)
     before = Permeabilities(k=clean.k, slabs=clean_slabs)
     intact, unsolved = measured.intact(log)
     known = np.isfinite(intact) & (clean_slabs.cut_out > 0.0)
     if np.any(known):
         factor = np.where(known, over(intact, clean_slabs.cut_out), 1.0)
         before = _in_series(scaled(clean_slabs, factor), specimen)
-        after = _in_series(carried_slabs(clean_slabs, before.slabs, own), specimen, before.k)
-    network = whole.solved.network
-    return AccurateLaw(
-        name=ALL_SPHERES,
-        second=SECTION_ARCHIE,
+        after = _in_series(carried_slabs(clean_slabs, before.slabs, slabs), specimen, before.k)
+    return _Known(
         before=before,
+        own=own,
         after=after,
-        flow=whole.solved.flow,
-        solved=whole.solved,
-        all_spheres=raw,
-        counts={
-            "all_spheres_pores": len(network.pore_radius),
-            "all_spheres_throats": len(network.throat_radius),
-            "all_spheres_hidden": network.counts["grains_hidden"],
-            "all_spheres_above_grains": int(whole.k > base.k),
-            "all_spheres_sections_above_grains": above,
-            "sections_resolved": int(known.sum()),
-        },
-        refused=(*whole.refused, *unsolved),
+        above=int(damaged.k > base.k),
+        sections_above=sections_above,
+        resolved=int(known.sum()),
+        refused=tuple(unsolved),
     )
 
 

@@ -12,20 +12,22 @@ from fdnet.case.names import (
     MOST_SPHERES,
     OWN_NETWORK,
     SECTION_ARCHIE,
+    UPSCALED,
 )
 from fdnet.errors import FlowError, NetworkError
-from fdnet.network.fines.occupancy import measure_occupancy
+from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.flow.slabs import SlabK
 from fdnet.network.laws.damage import Damage, DamageLaw
 from fdnet.network.laws.named import LAWS, damage_law
 from fdnet.network.network import Network
 from fdnet.network.resolved.all_spheres import AllSpheres, measure_all_spheres
 from fdnet.network.resolved.intact import resolved_intact
-from fdnet.network.resolved.slab import CutNetworks, Sides, cut_networks
+from fdnet.network.resolved.slab import CutNetworks, Sides, cut_networks, cut_out
 from fdnet.network.resolved.state import Log, State, clean_halves, make_state, state_slabs
 from fdnet.network.specimen.specimen import Specimen
+from fdnet.network.upscaling.upscaled import upscaled_damage
 from fdnet.spheres.arrays import one_line
-from fdnet.spheres.snapshot import Array, frozen
+from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
 
 @dataclass(slots=True, eq=False, kw_only=True)
@@ -67,7 +69,7 @@ class Measured:
             return base, None
         if (choices.law, name) not in self._damaged:
             with log.timed("conductance"):
-                damage = _law(choices, name)(base.network, occupancy, base.conductance)
+                damage = self._damage(choices, name, (base.network, base.conductance), occupancy)
             state = make_state(base.network, damage.conductance, log, halves=base.halves)
             self._damaged[choices.law, name] = state, damage
         return self._damaged[choices.law, name]
@@ -100,10 +102,8 @@ class Measured:
     def all_spheres(self, log: Log) -> AllSpheres:
         """Grains and fines together. Raises NetworkError and FlowError as its parts do."""
         if self._all is None:
-            fines = self.specimen.fines
-            assert fines is not None
             self._all = measure_all_spheres(
-                self.specimen.grains[1].joined(fines),
+                self._together(),
                 self.specimen.edges,
                 sides=self.sides,
                 timed=log.timed,
@@ -117,7 +117,8 @@ class Measured:
         warning, where these make no network.
         """
         fines, name = self.specimen.fines, choices.damage_law
-        if fines is None or not len(fines) or name not in (AUTO, *OWN_NETWORK):
+        asked = name in (AUTO, *OWN_NETWORK) and name != UPSCALED
+        if fines is None or not len(fines) or not asked:
             return None
         if name in OWN_NETWORK:
             return self.all_spheres(log)
@@ -134,8 +135,30 @@ class Measured:
         fines = self.specimen.fines
         assert fines is not None
         occupancy = measure_occupancy(network, fines, overlap=choices.throat_overlap)
-        clean = LAWS[choices.law](network)
-        return _law(choices, name)(network, occupancy, clean).conductance
+        given = network, LAWS[choices.law](network)
+        return self._damage(choices, name, given, occupancy).conductance
+
+    def _damage(
+        self,
+        choices: AnalysisChoices,
+        name: str,
+        grains: tuple[Network, Array],
+        occupancy: Occupancy,
+    ) -> Damage:
+        """The damage law `name` on a network of grains with its clean conductance (T,) m3."""
+        if name != UPSCALED:
+            return _law(choices, name)(grains[0], occupancy, grains[1])
+        spheres = self._together()
+        if not grains[0].periodic[0]:
+            low, high = map(float, grains[0].box[0])
+            spheres = cut_out(spheres, (low, high), self.sides.periodic)
+        return upscaled_damage(grains[0], spheres, grains[1])
+
+    def _together(self) -> Snapshot:
+        """The grains where they ended and the fines."""
+        fines = self.specimen.fines
+        assert fines is not None
+        return self.specimen.grains[1].joined(fines)
 
     def _clean_slabs(self, state: State, law: str, log: Log, *, final: bool) -> SlabK:
         """The sections of the grains without fines, as they were or where they ended."""

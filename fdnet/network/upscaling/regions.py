@@ -1,0 +1,134 @@
+"""Regions of cells around a cell, and the pores in them; many are made at once."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fdnet.network.upscaling.owners import Owners
+from fdnet.network.upscaling.pore_graph import PoreGraph
+from fdnet.network.upscaling.shifts import keys_of, members_of
+from fdnet.spheres.arrays import one_line
+from fdnet.spheres.snapshot import Array
+
+RINGS = 2
+"""A region holds a cell, its neighbours and theirs.
+
+With one ring the permeability of the known slabs would be 19 % (rms) off that of all spheres, with
+two it is 2.2 %, with three 1.4 %.
+"""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Lists:
+    """Lists of neighbours, one for each of some nodes.
+
+    Attributes:
+        first: (n+1,) where the list of each node begins.
+        other: (M,) the neighbour.
+        shift: (M, 3) whole periods from the node to it.
+        weight: (M,) conductance in between, m3.
+    """
+
+    first: Array
+    other: Array
+    shift: Array
+    weight: Array
+
+    __repr__ = one_line
+
+
+def lists_of(ends: Array, shift: Array, weight: Array, count: int) -> Lists:
+    """The lists of `count` nodes that links (K) join: `ends` (K, 2), `shift` (K, 3), `weight`."""
+    own = np.concatenate([ends[:, 0], ends[:, 1]])
+    other = np.concatenate([ends[:, 1], ends[:, 0]])
+    order = np.argsort(own, kind="stable")
+    return Lists(
+        first=np.searchsorted(own[order], np.arange(count + 1)),
+        other=other[order],
+        shift=np.concatenate([shift, -shift])[order],
+        weight=np.concatenate([weight, weight])[order],
+    )
+
+
+def neighbouring_cells(
+    whole: PoreGraph, owners: Owners, throats: tuple[Array, Array], count: int
+) -> Lists:
+    """The neighbours of `count` cells: those to which a throat between grains or a link leads.
+
+    `throats` are the ends (T, 2) and shifts (T, 3) of the throats between grains, and `whole` is
+    the graph of all spheres.
+    """
+    inner = np.flatnonzero((whole.ends < len(whole.node)).all(axis=1))
+    pore = whole.ends[inner]
+    shift = whole.shift[inner] + owners.offset[pore[:, 0]] - owners.offset[pore[:, 1]]
+    table = np.concatenate([np.column_stack([owners.cell[pore], shift]), np.column_stack(throats)])
+    apart = (table[:, 0] != table[:, 1]) | (table[:, 2:] != 0).any(axis=1)
+    table = np.unique(table[apart], axis=0)
+    return lists_of(table[:, :2], table[:, 2:], np.ones(len(table)), count)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Regions:
+    """The cells (C) of regions (B), and the pores (U) in these that carry flow.
+
+    Attributes:
+        cell_key: (C,) sorted, see `cell_keys`.
+        pore_key: (U,) sorted, see `pore_keys`.
+        centre: (U,) region of each pore.
+        pore: (U,) its number.
+        shift: (U, 3) whole periods by which it lies beyond its place.
+        of_cell: (U,) cell in which it lies.
+    """
+
+    cell_key: Array
+    pore_key: Array
+    centre: Array
+    pore: Array
+    shift: Array
+    of_cell: Array
+
+    __repr__ = one_line
+
+
+def regions_around(
+    centres: Array, near: Lists, pores: tuple[Array, Array], offset: Array
+) -> Regions:
+    """The regions around the cells `centres` (B,).
+
+    `pores` are those that carry flow, sorted by their cell, and where those of each cell begin;
+    `offset` (G, 3) is `Owners.offset`.
+    """
+    row = np.arange(len(centres))
+    table = np.column_stack([row, centres, np.zeros((len(row), 3), np.intp)])
+    for _ in range(RINGS):
+        at, which = members_of(near.first, table[:, 1])
+        added = np.column_stack(
+            [table[at, 0], near.other[which], table[at, 2:] + near.shift[which]]
+        )
+        table = np.concatenate([table, added])
+        key = cell_keys(table[:, 0], table[:, 1], table[:, 2:], len(near.first))
+        table = table[np.unique(key, return_index=True)[1]]
+    held, first = pores
+    cell, which = members_of(first, table[:, 1])
+    pore, centre = held[which], table[cell, 0]
+    shift = table[cell, 2:] + offset[pore]
+    key = pore_keys(centre, pore, shift, len(offset))
+    order = np.argsort(key)
+    return Regions(
+        cell_key=cell_keys(table[:, 0], table[:, 1], table[:, 2:], len(near.first)),
+        pore_key=key[order],
+        centre=centre[order],
+        pore=pore[order],
+        shift=shift[order],
+        of_cell=cell[order],
+    )
+
+
+def cell_keys(centre: Array, cell: Array, shift: Array, size: int) -> Array:
+    """Numbers (N,) of the cells `cell` (N,) at `shift` (N, 3) in the regions `centre` (N,)."""
+    return keys_of(centre, cell, shift=shift, size=size)
+
+
+def pore_keys(centre: Array, pore: Array, shift: Array, size: int) -> Array:
+    """Numbers (N,) of the pores `pore` (N,), likewise."""
+    return keys_of(centre, pore, shift=shift, size=size)
