@@ -1,7 +1,7 @@
 """Damage by flow through the fines around each throat: local upscaling.
 
 The network of all spheres knows every fine but has many times the throats. Here it is solved in
-small regions only, each a pore between grains with its neighbours and theirs (`local_flow`). From
+small regions only, each a pore between grains and three rings of neighbours (`local_flow`). From
 the flux Q across a facet between grains and the difference dp of the mean pressures of the two
 pores at it follows the conductance of the throat. Both pores have a region of their own, so there
 are two fluxes and two differences, and the conductance is (sum of Q^2 / sum of dp^2)^(1/2). There
