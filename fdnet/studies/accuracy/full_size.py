@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from fdnet.case.names import ALL_SPHERES, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, SECTION_ARCHIE
+from fdnet.case.names import ALL_SPHERES, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, SECTION_ARCHIE, UPSCALED
 from fdnet.network.analysis import Analysis
 from fdnet.network.permeability import compare
 from fdnet.run.open_run import open_run
@@ -22,7 +22,7 @@ FULL_SIZE = "accuracy_full_size.csv"
 EDGES_MM = (0.0, 0.5, 1.0, 2.0)
 """Where sections begin, mm from the face; the last one reaches to the outlet."""
 WHOLE = "whole"
-TWO_SCALE = (DEFAULT_DAMAGE_LAW, SECTION_ARCHIE)
+TWO_SCALE = (DEFAULT_DAMAGE_LAW, SECTION_ARCHIE, UPSCALED)
 
 
 def full_size_rows(runs: Iterable[Path]) -> list[Row]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.case.names import ALL_SPHERES, AUTO
+from fdnet.case.names import ALL_SPHERES, AUTO, UPSCALED
 from fdnet.network.laws.named import DEFAULT_LAW
 from fdnet.network.permeability import compare
 from fdnet.spheres.snapshot import Array, Snapshot
@@ -20,7 +20,9 @@ from fdnet.studies.truth.slabs import SLAB_TRUTH, read_specimen
 Row = dict[str, Any]
 FINEST, CHOSEN = f"{DEFAULT_LAW} + {ALL_SPHERES}", f"{DEFAULT_LAW} + {AUTO}"
 """The network of all spheres, and what the default of runs and commands chooses."""
-SLAB_PAIRS = (*PAIRS, FINEST, CHOSEN)
+LOCAL = f"{DEFAULT_LAW} + {UPSCALED}"
+"""The network of the grains, its throats by the flow through the fines around them."""
+SLAB_PAIRS = (*PAIRS, LOCAL, FINEST, CHOSEN)
 """The pairs of laws that are compared on slabs."""
 
 
