@@ -15,6 +15,7 @@ from fdnet.network.upscaling.overlay import Overlay
 from fdnet.network.upscaling.regions import (
     RINGS,
     Regions,
+    blocks_of,
     cell_keys,
     lists_of,
     pore_keys,
@@ -40,36 +41,51 @@ class LocalFlow:
         order = np.argsort(cell, kind="stable")
         self._pores = live[order], np.searchsorted(cell[order], np.arange(cells + 1))
 
-    def sizes(self, centres: Array) -> Array:
-        """At most how many pores (B,) the regions around `centres` (B,) hold."""
-        held, near = np.diff(self._pores[1]), self.overlay.near
+    def parts(self, centres: Array, largest: int) -> list[tuple[Array, Array]]:
+        """The cells `centres` in parts whose regions hold some `largest` pores together.
+
+        Each part is the cells (N,) and the region (N,) of each.
+        """
+        place, near = self.overlay.coarse.place[centres], self.overlay.near
+        held = np.diff(self._pores[1])
         row, which = members_of(near.first, np.arange(len(held)))
         for _ in range(RINGS):
             around = np.bincount(row, held[near.other[which]], len(held))
             held = held + around.astype(np.intp)
-        return held[centres]
+        block = blocks_of(place)
+        order = np.argsort(block, kind="stable")
+        cell, block = centres[order], block[order]
+        first = np.unique(block, return_index=True)[1]
+        part = (np.cumsum(held[cell[first]]) // largest)[block]
+        return [
+            (cell[own], np.unique(block[own], return_inverse=True)[1])
+            for own in (part == number for number in np.unique(part))
+        ]
 
-    def across_facets(self, centres: Array, wanted: Wanted) -> tuple[Array, Array, Array]:
+    def across_facets(
+        self, centres: tuple[Array, Array], wanted: Wanted
+    ) -> tuple[Array, Array, Array]:
         """Facets (M,) at the cells `centres`, the flux m4 across them and the difference m.
 
-        The difference is that of the mean pressures of its two nodes.
+        The difference is that of the mean pressures of its two nodes. `centres` is a part.
         """
-        overlay = self.overlay
+        overlay, (cell, region) = self.overlay, centres
         regions = regions_around(centres, overlay.near, self._pores, overlay.owners.offset)
-        solved = _Solved(self, regions, overlay.coarse.place[centres, 0])
-        row, which = members_of(wanted.first, centres)
+        first = np.unique(region, return_index=True)[1]
+        solved = _Solved(self, regions, overlay.coarse.place[cell[first], 0])
+        seen, which = members_of(wanted.first, cell)
         facet = wanted.facet[which]
-        flux = solved.flux(row, wanted.link[which], wanted.image[which])
+        flux = solved.flux(region[seen], wanted.link[which], wanted.image[which])
         keys, at, member = np.unique(
-            row * len(overlay.facets.ends) + facet, return_index=True, return_inverse=True
+            seen * len(overlay.facets.ends) + facet, return_index=True, return_inverse=True
         )
         total = np.bincount(member.ravel(), wanted.share[which] * flux, len(keys))
-        ends = overlay.facets.ends[facet[at]]
-        first, second = (
-            solved.mean(row[at], ends[:, end], wanted.ends[which[at], end]) for end in (0, 1)
+        ends, row = overlay.facets.ends[facet[at]], region[seen[at]]
+        one, other = (
+            solved.mean(row, ends[:, end], wanted.ends[which[at], end]) for end in (0, 1)
         )
-        known = np.isfinite(first - second)
-        return facet[at][known], total[known], (first - second)[known]
+        known = np.isfinite(one - other)
+        return facet[at][known], total[known], (one - other)[known]
 
 
 class _Solved:

@@ -85,6 +85,5 @@ def _solved(flow: LocalFlow, wanted: Wanted, asked: Array) -> list[tuple[Array, 
     centres = wanted.centres(asked)
     if not len(centres):
         return []
-    batch = np.cumsum(flow.sizes(centres)) // PORES
-    parts = np.split(centres, np.flatnonzero(np.diff(batch)) + 1)
+    parts = flow.parts(centres, PORES)
     return on_all_cores(lambda part: flow.across_facets(part, wanted), parts)
