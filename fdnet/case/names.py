@@ -30,7 +30,7 @@ ALL_SPHERES: DamageLawName = "all-spheres"
 UPSCALED: DamageLawName = "upscaled"
 """The damage law of the throats between grains that solves the flow around each of them."""
 SECTION_ARCHIE: DamageLawName = "section-archie"
-"""The damage law that it takes for more of them."""
+"""The damage law that "auto" takes for more of them."""
 DEFAULT_DAMAGE_LAW: DamageLawName = "side-kozeny"
 """The damage law that it takes with conductance laws other than `DEFAULT_LAW`."""
 MOST_SPHERES = 300_000

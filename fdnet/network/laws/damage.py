@@ -25,7 +25,7 @@ class Damage:
     """Conductance of throats (T) with fines.
 
     Attributes:
-        conductance: (T,) m3, never above that of the clean throat but by `upscaled_damage`.
+        conductance: (T,) m3. Only `upscaled_damage` may exceed that of the clean throat.
         law_used: (T,) which rule applied: clean, deposition, clogging, blocked, kozeny, sections
             or upscaled.
         counts: how many throats, pores or sides were capped or closed.

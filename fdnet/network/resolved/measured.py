@@ -7,10 +7,11 @@ import numpy as np
 
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.names import (
+    ALL_SPHERES,
     AUTO,
+    COMBINED,
     DEFAULT_LAW,
     MOST_SPHERES,
-    OWN_NETWORK,
     SECTION_ARCHIE,
     UPSCALED,
 )
@@ -117,10 +118,9 @@ class Measured:
         warning, where these make no network.
         """
         fines, name = self.specimen.fines, choices.damage_law
-        asked = name in (AUTO, *OWN_NETWORK) and name != UPSCALED
-        if fines is None or not len(fines) or not asked:
+        if fines is None or not len(fines) or name not in (AUTO, COMBINED, ALL_SPHERES):
             return None
-        if name in OWN_NETWORK:
+        if name != AUTO:
             return self.all_spheres(log)
         if choices.law != DEFAULT_LAW or len(fines) + len(self.specimen.grains[1]) > MOST_SPHERES:
             return None

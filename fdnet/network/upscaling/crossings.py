@@ -29,6 +29,7 @@ class Seen:
         shift: (K, 3) whole periods from the first of them to the second; 0 where it is a plane.
         image: (K, 3) shift of the first end of the link, with the node of the home at its place.
         way: (K,) 1 where the first end is the home, else -1.
+        direct: (K,) whether both ends are planes.
     """
 
     link: Array
@@ -36,6 +37,7 @@ class Seen:
     shift: Array
     image: Array
     way: Array
+    direct: Array
 
     __repr__ = one_line
 
@@ -47,6 +49,7 @@ class Seen:
             shift=self.shift[kept],
             image=self.image[kept],
             way=self.way[kept],
+            direct=self.direct[kept],
         )
 
 
@@ -89,6 +92,7 @@ def links_across(whole: PoreGraph, coarse: PoreGraph, owners: Owners) -> Seen:
         shift=np.where(column, -shift, shift) * np.logical_and(*inner.T)[:, None],
         image=np.where(column, offset[:, 1] - whole.shift, offset[:, 0]),
         way=np.where(second, -1.0, 1.0),
+        direct=np.logical_and(*plane.T),
     )
     return seen.where((nodes[:, 0] != nodes[:, 1]) | (seen.shift != 0).any(axis=1))
 
@@ -105,10 +109,11 @@ def crossings_of(seen: Seen, facets: Facets) -> Crossings:
     for k, (home, other) in enumerate(astray.nodes.tolist()):
         key = home, other, shift_of(astray.shift[k])
         if key not in known:
-            known[key] = list(hops(facets, *key)) if home < facets.cells else []
-        lost += not known[key]
+            known[key] = list(hops(facets, *key))
+        steps = known[key] if home < facets.cells or astray.direct[k] else []
+        lost += not steps
         one = slice(k, k + 1)
-        for number, way, at, share in known[key]:
+        for number, way, at, share in steps:
             on_the_way = astray.way[one] * way * share
             parts.append(
                 (np.array([number]), astray.link[one], on_the_way, astray.image[one] - at)

@@ -1,10 +1,10 @@
 """Flow through regions of the network of all spheres, and what it says of the facets in them.
 
-On the pores around a region the pressure falls evenly along x, the direction of the flow, and on
+On the pores around a region the pressure changes evenly along x, the direction of the flow, and on
 inlet and outlet plane it is what it is there (Durlofsky 1991, Water Resour. Res. 27, 699, with a
 border around the part that counts as Wen, Durlofsky and Edwards 2003, Comput. Geosci. 7, 121).
-Pressures are in metres, as if they fell by 1 a metre along x, over that at the centre of a region.
-The mean pressure of a cell is weighted with the conductances of its pores.
+Pressures are in metres: they rise by 1 a metre along x, from 0 at a cell of the region. The mean
+pressure of a cell is weighted with the conductances of its pores.
 """
 
 import numpy as np
@@ -41,12 +41,13 @@ class LocalFlow:
         order = np.argsort(cell, kind="stable")
         self._pores = live[order], np.searchsorted(cell[order], np.arange(cells + 1))
 
-    def parts(self, centres: Array, largest: int) -> list[tuple[Array, Array]]:
-        """The cells `centres` in parts whose regions hold some `largest` pores together.
+    def parts(self, cells: Array, most: int) -> list[tuple[Array, Array]]:
+        """The `cells` in parts whose regions hold at most some `most` pores together.
 
-        Each part is the cells (N,) and the region (N,) of each.
+        Each part is the cells (N,) and the region (N,) of each. A pore is counted once for each
+        way that leads to it.
         """
-        place, near = self.overlay.coarse.place[centres], self.overlay.near
+        place, near = self.overlay.coarse.place[cells], self.overlay.near
         held = np.diff(self._pores[1])
         row, which = members_of(near.first, np.arange(len(held)))
         for _ in range(RINGS):
@@ -54,23 +55,23 @@ class LocalFlow:
             held = held + around.astype(np.intp)
         block = blocks_of(place)
         order = np.argsort(block, kind="stable")
-        cell, block = centres[order], block[order]
+        cell, block = cells[order], block[order]
         first = np.unique(block, return_index=True)[1]
-        part = (np.cumsum(held[cell[first]]) // largest)[block]
+        part = (np.cumsum(held[cell[first]]) // most)[block]
         return [
             (cell[own], np.unique(block[own], return_inverse=True)[1])
             for own in (part == number for number in np.unique(part))
         ]
 
     def across_facets(
-        self, centres: tuple[Array, Array], wanted: Wanted
+        self, part: tuple[Array, Array], wanted: Wanted
     ) -> tuple[Array, Array, Array]:
-        """Facets (M,) at the cells `centres`, the flux m4 across them and the difference m.
+        """Facets (M,) at the cells of a part, the flux m4 across them and the difference m.
 
-        The difference is that of the mean pressures of its two nodes. `centres` is a part.
+        The difference is that of the mean pressures of its two nodes.
         """
-        overlay, (cell, region) = self.overlay, centres
-        regions = regions_around(centres, overlay.near, self._pores, overlay.owners.offset)
+        overlay, (cell, region) = self.overlay, part
+        regions = regions_around(part, overlay.near, self._pores, overlay.owners.offset)
         first = np.unique(region, return_index=True)[1]
         solved = _Solved(self, regions, overlay.coarse.place[cell[first], 0])
         seen, which = members_of(wanted.first, cell)
@@ -89,7 +90,7 @@ class LocalFlow:
 
 
 class _Solved:
-    """The flow through some regions, whose centres lie at `origin` (B,) m along x."""
+    """The flow through some regions, whose pressure is 0 at `origin` (B,) m along x."""
 
     def __init__(self, flow: LocalFlow, regions: Regions, origin: Array) -> None:
         self._flow, self._overlay, self._regions = flow, flow.overlay, regions
@@ -106,7 +107,7 @@ class _Solved:
         pressure = []
         for end in (0, 1):
             pore, shift = whole.ends[link, end], image + end * whole.shift[link]
-            place, there = self._found(row, pore, shift)
+            place, there = self._placed(row, pore, shift)
             inside = self._pressure[place] if len(self._pressure) else 0.0
             pressure.append(np.where(there, inside, self._outside(row, pore, shift)))
         return whole.conductance[link] * (pressure[0] - pressure[1])
@@ -129,7 +130,6 @@ class _Solved:
         facets, size = self._overlay.facets, len(self._overlay.near.first)
         total = weight = 0.0
         for (other, at), (facet, _) in facets.near[node].items():
-            value = np.nan
             if other >= facets.cells:
                 value = self._overlay.planes[other - facets.cells] - self._origin[row]
             else:
@@ -148,10 +148,10 @@ class _Solved:
         if not count:
             return np.zeros(0)
         pore, which = members_of(links.first, regions.pore)
-        centre, other = regions.centre[pore], links.other[which]
+        region, other = regions.region[pore], links.other[which]
         shift, weight = regions.shift[pore] + links.shift[which], links.weight[which]
-        place, there = self._found(centre, other, shift)
-        held = weight * np.where(there, 0.0, self._outside(centre, other, shift))
+        place, there = self._placed(region, other, shift)
+        held = weight * np.where(there, 0.0, self._outside(region, other, shift))
         total = self._flow.total[regions.pore]
         inner = (-weight[there], (pore[there], place[there]))
         matrix = sparse.coo_matrix(inner, (count, count)) + sparse.diags(total)
@@ -164,7 +164,7 @@ class _Solved:
         )
         return np.asarray(scale @ factor.solve(scale @ np.bincount(pore, held, count)))
 
-    def _found(self, row: Array, pore: Array, shift: Array) -> tuple[Array, Array]:
+    def _placed(self, row: Array, pore: Array, shift: Array) -> tuple[Array, Array]:
         """Places (N,) of pores in the regions, and whether they are in them; planes are not."""
         count = len(self._overlay.whole.node)
         plane = pore >= count

@@ -43,12 +43,11 @@ class Overlay:
     __repr__ = one_line
 
 
-def overlay_of(network: Network, clean: Array, whole: Network) -> Overlay:
+def overlay_of(network: Network, coarse: PoreGraph, whole: Network) -> Overlay:
     """The network of all spheres, the `whole`, over the `network` of the grains.
 
-    `clean` (T,) m3 is the conductance of the throats between grains.
+    `coarse` is the graph of the grains with clean throats; it has at least one link.
     """
-    coarse = pore_graph(network, clean)
     fine = pore_graph(whole, 1.0 / deposit_resistances(whole).sum(axis=1))
     tetrahedra, facets = Tetrahedra(network), facets_of(coarse)
     members = Members(network, tetrahedra, centroids(whole, fine), coarse.place)

@@ -107,10 +107,9 @@ def _nearest(points: Array, network: Network, coarse: PoreGraph) -> tuple[Array,
     some = np.flatnonzero(_open(network, coarse))
     size = np.where(network.periodic, np.ptp(network.box, axis=1), 0.0)
     low = network.box[:, 0]
-    wrapped = [
-        np.where(size > 0.0, np.mod(place - low, np.where(size > 0.0, size, 1.0)), place - low)
-        for place in (points, coarse.place[some])
-    ]
+    around = np.where(size > 0.0, size, np.inf)
+    wrapped = [np.mod(place - low, around) for place in (points, coarse.place[some])]
+    wrapped = [np.where(place < around, place, 0.0) for place in wrapped]
     tree = cKDTree(wrapped[1], boxsize=size)
     cell = some[tree.query(wrapped[0])[1]]
     with np.errstate(invalid="ignore", divide="ignore"):

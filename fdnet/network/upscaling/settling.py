@@ -1,11 +1,9 @@
-"""Pores that lie in two cells are put into the one that leads to their neighbours.
+"""Pores that stick out of their cell are moved into the one that leads to their neighbours.
 
 A link between two cells that share no facet shows that one of its pores sticks out of its cell.
-The pore that lies nearer to a cell in between is moved into that one. Without this the
-permeability of slabs with fines would be off by 4 % (rms) from that of all spheres, with it by 2.
+The pore that lies deeper in a cell in between is moved into that one. With regions of two rings
+this took the permeability of known slabs from 4 to 2 % (rms) off that of all spheres.
 """
-
-from collections.abc import Iterator
 
 import numpy as np
 
@@ -21,8 +19,10 @@ PASSES = 3
 """How often pores may be moved."""
 SHALLOWEST = -0.5
 """Least barycentric coordinate of a pore in a tetrahedron of the cell into which it is moved."""
-Moves = dict[int, tuple[float, int, Shift]]
+Move = tuple[float, int, Shift]
 """How deep a pore lies in its new cell, that cell, and the offset of the pore."""
+Moves = dict[int, Move]
+NOWHERE: Move = (-np.inf, -1, HERE)
 
 
 def settled(
@@ -35,7 +35,7 @@ def settled(
         seen = seen.where(~facets.at(seen.nodes, seen.shift)[1])
         moves = _moves(seen, graphs[0], facets, members)
         held = np.bincount(cell, minlength=facets.cells)
-        for pore, (_, new, at) in moves.items():
+        for pore, (_, new, at) in sorted(moves.items(), key=lambda one: one[1], reverse=True):
             if held[cell[pore]] > 1:
                 held[cell[pore]] -= 1
                 cell[pore], offset[pore] = new, at
@@ -45,24 +45,56 @@ def settled(
 
 
 def _moves(seen: Seen, whole: PoreGraph, facets: Facets, members: "Members") -> Moves:
-    """The pores of the links `seen` that may move, and where to."""
+    """The pores of the links `seen` that may move, and where to.
+
+    Of each link it is the pore that lies deeper in its new cell.
+    """
     moves: Moves = {}
     for k, (home, other) in enumerate(seen.nodes.tolist()):
-        ends = [int(end) for end in whole.ends[seen.link[k]]]
         if home >= facets.cells:
-            pore = min(ends)  # planes have the larger numbers
-            for cell, depth, offset in members.from_plane_to_plane(pore, facets):
-                if depth > moves.get(pore, (-np.inf, 0, HERE))[0]:
-                    moves[pore] = depth, cell, offset
-            continue
-        images = seen.image[k], seen.image[k] + whole.shift[seen.link[k]]
-        for cell, at, _ in through_one(facets, home, other, shift_of(seen.shift[k])):
-            for pore, image in zip(ends, images, strict=True):
-                if cell < facets.cells and pore < len(whole.node):
-                    depth = members.depth(cell, pore, image - at)
-                    if depth > moves.get(pore, (SHALLOWEST, 0, HERE))[0]:
-                        moves[pore] = depth, cell, shift_of(image - at)
+            pore, deepest = _from_plane_to_plane(whole.ends[seen.link[k]], facets, members)
+        else:
+            ways = through_one(facets, home, other, shift_of(seen.shift[k]))
+            cells = [(cell, at) for cell, at, _ in ways if cell < facets.cells]
+            pore, deepest = _deeper(cells, (seen, k), whole, members)
+        if deepest > moves.get(pore, NOWHERE):
+            moves[pore] = deepest
     return moves
+
+
+def _deeper(
+    cells: list[tuple[int, Shift]], seen: tuple[Seen, int], whole: PoreGraph, members: "Members"
+) -> tuple[int, Move]:
+    """The end of the link `seen[1]` that lies deeper in one of the `cells`, and its move."""
+    links, k = seen
+    link = links.link[k]
+    best, deepest = -1, (SHALLOWEST, -1, HERE)
+    for end, pore in enumerate(map(int, whole.ends[link])):
+        if pore < len(whole.node):
+            image = links.image[k] + end * whole.shift[link]
+            for cell, at in cells:
+                move = members.depth(cell, pore, image - at), cell, shift_of(image - at)
+                if move > deepest:
+                    best, deepest = pore, move
+    return best, deepest if best >= 0 else NOWHERE
+
+
+def _from_plane_to_plane(ends: Array, facets: Facets, members: "Members") -> tuple[int, Move]:
+    """The move of a pore on one plane that a link joins to the other, into a cell at both.
+
+    Where both ends are planes there is none.
+    """
+    pore = int(ends.min())  # planes have the larger numbers
+    if pore >= members.count:
+        return pore, NOWHERE
+    inlet, outlet = facets.near[facets.cells : facets.cells + 2]
+    cells = [cell for cell, at in inlet if (cell, at) in outlet]
+    offsets = [members.offset(cell, pore) for cell in cells]
+    moves = [
+        (members.depth(cell, pore, np.array(at)), cell, at)
+        for cell, at in zip(cells, offsets, strict=True)
+    ]
+    return pore, max(moves, default=NOWHERE)
 
 
 class Members:
@@ -79,6 +111,7 @@ class Members:
         self, network: Network, tetrahedra: Tetrahedra, points: Array, places: Array
     ) -> None:
         self._tetrahedra, self._points, self._places = tetrahedra, points, places
+        self.count = len(points)
         self._periodic = np.array(network.periodic)
         self._size = np.ptp(network.box, axis=1)
         group = network.pore_group
@@ -91,11 +124,7 @@ class Members:
         point = self._points[pore] + shift * self._size
         return float(self._tetrahedra.depth(own, np.broadcast_to(point, (len(own), 3))).max())
 
-    def from_plane_to_plane(self, pore: int, facets: Facets) -> Iterator[tuple[int, float, Shift]]:
-        """Cells with a facet to both planes, how deep a pore lies in them, and its offset."""
-        inlet, outlet = facets.near[facets.cells : facets.cells + 2]
-        for cell, at in inlet:
-            if (cell, at) in outlet:
-                apart = (self._places[cell] - self._points[pore]) / self._size
-                offset = np.where(self._periodic, np.rint(apart), 0).astype(np.intp)
-                yield cell, self.depth(cell, pore, offset), shift_of(offset)
+    def offset(self, cell: int, pore: int) -> Shift:
+        """Whole periods by which a pore has to be moved to be nearest to a cell."""
+        apart = (self._places[cell] - self._points[pore]) / self._size
+        return shift_of(np.where(self._periodic, np.rint(apart), 0))

@@ -1,15 +1,15 @@
 """Damage by flow through the fines around each throat: local upscaling.
 
 The network of all spheres knows every fine but has many times the throats. Here it is solved in
-small regions only, each a pore between grains and three rings of neighbours (`local_flow`). From
-the flux Q across a facet between grains and the difference dp of the mean pressures of the two
-pores at it follows the conductance of the throat. Both pores have a region of their own, so there
-are two fluxes and two differences, and the conductance is (sum of Q^2 / sum of dp^2)^(1/2). There
-is no constant in it. The network of the grains with these conductances then gives the
-permeability.
+small regions only, around a few pores between grains with three rings of neighbours
+(`local_flow`). From the flux Q across a facet between grains and the difference dp of the mean
+pressures of the two pores at it follows the conductance of the throat. Both pores lie in the
+middle of a region, so there are two fluxes and two differences, which are the same where the
+region is. The conductance is (sum of Q^2 / sum of dp^2)^(1/2). There is no constant in it. The
+network of the grains with these conductances then gives the permeability.
 
-A throat may come out more conductive than without fines, where fluid that fines turn away from a
-neighbour passes through it.
+The conductances carry the flow together. That of a single throat may be several times too high or
+too low, for the mean pressure of a pore moves when a fine divides it, also a small one.
 """
 
 import numpy as np
@@ -20,17 +20,19 @@ from fdnet.network.laws.damage import BLOCKED, CLEAN, UPSCALED, Damage
 from fdnet.network.network import Network, build_network
 from fdnet.network.upscaling.local_flow import LocalFlow
 from fdnet.network.upscaling.overlay import Overlay, overlay_of
+from fdnet.network.upscaling.pore_graph import pore_graph
 from fdnet.network.upscaling.wanted import Wanted, wanted_of
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
-PORES = 60_000
-"""Pores of all regions that are solved at once."""
+MOST_PORES = 60_000
+"""Bound on the pores of regions that are solved at once; there are some ten times fewer."""
 
 
 def upscaled_damage(network: Network, spheres: Snapshot, clean: Array) -> Damage:
     """Conductance of the throats of a network of grains, from flow through all `spheres` nearby.
 
-    Throats between pores without fines keep the clean conductance.
+    Throats between pores without fines keep the clean conductance. All throats from a pore to one
+    plane count as one, and so do all from plane to plane.
 
     Args:
         network: of the grains.
@@ -40,30 +42,37 @@ def upscaled_damage(network: Network, spheres: Snapshot, clean: Array) -> Damage
     Raises:
         NetworkError: grains and fines together make no network.
     """
+    factor, changed, lost = np.ones(len(clean)), np.zeros(len(clean), bool), 0
+    coarse = pore_graph(network, clean)
+    throat = coarse.throat
+    if len(throat) and len(spheres.fines()):
+        overlay = overlay_of(network, coarse, _together(network, spheres))
+        facet = overlay.facets.of_link
+        filled = overlay.filled[network.pore_group[network.throat_pores[throat]]]
+        asked = np.zeros(len(overlay.facets.ends), bool)
+        asked[facet[np.logical_or(*filled.T)]] = True
+        changed[throat], lost = asked[facet], overlay.crossings.lost
+        factor[throat] = _factors(overlay, asked)[facet]
+    law = np.where(changed, np.where(factor > 0.0, UPSCALED, BLOCKED), CLEAN)
+    counts = {
+        "throats_filled": int(np.sum(factor == 0.0)),
+        "throats_above_clean": int(np.sum(factor > 1.0)),
+        "links_without_facet": lost,
+    }
+    return Damage(
+        conductance=frozen(clean * factor), law_used=frozen(law.astype("<U10")), counts=counts
+    )
+
+
+def _together(network: Network, spheres: Snapshot) -> Network:
+    """The network of all spheres in the box of the network of the grains."""
     try:
-        whole = build_network(spheres, periodic=network.periodic, walls=network.walls)
+        return build_network(spheres, periodic=network.periodic, walls=network.walls)
     except NetworkError as error:
         raise NetworkError(
             f"upscaled: grains and fines together make no network: {error}; use "
             "analysis.damage_law = 'section-archie'"
         ) from error
-    overlay = overlay_of(network, clean, whole)
-    throat, facet = overlay.coarse.throat, overlay.facets.of_link
-    touched = overlay.filled[network.pore_group[network.throat_pores]]
-    touched = np.logical_or(touched[:, 0], touched[:, 1])
-    asked = np.zeros(len(overlay.facets.ends), bool)
-    asked[facet[touched[throat]]] = True
-    factor = np.ones(len(clean))
-    factor[throat] = _factors(overlay, asked)[facet]
-    law = np.where(touched, np.where(factor > 0.0, UPSCALED, BLOCKED), CLEAN)
-    counts = {
-        "throats_filled": int(np.sum(factor == 0.0)),
-        "throats_above_clean": int(np.sum(factor > 1.0)),
-        "links_without_facet": overlay.crossings.lost,
-    }
-    return Damage(
-        conductance=frozen(clean * factor), law_used=frozen(law.astype("<U10")), counts=counts
-    )
 
 
 def _factors(overlay: Overlay, asked: Array) -> Array:
@@ -82,8 +91,8 @@ def _factors(overlay: Overlay, asked: Array) -> Array:
 
 def _solved(flow: LocalFlow, wanted: Wanted, asked: Array) -> list[tuple[Array, Array, Array]]:
     """The fluxes and differences of all regions that see facets which are `asked` for."""
-    centres = wanted.centres(asked)
-    if not len(centres):
+    cells = wanted.seeing(asked)
+    if not len(cells):
         return []
-    parts = flow.parts(centres, PORES)
+    parts = flow.parts(cells, MOST_PORES)
     return on_all_cores(lambda part: flow.across_facets(part, wanted), parts)

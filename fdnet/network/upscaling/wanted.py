@@ -31,10 +31,10 @@ class Wanted:
 
     __repr__ = one_line
 
-    def centres(self, facets: Array) -> Array:
-        """The cells that see a facet for which `facets` (E,) is true."""
+    def seeing(self, asked: Array) -> Array:
+        """The cells that see a facet which is `asked` for (E,)."""
         sees = np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
-        return np.unique(sees[facets[self.facet]])
+        return np.unique(sees[asked[self.facet]])
 
 
 def wanted_of(overlay: Overlay) -> Wanted:
@@ -51,10 +51,11 @@ def wanted_of(overlay: Overlay) -> Wanted:
         places = np.stack([turn, turn + shift[own]], axis=1)
         seen.append((ends[own, end], own, crossings.image[own] + turn, places))
     across = np.flatnonzero((ends >= facets.cells).all(axis=1))
-    pore = overlay.whole.ends[crossings.link[across]].min(axis=1)  # planes have larger numbers
-    across, pore = (one[pore < len(overlay.whole.node)] for one in (across, pore))
+    first, second = overlay.whole.ends[crossings.link[across]].T
+    pore = np.where(first < len(overlay.whole.node), first, second)
+    cell = np.append(overlay.owners.cell, [0, 0])[pore]  # any, for a link from plane to plane
     nowhere = np.zeros((len(across), 2, 3), np.intp)
-    seen.append((overlay.owners.cell[pore], across, crossings.image[across], nowhere))
+    seen.append((cell, across, crossings.image[across], nowhere))
     centre, which, image, places = (np.concatenate(column) for column in zip(*seen, strict=True))
     order = np.argsort(centre, kind="stable")
     which = which[order]

@@ -11,6 +11,7 @@ from fdnet.network.laws.named import LAWS
 from fdnet.studies.accuracy.goals import DAMAGE_GOAL, GOALS, Row
 from fdnet.studies.accuracy.rows import RULES
 from fdnet.studies.engine.palette import (
+    GREEN,
     NEARLY_BLACK,
     ORANGE,
     PALE_BLUE,
@@ -27,6 +28,7 @@ RULE_STYLES = (
     (PALE_BLUE, "s"),
     (NEARLY_BLACK, "o"),
     (ORANGE, "d"),
+    (GREEN, "+"),
     (VIOLET, "x"),
 )
 """Colour and marker of each of `LAWS` and of each of `RULES`."""

@@ -1,7 +1,7 @@
-"""The two laws of the network of the grains against the network of all spheres, at full size.
+"""The laws of the throats between grains against the network of all spheres, at full size.
 
 No grid resolves a specimen of thousands of grains and fines. There the network of all spheres,
-which resolved flow has judged on slabs, is what the two laws are compared with.
+which resolved flow has judged on slabs, is what these laws are compared with.
 """
 
 from collections.abc import Iterable, Sequence
@@ -90,13 +90,13 @@ def full_size_table(validation: Path) -> str:
 
 
 def full_size_numbers(validation: Path) -> dict[str, str]:
-    """What the two laws make of the first half-millimetre and of the whole, over all spheres."""
+    """What the laws make of the first half-millimetre and of the whole, over all spheres."""
     rows = read_named(validation / FULL_SIZE)
     face, whole = rows[0]["section"], WHOLE
     return {
         f"full_size_{part}_{key}": _span(rows, section, law)
         for part, section in (("face", face), ("whole", whole))
-        for key, law in zip(("kozeny", "archie"), TWO_SCALE, strict=True)
+        for key, law in zip(("kozeny", "archie", "local"), TWO_SCALE, strict=True)
     } | {"full_size_runs": str(sum(row["section"] == whole for row in rows))}
 
 

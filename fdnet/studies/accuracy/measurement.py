@@ -5,13 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fdnet.case.names import COMBINED, SECTION_ARCHIE
+from fdnet.case.names import COMBINED, SECTION_ARCHIE, UPSCALED
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.flow.slabs import whole_permeability
 from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, LAWS
 from fdnet.network.network import Network, build_network
 from fdnet.network.resolved.all_spheres import all_conductances
 from fdnet.network.resolved.combined import combined
+from fdnet.network.upscaling.upscaled import upscaled_damage
 from fdnet.spheres.snapshot import Array, Snapshot
 
 PERIODIC = (True, True, True)
@@ -28,6 +29,8 @@ RESOLVED = "all spheres as grains"
 """The network of grains and fines alike, at the scale of the fines; it has no damage law."""
 ARCHIE, MEAN = f"{DEFAULT_LAW} + {SECTION_ARCHIE}", f"{DEFAULT_LAW} + {COMBINED}"
 """The pair of laws whose mean with `RESOLVED` is `combined`, and that mean."""
+LOCAL = f"{DEFAULT_LAW} + {UPSCALED}"
+"""The damage law of throats between grains that solves parts of that network."""
 RESOLVED_LIMIT = 20_000
 """Spheres above which that network is left out."""
 
@@ -84,6 +87,14 @@ def resolved(pack: Snapshot) -> float:
     return permeability(network, all_conductances(network))
 
 
+def local(pack: Snapshot, network: Network) -> float:
+    """k (m2) by `LOCAL`; nan above `RESOLVED_LIMIT` spheres."""
+    if len(pack) > RESOLVED_LIMIT:
+        return float("nan")
+    damage = upscaled_damage(network, pack, LAWS[DEFAULT_LAW](network))
+    return permeability(network, damage.conductance)
+
+
 def mean_of(intact: float, whole: float, archie: float) -> float:
     """k with fines by `MEAN`, from k without fines, by `RESOLVED` and by `ARCHIE`, in one unit."""
     parts = (np.array([min(k, intact)]) for k in (whole, archie))
@@ -93,10 +104,12 @@ def mean_of(intact: float, whole: float, archie: float) -> float:
 def measure_loss(
     pack: Snapshot, network: Network, *, pairs: Sequence[str] = PAIRS, whole: bool = True
 ) -> Loss:
-    """Permeabilities of a pack by `pairs` of laws, and by `RESOLVED` if `whole`."""
+    """Permeabilities of a pack by `pairs` of laws, and by `LOCAL` and `RESOLVED` if `whole`."""
     occupancy = measure_occupancy(network, pack.fines())
     damaged = {pair: by_pair(network, occupancy, pair) for pair in pairs}
+    if whole:
+        damaged |= {LOCAL: local(pack, network), RESOLVED: resolved(pack)}
     return Loss(
         intact={law: by_law(network, law) for law in dict.fromkeys(map(law_of, pairs))},
-        damaged=damaged | ({RESOLVED: resolved(pack)} if whole else {}),
+        damaged=damaged,
     )

@@ -8,11 +8,18 @@ import numpy as np
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import Network
 from fdnet.network.tessellation import delaunay
-from fdnet.studies.accuracy.measurement import PAIRS, RESOLVED, by_law, measure_loss, network_of
+from fdnet.studies.accuracy.measurement import (
+    LOCAL,
+    PAIRS,
+    RESOLVED,
+    by_law,
+    measure_loss,
+    network_of,
+)
 from fdnet.studies.truth.cases import UNEQUAL, Case
 
 Row = dict[str, Any]
-RULES = (*PAIRS, RESOLVED)
+RULES = (*PAIRS, LOCAL, RESOLVED)
 """What is compared on packs with fines."""
 
 

@@ -15,10 +15,18 @@ from fdnet.studies.accuracy.goals import (
     worst,
     worst_case,
 )
-from fdnet.studies.accuracy.measurement import ARCHIE, SIDE_KOZENY
+from fdnet.studies.accuracy.measurement import ARCHIE, LOCAL, SIDE_KOZENY
 from fdnet.studies.accuracy.slabs import CHOSEN, FINEST
-from fdnet.studies.truth.slabs import YES
+from fdnet.studies.truth.slabs import LATER, NO, YES
 
+COMPARED = {
+    "default": CHOSEN,
+    "finest": FINEST,
+    "local": LOCAL,
+    "archie": ARCHIE,
+    "two_scale": SIDE_KOZENY,
+}
+"""The laws that the page compares on slabs, by their names in its prose."""
 FINE_RATIOS = (8, 10)
 """Grains over fines in the names of the slabs with fine fines."""
 
@@ -27,16 +35,29 @@ def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
     """Every number of the prose on slabs by its name in docs/accuracy.md.in."""
     aside = [row for row in rows if row["known_before"] != YES]
     known = [row for row in rows if row["known_before"] == YES]
-    pairs = {"default": CHOSEN, "finest": FINEST, "two_scale": SIDE_KOZENY, "archie": ARCHIE}
+    parts = {
+        "fresh": [row for row in rows if row["known_before"] == LATER],
+        "former": [row for row in rows if row["known_before"] == NO],
+        "known": known,
+    }
     fine = _with_fine_fines(rows)
     coarse = [row for row in rows if row not in fine]
     known_k0 = [row[f"{SIDE_KOZENY}: k0"] for row in known]
     return {
         "slabs": str(len(rows)),
         "slabs_aside": str(len(aside)),
-        "slabs_known": str(len(known)),
-        **{f"slabs_aside_{key}": summary(aside, name) for key, name in pairs.items()},
-        **{f"slabs_known_{key}": summary(known, name) for key, name in pairs.items()},
+        **{f"slabs_{part}": str(len(some)) for part, some in parts.items()},
+        **{
+            f"slabs_{part}_{key}": summary(some, name)
+            for part, some in parts.items()
+            for key, name in COMPARED.items()
+        },
+        **{
+            f"slabs_aside_{key}": summary(aside, name)
+            for key, name in COMPARED.items()
+            if name != LOCAL
+        },
+        "slabs_local_over": _over(rows),
         "slabs_default_rms": percent(rms(values(aside, CHOSEN))),
         "slabs_aside_k_default": percent(rms([row[f"{CHOSEN}: k"] for row in aside])),
         "slabs_default_k0": percent(rms([row[f"{CHOSEN}: k0"] for row in rows])),
@@ -59,6 +80,11 @@ def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
         "slabs_most": f"{max(row['k_over_k0'] for row in rows):.2f}",
         "slabs_errors": truth_errors(rows),
     }
+
+
+def _over(rows: Sequence[Row]) -> str:
+    """rms and worst of k by `upscaled` over that by all spheres."""
+    return summed_up(row[f"{LOCAL}: k"] / row[f"{FINEST}: k"] for row in rows)
 
 
 def _apart(rows: Sequence[Row]) -> dict[str, str]:

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.case.names import ALL_SPHERES, AUTO, UPSCALED
+from fdnet.case.names import ALL_SPHERES, AUTO
 from fdnet.network.laws.named import DEFAULT_LAW
 from fdnet.network.permeability import compare
 from fdnet.spheres.snapshot import Array, Snapshot
 from fdnet.studies.accuracy.goals import percent, ratio, summary
-from fdnet.studies.accuracy.measurement import PAIRS, SIDE_KOZENY
+from fdnet.studies.accuracy.measurement import LOCAL, PAIRS, SIDE_KOZENY
 from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.engine.markdown import markdown_table
 from fdnet.studies.truth.packs import MM
@@ -20,8 +20,6 @@ from fdnet.studies.truth.slabs import SLAB_TRUTH, read_specimen
 Row = dict[str, Any]
 FINEST, CHOSEN = f"{DEFAULT_LAW} + {ALL_SPHERES}", f"{DEFAULT_LAW} + {AUTO}"
 """The network of all spheres, and what the default of runs and commands chooses."""
-LOCAL = f"{DEFAULT_LAW} + {UPSCALED}"
-"""The network of the grains, its throats by the flow through the fines around them."""
 SLAB_PAIRS = (*PAIRS, LOCAL, FINEST, CHOSEN)
 """The pairs of laws that are compared on slabs."""
 

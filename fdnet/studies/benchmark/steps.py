@@ -38,8 +38,8 @@ SHAKE = 0.02
 FINE = 0.1
 SIDES, BOX = (False, True, True), (False, False, False)
 """Sides of the periodic packs, and of the same in a box of walls."""
-TWO_SCALE: tuple[DamageLawName, ...] = ("side-kozeny", "section-archie")
-"""Laws on the network of the grains that are timed next to that of all spheres."""
+TWO_SCALE: tuple[DamageLawName, ...] = ("side-kozeny", "section-archie", "upscaled")
+"""Laws of the throats between grains that are timed next to the network of all spheres."""
 SECTIONS = 8
 """Sections of the analysis by `combined`, those of a case by default."""
 DECADES, CLOSED = 12, 0.1
