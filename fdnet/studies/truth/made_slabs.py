@@ -175,7 +175,7 @@ CUTS: tuple[tuple[str, tuple[float, float], tuple[int, ...], str], ...] = (
     ("slabHL_r10", FACE, FINEST, NO),
     ("slabIA_r5", FACE, MIDDLE, LATER),
     ("slabIB_r8", FACE, FINEST, LATER),
-    ("slabIC_r10", FACE, FINEST, LATER),
+    ("slabIC_r10", FACE, BEYOND, LATER),
     ("slabID_r5_followed", FACE, MIDDLE, LATER),
     ("slabIE_r8_followed", FACE, FINEST, LATER),
     ("slabIF_r6", TWICE, MIDDLE, LATER),
@@ -184,10 +184,10 @@ CUTS: tuple[tuple[str, tuple[float, float], tuple[int, ...], str], ...] = (
     ("slabII_r3", TWICE, MIDDLE, LATER),
     ("slabIJ_r4", FACE, MIDDLE, LATER),
     ("slabIK_r8_mu0", FACE, FINEST, LATER),
-    ("slabIL_r10", FACE, FINEST, LATER),
+    ("slabIL_r10", FACE, BEYOND, LATER),
     ("slabJA_r5", FACE, MIDDLE, LATER),
     ("slabJB_r8", FACE, FINEST, LATER),
-    ("slabJC_r10", FACE, FINEST, LATER),
+    ("slabJC_r10", FACE, BEYOND, LATER),
     ("slabJD_r5_followed", FACE, MIDDLE, LATER),
     ("slabJE_r8_followed", FACE, FINEST, LATER),
     ("slabJF_r6", TWICE, MIDDLE, LATER),
@@ -196,7 +196,7 @@ CUTS: tuple[tuple[str, tuple[float, float], tuple[int, ...], str], ...] = (
     ("slabJI_r3", TWICE, MIDDLE, LATER),
     ("slabJJ_r4", FACE, MIDDLE, LATER),
     ("slabJK_r8_mu0", FACE, FINEST, LATER),
-    ("slabJL_r10", FACE, FINEST, LATER),
+    ("slabJL_r10", FACE, BEYOND, LATER),
 )
 """Specimen, slab, grids, and whether its truth was known when the laws were shaped."""
 SLABS = {
