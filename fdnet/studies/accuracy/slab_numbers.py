@@ -52,11 +52,7 @@ def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
             for part, some in parts.items()
             for key, name in COMPARED.items()
         },
-        **{
-            f"slabs_aside_{key}": summary(aside, name)
-            for key, name in COMPARED.items()
-            if name != LOCAL
-        },
+        "slabs_aside_finest": summary(aside, FINEST),
         "slabs_local_over": _over(rows),
         "slabs_default_rms": percent(rms(values(aside, CHOSEN))),
         "slabs_aside_k_default": percent(rms([row[f"{CHOSEN}: k"] for row in aside])),
