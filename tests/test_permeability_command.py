@@ -276,7 +276,7 @@ def test_three_axes_as_a_table_and_as_csv(tmp_path, capsys):
     assert code == 0, err
     table = out.split("sections")[0].splitlines()[1:]
     by_axis = [line for line in table if line.split()[2] in ("x", "y", "z")]
-    assert len(by_axis) == 3 * 28  # the default, and all pairs
+    assert len(by_axis) == 3 * 29  # the default, and all pairs
     assert len({len(line) for line in by_axis}) == 1
     header, *rows = (tmp_path / "laws.csv").read_text().splitlines()
     assert header.endswith("k_x_m2,k_y_m2,k_z_m2,k_x_damaged_m2,k_y_damaged_m2,k_z_damaged_m2")
