@@ -17,11 +17,11 @@ from fdnet.network.laws.section_rays import aim, set_sides
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse
-from fdnet.network.resolved import intact
 from fdnet.spheres.snapshot import Kind, Snapshot
 from fdnet.studies.truth.packs import read_pack, truth_folder
 from tests.network.packs import random_pack, with_fines
 
+pytestmark = pytest.mark.usefixtures("by_the_network_alone")
 SIDES = "yz"
 BASE = np.array([[0.0, 0.0], [1.0, 0.0], [0.3, 0.9]])
 
@@ -31,14 +31,6 @@ def sides():
     side = np.empty((3, 3))
     set_sides(BASE, side)
     return side
-
-
-@pytest.fixture(scope="module", autouse=True)
-def by_the_network_alone():
-    """No section is small enough for resolved flow, which has tests of its own."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(intact, "MOST_CELLS", 0)
-        yield
 
 
 @pytest.fixture(scope="module")

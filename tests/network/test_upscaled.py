@@ -11,7 +11,6 @@ from fdnet.network.laws.damage import BLOCKED, CLEAN, UPSCALED
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse, compare
-from fdnet.network.resolved import intact
 from fdnet.network.resolved.all_spheres import all_conductances
 from fdnet.network.upscaling import regions, upscaled
 from fdnet.network.upscaling.overlay import overlay_of
@@ -22,16 +21,9 @@ from fdnet.spheres.snapshot import Kind, Snapshot
 from fdnet.studies.truth.packs import read_pack, truth_folder
 from tests.network.packs import body_centred, random_pack, with_fines
 
+pytestmark = pytest.mark.usefixtures("by_the_network_alone")
 LAW = "upscaled"
 SIDES = "yz"
-
-
-@pytest.fixture(scope="module", autouse=True)
-def by_the_network_alone():
-    """No section is small enough for resolved flow, which has tests of its own."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(intact, "MOST_CELLS", 0)
-        yield
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +34,12 @@ def pack():
 def both_networks(pack, periodic):
     grains, whole = (build_network(one, periodic=periodic) for one in (pack.grains(), pack))
     return grains, LAWS["lubrication"](grains), whole
+
+
+def damaged_sections(pack, sections, law):
+    """k_damaged of the sections by a damage law."""
+    result = analyse(pack, periodic=SIDES, sections=sections, damage_law=law)
+    return [one.k_damaged for one in result.sections]
 
 
 @pytest.mark.parametrize("periodic", ["", "yz"])
@@ -129,26 +127,14 @@ def test_a_section_is_the_specimen_of_its_own_spheres(pack):
 @pytest.mark.parametrize("sections", [8, 12, 20])
 def test_thin_sections_are_near_to_all_spheres(pack, sections):
     """From half a grain to a quarter of it thick: fluid goes straight from plane to plane."""
-    own, whole = (
-        [
-            one.k_damaged
-            for one in analyse(pack, periodic=SIDES, sections=sections, damage_law=law).sections
-        ]
-        for law in (LAW, "all-spheres")
-    )
+    own, whole = (damaged_sections(pack, sections, law) for law in (LAW, "all-spheres"))
     assert own == pytest.approx(whole, rel=0.05)
 
 
 def test_fluid_may_go_from_plane_to_plane_where_no_throat_between_grains_does():
     pack = with_fines(random_pack(20, aspect=2.0, seed=5), 40, 0.3, seed=5)
     edges = [0, 0.3, 1.6, float(pack.box[0, 1])]
-    own, whole = (
-        [
-            one.k_damaged
-            for one in analyse(pack, periodic=SIDES, sections=edges, damage_law=law).sections
-        ]
-        for law in (LAW, "all-spheres")
-    )
+    own, whole = (damaged_sections(pack, edges, law) for law in (LAW, "all-spheres"))
     assert own == pytest.approx(whole, rel=0.05)
 
 

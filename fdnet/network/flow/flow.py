@@ -16,10 +16,10 @@ from fdnet.network.flow.links import (
     OUTLET,
     Links,
     check_conductance,
+    links_around,
     links_between,
 )
 from fdnet.network.flow.stiff import Balance, balance_links
-from fdnet.network.flow.winding import winding_groups
 from fdnet.network.network import Network
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, frozen
@@ -91,7 +91,7 @@ def solve_flow(
     """
     check_conductance(conductance, len(network.throat_pores))
     if span is None and network.periodic[0]:
-        return _solve_period(network, conductance * network.throat_share)
+        return _solve_period(network, conductance)
     low, high = map(float, network.box[0] if span is None else span)
     links, place, free = links_between(network, conductance, (low, high))
     isolated = int(np.sum(((place == BETWEEN) & ~free)[network.pore_group]))
@@ -173,22 +173,17 @@ def _solve_period(network: Network, conductance: Array) -> Flow:
     The pressure of one pore in each connected group is the reference of that group.
     """
     group = network.pore_group
-    count = int(group.max()) + 1
-    pair, jump = group[network.throat_pores], network.throat_shift[:, 0].astype(float)
-    throat = np.flatnonzero((conductance > 0) & ((pair[:, 0] != pair[:, 1]) | (jump != 0)))
-    pair, jump = pair[throat], jump[throat]
-    live = winding_groups(pair, jump, count)[1]
+    links, live = links_around(network, conductance)
     isolated = int(np.sum(~live[group]))
     if not live.any():
         nowhere = np.full(len(group), np.nan)
         return _no_flow(
             nowhere, len(conductance), isolated, "no open path around the period along x"
         )
-    use = live[pair[:, 0]]
-    throat, node, jump = throat[use], (np.cumsum(live) - 1)[pair[use]], jump[use]
-    g = conductance[throat]
+    throat, g = links.throat, links.conductance
+    node, jump = (np.cumsum(live) - 1)[links.ends], network.throat_shift[throat, 0].astype(float)
     balance = balance_links(node, g, jump, int(live.sum()))
-    pressure = np.full(count, np.nan)
+    pressure = np.full(len(live), np.nan)
     pressure[live] = balance.pressure
     inflow, spent = float(balance.flux @ jump), float(np.sum(balance.flux**2 / g))
     return _checked(

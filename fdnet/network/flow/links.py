@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.errors import FlowError
-from fdnet.network.flow.winding import groups
+from fdnet.network.flow.winding import groups, winding_groups
 from fdnet.network.network import Network
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
@@ -91,6 +91,23 @@ def links_between(
     links = _cut_links(network, conductance * network.throat_share, low, high)
     free = _tied_to_both(links, place)
     return links.where(np.all((links.ends < 0) | free[links.ends], axis=1)), place, free
+
+
+def links_around(network: Network, conductance: Array) -> tuple[Links, Array]:
+    """The links that carry flow around the period along x.
+
+    `conductance` (T,) m3 is that of the throats.
+
+    Returns:
+        links: those in clusters that go once around the period.
+        live: (G,) true for the groups of pores in these clusters.
+    """
+    group, carried = network.pore_group, conductance * network.throat_share
+    ends, jump = group[network.throat_pores], network.throat_shift[:, 0].astype(float)
+    throat = np.flatnonzero((carried > 0) & ((ends[:, 0] != ends[:, 1]) | (jump != 0)))
+    live = winding_groups(ends[throat], jump[throat], int(group.max()) + 1)[1]
+    throat = throat[live[ends[throat, 0]]]
+    return Links(ends=ends[throat], conductance=carried[throat], throat=throat), live
 
 
 def _places(network: Network, x: Array, low: float, high: float) -> Array:

@@ -16,7 +16,7 @@ from fdnet.case.names import (
     UPSCALED,
 )
 from fdnet.errors import FlowError, NetworkError
-from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
+from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.flow.slabs import SlabK
 from fdnet.network.laws.damage import Damage, DamageLaw
 from fdnet.network.laws.named import LAWS, damage_law
@@ -70,7 +70,10 @@ class Measured:
             return base, None
         if (choices.law, name) not in self._damaged:
             with log.timed("conductance"):
-                damage = self._damage(choices, name, (base.network, base.conductance), occupancy)
+                if name == UPSCALED:
+                    damage = self._upscaled(base.network, base.conductance)
+                else:
+                    damage = _law(choices, name)(base.network, occupancy, base.conductance)
             state = make_state(base.network, damage.conductance, log, halves=base.halves)
             self._damaged[choices.law, name] = state, damage
         return self._damaged[choices.law, name]
@@ -132,27 +135,20 @@ class Measured:
 
     def _damaged_conductance(self, choices: AnalysisChoices, name: str, network: Network) -> Array:
         """Conductance (T,) m3 of the throats of a slab's own network with its fines."""
-        fines = self.specimen.fines
+        fines, clean = self.specimen.fines, LAWS[choices.law](network)
         assert fines is not None
+        if name == UPSCALED:
+            return self._upscaled(network, clean).conductance
         occupancy = measure_occupancy(network, fines, overlap=choices.throat_overlap)
-        given = network, LAWS[choices.law](network)
-        return self._damage(choices, name, given, occupancy).conductance
+        return _law(choices, name)(network, occupancy, clean).conductance
 
-    def _damage(
-        self,
-        choices: AnalysisChoices,
-        name: str,
-        grains: tuple[Network, Array],
-        occupancy: Occupancy,
-    ) -> Damage:
-        """The damage law `name` on a network of grains with its clean conductance (T,) m3."""
-        if name != UPSCALED:
-            return _law(choices, name)(grains[0], occupancy, grains[1])
+    def _upscaled(self, network: Network, clean: Array) -> Damage:
+        """The damage law `upscaled` on a network of grains with its clean conductance (T,) m3."""
         spheres = self._together()
-        if not grains[0].periodic[0]:
-            low, high = map(float, grains[0].box[0])
+        if not network.periodic[0]:
+            low, high = map(float, network.box[0])
             spheres = cut_out(spheres, (low, high), self.sides.periodic)
-        return upscaled_damage(grains[0], spheres, grains[1])
+        return upscaled_damage(network, spheres, clean)
 
     def _together(self) -> Snapshot:
         """The grains where they ended and the fines."""

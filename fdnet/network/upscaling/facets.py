@@ -23,7 +23,7 @@ Neighbours = dict[tuple[int, Shift], Step]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Facets:
-    """Pairs of nodes (E) of a network of grains that throats join.
+    """Pairs of nodes (E) of a network of grains that throats join, in the order of their keys.
 
     The nodes are the cells, and after them the inlet and the outlet plane (`PoreGraph`).
 
@@ -48,10 +48,9 @@ class Facets:
     def at(self, nodes: Array, shift: Array) -> tuple[Array, Array]:
         """The facets (K,) between `nodes` (K, 2), and whether there is one (K,)."""
         ends, turn, _ = ordered(nodes, shift)
-        keys = keys_of(*self.ends.T, shift=self.shift, size=len(self.near))
-        order = np.argsort(keys)
-        place, there = looked_up(keys[order], keys_of(*ends.T, shift=turn, size=len(self.near)))
-        return order[place] if len(order) else place, there
+        size = len(self.near)
+        keys = keys_of(*self.ends.T, shift=self.shift, size=size)
+        return looked_up(keys, keys_of(*ends.T, shift=turn, size=size))
 
 
 def facets_of(graph: PoreGraph) -> Facets:
@@ -71,6 +70,12 @@ def facets_of(graph: PoreGraph) -> Facets:
         near=near,
         cells=len(graph.node),
     )
+
+
+def from_plane_to_plane(facets: Facets) -> list[int]:
+    """The cells with a facet to both planes."""
+    inlet, outlet = facets.near[facets.cells : facets.cells + 2]
+    return [cell for cell, at in inlet if (cell, at) in outlet]
 
 
 def ordered(ends: Array, shift: Array) -> tuple[Array, Array, Array]:

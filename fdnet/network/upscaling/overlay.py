@@ -50,8 +50,9 @@ def overlay_of(network: Network, coarse: PoreGraph, whole: Network) -> Overlay:
     """
     fine = pore_graph(whole, 1.0 / deposit_resistances(whole).sum(axis=1))
     tetrahedra, facets = Tetrahedra(network), facets_of(coarse)
-    members = Members(network, tetrahedra, centroids(whole, fine), coarse.place)
-    owners = owners_of((whole, fine), (network, coarse), tetrahedra)
+    points = centroids(whole, fine)
+    members = Members(network, tetrahedra, points, coarse.place)
+    owners = owners_of(points, network, coarse, tetrahedra)
     owners = settled((fine, coarse), facets, owners, members)
     with_fine = whole.image_fine[whole.pore_images].any(axis=1)
     filled = np.zeros(len(coarse.node), bool)

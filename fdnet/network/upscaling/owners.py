@@ -60,16 +60,15 @@ class Tetrahedra:
 
 
 def owners_of(
-    whole: tuple[Network, PoreGraph], grains: tuple[Network, PoreGraph], tetrahedra: Tetrahedra
+    points: Array, network: Network, coarse: PoreGraph, tetrahedra: Tetrahedra
 ) -> Owners:
-    """The cell of each pore of the network of all spheres, the `whole`.
+    """The cells that hold the `points` (G, 3) m of the pores.
 
-    It is the one that holds the centroid of the largest tetrahedron of the pore.
+    A point in no tetrahedron, or in a cell without an open throat, gets the nearest open cell.
+    `network` is that of the grains, and `coarse` is its graph.
     """
-    network, coarse = grains
-    points = centroids(*whole)
-    use = tetrahedra.solid & _open(network, coarse)[network.pore_group]
-    rows = np.flatnonzero(use)
+    open_cells = _open(coarse)
+    rows = np.flatnonzero(tetrahedra.solid & open_cells[network.pore_group])
     low, high = tetrahedra.low[rows], tetrahedra.high[rows]
     margin = MARGIN * network.grain_radius
     image, owner = periodic_images(network, points, low.min(axis=0), high.max(axis=0), margin)
@@ -77,11 +76,15 @@ def owners_of(
     depth = tetrahedra.depth(rows[box], image[which])
     order = np.lexsort((-depth, owner[which]))
     best = order[np.unique(owner[which][order], return_index=True)[1]]
-    size = np.ptp(network.box, axis=1)
-    cell, offset = _nearest(points, network, coarse)
+    cell, offset = np.full(len(points), -1), np.zeros((len(points), 3), np.intp)
     at = owner[which[best]]
     cell[at] = network.pore_group[rows[box[best]]]
-    offset[at] = np.rint((image[which[best]] - points[at]) / size)
+    offset[at] = np.rint((image[which[best]] - points[at]) / np.ptp(network.box, axis=1))
+    left = np.flatnonzero(cell < 0)
+    if len(left):
+        some = np.flatnonzero(open_cells)
+        near, offset[left] = _nearest(points[left], network, coarse.place[some])
+        cell[left] = some[near]
     return Owners(cell=cell, offset=offset)
 
 
@@ -90,7 +93,7 @@ def centroids(network: Network, graph: PoreGraph) -> Array:
     return inside(network, network.pore_corner[graph.pore].mean(axis=1))
 
 
-def _open(network: Network, coarse: PoreGraph) -> Array:
+def _open(coarse: PoreGraph) -> Array:
     """Cells (C,) on a plane, or from which an open throat leads to another cell or to a plane."""
     count = len(coarse.node)
     open_ = coarse.node != np.arange(count)
@@ -99,19 +102,15 @@ def _open(network: Network, coarse: PoreGraph) -> Array:
     return open_
 
 
-def _nearest(points: Array, network: Network, coarse: PoreGraph) -> tuple[Array, Array]:
-    """The open cell (N,) nearest to each point, and the offset (N, 3) of the point.
-
-    It is for points in no tetrahedron, and in cells without an open throat.
-    """
-    some = np.flatnonzero(_open(network, coarse))
+def _nearest(points: Array, network: Network, places: Array) -> tuple[Array, Array]:
+    """The nearest of the `places` (M, 3) m to each point (N, 3) m, and its offset (N, 3)."""
     size = np.where(network.periodic, np.ptp(network.box, axis=1), 0.0)
     low = network.box[:, 0]
     around = np.where(size > 0.0, size, np.inf)
-    wrapped = [np.mod(place - low, around) for place in (points, coarse.place[some])]
+    wrapped = [np.mod(place - low, around) for place in (points, places)]
     wrapped = [np.where(place < around, place, 0.0) for place in wrapped]
     tree = cKDTree(wrapped[1], boxsize=size)
-    cell = some[tree.query(wrapped[0])[1]]
+    near = tree.query(wrapped[0])[1]
     with np.errstate(invalid="ignore", divide="ignore"):
-        offset = np.rint((coarse.place[cell] - points) / size)
-    return cell, np.where(np.isfinite(offset), offset, 0).astype(np.intp)
+        offset = np.rint((places[near] - points) / size)
+    return near, np.where(np.isfinite(offset), offset, 0).astype(np.intp)

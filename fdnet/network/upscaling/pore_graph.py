@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fdnet.network.flow.links import BETWEEN, INLET, links_between
-from fdnet.network.flow.winding import winding_groups
+from fdnet.network.flow.links import BETWEEN, INLET, links_around, links_between
 from fdnet.network.network import Network
 from fdnet.network.nodes import nodes_of
 from fdnet.spheres.arrays import one_line
@@ -49,20 +48,18 @@ def pore_graph(network: Network, conductance: Array) -> PoreGraph:
     order = np.lexsort((-network.pore_tetra_volume, group))
     pore = order[np.unique(group[order], return_index=True)[1]]
     if network.periodic[0]:
-        ends, throat, carried = _around_period(network, conductance, count)
-        node = np.arange(count)
+        links, node = links_around(network, conductance)[0], np.arange(count)
     else:
         links, where, _ = links_between(network, conductance, _span(network))
-        ends = np.where(links.ends < 0, count + INLET - links.ends, links.ends)
-        throat, carried = links.throat, links.conductance
         node = np.where(where == BETWEEN, np.arange(count), count + INLET - where)
-    shift = network.throat_shift[throat].astype(np.intp)
+    ends = np.where(links.ends < 0, count + INLET - links.ends, links.ends)
+    shift = network.throat_shift[links.throat].astype(np.intp)
     shift[(ends >= count).any(axis=1)] = 0
     return PoreGraph(
         ends=ends,
         shift=shift,
-        conductance=carried,
-        throat=throat,
+        conductance=links.conductance,
+        throat=links.throat,
         node=node,
         place=inside(network, nodes_of(network).position[pore]),
         pore=pore,
@@ -71,17 +68,6 @@ def pore_graph(network: Network, conductance: Array) -> PoreGraph:
 
 def _span(network: Network) -> tuple[float, float]:
     return float(network.box[0, 0]), float(network.box[0, 1])
-
-
-def _around_period(network: Network, conductance: Array, count: int) -> tuple[Array, Array, Array]:
-    """Ends (K, 2), throats (K,) and conductances (K,) m3 that carry flow around the period."""
-    ends, carried = network.pore_group[network.throat_pores], conductance * network.throat_share
-    moved = (network.throat_shift != 0).any(axis=1)
-    throat = np.flatnonzero((carried > 0) & ((ends[:, 0] != ends[:, 1]) | moved))
-    jump = network.throat_shift[throat, 0].astype(float)
-    winds = winding_groups(ends[throat], jump, count)[1]
-    throat = throat[winds[ends[throat, 0]]]
-    return ends[throat], throat, carried[throat]
 
 
 def inside(network: Network, points: Array) -> Array:

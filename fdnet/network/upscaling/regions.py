@@ -16,8 +16,6 @@ RINGS = 3
 With one ring the permeability of the known slabs would be 19 % (rms) off that of all spheres, with
 two rings 2.4 %. With three it is 1.5 %.
 """
-
-
 FLATTEST = 1e-3
 """Least extent along which a group of cells is divided, over its largest."""
 BLOCK = 4
@@ -129,16 +127,17 @@ def regions_around(
         )
         table = np.concatenate([table, added])
         key = cell_keys(table[:, 0], table[:, 1], table[:, 2:], len(near.first))
-        table = table[np.unique(key, return_index=True)[1]]
+        key, kept = np.unique(key, return_index=True)
+        table = table[kept]
     held, first = pores
     cell, which = members_of(first, table[:, 1])
     pore, region = held[which], table[cell, 0]
     shift = table[cell, 2:] + offset[pore]
-    key = pore_keys(region, pore, shift, len(offset))
-    order = np.argsort(key)
+    pore_key = pore_keys(region, pore, shift, len(offset))
+    order = np.argsort(pore_key)
     return Regions(
-        cell_key=cell_keys(table[:, 0], table[:, 1], table[:, 2:], len(near.first)),
-        pore_key=key[order],
+        cell_key=key,
+        pore_key=pore_key[order],
         region=region[order],
         pore=pore[order],
         shift=shift[order],

@@ -9,7 +9,7 @@ import numpy as np
 
 from fdnet.network.network import Network
 from fdnet.network.upscaling.crossings import Seen, links_across
-from fdnet.network.upscaling.facets import Facets, through_one
+from fdnet.network.upscaling.facets import Facets, from_plane_to_plane, through_one
 from fdnet.network.upscaling.owners import Owners, Tetrahedra
 from fdnet.network.upscaling.pore_graph import PoreGraph
 from fdnet.network.upscaling.shifts import HERE, Shift, shift_of
@@ -50,9 +50,10 @@ def _moves(seen: Seen, whole: PoreGraph, facets: Facets, members: "Members") -> 
     Of each link it is the pore that lies deeper in its new cell.
     """
     moves: Moves = {}
+    thin = from_plane_to_plane(facets)
     for k, (home, other) in enumerate(seen.nodes.tolist()):
         if home >= facets.cells:
-            pore, deepest = _from_plane_to_plane(whole.ends[seen.link[k]], facets, members)
+            pore, deepest = _into_one_of(thin, whole.ends[seen.link[k]], members)
         else:
             ways = through_one(facets, home, other, shift_of(seen.shift[k]))
             cells = [(cell, at) for cell, at, _ in ways if cell < facets.cells]
@@ -79,16 +80,14 @@ def _deeper(
     return best, deepest if best >= 0 else NOWHERE
 
 
-def _from_plane_to_plane(ends: Array, facets: Facets, members: "Members") -> tuple[int, Move]:
+def _into_one_of(cells: list[int], ends: Array, members: "Members") -> tuple[int, Move]:
     """The move of a pore on one plane that a link joins to the other, into a cell at both.
 
-    Where both ends are planes there is none.
+    `cells` are these, and `ends` are those of the link. Where both are planes there is no move.
     """
     pore = int(ends.min())  # planes have the larger numbers
     if pore >= members.count:
         return pore, NOWHERE
-    inlet, outlet = facets.near[facets.cells : facets.cells + 2]
-    cells = [cell for cell, at in inlet if (cell, at) in outlet]
     offsets = [members.offset(cell, pore) for cell in cells]
     moves = [
         (members.depth(cell, pore, np.array(at)), cell, at)
