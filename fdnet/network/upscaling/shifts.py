@@ -34,9 +34,9 @@ def keys_of(*parts: Array, shift: Array, size: int) -> Array:
     """
     if len(shift) and np.abs(shift).max() >= BASE // 2:
         raise NetworkError(
-            f"upscaled: pores that are close together lie {int(np.abs(shift).max())} periods "
-            f"apart, at most {BASE // 2 - 1} are possible; take a wider box, or "
-            "analysis.damage_law = 'all-spheres'"
+            f"upscaled: the box is so narrow that pores next to each other lie "
+            f"{int(np.abs(shift).max())} periods apart, at most {BASE // 2 - 1} are possible; "
+            "take a wider box, or analysis.damage_law = 'all-spheres'"
         )
     number = np.zeros(len(shift), np.int64)
     for part in parts:

@@ -2,11 +2,11 @@
 
 The network of all spheres knows every fine but has many times the throats. Here it is solved in
 small regions only, around a few pores between grains with three rings of neighbours
-(`local_flow`). From the flux Q across a facet between grains and the difference dp of the mean
-pressures of the two pores at it follows the conductance of the throat. Both pores lie in the
-middle of a region, so there are two fluxes and two differences, which are the same where the
-region is. The conductance is (sum of Q^2 / sum of dp^2)^(1/2). There is no constant in it. The
-network of the grains with these conductances then gives the permeability.
+(`local_flow`). The conductance of a throat follows from the flux Q across its facet and the
+difference dp of the mean pressures of the two pores at it. Both pores lie in the middle of a
+region, so there are two fluxes and two differences, one of each if the pores share a region. The
+conductance is (sum of Q^2 / sum of dp^2)^(1/2). There is no constant in it. The network of the
+grains with these conductances then gives the permeability.
 
 The conductances carry the flow together. That of a single throat may be several times too high or
 too low, for the mean pressure of a pore moves when a fine divides it, also a small one.
