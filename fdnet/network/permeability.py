@@ -160,7 +160,7 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
     after = before
     if best is not None:
         before, after = best.before, best.after
-        log.warnings += best.refused
+        log.warnings += best.doubts
         if best.second is not None:
             log.warnings += laws_apart(_finest(best), (name, final.k))
     elif final is not clean:

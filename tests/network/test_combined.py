@@ -7,9 +7,9 @@ import pytest
 
 from fdnet.network.flow.depth import Layers, scaled_layers
 from fdnet.network.permeability import analyse, compare
-from fdnet.network.resolved import intact, measured
+from fdnet.network.resolved import coarse_flow, measured
+from fdnet.network.resolved.coarse_flow import WITHOUT_FINES, resolved_sections
 from fdnet.network.resolved.combined import carried_over, combined, in_series
-from fdnet.network.resolved.intact import resolved_intact
 from fdnet.network.resolved.slab import Sides, cut_out
 from fdnet.network.stokes.staggered import OPEN
 from fdnet.network.stokes.stokes import StokesFlow, extrapolate, solve_slab
@@ -30,8 +30,16 @@ def pack():
     return crowd.where((crowd.kind == Kind.GRAIN) | (crowd.position[:, 0] < crowd.box[0, 1] / 3.0))
 
 
+@pytest.fixture(scope="module", autouse=True)
+def fines_by_the_network():
+    """No section is small enough for resolved flow with fines (`test_known.py`)."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(measured, "WITH_FINES", replace(measured.WITH_FINES, most_cells=0))
+        yield
+
+
 @pytest.fixture(scope="module")
-def by_law(pack):
+def by_law(pack, fines_by_the_network):
     laws = ["auto", "combined", "all-spheres", "section-archie"]
     pairs = [("lubrication", law) for law in laws]
     return dict(zip(laws, compare(pack, periodic=SIDES, sections=2, laws=pairs), strict=True))
@@ -116,23 +124,27 @@ def test_drops_of_scaled_layers_add_up_to_the_whole():
     assert scaled.drop_initial == pytest.approx(layers.drop_initial)
 
 
-def test_the_sections_at_the_face_are_solved_first(pack, monkeypatch):
+def test_the_sections_at_the_face_are_solved_first(pack):
     edges, sides = np.linspace(*pack.box[0], 3), Sides(periodic=(False, True, True), walls="slip")
-    size = intact._size(cut_out(pack.grains(), (edges[0], edges[1]), sides.periodic), OPEN)
-    monkeypatch.setattr(intact, "MOST_CELLS", int(1.5 * size))
-    k, refused = resolved_intact(pack.grains(), edges, sides)
+    slab = cut_out(pack.grains(), (edges[0], edges[1]), sides.periodic)
+    size = coarse_flow._size(slab, WITHOUT_FINES.cells(slab)[1], OPEN)
+    grids = replace(WITHOUT_FINES, most_cells=int(1.5 * size))
+    k, refused = resolved_sections(
+        pack.grains(), edges, sides, wanted=np.ones(2, bool), grids=grids
+    )
     assert np.isfinite(k).tolist() == [True, False]
     assert not refused
 
 
 @pytest.mark.parametrize("periodic", [(True, True, True), (False, False, True)])
 def test_no_section_is_solved_where_x_repeats_or_walls_slip(pack, periodic):
-    k, _ = resolved_intact(pack.grains(), pack.box[0], Sides(periodic=periodic, walls="slip"))
+    sides, every = Sides(periodic=periodic, walls="slip"), np.ones(1, bool)
+    k, _ = resolved_sections(pack.grains(), pack.box[0], sides, wanted=every, grids=WITHOUT_FINES)
     assert np.all(np.isnan(k))
 
 
 def test_grids_that_disagree_leave_the_network(pack, monkeypatch):
-    monkeypatch.setattr(intact, "LARGEST_ERROR", 1e-4)
+    monkeypatch.setattr(coarse_flow, "LARGEST_ERROR", 1e-4)
     result = analyse(pack, periodic=SIDES, sections=2)
     assert result.counts["sections_resolved"] == 0
     assert any("section 1 without fines was left to the network" in t for t in result.warnings)
@@ -160,14 +172,15 @@ def test_a_coarse_grid_far_above_the_fine_one_leaves_the_network(pack, monkeypat
     """The extrapolation would be negative."""
     flows = iter([3.0, 1.0, 3.0, 1.0])
     monkeypatch.setattr(
-        intact,
+        coarse_flow,
         "solve_slab",
         lambda *_, cells, **__: StokesFlow(
             k=next(flows), iterations=1, residual=0.0, seconds=0.0, cells=cells, unknowns=1
         ),
     )
     sides = Sides(periodic=(False, True, True), walls="no-slip")
-    k, refused = resolved_intact(pack.grains(), np.linspace(*pack.box[0], 3), sides)
+    edges, every = np.linspace(*pack.box[0], 3), np.ones(2, bool)
+    k, refused = resolved_sections(pack.grains(), edges, sides, wanted=every, grids=WITHOUT_FINES)
     assert np.all(np.isnan(k))
     assert len(refused) == 1  # the other section takes more cells than are left
 

@@ -37,6 +37,20 @@ def test_slab_within_one_throat():
     assert solve_flow(chain(2), np.full(2, 1.0), span=(0.2, 0.6)).inflow == pytest.approx(1 / 0.4)
 
 
+@pytest.mark.parametrize(
+    ("resistances", "carrying"),
+    [([1, 1, 1, 1], 4.0), ([1, 3], 16 / 10), ([1, 0, 0, 0], 1.0), ([1, 1, 0], 2.0)],
+)
+def test_throats_in_series_carry_the_flow_by_their_share_of_the_energy(resistances, carrying):
+    g = 1.0 / np.maximum(np.array(resistances, float), 1e-9)
+    flow = solve_flow(chain(len(g)), g)
+    assert flow.carrying_throats == pytest.approx(carrying)
+
+
+def test_no_throat_carries_where_nothing_flows():
+    assert solve_flow(chain(2), np.array([1.0, 0.0])).carrying_throats == 0.0
+
+
 def test_random_network_against_the_pseudo_inverse():
     network, g = random_network()
     flow = solve_flow(network, g)

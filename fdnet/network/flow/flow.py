@@ -47,6 +47,10 @@ class Flow:
             without flow.
         inflow: m3, flux times viscosity over the pressure drop.
         isolated_pores: number of pores that are not connected to both planes.
+        carrying_throats: number of throats that carry the flow, 1 / sum of w^2, where w is the
+            share of a throat in the energy spent. It is T where all of T spend alike, and near 1
+            where one throat spends nearly all (the participation number; Bell and Dean 1970,
+            Discuss. Faraday Soc. 50, 55). 0 without flow.
         reason: why the inflow is 0; empty where there is flow.
     """
 
@@ -57,6 +61,7 @@ class Flow:
     mass_balance: float | None
     inflow: float
     isolated_pores: int
+    carrying_throats: float
     reason: str
 
     __repr__ = one_line
@@ -102,8 +107,7 @@ def solve_flow(
     balance = _solve(links, free)
     pressure[free], flux = balance.pressure[1:], balance.flux
     inflow, outflow = _through(links, flux, INLET), -_through(links, flux, OUTLET)
-    per_throat = np.zeros(len(conductance))
-    per_throat[links.throat] = flux
+    per_throat = np.bincount(links.throat, weights=flux, minlength=len(conductance))
     return _checked(
         Flow(
             pore_pressure=frozen(pressure[network.pore_group]),
@@ -113,6 +117,7 @@ def solve_flow(
             residual=balance.defect,
             mass_balance=_apart(inflow, outflow),
             isolated_pores=isolated,
+            carrying_throats=_carrying(balance.flux, links.conductance),
             reason="",
         ),
         bounds=(0.0, 1.0),
@@ -136,6 +141,13 @@ def _through(links: Links, flux: Array, plane: int) -> float:
     return float(np.sum(flux[links.ends[:, 0] == plane]) - np.sum(flux[links.ends[:, 1] == plane]))
 
 
+def _carrying(flux: Array, conductance: Array) -> float:
+    """`Flow.carrying_throats` of links (K,) with these `flux` and `conductance`, m3."""
+    drop = np.abs(flux) / conductance
+    energy = np.abs(flux) / np.abs(flux).max() * (drop / drop.max())
+    return float(energy.sum() ** 2 / np.sum(energy**2))
+
+
 def _no_flow(pressure: Array, throats: int, isolated: int, reason: str) -> Flow:
     """The flow where no open path joins inlet and outlet."""
     return Flow(
@@ -146,6 +158,7 @@ def _no_flow(pressure: Array, throats: int, isolated: int, reason: str) -> Flow:
         mass_balance=None,
         inflow=0.0,
         isolated_pores=isolated,
+        carrying_throats=0.0,
         reason=reason,
     )
 
@@ -197,6 +210,7 @@ def _solve_period(network: Network, conductance: Array) -> Flow:
             inflow=inflow,
             mass_balance=_apart(inflow, spent),
             isolated_pores=isolated,
+            carrying_throats=_carrying(balance.flux, links.conductance),
             reason="",
         ),
         bounds=(-np.inf, np.inf),

@@ -22,30 +22,13 @@ from fdnet.case.names import (
 )
 from fdnet.network.flow.depth import Solved
 from fdnet.network.flow.flow import Flow
-from fdnet.network.flow.slabs import SlabK
 from fdnet.network.resolved.all_spheres import AllSpheres
-from fdnet.network.resolved.combined import (
-    carried_slabs,
-    combined_slabs,
-    in_series,
-    over,
-    scaled,
-)
+from fdnet.network.resolved.combined import combined_slabs, over, replaced, scaled
+from fdnet.network.resolved.known import Permeabilities, known_permeabilities, series_of
 from fdnet.network.resolved.measured import Measured
 from fdnet.network.resolved.state import Log, capped
-from fdnet.network.specimen.specimen import Specimen
 from fdnet.spheres.arrays import one_line
-from fdnet.spheres.snapshot import frozen
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Permeabilities:
-    """Of one state of a specimen: k of the whole, m2, and of its sections."""
-
-    k: float
-    slabs: SlabK
-
-    __repr__ = one_line
+from fdnet.spheres.snapshot import Array, frozen
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -62,8 +45,11 @@ class AccurateLaw:
         solved: the network of all spheres, where that was solved.
         all_spheres: with fines, by that network alone, at most that of the grains; None without
             it.
+        resolved: (S,) m2, sections with fines by resolved flow, at most those without; not a
+            number where they are by the law.
         counts: of that network, or of the damage law.
-        refused: sections whose spheres make no network of their own, one sentence each.
+        doubts: sections whose spheres make no network of their own, that resolved flow gave no
+            value for, or whose flow few throats carry, one sentence each.
     """
 
     name: str
@@ -73,8 +59,9 @@ class AccurateLaw:
     flow: Flow
     solved: Solved | None
     all_spheres: Permeabilities | None
+    resolved: Array
     counts: Mapping[str, int]
-    refused: tuple[str, ...]
+    doubts: tuple[str, ...]
 
     __repr__ = one_line
 
@@ -106,8 +93,9 @@ def accurate_law(measured: Measured, choices: AnalysisChoices, log: Log) -> Accu
         flow=state.flow,
         solved=None,
         all_spheres=None,
+        resolved=frozen(np.full(len(measured.specimen.edges) - 1, np.nan)),
         counts={} if damage is None else damage.counts,
-        refused=(),
+        doubts=(),
     )
 
 
@@ -115,7 +103,8 @@ def _of_all_spheres(
     measured: Measured, whole: AllSpheres, choices: AnalysisChoices, log: Log
 ) -> AccurateLaw:
     """The network of all spheres, at most the permeability of the grains."""
-    known = _known(measured, Permeabilities(k=whole.k, slabs=whole.slabs), choices, log)
+    alone = Permeabilities(k=whole.k, slabs=whole.slabs)
+    known = known_permeabilities(measured, alone, choices, log)
     network = whole.solved.network
     return AccurateLaw(
         name=ALL_SPHERES,
@@ -125,15 +114,16 @@ def _of_all_spheres(
         flow=whole.solved.flow,
         solved=whole.solved,
         all_spheres=known.own,
+        resolved=known.resolved,
         counts={
             "all_spheres_pores": len(network.pore_radius),
             "all_spheres_throats": len(network.throat_radius),
             "all_spheres_hidden": network.counts["grains_hidden"],
             "all_spheres_above_grains": known.above,
             "all_spheres_sections_above_grains": known.sections_above,
-            "sections_resolved": known.resolved,
+            **known.counts,
         },
-        refused=(*whole.refused, *known.refused),
+        doubts=(*whole.refused, *known.doubts),
     )
 
 
@@ -141,7 +131,7 @@ def _upscaled(measured: Measured, choices: AnalysisChoices, log: Log) -> Accurat
     """The network of the grains with upscaled throats, at most the permeability of the grains."""
     state, _ = measured.damaged(choices, UPSCALED, log)
     slabs = measured.damaged_slabs(state, choices, UPSCALED, log)
-    known = _known(measured, Permeabilities(k=state.k, slabs=slabs), choices, log)
+    known = known_permeabilities(measured, Permeabilities(k=state.k, slabs=slabs), choices, log)
     return AccurateLaw(
         name=UPSCALED,
         second=None,
@@ -150,70 +140,13 @@ def _upscaled(measured: Measured, choices: AnalysisChoices, log: Log) -> Accurat
         flow=state.flow,
         solved=None,
         all_spheres=None,
+        resolved=known.resolved,
         counts={
             "upscaled_above_grains": known.above,
             "upscaled_sections_above_grains": known.sections_above,
-            "sections_resolved": known.resolved,
+            **known.counts,
         },
-        refused=known.refused,
-    )
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Known:
-    """Permeabilities with fines by a network of their own, once the grains are known better.
-
-    Attributes:
-        before: without fines, by resolved flow where that is known.
-        own: with fines, by their network alone, at most that of the grains.
-        after: with fines, carried over to `before`.
-        above: 1 where their network had more than the grains as a whole, else 0.
-        sections_above: in how many sections it had more.
-        resolved: how many sections are known by resolved flow.
-        refused: sections that could not be solved, one sentence each.
-    """
-
-    before: Permeabilities
-    own: Permeabilities
-    after: Permeabilities
-    above: int
-    sections_above: int
-    resolved: int
-    refused: tuple[str, ...]
-
-    __repr__ = one_line
-
-
-def _known(
-    measured: Measured, damaged: Permeabilities, choices: AnalysisChoices, log: Log
-) -> _Known:
-    """Permeabilities with fines, at most those of the grains, and carried over to resolved flow.
-
-    Fines never raise the permeability. Where few of them make the network of all spheres finer,
-    its k may be above that of the grains by the difference of two errors; it is then set to that
-    of the grains, and counted.
-    """
-    specimen, base = measured.specimen, measured.base(choices.law, log)
-    clean, clean_slabs = measured.clean(choices.law, log)
-    slabs, sections_above = damaged.slabs, 0
-    if not specimen.moved:
-        slabs, sections_above = capped(clean_slabs, damaged.slabs, specimen.empty_sections())
-    own = after = Permeabilities(k=min(damaged.k, base.k), slabs=slabs)
-    before = Permeabilities(k=clean.k, slabs=clean_slabs)
-    intact, unsolved = measured.intact(log)
-    known = np.isfinite(intact) & (clean_slabs.cut_out > 0.0)
-    if np.any(known):
-        factor = np.where(known, over(intact, clean_slabs.cut_out), 1.0)
-        before = _in_series(scaled(clean_slabs, factor), specimen)
-        after = _in_series(carried_slabs(clean_slabs, before.slabs, slabs), specimen, before.k)
-    return _Known(
-        before=before,
-        own=own,
-        after=after,
-        above=int(damaged.k > base.k),
-        sections_above=sections_above,
-        resolved=int(known.sum()),
-        refused=tuple(unsolved),
+        doubts=known.doubts,
     )
 
 
@@ -231,12 +164,7 @@ def _combined(
     else:  # all spheres in place may be above the grains, which is no gain
         whole = replace(whole, inplace=frozen(np.minimum(whole.inplace, first.inplace)))
     factor = over(finest.before.slabs.cut_out, clean.cut_out)
-    slabs = combined_slabs(first, whole, scaled(two_scale, factor))
+    slabs = replaced(combined_slabs(first, whole, scaled(two_scale, factor)), finest.resolved)
     if not specimen.moved:
         slabs, _ = capped(first, slabs, specimen.empty_sections())
-    return replace(finest, name=COMBINED, after=_in_series(slabs, specimen, limit))
-
-
-def _in_series(slabs: SlabK, specimen: Specimen, most: float = np.inf) -> Permeabilities:
-    """The sections, and the whole from those in place, at most `most` m2."""
-    return Permeabilities(k=min(in_series(slabs.inplace, specimen.edges), most), slabs=slabs)
+    return replace(finest, name=COMBINED, after=series_of(slabs, specimen, limit))

@@ -22,7 +22,11 @@ from fdnet.network.laws.damage import Damage, DamageLaw
 from fdnet.network.laws.named import LAWS, damage_law
 from fdnet.network.network import Network
 from fdnet.network.resolved.all_spheres import AllSpheres, measure_all_spheres
-from fdnet.network.resolved.intact import resolved_intact
+from fdnet.network.resolved.coarse_flow import (
+    WITH_FINES,
+    WITHOUT_FINES,
+    resolved_sections,
+)
 from fdnet.network.resolved.slab import CutNetworks, Sides, cut_networks, cut_out
 from fdnet.network.resolved.state import Log, State, clean_halves, make_state, state_slabs
 from fdnet.network.specimen.specimen import Specimen
@@ -42,7 +46,8 @@ class Measured:
     _cut: dict[bool, CutNetworks] = field(default_factory=dict)
     _all: AllSpheres | None = None
     _damaged: dict[tuple[str, str], tuple[State, Damage | None]] = field(default_factory=dict)
-    _intact: tuple[Array, list[str]] | None = None
+    _intact: tuple[Array, dict[int, str]] | None = None
+    _resolved: dict[bytes, tuple[Array, dict[int, str]]] = field(default_factory=dict)
 
     __repr__ = one_line
 
@@ -84,18 +89,35 @@ class Measured:
             return self.clean(law, log)[1]
         return self._clean_slabs(self.base(law, log), law, log, final=True)
 
-    def intact(self, log: Log) -> tuple[Array, list[str]]:
+    def intact(self, log: Log) -> tuple[Array, dict[int, str]]:
         """The sections (S,) without fines by resolved flow, m2, and why some could not be solved.
 
         They are not a number where that is dear, and where the invasion moved the grains.
         """
         if self.specimen.moved:
-            return np.full(len(self.specimen.edges) - 1, np.nan), []
+            return np.full(len(self.specimen.edges) - 1, np.nan), {}
         if self._intact is None:
             grains, edges = self.specimen.grains[0], self.specimen.edges
+            every = np.ones(len(edges) - 1, bool)
             with log.timed("solve"):
-                self._intact = resolved_intact(grains, edges, self.sides)
+                self._intact = resolved_sections(
+                    grains, edges, self.sides, wanted=every, grids=WITHOUT_FINES
+                )
         return self._intact
+
+    def resolved(self, wanted: Array, log: Log) -> tuple[Array, dict[int, str]]:
+        """The `wanted` (S,) sections with fines by resolved flow, as `intact`."""
+        key = wanted.tobytes()
+        if key not in self._resolved:
+            with log.timed("solve"):
+                self._resolved[key] = resolved_sections(
+                    self._together(),
+                    self.specimen.edges,
+                    self.sides,
+                    wanted=wanted,
+                    grids=WITH_FINES,
+                )
+        return self._resolved[key]
 
     def damaged_slabs(self, state: State, choices: AnalysisChoices, name: str, log: Log) -> SlabK:
         """The sections of `damaged`; their own networks hold their own part of the fines."""
