@@ -46,6 +46,8 @@ def test_the_permeability_is_that_of_finer_grids(pack, by_law):
     for law in LAWS[:3]:
         assert by_law[law].counts[COUNT] >= 1
         assert by_law[law].sections[0].k_damaged == first.k_damaged
+        assert by_law[law].sections[0].k_damaged_resolved
+    assert not by_law["section-archie"].sections[0].k_damaged_resolved
     assert COUNT not in by_law["section-archie"].counts
     assert not any("throats carry" in t and "section 1" in t for t in by_law["auto"].warnings)
 

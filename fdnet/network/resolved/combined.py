@@ -7,6 +7,7 @@ other, so the mean of the logarithms with weights 1 / error^2 is better than eit
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -90,7 +91,9 @@ def replaced(slabs: SlabK, known: Array) -> SlabK:
 
     The permeability in place changes by the same factor. A closed section stays closed.
     """
-    return scaled(slabs, np.where(np.isfinite(known), over(known, slabs.cut_out), 1.0))
+    resolved = np.isfinite(known)
+    factor = np.where(resolved, over(known, slabs.cut_out), 1.0)
+    return replace(scaled(slabs, factor), resolved=frozen(resolved))
 
 
 def in_series(inplace: Array, edges: Array) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.network.flow.slabs import SlabK
-from fdnet.network.resolved.combined import carried_slabs, in_series, over, replaced, scaled
+from fdnet.network.resolved.combined import carried_slabs, in_series, replaced
 from fdnet.network.resolved.measured import Measured
 from fdnet.network.resolved.state import Log, capped
 from fdnet.network.specimen.specimen import Specimen
@@ -87,8 +87,8 @@ def known_permeabilities(
     wide = slabs.cut_out >= LEAST_LEFT * clean_slabs.cut_out
     resolved, refused = measured.resolved(few & wide & known, log)
     if np.any(known):
-        factor = np.where(known, over(intact, clean_slabs.cut_out), 1.0)
-        before = series_of(scaled(clean_slabs, factor), specimen)
+        grains = replaced(clean_slabs, np.where(known, intact, np.nan))
+        before = series_of(grains, specimen)
         resolved = frozen(np.minimum(resolved, before.slabs.cut_out))
         carried = carried_slabs(clean_slabs, before.slabs, slabs)
         after = series_of(replaced(carried, resolved), specimen, before.k)

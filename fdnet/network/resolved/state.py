@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -117,4 +117,4 @@ def capped(before: SlabK, after: SlabK, empty: Array) -> tuple[SlabK, int]:
     """
     above = (after.cut_out > before.cut_out) & ~empty
     cut = np.where(empty | above, before.cut_out, after.cut_out)
-    return SlabK(cut_out=frozen(cut), inplace=after.inplace, flows=after.flows), int(above.sum())
+    return replace(after, cut_out=frozen(cut)), int(above.sum())
