@@ -11,7 +11,7 @@ import numpy as np
 
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.network.flow.slabs import SlabK
-from fdnet.network.resolved.combined import carried_slabs, in_series, replaced
+from fdnet.network.resolved.combined import carried_slabs, in_series, over, replaced
 from fdnet.network.resolved.measured import Measured
 from fdnet.network.resolved.state import Log, capped
 from fdnet.network.specimen.specimen import Specimen
@@ -21,9 +21,10 @@ from fdnet.spheres.snapshot import Array, frozen
 FEW_THROATS = 100
 """Number of throats that carry the flow of a section (`Flow.carrying_throats`) below which the
 network of all spheres is off by 5 % (rms), above which by 2 % (docs/accuracy.md)."""
-LEAST_LEFT = 0.1
-"""Share of the permeability that is left, by the network, below which resolved flow on coarse
-grids is no better: the channels between the fines are then narrower than a few of its cells."""
+LEAST_LEFT, MOST_LEFT = 0.1, 0.8
+"""Shares of the permeability left, by the network, between which resolved flow is worth its cost.
+Below, the channels between the fines are narrower than a few of its cells. Above, the errors with
+and without fines are alike, and k/k0 is known as well from the two laws of `combined`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -83,9 +84,9 @@ def known_permeabilities(
     before = Permeabilities(k=clean.k, slabs=clean_slabs)
     intact, unsolved = measured.intact(log)
     known = np.isfinite(intact) & (clean_slabs.cut_out > 0.0)
-    few = few_throats(damaged.slabs) & ~specimen.empty_sections()
-    wide = slabs.cut_out >= LEAST_LEFT * clean_slabs.cut_out
-    resolved, refused = measured.resolved(few & wide & known, log)
+    left = over(slabs.cut_out, clean_slabs.cut_out)
+    few = few_throats(damaged.slabs) & (left < MOST_LEFT)
+    resolved, refused = measured.resolved(few & known & (left >= LEAST_LEFT), log)
     if np.any(known):
         grains = replaced(clean_slabs, np.where(known, intact, np.nan))
         before = series_of(grains, specimen)
