@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from fdnet.report.resolved_words import resolved_words
 from fdnet.report.units import MILLIDARCY
 
 Row = Mapping[str, Any]
@@ -45,6 +46,7 @@ def answer_lines(results: Sequence[Row], given: Given) -> Iterator[str]:
         )
     if given.sections:
         yield from _section_lines(first, fines=given.fines)
+    yield from filter(None, [resolved_words(first.get("sections", ()))])
     for warning in first["warnings"]:
         yield f"warning: {warning}"
 

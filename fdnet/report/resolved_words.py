@@ -18,7 +18,9 @@ def resolved_words(rows: Sequence[Mapping[str, Any]]) -> str:
             parts.append(f"section{'s' * (len(numbers) > 1)} {_listed(numbers)} {state}")
     if not parts:
         return ""
-    return f"By resolved flow on coarse grids: {'; '.join(parts)}. The others are by the network."
+    every = all(row.get(key) for row in rows for key in STATES)
+    rest = "" if every else " The others are by the network."
+    return f"By resolved flow on coarse grids: {'; '.join(parts)}.{rest}"
 
 
 def _listed(numbers: Sequence[str]) -> str:

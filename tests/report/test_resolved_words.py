@@ -28,6 +28,11 @@ def test_the_sections_are_named(initial, damaged, words):
     assert resolved_words(rows(initial, damaged)) == f"{start}{words}{end}"
 
 
+def test_the_network_is_left_out_where_it_gave_nothing():
+    words = resolved_words(rows((1, 2, 3), (1, 2, 3)))
+    assert words.endswith("sections 1, 2 and 3 without fines; sections 1, 2 and 3 with fines.")
+
+
 def test_nothing_is_said_where_all_are_by_the_network():
     assert resolved_words(rows((), ())) == ""
     assert resolved_words([{"section": 1}]) == ""  # a run of an earlier version

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fdnet.network.resolved.known import FEW_THROATS
 from fdnet.studies.accuracy.goals import (
     Row,
     percent,
@@ -16,8 +17,8 @@ from fdnet.studies.accuracy.goals import (
     worst_case,
 )
 from fdnet.studies.accuracy.measurement import ARCHIE, LOCAL, SIDE_KOZENY
-from fdnet.studies.accuracy.slabs import CHOSEN, FINEST
-from fdnet.studies.truth.slabs import LATER, NO, YES
+from fdnet.studies.accuracy.slabs import ALONE, CARRYING, CHOSEN, FINEST, SOLVED
+from fdnet.studies.truth.slabs import YES
 
 COMPARED = {
     "default": CHOSEN,
@@ -35,25 +36,18 @@ def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
     """Every number of the prose on slabs by its name in docs/accuracy.md.in."""
     aside = [row for row in rows if row["known_before"] != YES]
     known = [row for row in rows if row["known_before"] == YES]
-    parts = {
-        "fresh": [row for row in rows if row["known_before"] == LATER],
-        "former": [row for row in rows if row["known_before"] == NO],
-        "known": known,
-    }
+    parts = {"aside": aside, "known": known}
     fine = _with_fine_fines(rows)
     coarse = [row for row in rows if row not in fine]
     known_k0 = [row[f"{SIDE_KOZENY}: k0"] for row in known]
     return {
         "slabs": str(len(rows)),
-        "slabs_aside": str(len(aside)),
         **{f"slabs_{part}": str(len(some)) for part, some in parts.items()},
         **{
             f"slabs_{part}_{key}": summary(some, name)
             for part, some in parts.items()
             for key, name in COMPARED.items()
         },
-        "slabs_aside_finest": summary(aside, FINEST),
-        "slabs_local_over": _over(rows),
         "slabs_default_rms": percent(rms(values(aside, CHOSEN))),
         "slabs_aside_k_default": percent(rms([row[f"{CHOSEN}: k"] for row in aside])),
         "slabs_default_k0": percent(rms([row[f"{CHOSEN}: k0"] for row in rows])),
@@ -66,6 +60,7 @@ def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
         "slabs_archie_rms": percent(rms(values(aside, ARCHIE))),
         "slabs_thesis_most": f"{max(values(rows, 'thesis + thesis')):.0f}",
         **_apart(rows),
+        **_alone(rows, aside),
         "slabs_coarse": str(len(coarse)),
         "slabs_coarse_k": summed_up(row[f"{FINEST}: k"] for row in coarse),
         "slabs_fine": str(len(fine)),
@@ -78,9 +73,24 @@ def slab_numbers(rows: Sequence[Row]) -> dict[str, str]:
     }
 
 
-def _over(rows: Sequence[Row]) -> str:
-    """rms and worst of k by `upscaled` over that by all spheres."""
-    return summed_up(row[f"{LOCAL}: k"] / row[f"{FINEST}: k"] for row in rows)
+def _alone(rows: Sequence[Row], aside: list[Row]) -> dict[str, str]:
+    """k by the network of all spheres alone, and where resolved flow takes its place."""
+    parts = {
+        "many": [row for row in rows if row[CARRYING] >= FEW_THROATS],
+        "few": [row for row in rows if row[CARRYING] < FEW_THROATS],
+        "solved": [row for row in rows if row[SOLVED]],
+    }
+    numbers = {"slabs_aside_alone": summary(aside, ALONE)}
+    for part, some in parts.items():
+        numbers |= {
+            f"slabs_{part}": str(len(some)),
+            f"slabs_{part}_alone": summary(some, ALONE),
+            f"slabs_{part}_k": summary(some, f"{CHOSEN}: k"),
+        }
+    return numbers | {
+        "slabs_aside_solved": str(sum(int(row[SOLVED]) for row in aside)),
+        "few_throats": str(FEW_THROATS),
+    }
 
 
 def _apart(rows: Sequence[Row]) -> dict[str, str]:
