@@ -74,6 +74,8 @@ def _text(row: Mapping[str, Any]) -> str:
     lines.append(_line("its finer cells, µm", *cells))
     over = (f"{_over(row, key):+.1%}" for key in ("k_initial_m2", "k_damaged_m2"))
     lines.append(_line("network over flow", *over))
+    if row["network_resolved"]:
+        lines.append(f"Not all numbers of the run are the network's. {row['network_resolved']}")
     return "\n".join(lines)
 
 

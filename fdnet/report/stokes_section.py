@@ -31,8 +31,14 @@ def section_html(rows: Sequence[Mapping[str, Any]]) -> str:
     return (
         "<h2>Sections by resolved Stokes flow</h2>\n"
         f'<div class="scroll"><table>\n<tr>{head}</tr>\n{body}\n</table></div>\n'
-        f'<p class="note">{_NOTE.format(rows[0]["network_damage_law"])}</p>'
+        f'<p class="note">{_NOTE.format(rows[0]["network_damage_law"])}{_coarse(rows)}</p>'
     )
+
+
+def _coarse(rows: Sequence[Mapping[str, Any]]) -> str:
+    """What the run itself took from resolved flow."""
+    words = [row["network_resolved"] for row in rows if row["network_resolved"]]
+    return f" Not all numbers of the run are the network's. {' '.join(words)}" if words else ""
 
 
 def _cells(row: Mapping[str, Any]) -> str:

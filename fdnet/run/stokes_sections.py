@@ -17,6 +17,7 @@ from fdnet.files.atomic import write_text
 from fdnet.network.resolved.slab import cut_out
 from fdnet.network.stokes.two_grids import Estimate
 from fdnet.report.later_sections import put_section
+from fdnet.report.resolved_words import resolved_words
 from fdnet.report.stokes_section import NAME, section_html
 from fdnet.run.finished import FinishedRun
 from fdnet.run.folder import locked
@@ -145,7 +146,10 @@ def report_section(folder: Path, case: Case, summary: Mapping[str, Any]) -> str:
 def with_network(
     resolved: Sequence[StokesSection], summary: Mapping[str, Any]
 ) -> list[dict[str, Any]]:
-    """The resolved sections that are sections of the `summary`, with what the network gives."""
+    """The resolved sections that are sections of the `summary`, with what the network gives.
+
+    `network_resolved` says in words what the run took from resolved flow on coarse grids.
+    """
     rows = []
     law = {"network_damage_law": str(summary.get("damage_law_used") or summary["damage_law"])}
     for section in summary["sections"]:
@@ -153,7 +157,8 @@ def with_network(
             if one.x_lo_m == section["x_lo_m"] and one.x_hi_m == section["x_hi_m"]:
                 names = ("k_initial_m2", "k_damaged_m2", "k_reduction")
                 network = {f"network_{name}": section[name] for name in names}
-                rows.append({"section": section["section"]} | asdict(one) | network | law)
+                flow = {"network_resolved": resolved_words([section])}
+                rows.append({"section": section["section"]} | asdict(one) | network | law | flow)
     return rows
 
 
