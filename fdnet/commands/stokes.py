@@ -54,6 +54,7 @@ def _stokes(options: argparse.Namespace) -> int:
 
 
 def _text(row: Mapping[str, Any]) -> str:
+    from fdnet.report.resolved_words import resolved_words, run_flags
     from fdnet.report.units import in_millidarcy
 
     lines = [
@@ -74,8 +75,8 @@ def _text(row: Mapping[str, Any]) -> str:
     lines.append(_line("its finer cells, µm", *cells))
     over = (f"{_over(row, key):+.1%}" for key in ("k_initial_m2", "k_damaged_m2"))
     lines.append(_line("network over flow", *over))
-    if row["network_resolved"]:
-        lines.append(f"Not all numbers of the run are the network's. {row['network_resolved']}")
+    if resolved := resolved_words([run_flags(row)]):
+        lines.append(f"What the run has here is not the network's alone. {resolved}")
     return "\n".join(lines)
 
 

@@ -46,7 +46,8 @@ def answer_lines(results: Sequence[Row], given: Given) -> Iterator[str]:
         )
     if given.sections:
         yield from _section_lines(first, fines=given.fines)
-    yield from filter(None, [resolved_words(first.get("sections", ()))])
+    if resolved := resolved_words(first.get("sections", ())):
+        yield resolved[:-1] + (" along x." if "k_x_m2" in first else ".")
     for warning in first["warnings"]:
         yield f"warning: {warning}"
 

@@ -1,4 +1,4 @@
-"""Which sections have their permeability from resolved flow, in words."""
+"""Which permeabilities are by resolved flow, in words."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -15,12 +15,14 @@ def resolved_words(rows: Sequence[Mapping[str, Any]]) -> str:
     for key, state in STATES.items():
         numbers = [str(row["section"]) for row in rows if row.get(key)]
         if numbers:
-            parts.append(f"section{'s' * (len(numbers) > 1)} {_listed(numbers)} {state}")
-    if not parts:
-        return ""
-    every = all(row.get(key) for row in rows for key in STATES)
-    rest = "" if every else " The others are by the network."
-    return f"By resolved flow on coarse grids: {'; '.join(parts)}.{rest}"
+            of = f" of section{'s' * (len(numbers) > 1)} {_listed(numbers)}" * (len(rows) > 1)
+            parts.append(f"the permeability{of} {state}")
+    return f"By resolved flow on coarse grids: {', '.join(parts)}." if parts else ""
+
+
+def run_flags(row: Mapping[str, Any]) -> dict[str, Any]:
+    """What the run itself took from resolved flow, of a row of `fdnet stokes`."""
+    return {"section": row["section"]} | {key: row.get(f"network_{key}", 0) for key in STATES}
 
 
 def _listed(numbers: Sequence[str]) -> str:

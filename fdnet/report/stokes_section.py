@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from fdnet.report.resolved_words import resolved_words, run_flags
 from fdnet.report.units import in_millidarcy
 
 NAME = "stokes"
@@ -37,8 +38,8 @@ def section_html(rows: Sequence[Mapping[str, Any]]) -> str:
 
 def _coarse(rows: Sequence[Mapping[str, Any]]) -> str:
     """What the run itself took from resolved flow."""
-    words = [row["network_resolved"] for row in rows if row["network_resolved"]]
-    return f" Not all numbers of the run are the network's. {' '.join(words)}" if words else ""
+    words = resolved_words([run_flags(row) for row in rows])
+    return f" What the run has is not the network's alone. {words}" if words else ""
 
 
 def _cells(row: Mapping[str, Any]) -> str:

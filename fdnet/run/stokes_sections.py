@@ -17,7 +17,7 @@ from fdnet.files.atomic import write_text
 from fdnet.network.resolved.slab import cut_out
 from fdnet.network.stokes.two_grids import Estimate
 from fdnet.report.later_sections import put_section
-from fdnet.report.resolved_words import resolved_words
+from fdnet.report.resolved_words import STATES
 from fdnet.report.stokes_section import NAME, section_html
 from fdnet.run.finished import FinishedRun
 from fdnet.run.folder import locked
@@ -84,7 +84,8 @@ def stokes_sections(
 
     Returns:
         For each section its number, the fields of `StokesSection`, and by the network the
-        permeabilities (m2), the reduction and the damage law.
+        permeabilities (m2), the reduction, the damage law, and what the run took from resolved
+        flow.
 
     Raises:
         CaseError: there is no such section, the side walls let the fluid slip, the grid would be
@@ -148,7 +149,8 @@ def with_network(
 ) -> list[dict[str, Any]]:
     """The resolved sections that are sections of the `summary`, with what the network gives.
 
-    `network_resolved` says in words what the run took from resolved flow on coarse grids.
+    `network_k_initial_resolved` and `network_k_damaged_resolved` are 1 where the run took that
+    permeability from resolved flow on coarse grids, else 0.
     """
     rows = []
     law = {"network_damage_law": str(summary.get("damage_law_used") or summary["damage_law"])}
@@ -157,8 +159,8 @@ def with_network(
             if one.x_lo_m == section["x_lo_m"] and one.x_hi_m == section["x_hi_m"]:
                 names = ("k_initial_m2", "k_damaged_m2", "k_reduction")
                 network = {f"network_{name}": section[name] for name in names}
-                flow = {"network_resolved": resolved_words([section])}
-                rows.append({"section": section["section"]} | asdict(one) | network | law | flow)
+                flags = {f"network_{key}": section.get(key, 0) for key in STATES}
+                rows.append({"section": section["section"]} | asdict(one) | network | law | flags)
     return rows
 
 

@@ -1,12 +1,14 @@
 """Sections with fines, where few throats carry the flow, by resolved flow."""
 
 from dataclasses import replace
+from math import ceil
 
 import numpy as np
 import pytest
+from scipy.fft import next_fast_len
 
 from fdnet.network.permeability import analyse, compare
-from fdnet.network.resolved import known, measured
+from fdnet.network.resolved import coarse_flow, known, measured
 from fdnet.network.resolved.combined import in_series
 from fdnet.network.resolved.slab import cut_out
 from fdnet.network.stokes.stokes import extrapolate, solve_slab
@@ -65,6 +67,35 @@ def test_sections_that_are_too_dear_are_named(pack, by_the_network):
     assert result.counts[COUNT] == 0
     (warning,) = [text for text in result.warnings if text.startswith("few throats carry")]
     assert " in section 1" in warning
+
+
+def test_grids_that_disagree_are_named_once(pack, monkeypatch):
+    """A section that resolved flow was tried on is not named as one with few throats again."""
+    true = coarse_flow.estimate
+    monkeypatch.setattr(
+        coarse_flow,
+        "estimate",
+        lambda *grids, with_fines: replace(
+            true(*grids, with_fines=with_fines), error=0.06 * with_fines
+        ),
+    )
+    result = analyse(pack, periodic=SIDES, sections=2, damage_law="all-spheres")
+    assert result.counts[COUNT] == 0
+    assert any(t.startswith("section 1 with fines was left") for t in result.warnings)
+    assert not any("throats carry" in t and "in section 1" in t for t in result.warnings)
+
+
+def test_the_grid_is_as_fine_as_grains_or_fines_need(pack):
+    longest = float(np.diff(pack.box, axis=1).max())
+    grain, fine = (float(one.radius.mean()) for one in (pack.grains(), pack.fines()))
+    slender = replace(pack, radius=np.where(pack.kind == Kind.FINE, 0.05 * fine, pack.radius))
+    for spheres, wanted in ((pack, 15.0 / grain), (slender, 2.0 / (0.05 * fine))):
+        coarse, finer = measured.WITH_FINES.cells(spheres)
+        assert finer == next_fast_len(ceil(wanted * longest))
+        assert coarse == next_fast_len(ceil(wanted * longest / 1.5))
+    assert measured.WITHOUT_FINES.cells(pack.grains())[1] == next_fast_len(
+        ceil(10.0 / grain * longest)
+    )
 
 
 def test_many_throats_keep_the_network(pack, monkeypatch):

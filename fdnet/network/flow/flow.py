@@ -38,7 +38,7 @@ class Flow:
         pore_pressure: (P,) over the pressure drop: 1 at the inlet plane, 0 at the outlet plane,
             NaN where the pore is not connected to both planes.
         throat_flux: (T,) m3, from the first to the second pore: flux inside the box times
-            viscosity over the pressure drop.
+            viscosity over the pressure drop; the sum over the parts of a throat that is cut twice.
         method: how the system was solved.
         residual: sum of the imbalances of the pores over the inflow, which bounds the relative
             error of the inflow.

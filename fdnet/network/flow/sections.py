@@ -130,7 +130,6 @@ def make_sections(
     share = count / max(len(depth), 1)
     before, after = (pooled(one, edges) for one in porosity)
     resolved = [np.zeros(len(count), bool) if one.resolved is None else one.resolved for one in k]
-    resolved[1] = resolved[1] | (resolved[0] & (k[1].cut_out == k[0].cut_out))
     return tuple(
         Section(
             section=s + 1,

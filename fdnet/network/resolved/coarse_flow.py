@@ -127,9 +127,11 @@ def _permeability(
         for number in cells
     )
     end = estimate(coarse, fine, with_fines=len(slab.fines()) > 0)
-    if not (end.k > 0.0 and 0.0 <= end.error <= LARGEST_ERROR):
+    both = f"stokes: two grids give {coarse.k:.4g} and {fine.k:.4g} m2"
+    if not end.k > 0.0:
+        raise FlowError(f"{both}, too far apart to be extrapolated to no spacing")
+    if end.error > LARGEST_ERROR:
         raise FlowError(
-            f"stokes: two grids give {coarse.k:.4g} and {fine.k:.4g} m2, an error of "
-            f"{abs(end.error):.1%}, expected at most {LARGEST_ERROR:.0%}"
+            f"{both}, an error of {end.error:.1%}, expected at most {LARGEST_ERROR:.0%}"
         )
     return end.k

@@ -91,9 +91,10 @@ def replaced(slabs: SlabK, known: Array) -> SlabK:
 
     The permeability in place changes by the same factor. A closed section stays closed.
     """
-    resolved = np.isfinite(known)
+    resolved = np.isfinite(known) & (slabs.cut_out > 0.0)
     factor = np.where(resolved, over(known, slabs.cut_out), 1.0)
-    return replace(scaled(slabs, factor), resolved=frozen(resolved))
+    cut_out = frozen(np.where(resolved, known, slabs.cut_out))
+    return replace(scaled(slabs, factor), cut_out=cut_out, resolved=frozen(resolved))
 
 
 def in_series(inplace: Array, edges: Array) -> float:

@@ -20,7 +20,8 @@ from fdnet.spheres.snapshot import Array, frozen
 
 FEW_THROATS = 100
 """Number of throats that carry the flow of a section (`Flow.carrying_throats`) below which the
-network of all spheres is off by 5 % (rms), above which by 2 % (docs/accuracy.md)."""
+network of all spheres is off by 5 % (rms), above which by 2 % (docs/accuracy.md). The throats
+between grains, by which `upscaled` is judged, are fewer, so the limit is stricter for it."""
 LEAST_LEFT, MOST_LEFT = 0.1, 0.8
 """Shares of the permeability left, by the network, between which resolved flow is worth its cost.
 Below, the channels between the fines are narrower than a few of its cells. Above, the errors with
@@ -121,12 +122,12 @@ def _few_doubts(slabs: SlabK, some: Array) -> Iterator[str]:
     numbers = [int(number) for number in np.flatnonzero(some)]
     if numbers:
         each = ", ".join(
-            f"{slabs.flows[number].carrying_throats:.0f} in section {number + 1}"
+            f"{int(slabs.flows[number].carrying_throats)} in section {number + 1}"
             for number in numbers
         )
         yield (
-            f"few throats carry the flow with fines, {each}: below {FEW_THROATS} their errors do "
-            "not average out"
+            f"few throats carry the flow with fines ({each}): the errors of single throats do not "
+            f"average out below {FEW_THROATS} of them"
         )
 
 
