@@ -76,7 +76,7 @@ def _text(row: Mapping[str, Any]) -> str:
     over = (f"{_over(row, key):+.1%}" for key in ("k_initial_m2", "k_damaged_m2"))
     lines.append(_line("network over flow", *over))
     if resolved := resolved_words([run_flags(row)]):
-        lines.append(f"What the run has here is not the network's alone. {resolved}")
+        lines.append(f"Not all that the run has is by the network. {resolved}")
     return "\n".join(lines)
 
 

@@ -15,9 +15,11 @@ def resolved_words(rows: Sequence[Mapping[str, Any]]) -> str:
     for key, state in STATES.items():
         numbers = [str(row["section"]) for row in rows if row.get(key)]
         if numbers:
-            of = f" of section{'s' * (len(numbers) > 1)} {_listed(numbers)}" * (len(rows) > 1)
-            parts.append(f"the permeability{of} {state}")
-    return f"By resolved flow on coarse grids: {', '.join(parts)}." if parts else ""
+            of = f"of section{'s' * (len(numbers) > 1)} {_listed(numbers)} " * (len(rows) > 1)
+            parts.append(f"{of}{state}")
+    if not parts:
+        return ""
+    return f"By resolved flow on coarse grids: the permeability {' and '.join(parts)}."
 
 
 def run_flags(row: Mapping[str, Any]) -> dict[str, Any]:

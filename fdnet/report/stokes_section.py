@@ -19,9 +19,10 @@ _HEAD = (
 )
 _NOTE = (
     "Resolved flow solves the Stokes equations between all spheres on two grids and needs no law "
-    "of throats. The error behind &plusmn; is its own. The rest of this report is by the network; "
-    "where the two differ by more than that error, the difference is the error of the network. "
-    "Cells are those of the finer grid, before and after. The damage law of the network is {}."
+    "of throats. The error behind &plusmn; is its own. The columns &ldquo;network&rdquo; hold "
+    "what the run has. Where the two differ by more than that error, the difference is the error "
+    "of the network. Cells are those of the finer grid, before and after. The damage law of the "
+    "network is {}."
 )
 
 
@@ -39,7 +40,7 @@ def section_html(rows: Sequence[Mapping[str, Any]]) -> str:
 def _coarse(rows: Sequence[Mapping[str, Any]]) -> str:
     """What the run itself took from resolved flow."""
     words = resolved_words([run_flags(row) for row in rows])
-    return f" What the run has is not the network's alone. {words}" if words else ""
+    return f" Not all that the run has is by the network. {words}" if words else ""
 
 
 def _cells(row: Mapping[str, Any]) -> str:

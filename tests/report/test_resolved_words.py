@@ -22,19 +22,21 @@ def rows(initial, damaged, count=3):
         (
             (1, 2, 3),
             (1,),
-            "the permeability of sections 1, 2 and 3 without fines, the permeability of section 1 "
-            "with fines",
+            "of sections 1, 2 and 3 without fines and of section 1 with fines",
         ),
-        ((2,), (), "the permeability of section 2 without fines"),
+        ((2,), (), "of section 2 without fines"),
     ],
 )
 def test_the_sections_are_named(initial, damaged, words):
-    assert resolved_words(rows(initial, damaged)) == f"By resolved flow on coarse grids: {words}."
+    assert (
+        resolved_words(rows(initial, damaged))
+        == f"By resolved flow on coarse grids: the permeability {words}."
+    )
 
 
 def test_one_section_alone_is_not_numbered():
-    words = resolved_words(rows((1,), (), 1))
-    assert words == "By resolved flow on coarse grids: the permeability without fines."
+    words = resolved_words(rows((1,), (1,), 1))
+    assert words.endswith("coarse grids: the permeability without fines and with fines.")
 
 
 def test_nothing_is_said_where_all_are_by_the_network():
