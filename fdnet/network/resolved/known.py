@@ -22,7 +22,7 @@ FEW_THROATS = 100
 """Number of throats that carry the flow of a section (`Flow.carrying_throats`) below which the
 network of all spheres is off by 5 % (rms), above which by 2 % (docs/accuracy.md). The throats
 between grains, by which `upscaled` is judged, are fewer, so the limit is stricter for it."""
-LEAST_LEFT, MOST_LEFT = 0.1, 0.8
+LEAST_LEFT, MOST_LEFT = 0.1, 0.9
 """Shares of the permeability left, by the network, between which resolved flow is worth its cost.
 Below, the channels between the fines are narrower than a few of its cells. Above, the errors with
 and without fines are alike, and k/k0 is known as well from the two laws of `combined`."""
