@@ -23,7 +23,7 @@ box = { size_mm = [1.6, 1.0, 1.0], sides = "periodic" }
 grains = { radius_mm = 0.25, count = 15 }
 fines = { radius_mm = 0.05, count = 60, supply = "batches" }
 run = { cap_ms = 0.2, checkpoint_ms = 0.02 }
-analysis = { sections = 2 }
+analysis = { sections = 2, damage_law = "section-archie" }
 """
 STAGES = ("--stages", "pack,invade,analyse")
 TABLES = (
