@@ -5,13 +5,15 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Annotated, Any, Literal, TypedDict, TypeVar
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag, ValidationError
+from pydantic import Discriminator, Field, Tag, ValidationError, field_validator
 
 from fdnet.case.names import (
+    ALL_SPHERES,
     AUTO,
     DEFAULT_LAW,
     MOST_SECTIONS,
-    OWN_NETWORK,
+    MOST_SPHERES,
+    REMOVED_LAWS,
     DamageLawName,
     LawName,
     WallName,
@@ -55,10 +57,9 @@ class AnalysisChoices(Part):
     law: LawName = Field(DEFAULT_LAW, description="Conductance of a clean throat.")
     damage_law: DamageLawName = Field(
         AUTO,
-        description="How fines lower the permeability: a law that damages the throats between "
-        'grains, of which "upscaled" solves the flow around each of them; "all-spheres", the '
-        'network of grains and fines together; or "combined", a mean of that and of '
-        '"section-archie". "auto" takes the most accurate one that its cost allows.',
+        description='How fines lower the permeability: "all-spheres", the network of grains and '
+        "fines together, or a law that damages the throats between grains. "
+        f'"auto" takes "all-spheres" up to {MOST_SPHERES:,} spheres and "section-archie" above.',
     )
     clogging_threshold: Fraction | None = Field(
         None,
@@ -82,13 +83,19 @@ class AnalysisChoices(Part):
     walls: WallName = Field(
         "no-slip",
         description="Whether side walls hold the fluid or let it slip; known to "
-        '"lubrication", "side-kozeny", "section-archie", "upscaled", "all-spheres" and '
-        '"combined".',
+        '"lubrication", "section-archie" and "all-spheres".',
     )
+
+    @field_validator("law", "damage_law", mode="before")
+    @classmethod
+    def _is_there(cls, name: Any) -> Any:
+        if isinstance(name, str) and name in REMOVED_LAWS:
+            raise ValueError(f"{name!r} is no longer there; take {REMOVED_LAWS[name]!r}")
+        return name
 
     def refusals(self) -> Iterator[str]:
         """Why laws do not go together, one sentence each."""
-        if self.damage_law in OWN_NETWORK and self.law != DEFAULT_LAW:
+        if self.damage_law == ALL_SPHERES and self.law != DEFAULT_LAW:
             yield (
                 f"analysis.damage_law: {self.damage_law!r} needs a network of all spheres, whose "
                 f"law is {DEFAULT_LAW!r}, analysis.law is {self.law!r}; take analysis.law = "

@@ -5,18 +5,8 @@ This module imports nothing heavy, so that `fdnet --help` answers at once.
 
 from typing import Literal, get_args
 
-LawName = Literal["thesis", "effective", "hydraulic", "series", "lubrication"]
-DamageLawName = Literal[
-    "auto",
-    "combined",
-    "all-spheres",
-    "upscaled",
-    "thesis",
-    "thesis-code",
-    "kozeny",
-    "side-kozeny",
-    "section-archie",
-]
+LawName = Literal["thesis", "effective", "lubrication"]
+DamageLawName = Literal["auto", "all-spheres", "section-archie", "thesis", "thesis-code"]
 WallName = Literal["no-slip", "slip"]
 LAW_NAMES: tuple[LawName, ...] = get_args(LawName)
 DAMAGE_LAW_NAMES: tuple[DamageLawName, ...] = get_args(DamageLawName)
@@ -24,30 +14,29 @@ WALL_NAMES: tuple[WallName, ...] = get_args(WallName)
 DEFAULT_LAW: LawName = "lubrication"
 AUTO: DamageLawName = "auto"
 """The damage law of the default: the most accurate that its cost allows."""
-COMBINED: DamageLawName = "combined"
-"""The damage law that "auto" takes for up to `MOST_SPHERES` spheres."""
 ALL_SPHERES: DamageLawName = "all-spheres"
-UPSCALED: DamageLawName = "upscaled"
-"""The damage law of the throats between grains that solves the flow around each of them."""
+"""The damage law that "auto" takes for up to `MOST_SPHERES` spheres; it needs `DEFAULT_LAW`."""
 SECTION_ARCHIE: DamageLawName = "section-archie"
-"""The damage law that "auto" takes for more of them."""
-DEFAULT_DAMAGE_LAW: DamageLawName = "side-kozeny"
-"""The damage law that it takes with conductance laws other than `DEFAULT_LAW`."""
+"""The damage law that "auto" takes for more of them, and with other conductance laws."""
 MOST_SPHERES = 300_000
-"""Grains and fines up to which "auto" takes `combined`.
+"""Grains and fines up to which "auto" takes `all-spheres`.
 
 So many take 260 s of one core and 2.1 GB in eight sections (docs/benchmark_spheres.csv).
 """
-OWN_NETWORK: tuple[DamageLawName, ...] = (COMBINED, ALL_SPHERES, UPSCALED)
-"""Damage laws that need the network of all spheres, and with it `DEFAULT_LAW`."""
 MOST_SECTIONS = 1000
+REMOVED_LAWS = {
+    "hydraulic": DEFAULT_LAW,
+    "series": DEFAULT_LAW,
+    "combined": AUTO,
+    "upscaled": ALL_SPHERES,
+    "kozeny": SECTION_ARCHIE,
+    "side-kozeny": SECTION_ARCHIE,
+}
+"""Laws that are gone, and the more accurate one to take in the place of each."""
 
 
 def law_pairs() -> list[tuple[LawName, DamageLawName]]:
-    """All pairs of a conductance law and a damage law that go together.
-
-    Those of `OWN_NETWORK` go with `lubrication` alone.
-    """
-    two_scale = [name for name in DAMAGE_LAW_NAMES if name not in (AUTO, *OWN_NETWORK)]
+    """All pairs of a conductance law and a damage law that go together."""
+    two_scale = [name for name in DAMAGE_LAW_NAMES if name not in (AUTO, ALL_SPHERES)]
     pairs = [(law, damage_law) for law in LAW_NAMES for damage_law in two_scale]
-    return [*pairs, *((DEFAULT_LAW, name) for name in OWN_NETWORK)]
+    return [*pairs, (DEFAULT_LAW, ALL_SPHERES)]

@@ -54,7 +54,6 @@ def _stokes(options: argparse.Namespace) -> int:
 
 
 def _text(row: Mapping[str, Any]) -> str:
-    from fdnet.report.resolved_words import resolved_words, run_flags
     from fdnet.report.units import in_millidarcy
 
     lines = [
@@ -75,8 +74,6 @@ def _text(row: Mapping[str, Any]) -> str:
     lines.append(_line("its finer cells, µm", *cells))
     over = (f"{_over(row, key):+.1%}" for key in ("k_initial_m2", "k_damaged_m2"))
     lines.append(_line("network over flow", *over))
-    if resolved := resolved_words([run_flags(row)]):
-        lines.append(f"Not all that the run has is by the network. {resolved}")
     return "\n".join(lines)
 
 

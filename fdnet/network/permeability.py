@@ -7,17 +7,15 @@ from typing import Any, Unpack
 import numpy as np
 
 from fdnet.case.analysis import AnalysisChoices, AnalysisKeys, with_visible_choices
-from fdnet.case.names import ALL_SPHERES, AUTO, DEFAULT_DAMAGE_LAW, OWN_NETWORK, law_pairs
+from fdnet.case.names import ALL_SPHERES, AUTO, SECTION_ARCHIE, law_pairs
 from fdnet.network.analysis import Analysis, laws_apart, worst_solve
 from fdnet.network.fines.occupancy import Occupancy
-from fdnet.network.flow.depth import Layers, layer_edges, make_layers, scaled_layers
+from fdnet.network.flow.depth import Layers, layer_edges, make_layers
 from fdnet.network.flow.flow import Flow
 from fdnet.network.flow.sections import Section, make_profile, make_sections, reduction, thin_slabs
-from fdnet.network.flow.slabs import SlabK
 from fdnet.network.laws.damage import CLEAN, Damage
 from fdnet.network.laws.named import LAWS
-from fdnet.network.resolved.accurate import AccurateLaw, Permeabilities, accurate_law
-from fdnet.network.resolved.combined import in_series, over
+from fdnet.network.resolved.all_spheres import AllSpheres, at_most_the_grains, few_throats
 from fdnet.network.resolved.measured import Measured
 from fdnet.network.resolved.slab import Sides
 from fdnet.network.resolved.state import Log, State, solved
@@ -28,7 +26,7 @@ from fdnet.network.specimen.specimen import (
     specimen_doubts,
 )
 from fdnet.spheres.directions import Directions, periodic_axes
-from fdnet.spheres.snapshot import Array, Snapshot, frozen
+from fdnet.spheres.snapshot import Snapshot, frozen
 
 
 @with_visible_choices
@@ -122,7 +120,7 @@ def compare(
         >>> import fdnet, numpy as np
         >>> lattice = 1e-3 * (np.indices((3, 3, 3)).reshape(3, -1).T + 0.5)
         >>> spheres = fdnet.Snapshot.from_arrays(lattice, 0.5e-3)
-        >>> pairs = [("thesis", "thesis"), ("lubrication", "side-kozeny")]
+        >>> pairs = [("thesis", "thesis"), ("lubrication", "section-archie")]
         >>> for result in fdnet.compare(spheres, periodic="xyz", laws=pairs):
         ...     print(f"{result.law}: {result.k_initial:.1e} m2")
         thesis: 1.4e-09 m2
@@ -148,64 +146,55 @@ def _chosen(options: AnalysisChoices | None, choices: AnalysisKeys) -> AnalysisC
 
 
 def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysis:
-    specimen, law = measured.specimen, options.law
+    specimen, law, name = measured.specimen, options.law, options.damage_law
     clean, clean_slabs = measured.clean(law, log)
     base = measured.base(law, log)
-    best = accurate_law(measured, options, log)
-    name = options.damage_law if best is None else best.second or best.name
-    if best is None and name in (AUTO, *OWN_NETWORK):  # no fines, or "auto" with another law
-        name = DEFAULT_DAMAGE_LAW
-    final, damage = measured.damaged(options, name, log)
-    before = Permeabilities(k=clean.k, slabs=clean_slabs)
-    after = before
-    if best is not None:
-        before, after = best.before, best.after
-        log.warnings += best.doubts
-        if best.second is not None:
-            log.warnings += laws_apart(_finest(best), (name, final.k))
+    whole = measured.all_spheres(options, log)
+    of_grains = SECTION_ARCHIE if name in (AUTO, ALL_SPHERES) else name
+    final, damage = measured.damaged(options, of_grains, log)
+    k, slabs, flow = clean.k, clean_slabs, final.flow
+    counts: dict[str, int] = {}
+    if whole is not None:
+        log.warnings += [*whole.refused, *few_throats(whole.slabs)]
+        grains = (base.k, None if specimen.moved else clean_slabs)
+        empty = specimen.empty_sections()
+        whole, counts = at_most_the_grains(whole, grains, specimen.edges, empty)
+        k, slabs, flow = whole.k, whole.slabs, whole.solved.flow
+        log.warnings += laws_apart((ALL_SPHERES, k), (of_grains, final.k))
     elif final is not clean:
-        slabs = measured.damaged_slabs(final, options, name, log)
-        after = Permeabilities(k=final.k, slabs=slabs)
+        k, slabs = final.k, measured.damaged_slabs(final, options, of_grains, log)
     sections = make_sections(
-        specimen.edges, specimen.porosity, (before.slabs, after.slabs), specimen.depth
+        specimen.edges, specimen.porosity, (clean_slabs, slabs), specimen.depth
     )
-    _warn(log, clean, (final if best is None else best).flow, sections)
+    _warn(log, clean, flow, sections)
     log.warnings += specimen_doubts(specimen, clean.k, options.walls)
     law_used = np.full(len(final.conductance), CLEAN) if damage is None else damage.law_used
-    flows = [clean.flow, base.flow, final.flow, *clean_slabs.flows, *after.slabs.flows]
-    more = {} if best is None else dict(best.counts)
+    flows = [clean.flow, base.flow, final.flow, flow, *clean_slabs.flows, *slabs.flows]
     return Analysis(
         network=base.network,
         occupancy=specimen.occupancy,
         law=law,
-        damage_law=options.damage_law,
-        damage_law_used=_used(specimen, best, name),
-        damage_law_other=None if best is None else best.second,
-        k_damaged_other=None if best is None or best.second is None else final.k,
+        damage_law=name,
+        damage_law_used=_used(specimen, whole, of_grains),
+        damage_law_other=None if whole is None else of_grains,
+        k_damaged_other=None if whole is None else final.k,
         conductance_initial=base.conductance,
         conductance_damaged=final.conductance,
         law_used=frozen(law_used),
         flow_initial=base.flow,
         flow_damaged=final.flow,
-        k_initial=before.k,
-        k_damaged=after.k,
+        k_initial=clean.k,
+        k_damaged=k,
         k_moved=base.k if specimen.moved else None,
-        k_reduction=reduction(before.k, after.k),
+        k_reduction=reduction(clean.k, k),
         sections=sections,
-        layers=None if best is None else _layers(specimen, (clean, clean_slabs), best),
-        solver=worst_solve(flows if best is None else [*flows, best.flow]),
-        counts=_counts(base, specimen.occupancy, damage, final.flow) | more,
+        layers=_layers(specimen, clean, whole),
+        solver=worst_solve(flows),
+        counts=_counts(base, specimen.occupancy, damage, final.flow) | counts,
         warnings=tuple(log.warnings),
         seconds=log.seconds,
         **_without_laws(specimen),
     )
-
-
-def _finest(best: AccurateLaw) -> tuple[str, float]:
-    """Name and k (m2) of what stands against the second law: all spheres, or the law itself."""
-    if best.all_spheres is None:
-        return best.name, best.after.k
-    return ALL_SPHERES, best.all_spheres.k
 
 
 def _without_laws(specimen: Specimen) -> dict[str, Any]:
@@ -225,37 +214,19 @@ def _without_laws(specimen: Specimen) -> dict[str, Any]:
     }
 
 
-def _used(specimen: Specimen, best: AccurateLaw | None, name: str) -> str | None:
+def _used(specimen: Specimen, whole: AllSpheres | None, of_grains: str) -> str | None:
     if specimen.fines is None or not len(specimen.fines):
         return None
-    return name if best is None else best.name
+    return of_grains if whole is None else ALL_SPHERES
 
 
-def _layers(specimen: Specimen, clean: tuple[State, SlabK], best: AccurateLaw) -> Layers | None:
-    """Layers of the mean diameter of a fine, from the network that resolves them.
-
-    They are scaled section by section, so that they agree with the sections.
-    """
-    state, slabs = clean
-    initial, fines = solved(state), specimen.fines
-    if initial is None or fines is None or best.solved is None or best.all_spheres is None:
+def _layers(specimen: Specimen, clean: State, whole: AllSpheres | None) -> Layers | None:
+    """Layers of the mean diameter of a fine, from the network that resolves them."""
+    initial, fines = solved(clean), specimen.fines
+    if initial is None or fines is None or whole is None:
         return None
-    edges = layer_edges(state.network.box, 2.0 * float(fines.radius.mean()))
-    layers = make_layers(initial, best.solved, edges=edges, depth=specimen.depth)
-    before, after = (
-        _factors(own.inplace, wanted.inplace, specimen.edges)
-        for own, wanted in (
-            (slabs, best.before.slabs),
-            (best.all_spheres.slabs, best.after.slabs),
-        )
-    )
-    return scaled_layers(layers, specimen.edges, before, after)
-
-
-def _factors(own: Array, wanted: Array, edges: Array) -> tuple[Array, float]:
-    """What turns the sections (S,) in place into those that are wanted, and their series."""
-    whole, start = in_series(wanted, edges), in_series(own, edges)
-    return over(wanted, own), whole / start if start > 0.0 else 1.0
+    edges = layer_edges(clean.network.box, 2.0 * float(fines.radius.mean()))
+    return make_layers(initial, whole.solved, edges=edges, depth=specimen.depth)
 
 
 def _warn(log: Log, clean: State, damaged: Flow, sections: tuple[Section, ...]) -> None:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fdnet.case.names import (
+    ALL_SPHERES,
     AUTO,
-    COMBINED,
     DAMAGE_LAW_NAMES,
     DEFAULT_LAW,
     LAW_NAMES,
@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=DAMAGE_LAW_NAMES,
         metavar="NAME",
         help=f"damage law: {', '.join(DAMAGE_LAW_NAMES)} (default {AUTO}: up to {MOST_SPHERES} "
-        f"spheres {COMBINED}, above {SECTION_ARCHIE})",
+        f"spheres {ALL_SPHERES}, above {SECTION_ARCHIE})",
     )
     parser.add_argument(
         "--compare-laws", action="store_true", help="all laws with all damage laws as a table"

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 from fdnet.errors import CaseError
 from fdnet.files.atomic import write_text
-from fdnet.report.resolved_words import resolved_words
 from fdnet.report.units import in_millidarcy
 
 if TYPE_CHECKING:
@@ -96,7 +95,6 @@ def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportP
         **_view_parts(parts.view),
         headline=headline(summary),
         columns=SECTION_COLUMNS,
-        resolved=resolved_words(summary.get("sections") or ()),
     )
     return write_text(path, text)
 

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from fdnet.report.resolved_words import resolved_words
 from fdnet.report.units import MILLIDARCY
 
 Row = Mapping[str, Any]
@@ -46,8 +45,6 @@ def answer_lines(results: Sequence[Row], given: Given) -> Iterator[str]:
         )
     if given.sections:
         yield from _section_lines(first, fines=given.fines)
-    if resolved := resolved_words(first.get("sections", ())):
-        yield resolved[:-1] + (" along x." if "k_x_m2" in first else ".")
     for warning in first["warnings"]:
         yield f"warning: {warning}"
 

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from fdnet.report.resolved_words import resolved_words, run_flags
 from fdnet.report.units import in_millidarcy
 
 NAME = "stokes"
@@ -33,14 +32,8 @@ def section_html(rows: Sequence[Mapping[str, Any]]) -> str:
     return (
         "<h2>Sections by resolved Stokes flow</h2>\n"
         f'<div class="scroll"><table>\n<tr>{head}</tr>\n{body}\n</table></div>\n'
-        f'<p class="note">{_NOTE.format(rows[0]["network_damage_law"])}{_coarse(rows)}</p>'
+        f'<p class="note">{_NOTE.format(rows[0]["network_damage_law"])}</p>'
     )
-
-
-def _coarse(rows: Sequence[Mapping[str, Any]]) -> str:
-    """What the run itself took from resolved flow."""
-    words = resolved_words([run_flags(row) for row in rows])
-    return f" Not all that the run has is by the network. {words}" if words else ""
 
 
 def _cells(row: Mapping[str, Any]) -> str:

@@ -49,8 +49,6 @@ def section_rows(analysis: "Analysis") -> list[dict[str, Any]]:
             "k_damaged_inplace_m2": s.k_damaged_inplace,
             "fines_count": s.fines_count,
             "fines_fraction": s.fines_fraction,
-            "k_initial_resolved": int(s.k_initial_resolved),
-            "k_damaged_resolved": int(s.k_damaged_resolved),
         }
         for s in analysis.sections
     ]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SPHERE_ARRAYS = {"radius": "radius_m", "kind": "kind", "id": "id", "velocity": "velocity_m_s"}
 """Names of the point data of sphere files, by the attribute of a snapshot."""
-LAW_CODES = {"clean": 0, "deposition": 1, "clogging": 2, "blocked": 3, "kozeny": 4, "sections": 5}
+LAW_CODES = {"clean": 0, "deposition": 1, "clogging": 2, "blocked": 3, "sections": 5}
 
 
 def write_network_vtp(path: str | Path, analysis: "Analysis") -> Path:

@@ -7,8 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from fdnet.case.case import Case, InvasionCase
+from fdnet.case.names import ALL_SPHERES
 from fdnet.errors import CaseError
+from fdnet.network.laws.named import LAWS
 from fdnet.network.network import Network, build_network
+from fdnet.network.resolved.all_spheres import all_conductances
 from fdnet.run.finished_text import html_lines, text_lines
 from fdnet.run.made_files import ANALYSE_AGAIN, START_OVER, check_one
 from fdnet.spheres.arrays import Array
@@ -134,17 +137,37 @@ class FinishedRun:
         _check_state(state)
         return self.throats[f"conductance_{state}_m3"].to_numpy()
 
-    def to_openpnm(self, state: State = "damaged") -> Any:
-        """The network with its conductances as an OpenPNM network, SI units.
+    def to_openpnm(self, state: State = "damaged", *, damage_law: str | None = None) -> Any:
+        """The network that gives `k_initial_m2` or `k_damaged_m2`, for OpenPNM, SI units.
+
+        With fines that is the network of `damage_law_used` of the summary: for "all-spheres" the
+        pores and throats between grains and fines alike, else those between the grains. With
+        `damage_law` = `damage_law_other` of the summary it is the network of the grains, which
+        gives `k_damaged_other_m2`. Where fines appeared to raise the permeability
+        (`all_spheres_above_grains` in `network_counts` is 1), `k_damaged_m2` is the permeability
+        of the grains, and this network has a little more.
 
         See `fdnet.report.openpnm.to_openpnm`; the viscosity is that of the case's fluid. Raises
-        CaseError where OpenPNM is not installed.
+        CaseError where OpenPNM is not installed, or the run has no number by that law.
         """
         from fdnet.report.openpnm import to_openpnm
 
-        return to_openpnm(
-            self.network(), self.conductance(state), viscosity=self.case.fluid.viscosity_Pa_s
-        )
+        _check_state(state)
+        used, other = (self.summary.get(f"damage_law_{one}") for one in ("used", "other"))
+        if damage_law not in (None, used, other):
+            raise CaseError(
+                f"damage_law: {damage_law!r}, but the run has numbers by "
+                f"{' and '.join(str(one) for one in (used, other) if one)} alone"
+            )
+        if state == "initial" or (damage_law or used) == ALL_SPHERES:
+            analysis, periodic = self.case.analysis, self.case.periodic
+            spheres = self.spheres(state)
+            network = build_network(spheres, periodic=periodic, walls=analysis.walls)
+            law = LAWS[analysis.law] if state == "initial" else all_conductances
+            conductance = law(network)
+        else:
+            network, conductance = self.network(), self.conductance(state)
+        return to_openpnm(network, conductance, viscosity=self.case.fluid.viscosity_Pa_s)
 
     def network_mesh(self) -> Any:
         """The network as a pyvista mesh, m: throats as lines, with pressures and conductances.

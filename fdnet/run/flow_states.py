@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.case.names import DEFAULT_DAMAGE_LAW
+from fdnet.case.names import SECTION_ARCHIE
 from fdnet.network.field.of_pack import velocity_field
 from fdnet.network.field.streamlines import streamlines
 from fdnet.network.fines.invaded import cake_of
@@ -73,7 +73,7 @@ def flux_of(run: FinishedRun) -> FlowOf:
     def _damaged(fines: Snapshot) -> Array:
         names = (str(run.summary.get(f"damage_law_{which}")) for which in ("other", "used"))
         law = damage_law(
-            next((name for name in names if name in DAMAGE_LAWS), str(DEFAULT_DAMAGE_LAW)),
+            next((name for name in names if name in DAMAGE_LAWS), SECTION_ARCHIE),
             clogging_threshold=choices.clogging_threshold,
             middle_band=choices.middle_band,
         )

@@ -17,7 +17,6 @@ from fdnet.files.atomic import write_text
 from fdnet.network.resolved.slab import cut_out
 from fdnet.network.stokes.two_grids import Estimate
 from fdnet.report.later_sections import put_section
-from fdnet.report.resolved_words import STATES
 from fdnet.report.stokes_section import NAME, section_html
 from fdnet.run.finished import FinishedRun
 from fdnet.run.folder import locked
@@ -147,11 +146,7 @@ def report_section(folder: Path, case: Case, summary: Mapping[str, Any]) -> str:
 def with_network(
     resolved: Sequence[StokesSection], summary: Mapping[str, Any]
 ) -> list[dict[str, Any]]:
-    """The resolved sections that are sections of the `summary`, with what the network gives.
-
-    `network_k_initial_resolved` and `network_k_damaged_resolved` are 1 where the run took that
-    permeability from resolved flow on coarse grids, else 0.
-    """
+    """The resolved sections that are sections of the `summary`, with what the network gives."""
     rows = []
     law = {"network_damage_law": str(summary.get("damage_law_used") or summary["damage_law"])}
     for section in summary["sections"]:
@@ -159,8 +154,7 @@ def with_network(
             if one.x_lo_m == section["x_lo_m"] and one.x_hi_m == section["x_hi_m"]:
                 names = ("k_initial_m2", "k_damaged_m2", "k_reduction")
                 network = {f"network_{name}": section[name] for name in names}
-                flags = {f"network_{key}": section.get(key, 0) for key in STATES}
-                rows.append({"section": section["section"]} | asdict(one) | network | law | flags)
+                rows.append({"section": section["section"]} | asdict(one) | network | law)
     return rows
 
 

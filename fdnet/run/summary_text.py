@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from fdnet.case.stages import STAGES
-from fdnet.report.resolved_words import resolved_words
 from fdnet.report.units import in_millidarcy
 
 WIDTH = 96
@@ -87,7 +86,6 @@ def _table(summary: Mapping[str, Any]) -> Iterator[str]:
     )
     for row in summary["sections"]:
         yield _section(row)
-    yield from filter(None, [resolved_words(summary["sections"])])
 
 
 def _section(row: dict[str, Any]) -> str:

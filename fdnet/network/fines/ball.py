@@ -38,35 +38,17 @@ Vector = tuple[float, float, float]
 
 
 @compiled
-def fill_pieces(
-    corner: Array, pairs: tuple[Array, Array], balls: tuple[Array, Array, Array], filled: Array
-) -> None:
-    """Add up the pieces of balls inside tetrahedra.
-
-    Args:
-        corner: (P, 4, 3) m, corners of the tetrahedra.
-        pairs: index of the tetrahedron and of the ball (K,), which may be apart.
-        balls: centre (N, 3) m, radius (N,) m and values (N, W).
-        filled: (P, 2 + W), to which the volume m3 of the pieces, their surface m2 and the volume
-            times each value are added.
-    """
-    centre, radius, value = balls
-    piece = pieces(corner, pairs, centre, radius)
-    for k in range(len(piece)):
-        if piece[k, 0] > 0.0:
-            p, b = pairs[0][k], pairs[1][k]
-            filled[p, 0] += piece[k, 0]
-            filled[p, 1] += piece[k, 1]
-            for w in range(value.shape[1]):
-                filled[p, 2 + w] += piece[k, 0] * value[b, w]
-
-
-@compiled
 def pieces(corner: Array, pairs: tuple[Array, Array], centre: Array, radius: Array) -> Array:
     """Volume m3 and surface m2 (K, 2) of the piece of a ball in a tetrahedron, pair by pair.
 
     Both are 0 where the two are apart. Pieces below 1e-13 cubes of the radius are rounding and
-    left out. The arguments are those of `fill_pieces`.
+    left out.
+
+    Args:
+        corner: (P, 4, 3) m, corners of the tetrahedra.
+        pairs: index of the tetrahedron and of the ball (K,), which may be apart.
+        centre: (N, 3) m, of the balls.
+        radius: (N,) m, of the balls.
     """
     pore, ball = pairs
     normal, place, depth = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(4)

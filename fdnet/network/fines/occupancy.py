@@ -7,7 +7,7 @@ import numpy as np
 
 from fdnet.errors import CaseError, NetworkError
 from fdnet.network.fines.cylinder import OVERLAPS, Pairs
-from fdnet.network.fines.deposit import deposit_in_pores, deposit_on_sides
+from fdnet.network.fines.deposit import deposit_in_pores
 from fdnet.network.fines.fine_images import centred_inside, reaching_inside
 from fdnet.network.fines.in_throats import FinesInThroats, fines_in_throats
 from fdnet.network.network import Network
@@ -19,9 +19,7 @@ class Occupancy:
     """Fines in throats (T) and pores (P), and pairs (K) of a throat and a fine in it; SI units.
 
     A throat here is the cylinder of its inscribed radius between the positions of its two pores
-    (Shi 2011, section 3.2.2). A side of a throat is the pyramid from its facet to the power centre
-    of the first or second pore; where that centre lies behind the facet, the pyramid is
-    subtracted, so that the sides of all facets fill space once.
+    (Shi 2011, section 3.2.2).
 
     Attributes:
         throat_solid_volume: (T,) m3, fines in the cylinder.
@@ -33,11 +31,6 @@ class Occupancy:
         pore_solid_volume: (P,) m3, fines in the tetrahedron.
         pore_solid_surface: (P,) m2, surface of the fines in the tetrahedron.
         pore_porosity: (P,) (void - fines) / tetrahedron.
-        pore_fine_volume: (P,) m3, mean volume of a whole fine, weighted by the volume in the pore.
-        pore_layer: (P,) m, thickness of the layer that the fines make on the grains, weighted so.
-        side_solid_volume: (T, 2) m3, fines in the two sides of the throat, with the sign of the
-            side.
-        side_solid_surface: (T, 2) m2, surface of the fines in the two sides, likewise.
         pair_throat: (K,) index of the throat.
         pair_fine: (K,) index of the fine.
         pair_distance: (K,) distance of the centre of the fine from the axis over the radius of
@@ -56,10 +49,6 @@ class Occupancy:
     pore_solid_volume: Array
     pore_solid_surface: Array
     pore_porosity: Array
-    pore_fine_volume: Array
-    pore_layer: Array
-    side_solid_volume: Array
-    side_solid_surface: Array
     pair_throat: Array
     pair_fine: Array
     pair_distance: Array
@@ -83,7 +72,7 @@ def measure_occupancy(
     """What `fines` fill of the throats and pores of a network (Shi 2011, section 3.2).
 
     Throats and pores see every fine whose sphere reaches into the box, also one that is centred
-    upstream of it. Pores and sides of throats hold what of it lies inside the box; a pore or
+    upstream of it. Pores hold what of it lies inside the box; a pore or
     throat that a mirrored face cuts stands for its mirrored part as well. Throats also see the
     mirror images of the fines centred inside. Fines centred outside are counted
     (`fines_outside_box`).
@@ -160,17 +149,12 @@ def _throat_fields(network: Network, throats: FinesInThroats) -> dict[str, Array
 
 
 def _pore_fields(network: Network, reaching: Snapshot) -> dict[str, Array]:
-    """The fields by pore and by side of a throat, from the fines that reach into the box."""
-    solid, surface, fine_volume, layer = deposit_in_pores(network, reaching)
-    sides = deposit_on_sides(network, reaching)
+    """The fields by pore, from the fines that reach into the box."""
+    solid, surface = deposit_in_pores(network, reaching)
     return {
         "pore_solid_volume": solid,
         "pore_solid_surface": surface,
         "pore_porosity": ratio(network.pore_volume - solid, network.pore_tetra_volume),
-        "pore_fine_volume": fine_volume,
-        "pore_layer": layer,
-        "side_solid_volume": sides[0],
-        "side_solid_surface": sides[1],
     }
 
 

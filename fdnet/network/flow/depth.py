@@ -1,6 +1,6 @@
 """Pressure by depth: how the pressure falls between the pores, and thin layers of a specimen."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -153,34 +153,3 @@ def make_layers(initial: Solved, damaged: Solved, *, edges: Array, depth: Array)
         drop_damaged=frozen(drops[1]),
         fines_count=frozen(np.histogram(depth, edges)[0]),
     )
-
-
-def scaled_layers(
-    layers: Layers, edges: Array, before: tuple[Array, float], after: tuple[Array, float]
-) -> Layers:
-    """The layers where the permeabilities of the sections in place are multiplied by factors.
-
-    A layer has the factor of the section that its middle lies in, and its share of the pressure
-    drop changes by that of the whole over it.
-
-    Args:
-        layers: of a network.
-        edges: (S+1,) m, of the sections.
-        before: factors (S,) of the sections without fines, and that of the whole.
-        after: the same with fines.
-    """
-    middle = 0.5 * (layers.edges[:-1] + layers.edges[1:])
-    inside = np.clip(np.searchsorted(edges, middle) - 1, 0, len(edges) - 2)
-    (first, first_whole), (last, last_whole) = before, after
-    return replace(
-        layers,
-        k_initial=frozen(layers.k_initial * first[inside]),
-        k_damaged=frozen(layers.k_damaged * last[inside]),
-        drop_initial=frozen(_share(layers.drop_initial * first_whole, first[inside])),
-        drop_damaged=frozen(_share(layers.drop_damaged * last_whole, last[inside])),
-    )
-
-
-def _share(drop: Array, factor: Array) -> Array:
-    """`drop` over `factor`; NaN where that is 0, as nothing flows."""
-    return np.divide(drop, factor, out=np.full_like(drop, np.nan), where=factor > 0.0)

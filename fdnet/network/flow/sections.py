@@ -36,8 +36,6 @@ class Section:
         k_reduction: 1 - k_damaged / k_initial; None where k_initial is 0.
         k_initial_inplace: m2, in place, without fines.
         k_damaged_inplace: m2, in place, with fines.
-        k_initial_resolved: whether `k_initial` is by resolved flow.
-        k_damaged_resolved: whether `k_damaged` is.
         fines_count: number of fines centred in the slab.
         fines_fraction: these as a share of all invaded fines.
     """
@@ -52,8 +50,6 @@ class Section:
     k_reduction: float | None
     k_initial_inplace: float
     k_damaged_inplace: float
-    k_initial_resolved: bool
-    k_damaged_resolved: bool
     fines_count: int
     fines_fraction: float
 
@@ -129,7 +125,6 @@ def make_sections(
     count = np.histogram(depth, edges)[0]
     share = count / max(len(depth), 1)
     before, after = (pooled(one, edges) for one in porosity)
-    resolved = [np.zeros(len(count), bool) if one.resolved is None else one.resolved for one in k]
     return tuple(
         Section(
             section=s + 1,
@@ -142,8 +137,6 @@ def make_sections(
             k_reduction=reduction(float(k[0].cut_out[s]), float(k[1].cut_out[s])),
             k_initial_inplace=float(k[0].inplace[s]),
             k_damaged_inplace=float(k[1].inplace[s]),
-            k_initial_resolved=bool(resolved[0][s]),
-            k_damaged_resolved=bool(resolved[1][s]),
             fines_count=int(count[s]),
             fines_fraction=float(share[s]),
         )

@@ -18,13 +18,11 @@ class SlabK:
         cut_out: (S,) m2, of each slab alone, with the pressure held on its two planes.
         inplace: (S,) m2, from the pressures of the whole specimen.
         flows: S flows through the slabs cut out.
-        resolved: (S,) whether they are by resolved flow; None where none is.
     """
 
     cut_out: Array
     inplace: Array
     flows: tuple[Flow, ...]
-    resolved: Array | None = None
 
     __repr__ = one_line
 

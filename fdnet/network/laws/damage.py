@@ -9,14 +9,12 @@ from fdnet.network.network import Network
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
 
-CLEAN, DEPOSITION, CLOGGING, BLOCKED, KOZENY, SECTIONS, UPSCALED = (
+CLEAN, DEPOSITION, CLOGGING, BLOCKED, SECTIONS = (
     "clean",
     "deposition",
     "clogging",
     "blocked",
-    "kozeny",
     "sections",
-    "upscaled",
 )
 
 
@@ -25,9 +23,8 @@ class Damage:
     """Conductance of throats (T) with fines.
 
     Attributes:
-        conductance: (T,) m3. Only `upscaled_damage` may exceed that of the clean throat.
-        law_used: (T,) which rule applied: clean, deposition, clogging, blocked, kozeny, sections
-            or upscaled.
+        conductance: (T,) m3, at most that of the clean throat.
+        law_used: (T,) which rule applied: clean, deposition, clogging, blocked or sections.
         counts: how many throats, pores or sides were capped or closed.
     """
 

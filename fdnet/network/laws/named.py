@@ -3,28 +3,23 @@
 from collections.abc import Mapping
 from functools import partial
 
-from fdnet.case.names import DEFAULT_DAMAGE_LAW, DEFAULT_LAW
+from fdnet.case.names import DEFAULT_LAW
 from fdnet.errors import CaseError
 from fdnet.network.laws.conductance import (
     Law,
     effective_law,
-    hydraulic_law,
     lubrication_law,
-    series_law,
     thesis_law,
 )
 from fdnet.network.laws.damage import DamageLaw
-from fdnet.network.laws.kozeny_damage import kozeny_damage, side_kozeny_damage
 from fdnet.network.laws.section_archie import section_archie_damage
 from fdnet.network.laws.thesis_damage import CODE_THRESHOLD, TEXT_THRESHOLD, thesis_damage
 
-__all__ = ["DAMAGE_LAWS", "DEFAULT_DAMAGE_LAW", "DEFAULT_LAW", "LAWS"]
+__all__ = ["DAMAGE_LAWS", "DEFAULT_LAW", "LAWS"]
 
 LAWS: Mapping[str, Law] = {
     "thesis": thesis_law,
     "effective": effective_law,
-    "hydraulic": hydraulic_law,
-    "series": series_law,
     "lubrication": lubrication_law,
 }
 """Conductance laws of clean throats by name: functions of a network that return (T,) m3.
@@ -32,7 +27,7 @@ LAWS: Mapping[str, Law] = {
 Examples:
     >>> import fdnet
     >>> sorted(fdnet.LAWS)
-    ['effective', 'hydraulic', 'lubrication', 'series', 'thesis']
+    ['effective', 'lubrication', 'thesis']
 """
 
 _THESIS_THRESHOLDS = {"thesis": TEXT_THRESHOLD, "thesis-code": CODE_THRESHOLD}
@@ -40,8 +35,6 @@ _THESIS_THRESHOLDS = {"thesis": TEXT_THRESHOLD, "thesis-code": CODE_THRESHOLD}
 DAMAGE_LAWS: Mapping[str, DamageLaw] = {
     "thesis": thesis_damage,
     "thesis-code": partial(thesis_damage, clogging_threshold=CODE_THRESHOLD),
-    "kozeny": kozeny_damage,
-    "side-kozeny": side_kozeny_damage,
     "section-archie": section_archie_damage,
 }
 """Damage laws by name: functions that lower the clean conductance (T,) m3 of throats with fines.
@@ -49,7 +42,7 @@ DAMAGE_LAWS: Mapping[str, DamageLaw] = {
 Examples:
     >>> import fdnet
     >>> sorted(fdnet.DAMAGE_LAWS)
-    ['kozeny', 'section-archie', 'side-kozeny', 'thesis', 'thesis-code']
+    ['section-archie', 'thesis', 'thesis-code']
 """
 
 
@@ -61,8 +54,8 @@ def damage_law(
     Args:
         name: a key of `DAMAGE_LAWS`.
         clogging_threshold: throat porosity below which the thesis laws take a throat as clogged;
-            None for the threshold of the law. The Kozeny laws have no such option.
-        middle_band: see `thesis_damage`. The Kozeny laws have no such option.
+            None for the threshold of the law. Only these two laws have options.
+        middle_band: see `thesis_damage`.
 
     Raises:
         CaseError: the name is unknown.

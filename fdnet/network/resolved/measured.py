@@ -3,17 +3,13 @@
 from dataclasses import dataclass, field
 from functools import partial
 
-import numpy as np
-
 from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.names import (
     ALL_SPHERES,
     AUTO,
-    COMBINED,
     DEFAULT_LAW,
     MOST_SPHERES,
     SECTION_ARCHIE,
-    UPSCALED,
 )
 from fdnet.errors import FlowError, NetworkError
 from fdnet.network.fines.occupancy import measure_occupancy
@@ -22,17 +18,11 @@ from fdnet.network.laws.damage import Damage, DamageLaw
 from fdnet.network.laws.named import LAWS, damage_law
 from fdnet.network.network import Network
 from fdnet.network.resolved.all_spheres import AllSpheres, measure_all_spheres
-from fdnet.network.resolved.coarse_flow import (
-    WITH_FINES,
-    WITHOUT_FINES,
-    resolved_sections,
-)
-from fdnet.network.resolved.slab import CutNetworks, Sides, cut_networks, cut_out
+from fdnet.network.resolved.slab import CutNetworks, Sides, cut_networks
 from fdnet.network.resolved.state import Log, State, clean_halves, make_state, state_slabs
 from fdnet.network.specimen.specimen import Specimen
-from fdnet.network.upscaling.upscaled import upscaled_damage
 from fdnet.spheres.arrays import one_line
-from fdnet.spheres.snapshot import Array, Snapshot, frozen
+from fdnet.spheres.snapshot import Array, frozen
 
 
 @dataclass(slots=True, eq=False, kw_only=True)
@@ -46,8 +36,6 @@ class Measured:
     _cut: dict[bool, CutNetworks] = field(default_factory=dict)
     _all: AllSpheres | None = None
     _damaged: dict[tuple[str, str], tuple[State, Damage | None]] = field(default_factory=dict)
-    _intact: tuple[Array, dict[int, str]] | None = None
-    _resolved: dict[bytes, tuple[Array, dict[int, str]]] = field(default_factory=dict)
 
     __repr__ = one_line
 
@@ -75,49 +63,10 @@ class Measured:
             return base, None
         if (choices.law, name) not in self._damaged:
             with log.timed("conductance"):
-                if name == UPSCALED:
-                    damage = self._upscaled(base.network, base.conductance)
-                else:
-                    damage = _law(choices, name)(base.network, occupancy, base.conductance)
+                damage = _law(choices, name)(base.network, occupancy, base.conductance)
             state = make_state(base.network, damage.conductance, log, halves=base.halves)
             self._damaged[choices.law, name] = state, damage
         return self._damaged[choices.law, name]
-
-    def base_slabs(self, law: str, log: Log) -> SlabK:
-        """The sections of `base`."""
-        if not self.specimen.moved:
-            return self.clean(law, log)[1]
-        return self._clean_slabs(self.base(law, log), law, log, final=True)
-
-    def intact(self, log: Log) -> tuple[Array, dict[int, str]]:
-        """The sections (S,) without fines by resolved flow, m2, and why some could not be solved.
-
-        They are not a number where that is dear, and where the invasion moved the grains.
-        """
-        if self.specimen.moved:
-            return np.full(len(self.specimen.edges) - 1, np.nan), {}
-        if self._intact is None:
-            grains, edges = self.specimen.grains[0], self.specimen.edges
-            every = np.ones(len(edges) - 1, bool)
-            with log.timed("solve"):
-                self._intact = resolved_sections(
-                    grains, edges, self.sides, wanted=every, grids=WITHOUT_FINES
-                )
-        return self._intact
-
-    def resolved(self, wanted: Array, log: Log) -> tuple[Array, dict[int, str]]:
-        """The `wanted` (S,) sections with fines by resolved flow, as `intact`."""
-        key = wanted.tobytes()
-        if key not in self._resolved:
-            with log.timed("solve"):
-                self._resolved[key] = resolved_sections(
-                    self._together(),
-                    self.specimen.edges,
-                    self.sides,
-                    wanted=wanted,
-                    grids=WITH_FINES,
-                )
-        return self._resolved[key]
 
     def damaged_slabs(self, state: State, choices: AnalysisChoices, name: str, log: Log) -> SlabK:
         """The sections of `damaged`; their own networks hold their own part of the fines."""
@@ -125,58 +74,35 @@ class Measured:
         parts = None if cut is None else (cut, partial(self._damaged_conductance, choices, name))
         return state_slabs(state, self.specimen.edges, log, cut=parts)
 
-    def all_spheres(self, log: Log) -> AllSpheres:
-        """Grains and fines together. Raises NetworkError and FlowError as its parts do."""
-        if self._all is None:
-            self._all = measure_all_spheres(
-                self._together(),
-                self.specimen.edges,
-                sides=self.sides,
-                timed=log.timed,
-            )
-        return self._all
-
-    def wanted(self, choices: AnalysisChoices, log: Log) -> AllSpheres | None:
-        """The network of all spheres where the damage law asks for it, else None.
+    def all_spheres(self, choices: AnalysisChoices, log: Log) -> AllSpheres | None:
+        """The network of grains and fines where the damage law asks for it, else None.
 
         "auto" asks for it up to `MOST_SPHERES` grains and fines, and goes without it, with a
-        warning, where these make no network.
+        warning, where these make no network. Raises NetworkError and FlowError as
+        `measure_all_spheres` does where "all-spheres" asks for it.
         """
         fines, name = self.specimen.fines, choices.damage_law
-        if fines is None or not len(fines) or name not in (AUTO, COMBINED, ALL_SPHERES):
+        if fines is None or not len(fines) or name not in (AUTO, ALL_SPHERES):
             return None
-        if name != AUTO:
-            return self.all_spheres(log)
-        if choices.law != DEFAULT_LAW or len(fines) + len(self.specimen.grains[1]) > MOST_SPHERES:
+        count = len(fines) + len(self.specimen.grains[1])
+        if name == AUTO and (choices.law != DEFAULT_LAW or count > MOST_SPHERES):
             return None
         try:
-            return self.all_spheres(log)
+            if self._all is None:
+                together, edges = self.specimen.grains[1].joined(fines), self.specimen.edges
+                self._all = measure_all_spheres(together, edges, sides=self.sides, timed=log.timed)
         except (NetworkError, FlowError) as error:
+            if name == ALL_SPHERES:
+                raise
             log.warnings.append(f"the damage law {SECTION_ARCHIE} was taken: {error}")
-            return None
+        return self._all
 
     def _damaged_conductance(self, choices: AnalysisChoices, name: str, network: Network) -> Array:
         """Conductance (T,) m3 of the throats of a slab's own network with its fines."""
         fines, clean = self.specimen.fines, LAWS[choices.law](network)
         assert fines is not None
-        if name == UPSCALED:
-            return self._upscaled(network, clean).conductance
         occupancy = measure_occupancy(network, fines, overlap=choices.throat_overlap)
         return _law(choices, name)(network, occupancy, clean).conductance
-
-    def _upscaled(self, network: Network, clean: Array) -> Damage:
-        """The damage law `upscaled` on a network of grains with its clean conductance (T,) m3."""
-        spheres = self._together()
-        if not network.periodic[0]:
-            low, high = map(float, network.box[0])
-            spheres = cut_out(spheres, (low, high), self.sides.periodic)
-        return upscaled_damage(network, spheres, clean)
-
-    def _together(self) -> Snapshot:
-        """The grains where they ended and the fines."""
-        fines = self.specimen.fines
-        assert fines is not None
-        return self.specimen.grains[1].joined(fines)
 
     def _clean_slabs(self, state: State, law: str, log: Log, *, final: bool) -> SlabK:
         """The sections of the grains without fines, as they were or where they ended."""

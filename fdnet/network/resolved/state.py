@@ -3,10 +3,8 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import pairwise
-
-import numpy as np
 
 from fdnet.case.names import DEFAULT_LAW
 from fdnet.network.flow.depth import Solved, depth_permeability
@@ -108,13 +106,3 @@ def state_slabs(
         inplace=frozen(inplace),
         flows=tuple(flow for _, flow in parts),
     )
-
-
-def capped(before: SlabK, after: SlabK, empty: Array) -> tuple[SlabK, int]:
-    """`after`, at most `before` in every slab cut out, and in how many it was above.
-
-    An `empty` (S,) slab, which holds no fines, has what it had before.
-    """
-    above = (after.cut_out > before.cut_out) & ~empty
-    cut = np.where(empty | above, before.cut_out, after.cut_out)
-    return replace(after, cut_out=frozen(cut)), int(above.sum())

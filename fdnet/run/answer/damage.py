@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from fdnet.case.names import OWN_NETWORK
+from fdnet.case.names import ALL_SPHERES
 from fdnet.run.answer.skin import Step
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def steps_of(analysis: "Analysis") -> list[Step]:
         for s in analysis.sections
     ]
     layers = analysis.layers
-    if layers is None or analysis.damage_law_used not in OWN_NETWORK:
+    if layers is None or analysis.damage_law_used != ALL_SPHERES:
         return whole
     thin = [
         Step(near=float(a), far=float(b), before=float(k0), after=float(k1))
