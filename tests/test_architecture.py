@@ -30,7 +30,6 @@ NETWORK_LAYERS = [
     ["nodes"],
     ["fines", "flow"],
     ["laws", "specimen", "analysis"],
-    ["upscaling"],
     ["resolved"],
     ["permeability"],
 ]
