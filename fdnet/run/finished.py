@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from fdnet.case.case import Case, InvasionCase
 from fdnet.errors import CaseError
 from fdnet.network.network import Network, build_network
-from fdnet.run.finished_text import html_lines, text_lines
 from fdnet.run.made_files import ANALYSE_AGAIN, START_OVER, check_one
+from fdnet.run.summary_text import html_lines, text_lines
 from fdnet.spheres.arrays import Array
 from fdnet.spheres.snapshot import Snapshot
 
