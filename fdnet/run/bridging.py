@@ -2,8 +2,8 @@
 
 A throat is the circle that touches three grains. Beside a side wall or an end face it runs out to
 the mirror images of the grains, which make it wider than any between grains, and each such throat
-counts twice; these have a row of their own, and no width. Shares of a count have Wilson's 95 % band
-(J. Am. Stat. Assoc. 22, 209, 1927).
+counts twice; these have a row of their own, and no width. Shares of a count have Wilson's 95 %
+band (J. Am. Stat. Assoc. 22, 209, 1927).
 """
 
 import math
@@ -25,7 +25,7 @@ RATIOS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, math.inf)
 CLASSES = 4
 """Classes of throats by their width, of equal number."""
 BRIDGED, CLOGGED = 0.5, 0.1
-"""Share of the clean conductance up to which a throat counts as bridged, below which as clogged."""
+"""Share of its clean conductance up to which a throat is bridged, and below which it is clogged."""
 _COUNTS = ("throats", "with_fines", "blocked", "clogged", "closed")
 
 
@@ -127,8 +127,8 @@ def ratio_rows(
 ) -> list[dict[str, Any]]:
     """The classes of ratio that hold throats, as bridging.csv names their values.
 
-    Of the open throats between grains that conduct, down to the depth above which 95 % of the fines
-    lie. The ratio is that of the mean fine in the throat, or of all where it holds none.
+    Of the open throats between grains that conduct, down to the depth above which 95 % of the
+    fines lie. The ratio is that of the mean fine in the throat, or of all where it holds none.
 
     Args:
         analysis: of the damaged specimen.

@@ -22,7 +22,8 @@ def summary_lines(summary: Mapping[str, Any]) -> Iterator[str]:
     for text in _said(summary):
         yield from textwrap.wrap(text, WIDTH)
     yield ""
-    yield from (f"{name:<14}{value}" for name, value in facts(summary))
+    for name, value in facts(summary):
+        yield from textwrap.wrap(f"{name:<14}{value}", WIDTH, subsequent_indent=14 * " ")
     yield ""
     yield _row(_HEAD)
     yield from (_row(section_cells(row)) for row in summary["sections"])
@@ -90,7 +91,7 @@ def _of_the_fines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         f"{summary['invaded_count']} invaded, {summary['passed_count']} passed, "
         f"{summary['upstream_count']} upstream of {summary['supplied_count']} supplied",
     )
-    yield "end", f"{summary['stop_reason']}: {words.get('end', '')}".rstrip(": ")
+    yield "end", words.get("end") or str(summary["stop_reason"])
     yield (
         "depth",
         f"95 % above {millimetres(summary['invasion_depth_p95_m'])}, "
@@ -142,8 +143,9 @@ def _rules(summary: Mapping[str, Any]) -> Iterator[str]:
     yield f"rules of thumb (the run {SHOWS[summary['run_shows']]}):"
     for rule in rules:
         author = rule["source"].split(",")[0]
+        agrees = AGREES[rule["agrees"]]
         yield (
-            f"  {author:<22} {rule['value']:>6.3g}  {rule['says']:<8} {AGREES[rule['agrees']]:<12} "
+            f"  {author:<22} {rule['value']:>6.3g}  {rule['says']:<8} {agrees:<12} "
             f"({rule['limit']})"
         )
     yield ""
