@@ -108,9 +108,9 @@ def _cake(results: Results, one: Invaded) -> Added:
             title="External cake",
             columns=_CAKE_COLUMNS,
             rows=rows,
-            note=f"The cake is {millimetres(cake.thickness)} thick: {'; '.join(said)}. Carman and "
-            f"Kozeny's formula is for packed beds; slices of a porosity above {PACKED:g} have a "
-            "dash.",
+            note=f"The cake is {millimetres(cake.thickness)} thick: {'; '.join(said)}. Carman's "
+            f"and Kozeny's formula is for packed beds: slices of a porosity above {PACKED:g} are "
+            "loose and have a dash.",
         ),
     )
 

@@ -9,6 +9,7 @@ band (J. Am. Stat. Assoc. 22, 209, 1927).
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,7 +26,7 @@ RATIOS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, math.inf)
 CLASSES = 4
 """Classes of throats by their width, of equal number."""
 BRIDGED, CLOGGED = 0.5, 0.1
-"""Share of its clean conductance up to which a throat is bridged, and below which it is clogged."""
+"""Share of the clean conductance up to which a throat is bridged, below which it is clogged."""
 _COUNTS = ("throats", "with_fines", "blocked", "clogged", "closed")
 
 
@@ -95,10 +96,8 @@ def width_rows(throats: Throats) -> list[dict[str, Any]]:
         edges = np.quantile(inner.width, np.linspace(0, 1, CLASSES + 1))
         number = np.clip(np.searchsorted(edges, inner.width, side="right") - 1, 0, CLASSES - 1)
         rows = [
-            _width_row(
-                inner.where(number == index), (float(edges[index]), float(edges[index + 1]))
-            )
-            for index in range(CLASSES)
+            _width_row(inner.where(number == index), (float(low), float(high)))
+            for index, (low, high) in enumerate(pairwise(edges))
         ]
     return [*rows, _width_row(beside, (None, None))] if len(beside.width) else rows
 
@@ -106,10 +105,8 @@ def width_rows(throats: Throats) -> list[dict[str, Any]]:
 def _width_row(own: Throats, edges: tuple[float | None, float | None]) -> dict[str, Any]:
     inside = own.where(own.bridged & own.held)
     names = ("fines_smallest_m", "fines_median_m", "fines_largest_m")
-    some = (
-        [float(q) for q in np.quantile(inside.fine, (0.0, 0.5, 1.0))] if len(inside.fine) else []
-    )
-    ratio = float(np.median(inside.fine / inside.width)) if some and edges[0] is not None else None
+    some = np.quantile(inside.fine, (0.0, 0.5, 1.0)).tolist() if len(inside.fine) else []
+    known = some and edges[0] is not None
     return {
         "throat_from_m": edges[0],
         "throat_to_m": edges[1],
@@ -118,7 +115,7 @@ def _width_row(own: Throats, edges: tuple[float | None, float | None]) -> dict[s
         "bridged": int(own.bridged.sum()),
         "blocked": int(own.blocked.sum()),
         **dict(zip(names, some or (None, None, None), strict=True)),
-        "fine_over_throat": ratio,
+        "fine_over_throat": float(np.median(inside.fine / inside.width)) if known else None,
     }
 
 

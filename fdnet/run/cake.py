@@ -94,8 +94,8 @@ class Cake:
         if layers >= THICK:
             return ""
         return (
-            f"packed to a porosity of {PACKED:g} or less over {layers:.1f} diameters of a fine, "
-            f"too thin for a permeability of its own ({THICK:g} are needed)"
+            f"packed for {layers:.1f} diameters of a fine, too thin for a permeability of its own "
+            f"({THICK:g} are needed)"
         )
 
     @property
@@ -263,19 +263,13 @@ def cake_words(summary: Mapping[str, Any]) -> str:
     table = summary.get("cake_by_depth")
     if table is None:
         return "no fine upstream touches the pack"
-    k, network = table["k_kozeny_m2"], table["k_network_m2"]
-    ways = [
-        *(
-            [
-                f"{in_millidarcy(k)} mD by Carman and Kozeny at a porosity of {table['porosity']:.2f}"
-            ]
-            if k is not None
-            else [table["too_thin"]]
-        ),
-        *([f"{in_millidarcy(network)} mD by its own network"] if network is not None else []),
-    ]
+    k, network, own = table["k_kozeny_m2"], table["k_network_m2"], table["too_thin"]
+    if k is not None:
+        porosity = f"at a porosity of {table['porosity']:.2f}"
+        own = f"{in_millidarcy(k)} mD by Carman and Kozeny {porosity}"
+    if network is not None:
+        own += f", {in_millidarcy(network)} mD by its own network"
     return (
-        f"{table['fines']} fines, {', '.join(ways)}; about "
-        f"{percent(summary['cake_resistance_share'])} % of the resistance of cake and specimen by "
-        f"{BY[table['share_by']]}"
+        f"{table['fines']} fines, {own}; about {percent(summary['cake_resistance_share'])} % of "
+        f"the resistance of cake and specimen by {BY[table['share_by']]}"
     )
