@@ -124,11 +124,11 @@ def _network(analysis: "Analysis") -> dict[str, Any]:
         "pores": len(analysis.network.pore_radius),
         "throats": len(analysis.network.throat_radius),
         "throats_blocked": blocked,
-        "network_counts": {**analysis.counts, **_above_intact(analysis)},
+        "network_counts": {**analysis.counts, **above_intact(analysis)},
     }
 
 
-def _above_intact(analysis: "Analysis") -> dict[str, int]:
+def above_intact(analysis: "Analysis") -> dict[str, int]:
     """Where a value in place is higher with the fines than without: they turn the flow aside."""
     sections, layers = analysis.sections, analysis.layers
     return {

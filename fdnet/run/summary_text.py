@@ -27,7 +27,11 @@ def summary_lines(summary: Mapping[str, Any]) -> Iterator[str]:
     yield ""
     yield _row(_HEAD)
     yield from (_row(section_cells(row)) for row in summary["sections"])
-    yield from textwrap.wrap(resolved_words(summary["sections"]), WIDTH)
+    for text in (
+        summary.get("words", {}).get("in_place", ""),
+        resolved_words(summary["sections"]),
+    ):
+        yield from textwrap.wrap(text, WIDTH)
     yield ""
     yield from _rules(summary)
     seconds = summary["seconds"]

@@ -10,7 +10,7 @@ from fdnet.case.case import Case, InvasionCase
 from fdnet.run.answer.damage import DAMAGED_FROM, Zone, steps_of, zone_of
 from fdnet.run.answer.rules import Sizes, rules_of, run_shows
 from fdnet.run.answer.scatter import scatter_of
-from fdnet.run.answer.sentence import answer_sentence, certainty, end_words
+from fdnet.run.answer.sentence import answer_sentence, certainty, end_words, in_place_words
 from fdnet.run.answer.skin import Step, flow_lost, layered_skin
 from fdnet.run.bridging import Throats, open_throats, width_rows
 from fdnet.run.cake import cake_words
@@ -39,7 +39,11 @@ def with_answer(
         result["throats_bridged"] = width_rows(throats)
         result["run_shows"] = run_shows(summary)
         result["rules"] = rules_of(_sizes(case, throats), result["run_shows"])
-        result["words"] = {"end": end_words(summary, case.run), "cake": cake_words(summary)}
+        result["words"] = {
+            "end": end_words(summary, case.run),
+            "cake": cake_words(summary),
+            "in_place": in_place_words(summary["network_counts"]),
+        }
     return {**result, "answer": answer_sentence(result), "certainty": list(certainty(result))}
 
 

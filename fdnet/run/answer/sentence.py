@@ -28,6 +28,18 @@ def end_words(summary: Mapping[str, Any], control: Run) -> str:
     return "the face plugged: no fine crossed it for the set time"
 
 
+def in_place_words(counts: Mapping[str, int]) -> str:
+    """Why values in place are above the intact ones, a sentence; "" where none is."""
+    sections, layers = counts["sections_inplace_above_intact"], counts["layers_above_intact"]
+    if not sections and not layers:
+        return ""
+    return (
+        f"In place, {sections} of the sections and {layers} of the thin layers seem to gain: the "
+        "fines turn the flow aside, so that they take less of the pressure than before. Fines "
+        "never raise the permeability of the specimen or of a slab cut out."
+    )
+
+
 def answer_sentence(summary: Mapping[str, Any]) -> str:
     """One sentence to act on; `summary` has the keys of the answer where there are fines."""
     if "damage" not in summary:
