@@ -54,7 +54,7 @@ CAPTIONS = {
     "depth": "Permeability in place (sections, and thin layers of the first millimetre) and "
     "porosity against depth, intact and damaged. In place is under the pressures of the whole "
     "specimen; where the fines turn the flow aside, a layer can take less of the pressure than "
-    "before and lie above its intact value.",
+    "before and lie above its intact value, though no fine raises the permeability.",
     "network": "Throats of a slice through the middle of the network, with the fines: pressure, "
     "absolute flux over the largest, and share of the conductance lost; crosses mark the throats "
     "of the slice that are blocked: one fine covers the whole section.",

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from fdnet.errors import CaseError
 from fdnet.files.atomic import write_text
 from fdnet.report.resolved_words import resolved_words
-from fdnet.report.units import AGREES, SHOWS, in_millidarcy, millimetres, percent
+from fdnet.report.units import AGREES, SHOWS, in_millidarcy, millimetres, percent, two_digits
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -160,8 +160,8 @@ def _skin(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     if "skin" not in summary:
         return []
     radius = millimetres(summary.get("skin_well_radius_m"))
-    value = "infinite" if summary["skin"] is None else f"{summary['skin']:.3g}"
-    cost = f"{percent(summary['skin_flow_lost'])} % of the flow"
+    value = "infinite" if summary["skin"] is None else f"{summary['skin']:.2g}"
+    cost = f"{two_digits(summary['skin_flow_lost'])} of the flow"
     return [("skin", value, f"costs {cost} of a well of {radius} radius")]
 
 

@@ -26,6 +26,11 @@ def percent(share: float | None) -> str:
     return "–" if share is None else f"{100 * share:z.1f}"
 
 
+def two_digits(share: float) -> str:
+    """A share in percent with two digits and the sign of percent."""
+    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
+
+
 def millimetres(length: float | None) -> str:
     """A length in m as mm with three digits and the unit; a dash for None."""
     return "–" if length is None else f"{1e3 * length:.3g} mm"

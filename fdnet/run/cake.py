@@ -93,6 +93,8 @@ class Cake:
         layers = self.packed_thickness / float(np.average(self.diameter, weights=self.count))
         if layers >= THICK:
             return ""
+        if not self.packed.any():
+            return "loose all through, without a permeability of its own"
         return (
             f"packed for {layers:.1f} diameters of a fine, too thin for a permeability of its own "
             f"({THICK:g} are needed)"

@@ -8,7 +8,7 @@ from typing import Any
 
 from fdnet.case.stages import STAGES
 from fdnet.report.resolved_words import resolved_words
-from fdnet.report.units import AGREES, SHOWS, in_millidarcy, millimetres, percent
+from fdnet.report.units import AGREES, SHOWS, in_millidarcy, millimetres, percent, two_digits
 
 WIDTH = 96
 """Letters in a line of running text."""
@@ -108,10 +108,10 @@ def _of_the_fines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             f"{percent(damage['zone_k_over_k0'])} % of its permeability",
         )
     if "skin" in summary:
-        skin = "infinite" if summary["skin"] is None else f"{summary['skin']:.3g}"
+        skin = "infinite" if summary["skin"] is None else f"{summary['skin']:.2g}"
         yield (
             "skin",
-            f"{skin}, costs {percent(summary['skin_flow_lost'])} % of the flow of a well of "
+            f"{skin}, costs {two_digits(summary['skin_flow_lost'])} of the flow of a well of "
             f"{millimetres(summary['skin_well_radius_m'])} radius",
         )
     yield (

@@ -98,7 +98,7 @@ def test_a_loose_column_of_fines_is_no_bed_and_has_no_permeability(layers):
     summary = cake_summary(cake, 1.0)
     assert summary["cake"] is summary["cake_by_depth"]["k_kozeny_m2"] is None
     assert all(row["k_kozeny_m2"] is None for row in cake_rows(cake))
-    assert "too thin" in cake_words(summary)
+    assert "loose all through" in cake_words(summary)
     assert "mD" not in cake_words(summary)
 
 

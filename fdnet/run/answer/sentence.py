@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from fdnet.case.control import Run
-from fdnet.report.units import in_millidarcy, millimetres, percent
+from fdnet.report.units import in_millidarcy, millimetres, percent, two_digits
 from fdnet.run.answer.skin import size_words
 
 ENDS = {
@@ -34,9 +34,10 @@ def in_place_words(counts: Mapping[str, int]) -> str:
     if not sections and not layers:
         return ""
     return (
-        f"In place, {sections} of the sections and {layers} of the thin layers seem to gain: the "
-        "fines turn the flow aside, so that they take less of the pressure than before. Fines "
-        "never raise the permeability of the specimen or of a slab cut out."
+        f"In place, {sections} of the sections and {layers} of the thin layers seem to gain: they "
+        "take less of the pressure than before, because the fines turn the flow aside, and "
+        "because the pores that say the pressure are wider than a thin layer. Fines never raise "
+        "the permeability of the specimen or of a slab cut out."
     )
 
 
@@ -61,10 +62,10 @@ def _depth(summary: Mapping[str, Any]) -> str:
         )
     if not damage["zone_depth_m"]:
         return (
-            f"{p95}, and no layer loses {_percent(damage['lost_from'])} of its permeability: the "
+            f"{p95}, and no layer loses {two_digits(damage['lost_from'])} of its permeability: the "
             "damage is negligible."
         )
-    share = f"{_percent(damage['zone_k_over_k0'])} of the permeability"
+    share = f"{two_digits(damage['zone_k_over_k0'])} of the permeability"
     if damage["reaches_the_end"]:
         return (
             f"{p95}, and the damage reaches the end of the specimen, which keeps {share}: "
@@ -73,7 +74,7 @@ def _depth(summary: Mapping[str, Any]) -> str:
     zone = millimetres(damage["zone_depth_m"])
     return (
         f"{p95} and the first {zone} keep {share}, so a perforation, a cut or a wash that reaches "
-        f"deeper than {zone} meets sand that lost less than {_percent(damage['lost_from'])}."
+        f"deeper than {zone} meets sand that lost less than {two_digits(damage['lost_from'])}."
     )
 
 
@@ -88,7 +89,7 @@ def _skin_words(summary: Mapping[str, Any]) -> str:
         return f"For {well} this is no skin."
     return (
         f"For {well} this is a {size_words(lost)} skin of {skin:.2g}, which costs "
-        f"{_percent(lost)} of the flow."
+        f"{two_digits(lost)} of the flow."
     )
 
 
@@ -102,11 +103,7 @@ def certainty(summary: Mapping[str, Any]) -> Iterator[str]:
     if scatter and summary.get("invaded_count"):
         yield (
             f"This is one run with one seed ({summary['seed']}). Repeated seeds of such "
-            f"specimens differ by {_percent(scatter['depth_p95_relative'])} in the depth and by "
+            f"specimens differ by {two_digits(scatter['depth_p95_relative'])} in the depth and by "
             f"{100 * scatter['first_mm_loss']:.2g} points in the loss of the first millimetre "
             f"(one standard deviation, {scatter['runs']} runs; {scatter['source']})."
         )
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
