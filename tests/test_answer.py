@@ -31,17 +31,28 @@ def test_hawkins_skin_of_a_thin_zone_is_small():
     assert math.isinf(hawkins(0.0, well=0.1, damaged=0.2))
 
 
-def test_rings_in_series_are_the_integral_of_the_pressure():
-    """p' = q / (k r): integrated numerically with and without the damage, over q / k."""
+@pytest.mark.parametrize(
+    ("before", "formation"),
+    [
+        ((2e-12, 2e-12, 2e-12), 2e-12),
+        ((8e-12, 4e-12, 2e-12), 10e-3 / (1 / 8 + 2 / 4 + 7 / 2) * 1e-9),
+    ],
+)
+def test_rings_in_series_are_the_integral_of_the_pressure(before, formation):
+    """p' = q / (k r): integrated numerically with and without the damage, over q / k.
+
+    The k is that of the formation, in series, also where the sand is more open at the face.
+    """
     edges, ratio = np.array([0.0, 1e-3, 3e-3, 10e-3]), (0.05, 0.4, 0.9)
     steps = [
-        step(a, b, 2e-12, 2e-12 * r) for a, b, r in zip(edges[:-1], edges[1:], ratio, strict=True)
+        step(a, b, k, k * r)
+        for a, b, k, r in zip(edges[:-1], edges[1:], before, ratio, strict=True)
     ]
     extra = 0.0
-    for a, b, r in zip(edges[:-1], edges[1:], ratio, strict=True):
+    for a, b, k, r in zip(edges[:-1], edges[1:], before, ratio, strict=True):
         radius = np.linspace(0.1 + a, 0.1 + b, 20001)
         middle = 0.5 * (radius[1:] + radius[:-1])
-        extra += float(np.sum(np.diff(radius) * (1 / r - 1) / middle))
+        extra += formation * float(np.sum(np.diff(radius) * (1 / (k * r) - 1 / k) / middle))
     assert layered_skin(steps, 0.1) == pytest.approx(extra, rel=1e-6)
     one = layered_skin([step(0, 1e-3, 1e-12, 0.141e-12)], 0.108)
     assert one == pytest.approx(hawkins(0.141, well=0.108, damaged=0.109), rel=1e-12)

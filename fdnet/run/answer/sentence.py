@@ -61,10 +61,8 @@ def _depth(summary: Mapping[str, Any]) -> str:
             "run.cap_ms and run it again (--force) before you use these numbers."
         )
     if not damage["zone_depth_m"]:
-        return (
-            f"{p95}, and no layer loses {two_digits(damage['lost_from'])} of its permeability: the "
-            "damage is negligible."
-        )
+        limit = two_digits(damage["lost_from"])
+        return f"{p95}, and no layer loses {limit} of its permeability: the damage is negligible."
     share = f"{two_digits(damage['zone_k_over_k0'])} of the permeability"
     if damage["reaches_the_end"]:
         return (
