@@ -116,7 +116,7 @@ def test_a_layer_that_seems_to_gain_is_made_up_for_and_nothing_is_cut_off():
 
 
 def test_values_in_place_above_the_intact_ones_are_counted():
-    sections = [(0.0, 1e-3, 2.0, 2.0 * (1 + 1e-12)), (1e-3, 2e-3, 2.0, 2.4)]
+    sections = [(0.0, 1e-3, 2.0, 2.0 * (1 + 1e-4)), (1e-3, 2e-3, 2.0, 2.4)]
     layers = [(0.0, 5e-4, 2.0, 2.4), (5e-4, 1e-3, 2.0, 1.0), (1e-3, 2e-3, 2.0, 2.1)]
     counted = above_intact(analysis_of(sections, layers))
     assert counted == {"sections_inplace_above_intact": 1, "layers_above_intact": 2}

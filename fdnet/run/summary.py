@@ -13,8 +13,8 @@ from fdnet.scales.check.catalogue import explained
 if TYPE_CHECKING:
     from fdnet.network.analysis import Analysis
 
-ROUNDING = 1e-9
-"""Relative difference of two solves that is none."""
+SEEN = 5e-4
+"""Least relative gain that counts: what a table in percent with one digit shows."""
 
 
 def summarise(
@@ -133,11 +133,11 @@ def above_intact(analysis: "Analysis") -> dict[str, int]:
     sections, layers = analysis.sections, analysis.layers
     return {
         "sections_inplace_above_intact": sum(
-            s.k_damaged_inplace > s.k_initial_inplace * (1 + ROUNDING) for s in sections
+            s.k_damaged_inplace > s.k_initial_inplace * (1 + SEEN) for s in sections
         ),
         "layers_above_intact": 0
         if layers is None
-        else int(np.sum(layers.k_damaged > layers.k_initial * (1 + ROUNDING))),
+        else int(np.sum(layers.k_damaged > layers.k_initial * (1 + SEEN))),
     }
 
 
