@@ -21,6 +21,6 @@ if __name__ == "__main__":
         upper = "inf" if row["ratio_hi"] is None else f"{row['ratio_hi']:g}"
         print(
             f"{row['concentration']:g} by volume, {row['ratio_lo']:g} to {upper}: "
-            f"{row['blocked']} of {row['throats']} blocked, {row['share_blocked']:.2f} "
+            f"{row['closed']} of {row['throats']} closed, {row['share_closed']:.2f} "
             f"({row['share_low']:.2f} to {row['share_high']:.2f})"
         )

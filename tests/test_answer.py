@@ -8,17 +8,15 @@ import pandas as pd
 import pytest
 
 from fdnet.case.file import read_case
-from fdnet.report.units import in_millidarcy, millidarcy
-from fdnet.run.answer.bridged import bridged_throats
-from fdnet.run.answer.cake import cake_of
+from fdnet.report.units import in_millidarcy, millidarcy, percent
 from fdnet.run.answer.case_words import case_words
 from fdnet.run.answer.damage import series, steps_of, zone_of
 from fdnet.run.answer.rules import Sizes, rules_of, run_shows
 from fdnet.run.answer.scatter import FULL, QUICK
-from fdnet.run.answer.sentence import answer_sentence, certainty
+from fdnet.run.answer.sentence import answer_sentence, certainty, end_words, in_place_words
 from fdnet.run.answer.skin import Step, flow_lost, hawkins, layered_skin
+from fdnet.run.summary import above_intact
 from fdnet.scales.scales import scales_of
-from fdnet.spheres.snapshot import Kind, Snapshot
 
 
 def step(near, far, before, after):
@@ -33,17 +31,28 @@ def test_hawkins_skin_of_a_thin_zone_is_small():
     assert math.isinf(hawkins(0.0, well=0.1, damaged=0.2))
 
 
-def test_rings_in_series_are_the_integral_of_the_pressure():
-    """p' = q / (k r): integrated numerically with and without the damage, over q / k."""
+@pytest.mark.parametrize(
+    ("before", "formation"),
+    [
+        ((2e-12, 2e-12, 2e-12), 2e-12),
+        ((8e-12, 4e-12, 2e-12), 10e-3 / (1 / 8 + 2 / 4 + 7 / 2) * 1e-9),
+    ],
+)
+def test_rings_in_series_are_the_integral_of_the_pressure(before, formation):
+    """p' = q / (k r): integrated numerically with and without the damage, over q / k.
+
+    The k is that of the formation, in series, also where the sand is more open at the face.
+    """
     edges, ratio = np.array([0.0, 1e-3, 3e-3, 10e-3]), (0.05, 0.4, 0.9)
     steps = [
-        step(a, b, 2e-12, 2e-12 * r) for a, b, r in zip(edges[:-1], edges[1:], ratio, strict=True)
+        step(a, b, k, k * r)
+        for a, b, k, r in zip(edges[:-1], edges[1:], before, ratio, strict=True)
     ]
     extra = 0.0
-    for a, b, r in zip(edges[:-1], edges[1:], ratio, strict=True):
+    for a, b, k, r in zip(edges[:-1], edges[1:], before, ratio, strict=True):
         radius = np.linspace(0.1 + a, 0.1 + b, 20001)
         middle = 0.5 * (radius[1:] + radius[:-1])
-        extra += float(np.sum(np.diff(radius) * (1 / r - 1) / middle))
+        extra += formation * float(np.sum(np.diff(radius) * (1 / (k * r) - 1 / k) / middle))
     assert layered_skin(steps, 0.1) == pytest.approx(extra, rel=1e-6)
     one = layered_skin([step(0, 1e-3, 1e-12, 0.141e-12)], 0.108)
     assert one == pytest.approx(hawkins(0.141, well=0.108, damaged=0.109), rel=1e-12)
@@ -60,6 +69,7 @@ def test_millidarcy_is_that_of_the_recommended_practice():
     assert in_millidarcy(9.869233e-13) == "1,000"
     assert in_millidarcy(9.869233e-16 * 194553.0) == "194,600"
     assert in_millidarcy(9.869233e-16 * 0.25) == "0.25"
+    assert (percent(-0.0004), percent(None), percent(0.3464)) == ("0.0", "–", "34.6")
     assert in_millidarcy(None) == in_millidarcy(float("nan")) == "–"
 
 
@@ -92,6 +102,26 @@ def test_layers_and_what_is_left_of_a_section_are_the_section_in_series():
     assert zone.ratio == pytest.approx((1 / 4 + 1 / 2) / (1 / 0.5 + 1 / 1.0))
     assert not zone.open_end
     assert len(steps_of(analysis_of([(0.0, 2e-3, *whole)], thin, law="section-archie"))) == 1
+
+
+def test_a_layer_that_seems_to_gain_is_made_up_for_and_nothing_is_cut_off():
+    """In place the fines turn the flow aside: layer and rest make the section in series."""
+    thin = [(0.0, 1e-3, 2.0, 1.0)]
+    section = [series([(1e-3, 2.0), (1e-3, 3.0)]), series([(1e-3, 1.0), (1e-3, 3.6)])]
+    first, rest = steps_of(analysis_of([(0.0, 2e-3, *section)], thin))
+    assert (rest.before, rest.after) == (pytest.approx(3.0), pytest.approx(3.6))
+    assert zone_of([first, rest]).depth == 1e-3
+    much = [(0.0, 1e-3, 2.0, 0.4)]  # resists more than its whole section
+    assert steps_of(analysis_of([(0.0, 2e-3, 2.0, 1.0)], much)) == [step(0.0, 2e-3, 2.0, 1.0)]
+
+
+def test_values_in_place_above_the_intact_ones_are_counted():
+    sections = [(0.0, 1e-3, 2.0, 2.0 * (1 + 1e-4)), (1e-3, 2e-3, 2.0, 2.4)]
+    layers = [(0.0, 5e-4, 2.0, 2.4), (5e-4, 1e-3, 2.0, 1.0), (1e-3, 2e-3, 2.0, 2.1)]
+    counted = above_intact(analysis_of(sections, layers))
+    assert counted == {"sections_inplace_above_intact": 1, "layers_above_intact": 2}
+    assert "1 of the sections and 2 of the thin layers" in in_place_words(counted)
+    assert in_place_words(above_intact(analysis_of(sections[:1]))) == ""
 
 
 @pytest.mark.parametrize(
@@ -148,27 +178,6 @@ def test_the_run_bridges_passes_or_does_not_decide():
     assert shown(stop_reason="cap") == shown(stop_reason="duration") == "undecided"
 
 
-def test_bridged_throats_are_counted_by_width_with_the_fines_in_them():
-    radius = np.array([1.0, 2.0, 3.0, 4.0, 0.0])
-    occupancy = SimpleNamespace(
-        throat_fine_radius=np.array([0.5, 0.0, 2.0, 0.0, 9.0]),
-        throat_fines=np.array([1, 0, 2, 0, 3]),
-        blocked=np.array([True, False, False, False, True]),
-    )
-    rows = bridged_throats(
-        SimpleNamespace(
-            occupancy=occupancy,
-            network=SimpleNamespace(throat_radius=radius),
-            conductance_initial=np.array([1.0, 1.0, 1.0, 1.0, 0.0]),
-            conductance_damaged=np.array([0.0, 1.0, 0.5, 0.6, 0.0]),
-        )
-    )
-    assert [row["throats"] for row in rows] == [1, 1, 1, 1]
-    assert [row["bridged"] for row in rows] == [1, 0, 1, 0]
-    assert [row["blocked"] for row in rows] == [1, 0, 0, 0]
-    assert [row["fine_over_throat"] for row in rows] == [0.5, None, pytest.approx(2 / 3), None]
-
-
 def test_the_scatter_of_a_seed_is_that_of_the_published_repeats(root):
     table = pd.read_csv(root / "docs/thesis/results.csv")
     table = table[table["law"] == "lubrication"]
@@ -189,7 +198,13 @@ SUMMARY = {
     "invasion_depth_p95_m": 1.388e-3,
     "k_initial_m2": 2e-12,
     "porosity_initial": 0.38,
-    "damage": {"zone_depth_m": 2e-3, "zone_k_over_k0": 0.34, "reaches_the_end": False},
+    "words": {"end": "the face plugged: no fine crossed it for the set time"},
+    "damage": {
+        "zone_depth_m": 2e-3,
+        "zone_k_over_k0": 0.34,
+        "reaches_the_end": False,
+        "lost_from": 0.05,
+    },
     "scatter": {"depth_p95_relative": 0.36, "first_mm_loss": 0.067, "runs": 30, "source": "x.csv"},
 }
 WELL = {"skin": 0.056, "skin_flow_lost": 0.0081, "skin_well_radius_m": 0.108}
@@ -198,9 +213,10 @@ WELL = {"skin": 0.056, "skin_flow_lost": 0.0081, "skin_well_radius_m": 0.108}
 @pytest.mark.parametrize(
     ("changed", "said", "not_said"),
     [
-        ({}, ["within 1.39 mm", "keep 34 %", "deeper than 2 mm"], "skin"),
+        ({}, ["within 1.39 mm", "keep 34 %", "deeper than 2 mm", "less than 5 %"], "skin"),
         (WELL, ["small skin of 0.056", "0.81 % of the flow", "108 mm"], "infinite"),
         (WELL | {"skin": None, "skin_flow_lost": 1.0}, ["skin is infinite"], "small"),
+        (WELL | {"skin": -1e-4, "skin_flow_lost": -1e-5}, ["this is no skin"], "-"),
         ({"final": False, "stop_reason": "cap"}, ["not final", "run.cap_ms"], "deeper"),
         ({"invaded_count": 0}, ["No fine entered"], "95 %"),
     ],
@@ -211,6 +227,23 @@ def test_the_answer_is_a_sentence_to_act_on(changed, said, not_said):
     assert not_said not in text
 
 
+@pytest.mark.parametrize(
+    ("reason", "run", "rate", "said"),
+    [
+        ("plugged", {}, None, "no fine crossed it"),
+        ("plugged", {"plug_rate": 0.02}, None, "at most 2.0 % of the fines"),
+        ("plugged", {"stop_rate": 0.2}, 0.19, "below 20.0 % of the first"),
+        ("plugged", {"stop_rate": 0.2}, 0.5, "no fine crossed it"),
+        ("duration", {}, None, "time or volume"),
+        ("supply_exhausted", {}, None, "supply of fines ran out"),
+        ("cap", {}, None, "cap"),
+    ],
+)
+def test_the_end_is_named_by_the_rule_that_ended_the_run(root, reason, run, rate, said):
+    control = read_case(root / "cases/quick.toml").run.model_copy(update=run)
+    assert said in end_words({"stop_reason": reason, "rate_over_initial": rate}, control)
+
+
 def test_one_seed_is_said_to_be_one_seed_and_a_cap_not_final():
     final, seed = certainty(SUMMARY)
     assert "is final" in final
@@ -219,28 +252,6 @@ def test_one_seed_is_said_to_be_one_seed_and_a_cap_not_final():
     assert "sand has 2,027 mD" in answer_sentence(
         {"k_initial_m2": 2e-12 * 1.0003, "porosity_initial": 0.38}
     )
-
-
-def test_a_cake_is_a_bed_of_three_layers_or_more():
-    """Eight fines of diameter 1 in 2 x 2 x 8.5: volume pi/6 each, k by the closed formula."""
-    position = [[-1.0 - layer, 1.0, 1.0] for layer in range(8)]
-    spheres = Snapshot(
-        step=0,
-        time_s=0.0,
-        box=np.array([[0.0, 4.0], [0.0, 2.0], [0.0, 2.0]]),
-        id=np.arange(8),
-        kind=np.full(8, int(Kind.FINE)),
-        position=np.array(position),
-        radius=np.full(8, 0.5),
-        velocity=np.zeros((8, 3)),
-    )
-    cake = cake_of(spheres, 8.5)
-    porosity = 1 - 8 * math.pi / 6 / (4 * 8.5)
-    assert cake.porosity == pytest.approx(porosity)
-    assert cake.permeability == pytest.approx(porosity**3 / (180 * (1 - porosity) ** 2))
-    assert cake.resistance == pytest.approx(8.5 / cake.permeability)
-    assert cake_of(spheres, 2.9) is None
-    assert cake_of(spheres, 0.0) is None
 
 
 @pytest.mark.parametrize(

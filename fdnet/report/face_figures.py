@@ -62,8 +62,11 @@ def fill_cake(figure: Any, *, rows: Sequence[Mapping[str, Any]]) -> None:
             right.stairs(
                 values, edges, baseline=None, color=colour, linestyle=line, linewidth=2, label=name
             )
-    right.set(ylabel="permeability (m²)", yscale="log")
-    legend_above(right)
+    if right.get_legend_handles_labels()[0]:
+        right.set(ylabel="permeability (m²)", yscale="log")
+        legend_above(right)
+    else:
+        right.set_axis_off()
     for axes in (left, right):
         axes.set(xlabel="distance from the face (mm)", xlim=(0, edges[-1]))
 
@@ -88,10 +91,10 @@ def fill_filtrate(
 
 
 def fill_bridging(figure: Any, *, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Share of blocked throats by the ratio of diameters, with its band."""
+    """Share of closed throats by the ratio of diameters, with its band."""
     axes = figure.add_subplot()
     place = np.arange(len(rows))
-    share = np.array([row["share_blocked"] for row in rows])
+    share = np.array([row["share_closed"] for row in rows])
     low, high = (np.array([row[key] for row in rows]) for key in ("share_low", "share_high"))
     axes.bar(place, share, color=BLUE, alpha=0.7)
     axes.errorbar(place, share, [share - low, high - share], fmt="none", color="black", capsize=3)
@@ -105,6 +108,6 @@ def fill_bridging(figure: Any, *, rows: Sequence[Mapping[str, Any]]) -> None:
     axes.set_xticks(place, labels, fontsize=9)
     axes.set(
         xlabel="diameter of the fines over that of the throat (number of throats)",
-        ylabel="share of the throats that is blocked (–)",
+        ylabel="share of the throats that is closed (–)",
         ylim=(0, 1),
     )

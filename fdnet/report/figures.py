@@ -18,6 +18,7 @@ from fdnet.report.history_figure import fill_history
 from fdnet.report.network_figure import fill_network
 from fdnet.report.side_view import fill_side_view
 from fdnet.report.size_figure import Sizes, fill_size_curves
+from fdnet.report.tables import between_grains
 from fdnet.report.units import MILLIDARCY
 from fdnet.spheres.snapshot import Array, Snapshot
 
@@ -52,14 +53,16 @@ CAPTIONS = {
     "network and in place from the pressures of the whole specimen.",
     "depth": "Permeability in place (sections, and thin layers of the first millimetre) and "
     "porosity against depth, intact and damaged. In place is under the pressures of the whole "
-    "specimen.",
+    "specimen; where the fines turn the flow aside, a layer can take less of the pressure than "
+    "before and lie above its intact value, though no fine raises the permeability.",
     "network": "Throats of a slice through the middle of the network, with the fines: pressure, "
-    "absolute flux over the largest, and share of the conductance lost; crosses mark blocked "
-    "throats.",
+    "absolute flux over the largest, and share of the conductance lost; crosses mark the throats "
+    "of the slice that are blocked: one fine covers the whole section.",
     "deposit_by_size": "Volume of the deposit against depth, in classes of the fines' diameter "
     "that hold equal volume.",
     "size_distributions": "Inscribed radii of throats and pores between the grains alone, by "
-    "number; the band is the range of the fines' radii.",
+    "number, without those beside side walls and end faces; the band is the range of the fines' "
+    "radii.",
     "size_curves": "Sizes by volume: the curve that the case asks for, with what is left out at "
     "its ends, the spheres that were placed, and the fines in the specimen at the end.",
     "layers": "The first millimetre in layers of a fine's diameter: permeability of each layer in "
@@ -249,11 +252,13 @@ def _in_millidarcy(layers: "Layers") -> tuple[Array, Array]:
 def _size_distributions(figure: Any, *, analysis: "Analysis", fines: Snapshot | None) -> None:
     network = analysis.network
     left, right = figure.subplots(1, 2)
-    for axes, radius, name, colour in (
-        (left, network.throat_radius, "throat", BLUE),
-        (right, network.pore_radius, "pore", GREEN),
+    for axes, radius, corners, name, colour in (
+        (left, network.throat_radius, network.throat_images, "throat", BLUE),
+        (right, network.pore_radius, network.pore_images, "pore", GREEN),
     ):
-        open_ones = np.asarray(radius)[np.asarray(radius) > 0] * MICRON
+        between = between_grains(network, corners)
+        radius = np.asarray(radius)[between if between.any() else ...]
+        open_ones = radius[radius > 0] * MICRON
         closed = len(radius) - len(open_ones)
         label = f"{len(radius)} {name}s" + (
             f",\n{closed} of them closed\n(not drawn)" if closed else ""

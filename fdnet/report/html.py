@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from fdnet.errors import CaseError
 from fdnet.files.atomic import write_text
-from fdnet.report.units import in_millidarcy
+from fdnet.report.units import AGREES, SHOWS, in_millidarcy, millimetres, percent, two_digits
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -19,12 +19,6 @@ if TYPE_CHECKING:
 DASH = "–"
 LEADING, STILL = "depth.png", "spheres_3d.png"
 """The figure that stands at the top, and the one in place of the 3-D view."""
-STOP_WORDS = {
-    "plugged": "plugged: no fine crossed the face for the set time",
-    "duration": "the set duration was over",
-    "supply_exhausted": "the supply of fines ran out before the specimen plugged",
-    "cap": "the cap on the run was reached before the specimen plugged",
-}
 SECTION_COLUMNS = (  # key, heading, unit, factor to that unit
     ("section", "section", "", None),
     ("x_lo_m", "from", "mm", 1e3),
@@ -124,7 +118,8 @@ def headline(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     ]
     if summary.get("stop_reason") is None and not invaded:
         return whole
-    reason, loss = summary.get("stop_reason"), DASH if lost is None else f"{100 * lost:.1f} % lost"
+    reason, words = summary.get("stop_reason"), summary.get("words") or {}
+    loss = DASH if lost is None else f"{percent(lost)} % lost"
     passed, upstream = (
         quantity(summary.get("passed_count")),
         quantity(summary.get("upstream_count")),
@@ -132,8 +127,8 @@ def headline(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     return [
         (
             "95 % of the fines above",
-            _millimetres(summary, "invasion_depth_p95_m"),
-            f"deepest {_millimetres(summary, 'invasion_depth_m')}",
+            millimetres(summary.get("invasion_depth_p95_m")),
+            f"deepest {millimetres(summary.get('invasion_depth_m'))}",
         ),
         whole[0],
         (
@@ -151,10 +146,10 @@ def headline(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         ),
         (
             "cake thickness",
-            _millimetres(summary, "cake_thickness_m"),
-            _cake(summary.get("cake")),
+            millimetres(summary.get("cake_thickness_m")),
+            words.get("cake", ""),
         ),
-        ("end of the run", quantity(reason), STOP_WORDS.get(str(reason), "")),
+        ("end of the run", quantity(reason), words.get("end", "")),
     ]
 
 
@@ -162,17 +157,10 @@ def _skin(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """Skin and the flow that it costs, where the case has a well."""
     if "skin" not in summary:
         return []
-    radius = scaled(summary.get("skin_well_radius_m"), 1e3)
+    radius = millimetres(summary.get("skin_well_radius_m"))
     value = "infinite" if summary["skin"] is None else f"{summary['skin']:.2g}"
-    cost = f"{100 * summary['skin_flow_lost']:.2g} % of the flow"
-    return [("skin", value, f"costs {cost} of a well of {quantity(radius, 'mm')} radius")]
-
-
-def _cake(cake: Mapping[str, Any] | None) -> str:
-    if cake is None:
-        return "deposit upstream of the face"
-    k = in_millidarcy(cake["k_carman_kozeny_m2"])
-    return f"{k} mD by Carman and Kozeny, resistance {quantity(cake['resistance_1_m'], '1/m')}"
+    cost = f"{two_digits(summary['skin_flow_lost'])} of the flow"
+    return [("skin", value, f"costs {cost} of a well of {radius} radius")]
 
 
 def _other(summary: Mapping[str, Any]) -> str:
@@ -216,10 +204,6 @@ def _digits(value: float) -> str:
     return f"{mantissa}·10{str(int(power)).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
 
 
-def _millimetres(summary: Mapping[str, Any], key: str) -> str:
-    return quantity(scaled(summary.get(key), 1e3), "mm")
-
-
 def _environment() -> "Environment":
     from jinja2 import Environment, StrictUndefined
 
@@ -227,7 +211,8 @@ def _environment() -> "Environment":
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters.update(quantity=quantity, fixed=fixed, scaled=scaled)
-    environment.filters["millidarcy"] = in_millidarcy
+    environment.filters.update(millidarcy=in_millidarcy, percent=percent)
+    environment.globals.update(shows=SHOWS, agrees=AGREES)
     return environment
 
 

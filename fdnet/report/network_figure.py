@@ -89,7 +89,7 @@ def _blocked(axes: Any, segments: Array, blocked: Array) -> None:
     middle = segments[blocked].mean(axis=1)
     if len(middle):
         axes.plot(*middle.T, "kx", markersize=6, markeredgewidth=1.6)
-    axes.set_title(f"x: {len(middle)} blocked throats", loc="right", fontsize=9)
+    axes.set_title(f"x: {len(middle)} blocked throats of the slice", loc="right", fontsize=9)
 
 
 def _frame(figure: Any, rows: Any, analysis: "Analysis") -> None:

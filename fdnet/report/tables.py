@@ -18,8 +18,10 @@ if TYPE_CHECKING:
 
     from fdnet.network.analysis import Analysis
     from fdnet.network.flow.depth import Layers
+    from fdnet.network.network import Network
 
 __all__ = [
+    "between_grains",
     "section_rows",
     "write_laws",
     "write_layers",
@@ -233,6 +235,16 @@ def blocked_throats(analysis: "Analysis") -> Array:
     if analysis.occupancy is None:
         return np.zeros(len(analysis.network.throat_radius), dtype=bool)
     return np.asarray(analysis.occupancy.blocked, dtype=bool)
+
+
+def between_grains(network: "Network", corners: Array) -> Array:
+    """Whether all `corners` (N, n), images of a throat or pore, are grains inside the box; (N,).
+
+    The others lie beside a side wall or an end face and run out to mirror images of the grains.
+    """
+    place, box = np.asarray(network.image_position), np.asarray(network.box)
+    inside = (place >= box[:, 0]) & (place <= box[:, 1]) | np.asarray(network.periodic)
+    return inside.all(axis=1)[np.asarray(corners)].all(axis=1)
 
 
 def pore_porosity(analysis: "Analysis") -> Array:

@@ -9,10 +9,11 @@ import numpy as np
 from fdnet.network.resolved.slab import Sides
 from fdnet.report.added import Added, PageTable
 from fdnet.report.face_figures import fill_bridging, fill_cake, fill_clean_up, fill_filtrate
-from fdnet.run.bridging import CLOGGED, bridging_rows, reached_throats
-from fdnet.run.cake import cake_rows, cake_summary, measure_cake
+from fdnet.report.units import millimetres
+from fdnet.run.bridging import CLOGGED, ratio_rows
+from fdnet.run.cake import PACKED, cake_rows, cake_summary, cake_words, measure_cake
 from fdnet.run.clean_up import Returned, clean_up_rows, clean_up_summary
-from fdnet.run.filtrate import HALF_HOUR, Filtration, fit_filtration
+from fdnet.run.filtrate import HALF_HOUR, Filtration, cake_share, fit_filtration
 from fdnet.run.outputs import Invaded, Results
 
 _CLEAN_UP_COLUMNS = (
@@ -80,8 +81,8 @@ _CAKE_COLUMNS = (
     ("fines_count", "fines", "", None),
     ("porosity", "porosity", "–", 1),
     ("sauter_diameter_m", "Sauter diameter", "mm", 1e3),
-    ("k_network_m2", "k by the network", "m²", 1),
-    ("k_kozeny_m2", "k by Carman-Kozeny", "m²", 1),
+    ("k_network_m2", "k by the network", "mD", 1),
+    ("k_kozeny_m2", "k by Carman and Kozeny", "mD", 1),
 )
 
 
@@ -91,28 +92,25 @@ def _cake(results: Results, one: Invaded) -> Added:
     sides = Sides(periodic=case.periodic, walls=case.analysis.walls)
     cake = measure_cake(one.damaged, sides)
     pack = case.size_m[0] / analysis.k_damaged if analysis.k_damaged > 0 else np.inf
-    flowing = one.updates and "pressure_cake_Pa" in one.updates[-1]
-    known = ("cake_resistance_share",) if flowing else ()
-    summary = cake_summary(cake, pack, known)
+    summary = cake_summary(cake, pack, flow=cake_share(one.updates))
     if cake is None:
         return Added(name="cake", summary=summary)
-    rows, table = cake_rows(cake), summary["cake_by_depth"]
-    network = table["share_network"]
-    said = "" if network is None else f"{100 * network:.1f} % by the network, "
+    rows = cake_rows(cake)
+    said = [cake_words(summary), *filter(None, [cake.unresolved])]
     return Added(
         name="cake",
         rows=rows,
         summary=summary,
         fill=partial(fill_cake, rows=rows),
         caption="The external cake in slices of a fine's diameter: porosity, and permeability by "
-        "the network of its own spheres and by Carman and Kozeny.",
+        "the network of its own spheres and, of packed slices, by Carman and Kozeny.",
         page=PageTable(
             title="External cake",
             columns=_CAKE_COLUMNS,
             rows=rows,
-            note=f"{table['fines']} fines, {1e3 * cake.thickness:.3g} mm thick. Its share of the "
-            f"resistance of cake and specimen: {said}{100 * table['share_kozeny']:.1f} % by "
-            f"Carman and Kozeny. {table['unresolved']}".strip(),
+            note=f"The cake is {millimetres(cake.thickness)} thick: {'; '.join(said)}. Carman's "
+            f"and Kozeny's formula is for packed beds: slices of a porosity above {PACKED:g} are "
+            "loose and have a dash.",
         ),
     )
 
@@ -124,9 +122,7 @@ def _filtrate(one: Invaded) -> Iterator[Added]:
     area = one.case.size_m[1] * one.case.size_m[2]
     time = one.scales.force_factor * np.array([row["time_s"] for row in one.updates])
     volume = np.array([row["filtrate_m3"] for row in one.updates]) / area
-    last = one.updates[-1]
-    drop = last["pressure_cake_Pa"] + last["pressure_pack_Pa"]
-    fit = fit_filtration(time, volume, last["pressure_cake_Pa"] / drop if drop > 0 else 0.0)
+    fit = fit_filtration(time, volume, cake_share(one.updates) or 0.0)
     if fit is None:
         return
     usable = not fit.unsupported
@@ -167,41 +163,21 @@ def _filtrate_keys(fit: Filtration) -> dict[str, Any]:
     }
 
 
-_BRIDGING_COLUMNS = (
-    ("ratio_lo", "fine over throat from", "", None),
-    ("ratio_hi", "to", "", None),
-    ("throats", "throats", "", None),
-    ("with_fines", "with fines", "", None),
-    ("covered", "covered by one", "", None),
-    ("clogged", "clogged", "", None),
-    ("blocked", "blocked", "", None),
-    ("share_blocked", "share blocked", "%", 1e2),
-    ("share_low", "low", "%", 1e2),
-    ("share_high", "high", "%", 1e2),
-    ("arrived_mean", "fines that would arrive", "", None),
-)
-
-
 def _bridging(results: Results, one: Invaded) -> Added:
-    """Which throats the fines block, by the ratio of diameters."""
+    """Which throats the fines close, by the ratio of diameters."""
     last = one.history[-1]
-    diameter = 2.0 * float(np.mean(one.damaged.fines().radius))
-    throats = reached_throats(results.analysis, last.invaded + last.passed, diameter)
-    rows = bridging_rows(throats, one.case.fines.placed_fraction)
+    rows = ratio_rows(
+        results.analysis,
+        entered=last.invaded + last.passed,
+        fine_diameter=2.0 * float(np.mean(one.damaged.fines().radius)),
+        concentration=one.case.fines.placed_fraction,
+    )
     return Added(
         name="bridging",
         rows=rows,
-        fill=partial(fill_bridging, rows=rows),
-        caption="Throats down to the depth above which 95 % of the fines lie: share that "
-        "is blocked, by the ratio of the fines' diameter "
-        "to that of the throat, with Wilson's 95 % band.",
-        page=PageTable(
-            title="Throats that fines block",
-            columns=_BRIDGING_COLUMNS,
-            rows=rows,
-            note=f"Suspension of {100 * one.case.fines.placed_fraction:.3g} % by volume. A throat "
-            "is blocked where one fine covers its cross-section or where it is clogged: its "
-            f"conductance is below {CLOGGED:g} of the clean one. The last column is by the "
-            "clean flow, as if no fine were caught.",
-        ),
+        fill=partial(fill_bridging, rows=rows) if rows else None,
+        caption="Throats between grains, down to the depth above which 95 % of the fines lie: the "
+        "share that is closed, by the ratio of the fines' diameter to that of the throat, with "
+        "Wilson's 95 % band. Closed: one fine covers the whole section (blocked), or less than "
+        f"{CLOGGED:g} of the conductance is left (clogged).",
     )

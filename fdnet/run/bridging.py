@@ -1,17 +1,20 @@
-"""Bridging statistics: which throats the fines block, by the ratio of fine to throat.
+"""Which throats the fines close, by the width of the throat and by the ratio of fine to throat.
 
-A throat that fines could reach either stays open or is blocked: one fine covers its
-cross-section, or it is clogged, its conductance below `CLOGGED` of the clean one. Shares of a
-count have Wilson's 95 % band (J. Am. Stat. Assoc. 22, 209, 1927).
+A throat is the circle that touches three grains. Beside a side wall or an end face it runs out to
+the mirror images of the grains, which make it wider than any between grains, and each such throat
+counts twice; these have a row of their own, and no width. Shares of a count have Wilson's 95 %
+band (J. Am. Stat. Assoc. 22, 209, 1927).
 """
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fdnet.report.tables import between_grains
 from fdnet.spheres.arrays import Array, one_line
 from fdnet.statistics.shares import wilson_interval
 
@@ -20,77 +23,141 @@ if TYPE_CHECKING:
 
 RATIOS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, math.inf)
 """Edges of the classes of the diameter of a fine over that of the throat."""
-CLOGGED = 0.1
-"""Share of the clean conductance below which a throat counts as clogged."""
-_COUNTS = ("throats", "with_fines", "covered", "clogged", "blocked")
+CLASSES = 4
+"""Classes of throats by their width, of equal number."""
+BRIDGED, CLOGGED = 0.5, 0.1
+"""Share of the clean conductance up to which a throat is bridged, below which it is clogged."""
+_COUNTS = ("throats", "with_fines", "blocked", "clogged", "closed")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Throats:
-    """The T open throats that fines could reach.
+    """T open throats and what the fines do to them.
 
     Attributes:
-        ratio: (T,) mean diameter of the fines in it, or of all where it holds none, over that of
-            the throat.
+        width: (T,) m, diameter.
+        fine: (T,) m, mean diameter of the fines in it; 0 where it holds none.
         held: (T,) whether it holds a fine.
-        covered: (T,) whether one fine covers its whole cross-section.
-        clogged: (T,) whether its conductance is below `CLOGGED` of the clean one.
-        arrived: (T,) fines that would pass it with the clean flow if none were caught.
+        blocked: (T,) whether one fine covers its whole cross-section.
+        left: (T,) conductance over the clean one; 1 where that is 0.
+        between: (T,) whether it lies between three grains, and not beside a wall or an end face.
     """
 
-    ratio: Array
+    width: Array
+    fine: Array
     held: Array
-    covered: Array
-    clogged: Array
-    arrived: Array
+    blocked: Array
+    left: Array
+    between: Array
 
     __repr__ = one_line
 
+    def where(self, use: Array) -> "Throats":
+        """The throats of a mask (T,)."""
+        return Throats(**{name: getattr(self, name)[use] for name in self.__slots__})
 
-def reached_throats(analysis: "Analysis", entered: int, fine_diameter: float) -> Throats:
-    """The open throats down to the depth above which 95 % of the fines lie.
+    @property
+    def bridged(self) -> Array:
+        """(T,) whether it lost half of its conductance or more."""
+        return self.left <= BRIDGED
+
+    @property
+    def clogged(self) -> Array:
+        """(T,) whether less than a tenth of its conductance is left."""
+        return self.left < CLOGGED
+
+
+def open_throats(analysis: "Analysis") -> Throats:
+    """The throats that the grains leave open, of a specimen with fines."""
+    network, occupancy = analysis.network, analysis.occupancy
+    assert occupancy is not None
+    clean = np.asarray(analysis.conductance_initial, float)
+    damaged = np.asarray(analysis.conductance_damaged, float)
+    return Throats(
+        width=2.0 * np.asarray(network.throat_radius),
+        fine=2.0 * np.asarray(occupancy.throat_fine_radius),
+        held=np.asarray(occupancy.throat_fines) > 0,
+        blocked=np.asarray(occupancy.blocked, bool),
+        left=np.divide(damaged, clean, out=np.ones(len(clean)), where=clean > 0),
+        between=between_grains(network, network.throat_images),
+    ).where(np.asarray(network.throat_radius) > 0)
+
+
+def width_rows(throats: Throats) -> list[dict[str, Any]]:
+    """Classes of throats by width from the narrowest, and those at walls and end faces.
+
+    The columns add up to all open throats, and `blocked` to `throats_blocked` of the summary.
+    Diameters are in m; those of the fines are means over the fines in each bridged throat, and
+    null where no throat of the class is bridged.
+    """
+    inner, beside = throats.where(throats.between), throats.where(~throats.between)
+    rows = []
+    if len(inner.width):
+        edges = np.quantile(inner.width, np.linspace(0, 1, CLASSES + 1))
+        number = np.clip(np.searchsorted(edges, inner.width, side="right") - 1, 0, CLASSES - 1)
+        rows = [
+            _width_row(inner.where(number == index), (float(low), float(high)))
+            for index, (low, high) in enumerate(pairwise(edges))
+        ]
+    return [*rows, _width_row(beside, (None, None))] if len(beside.width) else rows
+
+
+def _width_row(own: Throats, edges: tuple[float | None, float | None]) -> dict[str, Any]:
+    inside = own.where(own.bridged & own.held)
+    names = ("fines_smallest_m", "fines_median_m", "fines_largest_m")
+    some = np.quantile(inside.fine, (0.0, 0.5, 1.0)).tolist() if len(inside.fine) else []
+    known = some and edges[0] is not None
+    return {
+        "throat_from_m": edges[0],
+        "throat_to_m": edges[1],
+        "throats": len(own.width),
+        "with_fines": int(own.held.sum()),
+        "bridged": int(own.bridged.sum()),
+        "blocked": int(own.blocked.sum()),
+        **dict(zip(names, some or (None, None, None), strict=True)),
+        "fine_over_throat": float(np.median(inside.fine / inside.width)) if known else None,
+    }
+
+
+def ratio_rows(
+    analysis: "Analysis", *, entered: int, fine_diameter: float, concentration: float
+) -> list[dict[str, Any]]:
+    """The classes of ratio that hold throats, as bridging.csv names their values.
+
+    Of the open throats between grains that conduct, down to the depth above which 95 % of the
+    fines lie. The ratio is that of the mean fine in the throat, or of all where it holds none.
 
     Args:
         analysis: of the damaged specimen.
         entered: number of fines that came in, those that passed too.
         fine_diameter: mean of the fines, m.
+        concentration: of the suspension, by volume.
     """
-    network, occupancy, flow = analysis.network, analysis.occupancy, analysis.flow_initial
-    assert occupancy is not None
+    network, flow = analysis.network, analysis.flow_initial
     depth = network.throat_corner[..., 0].mean(axis=1) - float(network.box[0, 0])
-    clean = analysis.conductance_initial
-    reached = depth <= analysis.invasion_depth_p95
-    use = np.flatnonzero(reached & (network.throat_radius > 0) & (clean > 0))
-    held = occupancy.throat_fines[use] > 0
-    diameter = np.where(held, 2.0 * occupancy.throat_fine_radius[use], fine_diameter)
-    flux = np.abs(flow.throat_flux[use])
-    return Throats(
-        ratio=diameter / (2.0 * network.throat_radius[use]),
-        held=held,
-        covered=np.asarray(occupancy.blocked[use], bool),
-        clogged=analysis.conductance_damaged[use] < CLOGGED * clean[use],
-        arrived=entered * flux / flow.inflow if flow.inflow > 0 else np.zeros(len(use)),
-    )
+    reached = (depth <= analysis.invasion_depth_p95) & (analysis.conductance_initial > 0)
+    between = between_grains(network, network.throat_images)
+    use = (reached & between)[np.asarray(network.throat_radius) > 0]
+    throats = open_throats(analysis).where(use)
+    flux = np.abs(flow.throat_flux[network.throat_radius > 0][use])
+    arrived = entered * flux / flow.inflow if flow.inflow > 0 else np.zeros(len(flux))
+    ratio = np.where(throats.held, throats.fine, fine_diameter) / throats.width
+    return classes_of(ratio, throats, arrived, concentration)
 
 
-def bridging_rows(throats: Throats, concentration: float) -> list[dict[str, Any]]:
-    """The classes of ratio that hold throats, as bridging.csv names their values."""
-    which = np.searchsorted(RATIOS, throats.ratio, "right") - 1
+def classes_of(
+    ratio: Array, throats: Throats, arrived: Array, concentration: float
+) -> list[dict[str, Any]]:
+    """`throats` by classes of their `ratio` (T,); `arrived` (T,) fines would come to each."""
+    which = np.searchsorted(RATIOS, ratio, "right") - 1
     rows = []
     for number in np.unique(which):
-        own = which == number
-        rows.append(
-            _row(
-                concentration,
-                (RATIOS[number], RATIOS[number + 1]),
-                throats=int(own.sum()),
-                held=int(throats.held[own].sum()),
-                covered=int(throats.covered[own].sum()),
-                clogged=int(throats.clogged[own].sum()),
-                blocked=int(np.sum(throats.clogged[own] | throats.covered[own])),
-                arrived=float(throats.arrived[own].sum()),
-            )
-        )
+        own = throats.where(which == number)
+        counts = (len(own.width), own.held.sum(), own.blocked.sum(), own.clogged.sum())
+        closed = int(np.sum(own.blocked | own.clogged))
+        edges = (RATIOS[number], RATIOS[number + 1])
+        came = float(arrived[which == number].sum())
+        rows.append(_row(concentration, edges, [*map(int, counts), closed], came))
     return rows
 
 
@@ -100,48 +167,29 @@ def pooled(tables: Iterable[Sequence[Mapping[str, Any]]]) -> list[dict[str, Any]
     for row in (row for table in tables for row in table):
         upper = math.inf if row["ratio_hi"] in (None, "") else float(row["ratio_hi"])
         key = float(row["concentration"]), float(row["ratio_lo"]), upper
-        counts = sums.setdefault(key, [0.0] * 6)
+        counts = sums.setdefault(key, [0.0] * (len(_COUNTS) + 1))
         own = [float(row[name]) for name in _COUNTS]
         for i, value in enumerate([*own, float(row["arrived_mean"]) * own[0]]):
             counts[i] += value
     return [
-        _row(
-            concentration,
-            (low, high),
-            throats=round(counts[0]),
-            held=round(counts[1]),
-            covered=round(counts[2]),
-            clogged=round(counts[3]),
-            blocked=round(counts[4]),
-            arrived=counts[5],
-        )
+        _row(concentration, (low, high), [round(count) for count in counts[:-1]], counts[-1])
         for (concentration, low, high), counts in sorted(sums.items())
     ]
 
 
 def _row(
-    concentration: float,
-    ratio: tuple[float, float],
-    *,
-    throats: int,
-    held: int,
-    covered: int,
-    clogged: int,
-    blocked: int,
-    arrived: float,
+    concentration: float, ratio: tuple[float, float], counts: Sequence[int], arrived: float
 ) -> dict[str, Any]:
-    low, high = wilson_interval(blocked, throats)
+    """A row of bridging.csv; `counts` are those of `_COUNTS`."""
+    named = dict(zip(_COUNTS, counts, strict=True))
+    low, high = wilson_interval(named["closed"], named["throats"])
     return {
         "concentration": concentration,
         "ratio_lo": ratio[0],
         "ratio_hi": ratio[1] if math.isfinite(ratio[1]) else None,
-        "throats": throats,
-        "with_fines": held,
-        "covered": covered,
-        "clogged": clogged,
-        "blocked": blocked,
-        "share_blocked": blocked / throats,
+        **named,
+        "share_closed": named["closed"] / named["throats"],
         "share_low": low,
         "share_high": high,
-        "arrived_mean": arrived / throats,
+        "arrived_mean": arrived / named["throats"],
     }

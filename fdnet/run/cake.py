@@ -2,11 +2,13 @@
 
 The resistance of a bed of thickness h and permeability k is h / k, 1/m; that of slices in series
 is their sum. k comes from the network of the cake's own spheres where there are enough of them,
-and from Carman's and Kozeny's eps^3 d^2 / (180 (1 - eps)^2) of each slice in any case.
+and from Carman's and Kozeny's eps^3 d^2 / (180 (1 - eps)^2) of each slice in any case. Their
+constant is that of packed beds: the permeability of a cake is that of its packed slices, and a
+cake with too few of these has none.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,15 +19,28 @@ from fdnet.errors import FlowError, NetworkError
 from fdnet.network.fines.invaded import cake_of
 from fdnet.network.resolved.all_spheres import measure_all_spheres
 from fdnet.network.resolved.slab import Sides, cut_out
+from fdnet.report.units import in_millidarcy, percent
 from fdnet.scales.darcy import carman_kozeny
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.porosity import measure_porosity
 from fdnet.spheres.snapshot import Array, Snapshot
 
 ENOUGH, THICK = 100, 3.0
-"""Fewest spheres, and least thickness in mean diameters, of a cake that a network resolves."""
+"""Fewest fines of a cake that a network resolves, and least thickness in mean diameters of one
+that has a permeability."""
 MOST = 20_000
-"""Most spheres of a cake that is resolved: the network of more takes minutes."""
+"""Most fines of a cake that is resolved: the network of more takes minutes."""
+PACKED = 0.7
+"""Porosity up to which a slice is a packed bed: above it Carman's and Kozeny's constant of 5 is
+low by more than a sixth (5.8 for spheres at 0.7, 7.2 at 0.8, 11.3 at 0.9; Happel and Brenner 1965,
+Low Reynolds number hydrodynamics, table 8-4.2)."""
+
+BY = {
+    "flow": "the flow of the last update",
+    "network": "the network of the cake",
+    "kozeny": "Carman and Kozeny",
+}
+"""What says the cake's share of the resistance, in words."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -37,7 +52,7 @@ class Cake:
         count: (B,) number of fines centred in the slice.
         porosity: (B,) void over volume.
         diameter: (B,) m, Sauter mean of these fines.
-        k_kozeny: (B,) m2, by Carman and Kozeny; inf in an empty slice.
+        k_kozeny: (B,) m2, by Carman and Kozeny; inf in an empty slice, too high in a loose one.
         k_network: (B,) m2, in place in the network of the cake; None where it is not resolved.
         unresolved: why not, in words; "" where it is.
     """
@@ -56,6 +71,38 @@ class Cake:
     def thickness(self) -> float:
         """Of the whole cake, m."""
         return float(self.edges[-1] - self.edges[0])
+
+    @property
+    def packed(self) -> Array:
+        """(B,) whether the slice is a packed bed."""
+        return self.porosity <= PACKED
+
+    @property
+    def packed_thickness(self) -> float:
+        """Of the packed slices together, m."""
+        return float(np.sum(np.diff(self.edges)[self.packed]))
+
+    @property
+    def packed_permeability(self) -> float | None:
+        """By Carman and Kozeny, m2, of the packed slices in series; None where `too_thin`."""
+        return None if self.too_thin else self.packed_thickness / self._packed_resistance
+
+    @property
+    def too_thin(self) -> str:
+        """Why the cake has no permeability of its own, in words; "" where it has one."""
+        layers = self.packed_thickness / float(np.average(self.diameter, weights=self.count))
+        if layers >= THICK:
+            return ""
+        if not self.packed.any():
+            return "loose all through, without a permeability of its own"
+        return (
+            f"packed for {layers:.1f} diameters of a fine, too thin for a permeability of its own "
+            f"({THICK:g} are needed)"
+        )
+
+    @property
+    def _packed_resistance(self) -> float:
+        return float(np.sum((np.diff(self.edges) / self.k_kozeny)[self.packed]))
 
     @property
     def best_resistance(self) -> float:
@@ -84,7 +131,7 @@ def measure_cake(spheres: Snapshot, sides: Sides) -> Cake | None:
     where = np.clip(np.searchsorted(edges, cake.position[:, 0], "right") - 1, 0, slices - 1)
     count = np.bincount(where, minlength=slices)
     diameter = _sauter(cake.radius, where, slices)
-    resolved, unresolved = _resolved(bed, edges, sides, thickness / mean)
+    resolved, unresolved = _resolved(bed, edges, sides, fines=len(cake), layers=thickness / mean)
     return Cake(
         edges=edges,
         count=count,
@@ -115,16 +162,20 @@ def _kozeny(porosity: float, diameter: float) -> float:
 
 
 def _resolved(
-    bed: Snapshot, edges: Array, sides: Sides, layers: float
+    bed: Snapshot, edges: Array, sides: Sides, *, fines: int, layers: float
 ) -> tuple[Array | None, str]:
     """Permeability (B,) m2 of the slices in place in the network of the bed, or why not."""
-    if len(bed) < ENOUGH or layers < THICK:
-        return None, (
-            f"the cake has {len(bed)} spheres and is {layers:.1f} of their diameters thick; a "
-            f"network needs {ENOUGH} and {THICK:g}"
-        )
-    if len(bed) > MOST:
-        return None, f"the cake has {len(bed)} spheres, more than the {MOST} of a network"
+    missed = [
+        *([f"has {fines} fines, and a network needs {ENOUGH}"] if fines < ENOUGH else []),
+        *([f"has {fines} fines, and a network takes {MOST}"] if fines > MOST else []),
+        *(
+            [f"is {layers:.1f} diameters of a fine thick, and a network needs {THICK:g}"]
+            if layers < THICK
+            else []
+        ),
+    ]
+    if missed:
+        return None, f"the cake {' and '.join(missed)}"
     around = replace(sides, periodic=(False, *sides.periodic[1:]))
     try:
         whole = measure_all_spheres(
@@ -148,7 +199,7 @@ def cake_rows(cake: Cake) -> list[dict[str, Any]]:
             "fines_count": int(cake.count[i]),
             "porosity": float(cake.porosity[i]),
             "sauter_diameter_m": float(cake.diameter[i]),
-            "k_kozeny_m2": float(cake.k_kozeny[i]) if math.isfinite(cake.k_kozeny[i]) else None,
+            "k_kozeny_m2": float(cake.k_kozeny[i]) if cake.packed[i] else None,
             "k_network_m2": None if cake.k_network is None else float(cake.k_network[i]),
         }
         for i in order
@@ -160,31 +211,67 @@ def resistance_share(cake: float, pack: float) -> float:
     return cake / (cake + pack) if math.isfinite(pack) else 0.0
 
 
-def cake_summary(cake: Cake | None, pack: float, known: Sequence[str] = ()) -> Mapping[str, Any]:
+def cake_summary(
+    cake: Cake | None, pack: float, *, flow: float | None = None
+) -> Mapping[str, Any]:
     """The keys that the cake adds to summary.json; `pack` is the resistance of the pack, 1/m.
 
-    The key `cake_resistance_share` is left out where it is `known` from the flow itself.
+    `flow` is the cake's share of the resistance by the flow itself, where that follows the
+    deposit; else the share is by the network of the cake, or by Carman and Kozeny.
     """
     if cake is None:
-        return {} if "cake_resistance_share" in known else {"cake_resistance_share": 0.0}
-    kozeny = cake.resistance(cake.k_kozeny)
+        return {"cake_resistance_share": flow or 0.0, "cake": None}
+    kozeny, k, packed = cake.resistance(cake.k_kozeny), cake.packed_permeability, cake.packed
     network = None if cake.k_network is None else cake.resistance(cake.k_network)
+    thick = np.diff(cake.edges)[packed]
+    porosity = float(np.average(cake.porosity[packed], weights=thick)) if packed.any() else None
     shares = {
-        "share_kozeny": resistance_share(kozeny, pack),
-        "share_network": None if network is None else resistance_share(network, pack),
+        "flow": flow,
+        "network": None if network is None else resistance_share(network, pack),
+        "kozeny": resistance_share(kozeny, pack),
     }
-    best = resistance_share(cake.best_resistance, pack)
+    by = next(name for name, share in shares.items() if share is not None)
     table = {
         "fines": int(cake.count.sum()),
         "slices": len(cake.count),
-        "porosity": float(np.average(cake.porosity, weights=np.diff(cake.edges))),
-        "k_kozeny_m2": cake.thickness / kozeny if kozeny > 0 else None,
+        "packed_thickness_m": cake.packed_thickness,
+        "porosity": porosity,
+        "k_kozeny_m2": k,
         "k_network_m2": cake.thickness / network if network else None,
         "resistance_kozeny_1_m": kozeny,
         "resistance_network_1_m": network,
         "resistance_pack_1_m": pack if math.isfinite(pack) else None,
-        **shares,
+        "share_kozeny": shares["kozeny"],
+        "share_network": shares["network"],
+        "share_by": by,
         "unresolved": cake.unresolved,
+        "too_thin": cake.too_thin,
     }
-    own = {} if "cake_resistance_share" in known else {"cake_resistance_share": best}
-    return own | {"cake_by_depth": table}
+    bed = {
+        "thickness_m": cake.thickness,
+        "porosity": porosity,
+        "k_carman_kozeny_m2": k,
+        "resistance_1_m": kozeny,
+    }
+    return {
+        "cake_resistance_share": shares[by],
+        "cake_by_depth": table,
+        "cake": None if k is None else bed,
+    }
+
+
+def cake_words(summary: Mapping[str, Any]) -> str:
+    """How the cake lets the fluid through, in words; `summary` has the keys of `cake_summary`."""
+    table = summary.get("cake_by_depth")
+    if table is None:
+        return "no fine upstream touches the pack"
+    k, network, own = table["k_kozeny_m2"], table["k_network_m2"], table["too_thin"]
+    if k is not None:
+        porosity = f"at a porosity of {table['porosity']:.2f}"
+        own = f"{in_millidarcy(k)} mD by Carman and Kozeny {porosity}"
+    if network is not None:
+        own += f", {in_millidarcy(network)} mD by its own network"
+    return (
+        f"{table['fines']} fines, {own}; about {percent(summary['cake_resistance_share'])} % of "
+        f"the resistance of cake and specimen by {BY[table['share_by']]}"
+    )

@@ -9,6 +9,7 @@ volume V per area: dV/dt = dp / (mu (R + alpha V)). Its integral is quadratic in
 a spurt 2 V(7.5 min) - V(30 min), where that line meets t = 0 (API RP 13I).
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,6 +63,13 @@ class Filtration:
     def spurt(self) -> float:
         """The spurt, m3/m2: the intercept, or 0 where that is below 0."""
         return max(0.0, self.intercept)
+
+
+def cake_share(updates: Sequence[Mapping[str, float]]) -> float | None:
+    """Share of the last drop of pressure that the cake takes up; None where no flow says it."""
+    last = updates[-1] if updates else {}
+    drop = last.get("pressure_cake_Pa", 0.0) + last.get("pressure_pack_Pa", 0.0)
+    return last["pressure_cake_Pa"] / drop if drop > 0 else None
 
 
 def fit_filtration(time: Array, volume: Array, cake_share: float = 1.0) -> Filtration | None:

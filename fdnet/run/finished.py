@@ -12,8 +12,8 @@ from fdnet.errors import CaseError
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import Network, build_network
 from fdnet.network.resolved.all_spheres import all_conductances
-from fdnet.run.finished_text import html_lines, text_lines
 from fdnet.run.made_files import ANALYSE_AGAIN, START_OVER, check_one
+from fdnet.run.summary_text import html_lines, text_lines
 from fdnet.spheres.arrays import Array
 from fdnet.spheres.snapshot import Snapshot
 

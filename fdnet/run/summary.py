@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from fdnet.case.case import Case
 from fdnet.dem.checkpoint import Checkpoint
 from fdnet.report.tables import section_rows
@@ -10,6 +12,9 @@ from fdnet.scales.check.catalogue import explained
 
 if TYPE_CHECKING:
     from fdnet.network.analysis import Analysis
+
+SEEN = 5e-4
+"""Least relative gain that counts: what a table in percent with one digit shows."""
 
 
 def summarise(
@@ -106,11 +111,9 @@ def _updates(invasion: dict[str, Any] | None) -> dict[str, Any]:
     common = {"drag_updates": updates["count"], "drag_last_update": last}
     if "rate_over_initial" not in last:
         return common
-    drop = last["pressure_cake_Pa"] + last["pressure_pack_Pa"]
     return common | {
         "rate_over_initial": last["rate_over_initial"],
         "filtrate_m3": last["filtrate_m3"],
-        "cake_resistance_share": last["pressure_cake_Pa"] / drop if drop > 0 else None,
         "momentum_defect_most": updates["momentum_defect_most"],
     }
 
@@ -121,7 +124,20 @@ def _network(analysis: "Analysis") -> dict[str, Any]:
         "pores": len(analysis.network.pore_radius),
         "throats": len(analysis.network.throat_radius),
         "throats_blocked": blocked,
-        "network_counts": analysis.counts,
+        "network_counts": {**analysis.counts, **above_intact(analysis)},
+    }
+
+
+def above_intact(analysis: "Analysis") -> dict[str, int]:
+    """Where a value in place is higher with the fines than without: they turn the flow aside."""
+    sections, layers = analysis.sections, analysis.layers
+    return {
+        "sections_inplace_above_intact": sum(
+            s.k_damaged_inplace > s.k_initial_inplace * (1 + SEEN) for s in sections
+        ),
+        "layers_above_intact": 0
+        if layers is None
+        else int(np.sum(layers.k_damaged > layers.k_initial * (1 + SEEN))),
     }
 
 

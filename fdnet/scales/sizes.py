@@ -54,7 +54,7 @@ def _curve_rows(name: str, spheres: Spheres) -> Iterator[tuple[str, str, float, 
             continue
         given = asked.get(share)
         compared = (
-            "" if given is None else f", given {given:.4g} m ({100 * (value / given - 1):+.1f} %)"
+            "" if given is None else f", given {given:.4g} m ({100 * (value / given - 1):+z.1f} %)"
         )
         yield (
             f"{name}: {100 * share:.0f} % by volume finer than",

@@ -100,6 +100,9 @@ def demo_network(grains):
     return SimpleNamespace(
         box=BOX,
         periodic=(False, False, False),
+        image_position=grains.position,
+        pore_images=mesh.simplices,
+        throat_images=facets,
         pore_grains=mesh.simplices,
         pore_position=position,
         pore_radius=radius,

@@ -15,6 +15,7 @@ from fdnet.report import view
 from fdnet.report.html import ReportParts, headline, quantity, write_report
 from fdnet.report.view import view_of
 from fdnet.run.answer.rules import Sizes, rules_of
+from fdnet.run.summary_text import html_lines, summary_lines
 
 SIZES = Sizes(
     fines={"D50": 40e-6, "D85": 60e-6, "D90": 100e-6},
@@ -56,6 +57,11 @@ SUMMARY = {
     "invasion_depth_p95_m": 2.5e-3,
     "cake_thickness_m": 3e-4,
     "stop_reason": "plugged",
+    "words": {
+        "end": "the face plugged: no fine crossed it",
+        "cake": "CAKE WORDS",
+        "in_place": "IN PLACE.",
+    },
     "sections": [
         SECTION,
         SECTION | {"section": 2, "k_initial_m2": 0.0, "k_damaged_m2": 0.0, "k_reduction": None},
@@ -114,7 +120,9 @@ def test_it_says_what_the_summary_says(tmp_path):
         "704",
         "of 3\u2009000 supplied",
         "95 % of the fines above 2.5 mm deepest 4 mm",
-        "plugged",
+        "cake thickness 0.3 mm CAKE WORDS",
+        "plugged the face plugged: no fine crossed it",
+        "of them blocked: one fine covers the whole section 2",
         "34.6",
         "gravity: a & b",
         "solve",
@@ -238,6 +246,40 @@ def test_a_summary_of_an_intact_pack_or_nothing_at_all_still_makes_a_page(tmp_pa
     assert "No warnings" in text
     _, text = page_of(tmp_path, {})
     assert "fdnet run" in text
+
+
+def test_text_page_and_notebook_say_the_same_numbers_and_words(tmp_path):
+    """Section 2 lost -0.04 %, which no reader shall see as -0.0."""
+    last = SECTION | {"section": 2, "k_damaged_m2": 7.65306e-11, "k_reduction": -0.0004}
+    said = SUMMARY | {
+        "answer": "THE ANSWER.",
+        "certainty": ["ONE SEED."],
+        "skin": 0.056,
+        "skin_flow_lost": 0.008,
+        "skin_well_radius_m": 0.108,
+        "run_shows": "bridges",
+        "rules": rules_of(SIZES, "bridges"),
+        "seconds": {"liggghts": 1.0},
+        "sections": [SECTION, last],
+    }
+    _, page = page_of(tmp_path, said)
+    text, book = "\n".join(summary_lines(said)), "".join(html_lines(tmp_path, said))
+    words = re.sub(r"\s+", " ", text)
+    for part in ("THE ANSWER.", "ONE SEED.", "77,510", "33.3 % lost", "2.5 mm", "CAKE WORDS"):
+        assert part in words, part
+        assert part in page, part
+        assert part in book, part
+    for part in (
+        "IN PLACE.",
+        "no fine crossed it",
+        "0.8 % of the flow of a well of 108 mm",
+        "34.6",
+    ):
+        assert part in words, part
+        assert part in page, part
+    assert "The run holds the fines: the face plugged." in page
+    assert "the run holds the fines: the face plugged)" in words
+    assert not re.search(r"-0\.0\b", page + words + book)
 
 
 def test_a_run_with_invaders_but_no_stop_reason_shows_the_damage():

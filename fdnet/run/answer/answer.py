@@ -2,26 +2,25 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fdnet.case.case import Case, InvasionCase
-from fdnet.run.answer.bridged import bridged_throats
-from fdnet.run.answer.cake import cake_of
 from fdnet.run.answer.damage import DAMAGED_FROM, Zone, steps_of, zone_of
 from fdnet.run.answer.rules import Sizes, rules_of, run_shows
 from fdnet.run.answer.scatter import scatter_of
-from fdnet.run.answer.sentence import answer_sentence, certainty
+from fdnet.run.answer.sentence import answer_sentence, certainty, end_words, in_place_words
 from fdnet.run.answer.skin import Step, flow_lost, layered_skin
+from fdnet.run.bridging import Throats, open_throats, width_rows
+from fdnet.run.cake import cake_words
 from fdnet.spheres.snapshot import Snapshot
 
 if TYPE_CHECKING:
     from fdnet.network.analysis import Analysis
 
 LARGEST = 0.99
-"""Share of the open throats, by number, that are narrower than the "largest" one."""
+"""Share of the open throats between grains, by number, that are narrower than the "largest"."""
 
 
 def with_answer(
@@ -29,26 +28,30 @@ def with_answer(
 ) -> dict[str, Any]:
     """`summary` with the keys of the answer; `spheres` are those at the end.
 
-    Adds `answer` and `certainty` (sentences) always; with fines also `damage`, `cake`,
-    `throats_bridged`, `rules`, `scatter`, and `skin` and `skin_flow_lost` where the case has a
-    well. Infinite skins are null.
+    Adds `answer` and `certainty` (sentences) always; with fines also `words` (parts of
+    sentences), `damage`, `throats_bridged`, `rules`, `scatter`, and `skin` and `skin_flow_lost`
+    where the case has a well. Infinite skins are null.
     """
     result = dict(summary)
     if isinstance(case, InvasionCase) and analysis.occupancy is not None:
+        throats = open_throats(analysis)
         result |= _damage_keys(case, analysis, spheres)
+        result["throats_bridged"] = width_rows(throats)
         result["run_shows"] = run_shows(summary)
-        result["rules"] = rules_of(_sizes(case, analysis), result["run_shows"])
+        result["rules"] = rules_of(_sizes(case, throats), result["run_shows"])
+        result["words"] = {
+            "end": end_words(summary, case.run),
+            "cake": cake_words(summary),
+            "in_place": in_place_words(summary["network_counts"]),
+        }
     return {**result, "answer": answer_sentence(result), "certainty": list(certainty(result))}
 
 
 def _damage_keys(case: InvasionCase, analysis: "Analysis", spheres: Snapshot) -> dict[str, Any]:
     steps = steps_of(analysis)
-    cake = cake_of(spheres, analysis.cake_thickness)
     return {
         "damage": _zone_keys(zone_of(steps)),
         **_skin_keys(case, steps),
-        "cake": None if cake is None else _cake_keys(asdict(cake)),
-        "throats_bridged": bridged_throats(analysis),
         "scatter": _scatter_keys(len(spheres.grains())),
     }
 
@@ -76,15 +79,6 @@ def _skin_keys(case: Case, steps: list[Step]) -> dict[str, float | None]:
     }
 
 
-def _cake_keys(cake: Mapping[str, float]) -> dict[str, float]:
-    return {
-        "thickness_m": cake["thickness"],
-        "porosity": cake["porosity"],
-        "k_carman_kozeny_m2": cake["permeability"],
-        "resistance_1_m": cake["resistance"],
-    }
-
-
 def _scatter_keys(grains: int) -> dict[str, Any]:
     one = scatter_of(grains)
     return {
@@ -95,9 +89,10 @@ def _scatter_keys(grains: int) -> dict[str, Any]:
     }
 
 
-def _sizes(case: InvasionCase, analysis: "Analysis") -> Sizes:
-    width = 2.0 * np.asarray(analysis.network.throat_radius)
-    middle, largest = np.quantile(width[width > 0], (0.5, LARGEST))
+def _sizes(case: InvasionCase, throats: Throats) -> Sizes:
+    """Of throats between grains; where all are beside walls or end faces, of those."""
+    width = throats.width[throats.between | ~throats.between.any()]
+    middle, largest = np.quantile(width, (0.5, LARGEST))
     fines = case.fines.curve
     return Sizes(
         fines={f"D{share}": fines.size_at(share / 100) for share in (50, 85, 90)},

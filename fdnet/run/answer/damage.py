@@ -39,8 +39,9 @@ class Zone:
 def steps_of(analysis: "Analysis") -> list[Step]:
     """Permeability by depth, in place: thin layers of the first millimetre, then the sections.
 
-    The layers are left out where the sections are not by the same law. Sections that the layers
-    reach into keep what is left of their resistance.
+    The layers are left out where the sections are not by the same law, and where those in a
+    section resist more than it does. Sections that the layers reach into keep what is left of
+    their resistance.
     """
     whole = [
         Step(near=s.x_lo, far=s.x_hi, before=s.k_initial_inplace, after=s.k_damaged_inplace)
@@ -55,32 +56,30 @@ def steps_of(analysis: "Analysis") -> list[Step]:
             layers.edges[:-1], layers.edges[1:], layers.k_initial, layers.k_damaged, strict=True
         )
     ]
-    return [*thin, *_beyond(whole, thin)]
-
-
-def _beyond(sections: Sequence[Step], thin: Sequence[Step]) -> Iterator[Step]:
-    """The sections, or what is left of them, behind the last of the thin layers."""
     end = thin[-1].far
-    for one in sections:
-        if one.far <= end * (1 + _TOUCH):
-            continue
-        if one.near >= end * (1 - _TOUCH):
-            yield one
-            continue
+    behind = [one for one in whole if one.near >= end * (1 - _TOUCH)]
+    cut = [one for one in whole if one.near < end * (1 - _TOUCH) < end * (1 + _TOUCH) < one.far]
+    for one in cut:
         inside = [layer for layer in thin if layer.near >= one.near - _TOUCH * end]
         before, after = (_rest(one, inside, which) for which in ("before", "after"))
-        yield Step(near=end, far=one.far, before=before, after=min(after, before))
+        if before is None or after is None:
+            return whole
+        behind = [Step(near=end, far=one.far, before=before, after=after), *behind]
+    return [*thin, *behind]
 
 
-def _rest(section: Step, inside: Sequence[Step], which: str) -> float:
-    """Permeability of the rest of a section, m2, whose resistances in series make up the whole."""
+def _rest(section: Step, inside: Sequence[Step], which: str) -> float | None:
+    """Permeability of the rest of a section, m2, whose resistances in series make up the whole.
+
+    None where the layers inside resist as much as the section or more.
+    """
     k, parts = getattr(section, which), [getattr(one, which) for one in inside]
     if k <= 0 or any(part <= 0 for part in parts):
         return k
     resistance = (section.far - section.near) / k - sum(
         (one.far - one.near) / part for one, part in zip(inside, parts, strict=True)
     )
-    return (section.far - inside[-1].far) / resistance if resistance > 0 else k
+    return (section.far - inside[-1].far) / resistance if resistance > 0 else None
 
 
 def zone_of(steps: Sequence[Step]) -> Zone:

@@ -45,15 +45,22 @@ def hawkins(ratio: float, *, well: float, damaged: float) -> float:
 
 
 def layered_skin(steps: Sequence[Step], well: float) -> float:
-    """Sum of (k_0 / k_i - 1) ln(r_{i+1} / r_i) over layers behind the face of a well.
+    """Sum of (k / k_i - k / k_0i) ln(r_{i+1} / r_i) over layers behind the face of a well.
 
-    It is Hawkins's formula for rings in series, each of its own permeability. `well` is the
-    radius of the well, m. Layers without permeability before the fines count nothing.
+    It is Hawkins's formula for rings in series, with the permeability k of the formation, that of
+    all layers before the fines in series: a layer that was more open than the formation, as those
+    at the face are, counts no more for that. `well` is the radius of the well, m. Layers without
+    permeability before the fines count nothing.
     """
+    rings = [one for one in steps if one.before > 0]
+    lengths = [one.far - one.near for one in rings]
+    inverse = sum(far / one.before for far, one in zip(lengths, rings, strict=True))
+    k = sum(lengths) / inverse if rings else 0.0
     return sum(
-        hawkins(one.after / one.before, well=well + one.near, damaged=well + one.far)
-        for one in steps
-        if one.before > 0
+        k
+        / one.before
+        * hawkins(one.after / one.before, well=well + one.near, damaged=well + one.far)
+        for one in rings
     )
 
 

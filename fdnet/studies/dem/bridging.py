@@ -23,9 +23,14 @@ def pooled_runs(runs: Sequence[Path], path: Path) -> list[dict[str, Any]]:
 def _classes(path: Path) -> list[dict[str, str]]:
     try:
         with path.open(newline="", encoding="utf-8") as file:
-            return list(csv.DictReader(file))
+            rows = list(csv.DictReader(file))
     except OSError as error:
         raise CaseError(
             f"{path}: cannot be read ({error.strerror}); give folders of runs in which fines "
             "invaded, or write it anew with --stages analyse,report --force"
         ) from error
+    if not all("closed" in row for row in rows):
+        raise CaseError(
+            f"{path}: has no column closed; write it anew with --stages analyse,report --force"
+        )
+    return rows
