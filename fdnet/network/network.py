@@ -179,8 +179,8 @@ def build_network(
 
     Raises:
         NetworkError: unknown walls, impossible lengths, too few or coplanar grains, facets without
-            partner, or no throat. A periodic cell that is too small is to be repeated, as `analyse`
-            does.
+            partner, or no throat. A periodic cell that is too small is to be repeated, as
+            `analyse` does.
 
     Examples:
         >>> import fdnet, numpy as np

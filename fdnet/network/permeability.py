@@ -192,7 +192,7 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
         solver=worst_solve(flows),
         copies=specimen.copies,
         counts=_counts(base, specimen.occupancy, damage, final.flow)
-        | {"spheres_dropped": sum(specimen.dropped)}
+        | {"spheres_dropped": specimen.inner.grains + specimen.inner.fines}
         | counts,
         warnings=tuple(log.warnings),
         seconds=log.seconds,

@@ -25,10 +25,10 @@ PROFILE_BINS = 32
 _TOUCH = 0.2
 """Part of its radius by which a sphere may reach across a wall: pressed grains do."""
 _MANY = 0.25
-"""Part of the spheres that would cross the side walls of a periodic pack, above which those that do
-are reported."""
+"""Part of the spheres that would cross the sides of a periodic pack, above which those that cross
+side walls are reported."""
 _LARGE_FINE = 0.5
-"""Part of the smallest grain's radius up to which spheres of type 2 are taken for fines unasked."""
+"""Part of the smallest grain's radius up to which spheres of type 2 are fines unasked."""
 _BOX_MISSING = "no --box given: the box around all grains was used"
 
 

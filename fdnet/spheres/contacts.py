@@ -114,24 +114,25 @@ def overlap_warnings(grains: float, fines: float = 0.0) -> list[str]:
     ]
 
 
-def inside_others(spheres: Snapshot, periodic: tuple[bool, bool, bool]) -> tuple[Array, Array]:
-    """Which spheres (N,) lie wholly inside another one, and which others for the most part.
+def inside_others(
+    spheres: Snapshot, periodic: tuple[bool, bool, bool]
+) -> tuple[Array, Array, Array]:
+    """Which spheres (N,) lie wholly inside another one, mostly, or with their centre only.
 
     The first add nothing to the solid. They may reach out by a thousandth of their radius, so that
     spheres that coincide or touch from within are among them but for the rounding of a file. The
     one of two that coincide is kept that comes first, a grain before a fine. The second have more
     than half of their surface inside another sphere: d2 < R2 - r2 for a distance d of the centres.
+    Of two equal spheres with their centres in each other one is counted.
     """
     radius, count = spheres.radius, len(spheres)
-    wholly, mostly = np.zeros(count, bool), np.zeros(count, bool)
+    wholly, mostly, centred = np.zeros((3, count), bool)
     if count < 2:
-        return wholly, mostly
+        return wholly, mostly, centred
     tree = neighbour_tree(spheres.position, spheres.box, periodic=periodic)
-    least = float(radius.min())
-    reach = np.maximum(np.sqrt(radius**2 - least**2), radius - (1 - _INSIDE_ROUNDING) * least)
-    # only spheres with the centre of another one inside can hold it, among rigid ones none
-    hosts = np.flatnonzero(tree.query_ball_point(tree.data, reach, return_length=True) > 1)
-    found = tree.query_ball_point(tree.data[hosts], reach[hosts])
+    # among rigid spheres none has the centre of another one inside
+    hosts = np.flatnonzero(tree.query_ball_point(tree.data, radius, return_length=True) > 1)
+    found = tree.query_ball_point(tree.data[hosts], radius[hosts])
     host = np.repeat(hosts, [len(one) for one in found])
     guest = np.array([number for one in found for number in one], int)
     rank = np.empty(count, int)
@@ -145,6 +146,7 @@ def inside_others(spheres: Snapshot, periodic: tuple[bool, bool, bool]) -> tuple
     holds = distance <= radius[host] - (1 - _INSIDE_ROUNDING) * radius[guest]
     for one, other in zip(host[holds], guest[holds], strict=True):
         wholly[other] |= not wholly[one]
-    more = (distance**2 < radius[host] ** 2 - radius[guest] ** 2) & ~wholly[host]
-    mostly[guest[more]] = True
-    return wholly, mostly & ~wholly
+    more = distance**2 < radius[host] ** 2 - radius[guest] ** 2
+    mostly[guest[more & ~wholly[host]]] = True
+    centred[guest[~wholly[host]]] = True
+    return wholly, mostly & ~wholly, centred & ~mostly & ~wholly

@@ -30,6 +30,22 @@ MOVED = 1e-9
 """A grain that is displaced by more than this, m, has moved."""
 
 
+MANY_CENTRED = 0.1
+"""Share of the grains with their centre inside another one, from which a warning says so."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Inner:
+    """How many grains and fines lie wholly inside other spheres; they were left out.
+
+    `centred` is the number of grains with their centre inside another one of about their size.
+    """
+
+    grains: int
+    fines: int
+    centred: int
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Specimen:
     """The parts of an analysis that depend on no law, in SI units.
@@ -40,7 +56,7 @@ class Specimen:
         grains: the grains as they were, and where they ended; those of all copies.
         fines: all fines, those beyond the box among them; None without fines.
         copies: of the cell along x, y and z.
-        dropped: number of grains and of fines that were left out, wholly inside other spheres.
+        inner: how many spheres lie inside others, and were left out for it.
         first: network of the grains as they were.
         network: network of the grains where they ended, the same one unless they moved.
         moved: whether any grain moved by more than 1 nm.
@@ -56,7 +72,7 @@ class Specimen:
     grains: tuple[Snapshot, Snapshot]
     fines: Snapshot | None
     copies: tuple[int, int, int]
-    dropped: tuple[int, int]
+    inner: Inner
     first: Network
     network: Network
     moved: bool
@@ -103,7 +119,7 @@ def measure_specimen(
     edges = section_edges(choices.sections, box)
     if fines is not None and (why := wide_fines(before, fines)):
         raise NetworkError(why)
-    before, after, fines, dropped = _without_inner(before, after, fines, periodic)
+    before, after, fines, inner = _without_inner(before, after, fines, periodic)
     with timed("tessellate"):
         moved = _displaced(before, after, periodic)
         packs = [before, *([after] if moved else [])]
@@ -135,7 +151,7 @@ def measure_specimen(
         grains=grains,
         fines=None if fines is None else repeated(fines, copies),
         copies=copies,
-        dropped=dropped,
+        inner=inner,
         first=first,
         network=network,
         moved=moved,
@@ -175,10 +191,17 @@ def specimen_doubts(specimen: Specimen, permeability: float, walls: str) -> Iter
             f"none of the {occupancy.counts['fines_outside_box']} fines is centred in the box: "
             "no pore holds any; check the box if some should"
         )
-    if any(specimen.dropped):
+    inner = specimen.inner
+    for count, name in ((inner.grains, "grains"), (inner.fines, "fines")):
+        if count:
+            yield (
+                f"{count} {name} lie wholly inside other spheres: they add nothing to the solid "
+                "and were left out"
+            )
+    if inner.centred > MANY_CENTRED * len(specimen.grains[0]) / np.prod(specimen.copies):
         yield (
-            "{} grains and {} fines lie wholly inside other spheres: they add nothing to the "
-            "solid and were left out".format(*specimen.dropped)
+            f"{inner.centred} grains have their centre inside another one of about their size: "
+            "between such clumps the permeability is 4 to 13 % too high by resolved flow"
         )
     porosity = specimen.porosity[0].mean
     yield from doubts(
@@ -201,21 +224,20 @@ def _without_inner(
     after: Snapshot,
     fines: Snapshot | None,
     periodic: tuple[bool, bool, bool],
-) -> tuple[Snapshot, Snapshot, Snapshot | None, tuple[int, int]]:
-    """Grains before and after and fines that add to the solid, and how many of both do not."""
-    inner = inside_others(before, periodic)[0]
-    together = after if fines is None else after.joined(fines)
-    later = inside_others(together, periodic)[0] if together is not before else inner
-    inner = inner & later[: len(before)]
-    if fines is not None:
-        hidden = later[len(before) :]
-        fines = fines.where(~hidden) if hidden.any() else fines
-        dropped = int(inner.sum()), int(hidden.sum())
+) -> tuple[Snapshot, Snapshot, Snapshot | None, Inner]:
+    """Grains before and after and fines that add to the solid, and how many do not."""
+    wholly, _, centred = inside_others(before, periodic)
+    if after is not before or fines is not None:
+        together = after if fines is None else after.joined(fines)
+        later = inside_others(together, periodic)[0]
+        wholly, hidden = wholly & later[: len(after)], later[len(after) :]
+        fines = fines.where(~hidden) if fines is not None and hidden.any() else fines
     else:
-        dropped = int(inner.sum()), 0
-    if inner.any():
-        before, after = before.where(~inner), after.where(~inner)
-    return before, after, fines, dropped
+        hidden = np.zeros(0, bool)
+    inner = Inner(grains=int(wholly.sum()), fines=int(hidden.sum()), centred=int(centred.sum()))
+    if inner.grains:
+        before, after = before.where(~wholly), after.where(~wholly)
+    return before, after, fines, inner
 
 
 def _same_grains(before: Snapshot, after: Snapshot) -> Snapshot:

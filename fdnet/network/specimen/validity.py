@@ -13,13 +13,16 @@ VALIDATED_POROSITY = (0.25, 0.50)
 SAND = (1e-6, 1e-2)
 """Smallest and largest diameter of a grain, m, that nobody wonders at."""
 CARMAN_KOZENY = (1 / 20, 5.0)
-"""Least and most permeability of any packing over that of Carman and Kozeny. Dense packs of equal
-and unequal spheres have 0.5 to 1.2 of it (docs: accuracy), lattices 0.97 to 1.2."""
+"""Least and most permeability of any packing over that of Carman and Kozeny; packs and lattices
+of spheres have 0.5 to 1.2 of it."""
 LIKE = 1e-3
 """A fine that is smaller than the smallest grain by less than this share is as large."""
-GAPS, FEWEST, MISSING, LEAST_SIDE = (0.05, 0.5), 5.0, 0.25, 2.5
+PRESSED = 0.2
+"""Part of its radius by which a grain may reach across a wall: pressed grains do."""
+GAPS, FEWEST, MISSING, LEAST_SIDE = (0.05, 0.5), 5.0, 0.55, 2.5
 """To find walls at periodic sides: gaps between neighbours, in diameters; the number of neighbours
-across a side, and its share, below which they are missing; the least side, in lengths between."""
+across a side, and its share, below which they are missing (packs between walls have 0.1 to 0.35 of
+it, periodic ones 0.8 and more); the least side, in lengths between neighbours."""
 _SERIES = 2 * np.arange(200) + 1.0
 
 
@@ -42,7 +45,7 @@ def wide_fines(grains: Snapshot, fines: Snapshot) -> str:
     if radius >= grain * (1.0 - LIKE):
         return (
             f"fines: the fine with id {number} has a radius of {radius:.4g} m, the smallest grain "
-            f"one of {grain:.4g} m; expected fines that are clearly smaller than the grains. Check "
+            f"one of {grain:.4g} m; expected fines that are clearly smaller than grains. Check "
             "the units of the radii, or which spheres are fines"
         )
     return ""
@@ -83,41 +86,37 @@ def packing_doubts(
     grains: Snapshot, porosity: float, permeability: float, periodic: tuple[bool, bool, bool]
 ) -> Iterator[str]:
     """Why grains, or their permeability (m2) without fines, are those of no sand pack."""
-    diameter = 2.0 * grains.radius
-    if diameter.max() > SAND[1] or diameter.min() < SAND[0]:
+    least, most = 2.0 * float(grains.radius.min()), 2.0 * float(grains.radius.max())
+    if most > SAND[1] or least < SAND[0]:
         yield (
-            f"the grains are {diameter.min():.3g} to {diameter.max():.3g} m wide, which is no sand "
-            f"({SAND[0]:g} to {SAND[1]:g} m): the unit of length is probably another one, and the "
-            "permeability goes with its square"
+            f"the grains are {least:.3g} to {most:.3g} m wide, which is no sand ({SAND[0]:g} to "
+            f"{SAND[1]:g} m): the unit of length is probably another one, and the permeability "
+            "goes with its square"
         )
     likely = kozeny(grains, porosity)
-    low, high = (share * likely for share in CARMAN_KOZENY)
-    # each of the spheres has at least the drag of one that is alone
-    high = min(
-        high,
-        2.0
-        * float(np.prod(np.ptp(grains.box, axis=1)))
-        / (6.0 * np.pi * float(grains.radius.sum())),
-    )
-    sparse = porosity > VALIDATED_POROSITY[1]
-    if permeability > high or (0.0 < permeability < low and not sparse):
+    # spheres that are far apart have the drag of single ones
+    volume = float(np.prod(np.ptp(grains.box, axis=1)))
+    lone = volume / (6.0 * np.pi * float(grains.radius.sum()))
+    high = min(CARMAN_KOZENY[1] * likely, 2.0 * lone)
+    low, (dense, sparse) = CARMAN_KOZENY[0] * likely, VALIDATED_POROSITY
+    if permeability > high or (0.0 < permeability < low and dense <= porosity <= sparse):
         yield (
-            f"the permeability without fines, {permeability:.3g} m2, is {permeability / likely:.3g} "
-            f"times what Carman and Kozeny give for these radii and this porosity ({likely:.3g} "
-            "m2), which no packing has: do not use it; check the box, which sides are periodic, "
-            "and whether radii and places have one unit"
+            f"the permeability without fines, {permeability:.3g} m2, is "
+            f"{permeability / likely:.3g} times what Carman and Kozeny give for these radii and "
+            f"this porosity ({likely:.3g} m2), which no packing has: do not use it; check the "
+            "box, which sides are periodic, and whether radii and places have one unit"
         )
     for axis, found, expected in _walls_at_periodic_sides(grains, periodic):
         yield (
             f"no grain crosses the periodic sides {axis}, and {found} neighbours meet across them "
             f"where {expected:.0f} are expected: the pack stands as between walls, and the gap "
-            "there carries flow; leave "
-            f"{axis} out of the periodic directions unless the pack repeats like this"
+            f"there carries flow; leave {axis} out of the periodic directions unless the pack "
+            "repeats like this"
         )
 
 
 def kozeny(grains: Snapshot, porosity: float) -> float:
-    """Permeability m2 by Carman (1937) and Kozeny with the constant 180 and the Sauter diameter."""
+    """Permeability m2 by Carman and Kozeny with the constant 180 and the Sauter diameter."""
     sauter = 2.0 * float(np.sum(grains.radius**3) / np.sum(grains.radius**2))
     return porosity**3 * sauter**2 / (180.0 * max(1.0 - porosity, 1e-9) ** 2)
 
@@ -131,7 +130,7 @@ def _walls_at_periodic_sides(
     within. Yields the axis, the number of these neighbours and the number expected.
     """
     place = wrapped(grains.position, grains.box, periodic)
-    reach, (low, high) = grains.radius[:, None] * (1.0 - 1e-3), grains.box.T
+    reach, (low, high) = grains.radius[:, None] * (1.0 - PRESSED), grains.box.T
     clear = np.array(periodic) & np.all((place - reach >= low) & (place + reach <= high), axis=0)
     if not clear.any():
         return

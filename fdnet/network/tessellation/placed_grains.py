@@ -63,7 +63,7 @@ def place_grains(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Plac
     if len(grains):
         check_lengths(grains, periodic)
     reaching = _reaching(grains, periodic) if len(grains) else np.zeros(0, int)
-    wholly, mostly = inside_others(grains.where(reaching), periodic)
+    wholly, mostly, _ = inside_others(grains.where(reaching), periodic)
     index, mostly = reaching[~wholly], mostly[~wholly]
     placed, beyond = onto_walls(grains.where(index), periodic)
     if len(double := _coinciding(placed, periodic)):
