@@ -162,7 +162,7 @@ def test_degenerate_spheres_end_with_4(tmp_path, capsys):
     (tmp_path / "sc.csv").write_text("x,y,z,radius\n" + rows)
     code, _, err = answer(capsys, tmp_path / "sc.csv", "--units", "mm", "--box", "0,2,0,2,0,2")
     assert code == 4
-    assert "3 of 4 grains" in err
+    assert "3 of 3 grains reach into the box" in err
     assert len(err.strip().splitlines()) == 1
 
 
