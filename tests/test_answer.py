@@ -91,7 +91,7 @@ def test_layers_and_what_is_left_of_a_section_are_the_section_in_series():
     assert zone.depth == 1e-3
     assert zone.ratio == pytest.approx((1 / 4 + 1 / 2) / (1 / 0.5 + 1 / 1.0))
     assert not zone.open_end
-    assert len(steps_of(analysis_of([(0.0, 2e-3, *whole)], thin, law="side-kozeny"))) == 1
+    assert len(steps_of(analysis_of([(0.0, 2e-3, *whole)], thin, law="section-archie"))) == 1
 
 
 @pytest.mark.parametrize(

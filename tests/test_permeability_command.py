@@ -124,7 +124,7 @@ def test_all_laws_as_a_table(tmp_path, capsys):
         "--compare-laws",
     )
     assert code == 0
-    for law in ("thesis", "effective", "hydraulic", "series", "thesis-code", "kozeny"):
+    for law in ("thesis", "effective", "thesis-code", "section-archie"):
         assert law in out
 
 
@@ -323,15 +323,22 @@ def test_what_the_answer_rests_on_is_in_it(tmp_path, capsys):
     assert any("walls that hold the fluid" in text for text in plain["assumptions"])
     chosen = json.loads(
         answer(
-            capsys, *given, "--fines-below", limit, "--damage-law", "kozeny", "--walls", "slip"
+            capsys,
+            *given,
+            "--fines-below",
+            limit,
+            "--damage-law",
+            "section-archie",
+            "--walls",
+            "slip",
         )[1]
     )
-    assert chosen["damage_law_used"] == "kozeny"
+    assert chosen["damage_law_used"] == "section-archie"
     assert any("let the fluid slip" in text for text in chosen["assumptions"])
     assert not any("damage law is fdnet's default" in text for text in chosen["assumptions"])
     default = json.loads(answer(capsys, *given, "--fines-below", limit)[1])
     assert default["damage_law"] == "auto"
-    assert default["damage_law_used"] == "combined"
+    assert default["damage_law_used"] == "all-spheres"
     assert any("damage law is fdnet's default" in text for text in default["assumptions"])
 
 

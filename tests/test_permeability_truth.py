@@ -7,11 +7,10 @@ import math
 import pytest
 
 from fdnet.case.names import (
+    ALL_SPHERES,
     AUTO,
-    COMBINED,
     DAMAGE_LAW_NAMES,
     LAW_NAMES,
-    OWN_NETWORK,
     SECTION_ARCHIE,
 )
 from fdnet.cli import main
@@ -83,7 +82,7 @@ def test_loss_by_fines_within_10_percent_and_5_in_the_mean_square(capsys, names)
 
 def test_names_offered_are_the_laws_there_are():
     assert set(LAW_NAMES) == set(LAWS)
-    assert set(DAMAGE_LAW_NAMES) == {AUTO, *OWN_NETWORK, *DAMAGE_LAWS}
+    assert set(DAMAGE_LAW_NAMES) == {AUTO, ALL_SPHERES, *DAMAGE_LAWS}
 
 
 def test_compared_laws_give_what_each_gives_alone(capsys, tmp_path):
@@ -91,9 +90,9 @@ def test_compared_laws_give_what_each_gives_alone(capsys, tmp_path):
     result = run(capsys, "packC_r5_d2-x", "--compare-laws", "--sections", "2", "--csv", str(table))
     pairs = {(one["law"], one["damage_law"]): one for one in result["laws"]}
     two_scale = {(law, damage) for law in LAWS for damage in DAMAGE_LAWS}
-    assert set(pairs) == two_scale | {(DEFAULT_LAW, name) for name in (AUTO, *OWN_NETWORK)}
+    assert set(pairs) == two_scale | {(DEFAULT_LAW, name) for name in (AUTO, ALL_SPHERES)}
     assert result["k_damaged_m2"] == pairs[DEFAULT_LAW, result["damage_law_used"]]["k_damaged_m2"]
-    assert (result["damage_law_used"], result["damage_law_other"]) == (COMBINED, SECTION_ARCHIE)
+    assert (result["damage_law_used"], result["damage_law_other"]) == (ALL_SPHERES, SECTION_ARCHIE)
     alone = run(
         capsys, "packC_r5_d2-x", "--law", "thesis", "--damage-law", "thesis", "--sections", "2"
     )

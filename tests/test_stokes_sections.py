@@ -173,7 +173,7 @@ def test_the_table_says_how_fine_the_grids_were(resolved, tmp_path):
     assert row["cell_initial_m"] == pytest.approx(
         spheres.grains().radius.mean() / ROUGH_GRAIN, rel=0.1
     )
-    assert row["network_damage_law"] == "combined"
+    assert row["network_damage_law"] == "all-spheres"
 
 
 @pytest.mark.parametrize("text", [b"", b"a,b\n1,2\n", b"\xff", HEAD, NOT_FINITE])

@@ -17,11 +17,13 @@ from fdnet.network.laws.section_rays import aim, set_sides
 from fdnet.network.laws.wedge import ratio_table
 from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse
+from fdnet.network.resolved.all_spheres import at_most_the_grains, measure_all_spheres
+from fdnet.network.resolved.slab import Sides
+from fdnet.network.resolved.state import Log
 from fdnet.spheres.snapshot import Kind, Snapshot
 from fdnet.studies.truth.packs import read_pack, truth_folder
 from tests.network.packs import random_pack, with_fines
 
-pytestmark = pytest.mark.usefixtures("by_the_network_alone")
 SIDES = "yz"
 BASE = np.array([[0.0, 0.0], [1.0, 0.0], [0.3, 0.9]])
 
@@ -198,10 +200,38 @@ def test_a_section_without_fines_loses_nothing(pack):
     assert result.sections[1].k_reduction == 0.0
 
 
-@pytest.mark.parametrize("name", ["all-spheres", "combined"])
-def test_all_spheres_goes_with_its_own_law_alone(pack, name):
-    with pytest.raises(CaseError, match=rf"analysis\.damage_law: '{name}'.*'thesis'"):
-        analyse(pack, periodic=SIDES, law="thesis", damage_law=name)
+def test_fines_that_seem_to_raise_k_are_capped_section_by_section_and_counted(pack):
+    """k of the whole is then the series of its sections, each at most that of the grains."""
+    edges = np.linspace(*pack.box[0], 4)
+    sides = Sides(periodic=(False, True, True), walls="no-slip")
+    timed = Log().timed
+    whole = measure_all_spheres(pack, edges, sides=sides, timed=timed)
+    k, cut, place = whole.k, whole.slabs.cut_out, whole.slabs.inplace
+    factor = np.array([0.9, 1.2, 0.8])
+    grains = replace(whole.slabs, cut_out=factor * cut, inplace=factor * place)
+    empty = np.array([False, True, False])
+    least, counts = at_most_the_grains(whole, (0.85 * k, grains), edges, empty)
+    assert least.slabs.cut_out == pytest.approx(factor * cut)
+    assert least.slabs.inplace == pytest.approx(np.minimum(factor, 1.0) * place)
+    assert least.k == pytest.approx(min(3.0 / np.sum(1.0 / least.slabs.inplace), 0.85 * k))
+    above = ("all_spheres_above_grains", "all_spheres_sections_above_grains")
+    assert [counts[name] for name in above] == [1, 2]
+    same, counts = at_most_the_grains(whole, (2.0 * k, None), edges, empty)
+    assert (same.k, same.slabs.inplace.tolist()) == (k, place.tolist())
+    assert [counts[name] for name in above] == [0, 0]
+
+
+def test_sections_through_which_few_throats_carry_the_flow_are_named(pack):
+    result = analyse(pack, periodic=SIDES, sections=2)
+    (said,) = [text for text in result.warnings if text.startswith("few throats carry")]
+    assert "in section 1" in said
+    assert "in section 2" in said
+    assert "fdnet stokes" in said
+
+
+def test_all_spheres_goes_with_its_own_law_alone(pack):
+    with pytest.raises(CaseError, match=r"analysis\.damage_law: 'all-spheres'.*'thesis'"):
+        analyse(pack, periodic=SIDES, law="thesis", damage_law="all-spheres")
 
 
 def test_spheres_that_make_no_network_are_refused_or_left_to_the_other_law(pack):

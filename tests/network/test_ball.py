@@ -7,18 +7,16 @@ import numpy as np
 import pytest
 from overlap import Sphere, Tetrahedron, overlap_area, overlap_volume
 
-from fdnet.network.fines.ball import fill_pieces
+from fdnet.network.fines.ball import pieces
 
 BALL, SPHERE = 4 / 3 * np.pi, 4 * np.pi
 CORNER = np.array([[0, 0, 0], [50, 0, 0], [0, 50, 0], [0, 0, 50.0]])
 
 
 def piece(corner, centre, radius=1.0):
-    filled, one = np.zeros((1, 3)), np.zeros(1, np.intp)
-    balls = (np.array([centre], float), np.array([float(radius)]), np.array([[7.0]]))
-    fill_pieces(np.array([corner], float), (one, one), balls, filled)
-    assert filled[0, 2] == 7.0 * filled[0, 0]
-    return filled[0, 0], filled[0, 1]
+    one = np.zeros(1, np.intp)
+    places = np.array([corner], float), (one, one), np.array([centre], float)
+    return tuple(pieces(*places, np.array([float(radius)]))[0])
 
 
 def oriented(corner):

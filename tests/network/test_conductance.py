@@ -4,14 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 
-from fdnet.network import geometry
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.laws.named import LAWS
-from fdnet.network.laws.pyramids import _foot_angles
 from fdnet.network.network import build_network
-from tests.network.packs import body_centred, face_centred, random_pack, simple_cubic
+from tests.network.packs import body_centred, random_pack
 
 ALL = (True,) * 3
 
@@ -27,35 +24,13 @@ def zick_homsy(solid, drag):
     return 2 / (9 * solid * drag)
 
 
-@pytest.mark.parametrize(("law", "ratio"), [("series", 1.07), ("hydraulic", 0.97)])
-def test_touching_simple_cubic_against_stokes(law, ratio):
-    measured = permeability(simple_cubic(), law) / zick_homsy(np.pi / 6, 42.1)
-    assert measured == pytest.approx(
-        ratio, abs=0.015
-    )  # ratios measured apart, by another code of these rules
-
-
 @pytest.mark.parametrize(
     ("law", "ratio"),
-    [("series", 1.00), ("hydraulic", 1.02), ("thesis", 0.27), ("effective", 1.04)],
+    [("thesis", 0.27), ("effective", 1.04)],
 )
 def test_touching_body_centred_against_stokes(law, ratio):
     measured = permeability(body_centred(), law) / zick_homsy(np.pi * np.sqrt(3) / 8, 162.9)
     assert measured == pytest.approx(ratio, abs=0.015)
-
-
-@pytest.mark.parametrize(("law", "ratio"), [("series", 1.38), ("hydraulic", 0.92)])
-def test_touching_face_centred_against_stokes(law, ratio):
-    measured = permeability(face_centred(), law) / zick_homsy(np.pi / np.sqrt(18), 435.0)
-    assert measured == pytest.approx(ratio, abs=0.015)
-
-
-@pytest.mark.parametrize(("solid", "drag", "ratio"), [(0.343, 15.4, 1.97), (0.45, 28.1, 1.36)])
-def test_loose_simple_cubic_shows_the_known_excess_of_the_hydraulic_law(solid, drag, ratio):
-    pack = simple_cubic(edge=(4 / 3 * np.pi / solid) ** (1 / 3))
-    assert permeability(pack, "hydraulic") / zick_homsy(solid, drag) == pytest.approx(
-        ratio, abs=0.02
-    )
 
 
 def test_body_centred_throat_by_the_formulas_on_paper():
@@ -76,14 +51,6 @@ def test_body_centred_throat_by_the_formulas_on_paper():
         np.pi * effective**4 / (8 * np.sqrt(2 / 3)), rel=1e-4
     )
 
-    def resistance(z):
-        inscribed = circle - np.sqrt(1 - z**2)
-        mean = 0.35 * inscribed + 0.65 * np.sqrt((area - np.pi * (1 - z**2) / 2) / np.pi)
-        return 8 / (np.pi * mean**4)
-
-    half = np.sqrt(2 / 3) / 2
-    assert LAWS["series"](network) == pytest.approx(1 / quad(resistance, -half, half)[0], rel=1e-3)
-
 
 @pytest.mark.parametrize("law", LAWS)
 def test_closed_throats_conduct_nothing_in_any_law(law):
@@ -97,15 +64,3 @@ def test_closed_throats_conduct_nothing_in_any_law(law):
     assert closed.any()
     assert np.all(conductance[closed] == 0)
     assert np.all(np.isfinite(conductance) & (conductance >= 0))
-
-
-@pytest.mark.parametrize("spread", [0.0, 0.33])
-def test_pyramids_to_the_power_centres_take_up_every_grain_once(spread):
-    """Their solid angles at a grain add up to 4 pi, so all facets have the same apexes."""
-    pack = random_pack(80, spread=spread)
-    network = build_network(pack, periodic=ALL)
-    base = geometry.flat(network.throat_corner)
-    middle = geometry.power_centre(base, network.throat_corner_radius)[0]
-    angle = sum(_foot_angles(base, middle, network.throat_heights[:, side]) for side in (0, 1))
-    whole = np.bincount(network.throat_grains.ravel(), weights=np.asarray(angle).ravel())
-    assert whole == pytest.approx(np.full(len(pack), 4 * np.pi), rel=1e-6)

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from fdnet.case.analysis import AnalysisChoices
 from fdnet.errors import CaseError
 from fdnet.network.laws.named import DAMAGE_LAWS, damage_law
 from tests.network.networks import chain
@@ -13,7 +14,7 @@ R, L = 0.1, 1.0
 CLEAN = np.pi * R**4 / (8 * L)
 
 
-def occupancy(porosity, *, fine=0.02, distance=0.9, blocked=None, solid=0.0, surface=0.0):
+def occupancy(porosity, *, fine=0.02, distance=0.9, blocked=None):
     porosity = np.asarray(porosity, float)
     count = len(porosity)
     return SimpleNamespace(
@@ -23,10 +24,6 @@ def occupancy(porosity, *, fine=0.02, distance=0.9, blocked=None, solid=0.0, sur
         blocked=np.zeros(count, bool) if blocked is None else np.asarray(blocked),
         pair_throat=np.arange(count),
         pair_distance=np.full(count, distance),
-        pore_solid_volume=np.broadcast_to(solid, count + 1).astype(float),
-        pore_solid_surface=np.broadcast_to(surface, count + 1).astype(float),
-        pore_fine_volume=np.zeros(count + 1),
-        pore_layer=np.zeros(count + 1),
     )
 
 
@@ -91,21 +88,6 @@ def test_clogging_never_exceeds_the_clean_throat():
     assert damage.counts["capped"] == 1
 
 
-def test_kozeny_is_the_harmonic_mean_of_two_pores():
-    state = occupancy([1.0], solid=np.array([0.2, 0.0]), surface=np.array([0.5, 0.0]))
-    factor = 0.8**3 / 1.5**2
-    damage = damaged("kozeny", state)
-    assert damage.conductance[0] == pytest.approx(CLEAN * 2 * factor / (1 + factor))
-    assert damage.law_used[0] == "kozeny"
-
-
-def test_kozeny_closes_a_filled_pore_and_counts_it():
-    damage = damaged("kozeny", occupancy([1.0, 1.0], solid=np.array([1.0, 0.0, 0.0]), surface=0.1))
-    assert damage.conductance == pytest.approx([0.0, CLEAN])
-    assert damage.counts["pores_filled"] == 1
-    assert damage.law_used.tolist() == ["blocked", "clean"]
-
-
 @pytest.mark.parametrize("options", [{"clogging_threshold": 1.2}, {"middle_band": "guess"}])
 def test_options_out_of_range_are_refused(options):
     with pytest.raises(CaseError, match=next(iter(options))):
@@ -113,9 +95,26 @@ def test_options_out_of_range_are_refused(options):
 
 
 def test_an_unknown_law_is_refused_with_the_known_ones():
-    with pytest.raises(CaseError, match=r"analysis.damage_law: 'guess'.*side-kozeny.*thesis-code"):
+    with pytest.raises(CaseError, match=r"damage_law: 'guess'.*section-archie.*thesis-code"):
         damage_law("guess")
 
 
-def test_the_kozeny_laws_have_no_options():
-    assert damage_law("kozeny", clogging_threshold=0.3) is DAMAGE_LAWS["kozeny"]
+def test_section_archie_has_no_options():
+    archie = damage_law("section-archie", clogging_threshold=0.3)
+    assert archie is DAMAGE_LAWS["section-archie"]
+
+
+@pytest.mark.parametrize(
+    ("key", "gone", "instead"),
+    [
+        ("law", "hydraulic", "lubrication"),
+        ("law", "series", "lubrication"),
+        ("damage_law", "combined", "auto"),
+        ("damage_law", "upscaled", "all-spheres"),
+        ("damage_law", "kozeny", "section-archie"),
+        ("damage_law", "side-kozeny", "section-archie"),
+    ],
+)
+def test_a_law_that_is_gone_is_refused_with_the_one_to_take(key, gone, instead):
+    with pytest.raises(CaseError, match=f"analysis.{key}: .*'{gone}'.*take '{instead}'"):
+        AnalysisChoices.of_pack(**{key: gone})

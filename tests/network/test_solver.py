@@ -8,7 +8,7 @@ from fdnet.errors import FlowError
 from fdnet.network.flow import solver
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.flow.solver import DIRECT, MULTIGRID, Balances
-from fdnet.network.laws.conductance import series_law
+from fdnet.network.laws.conductance import effective_law
 from fdnet.network.network import build_network
 from tests.network.packs import random_pack
 
@@ -61,7 +61,7 @@ def test_a_cycle_is_pyamgs_own_and_symmetric(monkeypatch):
 def test_multigrid_and_direct_agree_on_a_pack(monkeypatch, periodic, decades):
     network = build_network(random_pack(120), periodic=periodic, walls="slip")
     rng = np.random.default_rng(4)
-    g = series_law(network) * 10.0 ** rng.uniform(-decades, 0, len(network.throat_pores))
+    g = effective_law(network) * 10.0 ** rng.uniform(-decades, 0, len(network.throat_pores))
     flows = []
     for limit in (0, 10_000):
         monkeypatch.setattr(solver, "DIRECT_UP_TO", limit)

@@ -65,7 +65,7 @@ def test_sections_of_a_walled_pack_are_those_of_its_doubled_pack():
     in_place = []
     for one, periodic in ((pack, NONE), (doubled(pack, (1, 2)), (False, True, True))):
         network = build_network(one, periodic=periodic, walls="slip")
-        flow = solve_flow(network, LAWS["series"](network))
+        flow = solve_flow(network, LAWS["effective"](network))
         in_place.append(inplace_permeability(network, flow, np.linspace(0, pack.box[0, 1], 5)))
     assert in_place[0] == pytest.approx(
         in_place[1], rel=1e-4

@@ -211,8 +211,6 @@ def demo_sections(initial, damaged, flows, edges):
             k_reduction=1 - k_damaged[i] / k_initial[i],
             k_initial_inplace=1.1 * k_initial[i],
             k_damaged_inplace=1.1 * k_damaged[i] * 0.95,
-            k_initial_resolved=False,
-            k_damaged_resolved=i == 0,
             fines_count=int(np.sum((depth >= edges[i]) & (depth < edges[i + 1]))),
             fines_fraction=float(
                 np.sum((depth >= edges[i]) & (depth < edges[i + 1])) / max(invaded, 1)

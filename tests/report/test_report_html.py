@@ -37,8 +37,6 @@ SECTION = {
     "k_damaged_inplace_m2": 4e-11,
     "fines_count": 704,
     "fines_fraction": 0.7,
-    "k_initial_resolved": 1,
-    "k_damaged_resolved": 0,
 }
 SUMMARY = {
     "case": "specimen <1>",

@@ -58,9 +58,7 @@ def changed(analysis, **values):
 def test_sections_hold_the_contract_columns_and_count_what_the_sphere_table_says(tmp_path):
     sections = rows_of(write_sections(tmp_path / "sections.csv", demo_analysis()))
     spheres = rows_of(write_spheres(tmp_path / "s.csv", demo_damaged()))
-    more = [f"k_{state}_{what}" for what in ("resolved", "mD") for state in ("initial", "damaged")]
-    assert list(sections[0]) == [*SECTION_COLUMNS, *more]
-    assert [row["k_damaged_resolved"] for row in sections[:2]] == ["1", "0"]
+    assert list(sections[0]) == [*SECTION_COLUMNS, "k_initial_mD", "k_damaged_mD"]
     depth = [float(sphere["x_m"]) for sphere in spheres if sphere["kind"] == "fine"]
     for row in sections:
         assert int(row["fines_count"]) == sum(

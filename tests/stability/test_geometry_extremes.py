@@ -21,7 +21,7 @@ def measure(
     grains: Snapshot,
     damaged: Snapshot | None = None,
     periodic: tuple[bool, bool, bool] = SIDES,
-    laws: tuple[str, str] = ("lubrication", "side-kozeny"),
+    laws: tuple[str, str] = ("lubrication", "section-archie"),
     sections: int = 1,
 ) -> Analysis:
     options = AnalysisChoices.of_pack(
@@ -277,7 +277,7 @@ def test_fines_larger_than_every_throat_close_a_lattice(radius, open_path):
         assert analysis.occupancy.blocked.sum() > 0
 
 
-@pytest.mark.parametrize("law", ["thesis", "thesis-code", "kozeny", "side-kozeny"])
+@pytest.mark.parametrize("law", ["thesis", "thesis-code", "section-archie"])
 def test_fines_that_fill_the_pack_leave_no_k(law):
     """With more volume of (overlapping) fines than void, k is 0 or nearly 0, and reported.
 
@@ -290,7 +290,7 @@ def test_fines_that_fill_the_pack_leave_no_k(law):
     left = np.exp(-4000 * 4 / 3 * np.pi * 0.3**3 / np.prod(pack.box[:, 1]))
     assert analysis.porosity_damaged == pytest.approx(left * analysis.porosity_initial, rel=0.1)
     assert analysis.k_damaged < 1e-3 * analysis.k_initial
-    if "kozeny" in law:
+    if law == "section-archie":
         assert analysis.k_damaged == 0
         assert analysis.counts["pore_porosity_negative"] > 0
         assert any("k_damaged = 0: no open path" in one for one in analysis.warnings)

@@ -151,7 +151,7 @@ def test_another_description_of_the_same_pack_gives_its_permeability(
     if change == "doubled" and "y" not in periodic:
         return  # two walled packs side by side are another pack
     pack = pack_of(spheres(spread), periodic)
-    for damage_law, rounding in (("side-kozeny", ROUNDING), ("auto", RAYS)):
+    for damage_law, rounding in (("thesis", ROUNDING), ("auto", RAYS)):
         intact, damaged = permeability(pack, tmp_path, capsys, "--damage-law", damage_law)
         other_intact, other_damaged = permeability(
             CHANGES[change](pack), tmp_path, capsys, "--damage-law", damage_law
