@@ -191,12 +191,12 @@ def _assumptions(
         yield "Fines and grains stay where they are."
 
 
-def _overlaps(spheres: "Snapshot", periodic: tuple[bool, bool, bool]) -> list[str]:
+def _overlaps(spheres: "Snapshot", periodic: tuple[bool, bool, bool]) -> Iterator[str]:
     """Warnings where the spheres that add to the solid overlap, as `fdnet run` has them."""
-    from fdnet.spheres.contacts import inside_others, max_overlap, overlap_warnings
+    from fdnet.spheres.contacts import inside_others, max_overlap, overlap_doubts
 
     seen = spheres.where(~inside_others(spheres, periodic)[0])
-    return overlap_warnings(
+    return overlap_doubts(
         max_overlap(seen.grains(), periodic), max_overlap(seen, periodic, only_fines=True)
     )
 

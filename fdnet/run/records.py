@@ -18,7 +18,7 @@ from fdnet.dem.packing import Pack
 from fdnet.dem.updates import UPDATES
 from fdnet.run.folder import RECORD_FORMAT
 from fdnet.run.made_files import digests_of
-from fdnet.spheres.contacts import overlap_warnings
+from fdnet.spheres.contacts import overlap_doubts
 
 PACK_DUMP = "post/pack.dump"
 MOMENTUM_LIMIT = 0.01
@@ -156,7 +156,7 @@ def _pack_warnings(pack: dict[str, Any]) -> list[str]:
     warnings, version = [], pack["runs"][0]["version"]
     if version != KNOWN_VERSION:
         warnings.append(f"LIGGGHTS {version}: fdnet was measured and tested with {KNOWN_VERSION}")
-    warnings += overlap_warnings(pack["max_overlap"])
+    warnings += overlap_doubts(pack["max_overlap"])
     if pack.get("restless"):
         warnings.append(
             f"{pack['restless']} packs did not come to rest and were made again from other random "

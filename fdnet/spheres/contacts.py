@@ -1,5 +1,6 @@
 """Which spheres touch, by how much they overlap, and which lie inside others."""
 
+from collections.abc import Iterator
 from itertools import count
 from typing import TYPE_CHECKING
 
@@ -103,15 +104,14 @@ def _own_images(spheres: Snapshot, periodic: tuple[bool, bool, bool], only_fines
     return float(max(1.0 - side / wide.max(initial=0.0), 0.0)) if len(wide) else 0.0
 
 
-def overlap_warnings(grains: float, fines: float = 0.0) -> list[str]:
+def overlap_doubts(grains: float, fines: float = 0.0) -> Iterator[str]:
     """Warnings on the largest overlaps of grains and of fines, as shares of a diameter."""
-    both = (("grains", "pack", grains), ("fines", "deposit", fines))
-    return [
-        f"{name} overlap by up to {100 * share:.1f} % of a diameter: the {what} is denser than "
-        "rigid spheres get"
-        for name, what, share in both
-        if share > _OVERLAP_WARNING
-    ]
+    for name, what, share in (("grains", "pack", grains), ("fines", "deposit", fines)):
+        if share > _OVERLAP_WARNING:
+            yield (
+                f"{name} overlap by up to {100 * share:.1f} % of a diameter: the {what} is denser "
+                "than rigid spheres get"
+            )
 
 
 def inside_others(
