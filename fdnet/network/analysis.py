@@ -55,6 +55,8 @@ class Analysis:
         invasion_depth_p95: depth above which 95 % of them lie, m.
         cake_thickness: thickness of the cake upstream of the formation face, m.
         solver: method, residual and mass balance, the worst of all solves.
+        copies: how often a periodic cell of a few grains was repeated along x, y and z, so that it
+            can be tessellated. The network and the values by pore and throat are of all copies.
         counts: how many pores, throats and spheres were closed, replaced or left out, by reason.
         warnings: doubts about the result, in words.
         seconds: run time of each step of the analysis, s.
@@ -89,6 +91,7 @@ class Analysis:
     invasion_depth_p95: float
     cake_thickness: float
     solver: Mapping[str, str | float | None]
+    copies: tuple[int, int, int]
     counts: Mapping[str, int]
     warnings: tuple[str, ...]
     seconds: Mapping[str, float]

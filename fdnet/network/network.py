@@ -36,7 +36,7 @@ class Network:
         area: m2, cross-section of the box.
         image_grain: (M,) index of the grain.
         image_fine: (M,) whether the image is one of a fine (`Snapshot.kind`), where grains and
-            fines are tessellated alike.
+            fines are tessellated alike, or of a grain that lies mostly inside another one.
         image_position: (M, 3) m.
         image_radius: (M,) m.
         image_height: (M,) m, how far the image reaches from its centre along x. It is the radius,
@@ -169,7 +169,7 @@ def build_network(
     half, fourth or eighth of the periodic specimen that its mirror images make up; with "no-slip"
     the y and z faces also hold the fluid, for the laws that account for it (`lubrication`).
     Unequal grains are tessellated by their power tessellation. Grains that do not reach into the
-    box are left out and counted.
+    box are left out and counted (`counts`), as are those that lie wholly inside another one.
 
     Args:
         grains: the spheres that carry the skeleton, m; those of the kind fine are taken as grains
@@ -178,8 +178,9 @@ def build_network(
         walls: "no-slip", the default as in `analyse`, or "slip".
 
     Raises:
-        NetworkError: unknown walls, impossible lengths, too few, coincident or coplanar grains,
-            facets without partner, or no throat.
+        NetworkError: unknown walls, impossible lengths, too few or coplanar grains, facets without
+            partner, or no throat. A periodic cell that is too small is to be repeated, as
+            `analyse` does.
 
     Examples:
         >>> import fdnet, numpy as np
@@ -198,7 +199,9 @@ def build_network(
     pores = measure_pores(tessellation, polyhedra)
     throats = measure_throats(tessellation, polyhedra, pores)
     counts = {
-        "grains_outside_box": len(grains) - len(placed.index),
+        "grains_outside_box": len(grains) - len(placed.index) - placed.dropped,
+        "grains_inside_others": placed.dropped,
+        "grains_mostly_inside_others": int(placed.inside.sum()),
         "grains_centred_beyond_walls": placed.beyond,
         "grains_hidden": tessellation.tetrahedra.hidden,
         **pores.counts,
@@ -221,7 +224,7 @@ def _assembled(
         grain_radius=tessellation.scale,
         area=float(tessellation.size[1] * tessellation.size[2]),
         image_grain=placed.index[points.owner],
-        image_fine=(placed.grains.kind == Kind.FINE)[points.owner],
+        image_fine=((placed.grains.kind == Kind.FINE) | placed.inside)[points.owner],
         image_position=points.position,
         image_radius=points.radius,
         image_height=placed.height[points.owner],

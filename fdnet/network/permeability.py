@@ -190,7 +190,10 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
         sections=sections,
         layers=_layers(specimen, clean, whole),
         solver=worst_solve(flows),
-        counts=_counts(base, specimen.occupancy, damage, final.flow) | counts,
+        copies=specimen.copies,
+        counts=_counts(base, specimen.occupancy, damage, final.flow)
+        | {"spheres_dropped": specimen.inner.grains + specimen.inner.fines}
+        | counts,
         warnings=tuple(log.warnings),
         seconds=log.seconds,
         **_without_laws(specimen),

@@ -24,8 +24,11 @@ if TYPE_CHECKING:
 PROFILE_BINS = 32
 _TOUCH = 0.2
 """Part of its radius by which a sphere may reach across a wall: pressed grains do."""
-_MANY = 0.1
-"""Part of all spheres above which those that cross the side walls are reported."""
+_MANY = 0.25
+"""Part of the spheres that would cross the sides of a periodic pack, above which those that cross
+side walls are reported."""
+_LARGE_FINE = 0.5
+"""Part of the smallest grain's radius up to which spheres of type 2 are fines unasked."""
 _BOX_MISSING = "no --box given: the box around all grains was used"
 
 
@@ -65,17 +68,51 @@ def _read(options: argparse.Namespace, periodic: tuple[bool, bool, bool]) -> "Sp
         types=None if options.types is None else types_of(options.types),
     )
     grains = len(given.spheres.grains())
-    if grains < 4:
-        raise CaseError(
-            f"{options.spheres}: {grains} grains, expected at least 4 for a tetrahedron; the dump "
-            "of an invasion holds fines alone (give the run's spheres_damaged.csv instead); if "
-            "grains and fines were taken for each other, use --fines-below or --types"
+    if grains < (1 if any(periodic) else 4):
+        why = (
+            "for a tetrahedron; a periodic cell of fewer needs --periodic"
+            if grains
+            else "for a tetrahedron; the dump of an invasion holds fines alone (give the run's "
+            "spheres_damaged.csv instead)"
         )
+        raise CaseError(
+            f"{options.spheres}: {grains} grains, expected at least 4 {why}; if grains and fines "
+            "were taken for each other, use --fines-below or --types"
+        )
+    _refuse_large_fines(given, options)
     if given.around_grains and any(periodic):
         raise CaseError(
             "--box: missing, a periodic direction needs its length; give --box x0,x1,y0,y1,z0,z1"
         )
     return given
+
+
+def _refuse_large_fines(given: "SphereFile", options: argparse.Namespace) -> None:
+    """Raise CaseError on fines that are as large as grains.
+
+    A type that was taken for that of the fines unasked must be clearly smaller.
+    """
+    from fdnet.network.specimen.validity import wide_fines
+
+    grains, fines = given.spheres.grains(), given.spheres.fines()
+    why = wide_fines(grains, fines)
+    unasked = any("type 2 a fine" in one for one in given.assumptions)
+    if unasked and not why and len(fines):
+        share = float(fines.radius.max() / grains.radius.min())
+        if share > _LARGE_FINE:
+            why = (
+                f"fines: the largest sphere of type 2 has {share:.2f} of the radius of the "
+                f"smallest of type 1, expected at most {_LARGE_FINE:g} where nothing says that "
+                "type 2 are fines"
+            )
+    if why:
+        kinds = (
+            "; --types 1=grain,2=grain takes both types as grains, --types 1=grain,2=fine says "
+            "that type 2 are fines"
+            if options.types is None and unasked
+            else "; name them grains, or tell them apart with --types or --fines-below"
+        )
+        raise CaseError(f"{options.spheres}: {why}{kinds}")
 
 
 def _along(
@@ -90,10 +127,18 @@ def _along(
     notes = [_BOX_MISSING] if given.around_grains else []
     if options.walls == "no-slip":
         notes += _crossing(given.spheres, periodic, axis)
+    notes += _overlaps(spheres, around)
     facts = [*given.assumptions, *_assumptions(spheres, periodic, options)]
     rows: list[dict[str, Any]] = []
     for result, seconds in _measure(spheres, around, options):
         used = result.damage_law_used
+        if not rows and max(result.copies) > 1:
+            times = " x ".join(str(result.copies[("xyz".index(k) - first) % 3]) for k in "xyz")
+            facts = [
+                *facts,
+                f"The cell was repeated {times} times, because it is too small for the "
+                "tessellation; its permeability is the same.",
+            ]
         if options.damage_law is None and not rows and used is not None:
             facts = [*facts, f"The damage law is fdnet's default, here {used}."]
         said = [explained(one) for one in [*notes, *result.warnings]]
@@ -129,6 +174,9 @@ def _assumptions(
 ) -> Iterator[str]:
     """What the answer rests on, one sentence each."""
     yield "The fluid creeps (Stokes flow): permeability depends on the geometry alone."
+    if any(periodic):
+        names = ", ".join(axis for axis, yes in zip("xyz", periodic, strict=True) if yes)
+        yield f"The spheres repeat along {names}, with the sides of the box as periods."
     walls = [
         axis
         for axis, repeats in zip("xyz", periodic, strict=True)
@@ -143,6 +191,16 @@ def _assumptions(
         yield "Fines and grains stay where they are."
 
 
+def _overlaps(spheres: "Snapshot", periodic: tuple[bool, bool, bool]) -> Iterator[str]:
+    """Warnings where the spheres that add to the solid overlap, as `fdnet run` has them."""
+    from fdnet.spheres.contacts import inside_others, max_overlap, overlap_doubts
+
+    seen = spheres.where(~inside_others(spheres, periodic)[0])
+    return overlap_doubts(
+        max_overlap(seen.grains(), periodic), max_overlap(seen, periodic, only_fines=True)
+    )
+
+
 def _crossing(spheres: "Snapshot", periodic: tuple[bool, bool, bool], axis: str) -> Iterator[str]:
     """A warning where many spheres reach across the side walls, as those of a periodic pack do."""
     import numpy as np
@@ -152,7 +210,8 @@ def _crossing(spheres: "Snapshot", periodic: tuple[bool, bool, bool], axis: str)
     low, high = spheres.box.T
     beyond = ((spheres.position - reach < low) | (spheres.position + reach > high)) & walls
     count = int(np.sum(beyond.any(axis=1)))
-    if count > _MANY * len(spheres):
+    expected = 2.0 * reach.mean() * len(spheres) * np.sum(walls / (high - low))
+    if count > max(_MANY * expected, 3):
         sides = "".join(
             name
             for name, crossed, repeats in zip("xyz", beyond.any(axis=0), periodic, strict=True)
@@ -198,6 +257,7 @@ def _row(result: "Analysis", seconds: float) -> dict[str, Any]:
         "k_damaged_other_m2": result.k_damaged_other,
         "sections": section_rows(result),
         "network_counts": result.counts,
+        "spheres_dropped": result.counts["spheres_dropped"],
         "seconds": seconds,
     }
 

@@ -45,6 +45,8 @@ def answer_lines(results: Sequence[Row], given: Given) -> Iterator[str]:
         )
     if given.sections:
         yield from _section_lines(first, fines=given.fines)
+    for fact in first.get("assumptions", ()):
+        yield f"assumed: {fact}"
     for warning in first["warnings"]:
         yield f"warning: {warning}"
 

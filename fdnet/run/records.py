@@ -18,11 +18,12 @@ from fdnet.dem.packing import Pack
 from fdnet.dem.updates import UPDATES
 from fdnet.run.folder import RECORD_FORMAT
 from fdnet.run.made_files import digests_of
+from fdnet.spheres.contacts import overlap_doubts
 
 PACK_DUMP = "post/pack.dump"
 MOMENTUM_LIMIT = 0.01
 """Largest difference of the forces in the pack and its drop of pressure times area, over it."""
-OVERLAP_WARNING, POROSITY_WARNING = 0.03, 0.02
+POROSITY_WARNING = 0.02
 _PACKAGES = (
     "fdnet",
     "numpy",
@@ -155,11 +156,7 @@ def _pack_warnings(pack: dict[str, Any]) -> list[str]:
     warnings, version = [], pack["runs"][0]["version"]
     if version != KNOWN_VERSION:
         warnings.append(f"LIGGGHTS {version}: fdnet was measured and tested with {KNOWN_VERSION}")
-    if pack["max_overlap"] > OVERLAP_WARNING:
-        warnings.append(
-            f"grains overlap by up to {100 * pack['max_overlap']:.1f} % of a diameter: the pack "
-            "is denser than rigid spheres get"
-        )
+    warnings += overlap_doubts(pack["max_overlap"])
     if pack.get("restless"):
         warnings.append(
             f"{pack['restless']} packs did not come to rest and were made again from other random "

@@ -1,10 +1,12 @@
-"""Which spheres touch: pairs, overlaps, and the largest of them."""
+"""Which spheres touch, by how much they overlap, and which lie inside others."""
 
+from collections.abc import Iterator
 from itertools import count
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fdnet.spheres.images import neighbour_tree
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 
 if TYPE_CHECKING:
@@ -12,6 +14,10 @@ if TYPE_CHECKING:
 
 _ROUNDING = 1e-6
 """Gap over the smaller diameter below which two spheres may touch, to LIGGGHTS's rounding."""
+_OVERLAP_WARNING = 0.03
+"""Overlap over a diameter above which it is reported."""
+_INSIDE_ROUNDING = 1e-3
+"""Part of its radius by which a sphere may reach out of another one and still lie inside of it."""
 
 
 def touching_pairs(
@@ -87,6 +93,60 @@ def max_overlap(
     if only_fines:
         fine = np.any(spheres.kind[pairs] == Kind.FINE, axis=1)
         pairs, overlap = pairs[fine], overlap[fine]
-    if len(pairs) == 0:
-        return 0.0
-    return float(np.max(overlap / (2 * np.min(spheres.radius[pairs], axis=1))))
+    share = overlap / (2 * np.min(spheres.radius[pairs], axis=1))
+    return float(max(share.max(initial=0.0), _own_images(spheres, periodic, only_fines)))
+
+
+def _own_images(spheres: Snapshot, periodic: tuple[bool, bool, bool], only_fines: bool) -> float:
+    """Overlap of the largest sphere with its own image over its diameter, as in a unit cell."""
+    side = float(np.min(np.ptp(spheres.box, axis=1), where=periodic, initial=np.inf))
+    wide = 2.0 * spheres.radius[(spheres.kind == Kind.FINE) | (not only_fines)]
+    return float(max(1.0 - side / wide.max(initial=0.0), 0.0)) if len(wide) else 0.0
+
+
+def overlap_doubts(grains: float, fines: float = 0.0) -> Iterator[str]:
+    """Warnings on the largest overlaps of grains and of fines, as shares of a diameter."""
+    for name, what, share in (("grains", "pack", grains), ("fines", "deposit", fines)):
+        if share > _OVERLAP_WARNING:
+            yield (
+                f"{name} overlap by up to {100 * share:.1f} % of a diameter: the {what} is denser "
+                "than rigid spheres get"
+            )
+
+
+def inside_others(
+    spheres: Snapshot, periodic: tuple[bool, bool, bool]
+) -> tuple[Array, Array, Array]:
+    """Which spheres (N,) lie wholly inside another one, mostly, or with their centre only.
+
+    The first add nothing to the solid. They may reach out by a thousandth of their radius, so that
+    spheres that coincide or touch from within are among them but for the rounding of a file. The
+    one of two that coincide is kept that comes first, a grain before a fine. The second have more
+    than half of their surface inside another sphere: d2 < R2 - r2 for a distance d of the centres.
+    Of two equal spheres with their centres in each other one is counted.
+    """
+    radius, count = spheres.radius, len(spheres)
+    wholly, mostly, centred = np.zeros((3, count), bool)
+    if count < 2:
+        return wholly, mostly, centred
+    tree = neighbour_tree(spheres.position, spheres.box, periodic=periodic)
+    # among rigid spheres none has the centre of another one inside
+    hosts = np.flatnonzero(tree.query_ball_point(tree.data, radius, return_length=True) > 1)
+    found = tree.query_ball_point(tree.data[hosts], radius[hosts])
+    host = np.repeat(hosts, [len(one) for one in found])
+    guest = np.array([number for one in found for number in one], int)
+    rank = np.empty(count, int)
+    rank[np.lexsort((np.arange(count), spheres.kind, -radius))] = np.arange(count)
+    pair = np.flatnonzero(rank[host] < rank[guest])
+    pair = pair[np.argsort(rank[host[pair]], kind="stable")]
+    host, guest = host[pair], guest[pair]
+    apart = spheres.position[host] - spheres.position[guest]
+    side = np.ptp(spheres.box, axis=1)
+    distance = np.linalg.norm(apart - np.where(periodic, np.rint(apart / side) * side, 0), axis=1)
+    holds = distance <= radius[host] - (1 - _INSIDE_ROUNDING) * radius[guest]
+    for one, other in zip(host[holds], guest[holds], strict=True):
+        wholly[other] |= not wholly[one]
+    more = distance**2 < radius[host] ** 2 - radius[guest] ** 2
+    mostly[guest[more & ~wholly[host]]] = True
+    centred[guest[~wholly[host]]] = True
+    return wholly, mostly & ~wholly, centred & ~mostly & ~wholly

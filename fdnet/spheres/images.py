@@ -3,13 +3,13 @@
 They are shifted across periodic sides and mirrored across the others.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from fdnet.spheres.arrays import one_line
-from fdnet.spheres.snapshot import Array
+from fdnet.spheres.snapshot import Array, Snapshot
 
 INSIDE, MIRROR_LOW, MIRROR_HIGH, ON_FACE = 0, 1, 2, 3
 
@@ -47,6 +47,21 @@ def neighbour_tree(position: Array, box: Array, *, periodic: tuple[bool, ...]) -
     # rounding may leave a wrapped place at the size itself
     return cKDTree(
         np.where(periodic & (place >= size), 0.0, place), boxsize=np.where(periodic, size, 0.0)
+    )
+
+
+def repeated(spheres: Snapshot, times: tuple[int, int, int]) -> Snapshot:
+    """The spheres of a periodic box of `times` as many cells along each axis, numbered from 1."""
+    if times == (1, 1, 1):
+        return spheres
+    size = np.ptp(spheres.box, axis=1)
+    shift = np.indices(times).reshape(3, -1).T * size
+    many, count = len(shift), len(shift) * len(spheres)
+    return replace(
+        spheres.where(np.tile(np.arange(len(spheres)), many)),
+        box=np.column_stack([spheres.box[:, 0], spheres.box[:, 0] + size * times]),
+        id=np.arange(1, count + 1),
+        position=(spheres.position + shift[:, None]).reshape(-1, 3),
     )
 
 

@@ -234,13 +234,23 @@ def test_all_spheres_goes_with_its_own_law_alone(pack):
         analyse(pack, periodic=SIDES, law="thesis", damage_law="all-spheres")
 
 
-def test_spheres_that_make_no_network_are_refused_or_left_to_the_other_law(pack):
-    double = pack.joined(replace(pack.fines(), id=pack.fines().id + 10_000))
-    with pytest.raises(NetworkError, match=r"all-spheres.*coincide.*section-archie"):
-        analyse(double, periodic=SIDES, damage_law="all-spheres")
-    default = analyse(double, periodic=SIDES)
+def test_spheres_that_make_no_network_are_refused_or_left_to_the_other_law(pack, monkeypatch):
+    def refuse(*_: object, **__: object) -> None:
+        raise NetworkError("no throat")
+
+    monkeypatch.setattr("fdnet.network.resolved.all_spheres.build_network", refuse)
+    with pytest.raises(NetworkError, match=r"all-spheres.*no throat.*section-archie"):
+        analyse(pack, periodic=SIDES, damage_law="all-spheres")
+    default = analyse(pack, periodic=SIDES)
     assert default.damage_law_used == "section-archie"
-    assert any("coincide" in text for text in default.warnings)
+    assert any("no throat" in text for text in default.warnings)
+
+
+def test_fines_that_are_there_twice_count_once(pack):
+    double = pack.joined(replace(pack.fines(), id=pack.fines().id + 10_000))
+    result, plain = analyse(double, periodic=SIDES), analyse(pack, periodic=SIDES)
+    assert result.k_damaged == plain.k_damaged
+    assert result.counts["spheres_dropped"] == len(pack.fines())
 
 
 def test_a_fourth_disc_takes_all_some_or_nothing():

@@ -89,7 +89,7 @@ def test_swallowed_grain_is_counted_and_leaves_the_void():
     more = snapshot(np.vstack([pack.position, inside]), np.append(pack.radius, 0.4), pack.box)
     plain, network = build_network(pack, periodic=ALL), build_network(more, periodic=ALL)
     assert plain.counts["grains_hidden"] == 0
-    assert network.counts["grains_hidden"] == 1
+    assert network.counts["grains_inside_others"] == 1
     assert network.pore_volume.sum() == pytest.approx(plain.pore_volume.sum(), rel=1e-9)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fdnet.network.laws.lubrication import half_resistances
+from fdnet.network.laws.deposit_resistances import grain_resistances
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array
 
@@ -36,4 +36,4 @@ def lubrication_law(network: Network) -> Array:
 
     No constant is fitted; see `lubrication` for the theory and its sources.
     """
-    return 1.0 / half_resistances(network).sum(axis=1)
+    return 1.0 / grain_resistances(network).sum(axis=1)

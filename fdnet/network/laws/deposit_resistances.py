@@ -51,6 +51,15 @@ def deposit_resistances(network: Network) -> Array:
     return halves
 
 
+def grain_resistances(network: Network) -> Array:
+    """Resistance (T, 2) 1/m3 of the throats between grains.
+
+    As `half_resistances` gives it. Spheres that lie mostly inside a grain, as those of a clump do,
+    leave of their throats what fines in a corner leave, so there it is `deposit_resistances`.
+    """
+    return deposit_resistances(network) if network.image_fine.any() else half_resistances(network)
+
+
 def node_resistances(
     network: Network, throats: Array, halves: Array, given: tuple[Array, Array]
 ) -> Array:

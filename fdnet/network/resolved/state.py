@@ -15,7 +15,7 @@ from fdnet.network.flow.slabs import (
     slab_permeability,
     whole_permeability,
 )
-from fdnet.network.laws.lubrication import half_resistances
+from fdnet.network.laws.deposit_resistances import grain_resistances
 from fdnet.network.network import Network
 from fdnet.network.resolved.slab import Conduct, CutNetworks, slab_permeabilities
 from fdnet.spheres.arrays import one_line
@@ -74,7 +74,7 @@ def solved(state: State) -> Solved | None:
 
 def clean_halves(network: Network, law: str) -> Array | None:
     """Resistances (T, 2) 1/m3 of the halves of clean throats; None for laws that have none."""
-    return half_resistances(network) if law == DEFAULT_LAW else None
+    return grain_resistances(network) if law == DEFAULT_LAW else None
 
 
 def state_slabs(

@@ -6,6 +6,7 @@ import numpy as np
 
 from fdnet.errors import NetworkError
 from fdnet.spheres.arrays import one_line
+from fdnet.spheres.contacts import inside_others
 from fdnet.spheres.images import neighbour_tree
 from fdnet.spheres.snapshot import Array, Snapshot
 
@@ -15,7 +16,7 @@ COARSE = 1e-8
 """Largest rounding of a coordinate, in mean grain radii: a tenth of the shake (`points.SHAKE`),
 which coarser coordinates could not hold."""
 COINCIDENT = 1e-3
-"""Grains nearer than this, in radii of the smallest grain, coincide."""
+"""Grains that are placed nearer than this, in radii of the smallest grain, coincide."""
 ON_FACE_TOLERANCE = 1e-6
 """A centre within this distance of a mirrored face, in mean grain radii, lies on the face."""
 INSET = 1e-4
@@ -35,6 +36,9 @@ class PlacedGrains:
         periodic: whether the sides x, y and z are periodic; the other faces are mirror planes.
         scale: m, mean radius of these grains as given.
         beyond: number of grains whose given centre lay beyond a mirrored face.
+        inside: (n,) whether more than half of the surface of a grain lies inside another one.
+        dropped: number of grains that were left out, because they lie wholly inside another one or
+            are placed where a larger one is.
     """
 
     grains: Snapshot
@@ -44,6 +48,8 @@ class PlacedGrains:
     periodic: tuple[bool, bool, bool]
     scale: float
     beyond: int
+    inside: Array
+    dropped: int
 
     __repr__ = one_line
 
@@ -51,20 +57,26 @@ class PlacedGrains:
 def place_grains(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> PlacedGrains:
     """The grains that reach into the box, ready for the tessellation.
 
-    Raises NetworkError on impossible lengths (`check_lengths`), on fewer than four grains in the
-    box, and on coincident grains.
+    Grains that add nothing to the solid are left out. Raises NetworkError on impossible lengths
+    (`check_lengths`) and on fewer than four grains in the box.
     """
     if len(grains):
         check_lengths(grains, periodic)
-    index = _reaching(grains, periodic) if len(grains) else np.zeros(0, int)
+    reaching = _reaching(grains, periodic) if len(grains) else np.zeros(0, int)
+    wholly, mostly, _ = inside_others(grains.where(reaching), periodic)
+    index, mostly = reaching[~wholly], mostly[~wholly]
+    placed, beyond = onto_walls(grains.where(index), periodic)
+    if len(double := _coinciding(placed, periodic)):
+        index, mostly = np.delete(index, double), np.delete(mostly, double)
+        placed, beyond = onto_walls(grains.where(index), periodic)
     if len(index) < 4:
+        dropped = f", {len(reaching)} with those inside others" * (len(index) < len(reaching))
         raise NetworkError(
-            f"tessellation: {len(index)} of {len(grains)} grains reach into the box; a "
-            "tetrahedron needs at least 4, give more grains or mend the box"
+            f"tessellation: {len(index)} of {len(grains)} grains reach into the box{dropped}; a "
+            "tetrahedron needs at least 4, give more grains, repeat a periodic cell, or mend the "
+            "box"
         )
     inside = grains.where(index)
-    placed, beyond = onto_walls(inside, periodic)
-    _refuse_coincident(placed, periodic)
     outward = _outward(inside, periodic)
     return PlacedGrains(
         grains=placed,
@@ -74,6 +86,8 @@ def place_grains(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Plac
         periodic=periodic,
         scale=float(inside.radius.mean()),
         beyond=beyond,
+        inside=mostly,
+        dropped=len(reaching) - len(index),
     )
 
 
@@ -121,7 +135,7 @@ def onto_walls(grains: Snapshot, periodic: tuple[bool, ...]) -> tuple[Snapshot, 
     faces it is put 1e-4 mean radii inside instead, so that the facets between three such grains
     are throats which end in pores on the face, where the pressure is held.
     """
-    scale = float(grains.radius.mean())
+    scale = float(grains.radius.mean()) if len(grains) else 0.0
     tolerance = ON_FACE_TOLERANCE * scale
     position, radius = grains.position.copy(), grains.radius.copy()
     moved = np.zeros(len(grains), bool)
@@ -176,13 +190,11 @@ def _heights_along_x(given: Snapshot, placed: Snapshot, outward: Array) -> Array
     return np.where(outward > 0.0, tall * (3.0 * base + tall**2) / (4.0 * base), placed.radius)
 
 
-def _refuse_coincident(grains: Snapshot, periodic: tuple[bool, ...]) -> None:
-    """Raise NetworkError on coincident grains."""
+def _coinciding(grains: Snapshot, periodic: tuple[bool, ...]) -> Array:
+    """Indices of placed grains that coincide with one that is not smaller."""
+    if not len(grains):
+        return np.zeros(0, int)
     tree = neighbour_tree(grains.position, grains.box, periodic=periodic)
     close = tree.query_pairs(COINCIDENT * float(grains.radius.min()), output_type="ndarray")
-    if len(close):
-        first, second = grains.id[close[0]]
-        raise NetworkError(
-            f"tessellation: grains {first} and {second} coincide at "
-            f"{grains.position[close[0, 0]]} m ({len(close)} such pairs); remove the doubles"
-        )
+    first, second = close.T
+    return np.unique(np.where(grains.radius[first] < grains.radius[second], first, second))
