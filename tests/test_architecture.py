@@ -98,7 +98,6 @@ DOORS = {
         "report/side_view",
         "report/size_figure",
         "studies/accuracy/figure",
-        "studies/benchmark/yade_invasion_figure",
         "studies/dem/mechanics_figure",
         "studies/engine/draw",
         "studies/outside/figure",
