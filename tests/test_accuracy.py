@@ -78,7 +78,7 @@ def test_turned_packs_have_the_axis_as_x(cases):
 def test_mean_and_worst_are_of_logarithms():
     assert summary([math.exp(0.03), math.exp(-0.04)]) == "3.5 %, 0.961"
     assert summary([1.3, 0.7, 1.01]).endswith(", 0.700")
-    assert summary([3.0, 0.5]).endswith(", 3.0")
+    assert summary([math.e**2, math.e**-2]) == "factor 7.4, 7.4"
 
 
 def test_laws_on_two_packs(cases):
@@ -166,13 +166,6 @@ def test_the_numbers_of_the_first_screen_are_those_of_the_tables(slabs, root):
         text = " ".join((root / name).read_text(encoding="utf-8").split())
         for words in rms:
             assert words in text, name
-
-
-def test_the_worst_by_the_goals(slabs):
-    """The goals of the project: k/k0 within 3 % (rms) from 100 throats on, within 6 % below."""
-    for many, goal in ((True, 0.03), (False, 0.06)):
-        logs = [math.log(row[FINEST]) for row in slabs if (row[THROATS] >= 100) == many]
-        assert math.sqrt(np.mean(np.square(logs))) < goal
 
 
 def test_full_size_tables_show_the_span_over_the_runs():

@@ -194,7 +194,11 @@ def full_size_rows(runs: Iterable[Path]) -> Iterator[Row]:
                 SECTION_ARCHIE: own.k_damaged / one.k_damaged,
                 f"{SECTION_ARCHIE}: in place": own.k_damaged_inplace / one.k_damaged_inplace,
             }
-        last = {"case": path.name, "section": WHOLE, "k_over_k0": whole.k_damaged / whole.k_initial}
+        last = {
+            "case": path.name,
+            "section": WHOLE,
+            "k_over_k0": whole.k_damaged / whole.k_initial,
+        }
         ratio = other.k_damaged / whole.k_damaged
         yield last | {SECTION_ARCHIE: ratio, f"{SECTION_ARCHIE}: in place": ratio}
 
@@ -239,7 +243,7 @@ def slab_table(rows: Sequence[Row]) -> str:
     """k/k0 of the slabs by `ALL_PAIRS`, and k0 and k by the default, by size ratio and throats."""
     columns = {pair: pair for pair in ALL_PAIRS if pair != PAIRS[1]}
     columns |= {f"{FINEST}: k": "k itself, all-spheres", f"{DEFAULT_LAW}: k0": "k0, lubrication"}
-    return _classes(rows, _slab_classes(rows), "D/d", columns)
+    return _classes(_slab_classes(rows), "D/d", columns)
 
 
 def _slab_classes(rows: Sequence[Row]) -> dict[str, list[Row]]:
@@ -263,7 +267,7 @@ def intact_table(rows: Sequence[Row]) -> str:
     groups = (EQUAL, UNEQUAL, LATTICE, LOOSE)
     intact = [row for row in rows if not row["fines"]]
     classes = {name: [row for row in intact if row["group"] == name] for name in groups}
-    return _classes(intact, classes, "grains alone", {f"{law}: k0": law for law in LAWS})
+    return _classes(classes, "grains alone", {f"{law}: k0": law for law in LAWS})
 
 
 def deposit_table(rows: Sequence[Row]) -> str:
@@ -274,7 +278,7 @@ def deposit_table(rows: Sequence[Row]) -> str:
         for number in sorted({round(row["size_ratio"]) for row in deposits})
     }
     columns = {pair: pair for pair in ALL_PAIRS} | {f"{FINEST}: k": "k itself, all-spheres"}
-    return _classes(deposits, classes, "D/d", columns)
+    return _classes(classes, "D/d", columns)
 
 
 def full_size_table(rows: Sequence[Row]) -> str:
@@ -291,25 +295,26 @@ def full_size_table(rows: Sequence[Row]) -> str:
     return markdown_table(header, lines)
 
 
-def _classes(
-    rows: Sequence[Row], classes: dict[str, list[Row]], label: str, columns: dict[str, str]
-) -> str:
+def _classes(classes: dict[str, list[Row]], label: str, columns: dict[str, str]) -> str:
     """rms of ln and the worst ratio of some columns, one line for each class of rows."""
     lines = [
         [name, str(len(of)), *(summary(row[column] for row in of) for column in columns)]
         for name, of in classes.items()
         if of
     ]
-    assert rows, "no rows to show"
     return markdown_table([label, "cases", *columns.values()], lines)
 
 
 def summary(ratios: Iterable[float]) -> str:
-    """Root mean square of ln(model / truth), and the ratio furthest from 1."""
+    """Root mean square of ln(model / truth), and the ratio furthest from 1.
+
+    From a half on, the root mean square is given as the factor that it stands for.
+    """
     logs = np.log(np.array(list(ratios)))
     worst = float(np.exp(logs[np.argmax(np.abs(logs))]))
     rms = float(np.sqrt(np.mean(logs**2)))
-    return f"{100 * rms:.1f} %, {worst:.{3 if worst < 2 else 1}f}"
+    words = f"{100 * rms:.1f} %" if rms < 0.5 else f"factor {np.exp(rms):.1f}"
+    return f"{words}, {worst:.{3 if worst < 2 else 1}f}"
 
 
 def draw_accuracy(slabs: Sequence[Row], path: Path) -> None:

@@ -58,9 +58,7 @@ def _throat_occupancy(table: Lookup, validation: Path) -> dict[str, str]:
     k = {name: table.levels(name, "k/k0, thesis") for name in throat_occupancy.PACKS}
     cost = {name: {level.value: level.cost for level in k[name]} for name in k}
     two_planes = table.levels(planes, "largest, inside")
-    thesis = {
-        row["case"]: float(row[PAIRS[0]]) for row in read_named(validation / PACKS)
-    }
+    thesis = {row["case"]: float(row[PAIRS[0]]) for row in read_named(validation / PACKS)}
     exact = _exact_of(table, clogging)
     return {
         "doubling": f"{math.floor(min(doubling) / 100) * 100:.0f}",
