@@ -97,7 +97,7 @@ DOORS = {
         "report/network_figure",
         "report/side_view",
         "report/size_figure",
-        "studies/accuracy/figure",
+        "studies/accuracy",
         "studies/dem/mechanics_figure",
         "studies/engine/draw",
         "studies/outside/figure",
