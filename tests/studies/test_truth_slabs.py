@@ -1,15 +1,12 @@
 """The slabs of the Stokes truth: their files, their cases, and the table from grids."""
 
-import shutil
-
 import numpy as np
 import pytest
 
 from fdnet.errors import CaseError
 from fdnet.network.stokes.stokes import StokesFlow, solve_slab
 from fdnet.spheres.snapshot import Kind, resting
-from fdnet.studies.accuracy.slabs import slab_rows, slab_summary
-from fdnet.studies.engine.csv_rows import read_named, write_named
+from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.truth.made_slabs import SLABS
 from fdnet.studies.truth.slab_grids import (
     DEPOSIT,
@@ -20,7 +17,6 @@ from fdnet.studies.truth.slab_grids import (
     tabulated,
 )
 from fdnet.studies.truth.slabs import (
-    NO,
     SLAB_FOLDER,
     SLAB_GRIDS,
     SLAB_TRUTH,
@@ -155,26 +151,6 @@ def test_stored_truth_of_a_slab_lies_below_a_coarse_grid():
 
 def test_the_page_lists_the_slabs(root):
     assert slab_table(SLAB_FOLDER) in (root / "docs/stokes.md").read_text(encoding="utf-8")
-
-
-def test_laws_on_a_slab(tmp_path):
-    """26 fines of a fifth of a grain: the default pair is near the truth, and ratios fit."""
-    name, pair = "slabO_r5_light", "lubrication + side-kozeny"
-    finest = "lubrication + all-spheres"
-    [line] = [r for r in read_named(SLAB_FOLDER / SLAB_TRUTH) if r["slab"] == name]
-    shutil.copy(SLAB_FOLDER / line["file"], tmp_path)
-    write_named(tmp_path / SLAB_TRUTH, [line])
-    [row] = slab_rows(tmp_path, [YES], [pair, finest])
-    assert slab_rows(tmp_path, [NO], [pair]) == []
-    assert row[pair] == pytest.approx(1.0, abs=0.1)
-    assert row[finest] == pytest.approx(1.0, abs=0.2)
-    assert row[f"{pair}: k0"] == pytest.approx(1.0, abs=0.15)
-    assert row[f"{pair}: k"] == pytest.approx(row[pair] * row[f"{pair}: k0"], rel=1e-3)
-    assert row["k_over_k0"] == pytest.approx(
-        float(line["k_mm2"]) / float(line["k0_mm2"]), rel=1e-3
-    )
-    assert row["fines"] >= 26
-    assert f"| {name} | {row['fines']} |" in slab_summary([row], [pair])
 
 
 def test_the_page_has_the_table_of_two_grids(root):

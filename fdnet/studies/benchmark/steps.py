@@ -20,11 +20,11 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fdnet.case.names import COMBINED, DamageLawName
+from fdnet.case.names import ALL_SPHERES, SECTION_ARCHIE
 from fdnet.network import network as tessellation
 from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.flow.flow import solve_flow
-from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_DAMAGE_LAW, DEFAULT_LAW, LAWS
+from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_LAW, LAWS
 from fdnet.network.permeability import analyse
 from fdnet.network.resolved.all_spheres import all_conductances
 from fdnet.spheres.porosity import measure_porosity
@@ -38,10 +38,8 @@ SHAKE = 0.02
 FINE = 0.1
 SIDES, BOX = (False, True, True), (False, False, False)
 """Sides of the periodic packs, and of the same in a box of walls."""
-TWO_SCALE: tuple[DamageLawName, ...] = ("side-kozeny", "section-archie", "upscaled")
-"""Laws of the throats between grains that are timed next to the network of all spheres."""
 SECTIONS = 8
-"""Sections of the analysis by `combined`, those of a case by default."""
+"""Sections of the analysis by `all-spheres`, those of a case by default."""
 DECADES, CLOSED = 12, 0.1
 MOST_GRAINS_STIFF = 200_000
 COMPILING = 600
@@ -123,7 +121,7 @@ def run_steps(
     if fines is not None:
         occupancy = clock.timed("occupancy", lambda: measure_occupancy(network, fines))
         damage = clock.timed(
-            "damage", lambda: DAMAGE_LAWS[DEFAULT_DAMAGE_LAW](network, occupancy, intact)
+            "damage", lambda: DAMAGE_LAWS[SECTION_ARCHIE](network, occupancy, intact)
         )
         clock.timed("solve damaged", lambda: solve_flow(network, damage.conductance))
         clock.timed("porosity", lambda: measure_porosity(grains.joined(fines), periodic=SIDES))
@@ -200,16 +198,15 @@ def walled_result(wanted: int, folder: Path) -> dict[str, Any]:
 def run_spheres(spheres: Snapshot) -> tuple[Clock, int]:
     """The steps of the network of all `spheres`, and the number of its pores.
 
-    Whole analyses on the network of the grains, by each of `TWO_SCALE`, and one by `combined` in
+    Whole analyses by `section-archie`, on the network of the grains, and by `all-spheres` in
     `SECTIONS` sections come last.
     """
     clock = Clock()
     pores = _run_together(clock, spheres)
     whole = partial(analyse, spheres, periodic=SIDES)
-    for law in TWO_SCALE:
-        clock.timed(f"total {law}", partial(whole, damage_law=law))
-    in_sections = partial(whole, damage_law=COMBINED, sections=SECTIONS)
-    clock.timed(f"total {COMBINED}, {SECTIONS} sections", in_sections)
+    clock.timed(f"total {SECTION_ARCHIE}", partial(whole, damage_law=SECTION_ARCHIE))
+    in_sections = partial(whole, damage_law=ALL_SPHERES, sections=SECTIONS)
+    clock.timed(f"total {ALL_SPHERES}, {SECTIONS} sections", in_sections)
     return clock, pores
 
 
@@ -231,7 +228,7 @@ def tiled_spheres(wanted: int, rng: np.random.Generator) -> Snapshot:
 
 
 def spheres_result(wanted: int, folder: Path) -> dict[str, Any]:
-    """Seconds and memory of every step of `all-spheres` on a tiled pack, and of `TWO_SCALE`."""
+    """Seconds and memory of every step of `all-spheres` and `section-archie` on a tiled pack."""
     rng = np.random.default_rng(1)
     run_spheres(tiled_spheres(COMPILING, rng))  # compiles and loads
     run_spheres(tiled_spheres(8 * COMPILING, rng))

@@ -18,7 +18,7 @@ from fdnet.run.open_run import run_case
 from fdnet.studies.engine.csv_rows import write_named
 from fdnet.studies.engine.runner import child_core_seconds
 
-LAWS = ("analysis.law=lubrication", "analysis.damage_law=side-kozeny")
+LAWS = ("analysis.law=lubrication", "analysis.damage_law=section-archie")
 SHARED = (
     "fines.supply=slab",
     "drag.upstream=darcy",

@@ -15,7 +15,7 @@ import numpy as np
 
 from fdnet.case.case import Case, InvasionCase, with_fines
 from fdnet.case.file import case_from, set_keys
-from fdnet.case.names import DEFAULT_DAMAGE_LAW
+from fdnet.case.names import SECTION_ARCHIE
 from fdnet.dem.binary import Binary, find_binary
 from fdnet.dem.checkpoint import HISTORY, HISTORY_HEADER, state_at
 from fdnet.dem.invade_deck import write_invade_inputs
@@ -187,7 +187,7 @@ def invasion_observed(case: InvasionCase, grains: Snapshot, result: Invasion) ->
         periodic=case.periodic,
         sections=case.analysis.sections,
         walls=case.analysis.walls,
-        damage_law=DEFAULT_DAMAGE_LAW,
+        damage_law=SECTION_ARCHIE,
     )
     first = analysis.sections[0]
     return {

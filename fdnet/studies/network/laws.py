@@ -9,18 +9,14 @@ from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.laws.named import DEFAULT_LAW, LAWS
 from fdnet.network.network import Network
 from fdnet.network.stokes.stokes import extrapolate, solve_stokes
-from fdnet.studies.accuracy.measurement import (
-    ARCHIE,
-    MEAN,
-    PAIRS,
-    RESOLVED,
-    RESOLVED_LIMIT,
+from fdnet.studies.accuracy import (
+    ALL_PAIRS,
+    FINEST,
+    by_all_spheres,
     by_law,
     by_pair,
     law_of,
-    mean_of,
     network_of,
-    resolved,
 )
 from fdnet.studies.engine.study import DONE, Measured, Panel, Point, Row, Study, row_of
 from fdnet.studies.engine.timing import least_time
@@ -53,10 +49,7 @@ def points(quick: bool) -> list[Point]:
 
 
 def _law_points(case: Case) -> Iterator[Point]:
-    names = list(LAWS)
-    if case.ratio is not None:
-        names = [*PAIRS, *([RESOLVED, MEAN] if len(case.pack) <= RESOLVED_LIMIT else [])]
-    for name in names:
+    for name in LAWS if case.ratio is None else ALL_PAIRS:
         yield Point(series=series_of(case), knob="law", value=name, settings={"pack": case.name})
 
 
@@ -104,26 +97,13 @@ def _by_law(case: Case, name: str) -> tuple[dict[str, float], float]:
         k, seconds = least_time(partial(by_law, network, name))
         return {"k": k}, build + seconds
     k0 = by_law(network, law_of(name))
-    if name == RESOLVED:
-        k, seconds = _whole(case.name)
-    elif name == MEAN:
-        (whole, first), (archie, second) = _whole(case.name), _of_pair(case.name, ARCHIE)
-        k, seconds = mean_of(k0, whole, archie), first + second
+    if name == FINEST:
+        (k, _), seconds = least_time(partial(by_all_spheres, case.pack))
     else:
-        k, seconds = _of_pair(case.name, name)
+        occupancy, occupied = _occupancy(case.name)
+        k, seconds = least_time(partial(by_pair, network, occupancy, name))
+        seconds += build + occupied
     return {"k": k, "k/k0": k / k0}, seconds
-
-
-@cache
-def _whole(name: str) -> tuple[float, float]:
-    return least_time(partial(resolved, cases()[name].pack))
-
-
-@cache
-def _of_pair(name: str, pair: str) -> tuple[float, float]:
-    (network, build), (occupancy, occupied) = _network(name), _occupancy(name)
-    k, seconds = least_time(partial(by_pair, network, occupancy, pair))
-    return k, build + occupied + seconds
 
 
 @cache
@@ -186,6 +166,6 @@ STUDY = Study(
         ),
     ),
     defaults=dict.fromkeys([*GROUPS, f"{INTACT}: networks"], DEFAULT_LAW)
-    | dict.fromkeys([*SIZES, f"{DAMAGED}: networks"], MEAN),
+    | dict.fromkeys([*SIZES, f"{DAMAGED}: networks"], FINEST),
     isolated=lambda point: point.knob == "cells",
 )

@@ -14,7 +14,7 @@ from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.laws.named import LAWS
 from fdnet.network.laws.thesis_damage import TEXT_THRESHOLD, thesis_damage
 from fdnet.spheres.snapshot import Array
-from fdnet.studies.accuracy.measurement import network_of, permeability
+from fdnet.studies.accuracy import network_of, permeability
 from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study, row_of
 from fdnet.studies.engine.timing import least_time
 from fdnet.studies.truth.packs import read_pack, truth_folder

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.network.laws.named import DEFAULT_LAW
-from fdnet.studies.accuracy.measurement import MEAN, PAIRS, RESOLVED, SIDE_KOZENY
+from fdnet.studies.accuracy import ARCHIE, FINEST, PACKS, PAIRS
 from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.engine.study import DONE
 from fdnet.studies.network import laws, linear_solver, solver_peers, throat_occupancy
@@ -58,9 +58,7 @@ def _throat_occupancy(table: Lookup, validation: Path) -> dict[str, str]:
     k = {name: table.levels(name, "k/k0, thesis") for name in throat_occupancy.PACKS}
     cost = {name: {level.value: level.cost for level in k[name]} for name in k}
     two_planes = table.levels(planes, "largest, inside")
-    thesis = {
-        row["case"]: float(row[PAIRS[0]]) for row in read_named(validation / "accuracy_damage.csv")
-    }
+    thesis = {row["case"]: float(row[PAIRS[0]]) for row in read_named(validation / PACKS)}
     exact = _exact_of(table, clogging)
     return {
         "doubling": f"{math.floor(min(doubling) / 100) * 100:.0f}",
@@ -101,7 +99,7 @@ def _laws(table: Lookup, validation: Path) -> dict[str, str]:
     times = [level.cost for level in table.levels(intact, "k")]
     errors = [level.bound for level in table.levels(intact, "k")]
     own = table.cost(intact, "k", DEFAULT_LAW)
-    with_fines = table.cost(damaged, "k", SIDE_KOZENY)
+    with_fines = table.cost(damaged, "k", FINEST)
     fifth, tenth = laws.FINES["_r5_"], laws.FINES["_r10_"]
     size = laws.SIZE.format("k/k0")
     thesis = [
@@ -127,16 +125,9 @@ def _laws(table: Lookup, validation: Path) -> dict[str, str]:
         "law_left": percents(left, 1),
         "law_loose": percent(max(map(abs, loose))),
         "thesis_damage": between(thesis),
-        "side_kozeny": percents(
-            table.error(series, size, SIDE_KOZENY) for series in (fifth, tenth)
-        ),
-        "resolved_times": f"{cost[RESOLVED] / cost[SIDE_KOZENY]:.0f}",
-        "resolved_error": _tenths(table, fifth, size, RESOLVED),
-        "kozeny_error": _tenths(table, fifth, size, SIDE_KOZENY),
-        "mean_errors": " and ".join(
-            _tenths(table, series, size, MEAN) for series in (fifth, tenth)
-        ),
-        "mean_times": f"{cost[MEAN] / cost[SIDE_KOZENY]:.0f}",
+        "archie_errors": _both(table, size, ARCHIE),
+        "spheres_errors": _both(table, size, FINEST),
+        "spheres_times": f"{cost[FINEST] / cost[ARCHIE]:.0f}",
     }
     for name, (pack, series, cells, network) in {
         "one_64": (laws.INTACT, one, 64.0, own),
@@ -149,9 +140,10 @@ def _laws(table: Lookup, validation: Path) -> dict[str, str]:
     return numbers
 
 
-def _tenths(table: Lookup, series: str, quantity: str, value: str) -> str:
-    level = table.level(series, quantity, value)
-    return f"{percent(level.size, 1)} ± {percent(level.half_width, 1)}"
+def _both(table: Lookup, quantity: str, value: str) -> str:
+    """Errors with fines of 1/5 and of 1/10, with their bands."""
+    of = [table.level(series, quantity, value) for series in laws.SIZES]
+    return " and ".join(f"{percent(one.size, 1)} ± {percent(one.half_width, 1)}" for one in of)
 
 
 def _linear_solver(table: Lookup) -> dict[str, str]:
