@@ -1,6 +1,7 @@
 """The mechanics of the pack of a case or of a run: found or packed, solved, and written down."""
 
 import json
+import shlex
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
@@ -69,7 +70,8 @@ def _of_folder(folder: Path, assignments: list[str]) -> Packed:
     if read_record(folder, "pack") is None:
         raise CaseError(
             f"{folder}: holds no finished pack; run the stage pack first "
-            f"(fdnet run {folder / CASE} --out {folder} --stages pack --resume)"
+            f"(fdnet run {shlex.quote(str(folder / CASE))} --out {shlex.quote(str(folder))} "
+            "--stages pack --resume)"
         )
     return Packed(case=case, grains=_grains_of(folder, case), folder=folder)
 
@@ -157,7 +159,7 @@ def write_mechanics(packed: Packed, numbers: dict[str, Any]) -> Path:
     """Write mechanics.json and, where there is a report, its section; returns the path."""
     folder = packed.folder / FOLDER
     folder.mkdir(parents=True, exist_ok=True)
-    path = write_text(folder / NUMBERS, json.dumps(numbers, indent=2) + "\n")
+    path = write_text(folder / NUMBERS, json.dumps(numbers, indent=2, allow_nan=False) + "\n")
     if (packed.folder / "report.html").is_file():
         put_mechanics(packed.folder / "report.html", folder)
     return path

@@ -28,6 +28,7 @@ class Comparison:
         keys: the keys that are varied.
         entries: all runs, also those that are not done.
         ranked_by: quantity of the order; the smallest is first.
+        left_out: folders of planned runs that are not among the entries, for want of a result.
     """
 
     title: str
@@ -35,6 +36,7 @@ class Comparison:
     keys: tuple[str, ...]
     entries: tuple[Entry, ...]
     ranked_by: str = RANKED_BY
+    left_out: tuple[str, ...] = ()
 
     @property
     def done(self) -> list[Entry]:

@@ -87,6 +87,7 @@ def summary_of(comparison: Comparison) -> dict[str, Any]:
         "done": len(comparison.done),
         "failed": len(comparison.failed),
         "failures": [_failure(comparison, entry) for entry in comparison.failed],
+        "left_out": list(comparison.left_out),
         "ranked_by": comparison.ranked_by,
         "ranking": comparison.ranking(),
         "variants": [_variant(comparison, name) for name in comparison.variants],

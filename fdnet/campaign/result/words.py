@@ -123,10 +123,11 @@ def _pair_text(quantity: str, pair: Pair) -> str:
 
 def failure_lines(comparison: Comparison) -> list[str]:
     """Each run that has no result, with its reason and folder."""
-    return [
+    failed = [
         f"{entry.name} {entry.status}: {entry.reason} (folder {entry.folder})"
         for entry in comparison.failed
     ]
+    return [*failed, *(f"{folder}: has no result and is left out" for folder in comparison.left_out)]
 
 
 def variant_text(comparison: Comparison, name: str) -> str:
