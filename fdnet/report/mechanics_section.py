@@ -50,17 +50,17 @@ class _Test(Checked):
 class Mechanics(Checked):
     """What mechanics.json holds."""
 
-    young_modulus_Pa: float
-    poisson_ratio: float
-    bulk_modulus_Pa: float
-    shear_modulus_Pa: float
+    young_modulus_Pa: float | None
+    poisson_ratio: float | None
+    bulk_modulus_Pa: float | None
+    shear_modulus_Pa: float | None
     young_modulus_x_Pa: float | None
     young_modulus_y_Pa: float | None
     young_modulus_z_Pa: float | None
     anisotropy: float | None
-    p_wave_m_s: float
-    s_wave_m_s: float
-    coordination: float
+    p_wave_m_s: float | None
+    s_wave_m_s: float | None
+    coordination: float | None
     rattlers: int
     bonds: int
     warnings: list[str]

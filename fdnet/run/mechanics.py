@@ -1,6 +1,5 @@
 """The mechanics of the pack of a case or of a run: found or packed, solved, and written down."""
 
-import json
 import shlex
 import time
 from collections.abc import Callable
@@ -18,6 +17,7 @@ from fdnet.mechanics.of_case import elastic_moduli, material_of, warnings_of
 from fdnet.mechanics.rest import Row, Triaxial
 from fdnet.mechanics.triaxial import Sheared, triaxial
 from fdnet.report.mechanics_section import put_mechanics
+from fdnet.report.tables import plain_json
 from fdnet.run.made_files import START_OVER, check_files
 from fdnet.run.mark import CASE, is_run_folder
 from fdnet.run.record_files import read_record
@@ -159,7 +159,7 @@ def write_mechanics(packed: Packed, numbers: dict[str, Any]) -> Path:
     """Write mechanics.json and, where there is a report, its section; returns the path."""
     folder = packed.folder / FOLDER
     folder.mkdir(parents=True, exist_ok=True)
-    path = write_text(folder / NUMBERS, json.dumps(numbers, indent=2, allow_nan=False) + "\n")
+    path = write_text(folder / NUMBERS, plain_json(numbers)[1] + "\n")
     if (packed.folder / "report.html").is_file():
         put_mechanics(packed.folder / "report.html", folder)
     return path

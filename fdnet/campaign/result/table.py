@@ -107,10 +107,11 @@ def write_summary(comparison: Comparison, more: Mapping[str, Any]) -> dict[str, 
     return summary
 
 
-def band_row(band: Band) -> dict[str, float | None]:
-    """Mean, low and high; null where there is none."""
+def band_row(band: Band) -> dict[str, Any]:
+    """Mean, low and high, null where there is none; and the bounds that the band was cut at."""
     ends = {"mean": band.mean, "low": band.low, "high": band.high}
-    return {name: None if math.isnan(value) else value for name, value in ends.items()}
+    row = {name: None if math.isnan(value) else value for name, value in ends.items()}
+    return row | ({"cut_at": list(band.cut)} if band.cut else {})
 
 
 def pair_row(pair: Pair) -> dict[str, Any]:
