@@ -16,8 +16,8 @@ def put_section(report: Path, name: str, section: str) -> None:
         text = report.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise CaseError(
-            f"{report}: cannot be read as a page ({error}), so the section on {name} is not in it; "
-            "write it anew with --stages report --force (the numbers of the section are kept)"
+            f"{report}: cannot be read as a page ({error}), and the section on {name} is not in "
+            "it; write it anew with --stages report --force (the numbers are kept)"
         ) from error
     before, has_begin, rest = text.partition(begin)
     _, has_end, after = rest.partition(end)

@@ -182,8 +182,8 @@ def read_table(
     missing = [name for name in columns if name not in table.columns]
     if missing:
         raise _refusal(path, f"has no column {', '.join(missing)}")
-    for name in [] if texts is None else table.columns:
-        if name not in texts and not pd.api.types.is_numeric_dtype(table[name]):
+    for name in table.columns:
+        if texts is not None and name not in texts and not pd.api.types.is_numeric_dtype(table[name]):
             raise _refusal(path, f"column {name} holds a value that is no number")
     if rows is not None and len(table) != rows:
         raise _refusal(path, f"has {len(table)} rows, expected {rows} by summary.json")

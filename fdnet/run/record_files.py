@@ -2,6 +2,7 @@
 
 import json
 import shlex
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -53,7 +54,6 @@ OPTIONAL = ("layers.csv", *SOME_TABLES)
 """Those of them that a finished stage may lack."""
 
 
-
 class _Execution(Checked):
     """One execution of LIGGGHTS."""
 
@@ -87,7 +87,7 @@ class StageRecord(Checked):
     steps: int
     dt_s: float
     ranks: int | None = None
-    files: dict[str, str] = {}
+    files: Mapping[str, str] = {}
     runs: list[_Execution]
     left_out: list[str]
 
@@ -127,12 +127,12 @@ class Manifest(Checked):
     format: Literal[1]
     case: str = ""
     stages: list[str]
-    digests: dict[str, str] = {}
-    files: dict[str, str] = {}
+    digests: Mapping[str, str] = {}
+    files: Mapping[str, str] = {}
     invade: InvadeRecord | None
 
 
-_MODELS = {"pack": PackRecord, "invade": InvadeRecord, "clean_up": CleanUpRecord}
+_MODELS: dict[str, type[Checked]] = {"pack": PackRecord, "invade": InvadeRecord, "clean_up": CleanUpRecord}
 
 
 def _expected(manifest: dict[str, Any], stage: str) -> tuple[str, ...]:

@@ -76,7 +76,7 @@ class Band:
         return (self.high - self.low) / 2
 
     def within(self, least: float, most: float) -> "Band":
-        """The band without the values that the quantity cannot take, below `least` or above `most`.
+        """The band without values that the quantity cannot take: below `least`, above `most`.
 
         It covers the true mean as often as the whole band does, because the mean cannot lie in
         what is cut off.

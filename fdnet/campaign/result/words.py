@@ -59,7 +59,8 @@ def band_text(quantity: str, band: Band) -> str:
     factor, unit = unit_of(quantity)
     low, high = _digits(factor * band.low), _digits(factor * band.high)
     cut = " and ".join(value_text(quantity, bound) for bound in band.cut)
-    return f"{mean} (95 % band {low} to {high} {unit}".strip() + (f", cut at {cut})" if cut else ")")
+    end = f", cut at {cut})" if cut else ")"
+    return f"{mean} (95 % band {low} to {high} {unit}".strip() + end
 
 
 def ranking_lines(comparison: Comparison) -> list[str]:
@@ -131,7 +132,8 @@ def failure_lines(comparison: Comparison) -> list[str]:
         f"{entry.name} {entry.status}: {entry.reason} (folder {entry.folder})"
         for entry in comparison.failed
     ]
-    return [*failed, *(f"{folder}: has no result and is left out" for folder in comparison.left_out)]
+    left_out = (f"{folder}: has no result and is left out" for folder in comparison.left_out)
+    return [*failed, *left_out]
 
 
 def variant_text(comparison: Comparison, name: str) -> str:
