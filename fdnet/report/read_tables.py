@@ -183,7 +183,11 @@ def read_table(
     if missing:
         raise _refusal(path, f"has no column {', '.join(missing)}")
     for name in table.columns:
-        if texts is not None and name not in texts and not pd.api.types.is_numeric_dtype(table[name]):
+        if (
+            texts is not None
+            and name not in texts
+            and not pd.api.types.is_numeric_dtype(table[name])
+        ):
             raise _refusal(path, f"column {name} holds a value that is no number")
     if rows is not None and len(table) != rows:
         raise _refusal(path, f"has {len(table)} rows, expected {rows} by summary.json")

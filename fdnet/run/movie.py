@@ -148,8 +148,7 @@ def _states(run: FinishedRun) -> list[State]:
     for step, name in files.items():
         if step not in rows or (kept and step not in kept):
             raise CaseError(
-                f"{run.path / name}: is no state that this run wrote; move it away, and no movie "
-                "shows it"
+                f"{run.path / name}: is no state that this run wrote; move it out of this folder"
             )
     first = dict.fromkeys(names, 0.0)
     states = [

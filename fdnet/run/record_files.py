@@ -132,7 +132,11 @@ class Manifest(Checked):
     invade: InvadeRecord | None
 
 
-_MODELS: dict[str, type[Checked]] = {"pack": PackRecord, "invade": InvadeRecord, "clean_up": CleanUpRecord}
+_MODELS: dict[str, type[Checked]] = {
+    "pack": PackRecord,
+    "invade": InvadeRecord,
+    "clean_up": CleanUpRecord,
+}
 
 
 def _expected(manifest: dict[str, Any], stage: str) -> tuple[str, ...]:

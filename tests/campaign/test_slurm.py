@@ -147,5 +147,5 @@ def test_nothing_that_a_user_names_is_run_by_the_scripts(tmp_path, folder):
 def test_an_option_that_sbatch_could_misread_is_refused(tmp_path, option):
     task = Task(name="one", words=("true",), makes="x")
     how = HowToRun(jobs=1, resources=(option,))
-    with pytest.raises(CaseError, match="--slurm-script: .*expected options of sbatch"):
+    with pytest.raises(CaseError, match=r"--slurm-script: .*expected options of sbatch"):
         write_slurm_scripts(tmp_path, "test", [task], how, ranks=1)
