@@ -6,10 +6,10 @@ from fdnet.errors import CaseError
 from fdnet.files.atomic import write_text
 
 
-def put_section(report: Path, name: str, section: str) -> None:
+def put_section(report: Path, name: str, section: str) -> bool:
     """Put a section into the place `name` of a page; a page without the place stays as it is.
 
-    Raises CaseError where the page is no text in UTF-8.
+    Returns whether the page has the place. Raises CaseError where the page is no text in UTF-8.
     """
     begin, end = f"<!-- {name} begins -->", f"<!-- {name} ends -->"
     try:
@@ -23,3 +23,4 @@ def put_section(report: Path, name: str, section: str) -> None:
     _, has_end, after = rest.partition(end)
     if has_begin and has_end:
         write_text(report, f"{before}{begin}\n{section}\n{end}{after}")
+    return bool(has_begin and has_end)

@@ -93,9 +93,9 @@ def section_html(folder: Path) -> str:
     return "\n".join(parts)
 
 
-def put_mechanics(report: Path, folder: Path) -> None:
-    """Put the section into a report that is written."""
-    put_section(report, NAME, section_html(folder))
+def put_mechanics(report: Path, folder: Path) -> bool:
+    """Put the section into a report that is written; whether it has the place for it."""
+    return put_section(report, NAME, section_html(folder))
 
 
 def _table(numbers: dict[str, Any], rows: tuple[tuple[str, str, float, str], ...]) -> str:

@@ -37,8 +37,8 @@ def may_be_gone(name: str) -> bool:
 
 def frames_of(names: Iterable[str]) -> dict[int, str]:
     """Those of the names below a run folder that are states of the invasion, by their step."""
-    found = [match for match in map(FRAME.fullmatch, names) if match]
-    return {int(match[1]): match[0] for match in found}
+    matches = [match for match in map(FRAME.fullmatch, names) if match]
+    return {int(match[1]): match[0] for match in matches}
 
 
 def frames_in(folder: Path) -> dict[int, str]:

@@ -156,10 +156,14 @@ def _springs(case: Case) -> dict[str, Any]:
 
 
 def write_mechanics(packed: Packed, numbers: dict[str, Any]) -> Path:
-    """Write mechanics.json and, where there is a report, its section; returns the path."""
+    """Write mechanics.json and, where there is a report, its section; returns the path.
+
+    Where the report has no place for the section, a further warning in `numbers` says so.
+    """
     folder = packed.folder / FOLDER
     folder.mkdir(parents=True, exist_ok=True)
     path = write_text(folder / NUMBERS, plain_json(numbers)[1] + "\n")
-    if (packed.folder / "report.html").is_file():
-        put_mechanics(packed.folder / "report.html", folder)
+    report = packed.folder / "report.html"
+    if report.is_file() and not put_mechanics(report, folder):
+        numbers["warnings"].append(f"{report} has no place for the mechanics and stays as it is")
     return path

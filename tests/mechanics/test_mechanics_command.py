@@ -223,3 +223,6 @@ def test_a_page_that_is_no_text_is_refused(packed, tmp_path, capsys):
     (run / "report.html").write_bytes(b"<p>\xff</p>")
     assert main(["mechanics", str(run)]) == 2
     assert "report.html: cannot be read as a page" in capsys.readouterr().err
+    (run / "report.html").write_text("<p>mine</p>")
+    assert main(["mechanics", str(run)]) == 0
+    assert "has no place for the mechanics" in capsys.readouterr().err
