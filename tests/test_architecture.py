@@ -106,7 +106,7 @@ DOORS = {
     "numba": {"network/compiled"},
     "pymetis": {"mechanics/solver", "network/flow/solver"},
     "pyamg": {"network/flow/solver", "studies/network/solver_peers"},
-    "pydantic": {"case"},
+    "pydantic": {"case", "report/read_tables", "run/record_files", "campaign/plan/folder"},
     "tomli_w": {"case/case", "studies/fuzz/mutations"},
     "rich": {"run/progress"},
 }

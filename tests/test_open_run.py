@@ -244,6 +244,20 @@ def test_a_missing_table_is_refused(copied):
         fdnet.open_run(copied)
 
 
+@pytest.mark.parametrize("name", ["layers", "history"])
+def test_a_table_that_only_some_runs_have_is_missed_where_the_run_wrote_it(copied, name):
+    (copied / f"{name}.csv").unlink()
+    with pytest.raises(CaseError, match=rf"{name}\.csv"):
+        getattr(fdnet.open_run(copied), name)
+
+
+def test_a_case_that_was_changed_is_refused(copied):
+    path = copied / "case.toml"
+    path.write_text(path.read_text().replace("seed = 1", "seed = 2", 1))
+    with pytest.raises(CaseError, match=r"case\.toml: is not the case that the run"):
+        fdnet.open_run(copied)
+
+
 TABLES = {
     "cut": (
         "throats",

@@ -47,7 +47,7 @@ class Compared:
         """table.csv: one row for each run, lengths in m and permeabilities in m2."""
         from fdnet.report.read_tables import read_table
 
-        return read_table(self.path / TABLE, ("run", "variant", "seed", "status"))
+        return read_table(self.path / TABLE, ("run", "variant", "seed", "status"), texts=None)
 
     def __str__(self) -> str:
         """The ranking and the differences."""

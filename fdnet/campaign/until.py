@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from fdnet.campaign.result.comparison import SHARES, Comparison
 from fdnet.errors import CaseError
-from fdnet.statistics.pairs import seeds_for_width
+from fdnet.statistics.pairs import seeds_for_width, student_band
 
 FEWEST = 3
 """Seeds before a band is believed; two say almost nothing of a spread."""
@@ -71,9 +71,8 @@ def _too_wide(until: Until, comparison: Comparison) -> Mapping[str, list[float]]
     wide = {}
     for name in comparison.variants:
         values = list(comparison.values(name, until.quantity).values())
-        if len(values) < FEWEST or (
-            comparison.band(name, until.quantity).half_width > _allowed(until, values)
-        ):
+        # the whole band, not what the bounds of the quantity leave of it
+        if len(values) < FEWEST or student_band(values).half_width > _allowed(until, values):
             wide[name] = values
     return wide
 

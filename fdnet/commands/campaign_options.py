@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -193,6 +194,7 @@ def run_campaign(
     goal = goal_of(options)
     comparison = carry_out(Path(options.out), plan, how_of(options), goal)
     if goal.scripts:
-        print(f"submit with: bash {options.out / 'submit.bash'}; then gather with --gather")
+        script = shlex.quote(str(options.out / "submit.bash"))
+        print(f"submit with: bash {script}; then gather with --gather")
         return 0
     return finish(options, comparison, **({} if judged is None else judged(comparison)))

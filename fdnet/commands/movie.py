@@ -28,12 +28,19 @@ def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
     movie.add_argument(
         "--fps", type=float, default=4.0, metavar="N", help="frames a second (default 4)"
     )
+    movie.add_argument("--force", action="store_true", help="replace a file that is there")
     movie.set_defaults(action=_movie)
 
 
 def _movie(options: argparse.Namespace) -> int:
     from fdnet.run.movie import movie_of
 
-    path = movie_of(options.run, options.out, per_second=options.fps, show=options.show)
+    path = movie_of(
+        options.run,
+        options.out,
+        per_second=options.fps,
+        show=options.show,
+        force=options.force,
+    )
     print(f"{'picture' if path.suffix.lower() == '.png' else 'movie'}: {path}")
     return 0

@@ -2,11 +2,11 @@
 
 import base64
 import html
-import json
 from pathlib import Path
 from typing import Any
 
 from fdnet.report.later_sections import put_section
+from fdnet.report.read_tables import Checked, read_json
 
 NAME = "mechanics"
 _ROWS = (
@@ -35,19 +35,56 @@ _TRIAXIAL_ROWS = (
 )
 
 
+class _Test(Checked):
+    """The numbers of a triaxial test."""
+
+    confining_Pa: float
+    young_modulus_Pa: float | None
+    peak_Pa: float | None
+    peak_strain: float | None
+    volume_strain_at_end: float | None
+    broken_in_tension: int
+    broken_in_shear: int
+
+
+class Mechanics(Checked):
+    """What mechanics.json holds."""
+
+    young_modulus_Pa: float | None
+    poisson_ratio: float | None
+    bulk_modulus_Pa: float | None
+    shear_modulus_Pa: float | None
+    young_modulus_x_Pa: float | None
+    young_modulus_y_Pa: float | None
+    young_modulus_z_Pa: float | None
+    anisotropy: float | None
+    p_wave_m_s: float | None
+    s_wave_m_s: float | None
+    coordination: float | None
+    rattlers: int
+    bonds: int
+    warnings: list[str]
+    triaxial: _Test | None = None
+
+
 def section_html(folder: Path) -> str:
-    """The section as HTML from the files in the folder `mechanics`; "" where nothing ran."""
+    """The section as HTML from the files in the folder `mechanics`; "" where nothing ran.
+
+    Raises CaseError where the numbers cannot be understood.
+    """
     path = folder / "mechanics.json"
-    if not path.is_file():
+    if not path.exists():
         return ""
-    numbers = json.loads(path.read_text(encoding="utf-8"))
+    advice = "measure it anew with fdnet mechanics, or remove the folder"
+    numbers = read_json(path, Mechanics, noun="result of fdnet mechanics", advice=advice)
     parts = ["<h2>Mechanics of the pack</h2>", _table(numbers, _ROWS)]
     if numbers.get("warnings"):
         items = "".join(f"<li>{html.escape(text)}</li>" for text in numbers["warnings"])
         parts.append(f'<div class="warnings"><ul>{items}</ul></div>')
     if numbers.get("triaxial"):
         parts += ["<h3>Triaxial test</h3>", _table(numbers["triaxial"], _TRIAXIAL_ROWS)]
-    for figure in sorted(folder.glob("*.png")):
+    figure = folder / "stress_strain.png"
+    if numbers.get("triaxial") and figure.is_file():
         data = base64.b64encode(figure.read_bytes()).decode("ascii")
         parts.append(
             f'<figure class="wide"><img src="data:image/png;base64,{data}" alt="{figure.stem}">'
@@ -56,9 +93,9 @@ def section_html(folder: Path) -> str:
     return "\n".join(parts)
 
 
-def put_mechanics(report: Path, folder: Path) -> None:
-    """Put the section into a report that is written."""
-    put_section(report, NAME, section_html(folder))
+def put_mechanics(report: Path, folder: Path) -> bool:
+    """Put the section into a report that is written; whether it has the place for it."""
+    return put_section(report, NAME, section_html(folder))
 
 
 def _table(numbers: dict[str, Any], rows: tuple[tuple[str, str, float, str], ...]) -> str:

@@ -3,6 +3,7 @@
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +64,8 @@ def write_movie(
     Raises:
         CaseError: another suffix, nothing could be drawn, or MP4 without imageio-ffmpeg.
     """
-    write = _writer(target)
+    refuse_suffix(target)
+    write = _WRITERS[target.suffix.lower()]
     still = target.suffix.lower() == ".png"
     with tempfile.TemporaryDirectory() as folder:
         module, arguments = _drawing(frames, scene, folder)
@@ -92,20 +94,15 @@ def _drawing(frames: Sequence[MovieFrame], scene: Scene, folder: str) -> tuple[s
     return "flow_frames", [*common, *scale, folder, *(name for pair in pairs for name in pair)]
 
 
-def _writer(target: Path) -> Any:
-    simple = {".gif": _write_gif, ".png": _write_panels}
-    if target.suffix.lower() in simple:
-        return simple[target.suffix.lower()]
-    if target.suffix.lower() != ".mp4":
+def refuse_suffix(target: Path) -> None:
+    """Raise CaseError where the name ends in nothing that a movie can be written as."""
+    if target.suffix.lower() not in _WRITERS:
         raise CaseError(f"{target}: ends in {target.suffix!r}, expected .gif, .mp4 or .png")
-    try:
-        import imageio_ffmpeg  # noqa: F401
-    except ModuleNotFoundError as error:
+    if target.suffix.lower() == ".mp4" and find_spec("imageio_ffmpeg") is None:
         raise CaseError(
             f"{target}: MP4 needs the package imageio-ffmpeg; install it with pip install "
             "imageio-ffmpeg, or give a name that ends in .gif"
-        ) from error
-    return _write_mp4
+        )
 
 
 def _captioned(path: Path, words: str) -> Any:
@@ -172,3 +169,6 @@ def _write_mp4(path: Path, pictures: Sequence[Any], per_second: float) -> None:
 def _lingering(pictures: Sequence[Any]) -> list[Any]:
     """The pictures of a movie, which stays on the last."""
     return [*pictures, *[pictures[-1]] * LAST_FRAMES]
+
+
+_WRITERS: dict[str, Any] = {".gif": _write_gif, ".png": _write_panels, ".mp4": _write_mp4}

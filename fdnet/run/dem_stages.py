@@ -15,7 +15,7 @@ from fdnet.dem.updates import read_updates
 from fdnet.errors import CaseError
 from fdnet.run.fluid.fluid_of import fluid_of
 from fdnet.run.forecast import Forecast
-from fdnet.run.made_files import ANALYSE_AGAIN, MESHES, START_OVER, check_files
+from fdnet.run.made_files import START_OVER, check_files, may_be_gone
 from fdnet.run.outputs import Invaded
 from fdnet.run.progress import Progress
 from fdnet.run.records import PACK_DUMP, invade_record, pack_record, ranks_of
@@ -101,12 +101,8 @@ def is_done(session: Session, stage: str) -> bool:
     if stage == "pack":
         packed_grains(session)
     else:
-        check_files(session.path / stage, record, START_OVER, may_lack=_is_dump)
+        check_files(session.path / stage, record, START_OVER, may_lack=may_be_gone)
     return True
-
-
-def _is_dump(name: str) -> bool:
-    return name.endswith(".dump")
 
 
 def packed_grains(session: Session) -> Snapshot:
@@ -130,7 +126,7 @@ def invaded(session: Session, case: InvasionCase, grains: Snapshot) -> Invaded:
     """
     folder, scales = session.path / "invade", scales_of(case)
     record = session.folder.record("invade") or {}
-    check_files(folder, record, START_OVER, may_lack=_is_dump)
+    check_files(folder, record, START_OVER, may_lack=may_be_gone)
     history = read_history(folder)
     damaged = state_at(folder, history[-1], case, scales, grains)
     return Invaded(
@@ -163,19 +159,3 @@ def file_warnings(session: Session) -> list[str]:
                 "missing from invasion.pvd"
             )
     return warnings
-
-
-def check_finished(session: Session) -> None:
-    """Raises CaseError when a file of the finished run is not what it wrote.
-
-    Dumps and the meshes for ParaView may be gone.
-    """
-    manifest = session.folder.manifest() or {}
-    check_files(session.path, manifest, ANALYSE_AGAIN, may_lack=_is_mesh)
-    for stage in LIGGGHTS_STAGES:
-        record = session.folder.record(stage) or {}
-        check_files(session.path / stage, record, START_OVER, may_lack=_is_dump)
-
-
-def _is_mesh(name: str) -> bool:
-    return name in MESHES

@@ -67,7 +67,7 @@ class FinishedRun:
         """
         from fdnet.report.read_tables import COLUMNS, empty_table
 
-        if not (self.path / "layers.csv").exists():
+        if not self._has("layers.csv"):
             return empty_table(COLUMNS["layers"])
         return self._table("layers", None)
 
@@ -95,7 +95,7 @@ class FinishedRun:
         counts = read_table(self.path / "invade" / "history.csv", HISTORY_COLUMNS)
         check_one(self.path / "invade", self.manifest["invade"], "history.csv", START_OVER)
         whole = self.path / "history.csv"
-        if not whole.exists():
+        if not self._has("history.csv"):
             counts.insert(0, "time_s", counts["step"] * self.manifest["invade"]["dt_s"])
             return counts
         times = read_table(whole, ["time_s", "physical_time_s", "step"])
@@ -200,6 +200,10 @@ class FinishedRun:
         mesh = read(self.path / name)
         self._check(name)
         return mesh
+
+    def _has(self, name: str) -> bool:
+        """Whether the run wrote this file, which some runs do not have."""
+        return name in self.manifest.get("files", {}) or (self.path / name).exists()
 
     def _check(self, name: str) -> None:
         """Raises CaseError when the file is not the one that the run wrote."""

@@ -1,6 +1,6 @@
 """The mechanics of the pack of a case or of a run: found or packed, solved, and written down."""
 
-import json
+import shlex
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
@@ -17,6 +17,7 @@ from fdnet.mechanics.of_case import elastic_moduli, material_of, warnings_of
 from fdnet.mechanics.rest import Row, Triaxial
 from fdnet.mechanics.triaxial import Sheared, triaxial
 from fdnet.report.mechanics_section import put_mechanics
+from fdnet.report.tables import plain_json
 from fdnet.run.made_files import START_OVER, check_files
 from fdnet.run.mark import CASE, is_run_folder
 from fdnet.run.record_files import read_record
@@ -69,7 +70,8 @@ def _of_folder(folder: Path, assignments: list[str]) -> Packed:
     if read_record(folder, "pack") is None:
         raise CaseError(
             f"{folder}: holds no finished pack; run the stage pack first "
-            f"(fdnet run {folder / CASE} --out {folder} --stages pack --resume)"
+            f"(fdnet run {shlex.quote(str(folder / CASE))} --out {shlex.quote(str(folder))} "
+            "--stages pack --resume)"
         )
     return Packed(case=case, grains=_grains_of(folder, case), folder=folder)
 
@@ -154,10 +156,14 @@ def _springs(case: Case) -> dict[str, Any]:
 
 
 def write_mechanics(packed: Packed, numbers: dict[str, Any]) -> Path:
-    """Write mechanics.json and, where there is a report, its section; returns the path."""
+    """Write mechanics.json and, where there is a report, its section; returns the path.
+
+    Where the report has no place for the section, a further warning in `numbers` says so.
+    """
     folder = packed.folder / FOLDER
     folder.mkdir(parents=True, exist_ok=True)
-    path = write_text(folder / NUMBERS, json.dumps(numbers, indent=2) + "\n")
-    if (packed.folder / "report.html").is_file():
-        put_mechanics(packed.folder / "report.html", folder)
+    path = write_text(folder / NUMBERS, plain_json(numbers)[1] + "\n")
+    report = packed.folder / "report.html"
+    if report.is_file() and not put_mechanics(report, folder):
+        numbers["warnings"].append(f"{report} has no place for the mechanics and stays as it is")
     return path

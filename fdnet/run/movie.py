@@ -1,6 +1,6 @@
 """The movie of a finished run, or a picture of it before and after, from the states it kept."""
 
-import re
+import shlex
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,8 +11,11 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase
 from fdnet.errors import CaseError
+from fdnet.files.new import refuse_present
 from fdnet.run.finished import FinishedRun
+from fdnet.run.made_files import ANALYSE_AGAIN, check_one, frames_in, frames_of
 from fdnet.run.open_run import open_run
+from fdnet.run.record_files import check_finished
 from fdnet.spheres.snapshot import Snapshot
 
 if TYPE_CHECKING:
@@ -45,27 +48,36 @@ class State:
 
 
 def movie_of(
-    folder: Path, target: Path | None = None, *, per_second: float = 4.0, show: str = "fines"
+    folder: Path,
+    target: Path | None = None,
+    *,
+    per_second: float = 4.0,
+    show: str = "fines",
+    force: bool = False,
 ) -> Path:
     """Write the invasion of the run in `folder` as a movie; returns its path.
 
     `target` ends in .gif or .mp4 and is invasion.gif in the run folder without it. With .png it is
     one picture of the specimen before and after. `show` is a key of `SHOWN`. Raises CaseError
-    where the folder is no finished run with fines and frames, or nothing can be drawn.
+    where the folder is no finished run with fines and frames, one of its files was changed, a
+    file is there that `force` does not allow to replace, or nothing can be drawn.
     """
-    from fdnet.report.movie import MovieFrame, Scene, write_movie
+    from fdnet.report.movie import MovieFrame, Scene, refuse_suffix, write_movie
 
     if not LEAST <= per_second <= MOST:
         raise CaseError(f"--fps: {per_second:g}, expected {LEAST:g} to {MOST:g} frames a second")
     if show not in SHOWN:
         raise CaseError(f"--show: {show!r} is not known; choose one of {sorted(SHOWN)}")
     run = open_run(folder)
-    states = _states(run, run.path / "frames")
     path = target or run.path / "invasion.gif"
+    refuse_suffix(path)
+    refuse_present(path, force=force)
+    check_finished(folder)
+    states = _states(run)
     if path.suffix.lower() == ".png":
         states = [states[0], states[-1]]
     with tempfile.TemporaryDirectory() as work:
-        still = run.path / "spheres_initial.vtp"
+        still = _whole(run, "spheres_initial.vtp")
         box = np.array([(0.0, side) for side in run.case.size_m])
         if show == "fines":
             frames = [
@@ -117,24 +129,42 @@ def _no_fines(run: FinishedRun, work: Path) -> Path:
     return write_spheres_vtp(work / "none.vtp", run.spheres("initial").fines())
 
 
-def _states(run: FinishedRun, folder: Path) -> list[State]:
+def _states(run: FinishedRun) -> list[State]:
     """The states in order of time; the first is the clean specimen."""
     if not isinstance(run.case, InvasionCase):
         raise CaseError(f"{run.path}: has no fines, so there is no invasion to show")
-    files = {int(re.sub(r"\D", "", path.stem)): path for path in folder.glob("spheres_*.vtp")}
+    kept = frames_of(run.manifest["files"])
+    files = frames_in(run.path) | kept
     if not files:
         raise CaseError(
-            f"{folder}: holds no states to draw; write them with fdnet run CASE.toml "
-            f"--out {run.path} --stages report --force"
+            f"{run.path / 'frames'}: holds no states to draw; write them with fdnet run CASE.toml "
+            f"--out {shlex.quote(str(run.path))} --stages report --force"
         )
     names = [str(name) for name in run.history.columns]
     rows = {
         int(row[names.index("step")]): dict(zip(names, row, strict=True))
         for row in run.history.itertuples(index=False)
     }
+    for step, name in files.items():
+        if step not in rows or (kept and step not in kept):
+            raise CaseError(
+                f"{run.path / name}: is no state that this run wrote; move it out of this folder"
+            )
     first = dict.fromkeys(names, 0.0)
-    kept = [State(spheres=path, row=rows.get(step, {})) for step, path in sorted(files.items())]
-    return [State(spheres=None, row=first), *kept]
+    states = [
+        State(spheres=_whole(run, name), row=rows[step]) for step, name in sorted(files.items())
+    ]
+    return [State(spheres=None, row=first), *states]
+
+
+def _whole(run: FinishedRun, name: str) -> Path:
+    """A mesh of the run that is there, uncut and, where its digest was kept, unchanged."""
+    path = run.path / name
+    check_one(run.path, run.manifest, name, ANALYSE_AGAIN)
+    if not path.is_file() or not path.read_bytes().rstrip().endswith(b"</VTKFile>"):
+        what = "is cut" if path.is_file() else "is missing"
+        raise CaseError(f"{path}: {what}; {ANALYSE_AGAIN}")
+    return path
 
 
 def _words(state: State, *, measured: float | None = None) -> str:
@@ -142,8 +172,6 @@ def _words(state: State, *, measured: float | None = None) -> str:
     row = state.row
     if state.spheres is None:
         return "clean sand"
-    if not row:
-        return ""
     words = [_time(float(row.get("physical_time_s", row["time_s"])))]
     if state.rate is not None:
         words.append(f"rate {state.rate:.2f}")

@@ -5,12 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from fdnet.case.case import Case
-from fdnet.case.file import read_case, recorded_case
+from fdnet.case.file import read_case
 from fdnet.errors import CaseError
 from fdnet.files.paths import expanded
 from fdnet.run.finished import FinishedRun
-from fdnet.run.folder import CASE, MANIFEST, STAGES, read_manifest
-from fdnet.run.mark import is_run_folder
+from fdnet.run.folder import STAGES
+from fdnet.run.record_files import finished_manifest
 
 
 def open_run(path: str | Path) -> FinishedRun:
@@ -38,9 +38,8 @@ def open_run(path: str | Path) -> FinishedRun:
         >>> axes = run.sections.plot(x="x_lo_m", y=["k_initial_m2", "k_damaged_m2"])
     """
     folder = expanded(path)
-    _refuse_unfinished(folder)
-    manifest = read_manifest(folder) or {}
-    return FinishedRun(path=folder, case=recorded_case(folder / CASE), manifest=manifest)
+    manifest, case = finished_manifest(folder)
+    return FinishedRun(path=folder, case=case, manifest=manifest)
 
 
 def run_case(
@@ -103,21 +102,3 @@ def _checked_stages(stages: Sequence[str]) -> tuple[str, ...]:
             "among them; for the pack or the invasion alone use fdnet run CASE.toml --stages"
         )
     return tuple(stage for stage in STAGES if stage in stages)
-
-
-def _refuse_unfinished(folder: Path) -> None:
-    if not folder.is_dir():
-        what = "is a file" if folder.exists() else "does not exist"
-        raise CaseError(f"{folder}: {what}; give the folder of a finished fdnet run")
-    ours = is_run_folder(folder)
-    if ours and (folder / MANIFEST).exists():
-        return
-    if ours:
-        raise CaseError(
-            f"{folder}: holds an unfinished run; continue it with fdnet run CASE.toml "
-            f"--out {folder} --resume, then open it"
-        )
-    raise CaseError(
-        f"{folder}: holds no fdnet run ({MANIFEST} is missing); give the folder that fdnet run "
-        "wrote"
-    )

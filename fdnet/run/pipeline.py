@@ -18,7 +18,6 @@ from fdnet.run.answer.answer import with_answer
 from fdnet.run.answer.case_words import case_words
 from fdnet.run.clean_up import Returned, clean_up_stage, compared, returned
 from fdnet.run.dem_stages import (
-    check_finished,
     file_warnings,
     invade_stage,
     invaded,
@@ -26,10 +25,11 @@ from fdnet.run.dem_stages import (
     packed_grains,
 )
 from fdnet.run.folder import RunFolder, open_folder
-from fdnet.run.made_files import MESHES, SOME_TABLES, TABLES, digests_of
+from fdnet.run.made_files import MESHES, SOME_TABLES, TABLES, digests_of, frames_in
 from fdnet.run.mark import RECORDS
 from fdnet.run.outputs import Results, draw_figures, write_paraview, write_tables
 from fdnet.run.placed_sizes import placed_sizes, size_summary
+from fdnet.run.record_files import check_finished
 from fdnet.run.records import record_warnings, stage_seconds, versions
 from fdnet.run.session import RunOptions, Session
 from fdnet.run.stokes_sections import report_section
@@ -62,7 +62,7 @@ def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
     try:
         session = Session(case=case, scales=scales_of(case), folder=folder, options=options)
         if folder.manifest() is not None and folder.holds(case, options.stages):
-            check_finished(session)
+            check_finished(folder.path)
             return _read_summary(folder)
         return _carry_out(session)
     except CaseError as error:
@@ -159,7 +159,16 @@ def _manifest(session: Session) -> dict[str, Any]:
         "command": session.options.command,
         "seconds": stage_seconds(pack, invasion, session.seconds, cleaned=cleaned),
         "versions": versions(pack),
-        "files": digests_of(session.path, [*TABLES, *SOME_TABLES, *MESHES, *RECORDS.values()]),
+        "files": digests_of(
+            session.path,
+            [
+                *TABLES,
+                *SOME_TABLES,
+                *MESHES,
+                *frames_in(session.path).values(),
+                *RECORDS.values(),
+            ],
+        ),
         "pack": pack,
         "invade": invasion,
         **({"clean_up": cleaned} if cleaned else {}),

@@ -1,15 +1,27 @@
 """The records of a run folder: of its finished stages, and the manifest of the whole run."""
 
 import json
-from collections.abc import Iterator, Mapping
+import shlex
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
+from pydantic import Field
+
+from fdnet.case.case import Case, InvasionCase
+from fdnet.case.file import recorded_case
 from fdnet.case.stages import STAGES
 from fdnet.errors import CaseError
 from fdnet.files.atomic import write_text
-from fdnet.run.made_files import SOME_TABLES
-from fdnet.run.mark import MANIFEST, RECORD_FORMAT, RECORDS
+from fdnet.report.read_tables import Checked, read_json
+from fdnet.run.made_files import (
+    ANALYSE_AGAIN,
+    SOME_TABLES,
+    START_OVER,
+    check_files,
+    may_be_gone,
+)
+from fdnet.run.mark import CASE, MANIFEST, RECORDS, is_run_folder
 
 OUTPUTS = {
     "pack": ("pack", "mechanics"),
@@ -41,26 +53,90 @@ OUTPUTS = {
 OPTIONAL = ("layers.csv", *SOME_TABLES)
 """Those of them that a finished stage may lack."""
 
-_NUMBER, _TEXTS, _ROWS = "a number", "a list of texts", "a list of tables"
-_COMMON = {
-    "digest": "a text",
-    "seconds": _NUMBER,
-    "max_overlap": _NUMBER,
-    "steps": _NUMBER,
-    "dt_s": _NUMBER,
-    "runs": _ROWS,
-    "left_out": _TEXTS,
+
+class _Execution(Checked):
+    """One execution of LIGGGHTS."""
+
+    version: str
+    seconds: float
+    waited: float = 0.0
+    ranks: int | None = None
+
+
+class _Attempt(Checked):
+    """One attempt at the porosity of a pack."""
+
+    liggghts_s: float
+
+
+class _Updates(Checked):
+    """How often a flow was computed anew."""
+
+    count: int
+    momentum_open: int = 0
+    momentum_defect_most: float = 0.0
+
+
+class StageRecord(Checked):
+    """What the record of every stage holds."""
+
+    format: Literal[1]
+    digest: str
+    seconds: float
+    max_overlap: float
+    steps: int
+    dt_s: float
+    ranks: int | None = None
+    files: Mapping[str, str] = {}
+    runs: list[_Execution]
+    left_out: list[str]
+
+
+class PackRecord(StageRecord):
+    """The record of a pack."""
+
+    porosity: float
+    porosity_assumed: float
+    creep_m_s: float = 0.0
+    restless: int = 0
+    attempts: Annotated[list[_Attempt], Field(min_length=1)]
+    runs: Annotated[list[_Execution], Field(min_length=1)]
+
+
+class InvadeRecord(StageRecord):
+    """The record of an invasion; one that was cut after its last checkpoint names no run."""
+
+    stop_reason: str
+    max_overlap_step: int | None = None
+    supplied: int
+    updates: _Updates | None = None
+    warnings: list[str]
+
+
+class CleanUpRecord(StageRecord):
+    """The record of a clean-up."""
+
+    stop_reason: str
+    physical_time_s: float
+    warnings: list[str]
+
+
+class Manifest(Checked):
+    """The manifest of a run that is analysed."""
+
+    format: Literal[1]
+    case: str = ""
+    stages: list[str]
+    digests: Mapping[str, str] = {}
+    files: Mapping[str, str] = {}
+    invade: InvadeRecord | None
+
+
+_MODELS: dict[str, type[Checked]] = {
+    "pack": PackRecord,
+    "invade": InvadeRecord,
+    "clean_up": CleanUpRecord,
 }
-_SHAPES: Mapping[str, Mapping[str, str]] = {
-    "pack": _COMMON | {"porosity": _NUMBER, "porosity_assumed": _NUMBER, "attempts": _ROWS},
-    "invade": _COMMON | {"stop_reason": "a text", "supplied": _NUMBER, "warnings": _TEXTS},
-    "clean_up": _COMMON
-    | {"stop_reason": "a text", "physical_time_s": _NUMBER, "warnings": _TEXTS},
-    "runs": {"version": "a text", "seconds": _NUMBER},
-    "attempts": {"liggghts_s": _NUMBER},
-    "manifest": {"stages": _TEXTS, "invade": "a table or null"},
-}
-"""What each key of a record must hold; further keys are not looked at."""
 
 
 def _expected(manifest: dict[str, Any], stage: str) -> tuple[str, ...]:
@@ -82,7 +158,7 @@ def read_record(folder: Path, stage: str) -> dict[str, Any] | None:
 
     Raises CaseError when it cannot be understood.
     """
-    return _read_record(folder / RECORDS[stage], stage)
+    return _read(folder / RECORDS[stage], _MODELS[stage], "record of a stage")
 
 
 def read_manifest(folder: Path) -> dict[str, Any] | None:
@@ -90,7 +166,7 @@ def read_manifest(folder: Path) -> dict[str, Any] | None:
 
     Raises CaseError when it cannot be understood, or when a file that it implies is missing.
     """
-    manifest = _read_record(folder / MANIFEST, "manifest")
+    manifest = _read(folder / MANIFEST, Manifest, "manifest of a run")
     if manifest is None:
         return None
     expected = (name for stage in STAGES[:4] for name in _expected(manifest, stage))
@@ -103,52 +179,54 @@ def read_manifest(folder: Path) -> dict[str, Any] | None:
     return manifest
 
 
-def _read_record(path: Path, shape: str) -> dict[str, Any] | None:
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
+def _read(path: Path, model: type[Checked], noun: str) -> dict[str, Any] | None:
+    if not path.exists():
         return None
-    except OSError as error:
+    return read_json(path, model, noun=noun, advice="start over with --force")
+
+
+def finished_manifest(folder: Path) -> tuple[dict[str, Any], Case]:
+    """The manifest and the case of the finished run in `folder`.
+
+    Raises CaseError where there is no folder, it holds no run or an unfinished one, its records
+    cannot be understood, or its case is not the one that was run.
+    """
+    if not folder.is_dir():
+        what = "is a file" if folder.exists() else "does not exist"
+        raise CaseError(f"{folder}: {what}; give the folder of a finished fdnet run")
+    if not is_run_folder(folder):
         raise CaseError(
-            f"{path}: cannot be read ({error.strerror}); mend that, then repeat the command with "
-            "--resume"
-        ) from error
-    except (ValueError, RecursionError) as error:
-        raise CaseError(f"{path}: cannot be read ({error}); start over with --force") from error
-    if not isinstance(record, dict) or record.get("format") != RECORD_FORMAT:
-        raise CaseError(
-            f"{path}: is no record of this fdnet (format {RECORD_FORMAT} expected); start over "
-            "with --force"
+            f"{folder}: holds no fdnet run ({MANIFEST} is missing); give the folder that fdnet "
+            "run wrote"
         )
-    problem = next(_problems(record, shape), None)
-    if problem is not None:
-        raise CaseError(f"{path}: {problem}; start over with --force")
-    return record
+    manifest = read_manifest(folder)
+    if manifest is None:
+        raise CaseError(
+            f"{folder}: holds an unfinished run; continue it with fdnet run CASE.toml --out "
+            f"{shlex.quote(str(folder))} --resume, then open it"
+        )
+    case = recorded_case(folder / CASE)
+    same = manifest.get("digests", {}).get("analyse") == case.digest()
+    if not same or (isinstance(case, InvasionCase) and manifest["invade"] is None):
+        raise CaseError(
+            f"{folder / CASE}: is not the case that the run in this folder had (its digest "
+            f"differs from {MANIFEST}); {ANALYSE_AGAIN}"
+        )
+    return manifest, case
 
 
-def _problems(record: Mapping[str, Any], shape: str) -> Iterator[str]:
-    """What is missing in a record or has another type than it must have."""
-    for key, expected in _SHAPES[shape].items():
-        if key not in record:
-            yield f"the key {key} is missing"
-        elif not _is(record[key], expected):
-            yield f"{key} is {str(record[key])[:40]!r}, expected {expected}"
-        elif expected == _ROWS:
-            if not record[key] and shape not in (
-                "invade",
-                "clean_up",
-            ):  # cut after its last checkpoint: no run
-                yield f"{key} is empty, expected at least one table"
-            for row in record[key]:
-                yield from (f"{key}: {problem}" for problem in _problems(row, key))
+def check_finished(folder: Path) -> tuple[dict[str, Any], Case]:
+    """The manifest and the case of the finished run in `folder`, with all its files as it wrote
+    them; dumps and meshes for ParaView may be gone.
 
-
-def _is(value: Any, expected: str) -> bool:
-    if expected == _NUMBER:
-        return isinstance(value, int | float) and not isinstance(value, bool)
-    if expected in (_TEXTS, _ROWS):
-        kind = str if expected == _TEXTS else dict
-        return isinstance(value, list) and all(isinstance(one, kind) for one in value)
-    if expected == "a text":
-        return isinstance(value, str)
-    return value is None or isinstance(value, dict)
+    This is what every command asks before it takes the numbers of a run. Raises CaseError as
+    `finished_manifest` does, and where a file is missing or was changed.
+    """
+    manifest, case = finished_manifest(folder)
+    if not manifest.get("files"):
+        raise CaseError(f"{folder / MANIFEST}: holds no digests of files; {ANALYSE_AGAIN}")
+    check_files(folder, manifest, ANALYSE_AGAIN, may_lack=may_be_gone)
+    for stage in RECORDS:
+        record = read_record(folder, stage) or {}
+        check_files(folder / stage, record, START_OVER, may_lack=may_be_gone)
+    return manifest, case

@@ -2,6 +2,7 @@
 
 import hashlib
 import platform
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from importlib import metadata
@@ -113,7 +114,7 @@ def run_record(run: Run) -> dict[str, Any]:
         for path in sorted(run.directory.glob("in.*"))
     }
     return {
-        "command": " ".join(run.command),
+        "command": shlex.join(run.command),
         "version": run.version,
         "seconds": run.seconds,
         **({"waited": run.waited} if run.waited else {}),

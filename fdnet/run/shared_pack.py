@@ -1,5 +1,6 @@
 """A pack that several runs share: made once, and copied into each of them."""
 
+import shlex
 import shutil
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ def take_pack(session: Session, source: Path) -> None:
     if record is None:
         raise CaseError(
             f"--pack-from {source}: holds no finished pack; make it with fdnet run CASE.toml "
-            f"--stages pack --out {source}"
+            f"--stages pack --out {shlex.quote(str(source))}"
         )
     _refuse_other(session, source, record)
     check_files(source / "pack", record, START_OVER)

@@ -5,8 +5,11 @@ import math
 import pytest
 from campaign.samples import comparison
 
+from fdnet.campaign.result.table import band_row
+from fdnet.campaign.result.words import band_text, value_text
 from fdnet.campaign.until import is_reached, next_seed_count, parse_until
 from fdnet.errors import CaseError
+from fdnet.run.finished_text import _lost
 from fdnet.statistics.bands import Band
 from fdnet.statistics.pairs import (
     Pair,
@@ -128,3 +131,49 @@ def test_seeds_are_added_until_the_band_is_narrow(tmp_path):
     assert not is_reached(goal, made)
     assert next_seed_count(goal, made, 32) == 6  # at most twice as many at a time
     assert next_seed_count(goal, made, 4) == 4
+
+
+@pytest.mark.parametrize(
+    ("quantity", "values", "ends", "said"),
+    [
+        # t(1) = 12.7062: the whole band of 0.5 and 0.6 is -0.085 to 1.185
+        ("k_reduction", [0.5, 0.6], (0.0, 1.0), "cut at 0 % and 100 %"),
+        # t(2) 0.08 / sqrt(3) = 4.302653 x 0.0461880 = 0.198731
+        ("k_reduction", [0.02, 0.10, 0.18], (0.0, 0.298731), "cut at 0 %"),
+        ("porosity_damaged", [0.82, 0.90, 0.98], (0.701269, 1.0), "cut at 100 %"),
+        ("invaded_count", [1, 5, 9], (0.0, 5 + 4.302653 * 4 / 3**0.5), "cut at 0"),
+        ("k_damaged_m2", [1e-12, 5e-12, 9e-12], (0.0, 5e-12 + 4.302653 * 4e-12 / 3**0.5), "cut"),
+        ("pores", [1, 5, 9], (0.0, 5 + 4.302653 * 4 / 3**0.5), "cut at 0"),
+        # neither bounded, nor within the bounds
+        ("skin", [1.0, 5.0, 9.0], (5 - 4.302653 * 4 / 3**0.5, 5 + 4.302653 * 4 / 3**0.5), ""),
+        ("k_reduction", [-0.1, 0.0, 0.1], (-0.248414, 0.248414), ""),
+        ("k_reduction", [0.3, 0.4, 0.5], (0.4 - 0.248414, 0.4 + 0.248414), ""),
+    ],
+)
+def test_a_band_ends_where_its_quantity_does(tmp_path, quantity, values, ends, said):
+    made = comparison(tmp_path, {"a": values}, more={quantity: values})
+    band = made.band("a", quantity)
+    assert (band.low, band.high) == pytest.approx(ends, rel=1e-5)
+    assert band.mean == pytest.approx(sum(values) / len(values))
+    assert said in band_text(quantity, band)
+    assert ("cut" in band_text(quantity, band)) == bool(said)
+    assert made.overall(quantity)[0] == band
+    assert band_row(band).get("cut_at", []) == list(band.cut)
+
+
+def test_a_difference_of_shares_ends_at_all_of_them(tmp_path):
+    """Welch with one degree of freedom each side: far more than 100 points."""
+    (pair,) = comparison(tmp_path, {"a": [0.1, 0.9], "b": [0.2, 0.9]}, shared=False).pairs()
+    assert (pair.difference.low, pair.difference.high) == (-1.0, 1.0)
+
+
+def test_the_seeds_are_added_by_the_whole_band(tmp_path):
+    """Of 0.02, 0.1 and 0.18 half a band is 0.199; what is left of it is half as wide."""
+    made = comparison(tmp_path, {"a": [0.02, 0.10, 0.18]})
+    assert not is_reached(parse_until("k_reduction ± 19 %"), made)
+    assert is_reached(parse_until("k_reduction ± 20 %"), made)
+
+
+def test_no_zero_has_a_sign():
+    assert value_text("k_reduction", -0.0) == "0 %"
+    assert _lost(-1e-6) == "0.0"

@@ -71,6 +71,13 @@ def test_named_variants_meet_every_case(written, tmp_path):
     [
         ("seeds = 2", "case: give one case file"),
         ('case = "tiny.toml"\nsweeps = 1', "sweeps: unknown key"),
+        ('case = "tiny.toml"\nname = "a\\ntouch hit"', "name: .*expected letters, digits"),
+        *(
+            (f'case = "tiny.toml"\nname = {name}', "name: .*expected letters, digits")
+            for name in ("'$(touch hit)'", "'a; b'", "'a b'", "''", '"\'"', "5", "'-x'")
+        ),
+        ('case = "tiny.toml"\n[[variants]]\nname = "a\\nb"', "variants.name: .*one line"),
+        ('case = "tiny.toml"\n[[variants]]\nname = []', "variants.name: .*one line"),
         ('case = "tiny.toml"\nseeds = 0', "seeds: 0"),
         ('case = "tiny.toml"\nseeds = [1, 1]', "names a seed twice"),
         ('case = "tiny.toml"\n[grid]\nfines.radius_mm = 0.05', "expected a list of values"),

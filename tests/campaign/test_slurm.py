@@ -9,8 +9,9 @@ import time
 
 import pytest
 
-from fdnet.campaign.engine.slurm import SUBMIT, write_slurm_scripts
+from fdnet.campaign.engine.slurm import RUNS, SUBMIT, write_slurm_scripts
 from fdnet.campaign.engine.tasks import HowToRun, Task
+from fdnet.errors import CaseError
 
 PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "sinfo")
 CONFIGURATION = """ClusterName=fdnet
@@ -96,3 +97,55 @@ def test_packs_come_before_runs_and_a_failing_job_stops_nothing(slurm, tmp_path)
     while time.monotonic() < end and not all(f.exists() and f.stat().st_size for f in files):
         time.sleep(0.5)
     assert [f.read_text() for f in files] == ["made", "made", "no good\n"]
+
+
+SBATCH = """#!/bin/bash
+# Stands for sbatch: keeps its words, and runs every job of the array.
+for word in "$@"; do echo "$word" >> words.txt; script=$word; done
+for job in 0 1; do SLURM_ARRAY_TASK_ID=$job bash "$script" </dev/null >&2; done
+echo 7
+"""
+HIT = "touch hit"
+
+
+@pytest.mark.parametrize(
+    "folder",
+    ["a b", f"a;{HIT};", f"$({HIT})", f"`{HIT}`", f"a\n{HIT}\n", "it's", f'"; {HIT} "', "-x"],
+)
+def test_nothing_that_a_user_names_is_run_by_the_scripts(tmp_path, folder):
+    """The scripts are carried out with a stand-in for sbatch: each job runs, and nothing else."""
+    out = tmp_path / folder
+    (out / "logs").mkdir(parents=True)
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin" / "sbatch").write_text(SBATCH)
+    (tmp_path / "bin" / "sbatch").chmod(0o755)
+    write = "import sys; open('made-' + sys.argv[1][0], 'w').write(sys.argv[1])"
+    words = [f"0 $({HIT}) ; {HIT} '\n{HIT}", f'1 `{HIT}` && {HIT} " | {HIT}']
+    tasks = [
+        Task(name=f"job-{word[0]}", words=(sys.executable, "-c", write, word), makes="x")
+        for word in words
+    ]
+    how = HowToRun(jobs=2, resources=(f"comment=a; {HIT} $({HIT})", "--time=2", "exclusive"))
+    write_slurm_scripts(out, f"tiny\n{HIT}", tasks, how, ranks=1)
+    path = f"{tmp_path / 'bin'}:{os.environ['PATH']}"
+    subprocess.run(
+        ["bash", str(out / SUBMIT)], cwd=tmp_path, env=os.environ | {"PATH": path}, check=True
+    )
+    assert not list(tmp_path.rglob("hit"))
+    assert [(out / f"made-{number}").read_text() for number in range(2)] == words
+    assert (out / "words.txt").read_text().split() == ["--parsable", "runs.sbatch"]
+    given = [line for line in (out / RUNS).read_text().splitlines() if line.startswith("#SBATCH")]
+    assert f"#SBATCH --comment='a; {HIT} $({HIT})'" in given
+    assert {"#SBATCH --time=2", "#SBATCH --exclusive"} <= set(given)
+    lines = (out / RUNS).read_text().splitlines()
+    assert lines[len(given) + 2].startswith("# A job that was cut")
+
+
+@pytest.mark.parametrize(
+    "option", ["a\nb", "comment='x", 'x="', "$(x)", "=3", "time=\\x", "a b=1"]
+)
+def test_an_option_that_sbatch_could_misread_is_refused(tmp_path, option):
+    task = Task(name="one", words=("true",), makes="x")
+    how = HowToRun(jobs=1, resources=(option,))
+    with pytest.raises(CaseError, match=r"--slurm-script: .*expected options of sbatch"):
+        write_slurm_scripts(tmp_path, "test", [task], how, ranks=1)

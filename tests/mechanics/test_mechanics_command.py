@@ -1,13 +1,14 @@
 """`fdnet mechanics` on a small pack of the real binary, and what it refuses."""
 
 import json
+import shutil
 
 import pytest
 
 from fdnet.case.file import case_from, recorded_case
 from fdnet.cli import main
 from fdnet.errors import CaseError
-from fdnet.report.mechanics_section import put_mechanics
+from fdnet.report.mechanics_section import put_mechanics, section_html
 
 CASE = """
 name = "sand"
@@ -179,3 +180,49 @@ def test_a_pack_whose_grains_hardly_touch_is_refused(tmp_path, capsys):
     out = str(tmp_path / "run")
     assert main(["mechanics", str(tmp_path / "loose.toml"), "--out", out, "--quiet"]) == 4
     assert "carries no load along x" in capsys.readouterr().err
+
+
+def edited(**keys):
+    """Puts keys into mechanics.json; None takes one out."""
+
+    def edit(path):
+        data = json.loads(path.read_text()) | keys
+        path.write_text(json.dumps({k: v for k, v in data.items() if v is not None}))
+
+    return edit
+
+
+@pytest.mark.liggghts
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        edited(bulk_modulus_Pa=None),
+        edited(warnings=None),
+        edited(warnings="none"),
+        edited(young_modulus_Pa="stiff"),
+        edited(poisson_ratio=float("nan")),
+        edited(triaxial=[1]),
+        lambda path: path.write_text("[1]"),
+        lambda path: path.write_text(""),
+        lambda path: path.write_bytes(b"{\xff}"),
+        lambda path: (path.unlink(), path.mkdir()),
+    ],
+)
+def test_numbers_of_another_shape_are_refused_in_the_report(packed, tmp_path, spoil):
+    folder = tmp_path / "mechanics"
+    shutil.copytree(packed / "mechanics", folder)
+    spoil(folder / "mechanics.json")
+    with pytest.raises(CaseError, match=r"mechanics\.json: .*measure it anew"):
+        section_html(folder)
+
+
+@pytest.mark.liggghts
+def test_a_page_that_is_no_text_is_refused(packed, tmp_path, capsys):
+    run = tmp_path / "run"
+    shutil.copytree(packed, run)
+    (run / "report.html").write_bytes(b"<p>\xff</p>")
+    assert main(["mechanics", str(run)]) == 2
+    assert "report.html: cannot be read as a page" in capsys.readouterr().err
+    (run / "report.html").write_text("<p>mine</p>")
+    assert main(["mechanics", str(run)]) == 0
+    assert "has no place for the mechanics" in capsys.readouterr().err

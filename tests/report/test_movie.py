@@ -1,5 +1,7 @@
 """Movies: the states in order with their times, and what is refused."""
 
+import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -79,3 +81,83 @@ def test_an_odd_speed_and_a_folder_without_a_run_are_refused(tmp_path):
         movie_of(tmp_path, show="cake")
     with pytest.raises(CaseError, match="holds no fdnet run"):
         movie_of(tmp_path)
+
+
+@pytest.fixture
+def copied(finished, tmp_path):
+    return Path(shutil.copytree(finished.path, tmp_path / "run"))
+
+
+@pytest.fixture
+def shown(monkeypatch):
+    """The files that a movie is made of, without drawing it."""
+    seen = []
+
+    def write(path, frames, scene, *, per_second):
+        seen.extend(frame.spheres.name for frame in frames)
+        return path
+
+    monkeypatch.setattr(movie, "write_movie", write)
+    return seen
+
+
+def a_frame(folder):
+    return sorted((folder / "frames").glob("spheres_*.vtp"))[1]
+
+
+@pytest.mark.liggghts
+@pytest.mark.parametrize("name", ["m.gif", "m.png", None])
+def test_a_movie_replaces_no_file_unasked(copied, tmp_path, shown, name):
+    there = copied / "invasion.gif" if name is None else tmp_path / name
+    there.write_text("mine")
+    target = None if name is None else there
+    with pytest.raises(CaseError, match=f"{there.name}: is there already; .*--force"):
+        movie_of(copied, target)
+    assert movie_of(copied, target, force=True) == there
+
+
+@pytest.mark.liggghts
+def test_a_movie_shows_the_states_of_its_run_alone(copied, tmp_path, shown):
+    whole = sorted((copied / "frames").glob("spheres_*.vtp"), key=lambda p: int(p.stem[8:]))
+    names = [path.name for path in whole]
+    for other in ("spheres_old.vtp", "spheres_.vtp", "spheres_1.vtp.bak"):
+        shutil.copy(whole[0], copied / "frames" / other)
+    movie_of(copied, tmp_path / "m.gif")
+    assert shown[1:] == names
+    shutil.copy(whole[0], copied / "frames" / "spheres_7.vtp")
+    with pytest.raises(CaseError, match=r"spheres_7\.vtp: is no state that this run wrote"):
+        movie_of(copied, tmp_path / "m.gif")
+
+
+@pytest.mark.liggghts
+@pytest.mark.parametrize("digests", [True, False])
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda path: path.write_bytes(path.read_bytes()[:3000]),
+        lambda path: path.write_bytes(b""),
+        lambda path: path.write_bytes(path.read_bytes()[:-20]),
+        lambda path: (path.unlink(), path.mkdir()),
+    ],
+)
+def test_a_cut_state_is_named_and_not_drawn_empty(copied, tmp_path, shown, spoil, digests):
+    """Also in a run whose manifest has no digests of its states."""
+    path = a_frame(copied)
+    spoil(path)
+    if not digests:
+        file = copied / "manifest.json"
+        manifest = json.loads(file.read_text())
+        files = {k: v for k, v in manifest["files"].items() if not k.startswith("frames/")}
+        file.write_text(json.dumps(manifest | {"files": files}))
+    with pytest.raises(CaseError, match=path.name):
+        movie_of(copied, tmp_path / "m.gif")
+    assert not shown
+
+
+@pytest.mark.liggghts
+@pytest.mark.parametrize("name", ["frames", "spheres_initial.vtp", "history.csv", "profile.csv"])
+def test_a_movie_of_a_changed_run_is_refused(copied, tmp_path, shown, name):
+    path = a_frame(copied) if name == "frames" else copied / name
+    path.write_bytes(path.read_bytes().replace(b"1", b"2", 1))
+    with pytest.raises(CaseError, match=rf"{path.name}: is not the file that the run wrote"):
+        movie_of(copied, tmp_path / "m.gif")

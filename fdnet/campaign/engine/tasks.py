@@ -9,7 +9,7 @@ from pathlib import Path
 
 from fdnet.campaign.plan.folder import CASES, LOGS, PACKS, RUNS
 from fdnet.campaign.plan.job import Job, Plan, shared_packs
-from fdnet.campaign.plan.state import is_done, pack_is_done
+from fdnet.campaign.plan.state import pack_is_done, state_of
 from fdnet.run.one_core import ONE_CORE
 
 
@@ -64,8 +64,11 @@ class Task:
 
 
 def tasks_of(path: Path, plan: Plan, how: HowToRun) -> list[Task]:
-    """What is missing: packs that several runs share, and the runs that are not done."""
-    missing = [job for job in plan.jobs if not is_done(path, plan, job)]
+    """What is missing: packs that several runs share, and the runs that are not done.
+
+    A run whose files were changed is asked again, and `fdnet run` says so in its log.
+    """
+    missing = [job for job in plan.jobs if state_of(path, plan, job).status != "done"]
     digests = {job.name: job.case.digest("pack") for job in missing}
     packs = {
         digest: job

@@ -20,7 +20,7 @@ class DepthCurve:
         edges: (S + 1,) m.
         intact: (S,) mD.
         damaged: (S,) mD.
-        low: (S,) mD, lower end of the 95 % band of `damaged`; None for a single run.
+        low: (S,) mD, lower end of the 95 % band of `damaged`, 0 or more; None for a single run.
         high: (S,) mD, its upper end.
     """
 
@@ -38,7 +38,9 @@ def depth_curves(comparison: Comparison, variant: str) -> DepthCurve | None:
     if not runs or any(_edges(rows) != _edges(runs[0]) for rows in runs):
         return None
     damaged = _values(runs, "k_damaged_inplace_m2")
-    bands = [student_band(list(column[~np.isnan(column)])) for column in damaged.T]
+    bands = [
+        student_band(list(column[~np.isnan(column)])).within(0.0, np.inf) for column in damaged.T
+    ]
     several = len(runs) > 1
     return DepthCurve(
         edges=np.array(_edges(runs[0])),

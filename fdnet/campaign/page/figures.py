@@ -115,7 +115,7 @@ def _draw_curve(axes: Any, name: str, curve: DepthCurve, colour: str) -> None:
         axes.stairs(
             curve.high,
             edges,
-            baseline=np.maximum(curve.low, 0),
+            baseline=curve.low,
             fill=True,
             color=colour,
             alpha=0.18,
@@ -204,7 +204,9 @@ def _svg(figure: Any) -> str:
 
 
 def _short(name: str) -> str:
-    return name if len(name) <= 40 else f"{name[:37]}..."
+    """A name as it is drawn: not too long, and no sign of it read as a formula."""
+    shown = name if len(name) <= 40 else f"{name[:37]}..."
+    return shown.replace("$", r"\$")
 
 
 def _with_unit(text: str, unit: str) -> str:

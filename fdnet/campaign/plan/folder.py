@@ -7,15 +7,43 @@ import os
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
 
 from fdnet.campaign.plan.job import Job, Plan
 from fdnet.errors import CaseError
 from fdnet.files.atomic import write_text
 from fdnet.files.paths import refuse_folder_name
+from fdnet.report.read_tables import Checked, read_json
 
 PLAN, CASES, RUNS, PACKS, LOGS, LOCK = "plan.json", "cases", "runs", "packs", "logs", ".lock"
 FORMAT = 1
+
+
+FolderName = Annotated[str, Field(pattern=r"^[A-Za-z0-9=+_-][A-Za-z0-9.=+_-]*$")]
+
+
+class _Variant(Checked):
+    name: FolderName
+    keys: dict[str, Any]
+
+
+class _Run(Checked):
+    name: FolderName
+    variant: FolderName
+    seed: Annotated[int, Field(ge=0, lt=2**31)]
+
+
+class PlanRecord(Checked):
+    """What plan.json holds."""
+
+    fdnet_campaign: Literal[1]
+    name: str
+    digest: str
+    seeds: Annotated[list[Annotated[int, Field(ge=0, lt=2**31)]], Field(min_length=1)]
+    variants: Annotated[list[_Variant], Field(min_length=1)]
+    runs: Annotated[list[_Run], Field(min_length=1)]
 
 
 def read_plan_record(folder: Path) -> dict[str, Any] | None:
@@ -24,15 +52,9 @@ def read_plan_record(folder: Path) -> dict[str, Any] | None:
     Raises CaseError when it cannot be read.
     """
     path = folder / PLAN
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    if not path.exists():
         return None
-    except (OSError, ValueError, RecursionError) as error:
-        raise CaseError(f"{path}: cannot be read ({error}); give another --out") from error
-    if not isinstance(record, dict) or record.get("fdnet_campaign") != FORMAT:
-        raise CaseError(f"{path}: is no plan of this fdnet; give another --out")
-    return record
+    return read_json(path, PlanRecord, noun="plan of this fdnet", advice="give another folder")
 
 
 @contextlib.contextmanager
@@ -48,7 +70,8 @@ def campaign_folder(path: Path, plan: Plan) -> Iterator[Plan]:
     refuse_folder_name(path)
     _refuse_foreign(path)
     try:
-        (path / LOGS).mkdir(parents=True, exist_ok=True)
+        for below in (LOGS, CASES):
+            (path / below).mkdir(parents=True, exist_ok=True)
         lock = os.open(path / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
     except OSError as error:
         raise CaseError(
@@ -78,7 +101,7 @@ def _refuse_foreign(path: Path) -> None:
         raise CaseError(f"{path}: is a file, expected a folder for --out")
     if not path.is_dir() or read_plan_record(path) is not None:
         return
-    others = {child.name for child in path.iterdir()} - {LOCK, LOGS}
+    others = {child.name for child in path.iterdir()} - {LOCK, LOGS, CASES}
     if others:
         raise CaseError(
             f"{path}: is not empty and holds no campaign of fdnet; give another --out (nothing "
@@ -115,10 +138,10 @@ def _admitted(path: Path, plan: Plan) -> Plan:
 
 def _write(path: Path, plan: Plan) -> None:
     """The cases first, so that a plan never names a case that is not there."""
-    (path / CASES).mkdir(exist_ok=True)
     for job in plan.jobs:
-        if not (path / case_path(job)).exists():
-            write_text(path / case_path(job), job.case.toml())
+        file, text = path / case_path(job), job.case.toml()
+        if not file.is_file() or file.read_bytes() != text.encode():
+            write_text(file, text)
     record = {
         "fdnet_campaign": FORMAT,
         "name": plan.name,

@@ -13,6 +13,9 @@ from fdnet.case.stages import STAGES
 
 LONGEST_NAME = 80
 _UNSAFE = re.compile(r"[^A-Za-z0-9.=+_-]+")
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
+"""What the name of a campaign may hold, as that of a case: nothing that a shell could take for
+more than a word."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -105,12 +108,17 @@ def _with_seed(case: Case, seed: int) -> Case:
     return case.model_copy(update={"seed": seed})
 
 
+def safe(text: str) -> str:
+    """`text` as the name of a folder or a job: any other sign becomes an underscore."""
+    return _UNSAFE.sub("_", text).strip("._") or "variant"
+
+
 def named(variants: Sequence[Variant]) -> tuple[Variant, ...]:
     """The variants with names that are fit for folders, each its own."""
     result: list[Variant] = []
     used: set[str] = set()
     for one in variants:
-        name = _UNSAFE.sub("_", one.name).strip("._") or "variant"
+        name = safe(one.name)
         if len(name) > LONGEST_NAME or name in used:
             name = f"{name[: LONGEST_NAME - 9]}-{_hash(one)}"
         number, base = 2, name

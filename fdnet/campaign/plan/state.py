@@ -1,13 +1,14 @@
 """Which runs of a plan are done, and why the others are not."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from fdnet.campaign.plan.folder import LOGS, RUNS
 from fdnet.campaign.plan.job import Job, Plan
-from fdnet.run.mark import MANIFEST, RECORDS, UNFINISHED
+from fdnet.errors import CaseError
+from fdnet.report.read_tables import read_summary
+from fdnet.run.mark import MANIFEST, RECORDS
+from fdnet.run.record_files import check_finished
 
 NOT_RUN = "not run yet"
 
@@ -26,9 +27,17 @@ class State:
 
 
 def state_of(path: Path, plan: Plan, job: Job) -> State:
-    """How a run of the campaign in `path` stands."""
-    if is_done(path, plan, job):
-        return State(status="done")
+    """How a run of the campaign in `path` stands.
+
+    It is done where it has all stages of the plan and every file as the run wrote it, and has
+    failed where one of its files was changed, cut or removed afterwards.
+    """
+    folder = path / RUNS / job.name
+    if (folder / MANIFEST).exists():
+        try:
+            return _finished(folder, plan, job)
+        except CaseError as error:
+            return State(status="failed", reason=str(error))
     for name in (job.name, f"pack-{job.case.digest('pack')}"):
         reason = _last_line(path / LOGS / f"{name}.txt")
         if reason:
@@ -36,29 +45,25 @@ def state_of(path: Path, plan: Plan, job: Job) -> State:
     return State(status="missing", reason=NOT_RUN)
 
 
-def is_done(path: Path, plan: Plan, job: Job) -> bool:
-    """Whether the run has a manifest of its own case with all stages of the plan."""
-    folder = path / RUNS / job.name
-    manifest = _json_of(folder / MANIFEST)
-    if manifest is None or (folder / UNFINISHED).exists():
-        return False
-    done = manifest.get("stages", [])
-    same = manifest.get("digests", {}).get("analyse") == job.case.digest()
-    asked = {stage for stage in plan.stages if stage in job.case.stages}
-    return same and asked <= set(done) and (folder / "summary.json").is_file()
+def _finished(folder: Path, plan: Plan, job: Job) -> State:
+    """A run with a manifest. Raises CaseError where its files are not what it wrote."""
+    manifest, case = check_finished(folder)
+    if case.digest() != job.case.digest():
+        raise CaseError(
+            f"{folder}: holds the run of another case than the plan has under this name; remove "
+            "the folder, and it is run again"
+        )
+    read_summary(folder / "summary.json")
+    missing = {stage for stage in plan.stages if stage in job.case.stages}
+    missing -= set(manifest["stages"])
+    if missing:
+        return State(status="missing", reason=f"not run yet: {', '.join(sorted(missing))}")
+    return State(status="done")
 
 
 def pack_is_done(folder: Path) -> bool:
     """Whether the run folder has a finished pack."""
     return (folder / RECORDS["pack"]).is_file()
-
-
-def _json_of(path: Path) -> dict[str, Any] | None:
-    try:
-        value = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
-        return None
-    return value if isinstance(value, dict) else None
 
 
 def _last_line(path: Path) -> str:

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fdnet.campaign.plan.job import Plan, Variant, named
+from fdnet.campaign.plan.job import NAME, Plan, Variant, named, safe
 from fdnet.case.file import read_case
 from fdnet.errors import CaseError
 from fdnet.files.paths import expanded
@@ -67,6 +67,8 @@ def read_sweep(path: str | Path) -> Sweep:
     """
     place = expanded(path)
     try:
+        if place.exists() and not place.is_file():
+            raise OSError("it is no ordinary file")
         data = tomllib.loads(place.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise CaseError(
@@ -80,7 +82,7 @@ def read_sweep(path: str | Path) -> Sweep:
     cases = data["cases"] if "cases" in data else [data["case"]]
     seeds = data.get("seeds", _SEEDS)
     return Sweep(
-        name=str(data.get("name", place.stem)),
+        name=data.get("name") or safe(place.stem),
         cases=tuple(place.parent / expanded(case) for case in cases),
         fixed=dotted(data.get("set", {})),
         grid={key: tuple(values) for key, values in dotted(data.get("grid", {})).items()},
@@ -114,6 +116,12 @@ def _problems(data: Mapping[str, Any]) -> Iterator[str]:
     cases = data.get("cases", [data.get("case", "")])
     if not isinstance(cases, list) or not cases or not all(isinstance(c, str) for c in cases):
         yield f"cases: {cases!r}, expected paths of case files"
+    name = data.get("name", "unnamed")
+    if not isinstance(name, str) or not NAME.fullmatch(name):
+        yield (
+            f"name: {name!r}, expected letters, digits, dots, underscores and hyphens, a letter "
+            "or a digit first"
+        )
     yield from _seed_problems(data.get("seeds", _SEEDS))
     for name in ("set", "grid", "targets"):
         if not isinstance(data.get(name, {}), dict):
@@ -122,6 +130,10 @@ def _problems(data: Mapping[str, Any]) -> Iterator[str]:
     if not isinstance(variants, list) or not all(isinstance(one, dict) for one in variants):
         yield "variants: expected tables, [[variants]]"
         return
+    for one in variants:
+        name = one.get("name", "unnamed")
+        if not isinstance(name, str) or not name or not name.isprintable():
+            yield f"variants.name: {name!r}, expected one line of text without control characters"
     yield from _key_problems(data)
 
 

@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,9 @@ from fdnet.statistics.pairs import Pair, compare_pair, holm, student_band
 RANKED_BY = "k_reduction"
 SHARES = re.compile(r"(^|\.)(k_reduction|.*porosity.*|.*_fraction|.*_share|\w*over_initial)$")
 """Quantities that are shares of one: a reader sees them in percent."""
+_FURTHER_SHARES = re.compile(r"(^|\.)(share_\w+|\w+_loss)$")
+_NEVER_NEGATIVE = re.compile(r"((?<!\bb_s)_m|_m2|_m3|_s|_count|_over_k0)$|^seconds\.")
+"""Lengths (but for the coefficient b_s_m), permeabilities, volumes, times and counts."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -28,6 +31,7 @@ class Comparison:
         keys: the keys that are varied.
         entries: all runs, also those that are not done.
         ranked_by: quantity of the order; the smallest is first.
+        left_out: folders of planned runs that are not among the entries, for want of a result.
     """
 
     title: str
@@ -35,6 +39,7 @@ class Comparison:
     keys: tuple[str, ...]
     entries: tuple[Entry, ...]
     ranked_by: str = RANKED_BY
+    left_out: tuple[str, ...] = ()
 
     @property
     def done(self) -> list[Entry]:
@@ -72,8 +77,23 @@ class Comparison:
         return next(entry.keys for entry in self.entries if entry.variant == variant)
 
     def band(self, variant: str, quantity: str) -> Band:
-        """Mean over the seeds of a variant with its 95 % band."""
-        return student_band(list(self.values(variant, quantity).values()))
+        """Mean over the seeds of a variant with its 95 % band, cut at the quantity's bounds."""
+        values = list(self.values(variant, quantity).values())
+        return student_band(values).within(*self.bounds(quantity))
+
+    def bounds(self, quantity: str) -> tuple[float, float]:
+        """Least and largest value that the quantity can have: 0 and 1 of a share, 0 of a count.
+
+        They are infinite of any other quantity, and of one that some run has beyond them.
+        """
+        values: list[Any] = [entry.numbers.get(quantity) for entry in self.done]
+        values = [value for value in values if is_number(value)]
+        least, most = -math.inf, math.inf
+        if SHARES.search(quantity) or _FURTHER_SHARES.search(quantity):
+            least, most = 0.0, 1.0
+        elif _NEVER_NEGATIVE.search(quantity) or all(type(value) is int for value in values):
+            least = 0.0
+        return (least, most) if all(least <= v <= most for v in values) else (-math.inf, math.inf)
 
     def overall(self, quantity: str) -> tuple[Band, int]:
         """Mean over all variants with its band, and the number of seeds that it rests on.
@@ -84,7 +104,7 @@ class Comparison:
         by_variant = [self.values(variant, quantity) for variant in self.variants]
         seeds = [seed for seed in by_variant[0] if all(seed in one for one in by_variant)]
         means = [math.fsum(one[seed] for one in by_variant) / len(by_variant) for seed in seeds]
-        return student_band(means), len(seeds)
+        return student_band(means).within(*self.bounds(quantity)), len(seeds)
 
     def ranking(self) -> list[str]:
         """Variants by the mean of `ranked_by`, smallest first; those without a value last."""
@@ -95,7 +115,8 @@ class Comparison:
         """Every two variants that both have values, in the order of the ranking."""
         name = quantity or self.ranked_by
         having = [one for one in self.ranking() if self.values(one, name)]
-        return holm(
+        least, most = self.bounds(name)
+        pairs = holm(
             [
                 compare_pair(
                     (one, other),
@@ -106,6 +127,10 @@ class Comparison:
                 for one, other in combinations(having, 2)
             ]
         )
+        return [
+            replace(pair, difference=pair.difference.within(least - most, most - least))
+            for pair in pairs
+        ]
 
     def _share_packs(self, one: str, other: str) -> bool:
         """Whether runs of the same seed have the same grains in both variants."""

@@ -1,12 +1,11 @@
 """One run of a comparison: what was varied, how it ended, and every number of its summary."""
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fdnet.errors import CaseError
+from fdnet.report.read_tables import read_summary
 
 TEXTS = ("law", "damage_law_used", "stop_reason")
 """Texts of a summary that a table shows next to the numbers."""
@@ -45,15 +44,7 @@ def numbers_of(folder: Path) -> dict[str, Any]:
     Sections are numbered from 1: `sections.1.k_damaged_m2`. Of the lists of sentences it gives the
     number of sentences. Raises CaseError when the summary cannot be read.
     """
-    path = folder / "summary.json"
-    try:
-        summary = json.loads(path.read_text(encoding="utf-8"))
-        if not isinstance(summary, dict):
-            raise ValueError("no table")
-    except (OSError, ValueError, RecursionError) as error:
-        raise CaseError(
-            f"{path}: cannot be read ({error}); run this case again with --force"
-        ) from error
+    summary = read_summary(folder / "summary.json")
     result = dict(_flat("", summary))
     return {key: value for key, value in result.items() if key != "seed"}
 

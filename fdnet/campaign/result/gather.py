@@ -11,10 +11,10 @@ from fdnet.campaign.plan.state import state_of
 from fdnet.campaign.result.comparison import RANKED_BY, Comparison
 from fdnet.campaign.result.entry import Entry, numbers_of
 from fdnet.case.case import Case
-from fdnet.case.file import recorded_case
 from fdnet.errors import CaseError
 from fdnet.files.paths import refuse_folder_name
-from fdnet.run.mark import CASE, MANIFEST, is_run_folder
+from fdnet.run.mark import MANIFEST, is_run_folder
+from fdnet.run.record_files import check_finished
 
 _NOT_COMPARED = ("name", "seed", "given")
 _RESULTS = {"table.csv", "table.parquet", "summary.json", "compare.html"}
@@ -52,11 +52,13 @@ def gather_runs(runs: Sequence[Path], out: Path, *, ranked_by: str = RANKED_BY) 
     """The comparison of finished run folders; a folder of a campaign stands for all its runs.
 
     Runs whose cases differ by the seed alone are one variant. Raises CaseError for a folder that
-    holds no finished run, for one given twice, and for two runs of the same case and seed.
+    holds no finished run or one whose files were changed, for one given twice, and for two runs
+    of the same case and seed.
     """
-    folders = [folder for run in runs for folder in _folders(run)]
+    left_out: list[str] = []
+    folders = [folder for run in runs for folder in _folders(run, left_out)]
     _refuse_twice(folders)
-    cases = {folder: _case(folder) for folder in folders}
+    cases = {folder: check_finished(folder)[1] for folder in folders}
     keys = _differing(list(cases.values()))
     names = _variant_names(cases, keys)
     entries = tuple(
@@ -73,7 +75,12 @@ def gather_runs(runs: Sequence[Path], out: Path, *, ranked_by: str = RANKED_BY) 
     )
     _refuse_same(entries)
     return Comparison(
-        title=f"{len(entries)} runs", path=out, keys=keys, entries=entries, ranked_by=ranked_by
+        title=f"{len(entries)} runs",
+        path=out,
+        keys=keys,
+        entries=entries,
+        ranked_by=ranked_by,
+        left_out=tuple(left_out),
     )
 
 
@@ -96,19 +103,18 @@ def result_folder(out: Path) -> Iterator[None]:
     yield
 
 
-def _folders(run: Path) -> Iterator[Path]:
-    if run.is_dir() and not is_run_folder(run) and read_plan_record(run) is not None:
-        below = sorted(path for path in (run / RUNS).glob("*") if (path / MANIFEST).exists())
-        if not below:
-            raise CaseError(f"{run}: this campaign has no finished run yet; run it first")
-        yield from below
-    elif (run / MANIFEST).exists() and is_run_folder(run):
+def _folders(run: Path, left_out: list[str]) -> Iterator[Path]:
+    """The run folders that `run` stands for; runs of a campaign without a result are left out."""
+    plan = None if not run.is_dir() or is_run_folder(run) else read_plan_record(run)
+    if plan is None:
         yield run
-    else:
-        what = "holds no finished fdnet run" if run.is_dir() else "does not exist"
-        raise CaseError(
-            f"{run}: {what}; give folders that fdnet run, ensemble or sweep has finished"
-        )
+        return
+    below = [run / RUNS / one["name"] for one in plan["runs"]]
+    having = [folder for folder in below if (folder / MANIFEST).exists()]
+    if not having:
+        raise CaseError(f"{run}: this campaign has no finished run yet; run it first")
+    left_out += [str(folder) for folder in below if folder not in having]
+    yield from having
 
 
 def _refuse_twice(folders: Sequence[Path]) -> None:
@@ -128,10 +134,6 @@ def _refuse_same(entries: Sequence[Entry]) -> None:
                 f"{entry.folder}: is the same case with the same seed as {first.folder}, and "
                 "would be counted twice; leave one out"
             )
-
-
-def _case(folder: Path) -> Case:
-    return recorded_case(folder / CASE)
 
 
 def _data(case: Case) -> dict[str, Any]:

@@ -87,6 +87,7 @@ def summary_of(comparison: Comparison) -> dict[str, Any]:
         "done": len(comparison.done),
         "failed": len(comparison.failed),
         "failures": [_failure(comparison, entry) for entry in comparison.failed],
+        "left_out": list(comparison.left_out),
         "ranked_by": comparison.ranked_by,
         "ranking": comparison.ranking(),
         "variants": [_variant(comparison, name) for name in comparison.variants],
@@ -106,10 +107,11 @@ def write_summary(comparison: Comparison, more: Mapping[str, Any]) -> dict[str, 
     return summary
 
 
-def band_row(band: Band) -> dict[str, float | None]:
-    """Mean, low and high; null where there is none."""
+def band_row(band: Band) -> dict[str, Any]:
+    """Mean, low and high, null where there is none; and the bounds that the band was cut at."""
     ends = {"mean": band.mean, "low": band.low, "high": band.high}
-    return {name: None if math.isnan(value) else value for name, value in ends.items()}
+    row = {name: None if math.isnan(value) else value for name, value in ends.items()}
+    return row | ({"cut_at": list(band.cut)} if band.cut else {})
 
 
 def pair_row(pair: Pair) -> dict[str, Any]:

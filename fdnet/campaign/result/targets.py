@@ -134,14 +134,14 @@ def _candidate(comparison: Comparison, name: str, limits: Mapping[str, float]) -
     runs = [entry for entry in comparison.done if entry.variant == name]
     if not runs:
         return None
-    verdicts = tuple(_verdict(goal, limit, runs) for goal, limit in limits.items())
+    verdicts = tuple(_verdict(goal, limit, comparison, runs) for goal, limit in limits.items())
     worst = max(v.band.mean / v.limit if v.limit else math.inf for v in verdicts)
     return Candidate(name=name, verdicts=verdicts, worst=worst)
 
 
-def _verdict(goal: str, limit: float, runs: list[Entry]) -> Verdict:
+def _verdict(goal: str, limit: float, comparison: Comparison, runs: list[Entry]) -> Verdict:
     values = [v for v in map(GOALS[goal].of_run, runs) if v is not None]
-    band = student_band(values)
+    band = student_band(values).within(*comparison.bounds(GOALS[goal].quantity))
     if len(values) < 2 or math.isnan(band.low):
         return Verdict(goal=goal, limit=limit, band=band, state=OPEN)
     state = MET if band.high <= limit else MISSED if band.low > limit else OPEN

@@ -47,18 +47,20 @@ def value_text(quantity: str, value: float) -> str:
 
 
 def _digits(value: float) -> str:
-    text = f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
+    text = f"{value:,.0f}" if abs(value) >= 1000 else f"{value:z.3g}"
     return text.replace("-", "\u2212")
 
 
 def band_text(quantity: str, band: Band) -> str:
-    """A mean with its band: `45 % (95 % band 38 to 52 %)`."""
+    """A mean with its band: `45 % (95 % band 0 to 92 %, cut at 0 %)`."""
     mean = value_text(quantity, band.mean)
     if math.isnan(band.low):
         return f"{mean} (no band: one run)" if not math.isnan(band.mean) else mean
     factor, unit = unit_of(quantity)
     low, high = _digits(factor * band.low), _digits(factor * band.high)
-    return f"{mean} (95 % band {low} to {high} {unit}".strip() + ")"
+    cut = " and ".join(value_text(quantity, bound) for bound in band.cut)
+    end = f", cut at {cut})" if cut else ")"
+    return f"{mean} (95 % band {low} to {high} {unit}".strip() + end
 
 
 def ranking_lines(comparison: Comparison) -> list[str]:
@@ -70,18 +72,21 @@ def ranking_lines(comparison: Comparison) -> list[str]:
         if not values:
             lines.append(f"{number}. {name}: no finished run.")
             continue
-        spread = _spread_text(quantity, values)
+        done = sum(entry.variant == name for entry in comparison.done)
+        spread = _spread_text(quantity, values, done)
         band = band_text(quantity, comparison.band(name, quantity))
         place = f"{number}. {name}: {label(quantity)} {band}"
         lines.append(f"{place}, {spread}{_ties(name, pairs)}.")
     return lines
 
 
-def _spread_text(quantity: str, values: Sequence[float]) -> str:
+def _spread_text(quantity: str, values: Sequence[float], done: int) -> str:
+    """The seeds that have a value, and how many of those `done` have none."""
+    lack = f" ({done - len(values)} more without a value)" if done > len(values) else ""
     if len(values) == 1:
-        return "1 seed"
+        return f"1 seed{lack}"
     low, high = (value_text(quantity, value) for value in (min(values), max(values)))
-    return f"{len(values)} seeds from {low} to {high}"
+    return f"{len(values)} seeds{lack} from {low} to {high}"
 
 
 def _ties(name: str, pairs: Sequence[Pair]) -> str:
@@ -123,10 +128,12 @@ def _pair_text(quantity: str, pair: Pair) -> str:
 
 def failure_lines(comparison: Comparison) -> list[str]:
     """Each run that has no result, with its reason and folder."""
-    return [
+    failed = [
         f"{entry.name} {entry.status}: {entry.reason} (folder {entry.folder})"
         for entry in comparison.failed
     ]
+    left_out = (f"{folder}: has no result and is left out" for folder in comparison.left_out)
+    return [*failed, *left_out]
 
 
 def variant_text(comparison: Comparison, name: str) -> str:
