@@ -40,7 +40,14 @@ So many take 260 s of one core and 2.1 GB in eight sections (docs/benchmark_sphe
 """
 OWN_NETWORK: tuple[DamageLawName, ...] = (COMBINED, ALL_SPHERES, UPSCALED)
 """Damage laws that need the network of all spheres, and with it `DEFAULT_LAW`."""
+THESIS_LAWS = ("thesis", "thesis-code")
+"""Laws that are off by factors (docs/accuracy.md): kept to compare with the thesis."""
 MOST_SECTIONS = 1000
+
+
+def off_by_factors(law: str, damage_law: str, *, fines: bool) -> bool:
+    """Whether a permeability by these laws, with or without fines, is wrong by factors."""
+    return law in THESIS_LAWS or (fines and damage_law in THESIS_LAWS)
 
 
 def law_pairs() -> list[tuple[LawName, DamageLawName]]:
