@@ -94,7 +94,7 @@ def _along(
         notes += _crossing(given.spheres, periodic, axis)
     facts = [*given.assumptions, *_assumptions(spheres, periodic, options)]
     rows: list[dict[str, Any]] = []
-    first: "Analysis | None" = None
+    first: Analysis | None = None
     for result, seconds in _measure(spheres, around, options):
         if first is not None and (result.law, result.damage_law) == (DEFAULT_LAW, AUTO):
             rows[0]["warnings"].insert(0, explained(thesis_law_warning(first, result)))

@@ -135,6 +135,8 @@ class Progress:
 def _short(number: str) -> str:
     """A number with three digits, unless it is a count of usual size."""
     try:
-        return number if number.isdecimal() and int(number) < _MOST_STEPS else f"{float(number):.3g}"
+        return (
+            number if number.isdecimal() and int(number) < _MOST_STEPS else f"{float(number):.3g}"
+        )
     except ValueError:
         return number
