@@ -5,12 +5,14 @@ written), 3 LIGGGHTS missing or failed, 4 degenerate geometry or an unconverged 
 runs of an ensemble or a sweep failed, 130 stopped by the user.
 """
 
+import _thread
 import argparse
 import io
 import os
 import shlex
 import signal
 import sys
+import threading
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
@@ -40,6 +42,8 @@ COMMANDS = (
 """Modules of the commands, in the order that `fdnet --help` shows."""
 
 _STOPPED = 130
+_PATIENCE = 0.2
+"""Seconds after which a stop that was lost is sent once more."""
 _SIGNALS: list[int] = []
 """Signals to stop that have arrived."""
 
@@ -56,10 +60,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _accept_any_character()
     _SIGNALS.clear()
     given = list(sys.argv[1:] if arguments is None else arguments)
-    options = _parser().parse_args(joined_box(given))
-    options.command_line = shlex.join(["fdnet", *given])
-    signal.signal(signal.SIGTERM, _interrupt)
+    debug = "--debug" in given
+    _listen_for_stops()
     try:
+        options = _parser().parse_args(joined_box(given))
+        options.command_line = shlex.join(["fdnet", *given])
         code = options.action(options)
         sys.stdout.flush()
         return code
@@ -67,17 +72,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 0
     except FdnetError as error:
-        if options.debug:
+        if debug:
             raise
         print(f"fdnet: {_one_line(error)}", file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
-        return _stopped()
+        return _stopped(last=arguments is None)
     except Exception as error:
         if _SIGNALS:  # a library may turn the stop into an error of its own
-            return _stopped()
+            return _stopped(last=arguments is None)
         words = words_of(error)
-        if options.debug or not words:
+        if debug or not words:
             raise
         print(f"fdnet: {words}", file=sys.stderr)
         return 2
@@ -90,7 +95,10 @@ def _accept_any_character() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
-def _stopped() -> int:
+def _stopped(*, last: bool) -> int:
+    """Say it in one line; with `last` the process ends next, and one more Ctrl-C says nothing."""
+    if last:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     print(
         "fdnet: stopped; what was written is kept, repeat the command to go on "
         "(a run: with --resume)",
@@ -99,9 +107,30 @@ def _stopped() -> int:
     return _STOPPED
 
 
+def _listen_for_stops() -> None:
+    """Ctrl-C, unless the shell has switched it off, and the end that a queue asks for."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _interrupt)
+    sys.unraisablehook = _stop_again
+
+
 def _interrupt(number: int, *_: Any) -> NoReturn:
     _SIGNALS.append(number)
     raise KeyboardInterrupt
+
+
+def _stop_again(lost: Any) -> None:
+    """Sends a stop once more that arrived where nothing can be raised, as in a call-back.
+
+    Other such errors are shown as Python shows them, unless a stop has made them.
+    """
+    if issubclass(lost.exc_type, KeyboardInterrupt):
+        again = threading.Timer(_PATIENCE, _thread.interrupt_main)
+        again.daemon = True
+        again.start()
+    elif not _SIGNALS:
+        sys.__unraisablehook__(lost)
 
 
 def _one_line(error: Exception) -> str:

@@ -2,10 +2,10 @@
 
 import argparse
 import json
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from fdnet.commands.case_options import add_case, case_of
+from fdnet.errors import CaseError
 
 if TYPE_CHECKING:
     from fdnet.case.case import Case
@@ -32,30 +32,12 @@ def _check(options: argparse.Namespace) -> int:
         print(json.dumps(result.data(), indent=2))
     else:
         print("\n".join(result.lines()))
-    return 0
+    return CaseError.exit_code if result.refused else 0
 
 
 def looked_at(case: "Case", scales: "Scales") -> "Checked":
     """The case with all that `fdnet run` would say or refuse."""
+    from fdnet.run.pipeline import refusals
     from fdnet.scales.check.checked import checked
 
-    return checked(case, scales, tuple(_refusals(case, scales)))
-
-
-def _refusals(case: "Case", scales: "Scales") -> Iterator[str]:
-    """Why `fdnet run` would refuse a case that can be read."""
-    from fdnet.case.case import InvasionCase
-    from fdnet.dem.supply import refuse_crowded_supply
-    from fdnet.errors import CaseError
-    from fdnet.scales.cost import over_limit
-    from fdnet.scales.densest import refuse_unreachable
-    from fdnet.scales.scales import InvasionScales
-
-    if text := over_limit(case, scales):
-        yield text
-    try:
-        refuse_unreachable(case)
-        if isinstance(case, InvasionCase) and isinstance(scales, InvasionScales):
-            refuse_crowded_supply(case, scales)
-    except CaseError as error:
-        yield str(error)
+    return checked(case, scales, tuple(refusals(case, scales)))

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 from fdnet.files.paths import path_option
 
 if TYPE_CHECKING:
-    from fdnet.scales.design.answers import Question
+    from fdnet.scales.design.choice import Design
+    from fdnet.scales.design.questions import Question
 
 SIZES = ("quick", "standard")
 
@@ -45,22 +46,48 @@ def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
 
 def _init(options: argparse.Namespace) -> int:
     from fdnet.files.new import refuse_present, write_new
-    from fdnet.scales.design.answers import answers_of, filled
-    from fdnet.scales.design.choice import BUDGETS
-    from fdnet.scales.design.sizing import designed
-    from fdnet.scales.design.text import case_text
+    from fdnet.scales.design.text import case_text, left_out
     from fdnet.scales.times import spoken_time
 
     out = options.out or Path(f"{options.name}.toml")
     refuse_present(out, force=options.force)
-    texts = filled(_given(options, out), _ask if sys.stdin.isatty() else None)
-    answers = answers_of(options.name, texts)
-    design = designed(answers, BUDGETS[options.size], folder=out.absolute().parent)
+    design = _designed(options, out)
     write_new(out, case_text(design), force=options.force)
     print(f"{out}: written, expected to take {spoken_time(design.seconds)} on one core")
+    for text in left_out(design):
+        print(f"  {text}")
     print(f"  fdnet check {out}    what is odd, time and memory")
     print(f"  fdnet run {out}      the answer, in runs/{options.name}/report.html")
     return 0
+
+
+def _designed(options: argparse.Namespace, out: Path) -> "Design":
+    """The design of the answers; on a terminal those that make no case are asked for again."""
+    from fdnet.errors import CaseError
+    from fdnet.run.pipeline import refusals
+    from fdnet.scales.design.answers import answers_of, filled
+    from fdnet.scales.design.choice import BUDGETS
+    from fdnet.scales.design.questions import named_in
+    from fdnet.scales.design.sizing import designed
+
+    ask = _ask if sys.stdin.isatty() else None
+    texts = filled(_given(options, out), ask)
+    while True:
+        try:
+            return designed(
+                answers_of(options.name, texts),
+                BUDGETS[options.size],
+                folder=out.absolute().parent,
+                refusals=refusals,
+            )
+        except CaseError as error:
+            again = [one for one in named_in(str(error)) if not texts.get(f"{one.group}_file")]
+            if ask is None or not again:
+                raise
+            print(" ".join(str(error).split()), file=sys.stderr)
+        for question in again:
+            del texts[question.key]
+        texts = filled(texts, ask)
 
 
 def _given(options: argparse.Namespace, out: Path) -> dict[str, str]:
@@ -80,10 +107,13 @@ def _given(options: argparse.Namespace, out: Path) -> dict[str, str]:
     return given
 
 
-def _ask(question: "Question") -> str:
+def _ask(question: "Question", problem: str) -> str | None:
+    """The answer of the terminal to a question; None when it has no more."""
+    if problem:
+        print(problem, file=sys.stderr)
     default = f" [{question.default}]" if question.default else ""
     example = "" if default else f', e.g. "{question.example}"'
     try:
         return input(f"{question.text}{example}{default}: ")
     except EOFError:
-        return ""
+        return None

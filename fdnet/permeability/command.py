@@ -5,7 +5,7 @@ import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from fdnet.case.names import AUTO, DEFAULT_LAW, law_pairs
+from fdnet.case.names import AUTO, DEFAULT_LAW, law_pairs, off_by_factors
 from fdnet.errors import CaseError
 from fdnet.permeability.options import (
     ALL_AXES,
@@ -122,15 +122,22 @@ def _along(
     options: argparse.Namespace,
 ) -> list[dict[str, Any]]:
     """What each pair of laws gives for flow along `axis`, the chosen pair first."""
-    spheres, first = given.spheres.turned(axis), "xyz".index(axis)
-    around = (periodic[first], periodic[(first + 1) % 3], periodic[(first + 2) % 3])
+    from fdnet.report.permeability_text import thesis_law_warning
+
+    spheres, along = given.spheres.turned(axis), "xyz".index(axis)
+    around = (periodic[along], periodic[(along + 1) % 3], periodic[(along + 2) % 3])
     notes = [_BOX_MISSING] if given.around_grains else []
     if options.walls == "no-slip":
         notes += _crossing(given.spheres, periodic, axis)
     notes += _overlaps(spheres, around)
     facts = [*given.assumptions, *_assumptions(spheres, periodic, options)]
     rows: list[dict[str, Any]] = []
+    first: Analysis | None = None
     for result, seconds in _measure(spheres, around, options):
+        if first is not None and (result.law, result.damage_law) == (DEFAULT_LAW, AUTO):
+            rows[0]["warnings"].insert(0, explained(thesis_law_warning(first, result)))
+            break
+        first = first or result
         used = result.damage_law_used
         if not rows and max(result.copies) > 1:
             times = " x ".join(str(result.copies[("xyz".index(k) - first) % 3]) for k in "xyz")
@@ -154,7 +161,9 @@ def _measure(
     from fdnet.network.permeability import compare
 
     chosen = (given.law or DEFAULT_LAW, given.damage_law or AUTO)
-    others = law_pairs() if given.compare_laws else ()
+    others = law_pairs() if given.compare_laws else []
+    if off_by_factors(*chosen, fines=len(spheres.fines()) > 0):
+        others = [*others, (DEFAULT_LAW, AUTO)]
     start = time.perf_counter()
     for result in compare(
         spheres,

@@ -2,9 +2,12 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from fdnet.report.units import MILLIDARCY
+from fdnet.report.units import MILLIDARCY, in_millidarcy
+
+if TYPE_CHECKING:
+    from fdnet.network.analysis import Analysis
 
 Row = Mapping[str, Any]
 
@@ -22,6 +25,26 @@ class Given:
     sides: str
     sections: bool
     fines: bool
+
+
+def thesis_law_warning(chosen: "Analysis", default: "Analysis") -> str:
+    """What laws that are off by factors give, with what fdnet's default laws give of the same."""
+    used = default.damage_law_used
+    return (
+        f"the laws {chosen.law} and {chosen.damage_law} are kept to compare with the thesis, and "
+        f"those of the thesis are wrong by factors: they give {_states(chosen)}, where fdnet's "
+        f"default laws ({' and '.join(filter(None, (default.law, used)))}) give "
+        f"{_states(default)}"
+    )
+
+
+def _states(analysis: "Analysis") -> str:
+    """The permeability of an analysis in words."""
+    before = f"{in_millidarcy(analysis.k_initial)} mD"
+    if analysis.damage_law_used is None or analysis.k_reduction is None:
+        return f"{before} without fines"
+    after = f"{in_millidarcy(analysis.k_damaged)} mD"
+    return f"{before} before and {after} after ({100 * analysis.k_reduction:z.1f} % lost)"
 
 
 def answer_lines(results: Sequence[Row], given: Given) -> Iterator[str]:

@@ -3,16 +3,20 @@
 Each stage is kept when it is done and continued when it was cut.
 """
 
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.case import Case, InvasionCase
+from fdnet.case.names import AUTO, DEFAULT_LAW, off_by_factors
 from fdnet.case.stages import LIGGGHTS_STAGES, STAGES
 from fdnet.dem.binary import find_binary
 from fdnet.dem.checkpoint import has_history
 from fdnet.dem.supply import refuse_crowded_supply
 from fdnet.errors import CaseError
+from fdnet.report.permeability_text import thesis_law_warning
 from fdnet.run.added_results import added_results
 from fdnet.run.answer.answer import with_answer
 from fdnet.run.answer.case_words import case_words
@@ -34,12 +38,14 @@ from fdnet.run.records import record_warnings, stage_seconds, versions
 from fdnet.run.session import RunOptions, Session
 from fdnet.run.stokes_sections import report_section
 from fdnet.run.summary import summarise
+from fdnet.scales.check.checked import doubts
 from fdnet.scales.clean_up import back_flow
-from fdnet.scales.cost import refuse_long
+from fdnet.scales.cost import over_limit
 from fdnet.scales.densest import refuse_unreachable
 from fdnet.scales.grain_pack import grain_count
-from fdnet.scales.scales import scales_of
+from fdnet.scales.scales import InvasionScales, Scales, scales_of
 from fdnet.scales.table import scale_rows
+from fdnet.spheres.directions import Directions
 from fdnet.spheres.snapshot import Snapshot
 
 if TYPE_CHECKING:
@@ -82,26 +88,50 @@ def refuse(case: Case, options: RunOptions) -> None:
             "drawdown_MPa, or leave the stage out"
         )
     needed = _stages_to_run(case, options)
-    _refuse_few_grains(case, options)
-    refuse_unreachable(case)
-    refuse_long(case, scales_of(case), pack="pack" in needed, invade="invade" in needed)
-    if isinstance(case, InvasionCase) and "clean_up" in case.stages:
-        back_flow(case)
     fresh = options.force or not has_history(options.out / "invade")
-    if isinstance(case, InvasionCase) and "invade" in needed and fresh:
-        refuse_crowded_supply(case, scales_of(case))
+    for refusal in refusals(
+        case, scales_of(case), needed=needed, stages=options.stages, supply=fresh
+    ):
+        raise CaseError(refusal)
     if needed:
         find_binary(options.liggghts, launcher=options.launcher)
 
 
-def _refuse_few_grains(case: Case, options: RunOptions) -> None:
-    """Raise CaseError on fewer grains than one tetrahedron has, when they are to be analysed."""
+def refusals(
+    case: Case,
+    scales: Scales,
+    *,
+    needed: Sequence[str] = LIGGGHTS_STAGES,
+    stages: Sequence[str] = STAGES,
+    supply: bool = True,
+) -> Iterator[str]:
+    """Why a case that can be read is not run, one sentence each: what `fdnet check` says too.
+
+    `needed` are the stages that will run LIGGGHTS, `stages` all that are asked for; `supply` says
+    whether the fines are still to be placed.
+    """
     count = grain_count(case)
-    if count < 4 and {"analyse", "report"} & set(options.stages):
-        raise CaseError(
+    if count < 4 and {"analyse", "report"} & set(stages):
+        yield (
             f"grains: the case has {count} grains, expected at least 4 for a pore network; raise "
             "grains.count or enlarge the box"
         )
+    yield from _refused(refuse_unreachable, case)
+    if text := over_limit(case, scales, pack="pack" in needed, invade="invade" in needed):
+        yield text
+    if isinstance(case, InvasionCase) and isinstance(scales, InvasionScales):
+        if "clean_up" in case.stages:
+            yield from _refused(back_flow, case)
+        if "invade" in needed and supply:
+            yield from _refused(refuse_crowded_supply, case, scales)
+
+
+def _refused(check: Callable[..., object], *arguments: Any) -> Iterator[str]:
+    """What a check raises, in words."""
+    try:
+        check(*arguments)
+    except CaseError as error:
+        yield str(error)
 
 
 def _stages_to_run(case: Case, options: RunOptions) -> list[str]:
@@ -181,14 +211,12 @@ def _clean_up_record(session: Session) -> dict[str, Any] | None:
 
 
 def _analyse_and_report(session: Session) -> dict[str, Any]:
-    from fdnet.network.permeability import analyse
-
     case, grains = session.case, packed_grains(session)
     invasion = invaded(session, case, grains) if isinstance(case, InvasionCase) else None
     damaged = None if invasion is None else invasion.damaged
     supplied = (session.folder.record("invade") or {}).get("supplied", 0)
     with session.timed("analyse"):
-        first = analyse(grains, damaged, periodic=case.periodic, options=case.analysis)
+        first = with_default_laws(grains, damaged, periodic=case.periodic, options=case.analysis)
         after = _returned(session, grains, damaged, first)
         results = Results(
             path=session.path,
@@ -208,6 +236,24 @@ def _analyse_and_report(session: Session) -> dict[str, Any]:
             write_paraview(results)
             figures, notes = draw_figures(results)
     return _write_summary(session, results, figures, notes)
+
+
+def with_default_laws(
+    grains: Snapshot,
+    damaged: Snapshot | None,
+    *,
+    periodic: Directions,
+    options: AnalysisChoices,
+) -> "Analysis":
+    """The analysis; by laws that are off by factors, a warning has the numbers by the default."""
+    from fdnet.network.permeability import compare
+
+    laws = (options.law, options.damage_law)
+    off = off_by_factors(*laws, fines=damaged is not None)
+    pairs = [laws, *([(DEFAULT_LAW, AUTO)] if off else [])]
+    first, *others = compare(grains, damaged, periodic=periodic, options=options, laws=pairs)
+    said = [thesis_law_warning(first, other) for other in others]
+    return replace(first, warnings=(*said, *first.warnings))
 
 
 def _returned(
@@ -246,7 +292,7 @@ def _write_summary(
         physical_time_s=results.physical_time_s,
         seconds=stage_seconds(pack, invasion, session.seconds, cleaned=cleaned),
         warnings=[
-            *scales.warnings,
+            *(one.sentence for one in doubts(case, scales)),
             *record_warnings(case, pack, invasion),
             *(cleaned["warnings"] if cleaned else []),
             *file_warnings(session),

@@ -12,6 +12,17 @@ from fdnet.scales.times import spoken_time
 
 _THERMO = re.compile(r"^\s*(\d+)\s+\d+\s+[-+.\deE]+\s+[-+.\deE]+\s*$")
 _QUIET_SECONDS = 5.0
+_NOTES = {
+    "grown": "grown {} of {}",
+    "relaxing": "coming to rest, {} times, energy {} J",
+    "restless": "not at rest, energy {} J",
+    "energy": "at rest, energy {} J",
+    "lifted": "{} fines of the cake lifted off",
+    "cleaned": "chunk {}",
+}
+"""What the lines of a deck say, by their first word; a line without an entry says nothing."""
+_MOST_STEPS = 10**9
+"""Number of steps from which they are shown with three digits."""
 
 
 class Progress:
@@ -74,8 +85,10 @@ class Progress:
             self.crossed.append((int(step), int(invaded) + int(passed)))
             self._at(int(step))
         elif line.startswith("FDNET"):
-            self.note = " ".join(line.split()[1:4])
-            self._at(self.step)
+            name, *numbers = line.split()[1:] or [""]
+            if name in _NOTES:
+                self.note = _NOTES[name].format(*map(_short, numbers), "", "")
+                self._at(self.step)
         elif match := _THERMO.match(line):
             self._at(int(match.group(1)))
 
@@ -105,8 +118,9 @@ class Progress:
 
     def _text(self) -> str:
         left = self._left() if self.clock else 0.0
-        eta = f", ~{spoken_time(left)} left" if left else ""
-        return f"step {self.step} of ~{self.end}, {self.note}{eta}"
+        eta = f"~{spoken_time(left)} left" if left else ""
+        steps = f"step {_short(str(self.step))} of ~{_short(str(self.end))}"
+        return ", ".join(filter(None, (steps, self.note, eta)))
 
     def _line(self) -> None:
         now = time.monotonic()
@@ -116,3 +130,13 @@ class Progress:
                 print(f"{self.stage}: {self._text()}", file=sys.stderr, flush=True)
             except BrokenPipeError:  # nobody reads the progress any more; the run goes on
                 self.show = False
+
+
+def _short(number: str) -> str:
+    """A number with three digits, unless it is a count of usual size."""
+    try:
+        return (
+            number if number.isdecimal() and int(number) < _MOST_STEPS else f"{float(number):.3g}"
+        )
+    except ValueError:
+        return number

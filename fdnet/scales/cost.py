@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.names import MOST_SPHERES
-from fdnet.errors import CaseError
 from fdnet.scales.forces.warnings import BRIDGING
 from fdnet.scales.grain_pack import (
     PACK_RELAX_STEPS,
@@ -169,13 +168,6 @@ def over_limit(case: Case, scales: Scales, *, pack: bool = True, invade: bool = 
         f"{remedy}, supply fewer fines, shorten run.duration_ms or run.cap_ms, or raise "
         "run.max_hours"
     )
-
-
-def refuse_long(case: Case, scales: Scales, *, pack: bool, invade: bool) -> None:
-    """Raises CaseError when the stages named do not fit into `run.max_hours`."""
-    refusal = over_limit(case, scales, pack=pack, invade=invade)
-    if refusal:
-        raise CaseError(refusal)
 
 
 def _step_reason(case: Case, scales: InvasionScales) -> tuple[str, str]:

@@ -9,7 +9,7 @@ from fdnet.campaign.result.table import band_row
 from fdnet.campaign.result.words import band_text, value_text
 from fdnet.campaign.until import is_reached, next_seed_count, parse_until
 from fdnet.errors import CaseError
-from fdnet.run.finished_text import _lost
+from fdnet.report.units import percent
 from fdnet.statistics.bands import Band
 from fdnet.statistics.pairs import (
     Pair,
@@ -176,4 +176,4 @@ def test_the_seeds_are_added_by_the_whole_band(tmp_path):
 
 def test_no_zero_has_a_sign():
     assert value_text("k_reduction", -0.0) == "0 %"
-    assert _lost(-1e-6) == "0.0"
+    assert percent(-1e-6) == "0.0"

@@ -32,6 +32,11 @@ class Checked:
     cost: Cost
     memory: float
 
+    @property
+    def refused(self) -> bool:
+        """Whether `fdnet run` refuses the case."""
+        return any(one.refused for one in self.findings)
+
     def data(self) -> dict[str, Any]:
         """As plain values."""
         return {
@@ -80,13 +85,17 @@ def checked(case: Case, scales: Scales, refusals: Iterable[str] = ()) -> Checked
         )
         for text in refusals
     ]
-    warned = [_of_warning(text) for text in scales.warnings]
     return Checked(
         name=case.name,
-        findings=(*refused, *findings(case, scales), *warned),
+        findings=(*refused, *doubts(case, scales)),
         cost=cost_of(case, scales),
         memory=peak_memory(case, scales),
     )
+
+
+def doubts(case: Case, scales: Scales) -> list[Finding]:
+    """All that is odd about a case: what `fdnet check` says, and the summary of its run."""
+    return [*findings(case, scales), *map(_of_warning, scales.warnings)]
 
 
 def _of_warning(text: str) -> Finding:

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from fdnet.scales.check.catalogue import explained
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
@@ -22,3 +24,13 @@ class Finding:
     do: str
     read: str
     refused: bool = False
+
+    @property
+    def sentence(self) -> str:
+        """As a warning of a summary."""
+        if not self.key:
+            return explained(self.what)
+        return (
+            f"{self.key}: {self.what}; what follows: {self.follows}; what to do: {self.do} "
+            f"(see {self.read})"
+        )

@@ -70,43 +70,64 @@ class Answers:
         return "concentration" if self.solids.rstrip().endswith("%") else "solids"
 
 
-def filled(given: Mapping[str, str], ask: Callable[[Question], str] | None) -> dict[str, str]:
+def filled(
+    given: Mapping[str, str], ask: Callable[[Question, str], str | None] | None
+) -> dict[str, str]:
     """The answers with what is missing asked for, or with defaults.
 
     Args:
         given: texts by the keys of `QUESTIONS`, and "sand_file" and "mud_file".
-        ask: shows a question and returns the answer; None where nobody can be asked.
+        ask: shows why the last answer was none and a question, returns the answer; None at the
+            end of all answers, and where nobody can be asked.
 
     Raises:
-        CaseError: answers without a default are missing and nobody can be asked; all are named.
+        CaseError: answers are missing or cannot be read, and nobody can be asked; it names all.
     """
-    answers, missing = dict(given), []
+    answers, missing, problems = dict(given), [], []
     for question in QUESTIONS:
-        if answers.get(question.key) or answers.get(f"{question.group}_file"):
+        if answers.get(f"{question.group}_file"):
             continue
-        text = ask(question).strip() if ask is not None else ""
-        if text or question.default is not None:
-            answers[question.key] = text or str(question.default)
-        else:
-            missing.append(f'--{question.key.replace("_", "-")} "{question.example}"')
+        text = _read(question, answers.get(question.key, ""))
+        problem = question.problem(text) if text else ""
+        while ask is not None and (problem or not text):
+            reply = ask(question, problem)
+            if reply is None:
+                ask = None
+                break
+            text = _read(question, reply or question.default or "")
+            problem = question.problem(text) if text else ""
+            if not reply and question.default is not None:
+                break
+        answers[question.key] = text or question.default or ""
+        if problem:
+            problems.append(problem)
+        elif not text and question.default is None:
+            missing.append(f'{question.option} "{question.example}"')
     if missing:
-        raise CaseError(
-            f"fdnet init: {len(missing)} answers are missing: {', '.join(missing)} (sizes also as "
+        problems.append(
+            f"{len(missing)} answers are missing: {', '.join(missing)} (sizes also as "
             "--sand-file or --mud-file with a CSV table); on a terminal they are asked for"
         )
+    if problems:
+        raise CaseError(" | ".join(problems))
     return answers
 
 
+def _read(question: Question, text: str) -> str:
+    """An answer as it is read: shares also as a number between 0 and 1."""
+    return _share(text.strip()) if "%" in question.unit else text.strip()
+
+
 def answers_of(name: str, texts: Mapping[str, str]) -> Answers:
-    """The answers from filled texts. Raises CaseError where the D50 of the mud is no length."""
+    """The answers from texts that `filled` has read."""
     mud, assumed = _mud(texts)
     return Answers(
         name=name,
         sand=_curve("sand", texts),
-        porosity=_share(texts["porosity"]),
+        porosity=texts["porosity"],
         mud=mud,
         assumed_spread=assumed,
-        solids=_share(texts["solids"]),
+        solids=texts["solids"],
         **{
             key: texts[key]
             for key in (
@@ -134,10 +155,7 @@ def _mud(texts: Mapping[str, str]) -> tuple[Curve, bool]:
         for question, factor in zip(QUESTIONS[5:7], (0.5, 2.0), strict=True)
         if texts[question.key] == question.default
     }
-    try:
-        median = converted(texts["mud_d50"], "_um")
-    except ValueError as error:
-        raise CaseError(f"--mud-d50: {texts['mud_d50']!r}: {error}") from error
+    median = converted(texts["mud_d50"], "_um")
     spread = {key: f"{factor * median:g} um" for key, factor in made_up.items()}
     return _curve("mud", {**texts, **spread}), bool(made_up)
 

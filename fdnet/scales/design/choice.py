@@ -49,6 +49,7 @@ class Choice:
         driven: whether the fines are driven faster than the fluid.
         inertia: whether drag is that of Schiller and Naumann.
         cap: s, or None.
+        passing: m, diameter up to which solids pass the throats.
     """
 
     width: float
@@ -63,6 +64,7 @@ class Choice:
     driven: bool = False
     inertia: bool = False
     cap: float | None = None
+    passing: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

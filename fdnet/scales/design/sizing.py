@@ -1,7 +1,8 @@
 """How large a specimen and how much mud a sand and a mud need, and what of them fits a budget."""
 
 import math
-from collections.abc import Iterator
+import re
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,14 +11,17 @@ import numpy as np
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import case_from, sizes_from
 from fdnet.case.sizes import Sizes
+from fdnet.case.units import share_of
 from fdnet.errors import CaseError
 from fdnet.scales.cost import cost_of
-from fdnet.scales.design.answers import Answers
+from fdnet.scales.darcy import carman_kozeny
+from fdnet.scales.design.answers import Answers, Curve
 from fdnet.scales.design.choice import Budget, Choice, Design, tables_of, um
+from fdnet.scales.design.questions import by_options
 from fdnet.scales.forces.reynolds import MOST_REYNOLDS
 from fdnet.scales.forces.throat import throat_width
 from fdnet.scales.forces.warnings import STOKES_REYNOLDS
-from fdnet.scales.scales import scales_of
+from fdnet.scales.scales import InvasionScales, scales_of
 from fdnet.scales.supply import PLUG_SOLIDS
 from fdnet.sizes.curve import SizeCurve
 
@@ -28,6 +32,8 @@ SAND_CUTS = (1.0, 2.0, 5.0, 10.0)
 """Shares of the finest sand, percent, that may be left out to clear the coarsest mud."""
 LEAST_KEPT = 0.5
 """Share of the solids that must stay when the finest are left out."""
+LEAST_LEFT = 0.05
+"""Share of the solids above a seventh of a throat from which the finer ones are left out."""
 FINEST_OF_THROAT = 1 / 7
 """Fines below this part of the throats pass (Barkman and Davidson 1972, J. Pet. Tech. 24)."""
 GAP = 0.95
@@ -36,48 +42,136 @@ MOST_COARSE = 0.35
 """Share of the coarsest solids that may be left out."""
 PATIENCE = 1.5
 """Cap over the expected time, and over that in which all of the mud arrives."""
+USUAL_SAND = Curve(diameters={"D10": "0.3 mm", "D50": "0.5 mm", "D90": "0.7 mm"})
+USUAL_MUD = Curve(diameters={"D10": "60 um", "D50": "80 um", "D90": "100 um"})
+USUAL_CHOICE = Choice(
+    width=5e-3,
+    length=5e-3,
+    sections=1,
+    sand_cut=1.0,
+    mud_cut=99.0,
+    cut=0.0,
+    slab=1e-3,
+    supply_share=1.0,
+    stiffness=STIFFNESSES[-1],
+)
+"""A specimen in which answers that are not about sizes are looked at."""
 
 
-def designed(answers: Answers, budget: Budget, *, folder: Path) -> Design:
+def designed(
+    answers: Answers,
+    budget: Budget,
+    *,
+    folder: Path,
+    refusals: Callable[[InvasionCase, InvasionScales], Iterable[str]],
+) -> Design:
     """The case of the answers within a budget; `folder` is where files of sizes are looked for.
 
     The width and length follow from the grains, the supply from what plugs the face. Then the
     finest solids are left out as far as the budget asks, and only then is the supply shortened.
+    A choice that makes no case, or one for which `fdnet run` has `refusals`, does not fit.
 
     Raises:
-        CaseError: the answers make no case; it says which.
+        CaseError: the answers make no case; it says which, by their options.
     """
-    first = _first_choice(answers, budget, folder)
-    choices = list(_candidates(answers, first, folder))
-    low, high = 0, len(choices) - 1
+    sand, mud = _sizes(answers, folder)
+    first = _first_choice(answers, budget, sand, mud)
+    choices = list(_candidates(first, _mud_curve(mud, first.mud_cut)))
+    low, high, why = 0, len(choices) - 1, ""
     while low < high:
         middle = (low + high) // 2
-        fits = _design(answers, choices[middle], budget, folder).seconds <= budget.seconds
+        try:
+            fits = _design(answers, choices[middle], budget, folder).seconds <= budget.seconds
+        except CaseError:
+            fits = False
         low, high = (low, middle) if fits else (middle + 1, high)
-    return _design(answers, choices[low], budget, folder)
+    for choice in choices[low:]:
+        try:
+            design = _design(answers, choice, budget, folder)
+            why = next(iter(refusals(design.case, design.scales)), "")
+        except CaseError as error:
+            why = str(error)
+        if not why:
+            return design
+    raise CaseError(_no_specimen(why, _mud_curve(mud, first.mud_cut), choices[0]))
 
 
-def _first_choice(answers: Answers, budget: Budget, folder: Path) -> Choice:
+def _no_specimen(why: str, solids: SizeCurve, first: Choice) -> str:
+    """That no choice makes a case that is run, with the reason and the options to change."""
+    reason = re.split(r"; |: (?=take|lower|raise)", _spoken(why))[0]
+    if reason.startswith("--"):
+        return f"{reason}: change it"
+    key, _, words = reason.partition(": ")
+    reason = {"run.max_hours": "at most ", "run.time_step_s": "a time step of "}.get(
+        key, ""
+    ) + words
+    passing = ""
+    if _kept_above(solids, first.passing) < LEAST_KEPT * solids.kept:
+        passing = (
+            f" (most of the solids, {um(solids.low)} to {um(solids.high)}, are finer than a "
+            f"seventh of a throat, {um(first.passing)}, and pass)"
+        )
+    return (
+        "no specimen of this sand and mud can be run, with as much of the finest "
+        f"solids and of the mud left out as may be{passing}: {reason}; give coarser or fewer "
+        "solids (--mud-d10, --mud-d50, --mud-d90, --solids), a finer sand (--sand-d10, "
+        "--sand-d50, --sand-d90), or another flow (--overbalance, --viscosity)"
+    )
+
+
+def _sizes(answers: Answers, folder: Path) -> tuple[Sizes, Sizes]:
+    """The curves of sand and mud.
+
+    Raises CaseError that names every answer that makes no case, by its option. What is not about
+    sizes is seen in a case of usual ones.
+    """
+    curves, problems = [], []
+    for source, given in (("--sand", answers.sand), ("--mud", answers.mud)):
+        try:
+            curves.append(sizes_from(given.table, source=source, folder=folder))
+        except CaseError as error:
+            problems.append(str(error))
+    try:
+        _case(replace(answers, sand=USUAL_SAND, mud=USUAL_MUD), USUAL_CHOICE, folder)
+    except CaseError as error:
+        problems.append(_spoken(str(error)))
+    if problems:
+        raise CaseError(" | ".join(problems))
+    return curves[0], curves[1]
+
+
+def _spoken(problem: str) -> str:
+    """A problem of a case by the options of `fdnet init`, without their number in front."""
+    return by_options(re.sub(r"^fdnet init: \d+ problems?: ", "", problem))
+
+
+def _mud_curve(mud: Sizes, coarsest: float) -> SizeCurve:
+    """The solids without those that are as coarse as the sand; `coarsest` is in percent."""
+    ends = (mud.cut_percent[0], min(coarsest, mud.cut_percent[1]))
+    return mud.model_copy(update={"cut_percent": ends}).curve()
+
+
+def _first_choice(answers: Answers, budget: Budget, sand: Sizes, mud: Sizes) -> Choice:
     """The specimen that the sand and the mud ask for, with all solids that matter."""
-    sand = sizes_from(answers.sand.table, source="--sand", folder=folder)
-    mud = sizes_from(answers.mud.table, source="--mud", folder=folder)
     sand_cut, mud_cut = _clear_cuts(sand, mud)
     grains = _cut(sand, low=sand_cut).curve()
     mean = grains.mean(3) / grains.mean(2)
     width = _up(max(budget.width * mean, 2.02 * grains.high))
     length = _up(max(budget.length * mean, 2 * grains.high))
-    choice = Choice(
+    porosity = share_of(answers.porosity)
+    throat = throat_width(porosity, carman_kozeny(porosity, mean))
+    return Choice(
         width=width,
         length=length,
         sections=max(1, int(length / (SECTION * mean))),
         sand_cut=sand_cut,
         mud_cut=mud_cut,
         cut=0.0,
-        slab=length,
+        slab=_mud_curve(mud, mud_cut).high,
         supply_share=1.0,
         stiffness=STIFFNESSES[-1],
+        passing=FINEST_OF_THROAT * throat,
     )
-    return replace(choice, slab=_slab(_case(answers, choice, folder), 1.0))
 
 
 def _clear_cuts(sand: Sizes, mud: Sizes) -> tuple[float, float]:
@@ -102,12 +196,13 @@ def _clear_cuts(sand: Sizes, mud: Sizes) -> tuple[float, float]:
     return best[1], min(99.0, round(100 - best[2] - 0.05, 1))
 
 
-def _candidates(answers: Answers, first: Choice, folder: Path) -> Iterator[Choice]:
-    """From all solids that matter to half of them, and then with less mud."""
-    case = _case(answers, first, folder)
-    throat = throat_width(scales_of(case).porosity, scales_of(case).permeability)
-    curve = case.fines.curve
-    finest = max(curve.low, FINEST_OF_THROAT * throat)
+def _candidates(first: Choice, curve: SizeCurve) -> Iterator[Choice]:
+    """From all solids that matter to half of them, and then with less mud.
+
+    Solids that pass are left out, unless hardly any others are there.
+    """
+    passing = first.passing if _kept_above(curve, first.passing) >= LEAST_LEFT else 0.0
+    finest = max(curve.low, passing)
     choice = replace(first, cut=finest if finest > curve.low else 0.0)
     yield choice
     while _kept_above(curve, finest := 1.1 * finest) >= LEAST_KEPT:
@@ -148,7 +243,8 @@ def _softest(answers: Answers, choice: Choice, folder: Path) -> Choice:
             warnings = scales_of(_case(answers, trial, folder)).warnings
         except CaseError:
             continue
-        if not any("overlap" in one or "may lock" in one for one in warnings):
+        of_fines = [one for one in warnings if not one.startswith("grains.")]
+        if not any("overlap" in one or "may lock" in one for one in of_fines):
             return trial
     return choice
 

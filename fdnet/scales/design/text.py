@@ -115,6 +115,24 @@ def _mud_notes(design: Design) -> dict[str, str]:
     return notes
 
 
+def left_out(design: Design) -> Iterator[str]:
+    """What of the sand and the mud is not in the case, and whether that was enough."""
+    choice, curve = design.choice, design.case.fines.curve
+    if choice.sand_cut > 1.0:
+        yield f"left out: the finest {choice.sand_cut:g} % of the sand"
+    if curve.below > 0.0:
+        yield f"left out: {100 * curve.below:.2g} % of the solids, finer than {um(curve.low)}"
+    if curve.above > 0.0:
+        yield f"left out: {100 * curve.above:.2g} % of the solids, coarser than {um(curve.high)}"
+    if choice.supply_share < 1.0:
+        yield f"mud: {100 * choice.supply_share:.0f} % of what surely plugs the face"
+    if design.seconds > 1.05 * design.budget.seconds:
+        yield (
+            f"longer than the {spoken_time(design.budget.seconds)} of --size "
+            f"{design.budget.name}: no more can be left out; coarser or fewer solids are faster"
+        )
+
+
 def _cut_note(design: Design, throat: float) -> str:
     curve = design.case.fines.curve
     text = f"{100 * curve.below:.0f} % of the solids are finer than this and left out"
