@@ -11,11 +11,11 @@ from pathlib import Path
 
 from fdnet.errors import CaseError
 
-
 SMALL, LARGE = 16 * 2**20, 4 * 2**30
 """Most bytes of a case, a sweep or a table of sizes, and of a file of spheres."""
 _ZIPPED = b"\x1f\x8b"
-_UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE, codecs.BOM_UTF8)
+"""Bytes at the start of a text that name its encoding."""
 _PACKED = {b"PK\x03\x04": "a zip archive or a spreadsheet", b"BZh": "bzip2", b"\xfd7zXZ": "xz"}
 _PACKED |= {b"(\xb5/\xfd": "zstd", b"7z\xbc\xaf": "7-Zip", b"\xd0\xcf\x11\xe0": "a spreadsheet"}
 _CONTROLS = dict.fromkeys([*range(9), *range(14, 26), *range(27, 32), 127])
@@ -76,7 +76,7 @@ def text_of(data: bytes, path: str | Path) -> str:
         if data.startswith(start):
             raise CaseError(f"{path}: is compressed or no text ({name}); save it as plain text")
     try:
-        text = data.decode("utf-16" if data.startswith(_UTF16) else "utf-8-sig")
+        text = data.decode("utf-16" if data.startswith(MARKS[:2]) else "utf-8-sig")
     except UnicodeDecodeError:
         text = data.decode("cp1252", "replace")
     if len(text.translate(_CONTROLS)) < len(text) or "\ufffd" in text:

@@ -36,9 +36,10 @@ def run(options: argparse.Namespace) -> int:
     """
     from fdnet.network.tessellation.placed_grains import check_lengths
 
-    periodic = directions_of(options.periodic)
+    chosen = None if options.periodic is None else directions_of(options.periodic)
     table = None if options.csv is None else table_file(options.csv, options.spheres)
-    given = _read(options, periodic)
+    given = _read(options, chosen)
+    periodic = given.periodic
     check_lengths(given.spheres, periodic)
     axes = "xyz" if options.axis == ALL_AXES else options.axis
     by_axis = {axis: _along(axis, given, periodic, options) for axis in axes}
@@ -53,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _read(options: argparse.Namespace, periodic: tuple[bool, bool, bool]) -> "SphereFile":
+def _read(options: argparse.Namespace, periodic: tuple[bool, bool, bool] | None) -> "SphereFile":
     """The spheres of the file. Raises CaseError for bad input."""
     from fdnet.spheres.readers import read_sphere_file
 
@@ -63,6 +64,7 @@ def _read(options: argparse.Namespace, periodic: tuple[bool, bool, bool]) -> "Sp
         box=None if options.box is None else box_of(options.box),
         fines_below=options.fines_below,
         types=None if options.types is None else types_of(options.types),
+        periodic=periodic,
     )
     grains = len(given.spheres.grains())
     if grains < 4:
@@ -71,7 +73,7 @@ def _read(options: argparse.Namespace, periodic: tuple[bool, bool, bool]) -> "Sp
             "of an invasion holds fines alone (give the run's spheres_damaged.csv instead); if "
             "grains and fines were taken for each other, use --fines-below or --types"
         )
-    if given.around_grains and any(periodic):
+    if given.around_grains and any(given.periodic):
         raise CaseError(
             "--box: missing, a periodic direction needs its length; give --box x0,x1,y0,y1,z0,z1"
         )
@@ -87,7 +89,7 @@ def _along(
     """What each pair of laws gives for flow along `axis`, the chosen pair first."""
     spheres, first = given.spheres.turned(axis), "xyz".index(axis)
     around = (periodic[first], periodic[(first + 1) % 3], periodic[(first + 2) % 3])
-    notes = [_BOX_MISSING] if given.around_grains else []
+    notes = [*given.warnings, *([_BOX_MISSING] if given.around_grains else [])]
     if options.walls == "no-slip":
         notes += _crossing(given.spheres, periodic, axis)
     facts = [*given.assumptions, *_assumptions(spheres, periodic, options)]
