@@ -164,6 +164,8 @@ class DumpReader:
         if end < 0:
             raise self.fail("the file ends in the middle of a line", kind=CutDumpError)
         text = self.data[self.position : end].strip()
+        if b"ITEM:" in text[1:]:
+            raise self.fail("the next frame begins in the middle of this line", kind=CutDumpError)
         self.position, self.line = end + 1, self.line + 1
         return text
 
@@ -224,8 +226,9 @@ class DumpReader:
             body=self.data[self.position : end],
             line=self.line,
         )
-        self.refuse_cut(head, last=end == len(self.data))
-        self.position, self.line = end, self.line + head.body.count(b"\n")
+        lines = head.body.count(b"\n")
+        self.refuse_cut(head, lines, last=end == len(self.data))
+        self.position, self.line = end, self.line + lines
         return head
 
     def bounds(self, numbers: int) -> list[float]:
@@ -236,7 +239,7 @@ class DumpReader:
             low = high = np.nan
             tilt = [0.0] * numbers
         if not (np.isfinite(high - low) and low < high) or len(tilt) != numbers - 2:
-            further = "" if numbers == 2 else ", and the tilt"
+            further = "" if numbers == 2 else ", and the tilt of a slanted box"
             raise self.fail(
                 f"box bounds {_shown(text)}, expected two numbers, the lower one first{further}",
                 line,
@@ -248,18 +251,16 @@ class DumpReader:
             )
         return [low, high]
 
-    def refuse_cut(self, head: Head, *, last: bool) -> None:
+    def refuse_cut(self, head: Head, lines: int, *, last: bool) -> None:
         """Raise CutDumpError unless all rows of the frame are there and whole."""
         body, ended = head.body, head.body.endswith(b"\n") or not head.body
-        rows = body.count(b"\n") + (not ended)
+        rows = lines + (not ended)
         if rows != head.count:
             rows = sum(1 for row in body.split(b"\n") if row.strip())
         whole = ended
         if last and not ended and not self.own:
-            first, end = body.split(b"\n", 1)[0], body[body.rfind(b"\n") + 1 :]
-            whole = len(end.split()) >= len(head.columns)
-            whole &= not first.rstrip(b"\r")[-1:].isspace() or end[-1:].isspace()
-            whole |= not end.strip()
+            end = body[body.rfind(b"\n") + 1 :].split()
+            whole = not end or len(end) >= len(head.columns)
         if rows > head.count and whole:
             raise self.fail(f"{rows} rows, expected {head.count}", head.line + head.count)
         if rows < head.count or not whole:
@@ -334,12 +335,15 @@ def _table(head: Head, needed: Sequence[int]) -> Array | None:
 
     body = head.body
     trailing = body[: body.find(b"\n")].endswith(b" ")
-    if b"  " in body or b"\n " in body or body.startswith(b" "):
+    marks, each = np.frombuffer(body, np.uint8), len(head.columns) - 1 + trailing
+    ends, spaces = np.flatnonzero(marks == ord("\n")), np.flatnonzero(marks == ord(" "))
+    if len(ends) != head.count or len(spaces) != each * head.count:
         return None
-    marks = np.frombuffer(body, np.uint8)
-    starts = np.flatnonzero(marks == ord("\n"))
-    spaces = np.add.reduceat(marks == ord(" "), [0, *(starts[:-1] + 1)], dtype=np.int64)
-    if len(starts) != head.count or np.any(spaces != len(head.columns) - 1 + trailing):
+    in_row = np.empty((head.count, each + 2), np.int64)
+    in_row[:, 0], in_row[0, 0], in_row[1:, 0] = 0, -1, ends[:-1]
+    in_row[:, 1:-1], in_row[:, -1] = spaces.reshape(head.count, each), ends
+    width = np.diff(in_row)
+    if np.any(width[:, : each + 1 - trailing] < 2) or (trailing and np.any(width[:, -1] != 1)):
         return None
     try:
         table = pd.read_csv(
@@ -359,5 +363,5 @@ def _table(head: Head, needed: Sequence[int]) -> Array | None:
         )
     except (ValueError, pd.errors.ParserError):
         return None
-    values = table[list(needed)].to_numpy()
+    values = table.to_numpy()
     return values if len(values) == head.count and np.all(np.isfinite(values)) else None

@@ -30,8 +30,13 @@ def dump_spheres(
     notes = [f"The lengths of {source} are in m."] if units is None and not head.units else []
     if len(heads) > 1 and step is None:
         notes.append(f"The last of {len(heads)} frames of {source} was used, step {head.step}.")
-    if not data.endswith(b"\n") and head is heads[-1]:
-        notes.append(f"{source} has no line feed at its end: its last number is taken as whole.")
+    warnings = [
+        f"{text}; this frame was left out and that of step {head.step} used" for text in cut
+    ]
+    warnings = warnings if step is None else []
+    if head.body and not head.body[-1:].isspace():
+        last = head.body.split()[-1].decode("utf-8", "replace")[:40]
+        warnings.append(f"{source} ends without a line feed: its last number, {last}, may be cut")
     return rows_from(
         columns,
         dict(zip(columns.needed, frame.rows.T, strict=True)),
@@ -42,11 +47,7 @@ def dump_spheres(
         source=source,
         step=head.step,
         notes=tuple(notes),
-        warnings=tuple(
-            f"{text}; this frame was left out and that of step {head.step} used" for text in cut
-        )
-        if step is None
-        else (),
+        warnings=tuple(warnings),
     )
 
 

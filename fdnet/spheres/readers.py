@@ -150,9 +150,9 @@ def _sides(
     """Which sides repeat, what was assumed of them, and where the file contradicts that."""
     if not rows.boundary or rows.box is None:
         return ((False, False, False) if given is None else periodic_axes(given)), [], []
-    said = [flag == "pp" for flag in rows.boundary]
+    said: list[bool] = [flag == "pp" for flag in rows.boundary]
     near = np.isclose(box, rows.box, rtol=_SAME_BOX, atol=_SAME_BOX * np.ptp(rows.box))
-    same = near.all(axis=1).tolist()
+    same: list[bool] = list(np.all(near, axis=1).tolist())
     own = " ".join(rows.boundary)
     if given is not None:
         chosen = periodic_axes(given)
@@ -247,11 +247,11 @@ def _by_type(rows: SphereRows, types: Mapping[int, str]) -> Array:
         raise CaseError(
             f"{rows.source}: has no types; name kinds in a column, or give fines_below"
         )
-    missing = sorted(set(rows.type.tolist()) - set(types))
+    found, which = np.unique(rows.type, return_inverse=True)
+    missing = sorted(set(found.tolist()) - set(types))
     if missing:
         raise CaseError(
             f"{rows.source}: type {missing[0]} is neither grain nor fine; name it, for example "
             f"types 1=grain,{missing[0]}=fine"
         )
-    kinds = {number: int(KIND_NAMES[name]) for number, name in types.items()}
-    return np.array([kinds[number] for number in rows.type.tolist()], dtype=np.int64)
+    return np.array([KIND_NAMES[types[number]] for number in found.tolist()], np.int64)[which]
