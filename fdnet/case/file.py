@@ -18,7 +18,7 @@ from fdnet.case.spoken import plain_tables
 from fdnet.case.units import stem_of, suffix_of
 from fdnet.case.values import Part
 from fdnet.errors import CaseError
-from fdnet.files.paths import expanded
+from fdnet.files.paths import SMALL, expanded, file_bytes
 
 
 def case_from(data: Mapping[str, Any], *, source: str = "case", folder: str | Path = ".") -> Case:
@@ -245,13 +245,20 @@ def recorded_case(path: Path) -> Case:
 
 
 def _tables(path: str | Path) -> dict[str, Any]:
+    return toml_tables(path, "a case file")
+
+
+def toml_tables(path: str | Path, what: str) -> dict[str, Any]:
+    """The tables of a TOML file; `what` names it in messages.
+
+    Raises CaseError where it cannot be read or is no TOML.
+    """
+    data = file_bytes(path, most=SMALL, what=what)
     try:
-        return tomllib.loads(expanded(path).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise CaseError(
-            f"{path}: cannot be read as a case file: {error}; give the path of a TOML file"
-        ) from error
+        return tomllib.loads(data.decode("utf-8"))
+    except UnicodeDecodeError as error:
+        raise CaseError(f"{path}: cannot be read as {what}: {error}; save it as UTF-8") from error
     except RecursionError as error:
-        raise CaseError(f"{path}: its tables or lists are nested too deeply for a case") from error
+        raise CaseError(f"{path}: its tables or lists are nested too deeply") from error
     except ValueError as error:
         raise CaseError(f"{path}: not valid TOML: {error}") from error

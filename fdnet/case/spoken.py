@@ -164,7 +164,7 @@ def _curve(
         spoken.refuse(dotted, f"given next to {others[0]}, give one of the two")
     else:
         try:
-            size, passing = read_size_file(folder, value)
+            size, passing = read_size_file(folder, value, by=str(table.get("by", "mass")))
         except ValueError as error:
             spoken.refuse(dotted, str(error))
         else:

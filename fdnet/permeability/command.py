@@ -39,9 +39,10 @@ def run(options: argparse.Namespace) -> int:
     """
     from fdnet.network.tessellation.placed_grains import check_lengths
 
-    periodic = directions_of(options.periodic)
+    chosen = None if options.periodic is None else directions_of(options.periodic)
     table = None if options.csv is None else table_file(options.csv, options.spheres)
-    given = _read(options, periodic)
+    given = _read(options, chosen)
+    periodic = given.periodic
     check_lengths(given.spheres, periodic)
     axes = "xyz" if options.axis == ALL_AXES else options.axis
     by_axis = {axis: _along(axis, given, periodic, options) for axis in axes}
@@ -56,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _read(options: argparse.Namespace, periodic: tuple[bool, bool, bool]) -> "SphereFile":
+def _read(options: argparse.Namespace, periodic: tuple[bool, bool, bool] | None) -> "SphereFile":
     """The spheres of the file. Raises CaseError for bad input."""
     from fdnet.spheres.readers import read_sphere_file
 
@@ -66,9 +67,10 @@ def _read(options: argparse.Namespace, periodic: tuple[bool, bool, bool]) -> "Sp
         box=None if options.box is None else box_of(options.box),
         fines_below=options.fines_below,
         types=None if options.types is None else types_of(options.types),
+        periodic=periodic,
     )
     grains = len(given.spheres.grains())
-    if grains < (1 if any(periodic) else 4):
+    if grains < (1 if any(given.periodic) else 4):
         why = (
             "for a tetrahedron; a periodic cell of fewer needs --periodic"
             if grains
@@ -80,7 +82,7 @@ def _read(options: argparse.Namespace, periodic: tuple[bool, bool, bool]) -> "Sp
             "were taken for each other, use --fines-below or --types"
         )
     _refuse_large_fines(given, options)
-    if given.around_grains and any(periodic):
+    if given.around_grains and any(given.periodic):
         raise CaseError(
             "--box: missing, a periodic direction needs its length; give --box x0,x1,y0,y1,z0,z1"
         )
@@ -126,7 +128,7 @@ def _along(
 
     spheres, along = given.spheres.turned(axis), "xyz".index(axis)
     around = (periodic[along], periodic[(along + 1) % 3], periodic[(along + 2) % 3])
-    notes = [_BOX_MISSING] if given.around_grains else []
+    notes = [*given.warnings, *([_BOX_MISSING] if given.around_grains else [])]
     if options.walls == "no-slip":
         notes += _crossing(given.spheres, periodic, axis)
     notes += _overlaps(spheres, around)
@@ -140,7 +142,7 @@ def _along(
         first = first or result
         used = result.damage_law_used
         if not rows and max(result.copies) > 1:
-            times = " x ".join(str(result.copies[("xyz".index(k) - first) % 3]) for k in "xyz")
+            times = " x ".join(str(result.copies[("xyz".index(k) - along) % 3]) for k in "xyz")
             facts = [
                 *facts,
                 f"The cell was repeated {times} times, because it is too small for the "

@@ -30,8 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "spheres",
         type=path_option,
         metavar="SPHERES",
-        help="CSV (columns x,y,z,radius[,kind] or x_m,...,radius_m[,kind]), LIGGGHTS or LAMMPS "
-        "text dump (its last frame), .vtp or .vtu with point data radius or diameter",
+        help="text (columns x,y,z,radius[,kind] or x_m,...,radius_m[,kind]), LIGGGHTS or LAMMPS "
+        "text dump (its last whole frame), .vtp, .vtu or .vtk with point data radius or "
+        "diameter; each also as .gz",
     )
     _add_file_choices(parser)
     parser.add_argument(
@@ -42,9 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--periodic",
-        default="",
         metavar="DIRS",
-        help="periodic directions of the file, any of x, y, z together; others are walls",
+        help="periodic directions of the file, any of x, y, z together; others are walls "
+        "(default: those of the dump's BOX BOUNDS, else none; '' for none)",
     )
     parser.add_argument(
         "--walls",

@@ -1,22 +1,25 @@
 """Sphere tables: written at full precision, read back strictly."""
 
 import csv
+import io
 import math
+import re
 from collections.abc import Iterator
-from dataclasses import dataclass
-from difflib import get_close_matches
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from fdnet.errors import CaseError
 from fdnet.files.atomic import replacing
-from fdnet.spheres.rows import UNITS, SphereRows, metres_per
-from fdnet.spheres.snapshot import KIND_NAMES, Kind, Snapshot, frozen
+from fdnet.files.paths import LARGE, file_bytes, text_of
+from fdnet.spheres.rows import UNITS, Columns, SphereRows, columns_of, rows_from, scale_of
+from fdnet.spheres.snapshot import KIND_NAMES, Kind, Snapshot
 
 PLAIN = ("x", "y", "z", "radius")
 METRES = ("x_m", "y_m", "z_m", "radius_m")
-OPTIONAL = ("kind", "id")
+_BEFORE_UNIT = re.compile(r"\s*([(\[])\s*")
+_FRACTION = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
 
 def write_spheres(path: str | Path, snapshot: Snapshot) -> Path:
@@ -38,164 +41,150 @@ def write_spheres(path: str | Path, snapshot: Snapshot) -> Path:
 
 
 def read_csv(path: str | Path, *, units: str | None = None) -> SphereRows:
-    """The spheres of a CSV table, in metres.
+    """The spheres of a table in a text file, in metres; see `table_rows`."""
+    data = file_bytes(path, most=LARGE, what="a file of spheres")
+    return table_rows(data, str(path), units=units)
 
-    Columns, in any order: `x,y,z,radius[,kind][,id]` in `units` (one of `UNITS`), or
-    `x_m,y_m,z_m,radius_m[,kind][,id]`, where `units` must be None. `kind` is grain or fine. Blank
-    lines and lines that start with `#` are skipped. Raises CaseError that names the file, the
-    line, what it holds and what was expected.
+
+def table_rows(data: bytes, source: str, *, units: str | None = None) -> SphereRows:
+    """The spheres of a table in text, in metres.
+
+    Columns stand between commas, semicolons, tabs or spaces, in any order: the centre x, y, z, a
+    size (radius, r, diameter or d) and, if there, kind (grain or fine), type and id; others are
+    not read. Lengths are in `units` (one of `UNITS`), or in the unit at the end of their names
+    ("x_m"), where `units` must be None. Names may also stand in the comment before the first row,
+    as Yade writes them (`#format x_y_z_r`); four columns without any name are x, y, z and radius.
+    Blank lines and lines that start with `#` are skipped. Raises CaseError that names the file,
+    the line, what it holds and what was expected.
     """
-    source = Path(path)
-    if units is not None:
-        metres_per(units)
-    lines = _Lines(source)
-    reader = csv.reader(lines, strict=True)
+    lines = _Lines(text_of(data, source), source)
+    cells = lines.cells()
     try:
-        header = _header(next(reader, None), lines.where(), units)
-        rows = [_row(fields, header, lines.where()) for fields in reader]
+        first = next(cells, None)
+        if first is None:
+            raise CaseError(f"{source}: the file is empty; expected a header {','.join(PLAIN)}")
+        names, notes = _names(first, lines)
+        columns = columns_of(names, lines.where())
+        scale = scale_of(columns, units, lines.where())
+        if scale is None:
+            raise CaseError(
+                f"{lines.where()}: the columns {','.join(PLAIN)} have no unit; give --units mm "
+                f'on the command line, units="mm" in Python (one of {", ".join(UNITS)}), or name '
+                "them x_m,y_m,z_m,radius_m"
+            )
+        rows = cells if first is names else chain([first], cells)
+        table, numbers = [], []
+        for row in rows:
+            if len(row) != len(names):
+                raise CaseError(
+                    f"{lines.where()}: {len(row)} values, expected {len(names)} as in the header"
+                )
+            table.append([_value(row[k], columns, k, lines) for k in columns.needed])
+            numbers.append(lines.number)
     except csv.Error as error:
         raise CaseError(f"{lines.where()}: {error}; expected comma-separated values") from error
-    if not rows:
+    if not table:
         raise CaseError(f"{source}: no spheres after the header; expected at least one row")
-    values = np.array([row[:4] for row in rows])
-    return SphereRows(
-        source=str(source),
-        scale=header.scale,
-        position=frozen(values[:, :3]),
-        radius=frozen(values[:, 3]),
-        kind=None if header.kind is None else frozen([row[4] for row in rows], np.int64),
-        id=None if header.id is None else frozen([row[5] for row in rows], np.int64),
+    if columns.ignored:
+        notes.append(f"Columns of {source} that are not read: {', '.join(columns.ignored)}.")
+    return rows_from(
+        columns,
+        dict(zip(columns.needed, np.array(table).T, strict=True)),
+        lambda row: f"{source}:{numbers[row]}",
+        scale=scale,
+        source=source,
+        notes=tuple(notes),
     )
 
 
 class _Lines:
-    """The lines of a text file that carry data, counting all of them from 1."""
+    """The lines of a text that carry data, counting all of them from 1."""
 
-    def __init__(self, source: Path) -> None:
-        self.source, self.number = source, 0
+    def __init__(self, text: str, source: str) -> None:
+        self.text, self.source, self.number = text, source, 0
+        self.comment = ""
+        self.comma = False
 
     def where(self) -> str:
-        return f"{self.source}:{self.number}" if self.number else str(self.source)
+        return f"{self.source}:{self.number}" if self.number else self.source
 
-    def __iter__(self) -> Iterator[str]:
-        try:
-            with self.source.open(encoding="utf-8-sig", newline=None) as handle:
-                for self.number, line in enumerate(handle, start=1):
-                    if line.strip() and not line.lstrip().startswith("#"):
-                        yield line
-        except UnicodeDecodeError as error:
-            raise CaseError(
-                f"{self.source}: not UTF-8 text ({error.reason}); expected CSV"
-            ) from error
-        except OSError as error:
-            raise CaseError(
-                f"{self.source}: {error.strerror}; expected a CSV file of spheres"
-            ) from error
+    def cells(self) -> Iterator[list[str]]:
+        """The cells of each line, parted as the first of them is.
+
+        Where that is not by commas, a comma is that of a decimal fraction.
+        """
+        lines = self._lines()
+        first = next(lines, None)
+        if first is None:
+            return
+        marks = [mark for mark in (";", "\t", ",") if mark in first]
+        self.comma = marks[:1] == [","]
+        whole = chain([first], lines)
+        if marks and marks[0] != "\t":
+            yield from csv.reader(whole, delimiter=marks[0], strict=True)
+        else:
+            for line in whole:
+                yield [cell.strip('"') for cell in _BEFORE_UNIT.sub(r"\1", line).split()]
+
+    def _lines(self) -> Iterator[str]:
+        started = False
+        for line in io.StringIO(self.text, newline=None):
+            self.number += 1
+            if line.lstrip().startswith("#"):
+                self.comment = self.comment if started else line.strip().lstrip("#").strip()
+            elif line.strip():
+                started = True
+                yield line
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Header:
-    """Where each column stands.
+def _names(first: list[str], lines: _Lines) -> tuple[list[str], list[str]]:
+    """Names of the columns, and what was assumed of them.
 
-    Attributes:
-        width: number of columns.
-        names: names of the columns x, y, z, radius.
-        numbers: places of these four.
-        kind: place of the column kind; None without one.
-        id: place of the column id; None without one.
-        scale: metres in the unit of the four columns.
+    They are the `first` line itself unless it holds numbers alone; then those of the comment
+    before it, or x, y, z, radius. Raises CaseError where there are none.
     """
-
-    width: int
-    names: tuple[str, ...]
-    numbers: tuple[int, ...]
-    kind: int | None
-    id: int | None
-    scale: float
-
-
-def _header(fields: list[str] | None, where: str, units: str | None) -> _Header:
-    if fields is None:
-        raise CaseError(f"{where}: the file is empty; expected a header {','.join(PLAIN)}[,kind]")
-    names = tuple(field.strip() for field in fields)
-    wanted = METRES if any(name in METRES for name in names) else PLAIN
-    _refuse_columns(names, wanted, where)
-    if wanted is METRES and units is not None:
+    if any(_float(cell, comma=lines.comma) is None for cell in first):
+        return first, []
+    words = re.split(r"[\s,;]+", lines.comment)
+    if len(words) == 2 and words[0].lower() == "format":
+        words = words[1].split("_")
+        words += ["further"] * (len(first) - len(words))
+    if len(words) == len(first) and not all(_float(word, comma=False) for word in words):
+        return words, []
+    if len(first) != len(PLAIN) or "diam" in lines.comment.lower():
         raise CaseError(
-            f"{where}: the columns {','.join(METRES)} are in metres already, "
-            f"but units {units!r} were given; leave out --units"
+            f"{lines.where()}: no header above {len(first)} columns of numbers; expected a line "
+            f"of names, {','.join(PLAIN)} or {','.join(PLAIN[:3])},diameter"
         )
-    if wanted is PLAIN and units is None:
+    note = f"{lines.source} has no header: its four columns are x, y, z and radius."
+    return list(PLAIN), [note]
+
+
+def _value(cell: str, columns: Columns, index: int, lines: _Lines) -> float:
+    name = columns.names[index].strip()
+    text = cell.strip()
+    if index == columns.others.get("kind"):
+        kind = KIND_NAMES.get(text.lower()) or {str(int(k)): k for k in Kind}.get(text)
+        if kind is None:
+            raise CaseError(
+                f"{lines.where()}: {name} is {text[:40]!r}, expected {' or '.join(KIND_NAMES)}"
+            )
+        return float(kind)
+    value = _float(text, comma=lines.comma)
+    if value is None or not math.isfinite(value):
+        expected = "a whole number" if index in columns.others.values() else "a finite number"
         raise CaseError(
-            f"{where}: the columns {','.join(PLAIN)} have no unit; give --units mm "
-            f'on the command line, units="mm" in Python (one of {", ".join(UNITS)}), or name them '
-            f" {','.join(METRES)}"
-        )
-    return _Header(
-        width=len(names),
-        names=wanted,
-        numbers=tuple(names.index(name) for name in wanted),
-        kind=names.index("kind") if "kind" in names else None,
-        id=names.index("id") if "id" in names else None,
-        scale=UNITS[units or "m"],
-    )
-
-
-def _refuse_columns(names: tuple[str, ...], wanted: tuple[str, ...], where: str) -> None:
-    expected = f"expected {','.join(wanted)}[,kind][,id]"
-    missing = [name for name in wanted if name not in names]
-    if missing:
-        raise CaseError(
-            f"{where}: no column {', '.join(missing)} in header {','.join(names)!r}; {expected}"
-        )
-    for name in names:
-        if name not in (*wanted, *OPTIONAL):
-            near = get_close_matches(name.lower(), (*wanted, *OPTIONAL), n=1)
-            hint = f" (did you mean {near[0]!r}?)" if near else "; remove it"
-            raise CaseError(f"{where}: unknown column {name!r}{hint}; {expected}")
-        if names.count(name) > 1:
-            raise CaseError(f"{where}: column {name!r} occurs twice; {expected}")
-
-
-def _row(
-    fields: list[str], header: _Header, where: str
-) -> tuple[float, float, float, float, int, int]:
-    if len(fields) != header.width:
-        raise CaseError(f"{where}: {len(fields)} values, expected {header.width} as in the header")
-    x, y, z, radius = (
-        _number(fields[i], name, where) * header.scale
-        for i, name in zip(header.numbers, header.names, strict=True)
-    )
-    if radius <= 0:
-        given = fields[header.numbers[3]].strip()
-        raise CaseError(f"{where}: {header.names[3]} is {given}, expected a number above 0")
-    kind = Kind.GRAIN if header.kind is None else _kind(fields[header.kind], where)
-    number = 0 if header.id is None else _id(fields[header.id], where)
-    return x, y, z, radius, int(kind), number
-
-
-def _id(text: str, where: str) -> int:
-    if not text.strip().isdecimal() or len(text.strip()) > 18:
-        raise CaseError(
-            f"{where}: id is {text.strip()[:40]!r}, expected a whole number from 0 to 18 digits"
-        )
-    return int(text)
-
-
-def _number(text: str, name: str, where: str) -> float:
-    try:
-        value = math.nan if "_" in text else float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise CaseError(
-            f"{where}: {name} is {text.strip()!r}, expected a finite number (decimal point)"
+            f"{lines.where()}: {name} is {text[:40]!r}, expected {expected} (decimal point)"
         )
     return value
 
 
-def _kind(text: str, where: str) -> Kind:
-    kind = KIND_NAMES.get(text.strip())
-    if kind is None:
-        raise CaseError(f"{where}: kind is {text.strip()!r}, expected {' or '.join(KIND_NAMES)}")
-    return kind
+def _float(text: str, *, comma: bool) -> float | None:
+    """The number of a cell; None where it is none. `comma` parts cells, else fractions."""
+    plain = text.strip()
+    if not comma and _FRACTION.fullmatch(plain):
+        plain = plain.replace(",", ".")
+    try:
+        return None if "_" in plain else float(plain)
+    except ValueError:
+        return None

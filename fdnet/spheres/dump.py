@@ -1,7 +1,9 @@
-"""LIGGGHTS text dumps: the one strict parser, and the columns fdnet writes."""
+"""Text dumps of LIGGGHTS and LAMMPS: the one parser, and the columns fdnet writes."""
 
+import csv
 import io
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,14 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.errors import DumpError
+from fdnet.errors import CaseError, DumpError
 from fdnet.files.atomic import disk_is_full
+from fdnet.files.paths import LARGE, file_bytes
 from fdnet.spheres.arrays import Array, frozen, one_line
 
 CUT = "The run was cut; continue it with --resume."
 COLUMNS = "id type x y z vx vy vz radius"
 FORMAT = "%d %d %.17g %.17g %.17g %.9g %.9g %.9g %.17g"
-_UNITS, _TIME = b"ITEM: UNITS\n", b"ITEM: TIME\n"
+_OPTIONAL = (b"ITEM: UNITS", b"ITEM: TIME\n", b"ITEM: TIME\r", b"ITEM: TIME ", b"ITEM: LABEL")
+_BLANK = re.compile(rb"\s+")
+_TILTS = ("xy", "xz", "yz")
+_SIDES = re.compile("pp|[fsm]{2}")
 _ITEMS = (b"ITEM: TIMESTEP", b"ITEM: NUMBER OF ATOMS", b"ITEM: BOX BOUNDS", b"ITEM: ATOMS")
 
 
@@ -49,8 +55,12 @@ class Frame:
         return self.rows[:, self.columns.index(name)]
 
 
+class CutDumpError(DumpError):
+    """The file or the frame ends before its last row."""
+
+
 def read_dump(path: Path) -> list[Frame]:
-    """All frames of a dump file.
+    """All frames of a dump that fdnet's own LIGGGHTS wrote.
 
     Raises DumpError that names path, line and step where it is malformed or cut.
     """
@@ -58,13 +68,11 @@ def read_dump(path: Path) -> list[Frame]:
 
 
 def bytes_of(path: Path) -> bytes:
-    """What a dump file holds. Raises DumpError where it cannot be read."""
+    """What a dump of a run holds. Raises DumpError where it cannot be read."""
     try:
-        return path.read_bytes()
-    except OSError as error:
-        raise DumpError(
-            f"{path}: cannot be read: {error.strerror}; the run did not write it"
-        ) from error
+        return file_bytes(path, most=LARGE, what="a dump")
+    except CaseError as error:
+        raise DumpError(f"{error}; the run did not write it") from error
 
 
 def read_frame(path: Path) -> Frame:
@@ -89,114 +97,229 @@ def full_disk_named(folder: Path) -> Iterator[None]:
 
 def parse_dump(data: bytes, source: str) -> Iterator[Frame]:
     """Frames of the bytes of a dump; `source` names it in errors. Raises DumpError."""
-    reader = _Reader(data, source)
-    while reader.position < len(data):
-        yield reader.frame()
+    reader = DumpReader(data, source)
+    while reader.goes_on():
+        head = reader.head()
+        yield reader.frame(head, range(len(head.columns)))
 
 
-class _Reader:
-    """A position in the bytes of a dump; knows the line it stands on."""
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Head:
+    """What stands before the rows of a frame, and where they stand.
 
-    def __init__(self, data: bytes, source: str) -> None:
+    Attributes:
+        step, box, columns, units: as those of a `Frame`.
+        boundary: what the file says of the sides across x, y and z ("pp", "ff"), else empty.
+        count: number of rows.
+        body: the rows.
+        line: line of the first of them.
+    """
+
+    step: int
+    box: list[list[float]]
+    columns: tuple[str, ...]
+    units: str
+    boundary: tuple[str, ...]
+    count: int
+    body: bytes
+    line: int
+
+
+class DumpReader:
+    """A position in the bytes of a dump; knows the line it stands on.
+
+    `own` dumps are those of fdnet's own LIGGGHTS: the last line ends with a line feed, and a cut
+    one tells to continue the run. What other programs wrote is bad input where it is malformed.
+    """
+
+    def __init__(self, data: bytes, source: str, *, own: bool = True) -> None:
         self.data, self.source, self.position, self.line = data, source, 0, 1
-        self.step: int | None = None
-        self.units = ""
+        self.own, self.step, self.units = own, -1, ""
 
-    def fail(self, what: str, line: int | None = None) -> DumpError:
-        step = "" if self.step is None else f" step {self.step}:"
-        return DumpError(f"{self.source}:{line or self.line}:{step} {what}")
+    def fail(
+        self, what: str, line: int | None = None, kind: type[DumpError] = DumpError
+    ) -> DumpError:
+        step = "" if self.step < 0 else f" step {self.step}:"
+        cut = f". {CUT}" if self.own and kind is CutDumpError else ""
+        error = kind(f"{self.source}:{max(1, line or self.line)}:{step} {what}{cut}")
+        error.exit_code = DumpError.exit_code if self.own else CaseError.exit_code
+        return error
+
+    def goes_on(self) -> bool:
+        """Whether anything but blank lines follows; they are passed over."""
+        rest = _BLANK.match(self.data, self.position)
+        if rest is not None:
+            self.line += rest[0].count(b"\n")
+            self.position = rest.end()
+        return self.position < len(self.data)
+
+    def to_next(self, before: int) -> None:
+        """Go on to the frame after the one that begins at `before`, or to the end."""
+        following = self.data.find(b"ITEM: TIMESTEP", self.data.find(_ITEMS[0], before) + 1)
+        self.position = following if following > before else len(self.data)
+        self.line = self.data.count(b"\n", 0, self.position) + 1
 
     def take(self) -> bytes:
         end = self.data.find(b"\n", self.position)
         if end < 0:
-            raise self.fail(f"the file ends in the middle of a line. {CUT}")
-        text = self.data[self.position : end]
+            raise self.fail("the file ends in the middle of a line", kind=CutDumpError)
+        text = self.data[self.position : end].strip()
+        if b"ITEM:" in text[1:]:
+            raise self.fail("the next frame begins in the middle of this line", kind=CutDumpError)
         self.position, self.line = end + 1, self.line + 1
         return text
 
     def item(self, expected: bytes) -> bytes:
         line = self.line
         if self.position >= len(self.data):
-            raise self.fail(f"the file ends before {expected.decode()}. {CUT}")
+            raise self.fail(
+                f"the file ends before {expected.decode()}", line - 1, kind=CutDumpError
+            )
         text = self.take()
         if not text.startswith(expected):
-            raise self.fail(f"{text[:60]!r}, expected {expected.decode()!r}", line)
+            raise self.fail(f"{_shown(text)}, expected {expected.decode()!r}", line)
         return text[len(expected) :]
 
-    def whole(self, what: str) -> int:
-        line, text = self.line, self.take()
-        try:
-            value = int(text) if len(text) < 19 else -1
-        except ValueError:
-            value = -1
-        if value < 0:
-            raise self.fail(f"{what} is {text[:40]!r}, expected a whole number, 0 or more", line)
-        return value
+    def value(self, what: str) -> bytes:
+        if self.position >= len(self.data):
+            raise self.fail(f"the file ends before the {what}", self.line - 1, CutDumpError)
+        return self.take()
 
-    def frame(self) -> Frame:
-        self.step = None
-        self.skip_optional()
+    def whole(self, what: str) -> int:
+        line, text = self.line, self.value(what)
+        if not (text.isdigit() and len(text) < 19):
+            raise self.fail(f"{what} is {_shown(text)}, expected a whole number, 0 or more", line)
+        return int(text)
+
+    def head(self) -> Head:
+        """What stands before the rows of the next frame; goes on to the end of its rows."""
+        self.step = -1
+        self.goes_on()
+        while self.data.startswith(_OPTIONAL, self.position):
+            name, text = self.take(), self.value("value of an item")
+            self.units = text.decode("ascii", "replace") if name == _OPTIONAL[0] else self.units
         self.item(_ITEMS[0])
         self.step = self.whole("step")
         self.item(_ITEMS[1])
         count = self.whole("number of atoms")
-        if b"xy" in self.item(_ITEMS[2]):
+        flags = tuple(self.item(_ITEMS[2]).decode("ascii", "replace").split())
+        slanted, boundary = flags[:3] == _TILTS, flags[3:] if flags[:3] == _TILTS else flags
+        if boundary and not (len(boundary) == 3 and all(map(_SIDES.fullmatch, boundary))):
             raise self.fail(
-                "the box is slanted (triclinic), expected sides along the axes",
+                f"box bounds {' '.join(flags)[:60]!r}, expected a box with sides along the axes, "
+                "each side pp, ff, ss or mm (a general slanted box is not read)",
                 self.line - 1,
             )
-        box = [self.bounds() for _ in range(3)]
-        columns = tuple(self.item(_ITEMS[3]).decode("ascii", "replace").split())
+        box = [self.bounds(3 if slanted else 2) for _ in range(3)]
+        columns = tuple(self.item(_ITEMS[3]).decode("utf-8", "replace").split())
         if not columns:
             raise self.fail("ITEM: ATOMS names no columns", self.line - 1)
-        return Frame(
+        end = self.data.find(b"ITEM: ", self.position)
+        end = len(self.data) if end < 0 else end
+        head = Head(
             step=self.step,
-            box=frozen(box, float),
+            box=box,
             columns=columns,
-            rows=self.rows(count, columns),
             units=self.units,
+            boundary=boundary,
+            count=count,
+            body=self.data[self.position : end],
+            line=self.line,
         )
+        lines = head.body.count(b"\n")
+        self.refuse_cut(head, lines, last=end == len(self.data))
+        self.position, self.line = end, self.line + lines
+        return head
 
-    def skip_optional(self) -> None:
-        """Read what LAMMPS may write before the step: the units and the time (not used)."""
-        for item in (_UNITS, _TIME):
-            if self.data.startswith(item, self.position):
-                self.take()
-                text = self.take().decode("ascii", "replace").strip()
-                self.units = text if item == _UNITS else self.units
-
-    def bounds(self) -> list[float]:
-        line, text = self.line, self.take()
+    def bounds(self, numbers: int) -> list[float]:
+        line, text = self.line, self.value("bounds of the box")
         try:
-            low, high = (float(part) for part in text.split())
+            low, high, *tilt = (float(part) for part in text.split())
         except ValueError:
             low = high = np.nan
-        if not (np.isfinite(high - low) and low < high):
+            tilt = [0.0] * numbers
+        if not (np.isfinite(high - low) and low < high) or len(tilt) != numbers - 2:
+            further = "" if numbers == 2 else ", and the tilt of a slanted box"
             raise self.fail(
-                f"box bounds {text[:60]!r}, expected two numbers, the lower one first", line
+                f"box bounds {_shown(text)}, expected two numbers, the lower one first{further}",
+                line,
+            )
+        if any(tilt):
+            raise self.fail(
+                f"the box is slanted (triclinic) by {tilt[0]:g}, expected sides along the axes",
+                line,
             )
         return [low, high]
 
-    def rows(self, count: int, columns: tuple[str, ...]) -> Array:
-        end = self.data.find(b"ITEM: ", self.position)
-        end = len(self.data) if end < 0 else end
-        body, first = self.data[self.position : end], self.line
-        complete = body.count(b"\n")
-        if complete != count or (body and not body.endswith(b"\n")):
-            what = "then the file ends" if end == len(self.data) else "then the next frame begins"
+    def refuse_cut(self, head: Head, lines: int, *, last: bool) -> None:
+        """Raise CutDumpError unless all rows of the frame are there and whole."""
+        body, ended = head.body, head.body.endswith(b"\n") or not head.body
+        rows = lines + (not ended)
+        if rows != head.count:
+            rows = sum(1 for row in body.split(b"\n") if row.strip())
+        whole = ended
+        if last and not ended and not self.own:
+            end = body[body.rfind(b"\n") + 1 :].split()
+            whole = not end or len(end) >= len(head.columns)
+        if rows > head.count and whole:
+            raise self.fail(f"{rows} rows, expected {head.count}", head.line + head.count)
+        if rows < head.count or not whole:
+            what = "then the file ends" if last else "then the next frame begins"
             raise self.fail(
-                f"{complete} of {count} rows, {what}. {CUT}",
-                first + complete,
+                f"{rows - (not whole)} of {head.count} rows, {what}",
+                head.line + max(0, body.rstrip().count(b"\n") - (not body.strip())),
+                CutDumpError,
             )
-        self.position, self.line = end, first + complete
-        table = _table(body, columns) if count else np.empty((0, len(columns)))
+
+    def frame(self, head: Head, needed: Sequence[int]) -> Frame:
+        """The frame of a head, with the columns of the indices `needed` alone."""
+        self.step = head.step
+        names = tuple(head.columns[index] for index in needed)
+        table = _table(head, needed) if head.count else np.empty((0, len(needed)))
         if table is None:
-            raise self.fail(*_bad_row(body, columns, first))
-        return frozen(
-            table[np.argsort(table[:, columns.index("id")], kind="stable")]
-            if "id" in columns
-            else table
+            table = self.careful(head, needed)
+        if "id" in names:
+            table = table[np.argsort(table[:, names.index("id")], kind="stable")]
+        return Frame(
+            step=head.step,
+            box=frozen(head.box, float),
+            columns=names,
+            rows=frozen(table),
+            units=head.units,
         )
+
+    def careful(self, head: Head, needed: Sequence[int]) -> Array:
+        """The rows as numbers, whatever white space parts them; names the first that is bad."""
+        rows = []
+        for line, row in enumerate(head.body.split(b"\n"), start=head.line):
+            parts = row.split()
+            if not parts:
+                continue
+            if len(parts) != len(head.columns):
+                names = " ".join(head.columns)
+                raise self.fail(
+                    f"{len(parts)} values, expected {len(head.columns)} ({names})", line
+                )
+            rows.append([_number(parts[index]) for index in needed])
+            for index, value in zip(needed, rows[-1], strict=True):
+                if not np.isfinite(value):
+                    raise self.fail(
+                        f"column {head.columns[index]} holds {_shown(parts[index])}, expected a "
+                        "finite number",
+                        line,
+                    )
+        return np.array(rows)
+
+
+def _shown(text: bytes) -> str:
+    return repr(text[:60].decode("utf-8", "replace"))
+
+
+def _number(text: bytes) -> float:
+    try:
+        return np.nan if b"_" in text else float(text)
+    except ValueError:
+        return np.nan
 
 
 def exact_numbers() -> dict[str, Any]:
@@ -206,20 +329,32 @@ def exact_numbers() -> dict[str, Any]:
     return {"float_precision": "round_trip"} if int(pd.__version__.split(".")[0]) < 3 else {}
 
 
-def _table(body: bytes, columns: tuple[str, ...]) -> Array | None:
-    """The rows as numbers (N, C), or None when one is short, long, not a number or not finite."""
+def _table(head: Head, needed: Sequence[int]) -> Array | None:
+    """The rows as numbers (N, needed), or None unless single spaces part finite numbers."""
     import pandas as pd
 
-    trailing = ["trailing space"] if body[: body.index(b"\n")].endswith(b" ") else []
+    body = head.body
+    trailing = body[: body.find(b"\n")].endswith(b" ")
+    marks, each = np.frombuffer(body, np.uint8), len(head.columns) - 1 + trailing
+    ends, spaces = np.flatnonzero(marks == ord("\n")), np.flatnonzero(marks == ord(" "))
+    if len(ends) != head.count or len(spaces) != each * head.count:
+        return None
+    in_row = np.empty((head.count, each + 2), np.int64)
+    in_row[:, 0], in_row[0, 0], in_row[1:, 0] = 0, -1, ends[:-1]
+    in_row[:, 1:-1], in_row[:, -1] = spaces.reshape(head.count, each), ends
+    width = np.diff(in_row)
+    if np.any(width[:, : each + 1 - trailing] < 2) or (trailing and np.any(width[:, -1] != 1)):
+        return None
     try:
         table = pd.read_csv(
             io.BytesIO(body),
             sep=" ",
             header=None,
-            names=[*columns, *trailing],
-            usecols=list(columns),
+            names=list(range(len(head.columns) + trailing)),
+            usecols=list(needed),
             dtype=np.float64,
             engine="c",
+            quoting=csv.QUOTE_NONE,
             na_filter=False,
             index_col=False,
             on_bad_lines="error",
@@ -229,26 +364,4 @@ def _table(body: bytes, columns: tuple[str, ...]) -> Array | None:
     except (ValueError, pd.errors.ParserError):
         return None
     values = table.to_numpy()
-    whole = body.count(b" ") == len(values) * (len(columns) - 1 + len(trailing))
-    return values if whole and np.all(np.isfinite(values)) else None
-
-
-def _bad_row(body: bytes, columns: tuple[str, ...], first: int) -> tuple[str, int]:
-    for index, row in enumerate(body.split(b"\n")):
-        parts = row.split()
-        if len(parts) != len(columns):
-            return (
-                f"{len(parts)} values, expected {len(columns)} ({' '.join(columns)})",
-                first + index,
-            )
-        for name, part in zip(columns, parts, strict=True):
-            try:
-                finite = np.isfinite(float(part))
-            except ValueError:
-                finite = False
-            if not finite:
-                return (
-                    f"column {name} holds {part[:40]!r}, expected a finite number",
-                    first + index,
-                )
-    return "rows are not separated by single spaces", first
+    return values if len(values) == head.count and np.all(np.isfinite(values)) else None

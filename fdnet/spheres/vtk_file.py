@@ -1,93 +1,154 @@
-"""Spheres of a VTK file (.vtp or .vtu): points with a radius."""
+"""Spheres of a VTK file (.vtp, .vtu or .vtk): points with a radius.
 
+VTK ends its process on some malformed files, so that they are read in a process of their own,
+which hands back the points and their data as arrays.
+"""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.spheres.arrays import Array, frozen
-from fdnet.spheres.rows import SphereRows, metres_per
-from fdnet.spheres.snapshot import Kind
+from fdnet.files.paths import LARGE, file_bytes
+from fdnet.spheres.arrays import Array
+from fdnet.spheres.rows import PLACES, RADII, SphereRows, columns_of, named, rows_from, scale_of
 
-IN_METRES = "radius_m"
-"""Point data of fdnet's own files, whose lengths are in m."""
-SUFFIXES = (".vtp", ".vtu")
+SUFFIXES = (".vtp", ".vtu", ".vtk")
+LEGACY, XML = b"# vtk DataFile", b"<VTKFile"
+_COORDINATES = {name for names in PLACES for name in names}
+_XML_READERS = {b"PolyData": "vtkXMLPolyDataReader"}
+_XML_READERS |= {b"UnstructuredGrid": "vtkXMLUnstructuredGridReader"}
+_SECONDS = 600
+_MEMORY, _GROWTH = 2**30, 20
+"""Memory that the child may take, bytes, besides this many times the size of the file."""
 
 
 def read_vtk(path: Path, *, units: str | None = None) -> SphereRows:
-    """The spheres of a .vtp or .vtu file, in metres.
+    """The spheres of a VTK file, in metres; see `vtk_spheres`."""
+    return vtk_spheres(file_bytes(path, most=LARGE, what="spheres"), str(path), units=units)
 
-    The centres are its points; the point data are `radius`, `radius_m` or `diameter`, and, if
+
+def vtk_spheres(data: bytes, source: str, *, units: str | None = None) -> SphereRows:
+    """The spheres of a .vtp, .vtu or legacy .vtk file, in metres.
+
+    The centres are its points; the point data are a size by any of the names of `RADII`, and, if
     there, `kind` (1 grain, 2 fine), `type` and `id`. `units` is the unit of length of the file, m
-    without it; with `radius_m` there is none to give. Raises CaseError where the file cannot be
-    read, is empty, or holds no or impossible values.
+    without it; where the name of the size carries a unit (radius_m) there is none to give. Raises
+    CaseError where the file cannot be read, is empty, or holds no or impossible values.
     """
-    scale = 1.0 if units is None else metres_per(units)
-    mesh = _mesh(path)
-    if IN_METRES in mesh.point_data and units not in (None, "m"):
-        raise CaseError(f"{path}: its {IN_METRES} is in m; leave out --units {units}")
-    position, radius = np.asarray(mesh.points, dtype=float), _radius(mesh, path)
-    for name, values, good in (
-        ("a centre that is not finite", position, np.isfinite(position).all(axis=1)),
-        ("a radius that is not above 0", radius, np.isfinite(radius) & (radius > 0)),
-    ):
-        bad = np.flatnonzero(~good)
-        if len(bad):
-            raise CaseError(f"{path}: point {bad[0]} has {name} ({values[bad[0]]})")
-    kind = _whole(mesh, "kind", path)
-    if kind is not None and not np.isin(kind, list(Kind)).all():
-        raise CaseError(
-            f"{path}: kind holds {kind.min()} to {kind.max()}, expected 1 (grain) or 2"
-        )
-    return SphereRows(
-        source=str(path),
-        scale=scale,
-        position=frozen(scale * position),
-        radius=frozen(scale * radius),
-        kind=kind,
-        type=_whole(mesh, "type", path),
-        id=_whole(mesh, "id", path),
-        notes=() if units is not None else (f"The lengths of {path} are in m.",),
+    arrays = _read_apart(data, source)
+    points = arrays.pop("points")
+    if not len(points):
+        raise CaseError(f"{source}: holds no points; expected spheres, one point each")
+    if points.dtype.kind not in "iuf":
+        raise CaseError(f"{source}: its points are no numbers")
+    usable = {
+        name: values
+        for name, values in arrays.items()
+        if values.shape == (len(points),) and values.dtype.kind in "iuf"
+    }
+    plain = {name: named(name) for name in arrays}
+    unit = next((f"_{unit}" for one, unit in plain.values() if unit and one in RADII), "")
+    data_names = [name for name, (one, _) in plain.items() if one not in _COORDINATES]
+    names = (*(f"{axis}{unit}" for axis in "xyz"), *data_names)
+    sized = columns_of(names, f"{source}: point data")
+    wanted = [names[index] for index in sized.needed if index >= 3]
+    for name in wanted:
+        if name not in usable:
+            raise CaseError(f"{source}: point data {name} is no number for each point")
+    scale = scale_of(sized, units, source)
+    values = dict(enumerate(np.asarray(points, dtype=float).T))
+    values |= {names.index(name): usable[name] for name in wanted}
+    return rows_from(
+        sized,
+        values,
+        lambda row: f"{source}: point {row}",
+        scale=1.0 if scale is None else scale,
+        source=source,
+        notes=(f"The lengths of {source} are in m.",) if scale is None else (),
     )
 
 
-def _mesh(path: Path) -> Any:
-    import pyvista as pv
+def _read_apart(data: bytes, source: str) -> dict[str, Array]:
+    """The arrays of the points of a file, and its points, read by VTK in a process of its own.
 
-    if not path.is_file():
-        raise CaseError(f"{path}: is no file; expected spheres as .vtp or .vtu")
-    with pv.vtk_verbosity("off"):
+    Raises CaseError, with VTK's own words, where that process fails.
+    """
+    reader = "vtkGenericDataObjectReader"
+    if not data.startswith(LEGACY):
+        kind = re.search(rb"<VTKFile[^>]*\btype\s*=\s*[\"'](\w+)", data[:10_000])
+        if kind is None or kind[1] not in _XML_READERS:
+            what = "no VTK file" if kind is None else f"of the type {kind[1].decode()}"
+            raise CaseError(
+                f"{source}: cannot be read as a VTK file (it is {what}); expected .vtp, .vtu or a "
+                "legacy .vtk file"
+            )
+        reader = _XML_READERS[kind[1]]
+    root = str(Path(__file__).resolve().parents[2])
+    paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "in").write_bytes(data)
         try:
-            mesh = pv.read(path)
-        except Exception as error:
-            raise CaseError(f"{path}: cannot be read as a VTK file ({error})") from error
-    if not getattr(mesh, "n_points", 0):
-        raise CaseError(f"{path}: holds no points; expected spheres, one point each")
-    return mesh
+            done = subprocess.run(
+                [sys.executable, "-m", "fdnet.spheres.vtk_file", reader, folder],
+                capture_output=True,
+                check=False,
+                stdin=subprocess.DEVNULL,
+                timeout=_SECONDS,
+                env=os.environ
+                | {"PYTHONPATH": os.pathsep.join(paths), "OPENBLAS_NUM_THREADS": "1"},
+            )
+        except subprocess.TimeoutExpired as error:
+            raise CaseError(f"{source}: VTK does not end reading it; write it again") from error
+        said = re.sub(r"\x1b\[[0-9;]*m", "", done.stderr.decode("utf-8", "replace"))
+        if done.returncode or "ERR|" in said:
+            why = re.search(r"ERR\|\s*(.*)", said) or re.search(r"(\S.*)\s*$", said)
+            how = why[1].strip()[:200] if why else "VTK failed"
+            how = f"VTK ended by signal {-done.returncode}" if done.returncode < 0 else how
+            raise CaseError(f"{source}: cannot be read as a VTK file ({how}); write it again")
+        with np.load(Path(folder) / "out.npz", allow_pickle=False) as arrays:
+            names = [str(name) for name in arrays["names"]]
+            return {name: arrays[str(number)] for number, name in enumerate(names)}
 
 
-def _radius(mesh: Any, path: Path) -> Array:
-    for name, factor in (("radius", 1.0), (IN_METRES, 1.0), ("diameter", 0.5)):
-        if name in mesh.point_data:
-            return factor * _one_each(mesh, name, path).astype(float)
-    known = ", ".join(mesh.point_data.keys()) or "none"
-    raise CaseError(
-        f"{path}: no point data radius, radius_m or diameter (it has: {known}); write one of them"
-    )
+def _child(reader_name: str, folder: Path) -> None:
+    """Read `in` of the folder, write its points and point data as `out.npz`."""
+    import resource
+
+    from vtkmodules import vtkIOLegacy, vtkIOXML
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    statm = Path("/proc/self/statm")
+    if statm.is_file():
+        taken = int(statm.read_text().split()[0]) * resource.getpagesize()
+        most = taken + _MEMORY + _GROWTH * (folder / "in").stat().st_size
+        resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    module = vtkIOXML if hasattr(vtkIOXML, reader_name) else vtkIOLegacy
+    reader: Any = getattr(module, reader_name)()
+    reader.SetFileName(str(folder / "in"))
+    if module is vtkIOLegacy:
+        reader.ReadAllScalarsOn()
+        reader.ReadAllFieldsOn()
+    reader.Update()
+    mesh = reader.GetOutput()
+    if reader.GetErrorCode() or mesh is None:
+        sys.exit(f"VTK reports the error {reader.GetErrorCode()}")
+    points = mesh.GetPoints() if hasattr(mesh, "GetPoints") else None
+    found = {"points": np.empty((0, 3)) if points is None else vtk_to_numpy(points.GetData())}
+    data: Any = mesh.GetPointData() if points is not None else None
+    for number in range(0 if data is None else data.GetNumberOfArrays()):
+        array = data.GetArray(number)
+        if array is not None and array.GetName():
+            found.setdefault(array.GetName(), vtk_to_numpy(array))
+    arrays: dict[str, Any] = {str(k): one for k, one in enumerate(found.values())}
+    np.savez(folder / "out.npz", names=np.array(list(found)), **arrays)
 
 
-def _whole(mesh: Any, name: str, path: Path) -> Array | None:
-    if name not in mesh.point_data:
-        return None
-    values = _one_each(mesh, name, path)
-    if not np.all(np.isfinite(values)) or np.any(values != np.round(values)):
-        raise CaseError(f"{path}: point data {name} holds a number that is not whole")
-    return frozen(values, np.int64)
-
-
-def _one_each(mesh: Any, name: str, path: Path) -> Array:
-    values = np.asarray(mesh.point_data[name])
-    if values.shape != (mesh.n_points,) or values.dtype.kind not in "iuf":
-        raise CaseError(f"{path}: point data {name} is no number for each point")
-    return values
+if __name__ == "__main__":
+    _child(sys.argv[1], Path(sys.argv[2]))

@@ -13,14 +13,13 @@ fluid.viscosity = "10 cP"
 
 import itertools
 import math
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from fdnet.campaign.plan.job import NAME, Plan, Variant, named, safe
-from fdnet.case.file import read_case
+from fdnet.case.file import read_case, toml_tables
 from fdnet.errors import CaseError
 from fdnet.files.paths import expanded
 
@@ -66,16 +65,7 @@ def read_sweep(path: str | Path) -> Sweep:
     Raises CaseError, which lists what is wrong in it.
     """
     place = expanded(path)
-    try:
-        if place.exists() and not place.is_file():
-            raise OSError("it is no ordinary file")
-        data = tomllib.loads(place.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise CaseError(
-            f"{path}: cannot be read as a sweep file: {error}; give the path of a TOML file"
-        ) from error
-    except (ValueError, RecursionError) as error:
-        raise CaseError(f"{path}: not valid TOML: {error}") from error
+    data = toml_tables(path, "a sweep file")
     problems = list(_problems(data))
     if problems:
         raise CaseError(f"{path}: {' | '.join(problems)}")
