@@ -126,7 +126,8 @@ def headline(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     ]
     if summary.get("stop_reason") is None and not invaded:
         return whole
-    reason, loss = summary.get("stop_reason"), DASH if lost is None else f"{100 * lost:.1f} % lost"
+    reason = summary.get("stop_reason")
+    loss = DASH if lost is None else f"{100 * lost:z.1f} % lost"
     passed, upstream = (
         quantity(summary.get("passed_count")),
         quantity(summary.get("upstream_count")),

@@ -90,4 +90,4 @@ def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _lost(share: float | None) -> str:
-    return "-" if share is None else f"{100 * share:.1f}"
+    return "-" if share is None else f"{100 * share:z.1f}"

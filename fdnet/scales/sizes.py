@@ -54,7 +54,7 @@ def _curve_rows(name: str, spheres: Spheres) -> Iterator[tuple[str, str, float, 
             continue
         given = asked.get(share)
         compared = (
-            "" if given is None else f", given {given:.4g} m ({100 * (value / given - 1):+.1f} %)"
+            "" if given is None else f", given {given:.4g} m ({100 * (value / given - 1):+z.1f} %)"
         )
         yield (
             f"{name}: {100 * share:.0f} % by volume finer than",
@@ -139,7 +139,7 @@ def _misfit_warnings(name: str, spheres: Spheres) -> Iterator[str]:
         fit = sizes.fit
         if fit is not None and fit.worst > MOST_MISFIT:
             missed = ", ".join(
-                f"D{100 * share:.0f} by {100 * off:+.0f} %" for share, off in fit.misfit.items()
+                f"D{100 * share:.0f} by {100 * off:+z.0f} %" for share, off in fit.misfit.items()
             )
             yield (
                 f"{key}: the {fit.name} curve misses {missed}; give the measured curve (size and "

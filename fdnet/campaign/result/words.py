@@ -47,7 +47,7 @@ def value_text(quantity: str, value: float) -> str:
 
 
 def _digits(value: float) -> str:
-    text = f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
+    text = f"{value:,.0f}" if abs(value) >= 1000 else f"{value:z.3g}"
     return text.replace("-", "\u2212")
 
 
