@@ -5,7 +5,6 @@ written), 3 LIGGGHTS missing or failed, 4 degenerate geometry or an unconverged 
 runs of an ensemble or a sweep failed, 130 stopped by the user.
 """
 
-import _thread
 import argparse
 import io
 import os
@@ -61,7 +60,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _SIGNALS.clear()
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in given
-    _listen_for_stops()
+    whole = arguments is None
+    _listen_for_stops(whole=whole)
     try:
         options = _parser().parse_args(joined_box(given))
         options.command_line = shlex.join(["fdnet", *given])
@@ -77,10 +77,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"fdnet: {_one_line(error)}", file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
-        return _stopped(last=arguments is None)
+        return _stopped(whole=whole)
     except Exception as error:
         if _SIGNALS:  # a library may turn the stop into an error of its own
-            return _stopped(last=arguments is None)
+            return _stopped(whole=whole)
         words = words_of(error)
         if debug or not words:
             raise
@@ -95,9 +95,9 @@ def _accept_any_character() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
-def _stopped(*, last: bool) -> int:
-    """Say it in one line; with `last` the process ends next, and one more Ctrl-C says nothing."""
-    if last:
+def _stopped(*, whole: bool) -> int:
+    """Say it in one line; where this is the `whole` process, one more Ctrl-C adds nothing."""
+    if whole:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     print(
         "fdnet: stopped; what was written is kept, repeat the command to go on "
@@ -107,12 +107,16 @@ def _stopped(*, last: bool) -> int:
     return _STOPPED
 
 
-def _listen_for_stops() -> None:
-    """Ctrl-C, unless the shell has switched it off, and the end that a queue asks for."""
+def _listen_for_stops(*, whole: bool) -> None:
+    """Ctrl-C, unless the shell has switched it off, and the end that a queue asks for.
+
+    Where this is the `whole` process, also those that are lost on their way.
+    """
     for number in (signal.SIGINT, signal.SIGTERM):
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _interrupt)
-    sys.unraisablehook = _stop_again
+    if whole:
+        sys.unraisablehook = _stop_again
 
 
 def _interrupt(number: int, *_: Any) -> NoReturn:
@@ -126,7 +130,8 @@ def _stop_again(lost: Any) -> None:
     Other such errors are shown as Python shows them, unless a stop has made them.
     """
     if issubclass(lost.exc_type, KeyboardInterrupt):
-        again = threading.Timer(_PATIENCE, _thread.interrupt_main)
+        main_thread = (threading.main_thread().ident, signal.SIGINT)
+        again = threading.Timer(_PATIENCE, signal.pthread_kill, main_thread)
         again.daemon = True
         again.start()
     elif not _SIGNALS:

@@ -1,12 +1,22 @@
 """`fdnet check`: what is odd about a case is said with what follows and what to do."""
 
 import json
+import re
+import subprocess
+import sys
 
 import pytest
 from builders import tiny
 
+import fdnet
+from fdnet.campaign.result.words import value_text
+from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.file import case_from
 from fdnet.cli import main
+from fdnet.report.html import ReportParts, write_report
+from fdnet.run.finished_text import text_lines
+from fdnet.run.pipeline import with_default_laws
+from fdnet.run.summary_text import summary_lines
 from fdnet.scales.check.checked import checked
 from fdnet.scales.check.narrow import PERIODIC, WALLS, WIDTHS, width_error
 from fdnet.scales.scales import scales_of
@@ -79,12 +89,12 @@ def test_a_wider_specimen_is_nearer_to_the_bulk():
 def test_the_command_prints_findings_with_what_to_do(tmp_path, capsys):
     path = tmp_path / "case.toml"
     path.write_text(tiny(*WELL, "fines.count=100", "run.max_hours=1e-6").toml())
-    assert main(["check", str(path)]) == 0
+    assert main(["check", str(path)]) == 2
     text = capsys.readouterr().out
     for part in ("fines.count: ", "what follows: ", "what to do: supply", "read: docs/", "time: "):
         assert part in text
     assert "run.max_hours: 1e-06 h" in text
-    assert main(["check", str(path), "--json"]) == 0
+    assert main(["check", str(path), "--json"]) == 2
     data = json.loads(capsys.readouterr().out)
     assert data["findings"][0]["refused"]
     assert all(one["follows"] for one in data["findings"])
@@ -93,6 +103,69 @@ def test_the_command_prints_findings_with_what_to_do(tmp_path, capsys):
     )
     assert main(["render", str(path), "--out", str(tmp_path / "decks")]) == 0
     assert text.strip() in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("assignments", "refused"),
+    [
+        ((), ""),
+        (("grains.count=3", "run.stiffness_N_m=auto"), "3 grains, expected at least 4"),
+        (("clean_up={drawdown_MPa=1000.0}",), "clean_up.drawdown_MPa: 1000"),
+        (("fines.count=4000", "fines.concentration=0.3"), "fines without a place"),
+        (("grains={radius_mm=0.25, porosity=0.2, max_overlap=0.02}",), "0.2 is out of reach"),
+        (("run.max_hours=1e-6",), "run.max_hours"),
+        (("fluid.velocity_m_s=5e9",), "drag alone would press"),
+    ],
+)
+def test_check_refuses_what_run_refuses(assignments, refused, tmp_path, capsys):
+    """Both have one list, so they say the same, too."""
+    path, out = tmp_path / "case.toml", tmp_path / "run"
+    path.write_text(tiny(*assignments).toml())
+    assert main(["check", str(path)]) == (2 if refused else 0)
+    said = " ".join("".join(capsys.readouterr()).split())
+    assert refused in said
+    if refused:
+        assert main(["run", str(path), "--out", str(out)]) == 2
+        assert refused in capsys.readouterr().err
+        assert not out.exists()
+
+
+def test_what_check_finds_stands_in_summary_and_report(finished):
+    """The tiny run is 3.2 grains wide: the study of widths has some 30 % for it."""
+    case = fdnet.read_case(finished.path / "case.toml")
+    found = [one.sentence for one in checked(case, scales_of(case)).findings]
+    assert found[0].startswith("box.size_mm: the specimen is 3.2 mean grains wide")
+    warnings = finished.summary["warnings"]
+    assert warnings[: len(found)] == found
+    report = (finished.path / "report.html").read_text(encoding="utf-8")
+    assert "the specimen is 3.2 mean grains wide" in report
+
+
+STOPPED = """
+import ctypes, signal, sys, time
+import fdnet.cli, fdnet.commands.check
+
+def check(options):
+    ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))()  # swallows the stop
+    if {raises}:
+        raise RuntimeError("no compiled object yet")
+    time.sleep(20)
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+fdnet.commands.check._check = check
+sys.argv = ["fdnet", "check", "case.toml"]
+sys.exit(fdnet.cli.main())
+"""
+
+
+@pytest.mark.parametrize("raises", [True, False])
+def test_a_stop_inside_a_compiler_is_one_line(raises):
+    """llvmlite's call-back loses a KeyboardInterrupt, and numba raises another error for it."""
+    command = [sys.executable, "-c", STOPPED.format(raises=raises)]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=15, check=False)
+    assert ended.returncode == 130
+    (line,) = ended.stderr.splitlines()
+    assert "repeat the command to go on (a run: with --resume)" in line
 
 
 def test_a_range_whose_finest_tenth_takes_the_time_is_named():
@@ -119,3 +192,31 @@ def test_times_are_said_in_hours_and_minutes(seconds, words):
 
 def test_memory_is_said_in_megabytes():
     assert (spoken_memory(6.6e8), spoken_memory(2.34e9)) == ("660 MB", "2.3 GB")
+
+
+def test_laws_of_the_thesis_are_said_to_be_wrong_with_the_default_beside(finished, capsys):
+    """The second number is what the same spheres give by the default laws in a run of its own."""
+    grains, damaged = finished.spheres("initial"), finished.spheres("damaged")
+    chosen = AnalysisChoices.of_pack(law="thesis", damage_law="thesis")
+    one = with_default_laws(grains, damaged, periodic="yz", options=chosen)
+    other = fdnet.analyse(grains, damaged, periodic="yz")
+    lost = [float(text) for text in re.findall(r"\((-?[\d.]+) % lost\)", one.warnings[0])]
+    assert lost == pytest.approx([100 * x.k_reduction for x in (one, other)], abs=0.051)
+    assert abs(lost[1] - lost[0]) > 10
+    assert not any("thesis" in text for text in other.warnings)
+    spheres = str(finished.path / "spheres_damaged.csv")
+    assert main(["permeability", spheres, "--law", "thesis", "--damage-law", "thesis"]) == 0
+    assert "warning: the laws thesis and thesis are kept to compare" in capsys.readouterr().out
+    assert main(["permeability", spheres]) == 0
+    assert "thesis" not in capsys.readouterr().out
+
+
+def test_nothing_is_said_to_have_lost_minus_zero(finished, tmp_path):
+    summary = json.loads((finished.path / "summary.json").read_text(encoding="utf-8"))
+    summary["k_reduction"] = -1e-9
+    for row in summary["sections"]:
+        row["k_reduction"] = -1e-9
+    page = write_report(tmp_path / "report.html", summary, parts=ReportParts())
+    texts = [*summary_lines(summary), *text_lines(finished.path, summary)]
+    assert "-0.0" not in "\n".join(texts) + page.read_text(encoding="utf-8")
+    assert value_text("k_reduction", -0.0) == "0 %"

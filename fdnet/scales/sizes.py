@@ -139,7 +139,7 @@ def _misfit_warnings(name: str, spheres: Spheres) -> Iterator[str]:
         fit = sizes.fit
         if fit is not None and fit.worst > MOST_MISFIT:
             missed = ", ".join(
-                f"D{100 * share:.0f} by {100 * off:+.0f} %" for share, off in fit.misfit.items()
+                f"D{100 * share:.0f} by {100 * off:+z.0f} %" for share, off in fit.misfit.items()
             )
             yield (
                 f"{key}: the {fit.name} curve misses {missed}; give the measured curve (size and "

@@ -78,12 +78,16 @@ def test_sizes_may_be_in_files_named_from_anywhere(tmp_path, monkeypatch):
     ("changed", "message"),
     [
         ({"sand_d50": "", "solids": ""}, '2 answers are missing: --sand-d50 "0.40 mm", --solids'),
-        ({"overbalance": "300"}, "fluid.overbalance: '300': has no unit"),
+        ({"overbalance": "300"}, "--overbalance: '300': has no unit"),
         ({"sand_d50": "0.2 mm"}, "--sand: the sizes make no curve"),
         ({"mud_d50": "0.4"}, "--mud-d50: '0.4': has no unit"),
         ({"mud_d50": "400 um"}, "as coarse as the finest sand"),
-        ({"solids": "45 %"}, "fines.concentration: 0.45"),
-        ({"porosity": "38 mm"}, "grains.porosity"),
+        ({"solids": "45 %"}, "--solids: 0.45"),
+        ({"porosity": "38 mm"}, "--porosity: '38 mm': 'mm' is a unit of length"),
+        ({"viscosity": "10", "mud_d50": "x", "solids": ""}, "| --viscosity: '10': has no unit"),
+        ({"viscosity": "10", "mud_d50": "x", "solids": ""}, "| 1 answers are missing: --solids"),
+        ({"porosity": "200 %", "sand_d50": "0.1 mm"}, "| --porosity: 2.0 should be less than 1"),
+        ({"mud_d50": "1 um"}, "finer than a seventh of a throat"),
     ],
 )
 def test_answers_that_make_no_case_are_refused(changed, message, tmp_path, capsys):
@@ -112,6 +116,54 @@ def test_on_a_terminal_what_is_missing_is_asked_for(tmp_path, monkeypatch):
     assert case.fines.sizes.D90_mm == pytest.approx(0.09)
     assert case.fines.sizes.D10_mm == pytest.approx(0.02)
     assert not any(prompt.startswith(("Sand, D10", "Viscosity")) for prompt in asked)
+
+
+def test_one_bad_answer_is_asked_for_again_and_the_others_stay(tmp_path, monkeypatch, capsys):
+    """One that cannot be read at once, one that makes no case when all are there."""
+    replies = {
+        "Sand, D50": ["0.40", "0.40 mm"],
+        "Porosity": ["38 %"],
+        "Solids in the mud": ["45 %", "5 %"],
+        "Viscosity": ["ten cP", "10 cP"],
+    }
+    asked: list[str] = []
+
+    def answer(prompt: str) -> str:
+        key = next((one for one in replies if prompt.startswith(one)), "")
+        asked.append(key)
+        return replies[key].pop(0) if key else ""
+
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
+    monkeypatch.setattr("builtins.input", answer)
+    out = tmp_path / "case.toml"
+    assert init(out, **dict.fromkeys(("sand_d50", "porosity", "solids", "viscosity"), "")) == 0
+    case = read_case(out)
+    assert (case.grains.sizes.D50_mm, case.fluid.viscosity_cP) == (0.4, 10)
+    assert case.fines.concentration == pytest.approx(0.05)
+    assert [len(left) for left in replies.values()] == [0, 0, 0, 0]
+    assert asked.count("Porosity") == 1
+    said = capsys.readouterr().err
+    for text in ("--sand-d50: '0.40': has no unit", "--viscosity: 'ten cP'", "--solids: 0.45"):
+        assert text in said
+
+
+@pytest.mark.parametrize("mud", [(5, 25, 70), (2, 20, 70)])
+def test_an_ordinary_carbonate_mud_makes_a_case(mud, tmp_path, capsys):
+    """With no cut it has more fines than fdnet takes; what is left out is said."""
+    out = tmp_path / "case.toml"
+    sizes = dict(zip(("mud_d10", "mud_d50", "mud_d90"), (f"{one} um" for one in mud), strict=True))
+    assert init(out, overbalance="200 psi", **sizes) == 0
+    said, curve = capsys.readouterr().out, read_case(out).fines.curve
+    assert curve.kept >= 0.5
+    assert f"left out: {100 * curve.below:.2g} % of the solids, finer than" in said
+    assert main(["check", str(out)]) == 0
+
+
+def test_a_dense_sand_does_not_make_its_fines_stiff(tmp_path):
+    """Its grains overlap whatever the stiffness is, and stiff contacts make short steps."""
+    loose, dense = tmp_path / "loose.toml", tmp_path / "dense.toml"
+    assert init(loose) == init(dense, porosity="32 %") == 0
+    assert read_case(dense).run.stiffness_N_m <= 2 * read_case(loose).run.stiffness_N_m
 
 
 def test_cases_lists_and_copies_what_comes_with_fdnet(tmp_path, capsys, root, monkeypatch):

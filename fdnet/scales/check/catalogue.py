@@ -76,7 +76,8 @@ def page() -> str:
         "",
         "This page lists every warning of fdnet: what follows from it, and what to do. A warning",
         "names something that is valid but doubtful, and the run goes on. … stands for what",
-        "differs from case to case.",
+        "differs from case to case. What `fdnet check` finds odd about the sizes, the speed and",
+        "the supply of a case comes first in the summary; it says all this itself.",
     ]
     for entry in catalogue():
         lines += [

@@ -114,7 +114,8 @@ def _short_supply(case: InvasionCase, scales: InvasionScales) -> Iterator[Findin
         key="run.cap_ms" if by_time else key,
         what=f"the fines that come would fill {come:.2g} of a median grain's depth; the shipped "
         f"cases were plugged by 0.1 to {TAKEN_SOLIDS:g}",
-        follows="the mud runs out, or the time, before the face plugs: more mud does more damage",
+        follows="the mud, or the time, may run out before the face plugs; then more mud would do "
+        "more damage",
         do="give the run more time (run.cap_ms or run.duration_ms)"
         if by_time
         else f"supply {1e3 * length:.2g} mm of mud ({TAKEN_SOLIDS / solids:.2g} times as much)",
