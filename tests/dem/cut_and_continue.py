@@ -1,12 +1,15 @@
 """Cut an invasion and continue it: is the result that of an uncut one, in every column?"""
 
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
-import numpy as np
+import pytest
 from builders import tiny
 
 from fdnet.case.case import InvasionCase
+from fdnet.dem.batches import batches_of
 from fdnet.dem.binary import Binary
 from fdnet.dem.invasion import Invasion, invade
 from fdnet.dem.liggghts import Launch
@@ -20,8 +23,6 @@ SUPPLIES = ("slab", "batches")
 SCHEMES = ("every_step", "held", "implicit", "viscous")
 MATRIX = tuple(product(SIDES, MOTIONS, SUPPLIES, SCHEMES))
 """All 32 cells: sides, motion of the grains, supply of the fines, scheme of the drag."""
-CUT_AT = 4
-"""Checkpoint at which the invasion is cut: batches still come then."""
 
 
 class StopError(Exception):
@@ -29,63 +30,85 @@ class StopError(Exception):
 
 
 def cell_case(sides: str, motion: str, supply: str, scheme: str, *keys: str) -> InvasionCase:
-    """The small case of one cell: 15 grains, 1,500 fines in batches, 5 checkpoints."""
+    """The small case of one cell: 15 grains, 500 fines in four batches, 6 checkpoints."""
     return tiny(
         f"box.sides={sides}",
         f"grains.motion={motion}",
         f"fines.supply={supply}",
         f"drag.scheme={scheme}",
+        "drag.pressure_gradient=true",
         "box.size_mm=[1.6,1.0,1.0]",
         "grains.count=15",
-        "fines.count=1500",
-        "run.cap_ms=0.2",
-        "run.checkpoint_ms=0.04",
+        "fines.count=500",
+        "run.time_step_factor=0.2",
+        "run.cap_ms=0.15",
+        "run.checkpoint_ms=0.025",
         *keys,
     )
 
 
-def differences(
-    case: InvasionCase, grains: Snapshot, folder: Path, binary: Binary, *, ranks: int = 1
-) -> list[str]:
-    """What differs between the uncut and the continued invasion; empty when nothing does.
+def places(case: InvasionCase, chunks: int) -> dict[str, tuple[int, ...]]:
+    """Where an invasion of so many `chunks` is cut: the checkpoints, which one after another."""
+    batches = len(batches_of(case, scales_of(case)).counts)
+    whole = 1 if batches == 1 else batches - 1
+    return {
+        "in the first chunk": (0,),
+        "after the first chunk": (1,),
+        "between batches": (max(1, whole - 1),),
+        "after the last batch": (whole,),
+        "in the last chunk": (chunks - 1,),
+        "at every checkpoint": tuple(range(1, chunks + 1)),
+    }
 
-    Both are run below `folder`. All counts of the history, all overlaps that were watched, and
-    every column of the spheres at the end, are compared bit for bit.
+
+def differences(
+    case: InvasionCase,
+    grains: Snapshot,
+    folder: Path,
+    binary: Binary,
+    *,
+    ranks: int = 1,
+    everywhere: bool = False,
+) -> list[str]:
+    """What differs between the uncut and continued invasions; empty when nothing does.
+
+    All are run below `folder`. One is cut at every checkpoint; `everywhere` adds one for each
+    other place. What the invasion says, all overlaps that were watched, every column of the
+    spheres at the end and the last restart are compared bit for bit.
     """
-    launch = Launch(binary=binary, ranks=ranks)
-    scales = scales_of(case)
-    whole = invade(
-        case, scales, grains, folder / "whole", launch, fluid=fluid_of(case, scales, grains)
-    )
-    again = cut_and_continue(case, grains, folder / "cut", launch)
-    columns = ("id", "kind", "position", "radius", "velocity")
-    different = [
-        name
-        for name in columns
-        if not np.array_equal(getattr(again.damaged, name), getattr(whole.damaged, name))
-    ]
-    if again.history != whole.history:
-        different.append("history")
-    if again.updates != whole.updates:
-        different.append("updates")
-    if list(read_watch(folder / "cut")) != list(read_watch(folder / "whole")):
-        different.append("overlaps")
+    launch, scales = Launch(binary=binary, ranks=ranks), scales_of(case)
+
+    def drive(name: str, launch: Launch) -> Invasion:
+        fluid = fluid_of(case, scales, grains)
+        return invade(case, scales, grains, folder / name, launch, fluid=fluid)
+
+    def stop_at(chunk: int) -> Launch:
+        def stop(line: str) -> None:
+            if line.lstrip().startswith(f"FDNET checkpoint {chunk} " if chunk else "Step "):
+                raise StopError
+
+        return replace(launch, follow=stop)
+
+    whole, different = drive("whole", launch), []
+    cuts = places(case, len(whole.history))
+    for place in cuts if everywhere else ("at every checkpoint",):
+        for chunk in cuts[place]:
+            with pytest.raises(StopError):
+                drive(place, stop_at(chunk))
+        again = drive(place, launch)
+        ends = [end_of(one, folder / name) for one, name in ((again, place), (whole, "whole"))]
+        different += [f"{place}: {name}" for name in ends[0] if ends[0][name] != ends[1][name]]
     return different
 
 
-def cut_and_continue(
-    case: InvasionCase, grains: Snapshot, folder: Path, launch: Launch
-) -> Invasion:
-    """The invasion, cut at checkpoint `CUT_AT` and continued."""
-
-    def stop(line: str) -> None:
-        if line.startswith(f"FDNET checkpoint {CUT_AT} "):
-            raise StopError
-
-    cut = Launch(binary=launch.binary, ranks=launch.ranks, follow=stop)
-    scales = scales_of(case)
-    try:
-        invade(case, scales, grains, folder, cut, fluid=fluid_of(case, scales, grains))
-    except StopError:
-        return invade(case, scales, grains, folder, launch, fluid=fluid_of(case, scales, grains))
-    raise AssertionError(f"the invasion ended before checkpoint {CUT_AT}")
+def end_of(result: Invasion, folder: Path) -> dict[str, Any]:
+    """All that a finished invasion in `folder` has to say, in parts that can be compared."""
+    told = ("history", "stop_reason", "supplied", "overlap", "warnings", "updates")
+    columns = ("id", "kind", "position", "radius", "velocity")
+    restart = folder / "post" / f"invade_{result.history[-1].step}.restart"
+    return {
+        **{name: getattr(result, name) for name in told},
+        **{name: getattr(result.damaged, name).tolist() for name in columns},
+        "overlaps": list(read_watch(folder)),
+        "restart": restart.read_bytes(),
+    }

@@ -122,26 +122,74 @@ def test_a_finished_clean_up_is_not_repeated(run):
     assert (folder / "clean_up" / "log.liggghts").stat().st_mtime_ns == stamp
 
 
-def test_a_cut_clean_up_goes_on_bit_for_bit(start, tmp_path, binary):
-    flow = back_flow(small("clean_up.duration_ms=1.0"))
+class StopError(Exception):
+    """Stands for any sudden end."""
 
-    class StopError(Exception):
-        pass
 
-    def stop(line):
-        if line.startswith("FDNET cleaned 2 "):
-            raise StopError
+@pytest.mark.parametrize(
+    ("scheme", "ranks"),
+    [
+        ("held", 1),
+        *(
+            pytest.param(scheme, ranks, marks=pytest.mark.slow)
+            for scheme in ("held", "viscous", "implicit")
+            for ranks in (1, 2)
+            if (scheme, ranks) != ("held", 1)
+        ),
+    ],
+)
+def test_a_clean_up_cut_at_every_checkpoint_goes_on_bit_for_bit(
+    start, tmp_path, binary, scheme, ranks
+):
+    keys = (f"drag.scheme={scheme}", "drag.pressure_gradient=true", "clean_up.duration_ms=1.0")
+    flow, folder = back_flow(small(*keys)), tmp_path / "cut"
+    whole = again(start, flow, tmp_path / "whole", binary, ranks=ranks)
+    for row in whole.history:
 
-    whole = again(start, flow, tmp_path / "whole", binary)
-    with pytest.raises(StopError):
-        again(start, flow, tmp_path / "cut", binary, follow=stop)
-    rest = again(start, flow, tmp_path / "cut", binary)
-    assert (tmp_path / "cut" / "clean_up" / "in.clean_up.resume").exists()
+        def stop(line, mark=f"FDNET cleaned {row.chunk} "):
+            if line.startswith(mark):
+                raise StopError
+
+        with pytest.raises(StopError):
+            again(start, flow, folder, binary, ranks=ranks, follow=stop)
+    rest = again(start, flow, folder, binary, ranks=ranks)
+    assert len(rest.history) > 3
     assert rest.history == whole.history
     for column in ("id", "position", "velocity"):
         assert np.array_equal(getattr(rest.state, column), getattr(whole.state, column))
-    with pytest.raises(CaseError, match="begun with --np 1"):
-        again(start, flow, tmp_path / "cut", binary, ranks=2)
+    ends = [
+        (tmp_path / one / "clean_up" / restart_name(whole.history[-1].step)).read_bytes()
+        for one in ("whole", "cut")
+    ]
+    assert ends[0] == ends[1]
+    with pytest.raises(CaseError, match=f"begun with --np {ranks}"):
+        again(start, flow, folder, binary, ranks=3 - ranks)
+
+
+@pytest.mark.parametrize("place", ["clean_up_stage", "analyse", "write_tables", "draw_figures"])
+def test_a_run_cut_in_a_later_stage_gives_the_summary_of_the_uncut_one(
+    run, tmp_path, monkeypatch, place
+):
+    """Cut where the clean-up, the analysis, its tables and the figures of the report begin."""
+    folder, first = run
+    shutil.copytree(folder, tmp_path / "run")
+    (tmp_path / "run" / "manifest.json").unlink()
+    if place == "clean_up_stage":
+        shutil.rmtree(tmp_path / "run" / "clean_up")
+    stages = (*STAGES, "report") if place == "draw_figures" else STAGES
+    options = RunOptions(out=tmp_path / "run", show_progress=False, stages=stages, resume=True)
+
+    def stop(*args, **more):
+        raise StopError
+
+    home = "fdnet.network.permeability" if place == "analyse" else "fdnet.run.pipeline"
+    with monkeypatch.context() as patch:
+        patch.setattr(f"{home}.{place}", stop)
+        with pytest.raises(StopError):
+            run_stages(small(), options)
+    again = run_stages(small(), options)
+    told = [{**one, "seconds": None} for one in (again, first)]
+    assert told[0] == told[1]
 
 
 def test_a_record_keeps_restarts_of_later_checkpoints(tmp_path):

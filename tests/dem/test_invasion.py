@@ -212,37 +212,6 @@ def test_every_stop_reason_is_told(binary, packed, tmp_path):
         assert result.stop_reason == reason
 
 
-class StopError(Exception):
-    """Stands for any sudden end."""
-
-
-@pytest.mark.parametrize(
-    "assignments",
-    [
-        [],
-        ["drag.scheme=every_step"],
-        ["drag.scheme=implicit"],
-        ["drag.scheme=viscous", "drag.upstream=darcy"],
-        ["grains.motion=mobile"],
-    ],
-)
-def test_a_cut_run_continues_bit_for_bit(binary, packed, tmp_path, monkeypatch, assignments):
-    case = tiny("run.cap_ms=0.5", *assignments)
-    scales, grains = scales_of(case), packed["walls"]
-    whole = invade(case, scales, grains, tmp_path / "whole", Launch(binary=binary))
-
-    def stop(line: str) -> None:
-        if line.startswith("FDNET checkpoint 2 "):
-            raise StopError
-
-    with pytest.raises(StopError):
-        invade(case, scales, grains, tmp_path / "cut", Launch(binary=binary, follow=stop))
-    assert read_history(tmp_path / "cut")[-1].chunk < whole.history[-1].chunk
-    again = invade(case, scales, grains, tmp_path / "cut", Launch(binary=binary))
-    assert again.history == whole.history
-    assert np.array_equal(again.damaged.position, whole.damaged.position)
-
-
 def test_broken_checkpoints_are_passed_over(binary, packed, tmp_path):
     case = tiny("run.cap_ms=0.3")
     scales, grains = scales_of(case), packed["walls"]
