@@ -7,6 +7,7 @@ import sys
 
 import pytest
 from builders import tiny
+from fdnet.run.finished_text import text_lines
 
 import fdnet
 from fdnet.campaign.result.words import value_text
@@ -14,7 +15,6 @@ from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.file import case_from
 from fdnet.cli import main
 from fdnet.report.html import ReportParts, write_report
-from fdnet.run.finished_text import text_lines
 from fdnet.run.pipeline import with_default_laws
 from fdnet.run.summary_text import summary_lines
 from fdnet.scales.check.checked import checked
