@@ -32,11 +32,6 @@ class Checked:
     cost: Cost
     memory: float
 
-    @property
-    def refused(self) -> bool:
-        """Whether `fdnet run` refuses the case."""
-        return any(one.refused for one in self.findings)
-
     def data(self) -> dict[str, Any]:
         """As plain values."""
         return {
