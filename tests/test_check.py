@@ -133,10 +133,10 @@ def test_check_refuses_what_run_refuses(assignments, refused, tmp_path, capsys):
 def test_what_check_finds_stands_in_summary_and_report(finished):
     """The tiny run is 3.2 grains wide: the study of widths has some 30 % for it."""
     case = fdnet.read_case(finished.path / "case.toml")
-    found = [one.sentence for one in checked(case, scales_of(case)).findings]
-    assert found[0].startswith("box.size_mm: the specimen is 3.2 mean grains wide")
+    odd = [one.sentence for one in checked(case, scales_of(case)).findings]
+    assert odd[0].startswith("box.size_mm: the specimen is 3.2 mean grains wide")
     warnings = finished.summary["warnings"]
-    assert warnings[: len(found)] == found
+    assert warnings[: len(odd)] == odd
     report = (finished.path / "report.html").read_text(encoding="utf-8")
     assert "the specimen is 3.2 mean grains wide" in report
 

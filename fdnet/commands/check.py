@@ -32,7 +32,10 @@ def _check(options: argparse.Namespace) -> int:
         print(json.dumps(result.data(), indent=2))
     else:
         print("\n".join(result.lines()))
-    return CaseError.exit_code if result.refused else 0
+    for one in result.findings:
+        if one.refused:
+            raise CaseError(f"fdnet run refuses this case: {one.what}")
+    return 0
 
 
 def looked_at(case: "Case", scales: "Scales") -> "Checked":

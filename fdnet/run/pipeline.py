@@ -38,7 +38,7 @@ from fdnet.run.records import record_warnings, stage_seconds, versions
 from fdnet.run.session import RunOptions, Session
 from fdnet.run.stokes_sections import report_section
 from fdnet.run.summary import summarise
-from fdnet.scales.check.checked import doubts
+from fdnet.scales.check.checked import every_finding
 from fdnet.scales.clean_up import back_flow
 from fdnet.scales.cost import over_limit
 from fdnet.scales.densest import refuse_unreachable
@@ -292,7 +292,7 @@ def _write_summary(
         physical_time_s=results.physical_time_s,
         seconds=stage_seconds(pack, invasion, session.seconds, cleaned=cleaned),
         warnings=[
-            *(one.sentence for one in doubts(case, scales)),
+            *(one.sentence for one in every_finding(case, scales)),
             *record_warnings(case, pack, invasion),
             *(cleaned["warnings"] if cleaned else []),
             *file_warnings(session),

@@ -85,7 +85,7 @@ def test_sizes_may_be_in_files_named_from_anywhere(tmp_path, monkeypatch):
         ({"solids": "45 %"}, "--solids: 0.45"),
         ({"porosity": "38 mm"}, "--porosity: '38 mm': 'mm' is a unit of length"),
         ({"viscosity": "10", "mud_d50": "x", "solids": ""}, "| --viscosity: '10': has no unit"),
-        ({"viscosity": "10", "mud_d50": "x", "solids": ""}, "| 1 answers are missing: --solids"),
+        ({"viscosity": "10", "mud_d50": "x", "solids": ""}, "| 1 answer is missing: --solids"),
         ({"porosity": "200 %", "sand_d50": "0.1 mm"}, "| --porosity: 2.0 should be less than 1"),
         ({"mud_d50": "1 um"}, "finer than a seventh of a throat"),
     ],

@@ -32,11 +32,6 @@ class Checked:
     cost: Cost
     memory: float
 
-    @property
-    def refused(self) -> bool:
-        """Whether `fdnet run` refuses the case."""
-        return any(one.refused for one in self.findings)
-
     def data(self) -> dict[str, Any]:
         """As plain values."""
         return {
@@ -87,13 +82,13 @@ def checked(case: Case, scales: Scales, refusals: Iterable[str] = ()) -> Checked
     ]
     return Checked(
         name=case.name,
-        findings=(*refused, *doubts(case, scales)),
+        findings=(*refused, *every_finding(case, scales)),
         cost=cost_of(case, scales),
         memory=peak_memory(case, scales),
     )
 
 
-def doubts(case: Case, scales: Scales) -> list[Finding]:
+def every_finding(case: Case, scales: Scales) -> list[Finding]:
     """All that is odd about a case: what `fdnet check` says, and the summary of its run."""
     return [*findings(case, scales), *map(_of_warning, scales.warnings)]
 

@@ -105,7 +105,8 @@ def filled(
             missing.append(f'{question.option} "{question.example}"')
     if missing:
         problems.append(
-            f"{len(missing)} answers are missing: {', '.join(missing)} (sizes also as "
+            f"{len(missing)} answer{'s are' if len(missing) > 1 else ' is'} missing: "
+            f"{', '.join(missing)} (sizes also as "
             "--sand-file or --mud-file with a CSV table); on a terminal they are asked for"
         )
     if problems:
