@@ -55,10 +55,6 @@ class Frame:
         return self.rows[:, self.columns.index(name)]
 
 
-class CutDumpError(DumpError):
-    """The file or the frame ends before its last row."""
-
-
 def read_dump(path: Path) -> list[Frame]:
     """All frames of a dump that fdnet's own LIGGGHTS wrote.
 
@@ -136,13 +132,12 @@ class DumpReader:
         self.data, self.source, self.position, self.line = data, source, 0, 1
         self.own, self.step, self.units = own, -1, ""
 
-    def fail(
-        self, what: str, line: int | None = None, kind: type[DumpError] = DumpError
-    ) -> DumpError:
+    def fail(self, what: str, line: int | None = None, *, cut: bool = False) -> DumpError:
         step = "" if self.step < 0 else f" step {self.step}:"
-        cut = f". {CUT}" if self.own and kind is CutDumpError else ""
-        error = kind(f"{self.source}:{max(1, line or self.line)}:{step} {what}{cut}")
+        advice = f". {CUT}" if self.own and cut else ""
+        error = DumpError(f"{self.source}:{max(1, line or self.line)}:{step} {what}{advice}")
         error.exit_code = DumpError.exit_code if self.own else CaseError.exit_code
+        error.cut = cut
         return error
 
     def goes_on(self) -> bool:
@@ -162,19 +157,17 @@ class DumpReader:
     def take(self) -> bytes:
         end = self.data.find(b"\n", self.position)
         if end < 0:
-            raise self.fail("the file ends in the middle of a line", kind=CutDumpError)
+            raise self.fail("the file ends in the middle of a line", cut=True)
         text = self.data[self.position : end].strip()
         if b"ITEM:" in text[1:]:
-            raise self.fail("the next frame begins in the middle of this line", kind=CutDumpError)
+            raise self.fail("the next frame begins in the middle of this line", cut=True)
         self.position, self.line = end + 1, self.line + 1
         return text
 
     def item(self, expected: bytes) -> bytes:
         line = self.line
         if self.position >= len(self.data):
-            raise self.fail(
-                f"the file ends before {expected.decode()}", line - 1, kind=CutDumpError
-            )
+            raise self.fail(f"the file ends before {expected.decode()}", line - 1, cut=True)
         text = self.take()
         if not text.startswith(expected):
             raise self.fail(f"{_shown(text)}, expected {expected.decode()!r}", line)
@@ -182,7 +175,7 @@ class DumpReader:
 
     def value(self, what: str) -> bytes:
         if self.position >= len(self.data):
-            raise self.fail(f"the file ends before the {what}", self.line - 1, CutDumpError)
+            raise self.fail(f"the file ends before the {what}", self.line - 1, cut=True)
         return self.take()
 
     def whole(self, what: str) -> int:
@@ -252,7 +245,7 @@ class DumpReader:
         return [low, high]
 
     def refuse_cut(self, head: Head, lines: int, *, last: bool) -> None:
-        """Raise CutDumpError unless all rows of the frame are there and whole."""
+        """Raise DumpError unless all rows of the frame are there and whole."""
         body, ended = head.body, head.body.endswith(b"\n") or not head.body
         rows = lines + (not ended)
         if rows != head.count:
@@ -268,7 +261,7 @@ class DumpReader:
             raise self.fail(
                 f"{rows - (not whole)} of {head.count} rows, {what}",
                 head.line + max(0, body.rstrip().count(b"\n") - (not body.strip())),
-                CutDumpError,
+                cut=True,
             )
 
     def frame(self, head: Head, needed: Sequence[int]) -> Frame:

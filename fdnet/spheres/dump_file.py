@@ -1,7 +1,7 @@
 """Spheres of a LIGGGHTS or LAMMPS text dump."""
 
-from fdnet.errors import CaseError
-from fdnet.spheres.dump import CutDumpError, DumpReader, Head
+from fdnet.errors import CaseError, DumpError
+from fdnet.spheres.dump import DumpReader, Head
 from fdnet.spheres.rows import SphereRows, columns_of, metres_per, rows_from
 
 DUMP_UNITS = {"si": 1.0, "cgs": 1e-2, "micro": 1e-6}
@@ -61,7 +61,9 @@ def _heads(reader: DumpReader) -> tuple[list[Head], list[str]]:
         before = reader.position
         try:
             heads.append(reader.head())
-        except CutDumpError as error:
+        except DumpError as error:
+            if not error.cut:
+                raise
             cut.append(error)
             reader.to_next(before)
     if cut and not heads:
