@@ -107,7 +107,7 @@ class Head:
         step, box, columns, units: as those of a `Frame`.
         boundary: what the file says of the sides across x, y and z ("pp", "ff"), else empty.
         count: number of rows.
-        body: the rows.
+        body: where the rows stand in the bytes.
         line: line of the first of them.
     """
 
@@ -117,7 +117,7 @@ class Head:
     units: str
     boundary: tuple[str, ...]
     count: int
-    body: bytes
+    body: slice
     line: int
 
 
@@ -216,11 +216,12 @@ class DumpReader:
             units=self.units,
             boundary=boundary,
             count=count,
-            body=self.data[self.position : end],
+            body=slice(self.position, end),
             line=self.line,
         )
-        lines = head.body.count(b"\n")
-        self.refuse_cut(head, lines, last=end == len(self.data))
+        body = self.data[head.body]
+        lines = body.count(b"\n")
+        self.refuse_cut(head, body, lines, last=end == len(self.data))
         self.position, self.line = end, self.line + lines
         return head
 
@@ -244,9 +245,9 @@ class DumpReader:
             )
         return [low, high]
 
-    def refuse_cut(self, head: Head, lines: int, *, last: bool) -> None:
+    def refuse_cut(self, head: Head, body: bytes, lines: int, *, last: bool) -> None:
         """Raise DumpError unless all rows of the frame are there and whole."""
-        body, ended = head.body, head.body.endswith(b"\n") or not head.body
+        ended = body.endswith(b"\n") or not body
         rows = lines + (not ended)
         if rows != head.count:
             rows = sum(1 for row in body.split(b"\n") if row.strip())
@@ -268,9 +269,10 @@ class DumpReader:
         """The frame of a head, with the columns of the indices `needed` alone."""
         self.step = head.step
         names = tuple(head.columns[index] for index in needed)
-        table = _table(head, needed) if head.count else np.empty((0, len(needed)))
+        body = self.data[head.body]
+        table = _table(head, body, needed) if head.count else np.empty((0, len(needed)))
         if table is None:
-            table = self.careful(head, needed)
+            table = self.careful(head, body, needed)
         if "id" in names:
             table = table[np.argsort(table[:, names.index("id")], kind="stable")]
         return Frame(
@@ -281,10 +283,10 @@ class DumpReader:
             units=head.units,
         )
 
-    def careful(self, head: Head, needed: Sequence[int]) -> Array:
+    def careful(self, head: Head, body: bytes, needed: Sequence[int]) -> Array:
         """The rows as numbers, whatever white space parts them; names the first that is bad."""
         rows = []
-        for line, row in enumerate(head.body.split(b"\n"), start=head.line):
+        for line, row in enumerate(body.split(b"\n"), start=head.line):
             parts = row.split()
             if not parts:
                 continue
@@ -322,11 +324,10 @@ def exact_numbers() -> dict[str, Any]:
     return {"float_precision": "round_trip"} if int(pd.__version__.split(".")[0]) < 3 else {}
 
 
-def _table(head: Head, needed: Sequence[int]) -> Array | None:
+def _table(head: Head, body: bytes, needed: Sequence[int]) -> Array | None:
     """The rows as numbers (N, needed), or None unless single spaces part finite numbers."""
     import pandas as pd
 
-    body = head.body
     trailing = body[: body.find(b"\n")].endswith(b" ")
     marks, each = np.frombuffer(body, np.uint8), len(head.columns) - 1 + trailing
     ends, spaces = np.flatnonzero(marks == ord("\n")), np.flatnonzero(marks == ord(" "))
