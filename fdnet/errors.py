@@ -66,14 +66,19 @@ class LiggghtsError(FdnetError):
 class DumpError(LiggghtsError):
     """A dump is malformed or cut; the message carries path, line and step.
 
+    Its exit code is 3 for a dump of a run of fdnet, and 2 for a file that a user gives. `cut`
+    tells that the file or a frame ends too early.
+
     Examples:
         >>> import fdnet, pathlib
         >>> _ = pathlib.Path("cut.dump").write_text("ITEM: TIMESTEP\\n")
         >>> fdnet.read_spheres("cut.dump")
         Traceback (most recent call last):
             ...
-        fdnet.errors.DumpError: cut.dump:2: ...
+        fdnet.errors.DumpError: cut.dump:1: ...
     """
+
+    cut = False
 
 
 class NetworkError(FdnetError):

@@ -55,10 +55,6 @@ class Frame:
         return self.rows[:, self.columns.index(name)]
 
 
-class CutDumpError(DumpError):
-    """The file or the frame ends before its last row."""
-
-
 def read_dump(path: Path) -> list[Frame]:
     """All frames of a dump that fdnet's own LIGGGHTS wrote.
 
@@ -111,7 +107,7 @@ class Head:
         step, box, columns, units: as those of a `Frame`.
         boundary: what the file says of the sides across x, y and z ("pp", "ff"), else empty.
         count: number of rows.
-        body: the rows.
+        body: where the rows stand in the bytes.
         line: line of the first of them.
     """
 
@@ -121,7 +117,7 @@ class Head:
     units: str
     boundary: tuple[str, ...]
     count: int
-    body: bytes
+    body: slice
     line: int
 
 
@@ -136,13 +132,12 @@ class DumpReader:
         self.data, self.source, self.position, self.line = data, source, 0, 1
         self.own, self.step, self.units = own, -1, ""
 
-    def fail(
-        self, what: str, line: int | None = None, kind: type[DumpError] = DumpError
-    ) -> DumpError:
+    def fail(self, what: str, line: int | None = None, *, cut: bool = False) -> DumpError:
         step = "" if self.step < 0 else f" step {self.step}:"
-        cut = f". {CUT}" if self.own and kind is CutDumpError else ""
-        error = kind(f"{self.source}:{max(1, line or self.line)}:{step} {what}{cut}")
+        advice = f". {CUT}" if self.own and cut else ""
+        error = DumpError(f"{self.source}:{max(1, line or self.line)}:{step} {what}{advice}")
         error.exit_code = DumpError.exit_code if self.own else CaseError.exit_code
+        error.cut = cut
         return error
 
     def goes_on(self) -> bool:
@@ -162,19 +157,17 @@ class DumpReader:
     def take(self) -> bytes:
         end = self.data.find(b"\n", self.position)
         if end < 0:
-            raise self.fail("the file ends in the middle of a line", kind=CutDumpError)
+            raise self.fail("the file ends in the middle of a line", cut=True)
         text = self.data[self.position : end].strip()
         if b"ITEM:" in text[1:]:
-            raise self.fail("the next frame begins in the middle of this line", kind=CutDumpError)
+            raise self.fail("the next frame begins in the middle of this line", cut=True)
         self.position, self.line = end + 1, self.line + 1
         return text
 
     def item(self, expected: bytes) -> bytes:
         line = self.line
         if self.position >= len(self.data):
-            raise self.fail(
-                f"the file ends before {expected.decode()}", line - 1, kind=CutDumpError
-            )
+            raise self.fail(f"the file ends before {expected.decode()}", line - 1, cut=True)
         text = self.take()
         if not text.startswith(expected):
             raise self.fail(f"{_shown(text)}, expected {expected.decode()!r}", line)
@@ -182,7 +175,7 @@ class DumpReader:
 
     def value(self, what: str) -> bytes:
         if self.position >= len(self.data):
-            raise self.fail(f"the file ends before the {what}", self.line - 1, CutDumpError)
+            raise self.fail(f"the file ends before the {what}", self.line - 1, cut=True)
         return self.take()
 
     def whole(self, what: str) -> int:
@@ -223,11 +216,12 @@ class DumpReader:
             units=self.units,
             boundary=boundary,
             count=count,
-            body=self.data[self.position : end],
+            body=slice(self.position, end),
             line=self.line,
         )
-        lines = head.body.count(b"\n")
-        self.refuse_cut(head, lines, last=end == len(self.data))
+        body = self.data[head.body]
+        lines = body.count(b"\n")
+        self.refuse_cut(head, body, lines, last=end == len(self.data))
         self.position, self.line = end, self.line + lines
         return head
 
@@ -251,9 +245,9 @@ class DumpReader:
             )
         return [low, high]
 
-    def refuse_cut(self, head: Head, lines: int, *, last: bool) -> None:
-        """Raise CutDumpError unless all rows of the frame are there and whole."""
-        body, ended = head.body, head.body.endswith(b"\n") or not head.body
+    def refuse_cut(self, head: Head, body: bytes, lines: int, *, last: bool) -> None:
+        """Raise DumpError unless all rows of the frame are there and whole."""
+        ended = body.endswith(b"\n") or not body
         rows = lines + (not ended)
         if rows != head.count:
             rows = sum(1 for row in body.split(b"\n") if row.strip())
@@ -268,16 +262,17 @@ class DumpReader:
             raise self.fail(
                 f"{rows - (not whole)} of {head.count} rows, {what}",
                 head.line + max(0, body.rstrip().count(b"\n") - (not body.strip())),
-                CutDumpError,
+                cut=True,
             )
 
     def frame(self, head: Head, needed: Sequence[int]) -> Frame:
         """The frame of a head, with the columns of the indices `needed` alone."""
         self.step = head.step
         names = tuple(head.columns[index] for index in needed)
-        table = _table(head, needed) if head.count else np.empty((0, len(needed)))
+        body = self.data[head.body]
+        table = _table(head, body, needed) if head.count else np.empty((0, len(needed)))
         if table is None:
-            table = self.careful(head, needed)
+            table = self.careful(head, body, needed)
         if "id" in names:
             table = table[np.argsort(table[:, names.index("id")], kind="stable")]
         return Frame(
@@ -288,10 +283,10 @@ class DumpReader:
             units=head.units,
         )
 
-    def careful(self, head: Head, needed: Sequence[int]) -> Array:
+    def careful(self, head: Head, body: bytes, needed: Sequence[int]) -> Array:
         """The rows as numbers, whatever white space parts them; names the first that is bad."""
         rows = []
-        for line, row in enumerate(head.body.split(b"\n"), start=head.line):
+        for line, row in enumerate(body.split(b"\n"), start=head.line):
             parts = row.split()
             if not parts:
                 continue
@@ -329,11 +324,10 @@ def exact_numbers() -> dict[str, Any]:
     return {"float_precision": "round_trip"} if int(pd.__version__.split(".")[0]) < 3 else {}
 
 
-def _table(head: Head, needed: Sequence[int]) -> Array | None:
+def _table(head: Head, body: bytes, needed: Sequence[int]) -> Array | None:
     """The rows as numbers (N, needed), or None unless single spaces part finite numbers."""
     import pandas as pd
 
-    body = head.body
     trailing = body[: body.find(b"\n")].endswith(b" ")
     marks, each = np.frombuffer(body, np.uint8), len(head.columns) - 1 + trailing
     ends, spaces = np.flatnonzero(marks == ord("\n")), np.flatnonzero(marks == ord(" "))

@@ -1,12 +1,12 @@
 """Spheres of a LIGGGHTS or LAMMPS text dump."""
 
-from fdnet.errors import CaseError
-from fdnet.spheres.dump import CutDumpError, DumpReader, Head
+from fdnet.errors import CaseError, DumpError
+from fdnet.spheres.dump import DumpReader, Head
 from fdnet.spheres.rows import SphereRows, columns_of, metres_per, rows_from
 
 DUMP_UNITS = {"si": 1.0, "cgs": 1e-2, "micro": 1e-6}
 """Metres in the unit of length of the unit systems that a dump may name."""
-_MOST_NAMED = 5
+_MOST_NAMED, _MOST_SHOWN = 5, 40
 
 
 def dump_spheres(
@@ -34,8 +34,9 @@ def dump_spheres(
         f"{text}; this frame was left out and that of step {head.step} used" for text in cut
     ]
     warnings = warnings if step is None else []
-    if head.body and not head.body[-1:].isspace():
-        last = head.body.split()[-1].decode("utf-8", "replace")[:40]
+    end = data[head.body][-_MOST_SHOWN:]
+    if end and not end[-1:].isspace():
+        last = end.split()[-1].decode("utf-8", "replace")
         warnings.append(f"{source} ends without a line feed: its last number, {last}, may be cut")
     return rows_from(
         columns,
@@ -61,7 +62,9 @@ def _heads(reader: DumpReader) -> tuple[list[Head], list[str]]:
         before = reader.position
         try:
             heads.append(reader.head())
-        except CutDumpError as error:
+        except DumpError as error:
+            if not error.cut:
+                raise
             cut.append(error)
             reader.to_next(before)
     if cut and not heads:

@@ -205,7 +205,11 @@ def rows_from(
         allowed = (one == np.round(one)) & (np.abs(one) <= _LARGEST_WHOLE)
         if name == "kind":
             allowed = np.isin(one, list(Kind))
-        expected = " or ".join(KIND_NAMES) + " (1 or 2)" if name == "kind" else "a whole number"
+        expected = (
+            " or ".join(KIND_NAMES) + " (1 or 2)"
+            if name == "kind"
+            else "a whole number, none too large"
+        )
         _refuse(~allowed, columns.names[columns.others[name]], one, where, expected)
     return SphereRows(
         scale=scale,

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from fdnet.case.case import InvasionCase
 from fdnet.case.file import case_from, read_case
-from fdnet.case.size_file import parse_sizes
+from fdnet.case.size_file import parse_sizes, read_size_file
 from fdnet.dem.batches import AT_ONCE, batches_of
 from fdnet.dem.measured_fines import densities, drawn_fines
 from fdnet.dem.pack_deck import draw_radii
@@ -258,11 +258,56 @@ def test_a_table_of_sieves_is_read_and_turned_round(tmp_path):
         ("size_um,passing %,finer %\n1,2,2\n3,4,4\n", "2 columns"),
         ("size_um,passing %\n1 mm,2\n3,4\n", "'1 mm' is no number; units stand in the names"),
         ("size_um,passing %\n1,2\n", "at least two rows"),
+        ("size_um,Percent Finer\n1,0\n2,0.4\n3,1\n", "look like fractions of 1"),
+        ("size_um,fraction finer\n1,0\n2,40\n3,100\n", "expected fractions from 0 to 1"),
+        ("size_um,Cumulative number %\n1,0\n2,100\n", "counts number, but the case says by"),
+        ("size_um,surface % finer\n1,0\n2,100\n", "counts surface, but the case says by"),
+        ("size_um,Q0 cumulative %\n1,0\n2,100\n", "counts number, but"),
+        ("size_um,intensity undersize %\n1,0\n2,100\n", "counts length or intensity, but"),
+        ("Depth (m),passing %\n1,0\n2,100\n", "'Depth \\(m\\)': not known as sizes of grains"),
+        ("size_um,% finer or coarser\n1,0\n2,100\n", "finer or coarser"),
     ],
 )
 def test_a_table_that_may_mean_several_things_is_refused(text, expected):
     with pytest.raises(ValueError, match=expected):
         parse_sizes(text)
+
+
+CURVE = ((0.075, 0), (0.15, 6), (0.3, 35), (0.6, 85), (1.18, 100))
+
+
+@pytest.mark.parametrize(
+    ("header", "rows", "encoding"),
+    [
+        ("Size (µm),Vol Under %", [(1e3 * d, f) for d, f in CURVE], "cp1252"),
+        ("Size (µm),Vol Under %", [(1e3 * d, f) for d, f in CURVE], "utf-16"),
+        ("Radius (um),Volume undersize %", [(500 * d, f) for d, f in CURVE], "utf-8"),
+        ("r_mm;mass % finer", [(d / 2, f) for d, f in CURVE], "utf-8-sig"),
+        ("sieve (mm),fraction finer", [(d, f / 100) for d, f in CURVE], "utf-8"),
+        ("d [mm]\tcum. fraction retained", [(d, 1 - f / 100) for d, f in CURVE], "utf-8"),
+    ],
+)
+def test_tables_of_instruments_give_one_curve(tmp_path, header, rows, encoding):
+    sep = next(one for one in ";\t," if one in header)
+    text = "\r\n".join([header, *(sep.join(map(str, row)) for row in rows)])
+    (tmp_path / "s.csv").write_bytes(text.encode(encoding))
+    sizes, finer = read_size_file(tmp_path, "s.csv")
+    assert sizes == pytest.approx([size for size, _ in CURVE])
+    assert finer == pytest.approx([share for _, share in CURVE])
+
+
+def test_what_a_column_counts_is_what_the_case_says(tmp_path):
+    (tmp_path / "s.csv").write_text("size_um,Cumulative number %\n100,0\n200,40\n400,100\n")
+    data = {
+        "name": "sand",
+        "box": {"size_mm": [4.0, 2.4, 2.4]},
+        "grains": {"porosity": 0.4, "sizes": {"file": "s.csv", "by": "number"}},
+    }
+    assert case_from(data, folder=tmp_path).grains.sizes.by == "number"
+    for by in ("mass", "surface"):
+        data["grains"]["sizes"]["by"] = by
+        with pytest.raises(CaseError, match=f"counts number, but the case says by '{by}'"):
+            case_from(data, folder=tmp_path)
 
 
 def test_a_plain_table_is_read():

@@ -1,6 +1,7 @@
 """Spheres come back from every format as they were written, and malformed files are refused."""
 
 import gzip
+import json
 import os
 import socket
 import warnings
@@ -11,6 +12,7 @@ import pytest
 from fdnet import read_case, read_spheres
 from fdnet.campaign.plan.sweep import read_sweep
 from fdnet.case.size_file import read_size_file
+from fdnet.cli import main
 from fdnet.errors import CaseError, DumpError
 from fdnet.report.vtk import write_spheres_vtp
 from fdnet.spheres.csv_file import write_spheres
@@ -561,3 +563,23 @@ def test_only_ordinary_files_of_bounded_size_are_read(tmp_path_factory, suffix):
         ):
             with pytest.raises((CaseError, ValueError)):
                 read(given)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "options"),
+    [
+        ("s.dump", PLAIN_DUMP, []),
+        ("s.dump", PLAIN_DUMP + lattice_dump(step=9, rows=9), ["--periodic", "xyz"]),
+        ("s.txt", TABLES["Yade"], ["--box", "0,3,0,3,0,3", "--periodic", "xyz"]),
+    ],
+)
+def test_the_permeability_of_the_lattice_comes_from_every_file(
+    tmp_path, capsys, name, text, options
+):
+    """Zick and Homsy 1982, K = 42.1: k = 2.5203e-9 m2. Sides that repeat come from the dump."""
+    path = write(tmp_path / name, text)
+    assert main(["permeability", str(path), "--units", "mm", "--json", *options]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["k_initial_m2"] == pytest.approx(2.5203e-9, rel=2e-3)
+    assert len(said["warnings"]) == text.count("\n9\nITEM: N")
+    assert any("BOX BOUNDS pp pp pp" in one for one in said["assumptions"]) == (not options)

@@ -16,9 +16,9 @@ from tests.network.packs import random_pack, with_fines
 
 ROUNDING = 1e-11
 """Largest relative difference of two descriptions, without fines and with them."""
-RAYS = 1e-4
-"""By the default damage law, which sums sections over rays and splits prisms at a face either way.
-"""
+RAYS = {"xyz": 1e-4, "yz": 1e-4, "": 5e-4}
+"""By the default damage law, which sums sections over rays and splits prisms at a face either way:
+at side walls there are more of these."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -151,7 +151,7 @@ def test_another_description_of_the_same_pack_gives_its_permeability(
     if change == "doubled" and "y" not in periodic:
         return  # two walled packs side by side are another pack
     pack = pack_of(spheres(spread), periodic)
-    for damage_law, rounding in (("thesis", ROUNDING), ("auto", RAYS)):
+    for damage_law, rounding in (("thesis", ROUNDING), ("auto", RAYS[periodic])):
         intact, damaged = permeability(pack, tmp_path, capsys, "--damage-law", damage_law)
         other_intact, other_damaged = permeability(
             CHANGES[change](pack), tmp_path, capsys, "--damage-law", damage_law

@@ -105,6 +105,8 @@ def heights(
         outward = times(less(shaken, b, a), less(shaken, c, a))
         normal = times(less(points, b, a), less(points, c, a))
         size = np.sqrt(along(normal, normal))
+        if size == 0.0:  # the corners lie on one line: no facet, whose height is 0 on both sides
+            size = 1.0
         if along(less(shaken, apex[t], a), outward) > 0.0:
             size = -size
         one, two = pore[t, 0], pore[t, 1]
