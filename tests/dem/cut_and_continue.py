@@ -103,11 +103,11 @@ def differences(
 
 def end_of(result: Invasion, folder: Path) -> dict[str, Any]:
     """All that a finished invasion in `folder` has to say, in parts that can be compared."""
-    told = ("history", "stop_reason", "supplied", "overlap", "warnings", "updates")
+    names = ("history", "stop_reason", "supplied", "overlap", "warnings", "updates")
     columns = ("id", "kind", "position", "radius", "velocity")
     restart = folder / "post" / f"invade_{result.history[-1].step}.restart"
     return {
-        **{name: getattr(result, name) for name in told},
+        **{name: getattr(result, name) for name in names},
         **{name: getattr(result.damaged, name).tolist() for name in columns},
         "overlaps": list(read_watch(folder)),
         "restart": restart.read_bytes(),
