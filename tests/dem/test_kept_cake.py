@@ -30,7 +30,7 @@ STAGES = ("pack", "invade", "clean_up", "analyse")
 WELL = ("well.radius_mm=108", "well.drainage_radius_m=100", "fluid.overbalance_MPa=20")
 SCHEMES = [
     ("drag.scheme=viscous",),
-    ("drag.scheme=every_step", "drag.pressure_gradient=true"),
+    ("drag.refresh_steps=1", "drag.pressure_gradient=true"),
     ("drag.scheme=held", "drag.upstream=darcy"),
     ("drag.scheme=implicit",),
 ]
