@@ -84,7 +84,7 @@ def test_every_problem_is_listed_at_once():
         ("grains", {"count": 200}, "sum to more than the box; expected at most 117"),
         ("drag", {"field": "network"}, "drag.upstream: 'interstitial', but with drag.field"),
         ("run", {"stop_rate": 0.1}, "run.stop_rate: 0.1 needs a rate that falls"),
-        ("drag", {"scheme": "every_step", "refresh_steps": 5}, "belongs to drag.scheme 'held'"),
+        ("drag", {"scheme": "viscous", "refresh_steps": 5}, "belongs to drag.scheme 'held'"),
         ("run", {"time_step_factor": 0.4}, "run.time_step_factor: 0.4"),
         ("run", {"skin_mm": 1e-5}, "run.skin_mm: 1e-05 mm, expected 0.0005"),
         ("run", {"skin_mm": 0.26}, "to 0.25 (a grain's radius)"),
@@ -95,6 +95,8 @@ def test_every_problem_is_listed_at_once():
         ("run", {"on_overlap": "stopp"}, "run.on_overlap: 'stopp'"),
         ("run", {"stiffness_N_m": "nominel"}, "run.stiffness_N_m: 'nominel'"),
         ("analysis", {"law": "darcy"}, "analysis.law: 'darcy'"),
+        ("analysis", {"damage_law": "kozeny"}, "'kozeny' is no longer there; take 'section-arc"),
+        ("drag", {"scheme": "every_step"}, "'every_step' is no longer there; take 'held'"),
         ("fluid", {"viscosity_Pas": 0.05}, "unknown key"),
     ],
 )

@@ -34,7 +34,7 @@ def explicit(step: float, scheme: str) -> Case:
     return tiny(f"run.time_step_s={step!r}", f"drag.scheme={scheme}", FAST, SLOW, *held)
 
 
-@pytest.mark.parametrize("scheme", ["every_step", "held", "implicit", "viscous"])
+@pytest.mark.parametrize("scheme", ["held", "implicit", "viscous"])
 def test_the_contact_bound_holds_for_every_scheme(scheme):
     for factor in (0.9999, 1.0):
         case = tiny(f"run.time_step_s={0.3 * factor * bound()!r}", f"drag.scheme={scheme}")
@@ -63,7 +63,7 @@ def test_a_long_step_is_accepted_as_far_as_the_contacts_leave_it_stable(keys, la
             scales_of(tiny(*keys, f"run.time_step_factor={largest + 0.005}"))
 
 
-@pytest.mark.parametrize("scheme", ["every_step", "held", "viscous"])
+@pytest.mark.parametrize("scheme", ["held", "viscous"])
 def test_explicit_drag_warns_above_a_tenth_of_tau_and_is_refused_above_tau(scheme):
     short = tau(1e3)
     for part in (0.0999, 0.1):
@@ -106,7 +106,7 @@ def test_a_derived_step_keeps_both_bounds_without_a_warning(factor):
             tiny(f"run.time_step_factor={factor}", "run.checkpoint_ms=0.1", *assignments)
         )
 
-    for scheme in ("every_step", "held", "viscous"):
+    for scheme in ("held", "viscous"):
         assert derived(f"drag.scheme={scheme}").time_step == pytest.approx(factor * bound())
         slow = derived(f"drag.scheme={scheme}", "drag.multiplier=1e4", "fluid.velocity_m_s=5e-4")
         assert slow.time_step == pytest.approx(min(0.1 * tau(1e4), factor * bound()))

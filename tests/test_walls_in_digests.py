@@ -9,7 +9,6 @@ from fdnet.errors import CaseError
 from fdnet.run.folder import RunFolder, open_folder
 
 NETWORK = ("drag.field=network", "drag.upstream=darcy", "drag.scheme=implicit")
-KEPT = ("clean_up.drawdown_MPa=1.0", "clean_up.lift_cake=false")
 LIFTED = ("clean_up.drawdown_MPa=1.0",)
 RECORD = {
     "format": 1,
@@ -46,12 +45,9 @@ def changed(*keys: str) -> set[str]:
     [
         (NETWORK, {"invade", "clean_up"}),
         ((*NETWORK, *LIFTED, "run.stiffness_N_m=auto"), {"invade", "clean_up"}),
-        (KEPT, {"clean_up"}),
-        ((*KEPT, "drag.crowd=beetstra", "drag.scheme=implicit"), {"clean_up"}),
         (LIFTED, set()),
         ((), set()),
         ((*NETWORK, *PERIODIC), set()),
-        ((*KEPT, *PERIODIC), set()),
     ],
 )
 def test_walls_count_where_the_fluid_is_made_with_them(keys, stages):
@@ -74,7 +70,7 @@ def with_stages(case: Case, path, *stages: str) -> RunFolder:
     return folder
 
 
-@pytest.mark.parametrize("keys", [NETWORK, (*NETWORK, *KEPT)])
+@pytest.mark.parametrize("keys", [NETWORK, (*NETWORK, *LIFTED)])
 def test_force_keeps_no_invasion_made_with_other_walls(keys, tmp_path):
     case, path = tiny(*keys), tmp_path / "run"
     with_stages(case, path, "pack", "invade")
@@ -83,13 +79,3 @@ def test_force_keeps_no_invasion_made_with_other_walls(keys, tmp_path):
     with pytest.raises(CaseError, match="invade: belongs to another case; add invade"):
         open_folder(path, slip, stages=later, resume=False, force=True)
     open_folder(path, case, stages=later, resume=False, force=True).close()
-
-
-def test_force_keeps_no_clean_up_behind_a_cake_measured_with_other_walls(tmp_path):
-    case, path = tiny(*KEPT), tmp_path / "run"
-    with_stages(case, path, "pack", "invade", "clean_up")
-    slip = tiny(*KEPT, "analysis.walls=slip")
-    with pytest.raises(CaseError, match="clean_up: belongs to another case; add clean_up"):
-        open_folder(path, slip, stages=("analyse",), resume=False, force=True)
-    again = ("clean_up", "analyse")
-    open_folder(path, slip, stages=again, resume=False, force=True).close()

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from fdnet.campaign.result.comparison import SHARES, Comparison
+from fdnet.campaign.result.pairs import seeds_for_width, student_band
 from fdnet.errors import CaseError
-from fdnet.statistics.pairs import seeds_for_width, student_band
 
 FEWEST = 3
 """Seeds before a band is believed; two say almost nothing of a spread."""

@@ -18,7 +18,7 @@ from fdnet.case.names import (
     LawName,
     WallName,
 )
-from fdnet.case.values import Finite, Fraction, Part, Positive
+from fdnet.case.values import Finite, Fraction, Part, Positive, still_there
 from fdnet.errors import CaseError
 
 
@@ -89,9 +89,7 @@ class AnalysisChoices(Part):
     @field_validator("law", "damage_law", mode="before")
     @classmethod
     def _is_there(cls, name: Any) -> Any:
-        if isinstance(name, str) and name in REMOVED_LAWS:
-            raise ValueError(f"{name!r} is no longer there; take {REMOVED_LAWS[name]!r}")
-        return name
+        return still_there(name, REMOVED_LAWS)
 
     def refusals(self) -> Iterator[str]:
         """Why laws do not go together, one sentence each."""

@@ -219,18 +219,16 @@ class InvasionCase(Case):
 def walls_of_the_fluid(stage: str, data: Mapping[str, Any]) -> dict[str, str]:
     """The key of the analysis that the fluid of `stage` depends on, if it does.
 
-    The network of `drag.field` = "network" and that of a cake that stays in a clean-up are made
-    with `analysis.walls`. Walls that hold the fluid are not named, so that the digests of cases
-    without that key are as they were.
+    The network of `drag.field` = "network" is made with `analysis.walls`. Walls that hold the
+    fluid are not named, so that the digests of cases without that key are as they were.
 
     Args:
         stage: "pack", "invade" or "clean_up".
         data: the tables of a case.
     """
-    kept = stage == "clean_up" and not data.get("clean_up", {}).get("lift_cake", True)
     network = stage != "pack" and data["drag"]["field"] == "network"
     walls = data["analysis"]["walls"]
-    named = data["box"]["sides"] == "walls" and walls == "slip" and (kept or network)
+    named = data["box"]["sides"] == "walls" and walls == "slip" and network
     return {"walls": walls} if named else {}
 
 

@@ -20,12 +20,6 @@ class CleanUp(Part):
         description="Pressure of the formation above that of the well. It is lost on the same way "
         "as the overbalance was, and makes the fluid's velocity by the same law."
     )
-    lift_cake: bool = Field(
-        True,
-        description="Whether the cake and the mud upstream of the formation face are taken away "
-        "before the flow is turned back. With `false` the cake stays and slows the returning "
-        "fluid down, until this pushes it off.",
-    )
     duration_ms: Positive | None = Field(
         None,
         description="Length of the clean-up. It replaces the stop rule and excludes `cap_ms`.",

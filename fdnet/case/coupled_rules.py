@@ -53,7 +53,7 @@ def crowd_scheme(drag: Drag) -> Iterator[str]:
     if drag.coupled and drag.scheme == "viscous":
         yield (
             "drag.scheme: 'viscous' has one damping for all fines, drag.crowd "
-            f"{drag.crowd!r} one for each; take 'implicit', 'held' or 'every_step'"
+            f"{drag.crowd!r} one for each; take 'implicit' or 'held'"
         )
 
 

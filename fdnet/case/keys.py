@@ -40,9 +40,15 @@ def _inner_tables(annotation: Any) -> Iterator[type[Part]]:
             yield from _inner_tables(kind)
 
 
+REMOVED_KEYS = {"clean_up.lift_cake": "the cake is always lifted, remove the key"}
+"""Keys that are gone, and what to do without each."""
+
+
 def nearest(path: str) -> str:
     """The known key that is nearest to an unknown one, in words; empty where none is near."""
     table, _, key = path.rpartition(".")
+    if path in REMOVED_KEYS:
+        return f"; {REMOVED_KEYS[path]}"
     if table in ("grains", "fines") and _DIAMETER.match(key):
         return f'; did you mean {table}.sizes = {{ D10 = "20 um", D50 = "40 um", ... }}?'
     here = [one for one in known_keys() if one.rpartition(".")[0] == table]

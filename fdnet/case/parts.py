@@ -3,9 +3,9 @@
 The keys carry the unit of the user; properties give the same values in SI for everything else.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from fdnet.case.values import (
     NonNegative,
@@ -13,6 +13,7 @@ from fdnet.case.values import (
     Positive,
     Triple,
     Vector,
+    still_there,
 )
 
 CROWD_TRAVEL, FLOW_TRAVEL, MOST_TRAVEL = 0.5, 1.0, 10.0
@@ -59,12 +60,11 @@ class Drag(Part):
         "while LIGGGHTS waits.",
     )
     multiplier: Positive = Field(1.0, description="Factor on the Stokes drag.")
-    scheme: Literal["every_step", "held", "implicit", "viscous"] = Field(
+    scheme: Literal["held", "implicit", "viscous"] = Field(
         "held",
-        description='How the force is integrated: "every_step" computes it at each step, "held" '
-        'keeps it for `refresh_steps` steps, "viscous" splits it into a constant force and '
-        'viscous damping (fines of one size only), "implicit" solves it for the new velocity and '
-        "is stable at any step.",
+        description='How the force is integrated: "held" keeps it for `refresh_steps` steps, '
+        '"viscous" splits it into a constant force and viscous damping (fines of one size only), '
+        '"implicit" solves it for the new velocity and is stable at any step.',
     )
     refresh_steps: Annotated[int, Field(ge=1)] | None = Field(
         None,
@@ -93,8 +93,7 @@ class Drag(Part):
     inertia: Literal["none", "schiller-naumann"] = Field(
         "none",
         description='Drag at finite Reynolds numbers: "none" is Stokes\'s at any speed, '
-        '"schiller-naumann" multiplies it by 1 + 0.15 Re^0.687 (Re up to 800; schemes "held" and '
-        '"every_step").',
+        '"schiller-naumann" multiplies it by 1 + 0.15 Re^0.687 (Re up to 800; scheme "held").',
     )
     crowd: Literal["none", "beetstra"] = Field(
         "none",
@@ -114,6 +113,11 @@ class Drag(Part):
         "the forces on all fines are computed anew. When absent: "
         f'{FLOW_TRAVEL:g} where the field is "network", else {CROWD_TRAVEL:g}.',
     )
+
+    @field_validator("scheme", mode="before")
+    @classmethod
+    def _is_there(cls, name: Any) -> Any:
+        return still_there(name, {"every_step": "held"})
 
     @property
     def coupled(self) -> bool:

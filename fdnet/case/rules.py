@@ -168,8 +168,7 @@ def _viscous(drag: Drag, fines: Fines) -> Iterator[str]:
     if drag.scheme == "viscous" and not fines.one_size:
         yield (
             f"drag.scheme: 'viscous' needs fines of one size, {size_text('fines', fines)} "
-            "(LIGGGHTS's viscous force is one number a material); take 'held', 'every_step' or "
-            "'implicit'"
+            "(LIGGGHTS's viscous force is one number a material); take 'held' or 'implicit'"
         )
 
 
@@ -185,7 +184,7 @@ def _inertia(drag: Drag) -> Iterator[str]:
     if drag.inertia != "none" and drag.scheme in ("viscous", "implicit") and not drag.coupled:
         yield (
             f"drag.inertia: {drag.inertia!r} makes the drag coefficient depend on the slip, "
-            f"drag.scheme {drag.scheme!r} keeps one a fine; take 'held' or 'every_step'"
+            f"drag.scheme {drag.scheme!r} keeps one a fine; take 'held'"
         )
 
 

@@ -1,8 +1,10 @@
 """The kinds of value that a case file may hold, and their bounds."""
 
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic_core import PydanticCustomError
 
 MAX_CONCENTRATION = 0.30
 """Random sequential addition of spheres saturates near 0.38 (Torquato, Uche & Stillinger 2006)."""
@@ -44,3 +46,11 @@ class Part(BaseModel):
     """A table of the case file: frozen, no unknown keys, no conversion of text to numbers."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+def still_there(name: Any, removed: Mapping[str, str]) -> Any:
+    """The name as given. Refuses one that is gone, with the one of `removed` to take instead."""
+    if isinstance(name, str) and name in removed:
+        text = "is no longer there; take '{instead}'"
+        raise PydanticCustomError("removed", text, {"instead": removed[name]})
+    return name

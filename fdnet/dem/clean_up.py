@@ -23,10 +23,8 @@ from fdnet.dem.clean_up_states import (
 )
 from fdnet.dem.coupled import Coupling
 from fdnet.dem.deck import Deck, LeftOut
-from fdnet.dem.drag import BELOW_ZERO
 from fdnet.dem.feed import Feed, run_fed
 from fdnet.dem.fluid import Fluid
-from fdnet.dem.kept_cake import KeptCake
 from fdnet.dem.liggghts import Launch, Run, run_deck
 from fdnet.dem.updates import UPDATES, Updates
 from fdnet.errors import LiggghtsError
@@ -45,17 +43,13 @@ class Start:
         grains: of the pack.
         invaded: grains and all fines at the end of the invasion.
         invasion: folder of the invasion.
-        cake: thickness of the cake, m.
         digest: of the case's clean-up.
-        slows: the cake that stays in a uniform field; None without one.
     """
 
     grains: Snapshot
     invaded: Snapshot
     invasion: Path
-    cake: float
     digest: str
-    slows: KeptCake | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -111,40 +105,28 @@ def clean_up(
     )
 
 
-def out_plane(flow: BackFlow, cake: float) -> float:
-    """x (m) upstream of which a fine has come out: the face, or beyond a cake that stays.
-
-    A fine has left a cake of `cake` m when it is a diameter of the largest fine beyond it.
-    """
-    if flow.choices.lift_cake or cake <= 0:
-        return 0.0
-    return -(cake + 2 * flow.case.fines.radius_range_m[1])
-
-
 def mark_of(flow: BackFlow, start: Start) -> str:
     """What checkpoints depend on.
 
-    One that an earlier version made otherwise starts over: its cake did not slow the fluid down,
-    or a crowd in the uniform field had the upstream velocity at the wrong end.
+    One that an earlier version made otherwise starts over: a crowd in the uniform field had the
+    upstream velocity at the wrong end.
     """
-    kept, drag = out_plane(flow, start.cake) < 0, flow.case.drag
+    drag = flow.case.drag
     crowd = drag.coupled and drag.field == "uniform" and drag.upstream == "darcy"
-    made = {"cake in series": kept, "mud side upstream": crowd}
-    return " ".join([start.digest, *(words for words, named in made.items() if named)])
+    return f"{start.digest} mud side upstream" if crowd else start.digest
 
 
 def fines_to_clean(flow: BackFlow, start: Start) -> Snapshot:
-    """The fines that take part: those inside, and those of a cake that stays."""
+    """The fines that take part: those inside."""
     fines = start.invaded.fines()
     x, length = fines.position[:, 0], flow.case.size_m[0]
-    return fines.where((x > min(out_plane(flow, start.cake), BELOW_ZERO)) & (x < length))
+    return fines.where((x >= 0) & (x < length))
 
 
 def _prepare(
     flow: BackFlow, start: Start, folder: Path, last: Cleaned | None, *, ranks: int
 ) -> tuple[Deck, Beginning]:
     """Write the deck of a start, or of a restart from `last` with later rows removed."""
-    face = out_plane(flow, start.cake)
     if last is None:
         old = sorted((folder / "post").glob("clean_*"))
         for stale in [folder / HISTORY, folder / UPDATES, *old]:
@@ -154,12 +136,12 @@ def _prepare(
         restart = f"../{start.invasion.name}/post/{path.name}"
     else:
         restart = restart_name(last.step)
-    begin = Beginning(restart=restart, row=last, face=face, slows=start.slows)
+    begin = Beginning(restart=restart, row=last)
     rows = [row.line() for row in read_cleaned(folder) if last and row.step <= last.step]
     write_text(folder / HISTORY, "\n".join([CLEANED_HEADER, *rows]) + "\n")
     deck = render_clean_up(flow, start.digest, begin, ranks=ranks)
     write_text(folder / (DECK if last is None else f"{DECK}.resume"), deck.text)
-    for name, text in clean_up_parts(flow, face).items():
+    for name, text in clean_up_parts(flow).items():
         write_text(folder / name, text)
     return deck, begin
 
@@ -202,12 +184,12 @@ def is_over(flow: BackFlow, last: Cleaned | None) -> bool:
     if last is None:
         return False
     quiet = flow.quiet_chunks and last.quiet >= flow.quiet_chunks
-    return last.chunk >= flow.chunks or bool(quiet) or last.inside + last.ahead == 0
+    return last.chunk >= flow.chunks or bool(quiet) or last.inside == 0
 
 
 def _ending(flow: BackFlow, last: Cleaned) -> tuple[str, tuple[str, ...]]:
     """The stop reason, and warnings."""
-    if last.inside + last.ahead == 0:
+    if last.inside == 0:
         return "empty", ()
     if not flow.quiet_chunks:
         return "duration", ()
@@ -225,16 +207,15 @@ def _check_balance(
     before, fines = len(fines_to_clean(flow, start)), state.fines()
     x, length = fines.position[:, 0], flow.case.size_m[0]
     inside = int(np.count_nonzero((x >= 0) & (x < length)))
-    if inside != last.inside or len(fines) != last.inside + last.ahead:
+    if inside != last.inside or len(fines) != last.inside:
         raise LiggghtsError(
             f"{folder}: the last dump holds {len(fines)} fines, {inside} of them inside; "
-            f"expected {last.inside + last.ahead} and {last.inside} as in {HISTORY}; start over "
-            "with --force"
+            f"expected {last.inside} as in {HISTORY}; start over with --force"
         )
-    if before != last.inside + last.ahead + last.out + last.passed:
+    if before != last.inside + last.out + last.passed:
         raise LiggghtsError(
-            f"{folder}: {last.inside} fines inside, {last.ahead} upstream, {last.out} come out "
-            f"and {last.passed} at the other end are not the {before} before: fines were lost; "
+            f"{folder}: {last.inside} fines inside, {last.out} come out and "
+            f" {last.passed} at the other end are not the {before} before: fines were lost; "
             "lower run.time_step_factor"
         )
 

@@ -11,7 +11,6 @@ from fdnet.dem.deck import Deck, number, render_text
 from fdnet.dem.drag import BELOW_ZERO, drag_variables, forces_left_out
 from fdnet.dem.gravity import gravity_variables
 from fdnet.dem.invade_deck import moving_variables
-from fdnet.dem.kept_cake import KeptCake, slowed_drag, slowed_variables
 from fdnet.dem.scene import header_variables
 from fdnet.scales.clean_up import BackFlow
 from fdnet.scales.scales import InvasionScales
@@ -25,14 +24,10 @@ class Beginning:
     Attributes:
         restart: path of the restart file, from the folder of the deck.
         row: the checkpoint of the clean-up that it holds; None at the end of the invasion.
-        face: x (m), at most 0, upstream of which a fine has come out.
-        slows: the cake that stays in a uniform field; None without one.
     """
 
     restart: str
     row: Cleaned | None
-    face: float
-    slows: KeptCake | None = None
 
 
 def render_clean_up(flow: BackFlow, digest: str, begin: Beginning, *, ranks: int = 1) -> Deck:
@@ -41,7 +36,6 @@ def render_clean_up(flow: BackFlow, digest: str, begin: Beginning, *, ranks: int
     gravity, left_out = gravity_variables(case, scales)
     left_out += forces_left_out(case)
     header = header_variables(case, "invade", left_out, ranks)
-    drag, slows = turned_drag(flow), begin.slows
     text = render_text(
         "clean_up.in.j2",
         header
@@ -52,11 +46,9 @@ def render_clean_up(flow: BackFlow, digest: str, begin: Beginning, *, ranks: int
             "going_on": begin.row is not None,
             "restart": begin.restart,
             "gravity": gravity,
-            "drag": drag if slows is None else slowed_drag(drag),
-            "cake": None if slows is None or drag["coupled"] else slowed_variables(slows),
+            "drag": turned_drag(flow),
             "resume": False,
-            "regions": _regions(flow, begin.face),
-            "ahead": begin.face < 0,
+            "regions": _regions(flow),
             "start": _start(begin.row),
             "chunks": flow.chunks,
             "chunk_steps": scales.checkpoint_steps,
@@ -67,11 +59,11 @@ def render_clean_up(flow: BackFlow, digest: str, begin: Beginning, *, ranks: int
     return Deck(text=text, stage="clean_up", digest=digest, left_out=tuple(left_out))
 
 
-def clean_up_parts(flow: BackFlow, face: float) -> dict[str, str]:
+def clean_up_parts(flow: BackFlow) -> dict[str, str]:
     """Name and text of each file that a coupled clean-up includes; empty when it is not."""
     parts = coupled_parts(flow.case, flow.scales)
     if parts:
-        parts["checkpoint.in"] = render_text("cleaned.in.j2", {"ahead": face < 0} | _dump(flow))
+        parts["checkpoint.in"] = render_text("cleaned.in.j2", _dump(flow))
     return parts
 
 
@@ -109,14 +101,10 @@ def _start(row: Cleaned | None) -> dict[str, int]:
     return {"chunk": row.chunk + 1, "out": row.out, "passed": row.passed, "quiet": row.quiet}
 
 
-def _regions(flow: BackFlow, face: float) -> dict[str, str]:
+def _regions(flow: BackFlow) -> dict[str, str]:
     length, sides = flow.case.size_m[0], "INF INF INF INF"
-    end = face if face < 0 else BELOW_ZERO
     return {
         "specimen": f"0.0 {number(np.nextafter(length, 0))} {sides}",
-        "ahead": f"{number(np.nextafter(end, 0))} {number(BELOW_ZERO)} {sides}"
-        if face < 0
-        else "",
-        "out": f"INF {number(end)} {sides}",
+        "out": f"INF {number(BELOW_ZERO)} {sides}",
         "beyond": f"{number(length)} INF {sides}",
     }

@@ -16,7 +16,7 @@ from fdnet.scales.clean_up import BackFlow
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Snapshot
 
-_NAMES = ("chunk", "step", "inside", "ahead", "out", "passed", "quiet")
+_NAMES = ("chunk", "step", "inside", "out", "passed", "quiet")
 CLEANED_HEADER = ",".join(_NAMES)
 
 
@@ -28,7 +28,6 @@ class Cleaned:
         chunk: number of the chunk, from 1.
         step: last step of the chunk; it counts on from those of the invasion.
         inside: fines inside the specimen.
-        ahead: fines upstream of the face that have not come out: a cake that was not lifted.
         out: fines that have come out since the clean-up began.
         passed: fines that have left through the other end.
         quiet: chunks since a fine came out.
@@ -37,7 +36,6 @@ class Cleaned:
     chunk: int
     step: int
     inside: int
-    ahead: int
     out: int
     passed: int
     quiet: int

@@ -12,7 +12,6 @@ from fdnet.case.case import InvasionCase
 from fdnet.dem.deck import LeftOut, number
 from fdnet.scales.forces.reynolds import COEFFICIENT, EXPONENT
 from fdnet.scales.scales import InvasionScales
-from fdnet.scales.time_step import HOLD_OVER_RELAXATION
 
 BELOW_ZERO = -5e-324
 """The largest number below 0: a region that ends here holds exactly x < 0."""
@@ -28,7 +27,7 @@ def drag_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]
     own = (
         _viscous(case, scales, coefficient, slower)
         if case.drag.scheme == "viscous"
-        else _by_radius(case, scales, slower)
+        else _by_radius(scales, slower)
     )
     return {
         "coupled": False,
@@ -82,7 +81,7 @@ def forces_left_out(case: InvasionCase) -> list[LeftOut]:
     ]
 
 
-def _by_radius(case: InvasionCase, scales: InvasionScales, slower: float) -> dict[str, Any]:
+def _by_radius(scales: InvasionScales, slower: float) -> dict[str, Any]:
     """F = 6 pi mu M r (u - v), for each fine by its own radius r.
 
     mu is the viscosity, M the multiplier, u the fluid's and v the fine's velocity.
@@ -91,34 +90,17 @@ def _by_radius(case: InvasionCase, scales: InvasionScales, slower: float) -> dic
     return {
         "fluid_x": fluid,
         "hold_steps": scales.hold_steps if scales.hold_steps > 1 else 0,
-        "inertia": _inertia(case, scales) if scales.push.reynolds_slope else None,
+        "inertia": _inertia(scales) if scales.push.reynolds_slope else None,
     }
 
 
-def _inertia(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]:
-    """Schiller and Naumann's factor; with "every_step" the coefficient is kept for some steps.
-
-    Its formula costs three times the rest of a step (docs/physics.md, section 3).
-    """
-    kept = kept_steps(case, scales) if case.drag.scheme == "every_step" else 0
+def _inertia(scales: InvasionScales) -> dict[str, str]:
+    """Schiller and Naumann's factor."""
     return {
         "factor": number(COEFFICIENT),
         "exponent": number(EXPONENT),
         "reynolds": number(scales.push.reynolds_slope),
-        "kept": kept,
-        "used": "f_st" if kept else "v_cr",
     }
-
-
-def kept_steps(case: InvasionCase, scales: InvasionScales) -> int:
-    """Steps for which a drag coefficient is kept: a divisor of those between two checkpoints.
-
-    It is the largest one within the share of the relaxation time for which "held" keeps the force.
-    """
-    radius = case.fines.radius_range_m[0]
-    shortest = scales.relaxation_time[0] * scales.push.relaxation_share(radius)
-    most = max(1, int(HOLD_OVER_RELAXATION * shortest / scales.time_step))
-    return next(n for n in range(most, 0, -1) if scales.checkpoint_steps % n == 0)
 
 
 def _viscous(

@@ -16,7 +16,6 @@ import numpy as np
 
 from fdnet.report.tables import between_grains
 from fdnet.spheres.arrays import Array, one_line
-from fdnet.statistics.shares import wilson_interval
 
 if TYPE_CHECKING:
     from fdnet.network.analysis import Analysis
@@ -177,12 +176,20 @@ def pooled(tables: Iterable[Sequence[Mapping[str, Any]]]) -> list[dict[str, Any]
     ]
 
 
+def wilsons_band(hits: int, trials: int) -> tuple[float, float]:
+    """The 95 % interval of a binomial share (Wilson 1927, J. Am. Stat. Assoc. 22, 209)."""
+    from scipy.stats import binomtest  # slow to import
+
+    band = binomtest(hits, trials).proportion_ci(method="wilson")
+    return float(band.low), float(band.high)
+
+
 def _row(
     concentration: float, ratio: tuple[float, float], counts: Sequence[int], arrived: float
 ) -> dict[str, Any]:
     """A row of bridging.csv; `counts` are those of `_COUNTS`."""
     named = dict(zip(_COUNTS, counts, strict=True))
-    low, high = wilson_interval(named["closed"], named["throats"])
+    low, high = wilsons_band(named["closed"], named["throats"])
     return {
         "concentration": concentration,
         "ratio_lo": ratio[0],

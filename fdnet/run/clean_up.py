@@ -7,32 +7,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fdnet.case.case import InvasionCase
-from fdnet.dem.batches import batches_of
-from fdnet.dem.clean_up import DECK, CleanedUp, Start, clean_up, out_plane
+from fdnet.dem.clean_up import DECK, CleanedUp, Start, clean_up
 from fdnet.dem.clean_up_states import cleaned_state, dump_name, read_cleaned
 from fdnet.dem.fluid import Fluid
-from fdnet.dem.kept_cake import KeptCake, kept_cake
-from fdnet.dem.measured_fines import densities
 from fdnet.dem.overlap import overlap_in
 from fdnet.dem.updates import UPDATES
 from fdnet.errors import CaseError
-from fdnet.network.fines.invaded import measure_invaded
-from fdnet.network.resolved.slab import Sides
-from fdnet.run.cake import measure_cake
 from fdnet.run.dem_stages import invaded, is_done, packed_grains
-from fdnet.run.fluid.behind_cake import BehindCake
 from fdnet.run.fluid.fluid_of import fluid_of
 from fdnet.run.fluid.mirrored import Mirrored, mirrored
-from fdnet.run.fluid.network_fluid import NetworkFluid
 from fdnet.run.fluid.uniform import UniformCrowd
 from fdnet.run.made_files import START_OVER, check_files, digests_of
 from fdnet.run.mark import RECORD_FORMAT
-from fdnet.run.outputs import Invaded
 from fdnet.run.progress import Progress
 from fdnet.run.records import run_record
 from fdnet.run.session import Session
 from fdnet.scales.clean_up import BackFlow, back_flow
-from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Array, Snapshot
 
 if TYPE_CHECKING:
@@ -50,57 +40,24 @@ def clean_up_stage(session: Session, case: InvasionCase) -> None:
     progress = Progress("clean_up", flow.chunks * flow.scales.checkpoint_steps, show=False)
     with session.timed(STAGE), progress:
         launch = session.launch(progress)
-        start = _start(session, case, flow, grains, before)
-        fluid = fluid_turned_back(flow, grains, start)
+        start = Start(
+            grains=grains,
+            invaded=before.damaged,
+            invasion=session.path / "invade",
+            digest=case.digest(STAGE),
+        )
+        fluid = fluid_turned_back(flow, grains)
         result = clean_up(flow, start, folder, launch, fluid=fluid)
-    record = _record(session, case, flow, result, folder) | _begun(case, start)
+    record = _record(session, case, flow, result, folder)
     session.folder.finish(STAGE, record)
 
 
-def fluid_turned_back(flow: BackFlow, grains: Snapshot, start: Start) -> Fluid | None:
-    """The fluid of a coupled clean-up, turned back; a cake that stays is in series with it."""
+def fluid_turned_back(flow: BackFlow, grains: Snapshot) -> Fluid | None:
+    """The fluid of a coupled clean-up, turned back."""
     fluid = fluid_of(flow.case, flow.scales, mirrored(grains))
     if isinstance(fluid, UniformCrowd):
         fluid = replace(fluid, mud_beyond=True)
-        if start.slows is not None:
-            return BehindCake(fluid=fluid, cake=start.slows)
-    if isinstance(fluid, NetworkFluid):
-        fluid = replace(fluid, cake_beyond=out_plane(flow, start.cake) < 0)
     return None if fluid is None else Mirrored(fluid=fluid)
-
-
-def _start(
-    session: Session, case: InvasionCase, flow: BackFlow, grains: Snapshot, before: Invaded
-) -> Start:
-    cake = measure_invaded(before.damaged, periodic=case.periodic).cake_thickness
-    return Start(
-        grains=grains,
-        invaded=before.damaged,
-        invasion=session.path / "invade",
-        cake=cake,
-        digest=case.digest(STAGE),
-        slows=_slows(case, flow, before, out_plane(flow, cake)),
-    )
-
-
-def _slows(case: InvasionCase, flow: BackFlow, before: Invaded, face: float) -> KeptCake | None:
-    """The cake that stays and slows the fluid down; None where it does not.
-
-    Its resistance is rounded, so that the last digits of a solve do not matter on a resume.
-    """
-    if face >= 0 or case.drag.field != "uniform":
-        return None
-    cake = measure_cake(before.damaged, Sides(periodic=case.periodic, walls=case.analysis.walls))
-    resistance = 0.0 if cake is None else float(f"{cake.best_resistance:.6g}")
-    density = densities(case, batches_of(case, scales_of(case)).counts)
-    return kept_cake(flow, before.damaged, face, resistance, density=density)
-
-
-def _begun(case: InvasionCase, start: Start) -> dict[str, Any]:
-    """The rate of a uniform field that the clean-up began with, over that without a cake."""
-    if case.drag.field != "uniform":
-        return {}
-    return {"rate_at_start": 1.0 if start.slows is None else start.slows.rate(start.invaded)}
 
 
 def _record(
@@ -224,7 +181,6 @@ def clean_up_summary(first: "Analysis", after: Returned, record: dict[str, Any])
         "clean_up": {
             "stop_reason": record["stop_reason"],
             "physical_time_s": record["physical_time_s"],
-            "rate_at_start": record.get("rate_at_start"),
             "inside_before": len(after.before),
             "came_out": len(after.before) - stayed,
             "stayed": stayed,

@@ -2,14 +2,6 @@
 
 The drawdown is lost on the way on which the overbalance was, so the fluid's velocity follows from
 it by the same law. The forces are those of the invasion at that velocity.
-
-A cake that stays is in series with this way while it stands. Its resistance R_c, 1/m, is thickness
-over permeability, so by Darcy's law the Darcy velocity is
-
-    U = p / (mu (l / k + R_c)),
-
-for the drawdown p, the viscosity mu, and the length l and permeability k of the way. The fluid
-loses mu R_c (U - v) in a cake that moves along x at v, and nothing in one that moves with it.
 """
 
 import math
@@ -46,47 +38,6 @@ class BackFlow:
     def step(self) -> float:
         """The time step, s."""
         return self.scales.time_step
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InSeries:
-    """A cake in series with the way on which the drawdown is lost.
-
-    Attributes:
-        cake: loss of pressure in the standing cake at the rate without a cake, over the drawdown.
-        viscous: share of the drawdown that viscosity takes without a cake; 1 by Darcy's law.
-    """
-
-    cake: float
-    viscous: float
-
-    def rate(self, there: float, carried: float) -> float:
-        """The rate over that without a cake.
-
-        With s for this ratio the losses are viscous s + (1 - viscous) s^2 + cake (s there -
-        carried) = 1. By Darcy's law s is (1 + cake carried) / (1 + cake there).
-
-        Args:
-            there: share of the cake that is still upstream of the face.
-            carried: this share times its mean velocity over the fluid's without a cake.
-        """
-        driven, resisted = 1 + self.cake * carried, self.viscous + self.cake * there
-        return 2 * driven / (resisted + math.sqrt(resisted**2 + self.inertia * driven))
-
-    @property
-    def inertia(self) -> float:
-        """Four times the share that inertia takes without a cake."""
-        return 4 * (1 - self.viscous)
-
-
-def in_series(flow: BackFlow, resistance: float) -> InSeries:
-    """A cake of a `resistance` in 1/m, its thickness over its permeability."""
-    fluid, scales = flow.case.fluid, flow.scales
-    loss = fluid.viscosity_Pa_s * resistance * scales.darcy_velocity
-    return InSeries(
-        cake=loss / flow.choices.drawdown_Pa,
-        viscous=1 - scales.inertial_loss if fluid.darcy_law == "ergun" else 1.0,
-    )
 
 
 def back_flow(case: InvasionCase) -> BackFlow:

@@ -21,7 +21,7 @@ STEP_SECONDS = 2.0e-6
 """Seconds of one step with nothing to do."""
 FIXED_GRAIN_SECONDS, MOVING_GRAIN_SECONDS = 1.3e-8, 1.0e-7
 """Seconds of one grain in one step."""
-FINE_SECONDS = {"every_step": 1.7e-7, "held": 1.4e-7, "implicit": 1.4e-7, "viscous": 1.35e-7}
+FINE_SECONDS = {"held": 1.4e-7, "implicit": 1.4e-7, "viscous": 1.35e-7}
 """Seconds of one fine in one step, contacts and drag, by `drag.scheme`."""
 CACHED_FINES = 8000
 """Fines n cost (1 + n / (n + CACHED_FINES)) times as much each: their neighbours leave the

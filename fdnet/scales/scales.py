@@ -21,7 +21,6 @@ from fdnet.scales.sticking import Sticking, sticking_of, sticking_warnings
 from fdnet.scales.stiff_enough import drive_in, pressed_in, relaxation_times, stiff_enough
 from fdnet.scales.stop_times import chunk_refreshes, plug_warnings, stop_times
 from fdnet.scales.time_step import (
-    coefficient_steps,
     densest_factor,
     drag_warnings,
     hold_steps,
@@ -175,8 +174,7 @@ def _invasion(case: InvasionCase, flow: Velocity, shared: Scales) -> InvasionSca
     step = time_step(case, shared.contacts, shortest)
     times = stop_times(case, slab, drive, upstream=upstream)
     hold = hold_steps(case, step, shortest / densest_factor(case), times.chunk)
-    unit = hold * coefficient_steps(case, step, shortest)
-    chunk_steps = chunk_refreshes(case, times.chunk, step * unit) * unit
+    chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
     contact = shared.contacts["grain-fine"]
     overlaps = pressed_in(case, flow, drive, contact)
     sticking = sticking_of(case, contact, push, step)

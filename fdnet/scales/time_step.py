@@ -125,17 +125,6 @@ def densest_factor(case: Case) -> float:
     return float(drag_factor(crowd, gradient_apart=False)) / RANDOM_CLOSE
 
 
-def coefficient_steps(case: Case, step: float, tau: float) -> int:
-    """Steps for which "every_step" keeps a drag coefficient that depends on the slip; else 1.
-
-    They last at most as long as "held" keeps the force by default. Checkpoints come after whole
-    multiples of them, so that a cut run continues bit for bit.
-    """
-    if case.drag.scheme != "every_step" or case.drag.inertia == "none":
-        return 1
-    return max(1, math.floor(HOLD_OVER_RELAXATION * tau / step))
-
-
 def drag_warnings(case: Case, held: float) -> list[str]:
     """What a drag that is constant for `held` tau costs in accuracy, in words.
 

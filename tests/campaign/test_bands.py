@@ -5,13 +5,7 @@ import math
 import pytest
 from campaign.samples import comparison
 
-from fdnet.campaign.result.table import band_row
-from fdnet.campaign.result.words import band_text, value_text
-from fdnet.campaign.until import is_reached, next_seed_count, parse_until
-from fdnet.errors import CaseError
-from fdnet.report.units import percent
-from fdnet.statistics.bands import Band
-from fdnet.statistics.pairs import (
+from fdnet.campaign.result.pairs import (
     Pair,
     compare_pair,
     holm,
@@ -20,6 +14,12 @@ from fdnet.statistics.pairs import (
     separate_seeds,
     student_band,
 )
+from fdnet.campaign.result.table import band_row
+from fdnet.campaign.result.words import band_text, value_text
+from fdnet.campaign.until import is_reached, next_seed_count, parse_until
+from fdnet.errors import CaseError
+from fdnet.report.units import percent
+from fdnet.statistics.bands import Band
 
 DRUG_1 = dict(enumerate([0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0.0, 2.0]))
 DRUG_2 = dict(enumerate([1.9, 0.8, 1.1, 0.1, -0.1, 4.4, 5.5, 1.6, 4.6, 3.4]))

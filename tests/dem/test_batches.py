@@ -126,7 +126,7 @@ def test_a_short_slab_is_one_batch():
 
 @pytest.mark.parametrize(
     ("scheme", "sets"),
-    [("viscous", set()), ("held", {"uf"}), ("every_step", {"uf"}), ("implicit", {"uf", "Ksl"})],
+    [("viscous", set()), ("held", {"uf"}), ("implicit", {"uf", "Ksl"})],
 )
 def test_the_deck_takes_each_batch_in_once_and_gives_it_its_drag(tmp_path, scheme, sets):
     case = tiny(*BATCHED, f"drag.scheme={scheme}")
@@ -148,8 +148,7 @@ def test_the_deck_takes_each_batch_in_once_and_gives_it_its_drag(tmp_path, schem
     ("settings", "stored"),
     [
         (("drag.scheme=held",), "v_fx v_fy v_fz"),
-        (("drag.scheme=every_step", "drag.inertia=schiller-naumann"), "v_cr"),
-        (("drag.scheme=every_step",), None),
+        (("drag.refresh_steps=1",), None),
     ],
 )
 def test_what_is_stored_for_each_fine_is_stored_anew_after_a_batch(tmp_path, settings, stored):
@@ -169,7 +168,7 @@ def test_what_is_stored_for_each_fine_is_stored_anew_after_a_batch(tmp_path, set
         ("viscous", ()),
         ("held", ()),
         ("implicit", ()),
-        ("every_step", ("drag.inertia=schiller-naumann", "drag.pressure_gradient=true")),
+        ("held", ("drag.inertia=schiller-naumann", "drag.pressure_gradient=true")),
     ],
 )
 def test_a_batched_invasion_accounts_for_every_fine_and_resumes(binary, tmp_path, scheme, forces):

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from builders import tiny
+from builders import resting_spheres, tiny
 
 from fdnet.case.file import case_from
-from fdnet.dem.clean_up import Start, clean_up, fines_to_clean
+from fdnet.dem.clean_up import Start, clean_up, fines_to_clean, mark_of
 from fdnet.dem.clean_up_deck import Beginning, render_clean_up, turned_drag
 from fdnet.dem.clean_up_states import (
     CLEANED_HEADER,
@@ -21,18 +21,21 @@ from fdnet.dem.clean_up_states import (
     newest_whole,
     restart_name,
 )
+from fdnet.dem.fluid import Moment
 from fdnet.dem.liggghts import Launch
 from fdnet.errors import CaseError
-from fdnet.network.fines.invaded import measure_invaded
+from fdnet.run.clean_up import fluid_turned_back
 from fdnet.run.dem_stages import invaded, packed_grains
 from fdnet.run.folder import open_folder
 from fdnet.run.pipeline import RunOptions, run_stages
 from fdnet.run.session import Session
 from fdnet.scales.clean_up import back_flow
 from fdnet.scales.scales import scales_of
+from fdnet.spheres.snapshot import Kind
 
 pytestmark = pytest.mark.liggghts
 STAGES = ("pack", "invade", "clean_up", "analyse")
+CROWD = ("drag.crowd=beetstra", "drag.scheme=implicit")
 
 
 def small(*more):
@@ -47,6 +50,16 @@ def small(*more):
         "clean_up.drawdown_MPa=1.0",
         *more,
     )
+
+
+def fines_at(x):
+    """Two grains and a fine at rest at each x (m)."""
+    box = np.array([[0.0, 2e-3], [0.0, 1.2e-3], [0.0, 1.2e-3]])
+    grains = resting_spheres(
+        [[3e-4, 6e-4, 6e-4], [9e-4, 6e-4, 6e-4]], 2.5e-4, box, kind=Kind.GRAIN
+    )
+    place = [[one, 6e-4, 6e-4] for one in x]
+    return grains.joined(resting_spheres(place, 5e-5, box, kind=Kind.FINE, first=3))
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +85,6 @@ def start(run):
         grains=grains,
         invaded=damaged,
         invasion=folder / "invade",
-        cake=measure_invaded(damaged, periodic=case.periodic).cake_thickness,
         digest="test",
     )
 
@@ -201,8 +213,7 @@ def test_a_record_keeps_restarts_of_later_checkpoints(tmp_path):
     """LIGGGHTS may be some checkpoints ahead of fdnet when one is recorded."""
     (tmp_path / "post").mkdir()
     rows = [
-        Cleaned(chunk=k, step=100 * k, inside=9, ahead=0, out=k, passed=0, quiet=0)
-        for k in range(1, 6)
+        Cleaned(chunk=k, step=100 * k, inside=9, out=k, passed=0, quiet=0) for k in range(1, 6)
     ]
     lines = [CLEANED_HEADER, *(row.line() for row in rows)]
     (tmp_path / "history.csv").write_text("\n".join(lines) + "\n")
@@ -227,15 +238,11 @@ def test_friction_decides_what_stays(start, tmp_path, binary):
     assert stayed[0.01] < stayed[5.0]
 
 
-def test_a_cake_that_stays_takes_part(start):
-    lifted, kept = back_flow(small()), back_flow(small("clean_up.lift_cake=false"))
+def test_the_fines_inside_take_part_and_the_cake_does_not(start):
     x = start.invaded.fines().position[:, 0]
     inside = int(np.sum((x >= 0) & (x < 2e-3)))
-    cake = int(np.sum((x < 0) & (x > -start.cake)))
-    assert start.cake > 0
-    assert cake > 0
-    assert len(fines_to_clean(lifted, start)) == inside
-    assert len(fines_to_clean(kept, start)) >= inside + cake
+    assert int(np.sum((x < 0) & (x > -1e-4))) > 0
+    assert len(fines_to_clean(back_flow(small()), start)) == inside
 
 
 def test_the_drag_is_that_of_the_drawdown_turned_back():
@@ -251,7 +258,7 @@ def test_the_drag_is_that_of_the_drawdown_turned_back():
     assert float(drag["gradient"]["force"]) == pytest.approx(gradient, rel=1e-12)
     outside = float(drag["push"]) + float(drag["slower"])
     assert outside == pytest.approx(push * ahead.porosity, rel=1e-12)
-    begin = Beginning(restart="../invade/post/invade_1.restart", row=None, face=0.0)
+    begin = Beginning(restart="../invade/post/invade_1.restart", row=None)
     assert f"addforce {drag['push']} 0.0 0.0" in render_clean_up(flow, "0", begin).text
 
 
@@ -273,7 +280,9 @@ def test_a_case_without_the_table_has_no_such_stage():
             ("clean_up.duration_ms=1", "clean_up.cap_ms=2"),
             "clean_up.cap_ms: 2 together with clean_up.duration_ms 1",
         ),
-        (("clean_up.lift_cakes=true",), "did you mean clean_up.lift_cake"),
+        (("clean_up.drawdowns_MPa=1",), "did you mean clean_up.drawdown_MPa"),
+        (("clean_up.lift_cake=true",), "the cake is always lifted, remove the key"),
+        (("clean_up.lift_cake=false",), "the cake is always lifted, remove the key"),
     ],
 )
 def test_bad_keys_are_named(keys, said):
@@ -295,3 +304,23 @@ def test_the_stage_without_its_table_is_refused(tmp_path):
     options = RunOptions(out=tmp_path / "run", show_progress=False, stages=("pack", "clean_up"))
     with pytest.raises(CaseError, match=r"clean_up: .* no table \[clean_up\]"):
         run_stages(case_from(plain), options)
+
+
+def test_the_mud_side_has_the_upstream_velocity_in_a_crowd_turned_back():
+    """As in the deck of lone fines: Darcy's upstream of the face, that of the pores elsewhere."""
+    flow = back_flow(small(*CROWD, "drag.upstream=darcy"))
+    spheres = fines_at([-2e-4, -1e-6, 1e-6, 6e-4, 1.999e-3, 2.1e-3])
+    fluid = fluid_turned_back(flow, spheres.grains())
+    moment = Moment(step=0, time=0.0, before=None, first=None, fresh=True)
+    made = fluid.forces(spheres, moment).velocity[:, 0]
+    assert flow.scales.upstream_velocity < 0.6 * flow.scales.drive_velocity
+    assert made[:2] == pytest.approx(-flow.scales.upstream_velocity, rel=1e-12)
+    assert made[2:] == pytest.approx(-flow.scales.drive_velocity, rel=1e-12)
+
+
+def test_a_checkpoint_of_a_crowd_with_the_ends_exchanged_is_not_continued(tmp_path):
+    spheres = fines_at([6e-4])
+    start = Start(grains=spheres.grains(), invaded=spheres, invasion=tmp_path, digest="test")
+    assert mark_of(back_flow(small(*CROWD, "drag.upstream=darcy")), start) != "test"
+    assert mark_of(back_flow(small(*CROWD)), start) == "test"
+    assert mark_of(back_flow(small("drag.scheme=held", "drag.upstream=darcy")), start) == "test"

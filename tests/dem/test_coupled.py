@@ -90,7 +90,7 @@ def test_a_continued_coupled_invasion_is_the_uncut_one(binary, grains, tmp_path,
 @pytest.mark.slow
 @pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("motion", ["fixed", "mobile"])
-@pytest.mark.parametrize("scheme", ["implicit", "held", "every_step"])
+@pytest.mark.parametrize("scheme", ["implicit", "held"])
 def test_it_is_so_everywhere(binary, grains, tmp_path, scheme, motion, ranks):
     case = small(scheme, f"grains.motion={motion}")
     assert differences(case, grains, tmp_path, binary, ranks=ranks) == []
@@ -199,7 +199,7 @@ def test_what_follow_raises_stops_liggghts(binary, grains, tmp_path):
 
 
 def test_explicit_drag_that_would_overshoot_is_refused(binary, grains, tmp_path):
-    case = small("every_step", "drag.multiplier=40.0", "run.stiffness_N_m=100.0")
+    case = small("held", "drag.multiplier=40.0", "run.stiffness_N_m=100.0")
     with pytest.raises(LiggghtsError, match=r"explicit drag would overshoot; take drag\.scheme"):
         run(case, grains, tmp_path, Launch(binary=binary))
 
@@ -211,7 +211,7 @@ def several(light: float):
         {"name": name, "share": density, "density_kg_m3": density, "sizes": sizes}
         for name, density in (("light", light), ("heavy", 2 * light))
     ]
-    data = small("every_step").data()
+    data = small("held").data()
     data["fines"] = {"count": 400, "supply": "batches", "materials": materials}
     return case_from(data)
 
@@ -320,7 +320,7 @@ def test_a_standing_bed_of_fines_takes_up_its_pressure_drop(binary, tmp_path):
     bed = bed_of_fines(binary, tmp_path / "bed")
     case = tiny(
         "drag.crowd=beetstra",
-        "drag.scheme=every_step",
+        "drag.refresh_steps=1",
         "box.size_mm=[9.0,3.5,3.5]",
         "box.sides=periodic",
         "fines.radius_mm=0.25",

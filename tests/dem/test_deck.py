@@ -84,10 +84,10 @@ def test_drag_is_stokes_with_the_multiplier():
     assert has(text, r"^fix drag fines addforce")
 
 
-def test_held_drag_stores_and_every_step_does_not():
+def test_drag_held_for_more_than_a_step_is_stored():
     assert has(invade_text(), r"^fix st fines store/state \d+ v_fx")
-    assert has(invade_text("drag.scheme=every_step"), r"^fix drag fines addforce v_fx v_fy v_fz$")
-    assert not has(invade_text("drag.scheme=every_step"), "store/state")
+    assert has(invade_text("drag.refresh_steps=1"), r"^fix drag fines addforce v_fx v_fy v_fz$")
+    assert not has(invade_text("drag.refresh_steps=1"), "store/state")
 
 
 def test_gravity_is_left_out_when_negligible_and_reported():
@@ -253,17 +253,7 @@ def test_moduli_that_liggghts_would_refuse_are_said_to_be_meant():
     assert not has(invade_text(), "_particles yes")
 
 
-def test_every_step_keeps_the_coefficient_of_a_finite_reynolds_number_but_not_the_force():
-    """For a divisor of the steps between checkpoints, so that cut runs continue bit for bit."""
-    settings = ("drag.inertia=schiller-naumann", "drag.scheme=every_step")
-    text, scales = invade_text(*settings), scales_of(tiny(*settings))
-    kept = int(re.search(r"(?m)^fix st fines store/state (\d+) v_cr$", text)[1])
-    assert kept > 1
-    assert scales.checkpoint_steps % kept == 0
-    share = scales.push.relaxation_share(5e-5) * scales.relaxation_time[0]
-    assert kept * scales.time_step <= 0.05 * share
-    assert has(text, r"^variable fx atom f_st\*v_sx$")
-    assert has(text, r"^fix drag fines addforce v_fx v_fy v_fz$")
+def test_held_drag_at_a_finite_reynolds_number_stores_the_force():
     held = invade_text("drag.inertia=schiller-naumann")
     assert has(held, r"^variable fx atom v_cr\*v_sx$")
     assert has(held, r"^fix drag fines addforce v_hx v_hy v_hz$")

@@ -22,7 +22,7 @@ from fdnet.scales.time_step import relaxation_time
 from fdnet.spheres.dump import COLUMNS, Frame, read_dump
 from fdnet.spheres.snapshot import Kind
 
-SCHEMES = ("every_step", "held", "implicit", "viscous")
+SCHEMES = ("held", "implicit", "viscous")
 SPEED, RADIUS = 2.0, 0.05e-3
 SLOW = "fluid.velocity_m_s=0.02"
 TAU = relaxation_time(RADIUS, 2146, 0.05)
@@ -38,7 +38,6 @@ def drag_case(*assignments: str) -> Case:
 
 def test_each_scheme_has_its_own_lines_and_no_others():
     own = {
-        "every_step": "addforce v_fx v_fy v_fz",
         "held": "store/state",
         "implicit": "couple/cfd/force/implicit CrankNicolson 1.0",
         "viscous": "fix drag fines viscous",
@@ -176,10 +175,8 @@ def test_a_fine_relaxes_to_the_fluid_as_stokes_has_it(binary, tmp_path, scheme):
 @pytest.mark.liggghts
 def test_the_viscous_split_moves_a_fine_as_drag_at_every_step_does(binary, tmp_path):
     moved = []
-    for scheme in ("every_step", "viscous"):
-        case = drag_case(
-            f"drag.scheme={scheme}", f"run.time_step_s={0.01 * TAU}", "run.stiffness_N_m=500.0"
-        )
+    for scheme in ("drag.refresh_steps=1", "drag.scheme=viscous"):
+        case = drag_case(scheme, f"run.time_step_s={0.01 * TAU}", "run.stiffness_N_m=500.0")
         moved.append(
             speeds(drive(case, binary, tmp_path / scheme, gap=1e-3, steps=200, every=20)[1])
         )
@@ -210,7 +207,7 @@ def test_implicit_drag_is_bounded_at_any_step(binary, tmp_path, ratio):
 @pytest.mark.liggghts
 @pytest.mark.parametrize(
     ("scheme", "ratio"),
-    [("every_step", 0.5), ("viscous", 0.5), ("implicit", 0.1), ("implicit", 10)],
+    [("held", 0.5), ("viscous", 0.5), ("implicit", 0.1), ("implicit", 10)],
 )
 def test_a_fine_at_rest_is_pressed_by_the_drag_of_the_fluid(binary, tmp_path, scheme, ratio):
     """Overlap 6 pi mu M r u / k, whatever the step."""

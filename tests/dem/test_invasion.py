@@ -129,7 +129,7 @@ def refuse_all(*_):
         [],
         ["box.sides=periodic"],
         ["grains.motion=mobile"],
-        ["drag.scheme=every_step"],
+        ["drag.refresh_steps=1"],
         ["drag.upstream=darcy"],
         ["drag.scheme=viscous", "drag.upstream=darcy"],
         ["drag.scheme=implicit", "fines.radius_mm=[0.02,0.05]"],

@@ -107,27 +107,6 @@ def test_a_continued_invasion_is_the_uncut_one(binary, fluid, tmp_path):
     assert differences(fluid.case, fluid.grains, tmp_path, binary) == []
 
 
-def test_a_cake_beyond_the_specimen_is_in_series_with_it(fluid):
-    """In a clean-up the fluid leaves by the cake: its drag and the drop add up to the drawdown."""
-    edge = np.arange(5e-5, 1e-3, 1e-4)
-    place = np.stack(np.meshgrid(1.65e-3 + edge[:4], edge, edge), axis=-1).reshape(-1, 3)
-    bed = fines(place, 4.9e-5, fluid.grains.box)
-    spheres = fluid.grains.joined(bed)
-    turned = replace(fluid, cake_beyond=True)
-    turned.__dict__["pack"] = fluid.pack
-    free, made = fluid.forces(spheres, FIRST), turned.forces(spheres, FIRST)
-    drag = float(made.coefficient @ made.velocity[:, 0]) / fluid.pack.network.area
-    seen = made.measures
-    assert free.measures["rate_over_initial"] == 1.0
-    assert 0.2 < seen["rate_over_initial"] < 0.8
-    assert seen["pressure_cake_Pa"] == pytest.approx(drag, rel=1e-9)
-    whole = free.measures["pressure_pack_Pa"]
-    assert seen["pressure_cake_Pa"] + seen["pressure_pack_Pa"] == pytest.approx(whole, rel=1e-9)
-    moving = replace(bed, velocity=fluid.forces(spheres, FIRST).velocity)
-    loose = turned.forces(fluid.grains.joined(moving), FIRST).measures
-    assert loose["rate_over_initial"] == pytest.approx(1.0, rel=1e-12)
-
-
 def test_batches_come_as_the_mud_that_slows_down_carries_them(binary, fluid, tmp_path):
     """The mud has moved by the filtrate over the face; a batch enters before it is needed."""
     keys = ("fines.supply=batches", "fines.count=600", "run.checkpoint_ms=0.02", "run.cap_ms=0.3")

@@ -31,7 +31,7 @@ def snapshot(case: Case, position: list, kind: Kind, radius: float, first: int =
     )
 
 
-@pytest.mark.parametrize("scheme", ["every_step", "held", "implicit", "viscous"])
+@pytest.mark.parametrize("scheme", ["held", "implicit", "viscous"])
 def test_gravity_buoyancy_and_drag_relax_to_the_terminal_velocity(binary, tmp_path, scheme):
     """v_z(t) = v_T (1 - exp(-t / tau)), v_T = 2 r^2 (rho - rho_f) g / (9 mu) (Stokes 1851)."""
     g = -2.0e4
@@ -63,7 +63,7 @@ OBLIQUE = (1.2e4, -0.9e4, -2.0e4)
 """Gravity, m/s2, across all axes, so that a fine settles within a millimetre."""
 
 
-@pytest.mark.parametrize("scheme", ["every_step", "held", "implicit", "viscous"])
+@pytest.mark.parametrize("scheme", ["held", "implicit", "viscous"])
 def test_a_fine_settles_along_an_oblique_gravity(binary, tmp_path, scheme):
     """v(t) = u + v_T (1 - exp(-t / tau)), v_T = 2 r^2 (rho - rho_f) g / (9 mu), in each axis."""
     case = tiny(

@@ -8,9 +8,8 @@ import pytest
 from packs import simple_cubic
 
 from fdnet.network.network import build_network
-from fdnet.run.bridging import Throats, classes_of, open_throats, pooled, width_rows
+from fdnet.run.bridging import Throats, classes_of, open_throats, pooled, width_rows, wilsons_band
 from fdnet.spheres.snapshot import Snapshot
-from fdnet.statistics.shares import wilson_interval
 
 
 def throats(ratio, clogged):
@@ -42,7 +41,7 @@ def rows_of(ratio, clogged, concentration):
 )
 def test_wilsons_band(hits, trials, low, high):
     """Values of Brown, Cai and DasGupta (2001), and Newcombe (1998) for 81 of 263."""
-    assert wilson_interval(hits, trials) == pytest.approx((low, high), abs=5e-5)
+    assert wilsons_band(hits, trials) == pytest.approx((low, high), abs=5e-5)
 
 
 def test_throats_fall_into_their_classes_and_runs_add_up():

@@ -18,7 +18,7 @@ from scipy.spatial import Delaunay
 from fdnet.dem.scene import box_of
 from fdnet.errors import CaseError
 from fdnet.spheres.snapshot import Kind, resting
-from fdnet.statistics.shares import wilson_interval
+from fdnet.studies.engine.bands import wilson_interval
 from fdnet.studies.thesis.numbers.deposition import deposition, write_deposition
 from fdnet.studies.thesis.numbers.examine import DEFAULT_PAIR, THESIS_PAIR, Examined, examine
 from fdnet.studies.thesis.numbers.first_millimetre import first_millimetre

@@ -10,7 +10,8 @@ from math import nan, sqrt
 
 import pytest
 
-from fdnet.statistics.bands import Band, Sample, band, difference
+from fdnet.statistics.bands import Band
+from fdnet.studies.engine.bands import Sample, band, difference
 from fdnet.studies.engine.markdown import as_told, figure, markdown_table, with_band
 from fdnet.studies.thesis.compare.tables import TABLES, table_of, thesis_tables
 from fdnet.studies.thesis.compare.trend_claims import (

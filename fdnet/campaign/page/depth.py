@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from fdnet.campaign.result.comparison import Comparison, is_number
+from fdnet.campaign.result.pairs import student_band
 from fdnet.report.units import MILLIDARCY
 from fdnet.spheres.snapshot import Array
-from fdnet.statistics.pairs import student_band
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from fdnet.campaign.result.entry import Entry
+from fdnet.campaign.result.pairs import Pair, compare_pair, holm, student_band
 from fdnet.errors import CaseError
 from fdnet.statistics.bands import Band
-from fdnet.statistics.pairs import Pair, compare_pair, holm, student_band
 
 RANKED_BY = "k_reduction"
 SHARES = re.compile(r"(^|\.)(k_reduction|.*porosity.*|.*_fraction|.*_share|\w*over_initial)$")

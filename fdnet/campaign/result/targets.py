@@ -7,11 +7,11 @@ from typing import Any
 
 from fdnet.campaign.result.comparison import Comparison, is_number
 from fdnet.campaign.result.entry import Entry
+from fdnet.campaign.result.pairs import MOST_SEEDS, seeds_for_width, student_band
 from fdnet.campaign.result.words import value_text
 from fdnet.case.units import converted, share_of
 from fdnet.errors import CaseError
 from fdnet.statistics.bands import Band
-from fdnet.statistics.pairs import MOST_SEEDS, seeds_for_width, student_band
 
 MET, OPEN, MISSED = "met", "open", "missed"
 """The 95 % band lies below the limit, across it, or above it."""

@@ -5,9 +5,9 @@ import re
 from collections.abc import Sequence
 
 from fdnet.campaign.result.comparison import SHARES, Comparison, described
+from fdnet.campaign.result.pairs import MOST_SEEDS, Pair
 from fdnet.report.units import MILLIDARCY
 from fdnet.statistics.bands import Band
-from fdnet.statistics.pairs import MOST_SEEDS, Pair
 
 LABELS = {
     "k_reduction": "permeability lost",

@@ -16,7 +16,6 @@ from fdnet.network.field.nearby import find_nearby
 from fdnet.network.field.pressure import Gradient, find_gradient
 from fdnet.network.field.sampled import Sampled, sample_velocity
 from fdnet.network.field.solved import Skeleton, Solved, Spheres, solve
-from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array, frozen
 
 
@@ -107,32 +106,6 @@ class VelocityField:
         """
         return self._gradient.at(_checked(points))
 
-    def updated(self, position: Any, radius: Any, *, velocity: Any = None) -> "VelocityField":
-        """The field with the fines at `position` (N, 3) m of `radius` (N,) m, or one for all.
-
-        The solve starts from this flow. The grid stays, so fines beyond its ends along x are left
-        out and counted. Each fine holds the fluid at its surface, or takes it along with its
-        `velocity` (N, 3) over U.
-
-        Raises:
-            CaseError: shapes disagree or values are not finite.
-            FlowError: the iterations run out.
-        """
-        place = _checked(position)
-        sizes = np.asarray(radius, float)
-        if sizes.shape not in ((), (len(place),)) or not np.all(sizes > 0.0):
-            raise CaseError(
-                f"velocity field: radius of shape {sizes.shape}, expected positive numbers, one "
-                f"or ({len(place)},)"
-            )
-        wanted = Wanted(
-            place=place,
-            radius=np.broadcast_to(sizes, len(place)),
-            velocity=None if velocity is None else _checked(velocity, len(place)),
-            tolerance=self.tolerance,
-        )
-        return solved_field(self.skeleton, wanted, self.solved)
-
     @cached_property
     def _flow(self) -> list[Array]:
         flow = self.skeleton.response.velocity(list(self.solved.force))
@@ -157,29 +130,17 @@ class VelocityField:
         return find_gradient(lattice, self.skeleton.response, self.solved, mean)
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Wanted:
-    """Fines at `place` (N, 3) m of `radius` (N,) m and `velocity` (N, 3), and the tolerance."""
-
-    place: Array
-    radius: Array
-    velocity: Array | None
-    tolerance: float
-
-    __repr__ = one_line
-
-
-def solved_field(skeleton: Skeleton, wanted: Wanted, former: Solved | None) -> VelocityField:
-    """The field around grains and fines, from a `former` flow or from scratch."""
-    inside = on_grid(skeleton.lattice, wanted.place, wanted.radius)
-    fines = frozen(wanted.place[inside]), frozen(wanted.radius[inside])
-    moves = None if wanted.velocity is None else wanted.velocity[inside]
+def solved_field(skeleton: Skeleton, deposit: Spheres, tolerance: float) -> VelocityField:
+    """The field around grains and fines; `deposit` are centres (N, 3) m and radii (N,) m."""
+    place, radius = deposit
+    inside = on_grid(skeleton.lattice, place, radius)
+    fines = frozen(place[inside]), frozen(radius[inside])
     return VelocityField(
         skeleton=skeleton,
         fines=fines,
         left_out=int(np.sum(~inside)),
-        tolerance=wanted.tolerance,
-        solved=solve(skeleton, fines, wanted.tolerance, velocity=moves, former=former),
+        tolerance=tolerance,
+        solved=solve(skeleton, fines, tolerance),
         inside=frozen(inside),
     )
 
@@ -192,13 +153,12 @@ def on_grid(lattice: Lattice, position: Array, radius: Array) -> Array:
     return (position[:, 0] - radius >= low) & (position[:, 0] + radius <= high)
 
 
-def _checked(points: Any, count: int | None = None) -> Array:
+def _checked(points: Any) -> Array:
     """Numbers (N, 3). Raises CaseError on others."""
     array = np.asarray(points, float)
-    rows = "N" if count is None else count
-    if array.ndim != 2 or array.shape[1] != 3 or count not in (None, len(array)):
+    if array.ndim != 2 or array.shape[1] != 3:
         raise CaseError(
-            f"velocity field: numbers of shape {array.shape}, expected ({rows}, 3), x, y, z"
+            f"velocity field: numbers of shape {array.shape}, expected (N, 3), x, y, z"
         )
     if not np.all(np.isfinite(array)):
         raise CaseError("velocity field: a value is not finite, expected numbers, x, y, z")

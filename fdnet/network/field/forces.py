@@ -1,10 +1,9 @@
 """The forces that hold the fluid at the walls, by conjugate gradients.
 
 All of space is taken as fluid, and the walls push back with forces F. With the flow S of forces
-(`response`), the slack D of the walls (`walls`), the superficial velocity U and the velocity v of
-the walls,
+(`response`), the slack D of the walls (`walls`) and the superficial velocity U,
 
-    S F + D F + U = v at every wall node.
+    S F + D F + U = 0 at every wall node.
 
 U is 1 along x. Along periodic sides the fluid may drift: the forces add up to 0 there, and that
 component of U is the multiplier. S + D is symmetric and positive semi-definite. The resistance of
@@ -78,9 +77,9 @@ class Problem:
                 part -= load * np.float32(dot(load, part) / self.norms[component])
         return scaled
 
-    def right(self, target: Array | None) -> Array:
-        """Right-hand side for a unit velocity along x and walls that move with `target`."""
-        right = np.zeros_like(self.weight) if target is None else target * self.weight
+    def right(self) -> Array:
+        """Right-hand side for a unit velocity along x and walls at rest."""
+        right = np.zeros_like(self.weight)
         right[0] -= self.weight[0]
         return right
 
@@ -108,26 +107,14 @@ class Held:
     __repr__ = one_line
 
 
-def hold(
-    problem: Problem, tolerance: float, *, start: Array | None = None, target: Array | None = None
-) -> Held:
-    """The wall forces.
-
-    Args:
-        problem: the operator.
-        tolerance: the slip at which the solve ends.
-        start: forces (3, n0, n1, n2) to start from; those off the walls are left out.
-        target: velocities (3, n0, n1, n2) of the walls.
+def hold(problem: Problem, tolerance: float) -> Held:
+    """The wall forces, solved until the slip is below `tolerance`.
 
     Raises:
         FlowError: the iterations run out.
     """
-    right, weight = problem.right(target), problem.weight
+    right, weight = problem.right(), problem.weight
     scaled, residual = np.zeros_like(right), right.copy()
-    if start is not None:
-        np.divide(start, weight, out=scaled, where=weight > 0)
-        problem.project(scaled)
-        residual -= problem.apply(scaled, weight * scaled)
     problem.project(residual)
     step = problem.smoothed(residual)
     force = weight * step

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.network.field.field import VelocityField, Wanted, on_grid, solved_field
+from fdnet.network.field.field import VelocityField, on_grid, solved_field
 from fdnet.network.field.lattice import build_lattice
 from fdnet.network.field.solved import Skeleton, build_skeleton
 from fdnet.spheres.directions import Directions, periodic_axes
@@ -69,10 +69,7 @@ def velocity_field(
     skeleton = _skeleton(
         grains, periodic_axes(periodic), (cells, _upstream(grains, deposit, upstream))
     )
-    wanted = Wanted(
-        place=deposit.position, radius=deposit.radius, velocity=None, tolerance=tolerance
-    )
-    return solved_field(skeleton, wanted, None)
+    return solved_field(skeleton, (deposit.position, deposit.radius), tolerance)
 
 
 def _upstream(grains: Snapshot, deposit: Snapshot, wanted: float | None) -> float:

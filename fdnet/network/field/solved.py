@@ -1,4 +1,4 @@
-"""Stokes flow on a staggered grid around grains and fines, from scratch or from a former flow."""
+"""Stokes flow on a staggered grid around grains and fines."""
 
 from dataclasses import dataclass
 
@@ -75,22 +75,13 @@ class Solved:
     __repr__ = one_line
 
 
-def solve(
-    skeleton: Skeleton,
-    fines: Spheres,
-    tolerance: float,
-    *,
-    velocity: Array | None = None,
-    former: Solved | None = None,
-) -> Solved:
+def solve(skeleton: Skeleton, fines: Spheres, tolerance: float) -> Solved:
     """The flow around grains and fines with a superficial velocity of 1 along x.
 
     Args:
         skeleton: the grains.
         fines: centres (N, 3) m and radii (N,) m; each holds the fluid at its surface.
         tolerance: rms velocity over the superficial one that may be left at the walls.
-        velocity: (N, 3) of the fines, over the superficial velocity; 0 without it.
-        former: a flow on the same grid to start from.
 
     Raises:
         NetworkError: no node of the grid feels a wall.
@@ -111,9 +102,7 @@ def solve(
             "the box; give grains or a finer grid"
         )
     problem = Problem(walls, skeleton.response, _radius(skeleton))
-    start = None if former is None else np.stack(former.force)
-    target = None if velocity is None else _targets(walls, (count, lattice.shape), velocity)
-    held = hold(problem, tolerance, start=start, target=target)
+    held = hold(problem, tolerance)
     return _result(walls, held, (lattice, count + len(fines[1])), solid)
 
 
@@ -121,18 +110,6 @@ def _radius(skeleton: Skeleton) -> float:
     """The mean radius of the grains in cells along x; a few cells where there is no grain."""
     radius = skeleton.grains[1]
     return float(radius.mean()) / skeleton.lattice.unit if len(radius) else float(LEAST_CELLS)
-
-
-def _targets(
-    walls: list[Walls], given: tuple[int, tuple[int, int, int]], velocity: Array
-) -> Array:
-    """Velocity (3, n0, n1, n2) of the walls; `given` are the number of grains and the shape."""
-    count, shape = given
-    target = np.zeros((3, *shape), np.float32)
-    for component, (wall, grid) in enumerate(zip(walls, target, strict=True)):
-        moving = wall.owner >= count
-        grid.reshape(-1)[wall.node[moving]] = velocity[wall.owner[moving] - count, component]
-    return target
 
 
 def _result(

@@ -52,7 +52,6 @@ class NetworkFluid:
         grains: of the pack, fixed.
         standing: share of the velocity given below which a fine belongs to the deposit.
         renewed: share of the deposit that may change before the network is solved anew.
-        cake_beyond: whether the cake is at the other end: that of a clean-up, mirrored.
     """
 
     case: InvasionCase
@@ -60,7 +59,6 @@ class NetworkFluid:
     grains: Snapshot
     standing: float = STANDING
     renewed: float = RENEWED
-    cake_beyond: bool = False
 
     @property
     def measured(self) -> tuple[str, ...]:
@@ -118,8 +116,7 @@ class NetworkFluid:
         near = local_porosity(spheres, self.case.periodic)
         share = pack.share_at(fines.position, carried)
         shape = place.velocity * share[:, None]
-        beyond = (depth >= pack.length) if self.cake_beyond else np.zeros(len(fines), bool)
-        caked = standing & ((depth < 0) | beyond)
+        caked = standing & (depth < 0)
         factor = self._factor(near, fines, before * shape)
         crowd = self.scales.push.coefficient * fines.radius * factor
         goes, rate = ~standing, self._drag_rate(fines, crowd, moment)

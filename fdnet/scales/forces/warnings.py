@@ -32,7 +32,7 @@ def reynolds_warnings(
     if reynolds > MOST_REYNOLDS:
         return [f"{outside} and of Schiller and Naumann's (below {MOST_REYNOLDS:g})"]
     remedy = 'set drag.inertia = "schiller-naumann"'
-    if case.drag.scheme not in ("held", "every_step") and not case.drag.coupled:
+    if case.drag.scheme != "held" and not case.drag.coupled:
         remedy += ' with drag.scheme = "held"'
     return [
         f"{outside}: the drag on a fine at rest is {drag_factor(reynolds):.3g} times as large by "

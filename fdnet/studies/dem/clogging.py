@@ -14,13 +14,13 @@ from fdnet.dem.checkpoint import read_history, readable_states
 from fdnet.errors import CaseError
 from fdnet.report.figures import draw
 from fdnet.report.tables import write_rows
-from fdnet.run.arrivals import arrivals
 from fdnet.run.bridging import CLOGGED
 from fdnet.run.open_run import open_run
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.snapshot import Array
-from fdnet.statistics.shares import wilson_interval
+from fdnet.studies.dem.arrivals import arrivals
+from fdnet.studies.engine.bands import wilson_interval
 
 RATIOS = (0.0, 0.25, 0.33, 0.4, 0.5, 0.65, 0.8, 1.0, 1.5, math.inf)
 """Edges of the classes of the diameter of a fine over that of the throat."""

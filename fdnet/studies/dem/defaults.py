@@ -8,8 +8,8 @@ import numpy as np
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import read_case
 from fdnet.case.shipped import case_path
-from fdnet.statistics.bands import half_width
 from fdnet.studies.dem.runs import invasion_run
+from fdnet.studies.engine.bands import half_width
 from fdnet.studies.engine.error_rows import against_reference
 from fdnet.studies.engine.levels import levels, percent
 from fdnet.studies.engine.markdown import markdown_table

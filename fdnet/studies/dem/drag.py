@@ -1,4 +1,4 @@
-"""Drag: four schemes against the exact relaxation of one fine, and in whole invasions."""
+"""Drag: its schemes against the exact relaxation of one fine, and in whole invasions."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,8 @@ from fdnet.studies.dem.runs import (
 from fdnet.studies.engine.error_rows import against_reference, profile_distance, sizes
 from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study, Value
 
-EVERY, HELD, IMPLICIT, VISCOUS = "every_step", "held", "implicit", "viscous"
+EVERY, HELD, IMPLICIT, VISCOUS = "every step", "held", "implicit", "viscous"
+"""Names of the series; `EVERY` is held drag that is computed at each step."""
 SCHEMES = (EVERY, HELD, IMPLICIT, VISCOUS)
 HOLDING, OTHER = "invasion, held", "invasion, not held"
 RESTARTED = "implicit, a run every tau/4"
@@ -130,8 +131,12 @@ def _invasion_case(point: Point, form: Form) -> InvasionCase:
 
 def _scheme_keys(value: Value, steps_per_tau: int) -> tuple[str, ...]:
     if isinstance(value, str):
-        return (f"drag.scheme={value}",)
+        return _scheme(value)
     return (f"drag.scheme={HELD}", f"drag.refresh_steps={round(value * steps_per_tau)}")
+
+
+def _scheme(name: str) -> tuple[str, ...]:
+    return ("drag.refresh_steps=1",) if name == EVERY else (f"drag.scheme={name}",)
 
 
 def _fall(series: str, interval: float, looks: int, work: Path, slug: str) -> dict[str, float]:
@@ -149,7 +154,7 @@ def _fall(series: str, interval: float, looks: int, work: Path, slug: str) -> di
         relaxation_run(
             work,
             f"{slug}-{n}",
-            f"drag.scheme={series}",
+            *_scheme(series),
             over_tau=interval,
             spans=n * interval,
             looks=1,

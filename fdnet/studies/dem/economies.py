@@ -29,7 +29,6 @@ _PLAIN: Mapping[str, str] = {
     "fines.supply": "slab",
     "run.time_step_factor": "0.1",
     "run.stiffness_N_m": "1e4",
-    "drag.scheme": "every_step",
 }
 _KEYS: Mapping[str, Mapping[str, str]] = {
     PLAIN: {},
@@ -37,7 +36,7 @@ _KEYS: Mapping[str, Mapping[str, str]] = {
     STEP: {"run.time_step_factor": "0.2"},
     SOFT: {"run.stiffness_N_m": "3e3"},
     SOFTER: {"run.stiffness_N_m": "1e3"},
-    HELD: {"drag.scheme": "held"},
+    HELD: {},
     VISCOUS: {"drag.scheme": "viscous"},
     IMPLICIT: {"drag.scheme": "implicit"},
 }
@@ -134,7 +133,10 @@ def case_of(point: Point) -> InvasionCase:
     form = FORMS[size, series]
     keys = {"fines.count": str(form.fines), "run.duration_ms": repr(form.duration_ms), **form.keys}
     keys |= {**_PLAIN, **_FINES[series]}
-    for economy in _TOGETHER[series] if point.value == ALL else (str(point.value),):
+    economies = _TOGETHER[series] if point.value == ALL else (str(point.value),)
+    if HELD not in economies:
+        keys["drag.refresh_steps"] = "1"
+    for economy in economies:
         keys |= _KEYS[economy]
     return slab_case(
         point.seed, *(f"{key}={text}" for key, text in keys.items()), small=size == "small"

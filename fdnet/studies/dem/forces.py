@@ -113,7 +113,7 @@ def _turns(count: int, size: tuple[str, ...], turns: tuple[int, int], work: Path
 
 
 def _case(count: int, *settings: str) -> InvasionCase:
-    return slab_case(1, f"fines.count={count}", "drag.scheme=every_step", *settings)
+    return slab_case(1, f"fines.count={count}", "drag.refresh_steps=1", *settings)
 
 
 def _deck(case: InvasionCase, grains: Snapshot) -> tuple[str, str]:

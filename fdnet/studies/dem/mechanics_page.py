@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from fdnet.statistics.bands import half_width
+from fdnet.studies.engine.bands import half_width
 from fdnet.studies.engine.markdown import figure, markdown_table
 from fdnet.studies.engine.study import DONE, Row, Value, shown
 

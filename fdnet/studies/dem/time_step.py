@@ -49,7 +49,7 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
     if point.series == ENERGY:
         return energy_run(work, point.slug, factor=point.value, seed=point.seed, spans=_SPANS)
     if point.series == DRAG:
-        return relaxation_run(work, point.slug, "drag.scheme=every_step", over_tau=point.value)
+        return relaxation_run(work, point.slug, "drag.refresh_steps=1", over_tau=point.value)
     step = (f"run.stiffness_N_m={_INVASION_STIFFNESS!r}", f"run.time_step_factor={point.value!r}")
     return invasion_run(
         slab_case(point.seed, *step, small=point.settings["size"] == "small"), work, point.slug

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.statistics.bands import half_width
+from fdnet.studies.engine.bands import half_width
 from fdnet.studies.engine.study import DONE, Measured, Row, Value, row_of
 
 NAN = float("nan")

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fdnet.statistics.bands import half_width
+from fdnet.studies.engine.bands import half_width
 from fdnet.studies.engine.study import Row, Value
 
 NAN = float("nan")

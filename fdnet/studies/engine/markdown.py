@@ -4,7 +4,8 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-from fdnet.statistics.bands import ROUNDING, Band
+from fdnet.statistics.bands import Band
+from fdnet.studies.engine.bands import ROUNDING
 
 NONE = "–"
 WIDTH = 99

@@ -47,7 +47,7 @@ _BASE = {
         "velocity_m_s": _SPEED,
     },
     "drag": {
-        "scheme": "every_step",
+        "refresh_steps": 1,
         "upstream": "interstitial",
         "pressure_gradient": False,
     },

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from fdnet.statistics.bands import Sample, band
+from fdnet.studies.engine.bands import Sample, band
 from fdnet.studies.engine.markdown import NONE, as_told, markdown_table, with_band
 from fdnet.studies.thesis.compare.table_properties import (
     ENDED,

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from fdnet.case.shipped import QUICK
-from fdnet.statistics.bands import Sample
+from fdnet.studies.engine.bands import Sample
 from fdnet.studies.thesis.numbers.examine import THESIS_PAIR
 from fdnet.studies.thesis.numbers.results import ResultRow
 

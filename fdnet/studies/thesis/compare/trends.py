@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fdnet.statistics.bands import ROUNDING, Band, Sample, band, difference
+from fdnet.statistics.bands import Band
+from fdnet.studies.engine.bands import ROUNDING, Sample, band, difference
 from fdnet.studies.engine.csv_rows import write_flat
 from fdnet.studies.thesis.compare.trend_claims import ALIKE, MARGIN, Claim, claims
 from fdnet.studies.thesis.compare.trend_quantities import (

@@ -16,7 +16,7 @@ import numpy as np
 
 from fdnet.network.laws.damage import CLOGGING, DEPOSITION
 from fdnet.spheres.snapshot import Array
-from fdnet.statistics.shares import wilson_interval
+from fdnet.studies.engine.bands import wilson_interval
 from fdnet.studies.engine.csv_rows import write_flat
 from fdnet.studies.thesis.numbers.examine import Examined
 from fdnet.studies.thesis.numbers.first_millimetre import FirstMillimetre, first_millimetre

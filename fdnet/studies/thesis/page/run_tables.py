@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from fdnet.scales.scales import scales_of
-from fdnet.statistics.bands import Sample, band
+from fdnet.studies.engine.bands import Sample, band
 from fdnet.studies.engine.markdown import NONE, figure, markdown_table, with_band
 from fdnet.studies.thesis.compare.trend_quantities import known, runs_of
 from fdnet.studies.thesis.numbers.examine import DEFAULT_PAIR

@@ -7,9 +7,9 @@ import pytest
 from network.packs import random_pack
 
 from fdnet.network.network import build_network
-from fdnet.run.arrivals import arrivals
 from fdnet.spheres.images import wrapped
 from fdnet.spheres.snapshot import Kind, Snapshot
+from fdnet.studies.dem.arrivals import arrivals
 from fdnet.studies.dem.clogging import Met, clogging_rows
 
 RADIUS = 0.05
