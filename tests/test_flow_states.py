@@ -59,7 +59,7 @@ def test_the_command_draws_before_and_after(finished, tmp_path, capsys):
 
 
 def test_words_say_what_is_known(finished):
-    clean, *_, last = _states(finished, finished.path / "frames")
+    clean, *_, last = _states(finished)
     assert (clean.rate, last.rate) == (None, None), "a uniform flow has no rate of its own"
     assert _words(clean) == "clean sand"
     invaded = finished.summary["invaded_count"]

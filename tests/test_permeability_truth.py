@@ -104,9 +104,9 @@ def test_compared_laws_give_what_each_gives_alone(capsys, tmp_path):
         "porosity_damaged",
         "solver",
         "network_counts",
-        "warnings",
     ):
         assert both[key] == alone[key], key
+    assert both["warnings"] == alone["warnings"][1:]  # the first is on the laws of the thesis
     with table.open() as rows:
         written = {
             (row["law"], row["damage_law"]): float(row["k_damaged_m2"])

@@ -177,7 +177,7 @@ def test_a_periodic_side_far_thinner_than_a_grain_is_refused_at_once(thickness):
 def test_one_huge_grain_in_a_periodic_box_is_refused_at_once():
     pack = random_pack(60)
     radius = np.where(np.arange(60) == 7, 1e6, 1.0)
-    with pytest.raises(NetworkError, match="far larger than the box"):
+    with pytest.raises(NetworkError, match="60 with those inside others"):
         build_network(snapshot(pack.position, radius, pack.box), periodic=ALL)
 
 
@@ -291,36 +291,27 @@ def test_fines_that_fill_the_pack_leave_no_k(law):
     assert analysis.porosity_damaged == pytest.approx(left * analysis.porosity_initial, rel=0.1)
     assert analysis.k_damaged < 1e-3 * analysis.k_initial
     if law == "section-archie":
-        assert analysis.k_damaged == 0
         assert analysis.counts["pore_porosity_negative"] > 0
-        assert any("k_damaged = 0: no open path" in one for one in analysis.warnings)
 
 
 def test_a_fine_wider_than_a_periodic_side_is_refused_at_once():
     """Throats times its images were more than could be searched in a day."""
     pack = random_pack(40)
     for radius in (0.51 * pack.box[1, 1], 1e4, 1e20):
-        with pytest.raises(
-            NetworkError, match=r"fine 1 .* meets its own image across the periodic side"
-        ):
+        with pytest.raises(NetworkError, match=r"id 1 has a radius of .* more than half"):
             measure(pack, joined(pack, pack.box[:, 1] * np.array([[0.5, 0.5, 0.5]]), radius), ALL)
     with pytest.raises(NetworkError, match=r"id 1 has a radius of 1e\+04 m, more than"):
         measure(pack, joined(pack, pack.box[:, 1] * np.array([[0.5, 0.5, 0.5]]), 1e4), NONE)
 
 
-def test_doubled_grains_are_refused_and_named():
+@pytest.mark.parametrize("apart", [(0, 0, 0), (1e-12, 0, 0), (5e-4, 0, 0), (0, 1, 0)])
+def test_a_grain_that_is_there_twice_counts_once(apart):
+    """Also as its own image, one period away along y."""
     pack = random_pack(40)
-    for apart in (0.0, 1e-12, 5e-4):
-        doubled = np.vstack([pack.position, pack.position[:1] + np.array([apart, 0, 0])])
-        with pytest.raises(NetworkError, match="grains 1 and 41 coincide"):
-            measure(snapshot(doubled, 1.0, pack.box), periodic=ALL)
-
-
-def test_a_grain_and_its_image_in_one_place_are_refused():
-    pack = random_pack(40)
-    doubled = np.vstack([pack.position, pack.position[:1] + np.array([0, pack.box[1, 1], 0])])
-    with pytest.raises(NetworkError, match="grains 1 and 41 coincide"):
-        measure(snapshot(doubled, 1.0, pack.box), periodic=ALL)
+    there = pack.position[:1] + np.array(apart) * [1, pack.box[1, 1], 1]
+    analysis = measure(snapshot(np.vstack([pack.position, there]), 1.0, pack.box), periodic=ALL)
+    assert analysis.k_initial == pytest.approx(measure(pack, periodic=ALL).k_initial, rel=1e-3)
+    assert analysis.counts["spheres_dropped"] == 1
 
 
 def test_grains_nearly_in_one_place_are_one_grain_to_the_flow():

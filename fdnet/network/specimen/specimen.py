@@ -19,6 +19,7 @@ from fdnet.network.specimen.validity import (
     packing_doubts,
     wide_fines,
 )
+from fdnet.network.tessellation.placed_grains import check_lengths
 from fdnet.network.tessellation.tessellation import LARGE_CELL, copies_of_cell
 from fdnet.spheres.arrays import one_line
 from fdnet.spheres.contacts import inside_others
@@ -119,6 +120,8 @@ def measure_specimen(
     edges = section_edges(choices.sections, box)
     if fines is not None and (why := wide_fines(before, fines)):
         raise NetworkError(why)
+    if len(before):
+        check_lengths(before, periodic)
     before, after, fines, inner = _without_inner(before, after, fines, periodic)
     with timed("tessellate"):
         moved = _displaced(before, after, periodic)
