@@ -1,6 +1,6 @@
 """Which throats the fines close, by the width of the throat and by the ratio of fine to throat.
 
-A throat is the circle that touches three grains. Beside a side wall or an end face it runs out to
+A throat is the circle that touches three grains. At a side wall or an end face it runs out to
 the mirror images of the grains, which make it wider than any between grains, and each such throat
 counts twice; these have a row of their own, and no width. Shares of a count have Wilson's 95 %
 band (J. Am. Stat. Assoc. 22, 209, 1927).
