@@ -7,7 +7,6 @@ import sys
 
 import pytest
 from builders import tiny
-from fdnet.run.finished_text import text_lines
 
 import fdnet
 from fdnet.campaign.result.words import value_text
@@ -16,7 +15,7 @@ from fdnet.case.file import case_from
 from fdnet.cli import main
 from fdnet.report.html import ReportParts, write_report
 from fdnet.run.pipeline import with_default_laws
-from fdnet.run.summary_text import summary_lines
+from fdnet.run.summary_text import summary_lines, text_lines
 from fdnet.scales.check.checked import checked
 from fdnet.scales.check.narrow import PERIODIC, WALLS, WIDTHS, width_error
 from fdnet.scales.scales import scales_of

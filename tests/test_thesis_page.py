@@ -9,7 +9,7 @@ import pytest
 from fdnet.errors import CaseError
 from fdnet.studies.thesis.collection import RESULTS
 from fdnet.studies.thesis.compare.trends import compare_trends
-from fdnet.studies.thesis.numbers.examine import examine
+from fdnet.studies.thesis.numbers.examine import THESIS_PAIR, examine
 from fdnet.studies.thesis.numbers.results import read_results, result_rows
 from fdnet.studies.thesis.numbers.values import thesis_of
 from fdnet.studies.thesis.outputs import CAPTIONS, DEPOSITION, TETRAHEDRA
@@ -228,6 +228,7 @@ def test_every_figure_is_there_and_small(root):
 
 @pytest.mark.parametrize("name", ["specimen1", "specimen5"])
 def test_a_kept_state_gives_its_rows_again(root, rows, name):
+    """Losses by fdnet's laws are by an earlier `auto`, as the page says."""
     item = Planned(case=name, group="specimen")
     state = read_state(state_path(root / "docs/thesis/states", item))
     assert state.case == item.load()
@@ -238,5 +239,6 @@ def test_a_kept_state_gives_its_rows_again(root, rows, name):
             known.invaded_count,
             known.stop_reason,
         )
-        assert row.k_reductions == pytest.approx(known.k_reductions, rel=1e-6, abs=1e-9)
+        if (row.law, row.damage_law) == THESIS_PAIR:
+            assert row.k_reductions == pytest.approx(known.k_reductions, rel=1e-6, abs=1e-9)
         assert row.porosity_damaged == pytest.approx(known.porosity_damaged, rel=1e-6)

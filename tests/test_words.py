@@ -115,7 +115,6 @@ def test_the_readme_is_short(root):
     "page",
     [
         "README.md",
-        "CHANGELOG.md",
         "docs/accuracy.md",
         "docs/physics_network.md",
         "docs/start/first_answer.md",

@@ -240,7 +240,7 @@ def blocked_throats(analysis: "Analysis") -> Array:
 def between_grains(network: "Network", corners: Array) -> Array:
     """Whether all `corners` (N, n), images of a throat or pore, are grains inside the box; (N,).
 
-    The others lie beside a side wall or an end face and run out to mirror images of the grains.
+    The others lie at a side wall or an end face and run out to mirror images of the grains.
     """
     place, box = np.asarray(network.image_position), np.asarray(network.box)
     inside = (place >= box[:, 0]) & (place <= box[:, 1]) | np.asarray(network.periodic)

@@ -1,6 +1,6 @@
 """Which throats the fines close, by the width of the throat and by the ratio of fine to throat.
 
-A throat is the circle that touches three grains. Beside a side wall or an end face it runs out to
+A throat is the circle that touches three grains. At a side wall or an end face it runs out to
 the mirror images of the grains, which make it wider than any between grains, and each such throat
 counts twice; these have a row of their own, and no width. Shares of a count have Wilson's 95 %
 band (J. Am. Stat. Assoc. 22, 209, 1927).
@@ -39,7 +39,7 @@ class Throats:
         held: (T,) whether it holds a fine.
         blocked: (T,) whether one fine covers its whole cross-section.
         left: (T,) conductance over the clean one; 1 where that is 0.
-        between: (T,) whether it lies between three grains, and not beside a wall or an end face.
+        between: (T,) whether it lies between three grains, and not at a wall or an end face.
     """
 
     width: Array
@@ -89,7 +89,7 @@ def width_rows(throats: Throats) -> list[dict[str, Any]]:
     Diameters are in m; those of the fines are means over the fines in each bridged throat, and
     null where no throat of the class is bridged.
     """
-    inner, beside = throats.where(throats.between), throats.where(~throats.between)
+    inner, at_walls = throats.where(throats.between), throats.where(~throats.between)
     rows = []
     if len(inner.width):
         edges = np.quantile(inner.width, np.linspace(0, 1, CLASSES + 1))
@@ -98,7 +98,7 @@ def width_rows(throats: Throats) -> list[dict[str, Any]]:
             _width_row(inner.where(number == index), (float(low), float(high)))
             for index, (low, high) in enumerate(pairwise(edges))
         ]
-    return [*rows, _width_row(beside, (None, None))] if len(beside.width) else rows
+    return [*rows, _width_row(at_walls, (None, None))] if len(at_walls.width) else rows
 
 
 def _width_row(own: Throats, edges: tuple[float | None, float | None]) -> dict[str, Any]:

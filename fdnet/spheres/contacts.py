@@ -132,9 +132,9 @@ def inside_others(
     tree = neighbour_tree(spheres.position, spheres.box, periodic=periodic)
     # among rigid spheres none has the centre of another one inside
     hosts = np.flatnonzero(tree.query_ball_point(tree.data, radius, return_length=True) > 1)
-    found = tree.query_ball_point(tree.data[hosts], radius[hosts])
-    host = np.repeat(hosts, [len(one) for one in found])
-    guest = np.array([number for one in found for number in one], int)
+    guests = tree.query_ball_point(tree.data[hosts], radius[hosts])
+    host = np.repeat(hosts, [len(one) for one in guests])
+    guest = np.array([number for one in guests for number in one], int)
     rank = np.empty(count, int)
     rank[np.lexsort((np.arange(count), spheres.kind, -radius))] = np.arange(count)
     pair = np.flatnonzero(rank[host] < rank[guest])

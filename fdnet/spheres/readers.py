@@ -247,11 +247,11 @@ def _by_type(rows: SphereRows, types: Mapping[int, str]) -> Array:
         raise CaseError(
             f"{rows.source}: has no types; name kinds in a column, or give fines_below"
         )
-    found, which = np.unique(rows.type, return_inverse=True)
-    missing = sorted(set(found.tolist()) - set(types))
+    present, which = np.unique(rows.type, return_inverse=True)
+    missing = sorted(set(present.tolist()) - set(types))
     if missing:
         raise CaseError(
             f"{rows.source}: type {missing[0]} is neither grain nor fine; name it, for example "
             f"types 1=grain,{missing[0]}=fine"
         )
-    return np.array([KIND_NAMES[types[number]] for number in found.tolist()], np.int64)[which]
+    return np.array([KIND_NAMES[types[number]] for number in present.tolist()], np.int64)[which]

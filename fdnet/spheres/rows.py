@@ -129,9 +129,9 @@ def columns_of(
             raise CaseError(f"{where}: column {name!r} occurs twice in {shown!r}; remove one")
     place = tuple(known[name][0] for name in sought[0])
     radius = {known[name][0]: RADII[name] for name in radii}
-    found = {unit_of[index] for index in (*place, *radius)}
-    if len(found) > 1:
-        shown = ", ".join(sorted(str(unit or "none") for unit in found))
+    written = {unit_of[index] for index in (*place, *radius)}
+    if len(written) > 1:
+        shown = ", ".join(sorted(str(unit or "none") for unit in written))
         raise CaseError(f"{where}: its columns are in different units ({shown}); give all one")
     return Columns(
         names=tuple(names),
@@ -139,7 +139,7 @@ def columns_of(
         scaled=sought[0] in SCALED,
         radius=radius,
         others={name: known[name][0] for name in OTHERS if name in known},
-        unit=found.pop(),
+        unit=written.pop(),
     )
 
 

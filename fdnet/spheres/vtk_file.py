@@ -140,14 +140,14 @@ def _child(reader_name: str, folder: Path) -> None:
     if reader.GetErrorCode() or mesh is None:
         sys.exit(f"VTK reports the error {reader.GetErrorCode()}")
     points = mesh.GetPoints() if hasattr(mesh, "GetPoints") else None
-    found = {"points": np.empty((0, 3)) if points is None else vtk_to_numpy(points.GetData())}
+    by_name = {"points": np.empty((0, 3)) if points is None else vtk_to_numpy(points.GetData())}
     data: Any = mesh.GetPointData() if points is not None else None
     for number in range(0 if data is None else data.GetNumberOfArrays()):
         array = data.GetArray(number)
         if array is not None and array.GetName():
-            found.setdefault(array.GetName(), vtk_to_numpy(array))
-    arrays: dict[str, Any] = {str(k): one for k, one in enumerate(found.values())}
-    np.savez(folder / "out.npz", names=np.array(list(found)), **arrays)
+            by_name.setdefault(array.GetName(), vtk_to_numpy(array))
+    arrays: dict[str, Any] = {str(k): one for k, one in enumerate(by_name.values())}
+    np.savez(folder / "out.npz", names=np.array(list(by_name)), **arrays)
 
 
 if __name__ == "__main__":

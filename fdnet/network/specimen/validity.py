@@ -106,9 +106,9 @@ def packing_doubts(
             f"this porosity ({likely:.3g} m2), which no packing has: do not use it; check the "
             "box, which sides are periodic, and whether radii and places have one unit"
         )
-    for axis, found, expected in _walls_at_periodic_sides(grains, periodic):
+    for axis, pairs, expected in _walls_at_periodic_sides(grains, periodic):
         yield (
-            f"no grain crosses the periodic sides {axis}, and {found} neighbours meet across them "
+            f"no grain crosses the periodic sides {axis}, and {pairs} neighbours meet across them "
             f"where {expected:.0f} are expected: the pack stands as between walls, and the gap "
             f"there carries flow; leave {axis} out of the periodic directions unless the pack "
             "repeats like this"
@@ -143,10 +143,10 @@ def _walls_at_periodic_sides(
     inside = np.abs(apart - np.where(periodic, np.rint(apart / size) * size, 0.0))
     for axis in np.flatnonzero(clear):
         expected = float(inside[:, axis].sum() / size[axis])
-        found = int(np.sum(np.abs(apart[:, axis]) > 0.5 * size[axis]))
+        meeting = int(np.sum(np.abs(apart[:, axis]) > 0.5 * size[axis]))
         wide = size[axis] > LEAST_SIDE * inside.max(initial=0.0)
-        if wide and expected >= FEWEST and found < MISSING * expected:
-            yield "xyz"[axis], found, expected
+        if wide and expected >= FEWEST and meeting < MISSING * expected:
+            yield "xyz"[axis], meeting, expected
 
 
 def empty_duct_permeability(box: Array, periodic: tuple[bool, bool, bool]) -> float:

@@ -90,7 +90,7 @@ def _scatter_keys(grains: int) -> dict[str, Any]:
 
 
 def _sizes(case: InvasionCase, throats: Throats) -> Sizes:
-    """Of throats between grains; where all are beside walls or end faces, of those."""
+    """Of throats between grains; where all are at walls or end faces, of those."""
     width = throats.width[throats.between | ~throats.between.any()]
     middle, largest = np.quantile(width, (0.5, LARGEST))
     fines = case.fines.curve
