@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from fdnet.errors import NetworkError as NetworkError
     from fdnet.mechanics.of_case import elastic_moduli as elastic_moduli
     from fdnet.mechanics.of_case import triaxial_test as triaxial_test
-    from fdnet.network.field.of_pack import velocity_field as velocity_field
+    from fdnet.network.field.field import velocity_field as velocity_field
     from fdnet.network.fines.occupancy import measure_occupancy as measure_occupancy
     from fdnet.network.flow.flow import solve_flow as solve_flow
     from fdnet.network.laws.named import DAMAGE_LAWS as DAMAGE_LAWS
@@ -65,7 +65,7 @@ _HOME = {
     "build_network": "fdnet.network.network",
     "measure_occupancy": "fdnet.network.fines.occupancy",
     "solve_flow": "fdnet.network.flow.flow",
-    "velocity_field": "fdnet.network.field.of_pack",
+    "velocity_field": "fdnet.network.field.field",
     "elastic_moduli": "fdnet.mechanics.of_case",
     "triaxial_test": "fdnet.mechanics.of_case",
     "LAWS": "fdnet.network.laws.named",

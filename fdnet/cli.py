@@ -15,30 +15,17 @@ import threading
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from fdnet.commands import (
-    cases,
-    check,
-    compare,
-    design,
-    ensemble,
-    init,
-    mechanics,
-    movie,
-    permeability,
-    render,
-    run,
-    stokes,
-    study,
-    sweep,
-)
+from fdnet.commands import campaign, finished, init, mechanics, permeability, run, study
+from fdnet.commands.permeability import joined_box
 from fdnet.errors import FdnetError, words_of
-from fdnet.permeability.options import joined_box
 
 COMMANDS = (
-    *(init, cases, check, run, ensemble, sweep, compare, design),
-    *(render, permeability, stokes, mechanics, movie, study),
+    *(init.add_command, run.add_cases, run.add_check, run.add_run),
+    *(campaign.add_ensemble, campaign.add_sweep, campaign.add_compare, campaign.add_design),
+    *(run.add_render, permeability.add_permeability, finished.add_stokes),
+    *(mechanics.add_command, finished.add_movie, study.add_command),
 )
-"""Modules of the commands, in the order that `fdnet --help` shows."""
+"""What adds each command to the parser, in the order that `fdnet --help` shows."""
 
 _STOPPED = 130
 _PATIENCE = 0.2
@@ -148,8 +135,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="fdnet", description=str(__doc__).splitlines()[0])
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
     commands = parser.add_subparsers(required=True, metavar="command")
-    for command in COMMANDS:
-        command.add_command(commands, common)
+    for add in COMMANDS:
+        add(commands, common)
     return parser
 
 

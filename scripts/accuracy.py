@@ -16,7 +16,7 @@ writes docs/validation/accuracy_full_size.csv from finished runs: `section-archi
 import argparse
 from pathlib import Path
 
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 from fdnet.studies.accuracy import write_accuracy, write_full_size
 
 VALIDATION = Path(__file__).resolve().parents[1] / "docs" / "validation"

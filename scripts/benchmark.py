@@ -9,7 +9,7 @@ Every case is run anew in its own folder below --out.
 import argparse
 from pathlib import Path
 
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 from fdnet.studies.benchmark.whole_runs import measure, show, write_table
 
 parser = argparse.ArgumentParser(

@@ -6,7 +6,7 @@
 
 import argparse
 
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 from fdnet.studies.benchmark.field import measure_field
 
 parser = argparse.ArgumentParser(

@@ -9,7 +9,7 @@ A tool that is not installed is named and left out.
 
 import argparse
 
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 from fdnet.studies.benchmark.network import Options, measure, show_growth, write_table
 from fdnet.studies.truth.packs import DATA
 

@@ -6,7 +6,7 @@
 
 import argparse
 
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 from fdnet.studies.benchmark.network import show_growth, write_table
 from fdnet.studies.benchmark.walled import measure_walled
 

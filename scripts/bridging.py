@@ -6,7 +6,7 @@
 
 import argparse
 
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 from fdnet.studies.dem.bridging import pooled_runs
 
 parser = argparse.ArgumentParser(

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from fdnet.cli import main
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 from fdnet.studies.chaos.chaos import chaos, prepared_runs
 from fdnet.studies.chaos.soak import soak
 

@@ -6,7 +6,7 @@
 
 import argparse
 
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 from fdnet.studies.dem.clogging import clogging_of_runs
 
 parser = argparse.ArgumentParser(

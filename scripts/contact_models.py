@@ -9,7 +9,7 @@ Rows that the table already holds are not run again.
 import argparse
 from pathlib import Path
 
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 from fdnet.studies.dem.contact_models import rows, summary
 from fdnet.studies.engine.csv_rows import read_named, write_named
 

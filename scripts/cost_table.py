@@ -13,9 +13,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from fdnet.case.file import read_case
-from fdnet.case.shipped import case_path, shipped_cases
-from fdnet.files.paths import path_option
+from fdnet.case.file import case_path, read_case, shipped_cases
+from fdnet.files import path_option
 from fdnet.scales.cost import cost_of, peak_memory
 from fdnet.scales.scales import scales_of
 

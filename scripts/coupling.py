@@ -10,7 +10,7 @@ can be repeated. CPU seconds are known of runs that this call makes.
 import argparse
 from pathlib import Path
 
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 from fdnet.studies.dem.coupling import FLUIDS, coupling_rows, write_rows
 
 parser = argparse.ArgumentParser(

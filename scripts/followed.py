@@ -10,7 +10,7 @@ command can be repeated. The uniform runs are read from the table of `fdnet stud
 import argparse
 from pathlib import Path
 
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 from fdnet.studies.dem.followed import SUPPLIED, followed_rows, uniform_rows, write_followed
 
 TABLE = Path(__file__).resolve().parents[1] / "docs" / "thesis" / "results.csv"

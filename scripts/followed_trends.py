@@ -11,7 +11,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 from fdnet.studies.dem.followed import FLOW
 from fdnet.studies.thesis.collection import collect
 from fdnet.studies.thesis.numbers.results import write_results

@@ -10,7 +10,7 @@ Both need LIGGGHTS. `effect` keeps finished runs below --out and continues cut o
 import argparse
 from pathlib import Path
 
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 from fdnet.studies.dem.forces import cost_rows, effect_rows
 from fdnet.studies.engine.csv_rows import write_as_they_come
 

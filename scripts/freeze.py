@@ -19,7 +19,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import fdnet
-from fdnet.network.analysis import Analysis
+from fdnet.network.permeability import Analysis
 from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.truth.packs import read_pack, truth_folder
 from fdnet.studies.truth.slabs import SLAB_FOLDER, SLAB_TRUTH, read_specimen

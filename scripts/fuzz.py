@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 from fdnet.cli import main
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 from fdnet.studies.fuzz.fuzz import fuzz
 
 MEMORY_BYTES = 6 << 30

@@ -8,7 +8,7 @@ It checks the forces of `drag.field = "network"`. The runs must be finished.
 
 import argparse
 
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 from fdnet.studies.dem.pressure_share import share_rows
 from fdnet.studies.engine.csv_rows import write_as_they_come
 

@@ -11,7 +11,7 @@ import argparse
 
 from fdnet.case.file import read_case
 from fdnet.dem.liggghts import Launch
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 from fdnet.studies.dem.runs import grains_of, the_binary
 from fdnet.studies.dem.solve_lag import lag_rows
 from fdnet.studies.engine.csv_rows import write_as_they_come

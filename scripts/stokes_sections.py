@@ -9,9 +9,8 @@ What a run keeps in its folder is not solved again (docs/how-to/check_the_face.m
 import argparse
 
 import fdnet
-from fdnet.files.paths import path_option
-from fdnet.run.stokes_grids import ACROSS_A_FINE
-from fdnet.run.stokes_sections import stokes_sections
+from fdnet.files import path_option
+from fdnet.run.stokes_sections import ACROSS_A_FINE, stokes_sections
 from fdnet.studies.engine.csv_rows import write_named
 
 parser = argparse.ArgumentParser(

@@ -22,7 +22,7 @@ import shlex
 import sys
 from pathlib import Path
 
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 from fdnet.studies.truth.grids import Solve, make, solve
 from fdnet.studies.truth.made_packs import PACKS
 from fdnet.studies.truth.made_slabs import SLABS, make_specimens

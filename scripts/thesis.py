@@ -10,7 +10,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 from fdnet.studies.thesis.page.document import write_page
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -10,7 +10,7 @@ which are then copied to docs/validation; --redraw makes the last two anew from 
 import argparse
 from pathlib import Path
 
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 from fdnet.studies.pages.validation import redraw, write_page
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from fdnet.dem.binary import Binary, find_binary
+from fdnet.dem.liggghts import Binary, find_binary
 from fdnet.run.finished import FinishedRun
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -8,13 +8,26 @@ import pandas as pd
 import pytest
 
 from fdnet.case.file import read_case
-from fdnet.report.units import in_millidarcy, millidarcy, percent
-from fdnet.run.answer.case_words import case_words
-from fdnet.run.answer.damage import series, steps_of, zone_of
-from fdnet.run.answer.rules import Sizes, rules_of, run_shows
-from fdnet.run.answer.scatter import FULL, QUICK
-from fdnet.run.answer.sentence import answer_sentence, certainty, end_words, in_place_words
-from fdnet.run.answer.skin import Step, flow_lost, hawkins, layered_skin
+from fdnet.report.tables import in_millidarcy, millidarcy, percent
+from fdnet.run.answer import (
+    FULL,
+    QUICK,
+    Sizes,
+    Step,
+    answer_sentence,
+    case_words,
+    certainty,
+    end_words,
+    flow_lost,
+    hawkins,
+    in_place_words,
+    layered_skin,
+    rules_of,
+    run_shows,
+    series,
+    steps_of,
+    zone_of,
+)
 from fdnet.run.summary import above_intact
 from fdnet.scales.scales import scales_of
 

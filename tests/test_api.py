@@ -217,7 +217,7 @@ def test_only_public_names_are_listed():
 
 
 def test_the_keywords_of_analyse_are_visible():
-    from fdnet.case.analysis import AnalysisKeys
+    from fdnet.case.tables import AnalysisKeys
 
     for function in (fdnet.analyse, fdnet.compare):
         assert set(AnalysisKeys.__annotations__) <= set(inspect.signature(function).parameters)

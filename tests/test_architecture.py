@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from fdnet.case.keys import known_keys
+from fdnet.case.file import known_keys
 
 LAYERS = [
-    ["errors"],
+    ["errors", "names"],
     ["files"],
     ["sizes", "statistics"],
     ["spheres", "case"],
@@ -16,7 +16,7 @@ LAYERS = [
     ["mechanics"],
     ["dem", "report"],
     ["run"],
-    ["permeability", "studies", "campaign"],
+    ["studies", "campaign"],
     ["commands"],
     ["cli"],
 ]
@@ -24,13 +24,13 @@ LAYERS = [
 
 NETWORK_LAYERS = [
     ["geometry", "compiled", "stokes"],
-    ["field", "cores"],
+    ["field"],
     ["tessellation"],
     ["network"],
     ["nodes"],
     ["fines", "flow"],
-    ["laws", "specimen", "analysis"],
-    ["resolved"],
+    ["laws", "specimen"],
+    ["states"],
     ["permeability"],
 ]
 STUDIES_LAYERS = [
@@ -68,35 +68,26 @@ DOORS = {
     "subprocess": {
         "campaign/engine/local",
         "campaign/engine/snakemake",
-        "dem/binary",
-        "dem/feed",
         "dem/liggghts",
-        "dem/process",
         "report/child",
         "spheres/vtk_file",
         "studies/benchmark",
         "studies/chaos",
     },
-    "pandas": {"spheres/dump", "spheres/csv_file", "report/tables", "report/read_tables"},
+    "pandas": {"spheres/dump", "spheres/readers", "report/tables"},
     "pyvista": {
         "report/flow_frames",
-        "report/meshes",
+        "report/vtk",
         "report/movie_frames",
         "report/picture",
-        "report/vtk",
     },
     "vtkmodules": {"report/vtk", "spheres/vtk_file"},
     "imageio_ffmpeg": {"report/movie"},
-    "openpnm": {"report/openpnm", "studies/benchmark"},
+    "openpnm": {"report/tables", "studies/benchmark"},
     "pyarrow": {"campaign/result/table"},
     "matplotlib": {
         "campaign/page/figures",
-        "report/depth_figure",
-        "report/stress_strain",
         "report/figures",
-        "report/network_figure",
-        "report/side_view",
-        "report/size_figure",
         "studies/accuracy",
         "studies/dem/mechanics_figure",
         "studies/engine/draw",
@@ -105,9 +96,9 @@ DOORS = {
     },
     "PIL": {"report/movie", "studies/thesis/figures/canvas"},
     "numba": {"network/compiled"},
-    "pymetis": {"mechanics/solver", "network/flow/solver"},
+    "pymetis": {"mechanics/springs", "network/flow/solver"},
     "pyamg": {"network/flow/solver", "studies/network/solver_peers"},
-    "pydantic": {"case", "report/read_tables", "run/record_files", "campaign/plan/folder"},
+    "pydantic": {"case", "report/tables", "run/folder", "campaign/plan/folder"},
     "tomli_w": {"case/case", "studies/fuzz/mutations"},
     "rich": {"run/progress"},
 }

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 from builders import tiny
 
-from fdnet.case.difference import difference_text
+from fdnet.case.case import difference_text
 from fdnet.case.file import case_from, set_keys
 from fdnet.cli import COMMANDS, main
-from fdnet.run.mark import mark_folder
+from fdnet.run.folder import mark_folder
 
 SAND_AND_MUD = """
 name = "bad"

@@ -12,10 +12,16 @@ import pytest
 import tomli_w
 from builders import TINY, tiny
 
-from fdnet.case.added import AS_BEFORE, completed, without_added
-from fdnet.case.case import KEYS, Case, InvasionCase, with_fines
-from fdnet.case.file import case_from, read_case, recorded_case, set_keys
-from fdnet.case.keys import known_keys
+from fdnet.case.case import (
+    AS_BEFORE,
+    KEYS,
+    Case,
+    InvasionCase,
+    completed,
+    with_fines,
+    without_added,
+)
+from fdnet.case.file import case_from, known_keys, read_case, recorded_case, set_keys
 from fdnet.errors import CaseError
 from fdnet.scales.scales import InvasionScales, Scales, scales_of
 from fdnet.studies.thesis.runs.carry_out import find_state, state_path

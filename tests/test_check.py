@@ -10,16 +10,15 @@ from builders import tiny
 
 import fdnet
 from fdnet.campaign.result.words import value_text
-from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.file import case_from
+from fdnet.case.tables import AnalysisChoices
 from fdnet.cli import main
 from fdnet.report.html import ReportParts, write_report
 from fdnet.run.pipeline import with_default_laws
-from fdnet.run.summary_text import summary_lines, text_lines
-from fdnet.scales.check.checked import checked
-from fdnet.scales.check.narrow import PERIODIC, WALLS, WIDTHS, width_error
+from fdnet.run.summary import summary_lines, text_lines
+from fdnet.scales.check import PERIODIC, WALLS, WIDTHS, checked, width_error
+from fdnet.scales.clock import spoken_memory, spoken_time
 from fdnet.scales.scales import scales_of
-from fdnet.scales.times import spoken_memory, spoken_time
 
 
 def keys(*assignments: str) -> set[str]:
@@ -142,7 +141,7 @@ def test_what_check_finds_stands_in_summary_and_report(finished):
 
 STOPPED = """
 import ctypes, signal, sys, time
-import fdnet.cli, fdnet.commands.check
+import fdnet.cli, fdnet.commands.run
 
 def check(options):
     ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))()  # swallows the stop
@@ -151,7 +150,7 @@ def check(options):
     time.sleep(20)
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
-fdnet.commands.check._check = check
+fdnet.commands.run._check = check
 sys.argv = ["fdnet", "check", "case.toml"]
 sys.exit(fdnet.cli.main())
 """

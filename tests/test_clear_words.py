@@ -79,7 +79,7 @@ def test_long_numbers_in_files_of_spheres_are_refused(tmp_path, capsys, number):
 
 @pytest.mark.parametrize(("column", "value"), [("type", 3.0), ("radius", 0.0)])
 def test_a_dump_of_a_run_with_a_sphere_of_no_kind_or_size_is_named(column, value):
-    from fdnet.dem.scene import snapshot_of
+    from fdnet.dem.deck import snapshot_of
     from fdnet.spheres.dump import COLUMNS, Frame
 
     columns = tuple(COLUMNS.split())
@@ -105,7 +105,7 @@ def test_a_dump_of_a_run_with_a_sphere_of_no_kind_or_size_is_named(column, value
     ],
 )
 def test_records_of_another_shape_are_named(tmp_path, stage, key, value):
-    from fdnet.run.record_files import read_manifest, read_record
+    from fdnet.run.folder import read_manifest, read_record
 
     row = {"version": "3.8.0", "seconds": 1.0, "liggghts_s": 1.0}
     numbers = dict.fromkeys(
@@ -152,7 +152,8 @@ def test_ranks_have_a_bound_that_fits_the_machine(tmp_path, case, capsys):
 
 
 def test_more_ranks_than_cores_are_warned_of_at_once(tmp_path, case, capsys, monkeypatch):
-    from fdnet.run import pipeline, session
+    from fdnet.run import pipeline
+    from fdnet.run import records as session
 
     monkeypatch.setattr(pipeline, "run_stages", lambda *_: {})
     monkeypatch.setattr(session, "cores", lambda: 2)
@@ -183,7 +184,7 @@ def test_a_picture_that_could_not_be_drawn_is_said_on_standard_error(
 def test_surroundings_are_named_and_not_blamed_on_liggghts(tmp_path, monkeypatch):
     import resource
 
-    from fdnet.dem.binary import find_binary
+    from fdnet.dem.liggghts import find_binary
 
     monkeypatch.setenv("TMPDIR", str(tmp_path / "none"))
     with pytest.raises(LiggghtsError, match=r"TMPDIR: .*none is no folder"):
@@ -195,7 +196,7 @@ def test_surroundings_are_named_and_not_blamed_on_liggghts(tmp_path, monkeypatch
 
 
 def test_a_program_without_its_helpers_is_named(tmp_path):
-    from fdnet.dem.binary import find_binary
+    from fdnet.dem.liggghts import find_binary
 
     fake = tmp_path / "liggghts"
     fake.write_text("#!/bin/sh\nno-such-helper-of-liggghts\n")
@@ -205,7 +206,7 @@ def test_a_program_without_its_helpers_is_named(tmp_path):
 
 
 def test_a_disk_without_free_inodes_is_full(tmp_path, monkeypatch):
-    from fdnet.files import atomic
+    from fdnet import files as atomic
 
     class NoInodes:
         f_files, f_favail = 100, 0
@@ -264,7 +265,7 @@ def test_a_library_that_cannot_be_loaded_is_named(tmp_path, capsys, monkeypatch)
 
 def test_a_failure_of_python_itself_for_want_of_memory_is_named(capsys, monkeypatch, tmp_path):
     """Attack 939 of seed 1: an import under a limit of 300 MiB ended with a SystemError."""
-    from fdnet.permeability import command as permeability_command
+    from fdnet.commands import permeability as permeability_command
 
     def importing(_):
         raise SystemError("_find_and_load returned NULL without setting an exception")
@@ -276,7 +277,7 @@ def test_a_failure_of_python_itself_for_want_of_memory_is_named(capsys, monkeypa
 def test_a_stop_that_a_library_turns_into_its_own_error_is_a_stop(capsys, monkeypatch, tmp_path):
     import signal
 
-    from fdnet.permeability import command as permeability_command
+    from fdnet.commands import permeability as permeability_command
 
     def importing(_):
         try:
@@ -324,7 +325,7 @@ def test_porosities_that_were_not_validated_are_warned_of():
 
 
 def test_a_permeability_above_that_of_the_empty_duct_is_said_with_its_number():
-    from fdnet.network.specimen.validity import doubts, empty_duct_permeability
+    from fdnet.network.specimen import doubts, empty_duct_permeability
 
     box = np.array([[0, 1.0], [0, 2.0], [0, 2.0]])
     square = empty_duct_permeability(box, (False, False, False))

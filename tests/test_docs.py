@@ -69,7 +69,7 @@ def test_every_key_of_a_case_has_a_meaning():
 
 
 def test_the_case_reference_shows_every_table(root):
-    from fdnet.case.keys import known_keys
+    from fdnet.case.file import known_keys
 
     page = (root / "docs" / "reference" / "case.md").read_text()
     tables = {key.split(".")[0] for key in known_keys() if "." in key}
@@ -214,7 +214,7 @@ def run_folder(tmp_path_factory):
     from builders import tiny
 
     from fdnet.run.pipeline import run_stages
-    from fdnet.run.session import RunOptions
+    from fdnet.run.records import RunOptions
 
     folder = tmp_path_factory.mktemp("docs") / "run"
     run_stages(tiny("run.cap_ms=0.35"), RunOptions(out=folder, show_progress=False))

@@ -10,7 +10,7 @@ from fdnet.dem.invade_deck import render_invade
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.errors import CaseError
-from fdnet.scales.drive import impact_stokes
+from fdnet.scales.flow import impact_stokes
 from fdnet.scales.scales import InvasionScales, scales_of
 from fdnet.scales.table import scale_rows
 from fdnet.spheres.snapshot import Array, Kind

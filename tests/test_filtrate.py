@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from fdnet.run.filtrate import fit_filtration
+from fdnet.run.cake import fit_filtration
 
 PRESSURE, VISCOSITY, PACK = 3.5e6, 0.05, 4e7
 """Pa, Pa s, and the resistance of the pack in 1/m."""

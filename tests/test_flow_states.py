@@ -7,8 +7,7 @@ from PIL import Image
 
 from fdnet import solve_flow
 from fdnet.cli import main
-from fdnet.run.flow_states import LINES, colour_limits, flux_of, streamlines_of
-from fdnet.run.movie import _states, _words
+from fdnet.run.movie import LINES, _states, _words, colour_limits, flux_of, streamlines_of
 
 pytestmark = pytest.mark.liggghts
 

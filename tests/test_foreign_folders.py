@@ -102,7 +102,7 @@ def test_a_folder_with_the_empty_lock_of_a_session_killed_at_once_is_empty(tmp_p
 def test_a_refused_run_leaves_what_another_put_into_its_new_folder(tmp_path, case, monkeypatch):
     from fdnet.errors import CaseError
     from fdnet.run import pipeline
-    from fdnet.run.session import RunOptions
+    from fdnet.run.records import RunOptions
 
     def refuse(session):
         (session.path / "notes.txt").write_text("mine")
@@ -205,7 +205,7 @@ def test_the_table_of_laws_never_replaces_a_device_a_pipe_or_a_folder(tmp_path, 
 
 def test_no_file_is_replaced_where_a_device_or_a_folder_stands(tmp_path):
     from fdnet.errors import CaseError
-    from fdnet.files.atomic import write_text
+    from fdnet.files import write_text
 
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "folder").mkdir()

@@ -9,7 +9,7 @@ from scipy.integrate import quad
 
 from fdnet.case.file import case_from
 from fdnet.errors import CaseError
-from fdnet.scales.hertz import (
+from fdnet.scales.contacts import (
     REFERENCE_OVERLAP,
     STEP_OVERLAP,
     collision_time,

@@ -10,9 +10,9 @@ from builders import tiny
 
 import fdnet
 from fdnet.errors import CaseError, DumpError, FdnetError
-from fdnet.run.made_files import TABLES
+from fdnet.run.folder import TABLES
 from fdnet.run.pipeline import run_stages
-from fdnet.run.session import RunOptions
+from fdnet.run.records import RunOptions
 
 pytestmark = pytest.mark.liggghts
 CASE = tiny("run.cap_ms=0.2")

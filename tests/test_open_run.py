@@ -12,7 +12,7 @@ from builders import tiny
 import fdnet
 from fdnet.errors import CaseError
 from fdnet.run.finished import FinishedRun
-from fdnet.run.summary_text import facts
+from fdnet.run.summary import facts
 
 pytestmark = pytest.mark.liggghts
 
@@ -147,7 +147,7 @@ def test_the_arrays_for_openpnm_balance_without_it(kind, request):
     from scipy.sparse import coo_matrix
     from scipy.sparse.linalg import spsolve
 
-    from fdnet.report.openpnm import openpnm_arrays
+    from fdnet.report.tables import openpnm_arrays
 
     network = run.network()
     arrays = openpnm_arrays(network, run.conductance(), viscosity=2.0)

@@ -289,7 +289,7 @@ def test_three_axes_as_a_table_and_as_csv(tmp_path, capsys):
 def test_every_format_gives_the_same_answer(tmp_path, capsys):
     """CSV with a limit, CSV with kinds, dump and VTK of the same spheres, to the last digit."""
     from fdnet.report.vtk import write_spheres_vtp
-    from fdnet.spheres.csv_file import write_spheres
+    from fdnet.spheres.readers import write_spheres
     from tests.spheres.test_readers import dump_text
 
     box, limit = damaged(tmp_path / "s.csv")
@@ -605,7 +605,7 @@ def test_a_walled_pack_called_periodic_is_told(tmp_path, capsys):
 def test_clumps_are_right_against_resolved_flow():
     """Grains with four bumps that lie mostly inside: k was 1.47 times that of resolved flow."""
     from fdnet.network.permeability import analyse
-    from fdnet.network.stokes.stokes import extrapolate, solve_stokes
+    from fdnet.network.stokes import extrapolate, solve_stokes
     from fdnet.spheres.snapshot import Snapshot
 
     rng, count, apart = np.random.default_rng(5), 12, 0.4

@@ -6,15 +6,16 @@ import math
 
 import pytest
 
-from fdnet.case.names import (
+from fdnet.cli import main
+from fdnet.names import (
     ALL_SPHERES,
     AUTO,
     DAMAGE_LAW_NAMES,
+    DEFAULT_LAW,
     LAW_NAMES,
     SECTION_ARCHIE,
 )
-from fdnet.cli import main
-from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_LAW, LAWS
+from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
 from fdnet.studies.truth.packs import DATA, truth_tables
 
 ROWS = [row for path in truth_tables() for row in csv.DictReader(path.open()) if row["file"]]

@@ -2,8 +2,7 @@
 
 import pytest
 
-from fdnet.run.forecast import Forecast
-from fdnet.run.progress import Progress
+from fdnet.run.progress import Forecast, Progress
 
 WELL = (
     Forecast(expected=86185, plug=24192, cap=482177, allowed=7.2756e-4),

@@ -8,11 +8,11 @@ from builders import tiny
 from fdnet.case.file import case_from, read_case
 from fdnet.dem.checkpoint import chunks_of
 from fdnet.errors import CaseError
-from fdnet.scales.darcy import carman_kozeny
+from fdnet.scales.clock import relaxation_time
+from fdnet.scales.contacts import series
+from fdnet.scales.flow import carman_kozeny
 from fdnet.scales.scales import scales_of
-from fdnet.scales.springs import series
 from fdnet.scales.table import scale_rows
-from fdnet.scales.time_step import relaxation_time
 
 
 @pytest.fixture

@@ -7,9 +7,8 @@ import pytest
 from builders import tiny
 
 from fdnet.case.spheres import SHEAR_RATIO
+from fdnet.scales.contacts import fall_velocity, false_force, groove_slope, sphere_mass
 from fdnet.scales.scales import scales_of
-from fdnet.scales.springs import sphere_mass
-from fdnet.scales.sticking import fall_velocity, false_force, groove_slope
 
 MATERIALS = ("grains.shear_stiffness_N_m=34e9", "fines.shear_stiffness_N_m=26e9")
 SMALL = "fines.radius_mm=0.0125"

@@ -11,10 +11,9 @@ from builders import tiny
 import fdnet
 from fdnet.cli import main
 from fdnet.errors import CaseError
-from fdnet.network.stokes.stokes import StokesFlow
-from fdnet.network.stokes.two_grids import estimate
-from fdnet.report.stokes_section import section_html
-from fdnet.run import stokes_grids
+from fdnet.network.stokes import StokesFlow, estimate
+from fdnet.report.html import stokes_html as section_html
+from fdnet.run import stokes_sections as stokes_grids
 from fdnet.run.folder import locked
 from fdnet.run.stokes_sections import (
     StokesSection,

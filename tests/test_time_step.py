@@ -7,8 +7,8 @@ from builders import tiny
 
 from fdnet.case.case import Case
 from fdnet.errors import CaseError
+from fdnet.scales.clock import relaxation_time
 from fdnet.scales.scales import InvasionScales, scales_of
-from fdnet.scales.time_step import relaxation_time
 
 FINE = 4 / 3 * math.pi * (0.05e-3) ** 3 * 2146
 FAST = "drag.multiplier=1e3"

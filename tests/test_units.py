@@ -8,8 +8,7 @@ import pytest
 from builders import TINY, tiny
 
 from fdnet.case.case import InvasionCase
-from fdnet.case.file import case_from, read_case
-from fdnet.case.keys import known_keys
+from fdnet.case.file import case_from, known_keys, read_case
 from fdnet.case.units import SUFFIXES, UNITS, converted, share_of, stem_of
 from fdnet.errors import CaseError
 

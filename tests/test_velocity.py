@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from fdnet.case.case import Case
 from fdnet.case.file import case_from, read_case, set_keys
 from fdnet.errors import CaseError
-from fdnet.scales.darcy import Losses, radial, straight
+from fdnet.scales.flow import Losses, radial, straight
 from fdnet.scales.scales import scales_of
 from fdnet.scales.table import scale_rows
 

@@ -4,7 +4,7 @@ import pytest
 from builders import tiny
 
 from fdnet.case.case import Case
-from fdnet.dem.checkpoint_record import case_digest
+from fdnet.dem.checkpoint import case_digest
 from fdnet.errors import CaseError
 from fdnet.run.folder import RunFolder, open_folder
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fdnet.scales.check.catalogue import GAP, PAGE, catalogue, entry_of, explained, page
+from fdnet.scales.check import GAP, PAGE, catalogue, entry_of, explained, page
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "docs/_ext"))
 

@@ -18,9 +18,9 @@ from fdnet.campaign.result.words import pair_lines, ranking_lines
 from fdnet.campaign.until import parse_until
 from fdnet.case.case import Case
 from fdnet.case.file import read_case
-from fdnet.case.stages import STAGES
-from fdnet.files.paths import expanded
-from fdnet.run.session import cores
+from fdnet.files import expanded
+from fdnet.names import STAGES
+from fdnet.run.records import cores
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -45,7 +45,7 @@ class Compared:
     @property
     def table(self) -> "pd.DataFrame":
         """table.csv: one row for each run, lengths in m and permeabilities in m2."""
-        from fdnet.report.read_tables import read_table
+        from fdnet.report.tables import read_table
 
         return read_table(self.path / TABLE, ("run", "variant", "seed", "status"), texts=None)
 

@@ -16,7 +16,7 @@ from fdnet.campaign.result.gather import gather_plan
 from fdnet.campaign.until import Until, is_reached, next_seed_count
 from fdnet.errors import CaseError, FdnetError
 from fdnet.run.pipeline import refuse
-from fdnet.run.session import RunOptions
+from fdnet.run.records import RunOptions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

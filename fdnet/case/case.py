@@ -1,33 +1,95 @@
-"""A case: what the specimen is. It is validated when it is made and never changes.
+"""The whole case, what differs between two, and keys of earlier files.
 
-A case holds no paths and no binary. `fdnet.case.file` reads one from TOML, `Case.toml()` writes it
-back with every default. Its tables are in the modules next to this one, what must hold between
-them is in `fdnet.case.rules`.
+Keys that cases did not have when their digests were first kept.
+
+A digest names what a result was made from. A new key whose value means "as before" changes no
+result, so it must change no digest either: run folders and stored states would be orphaned. They
+hold their case with every key written out, so a key that they lack means "as before" too, whatever
+its default is now.
 """
 
 import hashlib
 import json
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Self
 
 import tomli_w
 from pydantic import Field, model_validator
 
-from fdnet.case.added import completed, without_added
-from fdnet.case.analysis import AnalysisChoices
-from fdnet.case.bonds import Bonds
-from fdnet.case.clean_up import CleanUp
-from fdnet.case.contact import MODEL_KEYS, ContactLaw
-from fdnet.case.control import Run
-from fdnet.case.fluid import Fluid, Well
-from fdnet.case.particles import Fines, Grains
-from fdnet.case.parts import Box, Drag, Gravity
 from fdnet.case.rules import cross_problems
-from fdnet.case.spheres import Spheres
-from fdnet.case.stages import LIGGGHTS_STAGES, STAGES, Stage
-from fdnet.case.values import Part
+from fdnet.case.spheres import Fines, Grains, Spheres
+from fdnet.case.tables import (
+    MODEL_KEYS,
+    AnalysisChoices,
+    Bonds,
+    Box,
+    CleanUp,
+    ContactLaw,
+    Drag,
+    Fluid,
+    Gravity,
+    Part,
+    Run,
+    Well,
+)
 from fdnet.errors import CaseError
+from fdnet.names import LIGGGHTS_STAGES, STAGES, Stage
+
+AS_BEFORE: dict[str, Any] = {
+    "contact.model": "hooke",
+    "contact.restitution": "dry",
+    "drag.crowd": "none",
+    "drag.inertia": "none",
+    "drag.pressure_gradient": False,
+    "fluid.darcy_law": "darcy",
+}
+"""New dotted keys, with the value that means what a case without the key meant. A key that is
+absent by default (None) needs no entry: it is not among the data of a case."""
+
+
+def without_added(
+    data: Mapping[str, Any], as_before: Mapping[str, Any] = AS_BEFORE
+) -> dict[str, Any]:
+    """The tables of a case without the new keys that mean "as before", and without empty tables.
+
+    `data` holds tables of keys, each at most one level deep, as `Case.data` gives them.
+    """
+    kept: dict[str, Any] = {}
+    for name, table in data.items():
+        if not isinstance(table, Mapping):
+            kept[name] = table
+            continue
+        keys = {
+            key: value
+            for key, value in table.items()
+            if (dotted := f"{name}.{key}") not in as_before or as_before[dotted] != value
+        }
+        if keys:
+            kept[name] = keys
+    return kept
+
+
+def completed(data: Mapping[str, Any], as_before: Mapping[str, Any] = AS_BEFORE) -> dict[str, Any]:
+    """The tables of a recorded case, as `Case.data` gave them once, with the new keys they lack.
+
+    A case without fines gets no table of fines.
+    """
+    tables = dict(data)
+    for dotted, value in as_before.items():
+        name, key = dotted.split(".")
+        if name in data or name != "fines":
+            tables[name] = {key: value} | tables.get(name, {})
+    return tables
+
+
+# ------------------------------------------------------------------------------------------------
+# A case: what the specimen is. It is validated when it is made and never changes.
+#
+# A case holds no paths and no binary. `fdnet.case.file` reads one from TOML, `Case.toml()` writes
+# it back with every default. Its tables are in the modules next to this one, what must hold
+# between them is in `fdnet.case.rules`.
+
 
 POLICIES = ("max_hours", "max_overlap", "on_overlap")
 """Keys of [run] that decide whether a run may go on, not what it computes."""
@@ -151,7 +213,7 @@ class Case(Part):
         "clean_up" the analysis, but for side walls that let a fluid slip which is made with them
         (`walls_of_the_fluid`). No result depends on `POLICIES` or on the bonds, which mechanics
         alone reads, so no digest does. A key that was added later counts only where its value
-        differs from what a case meant before (`fdnet.case.added`).
+        differs from what a case meant before (`fdnet.case.case`).
         """
         data = without_added(self.data())
         data.pop("given", None)
@@ -252,3 +314,47 @@ def _without_none(value: Any) -> Any:
     if isinstance(value, list):
         return [_without_none(item) for item in value]
     return value
+
+
+# ------------------------------------------------------------------------------------------------
+# Which keys of two cases differ, in words.
+
+
+MOST_NAMED = 4
+"""Most differing keys that a message names."""
+
+
+def differences(asked: Case, kept: Mapping[str, Any]) -> list[str]:
+    """The dotted keys in which a case differs from the tables of another, with both values.
+
+    Keys that decide only whether a run may go on are left out, and what was given in words.
+    """
+    mine, other = dict(_flat(asked.data())), dict(_flat(kept))
+    return [
+        f"{key} = {_shown(other, key)} there, {_shown(mine, key)} here"
+        for key in sorted(mine.keys() | other.keys())
+        if mine.get(key) != other.get(key)
+        and not key.startswith("given.")
+        and key not in [f"run.{policy}" for policy in POLICIES]
+    ]
+
+
+def difference_text(asked: Case, kept: Mapping[str, Any]) -> str:
+    """`differences` as the part of a message; empty where nothing differs."""
+    named = differences(asked, kept)
+    if not named:
+        return ""
+    more = f", and {len(named) - MOST_NAMED} more keys" if len(named) > MOST_NAMED else ""
+    return "; ".join(named[:MOST_NAMED]) + more
+
+
+def _flat(tables: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in tables.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{path}{key}.")
+        else:
+            yield f"{path}{key}", value
+
+
+def _shown(flat: Mapping[str, Any], key: str) -> str:
+    return str(flat[key])[:40] if key in flat else "absent"

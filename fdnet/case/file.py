@@ -1,24 +1,438 @@
-"""Case files: a case is read from TOML, and all its problems are named at once."""
+"""Reading a case file: size tables, keys, values with units, and the cases that come with fdnet.
+
+Curves of sizes in CSV files: tables of sieves and of laser instruments.
+"""
 
 import copy
+import csv
+import difflib
+import re
 import tomllib
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from fdnet.case.added import completed
-from fdnet.case.case import Case, case_type
-from fdnet.case.keys import nearest, table_of
+from fdnet.case.case import Case, InvasionCase, case_type, completed
 from fdnet.case.rules import cross_problems
-from fdnet.case.sizes import Sizes
-from fdnet.case.spoken import plain_tables
-from fdnet.case.units import stem_of, suffix_of
-from fdnet.case.values import Part
+from fdnet.case.spheres import Sizes
+from fdnet.case.tables import Part
+from fdnet.case.units import SUFFIXES, converted, length_factor, share_of, stem_of, suffix_of
 from fdnet.errors import CaseError
-from fdnet.files.paths import SMALL, expanded, file_bytes
+from fdnet.files import SMALL, expanded, file_bytes, text_of
+
+_BRACKETS = re.compile(r"[(\[]([^)\]]*)[)\]]")
+_FINER = r"passing|finer|under|smaller|less|<"
+_COARSER = r"retained|over|coarser|larger|greater|>"
+_SIZES = (
+    r"size|diam|sieve|mesh|opening|apertur|screen|particle|grain|durchm|korn|masch|sieb|tamis"
+    r"|maill|taille|tamiz|tama|^[dx]?$"
+)
+_RADII = r"radi|rayon|^r$"
+_POWERS = {
+    "mass": r"mass|weight|\bwt|vol|q3",
+    "number": r"number|count|\bnum|\bno\b|\bnr\b|q0",
+    "surface": r"surface|area|q2",
+    "length or intensity": r"length|intensity|q1",
+}
+"""What the shares of a column may count, with the words that say it."""
+_AS_MASS = {"mass", "volume"}
+_MOST_FRACTION = 1.0 + 1e-9
+
+
+def read_size_file(
+    folder: Path, name: str, *, by: str = "mass"
+) -> tuple[list[float], list[float]]:
+    """Diameters, mm, that rise, and the percentage finer than each, from a CSV file.
+
+    The first line that is no comment (#) names the columns, with their units: one of sizes
+    ("size_um", "Diameter (mm)", or "Radius (mm)", which is doubled) and one cumulative percentage
+    ("passing %", "cumulative % finer", or "cumulative % retained", which is turned around; shares
+    from 0 to 1 are named "fraction finer"). The rows may rise or fall. The text is UTF-8, UTF-16
+    or Windows-1252. `by` is what the case says that the percentages count; a column that says
+    another thing is refused.
+
+    Raises ValueError, with the file and what was expected, where it cannot be read so.
+    """
+    path = expanded(name)
+    path = path if path.is_absolute() else folder / path
+    try:
+        text = text_of(file_bytes(path, most=SMALL, what="a table of sizes"), path)
+    except CaseError as error:
+        raise ValueError(str(error)) from error
+    try:
+        return parse_sizes(text, by=by)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def parse_sizes(text: str, *, by: str = "mass") -> tuple[list[float], list[float]]:
+    """As `read_size_file`, of the text of a file."""
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    if len(lines) < 3:
+        raise ValueError("expected a line of column names and at least two rows")
+    delimiter = next((one for one in (";", "\t", ",") if one in lines[0]), ",")
+    try:
+        header, *rows = list(csv.reader(lines, delimiter=delimiter))
+    except csv.Error as error:
+        raise ValueError(f"{error}; expected comma-separated values") from error
+    sizes, factor = _size_column(header)
+    percents, retained, whole = _share_column(header, sizes, by)
+    points = [_row(row, sizes, percents, comma=delimiter != ",") for row in rows]
+    if points[0][0] > points[-1][0]:
+        points.reverse()
+    largest = max(share for _, share in points)
+    if whole == 100 and 0 < largest <= _MOST_FRACTION:
+        raise ValueError(
+            f"column {header[percents]!r}: its numbers end at {largest:g} and look like fractions "
+            "of 1, expected percentages that end at 100; multiply them by 100, or name the column "
+            "'fraction finer' or 'cumulative fraction retained'"
+        )
+    if whole == 1 and not largest <= _MOST_FRACTION:
+        raise ValueError(
+            f"column {header[percents]!r}: holds {largest:g}, expected fractions from 0 to 1; "
+            "name the column with % where it holds percentages"
+        )
+    finer = [100 * (whole - share if retained else share) / whole for _, share in points]
+    return [size * factor for size, _ in points], finer
+
+
+def _size_column(header: list[str]) -> tuple[int, float]:
+    """Index of the column of sizes and the factor that makes diameters, mm, of its numbers."""
+    columns = []
+    for index, name in enumerate(header):
+        last = re.split(r"[\s_,]+", name.strip())[-1]
+        for unit in (*_BRACKETS.findall(name), last):
+            factor = length_factor(unit)
+            if factor is not None and "%" not in name:
+                columns.append((index, factor, name.replace(unit, "").strip(" _,()[]").lower()))
+                break
+    if len(columns) != 1:
+        raise ValueError(
+            f"{len(columns)} columns of {header} have a unit of length, expected one, named such "
+            "as 'size_um' or 'Diameter (mm)'"
+        )
+    index, factor, words = columns[0]
+    if re.search(_RADII, words):
+        return index, 2 * factor
+    if not re.search(_SIZES, words):
+        raise ValueError(
+            f"column {header[index]!r}: not known as sizes of grains; name it such as 'size_um', "
+            "'Diameter (mm)' or 'Radius (mm)'"
+        )
+    return index, factor
+
+
+def _share_column(header: list[str], sizes: int, by: str) -> tuple[int, bool, float]:
+    """Index of the column of cumulative shares, whether it counts what is coarser, its whole."""
+    columns = []
+    for index, name in enumerate(header):
+        words = name.lower()
+        percent = "%" in words or "percent" in words
+        cumulative = "cum" in words
+        finer, coarser = bool(re.search(_FINER, words)), bool(re.search(_COARSER, words))
+        if index == sizes or not (percent or "fraction" in words):
+            continue
+        if finer and coarser:
+            raise ValueError(f"column {name!r}: finer or coarser? Name it 'passing %', or so")
+        if coarser and not cumulative:
+            raise ValueError(
+                f"column {name!r}: is it the share on each sieve, or on it and all above? "
+                "Name it 'cumulative % retained' if it is the latter"
+            )
+        if finer or coarser or cumulative:
+            columns.append((index, coarser, 100.0 if percent else 1.0))
+    if len(columns) != 1:
+        raise ValueError(
+            f"{len(columns)} columns of {header} are cumulative percentages, expected one, named "
+            "such as 'passing %', 'cumulative % finer' or 'cumulative % retained'"
+        )
+    _refuse_other_shares(header[columns[0][0]], by)
+    return columns[0]
+
+
+def _refuse_other_shares(name: str, by: str) -> None:
+    """Raise ValueError where a column says that it counts another thing than `by`."""
+    said = {power for power, words in _POWERS.items() if re.search(words, name.lower())}
+    own = "mass" if by in _AS_MASS else by
+    if said - {own}:
+        known = "mass, volume, surface or number"
+        raise ValueError(
+            f"column {name!r}: counts {' and '.join(sorted(said))}, but the case says by "
+            f"{by!r}; give by = what the column counts ({known}) next to the file"
+        )
+
+
+def _row(row: list[str], sizes: int, percents: int, *, comma: bool) -> tuple[float, float]:
+    values = []
+    for index in (sizes, percents):
+        cell = row[index].strip() if index < len(row) else ""
+        try:
+            values.append(float(cell.replace(",", ".") if comma else cell))
+        except ValueError:
+            raise ValueError(
+                f"row {row}: {cell!r} is no number; units stand in the names of the columns"
+            ) from None
+    return values[0], values[1]
+
+
+# ------------------------------------------------------------------------------------------------
+# The keys of a case file, and the one that an unknown key means.
+
+
+_DIAMETER = re.compile(r"[dD]_?\d\d")
+
+
+def known_keys(model: type[Part] = InvasionCase, prefix: str = "") -> Iterator[str]:
+    """Every dotted key that a case file may hold."""
+    for name, info in model.model_fields.items():
+        yield prefix + name
+        table = table_of(info)
+        for inner in [table] if table is not None else _inner_tables(info.annotation):
+            yield from known_keys(inner, f"{prefix}{name}.")
+
+
+def table_of(field: FieldInfo) -> type[Part] | None:
+    """The class of a table's keys, also where the table may be absent; None for a plain key."""
+    for kind in (field.annotation, *get_args(field.annotation)):
+        if isinstance(kind, type) and issubclass(kind, Part):
+            return kind
+    return None
+
+
+def _inner_tables(annotation: Any) -> Iterator[type[Part]]:
+    """The tables that a key may hold, one or a list of them."""
+    for kind in get_args(annotation):
+        if isinstance(kind, type) and issubclass(kind, Part):
+            yield kind
+        else:
+            yield from _inner_tables(kind)
+
+
+REMOVED_KEYS = {"clean_up.lift_cake": "the cake is always lifted, remove the key"}
+"""Keys that are gone, and what to do without each."""
+
+
+def nearest(path: str) -> str:
+    """The known key that is nearest to an unknown one, in words; empty where none is near."""
+    table, _, key = path.rpartition(".")
+    if path in REMOVED_KEYS:
+        return f"; {REMOVED_KEYS[path]}"
+    if table in ("grains", "fines") and _DIAMETER.match(key):
+        return f'; did you mean {table}.sizes = {{ D10 = "20 um", D50 = "40 um", ... }}?'
+    here = [one for one in known_keys() if one.rpartition(".")[0] == table]
+    stems = {one: stem_of(one.rpartition(".")[2]) for one in here}
+    same = [one for one in here if stems[one] == stem_of(key)]
+    near = same or _near(key, here) or _named_alike(key) or _near(key, list(known_keys()))
+    return f"; did you mean {near[0]}?" if near else ""
+
+
+def _near(key: str, keys: list[str]) -> list[str]:
+    """The key of nearly the same spelling; tables and units count for nothing."""
+    stems = {stem_of(one.rpartition(".")[2]): one for one in reversed(keys)}
+    return [stems[one] for one in difflib.get_close_matches(stem_of(key), stems, n=1, cutoff=0.65)]
+
+
+def _named_alike(key: str) -> list[str]:
+    """A key of another table with the same name."""
+    return [one for one in known_keys() if stem_of(one.rpartition(".")[2]) == stem_of(key)]
+
+
+# ------------------------------------------------------------------------------------------------
+# Case files as people write them: values with their units, and curves in files of their own.
+#
+# A key without the unit in its name takes a text with the unit, `viscosity = "10 cP"`, and stands
+# for the key with the unit, `viscosity_cP = 10`. A share takes a percentage, `porosity = "38 %"`.
+# What was given so is kept in the table `given` of the resolved case.
+
+
+FILE = "file"
+"""Key of a table of sizes that names a file with the curve."""
+
+
+@dataclass(slots=True)
+class Spoken:
+    """Nested tables in the keys of the models.
+
+    Attributes:
+        data: the tables.
+        given: what was written, by dotted key.
+        problems: what could not be understood, one sentence each.
+        bad: dotted keys, of at most two parts, whose value was refused.
+    """
+
+    data: dict[str, Any]
+    given: dict[str, str] = field(default_factory=dict)
+    problems: list[str] = field(default_factory=list)
+    bad: set[str] = field(default_factory=set)
+
+    def refuse(self, key: str, problem: str) -> None:
+        """Note a problem with the dotted `key`."""
+        self.problems.append(f"{key}: {problem}")
+        self.bad.add(".".join(key.split(".")[:2]))
+
+
+def plain_tables(model: type[Part], data: Mapping[str, Any], folder: Path) -> Spoken:
+    """The tables of a case file with every text turned into the number that its key takes.
+
+    `folder` is where files that the case names are looked for.
+    """
+    spoken = Spoken(data={})
+    earlier = data.get("given")
+    if isinstance(earlier, Mapping):
+        data = {key: value for key, value in data.items() if key != "given"}
+    spoken.data = _table(spoken, model, data, path="", folder=folder)
+    _drop_bad(spoken)
+    if isinstance(earlier, Mapping):
+        kept = {str(key): text for key, text in earlier.items() if _holds(key, text, spoken.data)}
+        spoken.given = kept | spoken.given
+    if spoken.given:
+        spoken.data["given"] = spoken.given
+    return spoken
+
+
+def _table(
+    spoken: Spoken, model: type[Part], table: Mapping[str, Any], *, path: str, folder: Path
+) -> dict[str, Any]:
+    result: dict[str, Any] = {}
+    for key, value in table.items():
+        dotted, fields = f"{path}{key}", model.model_fields
+        inner = _inner(fields[key].annotation) if key in fields else None
+        if inner is not None and isinstance(value, Mapping):
+            result[key] = _table(spoken, inner, value, path=f"{dotted}.", folder=folder)
+        elif inner is not None and isinstance(value, list) and key == "materials":
+            result[key] = [
+                _table(spoken, inner, one, path=f"{dotted}.{number}.", folder=folder)
+                if isinstance(one, Mapping)
+                else one
+                for number, one in enumerate(value)
+            ]
+        elif key in fields:
+            result[key] = _percentage(spoken, dotted, key, value)
+        elif model is Sizes and key == FILE:
+            _put_absent(result, _curve(spoken, dotted, value, table, folder))
+        else:
+            _put_absent(result, _with_unit(spoken, model, table, key=key, dotted=dotted))
+    return result
+
+
+def _drop_bad(spoken: Spoken) -> None:
+    """Take out the keys that were refused, so that nothing else is said of them."""
+    for dotted in spoken.bad:
+        name, _, key = dotted.partition(".")
+        table = spoken.data if not key else spoken.data.get(name)
+        if isinstance(table, dict):
+            table.pop(key or name, None)
+
+
+def _put_absent(result: dict[str, Any], more: Mapping[str, Any]) -> None:
+    for key, value in more.items():
+        result.setdefault(key, value)
+
+
+def _inner(annotation: Any) -> type[Part] | None:
+    """The table that a key holds, one or a list of them; None for a plain value."""
+    if isinstance(annotation, type) and issubclass(annotation, Part):
+        return annotation
+    return next((inner for kind in get_args(annotation) if (inner := _inner(kind))), None)
+
+
+def _percentage(spoken: Spoken, dotted: str, key: str, value: Any) -> Any:
+    """A share as a text with a percent sign; any other value as it is."""
+    if not isinstance(value, str) or suffix_of(key) or not value.rstrip().endswith("%"):
+        return value
+    try:
+        share = share_of(value)
+    except ValueError as error:
+        spoken.refuse(dotted, f"{value!r}: {error}")
+        return value
+    spoken.given[dotted] = value
+    return share
+
+
+def _with_unit(
+    spoken: Spoken, model: type[Part], table: Mapping[str, Any], *, key: str, dotted: str
+) -> dict[str, Any]:
+    """The key with the unit in its name, for one that leaves the unit to its value."""
+    meant = [f"{key}{suffix}" for suffix in SUFFIXES if f"{key}{suffix}" in model.model_fields]
+    if len(meant) != 1:
+        return {key: table[key]}
+    target, value = meant[0], table[key]
+    if target in table:
+        spoken.refuse(dotted, f"given next to {target}, give one of the two")
+        spoken.bad.add(_two_parts(dotted, target))
+        return {}
+    texts = list(value) if isinstance(value, list | tuple) else [value]
+    if not all(isinstance(one, str) for one in texts):
+        spoken.refuse(
+            dotted, f"{value!r} has no unit; write it with its unit, in quotes, or as {target}"
+        )
+    else:
+        try:
+            numbers = [converted(one, suffix_of(target)) for one in texts]
+        except ValueError as error:
+            spoken.refuse(dotted, f"{value!r}: {error}")
+        else:
+            spoken.given[dotted] = ", ".join(texts)
+            return {target: numbers if isinstance(value, list | tuple) else numbers[0]}
+    spoken.bad.add(_two_parts(dotted, target))
+    return {}
+
+
+def _two_parts(dotted: str, target: str) -> str:
+    """The key `target` next to `dotted`, by at most its first two parts."""
+    return ".".join([*dotted.split(".")[:-1], target][:2])
+
+
+def _curve(
+    spoken: Spoken, dotted: str, value: Any, table: Mapping[str, Any], folder: Path
+) -> dict[str, Any]:
+    """The points of the file that a table of sizes names."""
+    others = [key for key in table if stem_of(key) in ("size", "passing", "D10", "D50", "D90")]
+    if not isinstance(value, str):
+        spoken.refuse(dotted, f"{value!r} should be the path of a CSV file, in quotes")
+    elif others:
+        spoken.refuse(dotted, f"given next to {others[0]}, give one of the two")
+    else:
+        try:
+            size, passing = read_size_file(folder, value, by=str(table.get("by", "mass")))
+        except ValueError as error:
+            spoken.refuse(dotted, str(error))
+        else:
+            spoken.given[dotted] = value
+            return {"size_mm": size, "passing_percent": passing}
+    return {}
+
+
+def _holds(key: Any, text: Any, data: Mapping[str, Any]) -> bool:
+    """Whether what was once given still is what the tables hold."""
+    *names, last = str(key).split(".")
+    table: Any = data
+    for name in names:
+        if isinstance(table, list) and name.isdecimal():
+            table = dict(enumerate(table)).get(int(name[:9]))
+        else:
+            table = table.get(name) if isinstance(table, Mapping) else None
+    if not isinstance(table, Mapping) or not isinstance(text, str):
+        return False
+    if last == FILE:
+        return "size_mm" in table
+    try:
+        if last in table:
+            return bool(table[last] == share_of(text))
+        targets = [f"{last}{suffix}" for suffix in SUFFIXES if f"{last}{suffix}" in table]
+        numbers = [converted(one, suffix_of(targets[0])) for one in text.split(", ")]
+        return table[targets[0]] in (numbers, numbers[0])
+    except (ValueError, IndexError):
+        return False
+
+
+# ------------------------------------------------------------------------------------------------
+# Case files: a case is read from TOML, and all its problems are named at once.
 
 
 def case_from(data: Mapping[str, Any], *, source: str = "case", folder: str | Path = ".") -> Case:
@@ -237,7 +651,7 @@ def read_case(
 
 
 def recorded_case(path: Path) -> Case:
-    """The case that a run folder holds, perhaps of an earlier version (`fdnet.case.added`).
+    """The case that a run folder holds, perhaps of an earlier version (`fdnet.case.case`).
 
     Raises CaseError as `read_case` does.
     """
@@ -262,3 +676,70 @@ def toml_tables(path: str | Path, what: str) -> dict[str, Any]:
         raise CaseError(f"{path}: its tables or lists are nested too deeply") from error
     except ValueError as error:
         raise CaseError(f"{path}: not valid TOML: {error}") from error
+
+
+# ------------------------------------------------------------------------------------------------
+# The case files that come with fdnet.
+
+
+QUICK = "quick-"
+_SENTENCE = re.compile(r"(.+?)[.:](\s|$)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShippedCase:
+    """A case file that comes with fdnet.
+
+    Attributes:
+        name: as `fdnet cases` takes it; "quick-NAME" is the quick form of NAME.
+        path: of the file.
+        about: the first sentence of its comment.
+    """
+
+    name: str
+    path: Path
+    about: str
+
+
+def cases_folder() -> Path:
+    """The folder of the shipped cases: in an installed package, or next to an editable one."""
+    package = Path(str(files("fdnet")))
+    for folder in (package / "cases", package.parent / "cases"):
+        if folder.is_dir():
+            return folder
+    raise CaseError(
+        f"{package.parent / 'cases'}: the shipped case files are missing; install fdnet again"
+    )
+
+
+def case_path(name: str) -> Path:
+    """The file of a shipped case; "quick-NAME" is the quick form of NAME."""
+    quick = name.startswith(QUICK)
+    return (
+        cases_folder()
+        / ("quick" if quick else "")
+        / f"{name.removeprefix(QUICK) if quick else name}.toml"
+    )
+
+
+def shipped_cases() -> tuple[ShippedCase, ...]:
+    """All shipped cases: those that are full first, then the quick forms, by name."""
+    folder = cases_folder()
+    full = [(path.stem, path) for path in sorted(folder.glob("*.toml"))]
+    quick = [(QUICK + path.stem, path) for path in sorted(folder.glob("quick/*.toml"))]
+    return tuple(
+        ShippedCase(name=name, path=path, about=first_sentence(path.read_text(encoding="utf-8")))
+        for name, path in [*full, *quick]
+    )
+
+
+def first_sentence(text: str) -> str:
+    """The first sentence of the comment at the top of a file, without its full stop."""
+    lines = []
+    for line in text.splitlines():
+        if not line.startswith("#"):
+            break
+        lines.append(line.lstrip("# "))
+    comment = " ".join(lines)
+    match = _SENTENCE.match(comment)
+    return match[1] if match else comment

@@ -1,38 +1,310 @@
-"""What must hold between the keys of a case."""
+"""What must hold between the keys of a case.
+
+What must hold between the table [contact] and the materials of a case.
+"""
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Any
 
-from fdnet.case.analysis import AnalysisChoices
-from fdnet.case.bonds import Bonds
-from fdnet.case.clean_up import CLEAN_UP_RULES
-from fdnet.case.contact import MODEL_KEYS
-from fdnet.case.contact_rules import of_cohesion, of_rolling, of_the_model
-from fdnet.case.control import Run
-from fdnet.case.coupled_rules import (
-    coupled_inertia,
-    crowd_scheme,
-    flow_field,
-    network_grains,
-    stop_rate,
-    stop_volume,
-    update_travel,
-)
-from fdnet.case.flow_rules import FLOW_RULES
-from fdnet.case.particles import Fines, Grains
-from fdnet.case.parts import Box, Drag
-from fdnet.case.rule import Rule
-from fdnet.case.size_rules import SIZE_RULES, SOME_THROAT, concentration_text, size_text
-from fdnet.case.spheres import Spheres
-from fdnet.case.values import (
+from fdnet.case.spheres import Fines, Grains, Spheres
+from fdnet.case.tables import (
+    CLEAN_UP_RULES,
+    DEEPEST_DAMPING,
     LEAST_SKIN,
+    MAX_CONCENTRATION,
+    MODEL_KEYS,
     MOST_BINS,
     MOST_FINES,
     MOST_GRAINS,
     MOST_NEIGHBOUR_BINS,
     MOST_SLAB,
+    AnalysisChoices,
+    Bonds,
+    Box,
+    ContactLaw,
+    Drag,
+    Fluid,
+    Rule,
+    Run,
+    Well,
 )
+
+
+def of_the_model(name: str) -> Callable[[ContactLaw, Spheres], Iterator[str]]:
+    """A check that the contact model takes what the table `name` ("grains", "fines") gives."""
+
+    def check(contact: ContactLaw, spheres: Spheres) -> Iterator[str]:
+        unread = sorted(contact.other_keys & spheres.model_fields_set)
+        if unread:
+            keys = ", ".join(f"{name}.{key}" for key in unread)
+            yield (
+                f"{keys}: not read by contact.model {contact.model!r}; leave out, or choose the "
+                "other contact.model"
+            )
+        if contact.model == "hertz" and spheres.damping_ratio > DEEPEST_DAMPING:
+            yield (
+                f"{name}.damping_ratio: {spheres.damping_ratio:g} with contact.model 'hertz', "
+                f"expected at most {DEEPEST_DAMPING:g} (LIGGGHTS takes a restitution above 0.05)"
+            )
+
+    return check
+
+
+def of_cohesion(contact: ContactLaw) -> Iterator[str]:
+    """Cohesion has something to act against."""
+    if contact.cohesion_J_m3 is not None and contact.model == "hooke":
+        yield (
+            f"contact.cohesion_J_m3: {contact.cohesion_J_m3:g} with contact.model 'hooke': the "
+            "attraction of LIGGGHTS's SJKR grows with the overlap as a linear spring does, so it "
+            "would only soften the contact and never pull; take contact.model = 'hertz'"
+        )
+
+
+def of_rolling(contact: ContactLaw, grains: Grains, fines: Fines) -> Iterator[str]:
+    """Rolling friction has sliding friction that makes fines roll."""
+    least = min(grains.friction, fines.friction)
+    if contact.rolling_friction is not None and least == 0:
+        yield (
+            f"contact.rolling_friction: {contact.rolling_friction:g} without friction "
+            "(grains.friction or fines.friction is 0): spheres that slide do not roll; give both "
+            "a friction, or leave contact.rolling_friction out"
+        )
+
+
+# ------------------------------------------------------------------------------------------------
+# What must hold between the keys of an invasion whose forces fdnet computes.
+
+
+def flow_field(drag: Drag) -> Iterator[str]:
+    """The network moves the mud at the rate over the cross-section; it alone knows the drive."""
+    if drag.field == "network" and drag.upstream != "darcy":
+        yield (
+            f"drag.upstream: {drag.upstream!r}, but with drag.field 'network' the mud moves at "
+            "the rate over the cross-section; set drag.upstream = 'darcy'"
+        )
+    if drag.field != "network" and drag.drive is not None:
+        yield (
+            f"drag.drive: {drag.drive!r} belongs to drag.field 'network'; the uniform field "
+            "always has its first velocity; leave it out"
+        )
+
+
+def network_grains(drag: Drag, grains: Grains) -> Iterator[str]:
+    """The pores of the network are those of grains that stay."""
+    if drag.field == "network" and grains.motion == "mobile":
+        yield (
+            "grains.motion: 'mobile' with drag.field 'network', whose pores are those of grains "
+            "that stay; take 'fixed'"
+        )
+
+
+def stop_rate(run: Run, drag: Drag) -> Iterator[str]:
+    """Only a rate that falls can end a run."""
+    if run.stop_rate is not None and not drag.slowed:
+        yield (
+            f"run.stop_rate: {run.stop_rate:g} needs a rate that falls; leave it out, or set "
+            "drag.field = 'network' with drag.drive = 'pressure'"
+        )
+
+
+def stop_volume(run: Run, drag: Drag) -> Iterator[str]:
+    """The uniform field keeps no account of the volume: it is the rate times the time."""
+    if run.stop_pore_volumes is not None and drag.field != "network":
+        yield (
+            f"run.stop_pore_volumes: {run.stop_pore_volumes:g} needs drag.field = 'network', but "
+            f"it is {drag.field!r}; set run.duration_ms, since the uniform field keeps its rate"
+        )
+
+
+def crowd_scheme(drag: Drag) -> Iterator[str]:
+    """One damping for all fines cannot carry a coefficient of each."""
+    if drag.coupled and drag.scheme == "viscous":
+        yield (
+            "drag.scheme: 'viscous' has one damping for all fines, drag.crowd "
+            f"{drag.crowd!r} one for each; take 'implicit' or 'held'"
+        )
+
+
+def update_travel(drag: Drag) -> Iterator[str]:
+    """Only coupled forces are computed anew."""
+    if drag.update_travel is not None and not drag.coupled:
+        yield (
+            f"drag.update_travel: {drag.update_travel:g} belongs to a drag that is computed while "
+            "LIGGGHTS waits; leave it out, or set drag.crowd = 'beetstra'"
+        )
+
+
+def coupled_inertia(drag: Drag) -> Iterator[str]:
+    """The Reynolds number of coupled drag is that of the law of the crowd."""
+    if drag.field == "network" and drag.crowd == "none" and drag.inertia != "none":
+        yield (
+            f"drag.inertia: {drag.inertia!r} with drag.field 'network' is part of the law of the "
+            "crowd; set drag.crowd = 'beetstra', or drag.inertia = 'none'"
+        )
+
+
+# ------------------------------------------------------------------------------------------------
+# What must hold between the keys that say how fast the fluid moves, and how it is simulated.
+
+
+def _one_drive(well: Well, fluid: Fluid) -> Iterator[str]:
+    """A well gives the velocity, so nothing else may."""
+    given = [
+        f"fluid.{name} = {value:g}"
+        for name in ("velocity_m_s", "darcy_length_mm")
+        if (value := getattr(fluid, name)) is not None
+    ]
+    if given:
+        yield (
+            f"well: the table [well] with {' and '.join(given)}: each gives the velocity of the "
+            "fluid; keep one of them"
+        )
+
+
+def _radii_of_well(well: Well) -> Iterator[str]:
+    if well.drainage_radius_m <= well.radius_m:
+        yield (
+            f"well.drainage_radius_m: {well.drainage_radius_m:g} m is not above the radius of the "
+            f"well, well.radius_mm = {well.radius_mm:g} ({well.radius_m:g} m)"
+        )
+
+
+def _driven_cohesion(drag: Drag, contact: ContactLaw) -> Iterator[str]:
+    if drag.drive_velocity_m_s is not None and contact.cohesion_J_m3 is not None:
+        yield (
+            f"drag.drive_velocity_m_s: {drag.drive_velocity_m_s} with contact.cohesion_J_m3: the "
+            "forces of the fluid are scaled, cohesion is not, so their ratio would be wrong; "
+            "leave out one of the two"
+        )
+
+
+FLOW_RULES = (
+    Rule(("well", "fluid.velocity_m_s", "fluid.darcy_length_mm"), _one_drive),
+    Rule(("well.radius_mm", "well.drainage_radius_m"), _radii_of_well),
+    Rule(("drag.drive_velocity_m_s", "contact.cohesion_J_m3"), _driven_cohesion),
+)
+
+
+# ------------------------------------------------------------------------------------------------
+# What must hold of the sizes of grains and fines, and of the solids in the mud.
+
+
+WIDEST_THROAT = math.sqrt(2) - 1
+"""Radius of the widest throat between touching grains over their radius: four in a square."""
+
+
+def size_text(name: str, spheres: Spheres) -> str:
+    """The sizes of grains or fines as the case gives them, for a message."""
+    if not spheres.measured:
+        radius = spheres.radius_mm
+        shown = list(radius) if isinstance(radius, tuple) else radius
+        return f"{name}.radius_mm: {shown}" if name == "fines" else f"{name}.radius_mm {shown}"
+    low, high = (2e3 * radius for radius in spheres.radius_range_m)
+    return f"{name}.sizes: diameters of {low:.3g} to {high:.3g} mm"
+
+
+def concentration_text(fines: Fines) -> str:
+    """The solids of the mud as the case gives them, for a message."""
+    if fines.solids_kg_m3 is not None:
+        return f"fines.solids_kg_m3: {fines.solids_kg_m3:g}"
+    return f"fines.concentration: {fines.concentration:g}"
+
+
+def _one_curve(name: str) -> Rule:
+    keys = ("radius_mm", "sizes", "materials") if name == "fines" else ("radius_mm", "sizes")
+
+    def check(spheres: Spheres) -> Iterator[str]:
+        given = [key for key in keys if getattr(spheres, key) is not None]
+        *others, last = keys
+        choice = f"give exactly one of {', '.join(others)} and {last}"
+        if not given:
+            yield f"{name}.radius_mm: missing, {choice}"
+        elif len(given) > 1:
+            yield f"{name}.{given[1]}: given beside {name}.{given[0]}, {choice}"
+
+    return Rule(tuple(f"{name}.{key}" for key in keys), check)
+
+
+def _cut(fines: Fines) -> Iterator[str]:
+    if fines.cut_um is not None and not fines.measured and fines.has_one_curve:
+        yield (
+            f"fines.cut_um: {fines.cut_um:g} cuts measured sizes, but the case gives "
+            "fines.radius_mm; leave it out or give fines.sizes"
+        )
+
+
+def _solids(fines: Fines) -> Iterator[str]:
+    """The solids are given once, and are no more than fit."""
+    if not fines.has_one_concentration:
+        yield (
+            f"fines.solids_kg_m3: {fines.solids_kg_m3} with fines.concentration: "
+            f"{fines.concentration}, give exactly one of the two"
+        )
+    elif fines.solids_kg_m3 is not None and fines.volume_fraction > MAX_CONCENTRATION:
+        most = MAX_CONCENTRATION * fines.solids_density_kg_m3
+        yield (
+            f"fines.solids_kg_m3: {fines.solids_kg_m3:g} of solids of "
+            f"{fines.solids_density_kg_m3:.4g} kg/m3 is {100 * fines.volume_fraction:.3g} % by "
+            f"volume; expected at most {most:.3g} ({100 * MAX_CONCENTRATION:.0f} %: more do not "
+            "fit at random places)"
+        )
+
+
+def _friction(fines: Fines) -> Iterator[str]:
+    for number, one in enumerate(fines.materials or ()):
+        if one.friction is not None and one.friction != fines.friction:
+            yield (
+                f"fines.materials.{number}.friction: {one.friction:g} of {one.name!r}, but all "
+                f"fines are of one contact material with fines.friction {fines.friction:g}; set "
+                "fines.friction for all"
+            )
+
+
+def _names(fines: Fines) -> Iterator[str]:
+    names = [one.name for one in fines.materials or ()]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        yield f"fines.materials: {twice[0]!r} is listed twice, give each material once"
+
+
+def _some_throat(grains: Grains, fines: Fines) -> Iterator[str]:
+    """Measured fines of which none fits through any throat between touching grains."""
+    if not fines.measured:
+        return
+    widest = 2 * WIDEST_THROAT * grains.radius_range_m[1]
+    smallest = 2 * fines.radius_range_m[0]
+    if smallest > widest:
+        yield (
+            f"fines.sizes: the smallest fine has {1e3 * smallest:.3g} mm, above every throat "
+            f"between touching grains of up to {2e3 * grains.radius_range_m[1]:.3g} mm (at most "
+            f"{1e3 * widest:.3g} mm): nothing could invade; check the units of both curves"
+        )
+
+
+SIZE_RULES = (
+    _one_curve("grains"),
+    _one_curve("fines"),
+    Rule(("fines.radius_mm", "fines.cut_um"), _cut),
+    Rule(
+        (
+            "fines.concentration",
+            "fines.solids_kg_m3",
+            "fines.materials",
+            "fines.density_kg_m3",
+        ),
+        _solids,
+    ),
+    Rule(("fines.materials", "fines.friction"), _friction),
+    Rule(("fines.materials",), _names),
+)
+"""Rules of sizes, in the order in which their problems are reported."""
+SOME_THROAT = Rule(("grains.radius_mm", "fines.radius_mm"), _some_throat)
+"""Some fine fits through some throat."""
+
+
+# ------------------------------------------------------------------------------------------------
+# What must hold between the keys of a case.
 
 
 def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iterator[str]:

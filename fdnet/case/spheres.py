@@ -1,20 +1,262 @@
-"""What the tables [grains] and [fines] share: sizes, density and contact of spheres."""
+"""The tables [grains] and [fines] of a case, and their sizes.
+
+The table `sizes` of grains, fines and materials: a measured curve of sizes.
+
+All sizes in it are diameters, as sieves and laser instruments give them.
+"""
 
 import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any
+from itertools import pairwise
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
 
-from fdnet.case.materials import Solid
-from fdnet.case.sizes import Sizes
-from fdnet.case.values import NonNegative, Part, Positive, Radius
-from fdnet.sizes.curve import NUMBER, SizeCurve, blended
-from fdnet.sizes.laws import Uniform
+from fdnet.case.tables import (
+    MAX_CONCENTRATION,
+    Fraction,
+    NonNegative,
+    Part,
+    Positive,
+    Radius,
+    as_tuple,
+    scaled,
+)
+from fdnet.sizes import (
+    NUMBER,
+    SURFACE,
+    VOLUME,
+    Fit,
+    Law,
+    Points,
+    SizeCurve,
+    Uniform,
+    best_fit,
+    blended,
+    cut_curve,
+)
+
+MOST_POINTS = 1000
+"""Most rows of a measured curve."""
+_POWERS = {"volume": VOLUME, "mass": VOLUME, "surface": SURFACE, "number": NUMBER}
+_ROUNDING = 1e-6
+LEAST_RATIO, MOST_RATIO = 1.001, 1000.0
+"""Smallest and largest ratio of two neighbours of D10, D50 and D90; spheres of nearly one size are
+given by `radius_mm`."""
+
+Lengths = Annotated[
+    tuple[Positive, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=MOST_POINTS)
+]
+Percent = Annotated[float, Field(ge=0, le=100)]
+Percents = Annotated[
+    tuple[Percent, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=MOST_POINTS)
+]
+Cut = Annotated[tuple[Percent, Percent], BeforeValidator(as_tuple)]
+
+
+class Sizes(Part):
+    """A curve of sizes: D10, D50 and D90, or the points of a sieve or laser measurement."""
+
+    D10_mm: Positive | None = Field(None, description="Diameter that 10 % are finer than.")
+    D50_mm: Positive | None = Field(None, description="Median diameter.")
+    D90_mm: Positive | None = Field(None, description="Diameter that 90 % are finer than.")
+    shape: Literal["log-normal", "rosin-rammler"] | None = Field(
+        None,
+        description="Law through D10, D50 and D90. When absent: the one of the two that misses "
+        "them least, for two given diameters the log-normal one.",
+    )
+    size_mm: Lengths | None = Field(
+        None, description="Diameters of a measured curve, rising; it is straight over ln d."
+    )
+    passing_percent: Percents | None = Field(
+        None, description="What is finer than each of `size_mm`, rising to 100."
+    )
+    by: Literal["mass", "volume", "surface", "number"] = Field(
+        "mass",
+        description="What the percentages count. Mass and volume are the same for one material.",
+    )
+    cut_percent: Cut = Field(
+        (1.0, 99.0),
+        description="Ends of the curve, by volume: finer and coarser sizes are left out, and the "
+        "summary says what share of the solids they are.",
+    )
+
+    @model_validator(mode="after")
+    def _is_a_curve(self) -> Self:
+        for problem in _problems(self):
+            raise PydanticCustomError("size_curve", "{problem}", {"problem": problem})
+        return self
+
+    @property
+    def asked(self) -> dict[float, float]:
+        """Diameters, m, by the share that is finer, of those among D10, D50 and D90 given."""
+        given = {0.1: self.D10_mm, 0.5: self.D50_mm, 0.9: self.D90_mm}
+        return {share: size * 1e-3 for share, size in given.items() if size is not None}
+
+    @property
+    def points(self) -> Iterator[tuple[float, float]]:
+        """Share finer and diameter, m, of each point of a measured curve."""
+        for size, finer in zip(self.size_mm or (), self.passing_percent or (), strict=False):
+            yield finer / 100, size * 1e-3
+
+    @cached_property
+    def fit(self) -> Fit | None:
+        """The law through D10, D50 and D90; None for a measured curve."""
+        return best_fit(self.asked, self.shape) if self.size_mm is None else None
+
+    @cached_property
+    def law(self) -> Law:
+        """The law of the whole, by `by`."""
+        if self.fit is not None:
+            return self.fit.law
+        assert self.size_mm is not None
+        assert self.passing_percent is not None
+        finer = [one / 100 for one in self.passing_percent]
+        return Points(tuple(one * 1e-3 for one in self.size_mm), (*finer[:-1], 1.0))
+
+    def curve(self, finest: float = 0.0) -> SizeCurve:
+        """The curve between its cuts, m; nothing finer than `finest` m."""
+        low, high = self.cut_percent
+        cut = (low / 100, high / 100)
+        return cut_curve(self.law, by=_POWERS[self.by], cut=cut, finest=finest)
+
+
+def _problems(sizes: Sizes) -> Iterator[str]:
+    given = {share: size for share, size in sizes.asked.items() if size is not None}
+    measured = sizes.size_mm is not None or sizes.passing_percent is not None
+    if measured and given:
+        yield "gives D10, D50 or D90 beside a measured curve; give one of the two"
+    elif measured:
+        yield from _measured_problems(sizes)
+    elif len(given) < 2:
+        yield (
+            f"gives {len(given)} of D10, D50 and D90, expected two or three of them (one diameter "
+            "has no spread), or size and passing of a measured curve, or a file"
+        )
+    elif not all(LEAST_RATIO <= b / a <= MOST_RATIO for a, b in pairwise(given.values())):
+        texts = ", ".join(f"D{100 * share:.0f} {1e3 * size:g} mm" for share, size in given.items())
+        yield (
+            f"{texts}: must rise from D10 to D90, each {LEAST_RATIO} to {MOST_RATIO:g} times the "
+            "one before"
+        )
+    if sizes.cut_percent[0] >= sizes.cut_percent[1]:
+        yield f"cut_percent {list(sizes.cut_percent)} must rise, [finest, coarsest]"
+    elif not measured and not 0 < sizes.cut_percent[0] < sizes.cut_percent[1] < 100:
+        yield (
+            f"cut_percent {list(sizes.cut_percent)}: the law of D10, D50 and D90 has no ends, "
+            "expected cuts above 0 and below 100"
+        )
+
+
+def _measured_problems(sizes: Sizes) -> Iterator[str]:
+    size, finer = sizes.size_mm, sizes.passing_percent
+    if size is None or finer is None:
+        yield "a measured curve needs both size_mm and passing_percent"
+    elif len(size) != len(finer):
+        yield f"{len(size)} sizes with {len(finer)} percentages, expected as many of both"
+    elif sizes.shape is not None:
+        yield f"shape {sizes.shape!r} belongs to D10, D50 and D90, not to a measured curve"
+    elif finer[0] > 0 and sizes.by in ("number", "surface"):
+        yield (
+            f"the curve by {sizes.by} begins at {finer[0]:g} %, expected 0 %: spheres of unknown "
+            "size have no volume"
+        )
+    else:
+        yield from _order_problems(size, finer)
+
+
+def _order_problems(size: tuple[float, ...], finer: tuple[float, ...]) -> Iterator[str]:
+    for (a, b), (p, q) in zip(pairwise(size), pairwise(finer), strict=True):
+        if b < (1 + _ROUNDING) * a:
+            yield f"size_mm must rise, but {b:g} mm follows {a:g} mm"
+            return
+        if p > q:
+            yield (
+                f"the curve must not fall: {p:g} % pass {a:g} mm, but {q:g} % pass {b:g} mm; "
+                "are these percentages of each fraction, or retained?"
+            )
+            return
+    if abs(finer[-1] - 100) > 100 * _ROUNDING:
+        yield (
+            f"the curve ends at {finer[-1]:g} % at {size[-1]:g} mm, expected 100 %: add the size "
+            "that all passes"
+        )
+
+
+# ------------------------------------------------------------------------------------------------
+# The materials of a mud: the list `fines.materials`, such as CaCO3, barite and drilled solids.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Solid:
+    """One material of some spheres.
+
+    Attributes:
+        name: as the case gives it; empty where there is one material.
+        share: of the volume of all solids of the case.
+        curve: diameters, m.
+        density: kg/m3.
+    """
+
+    name: str
+    share: float
+    curve: SizeCurve
+    density: float
+
+
+class Material(Part):
+    """One kind of solids in the mud."""
+
+    name: str = Field(min_length=1, max_length=60, description="Name of the material.")
+    share: Positive = Field(
+        description="Its share of the solids by mass; the shares are relative to their sum."
+    )
+    sizes: Sizes = Field(description="Its curve of diameters, as `fines.sizes`.")
+    density_kg_m3: Positive | None = Field(
+        None, description="Density of the material. When absent: `fines.density_kg_m3`."
+    )
+    friction: NonNegative | None = Field(
+        None,
+        description="Coefficient of sliding friction; for now it must be that of all fines, "
+        "`fines.friction`, which is also the default.",
+    )
+
+
+def components_of(
+    materials: Sequence[Material], *, density: float, finest: float
+) -> tuple[Solid, ...]:
+    """The materials with their shares by volume of all solids.
+
+    `density` kg/m3 is for those without one; nothing finer than `finest` m is kept.
+    """
+    volumes = [one.share / (one.density_kg_m3 or density) for one in materials]
+    return tuple(
+        Solid(
+            name=one.name,
+            share=volume / sum(volumes),
+            curve=one.sizes.curve(finest),
+            density=one.density_kg_m3 or density,
+        )
+        for one, volume in zip(materials, volumes, strict=True)
+    )
+
+
+def mixed_density(materials: Sequence[Material], density: float) -> float:
+    """Mass over volume, kg/m3, of materials by their shares of mass; see `components_of`."""
+    mass = sum(one.share for one in materials)
+    return mass / sum(one.share / (one.density_kg_m3 or density) for one in materials)
+
+
+# ------------------------------------------------------------------------------------------------
+# What the tables [grains] and [fines] share: sizes, density and contact of spheres.
+
 
 SHEAR_RATIO = 0.04
 """Tangential over normal stiffness of a material that gives none: small enough that no fine larger
-than 1/370 of a grain at friction 0.55 locks between two grains (`fdnet.scales.sticking`)."""
+than 1/370 of a grain at friction 0.55 locks between two grains (`fdnet.scales.contacts`)."""
 
 
 class Spheres(Part):
@@ -156,3 +398,182 @@ class Spheres(Part):
         return (
             2 * (0.25 * (low + high) * (low**2 + high**2)) / ((low**2 + low * high + high**2) / 3)
         )
+
+
+# ------------------------------------------------------------------------------------------------
+# The tables [grains] and [fines] of a case file: material and number of the spheres.
+
+
+Materials = Annotated[
+    tuple[Material, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=20)
+]
+
+
+class Grains(Spheres):
+    """The skeleton: the sand grains of the formation. Give either `porosity` or `count`."""
+
+    porosity: Fraction | None = Field(
+        None,
+        description="Porosity of the finished pack, with overlaps of grains counted once. The "
+        "number of grains is adjusted until it is met within 0.003.",
+    )
+    count: Annotated[int, Field(ge=1)] | None = Field(
+        None, description="Number of grains. It overrides `porosity`."
+    )
+    density_kg_m3: Positive = Field(2650.0, description="Density of the grains.")
+    normal_stiffness_N_m: Positive = Field(
+        94.3e9,
+        description="Normal contact stiffness of the grains' material, and of the walls. "
+        "`run.stiffness_N_m` scales all contact stiffnesses by one factor.",
+    )
+    shear_stiffness_N_m: Positive | None = Field(
+        None,
+        description="Tangential contact stiffness of the grains' material, and of the walls. When "
+        "absent: 0.04 of the normal one, so that friction lets go of fines that roll around the "
+        "neck of two grains. The thesis has 34e9.",
+    )
+    youngs_modulus_GPa: Positive = Field(
+        94.3,
+        description="Young's modulus of the grains' material, and of the walls, for "
+        'contact.model = "hertz". The default is the thesis\'s (quartz). `run.stiffness_N_m` '
+        "scales all moduli by one factor.",
+    )
+    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = Field(
+        0.387,
+        description="Poisson's ratio of the grains' material, and of the walls, for "
+        'contact.model = "hertz". The default is E / 2G - 1 of the thesis\'s 94.3 and 34 GPa.',
+    )
+    motion: Literal["fixed", "mobile"] = Field(
+        "fixed",
+        description='Motion of the grains during the invasion: "fixed" keeps them in place, '
+        '"mobile" lets the fines push them. The fluid itself does not push grains.',
+    )
+    max_overlap: Fraction = Field(
+        0.15,
+        description="Largest accepted overlap of two grains in the pack, over the smaller "
+        "diameter. A denser pack is refused.",
+    )
+
+
+class Fines(Spheres):
+    """The invading particles: a slab of suspension upstream. Give either `count` or `slab_mm`.
+
+    A case without this table has no invasion: only the intact pack is made and analysed.
+    """
+
+    density_kg_m3: Positive = Field(2146.0, description="Density of the fines.")
+    normal_stiffness_N_m: Positive = Field(
+        63.0e9, description="Normal contact stiffness of the fines' material."
+    )
+    shear_stiffness_N_m: Positive | None = Field(
+        None,
+        description="Tangential contact stiffness of the fines' material. When absent: 0.04 of "
+        "the normal one. The thesis has 26e9.",
+    )
+    youngs_modulus_GPa: Positive = Field(
+        63.0,
+        description="Young's modulus of the fines' material, for contact.model = \"hertz\". The "
+        "default is the thesis's.",
+    )
+    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = Field(
+        0.212,
+        description="Poisson's ratio of the fines' material, for contact.model = \"hertz\". The "
+        "default is E / 2G - 1 of the thesis's 63 and 26 GPa.",
+    )
+    materials: Materials | None = Field(
+        None,
+        description="Several materials, each a table with its own sizes, instead of `radius_mm` "
+        "or `sizes`; their keys are below.",
+    )
+    cut_um: Positive | None = Field(
+        None,
+        description="Diameter below which solids of measured sizes are left out. Their share is "
+        "said in the warnings of the summary, and the suspension is thinner by it.",
+    )
+    concentration: Annotated[float, Field(gt=0, le=MAX_CONCENTRATION)] | None = Field(
+        0.10,
+        description="Volume of solids over the volume of suspension in the slab upstream. It has "
+        "no default where `solids_kg_m3` is given.",
+    )
+    solids_kg_m3: Positive | None = Field(
+        None, description="Mass of solids in a volume of mud, instead of `concentration`."
+    )
+    count: Annotated[int, Field(ge=1)] | None = Field(
+        None, description="Number of fines supplied. The length of the slab follows from it."
+    )
+    slab_mm: Positive | None = Field(
+        None,
+        description="Length of the slab of suspension along the flow. The number of fines follows "
+        "from it.",
+    )
+    supply: Literal["slab", "batches"] = Field(
+        "batches",
+        description='How the fines enter: "batches" puts each part of the slab in when it is '
+        'about to arrive, "slab" puts all of them in at the start. The suspension is the same; '
+        "batches are much faster for a long slab.",
+    )
+
+    @property
+    def slab_m(self) -> float | None:
+        """Length of the slab of suspension, m; None: it follows from the count."""
+        return scaled(self.slab_mm, 1e-3)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_concentration(cls, data: Any) -> Any:
+        """The default of `concentration` gives way to `solids_kg_m3`."""
+        by_mass = isinstance(data, Mapping) and data.get("solids_kg_m3") is not None
+        return {"concentration": None, **data} if by_mass else data
+
+    @model_validator(mode="after")
+    def _something_is_left(self) -> Self:
+        sizes = [self.sizes] if self.sizes is not None else []
+        for one in [*sizes, *(material.sizes for material in self.materials or ())]:
+            largest = one.curve().high
+            if self.finest_m >= largest:
+                problem = (
+                    f"cut_um {self.cut_um:g} leaves nothing of a curve that ends at "
+                    f"{1e6 * largest:.3g} um; lower it"
+                )
+                raise PydanticCustomError("size_curve", "{problem}", {"problem": problem})
+        return self
+
+    @property
+    def _size_keys(self) -> tuple[Any, ...]:
+        return self.radius_mm, self.sizes, self.materials
+
+    @property
+    def finest_m(self) -> float:
+        """Diameter, m, below which sizes are left out."""
+        return (self.cut_um or 0.0) * 1e-6
+
+    @cached_property
+    def components(self) -> tuple[Solid, ...]:
+        """The materials that the fines are of, with their shares by volume of what is kept."""
+        if self.materials is None:
+            return super().components
+        return components_of(self.materials, density=self.density_kg_m3, finest=self.finest_m)
+
+    @property
+    def solids_density_kg_m3(self) -> float:
+        """Mass over volume of all solids of the mud, those that are left out as well."""
+        if self.materials is None:
+            return self.density_kg_m3
+        return mixed_density(self.materials, self.density_kg_m3)
+
+    @property
+    def has_one_concentration(self) -> bool:
+        """Whether the solids of the mud are given, and once only."""
+        return (self.solids_kg_m3 is None) != (self.concentration is None)
+
+    @property
+    def volume_fraction(self) -> float:
+        """Volume of all solids over that of the suspension."""
+        if self.solids_kg_m3 is not None:
+            return self.solids_kg_m3 / self.solids_density_kg_m3
+        return self.concentration or 0.0
+
+    @property
+    def placed_fraction(self) -> float:
+        """Volume of the fines over that of the suspension: the solids without what is left out."""
+        return self.volume_fraction * self.curve.kept if self.measured else self.volume_fraction

@@ -6,18 +6,18 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 
 if TYPE_CHECKING:
-    from fdnet.scales.design.choice import Design
-    from fdnet.scales.design.questions import Question
+    from fdnet.scales.design import Design
+    from fdnet.scales.questions import Question
 
 SIZES = ("quick", "standard")
 
 
 def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
     """Adds the command to the command line."""
-    from fdnet.scales.design.questions import QUESTIONS
+    from fdnet.scales.questions import QUESTIONS
 
     init = commands.add_parser(
         "init",
@@ -45,9 +45,9 @@ def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
 
 
 def _init(options: argparse.Namespace) -> int:
-    from fdnet.files.new import refuse_present, write_new
-    from fdnet.scales.design.text import case_text, left_out
-    from fdnet.scales.times import spoken_time
+    from fdnet.files import refuse_present, write_new
+    from fdnet.scales.clock import spoken_time
+    from fdnet.scales.design import case_text, left_out
 
     out = options.out or Path(f"{options.name}.toml")
     refuse_present(out, force=options.force)
@@ -65,10 +65,8 @@ def _designed(options: argparse.Namespace, out: Path) -> "Design":
     """The design of the answers; on a terminal those that make no case are asked for again."""
     from fdnet.errors import CaseError
     from fdnet.run.pipeline import refusals
-    from fdnet.scales.design.answers import answers_of, filled
-    from fdnet.scales.design.choice import BUDGETS
-    from fdnet.scales.design.questions import named_in
-    from fdnet.scales.design.sizing import designed
+    from fdnet.scales.design import BUDGETS, answers_of, designed, filled
+    from fdnet.scales.questions import named_in
 
     ask = _ask if sys.stdin.isatty() else None
     texts = filled(_given(options, out), ask)
@@ -92,7 +90,7 @@ def _designed(options: argparse.Namespace, out: Path) -> "Design":
 
 def _given(options: argparse.Namespace, out: Path) -> dict[str, str]:
     """The options that were given; files as seen from the folder of the case."""
-    from fdnet.scales.design.questions import QUESTIONS
+    from fdnet.scales.questions import QUESTIONS
 
     given = {
         question.key: text

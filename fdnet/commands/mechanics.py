@@ -6,9 +6,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from fdnet.commands.case_options import add_overrides, overrides_of
+from fdnet.commands.run import add_overrides, overrides_of
 from fdnet.errors import CaseError
-from fdnet.files.paths import path_option
+from fdnet.files import path_option
 
 
 def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -55,7 +55,7 @@ def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
 
 def _mechanics(options: argparse.Namespace) -> int:
     from fdnet.run.mechanics import measure_elastic, packed_case, write_mechanics
-    from fdnet.run.session import RunOptions
+    from fdnet.run.records import RunOptions
 
     pressure = _pressure(options.confining_MPa)
     _check_test(options)
@@ -92,7 +92,7 @@ def _check_test(options: argparse.Namespace) -> None:
 
 
 def _triaxial(options: argparse.Namespace, packed: Any, confining: float) -> dict[str, Any]:
-    from fdnet.mechanics.rest import Row, Triaxial
+    from fdnet.mechanics.triaxial import Row, Triaxial
     from fdnet.run.mechanics import measure_triaxial, write_curve
 
     def follow(row: Row) -> None:

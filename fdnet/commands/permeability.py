@@ -1,13 +1,495 @@
-"""`fdnet permeability`: permeability of a file of spheres, without LIGGGHTS."""
+"""`fdnet permeability`: its options, and what it does and prints.
 
-from typing import Any
+The options of `fdnet permeability` and how each is read.
+"""
+
+import argparse
+import math
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fdnet.errors import CaseError
+from fdnet.files import path_option
+from fdnet.names import (
+    ALL_SPHERES,
+    AUTO,
+    DAMAGE_LAW_NAMES,
+    DEFAULT_LAW,
+    LAW_NAMES,
+    MOST_SECTIONS,
+    MOST_SPHERES,
+    SECTION_ARCHIE,
+    WALL_NAMES,
+    law_pairs,
+    off_by_factors,
+)
+
+if TYPE_CHECKING:
+    from fdnet.network.permeability import Analysis
+    from fdnet.spheres.readers import SphereFile
+    from fdnet.spheres.snapshot import Snapshot
+
+UNITS = ("m", "cm", "mm", "um")
+ALL_AXES = "all"
+_LAWS_START = b"law,damage_law,"
 
 
-def add_command(commands: Any, common: Any) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of the command."""
+    parser.add_argument(
+        "spheres",
+        type=path_option,
+        metavar="SPHERES",
+        help="text (columns x,y,z,radius[,kind] or x_m,...,radius_m[,kind]), LIGGGHTS or LAMMPS "
+        "text dump (its last whole frame), .vtp, .vtu or .vtk with point data radius or "
+        "diameter; each also as .gz",
+    )
+    _add_file_choices(parser)
+    parser.add_argument(
+        "--axis",
+        choices=("x", "y", "z", ALL_AXES),
+        default="x",
+        help="flow direction; all: the three one after another (default x)",
+    )
+    parser.add_argument(
+        "--periodic",
+        metavar="DIRS",
+        help="periodic directions of the file, any of x, y, z together; others are walls "
+        "(default: those of the dump's BOX BOUNDS, else none; '' for none)",
+    )
+    parser.add_argument(
+        "--walls",
+        choices=WALL_NAMES,
+        default="no-slip",
+        help="side walls hold the fluid, or it slips along them: slip for spheres cut out of a "
+        "larger pack (default no-slip; known to lubrication and its damage laws)",
+    )
+    parser.add_argument(
+        "--sections", type=_count, default=1, metavar="N", help="slabs along the flow (default 1)"
+    )
+    parser.add_argument(
+        "--law", choices=LAW_NAMES, help=f"conductance law (default {DEFAULT_LAW})"
+    )
+    parser.add_argument(
+        "--damage-law",
+        choices=DAMAGE_LAW_NAMES,
+        metavar="NAME",
+        help=f"damage law: {', '.join(DAMAGE_LAW_NAMES)} (default {AUTO}: up to {MOST_SPHERES} "
+        f"spheres {ALL_SPHERES}, above {SECTION_ARCHIE})",
+    )
+    parser.add_argument(
+        "--compare-laws", action="store_true", help="all laws with all damage laws as a table"
+    )
+    parser.add_argument(
+        "--csv", type=path_option, metavar="FILE", help="write the laws, one row each, as CSV"
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def joined_box(arguments: Sequence[str]) -> list[str]:
+    """The arguments with `--box -1,1,...` as `--box=-1,1,...`.
+
+    argparse takes a separate value that begins with a minus sign for an option.
+    """
+    result: list[str] = []
+    for argument in arguments:
+        if result and result[-1] == "--box" and argument[:1] == "-" and "," in argument:
+            result[-1] = f"--box={argument}"
+        else:
+            result.append(argument)
+    return result
+
+
+def _add_file_choices(parser: argparse.ArgumentParser) -> None:
+    """How the file is to be read."""
+    parser.add_argument(
+        "--units",
+        choices=UNITS,
+        help="unit of length of the file, of --box and of --fines-below (not with x_m columns; "
+        "default for a dump or VTK file: m)",
+    )
+    parser.add_argument(
+        "--box",
+        metavar="x0,x1,y0,y1,z0,z1",
+        help="the specimen, in the unit of the file (default: the box of the dump, else the box "
+        "around all grains)",
+    )
+    parser.add_argument(
+        "--fines-below",
+        type=float,
+        metavar="RADIUS",
+        help="spheres of a smaller radius are fines, in the unit of the file",
+    )
+    parser.add_argument(
+        "--types",
+        metavar="TYPE=KIND,...",
+        help="which types of a dump are grains and which fines (default 1=grain,2=fine)",
+    )
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or len(text) > 18 or not 1 <= int(text) <= MOST_SECTIONS:
+        raise argparse.ArgumentTypeError(f"{text[:40]!r}, expected 1 to {MOST_SECTIONS}")
+    return int(text)
+
+
+def table_file(path: Path, spheres: Path) -> Path:
+    """The file that the table of laws is written to, without links.
+
+    Raises CaseError where that would replace the file of spheres, or anything but such a table.
+    """
+    target = path.resolve()
+    if not target.parent.is_dir():
+        raise CaseError(f"--csv: {path.parent} is not a folder; make it first")
+    if not target.exists():
+        return target
+    if not target.is_file():
+        raise CaseError(
+            f"--csv: {path} is no ordinary file (a folder, a device or a pipe); give the name of "
+            "a file, or print with --json"
+        )
+    if spheres.exists() and target.samefile(spheres):
+        raise CaseError(f"--csv: {path} is the file of spheres itself; give another name")
+    with target.open("rb") as file:
+        start = file.read(len(_LAWS_START))
+    if start not in (b"", _LAWS_START):
+        raise CaseError(
+            f"--csv: {path} is there already and is no table of laws; give another name (nothing "
+            "was changed)"
+        )
+    return target
+
+
+def directions_of(text: str) -> tuple[bool, bool, bool]:
+    from fdnet.spheres.snapshot import periodic_axes
+
+    try:
+        return periodic_axes(text)
+    except CaseError as error:
+        raise CaseError(f"--{error}") from error
+
+
+def box_of(text: str) -> list[float]:
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if (
+        len(values) != 6
+        or not all(map(math.isfinite, values))
+        or any(values[i] >= values[i + 1] for i in (0, 2, 4))
+    ):
+        raise CaseError(
+            f"--box: {text!r}, expected six numbers x0,x1,y0,y1,z0,z1 with each lower bound below "
+            "the upper"
+        )
+    return values
+
+
+def types_of(text: str) -> dict[int, str]:
+    pairs = [part.partition("=") for part in text.split(",")]
+    if not all(
+        number.strip().isdecimal() and len(number) < 10 and name.strip()
+        for number, _, name in pairs
+    ):
+        raise CaseError(f"--types: {text!r}, expected TYPE=KIND,..., for example 1=grain,2=fine")
+    if len({int(number) for number, _, _ in pairs}) < len(pairs):
+        raise CaseError(f"--types: {text!r} names a type twice")
+    return {int(number): name.strip() for number, _, name in pairs}
+
+
+# ------------------------------------------------------------------------------------------------
+# `fdnet permeability`: the permeability of spheres in a file, without LIGGGHTS.
+
+
+PROFILE_BINS = 32
+_TOUCH = 0.2
+"""Part of its radius by which a sphere may reach across a wall: pressed grains do."""
+_MANY = 0.25
+"""Part of the spheres that would cross the sides of a periodic pack, above which those that cross
+side walls are reported."""
+_LARGE_FINE = 0.5
+"""Part of the smallest grain's radius up to which spheres of type 2 are fines unasked."""
+_BOX_MISSING = "no --box given: the box around all grains was used"
+
+
+def run(options: argparse.Namespace) -> int:
+    """Analyse the file and print the result.
+
+    Raises CaseError for bad input; nothing is written then.
+    """
+    from fdnet.network.tessellation.delaunay import check_lengths
+
+    chosen = None if options.periodic is None else directions_of(options.periodic)
+    table = None if options.csv is None else table_file(options.csv, options.spheres)
+    given = _read(options, chosen)
+    periodic = given.periodic
+    check_lengths(given.spheres, periodic)
+    axes = "xyz" if options.axis == ALL_AXES else options.axis
+    by_axis = {axis: _along(axis, given, periodic, options) for axis in axes}
+    results = by_axis[axes[0]]
+    if options.axis == ALL_AXES:
+        results = [row | _by_axis(by_axis, number) for number, row in enumerate(results)]
+    if table is not None:
+        from fdnet.report.tables import write_laws
+
+        write_laws(table, results)
+    _print(results, options, sides=_sides(periodic, options), fines=len(given.spheres.fines()))
+    return 0
+
+
+def _read(options: argparse.Namespace, periodic: tuple[bool, bool, bool] | None) -> "SphereFile":
+    """The spheres of the file. Raises CaseError for bad input."""
+    from fdnet.spheres.readers import read_sphere_file
+
+    given = read_sphere_file(
+        options.spheres,
+        units=options.units,
+        box=None if options.box is None else box_of(options.box),
+        fines_below=options.fines_below,
+        types=None if options.types is None else types_of(options.types),
+        periodic=periodic,
+    )
+    grains = len(given.spheres.grains())
+    if grains < (1 if any(given.periodic) else 4):
+        why = (
+            "for a tetrahedron; a periodic cell of fewer needs --periodic"
+            if grains
+            else "for a tetrahedron; the dump of an invasion holds fines alone (give the run's "
+            "spheres_damaged.csv instead)"
+        )
+        raise CaseError(
+            f"{options.spheres}: {grains} grains, expected at least 4 {why}; if grains and fines "
+            "were taken for each other, use --fines-below or --types"
+        )
+    _refuse_large_fines(given, options)
+    if given.around_grains and any(given.periodic):
+        raise CaseError(
+            "--box: missing, a periodic direction needs its length; give --box x0,x1,y0,y1,z0,z1"
+        )
+    return given
+
+
+def _refuse_large_fines(given: "SphereFile", options: argparse.Namespace) -> None:
+    """Raise CaseError on fines that are as large as grains.
+
+    A type that was taken for that of the fines unasked must be clearly smaller.
+    """
+    from fdnet.network.specimen import wide_fines
+
+    grains, fines = given.spheres.grains(), given.spheres.fines()
+    why = wide_fines(grains, fines)
+    unasked = any("type 2 a fine" in one for one in given.assumptions)
+    if unasked and not why and len(fines):
+        share = float(fines.radius.max() / grains.radius.min())
+        if share > _LARGE_FINE:
+            why = (
+                f"fines: the largest sphere of type 2 has {share:.2f} of the radius of the "
+                f"smallest of type 1, expected at most {_LARGE_FINE:g} where nothing says that "
+                "type 2 are fines"
+            )
+    if why:
+        kinds = (
+            "; --types 1=grain,2=grain takes both types as grains, --types 1=grain,2=fine says "
+            "that type 2 are fines"
+            if options.types is None and unasked
+            else "; name them grains, or tell them apart with --types or --fines-below"
+        )
+        raise CaseError(f"{options.spheres}: {why}{kinds}")
+
+
+def _along(
+    axis: str,
+    given: "SphereFile",
+    periodic: tuple[bool, bool, bool],
+    options: argparse.Namespace,
+) -> list[dict[str, Any]]:
+    """What each pair of laws gives for flow along `axis`, the chosen pair first."""
+    from fdnet.report.permeability_text import thesis_law_warning
+    from fdnet.scales.check import explained
+
+    spheres, along = given.spheres.turned(axis), "xyz".index(axis)
+    around = (periodic[along], periodic[(along + 1) % 3], periodic[(along + 2) % 3])
+    notes = [*given.warnings, *([_BOX_MISSING] if given.around_grains else [])]
+    if options.walls == "no-slip":
+        notes += _crossing(given.spheres, periodic, axis)
+    notes += _overlaps(spheres, around)
+    facts = [*given.assumptions, *_assumptions(spheres, periodic, options)]
+    rows: list[dict[str, Any]] = []
+    first: Analysis | None = None
+    for result, seconds in _measure(spheres, around, options):
+        if first is not None and (result.law, result.damage_law) == (DEFAULT_LAW, AUTO):
+            rows[0]["warnings"].insert(0, explained(thesis_law_warning(first, result)))
+            break
+        first = first or result
+        used = result.damage_law_used
+        if not rows and max(result.copies) > 1:
+            times = " x ".join(str(result.copies[("xyz".index(k) - along) % 3]) for k in "xyz")
+            facts = [
+                *facts,
+                f"The cell was repeated {times} times, because it is too small for the "
+                "tessellation; its permeability is the same.",
+            ]
+        if options.damage_law is None and not rows and used is not None:
+            facts = [*facts, f"The damage law is fdnet's default, here {used}."]
+        said = [explained(one) for one in [*notes, *result.warnings]]
+        more = {"warnings": said, "assumptions": facts}
+        rows.append(_row(result, seconds) | more)
+    return rows
+
+
+def _measure(
+    spheres: "Snapshot", periodic: tuple[bool, bool, bool], given: argparse.Namespace
+) -> Iterator[tuple["Analysis", float]]:
+    """Each result with its seconds; those of the first hold what all of them share."""
+    from fdnet.network.permeability import compare
+
+    chosen = (given.law or DEFAULT_LAW, given.damage_law or AUTO)
+    others = law_pairs() if given.compare_laws else []
+    if off_by_factors(*chosen, fines=len(spheres.fines()) > 0):
+        others = [*others, (DEFAULT_LAW, AUTO)]
+    start = time.perf_counter()
+    for result in compare(
+        spheres,
+        periodic=periodic,
+        laws=[chosen, *(pair for pair in others if pair != chosen)],
+        sections=given.sections,
+        walls=given.walls,
+        profile_bin_mm=1e3 * (spheres.box[0, 1] - spheres.box[0, 0]) / PROFILE_BINS,
+    ):
+        now = time.perf_counter()
+        yield result, now - start
+        start = now
+
+
+def _assumptions(
+    spheres: "Snapshot", periodic: tuple[bool, bool, bool], given: argparse.Namespace
+) -> Iterator[str]:
+    """What the answer rests on, one sentence each."""
+    yield "The fluid creeps (Stokes flow): permeability depends on the geometry alone."
+    if any(periodic):
+        names = ", ".join(axis for axis, yes in zip("xyz", periodic, strict=True) if yes)
+        yield f"The spheres repeat along {names}, with the sides of the box as periods."
+    walls = [
+        axis
+        for axis, repeats in zip("xyz", periodic, strict=True)
+        if not repeats and axis != given.axis
+    ]
+    if walls:
+        what = "hold the fluid" if given.walls == "no-slip" else "let the fluid slip"
+        yield f"Sides across {', '.join(walls)} are walls that {what}."
+    if given.law is None:
+        yield f"The conductance law is fdnet's default, {DEFAULT_LAW}."
+    if len(spheres.fines()):
+        yield "Fines and grains stay where they are."
+
+
+def _overlaps(spheres: "Snapshot", periodic: tuple[bool, bool, bool]) -> Iterator[str]:
+    """Warnings where the spheres that add to the solid overlap, as `fdnet run` has them."""
+    from fdnet.spheres.geometry import inside_others, max_overlap, overlap_doubts
+
+    seen = spheres.where(~inside_others(spheres, periodic)[0])
+    return overlap_doubts(
+        max_overlap(seen.grains(), periodic), max_overlap(seen, periodic, only_fines=True)
+    )
+
+
+def _crossing(spheres: "Snapshot", periodic: tuple[bool, bool, bool], axis: str) -> Iterator[str]:
+    """A warning where many spheres reach across the side walls, as those of a periodic pack do."""
+    import numpy as np
+
+    walls = np.array([not periodic[k] and "xyz"[k] != axis for k in range(3)])
+    reach = spheres.radius[:, None] * (1 - _TOUCH)
+    low, high = spheres.box.T
+    beyond = ((spheres.position - reach < low) | (spheres.position + reach > high)) & walls
+    count = int(np.sum(beyond.any(axis=1)))
+    expected = 2.0 * reach.mean() * len(spheres) * np.sum(walls / (high - low))
+    if count > max(_MANY * expected, 3):
+        sides = "".join(
+            name
+            for name, crossed, repeats in zip("xyz", beyond.any(axis=0), periodic, strict=True)
+            if crossed or repeats
+        )
+        yield (
+            f"{count} of {len(spheres)} spheres cross the side walls; if the pack is periodic "
+            f"give --periodic {sides}"
+        )
+
+
+def _sides(periodic: tuple[bool, bool, bool], options: argparse.Namespace) -> str:
+    """What each side of the box is, on one line."""
+    what = "hold the fluid" if options.walls == "no-slip" else "let the fluid slip"
+    if options.axis == ALL_AXES:
+        across = [f"{name} periodic" for name, yes in zip("xyz", periodic, strict=True) if yes]
+        walls = f"the other sides: walls that {what}"
+        return "; ".join(["along each axis: inlet and outlet", *across, walls])
+    others = [(k, name) for k, name in enumerate("xyz") if name != options.axis]
+    walled = ", ".join(name for k, name in others if not periodic[k])
+    repeated = ", ".join(name for k, name in others if periodic[k])
+    parts = [f"{options.axis}: inlet and outlet"]
+    parts += [f"{walled}: walls that {what}"] if walled else []
+    return "; ".join([*parts, f"{repeated}: periodic"] if repeated else parts)
+
+
+def _row(result: "Analysis", seconds: float) -> dict[str, Any]:
+    from fdnet.report.tables import section_rows
+
+    return {
+        "k_initial_m2": result.k_initial,
+        "k_damaged_m2": result.k_damaged,
+        "k_reduction": result.k_reduction,
+        "porosity_initial": result.porosity_initial,
+        "porosity_damaged": result.porosity_damaged,
+        "pores": len(result.network.pore_radius),
+        "throats": len(result.network.throat_radius),
+        "solver": result.solver,
+        "law": result.law,
+        "damage_law": result.damage_law,
+        "damage_law_used": result.damage_law_used,
+        "damage_law_other": result.damage_law_other,
+        "k_damaged_other_m2": result.k_damaged_other,
+        "sections": section_rows(result),
+        "network_counts": result.counts,
+        "spheres_dropped": result.counts["spheres_dropped"],
+        "seconds": seconds,
+    }
+
+
+def _by_axis(by_axis: dict[str, list[dict[str, Any]]], number: int) -> dict[str, Any]:
+    """The permeabilities of one pair of laws along the three axes, and all warnings."""
+    rows = {axis: results[number] for axis, results in by_axis.items()}
+    warnings = [f"{axis}: {text}" for axis, row in rows.items() for text in row["warnings"]]
+    return (
+        {f"k_{axis}_m2": row["k_initial_m2"] for axis, row in rows.items()}
+        | {f"k_{axis}_damaged_m2": row["k_damaged_m2"] for axis, row in rows.items()}
+        | {"warnings": warnings, "seconds": sum(row["seconds"] for row in rows.values())}
+    )
+
+
+def _print(
+    results: list[dict[str, Any]], options: argparse.Namespace, *, sides: str, fines: int
+) -> None:
+    if options.json:
+        from fdnet.report.tables import plain_json
+
+        first = results[0]
+        print(plain_json({**first, "laws": results} if options.compare_laws else first)[1])
+        return
+    from fdnet.report.permeability_text import Given, answer_lines
+
+    given = Given(sides=sides, sections=options.sections > 1, fines=fines > 0)
+    for line in answer_lines(results, given):
+        print(line)
+
+
+# ------------------------------------------------------------------------------------------------
+# `fdnet permeability`: permeability of a file of spheres, without LIGGGHTS.
+
+
+def add_permeability(commands: Any, common: Any) -> None:
     """Adds the command to the command line."""
-    from fdnet.permeability.command import run
-    from fdnet.permeability.options import add_arguments
-
     command = commands.add_parser(
         "permeability",
         parents=[common],

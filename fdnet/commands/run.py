@@ -1,17 +1,231 @@
-"""`fdnet run`: pack, invade, analyse and report one case."""
+"""`fdnet run`, `check`, `render` and `cases`: commands on a case.
+
+Options of every command that takes a case file.
+"""
 
 import argparse
 import json
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from fdnet.case.stages import STAGES
-from fdnet.commands.case_options import add_case, add_program, case_of, stages_of
-from fdnet.files.paths import path_option
+from fdnet.errors import CaseError
+from fdnet.files import path_option
+from fdnet.names import STAGES
+
+if TYPE_CHECKING:
+    from fdnet.case.case import Case
+    from fdnet.scales.check import Checked
+    from fdnet.scales.scales import Scales
 
 
-def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
+def add_case(parser: argparse.ArgumentParser) -> None:
+    """Adds the case file, --seed, --set and --np to a parser."""
+    add_file_and_set(parser)
+    add_ranks(parser)
+
+
+def add_file_and_set(parser: argparse.ArgumentParser) -> None:
+    """Adds the case file, --seed and --set to a parser."""
+    parser.add_argument("case", type=path_option, metavar="CASE.toml", help="the case file")
+    add_overrides(parser, example="fines.count=500")
+
+
+def add_overrides(parser: argparse.ArgumentParser, *, example: str) -> None:
+    """Adds --seed and --set to a parser; the help of --set shows `example`."""
+    parser.add_argument("--seed", type=int, help="overrides the seed of the case")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help=f"overrides a key, e.g. {example}",
+    )
+
+
+def add_ranks(parser: argparse.ArgumentParser) -> None:
+    """Adds --np to a parser."""
+    parser.add_argument(
+        "--np",
+        type=_ranks,
+        default=1,
+        metavar="N",
+        help="MPI ranks for LIGGGHTS (default 1); another number of ranks gives another pack from "
+        "the same seed, and a cut run is continued with the number it was begun with",
+    )
+
+
+def add_program(parser: argparse.ArgumentParser) -> None:
+    """Adds --liggghts, --launcher and --timeout to a parser."""
+    parser.add_argument("--liggghts", metavar="PATH", help="the LIGGGHTS binary")
+    parser.add_argument(
+        "--launcher",
+        metavar="TEMPLATE",
+        help="how several MPI ranks are started, with {ranks} for their number, e.g. "
+        "'srun -n {ranks}' (default: the mpirun of LIGGGHTS)",
+    )
+    parser.add_argument(
+        "--timeout",
+        type=float,
+        metavar="SECONDS",
+        help="stop LIGGGHTS after this time (continue with --resume)",
+    )
+
+
+def stages_of(text: str) -> tuple[str, ...]:
+    """The stages that --stages names. Raises CaseError for others, and for none."""
+    names = [part.strip() for part in text.split(",") if part.strip()]
+    unknown = [name for name in names if name not in STAGES]
+    if unknown or not names:
+        raise CaseError(
+            f"--stages: {text!r} has {unknown or 'nothing'}, expected some of {','.join(STAGES)}"
+        )
+    return tuple(stage for stage in STAGES if stage in names)
+
+
+def _ranks(text: str) -> int:
+    if not text.isdecimal() or len(text) > 9 or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text[:40]!r}, expected a number of ranks, 1 or more")
+    return int(text)
+
+
+def case_of(options: argparse.Namespace) -> Any:
+    """The case that the options name, with --set and --seed applied."""
+    from fdnet.case.file import read_case
+
+    return read_case(options.case, assignments=overrides_of(options))
+
+
+def overrides_of(options: argparse.Namespace) -> list[str]:
+    """The assignments of --set, then that of --seed."""
+    seed = [] if options.seed is None else [f"seed={options.seed}"]
+    return [*options.set, *seed]
+
+
+# ------------------------------------------------------------------------------------------------
+# `fdnet cases`: list the shipped cases, or copy one.
+
+
+def add_cases(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Adds the command to the command line."""
+    cases = commands.add_parser(
+        "cases", parents=[common], help="list the cases that come with fdnet, or copy one"
+    )
+    cases.add_argument("name", nargs="?", help="the case to copy (default: list all)")
+    cases.add_argument("--out", type=path_option, help="file to write (default NAME.toml)")
+    cases.add_argument("--force", action="store_true", help="replace a file that is there")
+    cases.set_defaults(action=_cases)
+
+
+def _cases(options: argparse.Namespace) -> int:
+    from fdnet.case.file import shipped_cases
+    from fdnet.files import write_new
+
+    if options.name is None:
+        for case in shipped_cases():
+            print(f"{case.name:<24} {case.about}")
+        return 0
+    out = options.out or Path(f"{options.name}.toml")
+    text = _text_of(options.name)
+    write_new(out, text, force=options.force)
+    print(f"{out}: written; fdnet check {out} looks at it, fdnet run {out} runs it")
+    return 0
+
+
+def _text_of(name: str) -> str:
+    import difflib
+
+    from fdnet.case.file import shipped_cases
+    from fdnet.errors import CaseError
+
+    known = {case.name: case for case in shipped_cases()}
+    if name not in known:
+        near = difflib.get_close_matches(name, list(known), n=1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise CaseError(f"{name}: no case of this name comes with fdnet{hint} (fdnet cases)")
+    return known[name].path.read_text(encoding="utf-8")
+
+
+# ------------------------------------------------------------------------------------------------
+# `fdnet check`: what is odd about a case, what to do about it, and what the run takes.
+
+
+def add_check(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Adds the command to the command line."""
+    check = commands.add_parser(
+        "check", parents=[common], help="say what is odd about a case, and what it takes"
+    )
+    add_case(check)
+    check.add_argument("--json", action="store_true", help="print the findings as JSON")
+    check.set_defaults(action=_check)
+
+
+def _check(options: argparse.Namespace) -> int:
+    from fdnet.scales.scales import scales_of
+
+    case = case_of(options)
+    result = looked_at(case, scales_of(case))
+    if options.json:
+        print(json.dumps(result.data(), indent=2))
+    else:
+        print("\n".join(result.lines()))
+    for one in result.findings:
+        if one.refused:
+            raise CaseError(f"fdnet run refuses this case: {one.what}")
+    return 0
+
+
+def looked_at(case: "Case", scales: "Scales") -> "Checked":
+    """The case with all that `fdnet run` would say or refuse."""
+    from fdnet.run.pipeline import refusals
+    from fdnet.scales.check import checked
+
+    return checked(case, scales, tuple(refusals(case, scales)))
+
+
+# ------------------------------------------------------------------------------------------------
+# `fdnet render`: write the decks without LIGGGHTS and print the scales.
+
+
+def add_render(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Adds the command to the command line."""
+    render = commands.add_parser(
+        "render", parents=[common], help="write the decks without LIGGGHTS and print the scales"
+    )
+    add_case(render)
+    render.add_argument("--out", type=path_option, required=True, help="folder for the decks")
+    render.set_defaults(action=_render)
+
+
+def _render(options: argparse.Namespace) -> int:
+    from fdnet.dem.invade_deck import render_decks
+    from fdnet.run.folder import is_run_folder
+    from fdnet.scales.scales import scales_of
+    from fdnet.scales.table import scale_rows
+
+    case = case_of(options)
+    scales = scales_of(case)
+    if is_run_folder(options.out):
+        raise CaseError(
+            f"{options.out}: is a run folder; give another --out (nothing was changed)"
+        )
+    decks = render_decks(case, options.out, ranks=options.np)
+    for row in scale_rows(case, scales):
+        print(
+            f"{row.name:<36} {row.symbol:<11} {row.value:>12.4g} {row.unit:<5} "
+            f"{row.formula:<40} {row.source}"
+        )
+    print("\n".join(looked_at(case, scales).lines()))
+    for deck in decks:
+        print(f"deck: {deck}")
+    return 0
+
+
+# ------------------------------------------------------------------------------------------------
+# `fdnet run`: pack, invade, analyse and report one case.
+
+
+def add_run(commands: Any, common: argparse.ArgumentParser) -> None:
     """Adds the command to the command line."""
     run = commands.add_parser(
         "run", parents=[common], help="pack, invade, analyse and report one case"
@@ -39,7 +253,7 @@ def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     from fdnet.run.pipeline import run_stages
-    from fdnet.run.session import RunOptions, cores
+    from fdnet.run.records import RunOptions, cores
 
     case = case_of(options)
     out = options.out or Path("runs") / case.name
@@ -77,7 +291,7 @@ def _warn(text: str) -> None:
 
 
 def _print_summary(summary: dict[str, Any], out: Path) -> None:
-    from fdnet.run.summary_text import summary_lines
+    from fdnet.run.summary import summary_lines
 
     for line in (
         summary_lines(summary) if summary else ["done (the analysis was not among the stages)"]

@@ -1,22 +1,345 @@
-"""The slab of fines upstream of the face: random, at the given concentration, touching nothing.
+"""Where the fines come from: places, batches, slabs.
 
-With `fines.supply` = "batches" it comes in batches (`batches`).
+Random places for fines of a wide range of sizes: class by class, from the largest.
+
+A large sphere finds no place among small ones that are there already. So every class of sizes is
+placed to the last sphere before the next one begins, in the whole slab at once: a batch that is
+filled before its neighbour would leave no place for large ones at their boundary.
+
+Rounds in which every sphere without a place is drawn again leave the last ones over by chance. So
+each of these is drawn many more times (`last_places`) before it counts as one without a place.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fdnet.case.case import InvasionCase
-from fdnet.case.size_rules import concentration_text
-from fdnet.dem.batches import Batches, batches_of
-from fdnet.dem.measured_fines import drawn_fines
-from fdnet.dem.size_classes import CLEARANCE, ROUNDS, few, last_places, places_by_size
+from fdnet.case.rules import concentration_text
+from fdnet.case.spheres import Fines
 from fdnet.errors import CaseError
 from fdnet.scales.scales import InvasionScales
-from fdnet.spheres.images import wrapped
+from fdnet.sizes import dealt
+from fdnet.spheres.geometry import wrapped
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
+
+CLEARANCE = 1.02
+"""Fines start at least this many radius sums apart."""
+ROUNDS = 400
+"""Times that a sphere without a place is drawn again, together with the others."""
+LAST_TRIES, LAST_SHARE = 100_000, 0.05
+"""Times that each of the last spheres is drawn, and the share of all that may be the last ones."""
+_CLASS, _MOST, _BLOCK = 2**0.25, 50_000, 1_000
+"""Largest ratio of radii in a class, most spheres that are drawn at once, and how many places for
+one of the last spheres are drawn at once."""
+
+Indices = NDArray[np.int64]
+NOBODY = (np.empty((0, 3)), np.empty(0))
+"""Places and radii of no sphere."""
+
+
+def places_by_size(
+    radius: Array,
+    low: Array,
+    high: Array,
+    size: Array,
+    *,
+    rng: np.random.Generator,
+    others: tuple[Array, Array] = NOBODY,
+    patient: bool = True,
+) -> tuple[Array, int]:
+    """Random places that touch nothing, by random sequential addition of whole classes.
+
+    Args:
+        radius: (N,) m.
+        low: (N, 3) m, smallest coordinates of each centre.
+        high: (N, 3) m, largest ones.
+        size: (3,) m, period along each axis, 0 where there is none.
+        rng: gives the places.
+        others: places (M, 3) m and radii (M,) m of spheres that are there already.
+        patient: whether the last spheres of a class are drawn `LAST_TRIES` times.
+
+    Returns:
+        Places (N, 3) m, and how many spheres got none; those places mean nothing then.
+    """
+    count = len(radius)
+    place = np.concatenate([np.empty((count, 3)), others[0]])
+    done = np.arange(len(place)) >= count
+    radius = np.concatenate([radius, others[1]])
+    for members in _classes(radius[:count]):
+        waiting = members
+        for _ in range(ROUNDS):
+            if not len(waiting):
+                break
+            place[waiting] = low[waiting] + rng.random((len(waiting), 3)) * (high - low)[waiting]
+            clear = _clear(place, radius, waiting, np.flatnonzero(done), size)
+            done[waiting[clear]] = True
+            waiting = waiting[~clear]
+        if patient and few(len(waiting), count):
+            last = last_places(
+                radius[waiting],
+                (low[waiting], high[waiting]),
+                size,
+                rng=rng,
+                others=(place[done], radius[done]),
+            )
+            place[waiting[: len(last)]], done[waiting[: len(last)]] = last, True
+            waiting = waiting[len(last) :]
+        if len(waiting):
+            return place[:count], int(np.sum(~done))
+    return place[:count], 0
+
+
+def few(waiting: int, count: int) -> bool:
+    """Whether the `waiting` ones of `count` spheres are the last ones."""
+    return 0 < waiting <= max(1.0, LAST_SHARE * count)
+
+
+def last_places(
+    radius: Array,
+    span: tuple[Array, Array],
+    size: Array,
+    *,
+    rng: np.random.Generator,
+    others: tuple[Array, Array],
+) -> Array:
+    """Places (K, 3) m of the first K spheres, each clear of the ones before it and of `others`.
+
+    K is N, or as many as there are before the first one that `LAST_TRIES` draws give no place.
+
+    Args:
+        radius: (N,) m.
+        span: smallest and largest coordinates (N, 3) m of each centre.
+        size: (3,) m, period along each axis, 0 where there is none.
+        rng: gives the places.
+        others: places (M, 3) m and radii (M,) m of spheres that are there already.
+    """
+    place, there = others
+    for one, low, high in zip(radius, *span, strict=True):
+        free = _place_of_one(one, (low, high), size, rng=rng, others=(place, there))
+        if free is None:
+            break
+        place, there = np.vstack([place, free]), np.append(there, one)
+    return place[len(others[0]) :]
+
+
+def _place_of_one(
+    radius: float,
+    span: tuple[Array, Array],
+    size: Array,
+    *,
+    rng: np.random.Generator,
+    others: tuple[Array, Array],
+) -> Array | None:
+    """The first of `LAST_TRIES` random places (3,) m that is clear of the `others`, or None."""
+    from scipy.spatial import cKDTree
+
+    low, high = span
+    place, there = others
+    tree = cKDTree(place, boxsize=size)
+    reach = CLEARANCE * (radius + float(there.max(initial=0.0)))
+    for _ in range(LAST_TRIES // _BLOCK):
+        drawn = low + rng.random((_BLOCK, 3)) * (high - low)
+        near = cKDTree(drawn, boxsize=size).sparse_distance_matrix(
+            tree, reach, output_type="ndarray"
+        )
+        clear = np.ones(_BLOCK, bool)
+        clear[near["i"][near["v"] < CLEARANCE * (radius + there[near["j"]])]] = False
+        if clear.any():
+            return np.asarray(drawn[np.argmax(clear)])
+    return None
+
+
+def _classes(radius: Array) -> Iterator[Indices]:
+    """Indices of the spheres of each class, from the largest."""
+    order = np.argsort(-radius, kind="stable")
+    start = 0
+    while start < len(order):
+        alike = radius[order[start:]] > radius[order[start]] / _CLASS
+        end = min(start + int(np.sum(alike)), start + _MOST)
+        yield order[start:end]
+        start = end
+
+
+def _clear(
+    place: Array, radius: Array, drawn: Indices, others: Indices, size: Array
+) -> NDArray[np.bool_]:
+    """Whether each drawn sphere clears the others and the drawn ones before it."""
+    from scipy.spatial import cKDTree
+
+    clear = np.ones(len(drawn), bool)
+    tree, reach = cKDTree(place[drawn], boxsize=size), CLEARANCE * radius[drawn].max()
+    if len(others):
+        near = tree.sparse_distance_matrix(
+            cKDTree(place[others], boxsize=size),
+            reach + CLEARANCE * radius[others].max(),
+            output_type="ndarray",
+        )
+        least = CLEARANCE * (radius[drawn[near["i"]]] + radius[others[near["j"]]])
+        clear[near["i"][near["v"] < least]] = False
+    near = tree.sparse_distance_matrix(tree, 2 * reach, output_type="ndarray")
+    near = near[near["i"] < near["j"]]
+    least = CLEARANCE * (radius[drawn[near["i"]]] + radius[drawn[near["j"]]])
+    clear[near["j"][near["v"] < least]] = False
+    return clear
+
+
+# ------------------------------------------------------------------------------------------------
+# How the slab of fines is cut into batches, and when each of them enters.
+#
+# With `fines.supply` = "batches" the slab is cut across the flow. A batch enters the simulation at
+# the start of a chunk, where the fluid would have carried it by then. The length of a batch is
+# what the suspension moves in a chunk of time t against a cake that grows towards it, to a
+# thickness h = c (u t + h) / phi with the concentration c, the velocity u and phi =
+# `LOOSEST_CAKE`. So no cake overtakes a batch as long as one more batch is present than needed.
+#
+# Where the deposit slows the mud down (`Drag.slowed`), the distance that the mud has moved takes
+# the place of u t. A batch enters at the start of the chunk in which the mud will have moved far
+# enough. Its fines are drawn then, at the mud's velocity, where the mud would have carried them
+# and clear of all fines that are there: those move with the mud only in the mean.
+
+
+LOOSEST_CAKE = 0.5
+"""Volume fraction of the loosest cake that batches leave room for. Random loose packing has 0.55
+(Onoda & Liniger 1990)."""
+AT_ONCE = 2
+"""Batches present from the start: the one that arrives in the first chunk, and the next."""
+ROUNDING = 1e-9
+"""Share of a chunk's travel that rounding may take from the distance of the mud."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Batches:
+    """How a slab is cut.
+
+    Attributes:
+        counts: number of fines in each batch.
+        length: m, of each batch along the flow.
+        travel: m, that the suspension moves in a chunk.
+    """
+
+    counts: tuple[int, ...]
+    length: float
+    travel: float
+
+    @property
+    def reach(self) -> float:
+        """Largest distance, m, of a fine to the slab's end when it enters undisturbed mud."""
+        later = max(0, len(self.counts) - AT_ONCE)
+        return min(AT_ONCE, len(self.counts)) * self.length + later * (self.length - self.travel)
+
+    def entered_at(self, chunk: int) -> int:
+        """Batches that are in the simulation in a chunk (numbered from 1) of undisturbed mud."""
+        return min(len(self.counts), chunk + AT_ONCE - 1)
+
+    def entered_after(self, distance: float) -> int:
+        """Batches that are in the simulation once the mud has moved by a `distance`, m."""
+        return self.entered_at(1 + math.floor(distance / self.travel + ROUNDING))
+
+    def entered_with(self, fines: int) -> int:
+        """The smallest number of batches that hold so many `fines`, and at least the first ones.
+
+        They are all batches where not even these hold so many.
+        """
+        totals = np.cumsum(self.counts)
+        needed = int(np.searchsorted(totals, fines)) + 1
+        return min(len(totals), max(needed, self.entered_at(1)))
+
+    def distance_of(self, number: int) -> float:
+        """Distance m by which undisturbed mud has moved when batch `number` (from 0) enters."""
+        return max(0, number + 1 - AT_ONCE) * self.travel
+
+    def supplied(self, entered: int) -> int:
+        """Fines in the first batches, `entered` of them."""
+        return sum(self.counts[:entered])
+
+
+def batches_of(case: InvasionCase, scales: InvasionScales) -> Batches:
+    """The batches of a case: of equal length, with the slab's fines shared out evenly.
+
+    A slab that is fed at once is one batch, and so is one of so few fines that some batch would be
+    empty. No batch is thinner than a fine, so that each must clear only the one next to it.
+    """
+    travel = scales.upstream_velocity * scales.checkpoint_steps * scales.time_step
+    apart = 1.01 * CLEARANCE * 2 * case.fines.radius_range_m[1]
+    length = max(travel / (1 - case.fines.placed_fraction / LOOSEST_CAKE), apart)
+    whole = Batches(counts=(scales.supplied_count,), length=scales.slab_length, travel=travel)
+    if case.fines.supply == "slab" or scales.slab_length <= AT_ONCE * length:
+        return whole
+    number = math.ceil(scales.slab_length / length - 1e-9)
+    share = np.minimum(np.arange(1, number + 1) * length / scales.slab_length, 1.0)
+    counts = np.diff(np.round(share * scales.supplied_count).astype(int), prepend=0)
+    if not counts.all():
+        return whole
+    return Batches(counts=tuple(int(count) for count in counts), length=length, travel=travel)
+
+
+# ------------------------------------------------------------------------------------------------
+# Fines of measured sizes: which radius and density each has, and in which batch it comes.
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Drawn:
+    """Some fines.
+
+    Attributes:
+        radius: (N,) m.
+        density: (N,) kg/m3.
+    """
+
+    radius: Array
+    density: Array
+
+
+def drawn_fines(case: InvasionCase, counts: Sequence[int]) -> list[Drawn]:
+    """Fines of measured sizes for batches of `counts`, each with the curve of the whole mud.
+
+    All fines are drawn at once, as strata of the curve of each material, and then dealt out.
+    """
+    whole = _whole(case.fines, sum(counts))
+    rng = np.random.default_rng([case.seed, 13])
+    return [
+        Drawn(radius=whole.radius[index], density=whole.density[index])
+        for index in dealt(counts, rng)
+    ]
+
+
+def densities(case: InvasionCase, counts: Sequence[int]) -> Array:
+    """(N,) density of every fine, kg/m3, in the order of their ids."""
+    if not case.fines.measured:
+        return np.full(sum(counts), case.fines.density_kg_m3)
+    return np.concatenate([batch.density for batch in drawn_fines(case, counts)])
+
+
+def _whole(fines: Fines, count: int) -> Drawn:
+    """`count` fines sorted by material and size."""
+    parts = list(zip(fines.components, _numbers(fines, count), strict=True))
+    return Drawn(
+        radius=np.concatenate([0.5 * one.curve.strata(number) for one, number in parts]),
+        density=np.concatenate([np.full(number, one.density) for one, number in parts]),
+    )
+
+
+def _numbers(fines: Fines, count: int) -> list[int]:
+    """How many of `count` fines are of each material, by the largest remainder."""
+    solids = [(one, one.curve.mean(3)) for one in fines.components]
+    rates = [one.share * one.curve.kept / cube for one, cube in solids]
+    exact = [count * rate / sum(rates) for rate in rates]
+    numbers = [int(one) for one in exact]
+    missing = count - sum(numbers)
+    for index in sorted(range(len(exact)), key=lambda i: numbers[i] - exact[i])[:missing]:
+        numbers[index] += 1
+    return numbers
+
+
+# ------------------------------------------------------------------------------------------------
+# The slab of fines upstream of the face: random, at the given concentration, touching nothing.
+#
+# With `fines.supply` = "batches" it comes in batches (`batches`).
+
 
 SURE_CROWDING = 0.2
 """Up to this `crowding` every fine gets a place. Random sequential addition of equal spheres

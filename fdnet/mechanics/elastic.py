@@ -12,13 +12,23 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from fdnet.errors import MechanicsError
-from fdnet.mechanics.joints import Joints, find_joints
-from fdnet.mechanics.kinematics import STRAINS, kinematics
-from fdnet.mechanics.solver import solver_of, stiffness
-from fdnet.mechanics.springs import Material, bond_springs, contact_springs
-from fdnet.mechanics.tensor import Moduli, anisotropy_of, voigt_average, wave_speeds, young_along
-from fdnet.spheres.arrays import one_line
-from fdnet.spheres.snapshot import Array, Snapshot
+from fdnet.mechanics.springs import (
+    STRAINS,
+    Joints,
+    Material,
+    Moduli,
+    anisotropy_of,
+    bond_springs,
+    contact_springs,
+    find_joints,
+    kinematics,
+    solver_of,
+    stiffness,
+    voigt_average,
+    wave_speeds,
+    young_along,
+)
+from fdnet.spheres.snapshot import Array, Snapshot, one_line
 
 LEAST_STIFFNESS = 1e-7
 """Stiffness along an axis, over that of grains held to the uniform strain, below which a pack

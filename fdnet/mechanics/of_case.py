@@ -1,21 +1,94 @@
-"""The material of a case's grains and bonds, and the moduli of its pack."""
+"""The moduli of a pack as keys of mechanics.json."""
+
+from typing import Any
 
 import numpy as np
 
-from fdnet.case.bonds import Bonds
 from fdnet.case.case import Case
+from fdnet.case.tables import Bonds
 from fdnet.errors import CaseError
 from fdnet.mechanics.elastic import Elastic, elastic_of
-from fdnet.mechanics.joints import find_joints
-from fdnet.mechanics.rest import Triaxial
-from fdnet.mechanics.springs import Cement, Material
-from fdnet.mechanics.triaxial import Sheared, triaxial
-from fdnet.scales.hertz import Elastic as Moduli
-from fdnet.scales.hertz import overlap_under, secant_stiffness, tangential_stiffness
-from fdnet.scales.hertz_contacts import pair_elastic
-from fdnet.scales.springs import series
-from fdnet.spheres.porosity import measure_porosity
+from fdnet.mechanics.springs import Cement, Material, find_joints
+from fdnet.mechanics.triaxial import Sheared, Triaxial, triaxial
+from fdnet.scales.contacts import Elastic as Moduli
+from fdnet.scales.contacts import (
+    overlap_under,
+    pair_elastic,
+    secant_stiffness,
+    series,
+    tangential_stiffness,
+)
+from fdnet.spheres.geometry import measure_porosity
 from fdnet.spheres.snapshot import Snapshot
+
+
+def elastic_numbers(result: Elastic) -> dict[str, Any]:
+    """Moduli, velocities and counts in SI; the moduli are those of the isotropic average."""
+    along = result.young_along or (None, None, None)
+    p_wave, s_wave = result.waves
+    return {
+        "young_modulus_Pa": result.averaged.young,
+        "poisson_ratio": result.averaged.poisson,
+        "bulk_modulus_Pa": result.averaged.bulk,
+        "shear_modulus_Pa": result.averaged.shear,
+        "p_wave_m_s": p_wave,
+        "s_wave_m_s": s_wave,
+        "density_kg_m3": result.density,
+        "young_modulus_x_Pa": along[0],
+        "young_modulus_y_Pa": along[1],
+        "young_modulus_z_Pa": along[2],
+        "tensor_Pa": result.tensor.tolist(),
+        "anisotropy": result.anisotropy,
+        "affine_young_modulus_Pa": result.affine_averaged.young,
+        "coordination": result.coordination,
+        "grains": result.grains,
+        "rattlers": result.rattlers,
+        "contacts": result.contacts,
+        "bonds": result.bonds,
+    }
+
+
+def triaxial_numbers(result: Sheared) -> dict[str, Any]:
+    """What a triaxial test gave, in SI; stresses and strains of compression are above 0."""
+    peak, last, test = result.peak, result.rows[-1], result.test
+    return {
+        "confining_Pa": test.confining,
+        "young_modulus_Pa": result.young,
+        "poisson_ratio": result.poisson,
+        "peak_Pa": peak.deviatoric,
+        "peak_strain": peak.axial_strain,
+        "at_end_Pa": last.deviatoric,
+        "strain_at_end": last.axial_strain,
+        "volume_strain_at_end": last.volume_strain,
+        "bonds": result.bonds,
+        "broken_in_tension": last.tension,
+        "broken_in_shear": last.shear,
+        "load_steps": test.steps,
+        "tolerance": test.tolerance,
+        "restless": result.restless,
+    }
+
+
+def triaxial_warnings(result: Sheared) -> list[str]:
+    """What a reader of the curve must know, one sentence each."""
+    warnings: list[str] = []
+    if result.restless:
+        warnings.append(
+            f"{result.restless} of {len(result.rows)} load steps of the triaxial test did not "
+            f"come to rest within the tolerance {result.test.tolerance:g}: the curve is uncertain "
+            "there; take more load steps"
+        )
+    if result.peak is result.rows[-1]:
+        warnings.append(
+            "the largest deviatoric stress of the triaxial test is that of its last step: the "
+            "peak may lie beyond; raise --strain"
+        )
+    return warnings
+
+
+# ------------------------------------------------------------------------------------------------
+# The material of a case's grains and bonds, and the moduli of its pack.
+
 
 QUARTZ_YOUNG = 94.3e9
 """Young's modulus of quartz, Pa (Shi 2011, section 2.3.1)."""

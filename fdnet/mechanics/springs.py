@@ -1,16 +1,315 @@
-"""Springs of the joints: contacts, and parallel bonds over their discs.
+"""Springs between the grains and the forces in them.
 
-A joint has six springs in its own frame: one along its normal, two across it, one that twists
-about the normal and two that bend.
+Joints of a pack: where two grains, or a grain and a wall, touch or are bonded.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import pymetis
+from scipy import sparse
+from scipy.sparse.linalg import splu
 
-from fdnet.mechanics.joints import CONTACT_GAP, Joints
-from fdnet.spheres.arrays import one_line
-from fdnet.spheres.snapshot import Array
+from fdnet.errors import MechanicsError
+from fdnet.spheres.geometry import touching_pairs, wrapped
+from fdnet.spheres.snapshot import Array, Snapshot, one_line
+
+WALL = -1
+"""Stands for a wall in the place of a second grain."""
+CONTACT_GAP = 1e-6
+"""Two grains touch when their gap is below this share of the smaller diameter."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Joints:
+    """K joints between N grains.
+
+    Attributes:
+        first: (K,) index of a grain.
+        second: (K,) index of the other grain, `WALL` for a wall.
+        overlap: (K,) m; a negative one is a gap.
+        normal: (K, 3) unit vector from the first grain to the second, or into the wall.
+        arm_first: (K, 3) m, from the centre of the first grain to the point of contact.
+        arm_second: (K, 3) m, from the centre of the second grain; zero for a wall.
+        radius: (K,) m, of the smaller of the two grains.
+        joint_radius: (K,) m, R1 R2 / (R1 + R2); at a wall that of the grain.
+    """
+
+    first: Array
+    second: Array
+    overlap: Array
+    normal: Array
+    arm_first: Array
+    arm_second: Array
+    radius: Array
+    joint_radius: Array
+
+    __repr__ = one_line
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    @property
+    def at_wall(self) -> Array:
+        """(K,) whether the second is a wall."""
+        return self.second == WALL
+
+    @property
+    def branch(self) -> Array:
+        """(K, 3) m, from centre to centre, or from the centre to the wall."""
+        return self.arm_first - self.arm_second
+
+    def where(self, mask: Array) -> "Joints":
+        """The joints for which `mask` (K,) is true, or those of the indices `mask`."""
+        return Joints(**{name: getattr(self, name)[mask] for name in self.__slots__})
+
+
+def find_joints(
+    grains: Snapshot, periodic: tuple[bool, bool, bool], *, gap: float = CONTACT_GAP
+) -> Joints:
+    """All pairs of grains, and grains at walls, that are nearer than `gap` smaller diameters.
+
+    Sides that are not periodic are walls. The point of contact halves the overlap, as in PFC.
+    """
+    pairs, walls = _pair_joints(grains, periodic, gap), _wall_joints(grains, periodic, gap)
+    return Joints(
+        **{
+            name: np.concatenate([getattr(pairs, name), getattr(walls, name)])
+            for name in Joints.__slots__
+        }
+    )
+
+
+def _pair_joints(grains: Snapshot, periodic: tuple[bool, bool, bool], gap: float) -> Joints:
+    pairs, overlap = touching_pairs(grains, periodic, gap=gap)
+    order = np.lexsort((pairs[:, 1], pairs[:, 0]))
+    pairs, overlap = pairs[order], overlap[order]
+    place = wrapped(grains.position, grains.box, periodic)
+    side = np.diff(grains.box, axis=1)[:, 0]
+    apart = place[pairs[:, 1]] - place[pairs[:, 0]]
+    apart -= np.where(periodic, side * np.round(apart / side), 0.0)
+    distance = np.linalg.norm(apart, axis=1)
+    normal = apart / np.where(distance > 0, distance, 1.0)[:, None]
+    radius = grains.radius[pairs]
+    reach = radius[:, 0] - 0.5 * overlap
+    return Joints(
+        first=pairs[:, 0],
+        second=pairs[:, 1],
+        overlap=overlap,
+        normal=normal,
+        arm_first=normal * reach[:, None],
+        arm_second=-normal * (distance - reach)[:, None],
+        radius=radius.min(axis=1),
+        joint_radius=radius.prod(axis=1) / radius.sum(axis=1),
+    )
+
+
+def _wall_joints(grains: Snapshot, periodic: tuple[bool, bool, bool], gap: float) -> Joints:
+    owner, normal, distance = [], [], []
+    for axis in (axis for axis in range(3) if not periodic[axis]):
+        for end, sign in ((0, -1.0), (1, 1.0)):
+            away = sign * (grains.box[axis, end] - grains.position[:, axis])
+            near = np.flatnonzero(away < grains.radius * (1 + 2 * gap))
+            owner.append(near)
+            distance.append(away[near])
+            normal.append(np.repeat(sign * np.eye(3)[None, axis], len(near), axis=0))
+    which = np.concatenate([np.empty(0, int), *owner])
+    length = np.concatenate([np.empty(0), *distance])
+    facing = np.concatenate([np.empty((0, 3)), *normal])
+    return Joints(
+        first=which,
+        second=np.full(len(which), WALL),
+        overlap=grains.radius[which] - length,
+        normal=facing,
+        arm_first=facing * length[:, None],
+        arm_second=np.zeros((len(which), 3)),
+        radius=grains.radius[which],
+        joint_radius=grains.radius[which],
+    )
+
+
+# ------------------------------------------------------------------------------------------------
+# From the motion of grains, and a uniform strain, to the displacements in the joints.
+#
+# Grains have six degrees of freedom: three displacements and three rotations times `length`, all
+# in m. A uniform strain moves each centre, and each point of a wall, with it and turns nothing;
+# the displacements of the grains come on top of that.
+
+
+STRAINS = ("xx", "yy", "zz", "yz", "xz", "xy")
+"""Order of the strains: three normal ones, then three shears by their angle (Voigt)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Kinematics:
+    """Linear maps to the displacements in K joints, six a joint, in each joint's frame.
+
+    Attributes:
+        of_grains: (6 K, 6 N) sparse, from the motion of the grains.
+        of_strain: (6 K, 6), m, from a uniform strain in the order of `STRAINS`.
+        frame: (K, 3, 3) normal and two tangents of each joint.
+        length: m, that turns a rotation into a degree of freedom.
+    """
+
+    of_grains: sparse.csr_matrix
+    of_strain: Array
+    frame: Array
+    length: float
+
+    __repr__ = one_line
+
+
+def kinematics(joints: Joints, count: int, *, length: float) -> Kinematics:
+    """The maps of the joints between `count` grains."""
+    frame = frames(joints.normal)
+    near = _block(frame, joints.arm_first, length)
+    far = _block(frame, joints.arm_second, length)
+    return Kinematics(
+        of_grains=_sparse(joints, near, far, count),
+        of_strain=_of_strain(frame, joints.branch),
+        frame=frame,
+        length=length,
+    )
+
+
+def frames(normal: Array) -> Array:
+    """(K, 3, 3) right-handed frames whose first rows are the unit vectors `normal` (K, 3)."""
+    least = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
+    first = np.cross(normal, least)
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return np.stack([normal, first, np.cross(normal, first)], axis=1)
+
+
+def _block(frame: Array, arm: Array, length: float) -> Array:
+    """(K, 6, 6) displacements at the end of `arm` by the motion of the grain it belongs to."""
+    block = np.zeros((len(arm), 6, 6))
+    block[:, :3, :3] = frame
+    block[:, :3, 3:] = -frame @ _crossed(arm) / length
+    block[:, 3:, 3:] = frame / length
+    return block
+
+
+def _crossed(arm: Array) -> Array:
+    """(K, 3, 3) matrices whose product with a vector v is arm x v."""
+    x, y, z = arm.T
+    none = np.zeros_like(x)
+    return np.stack([none, -z, y, z, none, -x, -y, x, none], axis=1).reshape(-1, 3, 3)
+
+
+def _sparse(joints: Joints, near: Array, far: Array, count: int) -> sparse.csr_matrix:
+    row = 6 * np.arange(len(joints))[:, None, None] + np.arange(6)[None, :, None]
+    column = np.arange(6)[None, None, :]
+    kept = ~joints.at_wall
+    parts = [(joints.first, -near, row), (joints.second[kept], far[kept], row[kept])]
+    rows, columns, values = [], [], []
+    for grain, block, line in parts:
+        place = 6 * grain[:, None, None] + column
+        rows.append(np.broadcast_to(line, block.shape).ravel())
+        columns.append(np.broadcast_to(place, block.shape).ravel())
+        values.append(block.ravel())
+    shape = (6 * len(joints), 6 * count)
+    return sparse.csr_matrix(
+        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape
+    )
+
+
+def _of_strain(frame: Array, branch: Array) -> Array:
+    """(6 K, 6): the strain times the branch, in the frame; the rotations stay 0."""
+    x, y, z = branch.T
+    none = np.zeros_like(x)
+    moved = np.stack(
+        [
+            np.stack([x, none, none, none, z / 2, y / 2], axis=1),
+            np.stack([none, y, none, z / 2, none, x / 2], axis=1),
+            np.stack([none, none, z, y / 2, x / 2, none], axis=1),
+        ],
+        axis=1,
+    )
+    result = np.zeros((len(branch), 6, 6))
+    result[:, :3] = frame @ moved
+    return result.reshape(-1, 6)
+
+
+# ------------------------------------------------------------------------------------------------
+# Engineering constants of a stiffness tensor (6, 6), in the order xx, yy, zz, yz, xz, xy.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Moduli:
+    """Elastic constants of an isotropic material, Pa.
+
+    Attributes:
+        young: 9 K G / (3 K + G).
+        poisson: (3 K - 2 G) / (6 K + 2 G).
+        bulk: K.
+        shear: G.
+    """
+
+    young: float
+    poisson: float
+    bulk: float
+    shear: float
+
+
+def voigt_average(tensor: Array) -> Moduli:
+    """The isotropic material with the mean stiffness over all directions (Voigt; Hill 1952)."""
+    normal, sideways = np.trace(tensor[:3, :3]), tensor[0, 1] + tensor[0, 2] + tensor[1, 2]
+    bulk = float(normal + 2 * sideways) / 9
+    shear = float(normal - sideways + 3 * np.trace(tensor[3:, 3:])) / 15
+    return moduli(bulk, shear)
+
+
+def reuss_average(tensor: Array) -> Moduli | None:
+    """The one with the mean compliance over all directions; None where something yields freely."""
+    if np.linalg.cond(tensor) > 1e12:
+        return None
+    soft = np.linalg.inv(tensor)
+    normal, sideways = np.trace(soft[:3, :3]), soft[0, 1] + soft[0, 2] + soft[1, 2]
+    bulk = 1 / float(normal + 2 * sideways)
+    shear = 15 / float(4 * normal - 4 * sideways + 3 * np.trace(soft[3:, 3:]))
+    return moduli(bulk, shear)
+
+
+def moduli(bulk: float, shear: float) -> Moduli:
+    """From the bulk and the shear modulus, Pa."""
+    return Moduli(
+        young=9 * bulk * shear / (3 * bulk + shear),
+        poisson=(3 * bulk - 2 * shear) / (6 * bulk + 2 * shear),
+        bulk=bulk,
+        shear=shear,
+    )
+
+
+def anisotropy_of(tensor: Array) -> float | None:
+    """5 G_V / G_R + K_V / K_R - 6: 0 when isotropic (Ranganathan and Ostoja-Starzewski 2008).
+
+    None where the tensor has no inverse.
+    """
+    stiff, soft = voigt_average(tensor), reuss_average(tensor)
+    if soft is None:
+        return None
+    return 5 * stiff.shear / soft.shear + stiff.bulk / soft.bulk - 6
+
+
+def young_along(tensor: Array) -> tuple[float, ...] | None:
+    """Young's modulus, Pa, of a test along x, y and z with free sides: 1 / S_ii; None as above."""
+    if np.linalg.cond(tensor) > 1e12:
+        return None
+    return tuple(float(1 / value) for value in np.diag(np.linalg.inv(tensor))[:3])
+
+
+def wave_speeds(averaged: Moduli, density: float) -> tuple[float, float]:
+    """P wave sqrt((K + 4 G / 3) / rho) and S wave sqrt(G / rho), m/s, at `density` kg/m3."""
+    p_wave = np.sqrt((averaged.bulk + 4 / 3 * averaged.shear) / density)
+    return float(p_wave), float(np.sqrt(averaged.shear / density))
+
+
+# ------------------------------------------------------------------------------------------------
+# Springs of the joints: contacts, and parallel bonds over their discs.
+#
+# A joint has six springs in its own frame: one along its normal, two across it, one that twists
+# about the normal and two that bend.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,3 +432,115 @@ def bond_stress(force: Array, disc: Discs) -> tuple[Array, Array]:
     tension = force[:, 0] / area + bent * disc.radius / bending
     shear = sheared / area + np.abs(force[:, 3]) * disc.radius / twist
     return np.where(there, tension, 0.0), np.where(there, shear, 0.0)
+
+
+# ------------------------------------------------------------------------------------------------
+# Stiffness matrices of packs: assembled, and solved directly or by conjugate gradients.
+
+
+LARGEST_DIRECT = 4000
+"""Grains up to which the system is factored; larger ones are solved by conjugate gradients."""
+WITHIN, MOST_STEPS = 1e-10, 20_000
+"""Residual over load that is reached, and the most steps of conjugate gradients."""
+_FLOOR = 1e-11
+"""Stiffness, over the largest, that keeps motions which no spring resists from growing."""
+
+Solve = Callable[[Array], Array]
+
+
+def stiffness(of_grains: sparse.csr_matrix, springs: Array) -> sparse.csr_matrix:
+    """Stiffness matrix B^T D B (6 N, 6 N), N/m, of joints with the springs (K, 6).
+
+    Motions that nothing resists get 1e-11 of the largest stiffness, so that the system can be
+    solved; no load acts on them.
+    """
+    matrix = (of_grains.T @ sparse.diags(springs.ravel()) @ of_grains).tocsr()
+    floor = _FLOOR * float(matrix.diagonal().max(initial=0.0))
+    return matrix + floor * sparse.identity(matrix.shape[0], format="csr")
+
+
+def solver_of(matrix: sparse.csr_matrix) -> Solve:
+    """Solves systems with the stiffness matrix (6 N, 6 N) for one load (6 N,) at a time."""
+    if matrix.shape[0] > 6 * LARGEST_DIRECT:
+        return conjugate_gradients(matrix)
+    return direct(matrix)
+
+
+def direct(matrix: sparse.csr_matrix) -> Solve:
+    """By SuperLU in symmetric mode, with the grains ordered by METIS nested dissection."""
+    order = (6 * _grain_order(matrix)[:, None] + np.arange(6)).ravel()
+    try:
+        factor = splu(
+            matrix[order][:, order].tocsc(),
+            permc_spec="NATURAL",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+    except RuntimeError as error:
+        raise MechanicsError(
+            f"stiffness of {matrix.shape[0] // 6} grains cannot be factored ({error}); raise the "
+            "stiffness of the contacts or add bonds"
+        ) from error
+
+    def solve(load: Array) -> Array:
+        moved = np.zeros_like(load)
+        for _ in range(2):
+            moved[order] += factor.solve((load - matrix @ moved)[order])
+        return moved
+
+    return solve
+
+
+def _grain_order(matrix: sparse.csr_matrix) -> Array:
+    """Order (N,) of the grains by nested dissection."""
+    count = matrix.shape[0] // 6
+    blocks = matrix.tobsr((6, 6))
+    links = sparse.csr_matrix(
+        (np.ones(len(blocks.indices)), blocks.indices, blocks.indptr), shape=(count, count)
+    )
+    links.setdiag(0.0)
+    links.eliminate_zeros()
+    if links.nnz == 0:
+        return np.arange(count)
+    adjacency = pymetis.CSRAdjacency(links.indptr, links.indices)
+    return np.asarray(pymetis.nested_dissection(adjacency=adjacency)[0])
+
+
+def conjugate_gradients(matrix: sparse.csr_matrix) -> Solve:
+    """By conjugate gradients, preconditioned with the inverse 6 x 6 block of each grain.
+
+    The solution raises MechanicsError where it does not reach the residual `WITHIN`.
+    """
+    inverse = np.linalg.inv(_diagonal_blocks(matrix))
+
+    def better(missing: Array) -> Array:
+        return np.einsum("nij,nj->ni", inverse, missing.reshape(-1, 6)).ravel()
+
+    def solve(load: Array) -> Array:
+        moved, missing = np.zeros_like(load), load.copy()
+        along, before = np.zeros_like(load), 1.0
+        target = WITHIN * float(np.linalg.norm(load))
+        for _ in range(MOST_STEPS):
+            if float(np.linalg.norm(missing)) <= target:
+                return moved
+            step = better(missing)
+            gain = float(np.einsum("i,i", missing, step))
+            along = step + (gain / before) * along
+            pulled = matrix @ along
+            size = gain / float(np.einsum("i,i", along, pulled))
+            moved, missing, before = moved + size * along, missing - size * pulled, gain
+        raise MechanicsError(
+            f"solve of {len(load) // 6} grains: residual {np.linalg.norm(missing):.1e} N after "
+            f"{MOST_STEPS} steps, expected {target:.1e} N; take a smaller or a stiffer pack"
+        )
+
+    return solve
+
+
+def _diagonal_blocks(matrix: sparse.csr_matrix) -> Array:
+    blocks = matrix.tobsr((6, 6))
+    row = np.repeat(np.arange(len(blocks.indptr) - 1), np.diff(blocks.indptr))
+    own = row == blocks.indices
+    result = np.zeros((matrix.shape[0] // 6, 6, 6))
+    result[row[own]] = blocks.data[own]
+    return result

@@ -15,27 +15,18 @@ import pickle
 import stat
 import sys
 import tempfile
+import threading
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numba
 from numba import types
 from numba.core import config
 from numba.core.caching import IndexDataCacheFile
 from numba.extending import intrinsic
-
-__all__ = [
-    "bits_of",
-    "compiled",
-    "compiled_for_loops",
-    "compiled_in_place",
-    "compiled_inline",
-    "cores_of_numba",
-    "loops_in_place",
-    "number_of",
-]
-
 
 _SETTINGS = (
     *("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "USING_SVML"),
@@ -255,3 +246,36 @@ bits_of: Any = intrinsic(_bits_of)
 """The bits of a number of double precision, as a whole number; for compiled functions only."""
 number_of: Any = intrinsic(_number_of)
 """The number of double precision that has these bits; for compiled functions only."""
+
+
+# ------------------------------------------------------------------------------------------------
+# Work on several processor cores at once, in the threads of this process.
+
+
+Part = TypeVar("Part")
+Result = TypeVar("Result")
+MOST_CORES = 8
+"""More would hardly help, for some of the work runs on one core, and each takes some 80 MB."""
+_here = threading.local()
+
+
+def on_all_cores(work: Callable[[Part], Result], parts: Iterable[Part]) -> list[Result]:
+    """What `work` gives for each of the `parts`, on up to `MOST_CORES` of the cores.
+
+    The cores are all of this process, or as many as the environment variable NUMBA_NUM_THREADS
+    says. Only functions that are `compiled_for_loops` run side by side, so most of the work should
+    be in them. No part may write to what another one reads or writes, so the result does not
+    depend on the number of cores. Work that is such a part itself does its own parts one after
+    the other. The first error of a part is raised.
+    """
+    every = list(parts)
+    cores = min(cores_of_numba(), MOST_CORES, len(every))
+    if cores <= 1 or getattr(_here, "is_part", False):
+        return [work(part) for part in every]
+    with ThreadPoolExecutor(cores, initializer=_mark) as pool:
+        return list(pool.map(work, every))
+
+
+def _mark() -> None:
+    """Marks this thread as one of those that do parts."""
+    _here.is_part = True

@@ -6,13 +6,16 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from fdnet.errors import NetworkError
-from fdnet.network.tessellation.placed_grains import PlacedGrains, place_grains
-from fdnet.network.tessellation.polyhedra import join_polyhedra
-from fdnet.network.tessellation.pores import Pores, measure_pores
-from fdnet.network.tessellation.tessellation import Tessellation, tessellate
-from fdnet.network.tessellation.throats import LENGTH_FLOOR, Throats, measure_throats
-from fdnet.spheres.directions import Directions, periodic_axes
-from fdnet.spheres.snapshot import Array, Kind, Snapshot
+from fdnet.network.tessellation.delaunay import PlacedGrains, place_grains
+from fdnet.network.tessellation.facets import Tessellation, join_polyhedra, tessellate
+from fdnet.network.tessellation.pores import (
+    LENGTH_FLOOR,
+    Pores,
+    Throats,
+    measure_pores,
+    measure_throats,
+)
+from fdnet.spheres.snapshot import Array, Directions, Kind, Snapshot, periodic_axes
 
 __all__ = ["LENGTH_FLOOR", "WALLS", "Network", "build_network"]
 

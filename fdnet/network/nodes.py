@@ -17,9 +17,8 @@ import numpy as np
 from fdnet.network.compiled import compiled_for_loops, loops_in_place
 from fdnet.network.geometry import FACETS
 from fdnet.network.network import Network
-from fdnet.network.tessellation.tetrahedron import along, less, times
-from fdnet.spheres.arrays import one_line
-from fdnet.spheres.snapshot import Array, frozen
+from fdnet.network.tessellation.delaunay import along, less, times
+from fdnet.spheres.snapshot import Array, frozen, one_line
 
 CENTRE = 4
 """The row of the power centre, after those of the four corners of a tetrahedron."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.files.atomic import replacing
+from fdnet.files import replacing
 from fdnet.spheres.snapshot import Array
 
 PNG_START, PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND"

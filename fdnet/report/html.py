@@ -1,6 +1,10 @@
-"""report.html: one self-contained page of a run, its pictures inside."""
+"""The report, and the sections that later commands add to it.
+
+Sections that a command adds to a report after the run, in places that its page keeps.
+"""
 
 import base64
+import html
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -10,11 +14,206 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fdnet.errors import CaseError
-from fdnet.files.atomic import write_text
-from fdnet.report.units import AGREES, SHOWS, in_millidarcy, millimetres, percent, two_digits
+from fdnet.files import write_text
+from fdnet.report.tables import (
+    AGREES,
+    SHOWS,
+    Checked,
+    in_millidarcy,
+    millimetres,
+    percent,
+    read_json,
+    two_digits,
+)
 
 if TYPE_CHECKING:
     from jinja2 import Environment
+
+
+def put_section(report: Path, name: str, section: str) -> bool:
+    """Put a section into the place `name` of a page; a page without the place stays as it is.
+
+    Returns whether the page has the place. Raises CaseError where the page is no text in UTF-8.
+    """
+    begin, end = f"<!-- {name} begins -->", f"<!-- {name} ends -->"
+    try:
+        text = report.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise CaseError(
+            f"{report}: cannot be read as a page ({error}), and the section on {name} is not in "
+            "it; write it anew with --stages report --force (the numbers are kept)"
+        ) from error
+    before, has_begin, rest = text.partition(begin)
+    _, has_end, after = rest.partition(end)
+    if has_begin and has_end:
+        write_text(report, f"{before}{begin}\n{section}\n{end}{after}")
+    return bool(has_begin and has_end)
+
+
+# ------------------------------------------------------------------------------------------------
+# The section of the report on the mechanics of the pack; a report without it has none.
+
+
+MECHANICS = "mechanics"
+_ROWS = (
+    ("young_modulus_Pa", "Young's modulus", 1e-9, "GPa"),
+    ("poisson_ratio", "Poisson's ratio", 1.0, ""),
+    ("bulk_modulus_Pa", "bulk modulus", 1e-9, "GPa"),
+    ("shear_modulus_Pa", "shear modulus", 1e-9, "GPa"),
+    ("young_modulus_x_Pa", "Young's modulus along x", 1e-9, "GPa"),
+    ("young_modulus_y_Pa", "Young's modulus along y", 1e-9, "GPa"),
+    ("young_modulus_z_Pa", "Young's modulus along z", 1e-9, "GPa"),
+    ("anisotropy", "anisotropy (0 is isotropic)", 1.0, ""),
+    ("p_wave_m_s", "P wave", 1.0, "m/s"),
+    ("s_wave_m_s", "S wave", 1.0, "m/s"),
+    ("coordination", "contacts and bonds of a grain", 1.0, ""),
+    ("rattlers", "grains that carry nothing", 1.0, ""),
+    ("bonds", "bonds", 1.0, ""),
+)
+_TRIAXIAL_ROWS = (
+    ("confining_Pa", "confining stress", 1e-6, "MPa"),
+    ("young_modulus_Pa", "initial slope", 1e-9, "GPa"),
+    ("peak_Pa", "largest deviatoric stress", 1e-6, "MPa"),
+    ("peak_strain", "axial strain there", 100.0, "%"),
+    ("volume_strain_at_end", "volume strain at the end (compression above 0)", 100.0, "%"),
+    ("broken_in_tension", "bonds broken in tension", 1.0, ""),
+    ("broken_in_shear", "bonds broken in shear", 1.0, ""),
+)
+
+
+class _Test(Checked):
+    """The numbers of a triaxial test."""
+
+    confining_Pa: float
+    young_modulus_Pa: float | None
+    peak_Pa: float | None
+    peak_strain: float | None
+    volume_strain_at_end: float | None
+    broken_in_tension: int
+    broken_in_shear: int
+
+
+class Mechanics(Checked):
+    """What mechanics.json holds."""
+
+    young_modulus_Pa: float | None
+    poisson_ratio: float | None
+    bulk_modulus_Pa: float | None
+    shear_modulus_Pa: float | None
+    young_modulus_x_Pa: float | None
+    young_modulus_y_Pa: float | None
+    young_modulus_z_Pa: float | None
+    anisotropy: float | None
+    p_wave_m_s: float | None
+    s_wave_m_s: float | None
+    coordination: float | None
+    rattlers: int
+    bonds: int
+    warnings: list[str]
+    triaxial: _Test | None = None
+
+
+def mechanics_html(folder: Path) -> str:
+    """The section as HTML from the files in the folder `mechanics`; "" where nothing ran.
+
+    Raises CaseError where the numbers cannot be understood.
+    """
+    path = folder / "mechanics.json"
+    if not path.exists():
+        return ""
+    advice = "measure it anew with fdnet mechanics, or remove the folder"
+    numbers = read_json(path, Mechanics, noun="result of fdnet mechanics", advice=advice)
+    parts = ["<h2>Mechanics of the pack</h2>", _table(numbers, _ROWS)]
+    if numbers.get("warnings"):
+        items = "".join(f"<li>{html.escape(text)}</li>" for text in numbers["warnings"])
+        parts.append(f'<div class="warnings"><ul>{items}</ul></div>')
+    if numbers.get("triaxial"):
+        parts += ["<h3>Triaxial test</h3>", _table(numbers["triaxial"], _TRIAXIAL_ROWS)]
+    figure = folder / "stress_strain.png"
+    if numbers.get("triaxial") and figure.is_file():
+        data = base64.b64encode(figure.read_bytes()).decode("ascii")
+        parts.append(
+            f'<figure class="wide"><img src="data:image/png;base64,{data}" alt="{figure.stem}">'
+            f"<figcaption><em>({figure.name})</em></figcaption></figure>"
+        )
+    return "\n".join(parts)
+
+
+def put_mechanics(report: Path, folder: Path) -> bool:
+    """Put the section into a report that is written; whether it has the place for it."""
+    return put_section(report, MECHANICS, mechanics_html(folder))
+
+
+def _table(numbers: dict[str, Any], rows: tuple[tuple[str, str, float, str], ...]) -> str:
+    cells = [
+        f'<tr><th>{html.escape(name)}</th><td class="number">{_shown(numbers[key], factor)} '
+        f"{unit}</td></tr>"
+        for key, name, factor, unit in rows
+        if key in numbers
+    ]
+    return '<table class="pairs">\n' + "\n".join(cells) + "\n</table>"
+
+
+def _shown(value: float | None, factor: float) -> str:
+    return "–" if value is None else f"{value * factor:.4g}"
+
+
+# ------------------------------------------------------------------------------------------------
+# The section of the report on resolved Stokes flow; a report without it has none.
+
+
+STOKES = "stokes"
+_HEAD = (
+    "depth (mm)",
+    "before, flow (mD)",
+    "before, network (mD)",
+    "after, flow (mD)",
+    "after, network (mD)",
+    "lost, flow",
+    "lost, network",
+    "cells of the flow (&micro;m)",
+)
+_NOTE = (
+    "Resolved flow solves the Stokes equations between all spheres on two grids and needs no law "
+    "of throats. The error behind &plusmn; is its own. The columns &ldquo;network&rdquo; hold "
+    "what the run has. Where the two differ by more than that error, the difference is the error "
+    "of the network. Cells are those of the finer grid, before and after. The damage law of the "
+    "network is {}."
+)
+
+
+def stokes_html(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The section as HTML, one row for each section that was resolved."""
+    head = "".join(f'<th class="number">{name}</th>' for name in _HEAD)
+    body = "\n".join(f"<tr>{_cells(row)}</tr>" for row in rows)
+    return (
+        "<h2>Sections by resolved Stokes flow</h2>\n"
+        f'<div class="scroll"><table>\n<tr>{head}</tr>\n{body}\n</table></div>\n'
+        f'<p class="note">{_NOTE.format(rows[0]["network_damage_law"])}</p>'
+    )
+
+
+def _cells(row: Mapping[str, Any]) -> str:
+    texts = [
+        f"{1e3 * row['x_lo_m']:g} to {1e3 * row['x_hi_m']:g}",
+        f"{in_millidarcy(row['k_initial_m2'])} &plusmn; {row['k_initial_error']:.1%}",
+        in_millidarcy(row["network_k_initial_m2"]),
+        f"{in_millidarcy(row['k_damaged_m2'])} &plusmn; {row['k_damaged_error']:.1%}",
+        in_millidarcy(row["network_k_damaged_m2"]),
+        _share(row["k_reduction"]),
+        _share(row["network_k_reduction"]),
+        f"{1e6 * row['cell_initial_m']:.3g}, {1e6 * row['cell_damaged_m']:.3g}",
+    ]
+    return "".join(f'<td class="number">{text}</td>' for text in texts)
+
+
+def _share(value: float | None) -> str:
+    return "&ndash;" if value is None else f"{value:.1%}"
+
+
+# ------------------------------------------------------------------------------------------------
+# report.html: one self-contained page of a run, its pictures inside.
+
 
 DASH = "–"
 LEADING, STILL = "depth.png", "spheres_3d.png"
@@ -44,12 +243,12 @@ class ReportParts:
     Attributes:
         figures: path and caption of each figure.
         case_words: the case in sentences.
-        view: spheres of the 3-D view (`fdnet.report.view.view_of`); None: a picture alone.
+        view: spheres of the 3-D view (`fdnet.report.vtk.view_of`); None: a picture alone.
         case_text: the resolved case as TOML.
         scales: rows with name, symbol, value, unit, formula and source (objects or mappings).
         versions: version of each program.
         commands: the command lines as they were typed.
-        tables: further tables (`fdnet.report.added.PageTable`), in order.
+        tables: further tables (`fdnet.report.figures.PageTable`), in order.
         stokes: the section on resolved Stokes flow, as HTML.
         mechanics: the section on the mechanics of the pack, as HTML.
     """

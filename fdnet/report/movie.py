@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fdnet.errors import CaseError
-from fdnet.files.atomic import replacing
+from fdnet.files import replacing
 from fdnet.report.child import box_text, draw_frames
 from fdnet.spheres.snapshot import Array
 

@@ -4,10 +4,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from fdnet.report.units import MILLIDARCY, in_millidarcy
+from fdnet.report.tables import MILLIDARCY, in_millidarcy
 
 if TYPE_CHECKING:
-    from fdnet.network.analysis import Analysis
+    from fdnet.network.permeability import Analysis
 
 Row = Mapping[str, Any]
 

@@ -1,36 +1,80 @@
-"""CSV tables and summary.json of a run folder: SI, units in the column names, nine digits."""
+"""Tables of a run, written and read.
+
+Numbers and words for a reader, each written in one way in text, pages and notebooks.
+"""
 
 import json
 import math
+import shlex
 from collections.abc import Mapping, Sequence
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import from_json
 
-from fdnet.files.atomic import replacing, write_text
-from fdnet.report.units import millidarcy
+from fdnet.case.tables import M2_PER_MD
+from fdnet.errors import CaseError
+from fdnet.files import replacing, write_text
+from fdnet.network.flow.flow import INLET, OUTLET, Links, open_links
+from fdnet.network.network import Network
+from fdnet.spheres.dump import exact_numbers
 from fdnet.spheres.snapshot import Array
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from fdnet.network.analysis import Analysis
-    from fdnet.network.flow.depth import Layers
+    from fdnet.network.flow.sections import Layers
     from fdnet.network.network import Network
+    from fdnet.network.permeability import Analysis
 
-__all__ = [
-    "between_grains",
-    "section_rows",
-    "write_laws",
-    "write_layers",
-    "write_pores",
-    "write_profile",
-    "write_sections",
-    "write_summary",
-    "write_throats",
-]
+MILLIDARCY = M2_PER_MD
+"""One millidarcy in m2: a darcy is 1 cP cm/s under 1 atm/cm (API RP 27, 1952)."""
+
+
+def millidarcy(permeability: float) -> float:
+    """Permeability in m2 as mD."""
+    return permeability / MILLIDARCY
+
+
+def in_millidarcy(permeability: Any) -> str:
+    """Permeability in m2 as mD with four digits and without a unit; a dash for None or NaN."""
+    if permeability is None or permeability != permeability:
+        return "–"
+    value = float(f"{millidarcy(permeability):.4g}")
+    return f"{value:,.10g}" if value == 0 or abs(value) >= 1e-3 else f"{value:.3e}"
+
+
+def percent(share: float | None) -> str:
+    """A share in percent with one digit and without a sign of percent; a dash for None."""
+    return "–" if share is None else f"{100 * share:z.1f}"
+
+
+def two_digits(share: float) -> str:
+    """A share in percent with two digits and the sign of percent."""
+    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
+
+
+def millimetres(length: float | None) -> str:
+    """A length in m as mm with three digits and the unit; a dash for None."""
+    return "–" if length is None else f"{1e3 * length:.3g} mm"
+
+
+SHOWS = {
+    "bridges": "holds the fines: the face plugged",
+    "passes": "lets the fines pass",
+    "undecided": "ended before one could see whether the sand holds the fines",
+}
+"""What the sand did with the fines, by `run_shows` of the summary: "The run ..."."""
+AGREES = {True: "agrees", False: "disagrees", None: "not decided"}
+"""Whether a rule of thumb and the run say the same."""
+
+
+# ------------------------------------------------------------------------------------------------
+# CSV tables and summary.json of a run folder: SI, units in the column names, nine digits.
+
 
 FLOAT_FORMAT = "%.9g"
 
@@ -289,3 +333,309 @@ def _plain(value: Any, where: str, refused: list[str]) -> Any:
         refused.append(f"summary {where}: {value} is not a number JSON can hold; written as null")
         return None
     return value
+
+
+# ------------------------------------------------------------------------------------------------
+# Tables and JSON of a run folder, read back strictly.
+
+
+_EDGES = ("x_lo_m", "x_hi_m", "porosity_initial", "porosity_damaged")
+COLUMNS: Mapping[str, tuple[str, ...]] = {
+    "sections": (
+        "section",
+        *_EDGES,
+        "k_initial_m2",
+        "k_damaged_m2",
+        "k_reduction",
+        "k_initial_inplace_m2",
+        "k_damaged_inplace_m2",
+        "fines_count",
+        "fines_fraction",
+    ),
+    "profile": (*_EDGES, "porosity_reduction", "fines_fraction"),
+    "layers": (
+        "x_lo_m",
+        "x_hi_m",
+        "k_initial_m2",
+        "k_damaged_m2",
+        "pressure_drop_initial",
+        "pressure_drop_damaged",
+        "fines_count",
+    ),
+    "pores": (
+        "pore",
+        "pore_coords_0_m",
+        "pore_coords_1_m",
+        "pore_coords_2_m",
+        "pore_radius_m",
+        "pore_volume_m3",
+        "pressure_initial",
+        "pressure_damaged",
+    ),
+    "throats": (
+        "throat",
+        "throat_conns_0",
+        "throat_conns_1",
+        "throat_radius_m",
+        "throat_length_m",
+        "blocked",
+        "law_used",
+        "conductance_initial_m3",
+        "conductance_damaged_m3",
+        "flux_initial_m3",
+        "flux_damaged_m3",
+    ),
+}
+"""Columns that a table of a run must have; further ones are read too."""
+HISTORY_COLUMNS = ("chunk", "step", "upstream", "invaded", "passed")
+TEXT_COLUMNS = ("law_used",)
+_AGAIN = "write it anew with fdnet run CASE.toml --out {folder} --stages analyse,report --force"
+
+
+class Checked(BaseModel):
+    """What a JSON file must hold: its keys with their types; further keys are not looked at."""
+
+    model_config = ConfigDict(strict=True, extra="allow", allow_inf_nan=False)
+
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Count = Annotated[int, Field(ge=0)]
+AboveZero = Annotated[float, Field(ge=0.0)]
+Lost = Annotated[float, Field(le=1.0)] | None
+
+
+class Section(Checked):
+    """One section of a summary."""
+
+    x_lo_m: float
+    x_hi_m: float
+    porosity_initial: Share
+    porosity_damaged: Share
+    k_initial_m2: AboveZero
+    k_damaged_m2: AboveZero
+    k_reduction: Lost
+    fines_count: Count
+
+
+class Summary(Checked):
+    """The numbers of a summary.json that every run has."""
+
+    case: str
+    seed: Count
+    law: str
+    damage_law: str
+    porosity_initial: Share
+    porosity_damaged: Share
+    k_initial_m2: AboveZero
+    k_damaged_m2: AboveZero
+    k_reduction: Lost
+    damage_law_used: str | None = None
+    damage_law_other: str | None = None
+    k_damaged_other_m2: AboveZero | None = None
+    supplied_count: Count
+    invaded_count: Count
+    passed_count: Count
+    upstream_count: Count
+    invasion_depth_m: AboveZero
+    invasion_depth_p95_m: AboveZero
+    cake_thickness_m: AboveZero
+    stop_reason: str | None
+    sections: list[Section]
+    pores: Count
+    throats: Count
+    throats_blocked: Count
+    answer: str | None = None
+    certainty: list[str] = []
+    warnings: list[str]
+
+
+def read_json(path: Path, model: type[Checked], *, noun: str, advice: str) -> dict[str, Any]:
+    """The JSON object in the file at `path`, as it is written, checked by `model`.
+
+    Raises CaseError where the file is missing, is not UTF-8 or JSON, holds NaN, or is not what
+    the model says; the message names the key. `noun` is what the file should be, and `advice`
+    what to do where it is not.
+    """
+    if not path.is_file():
+        what = "is no ordinary file" if path.exists() else "is missing"
+        raise CaseError(f"{path}: {what}; {advice}")
+    try:
+        data = from_json(path.read_bytes(), allow_inf_nan=False)
+        model.model_validate(data)
+    except OSError as error:
+        raise CaseError(f"{path}: cannot be read ({error.strerror}); {advice}") from error
+    except ValidationError as error:
+        raise CaseError(
+            f"{path}: cannot be understood, it is no {noun} ({_problem(error)}); {advice}"
+        ) from error
+    except ValueError as error:
+        raise CaseError(f"{path}: cannot be read as JSON ({error}); {advice}") from error
+    return data
+
+
+def _problem(error: ValidationError) -> str:
+    """The first thing that is wrong, with the key that holds it."""
+    first = error.errors(include_url=False)[0]
+    key, given = ".".join(map(str, first["loc"])) or "the whole", first["input"]
+    if first["type"] == "missing":
+        return f"the key {key} is missing"
+    shown = f" and not {given!r:.60}" if isinstance(given, str | float | None) else ""
+    return f"{key}: {first['msg'][0].lower()}{first['msg'][1:]}{shown}"
+
+
+def read_table(
+    path: Path,
+    columns: Sequence[str],
+    *,
+    rows: int | None = None,
+    texts: Sequence[str] | None = TEXT_COLUMNS,
+) -> "pd.DataFrame":
+    """The CSV table at `path`, SI units as its column names say.
+
+    `texts` are columns that may hold texts; None allows them in any. Raises CaseError when it is
+    missing or malformed, lacks one of `columns`, holds text where a number is expected, or has
+    another number of rows than `rows`.
+    """
+    import pandas as pd
+
+    if not path.is_file():
+        raise _refusal(path, "is no ordinary file" if path.exists() else "is missing")
+    try:
+        table = pd.read_csv(path, **exact_numbers())
+    except (OSError, ValueError) as error:
+        raise _refusal(path, f"cannot be read as a table ({str(error).strip()})") from error
+    missing = [name for name in columns if name not in table.columns]
+    if missing:
+        raise _refusal(path, f"has no column {', '.join(missing)}")
+    for name in table.columns:
+        if (
+            texts is not None
+            and name not in texts
+            and not pd.api.types.is_numeric_dtype(table[name])
+        ):
+            raise _refusal(path, f"column {name} holds a value that is no number")
+    if rows is not None and len(table) != rows:
+        raise _refusal(path, f"has {len(table)} rows, expected {rows} by summary.json")
+    return table
+
+
+def empty_table(columns: Sequence[str]) -> "pd.DataFrame":
+    """A table of no rows."""
+    import pandas as pd
+
+    return pd.DataFrame({name: pd.Series(dtype=float) for name in columns})
+
+
+def read_summary(path: Path) -> dict[str, Any]:
+    """The mapping of summary.json. Raises CaseError when it is missing or cannot be read."""
+    return read_json(path, Summary, noun="summary of an fdnet run", advice=_again(path))
+
+
+def _again(path: Path) -> str:
+    return _AGAIN.format(folder=shlex.quote(str(path.parent)))
+
+
+def _refusal(path: Path, what: str) -> CaseError:
+    return CaseError(f"{path}: {what}; {_again(path)}")
+
+
+# ------------------------------------------------------------------------------------------------
+# The network with its conductances for OpenPNM (optional: pip install "fdnet[openpnm]").
+
+
+def to_openpnm(network: Network, conductance: Array, *, viscosity: float) -> Any:
+    """The part of the network that carries flow along x, as an OpenPNM network in SI units.
+
+    fdnet holds the pressure on the two faces of the box. A throat that a face cuts therefore ends
+    in a pore of its own on that face, with the conductance of the part inside. Pores of one
+    `pore_group` have one pressure and are one pore. Pores and throats that no flow reaches are
+    left out.
+
+    Args:
+        network: the pore network; its box is not periodic along x.
+        conductance: (T,) conductance of each throat, m3 (flux times viscosity over pressure drop).
+        viscosity: dynamic viscosity of the fluid, Pa s.
+
+    Returns:
+        An `openpnm.network.Network` with `pore.coords` (m), `pore.diameter` (m), `pore.volume`
+        (m3), labels `pore.inlet`, `pore.outlet` and `throat.periodic`, `throat.diameter` (m),
+        `throat.length` (m), `throat.hydraulic_conductance` (m3/(Pa s)), and the row numbers
+        `pore.fdnet_pore` (-1 on a face) and `throat.fdnet_throat` of pores.csv and throats.csv.
+
+    Raises:
+        CaseError: OpenPNM is not installed, the network is periodic along x, or no path is open.
+    """
+    arrays = openpnm_arrays(network, conductance, viscosity=viscosity)
+    try:
+        import openpnm
+    except ImportError as error:
+        raise CaseError(
+            'OpenPNM is not installed; install it with pip install "fdnet[openpnm]", or use '
+            "pores.csv and throats.csv of the run"
+        ) from error
+    made = openpnm.network.Network(
+        coords=arrays.pop("pore.coords"), conns=arrays.pop("throat.conns")
+    )
+    for name, values in arrays.items():
+        made[name] = values
+    return made
+
+
+def openpnm_arrays(network: Network, conductance: Array, *, viscosity: float) -> dict[str, Array]:
+    """The arrays of `to_openpnm` by their OpenPNM names."""
+    if network.periodic[0]:
+        raise CaseError(
+            "OpenPNM: the network is periodic along x, where fdnet prescribes a pressure drop per "
+            "period; build it with walls along x (periodic='yz')"
+        )
+    if not viscosity > 0:
+        raise CaseError(f"viscosity: {viscosity} Pa s, expected a number above 0")
+    links = open_links(network, conductance)
+    if not len(links.throat):
+        raise CaseError("OpenPNM: no open path leads from the inlet to the outlet face")
+    conns, groups, faces = _numbered(links)
+    pore = np.unique(network.pore_group, return_index=True)[1][groups]
+    inside, none, plane = np.zeros(len(pore), bool), np.zeros(len(faces)), links.ends[*faces.T]
+    volume = np.bincount(
+        network.pore_group, weights=np.maximum(network.pore_volume, 0.0) * network.pore_share
+    )
+    return {
+        "pore.coords": np.concatenate(
+            [network.pore_position[pore], _on_faces(network, links, faces)]
+        ),
+        "throat.conns": np.sort(conns, axis=1),
+        "pore.diameter": np.append(2.0 * network.pore_radius[pore], none),
+        "pore.volume": np.append(volume[groups], none),
+        "pore.inlet": np.append(inside, plane == INLET),
+        "pore.outlet": np.append(inside, plane == OUTLET),
+        "pore.fdnet_pore": np.append(pore, np.full(len(faces), -1)),
+        "throat.diameter": 2.0 * network.throat_radius[links.throat],
+        "throat.length": network.throat_length[links.throat],
+        "throat.hydraulic_conductance": links.conductance / viscosity,
+        "throat.fdnet_throat": links.throat,
+        "throat.periodic": np.any(network.throat_shift[links.throat], axis=1),
+    }
+
+
+def _numbered(links: Links) -> tuple[Array, Array, Array]:
+    """Pores (K, 2) of each link: first the groups that occur (G,), then each end on a face (E, 2).
+
+    An end on a face is given by its link and its place in it (0 or 1).
+    """
+    groups = np.unique(links.ends[links.ends >= 0])
+    faces = np.argwhere(links.ends < 0)
+    conns = np.searchsorted(groups, links.ends)
+    conns[*faces.T] = len(groups) + np.arange(len(faces))
+    return conns, groups, faces
+
+
+def _on_faces(network: Network, links: Links, faces: Array) -> Array:
+    """(E, 3) where the throats of `faces` cross the face at which they end, m."""
+    link, end = faces.T
+    ends = network.throat_ends[links.throat[link]]
+    rows = np.arange(len(faces))
+    here, there = ends[rows, end], ends[rows, 1 - end]
+    x = np.where(links.ends[link, end] == INLET, network.box[0, 0], network.box[0, 1])
+    run = here[:, 0] - there[:, 0]
+    share = np.divide(x - there[:, 0], run, out=np.ones(len(rows)), where=run != 0)
+    return there + share[:, None] * (here - there)

@@ -1,8 +1,12 @@
-"""ParaView files (.vtp, .pvd) of one specimen."""
+"""ParaView files, meshes and the view in the report.
 
+ParaView files (.vtp, .pvd) of one specimen.
+"""
+
+import base64
 import errno
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -11,12 +15,13 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from fdnet.files.atomic import write_bytes, write_text
+from fdnet.errors import CaseError
+from fdnet.files import write_bytes, write_text
 from fdnet.report.tables import blocked_throats, pore_porosity
 from fdnet.spheres.snapshot import Array, Snapshot
 
 if TYPE_CHECKING:
-    from fdnet.network.analysis import Analysis
+    from fdnet.network.permeability import Analysis
 
 SPHERE_ARRAYS = {"radius": "radius_m", "kind": "kind", "id": "id", "velocity": "velocity_m_s"}
 """Names of the point data of sphere files, by the attribute of a snapshot."""
@@ -215,3 +220,89 @@ def write_lines_vtp(path: str | Path, lines: Sequence[tuple[Array, Array]]) -> P
     )
     mesh.point_data["value"] = np.concatenate([values for _, values in lines])
     return _save(path, mesh)
+
+
+# ------------------------------------------------------------------------------------------------
+# The ParaView files of a run as pyvista meshes, ready to plot.
+
+
+ROUNDNESS = 16
+"""Segments around a ball."""
+
+
+def read_mesh(path: Path) -> Any:
+    """The mesh in a .vtp file, m. Raises CaseError when it is missing, unreadable or empty."""
+    import pyvista as pv
+
+    if not path.exists():
+        raise CaseError(
+            f"{path}: is missing; write it with fdnet run CASE.toml --out {path.parent} "
+            "--stages report"
+        )
+    with pv.vtk_verbosity("off"):
+        try:
+            mesh = pv.read(path)
+        except Exception as error:
+            raise CaseError(f"{path}: cannot be read as a VTK file ({error})") from error
+    if not mesh.n_points:
+        raise CaseError(f"{path}: holds no points; write it anew with --stages report --force")
+    return mesh
+
+
+def read_balls(path: Path) -> Any:
+    """The spheres in a .vtp file as balls, m, with `radius_m`, `kind` and `id` on them.
+
+    In files of earlier versions the array is named `radius`.
+    """
+    import pyvista as pv
+
+    points = read_mesh(path)
+    ball = pv.Sphere(radius=1.0, theta_resolution=ROUNDNESS, phi_resolution=ROUNDNESS)
+    name = "radius_m" if "radius_m" in points.point_data else "radius"
+    return points.glyph(geom=ball, scale=name, orient=False)
+
+
+# ------------------------------------------------------------------------------------------------
+# The spheres of the page's 3-D view, as JSON that its script reads.
+
+
+MM, MICRON = 1e3, 1e6
+MOST_SPHERES = 40_000
+"""Spheres up to which a page has a 3-D view: half a megabyte."""
+UPSTREAM_SHOWN = 0.12
+"""Share of the length upstream of the face up to which fines are shown."""
+STEPS = 65535
+
+
+def view_of(spheres: Snapshot) -> Mapping[str, Any] | None:
+    """Grains and fines for the view; None where there are more than `MOST_SPHERES`, or none.
+
+    `data` is base64 of (N, 4) unsigned 16-bit numbers, little endian, grains first: x, y and z
+    from `low` to `high` (mm), and the radius from 0 to `radius` (mm). `grains` is their number.
+    """
+    length = float(np.ptp(spheres.box[0]))
+    shown = spheres.position[:, 0] > spheres.box[0, 0] - UPSTREAM_SHOWN * length
+    grains, fines = spheres.grains(), spheres.where(shown).fines()
+    if not 0 < len(grains) + len(fines) <= MOST_SPHERES:
+        return None
+    position = np.concatenate([grains.position, fines.position]) * MM
+    radius = np.concatenate([grains.radius, fines.radius]) * MM
+    low, high = position.min(axis=0), position.max(axis=0)
+    table = np.column_stack([_steps(position, low, high), _steps(radius, 0.0, radius.max())])
+    sizes = np.unique(np.round(fines.radius * MICRON, 6)) if len(fines) else np.zeros(0)
+    return {
+        "grains": len(grains),
+        "spheres": len(radius),
+        "low": low.tolist(),
+        "high": high.tolist(),
+        "radius": float(radius.max()),
+        "box": (np.asarray(spheres.box) * MM).tolist(),
+        "one_size": len(sizes) <= 1,
+        "data": base64.b64encode(table.astype("<u2").tobytes()).decode("ascii"),
+    }
+
+
+def _steps(value: Array, low: Any, high: Any) -> Array:
+    """`value` as whole steps of 0 to `STEPS` between `low` and `high`."""
+    span = np.where(np.asarray(high) > low, np.asarray(high) - low, 1.0)
+    return np.rint((value - low) / span * STEPS)

@@ -6,14 +6,29 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.network.resolved.slab import Sides
-from fdnet.report.added import Added, PageTable
-from fdnet.report.face_figures import fill_bridging, fill_cake, fill_clean_up, fill_filtrate
-from fdnet.report.units import millimetres
+from fdnet.network.states import Sides
+from fdnet.report.figures import (
+    Added,
+    PageTable,
+    fill_bridging,
+    fill_cake,
+    fill_clean_up,
+    fill_filtrate,
+)
+from fdnet.report.tables import millimetres
 from fdnet.run.bridging import CLOGGED, ratio_rows
-from fdnet.run.cake import PACKED, cake_rows, cake_summary, cake_words, measure_cake
+from fdnet.run.cake import (
+    HALF_HOUR,
+    PACKED,
+    Filtration,
+    cake_rows,
+    cake_share,
+    cake_summary,
+    cake_words,
+    fit_filtration,
+    measure_cake,
+)
 from fdnet.run.clean_up import Returned, clean_up_rows, clean_up_summary
-from fdnet.run.filtrate import HALF_HOUR, Filtration, cake_share, fit_filtration
 from fdnet.run.outputs import Invaded, Results
 
 _CLEAN_UP_COLUMNS = (

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fdnet.report.tables import between_grains
-from fdnet.spheres.arrays import Array, one_line
+from fdnet.spheres.snapshot import Array, one_line
 
 if TYPE_CHECKING:
-    from fdnet.network.analysis import Analysis
+    from fdnet.network.permeability import Analysis
 
 RATIOS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, math.inf)
 """Edges of the classes of the diameter of a fine over that of the throat."""

@@ -7,26 +7,28 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fdnet.case.case import InvasionCase
-from fdnet.dem.clean_up import DECK, CleanedUp, Start, clean_up
-from fdnet.dem.clean_up_states import cleaned_state, dump_name, read_cleaned
-from fdnet.dem.fluid import Fluid
-from fdnet.dem.overlap import overlap_in
-from fdnet.dem.updates import UPDATES
+from fdnet.dem.checkpoint import UPDATES, overlap_in
+from fdnet.dem.clean_up import (
+    DECK,
+    CleanedUp,
+    Start,
+    clean_up,
+    cleaned_state,
+    dump_name,
+    read_cleaned,
+)
+from fdnet.dem.invade_deck import Fluid
 from fdnet.errors import CaseError
 from fdnet.run.dem_stages import invaded, is_done, packed_grains
-from fdnet.run.fluid.fluid_of import fluid_of
-from fdnet.run.fluid.mirrored import Mirrored, mirrored
-from fdnet.run.fluid.uniform import UniformCrowd
-from fdnet.run.made_files import START_OVER, check_files, digests_of
-from fdnet.run.mark import RECORD_FORMAT
+from fdnet.run.fluid import Mirrored, UniformCrowd, fluid_of, mirrored
+from fdnet.run.folder import RECORD_FORMAT, START_OVER, check_files, digests_of
 from fdnet.run.progress import Progress
-from fdnet.run.records import run_record
-from fdnet.run.session import Session
-from fdnet.scales.clean_up import BackFlow, back_flow
+from fdnet.run.records import Session, run_record
+from fdnet.scales.scales import BackFlow, back_flow
 from fdnet.spheres.snapshot import Array, Snapshot
 
 if TYPE_CHECKING:
-    from fdnet.network.analysis import Analysis
+    from fdnet.network.permeability import Analysis
 
 STAGE = "clean_up"
 

@@ -4,25 +4,19 @@ import math
 from pathlib import Path
 
 from fdnet.case.case import InvasionCase
-from fdnet.case.stages import LIGGGHTS_STAGES
-from fdnet.dem.checkpoint import read_history, state_at
-from fdnet.dem.digests import checkpoint_files
+from fdnet.dem.checkpoint import checkpoint_files, read_history, read_updates, state_at
+from fdnet.dem.deck import snapshot_of
 from fdnet.dem.invasion import invade
-from fdnet.dem.pack_deck import check_radii
-from fdnet.dem.packing import make_pack
-from fdnet.dem.scene import snapshot_of
-from fdnet.dem.updates import read_updates
+from fdnet.dem.packing import check_radii, make_pack
 from fdnet.errors import CaseError
-from fdnet.run.fluid.fluid_of import fluid_of
-from fdnet.run.forecast import Forecast
-from fdnet.run.made_files import START_OVER, check_files, may_be_gone
+from fdnet.names import LIGGGHTS_STAGES
+from fdnet.run.fluid import fluid_of
+from fdnet.run.folder import START_OVER, check_files, may_be_gone
 from fdnet.run.outputs import Invaded
-from fdnet.run.progress import Progress
-from fdnet.run.records import PACK_DUMP, invade_record, pack_record, ranks_of
-from fdnet.run.session import Session
-from fdnet.run.shared_pack import take_pack
+from fdnet.run.progress import Forecast, Progress
+from fdnet.run.records import PACK_DUMP, Session, invade_record, pack_record, ranks_of, take_pack
 from fdnet.scales.cost import expected_duration
-from fdnet.scales.grain_pack import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES
+from fdnet.scales.pack import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES
 from fdnet.scales.scales import InvasionScales, scales_of
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Snapshot

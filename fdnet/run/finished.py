@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from fdnet.case.case import Case, InvasionCase
-from fdnet.case.names import ALL_SPHERES
 from fdnet.errors import CaseError
+from fdnet.names import ALL_SPHERES
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import Network, build_network
-from fdnet.network.resolved.all_spheres import all_conductances
-from fdnet.run.made_files import ANALYSE_AGAIN, START_OVER, check_one
-from fdnet.run.summary_text import html_lines, text_lines
-from fdnet.spheres.arrays import Array
-from fdnet.spheres.snapshot import Snapshot
+from fdnet.network.states import all_conductances
+from fdnet.run.folder import ANALYSE_AGAIN, START_OVER, check_one
+from fdnet.run.summary import html_lines, text_lines
+from fdnet.spheres.snapshot import Array, Snapshot
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,7 +42,7 @@ class FinishedRun:
     @cached_property
     def summary(self) -> Mapping[str, Any]:
         """The numbers of summary.json, SI; a length is in m, a permeability in m2."""
-        from fdnet.report.read_tables import read_summary
+        from fdnet.report.tables import read_summary
 
         summary = read_summary(self.path / "summary.json")
         self._check("summary.json")
@@ -65,7 +64,7 @@ class FinishedRun:
 
         They are from the network of all spheres; where that was not solved there are no rows.
         """
-        from fdnet.report.read_tables import COLUMNS, empty_table
+        from fdnet.report.tables import COLUMNS, empty_table
 
         if not self._has("layers.csv"):
             return empty_table(COLUMNS["layers"])
@@ -88,7 +87,7 @@ class FinishedRun:
         It joins history.csv of the run folder, where there is one, with the counts that the deck
         wrote to invade/history.csv. A run without fines has no history: the table has no rows.
         """
-        from fdnet.report.read_tables import HISTORY_COLUMNS, empty_table, read_table
+        from fdnet.report.tables import HISTORY_COLUMNS, empty_table, read_table
 
         if not isinstance(self.case, InvasionCase):
             return empty_table(["time_s", *HISTORY_COLUMNS])
@@ -147,10 +146,10 @@ class FinishedRun:
         (`all_spheres_above_grains` in `network_counts` is 1), `k_damaged_m2` is the permeability
         of the grains, and this network has a little more.
 
-        See `fdnet.report.openpnm.to_openpnm`; the viscosity is that of the case's fluid. Raises
+        See `fdnet.report.tables.to_openpnm`; the viscosity is that of the case's fluid. Raises
         CaseError where OpenPNM is not installed, or the run has no number by that law.
         """
-        from fdnet.report.openpnm import to_openpnm
+        from fdnet.report.tables import to_openpnm
 
         _check_state(state)
         used, other = (self.summary.get(f"damage_law_{one}") for one in ("used", "other"))
@@ -174,7 +173,7 @@ class FinishedRun:
 
         It is read from network.vtp, which the stage "report" writes.
         """
-        from fdnet.report.meshes import read_mesh
+        from fdnet.report.vtk import read_mesh
 
         return self._mesh("network.vtp", read_mesh)
 
@@ -184,13 +183,13 @@ class FinishedRun:
         They are read from spheres_damaged.vtp or spheres_initial.vtp, which the stage "report"
         writes.
         """
-        from fdnet.report.meshes import read_balls
+        from fdnet.report.vtk import read_balls
 
         _check_state(state)
         return self._mesh(f"spheres_{state}.vtp", read_balls)
 
     def _table(self, name: str, rows: int | None) -> "pd.DataFrame":
-        from fdnet.report.read_tables import COLUMNS, read_table
+        from fdnet.report.tables import COLUMNS, read_table
 
         table = read_table(self.path / f"{name}.csv", COLUMNS[name], rows=rows)
         self._check(f"{name}.csv")

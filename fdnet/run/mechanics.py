@@ -9,20 +9,22 @@ from typing import Any
 
 from fdnet.case.case import Case
 from fdnet.case.file import case_from, read_case, recorded_case, set_keys
-from fdnet.dem.scene import snapshot_of
+from fdnet.dem.deck import snapshot_of
 from fdnet.errors import CaseError
-from fdnet.files.atomic import write_text
-from fdnet.mechanics.numbers import elastic_numbers, triaxial_numbers, triaxial_warnings
-from fdnet.mechanics.of_case import elastic_moduli, material_of, warnings_of
-from fdnet.mechanics.rest import Row, Triaxial
-from fdnet.mechanics.triaxial import Sheared, triaxial
-from fdnet.report.mechanics_section import put_mechanics
+from fdnet.files import write_text
+from fdnet.mechanics.of_case import (
+    elastic_moduli,
+    elastic_numbers,
+    material_of,
+    triaxial_numbers,
+    triaxial_warnings,
+    warnings_of,
+)
+from fdnet.mechanics.triaxial import Row, Sheared, Triaxial, triaxial
+from fdnet.report.html import put_mechanics
 from fdnet.report.tables import plain_json
-from fdnet.run.made_files import START_OVER, check_files
-from fdnet.run.mark import CASE, is_run_folder
-from fdnet.run.record_files import read_record
-from fdnet.run.records import PACK_DUMP
-from fdnet.run.session import RunOptions
+from fdnet.run.folder import CASE, START_OVER, check_files, is_run_folder, read_record
+from fdnet.run.records import PACK_DUMP, RunOptions
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Snapshot
 
@@ -129,7 +131,7 @@ def measure_triaxial(
 
 def write_curve(packed: Packed, result: Sheared) -> Path:
     """Write stress_strain.csv and its figure to the folder of the mechanics; the table's path."""
-    from fdnet.report.stress_strain import draw_stress_strain
+    from fdnet.report.figures import draw_stress_strain
 
     folder = packed.folder / FOLDER
     folder.mkdir(parents=True, exist_ok=True)

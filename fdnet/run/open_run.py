@@ -7,10 +7,9 @@ from pathlib import Path
 from fdnet.case.case import Case
 from fdnet.case.file import read_case
 from fdnet.errors import CaseError
-from fdnet.files.paths import expanded
+from fdnet.files import expanded
 from fdnet.run.finished import FinishedRun
-from fdnet.run.folder import STAGES
-from fdnet.run.record_files import finished_manifest
+from fdnet.run.folder import STAGES, finished_manifest
 
 
 def open_run(path: str | Path) -> FinishedRun:
@@ -83,7 +82,7 @@ def run_case(
         ('quick', True)
     """
     from fdnet.run.pipeline import run_stages
-    from fdnet.run.session import RunOptions
+    from fdnet.run.records import RunOptions
 
     given = case if isinstance(case, Case) else read_case(case)
     folder = Path("runs") / given.name if out is None else expanded(out)

@@ -8,18 +8,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.case import Case, InvasionCase
-from fdnet.case.names import AUTO, DEFAULT_LAW, off_by_factors
-from fdnet.case.stages import LIGGGHTS_STAGES, STAGES
-from fdnet.dem.binary import find_binary
+from fdnet.case.tables import AnalysisChoices
 from fdnet.dem.checkpoint import has_history
+from fdnet.dem.liggghts import find_binary
 from fdnet.dem.supply import refuse_crowded_supply
 from fdnet.errors import CaseError
+from fdnet.names import AUTO, DEFAULT_LAW, LIGGGHTS_STAGES, STAGES, off_by_factors
 from fdnet.report.permeability_text import thesis_law_warning
 from fdnet.run.added_results import added_results
-from fdnet.run.answer.answer import with_answer
-from fdnet.run.answer.case_words import case_words
+from fdnet.run.answer import case_words, with_answer
 from fdnet.run.clean_up import Returned, clean_up_stage, compared, returned
 from fdnet.run.dem_stages import (
     file_warnings,
@@ -28,28 +26,37 @@ from fdnet.run.dem_stages import (
     pack_stage,
     packed_grains,
 )
-from fdnet.run.folder import RunFolder, open_folder
-from fdnet.run.made_files import MESHES, SOME_TABLES, TABLES, digests_of, frames_in
-from fdnet.run.mark import RECORDS
-from fdnet.run.outputs import Results, draw_figures, write_paraview, write_tables
-from fdnet.run.placed_sizes import placed_sizes, size_summary
-from fdnet.run.record_files import check_finished
-from fdnet.run.records import record_warnings, stage_seconds, versions
-from fdnet.run.session import RunOptions, Session
+from fdnet.run.folder import (
+    MESHES,
+    RECORDS,
+    SOME_TABLES,
+    TABLES,
+    RunFolder,
+    check_finished,
+    digests_of,
+    frames_in,
+    open_folder,
+)
+from fdnet.run.outputs import (
+    Results,
+    draw_figures,
+    placed_sizes,
+    size_summary,
+    write_paraview,
+    write_tables,
+)
+from fdnet.run.records import RunOptions, Session, record_warnings, stage_seconds, versions
 from fdnet.run.stokes_sections import report_section
 from fdnet.run.summary import summarise
-from fdnet.scales.check.checked import every_finding
-from fdnet.scales.clean_up import back_flow
+from fdnet.scales.check import every_finding
 from fdnet.scales.cost import over_limit
-from fdnet.scales.densest import refuse_unreachable
-from fdnet.scales.grain_pack import grain_count
-from fdnet.scales.scales import InvasionScales, Scales, scales_of
+from fdnet.scales.pack import grain_count, refuse_unreachable
+from fdnet.scales.scales import InvasionScales, Scales, back_flow, scales_of
 from fdnet.scales.table import scale_rows
-from fdnet.spheres.directions import Directions
-from fdnet.spheres.snapshot import Snapshot
+from fdnet.spheres.snapshot import Directions, Snapshot
 
 if TYPE_CHECKING:
-    from fdnet.network.analysis import Analysis
+    from fdnet.network.permeability import Analysis
 
 
 def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
@@ -143,7 +150,7 @@ def _stages_to_run(case: Case, options: RunOptions) -> list[str]:
 
 
 def _read_summary(folder: RunFolder) -> dict[str, Any]:
-    from fdnet.report.read_tables import read_summary
+    from fdnet.report.tables import read_summary
 
     path = folder.path / "summary.json"
     return read_summary(path) if path.exists() else {}
@@ -275,8 +282,8 @@ def _write_summary(
     session: Session, results: Results, figures: list[tuple[Path, str]], notes: list[str]
 ) -> dict[str, Any]:
     from fdnet.report import html, tables
-    from fdnet.report.mechanics_section import section_html
-    from fdnet.report.view import view_of
+    from fdnet.report.html import mechanics_html as section_html
+    from fdnet.report.vtk import view_of
 
     case, scales = session.case, session.scales
     pack = _pack_record(session)

@@ -1,25 +1,43 @@
-"""Records of finished stages, for later stages, for resuming and for the manifest."""
+"""A run as it is carried out: its session, records of its stages, and a shared pack.
+
+Records of finished stages, for later stages, for resuming and for the manifest.
+"""
 
 import hashlib
+import math
+import os
 import platform
 import shlex
+import shutil
 import sys
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from fdnet.case.case import Case
-from fdnet.dem.binary import KNOWN_VERSION
-from fdnet.dem.checkpoint import HISTORY
+from fdnet.dem.checkpoint import HISTORY, UPDATES, WATCH, Deepest, overlap_text
 from fdnet.dem.invasion import Invasion
-from fdnet.dem.liggghts import Run
-from fdnet.dem.overlap import WATCH, Deepest, overlap_text
+from fdnet.dem.liggghts import KNOWN_VERSION, Binary, Launch, Run, find_binary
 from fdnet.dem.packing import Pack
-from fdnet.dem.updates import UPDATES
-from fdnet.run.folder import RECORD_FORMAT
-from fdnet.run.made_files import digests_of
-from fdnet.spheres.contacts import overlap_doubts
+from fdnet.errors import CaseError
+from fdnet.names import STAGES
+from fdnet.run.folder import (
+    LOCK,
+    RECORD_FORMAT,
+    RECORDS,
+    START_OVER,
+    RunFolder,
+    check_files,
+    digests_of,
+    read_record,
+)
+from fdnet.run.progress import Progress
+from fdnet.scales.scales import Scales
+from fdnet.spheres.geometry import overlap_doubts
 
 PACK_DUMP = "post/pack.dump"
 MOMENTUM_LIMIT = 0.01
@@ -214,3 +232,163 @@ def versions(pack: dict[str, Any] | None) -> dict[str, str]:
     liggghts = {"liggghts": pack["runs"][0]["version"]} if pack else {}
     python, system = sys.version.split()[0], platform.platform()
     return {**packages, "python": python, **liggghts, "system": system}
+
+
+# ------------------------------------------------------------------------------------------------
+# One session of a run: what is run, where, and how long each stage took.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunOptions:
+    """How to run a case, as opposed to what it is.
+
+    Attributes:
+        out: run folder.
+        ranks: MPI ranks of LIGGGHTS.
+        resume: continue an unfinished run.
+        force: replace what is there.
+        stages: stages to run, of "pack", "invade", "analyse" and "report".
+        liggghts: path of the binary; None: looked for.
+        launcher: template that starts several ranks, as "srun -n {ranks}"; None: mpirun.
+        pack_from: run folder whose finished pack is taken; None: the pack is made.
+        timeout: s, after which LIGGGHTS is stopped; None: never.
+        show_progress: whether to write progress to standard error.
+        command: command line that started the run, for its records.
+    """
+
+    out: Path
+    ranks: int = 1
+    resume: bool = False
+    force: bool = False
+    stages: tuple[str, ...] = STAGES
+    liggghts: str | None = None
+    launcher: str | None = None
+    pack_from: Path | None = None
+    timeout: float | None = None
+    show_progress: bool = True
+    command: str = ""
+
+    def __post_init__(self) -> None:
+        """Raise CaseError on a time limit or a number of ranks that means nothing."""
+        if self.timeout is not None and not 0 < self.timeout < math.inf:
+            raise CaseError(
+                f"timeout: {self.timeout}, expected a number of seconds above 0; leave it out for "
+                "no limit"
+            )
+        if not 1 <= self.ranks <= most_ranks():
+            raise CaseError(
+                f"ranks: {self.ranks}, expected 1 to {most_ranks()} on the {cores()} cores of "
+                "this machine"
+            )
+
+
+def cores() -> int:
+    """Number of processor cores that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def most_ranks() -> int:
+    """Largest number of MPI ranks that is accepted: more would only exhaust the machine."""
+    return max(256, 64 * cores())
+
+
+@dataclass(slots=True)
+class Session:
+    """A run while it goes on.
+
+    Attributes:
+        case: what is run.
+        scales: of the case.
+        folder: where it is run; this process holds its lock.
+        options: how it is run.
+        seconds: s, that each stage took in this session.
+    """
+
+    case: Case
+    scales: Scales
+    folder: RunFolder
+    options: RunOptions
+    seconds: dict[str, float] = field(default_factory=dict)
+    _binary: Binary | None = None
+
+    @property
+    def path(self) -> Path:
+        """The run folder."""
+        return self.folder.path
+
+    def wants(self, stage: str) -> bool:
+        """Whether the stage was asked for and belongs to the case."""
+        return stage in self.options.stages and stage in self.case.stages
+
+    def launch(self, progress: Progress) -> Launch:
+        """How this run starts LIGGGHTS; the binary is looked for when a stage first needs it."""
+        if self._binary is None:
+            options = self.options
+            self._binary = find_binary(options.liggghts, launcher=options.launcher)
+        return Launch(
+            binary=self._binary,
+            ranks=self.options.ranks,
+            timeout=self.options.timeout,
+            follow=progress,
+        )
+
+    @contextmanager
+    def timed(self, stage: str) -> Iterator[None]:
+        """Add the time inside the `with` block to the seconds of the stage."""
+        start = time.monotonic()
+        yield
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.monotonic() - start
+
+
+# ------------------------------------------------------------------------------------------------
+# A pack that several runs share: made once, and copied into each of them.
+
+
+def take_pack(session: Session, source: Path) -> None:
+    """Copy the finished pack of the run folder `source`, as if this run had made it.
+
+    Its record counts no seconds of LIGGGHTS, which belong to the run that made the pack.
+
+    Raises CaseError when `source` holds no finished pack, or one of another case, seed or number
+    of ranks, or when its files are not those that the stage made.
+    """
+    record = read_record(source, "pack")
+    if record is None:
+        raise CaseError(
+            f"--pack-from {source}: holds no finished pack; make it with fdnet run CASE.toml "
+            f"--stages pack --out {shlex.quote(str(source))}"
+        )
+    _refuse_other(session, source, record)
+    check_files(source / "pack", record, START_OVER)
+    with session.timed("pack"):
+        shutil.copytree(
+            source / "pack",
+            session.path / "pack",
+            ignore=shutil.ignore_patterns(LOCK, Path(RECORDS["pack"]).name),
+            dirs_exist_ok=True,
+        )
+    session.folder.finish("pack", _taken(record, source, session.seconds["pack"]))
+
+
+def _refuse_other(session: Session, source: Path, record: dict[str, Any]) -> None:
+    if record["digest"] != session.case.digest("pack"):
+        raise CaseError(
+            f"--pack-from {source}: its pack is that of another case or seed (digest "
+            f"{record['digest']}, this case {session.case.digest('pack')}); leave the option out"
+        )
+    if ranks_of(record) != session.options.ranks:
+        raise CaseError(
+            f"--pack-from {source}: its pack was made with --np {ranks_of(record)}, this run has "
+            f"--np {session.options.ranks}, which would give another pack; use the same number"
+        )
+
+
+def _taken(record: dict[str, Any], source: Path, seconds: float) -> dict[str, Any]:
+    """The record of the copy; the time that it took to make is kept apart."""
+    return record | {
+        "seconds": seconds,
+        "taken_from": str(source),
+        "made_in_seconds": record["seconds"],
+        "runs": [row | {"seconds": 0.0} for row in record["runs"]],
+        "attempts": [row | {"liggghts_s": 0.0} for row in record["attempts"]],
+    }

@@ -1,8 +1,410 @@
-"""The contacts of a case by its contact model."""
+"""Contacts: stiffness, restitution, overlap and cohesion.
 
-from fdnet.case.case import Case
-from fdnet.scales.hertz_contacts import hertz_contacts, hertz_factor
-from fdnet.scales.springs import Contact, hooke_contacts, hooke_factor
+Rebound in a liquid: the restitution of a contact from the impact Stokes number.
+
+The liquid film between two spheres takes the energy of the impact. Experiments with spheres and
+walls show no rebound below an impact Stokes number of about 10, and the dry restitution from about
+500 on (Joseph and others, J. Fluid Mech. 433, 329, 2001; Gondret and others, Phys. Fluids 14, 643,
+2002). exp(-35 / St) of the dry restitution follows them (Legendre and others, Phys. Fluids 17,
+097105, 2005, and Chem. Eng. Sci. 61, 3543, 2006).
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from fdnet.case.case import Case, InvasionCase
+from fdnet.case.spheres import Spheres
+from fdnet.errors import CaseError
+from fdnet.scales.drag import Push, arrival_velocity, pore_width
+
+FILM = 35.0
+"""Stokes number at which the liquid leaves exp(-1) of the dry restitution (Legendre 2005)."""
+LEAST: Mapping[str, float] = {"hooke": 1e-6, "hertz": 0.0501}
+"""Least restitution by contact model, below which nothing is lowered further. LIGGGHTS's Hertz
+model takes 0.05 and less for an error; for linear contacts it keeps the damping ratio below 1."""
+
+
+def pair_stokes(mass: float, radius: float, velocity: float, viscosity: float) -> float:
+    """m_eff v / (6 pi mu R*^2), the impact Stokes number of a pair.
+
+    For the effective mass in kg, R* in m, the velocity of approach in m/s, and the viscosity in
+    Pa s. Of a sphere and a wall it is 2 r rho v / (9 mu) (Joseph and others 2001).
+    """
+    return mass * velocity / (6 * math.pi * viscosity * radius**2)
+
+
+def wet_ratio(dry_ratio: float, stokes: float, *, least: float) -> float:
+    """Damping ratio of a contact with exp(-35 / St) of the restitution of `dry_ratio`.
+
+    z = -ln e / sqrt(ln^2 e + pi^2), with e at least `least`.
+    """
+    log = -math.pi * dry_ratio / math.sqrt(1 - dry_ratio**2) - FILM / stokes
+    log = max(log, math.log(least))
+    return -log / math.hypot(log, math.pi)
+
+
+def is_wet(case: Case, pair: tuple[str, str]) -> bool:
+    """Whether the liquid decides the restitution of a pair."""
+    wanted = isinstance(case, InvasionCase) and case.contact.restitution == "liquid"
+    return wanted and "fine" in pair
+
+
+# ------------------------------------------------------------------------------------------------
+# Hertz-Mindlin contacts in closed form, for pairs of spheres and for a sphere and a plane.
+#
+# Sources: Hertz (1882) and Johnson, Contact Mechanics (1985), chapters 4 and 11, for force, impact
+# and duration; Mindlin (1949) for the tangential stiffness; Antypov and Elliott (EPL 94, 50004,
+# 2011) for the damped collision.
+
+
+REFERENCE_OVERLAP = 0.01
+"""Overlap over the smaller diameter at which a Hertz contact has the stiffness that is asked."""
+STEP_OVERLAP = 0.04
+"""Overlap over the smaller diameter whose tangent stiffness sets the time step. It is three times
+the stiffness at `REFERENCE_OVERLAP`."""
+_COLLISION = 0.8 * math.sqrt(math.pi) * math.gamma(0.4) / math.gamma(0.9)
+"""Duration of a collision times v over the largest overlap, 2.943; times (15/16)^(2/5) it is the
+2.87 of the textbooks."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Elastic:
+    """Elastic constants of a pair of materials, as they are used.
+
+    Attributes:
+        modulus: E* = 1 / ((1 - nu1^2) / E1 + (1 - nu2^2) / E2), Pa.
+        shear: G* = 1 / ((2 - nu1) / G1 + (2 - nu2) / G2), Pa, with G = E / 2 (1 + nu).
+    """
+
+    modulus: float
+    shear: float
+
+
+def elastic(first: tuple[float, float], second: tuple[float, float]) -> Elastic:
+    """Of two materials, each with Young's modulus in Pa and Poisson's ratio."""
+    (e1, nu1), (e2, nu2) = first, second
+    return Elastic(
+        modulus=1 / ((1 - nu1**2) / e1 + (1 - nu2**2) / e2),
+        shear=1 / (2 * (2 - nu1) * (1 + nu1) / e1 + 2 * (2 - nu2) * (1 + nu2) / e2),
+    )
+
+
+def joint_radius(first: float, second: float) -> float:
+    """R* = 1 / (1/r1 + 1/r2), m; a plane has the radius infinity."""
+    return 1 / (1 / first + 1 / second)
+
+
+def secant_stiffness(modulus: float, radius: float, overlap: float) -> float:
+    """F / delta = 4/3 E* sqrt(R* delta), N/m; the tangent stiffness is 1.5 times that."""
+    return 4 / 3 * modulus * math.sqrt(radius * overlap)
+
+
+def tangential_stiffness(shear: float, radius: float, overlap: float) -> float:
+    """8 G* sqrt(R* delta), N/m (Mindlin 1949), without slip."""
+    return 8 * shear * math.sqrt(radius * overlap)
+
+
+def overlap_under(force: float, modulus: float, radius: float) -> float:
+    """(3 F / (4 E* sqrt(R*)))^(2/3), m, at rest under a force in N."""
+    return float((0.75 * force / (modulus * math.sqrt(radius))) ** (2 / 3))
+
+
+def overlap_of_impact(
+    mass: float, velocity: float, modulus: float, radius: float, *, damping: float = 0.0
+) -> float:
+    """Largest overlap, m, of a collision of effective mass in kg at a velocity in m/s.
+
+    Undamped (15 m v^2 / (16 E* sqrt(R*)))^(2/5). With a force of damping that goes with
+    delta^(1/4), as in LIGGGHTS, delta^(5/4) is the way of a linear oscillator of the ratio
+    `damping`, so that the factor is that of the oscillator to the power 4/5.
+    """
+    free = float((15 * mass * velocity**2 / (16 * modulus * math.sqrt(radius))) ** 0.4)
+    if damping == 0:
+        return free
+    s = math.sqrt(1 - damping**2)
+    return free * math.exp(-0.8 * damping / s * math.atan2(s, damping))
+
+
+def collision_time(mass: float, velocity: float, modulus: float, radius: float) -> float:
+    """2.87 (m^2 / (R* E*^2 v))^(1/5), s, of an undamped collision."""
+    return _COLLISION * overlap_of_impact(mass, velocity, modulus, radius) / velocity
+
+
+def rayleigh_time(radius: float, density: float, young: float, poisson: float) -> float:
+    """pi r sqrt(rho / G) / (0.1631 nu + 0.8766), s: a Rayleigh wave along half a sphere.
+
+    Of a sphere of `radius` m and `density` kg/m3, with Young's modulus in Pa (Thornton and
+    Randall 1988).
+    """
+    shear = young / (2 * (1 + poisson))
+    return math.pi * radius * math.sqrt(density / shear) / (0.1631 * poisson + 0.8766)
+
+
+def restitution_of(damping: float) -> float:
+    """exp(-pi z / sqrt(1 - z^2)), of a contact of the damping ratio z < 1 that may pull.
+
+    It holds for linear and, with the damping of LIGGGHTS, for Hertz contacts.
+    """
+    return math.exp(-math.pi * damping / math.sqrt(1 - damping**2))
+
+
+# ------------------------------------------------------------------------------------------------
+# Contacts of pairs of materials, and linear (Hooke) ones: springs in series, viscous damping.
+
+
+PAIRS = (
+    ("grain", "grain"),
+    ("grain", "wall"),
+    ("grain", "fine"),
+    ("fine", "fine"),
+    ("fine", "wall"),
+)
+"""Pairs of materials in contact."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contact:
+    """Contact of one pair of materials, as it is used.
+
+    A Hertz contact has no stiffness of its own: its stiffnesses are those at an overlap of
+    `fdnet.scales.contacts.REFERENCE_OVERLAP`.
+
+    Attributes:
+        pair: names of the two materials, such as "grain-fine".
+        normal_stiffness: N/m, force over overlap.
+        shear_stiffness: N/m.
+        friction: coefficient of sliding friction.
+        damping_ratio: damping over the critical one.
+        damping_rate: 1/s, viscous damping force over effective mass and velocity.
+        contact_time: s, half a period of the damped oscillation; of a Hertz contact the duration
+            of an undamped collision at the velocity of the fluid.
+        step_limit: s, sqrt(m/k) of the lighter sphere.
+        elastic: constants of a Hertz contact; None when the contact is linear.
+        stokes: impact Stokes number at the velocity of the fluid; None where the restitution does
+            not depend on it.
+    """
+
+    pair: str
+    normal_stiffness: float
+    shear_stiffness: float
+    friction: float
+    damping_ratio: float
+    damping_rate: float
+    contact_time: float
+    step_limit: float
+    elastic: Elastic | None = None
+    stokes: float | None = None
+
+    @property
+    def restitution(self) -> float:
+        """Coefficient of restitution of a contact that may pull: exp(-pi z / sqrt(1 - z^2))."""
+        return restitution_of(self.damping_ratio)
+
+
+def series(first: float, second: float) -> float:
+    """Two springs in series, kA kB / (kA + kB) (PFC's rule for a contact)."""
+    return first * second / (first + second)
+
+
+def sphere_mass(radius: float, density: float) -> float:
+    """4/3 pi r^3 rho, kg."""
+    return 4 / 3 * math.pi * radius**3 * density
+
+
+def mass_range(spheres: Spheres) -> tuple[float, float]:
+    """Mass of the smallest and of the largest sphere, kg."""
+    if not spheres.measured:
+        low, high = spheres.radius_range_m
+        return sphere_mass(low, spheres.density_kg_m3), sphere_mass(high, spheres.density_kg_m3)
+    ends = [
+        (
+            sphere_mass(0.5 * one.curve.low, one.density),
+            sphere_mass(0.5 * one.curve.high, one.density),
+        )
+        for one in spheres.components
+    ]
+    return min(low for low, _ in ends), max(high for _, high in ends)
+
+
+def _nominal(case: Case) -> dict[str, tuple[float, float, float]]:
+    """Per material: normal and shear stiffness, friction. Walls are of the grains' material."""
+    table = {
+        name: (spheres.normal_stiffness_N_m, spheres.tangential_stiffness, spheres.friction)
+        for name, spheres in case.spheres.items()
+    }
+    return table | {"wall": (*table["grain"][:2], case.wall_friction)}
+
+
+def pairs_of(case: Case) -> list[tuple[str, str]]:
+    """Pairs of materials that may touch; walls do not touch each other."""
+    return [pair for pair in PAIRS if set(pair) <= {*case.spheres, "wall"}]
+
+
+def stiffness_of(case: Case) -> float:
+    """`run.stiffness_N_m` where it is a number; `stiff_enough` has put one for "auto"."""
+    given = case.run.stiffness_N_m
+    assert not isinstance(given, str)
+    return given
+
+
+def hooke_factor(case: Case) -> float:
+    """Factor on all contact stiffnesses: run.stiffness_N_m over that of the stiffest pair."""
+    if case.run.stiffness_N_m == "nominal":
+        return 1.0
+    nominal = _nominal(case)
+    return stiffness_of(case) / max(
+        series(nominal[a][0], nominal[b][0]) for a, b in pairs_of(case)
+    )
+
+
+def hooke_contacts(case: Case, velocity: float) -> dict[str, Contact]:
+    """The linear contact of each pair of materials, in a fluid of a velocity in m/s."""
+    return {f"{a}-{b}": _contact(case, (a, b), velocity) for a, b in pairs_of(case)}
+
+
+def _contact(case: Case, pair: tuple[str, str], velocity: float) -> Contact:
+    nominal, factor = _nominal(case), hooke_factor(case)
+    first, second = pair
+    normal = factor * series(nominal[first][0], nominal[second][0])
+    damping, stokes = damping_and_stokes(case, pair, velocity)
+    frequency = math.sqrt(normal / effective_mass(case, pair))
+    lightest = case.spheres["fine" if "fine" in pair else "grain"]
+    return Contact(
+        pair=f"{first}-{second}",
+        normal_stiffness=normal,
+        shear_stiffness=factor * series(nominal[first][1], nominal[second][1]),
+        friction=min(nominal[first][2], nominal[second][2]),
+        damping_ratio=damping,
+        damping_rate=2 * damping * frequency,
+        contact_time=math.pi / (frequency * math.sqrt(1 - damping**2)),
+        step_limit=math.sqrt(mass_range(lightest)[0] / normal),
+        stokes=stokes,
+    )
+
+
+def damping_and_stokes(
+    case: Case, pair: tuple[str, str], velocity: float
+) -> tuple[float, float | None]:
+    """Damping ratio of a contact, and the impact Stokes number where that decides it.
+
+    Dry it is the mean of the two materials, a wall taking the sphere's. `velocity` is the fluid's,
+    m/s.
+    """
+    spheres = [case.spheres[name] for name in pair if name != "wall"]
+    dry = sum(one.damping_ratio for one in spheres) / len(spheres)
+    if not is_wet(case, pair):
+        return dry, None
+    radius = pair_radius(case, pair, case.spheres["fine"].mean_radius_m)
+    mass = effective_mass(case, pair)
+    stokes = pair_stokes(mass, radius, velocity, case.fluid.viscosity_Pa_s)
+    return wet_ratio(dry, stokes, least=LEAST[case.contact.model]), stokes
+
+
+def pair_radius(case: Case, pair: tuple[str, str], radius: float) -> float:
+    """R*, m, of a sphere of `radius` m, the lighter one of the pair, and its partner."""
+    if "wall" in pair:
+        return radius
+    mixed = "fine" in pair and "grain" in pair
+    return joint_radius(radius, case.grains.mean_radius_m if mixed else radius)
+
+
+def effective_mass(case: Case, pair: tuple[str, str]) -> float:
+    """m1 m2 / (m1 + m2) of a typical contact, kg.
+
+    Walls have infinite mass, and fixed grains too while fines invade; so it is in LIGGGHTS.
+    """
+    fixed = {"wall", "grain"} if "fine" in pair and case.grains.motion == "fixed" else {"wall"}
+    return 1 / sum(0.0 if name in fixed else _inverse_mass(case.spheres[name]) for name in pair)
+
+
+def _inverse_mass(spheres: Spheres) -> float:
+    return 1 / sphere_mass(spheres.mean_radius_m, spheres.mean_density_kg_m3)
+
+
+# ------------------------------------------------------------------------------------------------
+# Hertz-Mindlin contacts of a case: moduli, softened by one factor, and their stable step.
+
+
+def hertz_contacts(case: Case, velocity: float) -> dict[str, Contact]:
+    """The Hertz-Mindlin contact of each pair of materials, in a fluid of a velocity in m/s."""
+    factor = hertz_factor(case)
+    return {f"{a}-{b}": _hertz_contact(case, (a, b), factor, velocity) for a, b in pairs_of(case)}
+
+
+def hertz_factor(case: Case) -> float:
+    """Factor on all Young's moduli: run.stiffness_N_m over the stiffness of the stiffest pair.
+
+    Pairs of a fine count, those of grains only in a case without fines.
+    """
+    if case.run.stiffness_N_m == "nominal":
+        return 1.0
+    pairs = [pair for pair in pairs_of(case) if "fine" in pair] or pairs_of(case)
+    return stiffness_of(case) / max(_stiffness(case, pair, 1.0) for pair in pairs)
+
+
+def material_of(case: Case, name: str, factor: float) -> tuple[float, float]:
+    """Young's modulus, Pa, times `factor`, and Poisson's ratio; walls are of grains' material."""
+    spheres = case.spheres["grain" if name == "wall" else name]
+    return factor * spheres.youngs_modulus_Pa, spheres.poissons_ratio
+
+
+def pair_elastic(case: Case, pair: tuple[str, str], factor: float) -> Elastic:
+    """Elastic constants of a pair of materials, softened by `factor`."""
+    return elastic(material_of(case, pair[0], factor), material_of(case, pair[1], factor))
+
+
+def _lighter(pair: tuple[str, str]) -> str:
+    return "fine" if "fine" in pair else "grain"
+
+
+def _stiffness(case: Case, pair: tuple[str, str], factor: float) -> float:
+    """Force over overlap at the reference overlap, N/m, of spheres of mean size."""
+    radius = case.spheres[_lighter(pair)].mean_radius_m
+    return secant_stiffness(
+        pair_elastic(case, pair, factor).modulus,
+        pair_radius(case, pair, radius),
+        REFERENCE_OVERLAP * 2 * radius,
+    )
+
+
+def tangent_stiffness(case: Case, pair: tuple[str, str], factor: float, overlap: float) -> float:
+    """dF/d(delta), N/m, of the smallest sphere at an overlap over its diameter."""
+    radius = case.spheres[_lighter(pair)].radius_range_m[0]
+    return 1.5 * secant_stiffness(
+        pair_elastic(case, pair, factor).modulus,
+        pair_radius(case, pair, radius),
+        overlap * 2 * radius,
+    )
+
+
+def _hertz_contact(case: Case, pair: tuple[str, str], factor: float, velocity: float) -> Contact:
+    lighter = case.spheres[_lighter(pair)]
+    constants, mass = pair_elastic(case, pair, factor), effective_mass(case, pair)
+    radius = pair_radius(case, pair, lighter.mean_radius_m)
+    overlap = REFERENCE_OVERLAP * 2 * lighter.mean_radius_m
+    normal = _stiffness(case, pair, factor)
+    damping, stokes = damping_and_stokes(case, pair, velocity)
+    stiffest = tangent_stiffness(case, pair, factor, STEP_OVERLAP)
+    frictions = [
+        case.wall_friction if name == "wall" else case.spheres[name].friction for name in pair
+    ]
+    return Contact(
+        pair="-".join(pair),
+        normal_stiffness=normal,
+        shear_stiffness=tangential_stiffness(constants.shear, radius, overlap),
+        friction=min(frictions),
+        damping_ratio=damping,
+        damping_rate=2 * damping * math.sqrt(1.25 * normal / mass),
+        contact_time=collision_time(mass, velocity, constants.modulus, radius),
+        step_limit=math.sqrt(mass_range(lighter)[0] / stiffest),
+        elastic=constants,
+        stokes=stokes,
+    )
+
+
+# ------------------------------------------------------------------------------------------------
+# The contacts of a case by its contact model.
 
 
 def contacts_of(case: Case, velocity: float) -> dict[str, Contact]:
@@ -14,3 +416,319 @@ def contacts_of(case: Case, velocity: float) -> dict[str, Contact]:
 def stiffness_factor(case: Case) -> float:
     """Factor from the materials' stiffness, or moduli, to those that are used."""
     return hertz_factor(case) if case.contact.model == "hertz" else hooke_factor(case)
+
+
+# ------------------------------------------------------------------------------------------------
+# How deep fines are pressed into grains, as predicted: by impact, by drag, in a deposit.
+
+
+MOST_OVERLAP = 0.5
+"""Predicted overlap over a fine's diameter from which a case is refused: beyond it a fine could
+pass through a grain."""
+LARGEST_CHAIN = 6.0
+"""Largest force between two spheres of a deposit over the drop of pressure times the section of a
+throat. Forces in packs of spheres go far beyond their mean, with an exponential tail (Radjai and
+others, Phys. Rev. Lett. 77, 274, 1996). Runs of the quick specimen 5 had 1 to 8."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Overlaps:
+    """Predicted overlaps of a fine with a grain, over the diameter of the largest fine.
+
+    Attributes:
+        drag: by drag and pressure gradient F on a fine at rest: F / k, or by Hertz.
+        impact: by a fine that arrives at its fastest velocity w: w sqrt(m / k), or by Hertz.
+        deposit: where the flow follows the deposit, by `deposit_force`; 0 in the uniform field.
+    """
+
+    drag: float
+    impact: float
+    deposit: float
+
+
+def deposit_force(case: InvasionCase, pressure: float, throat: float) -> float:
+    """Largest force, N, on a fine of a deposit that takes up all the `pressure` Pa.
+
+    The pressure acts on the section of a throat, of the width `throat` m. Contacts hand the forces
+    on to each other, so that some bear several times as much (`LARGEST_CHAIN`). The uniform field
+    knows of no such pressure: 0.
+    """
+    if case.drag.field != "network":
+        return 0.0
+    return LARGEST_CHAIN * pressure * math.pi / 4.0 * throat**2
+
+
+def overlaps_of(
+    case: InvasionCase, contact: Contact, push: Push, porosity: float, *, deposit: float
+) -> Overlaps:
+    """The overlaps in the `contact` of a grain and a fine, in a pack of a porosity.
+
+    A fine comes with the fluid and gains speed by the pressure gradient across a pore. In a
+    deposit it bears the force `deposit`, N.
+    """
+    radius, mass = case.fines.radius_range_m[1], mass_range(case.fines)[1]
+    width = pore_width(porosity, case.grains.sauter_diameter_m)
+    lightest = min(one.density for one in case.fines.components)
+    velocity = arrival_velocity(push, radius, lightest, width)
+    force = push.force(radius)
+    if contact.elastic:
+        modulus, joint = contact.elastic.modulus, pair_radius(case, ("grain", "fine"), radius)
+        impact = overlap_of_impact(mass, velocity, modulus, joint)
+        drag, held = (overlap_under(one, modulus, joint) for one in (force, deposit))
+    else:
+        impact = velocity * math.sqrt(mass / contact.normal_stiffness)
+        drag, held = force / contact.normal_stiffness, deposit / contact.normal_stiffness
+    return Overlaps(
+        impact=impact / (2 * radius), drag=drag / (2 * radius), deposit=held / (2 * radius)
+    )
+
+
+def overlap_warnings(case: InvasionCase, overlaps: Overlaps) -> list[str]:
+    """Overlaps above `run.max_overlap`, in words.
+
+    Raises CaseError when one of them alone would press a fine half through a grain.
+    """
+    _refuse_deep(overlaps)
+    return _deposit_warnings(case, overlaps.deposit) + [
+        f"predicted overlap under {name} is {100 * getattr(overlaps, name):.2g} % of a fine's "
+        f"diameter (above run.max_overlap, {100 * case.run.max_overlap:.3g} %): raise "
+        "run.stiffness_N_m"
+        for name in ("impact", "drag")
+        if getattr(overlaps, name) > case.run.max_overlap
+    ]
+
+
+def _deposit_warnings(case: InvasionCase, overlap: float) -> list[str]:
+    """A deposit that presses its fines too deep into each other, with the stiffness it needs."""
+    if overlap <= case.run.max_overlap:
+        return []
+    hertz = case.contact.model == "hertz"
+    raised = (overlap / case.run.max_overlap) ** (1.5 if hertz else 1.0)
+    given = case.run.stiffness_N_m
+    remedy = (
+        "; the materials are too soft for this pressure"
+        if given == "nominal"
+        else f": set run.stiffness_N_m = {two_digits_up(raised * given):g}, or 'auto'"
+    )
+    return [
+        f"predicted overlap of fines that hold the whole pressure is {100 * overlap:.2g} % of a "
+        f"fine's diameter (above run.max_overlap, {100 * case.run.max_overlap:.3g} %){remedy}"
+    ]
+
+
+def two_digits_up(value: float) -> float:
+    """The next number of two digits that is not below `value`, above 0."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return math.ceil(value / unit - 1e-9) * unit
+
+
+def _refuse_deep(overlaps: Overlaps) -> None:
+    """Raises CaseError when one of them alone would press a fine half through a grain."""
+    remedies = {
+        "drag": "drag.multiplier, fluid.viscosity_cP or fluid.velocity_m_s",
+        "impact": "the velocity (fluid.velocity_m_s)",
+        "deposit": "the pressure (fluid.overbalance_MPa, fluid.velocity_m_s)",
+    }
+    for name, remedy in remedies.items():
+        overlap = getattr(overlaps, name)
+        if overlap > MOST_OVERLAP:
+            raise CaseError(
+                f"run.stiffness_N_m: {name} alone would press a fine {100 * overlap:.3g} % of its "
+                f"diameter into a grain (limit {100 * MOST_OVERLAP:.0f} %); set it to "
+                f"'auto', raise it, or lower {remedy}"
+            )
+
+
+# ------------------------------------------------------------------------------------------------
+# Cohesion of Hertz contacts by LIGGGHTS's SJKR: attraction c times the area of contact.
+#
+# Two spheres that overlap by delta intersect in a circle of the area 2 pi R* delta, to first
+# order. The force 4/3 E* sqrt(R*) delta^(3/2) - 2 pi c R* delta pulls below the overlap at rest,
+# most at 4/9 of it. With linear springs both terms grow alike and nothing would pull.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PullOff:
+    """What it takes to part two cohesive spheres.
+
+    Attributes:
+        force: N, the largest pull that the contact bears.
+        overlap: m, at this pull.
+        resting: m, the overlap without a pull.
+    """
+
+    force: float
+    overlap: float
+    resting: float
+
+
+def pull_off(cohesion: float, modulus: float, radius: float) -> PullOff:
+    """Of a cohesion c in J/m3, E* in Pa and R* in m.
+
+    The force is 2/3 (pi c)^3 R*^2 / E*^2 at the overlap (pi c / E*)^2 R*; at rest it is 9/4 of it.
+    """
+    overlap = (math.pi * cohesion / modulus) ** 2 * radius
+    force = 2 / 3 * (math.pi * cohesion) ** 3 * radius**2 / modulus**2
+    return PullOff(force=force, overlap=overlap, resting=2.25 * overlap)
+
+
+def pull_off_of(case: InvasionCase, contact: Contact) -> PullOff:
+    """Of the largest fine and a grain, whose `contact` it is; all zero without cohesion."""
+    density, radius = case.contact.cohesion_J_m3, case.fines.radius_range_m[1]
+    if density is None or contact.elastic is None:
+        return PullOff(force=0.0, overlap=0.0, resting=0.0)
+    joint = pair_radius(case, ("grain", "fine"), radius)
+    return pull_off(density, contact.elastic.modulus, joint)
+
+
+def cohesion_warnings(case: InvasionCase, contact: Contact) -> list[str]:
+    """A resting overlap above `run.max_overlap`, in words.
+
+    Raises CaseError when cohesion alone would draw a fine half into a grain.
+    """
+    share = _resting_share(case, contact)
+    if share > MOST_OVERLAP:
+        raise CaseError(
+            f"contact.cohesion_J_m3: {case.contact.cohesion_J_m3:g} draws a fine "
+            f"{100 * share:.3g} % of its diameter into a grain (limit "
+            f"{100 * MOST_OVERLAP:.0f} %); lower it, or raise run.stiffness_N_m"
+        )
+    if share <= case.run.max_overlap:
+        return []
+    return [
+        f"cohesion draws a fine {100 * share:.2g} % of its diameter into a grain (above "
+        f"run.max_overlap, {100 * case.run.max_overlap:.3g} %): lower contact.cohesion_J_m3 or "
+        "raise run.stiffness_N_m"
+    ]
+
+
+def _resting_share(case: InvasionCase, contact: Contact) -> float:
+    return pull_off_of(case, contact).resting / (2 * case.fines.radius_range_m[1])
+
+
+# ------------------------------------------------------------------------------------------------
+# Whether fines lock in the groove between two grains, from which the fluid should roll them.
+#
+# A fine that rolls around the neck of two grains sits in a groove whose sides have the slope
+# t = sqrt((1 + q)^2 - 1), q the radius of the fine over that of the grain. Friction f can hold it
+# there only if f > t. Two things press it in. Both need a stiff tangential spring:
+#
+# - The spring itself. The normal springs throw back a fine that ran into the groove, until the
+#   tangential ones hold it. Where both balance, the fine is still pressed in if k_t / k_n > f t
+#   (derived in docs/physics.md, section 1).
+# - LIGGGHTS's integrator. It adds the slip of half a step ago along the normal of now, so a fine
+#   that turns about the neck gains a slip that did not happen (Vyas and others, Comput. Phys.
+#   Commun. 310, 109524). In a quarter turn the force of it is F' = (pi/4) k_t v dt, with the time
+#   step dt and the velocity v of the fine.
+
+
+MOST_FALSE_FORCE = 0.5
+"""False force of the integrator over the push of the fluid, up to which no fine was seen to be
+held by it (docs/validation.md, section 10)."""
+_ROUNDING = 1 + 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sticking:
+    """How far a fine may lock between two touching grains.
+
+    Attributes:
+        size_ratio: radius of the fine over that of the largest grain.
+        friction: coefficient of friction of a fine against a grain.
+        slope: of the sides of the groove; friction below it holds no fine.
+        shear_ratio: tangential over normal contact stiffness, force over overlap.
+        push: force of the fluid on the fine at rest over normal stiffness and radius, F / (k r).
+        false_force: tangential force that the integrator adds in a quarter turn, over the push.
+        linear: whether the tangential stiffness can be chosen (Hertz-Mindlin's cannot).
+    """
+
+    size_ratio: float
+    friction: float
+    slope: float
+    shear_ratio: float
+    push: float
+    false_force: float
+    linear: bool = True
+
+    @property
+    def by_springs(self) -> bool:
+        """Whether the tangential springs can lock the fine."""
+        return self.friction > self.slope and self.shear_ratio > self.friction * self.slope
+
+    @property
+    def by_integrator(self) -> bool:
+        """Whether the integrator may press the fine in."""
+        too_large = self.false_force > MOST_FALSE_FORCE * _ROUNDING
+        return self.friction > self.slope and too_large
+
+
+def groove_slope(size_ratio: float) -> float:
+    """sqrt((1 + q)^2 - 1), slope of the sides of the groove between two touching grains."""
+    return math.sqrt((1 + size_ratio) ** 2 - 1)
+
+
+def false_force(shear_stiffness: float, velocity: float, step: float) -> float:
+    """Tangential force, N, that the integrator adds in a quarter turn: (pi/4) k_t v dt.
+
+    For a tangential stiffness in N/m, the velocity of the fine in m/s and a time step in s.
+    """
+    return math.pi / 4 * shear_stiffness * velocity * step
+
+
+def fall_velocity(push: float, mass: float, distance: float) -> float:
+    """sqrt(2 F s / m), m/s: what a force of `push` N gives a mass in kg over a distance in m."""
+    return math.sqrt(2 * push * distance / mass)
+
+
+def sticking_of(case: InvasionCase, contact: Contact, push: Push, step: float) -> Sticking:
+    """Of the smallest fine between two of the largest grains, which locks most easily.
+
+    Args:
+        case: the case.
+        contact: of a grain and a fine.
+        push: of the fluid; a fine rolls no faster than it drifts freely.
+        step: time step, s.
+    """
+    radius, grain = case.fines.radius_range_m[0], case.grains.radius_range_m[1]
+    mass = sphere_mass(radius, min(one.density for one in case.fines.components))
+    force, slope = push.force(radius), groove_slope(radius / grain)
+    drift = push.velocity + push.drift(radius)
+    rolling = min(drift, fall_velocity(force, mass, slope * grain))
+    return Sticking(
+        size_ratio=radius / grain,
+        friction=contact.friction,
+        slope=slope,
+        shear_ratio=contact.shear_stiffness / contact.normal_stiffness,
+        push=force / (contact.normal_stiffness * radius),
+        false_force=false_force(contact.shear_stiffness, rolling, step) / force,
+        linear=contact.elastic is None,
+    )
+
+
+def sticking_warnings(sticking: Sticking) -> list[str]:
+    """Fines that may lock between grains, in words; empty when none do."""
+    if not (sticking.by_springs or sticking.by_integrator):
+        return []
+    who = (
+        f"fines of 1/{1 / sticking.size_ratio:.3g} of a grain may lock between grains: friction "
+        f"{sticking.friction:g} (above the slope {sticking.slope:.2g} of the groove), "
+        f"push F/(k r) {sticking.push:.1e}"
+    )
+    if sticking.by_springs:
+        most = sticking.friction * sticking.slope
+        remedy = (
+            "leave out grains.shear_stiffness_N_m and fines.shear_stiffness_N_m"
+            if sticking.linear
+            else "take contact.model = 'hooke'"
+        )
+        return [
+            f"{who}, tangential over normal stiffness {sticking.shear_ratio:.2g} (above "
+            f"{most:.2g}): {remedy}, or lower friction to {sticking.slope:.2g}"
+        ]
+    excess = sticking.false_force / MOST_FALSE_FORCE
+    return [
+        f"{who}, false force of the integrator over the push {sticking.false_force:.2g} (above "
+        f"{MOST_FALSE_FORCE:g}): divide run.time_step_factor by {excess:.2g}, or "
+        f"run.stiffness_N_m by {excess**2:.2g} as far as overlaps allow, or lower friction to "
+        f"{sticking.slope:.2g}"
+    ]

@@ -4,18 +4,22 @@ import math
 from dataclasses import dataclass
 
 from fdnet.case.case import Case, InvasionCase
-from fdnet.case.names import MOST_SPHERES
-from fdnet.scales.forces.warnings import BRIDGING
-from fdnet.scales.grain_pack import (
+from fdnet.names import MOST_SPHERES
+from fdnet.scales.clock import (
+    TAKEN_SOLIDS,
+    contact_step,
+    present_share,
+    spoken_time,
+    supplied_solids,
+)
+from fdnet.scales.drag import BRIDGING
+from fdnet.scales.pack import (
     PACK_RELAX_STEPS,
     PACK_STAGE_STEPS,
     PACK_STAGES,
     grain_count,
 )
 from fdnet.scales.scales import InvasionScales, Scales
-from fdnet.scales.supply import TAKEN_SOLIDS, present_share, supplied_solids
-from fdnet.scales.time_step import contact_step
-from fdnet.scales.times import spoken_time
 
 STEP_SECONDS = 2.0e-6
 """Seconds of one step with nothing to do."""

@@ -5,28 +5,36 @@ from dataclasses import dataclass, fields, replace
 from typing import overload
 
 from fdnet.case.case import Case, InvasionCase
+from fdnet.case.tables import CleanUp
 from fdnet.errors import CaseError
-from fdnet.scales.cohesion import cohesion_warnings
-from fdnet.scales.contacts import contacts_of, stiffness_factor
-from fdnet.scales.drive import Drive, drive_warnings
-from fdnet.scales.forces.push import Push, push_of
-from fdnet.scales.forces.throat import throat_width
-from fdnet.scales.forces.warnings import reynolds_warnings, throat_warnings
-from fdnet.scales.grain_pack import pack_step, target_porosity
-from fdnet.scales.overlaps import overlap_warnings
-from fdnet.scales.sizes import size_warnings
-from fdnet.scales.slab import slab_of, slab_warnings
-from fdnet.scales.springs import Contact
-from fdnet.scales.sticking import Sticking, sticking_of, sticking_warnings
-from fdnet.scales.stiff_enough import drive_in, pressed_in, relaxation_times, stiff_enough
-from fdnet.scales.stop_times import chunk_refreshes, plug_warnings, stop_times
-from fdnet.scales.time_step import (
+from fdnet.scales.clock import (
+    chunk_refreshes,
     densest_factor,
     drag_warnings,
+    drive_in,
     hold_steps,
+    plug_warnings,
+    pressed_in,
+    relaxation_times,
+    slab_of,
+    slab_warnings,
+    stiff_enough,
+    stop_times,
     time_step,
 )
-from fdnet.scales.velocity import Velocity, velocity_of, velocity_warnings
+from fdnet.scales.contacts import (
+    Contact,
+    Sticking,
+    cohesion_warnings,
+    contacts_of,
+    overlap_warnings,
+    sticking_of,
+    sticking_warnings,
+    stiffness_factor,
+)
+from fdnet.scales.drag import Push, push_of, reynolds_warnings, throat_warnings, throat_width
+from fdnet.scales.flow import Drive, Velocity, drive_warnings, velocity_of, velocity_warnings
+from fdnet.scales.pack import pack_step, size_warnings, target_porosity
 
 MOST_STEPS = 2**31 - 1
 """LIGGGHTS counts the steps of a run in 32 bits."""
@@ -266,3 +274,81 @@ def _refuse_long_chunk(step: float, chunk_steps: int) -> None:
             f"run.time_step_s: {step:.3g} s needs {chunk_steps:.3g} steps between checkpoints "
             f"(limit {MOST_STEPS:.3g}); raise the step or shorten run.checkpoint_ms"
         )
+
+
+# ------------------------------------------------------------------------------------------------
+# The scales of a clean-up: the flow of the invasion turned back, at the drawdown.
+#
+# The drawdown is lost on the way on which the overbalance was, so the fluid's velocity follows
+# from it by the same law. The forces are those of the invasion at that velocity.
+
+
+MOST_PASSAGES = 20
+"""Passages of the fluid through the specimen after which a clean-up ends by default."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BackFlow:
+    """A clean-up in numbers. Times and velocities are those of the simulation.
+
+    Attributes:
+        case: the case of the invasion with the drawdown for the overbalance.
+        scales: of that case; its velocities are positive.
+        choices: the table [clean_up].
+        chunks: most chunks of `scales.checkpoint_steps` steps.
+        quiet_chunks: chunks without a fine that comes out which end it; 0 where it has a duration.
+    """
+
+    case: InvasionCase
+    scales: InvasionScales
+    choices: CleanUp
+    chunks: int
+    quiet_chunks: int
+
+    @property
+    def step(self) -> float:
+        """The time step, s."""
+        return self.scales.time_step
+
+
+def back_flow(case: InvasionCase) -> BackFlow:
+    """The flow of the clean-up of a case.
+
+    Raises CaseError when the case has no table [clean_up], or as `scales_of` does at the drawdown.
+    """
+    choices = case.clean_up
+    if choices is None:
+        raise CaseError(f"case {case.name}: has no table [clean_up]; add it with drawdown_MPa")
+    turned = _at_drawdown(case, choices)
+    try:
+        scales = scales_of(turned)
+    except CaseError as error:
+        given = 1e-6 * choices.drawdown_Pa
+        raise CaseError(f"clean_up.drawdown_MPa: {given:g}: {error}") from error
+    chunk = scales.checkpoint_steps * scales.time_step * scales.force_factor
+    passage = case.size_m[0] / scales.drive_velocity * scales.force_factor
+    longest = choices.duration_s or choices.cap_s or MOST_PASSAGES * passage
+    chunks = longest / chunk
+    timed = choices.duration_s is not None
+    return BackFlow(
+        case=turned,
+        scales=scales,
+        choices=choices,
+        chunks=max(1, round(chunks) if timed else math.ceil(chunks - 1e-9)),
+        quiet_chunks=0 if timed else max(1, math.ceil((choices.quiet_s or passage) / chunk)),
+    )
+
+
+def _at_drawdown(case: InvasionCase, choices: CleanUp) -> InvasionCase:
+    """The case with the drawdown for its overbalance, driven by the same factor as before.
+
+    What its table [run] says of the length of the invasion is that of the clean-up.
+    """
+    fluid, run = choices.fluid_of(case.fluid), choices.run_of(case.run)
+    undriven = case.drag.model_copy(update={"drive_velocity_m_s": None})
+    turned = case.model_copy(update={"fluid": fluid, "run": run, "drag": undriven})
+    if case.drag.drive_velocity_m_s is None:
+        return turned
+    driven = scales_of(turned).interstitial_velocity * scales_of(case).force_factor
+    drag = case.drag.model_copy(update={"drive_velocity_m_s": driven})
+    return turned.model_copy(update={"drag": drag})

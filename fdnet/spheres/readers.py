@@ -1,19 +1,314 @@
-"""Spheres from a file of any known format, with grains distinguished from fines."""
+"""Spheres from files: CSV, dumps and VTK.
 
+Sphere tables: written at full precision, read back strictly.
+"""
+
+import csv
+import io
+import math
+import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fdnet.errors import CaseError
-from fdnet.files.paths import LARGE, MARKS, expanded, file_bytes, text_of, unzipped
-from fdnet.spheres.arrays import Array
-from fdnet.spheres.directions import Directions, periodic_axes
-from fdnet.spheres.rows import SphereRows
-from fdnet.spheres.snapshot import KIND_NAMES, Kind, Snapshot, checked_box, grain_box
+from fdnet.errors import CaseError, DumpError
+from fdnet.files import LARGE, MARKS, expanded, file_bytes, replacing, text_of, unzipped
+from fdnet.spheres.dump import DumpReader, Head
+from fdnet.spheres.rows import (
+    UNITS,
+    Columns,
+    SphereRows,
+    columns_of,
+    metres_per,
+    rows_from,
+    scale_of,
+)
+from fdnet.spheres.snapshot import (
+    KIND_NAMES,
+    Array,
+    Directions,
+    Kind,
+    Snapshot,
+    checked_box,
+    grain_box,
+    periodic_axes,
+)
+
+PLAIN = ("x", "y", "z", "radius")
+METRES = ("x_m", "y_m", "z_m", "radius_m")
+_BEFORE_UNIT = re.compile(r"\s*([(\[])\s*")
+_FRACTION = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+
+
+def write_spheres(path: str | Path, snapshot: Snapshot) -> Path:
+    """Write x_m, y_m, z_m, radius_m, kind, id; one row per sphere, atomically.
+
+    Coordinates are the shortest decimals that read back to the same number (`repr`), so that a
+    count by `lo <= x < hi` is the same from the file as from memory.
+    """
+    import pandas as pd
+
+    names = {int(kind): name for name, kind in KIND_NAMES.items()}
+    columns = dict(zip(METRES, (*snapshot.position.T, snapshot.radius), strict=True))
+    frame = pd.DataFrame(
+        columns | {"kind": [names[int(k)] for k in snapshot.kind], "id": snapshot.id}
+    )
+    with replacing(path) as part:
+        frame.to_csv(part, index=False, lineterminator="\n")
+    return Path(path)
+
+
+def read_csv(path: str | Path, *, units: str | None = None) -> SphereRows:
+    """The spheres of a table in a text file, in metres; see `table_rows`."""
+    data = file_bytes(path, most=LARGE, what="a file of spheres")
+    return table_rows(data, str(path), units=units)
+
+
+def table_rows(data: bytes, source: str, *, units: str | None = None) -> SphereRows:
+    """The spheres of a table in text, in metres.
+
+    Columns stand between commas, semicolons, tabs or spaces, in any order: the centre x, y, z, a
+    size (radius, r, diameter or d) and, if there, kind (grain or fine), type and id; others are
+    not read. Lengths are in `units` (one of `UNITS`), or in the unit at the end of their names
+    ("x_m"), where `units` must be None. Names may also stand in the comment before the first row,
+    as Yade writes them (`#format x_y_z_r`); four columns without any name are x, y, z and radius.
+    Blank lines and lines that start with `#` are skipped. Raises CaseError that names the file,
+    the line, what it holds and what was expected.
+    """
+    lines = _Lines(text_of(data, source), source)
+    cells = lines.cells()
+    try:
+        first = next(cells, None)
+        if first is None:
+            raise CaseError(f"{source}: the file is empty; expected a header {','.join(PLAIN)}")
+        names, notes = _names(first, lines)
+        columns = columns_of(names, lines.where())
+        scale = scale_of(columns, units, lines.where())
+        if scale is None:
+            raise CaseError(
+                f"{lines.where()}: the columns {','.join(PLAIN)} have no unit; give --units mm "
+                f'on the command line, units="mm" in Python (one of {", ".join(UNITS)}), or name '
+                "them x_m,y_m,z_m,radius_m"
+            )
+        rows = cells if first is names else chain([first], cells)
+        table, numbers = [], []
+        for row in rows:
+            if len(row) != len(names):
+                raise CaseError(
+                    f"{lines.where()}: {len(row)} values, expected {len(names)} as in the header"
+                )
+            table.append([_value(row[k], columns, k, lines) for k in columns.needed])
+            numbers.append(lines.number)
+    except csv.Error as error:
+        raise CaseError(f"{lines.where()}: {error}; expected comma-separated values") from error
+    if not table:
+        raise CaseError(f"{source}: no spheres after the header; expected at least one row")
+    if columns.ignored:
+        notes.append(f"Columns of {source} that are not read: {', '.join(columns.ignored)}.")
+    return rows_from(
+        columns,
+        dict(zip(columns.needed, np.array(table).T, strict=True)),
+        lambda row: f"{source}:{numbers[row]}",
+        scale=scale,
+        source=source,
+        notes=tuple(notes),
+    )
+
+
+class _Lines:
+    """The lines of a text that carry data, counting all of them from 1."""
+
+    def __init__(self, text: str, source: str) -> None:
+        self.text, self.source, self.number = text, source, 0
+        self.comment = ""
+        self.comma = False
+
+    def where(self) -> str:
+        return f"{self.source}:{self.number}" if self.number else self.source
+
+    def cells(self) -> Iterator[list[str]]:
+        """The cells of each line, parted as the first of them is.
+
+        Where that is not by commas, a comma is that of a decimal fraction.
+        """
+        lines = self._lines()
+        first = next(lines, None)
+        if first is None:
+            return
+        marks = [mark for mark in (";", "\t", ",") if mark in first]
+        self.comma = marks[:1] == [","]
+        whole = chain([first], lines)
+        if marks and marks[0] != "\t":
+            yield from csv.reader(whole, delimiter=marks[0], strict=True)
+        else:
+            for line in whole:
+                yield [cell.strip('"') for cell in _BEFORE_UNIT.sub(r"\1", line).split()]
+
+    def _lines(self) -> Iterator[str]:
+        started = False
+        for line in io.StringIO(self.text, newline=None):
+            self.number += 1
+            if line.lstrip().startswith("#"):
+                self.comment = self.comment if started else line.strip().lstrip("#").strip()
+            elif line.strip():
+                started = True
+                yield line
+
+
+def _names(first: list[str], lines: _Lines) -> tuple[list[str], list[str]]:
+    """Names of the columns, and what was assumed of them.
+
+    They are the `first` line itself unless it holds numbers alone; then those of the comment
+    before it, or x, y, z, radius. Raises CaseError where there are none.
+    """
+    if any(_float(cell, comma=lines.comma) is None for cell in first):
+        return first, []
+    words = re.split(r"[\s,;]+", lines.comment)
+    if len(words) == 2 and words[0].lower() == "format":
+        words = words[1].split("_")
+        words += ["further"] * (len(first) - len(words))
+    if len(words) == len(first) and not all(_float(word, comma=False) for word in words):
+        return words, []
+    if len(first) != len(PLAIN) or "diam" in lines.comment.lower():
+        raise CaseError(
+            f"{lines.where()}: no header above {len(first)} columns of numbers; expected a line "
+            f"of names, {','.join(PLAIN)} or {','.join(PLAIN[:3])},diameter"
+        )
+    note = f"{lines.source} has no header: its four columns are x, y, z and radius."
+    return list(PLAIN), [note]
+
+
+def _value(cell: str, columns: Columns, index: int, lines: _Lines) -> float:
+    name = columns.names[index].strip()
+    text = cell.strip()
+    if index == columns.others.get("kind"):
+        kind = KIND_NAMES.get(text.lower()) or {str(int(k)): k for k in Kind}.get(text)
+        if kind is None:
+            raise CaseError(
+                f"{lines.where()}: {name} is {text[:40]!r}, expected {' or '.join(KIND_NAMES)}"
+            )
+        return float(kind)
+    value = _float(text, comma=lines.comma)
+    if value is None or not math.isfinite(value):
+        expected = "a whole number" if index in columns.others.values() else "a finite number"
+        raise CaseError(
+            f"{lines.where()}: {name} is {text[:40]!r}, expected {expected} (decimal point)"
+        )
+    return value
+
+
+def _float(text: str, *, comma: bool) -> float | None:
+    """The number of a cell; None where it is none. `comma` parts cells, else fractions."""
+    plain = text.strip()
+    if not comma and _FRACTION.fullmatch(plain):
+        plain = plain.replace(",", ".")
+    try:
+        return None if "_" in plain else float(plain)
+    except ValueError:
+        return None
+
+
+# ------------------------------------------------------------------------------------------------
+# Spheres of a LIGGGHTS or LAMMPS text dump.
+
+
+DUMP_UNITS = {"si": 1.0, "cgs": 1e-2, "micro": 1e-6}
+"""Metres in the unit of length of the unit systems that a dump may name."""
+_MOST_NAMED, _MOST_SHOWN = 5, 40
+
+
+def dump_spheres(
+    data: bytes, source: str, *, units: str | None = None, step: int | None = None
+) -> SphereRows:
+    """The spheres of one frame of a dump, in metres: the last whole frame, or the one of `step`.
+
+    Columns: x y z (or xu yu zu, or xs ys zs or xsu ysu zsu in parts of the box), radius or
+    diameter, and type and id if they are there; others are not read. `units` is the unit of length
+    of the dump. Without it the unit is that of the dump's own unit system, or m where it names
+    none. Raises DumpError where the file is malformed or holds no whole frame, CaseError where
+    `step`, a column or the unit is missing.
+    """
+    reader = DumpReader(data, source, own=False)
+    heads, cut = _heads(reader)
+    head = _chosen(heads, cut, source, step)
+    where = f"{source}: step {head.step}"
+    scale = _scale(head, where) if units is None else metres_per(units)
+    columns = columns_of(head.columns, where, box=True, units=False)
+    frame = reader.frame(head, columns.needed)
+    notes = [f"The lengths of {source} are in m."] if units is None and not head.units else []
+    if len(heads) > 1 and step is None:
+        notes.append(f"The last of {len(heads)} frames of {source} was used, step {head.step}.")
+    warnings = [
+        f"{text}; this frame was left out and that of step {head.step} used" for text in cut
+    ]
+    warnings = warnings if step is None else []
+    end = data[head.body][-_MOST_SHOWN:]
+    if end and not end[-1:].isspace():
+        last = end.split()[-1].decode("utf-8", "replace")
+        warnings.append(f"{source} ends without a line feed: its last number, {last}, may be cut")
+    return rows_from(
+        columns,
+        dict(zip(columns.needed, frame.rows.T, strict=True)),
+        lambda row: f"{where}: row {row + 1} by id",
+        scale=scale,
+        box=frame.box,
+        boundary=head.boundary,
+        source=source,
+        step=head.step,
+        notes=tuple(notes),
+        warnings=tuple(warnings),
+    )
+
+
+def _heads(reader: DumpReader) -> tuple[list[Head], list[str]]:
+    """The whole frames, and of each frame that is cut what is wrong with it.
+
+    Raises DumpError where all are cut.
+    """
+    heads, cut = [], []
+    while reader.goes_on():
+        before = reader.position
+        try:
+            heads.append(reader.head())
+        except DumpError as error:
+            if not error.cut:
+                raise
+            cut.append(error)
+            reader.to_next(before)
+    if cut and not heads:
+        raise cut[0]
+    return heads, [str(error) for error in cut]
+
+
+def _chosen(heads: list[Head], cut: list[str], source: str, step: int | None) -> Head:
+    chosen = heads if step is None else [head for head in heads if head.step == step]
+    if not chosen:
+        known = ", ".join(str(head.step) for head in heads[:_MOST_NAMED])
+        known += ", ..." if len(heads) > _MOST_NAMED else ""
+        more = f" ({cut[-1]})" if cut else ""
+        raise CaseError(f"{source}: no frame of step {step}; the file has {known}{more}")
+    if not chosen[-1].count:
+        raise CaseError(f"{source}: step {chosen[-1].step} holds no spheres; choose another step")
+    return chosen[-1]
+
+
+def _scale(head: Head, where: str) -> float:
+    if head.units and head.units not in DUMP_UNITS:
+        raise CaseError(
+            f"{where}: its units are {head.units!r}, which fdnet cannot convert to m; give the "
+            "unit of length of the file (units)"
+        )
+    return DUMP_UNITS.get(head.units, 1.0)
+
+
+# ------------------------------------------------------------------------------------------------
+# Spheres from a file of any known format, with grains distinguished from fines.
+
 
 OWN_TYPES = {int(kind): name for name, kind in KIND_NAMES.items()}
 """Atom types of fdnet's own dumps: 1 a grain, 2 a fine."""
@@ -179,8 +474,6 @@ def _read_rows(path: str | Path, units: str | None, step: int | None) -> SphereR
     if data.startswith(MARKS):
         data = text_of(data, source).encode()
     if data[:_START].lstrip().startswith(b"ITEM:"):
-        from fdnet.spheres.dump_file import dump_spheres
-
         return dump_spheres(data, source, units=units, step=step)
     if step is not None:
         raise CaseError(f"{source}: is no dump, so it has no step {step}; leave out the step")
@@ -193,8 +486,6 @@ def _read_rows(path: str | Path, units: str | None, step: int | None) -> SphereR
         or name.endswith(vtk_file.SUFFIXES)
     ):
         return vtk_file.vtk_spheres(data, source, units=units)
-    from fdnet.spheres.csv_file import table_rows
-
     return table_rows(data, source, units=units)
 
 

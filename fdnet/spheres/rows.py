@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.spheres.arrays import Array, frozen, one_line
-from fdnet.spheres.snapshot import KIND_NAMES, Kind
+from fdnet.spheres.snapshot import KIND_NAMES, Array, Kind, frozen, one_line
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 """Metres in each unit of length that a file may be in."""

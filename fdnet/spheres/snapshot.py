@@ -1,16 +1,84 @@
-"""All spheres of a specimen at one step, in SI units."""
+"""Spheres of one moment, and the small helpers of their arrays.
 
-from dataclasses import dataclass
+Read-only arrays, and how a class that owns arrays prints itself.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
 from enum import IntEnum
 from typing import Any
 
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.spheres.arrays import Array, frozen
-from fdnet.spheres.directions import axis_number
 
-__all__ = ["KIND_NAMES", "Array", "Kind", "Snapshot", "frozen", "resting"]
+Array = np.ndarray[Any, np.dtype[Any]]
+
+MOST_SHOWN = 60
+"""Longest text of one field in `one_line`, characters."""
+
+
+def frozen(values: Any, dtype: Any = None) -> Array:
+    """A read-only copy of `values` as an array."""
+    array = np.array(values, dtype=dtype)
+    array.setflags(write=False)
+    return array
+
+
+def one_line(owner: Any) -> str:
+    """The data class `owner` on one line: numbers as they are, arrays by their shape alone."""
+    shown = (f"{field.name}={_short(getattr(owner, field.name))}" for field in fields(owner))
+    return f"{type(owner).__name__}({', '.join(shown)})"
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        return f"array{value.shape}"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, tuple | list | dict) and len(repr(value)) > MOST_SHOWN:
+        return f"{len(value)} items"
+    text = " ".join(repr(value).split())
+    return text if len(text) <= MOST_SHOWN else f"{type(value).__name__}(...)"
+
+
+# ------------------------------------------------------------------------------------------------
+# The axes x, y, z, given by letters or as three truth values.
+
+
+Directions = str | Sequence[bool]
+"""Some of the three axes: letters such as "yz", or three truth values (x, y, z)."""
+
+
+def periodic_axes(periodic: Directions) -> tuple[bool, bool, bool]:
+    """Which of x, y, z are periodic, from letters ("yz", "" for none) or three truth values.
+
+    Raises CaseError on other letters, on a repeated letter and on another number of values.
+    """
+    if isinstance(periodic, str):
+        if not set(periodic) <= set("xyz") or len(set(periodic)) != len(periodic):
+            raise CaseError(
+                f"periodic: {periodic!r}, expected any of x, y, z together, for example 'yz'"
+            )
+        return "x" in periodic, "y" in periodic, "z" in periodic
+    values = tuple(periodic) if isinstance(periodic, Iterable) else ()
+    if len(values) != 3 or not all(isinstance(value, bool | np.bool_) for value in values):
+        raise CaseError(
+            f"periodic: {periodic!r}, expected letters such as 'yz', or three truth values for x, "
+            "y, z"
+        )
+    return bool(values[0]), bool(values[1]), bool(values[2])
+
+
+def axis_number(axis: str) -> int:
+    """0, 1 or 2 for "x", "y" or "z". Raises CaseError on anything else."""
+    if axis not in ("x", "y", "z"):
+        raise CaseError(f"axis: {axis!r}, expected x, y or z")
+    return "xyz".index(axis)
+
+
+# ------------------------------------------------------------------------------------------------
+# All spheres of a specimen at one step, in SI units.
 
 
 class Kind(IntEnum):

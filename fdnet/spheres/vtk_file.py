@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.files.paths import LARGE, file_bytes
-from fdnet.spheres.arrays import Array
+from fdnet.files import LARGE, file_bytes
 from fdnet.spheres.rows import PLACES, RADII, SphereRows, columns_of, named, rows_from, scale_of
+from fdnet.spheres.snapshot import Array
 
 SUFFIXES = (".vtp", ".vtu", ".vtk")
 LEGACY, XML = b"# vtk DataFile", b"<VTKFile"

@@ -11,18 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.case.names import ALL_SPHERES, DEFAULT_LAW, SECTION_ARCHIE
-from fdnet.files.atomic import replacing
-from fdnet.network.analysis import Analysis
+from fdnet.files import replacing
+from fdnet.names import ALL_SPHERES, DEFAULT_LAW, SECTION_ARCHIE
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.flow.flow import Flow
-from fdnet.network.flow.sections import Section
-from fdnet.network.flow.slabs import whole_permeability
+from fdnet.network.flow.sections import Section, whole_permeability
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
 from fdnet.network.network import Network, build_network
-from fdnet.network.permeability import compare
-from fdnet.network.resolved.all_spheres import FEW_THROATS, all_conductances
-from fdnet.network.resolved.slab import cut_out
+from fdnet.network.permeability import Analysis, compare
+from fdnet.network.states import FEW_THROATS, all_conductances, cut_out
 from fdnet.run.open_run import open_run
 from fdnet.spheres.snapshot import Array, Snapshot
 from fdnet.studies.engine.csv_rows import DIGITS, read_named, write_named

@@ -7,10 +7,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from fdnet.dem.binary import find_binary
+from fdnet.dem.liggghts import find_binary
 from fdnet.errors import CaseError
-from fdnet.files.atomic import write_text
-from fdnet.files.paths import path_option, refuse_folder_name
+from fdnet.files import path_option, refuse_folder_name, write_text
 from fdnet.studies.engine.study import Study
 
 STUDIES: Mapping[str, str] = {

@@ -6,9 +6,7 @@ from pathlib import Path
 from fdnet.campaign.result.comparison import Comparison
 from fdnet.campaign.result.entry import Entry
 from fdnet.case.case import Case
-from fdnet.run.made_files import digests_of
-from fdnet.run.mark import mark_folder
-from fdnet.run.record_files import OPTIONAL, OUTPUTS
+from fdnet.run.folder import OPTIONAL, OUTPUTS, digests_of, mark_folder
 
 
 def comparison(path: Path, values: dict, *, shared: bool = True, more: dict | None = None):

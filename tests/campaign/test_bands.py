@@ -18,7 +18,7 @@ from fdnet.campaign.result.table import band_row
 from fdnet.campaign.result.words import band_text, value_text
 from fdnet.campaign.until import is_reached, next_seed_count, parse_until
 from fdnet.errors import CaseError
-from fdnet.report.units import percent
+from fdnet.report.tables import percent
 from fdnet.statistics.bands import Band
 
 DRUG_1 = dict(enumerate([0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0.0, 2.0]))

@@ -11,7 +11,7 @@ from campaign.samples import finished_run
 from fdnet.campaign.plan.ensemble import ensemble_plan
 from fdnet.campaign.plan.folder import campaign_folder
 from fdnet.cli import main
-from fdnet.run.made_files import digests_of
+from fdnet.run.folder import digests_of
 
 BAD = "tiny-seed-2"
 

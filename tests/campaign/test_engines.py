@@ -8,7 +8,7 @@ from fdnet.campaign.engine import local
 from fdnet.campaign.engine.local import run_local
 from fdnet.campaign.engine.snakemake import has_snakemake, run_snakemake
 from fdnet.campaign.engine.tasks import HowToRun, Task
-from fdnet.dem.binary import Binary, find_binary
+from fdnet.dem.liggghts import Binary, find_binary
 from fdnet.errors import CaseError, LiggghtsError
 
 

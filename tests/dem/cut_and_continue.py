@@ -9,12 +9,11 @@ import pytest
 from builders import tiny
 
 from fdnet.case.case import InvasionCase
-from fdnet.dem.batches import batches_of
-from fdnet.dem.binary import Binary
+from fdnet.dem.checkpoint import read_watch
 from fdnet.dem.invasion import Invasion, invade
-from fdnet.dem.liggghts import Launch
-from fdnet.dem.overlap import read_watch
-from fdnet.run.fluid.fluid_of import fluid_of
+from fdnet.dem.liggghts import Binary, Launch
+from fdnet.dem.supply import batches_of
+from fdnet.run.fluid import fluid_of
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Snapshot
 

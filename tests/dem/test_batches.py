@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from builders import resting_spheres, tiny
 
-from fdnet.dem.batches import AT_ONCE, LOOSEST_CAKE, batches_of
+from fdnet.dem.deck import box_of
 from fdnet.dem.invade_deck import render_invade, write_batches
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
-from fdnet.dem.scene import box_of
-from fdnet.dem.supply import CLEARANCE, place_batches, slab_end
+from fdnet.dem.supply import AT_ONCE, CLEARANCE, LOOSEST_CAKE, batches_of, place_batches, slab_end
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Kind
 

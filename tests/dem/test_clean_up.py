@@ -11,26 +11,30 @@ import pytest
 from builders import resting_spheres, tiny
 
 from fdnet.case.file import case_from
-from fdnet.dem.clean_up import Start, clean_up, fines_to_clean, mark_of
-from fdnet.dem.clean_up_deck import Beginning, render_clean_up, turned_drag
-from fdnet.dem.clean_up_states import (
+from fdnet.dem.clean_up import (
     CLEANED_HEADER,
+    Beginning,
     Cleaned,
+    Start,
+    clean_up,
     dump_name,
+    fines_to_clean,
     keep_record,
+    mark_of,
     newest_whole,
+    render_clean_up,
     restart_name,
+    turned_drag,
 )
-from fdnet.dem.fluid import Moment
+from fdnet.dem.invade_deck import Moment
 from fdnet.dem.liggghts import Launch
 from fdnet.errors import CaseError
 from fdnet.run.clean_up import fluid_turned_back
 from fdnet.run.dem_stages import invaded, packed_grains
 from fdnet.run.folder import open_folder
 from fdnet.run.pipeline import RunOptions, run_stages
-from fdnet.run.session import Session
-from fdnet.scales.clean_up import back_flow
-from fdnet.scales.scales import scales_of
+from fdnet.run.records import Session
+from fdnet.scales.scales import back_flow, scales_of
 from fdnet.spheres.snapshot import Kind
 
 pytestmark = pytest.mark.liggghts

@@ -7,11 +7,15 @@ import pytest
 from builders import tiny
 from test_deck import has, invade_text
 
-from fdnet.dem.pack_deck import render_pack
+from fdnet.dem.packing import render_pack
 from fdnet.errors import CaseError
-from fdnet.scales.cohesion import pull_off
-from fdnet.scales.hertz import restitution_of, secant_stiffness
-from fdnet.scales.restitution import pair_stokes, wet_ratio
+from fdnet.scales.contacts import (
+    pair_stokes,
+    pull_off,
+    restitution_of,
+    secant_stiffness,
+    wet_ratio,
+)
 from fdnet.scales.scales import scales_of
 from fdnet.scales.table import scale_rows
 

@@ -12,10 +12,9 @@ from fdnet.case.case import with_fines
 from fdnet.case.file import case_from
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
-from fdnet.scales.hertz import collision_time, overlap_of_impact
-from fdnet.scales.hertz_contacts import pair_elastic
+from fdnet.scales.contacts import collision_time, overlap_of_impact, pair_elastic
 from fdnet.scales.scales import scales_of
-from fdnet.spheres.contacts import max_overlap, touching_pairs
+from fdnet.spheres.geometry import max_overlap, touching_pairs
 from fdnet.spheres.snapshot import Kind, resting
 from fdnet.studies.dem import size_ratio
 from fdnet.studies.dem.closed import Watch, closed_run, kinetic_energy, restitution_of

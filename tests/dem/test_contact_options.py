@@ -8,12 +8,10 @@ import pytest
 from builders import tiny
 from cut_and_continue import cell_case, differences
 
-from fdnet.dem.contact_lines import contact_variables
-from fdnet.dem.deck import number, render_text
+from fdnet.dem.deck import contact_variables, number, render_text, wall_variables, write_data
 from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.packing import make_pack
-from fdnet.dem.scene import wall_variables, write_data
-from fdnet.scales.cohesion import pull_off
+from fdnet.scales.contacts import pull_off
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.dump import read_dump
 from fdnet.spheres.snapshot import Kind, resting

@@ -16,28 +16,25 @@ from builders import TINY, followed, resting_spheres, tiny
 from cut_and_continue import StopError, differences
 
 from fdnet.case.file import case_from
-from fdnet.dem.batches import batches_of
-from fdnet.dem.checkpoint_record import last_checkpoint
-from fdnet.dem.coupled import steps_between
-from fdnet.dem.feed import run_fed
-from fdnet.dem.fluid import (
+from fdnet.dem.checkpoint import UPDATES, last_checkpoint, read_updates
+from fdnet.dem.deck import box_of, snapshot_of, write_data
+from fdnet.dem.invade_deck import (
     FluidForces,
     Moment,
     fine_density,
     largest_share,
     read_state,
+    render_decks,
+    render_invade,
     write_forces,
+    write_parts,
 )
-from fdnet.dem.invade_deck import render_invade, write_parts
-from fdnet.dem.invasion import invade
-from fdnet.dem.liggghts import Launch
-from fdnet.dem.measured_fines import densities
+from fdnet.dem.invasion import invade, steps_between
+from fdnet.dem.liggghts import Launch, run_fed
 from fdnet.dem.packing import make_pack
-from fdnet.dem.render import render_decks
-from fdnet.dem.scene import box_of, snapshot_of, write_data
-from fdnet.dem.updates import UPDATES, read_updates
+from fdnet.dem.supply import batches_of, densities
 from fdnet.errors import CaseError, LiggghtsError
-from fdnet.run.fluid.fluid_of import fluid_of
+from fdnet.run.fluid import fluid_of
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Kind, Snapshot
@@ -152,8 +149,8 @@ def test_liggghts_that_is_killed_is_reported_and_the_run_goes_on_bit_for_bit(
 ORPHAN = """
 import sys
 from pathlib import Path
-from fdnet.dem.binary import find_binary
-from fdnet.dem.feed import run_fed
+from fdnet.dem.liggghts import find_binary
+from fdnet.dem.liggghts import run_fed
 from fdnet.dem.liggghts import Launch
 
 def play(feed):

@@ -9,7 +9,7 @@ from builders import tiny
 
 from fdnet.dem.deck import render_text, used_variables
 from fdnet.dem.invade_deck import render_invade
-from fdnet.dem.pack_deck import draw_radii, render_pack
+from fdnet.dem.packing import draw_radii, render_pack
 from fdnet.errors import DeckError
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Kind, Snapshot

@@ -10,15 +10,11 @@ from builders import resting_spheres, tiny
 
 from fdnet.case.case import Case
 from fdnet.case.file import case_from
-from fdnet.dem.binary import Binary
-from fdnet.dem.contact_lines import contact_variables
-from fdnet.dem.deck import number, render_text
-from fdnet.dem.drag import drag_variables
-from fdnet.dem.liggghts import Launch, run_deck
-from fdnet.dem.scene import write_data
+from fdnet.dem.deck import contact_variables, drag_variables, number, render_text, write_data
+from fdnet.dem.liggghts import Binary, Launch, run_deck
 from fdnet.errors import CaseError
+from fdnet.scales.clock import relaxation_time
 from fdnet.scales.scales import InvasionScales, scales_of
-from fdnet.scales.time_step import relaxation_time
 from fdnet.spheres.dump import COLUMNS, Frame, read_dump
 from fdnet.spheres.snapshot import Kind
 

@@ -8,9 +8,15 @@ import pytest
 from builders import tiny
 
 from fdnet.dem import checkpoint, supply
-from fdnet.dem.checkpoint import HISTORY_HEADER, plug_allowance, read_history
-from fdnet.dem.checkpoint_record import last_checkpoint
-from fdnet.dem.digests import file_digest, read_record, store_record
+from fdnet.dem.checkpoint import (
+    HISTORY_HEADER,
+    file_digest,
+    last_checkpoint,
+    plug_allowance,
+    read_history,
+    read_record,
+    store_record,
+)
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
@@ -18,7 +24,7 @@ from fdnet.dem.supply import CLEARANCE, SURE_CROWDING, crowding, place_fines, re
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.run import pipeline
 from fdnet.scales.scales import scales_of
-from fdnet.spheres.contacts import touching_pairs
+from fdnet.spheres.geometry import touching_pairs
 from fdnet.spheres.snapshot import Kind
 
 pytestmark = pytest.mark.liggghts

@@ -5,9 +5,9 @@ import pytest
 from builders import tiny
 from scipy.spatial import cKDTree
 
-from fdnet.dem import size_classes, supply
-from fdnet.dem.size_classes import CLEARANCE, few, last_places, places_by_size
-from fdnet.dem.supply import refuse_crowded_supply
+from fdnet.dem import supply
+from fdnet.dem import supply as size_classes
+from fdnet.dem.supply import CLEARANCE, few, last_places, places_by_size, refuse_crowded_supply
 from fdnet.scales.scales import scales_of
 
 RADIUS, SIZE = 0.05, np.array([1.0, 1.0, 1.0])

@@ -10,9 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from fdnet.dem import process
-from fdnet.dem.binary import Binary, find_binary
-from fdnet.dem.liggghts import Launch, run_deck
+from fdnet.dem import liggghts as process
+from fdnet.dem.liggghts import Binary, Launch, find_binary, run_deck
 from fdnet.errors import LiggghtsError
 
 FAKE = """#!/bin/sh
@@ -92,7 +91,7 @@ def test_the_run_dies_with_its_parent(fake, tmp_path):
     (tmp_path / "mode").write_text("hang")
     code = textwrap.dedent(f"""
         from pathlib import Path
-        from fdnet.dem.binary import find_binary
+        from fdnet.dem.liggghts import find_binary
         from fdnet.dem.liggghts import Launch, run_deck
         launch = Launch(binary=find_binary({str(fake.path)!r}))
         run_deck(Path({str(tmp_path)!r}), "in.deck", launch)

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from fdnet.case.spheres import SHEAR_RATIO
-from fdnet.scales.sticking import MOST_FALSE_FORCE
+from fdnet.scales.contacts import MOST_FALSE_FORCE
 from fdnet.studies.dem.neck import LEAVES_AFTER, Neck, factor_step, leaving_time
 
 pytestmark = pytest.mark.liggghts

@@ -10,24 +10,27 @@ from builders import followed
 from cut_and_continue import differences
 from scipy.integrate import quad
 
-from fdnet.dem.batches import batches_of
-from fdnet.dem.checkpoint_record import last_checkpoint
-from fdnet.dem.digests import read_record, store_record
-from fdnet.dem.fluid import Moment
+from fdnet.dem.checkpoint import last_checkpoint, read_record, store_record
+from fdnet.dem.invade_deck import Moment
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
-from fdnet.dem.supply import CLEARANCE, later_batch, place_batches, slab_end
+from fdnet.dem.supply import CLEARANCE, batches_of, later_batch, place_batches, slab_end
 from fdnet.errors import CaseError
-from fdnet.network.field.of_pack import velocity_field
+from fdnet.network.field.field import velocity_field
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import build_network
-from fdnet.run.fluid.fluid_of import fluid_of
-from fdnet.run.fluid.network_flow import MOVED, Renewal, changed_share, placed, pore_through
-from fdnet.run.fluid.network_fluid import NetworkFluid
-from fdnet.run.fluid.pressed import bed_section, on_each_fine
-from fdnet.run.history import history_rows
+from fdnet.run.fluid import NetworkFluid, fluid_of, history_rows
+from fdnet.run.network_flow import (
+    MOVED,
+    Renewal,
+    bed_section,
+    changed_share,
+    on_each_fine,
+    placed,
+    pore_through,
+)
 from fdnet.scales.scales import scales_of
 from fdnet.scales.table import scale_rows
 from fdnet.spheres.snapshot import Kind, Snapshot

@@ -7,13 +7,9 @@ import numpy as np
 import pytest
 from builders import resting_spheres, tiny
 
-from fdnet.dem import invade_deck, invasion, keeper
-from fdnet.dem.contact_lines import contact_variables
-from fdnet.dem.deck import number, render_text
-from fdnet.dem.invade_deck import render_invade, write_invade_inputs
-from fdnet.dem.invasion import invade
-from fdnet.dem.liggghts import Launch, run_deck
-from fdnet.dem.overlap import (
+from fdnet.dem import invade_deck, invasion
+from fdnet.dem import invasion as keeper
+from fdnet.dem.checkpoint import (
     Deepest,
     cut_watch,
     deepest_of,
@@ -21,11 +17,14 @@ from fdnet.dem.overlap import (
     watch_variables,
     write_watch_parts,
 )
+from fdnet.dem.deck import box_of, contact_variables, number, render_text, write_data
+from fdnet.dem.invade_deck import render_invade, write_invade_inputs
+from fdnet.dem.invasion import invade
+from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.packing import make_pack
-from fdnet.dem.scene import box_of, write_data
 from fdnet.errors import LiggghtsError
 from fdnet.scales.scales import scales_of
-from fdnet.spheres.contacts import touching_pairs
+from fdnet.spheres.geometry import touching_pairs
 from fdnet.spheres.snapshot import Kind
 
 LIMIT = 0.03

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from builders import tiny
 
+from fdnet.dem.deck import box_of
 from fdnet.dem.liggghts import Launch
-from fdnet.dem.pack_deck import check_radii, draw_radii
-from fdnet.dem.packing import RestlessError, _creep, make_pack
-from fdnet.dem.scene import box_of
+from fdnet.dem.packing import RestlessError, _creep, check_radii, draw_radii, make_pack
 from fdnet.errors import CaseError, DumpError, LiggghtsError
 from fdnet.run.records import pack_record, record_warnings
 from fdnet.scales.scales import scales_of
@@ -114,8 +113,8 @@ def test_the_overlap_limit_holds_for_a_count_too(binary, tmp_path):
 
 
 def short_relaxation(monkeypatch):
-    monkeypatch.setattr("fdnet.dem.pack_deck.REST_RUNS", 1)
-    monkeypatch.setattr("fdnet.dem.pack_deck.RELAX_RUN_STEPS", 10)
+    monkeypatch.setattr("fdnet.dem.packing.REST_RUNS", 1)
+    monkeypatch.setattr("fdnet.dem.packing.RELAX_RUN_STEPS", 10)
 
 
 def test_a_pack_that_never_rests_is_given_up_after_some_places(binary, tmp_path, monkeypatch):

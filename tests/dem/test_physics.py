@@ -8,16 +8,14 @@ from builders import resting_spheres, tiny
 
 from fdnet.case.case import Case
 from fdnet.case.file import case_from
-from fdnet.dem.contact_lines import contact_variables
-from fdnet.dem.deck import number, render_text
+from fdnet.dem.deck import contact_variables, number, render_text, write_data
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch, run_deck
-from fdnet.dem.measured_fines import densities
-from fdnet.dem.scene import write_data
+from fdnet.dem.supply import densities
+from fdnet.scales.clock import relaxation_time
 from fdnet.scales.scales import scales_of
-from fdnet.scales.time_step import relaxation_time
-from fdnet.spheres.contacts import max_overlap, touching_pairs
 from fdnet.spheres.dump import read_dump
+from fdnet.spheres.geometry import max_overlap, touching_pairs
 from fdnet.spheres.snapshot import Kind, Snapshot
 
 pytestmark = pytest.mark.liggghts

@@ -8,11 +8,10 @@ from builders import resting_spheres, tiny
 from test_drag import RADIUS, TAU, drag_text, drive, speeds
 
 from fdnet.case.case import Case
-from fdnet.dem.deck import render_text
+from fdnet.dem.deck import render_text, write_data
 from fdnet.dem.liggghts import Launch, run_deck
-from fdnet.dem.scene import write_data
-from fdnet.scales.forces.crowd import Crowd, drag_factor
-from fdnet.scales.forces.push import push_of
+from fdnet.scales.drag import Crowd, push_of
+from fdnet.scales.drag import crowd_drag_factor as drag_factor
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.dump import read_dump
 from fdnet.spheres.snapshot import Kind

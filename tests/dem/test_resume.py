@@ -9,7 +9,7 @@ import pytest
 from builders import tiny
 from cut_and_continue import MATRIX, StopError, cell_case, differences
 
-from fdnet.dem.checkpoint_record import last_checkpoint
+from fdnet.dem.checkpoint import last_checkpoint
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from builders import followed
 
-from fdnet.dem.coupled import steps_between
-from fdnet.dem.fluid import Moment, drag_rate
+from fdnet.dem.invade_deck import Moment, drag_rate
+from fdnet.dem.invasion import steps_between
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
-from fdnet.run.fluid.network_fluid import NetworkFluid
-from fdnet.run.fluid.way_ahead import Movers, mean_ahead
+from fdnet.run.fluid import Movers, NetworkFluid, mean_ahead
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Kind, Snapshot
 

@@ -186,7 +186,7 @@ def test_cases_lists_and_copies_what_comes_with_fdnet(tmp_path, capsys, root, mo
 
 
 def test_a_shipped_case_is_described_by_its_first_sentence():
-    from fdnet.case.shipped import first_sentence
+    from fdnet.case.file import first_sentence
 
     text = "# A box of 4 x 2.4 mm, that is small.\n# More.\nname = 1\n# no\n"
     assert first_sentence(text) == "A box of 4 x 2.4 mm, that is small"

@@ -6,20 +6,22 @@ import numpy as np
 import pytest
 
 from fdnet.errors import CaseError
-from fdnet.scales.forces.bed import (
+from fdnet.scales.drag import (
+    CUBIC_TERM,
     Bed,
+    Crowd,
+    bed_factor,
     ergun_gradient,
     ergun_velocity,
     fluidisation_velocity,
     kozeny_gradient,
-)
-from fdnet.scales.forces.crowd import (
-    CUBIC_TERM,
-    MOST_REYNOLDS,
-    Crowd,
-    bed_factor,
-    drag_factor,
     size_factor,
+)
+from fdnet.scales.drag import (
+    MOST_CROWD_REYNOLDS as MOST_REYNOLDS,
+)
+from fdnet.scales.drag import (
+    crowd_drag_factor as drag_factor,
 )
 
 TUTORIAL = Bed(diameter=1e-3, porosity=0.451335, viscosity=1.5e-3, density=10.0)

@@ -8,11 +8,13 @@ from builders import tiny
 
 from fdnet.case.file import read_case
 from fdnet.errors import CaseError
-from fdnet.scales.forces.push import arrival_velocity, pore_width, push_of
-from fdnet.scales.forces.reynolds import (
+from fdnet.scales.drag import (
     MOST_REYNOLDS,
+    arrival_velocity,
     balanced_slip,
     drag_factor,
+    pore_width,
+    push_of,
     slope_factor,
 )
 from fdnet.scales.scales import scales_of

@@ -6,7 +6,7 @@ from builders import tiny
 from scipy.special import eval_legendre, ive
 
 from fdnet.errors import CaseError
-from fdnet.scales.forces.throat import (
+from fdnet.scales.drag import (
     SOLVED,
     free_speed,
     held_factor,

@@ -3,10 +3,17 @@
 import numpy as np
 import pytest
 
-from fdnet.mechanics.joints import find_joints
-from fdnet.mechanics.kinematics import kinematics
-from fdnet.mechanics.solver import direct, stiffness
-from fdnet.mechanics.springs import Cement, Material, bond_springs, bond_stress, discs_of
+from fdnet.mechanics.springs import (
+    Cement,
+    Material,
+    bond_springs,
+    bond_stress,
+    direct,
+    discs_of,
+    find_joints,
+    kinematics,
+    stiffness,
+)
 from fdnet.spheres.snapshot import resting
 
 R1, R2 = 0.3e-3, 0.2e-3

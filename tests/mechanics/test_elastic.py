@@ -5,9 +5,16 @@ import pytest
 
 from fdnet.errors import MechanicsError
 from fdnet.mechanics.elastic import elastic_of
-from fdnet.mechanics.solver import conjugate_gradients, direct
-from fdnet.mechanics.springs import Cement, Material
-from fdnet.mechanics.tensor import anisotropy_of, moduli, voigt_average, young_along
+from fdnet.mechanics.springs import (
+    Cement,
+    Material,
+    anisotropy_of,
+    conjugate_gradients,
+    direct,
+    moduli,
+    voigt_average,
+    young_along,
+)
 from fdnet.spheres.snapshot import resting
 
 R = 0.3e-3
@@ -111,9 +118,7 @@ def test_numbering_and_units_do_not_matter():
 
 def test_the_two_solvers_agree():
     from fdnet.mechanics.elastic import carrying
-    from fdnet.mechanics.kinematics import kinematics
-    from fdnet.mechanics.solver import stiffness
-    from fdnet.mechanics.springs import contact_springs
+    from fdnet.mechanics.springs import contact_springs, kinematics, stiffness
 
     pack = random_pack()
     joints, kept = carrying(pack, SPRINGS, ALL)

@@ -8,7 +8,8 @@ import pytest
 from fdnet.case.file import case_from, recorded_case
 from fdnet.cli import main
 from fdnet.errors import CaseError
-from fdnet.report.mechanics_section import put_mechanics, section_html
+from fdnet.report.html import mechanics_html as section_html
+from fdnet.report.html import put_mechanics
 
 CASE = """
 name = "sand"

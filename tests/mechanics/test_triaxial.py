@@ -7,14 +7,21 @@ import pytest
 from test_elastic import R, random_pack, simple_cubic
 
 from fdnet.errors import CaseError, MechanicsError
-from fdnet.mechanics.after_step import carried_out, overloaded
-from fdnet.mechanics.deformed import SHEAR, SOUND, TENSION, at_rest
 from fdnet.mechanics.elastic import elastic_of
-from fdnet.mechanics.load_step import Load, balance, scene_of
-from fdnet.mechanics.rest import Triaxial
-from fdnet.mechanics.springs import Cement, Material
-from fdnet.mechanics.tensor import young_along
-from fdnet.mechanics.triaxial import triaxial
+from fdnet.mechanics.springs import Cement, Material, young_along
+from fdnet.mechanics.triaxial import (
+    SHEAR,
+    SOUND,
+    TENSION,
+    Load,
+    Triaxial,
+    at_rest,
+    balance,
+    carried_out,
+    overloaded,
+    scene_of,
+    triaxial,
+)
 from fdnet.spheres.snapshot import resting
 
 ALL = (True, True, True)

@@ -2,15 +2,16 @@
 
 import numpy as np
 
-from fdnet.network.laws.corner_rays import corner_room
 from fdnet.network.laws.cross_section import (
+    LANES,
+    corner_room,
     even_fluxes,
     even_room,
     set_wedges,
     uneven_fluxes,
     uneven_room,
+    wall_fluxes,
 )
-from fdnet.network.laws.wall_cross_section import LANES, wall_fluxes
 from fdnet.spheres.snapshot import Array
 
 

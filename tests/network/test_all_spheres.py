@@ -6,20 +6,27 @@ import numpy as np
 import pytest
 
 from fdnet.errors import CaseError, NetworkError
-from fdnet.network.flow.depth import Solved, depth_pressures, layer_edges
-from fdnet.network.flow.slabs import whole_permeability
-from fdnet.network.laws.corner_rays import aim_at_fourth, aim_corners, corner_room
+from fdnet.network.flow.sections import Solved, depth_pressures, layer_edges, whole_permeability
+from fdnet.network.laws.cross_section import (
+    aim,
+    aim_at_fourth,
+    aim_corners,
+    corner_room,
+    set_sides,
+)
 from fdnet.network.laws.deposit_resistances import deposit_resistances
-from fdnet.network.laws.fourth_grain import depth_within, share_left
 from fdnet.network.laws.lubrication import half_resistances
-from fdnet.network.laws.outside import bundles, meet, share_around
-from fdnet.network.laws.section_rays import aim, set_sides
-from fdnet.network.laws.wedge import ratio_table
+from fdnet.network.laws.reaching_grains import (
+    bundles,
+    depth_within,
+    meet,
+    share_around,
+    share_left,
+)
+from fdnet.network.laws.wedges import ratio_table
 from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse
-from fdnet.network.resolved.all_spheres import at_most_the_grains, measure_all_spheres
-from fdnet.network.resolved.slab import Sides
-from fdnet.network.resolved.state import Log
+from fdnet.network.states import Log, Sides, at_most_the_grains, measure_all_spheres
 from fdnet.spheres.snapshot import Kind, Snapshot
 from fdnet.studies.truth.packs import read_pack, truth_folder
 from tests.network.packs import random_pack, with_fines
@@ -238,7 +245,7 @@ def test_spheres_that_make_no_network_are_refused_or_left_to_the_other_law(pack,
     def refuse(*_: object, **__: object) -> None:
         raise NetworkError("no throat")
 
-    monkeypatch.setattr("fdnet.network.resolved.all_spheres.build_network", refuse)
+    monkeypatch.setattr("fdnet.network.states.build_network", refuse)
     with pytest.raises(NetworkError, match=r"all-spheres.*no throat.*section-archie"):
         analyse(pack, periodic=SIDES, damage_law="all-spheres")
     default = analyse(pack, periodic=SIDES)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from overlap import Sphere, Tetrahedron, overlap_area, overlap_volume
 
-from fdnet.network.fines.ball import pieces
+from fdnet.network.fines.deposit import pieces
 
 BALL, SPHERE = 4 / 3 * np.pi, 4 * np.pi
 CORNER = np.array([[0, 0, 0], [50, 0, 0], [0, 50, 0], [0, 0, 50.0]])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from packs import random_pack, simple_cubic
 
-from fdnet.network.resolved.slab import Sides
+from fdnet.network.states import Sides
 from fdnet.run.cake import cake_rows, cake_summary, cake_words, measure_cake, resistance_share
 from fdnet.spheres.snapshot import Kind, Snapshot
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import fdnet
-from fdnet.network.field import collective, of_pack
-from fdnet.network.field.forces import Problem
-from fdnet.network.field.wall_nodes import differences, dot
-from fdnet.network.field.walls import find_walls
+from fdnet.network.field import field as of_pack
+from fdnet.network.field import solved as collective
+from fdnet.network.field.grid import differences, dot, find_walls
+from fdnet.network.field.solved import Problem
 
 
 def _grains() -> fdnet.Snapshot:

@@ -66,7 +66,7 @@ def test_an_installation_in_another_place_uses_the_same_code(tmp_path, root):
 
 SOURCE = """
 import sys
-from fdnet.network.fines import point_search
+from fdnet.network.fines import deposit
 from fdnet.network.compiled import compiled
 
 @compiled

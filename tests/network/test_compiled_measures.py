@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from fdnet.network import geometry
-from fdnet.network.tessellation import section, tetrahedron
+from fdnet.network.tessellation import delaunay as tetrahedron
+from fdnet.network.tessellation import facets as section
 
 COUNT = 400
 

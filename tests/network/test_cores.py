@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numba.core import config
 
-from fdnet.network.cores import on_all_cores
-from fdnet.network.laws import fine_sections, lubrication
-from fdnet.network.laws.deposit_resistances import deposit_resistances
-from fdnet.network.laws.fine_sections import bounded_by_fines
+from fdnet.network.compiled import on_all_cores
+from fdnet.network.laws import deposit_resistances as fine_sections
+from fdnet.network.laws import lubrication
+from fdnet.network.laws.deposit_resistances import bounded_by_fines, deposit_resistances
 from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse
 from tests.network.packs import random_pack, with_fines

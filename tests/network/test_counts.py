@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fdnet.network.network import build_network
-from fdnet.network.tessellation.pierced import STEPS
-from fdnet.spheres.porosity import measure_porosity
+from fdnet.network.tessellation.facets import STEPS
+from fdnet.spheres.geometry import measure_porosity
 from fdnet.spheres.readers import read_spheres
 from tests.network.packs import body_centred, face_centred, random_pack, simple_cubic, snapshot
 

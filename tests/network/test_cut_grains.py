@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from fdnet import Snapshot, build_network
-from fdnet.network.flow.slabs import whole_permeability
-from fdnet.network.laws.cut_grains import cut_corners, cut_room, share_of_cut
+from fdnet.network.flow.sections import whole_permeability
+from fdnet.network.laws.cross_section import RAYS
 from fdnet.network.laws.lubrication import half_resistances
-from fdnet.network.laws.section_rays import RAYS
-from fdnet.network.laws.wedge import ratio_table
-from fdnet.network.resolved.slab import cut_out
+from fdnet.network.laws.reaching_grains import cut_corners, cut_room, share_of_cut
+from fdnet.network.laws.wedges import ratio_table
+from fdnet.network.states import cut_out
 from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.truth.packs import MM
 from fdnet.studies.truth.slabs import SLAB_FOLDER, SLAB_TRUTH, read_specimen

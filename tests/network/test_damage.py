@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fdnet.case.analysis import AnalysisChoices
+from fdnet.case.tables import AnalysisChoices
 from fdnet.errors import CaseError
 from fdnet.network.laws.named import DAMAGE_LAWS, damage_law
 from tests.network.networks import chain

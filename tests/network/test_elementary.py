@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fdnet.network.compiled import compiled_for_loops
-from fdnet.network.laws.elementary import QUARTER, angle_of, cosine_of, log_of, sine_of
+from fdnet.network.laws.wedges import QUARTER, angle_of, cosine_of, log_of, sine_of
 
 
 @compiled_for_loops

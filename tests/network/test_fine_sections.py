@@ -6,17 +6,21 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
-from fdnet.network.laws import fine_sections as fine
-from fdnet.network.laws.deposit_resistances import deposit_resistances, node_resistances
+from fdnet.network.laws import deposit_resistances as fine
+from fdnet.network.laws.deposit_resistances import (
+    deposit_resistances,
+    node_resistances,
+    parts_of_triangle,
+    set_near,
+    solids_of,
+)
+from fdnet.network.laws.deposit_resistances import points_flux as points_flux_of
 from fdnet.network.laws.lubrication import half_resistances
-from fdnet.network.laws.point_sections import parts_of_triangle
-from fdnet.network.laws.point_sections import points_flux as points_flux_of
-from fdnet.network.laws.solids import set_near, solids_of
-from fdnet.network.laws.tube import OPEN_WIDENING, WIDENING
+from fdnet.network.laws.wedges import OPEN_WIDENING, WIDENING
 from fdnet.network.network import build_network
 from fdnet.network.nodes import nodes_of
-from fdnet.network.resolved.slab import cut_out
-from fdnet.spheres.images import make_images
+from fdnet.network.states import cut_out
+from fdnet.spheres.geometry import make_images
 from fdnet.spheres.snapshot import Kind
 from tests.network.networks import network_of
 from tests.network.packs import random_pack, with_fines

@@ -5,7 +5,7 @@ import pytest
 
 from fdnet.errors import FlowError
 from fdnet.network.flow.flow import solve_flow
-from fdnet.network.flow.slabs import inplace_permeability, plane_pressures, slab_permeability
+from fdnet.network.flow.sections import inplace_permeability, plane_pressures, slab_permeability
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import build_network
 from tests.network.networks import chain, network_of, random_network

@@ -3,11 +3,17 @@
 import numpy as np
 import pytest
 
-from fdnet.network.laws.deposit_resistances import deposit_resistances
-from fdnet.network.laws.fine_sections import DIVISIONS, bounded_by_fines, fine_resistances
-from fdnet.network.laws.held_sections import MOST_PLANES, held_flux, planes_of
+from fdnet.network.laws.deposit_resistances import (
+    DIVISIONS,
+    MOST_PLANES,
+    bounded_by_fines,
+    deposit_resistances,
+    fine_resistances,
+    held_flux,
+    parts_of_triangle,
+    planes_of,
+)
 from fdnet.network.laws.lubrication import half_resistances
-from fdnet.network.laws.point_sections import parts_of_triangle
 from fdnet.network.network import build_network
 from fdnet.network.nodes import nodes_of
 from tests.network.packs import random_pack, with_fines

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fdnet.network import geometry
-from fdnet.network.fines.inside import clip_to_box
+from fdnet.network.fines.deposit import clip_to_box
 
 CORNER = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]])
 

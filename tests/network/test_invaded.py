@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fdnet.network.fines.invaded import measure_invaded
+from fdnet.network.specimen import measure_invaded
 from fdnet.spheres.snapshot import Kind
 from tests.network.packs import snapshot
 

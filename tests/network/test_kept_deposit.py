@@ -5,9 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fdnet.network.fines.deposit import deposit_in_pores
-from fdnet.network.fines.fine_images import reaching_inside
-from fdnet.network.fines.kept_deposit import holders_of, measured_deposit
+from fdnet.network.fines.deposit import (
+    deposit_in_pores,
+    holders_of,
+    measured_deposit,
+    reaching_inside,
+)
 from fdnet.network.network import build_network
 from fdnet.spheres.snapshot import Kind, Snapshot
 

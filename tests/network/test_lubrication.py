@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from fdnet.network.laws import cross_section as section
-from fdnet.network.laws import tube, wedge
-from fdnet.network.laws.wedge import ratio_table
+from fdnet.network.laws import wedges as tube
+from fdnet.network.laws import wedges as wedge
+from fdnet.network.laws.wedges import ratio_table
 from tests.network.one_section import even_flux, uneven_flux
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from fdnet.network.flow.slabs import whole_permeability
+from fdnet.network.flow.sections import whole_permeability
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.network import build_network
 from fdnet.network.nodes import nodes_of

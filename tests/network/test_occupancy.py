@@ -9,9 +9,14 @@ from scipy.integrate import quad
 from scipy.spatial import cKDTree
 
 from fdnet.errors import CaseError
-from fdnet.network.fines.cylinder import Pairs, covers_section, exact_volume, two_plane_volume
-from fdnet.network.fines.fine_images import mirrored_images
-from fdnet.network.fines.occupancy import measure_occupancy
+from fdnet.network.fines.deposit import mirrored_images
+from fdnet.network.fines.occupancy import (
+    Pairs,
+    covers_section,
+    exact_volume,
+    measure_occupancy,
+    two_plane_volume,
+)
 from fdnet.network.geometry import disc_lens_area
 from fdnet.network.network import build_network
 from fdnet.spheres.snapshot import Kind

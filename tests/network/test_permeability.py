@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fdnet.case.analysis import AnalysisChoices
+from fdnet.case.tables import AnalysisChoices
 from fdnet.errors import CaseError, NetworkError
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
 from fdnet.network.permeability import analyse

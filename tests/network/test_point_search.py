@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fdnet.network.fines.point_search import points_in_boxes
+from fdnet.network.fines.deposit import points_in_boxes
 
 
 @pytest.mark.parametrize("stretch", [[1, 1, 1], [10, 1, 0], [1e-9, 0, 0], [0, 0, 0]])

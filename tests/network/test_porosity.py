@@ -5,7 +5,7 @@ import pytest
 
 from fdnet.errors import CaseError
 from fdnet.network.flow.sections import pooled
-from fdnet.spheres.porosity import Porosity, measure_porosity
+from fdnet.spheres.geometry import Porosity, measure_porosity
 from tests.network.packs import face_centred, random_pack, simple_cubic, snapshot
 
 BOX = np.array([[0.0, 2.0]] * 3)

@@ -8,7 +8,7 @@ from fdnet.network.flow.flow import solve_flow
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import build_network
 from fdnet.network.tessellation import delaunay
-from fdnet.spheres.porosity import measure_porosity
+from fdnet.spheres.geometry import measure_porosity
 from tests.network.packs import random_pack, snapshot
 
 ALL = (True,) * 3

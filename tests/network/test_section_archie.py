@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from fdnet.network.fines.occupancy import measure_occupancy
-from fdnet.network.flow.slabs import whole_permeability
+from fdnet.network.flow.sections import whole_permeability
 from fdnet.network.laws import section_archie
-from fdnet.network.laws.beside_throats import FineImages, prisms_of
-from fdnet.network.laws.kept_sections import measured_sections
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
+from fdnet.network.laws.section_archie import FineImages, measured_sections, prisms_of
 from fdnet.network.network import build_network
 from fdnet.network.nodes import nodes_of
 from fdnet.network.permeability import analyse

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fdnet.network.laws import cross_section as section
-from fdnet.network.laws import wedge
-from fdnet.network.laws.wedge import ratio_table
+from fdnet.network.laws import wedges as wedge
+from fdnet.network.laws.wedges import ratio_table
 from tests.network.one_section import even_flux, uneven_flux
 from tests.network.section_flux import resolved_flux
 

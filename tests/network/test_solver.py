@@ -8,7 +8,7 @@ from fdnet.errors import FlowError
 from fdnet.network.flow import solver
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.flow.solver import DIRECT, MULTIGRID, Balances
-from fdnet.network.laws.conductance import effective_law
+from fdnet.network.laws.named import effective_law
 from fdnet.network.network import build_network
 from tests.network.packs import random_pack
 

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from fdnet.errors import FlowError
-from fdnet.network.flow import stiff
+from fdnet.network.flow import solver as stiff
 from fdnet.network.flow.flow import solve_flow
-from fdnet.network.flow.stiff import balance_links, stiffness
-from fdnet.network.flow.winding import groups, heights, winding_groups
+from fdnet.network.flow.solver import balance_links, groups, heights, stiffness, winding_groups
 from tests.network.exact import exact_balance, random_links
 from tests.network.networks import chain, network_of
 

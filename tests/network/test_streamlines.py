@@ -5,7 +5,7 @@ import pytest
 
 import fdnet
 from fdnet.errors import CaseError
-from fdnet.network.field.streamlines import streamlines
+from fdnet.network.field.field import streamlines
 
 
 class Velocity:

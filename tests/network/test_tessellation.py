@@ -7,7 +7,7 @@ import pytest
 
 from fdnet.errors import NetworkError
 from fdnet.network.network import build_network
-from fdnet.spheres.porosity import measure_porosity
+from fdnet.spheres.geometry import measure_porosity
 from tests.network.packs import body_centred, face_centred, random_pack, simple_cubic, snapshot
 
 ALL, NONE, SIDES = (True,) * 3, (False,) * 3, (False, True, True)

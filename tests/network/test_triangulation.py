@@ -11,8 +11,7 @@ from fdnet.network.flow.flow import solve_flow
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import build_network
 from fdnet.network.tessellation import delaunay, triangulation
-from fdnet.network.tessellation.predicates import in_sphere, side_of_plane
-from fdnet.network.tessellation.triangulation import triangulate
+from fdnet.network.tessellation.triangulation import in_sphere, side_of_plane, triangulate
 from tests.network.packs import random_pack
 
 

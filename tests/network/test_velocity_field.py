@@ -10,9 +10,9 @@ from network.packs import random_pack
 import fdnet
 from fdnet.errors import CaseError, NetworkError
 from fdnet.network.field.field import VelocityField
-from fdnet.network.field.lattice import build_lattice
+from fdnet.network.field.grid import build_lattice
 from fdnet.network.field.solved import build_skeleton, solve
-from fdnet.network.stokes.stokes import solve_stokes
+from fdnet.network.stokes import solve_stokes
 from fdnet.spheres.snapshot import Snapshot
 from fdnet.studies.engine.timing import least_time
 from fdnet.studies.network.interception import happel, intercepted

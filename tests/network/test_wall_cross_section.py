@@ -3,19 +3,18 @@
 import numpy as np
 import pytest
 
-from fdnet.case.analysis import AnalysisChoices
+from fdnet.case.tables import AnalysisChoices
 from fdnet.errors import CaseError, NetworkError
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.laws import lubrication
-from fdnet.network.laws.cut_grains import cut_corners
-from fdnet.network.laws.edge_cross_section import edge_fluxes
+from fdnet.network.laws.cross_section import LANES, edge_fluxes, wall_cuts, wall_fluxes
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.named import LAWS
-from fdnet.network.laws.wall_cross_section import LANES, wall_cuts, wall_fluxes
-from fdnet.network.laws.wedge import ratio_table
+from fdnet.network.laws.reaching_grains import cut_corners
+from fdnet.network.laws.wedges import ratio_table
 from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse
-from fdnet.network.resolved.slab import cut_out
+from fdnet.network.states import cut_out
 from tests.network.one_section import uneven_flux, wall_flux
 from tests.network.packs import random_pack, simple_cubic, snapshot, with_fines
 from tests.network.walled_section import resolved_flux

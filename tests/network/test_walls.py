@@ -8,11 +8,11 @@ import pytest
 
 from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.flow.flow import solve_flow
-from fdnet.network.flow.slabs import inplace_permeability
+from fdnet.network.flow.sections import inplace_permeability
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import build_network
-from fdnet.network.tessellation.placed_grains import onto_walls
-from fdnet.spheres.porosity import measure_porosity
+from fdnet.network.tessellation.delaunay import onto_walls
+from fdnet.spheres.geometry import measure_porosity
 from fdnet.spheres.snapshot import Kind
 from tests.network.packs import random_pack, simple_cubic, snapshot, with_fines
 

@@ -5,7 +5,7 @@ import pytest
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from fdnet.network.laws import wedge
+from fdnet.network.laws import wedges as wedge
 
 
 def rays(angle: float, disc: float) -> float:

@@ -12,7 +12,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import Delaunay, cKDTree
 
-from fdnet.network.flow.depth import Layers
+from fdnet.network.flow.sections import Layers
 from fdnet.spheres.snapshot import Kind, Snapshot
 
 BOX = np.array([[0.0, 4e-3], [0.0, 2e-3], [0.0, 2e-3]])

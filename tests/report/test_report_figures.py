@@ -9,11 +9,9 @@ from matplotlib.image import imread
 from report_demo import demo_analysis, demo_damaged, demo_grains, snapshot_of
 
 from fdnet.report import figures
-from fdnet.report.side_view import cut_circles
-from fdnet.report.size_figure import fill_size_curves
-from fdnet.run.placed_sizes import PlacedSizes
-from fdnet.sizes.curve import cut_curve
-from fdnet.sizes.laws import LogNormal
+from fdnet.report.figures import cut_circles, fill_size_curves
+from fdnet.run.outputs import PlacedSizes
+from fdnet.sizes import LogNormal, cut_curve
 from fdnet.spheres.snapshot import Kind
 
 HISTORY = [

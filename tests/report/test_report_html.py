@@ -11,11 +11,11 @@ import pytest
 from report_demo import demo_damaged
 
 from fdnet.errors import CaseError
-from fdnet.report import view
+from fdnet.report import vtk as view
 from fdnet.report.html import ReportParts, headline, quantity, write_report
-from fdnet.report.view import view_of
-from fdnet.run.answer.rules import Sizes, rules_of
-from fdnet.run.summary_text import html_lines, summary_lines
+from fdnet.report.vtk import view_of
+from fdnet.run.answer import Sizes, rules_of
+from fdnet.run.summary import html_lines, summary_lines
 
 SIZES = Sizes(
     fines={"D50": 40e-6, "D85": 60e-6, "D90": 100e-6},

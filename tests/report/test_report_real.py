@@ -8,7 +8,7 @@ import pytest
 import pyvista as pv
 from report_demo import BOX, demo_damaged, demo_grains
 
-from fdnet.case.analysis import AnalysisChoices
+from fdnet.case.tables import AnalysisChoices
 from fdnet.network.permeability import analyse
 from fdnet.report import figures, tables, vtk
 from fdnet.report.html import ReportParts, write_report

@@ -5,7 +5,7 @@ import pytest
 from report_demo import demo_damaged, snapshot_of
 
 from fdnet.errors import CaseError
-from fdnet.spheres.csv_file import read_csv, write_spheres
+from fdnet.spheres.readers import read_csv, write_spheres
 from fdnet.spheres.snapshot import Kind
 
 

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from report_demo import demo_analysis, demo_damaged
 
-from fdnet.files.atomic import replacing, write_text
+from fdnet.files import replacing, write_text
 from fdnet.report.tables import (
     section_rows,
     write_pores,
@@ -19,7 +19,7 @@ from fdnet.report.tables import (
     write_summary,
     write_throats,
 )
-from fdnet.spheres.csv_file import write_spheres
+from fdnet.spheres.readers import write_spheres
 
 # DESIGN section 4, word for word
 SECTION_COLUMNS = [

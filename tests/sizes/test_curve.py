@@ -7,10 +7,23 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import gamma, gammaincinv, ndtr
 
-from fdnet.sizes.curve import NUMBER, SURFACE, VOLUME, SizeCurve, blended, cut_curve
-from fdnet.sizes.deal import dealt, volume_quantiles
-from fdnet.sizes.fit import best_fit, fit_log_normal, fit_rosin_rammler
-from fdnet.sizes.laws import LogNormal, Points, RosinRammler, Uniform
+from fdnet.sizes import (
+    NUMBER,
+    SURFACE,
+    VOLUME,
+    LogNormal,
+    Points,
+    RosinRammler,
+    SizeCurve,
+    Uniform,
+    best_fit,
+    blended,
+    cut_curve,
+    dealt,
+    fit_log_normal,
+    fit_rosin_rammler,
+    volume_quantiles,
+)
 
 Z10 = 1.2815515655446004
 """Normal quantile of 90 %."""

@@ -6,7 +6,7 @@ import pytest
 from builders import tiny
 
 from fdnet.errors import CaseError
-from fdnet.scales.densest import (
+from fdnet.scales.pack import (
     EQUAL_SPHERES,
     close_packing,
     densest_porosity,
@@ -14,8 +14,7 @@ from fdnet.scales.densest import (
     within_limit,
 )
 from fdnet.scales.scales import scales_of
-from fdnet.sizes.curve import NUMBER, SizeCurve
-from fdnet.sizes.laws import LogNormal, Uniform
+from fdnet.sizes import NUMBER, LogNormal, SizeCurve, Uniform
 
 
 def test_equal_spheres_fill_what_farr_and_groot_calibrated_on():

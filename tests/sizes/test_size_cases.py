@@ -9,18 +9,24 @@ from builders import TINY
 from scipy.spatial import cKDTree
 
 from fdnet.case.case import InvasionCase
-from fdnet.case.file import case_from, read_case
-from fdnet.case.size_file import parse_sizes, read_size_file
-from fdnet.dem.batches import AT_ONCE, batches_of
-from fdnet.dem.measured_fines import densities, drawn_fines
-from fdnet.dem.pack_deck import draw_radii
-from fdnet.dem.scene import box_of
-from fdnet.dem.supply import CLEARANCE, crowding, place_batches, slab_end
+from fdnet.case.file import case_from, parse_sizes, read_case, read_size_file
+from fdnet.dem.deck import box_of
+from fdnet.dem.packing import draw_radii
+from fdnet.dem.supply import (
+    AT_ONCE,
+    CLEARANCE,
+    batches_of,
+    crowding,
+    densities,
+    drawn_fines,
+    place_batches,
+    slab_end,
+)
 from fdnet.errors import CaseError
+from fdnet.scales.contacts import mass_range
+from fdnet.scales.pack import diameter_at, size_rows
 from fdnet.scales.scales import scales_of
-from fdnet.scales.sizes import diameter_at, size_rows
-from fdnet.scales.springs import mass_range
-from fdnet.sizes.deal import volume_quantiles
+from fdnet.sizes import volume_quantiles
 from fdnet.spheres.snapshot import Kind, resting
 
 SAND = {"D10": "0.25 mm", "D50": "0.40 mm", "D90": "0.60 mm"}

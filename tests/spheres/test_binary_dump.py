@@ -5,8 +5,7 @@ import pytest
 
 from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.errors import DumpError
-from fdnet.spheres.binary_dump import read_binary_frame
-from fdnet.spheres.dump import read_frame
+from fdnet.spheres.dump import read_binary_frame, read_frame
 
 COLUMNS = ("id", "x", "radius")
 ROWS = np.array([[3.0, 0.1, 1e-5], [1.0, 0.2, 2e-5], [2.0, -0.3, 3e-5]])

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from fdnet.spheres.contacts import groups_apart, touching_pairs
+from fdnet.spheres.geometry import groups_apart, touching_pairs
 from fdnet.spheres.snapshot import resting
 
 CORNER = np.zeros((1, 3))

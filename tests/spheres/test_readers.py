@@ -11,12 +11,11 @@ import pytest
 
 from fdnet import read_case, read_spheres
 from fdnet.campaign.plan.sweep import read_sweep
-from fdnet.case.size_file import read_size_file
+from fdnet.case.file import read_size_file
 from fdnet.cli import main
 from fdnet.errors import CaseError, DumpError
 from fdnet.report.vtk import write_spheres_vtp
-from fdnet.spheres.csv_file import write_spheres
-from fdnet.spheres.readers import read_sphere_file
+from fdnet.spheres.readers import read_sphere_file, write_spheres
 from fdnet.spheres.snapshot import Kind, Snapshot
 
 BOX = [[0.0, 4e-3], [0.0, 2e-3], [-1e-3, 1e-3]]

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from fdnet.errors import FlowError
-from fdnet.network.flow.flow import Flow, solve_flow
-from fdnet.network.flow.links import INLET, OUTLET
-from fdnet.network.flow.slabs import plane_pressures, whole_permeability
+from fdnet.network.flow.flow import INLET, OUTLET, Flow, solve_flow
+from fdnet.network.flow.sections import plane_pressures, whole_permeability
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import Network, build_network
 from fdnet.spheres.snapshot import Array

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from fdnet.case.analysis import AnalysisChoices
+from fdnet.case.tables import AnalysisChoices
 from fdnet.errors import NetworkError
-from fdnet.network.analysis import Analysis
 from fdnet.network.network import build_network
-from fdnet.network.permeability import analyse
-from fdnet.spheres.porosity import measure_porosity
+from fdnet.network.permeability import Analysis, analyse
+from fdnet.spheres.geometry import measure_porosity
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 from tests.network.packs import face_centred, random_pack, simple_cubic, snapshot, with_fines
 

@@ -13,10 +13,9 @@ from builders import TINY
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from fdnet.case.analysis import AnalysisChoices
 from fdnet.case.case import Case, InvasionCase
-from fdnet.case.file import case_from, set_keys
-from fdnet.case.keys import known_keys
+from fdnet.case.file import case_from, known_keys, set_keys
+from fdnet.case.tables import AnalysisChoices
 from fdnet.errors import CaseError, DumpError, FdnetError
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.permeability import analyse

@@ -16,14 +16,12 @@ from builders import TINY, tiny
 from fdnet.case.case import Case
 from fdnet.case.file import read_case, set_keys
 from fdnet.cli import main
-from fdnet.dem.contact_lines import contact_variables
-from fdnet.dem.deck import number, render_text
+from fdnet.dem.deck import contact_variables, number, render_text, write_data
 from fdnet.dem.liggghts import Launch, run_deck
-from fdnet.dem.scene import write_data
+from fdnet.scales.clock import largest_factor
 from fdnet.scales.scales import scales_of
-from fdnet.scales.time_step import largest_factor
-from fdnet.spheres.contacts import touching_pairs
 from fdnet.spheres.dump import Frame, read_dump
+from fdnet.spheres.geometry import touching_pairs
 from fdnet.spheres.snapshot import Kind, Snapshot, resting
 from fdnet.studies.dem.collisions import energy_run
 

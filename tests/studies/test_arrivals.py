@@ -7,7 +7,7 @@ import pytest
 from network.packs import random_pack
 
 from fdnet.network.network import build_network
-from fdnet.spheres.images import wrapped
+from fdnet.spheres.geometry import wrapped
 from fdnet.spheres.snapshot import Kind, Snapshot
 from fdnet.studies.dem.arrivals import arrivals
 from fdnet.studies.dem.clogging import Met, clogging_rows

@@ -5,7 +5,8 @@ import csv
 import pytest
 
 from fdnet.cli import main
-from fdnet.network.laws.named import DEFAULT_LAW, LAWS
+from fdnet.names import DEFAULT_LAW
+from fdnet.network.laws.named import LAWS
 from fdnet.studies.accuracy import ALL_PAIRS, ARCHIE, FINEST, PACKS
 from fdnet.studies.command import run_study
 from fdnet.studies.engine.table import read_rows

@@ -6,7 +6,7 @@ from builders import followed
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
-from fdnet.run.fluid.network_fluid import NetworkFluid
+from fdnet.run.fluid import NetworkFluid
 from fdnet.scales.scales import scales_of
 from fdnet.studies.dem.solve_lag import LagOf, WatchedFluid
 

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
+from fdnet.scales.contacts import sphere_mass
 from fdnet.scales.scales import scales_of
-from fdnet.scales.springs import sphere_mass
 from fdnet.studies.command import run_study
 from fdnet.studies.dem.closed import deepest_overlap_of, restitution_of
 from fdnet.studies.dem.collisions import SPEED

@@ -9,11 +9,15 @@ import pytest
 from direct_stokes import direct_tensor
 
 from fdnet.errors import CaseError, FlowError
-from fdnet.network.stokes import forces
-from fdnet.network.stokes.green import build_green
-from fdnet.network.stokes.staggered import Staggered, stagger
-from fdnet.network.stokes.stokes import extrapolate, solve_stokes
-from fdnet.network.stokes.walls import find_walls
+from fdnet.network import stokes as forces
+from fdnet.network.stokes import (
+    Staggered,
+    build_green,
+    extrapolate,
+    find_walls,
+    solve_stokes,
+    stagger,
+)
 from fdnet.spheres.snapshot import Array, Snapshot
 from fdnet.studies.truth.packs import DATA, OWN_TRUTH
 

@@ -8,10 +8,14 @@ import pytest
 from direct_stokes import direct_tensor
 
 from fdnet.errors import CaseError
-from fdnet.network.stokes.green import build_green
-from fdnet.network.stokes.staggered import Staggered
-from fdnet.network.stokes.stokes import extrapolate, solve_slab, solve_stokes
-from fdnet.network.stokes.walls import find_walls
+from fdnet.network.stokes import (
+    Staggered,
+    build_green,
+    extrapolate,
+    find_walls,
+    solve_slab,
+    solve_stokes,
+)
 from fdnet.spheres.snapshot import Array, Snapshot, resting
 
 EDGES = (7, 8, 9)

@@ -15,7 +15,7 @@ import pytest
 from builders import resting_spheres, tiny
 from scipy.spatial import Delaunay
 
-from fdnet.dem.scene import box_of
+from fdnet.dem.deck import box_of
 from fdnet.errors import CaseError
 from fdnet.spheres.snapshot import Kind, resting
 from fdnet.studies.engine.bands import wilson_interval

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fdnet.network.fines.cylinder import GAUSS_POINTS, Pairs
+from fdnet.network.fines.occupancy import GAUSS_POINTS, Pairs
 from fdnet.studies.command import run_study
 from fdnet.studies.engine.table import read_rows
 from fdnet.studies.network.throat_occupancy import STUDY, TWO_PLANE, reference_volume

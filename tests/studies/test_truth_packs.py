@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fdnet.spheres.porosity import measure_porosity
+from fdnet.spheres.geometry import measure_porosity
 from fdnet.studies.truth.grids import make, tabulated
 from fdnet.studies.truth.made_packs import touching_three
 from fdnet.studies.truth.packs import DATA, read_pack

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fdnet.errors import CaseError
-from fdnet.network.stokes.stokes import StokesFlow, solve_slab
+from fdnet.network.stokes import StokesFlow, solve_slab
 from fdnet.spheres.snapshot import Kind, resting
 from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.truth.made_slabs import SLABS

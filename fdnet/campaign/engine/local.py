@@ -11,7 +11,7 @@ from pathlib import Path
 
 from fdnet.campaign.engine.tasks import Task, environment
 from fdnet.errors import CaseError
-from fdnet.files.atomic import disk_is_full
+from fdnet.files import disk_is_full
 
 PAUSE = 0.05
 """Seconds between two looks at the running processes."""

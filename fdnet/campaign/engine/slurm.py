@@ -9,8 +9,8 @@ from pathlib import Path
 from fdnet.campaign.engine.tasks import HowToRun, Task
 from fdnet.campaign.plan.job import safe
 from fdnet.errors import CaseError
-from fdnet.files.atomic import write_text
-from fdnet.run.one_core import ONE_CORE
+from fdnet.files import write_text
+from fdnet.run.progress import ONE_CORE
 
 PACKS, RUNS, SUBMIT = "packs.sbatch", "runs.sbatch", "submit.bash"
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from fdnet.campaign.engine.tasks import HowToRun, Task, environment
 from fdnet.errors import CaseError
-from fdnet.files.atomic import write_text
+from fdnet.files import write_text
 
 SNAKEFILE, TASKS, LOG = "Snakefile", "tasks.json", "logs/snakemake.log"
 PAUSE, PATIENCE = 0.2, 60.0

@@ -10,7 +10,7 @@ from pathlib import Path
 from fdnet.campaign.plan.folder import CASES, LOGS, PACKS, RUNS
 from fdnet.campaign.plan.job import Job, Plan, shared_packs
 from fdnet.campaign.plan.state import pack_is_done, state_of
-from fdnet.run.one_core import ONE_CORE
+from fdnet.run.progress import ONE_CORE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

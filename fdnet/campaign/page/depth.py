@@ -8,7 +8,7 @@ import numpy as np
 
 from fdnet.campaign.result.comparison import Comparison, is_number
 from fdnet.campaign.result.pairs import student_band
-from fdnet.report.units import MILLIDARCY
+from fdnet.report.tables import MILLIDARCY
 from fdnet.spheres.snapshot import Array
 
 

@@ -19,7 +19,7 @@ from fdnet.campaign.result.words import (
     ranking_lines,
     value_text,
 )
-from fdnet.files.atomic import write_text
+from fdnet.files import write_text
 
 PAGE = "compare.html"
 SHOWN = ("k_reduction", "k_damaged_m2", "invasion_depth_p95_m", "invaded_count", "passed_count")

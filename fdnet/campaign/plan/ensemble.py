@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from fdnet.campaign.plan.job import Plan, Variant, named
 from fdnet.campaign.plan.sweep import MOST_JOBS, refuse_many, seeds_of
 from fdnet.case.case import Case
-from fdnet.case.stages import STAGES
 from fdnet.errors import CaseError
+from fdnet.names import STAGES
 
 
 def ensemble_plan(

@@ -13,9 +13,8 @@ from pydantic import Field
 
 from fdnet.campaign.plan.job import Job, Plan
 from fdnet.errors import CaseError
-from fdnet.files.atomic import write_text
-from fdnet.files.paths import refuse_folder_name
-from fdnet.report.read_tables import Checked, read_json
+from fdnet.files import refuse_folder_name, write_text
+from fdnet.report.tables import Checked, read_json
 
 PLAN, CASES, RUNS, PACKS, LOGS, LOCK = "plan.json", "cases", "runs", "packs", "logs", ".lock"
 FORMAT = 1

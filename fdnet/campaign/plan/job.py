@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fdnet.case.case import Case
-from fdnet.case.stages import STAGES
+from fdnet.names import STAGES
 
 LONGEST_NAME = 80
 _UNSAFE = re.compile(r"[^A-Za-z0-9.=+_-]+")

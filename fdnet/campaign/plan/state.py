@@ -6,9 +6,8 @@ from pathlib import Path
 from fdnet.campaign.plan.folder import LOGS, RUNS
 from fdnet.campaign.plan.job import Job, Plan
 from fdnet.errors import CaseError
-from fdnet.report.read_tables import read_summary
-from fdnet.run.mark import MANIFEST, RECORDS
-from fdnet.run.record_files import check_finished
+from fdnet.report.tables import read_summary
+from fdnet.run.folder import MANIFEST, RECORDS, check_finished
 
 NOT_RUN = "not run yet"
 

@@ -21,7 +21,7 @@ from typing import Any
 from fdnet.campaign.plan.job import NAME, Plan, Variant, named, safe
 from fdnet.case.file import read_case, toml_tables
 from fdnet.errors import CaseError
-from fdnet.files.paths import expanded
+from fdnet.files import expanded
 
 MOST_JOBS = 1000
 """Most runs of a plan that are accepted without a word of confirmation."""

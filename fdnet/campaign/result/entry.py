@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fdnet.report.read_tables import read_summary
+from fdnet.report.tables import read_summary
 
 TEXTS = ("law", "damage_law_used", "stop_reason")
 """Texts of a summary that a table shows next to the numbers."""

@@ -12,9 +12,8 @@ from fdnet.campaign.result.comparison import RANKED_BY, Comparison
 from fdnet.campaign.result.entry import Entry, numbers_of
 from fdnet.case.case import Case
 from fdnet.errors import CaseError
-from fdnet.files.paths import refuse_folder_name
-from fdnet.run.mark import MANIFEST, is_run_folder
-from fdnet.run.record_files import check_finished
+from fdnet.files import refuse_folder_name
+from fdnet.run.folder import MANIFEST, check_finished, is_run_folder
 
 _NOT_COMPARED = ("name", "seed", "given")
 _RESULTS = {"table.csv", "table.parquet", "summary.json", "compare.html"}

@@ -12,7 +12,7 @@ from typing import Any
 from fdnet.campaign.result.comparison import Comparison, is_number
 from fdnet.campaign.result.entry import Entry
 from fdnet.campaign.result.pairs import Pair
-from fdnet.files.atomic import replacing, write_text
+from fdnet.files import replacing, write_text
 from fdnet.statistics.bands import Band
 
 TABLE, PARQUET, SUMMARY = "table.csv", "table.parquet", "summary.json"

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from fdnet.campaign.result.comparison import SHARES, Comparison, described
 from fdnet.campaign.result.pairs import MOST_SEEDS, Pair
-from fdnet.report.units import MILLIDARCY
+from fdnet.report.tables import MILLIDARCY
 from fdnet.statistics.bands import Band
 
 LABELS = {

@@ -1,22 +1,22 @@
-"""The velocity of the fluid in the pores of a pack, with a deposit of fines or without.
+"""The velocity field of a pack, and its streamlines.
+
+The velocity of the fluid in the pores of a pack, with a deposit of fines or without.
 
 A coarse resolved Stokes flow on a staggered grid (`solved`), interpolated down to the walls
 (`sampled`). Formulas and checks: docs/velocity_field.md.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.network.field.lattice import Lattice
-from fdnet.network.field.nearby import find_nearby
-from fdnet.network.field.pressure import Gradient, find_gradient
-from fdnet.network.field.sampled import Sampled, sample_velocity
-from fdnet.network.field.solved import Skeleton, Solved, Spheres, solve
-from fdnet.spheres.snapshot import Array, frozen
+from fdnet.network.field.grid import Lattice, build_lattice, find_nearby
+from fdnet.network.field.sampled import Gradient, Sampled, find_gradient, sample_velocity
+from fdnet.network.field.solved import Skeleton, Solved, Spheres, build_skeleton, solve
+from fdnet.spheres.snapshot import Array, Directions, Kind, Snapshot, frozen, periodic_axes
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -163,3 +163,184 @@ def _checked(points: Any) -> Array:
     if not np.all(np.isfinite(array)):
         raise CaseError("velocity field: a value is not finite, expected numbers, x, y, z")
     return array
+
+
+# ------------------------------------------------------------------------------------------------
+# The velocity field of a pack, from its spheres.
+
+
+COARSEST, FINEST, AFFORDED = 10.0, 18.0, 1_000_000
+"""Cells across a mean grain where none is given: as many between the first two as keep the grid
+below the third number of cells (`fdnet study velocity-field`)."""
+TOLERANCE = 0.05
+"""Rms velocity left at the walls over the superficial velocity."""
+UPSTREAM, DOWNSTREAM = 1.0, 0.5
+"""Clear fluid before and beyond a specimen that is not periodic along x, in grain diameters."""
+
+
+def velocity_field(
+    grains: Snapshot,
+    *,
+    periodic: Directions = "",
+    fines: Snapshot | None = None,
+    cells: float | None = None,
+    upstream: float | None = None,
+    tolerance: float = TOLERANCE,
+) -> VelocityField:
+    """The velocity of a slow fluid in the pores of a pack, over the superficial one along x.
+
+    Stokes flow is solved on a grid of `cells` cells across a mean grain. Fines are resolved as the
+    grains are. The sides y and z that are not periodic are walls that hold the fluid. A specimen
+    that is not periodic along x has clear fluid before and beyond it, which moves evenly.
+
+    Args:
+        grains: the skeleton, m; `box` is the specimen. Fines among them are the deposit where
+            `fines` is not given.
+        periodic: sides that repeat, letters such as "yz" or three truth values (x, y, z).
+        fines: the deposit; its spheres of kind grain are ignored where it has any of kind fine.
+        cells: across a mean grain diameter; without it 10 to 18, as a million cells allow.
+        upstream: m of grid before the specimen; without it, a grain diameter more than the fines
+            reach. Without meaning where x is periodic.
+        tolerance: rms velocity over the superficial one that may be left at the walls.
+
+    Raises:
+        CaseError: there is no grain, or a value is outside its range.
+        NetworkError: the box has no extent, or no grain reaches into the grid.
+        FlowError: the iterations run out, as in a closed pore space.
+
+    Examples:
+        >>> import fdnet, numpy as np
+        >>> lattice = 1e-3 * (np.indices((2, 2, 2)).reshape(3, -1).T + 0.5)
+        >>> grains = fdnet.Snapshot.from_arrays(lattice, 0.5e-3)
+        >>> field = fdnet.velocity_field(grains, periodic="xyz")
+        >>> print(f"{field.at([[1e-3, 1e-3, 1e-3]])[0, 0]:.0f}")
+        4
+    """
+    if not len(grains.grains()):
+        raise CaseError("velocity field: no grain among the spheres, expected at least one")
+    if not ((cells is None or 1.0 <= cells < np.inf) and 0.0 < tolerance < 1.0):
+        raise CaseError(
+            f"velocity field: {cells!r} cells across a grain and a tolerance of {tolerance!r}, "
+            "expected at least 1 cell and a tolerance between 0 and 1"
+        )
+    deposit = _deposit(grains if fines is None else fines, fines is not None)
+    skeleton = _skeleton(
+        grains, periodic_axes(periodic), (cells, _upstream(grains, deposit, upstream))
+    )
+    return solved_field(skeleton, (deposit.position, deposit.radius), tolerance)
+
+
+def _upstream(grains: Snapshot, deposit: Snapshot, wanted: float | None) -> float:
+    """Metres of grid before the specimen."""
+    if wanted is not None:
+        return wanted
+    reach = grains.box[0, 0] - (deposit.position[:, 0] - deposit.radius)
+    clear = UPSTREAM * 2.0 * float(grains.grains().radius.mean())
+    return clear + float(max(0.0, reach.max(initial=0.0)))
+
+
+def _skeleton(
+    spheres: Snapshot, sides: tuple[bool, bool, bool], grid: tuple[float | None, float]
+) -> Skeleton:
+    """The grains on a grid of so many cells across a grain and so many metres upstream."""
+    grains, (cells, upstream) = spheres.grains(), grid
+    diameter = 2.0 * float(grains.radius.mean())
+    if cells is None:
+        edges = np.ptp(spheres.box, axis=1)
+        edges[0] += 0.0 if sides[0] else upstream + DOWNSTREAM * diameter
+        affordable = diameter * (AFFORDED / np.prod(edges)) ** (1.0 / 3.0)
+        cells = float(np.clip(affordable, COARSEST, FINEST))
+    lattice = build_lattice(
+        spheres.box,
+        sides,
+        spacing=diameter / cells,
+        upstream=upstream,
+        downstream=DOWNSTREAM * diameter,
+    )
+    kept = grains.where(on_grid(lattice, grains.position, grains.radius))
+    return build_skeleton(lattice, (kept.position, kept.radius))
+
+
+def _deposit(spheres: Snapshot, given: bool) -> Snapshot:
+    """The spheres of kind fine; all of them where they were given as fines and none is."""
+    fines = spheres.fines()
+    if given and not len(fines):
+        return replace(spheres, kind=np.full(len(spheres), Kind.FINE))
+    return fines
+
+
+# ------------------------------------------------------------------------------------------------
+# Streamlines of a velocity field: the ways that fluid takes through a specimen.
+
+
+SLOWEST = 1e-6
+"""Speed over the superficial one below which a streamline ends, as at a wall."""
+SHORTER = (1.0, 0.25, 0.0625)
+"""Shares of a step that are tried in turn, where a longer one would end in the solid."""
+
+
+def streamlines(
+    field: "VelocityField", start: Array, *, step: float, until: float, longest: float = 10.0
+) -> list[Array]:
+    """The streamlines of a field from given points on.
+
+    Each goes on in steps of equal length by the midpoint rule until its x exceeds `until`, the
+    fluid stands still, or it is `longest` times as long as the way along x. A line that leaves
+    through a periodic side goes on beyond it and is not brought back into the box.
+
+    Args:
+        field: the velocity.
+        start: (N, 3) m, first points.
+        step: length of a step, m; near walls it is shorter.
+        until: x at which a line ends, m.
+        longest: length of a line over `until` less the least x of the first points.
+
+    Returns:
+        N arrays (M, 3) m, the points of each line; one point where the fluid stands still at once.
+
+    Raises:
+        CaseError: the step is not positive, or the first points are not upstream of `until`.
+    """
+    way = until - float(np.min(start[:, 0], initial=until))
+    if not (step > 0.0 and way > 0.0):
+        raise CaseError(
+            f"streamlines: a step of {step:g} m and a way of {way:g} m along x, expected both to "
+            "be positive"
+        )
+    place = np.array(start, float)
+    points, moving = [place.copy()], np.ones(len(place), bool)
+    kept = [moving.copy()]
+    for _ in range(int(np.ceil(longest * way / step))):
+        if not moving.any():
+            break
+        rows = np.flatnonzero(moving)
+        place[rows], held = _stepped(field, place[rows], step)
+        moving[rows[held]] = False
+        points.append(place.copy())
+        kept.append(moving.copy())
+        moving &= place[:, 0] < until
+    way_points, use = np.stack(points), np.stack(kept)
+    return [way_points[use[:, line], line] for line in range(len(place))]
+
+
+def _stepped(field: "VelocityField", place: Array, step: float) -> tuple[Array, Array]:
+    """Points (N, 3) one step on, a shorter one near walls, and where (N,) there is no way on."""
+    result, held = place.copy(), np.ones(len(place), bool)
+    for share in SHORTER:
+        rows = np.flatnonzero(held)
+        here, length = place[rows], share * step
+        ahead, _ = _directions(field, here)
+        along, still = _directions(field, here + 0.5 * length * ahead)
+        there = here + length * along
+        free = ~(still | _directions(field, there)[1])
+        result[rows[free]] = there[free]
+        held[rows[free]] = False
+    return result, held
+
+
+def _directions(field: "VelocityField", points: Array) -> tuple[Array, Array]:
+    """Unit vectors (N, 3) of the velocity at the points, and where (N,) there is none."""
+    velocity = field.at(points)
+    speed = np.linalg.norm(velocity, axis=1)
+    held = speed < SLOWEST
+    return velocity / np.where(held, 1.0, speed)[:, None], held

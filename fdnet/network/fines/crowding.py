@@ -9,10 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.network.compiled import compiled
-from fdnet.network.fines.point_search import Grid, grid_of
-from fdnet.spheres.arrays import one_line
-from fdnet.spheres.images import make_images, wrapped
-from fdnet.spheres.snapshot import Array, Snapshot
+from fdnet.network.fines.deposit import Grid, grid_of
+from fdnet.spheres.geometry import make_images, wrapped
+from fdnet.spheres.snapshot import Array, Snapshot, one_line
 
 REACH = 4.0
 """Radius of the neighbourhood over that of the fine (or over the Sauter mean of all, if that is

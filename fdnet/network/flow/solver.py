@@ -1,22 +1,118 @@
-"""Mass balances of a network of links: a direct solver, and multigrid for larger networks.
+"""Solvers of the pressures of a network.
 
-The systems are symmetric and positive definite.
+One level of a multigrid cycle: both Gauss-Seidel sweeps, and the way to the next level.
+
+The operations are those of pyamg and scipy, in the same order, so the numbers are the same to the
+last digit. Called one by one from Python they took most of the time of a cycle, for the levels of
+a pack hold a few thousand pores at most.
 """
 
 import os
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pyamg
 import pymetis
 from scipy import sparse
-from scipy.sparse.csgraph import reverse_cuthill_mckee
+from scipy.sparse.csgraph import breadth_first_order, reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
 from fdnet.errors import FlowError
-from fdnet.network.flow.cycle import level_of
-from fdnet.spheres.snapshot import Array
+from fdnet.network.compiled import compiled, compiled_in_place
+from fdnet.spheres.snapshot import Array, one_line
+
+Rows = tuple[Array, Array, Array]
+"""Where the rows of a matrix begin, the columns of its entries, and their values."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Level:
+    """A level of n nodes above one of m nodes.
+
+    Attributes:
+        matrix: of the level, (n, n).
+        prolongation: (n, m), from the nodes of the next level to those of this one.
+        count: m.
+    """
+
+    matrix: Rows
+    prolongation: Rows
+    count: int
+
+    __repr__ = one_line
+
+    def down(self, source: Array) -> tuple[Array, Array]:
+        """The solution (n,) after a forward sweep from 0, and what is left for the next level."""
+        solution, coarse = np.zeros(len(source)), np.zeros(self.count)
+        _down(self.matrix, self.prolongation, (solution, source), coarse)
+        return solution, coarse
+
+    def up(self, solution: Array, source: Array, coarse: Array) -> None:
+        """Adds what the next level gives, `coarse` (m,), and sweeps backward; in place."""
+        _up(self.matrix, self.prolongation, (solution, source), coarse)
+
+
+def level_of(matrix: sparse.csr_matrix, prolongation: sparse.csr_matrix) -> Level:
+    """The level of a `matrix` (n, n) and the `prolongation` (n, m) to it."""
+    return Level(
+        matrix=_rows(matrix), prolongation=_rows(prolongation), count=prolongation.shape[1]
+    )
+
+
+def _rows(matrix: sparse.csr_matrix) -> Rows:
+    return matrix.indptr, matrix.indices, matrix.data
+
+
+@compiled_in_place
+def _relax(matrix: Rows, row: int, solution: Array, source: Array) -> None:
+    """Sets the solution of one row to what balances it; a row without a diagonal stays."""
+    first, column, value = matrix
+    total, diagonal = 0.0, 0.0
+    for entry in range(first[row], first[row + 1]):
+        if column[entry] == row:
+            diagonal = value[entry]
+        else:
+            total += value[entry] * solution[column[entry]]
+    if diagonal != 0.0:
+        solution[row] = (source[row] - total) / diagonal
+
+
+@compiled_in_place
+def _down(matrix: Rows, prolongation: Rows, state: tuple[Array, Array], coarse: Array) -> None:
+    first, column, value = matrix
+    upward, to, weight = prolongation
+    solution, source = state
+    for row in range(len(source)):
+        _relax(matrix, row, solution, source)
+    for row in range(len(source)):
+        total = 0.0
+        for entry in range(first[row], first[row + 1]):
+            total += value[entry] * solution[column[entry]]
+        missing = source[row] - total
+        for entry in range(upward[row], upward[row + 1]):
+            coarse[to[entry]] += weight[entry] * missing
+
+
+@compiled_in_place
+def _up(matrix: Rows, prolongation: Rows, state: tuple[Array, Array], coarse: Array) -> None:
+    upward, to, weight = prolongation
+    solution, source = state
+    for row in range(len(solution)):
+        total = 0.0
+        for entry in range(upward[row], upward[row + 1]):
+            total += weight[entry] * coarse[to[entry]]
+        solution[row] += total
+    for row in range(len(solution) - 1, -1, -1):
+        _relax(matrix, row, solution, source)
+
+
+# ------------------------------------------------------------------------------------------------
+# Mass balances of a network of links: a direct solver, and multigrid for larger networks.
+#
+# The systems are symmetric and positive definite.
+
 
 DIRECT, MULTIGRID = "splu, METIS nested dissection", "CG, Ruge-Stuben AMG"
 DIRECT_UP_TO = 3_000
@@ -272,3 +368,338 @@ def _free_memory() -> float:
         return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     except (AttributeError, OSError, ValueError):
         return np.inf
+
+
+# ------------------------------------------------------------------------------------------------
+# Which groups of links carry flow: from plane to plane, or once around the period.
+#
+# A link between the nodes a and b carries the flux g (p_a - p_b + jump), with its conductance g
+# and the pressures p. The two planes are one node of pressure 0, and a link from the inlet plane
+# has the jump 1. Where x is periodic, a link across the period has a jump. A group of links is
+# said to wind when it has a closed loop whose jumps do not add up to 0. A group that does not wind
+# carries nothing: pressures can be chosen that cancel all its jumps.
+
+
+def groups(ends: Array, count: int) -> Array:
+    """Number (n,) of the connected group of each of `count` nodes, in the order of the nodes.
+
+    `ends` (K, 2) are the nodes that the links join.
+    """
+    return winding_groups(ends, np.zeros(len(ends)), count)[0]
+
+
+def heights(ends: Array, jump: Array, group: Array) -> Array:
+    """Pressures (n,) that cancel the jump of every link of a spanning forest: p_b = p_a + jump.
+
+    The forest is made breadth first from the first node of each `group` (n,), in a graph whose
+    vertices are the nodes and the links, so that parallel links remain distinct.
+    """
+    count, links = len(group), len(ends)
+    root = count + links
+    first = np.unique(group, return_index=True)[1]
+    vertex = np.arange(count, root)
+    rows = np.concatenate([ends[:, 0], vertex, ends[:, 1], vertex, np.full(len(first), root)])
+    columns = np.concatenate([vertex, ends[:, 0], vertex, ends[:, 1], first])
+    graph = sparse.csr_matrix(
+        (np.ones(len(rows), np.int8), (rows, columns)), shape=(root + 1, root + 1)
+    )
+    _, before = breadth_first_order(graph, root, directed=True)
+    link = before[:count] - count
+    inner = link < links
+    parent = np.arange(count)
+    parent[inner] = before[count + link[inner]]
+    rise = np.zeros(count)
+    reached = link[inner]
+    rise[inner] = jump[reached] * np.where(ends[reached, 1] == np.flatnonzero(inner), 1.0, -1.0)
+    while np.any(parent != parent[parent]):
+        rise += rise[parent]
+        parent = parent[parent]
+    return rise
+
+
+def winding_groups(ends: Array, jump: Array, count: int) -> tuple[Array, Array]:
+    """Connected group (n,) of each of `count` nodes, and whether that group winds (n,)."""
+    group, winds = _joined(
+        np.ascontiguousarray(ends, np.int64), np.ascontiguousarray(jump, float), count
+    )
+    return group, winds[group]
+
+
+@compiled
+def _joined(ends: Array, jump: Array, count: int) -> tuple[Array, Array]:
+    """Group (n,) of each node, and whether each group (G,) winds.
+
+    Every node knows another of its group and the pressure over it; links join two trees of such
+    nodes or close a loop (Tarjan 1975, J. ACM 22, 215). The root of a tree is its first node.
+    """
+    parent, rise, winding = np.arange(count), np.zeros(count), np.zeros(count, np.bool_)
+    for k in range(len(ends)):
+        one, other = ends[k, 0], ends[k, 1]
+        first, second = _root(parent, rise, one), _root(parent, rise, other)
+        over = rise[one] + jump[k] - rise[other]
+        if first == second:
+            winding[first] = winding[first] or over != 0.0
+            continue
+        if first > second:
+            first, second, over = second, first, -over
+        parent[second], rise[second] = first, over
+        winding[first] = winding[first] or winding[second]
+    group, winds, roots = np.empty(count, np.int64), np.zeros(count, np.bool_), 0
+    for node in range(count):
+        root = _root(parent, rise, node)
+        if root == node:
+            group[node], winds[roots] = roots, winding[node]
+            roots += 1
+        else:
+            group[node] = group[root]
+    return group, winds
+
+
+@compiled
+def _root(parent: Array, rise: Array, node: int) -> int:
+    """The root of a node, which afterwards knows it directly, as do all on the way."""
+    root, total = node, 0.0
+    while parent[root] != root:
+        total += rise[root]
+        root = parent[root]
+    while node != root:
+        step, after = rise[node], parent[node]
+        parent[node], rise[node] = root, total
+        total, node = total - step, after
+    return root
+
+
+# ------------------------------------------------------------------------------------------------
+# Pressures and fluxes of links whose conductances differ by any number of decades.
+#
+# A link between the nodes a and b carries the flux g (p_a - p_b + jump); jumps are whole numbers.
+# Node 0 and the first node of every further group have the pressure 0.
+#
+# The critical conductance of a node is that of the weakest link in the best closed loop with a
+# jump through it. Links far more conductive than that are stiff: their pressure difference is
+# smaller than a number can hold. Their nodes are contracted into one, and their fluxes follow from
+# the balance within the contracted group, where the same is done again.
+
+
+CONTRASTS = (1e8, 1e6, 1e10)
+"""Ratios of conductance between levels of stiffness, in the order in which they are tried."""
+STEP = 10.0
+"""Factor within which the critical conductance is determined."""
+SETTLED = 1e-9
+"""A balance of less defect is accepted."""
+MOST_SWEEPS = 30
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Balance:
+    """Pressures of n nodes and fluxes of K links.
+
+    Attributes:
+        pressure: (n,) over the unit of the jumps.
+        flux: (K,) from the first to the second end, in units of conductance times jump.
+        defect: sum of the imbalances of the nodes and of the errors of the links' own equations,
+            over the throughput; it bounds the relative error of the throughput.
+        method: how the system was solved.
+    """
+
+    pressure: Array
+    flux: Array
+    defect: float
+    method: str
+
+    __repr__ = one_line
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Stage:
+    """The links of one level of stiffness; the nodes that higher levels join are one node.
+
+    Attributes:
+        links: (L,) indices of the links.
+        label: (n,) number of the contracted node of each node.
+        free: (m,) whether the pressure of each contracted node is unknown; else it is 0.
+        balances: the system of equations of the free nodes.
+    """
+
+    links: Array
+    label: Array
+    free: Array
+    balances: Balances
+
+
+def balance_links(
+    ends: Array, conductance: Array, jump: Array, count: int, *, direct_up_to: int | None = None
+) -> Balance:
+    """Balance of all nodes, every one of which must be in a group that winds.
+
+    The levels of stiffness differ by a contrast of 1e8. Where links of like conductance fall on
+    both sides of that border and the sweeps do not settle, another contrast is tried. The best
+    balance is returned, and the caller judges its `defect`.
+
+    Args:
+        ends: (K, 2) nodes that the links join.
+        conductance: (K,) above 0.
+        jump: (K,) of the links.
+        count: number of nodes.
+        direct_up_to: number of nodes up to which a direct solver is used, see `Balances`.
+    """
+    tried = []
+    for contrast in CONTRASTS:
+        level = stiffness(ends, conductance, jump, count, contrast=contrast)
+        tried.append(_balance(ends, conductance, jump, (level, count), direct_up_to))
+        if tried[-1].defect <= SETTLED or not level.any():
+            break
+    return min(tried, key=lambda one: one.defect)
+
+
+def _balance(
+    ends: Array,
+    conductance: Array,
+    jump: Array,
+    levels: tuple[Array, int],
+    direct_up_to: int | None,
+) -> Balance:
+    """Balance level by level, repeated for what is left over.
+
+    Left over are the imbalances, and the pressure differences within the contracted groups, which
+    the links next to them did not see. Fluxes add up by increments, never as differences of nearly
+    equal pressures. `levels` holds the level (K,) of each link and the number of nodes.
+    """
+    level, count = levels
+    stiff = level > 0
+    height = (
+        heights(ends[stiff], jump[stiff], groups(ends[stiff], count))
+        if stiff.any()
+        else np.zeros(count)
+    )
+    drive = jump + _difference(height, ends)
+    level = _with_inner_links(ends, level, count)
+    parts = [_contracted(ends, level, at, count) for at in range(int(level.max(initial=0)) + 1)]
+    stages = [_stage(ends, conductance, part, direct_up_to) for part in parts]
+    pressure, flux, defect, allowed = height, np.zeros(len(ends)), np.inf, None
+    for _ in range(MOST_SWEEPS):
+        step, gain, drive = _sweep(
+            stages, ends, conductance, drive, (_net(ends, flux, count), allowed)
+        )
+        pressure, flux = pressure + step, flux + gain
+        before, defect = (
+            defect,
+            _defect(_net(ends, flux, count), conductance * drive, float(flux @ jump)),
+        )
+        allowed = 0.3 * SETTLED * abs(float(flux @ jump))
+        if defect <= SETTLED or not defect < 0.7 * before:
+            break
+    return Balance(
+        pressure=pressure - pressure[0], flux=flux, defect=defect, method=stages[0].balances.method
+    )
+
+
+def stiffness(
+    ends: Array, conductance: Array, jump: Array, count: int, *, contrast: float = CONTRASTS[0]
+) -> Array:
+    """Level (K,) of stiffness of each link.
+
+    It is 0 up to `contrast` times the critical conductance of the nodes, 1 up to its square times
+    that, and so on. The critical conductance of a node is the greatest at which the links that are
+    as good or better still join it to a closed loop with a jump (Ambegaokar, Halperin and Langer
+    1971); it is determined within a factor of 10. No more than a few times that flows through the
+    node per unit of drive, so a link of level 1 takes at most some 1 / contrast of the drive.
+    """
+    level = np.zeros(len(ends), int)
+    if not len(ends):
+        return level
+    lowest, highest = float(conductance.min()), float(conductance.max())
+    if highest <= contrast * lowest:
+        return level
+    critical, bound = np.zeros(count), highest / contrast
+    while True:
+        strong = conductance >= bound
+        winds = winding_groups(ends[strong], jump[strong], count)[1]
+        critical[winds & (critical == 0)] = bound
+        if bound <= lowest or np.all(critical > 0):
+            break
+        bound = max(min(bound / STEP, float(conductance[~strong].max())), lowest)
+    ratio = conductance / np.maximum(critical[ends[:, 0]], critical[ends[:, 1]])
+    return np.maximum(np.ceil(np.log(ratio) / np.log(contrast)).astype(int) - 1, 0)
+
+
+def _with_inner_links(ends: Array, level: Array, count: int) -> Array:
+    """The levels (K,), raised for links between nodes that higher levels contract into one."""
+    level = level.copy()
+    for at in range(int(level.max(initial=0))):
+        label = groups(ends[level > at], count)
+        level[(level == at) & (label[ends[:, 0]] == label[ends[:, 1]])] = at + 1
+    return level
+
+
+def _contracted(ends: Array, level: Array, at: int, count: int) -> tuple[Array, Array]:
+    """Links of level `at`, and labels (n,) of the nodes with all higher levels contracted."""
+    return np.flatnonzero(level == at), groups(ends[level > at], count)
+
+
+def _stage(
+    ends: Array, conductance: Array, contracted: tuple[Array, Array], direct_up_to: int | None
+) -> _Stage:
+    """The stage of links and labels as `_contracted` gives them."""
+    links, label = contracted
+    pair, size = label[ends[links]], int(label.max(initial=-1)) + 1
+    free = np.ones(size, bool)
+    free[np.unique(groups(pair, size), return_index=True)[1]] = False
+    index = np.cumsum(free) - 1
+    own = conductance[links]
+    tied = np.zeros(int(free.sum()))
+    for side in (0, 1):
+        held = free[pair[:, side]] & ~free[pair[:, 1 - side]]
+        tied += np.bincount(index[pair[held, side]], weights=own[held], minlength=len(tied))
+    inner = np.all(free[pair], axis=1)
+    balances = Balances(index[pair[inner]], own[inner], tied, direct_up_to=direct_up_to)
+    return _Stage(links=links, label=label, free=free, balances=balances)
+
+
+def _sweep(
+    stages: list[_Stage],
+    ends: Array,
+    conductance: Array,
+    drive: Array,
+    state: tuple[Array, float | None],
+) -> tuple[Array, Array, Array]:
+    """Increments of pressure (n,) and flux (K,), and the drive (K,) left for the next sweep.
+
+    The increments balance what drives the links, `drive` (K,), and what the nodes lack. The drive
+    that is left is what the lower stages have since set up for the stiffer links. `state` holds
+    the net flux (n,) out of each node, and the sum of imbalances that may stay.
+    """
+    net, allowed = state
+    flux, late, steps = np.zeros(len(ends)), np.zeros(len(ends)), []
+    for stage in stages:
+        own, pushed = conductance[stage.links], drive[stage.links]
+        net = net + _net(ends[stage.links], own * pushed, len(net))
+        lack = np.bincount(stage.label, weights=-net, minlength=len(stage.free))
+        pressure = np.zeros(len(stage.free))
+        pressure[stage.free] = stage.balances.solve(lack[stage.free], imbalance=allowed)
+        steps.append(pressure[stage.label])
+        gain = own * _difference(steps[-1], ends[stage.links])
+        net = net + _net(ends[stage.links], gain, len(net))
+        flux[stage.links] = gain + own * pushed
+    for at, stage in enumerate(stages):
+        for step in steps[at + 1 :]:
+            late[stage.links] += _difference(step, ends[stage.links])
+    return np.sum(steps, axis=0), flux, late
+
+
+def _difference(pressure: Array, ends: Array) -> Array:
+    """Pressure difference (K,) along each link."""
+    return pressure[ends[:, 0]] - pressure[ends[:, 1]]
+
+
+def _net(ends: Array, flux: Array, count: int) -> Array:
+    """Net flux (n,) out of each node."""
+    return np.bincount(ends[:, 0], weights=flux, minlength=count) - np.bincount(
+        ends[:, 1], weights=flux, minlength=count
+    )
+
+
+def _defect(net: Array, late: Array, throughput: float) -> float:
+    """Imbalances of nodes `net` (n,) and of links `late` (K,) over the throughput."""
+    off = float(np.abs(net).sum() + np.abs(late).sum())
+    return off / throughput if throughput > 0 else np.inf

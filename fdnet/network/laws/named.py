@@ -1,21 +1,53 @@
-"""The laws by the names that a case or the command line gives them."""
+"""The laws of clean throats, and all laws by name.
 
-from collections.abc import Mapping
+Conductance of clean throats: three laws.
+
+Each law takes a Network and returns the conductance g (T,) m3 of its throats. Viscosity is
+factored out: flux = g dp / mu, with the pressure drop dp along the throat and the viscosity mu.
+"""
+
+from collections.abc import Callable, Mapping
 from functools import partial
 
-from fdnet.case.names import DEFAULT_LAW
-from fdnet.errors import CaseError
-from fdnet.network.laws.conductance import (
-    Law,
-    effective_law,
-    lubrication_law,
-    thesis_law,
-)
-from fdnet.network.laws.damage import DamageLaw
-from fdnet.network.laws.section_archie import section_archie_damage
-from fdnet.network.laws.thesis_damage import CODE_THRESHOLD, TEXT_THRESHOLD, thesis_damage
+import numpy as np
 
-__all__ = ["DAMAGE_LAWS", "DEFAULT_LAW", "LAWS"]
+from fdnet.errors import CaseError
+from fdnet.network.laws.damage import CODE_THRESHOLD, TEXT_THRESHOLD, DamageLaw, thesis_damage
+from fdnet.network.laws.deposit_resistances import grain_resistances
+from fdnet.network.laws.section_archie import section_archie_damage
+from fdnet.network.network import Network
+from fdnet.spheres.snapshot import Array
+
+Law = Callable[[Network], Array]
+
+
+def thesis_law(network: Network) -> Array:
+    """Hagen-Poiseuille flow in a tube of the inscribed radius r: g = pi r^4 / (8 L).
+
+    L is the length of the throat. Shi 2011, section 3.1.3.
+    """
+    return np.pi * network.throat_radius**4 / (8.0 * network.throat_length)
+
+
+def effective_law(network: Network) -> Array:
+    """Hagen-Poiseuille flow in a tube of equal open area S: g = pi r^4 / (8 L), r = sqrt(S / pi).
+
+    Shi 2011, section 3.1.2, figure 26.
+    """
+    return np.pi * network.throat_radius_effective**4 / (8.0 * network.throat_length)
+
+
+def lubrication_law(network: Network) -> Array:
+    """One over the resistance between the nodes of pores, by extended lubrication theory.
+
+    No constant is fitted; see `lubrication` for the theory and its sources.
+    """
+    return 1.0 / grain_resistances(network).sum(axis=1)
+
+
+# ------------------------------------------------------------------------------------------------
+# The laws by the names that a case or the command line gives them.
+
 
 LAWS: Mapping[str, Law] = {
     "thesis": thesis_law,

@@ -1,48 +1,189 @@
-"""Damage by the share that the fines leave of each section of a throat.
+"""The damage law of sections: what fines leave of the flow through each section of a throat.
 
-The sections of a throat are those of `lubrication`, with discs of the three grains. Every fine
-that reaches into the throat shows a disc in the sections that it meets. Together they leave the
-share s of the flux through the section, summed over rays (`outside.share_around`). The section
-then carries s^m of its clean flux.
-
-With m = 1 the fluid would go straight through the gaps between the fines. But the gaps of one
-section do not lie behind those of the next, so its path winds. Archie (1942, Trans. AIME 146, 54)
-measured the same for an electric current in unconsolidated sand: its resistance grows as porosity
-to the power -1.3. The same power is taken here.
-
-The factor of the widening tube (`lubrication`) is that of the narrowed sections.
+Which fines reach into the sections of a throat, and where they lie as seen from its facet.
 """
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fdnet.network import geometry
-from fdnet.network.compiled import compiled_for_loops, loops_in_place
+from fdnet.network.compiled import compiled, compiled_for_loops, loops_in_place
+from fdnet.network.fines.deposit import mirrored_images, points_in_boxes, size_classes
 from fdnet.network.fines.occupancy import Occupancy, ratio
-from fdnet.network.laws.beside_throats import FineImages, Prisms, prisms_of
+from fdnet.network.geometry import dot, flat
+from fdnet.network.laws.cross_section import inwards, set_sides, wall_cuts
 from fdnet.network.laws.damage import BLOCKED, CLEAN, SECTIONS, Damage
 from fdnet.network.laws.lubrication import (
     THROATS,
     WIDENING,
     Prepared,
+    SectionRoom,
     Span,
+    forget,
     prepared,
     resistance_of,
+    section_room,
     set_fluxes,
     spans_of,
     throat_at,
 )
-from fdnet.network.laws.open_sections import SectionRoom, forget, section_room
-from fdnet.network.laws.outside import meet, share_around
-from fdnet.network.laws.section_rays import set_sides
-from fdnet.network.laws.wall_cross_section import wall_cuts
-from fdnet.network.laws.wedge import ratio_table
+from fdnet.network.laws.reaching_grains import facet_axes, meet, share_around
+from fdnet.network.laws.wedges import ratio_table
 from fdnet.network.network import LENGTH_FLOOR, Network
 from fdnet.network.nodes import nodes_of
-from fdnet.spheres.arrays import one_line
-from fdnet.spheres.snapshot import Array, Snapshot, frozen
+from fdnet.spheres.snapshot import Array, Snapshot, frozen, one_line, unmoved
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class FinesBeside:
+    """Fines that reach into the prisms of K throats, from node to node.
+
+    Attributes:
+        first: (K+1,) the first fine of each throat, and their number N at the end.
+        place: (N, 5) m, along the first edge of the facet, across it towards the third corner,
+            and height above the facet towards the second pore, of its centre from the first
+            corner; its radius m, and 1 (a sphere is not flat).
+    """
+
+    first: Array
+    place: Array
+
+    __repr__ = one_line
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Prisms:
+    """The prisms of K throats, from node to node.
+
+    Attributes:
+        origin: (K, 3) m, the first corner of each facet.
+        axes: unit vectors (K, 3) of `facet_axes`.
+        base: (K, 3, 2) m, corners of the facets in their own planes.
+        height: (K, 2) m above the facets, of the lower and the upper end.
+        low: (K, 3) m, lower corners of the boxes around them.
+        high: (K, 3) m, their upper corners.
+    """
+
+    origin: Array
+    axes: tuple[Array, Array, Array]
+    base: Array
+    height: Array
+    low: Array
+    high: Array
+
+    __repr__ = one_line
+
+
+def prisms_of(network: Network, part: slice, heights: Array) -> Prisms:
+    """The prisms of the throats `part` (K), whose nodes are `heights` (K, 2) m above the facet."""
+    facet = network.image_position[network.throat_images[part]]
+    axes = facet_axes(network, np.arange(part.start, part.stop), facet)
+    height = heights * (-1.0, 1.0)
+    ends = (facet[:, None] + (height[:, :, None] * axes[2][:, None])[:, :, None]).reshape(
+        len(facet), 6, 3
+    )
+    return Prisms(
+        origin=facet[:, 0].copy(),
+        axes=axes,
+        base=flat(facet),
+        height=np.sort(height, axis=1),
+        low=ends.min(axis=1),
+        high=ends.max(axis=1),
+    )
+
+
+class FineImages:
+    """Spheres at `position` (N, 3) m of `radius` (N,) m, with their images near all throats.
+
+    The images are shifted or mirrored. A fine that is centred on or beyond a face that is not
+    periodic has no mirror image there: its body inside the box is that of the sphere itself.
+    """
+
+    def __init__(self, network: Network, position: Array, radius: Array) -> None:
+        used = np.zeros(len(network.image_position), bool)
+        used[network.throat_images] = True
+        corner = network.image_position[used]
+        low, high = corner.min(axis=0), corner.max(axis=0)
+        self._classes: list[tuple[Array, Array]] = []
+        for some in size_classes(radius) if len(radius) else []:
+            own = radius[some]
+            place, owner = mirrored_images(network, position[some], low, high, float(own.max()))
+            self._classes.append((place, own[owner]))
+
+    def beside(self, prisms: Prisms, rows: Array | None = None) -> FinesBeside:
+        """The fines that reach into the prisms (K), or into those of some `rows` alone."""
+        throats, places = [np.zeros(0, np.intp)], [np.zeros((0, 5))]
+        for throat, place in self._reaching(prisms, rows):
+            throats.append(throat)
+            places.append(place)
+        throat, place = np.concatenate(throats), np.concatenate(places)
+        order = np.lexsort((*place[:, 2::-1].T, throat))  # whatever order the search has
+        first = np.searchsorted(throat[order], np.arange(len(prisms.low) + 1))
+        return FinesBeside(first=frozen(first), place=frozen(place[order]))
+
+    def reached(self, prisms: Prisms) -> Array:
+        """Whether a fine reaches into each of the prisms (K,)."""
+        some = np.zeros(len(prisms.low), bool)
+        for throat, _ in self._reaching(prisms, None):
+            some[throat] = True
+        return some
+
+    def _reaching(self, prisms: Prisms, rows: Array | None) -> Iterator[tuple[Array, Array]]:
+        """The throat (N,) and `place` (N, 5) of fines of one size after the other, not sorted."""
+        low, high = prisms.low, prisms.high
+        if rows is not None:
+            low, high = low[rows], high[rows]
+        for position, radius in self._classes:
+            widest = float(radius.max())
+            row, image = points_in_boxes(position, low - widest, high + widest)
+            reach = radius[image, None]  # its own, whatever other fines are in the class
+            near = (position[image] >= low[row] - reach) & (position[image] <= high[row] + reach)
+            row, image = (one[near.all(axis=1)] for one in (row, image))
+            throat = row if rows is None else rows[row]
+            away = position[image] - prisms.origin[throat]
+            place = np.ones((len(throat), 5))
+            for k, axis in enumerate(prisms.axes):
+                place[:, k] = dot(away, axis[throat])
+            place[:, 3] = radius[image]
+            real = _reaching(prisms.base, prisms.height, throat, place)
+            yield throat[real], place[real]
+
+
+@compiled
+def _reaching(base: Array, height: Array, throat: Array, place: Array) -> Array:
+    """Whether spheres (N) reach between two heights (K, 2) m and within the lines of a triangle.
+
+    The triangles are `base` (K, 3, 2) m, `throat` (N,) says which, and `place` (N, 5) is that of
+    `FinesBeside`.
+    """
+    real, side = np.empty(len(throat), np.bool_), np.empty((3, 3))
+    for n in range(len(throat)):
+        t, x, y, z, r = throat[n], place[n, 0], place[n, 1], place[n, 2], place[n, 3]
+        real[n] = height[t, 0] - r < z < height[t, 1] + r
+        if real[n]:
+            set_sides(base[t], side)
+            for i in range(3):
+                real[n] = real[n] and inwards(base[t], side, i, x, y) > -r
+    return real
+
+
+# ------------------------------------------------------------------------------------------------
+# Damage by the share that the fines leave of each section of a throat.
+#
+# The sections of a throat are those of `lubrication`, with discs of the three grains. Every fine
+# that reaches into the throat shows a disc in the sections that it meets. Together they leave the
+# share s of the flux through the section, summed over rays (`outside.share_around`). The section
+# then carries s^m of its clean flux.
+#
+# With m = 1 the fluid would go straight through the gaps between the fines. But the gaps of one
+# section do not lie behind those of the next, so its path winds. Archie (1942, Trans. AIME 146,
+# 54) measured the same for an electric current in unconsolidated sand: its resistance grows as
+# porosity to the power -1.3. The same power is taken here.
+#
+# The factor of the widening tube (`lubrication`) is that of the narrowed sections.
+
 
 EXPONENT = 1.3
 """Power of the share that the fines leave: Archie's for unconsolidated sand."""
@@ -230,3 +371,92 @@ def _both(
         flux[k] *= share_around(base, side, (count, seen), rays, table) ** power
     given_step = (part, step, widening)
     return resistance_of(clear, given_step), resistance_of(flux, given_step)
+
+
+# ------------------------------------------------------------------------------------------------
+# The damage law `section-archie` where fines come, leave and move between the solves of a flow.
+#
+# The resistances of a throat depend on the fines that reach into it and on nothing else. Only
+# throats that a changed fine reaches, at its former place or at its new one, are summed anew.
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class KeptSections:
+    """Resistances of the sides of throats (T) among fines.
+
+    Attributes:
+        network: pores and throats.
+        parts: what does not depend on the fines, of its throats.
+        step: greatest between two sections, in radii of the smallest fine in the throat.
+        fines: at the places for which the resistances hold.
+        without: (T, 2) 1/m3, without the fines; see `fine_resistances`.
+        raised: (T, 2) 1/m3, with them.
+        renewed: number of throats that the last change summed anew.
+    """
+
+    network: Network
+    parts: Sequence[Part]
+    step: float
+    fines: Snapshot
+    without: Array
+    raised: Array
+    renewed: int
+
+    __repr__ = one_line
+
+    @property
+    def factor(self) -> Array:
+        """Share (T, 2) of its clean conductance that each side keeps, at most 1."""
+        finite = np.where(np.isfinite(self.raised), self.raised, 0.0)
+        left = ratio(self.without, finite)  # 0 where the fines close a side
+        return np.where(self.raised > self.without, left, 1.0)
+
+    def changed_to(self, fines: Snapshot) -> "KeptSections":
+        """The resistances among other `fines`; those at the same place are taken as unchanged."""
+        new, old = unmoved((fines.id, fines.position), (self.fines.id, self.fines.position))
+        gone, come = np.ones(len(self.fines), bool), np.ones(len(fines), bool)
+        gone[old] = come[new] = False
+        reached = self._throats_beside(
+            np.concatenate([self.fines.position[gone], fines.position[come]]),
+            np.concatenate([self.fines.radius[gone], fines.radius[come]]),
+        )
+        both = fine_resistances(
+            self.network, fines, among=reached, parts=self.parts, step=self.step
+        )[:2]
+        without, raised = (
+            np.where(reached[:, None], now, before)
+            for now, before in zip(both, (self.without, self.raised), strict=True)
+        )
+        return replace(
+            self,
+            fines=fines,
+            without=frozen(without),
+            raised=frozen(raised),
+            renewed=int(reached.sum()),
+        )
+
+    def _throats_beside(self, position: Array, radius: Array) -> Array:
+        """Whether spheres at `position` (N, 3) m of `radius` (N,) m reach into each throat."""
+        images = FineImages(self.network, position, radius)
+        return np.concatenate([images.reached(part.prisms) for part in self.parts])
+
+
+def measured_sections(
+    network: Network,
+    fines: Snapshot,
+    *,
+    parts: Sequence[Part] | None = None,
+    step: float = STEP,
+) -> KeptSections:
+    """The resistances among `fines`, those of all throats summed; `parts` of the network."""
+    parts = tuple(parts_of(network)) if parts is None else parts
+    without, raised, _ = fine_resistances(network, fines, parts=parts, step=step)
+    return KeptSections(
+        network=network,
+        parts=parts,
+        step=step,
+        fines=fines,
+        without=frozen(without),
+        raised=frozen(raised),
+        renewed=len(without),
+    )

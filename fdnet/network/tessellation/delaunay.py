@@ -1,21 +1,514 @@
-"""Tetrahedra of grains and images: Delaunay's, or for unequal grains of the power tessellation.
+"""Grains in their box with images and mirror images, and the tetrahedra between them.
 
-Along a periodic axis tetrahedra that differ by whole periods are one.
+The grains that are tessellated: checked, and placed with their centres in the box.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import ConvexHull, Delaunay, QhullError
 
 from fdnet.errors import NetworkError
 from fdnet.network import geometry
-from fdnet.network.tessellation.points import Points, make_points
-from fdnet.network.tessellation.tetrahedron import centres
+from fdnet.network.compiled import compiled
 from fdnet.network.tessellation.triangulation import triangulate
-from fdnet.spheres.arrays import one_line
-from fdnet.spheres.images import INSIDE
-from fdnet.spheres.snapshot import Array, Snapshot
+from fdnet.spheres.geometry import (
+    INSIDE,
+    inside_others,
+    label,
+    make_images,
+    neighbour_tree,
+    packed_shift,
+)
+from fdnet.spheres.snapshot import Array, Snapshot, one_line
+
+LENGTHS = (1e-60, 1e60)
+"""Shortest radius and longest length, m; no double number holds the cubes of lengths beyond."""
+COARSE = 1e-8
+"""Largest rounding of a coordinate, in mean grain radii: a tenth of the shake (`points.SHAKE`),
+which coarser coordinates could not hold."""
+COINCIDENT = 1e-3
+"""Grains that are placed nearer than this, in radii of the smallest grain, coincide."""
+ON_FACE_TOLERANCE = 1e-6
+"""A centre within this distance of a mirrored face, in mean grain radii, lies on the face."""
+INSET = 1e-4
+"""Depth inside the box, in mean grain radii, of grains that are placed on an x face."""
+ITERATIONS = 20
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PlacedGrains:
+    """The n grains that reach into the box, every centre inside it or on its mirrored faces.
+
+    Attributes:
+        grains: the n grains, their positions and radii as they are tessellated.
+        height: (n,) m, how far what stands for each grain reaches from its centre along x: less
+            than the radius for the flat cap of a grain centred beyond an x face.
+        index: (n,) which of the given grains they are.
+        periodic: whether the sides x, y and z are periodic; the other faces are mirror planes.
+        scale: m, mean radius of these grains as given.
+        beyond: number of grains whose given centre lay beyond a mirrored face.
+        inside: (n,) whether more than half of the surface of a grain lies inside another one.
+        dropped: number of grains that were left out, because they lie wholly inside another one or
+            are placed where a larger one is.
+    """
+
+    grains: Snapshot
+    height: Array
+    outward: Array
+    index: Array
+    periodic: tuple[bool, bool, bool]
+    scale: float
+    beyond: int
+    inside: Array
+    dropped: int
+
+    __repr__ = one_line
+
+
+def place_grains(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> PlacedGrains:
+    """The grains that reach into the box, ready for the tessellation.
+
+    Grains that add nothing to the solid are left out. Raises NetworkError on impossible lengths
+    (`check_lengths`) and on fewer than four grains in the box.
+    """
+    if len(grains):
+        check_lengths(grains, periodic)
+    reaching = _reaching(grains, periodic) if len(grains) else np.zeros(0, int)
+    wholly, mostly, _ = inside_others(grains.where(reaching), periodic)
+    index, mostly = reaching[~wholly], mostly[~wholly]
+    placed, beyond = onto_walls(grains.where(index), periodic)
+    if len(double := _coinciding(placed, periodic)):
+        index, mostly = np.delete(index, double), np.delete(mostly, double)
+        placed, beyond = onto_walls(grains.where(index), periodic)
+    if len(index) < 4:
+        dropped = f", {len(reaching)} with those inside others" * (len(index) < len(reaching))
+        raise NetworkError(
+            f"tessellation: {len(index)} of {len(grains)} grains reach into the box{dropped}; a "
+            "tetrahedron needs at least 4, give more grains, repeat a periodic cell, or mend the "
+            "box"
+        )
+    inside = grains.where(index)
+    outward = _outward(inside, periodic)
+    return PlacedGrains(
+        grains=placed,
+        height=_heights_along_x(inside, placed, outward),
+        outward=outward,
+        index=index,
+        periodic=periodic,
+        scale=float(inside.radius.mean()),
+        beyond=beyond,
+        inside=mostly,
+        dropped=len(reaching) - len(index),
+    )
+
+
+def check_lengths(spheres: Snapshot, periodic: tuple[bool, ...]) -> None:
+    """Raise NetworkError on lengths that no tessellation can work with.
+
+    These are radii or box sides that are not positive, lengths whose cubes no double number holds,
+    and a box, or centres along its periodic sides, so far from the origin that their coordinates
+    are rounded by more than 1e-8 mean radii.
+    """
+    box, radius = spheres.box, spheres.radius
+    if np.any(radius <= 0):
+        raise NetworkError("tessellation: a grain radius is not positive; check the input lengths")
+    largest = max(float(np.max(np.abs(one))) for one in (box, radius, spheres.position))
+    if radius.min() < LENGTHS[0] or largest > LENGTHS[1]:
+        raise NetworkError(
+            f"tessellation: lengths from {radius.min():.3g} m (radius) to {largest:.3g} m, "
+            f"expected between {LENGTHS[0]:g} and {LENGTHS[1]:g} m; check the units"
+        )
+    around = spheres.position[:, np.array(periodic, bool)]
+    scale = float(radius.mean())
+    farthest = max(float(np.max(np.abs(box))), float(np.max(np.abs(around), initial=0.0)))
+    if np.spacing(farthest) > COARSE * scale:
+        raise NetworkError(
+            f"tessellation: coordinates up to {farthest:.3g} m are rounded by "
+            f"{np.spacing(farthest):.1g} m, more than {COARSE:g} of a radius of {scale:.3g} m; "
+            "move the specimen to the origin, check units and box"
+        )
+    if np.any(box[:, 1] <= box[:, 0]):
+        raise NetworkError("tessellation: a box side is not positive; check the input lengths")
+
+
+def _reaching(grains: Snapshot, periodic: tuple[bool, ...]) -> Array:
+    """Indices (n,) of the grains whose sphere reaches into the box."""
+    beyond = np.maximum(grains.box[:, 0] - grains.position, grains.position - grains.box[:, 1])
+    return np.flatnonzero(np.all((beyond < grains.radius[:, None]) | np.array(periodic), axis=1))
+
+
+def onto_walls(grains: Snapshot, periodic: tuple[bool, ...]) -> tuple[Snapshot, int]:
+    """Grains with every centre inside or on the mirrored faces, and how many were centred beyond.
+
+    Of a grain centred beyond a face only a cap is inside the box. A half sphere of the volume of
+    that cap, centred on the face, takes its place: the specimen stays its own mirror image and
+    keeps its void. A centre within `ON_FACE_TOLERANCE` of a face is put on the face. At the x
+    faces it is put 1e-4 mean radii inside instead, so that the facets between three such grains
+    are throats which end in pores on the face, where the pressure is held.
+    """
+    scale = float(grains.radius.mean()) if len(grains) else 0.0
+    tolerance = ON_FACE_TOLERANCE * scale
+    position, radius = grains.position.copy(), grains.radius.copy()
+    moved = np.zeros(len(grains), bool)
+    for axis in np.flatnonzero(~np.array(periodic)):
+        low, high = grains.box[axis]
+        beyond = np.maximum(low - position[:, axis], position[:, axis] - high)
+        outside = beyond > tolerance
+        height = np.where(outside, radius - beyond, radius)
+        # half sphere 2 pi r^3 / 3 against cap pi h^2 (3 R - h) / 3
+        depth = INSET * scale if axis == 0 else 0.0
+        radius = np.where(outside, _same_cap(radius, height, depth), radius)
+        near = beyond > -max(tolerance, depth)
+        middle = 0.5 * (low + high)
+        position[near, axis] = np.where(position[near, axis] < middle, low + depth, high - depth)
+        moved |= outside
+    return replace(grains, position=position, radius=radius), int(moved.sum())
+
+
+def _same_cap(radius: Array, height: Array, depth: float) -> Array:
+    """Radius (n,) m of the sphere whose part inside a face has the volume of a given cap.
+
+    The sphere is centred `depth` m inside the face; the cap has `height` (n,) m and belongs to a
+    sphere of `radius` (n,) m.
+    """
+    cap = 0.5 * height**2 * (3.0 * radius - height)
+    same = np.cbrt(cap)
+    for _ in range(ITERATIONS):
+        same = np.cbrt(np.maximum(cap - 1.5 * depth * same**2 + 0.5 * depth**3, 0.0))
+    return np.maximum(same, depth)
+
+
+def _outward(given: Snapshot, periodic: tuple[bool, ...]) -> Array:
+    """How far beyond an x face (n,) m the grains are centred that show the box a flat cap.
+
+    It is 0 for all other grains, those that lie beyond a side wall as well among them.
+    """
+    beyond = np.maximum(given.box[:, 0] - given.position, given.position - given.box[:, 1])
+    outside = (beyond > ON_FACE_TOLERANCE * float(given.radius.mean())) & ~np.array(periodic)
+    return np.where(outside[:, 0] & ~outside[:, 1:].any(axis=1), beyond[:, 0], 0.0)
+
+
+def _heights_along_x(given: Snapshot, placed: Snapshot, outward: Array) -> Array:
+    """Semi-axis along x (n,) m of the half ellipsoids that stand for caps at the x faces.
+
+    Of a grain centred beyond an x face, by `outward` (n,) m, a cap of height h on a disc of radius
+    a is in the box. The half ellipsoid on that disc with the volume of the cap has the height
+    h (3 a^2 + h^2) / (4 a^2); `placed` has the radius of the half sphere of that volume. All other
+    grains are spheres: their height is their radius.
+    """
+    tall = given.radius - outward
+    base = tall * (2.0 * given.radius - tall)
+    return np.where(outward > 0.0, tall * (3.0 * base + tall**2) / (4.0 * base), placed.radius)
+
+
+def _coinciding(grains: Snapshot, periodic: tuple[bool, ...]) -> Array:
+    """Indices of placed grains that coincide with one that is not smaller."""
+    if not len(grains):
+        return np.zeros(0, int)
+    tree = neighbour_tree(grains.position, grains.box, periodic=periodic)
+    close = tree.query_pairs(COINCIDENT * float(grains.radius.min()), output_type="ndarray")
+    first, second = close.T
+    return np.unique(np.where(grains.radius[first] < grains.radius[second], first, second))
+
+
+# ------------------------------------------------------------------------------------------------
+# The points that are tessellated: the centres of the grains and of their images near the box.
+#
+# Along a periodic axis a grain has images shifted by whole periods. A face that is not periodic is
+# a mirror plane: it separates every grain from its own mirror image, so the power centres of what
+# lies inside the box are inside too, and those of what the face cuts lie on the face.
+#
+# A shake of 1e-7 mean grain radii, for the tessellation alone and the same for all periodic images
+# of a grain, splits cospherical sets of grains (lattices, and always the prisms cut by a face) in
+# the same manner everywhere.
+
+
+SHAKE = 1e-7
+"""Largest displacement of a point along an axis, in mean grain radii."""
+SHAKE_SEED = 3_141_592
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Points:
+    """M images of n grains, the grains themselves among them.
+
+    Attributes:
+        owner: (M,) index of the grain.
+        position: (M, 3) m, centre of the image.
+        shift: (M, 3) whole periods by which the image is moved along each axis.
+        mirror: (M, 3) one of INSIDE, MIRROR_LOW, MIRROR_HIGH, ON_FACE of `spheres.images`.
+        radius: (M,) m.
+        shaken: (M, 3) m, centre after the shake.
+        scaled: (M, 3) shaken centre from the low corner of the box, in mean grain radii.
+        name: (M,) integer of grain and mirror image; images that differ by periods share it.
+        key: (M,) integer that orders the images by name, then by shift.
+    """
+
+    owner: Array
+    position: Array
+    shift: Array
+    mirror: Array
+    radius: Array
+    shaken: Array
+    scaled: Array
+    name: Array
+    key: Array
+
+    __repr__ = one_line
+
+
+def make_points(grains: Snapshot, *, periodic: tuple[bool, ...], margin: Array) -> Points:
+    """All images of `grains` within `margin` (3,) m of the box."""
+    scale = float(grains.radius.mean())
+    images = make_images(
+        grains.position,
+        grains.box,
+        periodic=periodic,
+        margin=margin,
+        tolerance=ON_FACE_TOLERANCE * scale,
+    )
+    name = label(images)
+    key = name.astype(np.int64) * 2**30 + packed_shift(images.shift)
+    shake = _shake(grains, images.owner, name)
+    scaled = (images.position - grains.box[:, 0]) / scale + shake
+    return Points(
+        owner=images.owner,
+        position=images.position,
+        shift=images.shift,
+        mirror=images.mirror,
+        radius=grains.radius[images.owner],
+        shaken=scaled * scale + grains.box[:, 0],
+        scaled=scaled,
+        name=name,
+        key=key,
+    )
+
+
+def _shake(grains: Snapshot, owner: Array, name: Array) -> Array:
+    """Displacement (M, 3) of the images in mean radii, the same for those that differ by periods.
+
+    It is drawn by the rank of the grain in the order of x, y, z, so that another numbering of the
+    grains changes nothing.
+    """
+    rank = np.empty(len(grains), int)
+    rank[np.lexsort(grains.position.T[::-1])] = np.arange(len(grains))
+    mirrors, code = np.unique(name % 27, return_inverse=True)
+    noise = np.random.default_rng(SHAKE_SEED).uniform(
+        -SHAKE, SHAKE, (len(mirrors), len(grains), 3)
+    )
+    return noise[code, rank[owner]]
+
+
+# ------------------------------------------------------------------------------------------------
+# What is measured on one tetrahedron after the other, in one compiled pass.
+#
+# The formulas are those of `geometry`, which has their sources. Here they are written for the
+# corners of one tetrahedron, so that a whole pack needs no arrays in between.
+
+
+Vector = tuple[float, float, float]
+
+
+@compiled
+def less(points: Array, a: int, b: int) -> Vector:
+    """Row `a` of `points` (M, 3) less row `b`."""
+    return points[a, 0] - points[b, 0], points[a, 1] - points[b, 1], points[a, 2] - points[b, 2]
+
+
+@compiled
+def times(left: Vector, right: Vector) -> Vector:
+    """Vector product."""
+    return (
+        left[1] * right[2] - left[2] * right[1],
+        left[2] * right[0] - left[0] * right[2],
+        left[0] * right[1] - left[1] * right[0],
+    )
+
+
+@compiled
+def along(left: Vector, right: Vector) -> float:
+    """Scalar product."""
+    return left[0] * right[0] + left[1] * right[1] + left[2] * right[2]
+
+
+@compiled
+def centres(
+    position: Array, shaken: Array, radius: Array, vertex: Array, given: tuple[float, float]
+) -> tuple[Array, Array, Array, Array]:
+    """Power centre (P, 3) m, reach (P,) m, volume (P,) m3 and flatness (P,) of tetrahedra.
+
+    `position` and `shaken` (M, 3) m are the points, `radius` (M,) m their spheres, `vertex` (P, 4)
+    the corners. `given` is the volume m3 below which a tetrahedron is flat and takes the centre of
+    its shaken corners, and the radius m of the largest sphere: the reach is that of the sphere
+    about the power centre in which the centre of the largest would have less power.
+    """
+    count = len(vertex)
+    centre, reach = np.empty((count, 3)), np.empty(count)
+    volume, flat = np.empty(count), np.empty(count, np.bool_)
+    flattest, largest = given
+    for t in range(count):
+        a, b, c, d = vertex[t, 0], vertex[t, 1], vertex[t, 2], vertex[t, 3]
+        one, two, three = less(position, b, a), less(position, c, a), less(position, d, a)
+        volume[t] = abs(along(one, times(two, three))) / 6.0
+        flat[t] = volume[t] < flattest
+        base = shaken if flat[t] else position
+        if flat[t]:
+            one, two, three = less(base, b, a), less(base, c, a), less(base, d, a)
+        first = radius[a]
+        half = (
+            0.5 * (along(one, one) + (first - radius[b]) * (first + radius[b])),
+            0.5 * (along(two, two) + (first - radius[c]) * (first + radius[c])),
+            0.5 * (along(three, three) + (first - radius[d]) * (first + radius[d])),
+        )
+        offset = _solved(one, two, three, half)
+        for k in range(3):
+            centre[t, k] = base[a, k] + offset[k]
+        power = along(offset, offset) - first * first
+        reach[t] = np.sqrt(max(power + largest * largest, 0.0))
+    return centre, reach, volume, flat
+
+
+@compiled
+def _solved(one: Vector, two: Vector, three: Vector, right: Vector) -> Vector:
+    """The vector with these three scalar products with three others; NaN if they lie in a plane.
+
+    Cramer's rule.
+    """
+    first, second, third = times(two, three), times(three, one), times(one, two)
+    determinant = along(one, first)
+    scale = 1.0 / determinant if determinant != 0.0 else np.nan
+    x, y, z = right[0] * scale, right[1] * scale, right[2] * scale
+    return (
+        x * first[0] + y * second[0] + z * third[0],
+        x * first[1] + y * second[1] + z * third[1],
+        x * first[2] + y * second[2] + z * third[2],
+    )
+
+
+@compiled
+def touching_spheres(
+    points: Array, radius: Array, vertex: Array, tolerance: float
+) -> tuple[Array, Array, Array]:
+    """Sphere that touches the four on the corners: centre (P, 3) m, radius (P,) m, and if within.
+
+    The radius is NaN where there is none. The last (P,) is true where the centre lies in the
+    tetrahedron; a barycentric coordinate may be negative by `tolerance`.
+    """
+    count = len(vertex)
+    centre, touching = np.empty((count, 3)), np.empty(count)
+    within = np.zeros(count, np.bool_)
+    for t in range(count):
+        a, b, c, d = vertex[t, 0], vertex[t, 1], vertex[t, 2], vertex[t, 3]
+        one, two, three = less(points, b, a), less(points, c, a), less(points, d, a)
+        first = radius[a]
+        constant = (
+            0.5 * (along(one, one) + first**2 - radius[b] ** 2),
+            0.5 * (along(two, two) + first**2 - radius[c] ** 2),
+            0.5 * (along(three, three) + first**2 - radius[d] ** 2),
+        )
+        apart = (first - radius[b], first - radius[c], first - radius[d])
+        u, v = _solved(one, two, three, constant), _solved(one, two, three, apart)
+        half, rest = first - along(u, v), along(u, u) - first**2
+        under = half**2 - (along(v, v) - 1.0) * rest
+        below = half + np.sqrt(under) if under >= 0.0 else np.nan
+        touching[t] = rest / below if below != 0.0 else np.nan
+        if not touching[t] > -min(first, radius[b], radius[c], radius[d]):
+            touching[t] = np.nan
+        offset = (
+            u[0] + v[0] * touching[t],
+            u[1] + v[1] * touching[t],
+            u[2] + v[2] * touching[t],
+        )
+        for k in range(3):
+            centre[t, k] = points[a, k] + offset[k]
+        within[t] = _within(one, two, three, offset, tolerance)
+    return centre, touching, within
+
+
+@compiled
+def _within(one: Vector, two: Vector, three: Vector, offset: Vector, tolerance: float) -> bool:
+    """Whether `offset` from a corner lies in the tetrahedron of three sides at that corner."""
+    first = times(two, three)
+    determinant = along(one, first)
+    if determinant == 0.0:
+        return False
+    x = along(offset, first) / determinant
+    y = along(offset, times(three, one)) / determinant
+    z = along(offset, times(one, two)) / determinant
+    return min(x, y, z) >= -tolerance and x + y + z <= 1.0 + tolerance
+
+
+@compiled
+def solids(points: Array, radius: Array, vertex: Array) -> tuple[Array, Array]:
+    """Volume (P,) m3 and surface (P,) m2 of the spheres on the corners in each tetrahedron.
+
+    As `geometry.solid_in_tetrahedra`.
+    """
+    count = len(vertex)
+    volume, surface = np.zeros(count), np.zeros(count)
+    for t in range(count):
+        a = vertex[t, 0]
+        one, two = less(points, vertex[t, 1], a), less(points, vertex[t, 2], a)
+        triple = abs(along(one, times(two, less(points, vertex[t, 3], a))))
+        for i in range(4):
+            own = vertex[t, i]
+            r = radius[own]
+            angle = _corner_angle(points, vertex[t], i, triple)
+            volume[t] += angle * r**3 / 3.0
+            surface[t] += angle * r**2
+            for j in range(i + 1, 4):
+                side = less(points, vertex[t, j], own)
+                apart, other = np.sqrt(along(side, side)), radius[vertex[t, j]]
+                if apart < r + other:
+                    turn = _edge_angle(points, vertex[t], (i, j), triple) / (2.0 * np.pi)
+                    shared, hidden = _lens(r, other, apart)
+                    volume[t] -= turn * shared
+                    surface[t] -= turn * hidden
+    return volume, surface
+
+
+@compiled
+def _corner_angle(points: Array, corner: Array, i: int, triple: float) -> float:
+    """Solid angle sr at corner `i`; `triple` m3 is six times the volume."""
+    a = less(points, corner[(i + 1) % 4], corner[i])
+    b = less(points, corner[(i + 2) % 4], corner[i])
+    c = less(points, corner[(i + 3) % 4], corner[i])
+    la, lb, lc = np.sqrt(along(a, a)), np.sqrt(along(b, b)), np.sqrt(along(c, c))
+    below = la * lb * lc + along(a, b) * lc + along(a, c) * lb + along(b, c) * la
+    return 2.0 * np.arctan2(triple, below)
+
+
+@compiled
+def _edge_angle(points: Array, corner: Array, ends: tuple[int, int], triple: float) -> float:
+    """Angle rad between the faces at the edge from corner i to j, `ends`."""
+    i, j = ends
+    k = 0
+    while k in (i, j):
+        k += 1
+    m = 6 - i - j - k
+    axis = less(points, corner[j], corner[i])
+    left = times(axis, less(points, corner[k], corner[i]))
+    right = times(axis, less(points, corner[m], corner[i]))
+    # (axis x u) x (axis x v) = axis (axis . (u x v))
+    return np.arctan2(np.sqrt(along(axis, axis)) * triple, along(left, right))
+
+
+@compiled
+def _lens(first: float, second: float, apart: float) -> tuple[float, float]:
+    """Volume m3 and surface m2 of the lens of two spheres that overlap."""
+    to_plane = (apart**2 + first**2 - second**2) / (2.0 * apart)
+    one = min(max(first - to_plane, 0.0), 2.0 * first)
+    other = min(max(second - apart + to_plane, 0.0), 2.0 * second)
+    volume = np.pi * (one**2 * (3.0 * first - one) + other**2 * (3.0 * second - other)) / 3.0
+    return volume, 2.0 * np.pi * (first * one + second * other)
+
+
+# ------------------------------------------------------------------------------------------------
+# Tetrahedra of grains and images: Delaunay's, or for unequal grains of the power tessellation.
+#
+# Along a periodic axis tetrahedra that differ by whole periods are one.
+
 
 FLAT = 1e-5
 """A tetrahedron of less volume, in mean grain radii cubed, is flat."""

@@ -1,14 +1,31 @@
-"""Facets that two tetrahedra share."""
+"""Facets of the tetrahedra, and the polyhedra that these make.
 
+Facets that two tetrahedra share.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
+from fdnet.errors import NetworkError
 from fdnet.network import geometry
-from fdnet.network.tessellation.delaunay import SAME_CENTRE, Tetrahedra
-from fdnet.spheres.arrays import one_line
-from fdnet.spheres.images import packed_shift
-from fdnet.spheres.snapshot import Array
+from fdnet.network.compiled import compiled, compiled_in_place
+from fdnet.network.tessellation.delaunay import (
+    SAME_CENTRE,
+    PlacedGrains,
+    Tetrahedra,
+    Vector,
+    along,
+    less,
+    make_tetrahedra,
+    place_grains,
+    times,
+)
+from fdnet.spheres.geometry import INSIDE, MIRROR_LOW, ON_FACE, packed_shift, repeated
+from fdnet.spheres.snapshot import Array, Snapshot, one_line
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -99,3 +116,546 @@ def _across_periods(
     beyond = np.any((below | above) & ~np.array(periodic), axis=1)
     shift = shifts[first, 0] - shifts[second, 0]
     return single[first], single[second], shift, int(np.sum(~beyond))
+
+
+# ------------------------------------------------------------------------------------------------
+# The tessellation of placed grains: tetrahedra that fill the box, and the facets they share.
+
+
+FIRST_MARGIN = 3.5
+"""Images of grains are first made within this many radii of the largest grain of the box."""
+ROUNDS = 8
+UNMATCHED_FEW = 1e-5
+"""Share of facets without partner that more images are not expected to help."""
+UNMATCHED_SHARE = 1e-3
+"""Share of facets without partner above which the tessellation is refused."""
+LARGE_CELL = 200
+"""Grains from which on a periodic cell is taken as it is."""
+SIDES_OF_CELLS = (0.0, 3.0, 4.0, 5.0, 6.0)
+"""Least sides of the cells that are tried, in sides of the cube that one grain has to itself."""
+GRAINS_A_FLAW = 27
+"""A repeated cell may have one facet without partner for so many grains."""
+MOST_PERIODS, MOST_IMAGES, IMAGES_A_GRAIN = 64, 50_000, 30
+"""Beyond these numbers grains or voids are far larger than the periodic sides, and Qhull would
+take hours. (Dense packs need 1 to 2 periods, a unit cell 125 images.)"""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Tessellation:
+    """Tetrahedra (P) of placed grains and the facets (T) between them.
+
+    Attributes:
+        tetrahedra: the P unique tetrahedra.
+        facets: the T facets that two tetrahedra share.
+        box: (3, 2) m, lower and upper bound of the specimen.
+        size: (3,) m, sides of the box.
+        periodic: whether the sides x, y and z are periodic; the other faces are mirror planes.
+        scale: m, mean radius of the grains.
+    """
+
+    tetrahedra: Tetrahedra
+    facets: Facets
+    box: Array
+    size: Array
+    periodic: tuple[bool, bool, bool]
+    scale: float
+
+    __repr__ = one_line
+
+
+def tessellate(placed: PlacedGrains) -> Tessellation:
+    """Unique tetrahedra of the grains in their box, and the facets they share.
+
+    Images of grains are added until every sphere that must be empty lies within them and every
+    facet has its partner. Both together mean that no tetrahedron is wrong or missing. A few facets
+    of flat tetrahedra may keep no partner, because rounding splits them otherwise on the two sides
+    of a period; more images do not help them, and they are counted.
+
+    Raises NetworkError on coplanar grains, on voids larger than the images reach, on more than
+    1e-3 of the facets without partner away from the mirrored faces, and when no facet is shared.
+    """
+    grains, periodic = placed.grains, placed.periodic
+    count, size = len(grains), grains.box[:, 1] - grains.box[:, 0]
+    margin = np.full(3, FIRST_MARGIN * float(grains.radius.max()))
+    for _ in range(ROUNDS):
+        margin = np.where(periodic, margin, np.minimum(margin, size))
+        _refuse_crowd(count, np.where(periodic, margin, 0.0), size)
+        widest = ~np.array(periodic) & (margin >= size)
+        tetrahedra = make_tetrahedra(grains, periodic=periodic, margin=margin)
+        needed = tetrahedra.margin
+        empty = len(tetrahedra.vertex) > 0 and bool(np.all((margin >= needed) | widest))
+        facets = share_facets(tetrahedra, grains.box, periodic=periodic) if empty else None
+        if facets is not None and (
+            facets.unmatched <= UNMATCHED_FEW * len(facets.pore) or widest.all()
+        ):
+            break
+        margin = np.maximum(1.5 * margin, np.minimum(1.02 * needed, 4.0 * margin))
+    if facets is None:
+        raise NetworkError(
+            f"tessellation of {count} grains: voids reach {needed.max():.3g} m beyond the box of "
+            f"{size.tolist()} m, further than the images around it; give more grains or a smaller "
+            "box"
+        )
+    _check_facets(facets, count)
+    return Tessellation(
+        tetrahedra=tetrahedra,
+        facets=facets,
+        box=grains.box,
+        size=size,
+        periodic=periodic,
+        scale=placed.scale,
+    )
+
+
+def copies_of_cell(
+    packs: Sequence[Snapshot], periodic: tuple[bool, bool, bool]
+) -> tuple[int, int, int]:
+    """How often a periodic cell is repeated along each axis, so that it can be tessellated.
+
+    In a cell of a few grains images of one grain lie on one sphere, and a tessellation splits them
+    in another way on the two sides of a period. The first of `packs` are the grains; the others
+    share their cell and are repeated with them. One copy where a larger cell does not help.
+    """
+    count = len(packs[0])
+    if not any(periodic) or not 0 < count < LARGE_CELL:
+        return 1, 1, 1
+    side = np.ptp(packs[0].box, axis=1)
+    spacing = np.cbrt(np.prod(side) / count)
+    for least in SIDES_OF_CELLS:
+        wanted = np.where(periodic, np.maximum(np.ceil(least * spacing / side), 1.0), 1.0)
+        if np.prod(wanted) * count > MOST_IMAGES / IMAGES_A_GRAIN:
+            break
+        times = int(wanted[0]), int(wanted[1]), int(wanted[2])
+        if all(_tiles(repeated(pack, times), periodic) for pack in packs):
+            return times
+    return 1, 1, 1
+
+
+def _tiles(grains: Snapshot, periodic: tuple[bool, bool, bool]) -> bool:
+    """Whether the tetrahedra of the grains fill their box, next to all facets with a partner."""
+    try:
+        made = tessellate(place_grains(grains, periodic=periodic))
+    except NetworkError:
+        return False
+    return made.facets.unmatched <= len(grains) // GRAINS_A_FLAW
+
+
+def _refuse_crowd(count: int, margin: Array, size: Array) -> None:
+    """Raise NetworkError when the images of `count` grains in `margin` (3,) m are too many."""
+    images = count * float(np.prod(1.0 + 2.0 * margin / size))
+    axis = int(np.argmax(margin / size))
+    most = MOST_IMAGES + IMAGES_A_GRAIN * count
+    if images > most or margin[axis] > MOST_PERIODS * size[axis]:
+        raise NetworkError(
+            f"tessellation of {count} grains: {images:.3g} images up to {margin[axis]:.3g} m "
+            f"beyond the periodic side {'xyz'[axis]} of {size[axis]:.3g} m are needed, expected "
+            f"at most {most} and {MOST_PERIODS} periods; grains or voids are far larger than the "
+            "box (check units and box), or a periodic cell of few grains is to be repeated"
+        )
+
+
+def _check_facets(facets: Facets, count: int) -> None:
+    """Raise NetworkError when the tetrahedra of `count` grains do not fill the box or touch."""
+    if facets.unmatched > max(4, UNMATCHED_SHARE * len(facets.pore)):
+        raise NetworkError(
+            f"tessellation: {facets.unmatched} of {len(facets.pore)} facets have no partner; the "
+            "grains do not tile the box, check the box and the periodic sides"
+        )
+    if not len(facets.pore):
+        raise NetworkError(
+            f"tessellation: no throat joins two pores of these {count} grains; the box is too "
+            "narrow for its side walls, give more grains or periodic sides"
+        )
+
+
+# ------------------------------------------------------------------------------------------------
+# What is measured on one facet after the other, in one compiled pass.
+#
+# The formulas are those of `geometry`, which has their sources.
+
+
+SIDE_ENDS = (1, 2, 0)
+"""The corner that follows each corner of a triangle."""
+
+
+@compiled
+def sections(
+    points: Array, radius: Array, vertex: Array, touching: float
+) -> tuple[Array, Array, Array]:
+    """Inscribed radius (T,) m, open area (T,) m2, and whether two of the three spheres overlap.
+
+    `vertex` (T, 3) are the corners among `points` (M, 3) m with spheres of `radius` (M,) m. The
+    radius is NaN where no circle touches the three discs. Spheres overlap that are nearer than the
+    sum of their radii by more than the share `touching` of it.
+    """
+    count = len(vertex)
+    inscribed, area, overlap = np.empty(count), np.empty(count), np.zeros(count, np.bool_)
+    for t in range(count):
+        a, b, c = vertex[t, 0], vertex[t, 1], vertex[t, 2]
+        one, two = less(points, b, a), less(points, c, a)
+        product = times(one, two)
+        twice, base = np.sqrt(along(product, product)), np.sqrt(along(one, one))
+        place = (base, along(one, two) / base, twice / base)
+        inscribed[t] = _inscribed(place, (radius[a], radius[b], radius[c]))
+        open_part = 0.5 * twice
+        for i in range(3):
+            own, after = vertex[t, i], vertex[t, SIDE_ENDS[i]]
+            left = less(points, after, own)
+            right = less(points, vertex[t, SIDE_ENDS[SIDE_ENDS[i]]], own)
+            open_part -= 0.5 * np.arctan2(twice, along(left, right)) * radius[own] ** 2
+            apart, both = np.sqrt(along(left, left)), radius[own] + radius[after]
+            open_part += 0.5 * _lens_area(radius[own], radius[after], apart)
+            overlap[t] = overlap[t] or apart < (1.0 - touching) * both
+        area[t] = open_part
+    return inscribed, area, overlap
+
+
+@compiled
+def _inscribed(place: tuple[float, float, float], disc: tuple[float, float, float]) -> float:
+    """Radius m of the circle that touches three discs from outside, NaN where there is none.
+
+    The corners are (0, 0), (a, 0) and (x, y) m with `place` = (a, x, y).
+    """
+    a, x, y = place
+    r = disc[0]
+    ux = 0.5 * (a * a + r * r - disc[1] ** 2) / a
+    vx = (r - disc[1]) / a
+    uy = (0.5 * (x * x + y * y + r * r - disc[2] ** 2) - x * ux) / y
+    vy = (r - disc[2] - x * vx) / y
+    half, rest = r - ux * vx - uy * vy, ux * ux + uy * uy - r * r
+    under = half * half - (vx * vx + vy * vy - 1.0) * rest
+    if not under >= 0.0:
+        return np.nan
+    below = half + np.sqrt(under)
+    touching = rest / below if below != 0.0 else np.nan
+    return touching if touching > -min(disc) else np.nan
+
+
+@compiled
+def _lens_area(first: float, second: float, apart: float) -> float:
+    """Area m2 common to two discs whose centres are `apart` m."""
+    if apart >= first + second:
+        return 0.0
+    if apart <= abs(first - second):
+        return np.pi * min(first, second) ** 2
+    to_chord = (apart**2 + first**2 - second**2) / (2.0 * apart)
+    chord = np.sqrt(max(first**2 - to_chord**2, 0.0))
+    return (
+        first**2 * np.arctan2(chord, to_chord)
+        - to_chord * chord
+        + second**2 * np.arctan2(chord, apart - to_chord)
+        - (apart - to_chord) * chord
+    )
+
+
+@compiled
+def heights(
+    places: tuple[Array, Array],
+    vertex: Array,
+    apex: Array,
+    centre: Array,
+    ends: tuple[Array, Array],
+) -> Array:
+    """Distances (T, 2) m of two power centres from each facet, positive on their own side.
+
+    `places` are the points (M, 3) m and their shaken places. Which side is whose follows from the
+    shaken ones, for a flat tetrahedron has none without. `vertex` (T, 3) are the corners, `apex`
+    (T,) is the point on the side of the first; `ends` are the indices (T, 2) of the tetrahedra,
+    whose centres are `centre` (P, 3) m, and what moves the second next to the first (T, 3) m.
+    """
+    (points, shaken), (pore, shift) = places, ends
+    height = np.empty((len(vertex), 2))
+    for t in range(len(vertex)):
+        a, b, c = vertex[t, 0], vertex[t, 1], vertex[t, 2]
+        outward = times(less(shaken, b, a), less(shaken, c, a))
+        normal = times(less(points, b, a), less(points, c, a))
+        size = np.sqrt(along(normal, normal))
+        if size == 0.0:  # the corners lie on one line: no facet, whose height is 0 on both sides
+            size = 1.0
+        if along(less(shaken, apex[t], a), outward) > 0.0:
+            size = -size
+        one, two = pore[t, 0], pore[t, 1]
+        height[t] = 0.0
+        for k in range(3):
+            height[t, 0] += (points[a, k] - centre[one, k]) * normal[k] / size
+            height[t, 1] += (centre[two, k] + shift[t, k] - points[a, k]) * normal[k] / size
+    return height
+
+
+# ------------------------------------------------------------------------------------------------
+# Polyhedra: tetrahedra of one power centre, which the tessellation splits arbitrarily.
+
+
+ADOPTION_ROUNDS = 8
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Polyhedra:
+    """Power centres of the tetrahedra (P), and which tetrahedra share one.
+
+    Attributes:
+        centre: (P, 3) m, power centres; a flat tetrahedron has that of a neighbour.
+        heights: (T, 2) m, distance of the two centres from their facet, positive on their own
+            side.
+        group: (P,) number of the polyhedron, equal for all parts of one.
+        wall: (P, 3) -1 or 1 where the low or high mirrored face cuts the polyhedron, else 0.
+    """
+
+    centre: Array
+    heights: Array
+    group: Array
+    wall: Array
+
+    __repr__ = one_line
+
+
+def join_polyhedra(tessellation: Tessellation) -> Polyhedra:
+    """Power centres, heights over the facets, groups, and the walls they lie on."""
+    centre = _adopted_centres(tessellation)
+    height = _heights(tessellation, centre)
+    joined = np.abs(height.sum(axis=1)) < SAME_CENTRE * tessellation.scale
+    pairs, count = tessellation.facets.pore[joined], len(centre)
+    graph = coo_matrix((np.ones(len(pairs), np.int8), pairs.T), shape=(count, count))
+    group = connected_components(graph, directed=False)[1]
+    return Polyhedra(
+        centre=centre, heights=height, group=group, wall=_walls(tessellation, centre, group)
+    )
+
+
+def _adopted_centres(tessellation: Tessellation) -> Array:
+    """Centres (P, 3) m, where a flat tetrahedron has the centre of a neighbour.
+
+    The corners of a flat tetrahedron are four corners of the face between two polyhedra. Its own
+    centre depends on the shake alone. Either neighbour leaves the same flow, since both splits of
+    a face count the same. A neighbour that no other mirrored face cuts comes first, so that the
+    flat one keeps its share inside the box; of these the one with the nearest centre, whatever the
+    order of the tetrahedra.
+    """
+    tetrahedra, size = tessellation.tetrahedra, tessellation.size
+    centre, known = tetrahedra.centre.copy(), ~tetrahedra.flat
+    near = tessellation.facets.where(np.any(tetrahedra.flat[tessellation.facets.pore], axis=1))
+    lender = np.concatenate([near.pore[:, 1], near.pore[:, 0]])
+    taker = np.concatenate([near.pore[:, 0], near.pore[:, 1]])
+    turn = np.concatenate([near.shift, -near.shift]) * size
+    middle = tetrahedra.points.position[tetrahedra.vertex[taker]].mean(axis=1)
+    crossed = _crossed(tetrahedra, taker)
+    for alike in (True, False):
+        for _ in range(ADOPTION_ROUNDS):
+            use = np.flatnonzero(known[lender] & ~known[taker])
+            if alike:
+                cut = _crossed(tetrahedra, lender[use]) | _on_face(
+                    tessellation, centre[lender[use]]
+                )
+                use = use[np.all(cut == crossed[use], axis=1)]
+            offered = centre[lender[use]] + turn[use]
+            away = np.sum((offered - middle[use]) ** 2, axis=1)
+            nearest = np.lexsort((away, taker[use]))
+            taken, rows = np.unique(taker[use][nearest], return_index=True)
+            centre[taken] = offered[nearest[rows]]
+            known[taken] = True
+    return centre
+
+
+def _crossed(tetrahedra: Tetrahedra, which: Array) -> Array:
+    """Whether a tetrahedron has corners on both sides of a mirrored face, (K, 3) by axis."""
+    mirror = tetrahedra.points.mirror[tetrahedra.vertex[which]]
+    inside = np.any(mirror == INSIDE, axis=1)
+    return np.asarray(inside & np.any((mirror != INSIDE) & (mirror != ON_FACE), axis=1))
+
+
+def _on_face(tessellation: Tessellation, centre: Array) -> Array:
+    """Whether a centre (K, 3) m lies on a mirrored face, (K, 3) by axis."""
+    tolerance = SAME_CENTRE * tessellation.scale
+    near = [np.abs(centre - face) < tolerance for face in tessellation.box.T]
+    return (near[0] | near[1]) & ~np.array(tessellation.periodic)
+
+
+def _heights(tessellation: Tessellation, centre: Array) -> Array:
+    """Distances (T, 2) m of the two power centres from the facet, positive on their own side."""
+    tetrahedra, facets = tessellation.tetrahedra, tessellation.facets
+    apex = tetrahedra.vertex[facets.pore[:, 0], facets.opposite[:, 0]]
+    ends = (facets.pore, facets.shift * tessellation.size)
+    places = (tetrahedra.points.position, tetrahedra.points.shaken)
+    result: Array = heights(places, facets.vertex, apex, centre, ends)
+    return result
+
+
+def _walls(tessellation: Tessellation, centre: Array, group: Array) -> Array:
+    """Mirrored faces (P, 3) that cut each polyhedron: -1 the low one, 1 the high one, 0 none.
+
+    A face cuts a tetrahedron with corners on both sides of it, and one with corners beyond it
+    whose centre lies on it. What it does to one part of a polyhedron it does to all.
+    """
+    tetrahedra = tessellation.tetrahedra
+    mirror = tetrahedra.points.mirror
+    mirrored = np.any((mirror != INSIDE) & (mirror != ON_FACE), axis=1)
+    doubtful = np.flatnonzero(np.any(mirrored[tetrahedra.vertex], axis=1))
+    corner = mirror[tetrahedra.vertex[doubtful]]
+    near = _on_face(tessellation, centre[doubtful])
+    beyond = np.any((corner != INSIDE) & (corner != ON_FACE), axis=1)
+    low = np.any(corner == MIRROR_LOW, axis=1)
+    cut = beyond & (np.any(corner == INSIDE, axis=1) | near)
+    wall = np.zeros((len(centre), 3), np.int8)
+    wall[doubtful] = np.where(cut, np.where(low, -1, 1), 0)
+    for axis in range(3):
+        for side in (-1, 1):
+            groups = np.zeros(int(group.max(initial=-1)) + 1, bool)
+            groups[group[wall[:, axis] == side]] = True
+            wall[groups[group], axis] = side
+    return wall
+
+
+# ------------------------------------------------------------------------------------------------
+# Open sections that a fourth grain reaches into.
+
+
+GRID = 12
+STEPS = (
+    np.array([(i, j, GRID - i - j) for i in range(GRID + 1) for j in range(GRID + 1 - i)]) / GRID
+)
+"""(91, 3) barycentric coordinates of the points at which a section is examined."""
+
+
+def pierced_facets(tessellation: Tessellation, facets: Facets, open_facet: Array) -> Array:
+    """True (T,) where a grain near the facet covers part of its open section.
+
+    `open_facet` (T,) is true where the section is open. The grains that are examined are the
+    apexes of the two tetrahedra of the facet and of those across their other facets. The section
+    is examined on a triangular grid of 91 points.
+    """
+    tetrahedra = tessellation.tetrahedra
+    beyond, turn = _apexes_beyond(tetrahedra, facets)
+    points = tetrahedra.points
+    size = np.asarray(tessellation.size, float)
+    result: Array = _pierced(
+        (points.position, points.radius),
+        (tetrahedra.vertex, beyond, turn),
+        (facets.vertex, facets.pore, facets.opposite, facets.shift),
+        open_facet,
+        size,
+    )
+    return result
+
+
+def _apexes_beyond(tetrahedra: Tetrahedra, facets: Facets) -> tuple[Array, Array]:
+    """Point (P, 4) opposite each facet on its other side, -1 beyond a wall; periods (P, 4, 3)."""
+    beyond = np.full(tetrahedra.vertex.shape, -1, np.int32)
+    turn = np.zeros((*beyond.shape, 3), np.int8)
+    one, two = facets.pore.T
+    first, second = facets.opposite.T
+    beyond[one, first] = tetrahedra.vertex[two, second]
+    beyond[two, second] = tetrahedra.vertex[one, first]
+    across = np.flatnonzero(np.any(facets.shift != 0, axis=1))
+    turn[one[across], first[across]] = facets.shift[across]
+    turn[two[across], second[across]] = -facets.shift[across]
+    return beyond, turn
+
+
+@compiled
+def _pierced(
+    spheres: tuple[Array, Array],
+    tetrahedra: tuple[Array, Array, Array],
+    facets: tuple[Array, Array, Array, Array],
+    open_facet: Array,
+    size: Array,
+) -> Array:
+    """As `pierced_facets`, with the parts of `Tetrahedra`, `_apexes_beyond` and `Facets`."""
+    pierced = np.zeros(len(open_facet), np.bool_)
+    _set_pierced(spheres, tetrahedra, facets, (open_facet, size), pierced)
+    return pierced
+
+
+@compiled_in_place
+def _set_pierced(
+    spheres: tuple[Array, Array],
+    tetrahedra: tuple[Array, Array, Array],
+    facets: tuple[Array, Array, Array, Array],
+    more: tuple[Array, Array],
+    pierced: Array,
+) -> None:
+    """Sets which open facets (T,) a grain of their two tetrahedra or of a neighbour pierces."""
+    vertex, beyond, turn = tetrahedra
+    corner, pore, opposite, shift = facets
+    open_facet, size = more
+    for t in range(len(corner)):
+        if not open_facet[t]:
+            continue
+        for side in range(2):
+            own, apex = pore[t, side], opposite[t, side]
+            for k in range(5):
+                # the apex of the tetrahedron first, then those across its other facets
+                if k == apex + 1:
+                    continue
+                other = vertex[own, apex] if k == 0 else beyond[own, k - 1]
+                if other < 0 or pierced[t]:
+                    continue
+                x, y, z = side * shift[t, 0], side * shift[t, 1], side * shift[t, 2]
+                if k > 0:
+                    x, y, z = (
+                        x + turn[own, k - 1, 0],
+                        y + turn[own, k - 1, 1],
+                        z + turn[own, k - 1, 2],
+                    )
+                moved = (x * size[0], y * size[1], z * size[2])
+                pierced[t] = _pierces(spheres, corner[t], other, moved)
+
+
+@compiled_in_place
+def _pierces(spheres: tuple[Array, Array], corner: Array, other: int, moved: Vector) -> bool:
+    """Whether the grain `other`, `moved` by a vector m, covers part of an open section."""
+    points, grain = spheres
+    a, b, c = corner[0], corner[1], corner[2]
+    one, two = less(points, b, a), less(points, c, a)
+    normal = times(one, two)
+    apart = less(points, other, a)
+    place = (apart[0] + moved[0], apart[1] + moved[1], apart[2] + moved[2])
+    square, radius = along(normal, normal), grain[other]
+    away = along(place, normal)
+    if not away * away < radius * radius * square:
+        return False
+    disc = np.sqrt(radius * radius - away * away / square)
+    size = np.sqrt(square)
+    third = (two[0] - one[0], two[1] - one[1], two[2] - one[2])
+    last = (place[0] - one[0], place[1] - one[1], place[2] - one[2])
+    if not (
+        _outside(one, normal, place, size) < disc
+        and _outside(third, normal, last, size) < disc
+        and -_outside(two, normal, place, size) < disc
+    ):
+        return False
+    return _covers((one, two, place), (grain[a], grain[b], grain[c], radius))
+
+
+@compiled_in_place
+def _outside(side: Vector, normal: Vector, place: Vector, size: float) -> float:
+    """How far m `place` lies to the right of a side of a triangle; `size` m2 is that of normal."""
+    return along(place, times(side, normal)) / (size * np.sqrt(along(side, side)))
+
+
+@compiled_in_place
+def _covers(
+    places: tuple[Vector, Vector, Vector], radii: tuple[float, float, float, float]
+) -> bool:
+    """Whether a ball covers a grid point of the triangle outside the three grains.
+
+    `places` m are the second and third corner and the ball, from the first corner; `radii` m are
+    those of the three grains and of the ball.
+    """
+    one, two, place = places
+    for step in STEPS:
+        x = step[1] * one[0] + step[2] * two[0]
+        y = step[1] * one[1] + step[2] * two[1]
+        z = step[1] * one[2] + step[2] * two[2]
+        if (
+            _square(x, y, z, place) < radii[3] ** 2
+            and x * x + y * y + z * z > radii[0] ** 2
+            and _square(x, y, z, one) > radii[1] ** 2
+            and _square(x, y, z, two) > radii[2] ** 2
+        ):
+            return True
+    return False
+
+
+@compiled
+def _square(x: float, y: float, z: float, place: Vector) -> float:
+    return (x - place[0]) ** 2 + (y - place[1]) ** 2 + (z - place[2]) ** 2

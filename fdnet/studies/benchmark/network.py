@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fdnet.run.one_core import ONE_CORE
+from fdnet.run.progress import ONE_CORE
 from fdnet.studies.engine.csv_rows import read_named, write_named
 from fdnet.studies.truth.packs import DATA, OWN_TRUTH
 

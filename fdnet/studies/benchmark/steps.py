@@ -20,14 +20,14 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fdnet.case.names import ALL_SPHERES, SECTION_ARCHIE
+from fdnet.names import ALL_SPHERES, DEFAULT_LAW, SECTION_ARCHIE
 from fdnet.network import network as tessellation
 from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.flow.flow import solve_flow
-from fdnet.network.laws.named import DAMAGE_LAWS, DEFAULT_LAW, LAWS
+from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
 from fdnet.network.permeability import analyse
-from fdnet.network.resolved.all_spheres import all_conductances
-from fdnet.spheres.porosity import measure_porosity
+from fdnet.network.states import all_conductances
+from fdnet.spheres.geometry import measure_porosity
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
 from fdnet.studies.benchmark.clock import Clock
 from fdnet.studies.truth import packs

@@ -4,7 +4,7 @@ import csv
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from fdnet.run.record_files import OUTPUTS
+from fdnet.run.folder import OUTPUTS
 from fdnet.studies.chaos.commands import Ended, FaultError
 from fdnet.studies.chaos.runs import (
     NOTES,

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fdnet.run.mark import CASE as CASE_FILE
-from fdnet.run.mark import UNFINISHED
+from fdnet.run.folder import CASE as CASE_FILE
+from fdnet.run.folder import UNFINISHED
 from fdnet.studies.chaos.commands import Child, Ended, started, wait_for
 from fdnet.studies.chaos.nursery import Nursery
 

@@ -17,8 +17,7 @@ from fdnet.report.tables import write_rows
 from fdnet.run.bridging import CLOGGED
 from fdnet.run.open_run import open_run
 from fdnet.scales.scales import scales_of
-from fdnet.spheres.arrays import one_line
-from fdnet.spheres.snapshot import Array
+from fdnet.spheres.snapshot import Array, one_line
 from fdnet.studies.dem.arrivals import arrivals
 from fdnet.studies.engine.bands import wilson_interval
 

@@ -10,19 +10,20 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.case.case import Case
-from fdnet.dem.contact_lines import contact_variables
-from fdnet.dem.deck import number, render_text
-from fdnet.dem.liggghts import Launch, run_deck
-from fdnet.dem.scene import (
+from fdnet.dem.deck import (
+    contact_variables,
     header_variables,
+    number,
+    render_text,
     snapshot_of,
     wall_variables,
     write_data,
 )
-from fdnet.files.atomic import write_text
+from fdnet.dem.liggghts import Launch, run_deck
+from fdnet.files import write_text
 from fdnet.scales.scales import Scales, scales_of
-from fdnet.spheres.contacts import touching_pairs
 from fdnet.spheres.dump import COLUMNS, read_dump
+from fdnet.spheres.geometry import touching_pairs
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 from fdnet.studies.dem.runs import the_binary
 

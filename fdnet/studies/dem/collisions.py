@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from fdnet.scales.contacts import sphere_mass
 from fdnet.scales.scales import scales_of
-from fdnet.scales.springs import sphere_mass
 from fdnet.spheres.snapshot import Kind, Snapshot, resting
 from fdnet.studies.dem.closed import (
     Watch,

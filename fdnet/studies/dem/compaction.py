@@ -8,10 +8,16 @@ import numpy as np
 from fdnet.case.case import Case
 from fdnet.case.file import case_from
 from fdnet.mechanics.elastic import carrying
-from fdnet.mechanics.kinematics import kinematics
 from fdnet.mechanics.of_case import material_of
-from fdnet.mechanics.solver import solver_of, stiffness
-from fdnet.mechanics.springs import Cement, Material, bond_springs, contact_springs
+from fdnet.mechanics.springs import (
+    Cement,
+    Material,
+    bond_springs,
+    contact_springs,
+    kinematics,
+    solver_of,
+    stiffness,
+)
 from fdnet.mechanics.triaxial import confined
 from fdnet.network.permeability import analyse
 from fdnet.spheres.snapshot import Array, Snapshot

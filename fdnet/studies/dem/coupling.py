@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.case.file import read_case
-from fdnet.run.mark import MANIFEST
+from fdnet.run.folder import MANIFEST
 from fdnet.run.open_run import run_case
 from fdnet.studies.engine.csv_rows import write_named
 from fdnet.studies.engine.runner import child_core_seconds

@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.case.case import InvasionCase, with_fines
-from fdnet.case.file import read_case
-from fdnet.case.shipped import case_path
+from fdnet.case.file import case_path, read_case
 from fdnet.studies.dem.runs import invasion_run
 from fdnet.studies.engine.bands import half_width
 from fdnet.studies.engine.error_rows import against_reference

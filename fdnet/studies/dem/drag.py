@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fdnet.case.case import InvasionCase
+from fdnet.scales.clock import HOLD_OVER_RELAXATION
 from fdnet.scales.scales import scales_of
-from fdnet.scales.time_step import HOLD_OVER_RELAXATION
 from fdnet.studies.dem.runs import (
     BINS,
     OBSERVED,

@@ -4,8 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fdnet.case.case import InvasionCase, with_fines
-from fdnet.case.file import case_from, read_case, set_keys
-from fdnet.case.shipped import case_path
+from fdnet.case.file import case_from, case_path, read_case, set_keys
 from fdnet.scales.scales import scales_of
 from fdnet.studies.dem.runs import invasion_run
 from fdnet.studies.engine.error_rows import against_reference

@@ -14,13 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.case.case import InvasionCase, with_fines
-from fdnet.case.file import case_from, read_case, set_keys
-from fdnet.case.parts import FLOW_TRAVEL
-from fdnet.case.shipped import case_path
+from fdnet.case.file import case_from, case_path, read_case, set_keys
+from fdnet.case.tables import FLOW_TRAVEL
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
-from fdnet.run.fluid.network_flow import RENEWED
-from fdnet.run.fluid.network_fluid import STANDING, NetworkFluid
+from fdnet.run.fluid import STANDING, NetworkFluid
+from fdnet.run.network_flow import RENEWED
 from fdnet.scales.scales import scales_of
 from fdnet.studies.dem.coupling import FLUIDS
 from fdnet.studies.dem.runs import grains_of, the_binary

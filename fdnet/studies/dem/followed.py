@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.case.case import Case
-from fdnet.case.file import read_case
-from fdnet.case.shipped import case_path
+from fdnet.case.file import case_path, read_case
 from fdnet.run.finished import FinishedRun
 from fdnet.run.open_run import run_case
 from fdnet.studies.engine.csv_rows import read_named, write_named

@@ -15,7 +15,7 @@ from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import read_case
 from fdnet.dem.invade_deck import render_invade, write_invade_inputs
 from fdnet.dem.liggghts import SCREEN, Launch, run_deck
-from fdnet.files.atomic import write_text
+from fdnet.files import write_text
 from fdnet.run.open_run import run_case
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Array, Snapshot

@@ -10,9 +10,8 @@ from fdnet.case.case import Case
 from fdnet.case.file import case_from
 from fdnet.mechanics.elastic import elastic_of
 from fdnet.mechanics.of_case import material_of
-from fdnet.mechanics.rest import Triaxial
 from fdnet.mechanics.springs import Cement
-from fdnet.mechanics.triaxial import Sheared, triaxial
+from fdnet.mechanics.triaxial import Sheared, Triaxial, triaxial
 from fdnet.spheres.snapshot import Array, Snapshot
 from fdnet.studies.dem.mechanics_figure import Panel, draw_ranges
 from fdnet.studies.dem.mechanics_page import mechanics_page

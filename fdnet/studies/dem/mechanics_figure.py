@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from fdnet.files.atomic import replacing
+from fdnet.files import replacing
 from fdnet.studies.engine.study import DONE, Row
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#7F7F7F")

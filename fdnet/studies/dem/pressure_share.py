@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.network.field.of_pack import velocity_field
-from fdnet.run.fluid.network_flow import Renewal, pack_flow
+from fdnet.network.field.field import velocity_field
+from fdnet.run.network_flow import Renewal, pack_flow
 from fdnet.run.open_run import open_run
 from fdnet.spheres.snapshot import Snapshot
 

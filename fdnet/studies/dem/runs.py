@@ -15,18 +15,17 @@ import numpy as np
 
 from fdnet.case.case import Case, InvasionCase, with_fines
 from fdnet.case.file import case_from, set_keys
-from fdnet.case.names import SECTION_ARCHIE
-from fdnet.dem.binary import Binary, find_binary
 from fdnet.dem.checkpoint import HISTORY, HISTORY_HEADER, state_at
+from fdnet.dem.deck import box_of, snapshot_of
 from fdnet.dem.invade_deck import write_invade_inputs
 from fdnet.dem.invasion import CheckpointKeeper, Invasion, invade
-from fdnet.dem.liggghts import Launch, Run, run_deck
+from fdnet.dem.liggghts import Binary, Launch, Run, find_binary, run_deck
 from fdnet.dem.packing import make_pack
-from fdnet.dem.scene import box_of, snapshot_of
-from fdnet.files.atomic import write_text
+from fdnet.files import write_text
+from fdnet.names import SECTION_ARCHIE
 from fdnet.network.permeability import analyse
+from fdnet.scales.clock import relaxation_time
 from fdnet.scales.scales import scales_of
-from fdnet.scales.time_step import relaxation_time
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
 from fdnet.studies.engine.runner import child_core_seconds

@@ -10,14 +10,20 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.case.case import Case
-from fdnet.dem.contact_lines import contact_variables, wall_law
-from fdnet.dem.deck import LeftOut, number, render_text
+from fdnet.dem.deck import (
+    LeftOut,
+    contact_variables,
+    header_variables,
+    number,
+    render_text,
+    wall_law,
+    write_data,
+)
 from fdnet.dem.liggghts import Launch, run_deck
-from fdnet.dem.scene import header_variables, write_data
 from fdnet.errors import LiggghtsError
-from fdnet.files.atomic import write_text
+from fdnet.files import write_text
+from fdnet.scales.contacts import series, sphere_mass
 from fdnet.scales.scales import scales_of
-from fdnet.scales.springs import series, sphere_mass
 from fdnet.spheres.dump import COLUMNS, FORMAT, read_frame
 from fdnet.spheres.snapshot import Array, Snapshot, resting
 from fdnet.studies.dem.runs import the_binary

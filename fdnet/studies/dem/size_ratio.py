@@ -12,8 +12,8 @@ from scipy.stats import binomtest
 
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import case_from
+from fdnet.scales.contacts import sphere_mass
 from fdnet.scales.scales import scales_of
-from fdnet.scales.springs import sphere_mass
 from fdnet.studies.dem.runs import window_run
 from fdnet.studies.engine.error_rows import sizes
 from fdnet.studies.engine.markdown import markdown_table

@@ -12,17 +12,16 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.case.case import InvasionCase
-from fdnet.dem.fluid import FluidForces, Moment
+from fdnet.dem.invade_deck import FluidForces, Moment
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
-from fdnet.network.fines.kept_deposit import KeptDeposit
-from fdnet.network.laws.kept_sections import KeptSections, measured_sections
+from fdnet.network.fines.deposit import KeptDeposit
 from fdnet.network.laws.section_archie import STEP as STEP_OF_ANALYSIS
-from fdnet.run.fluid.network_flow import Carried, changed_share
-from fdnet.run.fluid.network_fluid import NetworkFluid
+from fdnet.network.laws.section_archie import KeptSections, measured_sections
+from fdnet.run.fluid import NetworkFluid
+from fdnet.run.network_flow import Carried, changed_share
 from fdnet.scales.scales import scales_of
-from fdnet.spheres.arrays import one_line
-from fdnet.spheres.snapshot import Snapshot
+from fdnet.spheres.snapshot import Snapshot, one_line
 
 THRESHOLDS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5)
 """Shares of the deposit by volume that may change before the network is solved anew."""

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.network.field.of_pack import velocity_field
+from fdnet.network.field.field import velocity_field
 from fdnet.report.figures import draw
 from fdnet.run.open_run import open_run
 from fdnet.spheres.snapshot import Array, Snapshot

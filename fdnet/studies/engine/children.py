@@ -16,7 +16,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, NoReturn, TypeVar
 
-from fdnet.run.one_core import ONE_CORE
+from fdnet.run.progress import ONE_CORE
 
 PATIENCE = 1.0
 """Seconds that children may take to end themselves before they are killed."""

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fdnet.errors import CaseError
-from fdnet.files.atomic import write_text
+from fdnet.files import write_text
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from fdnet.files.atomic import replacing
+from fdnet.files import replacing
 from fdnet.studies.engine.levels import Level, levels
 from fdnet.studies.engine.palette import CURVES
 from fdnet.studies.engine.study import Panel, Row, Study, shown

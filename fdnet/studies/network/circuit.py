@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.network.flow.winding import groups
+from fdnet.network.flow.solver import groups
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import build_network
 from fdnet.spheres.snapshot import Array

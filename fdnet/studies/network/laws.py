@@ -5,10 +5,11 @@ from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 
+from fdnet.names import DEFAULT_LAW
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
-from fdnet.network.laws.named import DEFAULT_LAW, LAWS
+from fdnet.network.laws.named import LAWS
 from fdnet.network.network import Network
-from fdnet.network.stokes.stokes import extrapolate, solve_stokes
+from fdnet.network.stokes import extrapolate, solve_stokes
 from fdnet.studies.accuracy import (
     ALL_PAIRS,
     FINEST,

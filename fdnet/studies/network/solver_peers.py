@@ -10,8 +10,13 @@ from scipy.sparse.linalg import spsolve
 
 from fdnet.errors import FlowError
 from fdnet.network.flow.flow import TOLERANCE
-from fdnet.network.flow.solver import conjugate_gradients, direct, laplacian, ruge_stuben
-from fdnet.network.flow.stiff import balance_links
+from fdnet.network.flow.solver import (
+    balance_links,
+    conjugate_gradients,
+    direct,
+    laplacian,
+    ruge_stuben,
+)
 from fdnet.spheres.snapshot import Array
 from fdnet.studies.network.circuit import Circuit
 

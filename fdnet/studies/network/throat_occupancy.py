@@ -9,10 +9,15 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import quad
 
-from fdnet.network.fines.cylinder import GAUSS_POINTS, Pairs, exact_volume, two_plane_volume
-from fdnet.network.fines.occupancy import measure_occupancy
+from fdnet.network.fines.occupancy import (
+    GAUSS_POINTS,
+    Pairs,
+    exact_volume,
+    measure_occupancy,
+    two_plane_volume,
+)
+from fdnet.network.laws.damage import TEXT_THRESHOLD, thesis_damage
 from fdnet.network.laws.named import LAWS
-from fdnet.network.laws.thesis_damage import TEXT_THRESHOLD, thesis_damage
 from fdnet.spheres.snapshot import Array
 from fdnet.studies.accuracy import network_of, permeability
 from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study, row_of

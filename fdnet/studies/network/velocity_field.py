@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fdnet.network.field.field import VelocityField
-from fdnet.network.field.of_pack import COARSEST, velocity_field
+from fdnet.network.field.field import COARSEST, VelocityField, velocity_field
 from fdnet.network.network import Network, build_network
-from fdnet.spheres.images import make_images
+from fdnet.spheres.geometry import make_images
 from fdnet.spheres.snapshot import Array, Snapshot
 from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study, row_of
 from fdnet.studies.engine.timing import least_time

@@ -6,10 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.scales.hertz import collision_time, overlap_of_impact
-from fdnet.scales.hertz_contacts import pair_elastic
+from fdnet.scales.contacts import collision_time, overlap_of_impact, pair_elastic, sphere_mass
 from fdnet.scales.scales import scales_of
-from fdnet.scales.springs import sphere_mass
 from fdnet.spheres.snapshot import Kind, resting
 from fdnet.studies.dem.closed import Watch, closed_run
 from fdnet.studies.dem.collisions import collision_run

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.scales.forces.bed import Bed, ergun_gradient
-from fdnet.scales.springs import sphere_mass
+from fdnet.scales.contacts import sphere_mass
+from fdnet.scales.drag import Bed, ergun_gradient
 from fdnet.spheres.snapshot import Kind, resting
 from fdnet.studies.engine.error_rows import against_exact
 from fdnet.studies.engine.study import DONE, Measured, Point, Row
@@ -133,7 +133,7 @@ def answers(rows: Sequence[Row]) -> list[Answer]:
         DROP: (
             "pressure drop of Ergun's bed: d 1 mm, porosity 0.451335, 15.6 mm, U 0.02 m/s",
             "230.5 Pa",
-            "{:.1f} Pa (formula of `fdnet.scales.forces.bed`)",
+            "{:.1f} Pa (formula of `fdnet.scales.drag`)",
         ),
         LIFT: (
             "superficial velocity that lifts spheres of that bed from the floor, model A",

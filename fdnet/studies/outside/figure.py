@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.files.atomic import replacing
+from fdnet.files import replacing
 from fdnet.studies.engine.palette import BLUE, NEARLY_BLACK, ORANGE
 from fdnet.studies.engine.study import DONE, Row
 from fdnet.studies.outside import throat

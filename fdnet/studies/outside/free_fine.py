@@ -15,9 +15,9 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import case_from, set_keys
+from fdnet.dem.deck import box_of
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
-from fdnet.dem.scene import box_of
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Array, Kind, resting
 from fdnet.studies.dem.runs import the_binary

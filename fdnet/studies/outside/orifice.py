@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.scales.springs import sphere_mass
-from fdnet.scales.time_step import relaxation_time
+from fdnet.scales.clock import relaxation_time
+from fdnet.scales.contacts import sphere_mass
 from fdnet.spheres.dump import Frame, read_dump
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
 from fdnet.studies.outside.pushed import (

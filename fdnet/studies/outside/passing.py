@@ -16,9 +16,9 @@ from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import case_from
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
+from fdnet.scales.contacts import sphere_mass
 from fdnet.scales.scales import scales_of
-from fdnet.scales.springs import sphere_mass
-from fdnet.spheres.contacts import max_overlap
+from fdnet.spheres.geometry import max_overlap
 from fdnet.studies.dem.runs import edited_run, grains_of, the_binary
 from fdnet.studies.engine.error_rows import sizes
 from fdnet.studies.engine.study import DONE, Measured, Point, Row, ladder

@@ -14,13 +14,18 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import case_from
-from fdnet.dem.contact_lines import contact_variables, wall_law
-from fdnet.dem.deck import number, render_text
+from fdnet.dem.deck import (
+    contact_variables,
+    header_variables,
+    number,
+    render_text,
+    wall_law,
+    write_data,
+)
 from fdnet.dem.liggghts import Launch, run_deck
-from fdnet.dem.scene import header_variables, write_data
-from fdnet.files.atomic import write_text
+from fdnet.files import write_text
+from fdnet.scales.contacts import sphere_mass
 from fdnet.scales.scales import scales_of
-from fdnet.scales.springs import sphere_mass
 from fdnet.spheres.dump import Frame, read_dump
 from fdnet.spheres.snapshot import Snapshot
 from fdnet.studies.dem.runs import the_binary

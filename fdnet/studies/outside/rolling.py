@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.scales.springs import sphere_mass
+from fdnet.scales.contacts import sphere_mass
 from fdnet.spheres.dump import read_dump
 from fdnet.spheres.snapshot import Kind, resting
 from fdnet.studies.engine.error_rows import against_exact

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.network.laws.named import DEFAULT_LAW
+from fdnet.names import DEFAULT_LAW
 from fdnet.studies.accuracy import ARCHIE, FINEST, PACKS, PAIRS
 from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.engine.study import DONE

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
-from fdnet.files.atomic import write_text
+from fdnet.files import write_text
 from fdnet.studies.command import STUDIES, study_named
 from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.engine.draw import draw_study

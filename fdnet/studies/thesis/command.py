@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fdnet.dem.binary import find_binary
-from fdnet.dem.liggghts import Launch
+from fdnet.dem.liggghts import Launch, find_binary
 from fdnet.errors import CaseError, LiggghtsError
-from fdnet.run.mark import is_run_folder, is_unused, mark_folder
+from fdnet.run.folder import is_run_folder, is_unused, mark_folder
 from fdnet.studies.thesis.collection import collect
 from fdnet.studies.thesis.compare.trend_table import trends_table
 from fdnet.studies.thesis.outputs import write_outputs

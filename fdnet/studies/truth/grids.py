@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
-from fdnet.network.stokes.stokes import StokesFlow, extrapolate, solve_stokes
-from fdnet.spheres.porosity import measure_porosity
+from fdnet.network.stokes import StokesFlow, extrapolate, solve_stokes
+from fdnet.spheres.geometry import measure_porosity
 from fdnet.studies.engine.csv_rows import read_named, write_named
 from fdnet.studies.truth.made_packs import PACKS, made_deposit, made_grains, write_pack
 from fdnet.studies.truth.packs import MM, read_pack

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.spatial import cKDTree
 
-from fdnet.spheres.porosity import measure_porosity
+from fdnet.spheres.geometry import measure_porosity
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 from fdnet.studies.truth.packs import MM, RADIUS, read_pack, snapshot
 

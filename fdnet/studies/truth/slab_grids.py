@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq
 
-from fdnet.network.stokes.stokes import StokesFlow, extrapolate, solve_slab
-from fdnet.spheres.porosity import measure_porosity
+from fdnet.network.stokes import StokesFlow, extrapolate, solve_slab
+from fdnet.spheres.geometry import measure_porosity
 from fdnet.spheres.snapshot import Snapshot
 from fdnet.studies.engine.csv_rows import read_named, write_named
 from fdnet.studies.engine.markdown import markdown_table

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.network.stokes.two_grids import estimate
+from fdnet.network.stokes import estimate
 from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.engine.markdown import markdown_table
 from fdnet.studies.truth.grids import flow_of

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import spearmanr
 
-from fdnet.case.shipped import QUICK
+from fdnet.case.file import QUICK
 from fdnet.studies.engine.bands import Sample
 from fdnet.studies.thesis.numbers.examine import THESIS_PAIR
 from fdnet.studies.thesis.numbers.results import ResultRow

@@ -4,7 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 
-from fdnet.case.shipped import QUICK
+from fdnet.case.file import QUICK
 from fdnet.statistics.bands import Band
 from fdnet.studies.engine.markdown import figure, markdown_table
 from fdnet.studies.thesis.compare.trend_claims import ABOVE, TRENDS

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.case.shipped import QUICK
-from fdnet.files.atomic import replacing
+from fdnet.case.file import QUICK
+from fdnet.files import replacing
 from fdnet.report.figures import STYLE
 from fdnet.spheres.snapshot import Array
 from fdnet.studies.engine.palette import (

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.network.analysis import Analysis
+from fdnet.network.permeability import Analysis
 from fdnet.spheres.snapshot import Array
 from fdnet.studies.engine.palette import BLUE, GREEN
 from fdnet.studies.thesis.figures.canvas import (

@@ -6,9 +6,8 @@ Tables, statistics and figures are made from it.
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from fdnet.case.names import AUTO, DEFAULT_LAW
-from fdnet.network.analysis import Analysis
-from fdnet.network.permeability import compare
+from fdnet.names import AUTO, DEFAULT_LAW
+from fdnet.network.permeability import Analysis, compare
 from fdnet.studies.thesis.runs.state import State
 
 THESIS_PAIR, DEFAULT_PAIR = ("thesis", "thesis"), (DEFAULT_LAW, AUTO)

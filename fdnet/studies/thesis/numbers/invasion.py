@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from fdnet.network.analysis import Analysis
-from fdnet.spheres.porosity import measure_porosity
+from fdnet.network.permeability import Analysis
+from fdnet.spheres.geometry import measure_porosity
 from fdnet.spheres.snapshot import Array
 from fdnet.studies.thesis.runs.state import State
 

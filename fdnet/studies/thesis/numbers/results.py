@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.case.shipped import QUICK
+from fdnet.case.file import QUICK
 from fdnet.errors import CaseError
-from fdnet.network.analysis import Analysis
 from fdnet.network.flow.sections import reduction
+from fdnet.network.permeability import Analysis
 from fdnet.studies.engine.csv_rows import parsed, read_csv, write_csv
 from fdnet.studies.thesis.numbers.examine import Examined
 from fdnet.studies.thesis.numbers.invasion import (

@@ -13,7 +13,7 @@ from pathlib import Path
 from fdnet.case.case import InvasionCase
 from fdnet.errors import CaseError, FdnetError
 from fdnet.run.pipeline import run_stages
-from fdnet.run.session import RunOptions
+from fdnet.run.records import RunOptions
 from fdnet.scales.cost import cost_of
 from fdnet.scales.scales import scales_of
 from fdnet.studies.engine.children import Send, answers_of

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.case.case import Case
+from fdnet.dem.deck import box_of, snapshot_of
 from fdnet.dem.liggghts import Launch, run_deck
-from fdnet.dem.pack_deck import write_pack_inputs
-from fdnet.dem.scene import box_of, snapshot_of
+from fdnet.dem.packing import write_pack_inputs
 from fdnet.errors import CaseError
-from fdnet.files.atomic import write_bytes
-from fdnet.scales.grain_pack import PACK_STAGES
+from fdnet.files import write_bytes
+from fdnet.scales.pack import PACK_STAGES
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Kind, Snapshot

@@ -4,8 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from fdnet.case.case import InvasionCase, with_fines
-from fdnet.case.file import read_case
-from fdnet.case.shipped import QUICK, case_path
+from fdnet.case.file import QUICK, case_path, read_case
 from fdnet.scales.scales import scales_of
 
 SPECIMENS = tuple(f"specimen{number}" for number in range(1, 9))

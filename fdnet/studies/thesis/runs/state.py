@@ -15,16 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.case.added import completed
-from fdnet.case.case import InvasionCase, with_fines
+from fdnet.case.case import InvasionCase, completed, with_fines
 from fdnet.case.file import case_from, recorded_case
 from fdnet.dem.checkpoint import read_history, state_at
-from fdnet.dem.pack_deck import check_radii
-from fdnet.dem.scene import box_of, snapshot_of
+from fdnet.dem.deck import box_of, snapshot_of
+from fdnet.dem.packing import check_radii
 from fdnet.errors import CaseError
-from fdnet.files.atomic import write_bytes
-from fdnet.run.folder import CASE, read_record
-from fdnet.run.made_files import check_files
+from fdnet.files import write_bytes
+from fdnet.run.folder import CASE, check_files, read_record
 from fdnet.run.records import PACK_DUMP
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.dump import read_frame

@@ -1,0 +1,796 @@
+"""The tables of a case: their keys, units, ranges and defaults.
+
+The kinds of value that a case file may hold, and their bounds.
+"""
+
+import inspect
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, TypedDict, TypeVar
+
+import numpy as np
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+    field_validator,
+)
+from pydantic_core import PydanticCustomError
+
+from fdnet.errors import CaseError
+from fdnet.names import (
+    ALL_SPHERES,
+    AUTO,
+    DEFAULT_LAW,
+    MOST_SECTIONS,
+    MOST_SPHERES,
+    REMOVED_LAWS,
+    DamageLawName,
+    LawName,
+    WallName,
+)
+
+MAX_CONCENTRATION = 0.30
+"""Random sequential addition of spheres saturates near 0.38 (Torquato, Uche & Stillinger 2006)."""
+
+MOST_GRAINS, MOST_FINES, MOST_SLAB, MOST_BINS = 10_000_000, 10_000_000, 1000, 10_000
+"""Upper bounds: grains, fines, slab over box length, profile bins."""
+
+LEAST_SKIN, MOST_NEIGHBOUR_BINS = 0.01, 10_000_000
+"""Smallest skin over the smallest fine's radius, most bins of the neighbour search in the box."""
+
+CONTACT_STEP_LIMIT = 0.3
+"""Largest time step over sqrt(m/k).
+
+Dense packs without damping keep their energy at 0.4. It grows at 0.5, and at 0.4 in a dilute gas.
+"""
+
+
+def as_tuple(value: Any) -> Any:
+    """A list of a case file as a tuple; anything else as it is."""
+    return tuple(value) if isinstance(value, list) else value
+
+
+Positive = Annotated[float, Field(ge=1e-18, le=1e15, allow_inf_nan=False)]
+Fraction = Annotated[float, Field(gt=0, lt=1)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Pair = Annotated[tuple[Positive, Positive], BeforeValidator(as_tuple)]
+Triple = Annotated[tuple[Positive, Positive, Positive], BeforeValidator(as_tuple)]
+Vector = Annotated[tuple[Finite, Finite, Finite], BeforeValidator(as_tuple)]
+Radius = Annotated[Positive | Pair, Field(union_mode="smart")]
+
+
+def scaled(value: float | None, factor: float) -> float | None:
+    """`value` times `factor`, which turns the unit of a key into SI; None stays None."""
+    return None if value is None else value * factor
+
+
+class Part(BaseModel):
+    """A table of the case file: frozen, no unknown keys, no conversion of text to numbers."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+def still_there(name: Any, removed: Mapping[str, str]) -> Any:
+    """The name as given. Refuses one that is gone, with the one of `removed` to take instead."""
+    if isinstance(name, str) and name in removed:
+        text = "is no longer there; take '{instead}'"
+        raise PydanticCustomError("removed", text, {"instead": removed[name]})
+    return name
+
+
+# ------------------------------------------------------------------------------------------------
+# One check of some keys of a case against each other.
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A check of some keys against each other.
+
+    Attributes:
+        keys: dotted keys that the check reads.
+        check: yields what is wrong; it is given the tables of `keys`, each once, in order.
+    """
+
+    keys: tuple[str, ...]
+    check: Callable[..., Iterator[str]]
+
+    @property
+    def tables(self) -> tuple[str, ...]:
+        """Names of the tables that the check is given."""
+        return tuple(dict.fromkeys(key.split(".")[0] for key in self.keys))
+
+
+# ------------------------------------------------------------------------------------------------
+# The tables [fluid] and [well] of a case file: the liquid of the mud and what drives it.
+
+
+M2_PER_MD = 9.869233e-16
+"""One millidarcy in m2."""
+
+
+class Fluid(Part):
+    """The mud's liquid. Its velocity is given, or follows from the overbalance by Darcy's law."""
+
+    viscosity_cP: Positive = Field(50.0, description="Dynamic viscosity.")
+    density_kg_m3: Positive = Field(
+        1095.0, description="Density; it decides buoyancy and the particle Reynolds number."
+    )
+    overbalance_MPa: Positive = Field(
+        3.5,
+        description="Pressure of the mud above that of the formation. Darcy's law turns it into "
+        "the fluid's velocity.",
+    )
+    velocity_m_s: Positive | None = Field(
+        None,
+        description="Interstitial velocity of the fluid along x. When absent it follows from "
+        "`overbalance_MPa` and either the table `[well]` or `darcy_length_mm`.",
+    )
+    darcy_length_mm: Positive | None = Field(
+        None,
+        description="Length of a plug over which the whole overbalance is lost. Without it and "
+        "without the table `[well]` it is the length of the box, which warns: around a well the "
+        "gradient is about a hundred times less.",
+    )
+    darcy_law: Literal["darcy", "ergun"] = Field(
+        "darcy",
+        description='How the overbalance becomes a velocity: "darcy" takes the viscous loss '
+        'alone, "ergun" adds the loss by inertia. Where this loss lowers the velocity by 5 % or '
+        'more, "darcy" warns.',
+    )
+
+    @property
+    def viscosity_Pa_s(self) -> float:
+        """Dynamic viscosity, Pa s."""
+        return self.viscosity_cP * 1e-3
+
+    @property
+    def stokes_coefficient_Pa_s(self) -> float:
+        """6 pi viscosity: the drag force over radius and relative velocity, Pa s (Stokes 1851)."""
+        return 6 * math.pi * self.viscosity_cP * 1e-3
+
+    @property
+    def darcy_length_m(self) -> float | None:
+        """Length over which the overbalance is lost, m; None: the length of the box."""
+        return scaled(self.darcy_length_mm, 1e-3)
+
+    @property
+    def overbalance_Pa(self) -> float:
+        """Pressure of the mud above that of the formation, Pa."""
+        return self.overbalance_MPa * 1e6
+
+
+class Well(Part):
+    """A vertical well in its formation: the overbalance is lost in radial flow around it.
+
+    The specimen is a piece of the formation at the face of the well.
+    """
+
+    radius_mm: Positive = Field(description="Radius of the well, to the formation face.")
+    drainage_radius_m: Positive = Field(
+        description="Radius at which the pressure is that of the undisturbed formation."
+    )
+    formation_permeability_mD: Positive | None = Field(
+        None,
+        description="Permeability of the formation around the well. When absent it is that of "
+        "the pack by Carman and Kozeny.",
+    )
+
+    @property
+    def radius_m(self) -> float:
+        """Radius of the well, m."""
+        return self.radius_mm * 1e-3
+
+    @property
+    def formation_permeability_m2(self) -> float | None:
+        """Permeability of the formation, m2; None: that of the pack."""
+        return scaled(self.formation_permeability_mD, M2_PER_MD)
+
+
+# ------------------------------------------------------------------------------------------------
+# The table [contact] of a case file: the law of contacts, and what acts in them besides.
+
+
+MODEL_KEYS = {
+    "hooke": frozenset({"normal_stiffness_N_m", "shear_stiffness_N_m"}),
+    "hertz": frozenset({"youngs_modulus_GPa", "poissons_ratio"}),
+}
+"""Keys of [grains] and [fines] that only one contact model reads."""
+DEEPEST_DAMPING = 0.69
+"""Damping ratio up to which LIGGGHTS's Hertz model takes the restitution (above 0.05)."""
+
+
+class ContactLaw(Part):
+    """The law of all contacts; what is not asked for is left out of the deck."""
+
+    model: Literal["hooke", "hertz"] = Field(
+        "hooke",
+        description='Contact law: "hooke", linear springs of `normal_stiffness_N_m` and '
+        '`shear_stiffness_N_m`, or "hertz", Hertz-Mindlin contacts of `youngs_modulus_GPa` and '
+        "`poissons_ratio`.",
+    )
+
+    restitution: Literal["dry", "liquid"] = Field(
+        "dry",
+        description='Rebound of fines: "dry" takes `damping_ratio` as it is, "liquid" lowers the '
+        "restitution of every contact of a fine by exp(-35 / St), St being the impact Stokes "
+        "number at the velocity of the fluid. Below a St of 10 nothing rebounds.",
+    )
+    rolling_friction: Positive | None = Field(
+        None,
+        description="Coefficient of rolling friction of all contacts with friction: the largest "
+        "rolling torque over normal force and effective radius. When absent nothing resists "
+        "rolling.",
+    )
+    cohesion_J_m3: Positive | None = Field(
+        None,
+        description="Cohesion of every contact of a fine: attraction over the area of contact "
+        '(LIGGGHTS\'s SJKR). It needs contact.model = "hertz". When absent nothing attracts.',
+    )
+
+    @property
+    def other_keys(self) -> frozenset[str]:
+        """Keys of [grains] and [fines] that the other contact model reads."""
+        return frozenset().union(*(MODEL_KEYS[name] for name in MODEL_KEYS if name != self.model))
+
+
+# ------------------------------------------------------------------------------------------------
+# The table [bonds] of a case file: cement between the grains.
+
+
+class Bonds(Part):
+    """Parallel bonds: a disc of elastic cement between two grains.
+
+    Only `fdnet mechanics` reads them; the invasion has no bonds.
+    """
+
+    radius_ratio: Annotated[float, Field(gt=0, le=1)] = Field(
+        description="Radius of a bond over that of the smaller of its two grains."
+    )
+    normal_stiffness_GPa_m: Positive = Field(
+        95.0, description="Normal stiffness of a bond per area of its disc."
+    )
+    shear_stiffness_GPa_m: Positive = Field(
+        40.0, description="Shear stiffness of a bond per area of its disc."
+    )
+    tensile_strength_MPa: Positive | None = Field(
+        None,
+        description="Largest tensile stress of a bond. When absent, bonds never break; give it "
+        "together with the shear strength.",
+    )
+    shear_strength_MPa: Positive | None = Field(
+        None, description="Largest shear stress of a bond; see the tensile strength."
+    )
+    gap_ratio: Annotated[float, Field(ge=0, le=0.5)] = Field(
+        0.01,
+        description="Widest gap that a bond bridges, over the smaller diameter of its two grains.",
+    )
+
+    @property
+    def normal_stiffness_Pa_m(self) -> float:
+        """Normal stiffness per area, Pa/m."""
+        return self.normal_stiffness_GPa_m * 1e9
+
+    @property
+    def shear_stiffness_Pa_m(self) -> float:
+        """Shear stiffness per area, Pa/m."""
+        return self.shear_stiffness_GPa_m * 1e9
+
+    @property
+    def tensile_strength_Pa(self) -> float | None:
+        """Tensile strength, Pa; None: bonds never break."""
+        return scaled(self.tensile_strength_MPa, 1e6)
+
+    @property
+    def shear_strength_Pa(self) -> float | None:
+        """Shear strength, Pa; None: bonds never break."""
+        return scaled(self.shear_strength_MPa, 1e6)
+
+
+# ------------------------------------------------------------------------------------------------
+# Tables of a case file: [box], [drag] and [gravity].
+#
+# The keys carry the unit of the user; properties give the same values in SI for everything else.
+
+
+CROWD_TRAVEL, FLOW_TRAVEL, MOST_TRAVEL = 0.5, 1.0, 10.0
+"""Diameters of the smallest fine between two updates: by default, and at most."""
+
+
+class Box(Part):
+    """The specimen: flow and depth run along the first side; x = 0 is the formation face."""
+
+    size_mm: Triple = Field(
+        description="Three side lengths of the box. The mud flows along the first side."
+    )
+    sides: Literal["walls", "periodic"] = Field(
+        "periodic",
+        description="What bounds the box in y and z: periodic images of itself, or solid walls.",
+    )
+    wall_friction: NonNegative | None = Field(
+        None,
+        description="Coefficient of sliding friction of the side walls, if there are any. When "
+        "absent it is that of the grains. A contact takes the smaller value of the wall and the "
+        "sphere.",
+    )
+
+    @property
+    def size_m(self) -> tuple[float, float, float]:
+        """Side lengths (x, y, z), m."""
+        x, y, z = self.size_mm
+        return x * 1e-3, y * 1e-3, z * 1e-3
+
+    @property
+    def periodic(self) -> tuple[bool, bool, bool]:
+        """Which directions are periodic; the flow direction never is."""
+        sideways = self.sides == "periodic"
+        return False, sideways, sideways
+
+
+class Drag(Part):
+    """Forces of the fluid on every fine: drag by its slip, and that of the pressure gradient."""
+
+    field: Literal["uniform", "network"] = Field(
+        "uniform",
+        description='Velocity field of the fluid: "uniform" is the same velocity everywhere. '
+        '"network" follows the pores of the pack and the deposit in them: fdnet solves it anew '
+        "while LIGGGHTS waits.",
+    )
+    multiplier: Positive = Field(1.0, description="Factor on the Stokes drag.")
+    scheme: Literal["held", "implicit", "viscous"] = Field(
+        "held",
+        description='How the force is integrated: "held" keeps it for `refresh_steps` steps, '
+        '"viscous" splits it into a constant force and viscous damping (fines of one size only), '
+        '"implicit" solves it for the new velocity and is stable at any step.',
+    )
+    refresh_steps: Annotated[int, Field(ge=1)] | None = Field(
+        None,
+        description='Steps for which scheme "held" keeps the force. When absent the force is kept '
+        "for at most 0.05 of the drag relaxation time.",
+    )
+    drive_velocity_m_s: Positive | Literal["auto"] | None = Field(
+        None,
+        description="Velocity of the fluid in the pores of the simulation, to shorten a run with "
+        "a weak push: every force is scaled by the same factor, and the physical clock runs "
+        "faster by it. Allowed where the fines' inertia does not matter, up to an impact Stokes "
+        'number of 1. "auto" drives to 0.1, or as fast as the fluid itself.',
+    )
+    upstream: Literal["interstitial", "darcy"] = Field(
+        "darcy",
+        description="Velocity of the fluid upstream of the formation face: the Darcy velocity of "
+        "the mud, or the interstitial one of the pack, which brings the mud faster than it flows "
+        "in.",
+    )
+    pressure_gradient: bool = Field(
+        True,
+        description="Whether the pressure gradient of the pack acts on every fine inside it, with "
+        "the volume of the fine times the fall of pressure with x. The thesis's cases leave it "
+        "out.",
+    )
+    inertia: Literal["none", "schiller-naumann"] = Field(
+        "none",
+        description='Drag at finite Reynolds numbers: "none" is Stokes\'s at any speed, '
+        '"schiller-naumann" multiplies it by 1 + 0.15 Re^0.687 (Re up to 800; scheme "held").',
+    )
+    crowd: Literal["none", "beetstra"] = Field(
+        "none",
+        description='How other fines nearby change the drag on a fine: "none" leaves it that of a '
+        'lone sphere, "beetstra" takes the law of Beetstra, van der Hoef and Kuipers (2007) with '
+        "the porosity around each fine, which fdnet computes while LIGGGHTS waits.",
+    )
+    drive: Literal["pressure", "rate"] | None = Field(
+        None,
+        description='What stays constant where the field is "network": the pressure over pack, '
+        "cake and the rest of the way on which the overbalance is lost, or the rate. When absent: "
+        '"pressure".',
+    )
+    update_travel: Annotated[float, Field(gt=0, le=MOST_TRAVEL)] | None = Field(
+        None,
+        description="How far the fluid carries a fine, in diameters of the smallest fine, before "
+        "the forces on all fines are computed anew. When absent: "
+        f'{FLOW_TRAVEL:g} where the field is "network", else {CROWD_TRAVEL:g}.',
+    )
+
+    @field_validator("scheme", mode="before")
+    @classmethod
+    def _is_there(cls, name: Any) -> Any:
+        return still_there(name, {"every_step": "held"})
+
+    @property
+    def coupled(self) -> bool:
+        """Whether fdnet computes the forces on each fine while LIGGGHTS waits."""
+        return self.crowd != "none" or self.field == "network"
+
+    @property
+    def slowed(self) -> bool:
+        """Whether the deposit slows the mud down."""
+        return self.field == "network" and self.drive != "rate"
+
+    @property
+    def travel_diameters(self) -> float:
+        """Diameters of the smallest fine between two updates of a coupled invasion."""
+        usual = FLOW_TRAVEL if self.field == "network" else CROWD_TRAVEL
+        return usual if self.update_travel is None else self.update_travel
+
+
+class Gravity(Part):
+    """Weight and buoyancy of the moving spheres."""
+
+    mode: Literal["auto", "on", "off"] = Field(
+        "auto",
+        description='"auto" leaves gravity out where weight over drag is below '
+        "`negligible_below`; the run summary then says so.",
+    )
+    acceleration_m_s2: Vector = Field(
+        (0.0, 0.0, -9.81), description="Gravity vector (x, y, z), in any direction."
+    )
+    buoyancy: bool = Field(
+        True,
+        description="Whether the fluid's buoyancy acts: gravity times 1 - fluid over sphere "
+        "density, for fines and for mobile grains.",
+    )
+    negligible_below: NonNegative = Field(
+        1e-3, description='Ratio of weight to drag below which mode "auto" leaves gravity out.'
+    )
+
+
+# ------------------------------------------------------------------------------------------------
+# The table [run] of a case file: what controls a simulation, apart from the specimen.
+
+
+DEFAULT_STIFFNESS = 1.0e4
+"""N/m, of the stiffest contact."""
+
+
+class Run(Part):
+    """Run control: contact stiffness, time step, when to stop and what to refuse.
+
+    `max_hours`, `max_overlap` and `on_overlap` decide only whether a run may go on. No result
+    depends on them, so they may be changed when a run is resumed. Times in ms are physical times;
+    they differ from those of the simulation with `drag.drive_velocity_m_s`.
+    """
+
+    stiffness_N_m: Positive | Literal["nominal", "auto"] = Field(
+        DEFAULT_STIFFNESS,
+        description="Stiffness of the stiffest contact; all others keep their ratio to it. With "
+        'contact.model = "hertz": force over overlap of the stiffest contact of a fine, at an '
+        "overlap of 1 % of its diameter. "
+        '"nominal" keeps the materials\' own stiffness, which needs a far smaller time step. '
+        '"auto" takes the least that keeps the predicted overlaps of a fine at 3 % of its '
+        "diameter, and at least the default.",
+    )
+    max_hours: Positive = Field(
+        24.0, description="A case that is expected to run longer is refused before it starts."
+    )
+    max_overlap: Fraction = Field(
+        0.03,
+        description="Overlap of a fine with another sphere, over the smaller diameter, above "
+        "which `on_overlap` applies.",
+    )
+    on_overlap: Literal["warn", "stop"] = Field(
+        "warn",
+        description="What follows when `max_overlap` is exceeded: a warning in the summary, or "
+        "the run stops with its state kept.",
+    )
+    time_step_factor: Annotated[float, Field(gt=0, le=CONTACT_STEP_LIMIT)] = Field(
+        0.2,
+        description="Time step over sqrt(m/k) of the lightest sphere and stiffest contact. Linear "
+        "contacts without rolling friction are stable up to 0.3 where damping ratios are at most "
+        "0.48, and up to somewhat less with more damping; all others take at most 0.2.",
+    )
+    time_step_s: Positive | None = Field(
+        None,
+        description="Time step of the invasion. When absent it follows from `time_step_factor`, "
+        "and explicit drag keeps it below 0.1 of the drag relaxation time.",
+    )
+    duration_ms: Positive | None = Field(
+        None,
+        description="Length of the invasion. It replaces the stop rule and excludes `cap_ms`.",
+    )
+    plug_time_ms: Positive | None = Field(
+        None,
+        description="The face counts as plugged when no fine has crossed it for this time. When "
+        "absent: the longer of the time in which the fluid passes four grain diameters and the "
+        "time in which ten fines arrive.",
+    )
+    plug_rate: Annotated[float, Field(ge=0, lt=1)] = Field(
+        0.0,
+        description="Share of the undisturbed supply that may still cross the face while it "
+        "counts as plugged.",
+    )
+    stop_rate: Fraction | None = Field(
+        None,
+        description="Share of the first rate below which the invasion counts as plugged, where "
+        'drag.field is "network" at constant pressure.',
+    )
+    stop_pore_volumes: Positive | None = Field(
+        None,
+        description="The invasion ends when so much fluid has passed the specimen, in volumes of "
+        'its intact pores, where drag.field is "network".',
+    )
+    cap_ms: Positive | None = Field(
+        None,
+        description="The invasion ends at this time at the latest. When absent it is derived from "
+        "the length of the slab, the plug time and the passage of the fluid.",
+    )
+    checkpoint_ms: Positive | None = Field(
+        None,
+        description="Time between checkpoints (dump and restart). When absent: the time in which "
+        "the fluid passes about one grain diameter.",
+    )
+    skin_mm: Positive | None = Field(
+        None,
+        description="Skin of LIGGGHTS's neighbour search. When absent: the radius of the smallest "
+        "fine. It changes run time and the order of sums, not the physics.",
+    )
+    neighbour_bin_mm: Positive | None = Field(
+        None,
+        description="Bin width of LIGGGHTS's neighbour search. When absent LIGGGHTS chooses it.",
+    )
+
+    @property
+    def duration_s(self) -> float | None:
+        """Length of the invasion, s; None: until the stop rule holds."""
+        return scaled(self.duration_ms, 1e-3)
+
+    @property
+    def plug_time_s(self) -> float | None:
+        """Time without a crossing after which the face counts as plugged, s, if given."""
+        return scaled(self.plug_time_ms, 1e-3)
+
+    @property
+    def cap_s(self) -> float | None:
+        """Time at which the invasion ends at the latest, s, if given."""
+        return scaled(self.cap_ms, 1e-3)
+
+    @property
+    def checkpoint_s(self) -> float | None:
+        """Time between checkpoints, s, if given."""
+        return scaled(self.checkpoint_ms, 1e-3)
+
+    @property
+    def skin_m(self) -> float | None:
+        """Skin of the neighbour search, m, if given."""
+        return scaled(self.skin_mm, 1e-3)
+
+    @property
+    def neighbour_bin_m(self) -> float | None:
+        """Bin width of the neighbour search, m, if given."""
+        return scaled(self.neighbour_bin_mm, 1e-3)
+
+
+# ------------------------------------------------------------------------------------------------
+# The table [clean_up] of a case file: the flow is turned back after the invasion.
+
+
+class CleanUp(Part):
+    """Production after the invasion: the flow is turned back, from the formation to the well.
+
+    Friction, rolling resistance and cohesion are those of the invasion.
+    """
+
+    drawdown_MPa: Positive = Field(
+        description="Pressure of the formation above that of the well. It is lost on the same way "
+        "as the overbalance was, and makes the fluid's velocity by the same law."
+    )
+    duration_ms: Positive | None = Field(
+        None,
+        description="Length of the clean-up. It replaces the stop rule and excludes `cap_ms`.",
+    )
+    quiet_ms: Positive | None = Field(
+        None,
+        description="The clean-up ends when no fine has come out for this time. When absent: the "
+        "time in which the fluid passes the specimen once.",
+    )
+    cap_ms: Positive | None = Field(
+        None,
+        description="The clean-up ends at this time at the latest. When absent: twenty times the "
+        "time in which the fluid passes the specimen.",
+    )
+
+    @property
+    def drawdown_Pa(self) -> float:
+        """Pressure of the formation above that of the well, Pa."""
+        return self.drawdown_MPa * 1e6
+
+    def fluid_of(self, fluid: Fluid) -> Fluid:
+        """The fluid with the drawdown for its overbalance."""
+        return fluid.model_copy(update={"overbalance_MPa": self.drawdown_MPa})
+
+    def run_of(self, run: Run) -> Run:
+        """The control of the invasion with the length of the clean-up."""
+        own = dict.fromkeys(("cap_ms", "plug_time_ms", "checkpoint_ms"))
+        return run.model_copy(update=own | {"duration_ms": self.duration_ms})
+
+    @property
+    def duration_s(self) -> float | None:
+        """Length of the clean-up, s; None: until the stop rule holds."""
+        return scaled(self.duration_ms, 1e-3)
+
+    @property
+    def quiet_s(self) -> float | None:
+        """Time without a fine that comes out which ends the clean-up, s, if given."""
+        return scaled(self.quiet_ms, 1e-3)
+
+    @property
+    def cap_s(self) -> float | None:
+        """Time at which the clean-up ends at the latest, s, if given."""
+        return scaled(self.cap_ms, 1e-3)
+
+
+def _known_way(clean_up: CleanUp, fluid: Fluid) -> Iterator[str]:
+    if fluid.velocity_m_s is not None:
+        yield (
+            f"clean_up.drawdown_MPa: {clean_up.drawdown_MPa:g} with fluid.velocity_m_s "
+            f"{fluid.velocity_m_s:g}: nothing says on which way the drawdown is lost; give "
+            "fluid.overbalance_MPa with the table [well] or with fluid.darcy_length_mm instead of "
+            "the velocity"
+        )
+
+
+def _one_end(clean_up: CleanUp) -> Iterator[str]:
+    if clean_up.duration_ms is None:
+        return
+    for name in ("cap_ms", "quiet_ms"):
+        if (value := getattr(clean_up, name)) is not None:
+            yield (
+                f"clean_up.{name}: {value:g} together with clean_up.duration_ms "
+                f"{clean_up.duration_ms:g}: give one of the two"
+            )
+
+
+CLEAN_UP_RULES = (
+    Rule(("clean_up.drawdown_MPa", "fluid.velocity_m_s"), _known_way),
+    Rule(("clean_up.duration_ms", "clean_up.cap_ms", "clean_up.quiet_ms"), _one_end),
+)
+
+
+# ------------------------------------------------------------------------------------------------
+# How permeability is computed: the table [analysis] of a case, or the same without one.
+
+
+def _count_or_edges(value: Any) -> str:
+    """A case file gives a count; only Python gives edges, as a tuple."""
+    return "[edges]" if isinstance(value, tuple) else "[count]"
+
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+Count = Annotated[int, Field(ge=1, le=MOST_SECTIONS), Tag("[count]")]
+Edges = Annotated[tuple[Finite, ...], Tag("[edges]")]
+Sections = Annotated[Count | Edges, Discriminator(_count_or_edges)]
+
+
+class AnalysisKeys(TypedDict, total=False):
+    """The keywords of `AnalysisChoices.of_pack` and of `fdnet.analyse`; see `AnalysisChoices`."""
+
+    sections: int | Sequence[float]
+    law: str
+    damage_law: str
+    clogging_threshold: float | None
+    middle_band: str
+    throat_overlap: str
+    profile_bin_mm: float | None
+    walls: str
+
+
+class AnalysisChoices(Part):
+    """How permeability is computed; the default laws are fdnet's most accurate pair."""
+
+    sections: Sections = Field(
+        8,
+        description="Number of equal slabs along the flow in `sections.csv`. In Python also the "
+        "edges (S+1,) of the slabs, m.",
+    )
+    law: LawName = Field(DEFAULT_LAW, description="Conductance of a clean throat.")
+    damage_law: DamageLawName = Field(
+        AUTO,
+        description='How fines lower the permeability: "all-spheres", the network of grains and '
+        "fines together, or a law that damages the throats between grains. "
+        f'"auto" takes "all-spheres" up to {MOST_SPHERES:,} spheres and "section-archie" above.',
+    )
+    clogging_threshold: Fraction | None = Field(
+        None,
+        description="Throat porosity below which the thesis's damage laws take a throat as "
+        'clogged. When absent: 0.40 ("thesis") or 0.36 ("thesis-code").',
+    )
+    middle_band: Literal["threshold", "position"] = Field(
+        "threshold",
+        description="Rule of the thesis's damage laws for a throat porosity of 0.36 to 0.80: "
+        "by `clogging_threshold` alone, or by where the fines lie in the throat.",
+    )
+    throat_overlap: Literal["exact", "two-plane"] = Field(
+        "exact",
+        description="Volume of a fine inside a throat: exact, or by the thesis's two planes.",
+    )
+    profile_bin_mm: Positive | None = Field(
+        0.25,
+        description="Width of the depth bins in `profile.csv`. In Python also None, the mean "
+        "radius of the grains.",
+    )
+    walls: WallName = Field(
+        "no-slip",
+        description="Whether side walls hold the fluid or let it slip; known to "
+        '"lubrication", "section-archie" and "all-spheres".',
+    )
+
+    @field_validator("law", "damage_law", mode="before")
+    @classmethod
+    def _is_there(cls, name: Any) -> Any:
+        return still_there(name, REMOVED_LAWS)
+
+    def refusals(self) -> Iterator[str]:
+        """Why laws do not go together, one sentence each."""
+        if self.damage_law == ALL_SPHERES and self.law != DEFAULT_LAW:
+            yield (
+                f"analysis.damage_law: {self.damage_law!r} needs a network of all spheres, whose "
+                f"law is {DEFAULT_LAW!r}, analysis.law is {self.law!r}; take analysis.law = "
+                f"{DEFAULT_LAW!r}, or another damage law"
+            )
+
+    @property
+    def profile_bin_m(self) -> float | None:
+        """Width of the depth bins, m; None stands for the mean radius of the grains."""
+        return None if self.profile_bin_mm is None else self.profile_bin_mm * 1e-3
+
+    @classmethod
+    def of_pack(cls, **keys: Any) -> "AnalysisChoices":
+        """Choices without a case: one section and bins of a mean grain radius, or as given.
+
+        `keys` are those of `AnalysisKeys`. Raises CaseError that names every key with a bad value.
+        """
+        given = {"sections": 1, "profile_bin_mm": None} | keys
+        given["sections"] = _plain_sections(given["sections"])
+        try:
+            choices = cls.model_validate(given)
+        except ValidationError as error:
+            raise CaseError("; ".join(map(_refusal, error.errors()))) from None
+        for refusal in choices.refusals():
+            raise CaseError(refusal)
+        return choices
+
+    def changed(self, **keys: Any) -> "AnalysisChoices":
+        """The same choices with `keys` changed. Raises CaseError as `of_pack` does."""
+        return type(self).of_pack(**self.model_dump() | keys) if keys else self
+
+
+def with_visible_choices(function: Function) -> Function:
+    """The function, whose `**choices: Unpack[AnalysisKeys]` is shown as the single keywords.
+
+    Their defaults are shown as they are without `options`.
+    """
+    shown = inspect.signature(function)
+    usual, kinds = AnalysisChoices.of_pack(), AnalysisKeys.__annotations__
+    plain = [one for one in shown.parameters.values() if one.kind is not one.VAR_KEYWORD]
+    single = [
+        inspect.Parameter(
+            name, inspect.Parameter.KEYWORD_ONLY, default=getattr(usual, name), annotation=kind
+        )
+        for name, kind in kinds.items()
+    ]
+    function.__dict__["__signature__"] = shown.replace(parameters=[*plain, *single])
+    return function
+
+
+def _plain_sections(value: Any) -> Any:
+    if isinstance(value, np.integer):
+        return int(value)
+    if isinstance(value, list | tuple | np.ndarray):
+        return tuple(np.asarray(value, dtype=float).ravel().tolist())
+    return value
+
+
+def _refusal(item: Any) -> str:
+    key = str(item["loc"][0])
+    if item["type"] == "extra_forbidden":
+        known = ", ".join(AnalysisChoices.model_fields)
+        return f"analysis.{key}: unknown key; choose some of {known}"
+    what = (
+        item["msg"].replace("Input should be", "should be").replace("should be a valid", "is no")
+    )
+    return f"analysis.{key}: {item['input']!r} {what}"

@@ -1,0 +1,322 @@
+"""`fdnet ensemble`, `sweep`, `compare` and `design`: commands on many runs.
+
+Options of the commands that run many cases, and what they print at the end.
+"""
+
+import argparse
+import json
+import shlex
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fdnet.commands.run import add_file_and_set, add_program, add_ranks, case_of, stages_of
+from fdnet.errors import CaseError
+from fdnet.files import path_option
+from fdnet.names import STAGES
+
+if TYPE_CHECKING:
+    from fdnet.campaign.campaign import Goal
+    from fdnet.campaign.engine.tasks import HowToRun
+    from fdnet.campaign.plan.job import Plan
+    from fdnet.campaign.result.comparison import Comparison
+
+SOME_FAILED = 5
+"""Exit code when some of the runs have no result."""
+MOST_SEEDS = 32
+
+
+def add_result(parser: argparse.ArgumentParser) -> None:
+    """Adds --out, --rank-by, --json and --quiet to a parser."""
+    parser.add_argument(
+        "--out", type=path_option, required=True, metavar="DIR", help="folder of the results"
+    )
+    parser.add_argument(
+        "--rank-by",
+        default="k_reduction",
+        metavar="QUANTITY",
+        help="number of the summaries that orders the variants, smallest first (default "
+        "k_reduction)",
+    )
+    parser.add_argument("--json", action="store_true", help="print summary.json")
+    parser.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def add_engine(parser: argparse.ArgumentParser) -> None:
+    """Adds what decides where and how the runs are carried out."""
+    add_ranks(parser)
+    add_program(parser)
+    parser.add_argument(
+        "--stages",
+        default=",".join(STAGES),
+        help="comma-separated (default: all; without report a run draws nothing)",
+    )
+    parser.add_argument(
+        "--jobs",
+        type=int,
+        metavar="N",
+        help="runs at the same time (default: cores over ranks; 100 on a cluster)",
+    )
+    parser.add_argument(
+        "--engine",
+        choices=("auto", "local", "snakemake"),
+        default="auto",
+        help="what starts the runs: Snakemake if it is installed, or processes of fdnet (local)",
+    )
+    parser.add_argument(
+        "--slurm",
+        nargs="?",
+        const="",
+        metavar="RESOURCES",
+        help="submit the runs to Slurm through Snakemake, with its default resources, e.g. "
+        "slurm_partition=short,runtime=60",
+    )
+    parser.add_argument(
+        "--slurm-script",
+        nargs="?",
+        const="",
+        metavar="OPTIONS",
+        help="only write scripts for sbatch, with its options, e.g. partition=short,time=60",
+    )
+    _add_budget(parser)
+
+
+def _add_budget(parser: argparse.ArgumentParser) -> None:
+    """Adds how many runs there may be."""
+    parser.add_argument(
+        "--until",
+        metavar="GOAL",
+        help="add seeds until the 95 %% band is as narrow, e.g. 'k_reduction ± 5 %%' or "
+        "'k_damaged_m2 +- 10 %%'",
+    )
+    parser.add_argument(
+        "--max-seeds",
+        type=int,
+        default=MOST_SEEDS,
+        metavar="N",
+        help=f"most seeds that --until may spend (default {MOST_SEEDS})",
+    )
+    parser.add_argument(
+        "--jobs-limit",
+        type=int,
+        default=1000,
+        metavar="N",
+        help="most runs of a plan that are accepted (default 1000)",
+    )
+    parser.add_argument(
+        "--gather", action="store_true", help="run nothing; gather the runs that are there"
+    )
+
+
+def how_of(options: argparse.Namespace) -> "HowToRun":
+    """How to run the jobs. Raises CaseError on options that do not fit together."""
+    from fdnet.campaign.engine.snakemake import has_snakemake
+    from fdnet.campaign.engine.tasks import HowToRun
+    from fdnet.run.records import cores
+
+    cluster = options.slurm is not None or options.slurm_script is not None
+    if options.jobs is not None and options.jobs < 1:
+        raise CaseError(f"--jobs {options.jobs}: expected 1 or more")
+    given = options.slurm if options.slurm is not None else options.slurm_script
+    engine = options.engine
+    if engine == "auto":
+        engine = "snakemake" if has_snakemake() else "local"
+    return HowToRun(
+        jobs=options.jobs or (100 if cluster else max(1, cores() // options.np)),
+        liggghts=options.liggghts,
+        launcher=options.launcher,
+        timeout=options.timeout,
+        engine="slurm" if options.slurm is not None else engine,
+        resources=tuple(part for part in (given or "").split(",") if part),
+        quiet=options.quiet,
+    )
+
+
+def goal_of(options: argparse.Namespace) -> "Goal":
+    """What the runs are for. Raises CaseError for a goal that cannot be read."""
+    from fdnet.campaign.campaign import Goal
+    from fdnet.campaign.until import parse_until
+
+    return Goal(
+        ranked_by=options.rank_by,
+        until=None if options.until is None else parse_until(options.until),
+        most_seeds=options.max_seeds,
+        run=not options.gather,
+        scripts=options.slurm_script is not None,
+    )
+
+
+def plan_options(options: argparse.Namespace) -> dict[str, Any]:
+    """Limit, ranks and stages of a plan."""
+    stages = stages_of(options.stages)
+    if "analyse" not in stages:
+        raise CaseError(
+            f"--stages {options.stages}: without analyse there is no number to compare; add it"
+        )
+    return {"limit": options.jobs_limit, "ranks": options.np, "stages": stages}
+
+
+def finish(
+    options: argparse.Namespace,
+    comparison: "Comparison",
+    *,
+    ranked: Sequence[str] = (),
+    **more: Any,
+) -> int:
+    """Write tables and page, print the ranking; returns the exit code.
+
+    `ranked` are sentences above the ranking, `more` further keys of summary.json.
+    """
+    from fdnet.campaign.page.page import write_comparison
+    from fdnet.campaign.result.words import failure_lines, pair_lines, ranking_lines
+
+    summary = write_comparison(comparison, more, ranked)
+    if options.json:
+        print(json.dumps(summary, indent=1, default=str))
+    else:
+        for line in [*ranked, *ranking_lines(comparison), *pair_lines(comparison)]:
+            print(line)
+        print(f"page: {comparison.path / 'compare.html'}")
+    for line in failure_lines(comparison):
+        print(f"fdnet: {line}", file=sys.stderr)
+    return SOME_FAILED if comparison.failed else 0
+
+
+def run_campaign(
+    options: argparse.Namespace,
+    plan: "Plan",
+    judged: "Callable[[Comparison], Mapping[str, Any]] | None" = None,
+) -> int:
+    """Carry out a plan and write its results; returns the exit code.
+
+    `judged` gives what `finish` shows besides.
+    """
+    from fdnet.campaign.campaign import carry_out
+
+    goal = goal_of(options)
+    comparison = carry_out(Path(options.out), plan, how_of(options), goal)
+    if goal.scripts:
+        script = shlex.quote(str(options.out / "submit.bash"))
+        print(f"submit with: bash {script}; then gather with --gather")
+        return 0
+    return finish(options, comparison, **({} if judged is None else judged(comparison)))
+
+
+# ------------------------------------------------------------------------------------------------
+# `fdnet ensemble`: one case with several seeds, and the band of every number.
+
+
+def add_ensemble(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Adds the command to the command line."""
+    parser = commands.add_parser(
+        "ensemble", parents=[common], help="one case with several seeds, with 95 %% bands"
+    )
+    add_file_and_set(parser)
+    parser.add_argument(
+        "--seeds",
+        type=int,
+        default=4,
+        metavar="N",
+        help="number of seeds, from that of the case on (default 4)",
+    )
+    add_result(parser)
+    add_engine(parser)
+    parser.set_defaults(action=_run_ensemble)
+
+
+def _run_ensemble(options: argparse.Namespace) -> int:
+    from fdnet.campaign.plan.ensemble import ensemble_plan
+
+    plan = ensemble_plan(case_of(options), options.seeds, **plan_options(options))
+    return run_campaign(options, plan)
+
+
+# ------------------------------------------------------------------------------------------------
+# `fdnet sweep`: every combination of keys, variants, cases and seeds of a sweep file.
+
+
+def add_sweep(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Adds the command to the command line."""
+    parser = commands.add_parser(
+        "sweep", parents=[common], help="many cases and seeds, compared with 95 %% bands"
+    )
+    parser.add_argument("sweep", type=path_option, metavar="SWEEP.toml", help="the sweep file")
+    add_result(parser)
+    add_engine(parser)
+    parser.set_defaults(action=_run_sweep)
+
+
+def _run_sweep(options: argparse.Namespace) -> int:
+    from fdnet.campaign.plan.sweep import plan_of, read_sweep
+
+    plan = plan_of(read_sweep(options.sweep), **plan_options(options))
+    return run_campaign(options, plan)
+
+
+# ------------------------------------------------------------------------------------------------
+# `fdnet compare`: finished runs against each other, grouped by what differs in their cases.
+
+
+def add_compare(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Adds the command to the command line."""
+    parser = commands.add_parser(
+        "compare", parents=[common], help="compare finished runs, with 95 %% bands over seeds"
+    )
+    parser.add_argument(
+        "runs",
+        nargs="+",
+        type=path_option,
+        metavar="RUN",
+        help="run folders; the folder of an ensemble or a sweep stands for all its runs",
+    )
+    add_result(parser)
+    parser.set_defaults(action=_run_compare)
+
+
+def _run_compare(options: argparse.Namespace) -> int:
+    from fdnet.campaign.result.comparison import refuse_unknown
+    from fdnet.campaign.result.gather import gather_runs, result_folder
+
+    comparison = gather_runs(options.runs, options.out, ranked_by=options.rank_by)
+    refuse_unknown(comparison, options.rank_by, "--rank-by")
+    with result_folder(options.out):
+        return finish(options, comparison)
+
+
+# ------------------------------------------------------------------------------------------------
+# `fdnet design`: candidate muds for a sand, ranked by targets with their reasons.
+
+
+def add_design(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Adds the command to the command line."""
+    parser = commands.add_parser(
+        "design", parents=[common], help="rank candidate muds for a sand by targets"
+    )
+    parser.add_argument(
+        "sweep",
+        type=path_option,
+        metavar="DESIGN.toml",
+        help="a sweep file with the table [targets]",
+    )
+    add_result(parser)
+    add_engine(parser)
+    parser.set_defaults(action=_run_design)
+
+
+def _run_design(options: argparse.Namespace) -> int:
+    from fdnet.campaign.plan.sweep import plan_of, read_sweep
+    from fdnet.campaign.result.targets import candidate_lines, candidates, read_targets
+
+    sweep = read_sweep(options.sweep)
+    limits = read_targets(sweep.targets)
+
+    def judged(comparison: "Comparison") -> dict[str, Any]:
+        muds = candidates(comparison, limits)
+        return {
+            "ranked": candidate_lines(muds),
+            "design": [{"name": mud.name, "state": mud.state} for mud in muds],
+            "targets": limits,
+        }
+
+    return run_campaign(options, plan_of(sweep, **plan_options(options)), judged)

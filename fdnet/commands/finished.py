@@ -1,0 +1,131 @@
+"""`fdnet movie` and `fdnet stokes`: commands on a finished run.
+
+`fdnet movie`: the invasion of a finished run as a GIF or MP4, or as one picture.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+from fdnet.files import path_option
+
+
+def add_movie(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Adds the command to the command line."""
+    movie = commands.add_parser(
+        "movie", parents=[common], help="the invasion of a finished run as a GIF, MP4 or picture"
+    )
+    movie.add_argument("run", type=path_option, help="run folder")
+    movie.add_argument(
+        "--out",
+        type=path_option,
+        help="the movie, .gif or .mp4 (default RUN/invasion.gif), or one picture of before and "
+        "after, .png",
+    )
+    movie.add_argument(
+        "--show",
+        choices=("fines", "flux", "streamlines"),
+        default="fines",
+        help="the fines alone (default), or with them the flux of every throat, or streamlines "
+        "(half a minute and more)",
+    )
+    movie.add_argument(
+        "--fps", type=float, default=4.0, metavar="N", help="frames a second (default 4)"
+    )
+    movie.add_argument("--force", action="store_true", help="replace a file that is there")
+    movie.set_defaults(action=_movie)
+
+
+def _movie(options: argparse.Namespace) -> int:
+    from fdnet.run.movie import movie_of
+
+    path = movie_of(
+        options.run,
+        options.out,
+        per_second=options.fps,
+        show=options.show,
+        force=options.force,
+    )
+    print(f"{'picture' if path.suffix.lower() == '.png' else 'movie'}: {path}")
+    return 0
+
+
+# ------------------------------------------------------------------------------------------------
+# `fdnet stokes`: sections of a finished run by resolved Stokes flow.
+
+
+def add_stokes(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Adds the command to the command line."""
+    parser = commands.add_parser(
+        "stokes",
+        parents=[common],
+        help="sections of a finished run by resolved flow, to check the network",
+    )
+    parser.add_argument("run", type=path_option, help="run folder")
+    parser.add_argument(
+        "--section",
+        type=int,
+        action="append",
+        metavar="N",
+        help="number of a section, 1 at the face (default 1); may be given again",
+    )
+    parser.add_argument(
+        "--across",
+        type=float,
+        metavar="CELLS",
+        help="cells across the mean radius of a fine, on the finer of two grids (default 3.5)",
+    )
+    parser.add_argument("--json", action="store_true", help="print the numbers as JSON")
+    parser.add_argument("--quiet", action="store_true", help="no progress")
+    parser.set_defaults(action=_stokes)
+
+
+def _stokes(options: argparse.Namespace) -> int:
+    from fdnet.run.stokes_sections import ACROSS_A_FINE, stokes_sections
+
+    def follow(line: str) -> None:
+        if not options.quiet:
+            print(line, file=sys.stderr, flush=True)
+
+    across = ACROSS_A_FINE if options.across is None else options.across
+    numbers = options.section or (1,)
+    rows = stokes_sections(options.run, numbers, across=across, follow=follow)
+    if options.json:
+        print(json.dumps(rows, indent=2))
+    else:
+        print("\n\n".join(map(_text, rows)))
+    return 0
+
+
+def _text(row: Mapping[str, Any]) -> str:
+    from fdnet.report.tables import in_millidarcy
+
+    lines = [
+        f"section {row['section']}, {1e3 * row['x_lo_m']:g} to {1e3 * row['x_hi_m']:g} mm, "
+        "cut out",
+        f"damage law of the network: {row['network_damage_law']}",
+        _line("", "before, mD", "after, mD", "lost"),
+    ]
+    for name, prefix in (("resolved flow", ""), ("network", "network_")):
+        before, after, lost = (
+            row[f"{prefix}{key}"] for key in ("k_initial_m2", "k_damaged_m2", "k_reduction")
+        )
+        shown = "-" if lost is None else f"{lost:.1%}"
+        lines.append(_line(name, in_millidarcy(before), in_millidarcy(after), shown))
+    errors = (f"{row[f'{key}_error']:.1%}" for key in ("k_initial", "k_damaged"))
+    lines.append(_line("error of the flow", *errors))
+    cells = (f"{1e6 * row[f'cell_{state}_m']:.3g}" for state in ("initial", "damaged"))
+    lines.append(_line("its finer cells, µm", *cells))
+    over = (f"{_over(row, key):+.1%}" for key in ("k_initial_m2", "k_damaged_m2"))
+    lines.append(_line("network over flow", *over))
+    return "\n".join(lines)
+
+
+def _line(name: str, before: str, after: str, lost: str = "") -> str:
+    return f"{name:<20}{before:>14}{after:>14}{lost:>10}".rstrip()
+
+
+def _over(row: Mapping[str, Any], key: str) -> float:
+    return float(row[f"network_{key}"] / row[key] - 1.0)

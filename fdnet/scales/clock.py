@@ -1,0 +1,406 @@
+"""Steps, times and the supply of fines.
+
+How much mud plugs a face, and how many fines are in the simulation until then.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import TypeVar
+
+from fdnet.case.case import Case, InvasionCase
+from fdnet.case.tables import CONTACT_STEP_LIMIT, DEFAULT_STIFFNESS
+from fdnet.errors import CaseError
+from fdnet.scales.contacts import (
+    Contact,
+    Overlaps,
+    contacts_of,
+    deposit_force,
+    overlaps_of,
+    two_digits_up,
+)
+from fdnet.scales.drag import Crowd, push_of, throat_width
+from fdnet.scales.drag import crowd_drag_factor as drag_factor
+from fdnet.scales.flow import Drive, Velocity, drive_of, driving_pressure, velocity_of
+from fdnet.scales.pack import target_porosity
+
+PLUG_SOLIDS = 0.6
+"""Volume of fines a unit of face, over the median diameter of the grains, that is ample to plug
+it: the shipped specimens and the well took 0.1 to 0.25 until they did, and go on a plug time."""
+TAKEN_SOLIDS = 0.25
+"""The same, of what has come when the face plugs."""
+FIRST_BATCHES = 0.3
+"""Share of the slab that is there before it is needed, where it comes in batches."""
+
+
+def supplied_solids(case: InvasionCase, slab: float) -> float:
+    """Fines of a slab of `slab` m a unit of face, over the median diameter of the grains."""
+    return slab * case.fines.placed_fraction / case.grains.curve.size_at(0.5)
+
+
+def present_share(case: InvasionCase, *, duration: float, feeding: float) -> float:
+    """Mean number of fines in the simulation over the number supplied.
+
+    The slab arrives evenly over `feeding` s of a simulation of `duration` s, in batches that come
+    ahead of what arrives.
+    """
+    if case.fines.supply == "slab":
+        return 1.0
+    full = (1 - FIRST_BATCHES) * feeding
+    if duration <= full:
+        return FIRST_BATCHES + 0.5 * (1 - FIRST_BATCHES) * duration / full
+    return 1 - 0.5 * (1 - FIRST_BATCHES) * full / duration
+
+
+# ------------------------------------------------------------------------------------------------
+# Times and amounts of memory in words.
+
+
+def spoken_time(seconds: float) -> str:
+    """A time as one says it: "40 s", "12 min", "3 h 20 min", "2.1e+03 h (2.4 years)"."""
+    minutes = seconds / 60
+    if seconds < 90:
+        return f"{max(1, round(seconds))} s"
+    if minutes < 90:
+        return f"{round(minutes)} min"
+    hours = minutes / 60
+    if hours < 10:
+        whole, rest = divmod(5 * round(minutes / 5), 60)
+        return f"{whole} h {rest} min" if rest else f"{whole} h"
+    years = hours / (24 * 365.25)
+    return f"{hours:.2g} h ({years:.2g} years)" if years > 1 else f"{hours:.0f} h"
+
+
+def spoken_memory(size: float) -> str:
+    """An amount of memory in bytes as one says it: "700 MB", "2.3 GB"."""
+    return f"{size / 1e9:.2g} GB" if size >= 1e9 else f"{size / 1e6:.0f} MB"
+
+
+# ------------------------------------------------------------------------------------------------
+# The slab of suspension that is supplied: how many fines, how long, how often one arrives.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Slab:
+    """The suspension upstream of the formation face.
+
+    Attributes:
+        count: number of fines in it.
+        length: m, along the flow; never shorter than the largest fine.
+    """
+
+    count: int
+    length: float
+
+
+def slab_of(case: InvasionCase) -> Slab:
+    """Number of fines n and length l of the slab, n v = c A l.
+
+    v is the mean volume of a fine, c the share by volume of the fines that are placed, A the
+    cross-section of the box. A case gives either n or l.
+    """
+    fines = case.fines
+    area, volume = case.size_m[1] * case.size_m[2], fines.mean_volume_m3
+    least = 2 * fines.radius_range_m[1]
+    if fines.count is not None:
+        length = max(fines.count * volume / (fines.placed_fraction * area), least)
+        return Slab(count=fines.count, length=length)
+    length = max(fines.slab_m or 0.0, least)
+    return Slab(count=max(1, round(fines.placed_fraction * area * length / volume)), length=length)
+
+
+def arrival_time(case: InvasionCase, upstream: float) -> float:
+    """Mean time between two fines that arrive at the face, v / (c A u), s; u = `upstream` m/s."""
+    return case.fines.mean_volume_m3 / (
+        case.fines.placed_fraction * case.size_m[1] * case.size_m[2] * upstream
+    )
+
+
+def slab_warnings(case: InvasionCase, slab: Slab) -> list[str]:
+    """The slab was lengthened to the largest fine; empty when it was not."""
+    diameter = 2 * case.fines.radius_range_m[1]
+    if slab.length > diameter:
+        return []
+    return [
+        f"the slab is lengthened to one fine's diameter, {1e3 * diameter:.3g} mm, so it is "
+        "thinner than fines.concentration"
+    ]
+
+
+# ------------------------------------------------------------------------------------------------
+# When an invasion ends, and how often it is looked at until then.
+
+
+ARRIVALS = 10
+"""The default plug time lets at least this many fines of the undisturbed suspension arrive."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StopTimes:
+    """Times of the stop rule, s of the simulation.
+
+    Attributes:
+        plug: the face counts as plugged when no fine has crossed it for this time.
+        cap: the invasion ends at this time at the latest.
+        chunk: time between two checkpoints.
+    """
+
+    plug: float
+    cap: float
+    chunk: float
+
+
+def stop_times(case: InvasionCase, slab: Slab, drive: Drive, *, upstream: float) -> StopTimes:
+    """The times that the case gives, or those that follow from the velocities.
+
+    In a chunk the fluid passes about one grain diameter. A given duration is cut into equal
+    chunks, so that it is met within one drag refresh a chunk. The times of a case are physical:
+    they are divided by the factor of the drive. `upstream` is the velocity there, m/s, simulated.
+    """
+    run, clock = case.run, 1 / drive.factor
+    passage = 2 * case.grains.mean_radius_m / drive.velocity
+    plug = max(4 * passage, ARRIVALS * arrival_time(case, upstream))
+    if run.plug_time_s is not None:
+        plug = run.plug_time_s * clock
+    cap = 3 * slab.length / upstream + 4 * plug + 2 * case.size_m[0] / drive.velocity
+    given = run.duration_s or run.cap_s
+    cap = cap if given is None else given * clock
+    chunk = min(passage, plug / 4) if run.checkpoint_s is None else run.checkpoint_s * clock
+    chunk = min(chunk, cap)
+    if run.duration_s is not None:
+        chunk = cap / math.ceil(cap / chunk)
+    return StopTimes(plug=plug, cap=cap, chunk=chunk)
+
+
+def chunk_refreshes(case: InvasionCase, chunk: float, refresh: float) -> int:
+    """Drag refreshes of `refresh` s in a chunk: rounded where a duration must be met, else up."""
+    refreshes = chunk / refresh
+    return max(1, math.ceil(refreshes) if case.run.duration_s is None else round(refreshes))
+
+
+def plug_warnings(case: InvasionCase, plug: float, drive: Drive, upstream: float) -> list[str]:
+    """The plug time is too short for the suspension; empty when it is not.
+
+    `plug` is in s and `upstream` in m/s, both as simulated.
+    """
+    if plug >= ARRIVALS * arrival_time(case, upstream):
+        return []
+    physical_ms = 1e3 * plug * drive.factor
+    return [
+        f"run.plug_time_ms: in {physical_ms:.3g} ms fewer than {ARRIVALS} fines of the suspension "
+        "arrive at the face: the invasion may be called plugged too early"
+    ]
+
+
+# ------------------------------------------------------------------------------------------------
+# The time step of an invasion, the steps for which drag is held, and their bounds of stability.
+#
+# `tau` is the relaxation time of the drag on the smallest fine, s.
+
+
+HOLD_OVER_RELAXATION = 0.05
+"""Share of tau for which the drag is held by default. At a share of 0.1 the error was measured to
+be as large as the scatter between seeds."""
+DRAG_WARNING, DRAG_LIMIT = 0.1, 1.0
+"""Time for which drag is constant over tau: above the first value fdnet warns, above the second it
+refuses the case."""
+SAFE_FACTOR = 0.2
+"""Time step over sqrt(m/k) that is accepted with any contact."""
+RANDOM_CLOSE = 0.36
+"""Porosity of random close packing of equal spheres (Scott and Kilgour 1969)."""
+_ROUNDING = 1 + 1e-12
+
+
+def relaxation_time(
+    radius: float, density: float, viscosity: float, multiplier: float = 1.0
+) -> float:
+    """tau = m / (6 pi mu r M) = 2 r^2 rho / (9 mu M), s (Stokes 1851).
+
+    For a sphere of `radius` m and `density` kg/m3 in a liquid of `viscosity` Pa s.
+    """
+    return 2 * radius**2 * density / (9 * viscosity * multiplier)
+
+
+def contact_step(case: Case, contacts: dict[str, Contact]) -> float:
+    """sqrt(m/k), s, of the lightest moving sphere and the stiffest of its contacts."""
+    return min(contact.step_limit for contact in _moving(case, contacts))
+
+
+def _moving(case: Case, contacts: dict[str, Contact]) -> list[Contact]:
+    mobile = case.grains.motion == "mobile"
+    return [contact for name, contact in contacts.items() if "fine" in name or mobile]
+
+
+def largest_factor(case: Case, contacts: dict[str, Contact]) -> float:
+    """Largest time step over sqrt(m/k) that stays stable in a deposit.
+
+    LIGGGHTS damps with the velocity of half a step ago, so a mode of the squared frequency w^2 and
+    the damping rate g is stable while w^2 dt^2 + 2 g dt < 4 (Jury's criterion of the leapfrog
+    step). The fastest mode of equal spheres with 12 linear contacts each, a face-centred cubic
+    lattice, has w^2 = 8 k/m and g = 8 c/m, c = 2 z sqrt(k m/2) for the damping ratio z. That gives
+    f^2 + 2 sqrt(2) z f = 1/2 for the largest factor f. It is cut to `CONTACT_STEP_LIMIT`. Hertz
+    contacts and rolling friction stiffen with the force; they keep `SAFE_FACTOR`.
+    """
+    if case.contact.model != "hooke" or case.contact.rolling_friction is not None:
+        return SAFE_FACTOR
+    damping = max(contact.damping_ratio for contact in _moving(case, contacts))
+    stable = math.sqrt(2 * damping**2 + 0.5) - math.sqrt(2) * damping
+    return max(SAFE_FACTOR, min(stable, CONTACT_STEP_LIMIT))
+
+
+def time_step(case: Case, contacts: dict[str, Contact], tau: float) -> float:
+    """The step, s: the one given, or `run.time_step_factor` of sqrt(m/k).
+
+    With explicit drag the derived step is at most 0.1 tau. Raises CaseError when the step or its
+    factor breaks the contact bound, or a given step exceeds tau while drag is explicit.
+    """
+    bound, given = contact_step(case, contacts), case.run.time_step_s
+    largest = largest_factor(case, contacts)
+    if given is None:
+        if case.run.time_step_factor > largest:
+            most = math.floor(largest * 1e3) / 1e3
+            raise CaseError(
+                f"run.time_step_factor: {case.run.time_step_factor:g} is above {largest:.3g}, the "
+                "largest that is stable with the damping_ratio, contact.model and "
+                f"contact.rolling_friction of this case; take at most {most:g}"
+            )
+        derived = case.run.time_step_factor * bound
+        return derived if case.drag.scheme == "implicit" else min(derived, DRAG_WARNING * tau)
+    if given > largest * bound * _ROUNDING:
+        raise CaseError(
+            f"run.time_step_s: {given:g} s is above the contact bound {largest:.3g} "
+            f"sqrt(m/k) = {largest * bound:.3g} s; lower it or run.stiffness_N_m"
+        )
+    if case.drag.scheme != "implicit" and given > DRAG_LIMIT * tau * _ROUNDING:
+        raise CaseError(
+            f"run.time_step_s: {given:g} s is above the drag relaxation time {tau:.3g} s, "
+            "explicit drag would overshoot; lower it, or take drag.scheme = 'implicit'"
+        )
+    return given
+
+
+def hold_steps(case: Case, step: float, tau: float, longest: float) -> int:
+    """Steps for which drag is held; 1 in every scheme but "held".
+
+    `longest` is the time between checkpoints, s, which the held time must fit into. Raises
+    CaseError when the refresh that the case gives is longer than tau or than that.
+    """
+    if case.drag.scheme != "held":
+        return 1
+    given, most = case.drag.refresh_steps, math.ceil(longest / step)
+    if given is None:
+        return max(1, min(math.floor(HOLD_OVER_RELAXATION * tau / step), most))
+    if given * step > DRAG_LIMIT * tau * _ROUNDING:
+        raise CaseError(
+            f"drag.refresh_steps: {given} steps of {step:.3g} s exceed the drag relaxation time "
+            f"{tau:.3g} s; at most {math.floor(DRAG_LIMIT * tau / step * _ROUNDING)} steps are "
+            "stable"
+        )
+    if given > most:
+        raise CaseError(
+            f"drag.refresh_steps: {given} steps of {step:.3g} s are longer than the "
+            f"{longest:.3g} s between checkpoints; expected at most {most}"
+        )
+    return given
+
+
+def densest_factor(case: Case) -> float:
+    """Factor on the drag of a fine in a random close packing of fines; 1 without a crowd."""
+    if case.drag.crowd == "none":
+        return 1.0
+    crowd = Crowd(porosity=RANDOM_CLOSE)
+    return float(drag_factor(crowd, gradient_apart=False)) / RANDOM_CLOSE
+
+
+def drag_warnings(case: Case, held: float) -> list[str]:
+    """What a drag that is constant for `held` tau costs in accuracy, in words.
+
+    Empty up to 0.1 tau, with the implicit scheme up to 1 tau.
+    """
+    implicit = case.drag.scheme == "implicit"
+    limit = DRAG_LIMIT if implicit else DRAG_WARNING
+    if held <= limit * _ROUNDING:
+        return []
+    if implicit:
+        return [
+            f"implicit drag with a time step of {held:.3g} relaxation times (above {limit:g}): "
+            "the difference of a fine's velocity to the fluid's turns into "
+            f"{(2 - held) / (2 + held):.2g} of it each step instead of {math.exp(-held):.2g}; "
+            "lower run.time_step_s to resolve it"
+        ]
+    remedy = "drag.refresh_steps or " if case.drag.scheme == "held" else ""
+    return [
+        f"drag is held for {held:.2g} of the relaxation time (above {limit:g}: a fine's velocity "
+        f"is off by over 2 %): lower {remedy}run.time_step_s"
+    ]
+
+
+# ------------------------------------------------------------------------------------------------
+# How fast the simulation is driven, how deep it presses fines, and the stiffness it needs.
+
+
+PRESSED = 0.03
+"""Largest predicted overlap of a fine over its diameter with `run.stiffness_N_m` = "auto"; the
+default of `run.max_overlap`."""
+
+AnyCase = TypeVar("AnyCase", bound=Case)
+
+
+def drive_in(case: InvasionCase, velocity: Velocity) -> Drive:
+    """How fast the simulation is driven; a free fine outruns the fluid by its drift."""
+    own = push_of(case, velocity.interstitial, velocity.pressure_gradient)
+    free = own.velocity + own.drift(case.fines.radius_range_m[1])
+    return drive_of(case, own.velocity, relaxation_times(case)[1], free=free)
+
+
+def relaxation_times(case: InvasionCase) -> tuple[float, float]:
+    """The shortest and the longest of the fines, s; with one material smallest and largest."""
+    viscosity, multiplier = case.fluid.viscosity_Pa_s, case.drag.multiplier
+    if not case.fines.measured:
+        ends = [(radius, case.fines.density_kg_m3) for radius in case.fines.radius_range_m]
+    else:
+        ends = [
+            (0.5 * diameter, one.density)
+            for one in case.fines.components
+            for diameter in (one.curve.low, one.curve.high)
+        ]
+    times = [relaxation_time(radius, density, viscosity, multiplier) for radius, density in ends]
+    return min(times), max(times)
+
+
+def pressed_in(case: InvasionCase, velocity: Velocity, drive: Drive, contact: Contact) -> Overlaps:
+    """The overlaps of fines in the `contact` of a grain and a fine, as simulated."""
+    push = push_of(case, drive.velocity, velocity.pressure_gradient, factor=drive.factor)
+    porosity = target_porosity(case)
+    pressure = drive.factor * driving_pressure(case, velocity.pressure_gradient)
+    plug = deposit_force(case, pressure, throat_width(porosity, velocity.permeability))
+    return overlaps_of(case, contact, push, porosity, deposit=plug)
+
+
+def stiff_enough(case: AnyCase) -> AnyCase:
+    """The case with a number for `run.stiffness_N_m` = "auto"; any other case as it is.
+
+    It is the least number of two digits at which every predicted overlap is at most `PRESSED`, and
+    at least the default. A force presses a linear contact in by F / k and an impact by
+    w sqrt(m / k); by Hertz they go with the powers -2/3 and -2/5 of the modulus.
+    """
+    if case.run.stiffness_N_m != "auto":
+        return case
+    soft = _with(case, DEFAULT_STIFFNESS)
+    if not isinstance(soft, InvasionCase):
+        return soft
+    velocity = velocity_of(soft, target_porosity(soft))
+    contact = contacts_of(soft, velocity.interstitial)["grain-fine"]
+    deep = pressed_in(soft, velocity, drive_in(soft, velocity), contact)
+    held, struck = (1.5, 2.5) if soft.contact.model == "hertz" else (1.0, 2.0)
+    raised = max(
+        1.0,
+        (max(deep.drag, deep.deposit) / PRESSED) ** held,
+        (deep.impact / PRESSED) ** struck,
+    )
+    return _with(case, two_digits_up(raised * DEFAULT_STIFFNESS))
+
+
+def _with(case: AnyCase, stiffness: float) -> AnyCase:
+    return case.model_copy(
+        update={"run": case.run.model_copy(update={"stiffness_N_m": stiffness})}
+    )

@@ -1,0 +1,786 @@
+"""A case from a sand and a mud (`fdnet init`).
+
+What an engineer knows of a sand, a mud and a well, as it is written: with its units.
+"""
+
+import json
+import math
+import re
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from fdnet.case.case import InvasionCase, with_fines
+from fdnet.case.file import case_from, sizes_from
+from fdnet.case.spheres import Sizes
+from fdnet.case.units import converted, share_of
+from fdnet.errors import CaseError
+from fdnet.scales.clock import PLUG_SOLIDS, spoken_time
+from fdnet.scales.cost import cost_of
+from fdnet.scales.drag import MOST_REYNOLDS, STOKES_REYNOLDS, throat_width
+from fdnet.scales.flow import carman_kozeny
+from fdnet.scales.pack import grain_count
+from fdnet.scales.questions import QUESTIONS, Question, by_options
+from fdnet.scales.scales import InvasionScales, scales_of
+from fdnet.sizes import SizeCurve
+
+DIAMETERS = ("D10", "D50", "D90")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Curve:
+    """A curve of sizes as it is given.
+
+    Attributes:
+        diameters: texts such as "0.25 mm" by the names of `DIAMETERS`.
+        file: path of a CSV file instead, as seen from the case file; empty without one.
+    """
+
+    diameters: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    file: str = ""
+
+    @property
+    def table(self) -> dict[str, Any]:
+        """The keys of the table `sizes`."""
+        return {"file": self.file} if self.file else dict(self.diameters)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answers:
+    """A sand, a mud and a well. Every value is a text with its unit.
+
+    Attributes:
+        name: of the case.
+        sand: sizes of the grains.
+        porosity: of the sand.
+        mud: sizes of the solids.
+        assumed_spread: whether D10 and D90 of the mud were made up from its D50.
+        solids: by volume, "5 %", or in mass a volume of mud, "25 lb/bbl".
+        solids_density: of the solids.
+        viscosity: of the liquid.
+        liquid_density: of the liquid.
+        overbalance: pressure of the mud above that of the formation.
+        well_radius: to the formation face.
+        drainage_radius: at which the pressure is that of the formation.
+        formation_permeability: of the formation; empty: that of the pack.
+    """
+
+    name: str
+    sand: Curve
+    porosity: str
+    mud: Curve
+    assumed_spread: bool
+    solids: str
+    solids_density: str
+    viscosity: str
+    liquid_density: str
+    overbalance: str
+    well_radius: str
+    drainage_radius: str
+    formation_permeability: str = ""
+
+    @property
+    def solids_key(self) -> str:
+        """The key of the case that takes the solids: a share, or a mass."""
+        return "concentration" if self.solids.rstrip().endswith("%") else "solids"
+
+
+def filled(
+    given: Mapping[str, str], ask: Callable[[Question, str], str | None] | None
+) -> dict[str, str]:
+    """The answers with what is missing asked for, or with defaults.
+
+    Args:
+        given: texts by the keys of `QUESTIONS`, and "sand_file" and "mud_file".
+        ask: shows why the last answer was none and a question, returns the answer; None at the
+            end of all answers, and where nobody can be asked.
+
+    Raises:
+        CaseError: answers are missing or cannot be read, and nobody can be asked; it names all.
+    """
+    answers, missing, problems = dict(given), [], []
+    for question in QUESTIONS:
+        if answers.get(f"{question.group}_file"):
+            continue
+        text = _read(question, answers.get(question.key, ""))
+        problem = question.problem(text) if text else ""
+        while ask is not None and (problem or not text):
+            reply = ask(question, problem)
+            if reply is None:
+                ask = None
+                break
+            text = _read(question, reply or question.default or "")
+            problem = question.problem(text) if text else ""
+            if not reply and question.default is not None:
+                break
+        answers[question.key] = text or question.default or ""
+        if problem:
+            problems.append(problem)
+        elif not text and question.default is None:
+            missing.append(f'{question.option} "{question.example}"')
+    if missing:
+        problems.append(
+            f"{len(missing)} answer{'s are' if len(missing) > 1 else ' is'} missing: "
+            f"{', '.join(missing)} (sizes also as "
+            "--sand-file or --mud-file with a CSV table); on a terminal they are asked for"
+        )
+    if problems:
+        raise CaseError(" | ".join(problems))
+    return answers
+
+
+def _read(question: Question, text: str) -> str:
+    """An answer as it is read: shares also as a number between 0 and 1."""
+    return _share(text.strip()) if "%" in question.unit else text.strip()
+
+
+def answers_of(name: str, texts: Mapping[str, str]) -> Answers:
+    """The answers from texts that `filled` has read."""
+    mud, assumed = _mud(texts)
+    return Answers(
+        name=name,
+        sand=_curve("sand", texts),
+        porosity=texts["porosity"],
+        mud=mud,
+        assumed_spread=assumed,
+        solids=texts["solids"],
+        **{
+            key: texts[key]
+            for key in (
+                *("solids_density", "viscosity", "liquid_density", "overbalance"),
+                *("well_radius", "drainage_radius", "formation_permeability"),
+            )
+        },
+    )
+
+
+def _curve(group: str, texts: Mapping[str, str]) -> Curve:
+    file = texts.get(f"{group}_file", "")
+    return Curve(
+        file=file,
+        diameters={} if file else {name: texts[f"{group}_{name.lower()}"] for name in DIAMETERS},
+    )
+
+
+def _mud(texts: Mapping[str, str]) -> tuple[Curve, bool]:
+    """The solids; a D10 or D90 that is not given is half or twice the D50."""
+    if texts.get("mud_file"):
+        return _curve("mud", texts), False
+    made_up = {
+        question.key: factor
+        for question, factor in zip(QUESTIONS[5:7], (0.5, 2.0), strict=True)
+        if texts[question.key] == question.default
+    }
+    median = converted(texts["mud_d50"], "_um")
+    spread = {key: f"{factor * median:g} um" for key, factor in made_up.items()}
+    return _curve("mud", {**texts, **spread}), bool(made_up)
+
+
+def _share(text: str) -> str:
+    """A share between 0 and 1 as a percentage, "0.38" as "38 %"; anything else as it is."""
+    try:
+        return f"{100 * float(text):g} %" if 0 < float(text) < 1 else text
+    except ValueError:
+        return text
+
+
+# ------------------------------------------------------------------------------------------------
+# What fdnet chooses for a case, and the tables of the case file.
+
+
+PLUG_RATE = 0.05
+"""Share of the supply that still enters a plugged face."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Budget:
+    """How large a specimen may be, and how long it may take.
+
+    Attributes:
+        name: as --size takes it.
+        width: in mean grain diameters (by volume over surface).
+        length: likewise.
+        seconds: of one core.
+    """
+
+    name: str
+    width: float
+    length: float
+    seconds: float
+
+
+BUDGETS = {
+    "quick": Budget(name="quick", width=5.0, length=8.0, seconds=600.0),
+    "standard": Budget(name="standard", width=8.0, length=10.0, seconds=4 * 3600.0),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """What fdnet chose for a case.
+
+    Attributes:
+        width: m. length: m. sections: their number.
+        sand_cut: percent of the sand left out at the fine end.
+        mud_cut: percent of the solids below the coarse cut.
+        cut: m, diameter below which solids are left out; 0 for none.
+        slab: m of mud.
+        supply_share: solids supplied over those that are expected to plug the face.
+        stiffness: N/m.
+        driven: whether the fines are driven faster than the fluid.
+        inertia: whether drag is that of Schiller and Naumann.
+        cap: s, or None.
+        passing: m, diameter up to which solids pass the throats.
+    """
+
+    width: float
+    length: float
+    sections: int
+    sand_cut: float
+    mud_cut: float
+    cut: float
+    slab: float
+    supply_share: float
+    stiffness: float
+    driven: bool = False
+    inertia: bool = False
+    cap: float | None = None
+    passing: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Design:
+    """A case with the reasons for its sizes.
+
+    Attributes:
+        answers: what was given.
+        choice: what fdnet chose.
+        case: the two together.
+        scales: of the case.
+        budget: that the case was fitted to.
+        seconds: expected on one core.
+    """
+
+    answers: Answers
+    choice: Choice
+    case: InvasionCase
+    scales: InvasionScales
+    budget: Budget
+    seconds: float
+
+
+def tables_of(answers: Answers, choice: Choice) -> dict[str, Any]:
+    """The tables of the case file."""
+    drive = {"drive_velocity_m_s": "auto"} if choice.driven else {}
+    inertia = {"inertia": "schiller-naumann"} if choice.inertia else {}
+    kept = {"cut_percent": [1.0, choice.mud_cut]} if choice.mud_cut != 99.0 else {}
+    sand = {"cut_percent": [choice.sand_cut, 99.0]} if choice.sand_cut != 1.0 else {}
+    known = answers.formation_permeability
+    return {
+        "name": answers.name,
+        "seed": 1,
+        "box": {"size": [mm(choice.length), mm(choice.width), mm(choice.width)]},
+        "grains": {"sizes": answers.sand.table | sand, "porosity": answers.porosity},
+        "fines": {
+            "sizes": answers.mud.table | kept,
+            **({"cut": um(choice.cut)} if choice.cut else {}),
+            answers.solids_key: answers.solids,
+            "density": answers.solids_density,
+            "slab": mm(choice.slab),
+        },
+        "fluid": {
+            "viscosity": answers.viscosity,
+            "density": answers.liquid_density,
+            "overbalance": answers.overbalance,
+        },
+        "well": {
+            "radius": answers.well_radius,
+            "drainage_radius": answers.drainage_radius,
+            **({"formation_permeability": known} if known else {}),
+        },
+        "drag": drive | inertia,
+        "run": {
+            "stiffness": f"{choice.stiffness:g} N/m",
+            "plug_rate": PLUG_RATE,
+            **({"cap": f"{1e3 * choice.cap:.3g} ms"} if choice.cap else {}),
+        },
+        "analysis": {"sections": choice.sections},
+    }
+
+
+def mm(length: float) -> str:
+    """A length in m as a text in mm."""
+    return f"{1e3 * length:.3g} mm"
+
+
+def um(length: float) -> str:
+    """A length in m as a text in um."""
+    return f"{1e6 * length:.3g} um"
+
+
+# ------------------------------------------------------------------------------------------------
+# How large a specimen and how much mud a sand and a mud need, and what of them fits a budget.
+
+
+SECTION = 2.0
+"""Thickness of a section in mean grain diameters."""
+STIFFNESSES = (30.0, 60.0, 100.0, 200.0, 500.0, 1e3, 2e3, 5e3, 1e4)
+SAND_CUTS = (1.0, 2.0, 5.0, 10.0)
+"""Shares of the finest sand, percent, that may be left out to clear the coarsest mud."""
+LEAST_KEPT = 0.5
+"""Share of the solids that must stay when the finest are left out."""
+LEAST_LEFT = 0.05
+"""Share of the solids above a seventh of a throat from which the finer ones are left out."""
+FINEST_OF_THROAT = 1 / 7
+"""Fines below this part of the throats pass (Barkman and Davidson 1972, J. Pet. Tech. 24)."""
+GAP = 0.95
+"""Largest fine over smallest grain."""
+MOST_COARSE = 0.35
+"""Share of the coarsest solids that may be left out."""
+PATIENCE = 1.5
+"""Cap over the expected time, and over that in which all of the mud arrives."""
+USUAL_SAND = Curve(diameters={"D10": "0.3 mm", "D50": "0.5 mm", "D90": "0.7 mm"})
+USUAL_MUD = Curve(diameters={"D10": "60 um", "D50": "80 um", "D90": "100 um"})
+USUAL_CHOICE = Choice(
+    width=5e-3,
+    length=5e-3,
+    sections=1,
+    sand_cut=1.0,
+    mud_cut=99.0,
+    cut=0.0,
+    slab=1e-3,
+    supply_share=1.0,
+    stiffness=STIFFNESSES[-1],
+)
+"""A specimen in which answers that are not about sizes are looked at."""
+
+
+def designed(
+    answers: Answers,
+    budget: Budget,
+    *,
+    folder: Path,
+    refusals: Callable[[InvasionCase, InvasionScales], Iterable[str]],
+) -> Design:
+    """The case of the answers within a budget; `folder` is where files of sizes are looked for.
+
+    The width and length follow from the grains, the supply from what plugs the face. Then the
+    finest solids are left out as far as the budget asks, and only then is the supply shortened.
+    A choice that makes no case, or one for which `fdnet run` has `refusals`, does not fit.
+
+    Raises:
+        CaseError: the answers make no case; it says which, by their options.
+    """
+    sand, mud = _sizes(answers, folder)
+    first = _first_choice(answers, budget, sand, mud)
+    choices = list(_candidates(first, _mud_curve(mud, first.mud_cut)))
+    low, high, why = 0, len(choices) - 1, ""
+    while low < high:
+        middle = (low + high) // 2
+        try:
+            fits = _design(answers, choices[middle], budget, folder).seconds <= budget.seconds
+        except CaseError:
+            fits = False
+        low, high = (low, middle) if fits else (middle + 1, high)
+    for choice in choices[low:]:
+        try:
+            design = _design(answers, choice, budget, folder)
+            why = next(iter(refusals(design.case, design.scales)), "")
+        except CaseError as error:
+            why = str(error)
+        if not why:
+            return design
+    raise CaseError(_no_specimen(why, _mud_curve(mud, first.mud_cut), choices[0]))
+
+
+def _no_specimen(why: str, solids: SizeCurve, first: Choice) -> str:
+    """That no choice makes a case that is run, with the reason and the options to change."""
+    reason = re.split(r"; |: (?=take|lower|raise)", _spoken(why))[0]
+    if reason.startswith("--"):
+        return f"{reason}: change it"
+    key, _, words = reason.partition(": ")
+    reason = {"run.max_hours": "at most ", "run.time_step_s": "a time step of "}.get(
+        key, ""
+    ) + words
+    passing = ""
+    if _kept_above(solids, first.passing) < LEAST_KEPT * solids.kept:
+        passing = (
+            f" (most of the solids, {um(solids.low)} to {um(solids.high)}, are finer than a "
+            f"seventh of a throat, {um(first.passing)}, and pass)"
+        )
+    return (
+        "no specimen of this sand and mud can be run, with as much of the finest "
+        f"solids and of the mud left out as may be{passing}: {reason}; give coarser or fewer "
+        "solids (--mud-d10, --mud-d50, --mud-d90, --solids), a finer sand (--sand-d10, "
+        "--sand-d50, --sand-d90), or another flow (--overbalance, --viscosity)"
+    )
+
+
+def _sizes(answers: Answers, folder: Path) -> tuple[Sizes, Sizes]:
+    """The curves of sand and mud.
+
+    Raises CaseError that names every answer that makes no case, by its option. What is not about
+    sizes is seen in a case of usual ones.
+    """
+    curves, problems = [], []
+    for source, given in (("--sand", answers.sand), ("--mud", answers.mud)):
+        try:
+            curves.append(sizes_from(given.table, source=source, folder=folder))
+        except CaseError as error:
+            problems.append(str(error))
+    try:
+        _case(replace(answers, sand=USUAL_SAND, mud=USUAL_MUD), USUAL_CHOICE, folder)
+    except CaseError as error:
+        problems.append(_spoken(str(error)))
+    if problems:
+        raise CaseError(" | ".join(problems))
+    return curves[0], curves[1]
+
+
+def _spoken(problem: str) -> str:
+    """A problem of a case by the options of `fdnet init`, without their number in front."""
+    return by_options(re.sub(r"^fdnet init: \d+ problems?: ", "", problem))
+
+
+def _mud_curve(mud: Sizes, coarsest: float) -> SizeCurve:
+    """The solids without those that are as coarse as the sand; `coarsest` is in percent."""
+    ends = (mud.cut_percent[0], min(coarsest, mud.cut_percent[1]))
+    return mud.model_copy(update={"cut_percent": ends}).curve()
+
+
+def _first_choice(answers: Answers, budget: Budget, sand: Sizes, mud: Sizes) -> Choice:
+    """The specimen that the sand and the mud ask for, with all solids that matter."""
+    sand_cut, mud_cut = _clear_cuts(sand, mud)
+    grains = _cut(sand, low=sand_cut).curve()
+    mean = grains.mean(3) / grains.mean(2)
+    width = _up(max(budget.width * mean, 2.02 * grains.high))
+    length = _up(max(budget.length * mean, 2 * grains.high))
+    porosity = share_of(answers.porosity)
+    throat = throat_width(porosity, carman_kozeny(porosity, mean))
+    return Choice(
+        width=width,
+        length=length,
+        sections=max(1, int(length / (SECTION * mean))),
+        sand_cut=sand_cut,
+        mud_cut=mud_cut,
+        cut=0.0,
+        slab=_mud_curve(mud, mud_cut).high,
+        supply_share=1.0,
+        stiffness=STIFFNESSES[-1],
+        passing=FINEST_OF_THROAT * throat,
+    )
+
+
+def _clear_cuts(sand: Sizes, mud: Sizes) -> tuple[float, float]:
+    """Percent of the finest sand left out, and of the mud that stays, so that the sizes differ.
+
+    Raises CaseError when the mud is as coarse as the sand.
+    """
+    whole = mud.curve()
+    best: tuple[float, float, float] | None = None
+    for cut in SAND_CUTS:
+        most = GAP * _cut(sand, low=cut).curve().low
+        above = 1 - whole.below - _share_below(whole, most)
+        lost = above + cut / 100
+        if above <= MOST_COARSE and (best is None or lost < best[0] - 1e-9):
+            best = (lost, cut, max(1.0, 100 * above))
+    if best is None:
+        raise CaseError(
+            f"--mud-d90: more than {100 * MOST_COARSE:.0f} % of the solids are as coarse as the "
+            f"finest sand grains (mud up to {um(whole.high)}, sand from {um(sand.curve().low)}): "
+            "nothing of them can invade; check the units of both curves"
+        )
+    return best[1], min(99.0, round(100 - best[2] - 0.05, 1))
+
+
+def _candidates(first: Choice, curve: SizeCurve) -> Iterator[Choice]:
+    """From all solids that matter to half of them, and then with less mud.
+
+    Solids that pass are left out, unless hardly any others are there.
+    """
+    passing = first.passing if _kept_above(curve, first.passing) >= LEAST_LEFT else 0.0
+    finest = max(curve.low, passing)
+    choice = replace(first, cut=finest if finest > curve.low else 0.0)
+    yield choice
+    while _kept_above(curve, finest := 1.1 * finest) >= LEAST_KEPT:
+        choice = replace(first, cut=_tidy(finest))
+        yield choice
+    while choice.supply_share > 0.3:
+        choice = replace(choice, supply_share=0.85 * choice.supply_share)
+        yield choice
+
+
+def _design(answers: Answers, choice: Choice, budget: Budget, folder: Path) -> Design:
+    """The candidate with its supply, contacts, drag and cap."""
+    choice = replace(choice, slab=_slab(_case(answers, choice, folder), choice.supply_share))
+    choice = _softest(answers, choice, folder)
+    choice = _with_drag(answers, choice, folder)
+    case = _case(answers, choice, folder)
+    scales = scales_of(case)
+    cost = cost_of(case, scales)
+    arrival = scales.slab_length / scales.upstream_velocity
+    cap = _up(PATIENCE * max(cost.duration, arrival) * scales.force_factor)
+    choice = replace(choice, cap=cap)
+    case = _case(answers, choice, folder)
+    return Design(
+        answers=answers,
+        choice=choice,
+        case=case,
+        scales=scales_of(case),
+        budget=budget,
+        seconds=cost.seconds,
+    )
+
+
+def _softest(answers: Answers, choice: Choice, folder: Path) -> Choice:
+    """The softest contacts whose predicted overlaps stay below run.max_overlap."""
+    for stiffness in STIFFNESSES:
+        trial = replace(choice, stiffness=stiffness)
+        try:
+            warnings = scales_of(_case(answers, trial, folder)).warnings
+        except CaseError:
+            continue
+        of_fines = [one for one in warnings if not one.startswith("grains.")]
+        if not any("overlap" in one or "may lock" in one for one in of_fines):
+            return trial
+    return choice
+
+
+def _with_drag(answers: Answers, choice: Choice, folder: Path) -> Choice:
+    """Drag of finite Reynolds numbers where they are, fines that are driven where they may be."""
+    scales = scales_of(_case(answers, choice, folder))
+    inertia = STOKES_REYNOLDS < scales.reynolds < MOST_REYNOLDS
+    choice = replace(choice, inertia=inertia)
+    driven = replace(choice, driven=True)
+    try:
+        faster = scales_of(_case(answers, driven, folder)).force_factor > 1.1
+    except CaseError:
+        return choice
+    return driven if faster else choice
+
+
+def _slab(case: InvasionCase, share: float) -> float:
+    """Length of mud, m, whose fines are `share` of what plugs the face."""
+    median = case.grains.curve.size_at(0.5)
+    return _up(share * PLUG_SOLIDS * median / case.fines.placed_fraction)
+
+
+def _case(answers: Answers, choice: Choice, folder: Path) -> InvasionCase:
+    return with_fines(case_from(tables_of(answers, choice), source="fdnet init", folder=folder))
+
+
+def _cut(sizes: Sizes, *, low: float) -> Sizes:
+    return sizes.model_copy(update={"cut_percent": (low, sizes.cut_percent[1])})
+
+
+def _share_below(curve: SizeCurve, diameter: float) -> float:
+    """Share of all solids between the fine end of the curve and a diameter, m."""
+    return curve.kept * float(curve.share_finer(np.array(min(diameter, curve.high))))
+
+
+def _kept_above(curve: SizeCurve, diameter: float) -> float:
+    """Share of all solids between a diameter, m, and the coarse end of the curve."""
+    return curve.kept - _share_below(curve, diameter)
+
+
+def _up(length: float) -> float:
+    """A length, m, rounded up to two digits."""
+    step = 10.0 ** (math.floor(math.log10(length)) - 1)
+    return step * math.ceil(length / step - 1e-9)
+
+
+def _tidy(length: float) -> float:
+    """Two digits of a length."""
+    return float(f"{length:.2g}")
+
+
+# ------------------------------------------------------------------------------------------------
+# The case file of a design, with the reason next to each value.
+
+
+_WIDTH = 96
+
+
+def case_text(design: Design) -> str:
+    """A case file that reads as the case of the design."""
+    tables, notes = tables_of(design.answers, design.choice), _notes(design)
+    lines = [*_comment(_top(design)), *_rows("", {k: tables[k] for k in ("name", "seed")}, {})]
+    for name, table in tables.items():
+        if isinstance(table, dict) and table:
+            lines += ["", f"[{name}]", *_rows(name, table, notes)]
+    return "\n".join(lines) + "\n"
+
+
+def _rows(name: str, table: dict[str, Any], notes: dict[str, str]) -> Iterator[str]:
+    for key, value in table.items():
+        if f"{name}.{key}" in notes:
+            yield from _comment(notes[f"{name}.{key}"])
+        yield f"{key} = {_value(value)}"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_value(one)}" for key, one in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(_value(one) for one in value) + "]"
+    return json.dumps(value)
+
+
+def _comment(text: str) -> list[str]:
+    return [f"# {line}" for line in textwrap.wrap(text, _WIDTH)]
+
+
+def _top(design: Design) -> str:
+    answers, fines = design.answers, design.case.fines
+    median = (
+        um(fines.curve.size_at((0.5 - fines.curve.below) / fines.curve.kept))
+        if (fines.curve.below < 0.5)
+        else "the solids"
+    )
+    return (
+        f"A mud of {answers.solids} solids (half of them below {median}) at a sand of "
+        f"{answers.porosity} porosity, {answers.overbalance} over the formation. Written by "
+        f"fdnet init, size {design.budget.name}: the run is expected to take "
+        f"{spoken_time(design.seconds)} on one core. fdnet check looks at it, fdnet run runs it."
+    )
+
+
+def _notes(design: Design) -> dict[str, str]:
+    return {
+        **_specimen_notes(design),
+        **_mud_notes(design),
+        **_run_notes(design),
+    }
+
+
+def _specimen_notes(design: Design) -> dict[str, str]:
+    case, choice = design.case, design.choice
+    grains, mean = case.grains.curve, case.grains.sauter_diameter_m
+    notes = {
+        "box.size": (
+            f"Depth, width, width. The width is {choice.width / mean:.2g} mean grains "
+            f"({mm(mean)}), and above two of the largest ({mm(grains.high)}), so that no grain "
+            f"meets itself across the periodic sides. It holds about {grain_count(case)} grains. "
+            f"The depth is {choice.length / mean:.2g} grains."
+        ),
+        "analysis.sections": (
+            f"Slabs by depth of {mm(choice.length / choice.sections)}, "
+            f"about {SECTION:g} grains each: thinner ones show single throats."
+        ),
+        "well.radius": (
+            "The overbalance is lost in radial flow around the well, from its face to the "
+            f"drainage radius: the mud moves at {design.scales.interstitial_velocity:.2g} m/s in "
+            "the pores."
+        ),
+    }
+    if choice.sand_cut > 1.0:
+        notes["grains.sizes"] = (
+            f"The finest {choice.sand_cut:g} % of the sand are left out, because the coarsest "
+            "solids of the mud must stay below the smallest grain."
+        )
+    return notes
+
+
+def _mud_notes(design: Design) -> dict[str, str]:
+    case, choice, scales = design.case, design.choice, design.scales
+    throat = throat_width(scales.porosity, scales.permeability)
+    curve = case.fines.curve
+    notes = {"fines.sizes": f"The throats of the sand are some {um(throat)} wide."}
+    if design.answers.assumed_spread:
+        notes["fines.sizes"] += (
+            " The spread is assumed, half and twice the median: give D10 and D90 if you know them."
+        )
+    if choice.mud_cut < 99.0:
+        notes["fines.sizes"] += (
+            f" The coarsest {100 * curve.above:.2g} % are left out: they are as large as the "
+            "smallest grains and would only lie in the cake."
+        )
+    if choice.cut:
+        notes["fines.cut"] = _cut_note(design, throat)
+    notes["fines.slab"] = _slab_note(design)
+    return notes
+
+
+def left_out(design: Design) -> Iterator[str]:
+    """What of the sand and the mud is not in the case, and whether that was enough."""
+    choice, curve = design.choice, design.case.fines.curve
+    if choice.sand_cut > 1.0:
+        yield f"left out: the finest {choice.sand_cut:g} % of the sand"
+    if curve.below > 0.0:
+        yield f"left out: {100 * curve.below:.2g} % of the solids, finer than {um(curve.low)}"
+    if curve.above > 0.0:
+        yield f"left out: {100 * curve.above:.2g} % of the solids, coarser than {um(curve.high)}"
+    if choice.supply_share < 1.0:
+        yield f"mud: {100 * choice.supply_share:.0f} % of what surely plugs the face"
+    if design.seconds > 1.05 * design.budget.seconds:
+        yield (
+            f"longer than the {spoken_time(design.budget.seconds)} of --size "
+            f"{design.budget.name}: no more can be left out; coarser or fewer solids are faster"
+        )
+
+
+def _cut_note(design: Design, throat: float) -> str:
+    curve = design.case.fines.curve
+    text = f"{100 * curve.below:.0f} % of the solids are finer than this and left out"
+    if curve.low <= 1.01 * FINEST_OF_THROAT * throat:
+        return f"{text}: below a seventh of a throat they pass."
+    return (
+        f"{text}, so that the run fits its time ({spoken_time(design.budget.seconds)} for the "
+        f"size {design.budget.name}). Those above a seventh of a throat "
+        f"({um(FINEST_OF_THROAT * throat)}) matter: lower it when you can wait longer."
+    )
+
+
+def _slab_note(design: Design) -> str:
+    scales, choice = design.scales, design.choice
+    feeding = scales.slab_length / scales.upstream_velocity
+    text = (
+        f"Length of mud that is supplied: {scales.supplied_count} fines, all of them at the face "
+        f"after {_ms(feeding * scales.force_factor)}. "
+    )
+    if choice.supply_share >= 1.0:
+        return text + (
+            f"They would fill {PLUG_SOLIDS:g} of a median grain's depth, two to six times what "
+            "plugged the shipped specimens."
+        )
+    return text + (
+        f"It is {100 * choice.supply_share:.0f} % of what surely plugs the face, because more "
+        "does not fit the time: if the summary says supply_exhausted, more mud would do more "
+        "damage."
+    )
+
+
+def _run_notes(design: Design) -> dict[str, str]:
+    scales, choice = design.scales, design.choice
+    notes = {
+        "run.stiffness": (
+            "Contacts as soft as they may be: the time of the run goes with the root of it, and "
+            f"the predicted overlap is {100 * max(scales.impact_overlap, scales.drag_overlap):.1f}"
+            " % of a fine."
+        ),
+        "run.plug_rate": (
+            f"The face counts as plugged when less than {100 * PLUG_RATE:g} % of the fines that "
+            f"arrive still enter, for {_ms(scales.plug_time * scales.force_factor)}."
+        ),
+        "run.cap": "The end at the latest; a summary that says cap is not final.",
+    }
+    if choice.driven:
+        notes["drag.drive_velocity_m_s"] = (
+            "The fines have no inertia to speak of, so the simulation runs "
+            f"{scales.force_factor:.2g} times as fast as the fluid."
+        )
+    if choice.inertia:
+        notes["drag.inertia"] = (
+            f"The Reynolds number of the largest fine is {scales.reynolds:.2g}: Stokes's drag "
+            "would be too small."
+        )
+    return notes
+
+
+def _ms(seconds: float) -> str:
+    return f"{1e3 * seconds:.3g} ms"

@@ -1,1 +1,0 @@
-"""From a sand, a mud and a well to a case whose answer means something."""

@@ -1,0 +1,312 @@
+"""What drives the fluid, and how fast.
+
+Flow through a pack in closed form: Carman and Kozeny, Darcy, Ergun, straight and radial.
+"""
+
+import math
+from dataclasses import dataclass
+
+from fdnet.case.case import Case, InvasionCase
+from fdnet.errors import CaseError
+from fdnet.scales.drag import CARMAN_KOZENY, ERGUN_INERTIAL, ERGUN_VISCOUS
+
+ERGUN_RATIO = ERGUN_INERTIAL / ERGUN_VISCOUS
+"""Loss by inertia over viscous loss, for each rho q d / (mu (1 - phi)) (Ergun 1952)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Path:
+    """The way on which the overbalance is lost, as the lengths that count for each loss.
+
+    Attributes:
+        viscous: m, the integral of q(s) / q over the way; q is the velocity at the face.
+        inertial: m, the integral of (q(s) / q)^2.
+    """
+
+    viscous: float
+    inertial: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Losses:
+    """Pressure gradient viscous q + inertial q^2 of a Darcy velocity q (Forchheimer 1901).
+
+    Attributes:
+        viscous: Pa s/m2, viscosity over permeability.
+        inertial: Pa s2/m3; 0 by Darcy's law.
+    """
+
+    viscous: float
+    inertial: float = 0.0
+
+    def gradient(self, velocity: float) -> float:
+        """Pressure gradient, Pa/m, of a Darcy velocity in m/s."""
+        return self.viscous * velocity + self.inertial * velocity**2
+
+    def velocity(self, pressure: float, path: Path) -> float:
+        """Darcy velocity at the face, m/s, that loses `pressure` Pa on the way.
+
+        It is the positive root of a q + b q^2 = p, written as 2 p / (a + sqrt(a^2 + 4 b p)), which
+        holds for b = 0 as well.
+        """
+        first, second = self.viscous * path.viscous, self.inertial * path.inertial
+        return 2 * pressure / (first + math.sqrt(first**2 + 4 * second * pressure))
+
+
+def carman_kozeny(porosity: float, diameter: float) -> float:
+    """k = d^2 phi^3 / (180 (1 - phi)^2), m2 (Carman 1937; 180 = 72 x tortuosity 2.5)."""
+    return diameter**2 * porosity**3 / (CARMAN_KOZENY * (1 - porosity) ** 2)
+
+
+def ergun_inertia(permeability: float, porosity: float, diameter: float, density: float) -> float:
+    """Inertial coefficient in Pa s2/m3: Ergun's share of the viscous loss of this permeability.
+
+    For a bed of `permeability` m2 and `diameter` m of its grains, and a fluid of `density` kg/m3.
+    Ergun's own bed has the permeability d^2 phi^3 / (150 (1 - phi)^2). The ratio of his two losses
+    is kept, so that the viscous one is that of the permeability in use.
+    """
+    return ERGUN_RATIO * density * diameter / (permeability * (1 - porosity))
+
+
+def straight(length: float) -> Path:
+    """A plug of `length` m: the velocity is the same all along."""
+    return Path(viscous=length, inertial=length)
+
+
+def radial(radius: float, outer: float) -> Path:
+    """From a well of `radius` m out to `outer` m: the velocity falls with one over the distance.
+
+    viscous = r_w ln(r_e / r_w), inertial = r_w^2 (1 / r_w - 1 / r_e).
+    """
+    return Path(
+        viscous=radius * math.log(outer / radius), inertial=radius**2 * (1 / radius - 1 / outer)
+    )
+
+
+# ------------------------------------------------------------------------------------------------
+# The velocity of the fluid at the formation face: given, or driven by the overbalance.
+
+
+INERTIA_WARNING = 0.05
+"""Share of Darcy's velocity that inertia takes, from which "darcy" warns."""
+USUAL_WELL = (0.108, 100.0)
+"""Radius of a well of 8 1/2 inches and a drainage radius, m: the example that warnings give."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Velocity:
+    """Velocity of the fluid along x.
+
+    Attributes:
+        permeability: m2, of the intact pack by Carman and Kozeny.
+        darcy: m/s, flow rate over the whole cross-section.
+        interstitial: m/s, mean velocity in the pores.
+        pressure_gradient: Pa/m, that drives this flow through the pack.
+        inertial_loss: share by which Ergun's inertial term lowers the velocity of Darcy's law at
+            the same overbalance; where the velocity is given, at the gradient that Darcy's law
+            needs for it.
+    """
+
+    permeability: float
+    darcy: float
+    interstitial: float
+    pressure_gradient: float
+    inertial_loss: float
+
+
+def velocity_of(case: Case, porosity: float) -> Velocity:
+    """The velocity that the case gives, or that of Darcy's or Ergun's law in the case."""
+    permeability = carman_kozeny(porosity, case.grains.sauter_diameter_m)
+    pack = _losses(case, porosity, permeability)
+    given = case.fluid.velocity_m_s
+    if given is not None:
+        darcy = given * porosity
+        loss = _inertial_loss(pack, Losses(viscous=pack.viscous).gradient(darcy), straight(1.0))
+    else:
+        path, pressure = path_of(case), case.fluid.overbalance_Pa
+        way = _losses(case, porosity, _permeability_of_way(case, permeability))
+        darcy = _by_law(case, way).velocity(pressure, path)
+        loss = _inertial_loss(way, pressure, path)
+    return Velocity(
+        permeability=permeability,
+        darcy=darcy,
+        interstitial=darcy / porosity if given is None else given,
+        pressure_gradient=_by_law(case, pack).gradient(darcy),
+        inertial_loss=loss,
+    )
+
+
+def driving_pressure(case: Case, gradient: float) -> float:
+    """Pressure, Pa, that drives the fluid: over its whole way, or over the specimen alone.
+
+    The latter is the `gradient`, Pa/m, times the length, where the case gives a velocity.
+    """
+    given = case.fluid.velocity_m_s
+    return case.fluid.overbalance_Pa if given is None else gradient * case.size_m[0]
+
+
+def path_of(case: Case) -> Path:
+    """The way on which the case's overbalance is lost: around the well, or along a plug."""
+    if case.well is not None:
+        return radial(case.well.radius_m, case.well.drainage_radius_m)
+    given = case.fluid.darcy_length_m
+    return straight(case.size_m[0] if given is None else given)
+
+
+def _permeability_of_way(case: Case, pack: float) -> float:
+    given = None if case.well is None else case.well.formation_permeability_m2
+    return pack if given is None else given
+
+
+def _losses(case: Case, porosity: float, permeability: float) -> Losses:
+    """The losses with inertia, whatever law the case names."""
+    diameter, density = case.grains.sauter_diameter_m, case.fluid.density_kg_m3
+    return Losses(
+        viscous=case.fluid.viscosity_Pa_s / permeability,
+        inertial=ergun_inertia(permeability, porosity, diameter, density),
+    )
+
+
+def _by_law(case: Case, losses: Losses) -> Losses:
+    return losses if case.fluid.darcy_law == "ergun" else Losses(viscous=losses.viscous)
+
+
+def _inertial_loss(losses: Losses, pressure: float, path: Path) -> float:
+    darcy = Losses(viscous=losses.viscous).velocity(pressure, path)
+    return 1 - losses.velocity(pressure, path) / darcy
+
+
+def velocity_warnings(case: InvasionCase, porosity: float, velocity: Velocity) -> list[str]:
+    """Doubts about the velocity: nothing says what drives it, or inertia is left out."""
+    return [*_plug_warning(case, porosity, velocity), *_inertia_warning(case, velocity)]
+
+
+def _plug_warning(case: InvasionCase, porosity: float, velocity: Velocity) -> list[str]:
+    """The whole overbalance is lost over the box because the case names no other way."""
+    fluid = case.fluid
+    if (case.well, fluid.velocity_m_s, fluid.darcy_length_m) != (None, None, None):
+        return []
+    radius, outer = USUAL_WELL
+    losses = _by_law(case, _losses(case, porosity, velocity.permeability))
+    at_well = losses.velocity(fluid.overbalance_Pa, radial(radius, outer)) / porosity
+    gradient = fluid.overbalance_Pa / case.size_m[0] / 1e6
+    return [
+        f"the whole overbalance is lost over the {1e3 * case.size_m[0]:.3g} mm of the box "
+        f"({gradient:.3g} MPa/m), which gives the fluid {velocity.interstitial:.3g} m/s; at the "
+        f"face of a well of {1e3 * radius:.0f} mm with a drainage radius of {outer:.0f} m it "
+        f"would be {at_well:.2g} m/s: add the table [well] with radius_mm and drainage_radius_m, "
+        "or give fluid.darcy_length_mm for a plug, or fluid.velocity_m_s"
+    ]
+
+
+def _inertia_warning(case: InvasionCase, velocity: Velocity) -> list[str]:
+    loss, fluid = velocity.inertial_loss, case.fluid
+    if loss < INERTIA_WARNING or fluid.darcy_law == "ergun" or fluid.velocity_m_s is not None:
+        return []
+    return [
+        f"the velocity of {velocity.interstitial:.3g} m/s is Darcy's; the fluid's inertia would "
+        f"lower it by {100 * loss:.0f} % (Ergun): take fluid.darcy_law = 'ergun'"
+    ]
+
+
+# ------------------------------------------------------------------------------------------------
+# Fines that are driven faster than the fluid moves them, with the same ratios of forces.
+#
+# Where the inertia of a fine does not matter, its way depends on the ratios of the forces alone:
+# drag, pressure gradient, weight. A simulation may then multiply the fluid's velocity, and with it
+# every force, by one factor s = u_DEM / u. Every fine goes the same way in 1 / s of the time.
+# Inertia does not matter while the impact Stokes number is well below 1: a fine that is stopped by
+# a grain has lost its momentum to the liquid within that share of its radius.
+
+
+AUTO_STOKES = 0.1
+"""Impact Stokes number to which "auto" drives the largest fine."""
+STOKES_WARNING, STOKES_LIMIT = 0.3, 1.0
+"""Impact Stokes number of a driven case: above the first value fdnet warns, above the second it
+refuses the case."""
+_ROUNDING = 1 + 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drive:
+    """How fast the simulated fluid moves.
+
+    Attributes:
+        velocity: m/s, in the pores.
+        factor: velocity over the fluid's own: the factor on all forces on a fine, and physical
+            time over simulated time.
+        impact_stokes: impact Stokes number of the largest fine, free in this fluid.
+    """
+
+    velocity: float
+    factor: float
+    impact_stokes: float
+
+
+def impact_stokes(relaxation_time: float, velocity: float, radius: float) -> float:
+    """tau v / r = m v / (6 pi mu r^2): the way on which drag stops a sphere, over its radius.
+
+    For the drag relaxation time in s, the velocity of the sphere in m/s and its radius in m
+    (Joseph and others, J. Fluid Mech. 433, 329, 2001).
+    """
+    return relaxation_time * velocity / radius
+
+
+def drive_of(
+    case: InvasionCase, velocity: float, relaxation_time: float, *, free: float | None = None
+) -> Drive:
+    """The velocity that the case asks for, or the fluid's own.
+
+    "auto" never drives slower than the fluid moves.
+
+    Args:
+        case: the case.
+        velocity: of the fluid in the pores, m/s.
+        relaxation_time: of the largest fine, s.
+        free: velocity of a free fine in this fluid, m/s: faster where a pressure gradient pushes
+            it; the fluid's own if not given.
+
+    Raises:
+        CaseError: a driven case whose impact Stokes number is above `STOKES_LIMIT`, as simulated
+            or at the fluid's own velocity.
+    """
+    radius, asked = case.fines.radius_range_m[1], case.drag.drive_velocity_m_s
+    own = impact_stokes(relaxation_time, velocity if free is None else free, radius)
+    driven = velocity
+    if asked == "auto":
+        driven = velocity * max(1.0, AUTO_STOKES / own)
+    elif asked is not None:
+        driven = asked
+    factor = driven / velocity
+    drive = Drive(velocity=driven, factor=factor, impact_stokes=own * factor)
+    if asked is not None:
+        _refuse_inertia(drive, own)
+    return drive
+
+
+def _refuse_inertia(drive: Drive, own_stokes: float) -> None:
+    if own_stokes > STOKES_LIMIT * _ROUNDING:
+        raise CaseError(
+            f"drag.drive_velocity_m_s: the impact Stokes number of the fines is {own_stokes:.2g} "
+            f"in the fluid itself (limit {STOKES_LIMIT:g}), so their inertia matters and no other "
+            "velocity gives the same result; leave the key out"
+        )
+    if drive.impact_stokes > STOKES_LIMIT * _ROUNDING:
+        most = drive.velocity * STOKES_LIMIT / drive.impact_stokes
+        raise CaseError(
+            f"drag.drive_velocity_m_s: {drive.velocity:g} m/s makes the impact Stokes number "
+            f"{drive.impact_stokes:.2g} (limit {STOKES_LIMIT:g}): the fines' inertia would "
+            f"matter; expected at most {most:.2g} m/s"
+        )
+
+
+def drive_warnings(case: InvasionCase, drive: Drive) -> list[str]:
+    """A driven case in which inertia may begin to matter; empty when it does not."""
+    if case.drag.drive_velocity_m_s is None or drive.impact_stokes <= STOKES_WARNING * _ROUNDING:
+        return []
+    lower = drive.velocity * STOKES_WARNING / drive.impact_stokes
+    return [
+        f"drag.drive_velocity_m_s: at {drive.velocity:.3g} m/s the impact Stokes number is "
+        f"{drive.impact_stokes:.2g} (above {STOKES_WARNING:g}), so the fines' inertia may begin "
+        f"to matter: lower it to {lower:.2g} m/s"
+    ]

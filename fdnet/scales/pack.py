@@ -1,0 +1,298 @@
+"""The pack: how dense it can be, its sizes, the grains.
+
+The densest random pack of rigid spheres of a range of sizes.
+
+Farr and Groot (J. Chem. Phys. 131 (2009) 244104) map spheres in space to rods on a line: the rods
+are the chords that a random line cuts out of the spheres, and neighbours keep a gap of at least
+0.7654 of the shorter one. Rods put in from the longest to the shortest, each into the widest gap,
+fill the same share of the line as random close packing does of space. The factor is theirs, from
+the 0.6435 of equal spheres.
+"""
+
+import heapq
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from fdnet.case.case import Case, InvasionCase
+from fdnet.case.spheres import Sizes, Spheres
+from fdnet.errors import CaseError
+from fdnet.scales.contacts import REFERENCE_OVERLAP, Contact, mass_range
+from fdnet.sizes import SURFACE, SizeCurve
+
+GAP = 0.7654
+"""Smallest gap over the shorter of its two rods."""
+RODS = 5000
+"""Rods on the line; the result is within 0.001 of that of many more."""
+EQUAL_SPHERES = 0.6435
+"""Random close packing of equal spheres; every range of sizes fills more."""
+
+
+def densest_porosity(spheres: Spheres) -> float:
+    """Porosity of the densest random pack of rigid spheres of these sizes."""
+    return 1 - close_packing(spheres.curve)
+
+
+def refuse_unreachable(case: Case) -> None:
+    """Raises CaseError on a porosity that needs more overlap than `grains.max_overlap`.
+
+    Rigid spheres that grow by a share d of their diameter beyond close packing overlap by d on
+    average, and fill (1 - d)^-3 as much.
+    """
+    porosity, most = case.grains.porosity, case.grains.max_overlap
+    if case.grains.count is not None or porosity is None or 1 - porosity <= EQUAL_SPHERES:
+        return
+    rigid = densest_porosity(case.grains)
+    least = 1 - (1 - rigid) / (1 - most) ** 3
+    if porosity < least:
+        raise CaseError(
+            f"grains.porosity: {porosity:g} is out of reach: {reach_text(rigid)}, and below "
+            f"{least:.3f} they overlap by more than grains.max_overlap {most:g} on average; ask "
+            f"for {math.ceil(1e3 * rigid) / 1e3:g} or more"
+        )
+
+
+def reach_text(rigid: float) -> str:
+    """The porosity that spheres reach without overlap, in words."""
+    return (
+        f"rigid spheres of these sizes reach a porosity of {rigid:.3f} at random (Farr and Groot "
+        "2009)"
+    )
+
+
+def within_limit(rigid: float, porosity: float, overlap: float, limit: float) -> float:
+    """Porosity at which the largest overlap is `limit`, from a denser pack that was made.
+
+    It takes the overlap as proportional to the growth beyond close packing. `rigid` is the densest
+    porosity without overlap; `porosity` and `overlap` are those of the pack.
+    """
+    start, made = (1 - rigid) ** (1 / 3), (1 - porosity) ** (1 / 3)
+    return 1 - (start + limit / overlap * (made - start)) ** 3
+
+
+def close_packing(curve: SizeCurve) -> float:
+    """Share of space that spheres of these sizes fill at random close packing."""
+    rods = _rods(curve)
+    gaps, total_gap = [-GAP * rods[0]], GAP * rods[0]
+    for rod in rods[1:]:
+        least = GAP * rod
+        widest = -heapq.heappop(gaps)
+        left = max(widest - rod - least, least)
+        total_gap += left + least - widest
+        heapq.heappush(gaps, -left)
+        heapq.heappush(gaps, -least)
+    return math.fsum(rods) / (math.fsum(rods) + total_gap)
+
+
+def _rods(curve: SizeCurve) -> list[float]:
+    """Chords, longest first: a line meets spheres by their cross-section, at a random distance.
+
+    A sphere of diameter D is cut in a chord above L with the probability 1 - (L / D)^2. The
+    diameters and the distances are taken evenly, in an order that mixes them (golden ratio).
+    """
+    even = (np.arange(RODS) + 0.5) / RODS
+    mixed = np.mod(even * RODS * (math.sqrt(5) - 1) / 2, 1.0)
+    if curve.low == curve.high:
+        diameter = np.full(RODS, curve.low)
+    else:
+        diameter = np.exp(np.interp(even, curve.finer(SURFACE), np.log(curve.edges)))
+    chords = diameter * np.sqrt(1 - mixed)
+    return sorted(chords.tolist(), reverse=True)
+
+
+# ------------------------------------------------------------------------------------------------
+# The sizes of a case in closed form: diameters of its curves, and what they leave out.
+
+
+SHARES = (0.1, 0.5, 0.9)
+"""Shares by volume whose diameters are shown: D10, D50 and D90."""
+MOST_MISFIT = 0.05
+"""Difference of a law to a given diameter, over it, above which a warning names it: a quarter of
+the step between two sieves of the series R 40/3 (ISO 565), 19 %."""
+_SOURCES = {
+    "log-normal": "Hatch & Choate 1929",
+    "rosin-rammler": "Rosin & Rammler 1933",
+    "measured": "as measured, straight over ln d",
+}
+
+
+def sized(case: Case) -> dict[str, Spheres]:
+    """Grains and fines by the names of their tables."""
+    fines = {"fines": case.fines} if isinstance(case, InvasionCase) else {}
+    return {"grains": case.grains, **fines}
+
+
+def diameter_at(curve: SizeCurve, share: float) -> float | None:
+    """Diameter, m, that `share` of all solids is finer than; None where that size is left out."""
+    inside = (share - curve.below) / curve.kept
+    return curve.size_at(inside) if 0 <= inside <= 1 else None
+
+
+def size_rows(case: Case) -> list[tuple[str, str, float, str, str, str]]:
+    """Rows of the table of scales: name, symbol, value, unit, formula, source.
+
+    They are the diameters of every measured curve next to those given, and its ends.
+    """
+    rows = []
+    for name, spheres in sized(case).items():
+        if spheres.measured:
+            rows += [*_curve_rows(name, spheres), *_end_rows(name, spheres.curve)]
+    return rows
+
+
+def _curve_rows(name: str, spheres: Spheres) -> Iterator[tuple[str, str, float, str, str, str]]:
+    law, asked = "measured", dict[float, float]()
+    if spheres.sizes is not None and spheres.sizes.fit is not None:
+        law, asked = spheres.sizes.fit.name, spheres.sizes.asked
+    for share in SHARES:
+        value = diameter_at(spheres.curve, share)
+        if value is None:
+            continue
+        given = asked.get(share)
+        compared = (
+            "" if given is None else f", given {given:.4g} m ({100 * (value / given - 1):+z.1f} %)"
+        )
+        yield (
+            f"{name}: {100 * share:.0f} % by volume finer than",
+            f"D{100 * share:.0f}",
+            value,
+            "m",
+            f"{law} curve{compared}",
+            _SOURCES[law],
+        )
+
+
+def _end_rows(name: str, curve: SizeCurve) -> list[tuple[str, str, float, str, str, str]]:
+    return [
+        (
+            f"{name}: smallest diameter placed",
+            "d_min",
+            curve.low,
+            "m",
+            _cut_text(curve.below, "finer"),
+            "cut",
+        ),
+        (
+            f"{name}: largest diameter placed",
+            "d_max",
+            curve.high,
+            "m",
+            _cut_text(curve.above, "coarser"),
+            "cut",
+        ),
+        (
+            f"{name}: number mean diameter",
+            "<d>",
+            curve.mean(1),
+            "m",
+            "moment of the curve",
+            "exact",
+        ),
+    ]
+
+
+def _cut_text(share: float, side: str) -> str:
+    return f"{100 * share:.3g} % of the solids are {side} and left out"
+
+
+def size_warnings(case: Case) -> list[str]:
+    """What curves miss and what they leave out, one sentence each."""
+    warnings = []
+    for name, spheres in sized(case).items():
+        if spheres.measured:
+            warnings += [*_misfit_warnings(name, spheres), *_cut_warnings(name, spheres.curve)]
+    if isinstance(case, InvasionCase) and case.fines.measured:
+        given, placed = case.fines.volume_fraction, case.fines.placed_fraction
+        if placed < given:
+            warnings.append(
+                f"fines: the suspension carries {100 * placed:.3g} % of fines by volume instead "
+                f"of {100 * given:.3g} %, because the sizes left out are not in it"
+            )
+    return warnings + _dense_warnings(case)
+
+
+def _dense_warnings(case: Case) -> list[str]:
+    """The sand is denser than rigid spheres of its sizes get."""
+    porosity = case.grains.porosity
+    if not case.grains.measured or case.grains.count is not None or porosity is None:
+        return []
+    rigid = densest_porosity(case.grains)
+    if porosity >= rigid:
+        return []
+    return [f"grains.porosity: {reach_text(rigid)}; at {porosity:g} grains overlap"]
+
+
+def _curves(name: str, spheres: Spheres) -> Iterator[tuple[str, Sizes]]:
+    """The given curves by the key that gives them."""
+    if spheres.sizes is not None:
+        yield f"{name}.sizes", spheres.sizes
+    for number, one in enumerate(getattr(spheres, "materials", None) or ()):
+        yield f"{name}.materials.{number}.sizes", one.sizes
+
+
+def _misfit_warnings(name: str, spheres: Spheres) -> Iterator[str]:
+    for key, sizes in _curves(name, spheres):
+        fit = sizes.fit
+        if fit is not None and fit.worst > MOST_MISFIT:
+            missed = ", ".join(
+                f"D{100 * share:.0f} by {100 * off:+z.0f} %" for share, off in fit.misfit.items()
+            )
+            yield (
+                f"{key}: the {fit.name} curve misses {missed}; give the measured curve (size and "
+                "passing, or a file) if it matters"
+            )
+
+
+def _cut_warnings(name: str, curve: SizeCurve) -> Iterator[str]:
+    parts = [
+        f"{100 * share:.3g} % of the solids ({side} than {1e6 * size:.3g} um)"
+        for share, side, size in (
+            (curve.below, "finer", curve.low),
+            (curve.above, "coarser", curve.high),
+        )
+        if share > 1e-9
+    ]
+    if parts:
+        yield f"{name}: {' and '.join(parts)} are left out; see sizes.cut_percent" + (
+            " and fines.cut_um" if name == "fines" else ""
+        )
+
+
+# ------------------------------------------------------------------------------------------------
+# The pack of grains in closed form: its porosity, the number of grains, and how it is grown.
+
+
+PACK_STAGES, PACK_STAGE_STEPS, PACK_RELAX_STEPS, PACK_START, PACK_STEP = 30, 300, 20_000, 0.6, 0.15
+"""Growth of a pack: number of stages and steps in each, steps of the first relaxation, radius at
+the start over the final one, time step over sqrt(m/k)."""
+
+
+def target_porosity(case: Case) -> float:
+    """The porosity that the case names; with `grains.count` that of the plain sum of spheres."""
+    if case.grains.count is not None:
+        return 1 - case.grains.count * case.grains.mean_volume_m3 / math.prod(case.size_m)
+    assert case.grains.porosity is not None
+    return case.grains.porosity
+
+
+def grain_count(case: Case) -> int:
+    """First guess of the number of grains, (1 - phi) V / v, or the count that is given."""
+    if case.grains.count is not None:
+        return case.grains.count
+    return max(
+        1, round((1 - target_porosity(case)) * math.prod(case.size_m) / case.grains.mean_volume_m3)
+    )
+
+
+def pack_step(case: Case, contacts: dict[str, Contact]) -> float:
+    """Time step of packing, s: `PACK_STEP` of sqrt(m/k) of the lightest grain.
+
+    The stiffness of Hertz contacts is that of its tangent at `grains.max_overlap`.
+    """
+    contact = contacts["grain-grain"]
+    stiffness = contact.normal_stiffness
+    if contact.elastic:
+        size = case.grains.radius_range_m[0] / case.grains.mean_radius_m
+        stiffness *= 1.5 * size * math.sqrt(case.grains.max_overlap / REFERENCE_OVERLAP)
+    return PACK_STEP * math.sqrt(mass_range(case.grains)[0] / stiffness)

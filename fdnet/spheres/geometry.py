@@ -1,0 +1,465 @@
+"""Spheres in a box: contacts, images across periodic sides, porosity.
+
+Which spheres touch, by how much they overlap, and which lie inside others.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fdnet.errors import CaseError
+from fdnet.spheres.snapshot import Array, Kind, Snapshot, frozen, one_line
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
+_ROUNDING = 1e-6
+"""Gap over the smaller diameter below which two spheres may touch, to LIGGGHTS's rounding."""
+_OVERLAP_WARNING = 0.03
+"""Overlap over a diameter above which it is reported."""
+_INSIDE_ROUNDING = 1e-3
+"""Part of its radius by which a sphere may reach out of another one and still lie inside of it."""
+
+
+def touching_pairs(
+    spheres: Snapshot, periodic: tuple[bool, bool, bool], *, gap: float = 0.0
+) -> tuple[Array, Array]:
+    """Pairs (K, 2) of spheres that touch, and their overlaps (K,) m; a negative one is a gap.
+
+    Two spheres touch when they are nearer than `gap` times the smaller diameter. Spheres are
+    searched in two classes of size, so that a few large ones do not widen the search of all.
+    """
+    from scipy.spatial import cKDTree
+
+    radius = spheres.radius
+    if len(radius) == 0:
+        return np.empty((0, 2), int), np.empty(0)
+    period = np.where(periodic, spheres.box[:, 1] - spheres.box[:, 0], 0.0)
+    position = spheres.position - spheres.box[:, 0]
+    position = np.where(period > 0, np.mod(position, np.where(period > 0, period, 1.0)), position)
+    # rounding may leave a wrapped place at the period itself, which the search tree refuses
+    position = np.where((period > 0) & (position >= period), 0.0, position)
+    small = radius <= 0.5 * radius.max()
+    groups = [group for group in (np.flatnonzero(small), np.flatnonzero(~small)) if len(group)]
+    trees = [cKDTree(position[group], boxsize=period) for group in groups]
+    touching = [
+        _pairs((trees[i], trees[j]), (groups[i], groups[j]), radius, gap)
+        for i in range(len(groups))
+        for j in range(i, len(groups))
+    ]
+    return np.concatenate([pairs for pairs, _ in touching]), np.concatenate(
+        [overlap for _, overlap in touching]
+    )
+
+
+def _pairs(
+    trees: "tuple[cKDTree, cKDTree]", groups: tuple[Array, Array], radius: Array, gap: float
+) -> tuple[Array, Array]:
+    first, second = groups
+    reach = radius[first].max() + radius[second].max()
+    reach += 2 * gap * min(radius[first].max(), radius[second].max())
+    near = trees[0].sparse_distance_matrix(trees[1], reach, output_type="coo_matrix")
+    pairs = np.column_stack([first[near.row], second[near.col]])
+    overlap = radius[pairs].sum(axis=1) - near.data
+    limit = -2 * gap * radius[pairs].min(axis=1)
+    keep = (overlap > limit) & ((pairs[:, 0] < pairs[:, 1]) | (trees[0] is not trees[1]))
+    return pairs[keep], overlap[keep]
+
+
+def groups_apart(spheres: Snapshot, periodic: tuple[bool, bool, bool]) -> Array:
+    """The group (N,) of each sphere, from 1; no two spheres of a group touch.
+
+    Greedy colouring of the graph of contacts, those with most contacts first (Welsh and Powell
+    1967). It takes at most one group more than a sphere has contacts.
+    """
+    pairs, _ = touching_pairs(spheres, periodic, gap=_ROUNDING)
+    ends = np.concatenate([pairs, pairs[:, ::-1]])
+    ends = ends[np.argsort(ends[:, 0], kind="stable")]
+    starts = np.searchsorted(ends[:, 0], np.arange(len(spheres) + 1))
+    group = np.zeros(len(spheres), int)
+    for sphere in np.argsort(-np.diff(starts), kind="stable"):
+        taken = set(group[ends[starts[sphere] : starts[sphere + 1], 1]].tolist())
+        group[sphere] = next(number for number in count(1) if number not in taken)
+    return group
+
+
+def max_overlap(
+    spheres: Snapshot, periodic: tuple[bool, bool, bool], *, only_fines: bool = False
+) -> float:
+    """Largest overlap of two spheres over the smaller one's diameter; 0 if none touch.
+
+    `only_fines` leaves out pairs of grains.
+    """
+    pairs, overlap = touching_pairs(spheres, periodic)
+    if only_fines:
+        fine = np.any(spheres.kind[pairs] == Kind.FINE, axis=1)
+        pairs, overlap = pairs[fine], overlap[fine]
+    share = overlap / (2 * np.min(spheres.radius[pairs], axis=1))
+    return float(max(share.max(initial=0.0), _own_images(spheres, periodic, only_fines)))
+
+
+def _own_images(spheres: Snapshot, periodic: tuple[bool, bool, bool], only_fines: bool) -> float:
+    """Overlap of the largest sphere with its own image over its diameter, as in a unit cell."""
+    side = float(np.min(np.ptp(spheres.box, axis=1), where=periodic, initial=np.inf))
+    wide = 2.0 * spheres.radius[(spheres.kind == Kind.FINE) | (not only_fines)]
+    return float(max(1.0 - side / wide.max(initial=0.0), 0.0)) if len(wide) else 0.0
+
+
+def overlap_doubts(grains: float, fines: float = 0.0) -> Iterator[str]:
+    """Warnings on the largest overlaps of grains and of fines, as shares of a diameter."""
+    for name, what, share in (("grains", "pack", grains), ("fines", "deposit", fines)):
+        if share > _OVERLAP_WARNING:
+            yield (
+                f"{name} overlap by up to {100 * share:.1f} % of a diameter: the {what} is denser "
+                "than rigid spheres get"
+            )
+
+
+def inside_others(
+    spheres: Snapshot, periodic: tuple[bool, bool, bool]
+) -> tuple[Array, Array, Array]:
+    """Which spheres (N,) lie wholly inside another one, mostly, or with their centre only.
+
+    The first add nothing to the solid. They may reach out by a thousandth of their radius, so that
+    spheres that coincide or touch from within are among them but for the rounding of a file. The
+    one of two that coincide is kept that comes first, a grain before a fine. The second have more
+    than half of their surface inside another sphere: d2 < R2 - r2 for a distance d of the centres.
+    Of two equal spheres with their centres in each other one is counted.
+    """
+    radius, count = spheres.radius, len(spheres)
+    wholly, mostly, centred = np.zeros((3, count), bool)
+    if count < 2:
+        return wholly, mostly, centred
+    tree = neighbour_tree(spheres.position, spheres.box, periodic=periodic)
+    # among rigid spheres none has the centre of another one inside
+    hosts = np.flatnonzero(tree.query_ball_point(tree.data, radius, return_length=True) > 1)
+    guests = tree.query_ball_point(tree.data[hosts], radius[hosts])
+    host = np.repeat(hosts, [len(one) for one in guests])
+    guest = np.array([number for one in guests for number in one], int)
+    rank = np.empty(count, int)
+    rank[np.lexsort((np.arange(count), spheres.kind, -radius))] = np.arange(count)
+    pair = np.flatnonzero(rank[host] < rank[guest])
+    pair = pair[np.argsort(rank[host[pair]], kind="stable")]
+    host, guest = host[pair], guest[pair]
+    apart = spheres.position[host] - spheres.position[guest]
+    side = np.ptp(spheres.box, axis=1)
+    distance = np.linalg.norm(apart - np.where(periodic, np.rint(apart / side) * side, 0), axis=1)
+    holds = distance <= radius[host] - (1 - _INSIDE_ROUNDING) * radius[guest]
+    for one, other in zip(host[holds], guest[holds], strict=True):
+        wholly[other] |= not wholly[one]
+    more = distance**2 < radius[host] ** 2 - radius[guest] ** 2
+    mostly[guest[more & ~wholly[host]]] = True
+    centred[guest[~wholly[host]]] = True
+    return wholly, mostly & ~wholly, centred & ~mostly & ~wholly
+
+
+# ------------------------------------------------------------------------------------------------
+# Images of spheres beyond the faces of a box.
+#
+# They are shifted across periodic sides and mirrored across the others.
+
+
+INSIDE, MIRROR_LOW, MIRROR_HIGH, ON_FACE = 0, 1, 2, 3
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Images:
+    """M images, the spheres themselves among them.
+
+    Attributes:
+        owner: (M,) index of the sphere.
+        position: (M, 3) centres, m.
+        shift: (M, 3) number of periods along each axis.
+        mirror: (M, 3) INSIDE, MIRROR_LOW or MIRROR_HIGH along each axis; ON_FACE for a centre on
+            or beyond a face, which has no mirror image across that axis.
+    """
+
+    owner: Array
+    position: Array
+    shift: Array
+    mirror: Array
+
+    __repr__ = one_line
+
+
+def wrapped(position: Array, box: Array, periodic: tuple[bool, ...]) -> Array:
+    """Positions (N, 3) brought into [low, high) along the periodic axes."""
+    low, size = box[:, 0], box[:, 1] - box[:, 0]
+    return np.where(periodic, low + (position - low) % size, position)
+
+
+def neighbour_tree(position: Array, box: Array, *, periodic: tuple[bool, ...]) -> cKDTree:
+    """Search tree of `position` (N, 3) that sees across the periodic sides."""
+    low, size = box[:, 0], box[:, 1] - box[:, 0]
+    place = wrapped(position, box, periodic) - low
+    # rounding may leave a wrapped place at the size itself
+    return cKDTree(
+        np.where(periodic & (place >= size), 0.0, place), boxsize=np.where(periodic, size, 0.0)
+    )
+
+
+def repeated(spheres: Snapshot, times: tuple[int, int, int]) -> Snapshot:
+    """The spheres of a periodic box of `times` as many cells along each axis, numbered from 1."""
+    if times == (1, 1, 1):
+        return spheres
+    size = np.ptp(spheres.box, axis=1)
+    shift = np.indices(times).reshape(3, -1).T * size
+    many, count = len(shift), len(shift) * len(spheres)
+    return replace(
+        spheres.where(np.tile(np.arange(len(spheres)), many)),
+        box=np.column_stack([spheres.box[:, 0], spheres.box[:, 0] + size * times]),
+        id=np.arange(1, count + 1),
+        position=(spheres.position + shift[:, None]).reshape(-1, 3),
+    )
+
+
+def make_images(
+    position: Array, box: Array, *, periodic: tuple[bool, ...], margin: Array, tolerance: float
+) -> Images:
+    """All images of the centres `position` (N, 3) m within `margin` (3,) m of the box.
+
+    A margin of NaN makes no images along that axis. A centre within `tolerance` m of a
+    non-periodic face, or beyond it, gets no mirror image there.
+    """
+    count = len(position)
+    owner, shift, mirror = (
+        np.arange(count),
+        np.zeros((count, 3), np.int16),
+        np.zeros((count, 3), np.int8),
+    )
+    position = wrapped(position, box, periodic)
+    for axis in range(3):
+        if np.isnan(margin[axis]):
+            continue
+        make = _shifted if periodic[axis] else _mirrored
+        pick, place, steps, codes = make(
+            position[:, axis], box[axis], float(margin[axis]), tolerance
+        )
+        owner, position, shift, mirror = owner[pick], position[pick], shift[pick], mirror[pick]
+        position[:, axis], shift[:, axis], mirror[:, axis] = place, steps, codes
+    return Images(owner=owner, position=position, shift=shift, mirror=mirror)
+
+
+def _shifted(
+    x: Array, bounds: Array, margin: float, tolerance: float
+) -> tuple[Array, Array, Array, Array]:
+    low, high = bounds
+    reach = int(np.ceil(margin / (high - low)))
+    steps = np.repeat(np.arange(-reach, reach + 1), len(x))
+    pick = np.tile(np.arange(len(x)), 2 * reach + 1)
+    place = x[pick] + steps * (high - low)
+    near = (place >= low - margin) & (place < high + margin)
+    return pick[near], place[near], steps[near], np.zeros(near.sum(), int)
+
+
+def _mirrored(
+    x: Array, bounds: Array, margin: float, tolerance: float
+) -> tuple[Array, Array, Array, Array]:
+    low, high = bounds
+    own = np.where((x <= low + tolerance) | (x >= high - tolerance), ON_FACE, INSIDE)
+    # a centre on one face has an image as far beyond the other when the margin is the whole side
+    lower = np.flatnonzero((x > low + tolerance) & (x < low + margin + tolerance))
+    upper = np.flatnonzero((x < high - tolerance) & (x > high - margin - tolerance))
+    pick = np.concatenate([np.arange(len(x)), lower, upper])
+    place = np.concatenate([x, 2 * low - x[lower], 2 * high - x[upper]])
+    codes = np.concatenate(
+        [own, np.full(len(lower), MIRROR_LOW), np.full(len(upper), MIRROR_HIGH)]
+    )
+    return pick, place, np.zeros(len(pick), int), codes
+
+
+def label(images: Images) -> Array:
+    """One integer (M,) for each sphere and its mirrors; images whole periods apart share it."""
+    mirror = np.where(images.mirror == ON_FACE, INSIDE, images.mirror)
+    return images.owner * 27 + mirror @ np.array([9, 3, 1])
+
+
+def packed_shift(shift: Array) -> Array:
+    """One integer per whole-period shift (..., 3), |shift| < 512; order is that of the rows."""
+    steps = shift.astype(np.int64) + 512
+    return (steps[..., 0] * 1024 + steps[..., 1]) * 1024 + steps[..., 2]
+
+
+# ------------------------------------------------------------------------------------------------
+# Porosity of spheres in a box, by depth: overlap counted once, spheres clipped to the box.
+#
+# The method is that of chords. Straight lines along x stand on a regular (y, z) lattice; on each
+# line the union of the spheres' chords is exact. Several lattices with random shifts give the mean
+# and its standard error (Cranley and Patterson 1976, SIAM J. Numer. Anal. 13, 904). The shifts are
+# spread over the cell as a Latin square (McKay et al. 1979), so the reported error is on the safe
+# side.
+
+
+LATTICES = 8
+LINES_PER_LATTICE = 5_000
+SHIFT_SEED = 20_110_501
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Porosity:
+    """Porosity of a box of spheres, all values between 0 and 1.
+
+    Attributes:
+        mean: porosity with the overlap of spheres counted once.
+        standard_error: standard error of `mean`.
+        edges: (B+1,) edges of the bins of depth, m.
+        profile: (B,) porosity of each bin, overlap counted once.
+        sum: porosity from the plain sum, 1 - volumes of the spheres centred in the box / its
+            volume.
+    """
+
+    mean: float
+    standard_error: float
+    edges: Array
+    profile: Array
+    sum: float
+
+    __repr__ = one_line
+
+
+def measure_porosity(
+    spheres: Snapshot,
+    *,
+    periodic: Sequence[bool],
+    edges: Array | None = None,
+    lines: int = LINES_PER_LATTICE,
+) -> Porosity:
+    """Porosity of spheres in their box, as a whole and by depth.
+
+    Args:
+        spheres: the spheres, m.
+        periodic: (3,) sides across which spheres reach round; across the others they are clipped.
+        edges: (B+1,) edges of the bins along x, m; one bin, the box, without them.
+        lines: number of chords in each of the 8 lattices.
+
+    Raises:
+        CaseError: `edges` do not ascend within the box.
+    """
+    low, high = spheres.box.T
+    bins = _checked_edges(edges, float(low[0]), float(high[0]))
+    cuts = np.unique(np.concatenate([[low[0], high[0]], bins]))
+    shifts = _spread_shifts(np.random.default_rng(SHIFT_SEED))
+    filled = np.array(
+        [_filled_below(spheres, cuts, shift, lines, tuple(periodic)) for shift in shifts]
+    )
+    void = 1.0 - (filled[:, -1] - filled[:, 0]) / (high[0] - low[0])
+    at_bins = filled.mean(axis=0)[np.searchsorted(cuts, bins)]
+    return Porosity(
+        mean=float(_without_rounding(void.mean())),
+        standard_error=float(void.std(ddof=1) / np.sqrt(LATTICES)),
+        edges=frozen(bins),
+        profile=frozen(_without_rounding(1.0 - np.diff(at_bins) / np.diff(bins))),
+        sum=_plain_sum(spheres, periodic),
+    )
+
+
+def _without_rounding(value: Array) -> Array:
+    """`value`, but 0 or 1 where it is beyond them by the rounding of the sums alone."""
+    bounded = np.clip(value, 0.0, 1.0)
+    return np.where(np.abs(value - bounded) < ROUNDING, bounded, value)
+
+
+def _checked_edges(edges: Array | None, low: float, high: float) -> Array:
+    bins = np.array([low, high]) if edges is None else np.asarray(edges, dtype=float)
+    tolerance = 1e-9 * (high - low)
+    if (
+        len(bins) < 2
+        or np.any(np.diff(bins) <= 0)
+        or bins[0] < low - tolerance
+        or bins[-1] > high + tolerance
+    ):
+        raise CaseError(
+            f"porosity bins: edges {bins.tolist()} do not ascend within the box "
+            f"[{low:g}, {high:g}] m; give ascending depths inside the box"
+        )
+    return np.clip(bins, low, high)
+
+
+def _spread_shifts(rng: np.random.Generator) -> Array:
+    strata = np.stack([rng.permutation(LATTICES), rng.permutation(LATTICES)], axis=1)
+    return (strata + rng.random((LATTICES, 2))) / LATTICES
+
+
+def _plain_sum(spheres: Snapshot, periodic: Sequence[bool]) -> float:
+    low, high = spheres.box.T
+    within = np.all(
+        ((spheres.position >= low) & (spheres.position < high)) | np.array(periodic), axis=1
+    )
+    volume = 4.0 / 3.0 * np.pi * np.sum(spheres.radius[within] ** 3)
+    return float(1.0 - volume / np.prod(high - low))
+
+
+def _filled_below(
+    spheres: Snapshot, cuts: Array, shift: Array, lines: int, periodic: tuple[bool, ...]
+) -> Array:
+    """Mean solid length of a line from the first to each of `cuts` (C,), on one lattice."""
+    size = spheres.box[1:, 1] - spheres.box[1:, 0]
+    count = np.maximum(1, np.round(np.sqrt(lines * size / size[::-1]))).astype(int)
+    sphere, line, half = _crossings(spheres, count, shift, periodic)
+    start, end = _wrapped(spheres, sphere, half, periodic[0])
+    line = np.resize(line, len(start))
+    start, end = np.clip(start, cuts[0], cuts[-1]), np.clip(end, cuts[0], cuts[-1])
+    start, end = _disjoint(line, start, end, cuts[-1] - cuts[0])
+    return (_total_below(start, cuts) - _total_below(end, cuts)) / count.prod()
+
+
+def _crossings(
+    spheres: Snapshot, count: Array, shift: Array, periodic: tuple[bool, ...]
+) -> tuple[Array, Array, Array]:
+    """Sphere index, line index and half chord length of every line through a sphere."""
+    step = (spheres.box[1:, 1] - spheres.box[1:, 0]) / count
+    centre = (spheres.position[:, 1:] - spheres.box[1:, 0]) / step - shift
+    # across a period the nearest image's chord holds all others; beyond a wall there are no lines
+    reach = np.minimum(spheres.radius[:, None] / step, np.where(periodic[1:], 0.5 * count, np.inf))
+    low, high = np.where(periodic[1:], -np.inf, 0.0), np.where(periodic[1:], np.inf, count - 1.0)
+    first = np.ceil(np.maximum(centre - reach, low)).astype(int)
+    last = np.floor(np.minimum(centre + reach, high)).astype(int)
+    wide = np.maximum(last - first + 1, 0)
+    lines = wide[:, 0] * wide[:, 1]
+    sphere = np.repeat(np.arange(len(spheres)), lines)
+    rank = np.arange(len(sphere)) - np.repeat(np.cumsum(lines) - lines, lines)
+    cell = first[sphere] + np.stack([rank // wide[sphere, 1], rank % wide[sphere, 1]], axis=1)
+    aside = (cell - centre[sphere]) * step
+    square = spheres.radius[sphere] ** 2 - aside[:, 0] ** 2 - aside[:, 1] ** 2
+    inside = square > 0
+    cell = cell[inside] % count
+    return sphere[inside], cell[:, 0] * count[1] + cell[:, 1], np.sqrt(square[inside])
+
+
+def _wrapped(
+    spheres: Snapshot, sphere: Array, half: Array, periodic_x: bool
+) -> tuple[Array, Array]:
+    """Chord ends (K,); with a periodic x their two images are appended."""
+    centre = spheres.position[sphere, 0]
+    length = spheres.box[0, 1] - spheres.box[0, 0]
+    if periodic_x:
+        centre = spheres.box[0, 0] + (centre - spheres.box[0, 0]) % length
+    images = (0.0, -length, length) if periodic_x else (0.0,)
+    centre = np.concatenate([centre + image for image in images])
+    half = np.tile(half, len(images))
+    return centre - half, centre + half
+
+
+def _disjoint(line: Array, start: Array, end: Array, span: float) -> tuple[Array, Array]:
+    """The same cover of each line by intervals that do not overlap."""
+    offset = line * (2.0 * span)
+    order = np.argsort(offset + start)
+    offset, start, end = offset[order], start[order], end[order]
+    reached = np.maximum.accumulate(end + offset) if len(end) else end
+    before = np.concatenate([[-np.inf], reached[:-1]]) - offset
+    start = np.maximum(start, before)
+    open_part = end > start
+    return start[open_part], end[open_part]
+
+
+def _total_below(values: Array, cuts: Array) -> Array:
+    """Sum of max(cut - value, 0) over the values, for each of `cuts` (C,)."""
+    ordered = np.sort(values)
+    summed = np.concatenate([[0.0], np.cumsum(ordered)])
+    below = np.searchsorted(ordered, cuts)
+    return below * cuts - summed[below]
