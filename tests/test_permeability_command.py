@@ -579,10 +579,10 @@ def test_a_permeability_that_no_packing_has_is_told(tmp_path, capsys):
     """The lattice in a periodic box that is twice as wide: a channel of 4 mm beside it."""
     cubic(tmp_path / "sc.csv")
     given = [tmp_path / "sc.csv", "--units", "mm", "--periodic", "xyz", "--json"]
-    for box, told in (("0,4,0,4,0,4", False), ("0,4,0,8,0,8", True)):
+    for box, doubted in (("0,4,0,4,0,4", False), ("0,4,0,8,0,8", True)):
         code, out, err = answer(capsys, *given, "--box", box)
         assert code == 0, err
-        assert any("no packing has" in one for one in json.loads(out)["warnings"]) == told
+        assert any("no packing has" in one for one in json.loads(out)["warnings"]) == doubted
 
 
 def test_a_walled_pack_called_periodic_is_told(tmp_path, capsys):
@@ -596,10 +596,10 @@ def test_a_walled_pack_called_periodic_is_told(tmp_path, capsys):
     file = table(tmp_path / "walled.csv", [(*place, 0.5) for place in places])
     given = [file, "--units", "mm", "--box", f"0,4,0,{height},0,4", "--json"]
     text = "no grain crosses the periodic sides y"
-    for periodic, told in (("xyz", True), ("xz", False)):
+    for periodic, doubted in (("xyz", True), ("xz", False)):
         code, out, err = answer(capsys, *given, "--periodic", periodic)
         assert code == 0, err
-        assert any(one.startswith(text) for one in json.loads(out)["warnings"]) == told
+        assert any(one.startswith(text) for one in json.loads(out)["warnings"]) == doubted
 
 
 def test_clumps_are_right_against_resolved_flow():
