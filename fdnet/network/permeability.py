@@ -307,6 +307,12 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
         grains = (base.k, None if specimen.moved else clean_slabs)
         empty = specimen.empty_sections()
         whole, counts = at_most_the_grains(whole, grains, specimen.edges, empty)
+        if counts["all_spheres_above_grains"]:
+            log.warnings.append(
+                "the damage is too light for the law all-spheres: its network gave more "
+                "permeability with the fines than that of the grains without them, so each "
+                f"section is taken as at most the latter; {of_grains} gives {final.k:.4g} m2 with fines"
+            )
         k, slabs, flow = whole.k, whole.slabs, whole.solved.flow
         log.warnings += laws_apart((ALL_SPHERES, k), (of_grains, final.k))
     elif final is not clean:

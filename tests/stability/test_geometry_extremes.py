@@ -80,13 +80,13 @@ def test_lattice_does_not_feel_a_shake_of_1e_12(name, periodic):
 
 @pytest.mark.parametrize("name", LATTICES)
 def test_damage_of_a_lattice_depends_on_the_split_by_less_than_documented(name):
-    """0.3 % in SC with 150 fines (docs/physics_network.md, section 2)."""
+    """0.7 % in SC with 150 fines by `section-archie` (docs/physics_network.md, section 2)."""
     pack, _ = LATTICES[name]
     filled = with_fines(pack, 150, 0.1)
     fines = filled.fines()
     moved = shaken(pack, 1e-12)
     analyses = [measure(grains, grains.joined(fines), ALL) for grains in (pack, moved)]
-    assert analyses[1].k_damaged == pytest.approx(analyses[0].k_damaged, rel=4e-3)
+    assert analyses[1].k_damaged == pytest.approx(analyses[0].k_damaged, rel=8e-3)
     assert analyses[0].k_damaged < analyses[0].k_initial
 
 

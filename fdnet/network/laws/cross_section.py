@@ -1,4 +1,4 @@
-"""The flow through a section of a throat: between three grains, beside a wall and in an edge.
+"""The flow through a section of a throat: between three grains, at a wall and in an edge.
 
 The flow on rays from the three corners of a section, whatever discs lie on them.
 

@@ -26,6 +26,7 @@ PLAIN, BATCHES, STEP, HELD, VISCOUS, IMPLICIT, ALL = (
 )
 SOFT, SOFTER = "3e3 N/m", "1e3 N/m"
 _PLAIN: Mapping[str, str] = {
+    "drag.scheme": "held",
     "fines.supply": "slab",
     "run.time_step_factor": "0.1",
     "run.stiffness_N_m": "1e4",
