@@ -311,7 +311,8 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
             log.warnings.append(
                 "the damage is too light for the law all-spheres: its network gave more "
                 "permeability with the fines than that of the grains without them, so each "
-                f"section is taken as at most the latter; {of_grains} gives {final.k:.4g} m2 with fines"
+                "section is taken as at most the latter; "
+                f"{of_grains} gives {final.k:.4g} m2 with fines"
             )
         k, slabs, flow = whole.k, whole.slabs, whole.solved.flow
         log.warnings += laws_apart((ALL_SPHERES, k), (of_grains, final.k))
