@@ -1,9 +1,9 @@
 #!/usr/bin/env python
 """The results that a change of the code must not move, and whether they stand.
 
-    python scripts/freeze.py            # compares with tests/data/frozen.json, some three minutes
-    python scripts/freeze.py --decks    # compares the rendered decks alone, some seconds
-    python scripts/freeze.py --write    # keeps the present results, after a change meant to move
+    python scripts/freeze.py --write    # keeps the present results, before the change
+    python scripts/freeze.py            # compares with them after it, some ten minutes
+    python scripts/freeze.py --decks    # compares the rendered decks alone
 
 It holds the SHA-256 of every deck of every shipped case, of the tables and of `summary.json` (less
 seconds and versions) of three small runs, and permeabilities at full digits by each law.
@@ -125,6 +125,8 @@ def main() -> None:
     parser.add_argument("--decks", action="store_true", help="the rendered decks alone")
     parser.add_argument("--write", action="store_true", help="keep the present results")
     asked = parser.parse_args()
+    if not asked.write and not KEPT.exists():
+        parser.error(f"{KEPT} is not there: call it with --write before the change, then without")
     with tempfile.TemporaryDirectory() as folder:
         now = dict(decks(Path(folder) / "decks"))
         if not asked.decks:
