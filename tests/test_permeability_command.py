@@ -506,6 +506,24 @@ def test_a_sphere_inside_a_grain_adds_nothing(tmp_path, capsys, name, kind):
     assert not any("overlap" in one for one in result["warnings"])
 
 
+@pytest.mark.parametrize("radius", [0.2, 0.35])
+def test_a_sphere_that_several_cover_together_adds_nothing(tmp_path, capsys, radius):
+    """Eight spheres on the corners of a cube reach 0.396 mm from its middle along an axis."""
+    places = np.indices((3, 3, 3)).reshape(3, -1).T + 0.1
+    corners = 0.17 * (2 * np.indices((2, 2, 2)).reshape(3, -1).T - 1)
+    rows = [(*((place + corner) % 3), 0.33) for place in places for corner in corners]
+    given = ["--units", "mm", "--box", "0,3,0,3,0,3", "--periodic", "xyz", "--json"]
+    results = []
+    for name, more in (("clumps", []), ("filled", [(*place, radius) for place in places])):
+        code, out, err = answer(capsys, table(tmp_path / f"{name}.csv", [*rows, *more]), *given)
+        assert code == 0, err
+        results.append(json.loads(out))
+    alone, filled = results
+    assert (alone["spheres_dropped"], filled["spheres_dropped"]) == (0, 27)
+    assert filled["k_initial_m2"] == alone["k_initial_m2"]
+    assert any("27 grains lie wholly inside" in one for one in filled["warnings"])
+
+
 def two_types(path: Path, radius: float) -> Path:
     """The touching lattice as a dump whose first layer is of type 2, with this radius."""
     from fdnet.spheres.snapshot import Snapshot
@@ -602,8 +620,21 @@ def test_a_walled_pack_called_periodic_is_told(tmp_path, capsys):
         assert any(one.startswith(text) for one in json.loads(out)["warnings"]) == doubted
 
 
-def test_clumps_are_right_against_resolved_flow():
-    """Grains with four bumps that lie mostly inside: k was 1.47 times that of resolved flow."""
+_CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / 3**0.5
+_CUBE = (2.0 * np.indices((2, 2, 2)).reshape(3, -1).T - 1) / 3**0.5
+
+
+@pytest.mark.parametrize(
+    ("parts", "radii"),
+    [
+        (np.vstack([[0, 0, 0], 0.8 * _CORNERS]), [1, 0.3, 0.3, 0.3, 0.3]),
+        (0.36 * _CORNERS, [0.75] * 4),
+        (0.52 * _CUBE, [0.72] * 8),
+    ],
+    ids=["bumps", "four", "eight"],
+)
+def test_clumps_are_right_against_resolved_flow(parts, radii):
+    """Clumps of spheres that lie in each other; k was up to 1.47 times that of resolved flow."""
     from fdnet.network.permeability import analyse
     from fdnet.network.stokes import extrapolate, solve_stokes
     from fdnet.spheres.snapshot import Snapshot
@@ -616,18 +647,14 @@ def test_clumps_are_right_against_resolved_flow():
         far = np.linalg.norm(away, axis=2) + 9 * np.eye(count)
         push = np.where(far < apart, (apart - far) / far, 0.0)
         places = (places + 0.3 * np.sum(push[:, :, None] * away, axis=1)) % 1
-    corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / 3**0.5
     turns = [np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(count)]
-    parts = np.concatenate(
-        [
-            place + 0.245 * np.vstack([[0, 0, 0], 0.8 * corners @ turn])
-            for place, turn in zip(places, turns, strict=True)
-        ]
+    spheres = np.concatenate(
+        [place + 0.245 * parts @ turn for place, turn in zip(places, turns, strict=True)]
     )
-    radii = np.tile(0.245 * np.array([1, 0.3, 0.3, 0.3, 0.3]), count)
-    clumps = Snapshot.from_arrays(1e-3 * (parts % 1), 1e-3 * radii, box=[0, 1e-3] * 3)
+    radius = 0.245e-3 * np.tile(radii, count)
+    clumps = Snapshot.from_arrays(1e-3 * (spheres % 1), radius, box=[0, 1e-3] * 3)
     coarse, fine = (solve_stokes(clumps, cells=cells, tolerance=1e-3) for cells in (32, 48))
     right = extrapolate(coarse, fine).k
     result = analyse(clumps, periodic="xyz")
-    assert result.counts["grains_mostly_inside_others"] == 4 * count
-    assert result.k_initial == pytest.approx(right, rel=0.08, abs=0)
+    assert result.counts["grains_centred_in_others"] > count
+    assert result.k_initial == pytest.approx(right, rel=0.05, abs=0)

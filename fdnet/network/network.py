@@ -15,7 +15,7 @@ from fdnet.network.tessellation.pores import (
     measure_pores,
     measure_throats,
 )
-from fdnet.spheres.snapshot import Array, Directions, Kind, Snapshot, periodic_axes
+from fdnet.spheres.snapshot import Array, Directions, Kind, Snapshot, sides_of
 
 __all__ = ["LENGTH_FLOOR", "WALLS", "Network", "build_network"]
 
@@ -164,7 +164,7 @@ class Network:
 
 
 def build_network(
-    grains: Snapshot, *, periodic: Directions = "", walls: str = "no-slip"
+    grains: Snapshot, *, periodic: Directions | None = None, walls: str = "no-slip"
 ) -> Network:
     """The network of pores and throats between grains (Shi 2011, section 3.2.1).
 
@@ -177,7 +177,8 @@ def build_network(
     Args:
         grains: the spheres that carry the skeleton, m; those of the kind fine are taken as grains
             are, and marked (`image_fine`).
-        periodic: the sides that are periodic, letters such as "yz" or three truth values.
+        periodic: the sides that are periodic, letters such as "yz" or three truth values;
+            without it those that the file of the grains gives, else none.
         walls: "no-slip", the default as in `analyse`, or "slip".
 
     Raises:
@@ -195,7 +196,7 @@ def build_network(
     """
     if walls not in WALLS:
         raise NetworkError(f"walls: {walls!r} is not known; choose one of {list(WALLS)}")
-    sides = periodic_axes(periodic)
+    sides = sides_of(grains, periodic)
     placed = place_grains(grains, periodic=sides)
     tessellation = tessellate(placed)
     polyhedra = join_polyhedra(tessellation)
@@ -204,7 +205,7 @@ def build_network(
     counts = {
         "grains_outside_box": len(grains) - len(placed.index) - placed.dropped,
         "grains_inside_others": placed.dropped,
-        "grains_mostly_inside_others": int(placed.inside.sum()),
+        "grains_centred_in_others": int(placed.inside.sum()),
         "grains_centred_beyond_walls": placed.beyond,
         "grains_hidden": tessellation.tetrahedra.hidden,
         **pores.counts,

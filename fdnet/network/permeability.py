@@ -44,7 +44,7 @@ from fdnet.network.states import (
     few_throats,
     solved,
 )
-from fdnet.spheres.snapshot import Array, Directions, Snapshot, frozen, periodic_axes
+from fdnet.spheres.snapshot import Array, Directions, Snapshot, frozen, sides_of
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -182,7 +182,7 @@ def analyse(
     spheres: Snapshot,
     damaged: Snapshot | None = None,
     *,
-    periodic: Directions = "",
+    periodic: Directions | None = None,
     options: AnalysisChoices | None = None,
     **choices: Unpack[AnalysisKeys],
 ) -> Analysis:
@@ -193,7 +193,8 @@ def analyse(
         damaged: the same grains, moved or not, and all fines. Without it, `spheres` holds the
             fines, or there are none.
         periodic: sides that repeat, letters such as "yz" or three truth values (x, y, z). The
-            other sides of the box are walls; along x they are the inlet and the outlet.
+            other sides of the box are walls; along x they are the inlet and the outlet. Without
+            it, the sides that the file of the spheres gives, as a dump does, else walls.
         options: choices of the analysis, for example `case.analysis`. Without it: one section,
             profile bins of a mean grain radius, fdnet's default laws.
         choices: single choices by name, in place of those of `options`: `sections` (a count, or
@@ -238,7 +239,7 @@ def compare(
     spheres: Snapshot,
     damaged: Snapshot | None = None,
     *,
-    periodic: Directions = "",
+    periodic: Directions | None = None,
     laws: Sequence[tuple[str, str]] | None = None,
     options: AnalysisChoices | None = None,
     **choices: Unpack[AnalysisKeys],
@@ -275,7 +276,7 @@ def compare(
         lubrication: 2.5e-09 m2
     """
     require_snapshots(spheres, damaged)
-    base, around = _chosen(options, choices), periodic_axes(periodic)
+    base, around = _chosen(options, choices), sides_of(spheres, periodic)
     if damaged is None and len(spheres.fines()):
         damaged = spheres
     if laws is None:

@@ -272,20 +272,12 @@ MOVED = 1e-9
 """A grain that is displaced by more than this, m, has moved."""
 
 
-MANY_CENTRED = 0.1
-"""Share of the grains with their centre inside another one, from which a warning says so."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Inner:
-    """How many grains and fines lie wholly inside other spheres; they were left out.
-
-    `centred` is the number of grains with their centre inside another one of about their size.
-    """
+    """How many grains and fines lie wholly inside other spheres; they were left out."""
 
     grains: int
     fines: int
-    centred: int
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -442,11 +434,6 @@ def specimen_doubts(specimen: Specimen, permeability: float, walls: str) -> Iter
                 f"{count} {name} lie wholly inside other spheres: they add nothing to the solid "
                 "and were left out"
             )
-    if inner.centred > MANY_CENTRED * len(specimen.grains[0]) / np.prod(specimen.copies):
-        yield (
-            f"{inner.centred} grains have their centre inside another one of about their size: "
-            "between such clumps the permeability is 4 to 13 % too high by resolved flow"
-        )
     porosity = specimen.porosity[0].mean
     yield from doubts(
         porosity=porosity,
@@ -470,7 +457,7 @@ def _without_inner(
     periodic: tuple[bool, bool, bool],
 ) -> tuple[Snapshot, Snapshot, Snapshot | None, Inner]:
     """Grains before and after and fines that add to the solid, and how many do not."""
-    wholly, _, centred = inside_others(before, periodic)
+    wholly = inside_others(before, periodic)[0]
     if after is not before or fines is not None:
         together = after if fines is None else after.joined(fines)
         later = inside_others(together, periodic)[0]
@@ -478,7 +465,7 @@ def _without_inner(
         fines = fines.where(~hidden) if fines is not None and hidden.any() else fines
     else:
         hidden = np.zeros(0, bool)
-    inner = Inner(grains=int(wholly.sum()), fines=int(hidden.sum()), centred=int(centred.sum()))
+    inner = Inner(grains=int(wholly.sum()), fines=int(hidden.sum()))
     if inner.grains:
         before, after = before.where(~wholly), after.where(~wholly)
     return before, after, fines, inner

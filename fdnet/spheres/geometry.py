@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from fdnet.errors import CaseError
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, frozen, one_line
@@ -119,21 +120,20 @@ def overlap_doubts(grains: float, fines: float = 0.0) -> Iterator[str]:
             )
 
 
-def inside_others(
-    spheres: Snapshot, periodic: tuple[bool, bool, bool]
-) -> tuple[Array, Array, Array]:
-    """Which spheres (N,) lie wholly inside another one, mostly, or with their centre only.
+def inside_others(spheres: Snapshot, periodic: tuple[bool, bool, bool]) -> tuple[Array, Array]:
+    """Which spheres (N,) lie wholly inside others, and which others have their centre in one.
 
     The first add nothing to the solid. They may reach out by a thousandth of their radius, so that
     spheres that coincide or touch from within are among them but for the rounding of a file. The
-    one of two that coincide is kept that comes first, a grain before a fine. The second have more
-    than half of their surface inside another sphere: d2 < R2 - r2 for a distance d of the centres.
-    Of two equal spheres with their centres in each other one is counted.
+    one of two that coincide is kept that comes first, a grain before a fine. Whether several
+    spheres cover one together is seen on `_SAMPLES` points of its surface and as many of its
+    inside, from the smallest sphere to the largest. The second are parts of clumps. Of two equal
+    spheres with their centres in each other one is counted.
     """
     radius, count = spheres.radius, len(spheres)
-    wholly, mostly, centred = np.zeros((3, count), bool)
+    wholly, centred = np.zeros((2, count), bool)
     if count < 2:
-        return wholly, mostly, centred
+        return wholly, centred
     tree = neighbour_tree(spheres.position, spheres.box, periodic=periodic)
     # among rigid spheres none has the centre of another one inside
     hosts = np.flatnonzero(tree.query_ball_point(tree.data, radius, return_length=True) > 1)
@@ -151,10 +151,45 @@ def inside_others(
     holds = distance <= radius[host] - (1 - _INSIDE_ROUNDING) * radius[guest]
     for one, other in zip(host[holds], guest[holds], strict=True):
         wholly[other] |= not wholly[one]
-    more = distance**2 < radius[host] ** 2 - radius[guest] ** 2
-    mostly[guest[more & ~wholly[host]]] = True
+    for one in sorted(set(guest) | set(host), key=lambda one: -rank[one]):
+        if not wholly[one]:
+            near = np.array(tree.query_ball_point(tree.data[one], radius[one] + radius.max()))
+            wholly[one] = _covered(one, near[~wholly[near]], spheres, periodic)
     centred[guest[~wholly[host]]] = True
-    return wholly, mostly & ~wholly, centred & ~mostly & ~wholly
+    return wholly, centred & ~wholly
+
+
+def _covered(
+    one: int, others: Array, spheres: Snapshot, periodic: tuple[bool, bool, bool]
+) -> bool:
+    """Whether the `others` together cover the ball of sphere `one`, in their nearest images."""
+    side = np.ptp(spheres.box, axis=1)
+    apart = spheres.position[others] - spheres.position[one]
+    apart -= np.where(periodic, np.rint(apart / side) * side, 0.0)
+    distance = np.linalg.norm(apart, axis=1)
+    near = (distance < spheres.radius[others] + spheres.radius[one]) & (others != one)
+    places, squares = apart[near], spheres.radius[others[near]] ** 2
+    for points in np.split(_BALL, [_FIRST]):  # few points tell of nearly all that they stand out
+        points = (1 - _INSIDE_ROUNDING) * spheres.radius[one] * points
+        if np.any(np.all(cdist(points, places, "sqeuclidean") > squares, axis=1)):
+            return False
+    return True
+
+
+def _ball_points() -> Array:
+    """Points of the unit ball (2 `_SAMPLES`, 3), in mixed order, those on its surface first."""
+    turn = np.arange(_SAMPLES) * np.pi * (3 - 5**0.5)
+    height = 1 - (2 * np.arange(_SAMPLES) + 1) / _SAMPLES
+    wide = np.sqrt(1 - height**2)
+    surface = np.column_stack([wide * np.cos(turn), wide * np.sin(turn), height])
+    mixed = np.random.default_rng(1).permutation(_SAMPLES)
+    depth = ((np.arange(_SAMPLES) + 0.5) / _SAMPLES) ** (1 / 3)
+    return np.concatenate([surface[mixed], surface * depth[mixed, None]])
+
+
+_SAMPLES = 5_000
+_FIRST = 40
+_BALL = _ball_points()
 
 
 # ------------------------------------------------------------------------------------------------

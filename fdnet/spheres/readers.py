@@ -326,16 +326,18 @@ class SphereFile:
         spheres: the spheres, SI units.
         assumptions: what the reader assumed where neither the file nor the caller says it.
         around_grains: whether the box is the one around all grains, for want of another.
-        periodic: which of the sides across x, y and z repeat: those that the caller gives, else
-            those that the file gives for its own box, else none.
         warnings: what is wrong with the file or contradicts it, one sentence each.
     """
 
     spheres: Snapshot
     assumptions: tuple[str, ...]
     around_grains: bool
-    periodic: tuple[bool, bool, bool] = (False, False, False)
     warnings: tuple[str, ...] = ()
+
+    @property
+    def periodic(self) -> tuple[bool, bool, bool]:
+        """Which of the sides across x, y and z repeat; none where no one says it."""
+        return self.spheres.periodic or (False, False, False)
 
 
 def read_spheres(
@@ -372,7 +374,8 @@ def read_spheres(
         step: time step of the frame of a dump. Without it the last frame that is whole.
 
     Returns:
-        The spheres in SI units. A file that does not tell kinds apart holds grains alone.
+        The spheres in SI units, with the sides that a dump says are periodic. A file that does
+        not tell kinds apart holds grains alone.
 
     Raises:
         CaseError: the file is missing or malformed, a value is impossible, or the choices do not
@@ -429,22 +432,22 @@ def read_sphere_file(
         position=rows.position,
         radius=rows.radius,
         velocity=np.zeros((count, 3)),
+        periodic=around_it,
     )
     return SphereFile(
         spheres=spheres,
         assumptions=(*rows.notes, *notes, *side_notes),
         around_grains=around,
-        periodic=around_it,
         warnings=(*rows.warnings, *side_warnings),
     )
 
 
 def _sides(
     rows: SphereRows, box: Array, given: Directions | None
-) -> tuple[tuple[bool, bool, bool], list[str], list[str]]:
+) -> tuple[tuple[bool, bool, bool] | None, list[str], list[str]]:
     """Which sides repeat, what was assumed of them, and where the file contradicts that."""
     if not rows.boundary or rows.box is None:
-        return ((False, False, False) if given is None else periodic_axes(given)), [], []
+        return (None if given is None else periodic_axes(given)), [], []
     said: list[bool] = [flag == "pp" for flag in rows.boundary]
     near = np.isclose(box, rows.box, rtol=_SAME_BOX, atol=_SAME_BOX * np.ptp(rows.box))
     same: list[bool] = list(np.all(near, axis=1).tolist())

@@ -4,7 +4,7 @@ Read-only arrays, and how a class that owns arrays prints itself.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from typing import Any
 
@@ -70,6 +70,13 @@ def periodic_axes(periodic: Directions) -> tuple[bool, bool, bool]:
     return bool(values[0]), bool(values[1]), bool(values[2])
 
 
+def sides_of(spheres: "Snapshot", periodic: Directions | None) -> tuple[bool, bool, bool]:
+    """Which of x, y, z are periodic: as given, else as the file of the spheres says, else none."""
+    if periodic is None:
+        return spheres.periodic or (False, False, False)
+    return periodic_axes(periodic)
+
+
 def axis_number(axis: str) -> int:
     """0, 1 or 2 for "x", "y" or "z". Raises CaseError on anything else."""
     if axis not in ("x", "y", "z"):
@@ -106,6 +113,8 @@ class Snapshot:
         position: (N, 3) centres, m.
         radius: (N,) m.
         velocity: (N, 3) m/s.
+        periodic: which of the sides across x, y and z repeat, by the file that the spheres come
+            from; None where no file says it.
 
     Raises CaseError when shapes disagree, values are not finite, or a kind is neither grain nor
     fine.
@@ -132,6 +141,7 @@ class Snapshot:
     position: Array
     radius: Array
     velocity: Array
+    periodic: tuple[bool, bool, bool] | None = None
 
     def __post_init__(self) -> None:
         count = len(self.id)
@@ -205,29 +215,19 @@ class Snapshot:
         """
         turn = [(axis_number(axis) + k) % 3 for k in range(3)]
         start = np.array([self.box[turn[0], 0], 0.0, 0.0])
-        return Snapshot(
-            step=self.step,
-            time_s=self.time_s,
+        sides = self.periodic
+        return replace(
+            self,
             box=self.box[turn] - start[:, None],
-            id=self.id,
-            kind=self.kind,
             position=self.position[:, turn] - start,
-            radius=self.radius,
             velocity=self.velocity[:, turn],
+            periodic=sides and (sides[turn[0]], sides[turn[1]], sides[turn[2]]),
         )
 
     def where(self, mask: Array) -> "Snapshot":
         """The spheres for which `mask` (N,) is true, or those of the indices `mask`."""
-        return Snapshot(
-            step=self.step,
-            time_s=self.time_s,
-            box=self.box,
-            id=self.id[mask],
-            kind=self.kind[mask],
-            position=self.position[mask],
-            radius=self.radius[mask],
-            velocity=self.velocity[mask],
-        )
+        own = {name: getattr(self, name)[mask] for name in _OF_EACH}
+        return replace(self, **own)
 
     def grains(self) -> "Snapshot":
         """The big spheres, by kind."""
@@ -239,16 +239,14 @@ class Snapshot:
 
     def joined(self, other: "Snapshot") -> "Snapshot":
         """These spheres followed by those of `other`, at the step and time of `other`."""
-        return Snapshot(
-            step=other.step,
-            time_s=other.time_s,
-            box=self.box,
-            id=np.concatenate([self.id, other.id]),
-            kind=np.concatenate([self.kind, other.kind]),
-            position=np.concatenate([self.position, other.position]),
-            radius=np.concatenate([self.radius, other.radius]),
-            velocity=np.concatenate([self.velocity, other.velocity]),
-        )
+        both = {
+            name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in _OF_EACH
+        }
+        return replace(self, step=other.step, time_s=other.time_s, **both)
+
+
+_OF_EACH = ("id", "kind", "position", "radius", "velocity")
+"""What a snapshot holds of each sphere."""
 
 
 def resting(

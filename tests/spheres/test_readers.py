@@ -444,6 +444,18 @@ def test_the_sides_are_those_of_the_file(tmp_path, bounds, given, box, periodic)
     assert not read.warnings
 
 
+def test_python_takes_the_sides_of_the_file_too(tmp_path):
+    """A simple cubic lattice in a dump with pp has k = 2.5203e-9 m2 (Zick and Homsy 1982)."""
+    from fdnet.network.permeability import analyse
+
+    spheres = read_spheres(write(tmp_path / "s.dump", lattice_dump(bounds="pp pp pp")), units="mm")
+    for one in (spheres, spheres.turned("y"), spheres.grains()):
+        assert analyse(one).k_initial == pytest.approx(2.5203e-9, rel=2e-3, abs=0)
+    assert analyse(spheres, periodic="").k_initial < 2e-9
+    sides = write(tmp_path / "t.dump", lattice_dump(bounds="ff pp ff"))
+    assert read_spheres(sides).turned("y").periodic == (True, False, False)
+
+
 def test_walls_that_are_called_periodic_are_named(tmp_path):
     path = write(tmp_path / "s.dump", lattice_dump(bounds="ff pp ff"))
     assert any(

@@ -16,7 +16,7 @@ from fdnet.errors import CaseError
 from fdnet.network.field.grid import Lattice, build_lattice, find_nearby
 from fdnet.network.field.sampled import Gradient, Sampled, find_gradient, sample_velocity
 from fdnet.network.field.solved import Skeleton, Solved, Spheres, build_skeleton, solve
-from fdnet.spheres.snapshot import Array, Directions, Kind, Snapshot, frozen, periodic_axes
+from fdnet.spheres.snapshot import Array, Directions, Kind, Snapshot, frozen, sides_of
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -181,7 +181,7 @@ UPSTREAM, DOWNSTREAM = 1.0, 0.5
 def velocity_field(
     grains: Snapshot,
     *,
-    periodic: Directions = "",
+    periodic: Directions | None = None,
     fines: Snapshot | None = None,
     cells: float | None = None,
     upstream: float | None = None,
@@ -196,7 +196,8 @@ def velocity_field(
     Args:
         grains: the skeleton, m; `box` is the specimen. Fines among them are the deposit where
             `fines` is not given.
-        periodic: sides that repeat, letters such as "yz" or three truth values (x, y, z).
+        periodic: sides that repeat, letters such as "yz" or three truth values (x, y, z);
+            without it those that the file of the grains gives, else none.
         fines: the deposit; its spheres of kind grain are ignored where it has any of kind fine.
         cells: across a mean grain diameter; without it 10 to 18, as a million cells allow.
         upstream: m of grid before the specimen; without it, a grain diameter more than the fines
@@ -225,7 +226,7 @@ def velocity_field(
         )
     deposit = _deposit(grains if fines is None else fines, fines is not None)
     skeleton = _skeleton(
-        grains, periodic_axes(periodic), (cells, _upstream(grains, deposit, upstream))
+        grains, sides_of(grains, periodic), (cells, _upstream(grains, deposit, upstream))
     )
     return solved_field(skeleton, (deposit.position, deposit.radius), tolerance)
 

@@ -48,7 +48,7 @@ class PlacedGrains:
         periodic: whether the sides x, y and z are periodic; the other faces are mirror planes.
         scale: m, mean radius of these grains as given.
         beyond: number of grains whose given centre lay beyond a mirrored face.
-        inside: (n,) whether more than half of the surface of a grain lies inside another one.
+        inside: (n,) whether the centre of a grain lies inside another one, as in clumps.
         dropped: number of grains that were left out, because they lie wholly inside another one or
             are placed where a larger one is.
     """
@@ -75,11 +75,11 @@ def place_grains(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Plac
     if len(grains):
         check_lengths(grains, periodic)
     reaching = _reaching(grains, periodic) if len(grains) else np.zeros(0, int)
-    wholly, mostly, _ = inside_others(grains.where(reaching), periodic)
-    index, mostly = reaching[~wholly], mostly[~wholly]
+    wholly, centred = inside_others(grains.where(reaching), periodic)
+    index, centred = reaching[~wholly], centred[~wholly]
     placed, beyond = onto_walls(grains.where(index), periodic)
     if len(double := _coinciding(placed, periodic)):
-        index, mostly = np.delete(index, double), np.delete(mostly, double)
+        index, centred = np.delete(index, double), np.delete(centred, double)
         placed, beyond = onto_walls(grains.where(index), periodic)
     if len(index) < 4:
         dropped = f", {len(reaching)} with those inside others" * (len(index) < len(reaching))
@@ -98,7 +98,7 @@ def place_grains(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Plac
         periodic=periodic,
         scale=float(inside.radius.mean()),
         beyond=beyond,
-        inside=mostly,
+        inside=centred,
         dropped=len(reaching) - len(index),
     )
 
