@@ -151,7 +151,7 @@ def inside_others(spheres: Snapshot, periodic: tuple[bool, bool, bool]) -> tuple
     holds = distance <= radius[host] - (1 - _INSIDE_ROUNDING) * radius[guest]
     for one, other in zip(host[holds], guest[holds], strict=True):
         wholly[other] |= not wholly[one]
-    for one in sorted(set(guest) | set(host), key=lambda one: -rank[one]):
+    for one in sorted({*guest.tolist(), *host.tolist()}, key=lambda one: -rank[one]):
         if not wholly[one]:
             near = np.array(tree.query_ball_point(tree.data[one], radius[one] + radius.max()))
             wholly[one] = _covered(one, near[~wholly[near]], spheres, periodic)

@@ -226,7 +226,7 @@ class Snapshot:
 
     def where(self, mask: Array) -> "Snapshot":
         """The spheres for which `mask` (N,) is true, or those of the indices `mask`."""
-        own = {name: getattr(self, name)[mask] for name in _OF_EACH}
+        own: dict[str, Any] = {name: getattr(self, name)[mask] for name in _OF_EACH}
         return replace(self, **own)
 
     def grains(self) -> "Snapshot":
@@ -239,7 +239,7 @@ class Snapshot:
 
     def joined(self, other: "Snapshot") -> "Snapshot":
         """These spheres followed by those of `other`, at the step and time of `other`."""
-        both = {
+        both: dict[str, Any] = {
             name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in _OF_EACH
         }
         return replace(self, step=other.step, time_s=other.time_s, **both)
