@@ -1,7 +1,6 @@
 """The documentation site follows the code: import graph, case keys, options, links, run folder."""
 
 import json
-import math
 import re
 import shlex
 import sys

@@ -25,7 +25,6 @@ from fdnet.studies.truth.slabs import (
     write_specimen,
 )
 from fdnet.studies.truth.specimens import SPECIMENS
-from fdnet.studies.truth.two_grids import two_grids_table
 
 
 def flow(cells: int, k: float) -> StokesFlow:
