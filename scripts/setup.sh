@@ -12,7 +12,7 @@
 #   FDNET_PYTHON     the python3 (3.11 or newer) to build .venv/ with
 #   FDNET_PREFIX     another place for the local prefix (.prefix is then a link to it)
 #   FDNET_LIGGGHTS   a LIGGGHTS binary of your own; then none is installed
-# docs/install.md describes every step.
+# docs/start/install.md describes every step.
 set -euo pipefail
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)"

@@ -1,7 +1,6 @@
 """The documentation site follows the code: import graph, case keys, options, links, run folder."""
 
 import json
-import math
 import re
 import shlex
 import sys
@@ -82,22 +81,6 @@ def test_the_tables_of_the_reference_are_those_of_the_code(root, page):
     text = (root / page).read_text(encoding="utf-8")
     assert "| Meaning |" in text
     assert reference_tables.filled(text) == text
-
-
-def test_the_numbers_of_the_page_about_the_velocity(root):
-    from fdnet.case.file import read_case
-    from fdnet.scales.scales import scales_of
-
-    page = (root / "docs/how-to/choose_the_velocity.md").read_text(encoding="utf-8")
-    length_mm = 1e3 * 0.108 * math.log(100 / 0.108)
-    assert f"{length_mm:.0f} mm, and 3.5 MPa give {3.5e3 / length_mm:.1f} MPa/m" in page
-    for length in (4, 8, 738):
-        case = read_case(
-            root / "cases/quick.toml", assignments=[f"fluid.darcy_length_mm={length}"]
-        )
-        scales = scales_of(case)
-        row = f"{scales.interstitial_velocity:.3g} m/s | {scales.reynolds:.2g} |"
-        assert row in page, row
 
 
 def test_every_command_and_option_is_explained(root):

@@ -238,7 +238,7 @@ def _thin_sections(case: Case) -> Iterator[Finding]:
         f"({1e3 * diameter:.3g} mm)",
         follows="the permeability of each is that of a few throats",
         do=f"take {most} sections or fewer" if most else "take a longer box",
-        read="docs/how-to/choose_sections.md",
+        read="docs/how-to/check_the_face.md",
     )
 
 

@@ -25,7 +25,6 @@ from fdnet.studies.truth.slabs import (
     write_specimen,
 )
 from fdnet.studies.truth.specimens import SPECIMENS
-from fdnet.studies.truth.two_grids import two_grids_table
 
 
 def flow(cells: int, k: float) -> StokesFlow:
@@ -151,10 +150,3 @@ def test_stored_truth_of_a_slab_lies_below_a_coarse_grid():
 
 def test_the_page_lists_the_slabs(root):
     assert slab_table(SLAB_FOLDER) in (root / "docs/stokes.md").read_text(encoding="utf-8")
-
-
-def test_the_page_has_the_table_of_two_grids(root):
-    """`scripts/stokes_truth.py two-grids` prints it."""
-    table = two_grids_table(SLAB_FOLDER)
-    assert table.strip() in (root / "docs/how-to/check_the_face.md").read_text()
-    assert "| 3 to 3.5 |" in table
