@@ -116,7 +116,6 @@ def test_the_readme_is_short(root):
     [
         "README.md",
         "docs/accuracy.md",
-        "docs/physics_network.md",
         "docs/start/first_answer.md",
     ],
 )
