@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What the forces of the fluid change and cost: the tables of docs/physics.md, section 3.
+"""What the forces of the fluid (docs/physics.md, section 3) change and cost.
 
     .venv/bin/python scripts/forces.py effect cases/quick/specimen1.toml ... --csv effect.csv
     .venv/bin/python scripts/forces.py cost --csv cost.csv

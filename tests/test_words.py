@@ -116,7 +116,6 @@ def test_the_readme_is_short(root):
     [
         "README.md",
         "docs/accuracy.md",
-        "docs/physics_network.md",
     ],
 )
 def test_the_accuracy_of_intact_packs_is_that_of_its_table(root, page):

@@ -11,14 +11,15 @@ from sphinx.transforms.post_transforms import SphinxPostTransform
 
 
 class FolderLinks(SphinxPostTransform):
-    """Replace a link to a folder by its text."""
+    """Replace a link to a folder, not to a page of the same name, by its text."""
 
     default_priority = 8  # before MyST looks for the target, at 9
 
     def run(self, **_: object) -> None:
         folder = Path(self.env.doc2path(self.env.docname)).parent
         for node in list(self.document.findall(pending_xref)):
-            if node["reftype"] == "myst" and (folder / node["reftarget"]).is_dir():
+            page = node.get("refdomain") == "doc"
+            if node["reftype"] == "myst" and not page and (folder / node["reftarget"]).is_dir():
                 node.replace_self(node.children)
 
 
