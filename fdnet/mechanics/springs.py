@@ -1,7 +1,4 @@
-"""Springs between the grains and the forces in them.
-
-Joints of a pack: where two grains, or a grain and a wall, touch or are bonded.
-"""
+"""Joints of a pack, where two grains, or a grain and a wall, touch or are bonded, as springs."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -33,7 +30,6 @@ class Joints:
         arm_first: (K, 3) m, from the centre of the first grain to the point of contact.
         arm_second: (K, 3) m, from the centre of the second grain; zero for a wall.
         radius: (K,) m, of the smaller of the two grains.
-        joint_radius: (K,) m, R1 R2 / (R1 + R2); at a wall that of the grain.
     """
 
     first: Array
@@ -43,7 +39,6 @@ class Joints:
     arm_first: Array
     arm_second: Array
     radius: Array
-    joint_radius: Array
 
     __repr__ = one_line
 
@@ -83,7 +78,7 @@ def find_joints(
     normal = apart / np.where(distance > 0, distance, 1.0)[:, None]
     radius = grains.radius[pairs]
     reach = radius[:, 0] - 0.5 * overlap
-    found = [
+    kinds = [
         Joints(
             first=pairs[:, 0],
             second=pairs[:, 1],
@@ -92,7 +87,6 @@ def find_joints(
             arm_first=normal * reach[:, None],
             arm_second=-normal * (distance - reach)[:, None],
             radius=radius.min(axis=1),
-            joint_radius=radius.prod(axis=1) / radius.sum(axis=1),
         )
     ]
     for axis, end in product(np.flatnonzero(~np.array(periodic)), (0, 1)):
@@ -100,7 +94,7 @@ def find_joints(
         away = sign * (grains.box[axis, end] - grains.position[:, axis])
         near = np.flatnonzero(away < grains.radius * (1 + 2 * gap))
         normal = np.repeat(sign * np.eye(3)[None, axis], len(near), axis=0)
-        found.append(
+        kinds.append(
             Joints(
                 first=near,
                 second=np.full(len(near), WALL),
@@ -109,12 +103,11 @@ def find_joints(
                 arm_first=normal * away[near, None],
                 arm_second=np.zeros((len(near), 3)),
                 radius=grains.radius[near],
-                joint_radius=grains.radius[near],
             )
         )
     return Joints(
         **{
-            name: np.concatenate([getattr(one, name) for one in found])
+            name: np.concatenate([getattr(one, name) for one in kinds])
             for name in Joints.__slots__
         }
     )
@@ -221,38 +214,34 @@ def _of_strain(frame: Array, branch: Array) -> Array:
 # Engineering constants of a stiffness tensor (6, 6), in the order xx, yy, zz, yz, xz, xy.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Moduli:
     """Elastic constants of an isotropic material, Pa.
 
     Attributes:
-        young: 9 K G / (3 K + G).
-        poisson: (3 K - 2 G) / (6 K + 2 G).
         bulk: K.
         shear: G.
     """
 
-    young: float
-    poisson: float
     bulk: float
     shear: float
 
+    @property
+    def young(self) -> float:
+        """9 K G / (3 K + G)."""
+        return 9 * self.bulk * self.shear / (3 * self.bulk + self.shear)
 
-def moduli(bulk: float, shear: float) -> Moduli:
-    """From the bulk and the shear modulus, Pa."""
-    return Moduli(
-        young=9 * bulk * shear / (3 * bulk + shear),
-        poisson=(3 * bulk - 2 * shear) / (6 * bulk + 2 * shear),
-        bulk=bulk,
-        shear=shear,
-    )
+    @property
+    def poisson(self) -> float:
+        """(3 K - 2 G) / (6 K + 2 G)."""
+        return (3 * self.bulk - 2 * self.shear) / (6 * self.bulk + 2 * self.shear)
 
 
 def voigt_average(tensor: Array) -> Moduli:
     """The isotropic material with the mean stiffness over all directions (Voigt; Hill 1952)."""
     normal, sideways = np.trace(tensor[:3, :3]), tensor[0, 1] + tensor[0, 2] + tensor[1, 2]
     bulk = float(normal + 2 * sideways) / 9
-    return moduli(bulk, float(normal - sideways + 3 * np.trace(tensor[3:, 3:])) / 15)
+    return Moduli(bulk, float(normal - sideways + 3 * np.trace(tensor[3:, 3:])) / 15)
 
 
 def compliance(tensor: Array) -> Array | None:

@@ -120,6 +120,7 @@ class LoadedPack:
 
     Attributes:
         pack: before the step.
+        material: of its contacts and bonds.
         joints: K joints, also across gaps that may close.
         maps: to the displacements in the joints.
         memory: of the joints.
@@ -132,6 +133,7 @@ class LoadedPack:
     """
 
     pack: Deformed
+    material: PackMaterial
     joints: Joints
     maps: Kinematics
     memory: Memory
@@ -223,6 +225,7 @@ def loaded_pack(
     )
     return LoadedPack(
         pack=pack,
+        material=material,
         joints=joints,
         maps=maps,
         memory=memory,
@@ -235,9 +238,9 @@ def loaded_pack(
     )
 
 
-def forces_at(loaded: LoadedPack, material: PackMaterial, moved_by: Array) -> JointForces:
+def forces_at(loaded: LoadedPack, moved_by: Array) -> JointForces:
     """Forces in the joints after the displacements `moved_by` (K, 6) in them."""
-    overlap = loaded.overlap - moved_by[:, 0]
+    material, overlap = loaded.material, loaded.overlap - moved_by[:, 0]
     closed = overlap >= 0
     normal = np.where(closed, material.normal * overlap, 0.0)
     stiff = np.where(loaded.limit > 0, material.shear, 0.0)
@@ -261,7 +264,7 @@ def forces_at(loaded: LoadedPack, material: PackMaterial, moved_by: Array) -> Jo
     )
 
 
-def balance(loaded: LoadedPack, material: PackMaterial, load: Load) -> tuple[Array, Array, int]:
+def balance(loaded: LoadedPack, load: Load) -> tuple[Array, Array, int]:
     """Motion (6 N,) of the grains and strain (3,) of the box that balance the step.
 
     The third is the number of Newton steps that it took. What is missing after `NEWTON_STEPS` of
@@ -270,11 +273,11 @@ def balance(loaded: LoadedPack, material: PackMaterial, load: Load) -> tuple[Arr
     strain: Array = np.where(np.isnan(load.strain), 0.0, load.strain)
     free = np.flatnonzero(np.isnan(load.strain))
     motion = np.zeros(loaded.maps.of_grains.shape[1])
-    missing = _missing(loaded, material, load, motion, strain)
+    missing = _missing(loaded, load, motion, strain)
     taken = 0
     while taken < NEWTON_STEPS and np.sqrt(np.einsum("i,i", missing, missing)) > load.within:
         taken += 1
-        forces = forces_at(loaded, material, loaded.moves(motion, strain))
+        forces = forces_at(loaded, loaded.moves(motion, strain))
         step, widening = _newton(loaded, forces, free, load, missing)
         way = np.zeros(3)
         way[free] = widening
@@ -283,7 +286,7 @@ def balance(loaded: LoadedPack, material: PackMaterial, load: Load) -> tuple[Arr
         # the energy is convex: its slope changes from downhill to uphill once
         low, high, part = 0.0, np.inf, 1.0
         for _ in range(_HALVES):
-            missing = _missing(loaded, material, load, motion + part * step, strain + part * way)
+            missing = _missing(loaded, load, motion + part * step, strain + part * way)
             slope = float(np.einsum("i,i", missing, along))
             if abs(slope) <= 0.5 * start:
                 break
@@ -295,14 +298,12 @@ def balance(loaded: LoadedPack, material: PackMaterial, load: Load) -> tuple[Arr
     return motion, strain, taken
 
 
-def _missing(
-    loaded: LoadedPack, material: PackMaterial, load: Load, motion: Array, strain: Array
-) -> Array:
+def _missing(loaded: LoadedPack, load: Load, motion: Array, strain: Array) -> Array:
     """Forces (6 N + F,) that are missing for balance, N.
 
     The last F are those of the stresses that are given, times volume over a length.
     """
-    forces = forces_at(loaded, material, loaded.moves(motion, strain)).total.ravel()
+    forces = forces_at(loaded, loaded.moves(motion, strain)).total.ravel()
     grains = -(loaded.maps.of_grains.T @ forces) - load.drag * motion
     stress = loaded.maps.of_strain[:, :3].T @ forces / loaded.volume
     box = ((load.stress - stress) * loaded.volume)[np.isnan(load.strain)] / loaded.maps.length
@@ -331,14 +332,12 @@ def _newton(
     return moved_by - reply @ widening, widening
 
 
-def carried_out(
-    loaded: LoadedPack, material: PackMaterial, motion: Array, strain: Array
-) -> tuple[Deformed, JointForces]:
+def carried_out(loaded: LoadedPack, motion: Array, strain: Array) -> tuple[Deformed, JointForces]:
     """The pack after a motion (6 N,) on top of a strain (3,) of the box, and what it bears.
 
     Bonds that no longer have a joint within reach are remembered as they were.
     """
-    forces = forces_at(loaded, material, loaded.moves(motion, strain))
+    forces = forces_at(loaded, loaded.moves(motion, strain))
     pack, frame = loaded.pack, loaded.maps.frame
     force, moment = (
         np.einsum("kji,kj->ki", frame, one) for one in (forces.bond[:, :3], forces.bond[:, 3:])
@@ -368,15 +367,14 @@ def carried_out(
     return after, forces
 
 
-def overloaded(
-    loaded: LoadedPack, forces: JointForces, material: PackMaterial
-) -> tuple[Array, Array]:
+def overloaded(loaded: LoadedPack, forces: JointForces) -> tuple[Array, Array]:
     """Stress over strength (K,) of each whole bond, and how it would break."""
-    if material.cement is None:
+    cement = loaded.material.cement
+    if cement is None:
         return np.zeros(len(loaded.joints)), np.full(len(loaded.joints), SOUND)
-    tension, shear = bond_stress(forces.bond, disc_radius(loaded.joints, material))
-    pulled = tension / material.cement.tensile_strength
-    cut = shear / material.cement.shear_strength
+    tension, shear = bond_stress(forces.bond, disc_radius(loaded.joints, loaded.material))
+    pulled = tension / cement.tensile_strength
+    cut = shear / cement.shear_strength
     ratio = np.where(loaded.memory.whole, np.maximum(pulled, cut), 0.0)
     return ratio, np.where(pulled >= cut, TENSION, SHEAR)
 
@@ -470,7 +468,6 @@ class Sheared:
     Attributes:
         test: what was done.
         rows: the pack after the confining stress, then after each load step.
-        confined: the pack under the confining stress.
         pack: at the end.
         bonds: number of bonds at the start.
         restless: load steps that never came within the tolerance.
@@ -478,7 +475,6 @@ class Sheared:
 
     test: Triaxial
     rows: tuple[LoadStep, ...]
-    confined: Deformed
     pack: Deformed
     bonds: int
     restless: int
@@ -521,7 +517,7 @@ def triaxial(
     """
     material = replace(material, glued=False)
     pack, row, restless = confined(grains, material, test, periodic)
-    begun = pack = replace(pack, strain=np.zeros(3))
+    pack = replace(pack, strain=np.zeros(3))
     rows = [_since(row, pack)]
     follow(rows[0])
     sides, step = np.nan if test.sides else 0.0, 1 / test.steps
@@ -536,7 +532,6 @@ def triaxial(
     return Sheared(
         test=test,
         rows=tuple(rows),
-        confined=begun,
         pack=pack,
         bonds=int(pack.memory.bonded.sum()),
         restless=restless,
@@ -604,11 +599,11 @@ def _brought_to_rest(
     for rests in range(1, test.rests + 1):
         loaded = loaded_pack(pack, material, periodic)
         load = Load(strain=strain, stress=stress, drag=drag * material.normal, within=within)
-        motion, given, taken = balance(loaded, material, load)
+        motion, given, taken = balance(loaded, load)
         strain = np.where(np.isnan(strain), np.nan, 0.0)
-        pack, forces = carried_out(loaded, material, motion, given)
+        pack, forces = carried_out(loaded, motion, given)
         # the bonds that are farthest beyond their strength break
-        ratio, how = overloaded(loaded, forces, material)
+        ratio, how = overloaded(loaded, forces)
         worst = float(ratio.max(initial=0.0))
         if worst > 1:
             gone = ratio >= max(1.0, _GROUP * worst)

@@ -7,11 +7,11 @@ from fdnet.errors import MechanicsError
 from fdnet.mechanics.elastic import elastic_of
 from fdnet.mechanics.springs import (
     Cement,
+    Moduli,
     PackMaterial,
     anisotropy_of,
     direct_solver,
     iterative_solver,
-    moduli,
     voigt_average,
     young_along,
 )
@@ -160,4 +160,4 @@ def test_constants_of_a_cubic_tensor():
     assert young_along(tensor)[0] == pytest.approx(6 * 21 / 16)
     reuss = 5 / (2 * 2 / 6 + 3 / 4)
     assert anisotropy_of(tensor) == pytest.approx(5 * 3.6 / reuss - 5)
-    assert moduli(7.0, 3.6).young == pytest.approx(9 * 7 * 3.6 / (21 + 3.6))
+    assert Moduli(7.0, 3.6).young == pytest.approx(9 * 7 * 3.6 / (21 + 3.6))

@@ -38,8 +38,8 @@ def column():
 def strained(pack, material, strain, stress=0.0):
     loaded = loaded_pack(pack, replace(material, glued=False), ALL)
     load = Load(strain=np.array(strain), stress=np.full(3, stress), drag=1e-3, within=1e-12)
-    motion, given, _ = balance(loaded, material, load)
-    return loaded, *carried_out(loaded, material, motion, given)
+    motion, given, _ = balance(loaded, load)
+    return loaded, *carried_out(loaded, motion, given)
 
 
 def test_a_contact_opens_and_pulls_nothing():
@@ -60,7 +60,7 @@ def test_bonds_break_in_tension_at_their_strength():
     at_strength = 1e7 / (1e14 * SIDE)
     for share in (0.99, 1.01):
         loaded, _, forces = strained(pack, material, [share * at_strength, 0, 0])
-        ratio, how = overloaded(loaded, forces, material)
+        ratio, how = overloaded(loaded, forces)
         assert ratio.max() == pytest.approx(share, rel=1e-3)
         assert how[np.argmax(ratio)] == TENSION
     assert np.all(pack.memory.broken == SOUND)

@@ -9,7 +9,6 @@ from fdnet.network.flow.flow import solve_flow
 from fdnet.network.flow.solver import (
     balance_links,
     cancelling_pressures,
-    groups,
     stiffness,
     winding_groups,
 )
@@ -84,7 +83,7 @@ def test_stiffness_counts_contrasts_above_the_weakest_link_of_the_best_way():
 def test_heights_take_up_the_jumps_of_a_forest():
     ends = np.array([(0, 1), (2, 1), (2, 3), (4, 5)])
     jump = np.array([1.0, 0.0, -2.0, 3.0])
-    height = cancelling_pressures(ends, jump, groups(ends, 6))
+    height = cancelling_pressures(ends, jump, 6)
     assert (jump + height[ends[:, 0]] - height[ends[:, 1]]).tolist() == [0, 0, 0, 0]
 
 

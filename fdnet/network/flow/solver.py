@@ -14,7 +14,7 @@ import numpy as np
 import pyamg
 import pymetis
 from scipy import sparse
-from scipy.sparse.csgraph import breadth_first_order, reverse_cuthill_mckee
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
 from fdnet.errors import FlowError
@@ -340,46 +340,27 @@ def groups(ends: Array, count: int) -> Array:
     return winding_groups(ends, np.zeros(len(ends)), count)[0]
 
 
-def cancelling_pressures(ends: Array, jump: Array, group: Array) -> Array:
-    """Pressures (n,) that cancel the jump of every link of a spanning forest: p_b = p_a + jump.
-
-    The forest is made breadth first from the first node of each `group` (n,), in a graph whose
-    vertices are the nodes and the links, so that parallel links remain distinct.
-    """
-    count, links = len(group), len(ends)
-    root = count + links
-    first = np.unique(group, return_index=True)[1]
-    vertex = np.arange(count, root)
-    rows = np.concatenate([ends[:, 0], vertex, ends[:, 1], vertex, np.full(len(first), root)])
-    columns = np.concatenate([vertex, ends[:, 0], vertex, ends[:, 1], first])
-    graph = sparse.csr_matrix(
-        (np.ones(len(rows), np.int8), (rows, columns)), shape=(root + 1, root + 1)
-    )
-    _, before = breadth_first_order(graph, root, directed=True)
-    link = before[:count] - count
-    inner = link < links
-    parent = np.arange(count)
-    parent[inner] = before[count + link[inner]]
-    rise = np.zeros(count)
-    reached = link[inner]
-    rise[inner] = jump[reached] * np.where(ends[reached, 1] == np.flatnonzero(inner), 1.0, -1.0)
-    while np.any(parent != parent[parent]):
-        rise += rise[parent]
-        parent = parent[parent]
-    return rise
-
-
 def winding_groups(ends: Array, jump: Array, count: int) -> tuple[Array, Array]:
     """Connected group (n,) of each of `count` nodes, and whether that group winds (n,)."""
-    group, winds = _joined(
+    group, winds, _ = _joined(
         np.ascontiguousarray(ends, np.int64), np.ascontiguousarray(jump, float), count
     )
     return group, winds[group]
 
 
+def cancelling_pressures(ends: Array, jump: Array, count: int) -> Array:
+    """Pressures (n,) of groups that do not wind, which cancel the jump of every link.
+
+    p_b = p_a + jump, from 0 at the first node of each group.
+    """
+    ends = np.ascontiguousarray(ends, np.int64)
+    rise: Array = _joined(ends, np.ascontiguousarray(jump, float), count)[2]
+    return rise
+
+
 @compiled
-def _joined(ends: Array, jump: Array, count: int) -> tuple[Array, Array]:
-    """Group (n,) of each node, and whether each group (G,) winds.
+def _joined(ends: Array, jump: Array, count: int) -> tuple[Array, Array, Array]:
+    """Group (n,) of each node, whether each group (G,) winds, and the pressure (n,) of each node.
 
     Every node knows another of its group and the pressure over it; links join two trees of such
     nodes or close a loop (Tarjan 1975, J. ACM 22, 215). The root of a tree is its first node.
@@ -404,7 +385,7 @@ def _joined(ends: Array, jump: Array, count: int) -> tuple[Array, Array]:
             roots += 1
         else:
             group[node] = group[root]
-    return group, winds
+    return group, winds, rise
 
 
 @compiled
@@ -519,7 +500,7 @@ def _balance(
     """
     stiff, pressure = level > 0, np.zeros(count)
     if stiff.any():
-        pressure = cancelling_pressures(ends[stiff], jump[stiff], groups(ends[stiff], count))
+        pressure = cancelling_pressures(ends[stiff], jump[stiff], count)
     drive, level = jump + _difference(pressure, ends), level.copy()
     for at in range(int(level.max(initial=0))):
         # links between nodes that higher levels contract into one belong to these

@@ -164,7 +164,17 @@ def tessellate(placed: PlacedGrains) -> Tessellation:
     margin = np.full(3, FIRST_MARGIN * float(grains.radius.max()))
     for _ in range(ROUNDS):
         margin = np.where(periodic, margin, np.minimum(margin, size))
-        _refuse_crowd(count, np.where(periodic, margin, 0.0), size)
+        beyond = np.where(periodic, margin, 0.0)
+        images = count * float(np.prod(1.0 + 2.0 * beyond / size))
+        most, axis = MOST_IMAGES + IMAGES_A_GRAIN * count, int(np.argmax(beyond / size))
+        if images > most or beyond[axis] > MOST_PERIODS * size[axis]:
+            raise NetworkError(
+                f"tessellation of {count} grains: {images:.3g} images up to {beyond[axis]:.3g} m "
+                f"beyond the periodic side {'xyz'[axis]} of {size[axis]:.3g} m are needed, "
+                f"expected at most {most} and {MOST_PERIODS} periods; grains or voids are far "
+                "larger than the box (check units and box), or a periodic cell of few grains is "
+                "to be repeated"
+            )
         widest = ~np.array(periodic) & (margin >= size)
         tetrahedra = make_tetrahedra(grains, periodic=periodic, margin=margin)
         needed = tetrahedra.margin
@@ -220,32 +230,16 @@ def copies_of_cell(
         if np.prod(wanted) * count > MOST_IMAGES / IMAGES_A_GRAIN:
             break
         times = int(wanted[0]), int(wanted[1]), int(wanted[2])
-        if all(_tiles(repeated(pack, times), periodic) for pack in packs):
-            return times
+        try:
+            for pack in (repeated(pack, times) for pack in packs):
+                facets = tessellate(place_grains(pack, periodic=periodic)).facets
+                if facets.unmatched > len(pack) // GRAINS_A_FLAW:
+                    break
+            else:
+                return times
+        except NetworkError:
+            continue
     return 1, 1, 1
-
-
-def _tiles(grains: Snapshot, periodic: tuple[bool, bool, bool]) -> bool:
-    """Whether the tetrahedra of the grains fill their box, next to all facets with a partner."""
-    try:
-        made = tessellate(place_grains(grains, periodic=periodic))
-    except NetworkError:
-        return False
-    return made.facets.unmatched <= len(grains) // GRAINS_A_FLAW
-
-
-def _refuse_crowd(count: int, margin: Array, size: Array) -> None:
-    """Raise NetworkError when the images of `count` grains in `margin` (3,) m are too many."""
-    images = count * float(np.prod(1.0 + 2.0 * margin / size))
-    axis = int(np.argmax(margin / size))
-    most = MOST_IMAGES + IMAGES_A_GRAIN * count
-    if images > most or margin[axis] > MOST_PERIODS * size[axis]:
-        raise NetworkError(
-            f"tessellation of {count} grains: {images:.3g} images up to {margin[axis]:.3g} m "
-            f"beyond the periodic side {'xyz'[axis]} of {size[axis]:.3g} m are needed, expected "
-            f"at most {most} and {MOST_PERIODS} periods; grains or voids are far larger than the "
-            "box (check units and box), or a periodic cell of few grains is to be repeated"
-        )
 
 
 # ------------------------------------------------------------------------------------------------
