@@ -1,4 +1,4 @@
-"""The compiled measures of tetrahedra and facets are the closed forms of `geometry`."""
+"""The compiled measures of tetrahedra and facets are the `closed_forms`."""
 
 import numpy as np
 import pytest

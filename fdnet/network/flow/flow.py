@@ -147,7 +147,7 @@ def _cut_links(network: Network, conductance: Array, span: tuple[float, float]) 
 # Steady flow through a network: pressures from the mass balance of each pore.
 #
 # Viscosity is factored out, so conductances and fluxes are in m3. Pressure is held on two planes
-# across x: 1 on the inlet plane, 0 on the outlet plane (`links`). Where x is periodic and no slab
+# across x: 1 on the inlet plane, 0 on the outlet plane (`Links`). Where x is periodic and no slab
 # is cut out, the pressure drops by 1 per period instead.
 
 

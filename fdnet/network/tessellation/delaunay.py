@@ -21,7 +21,7 @@ from fdnet.spheres.snapshot import Array, Snapshot, one_line
 LENGTHS = (1e-60, 1e60)
 """Shortest radius and longest length, m; no double number holds the cubes of lengths beyond."""
 COARSE = 1e-8
-"""Largest rounding of a coordinate, in mean grain radii: a tenth of the shake (`points.SHAKE`),
+"""Largest rounding of a coordinate, in mean grain radii: a tenth of the shake (`SHAKE`),
 which coarser coordinates could not hold."""
 COINCIDENT = 1e-3
 """Grains that are placed nearer than this, in radii of the smallest grain, coincide."""
@@ -206,7 +206,7 @@ class ImagePoints:
         owner: (M,) index of the grain.
         position: (M, 3) m, centre of the image.
         shift: (M, 3) whole periods by which the image is moved along each axis.
-        mirror: (M, 3) one of INSIDE, MIRROR_LOW, MIRROR_HIGH, ON_FACE of `spheres.images`.
+        mirror: (M, 3) one of INSIDE, MIRROR_LOW, MIRROR_HIGH, ON_FACE of `spheres.geometry`.
         radius: (M,) m.
         shaken: (M, 3) m, centre after the shake.
         scaled: (M, 3) shaken centre from the low corner of the box, in mean grain radii.

@@ -250,7 +250,7 @@ def _sphere_in_pairs(points: Array, weight: Array, corner: Corners, e: int, most
 # Bowyer (1981, Comput. J. 24, 162) and Watson (1981, Comput. J. 24, 167): a new point removes the
 # tetrahedra that it changes, and is joined to the facets of the hole. With weights the same makes
 # the power tessellation (Edelsbrunner and Shah 1996, Algorithmica 15, 223). The points come in the
-# order of `curve`, so that the next tetrahedron is found within a few steps of the last.
+# order of `insertion_order`, so that the next tetrahedron is found within a few steps of the last.
 #
 # All points lie in one tetrahedron of four distant points. What these four are part of is left out
 # at the end. A tetrahedron is missed only where its sphere reaches that far.
