@@ -96,7 +96,7 @@ DOORS = {
     },
     "PIL": {"report/movie", "studies/thesis/figures/canvas"},
     "numba": {"network/compiled"},
-    "pymetis": {"mechanics/springs", "network/flow/solver"},
+    "pymetis": {"network/flow/solver"},
     "pyamg": {"network/flow/solver", "studies/network/solver_peers"},
     "pydantic": {"case", "report/tables", "run/folder", "campaign/plan/folder"},
     "tomli_w": {"case/case", "studies/fuzz/mutations"},

@@ -54,11 +54,36 @@ def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
 
 
 def _mechanics(options: argparse.Namespace) -> int:
-    from fdnet.run.mechanics import measure_elastic, packed_case, write_mechanics
+    from fdnet.mechanics.triaxial import LoadStep, Triaxial
+    from fdnet.run.mechanics import (
+        measure_elastic,
+        measure_triaxial,
+        packed_case,
+        write_mechanics,
+    )
     from fdnet.run.records import RunOptions
 
-    pressure = _pressure(options.confining_MPa)
-    _check_test(options)
+    given, pressure = options.confining_MPa, None
+    if given is not None:
+        if not 0 < given < 1e9:
+            raise CaseError(f"--confining_MPa: {given}, expected a stress above 0, in MPa")
+        pressure = given * 1e6
+    if options.triaxial and given is None:
+        raise CaseError("--triaxial: needs the stress on the sides; give --confining_MPa")
+    if options.triaxial and not 0 < options.strain <= 0.3:
+        raise CaseError(f"--strain: {options.strain}, expected a share above 0, at most 0.3")
+    if options.triaxial and not 1 <= options.steps <= 10_000:
+        raise CaseError(f"--steps: {options.steps}, expected 1 to 10000 load steps")
+
+    def follow(row: LoadStep) -> None:
+        if not options.quiet:
+            print(
+                f"triaxial: strain {row.axial_strain:.3e}, deviatoric {row.deviatoric / 1e6:.4g} "
+                f"MPa, bonds broken {row.tension + row.shear}",
+                file=sys.stderr,
+                flush=True,
+            )
+
     chosen = RunOptions(
         out=options.out or Path("runs"),
         liggghts=options.liggghts,
@@ -68,7 +93,8 @@ def _mechanics(options: argparse.Namespace) -> int:
     packed = packed_case(options.source, chosen, overrides_of(options))
     numbers = measure_elastic(packed, pressure)
     if options.triaxial:
-        numbers["triaxial"] = _triaxial(options, packed, pressure or 0.0)
+        test = Triaxial(confining=pressure or 0.0, strain=options.strain, steps=options.steps)
+        numbers["triaxial"] = measure_triaxial(packed, test, follow)
     path = write_mechanics(packed, numbers)
     for warning in [*numbers["warnings"], *numbers.get("triaxial", {}).get("warnings", [])]:
         print(f"fdnet: warning: {warning}", file=sys.stderr)
@@ -78,44 +104,6 @@ def _mechanics(options: argparse.Namespace) -> int:
         _print(numbers)
         print(f"written: {path}")
     return 0
-
-
-def _check_test(options: argparse.Namespace) -> None:
-    if not options.triaxial:
-        return
-    if options.confining_MPa is None:
-        raise CaseError("--triaxial: needs the stress on the sides; give --confining_MPa")
-    if not 0 < options.strain <= 0.3:
-        raise CaseError(f"--strain: {options.strain}, expected a share above 0, at most 0.3")
-    if not 1 <= options.steps <= 10_000:
-        raise CaseError(f"--steps: {options.steps}, expected 1 to 10000 load steps")
-
-
-def _triaxial(options: argparse.Namespace, packed: Any, confining: float) -> dict[str, Any]:
-    from fdnet.mechanics.triaxial import Row, Triaxial
-    from fdnet.run.mechanics import measure_triaxial, write_curve
-
-    def follow(row: Row) -> None:
-        if not options.quiet:
-            print(
-                f"triaxial: strain {row.axial_strain:.3e}, deviatoric {row.deviatoric / 1e6:.4g} "
-                f"MPa, bonds broken {row.tension + row.shear}",
-                file=sys.stderr,
-                flush=True,
-            )
-
-    test = Triaxial(confining=confining, strain=options.strain, steps=options.steps)
-    result, numbers = measure_triaxial(packed, test, follow)
-    write_curve(packed, result)
-    return numbers
-
-
-def _pressure(given: float | None) -> float | None:
-    if given is None:
-        return None
-    if not 0 < given < 1e9:
-        raise CaseError(f"--confining_MPa: {given}, expected a stress above 0, in MPa")
-    return given * 1e6
 
 
 def _print(numbers: dict[str, Any]) -> None:

@@ -15,17 +15,16 @@ from fdnet.errors import MechanicsError
 from fdnet.mechanics.springs import (
     STRAINS,
     Joints,
-    Material,
     Moduli,
+    PackMaterial,
     anisotropy_of,
     bond_springs,
     contact_springs,
     find_joints,
     kinematics,
     solver_of,
-    stiffness,
+    stiffness_matrix,
     voigt_average,
-    wave_speeds,
     young_along,
 )
 from fdnet.spheres.snapshot import Array, Snapshot, one_line
@@ -82,13 +81,15 @@ class Elastic:
 
     @property
     def waves(self) -> tuple[float, float]:
-        """Velocity of P and S waves, m/s."""
-        return wave_speeds(self.averaged, self.density)
+        """Velocity of P waves, sqrt((K + 4 G / 3) / rho), and of S waves, sqrt(G / rho), m/s."""
+        bulk, shear = self.averaged.bulk, self.averaged.shear
+        p_wave = np.sqrt((bulk + 4 / 3 * shear) / self.density)
+        return float(p_wave), float(np.sqrt(shear / self.density))
 
 
 def elastic_of(
     grains: Snapshot,
-    material: Material,
+    material: PackMaterial,
     *,
     periodic: tuple[bool, bool, bool],
     porosity: float = 0.0,
@@ -106,15 +107,26 @@ def elastic_of(
     joints, kept = carrying(grains, material, periodic)
     volume = float(np.prod(np.diff(grains.box, axis=1)))
     count, length = len(grains), float(grains.radius.mean()) if len(grains) else 1.0
-    springs = contact_springs(joints, material) + bond_springs(joints, material)
+    contacts, pairs = contact_springs(joints, material), ~joints.at_wall
+    springs = contacts + bond_springs(joints, material)
     maps = kinematics(joints, count, length=length)
     pulled = springs.reshape(-1, 1) * maps.of_strain
     affine = maps.of_strain.T @ pulled / volume
-    motion = _motion(maps.of_grains, springs, pulled, kept)
+    moving, motion = np.repeat(kept, 6), np.zeros((6 * count, len(STRAINS)))
+    if kept.any():
+        live = maps.of_grains[:, np.flatnonzero(moving)]
+        solve, load = solver_of(stiffness_matrix(live, springs)), -(live.T @ pulled)
+        motion[moving] = np.column_stack([solve(column) for column in load.T])
     tensor = affine + (pulled.T @ (maps.of_grains @ motion)) / volume
     tensor = 0.5 * (tensor + tensor.T)
-    _refuse_loose(tensor, affine, count=count, rattlers=int(count - kept.sum()))
-    pairs = ~joints.at_wall
+    rattlers = int(count - kept.sum())
+    for axis in range(3):
+        if not tensor[axis, axis] > LEAST_STIFFNESS * affine[axis, axis]:
+            raise MechanicsError(
+                f"pack of {count} grains carries no load along {'xyz'[axis]}: {rattlers} of them "
+                "carry nothing, and the joints of the rest form no path from side to side; make "
+                "the pack denser, or bridge wider gaps with bonds.gap_ratio"
+            )
     shown = motion.T.reshape(len(STRAINS), count, 6).copy()
     shown[:, :, 3:] /= length
     return Elastic(
@@ -125,8 +137,8 @@ def elastic_of(
         density=(1 - porosity) * material.density,
         coordination=2 * float(pairs.sum()) / max(1, int(kept.sum())),
         grains=count,
-        rattlers=int(count - kept.sum()),
-        contacts=int(np.sum(contact_springs(joints, material)[:, 0] > 0)),
+        rattlers=rattlers,
+        contacts=int(np.sum(contacts[:, 0] > 0)),
         bonds=0 if material.cement is None else int(pairs.sum()),
         joints=joints,
         motion=shown,
@@ -134,7 +146,7 @@ def elastic_of(
 
 
 def carrying(
-    grains: Snapshot, material: Material, periodic: tuple[bool, bool, bool]
+    grains: Snapshot, material: PackMaterial, periodic: tuple[bool, bool, bool]
 ) -> tuple[Joints, Array]:
     """Joints of the grains that can carry a load, and which grains those are (N,).
 
@@ -150,40 +162,12 @@ def carrying(
         if not single.any():
             break
         kept = kept & ~single
-    kept = kept & _largest_group(joints.where(live), kept)
-    return joints.where(kept[joints.first] & (joints.at_wall | kept[joints.second])), kept
-
-
-def _largest_group(joints: Joints, kept: Array) -> Array:
-    """(N,) grains of the largest group; the walls join what touches them."""
-    count = len(kept)
+    # the walls are one more grain, which joins what touches them
     other = np.where(joints.at_wall, count, joints.second)
     links = sparse.coo_matrix(
-        (np.ones(len(joints)), (joints.first, other)), shape=(count + 1, count + 1)
+        (np.ones(live.sum()), (joints.first[live], other[live])), shape=(count + 1, count + 1)
     )
-    _, group = connected_components(links, directed=False)
-    sizes = np.bincount(group[:-1], weights=kept)
-    return group[:-1] == np.argmax(sizes) if len(sizes) else kept
-
-
-def _motion(of_grains: sparse.csr_matrix, springs: Array, pulled: Array, kept: Array) -> Array:
-    """(6 N, 6) motion of the grains under each strain; zero for those that carry nothing."""
-    moving = np.repeat(kept, 6)
-    motion = np.zeros((len(moving), pulled.shape[1]))
-    if not kept.any():
-        return motion
-    live = of_grains[:, np.flatnonzero(moving)]
-    solve = solver_of(stiffness(live, springs))
-    load = -(live.T @ pulled)
-    motion[moving] = np.column_stack([solve(column) for column in load.T])
-    return motion
-
-
-def _refuse_loose(tensor: Array, affine: Array, *, count: int, rattlers: int) -> None:
-    for axis in range(3):
-        if not tensor[axis, axis] > LEAST_STIFFNESS * affine[axis, axis]:
-            raise MechanicsError(
-                f"pack of {count} grains carries no load along {'xyz'[axis]}: {rattlers} of them "
-                "carry nothing, and the joints of the rest form no path from side to side; make "
-                "the pack denser, or bridge wider gaps with bonds.gap_ratio"
-            )
+    group = connected_components(links, directed=False)[1][:-1]
+    if count:
+        kept = kept & (group == np.argmax(np.bincount(group, weights=kept)))
+    return joints.where(kept[joints.first] & (joints.at_wall | kept[joints.second])), kept

@@ -5,12 +5,10 @@ from typing import Any
 import numpy as np
 
 from fdnet.case.case import Case
-from fdnet.case.tables import Bonds
 from fdnet.errors import CaseError
 from fdnet.mechanics.elastic import Elastic, elastic_of
-from fdnet.mechanics.springs import Cement, Material, find_joints
+from fdnet.mechanics.springs import Cement, PackMaterial, find_joints, mean_force
 from fdnet.mechanics.triaxial import Sheared, Triaxial, triaxial
-from fdnet.scales.contacts import Elastic as Moduli
 from fdnet.scales.contacts import (
     overlap_under,
     pair_elastic,
@@ -121,7 +119,7 @@ def elastic_moduli(grains: Snapshot, case: Case, *, pressure_Pa: float | None = 
         True
     """
     pack = grains.grains()
-    material = material_of(case, pack, pressure_Pa)
+    material = pack_material(case, pack, pressure_Pa)
     porosity = measure_porosity(pack, periodic=case.periodic).mean if len(pack) else 1.0
     return elastic_of(pack, material, periodic=case.periodic, porosity=porosity)
 
@@ -162,64 +160,52 @@ def triaxial_test(
     """
     pack = grains.grains()
     test = Triaxial(confining=confining_Pa, strain=strain, steps=steps)
-    return triaxial(pack, material_of(case, pack, confining_Pa), test, periodic=case.periodic)
+    return triaxial(pack, pack_material(case, pack, confining_Pa), test, periodic=case.periodic)
 
 
-def material_of(case: Case, grains: Snapshot, pressure_Pa: float | None = None) -> Material:
+def pack_material(case: Case, grains: Snapshot, pressure_Pa: float | None = None) -> PackMaterial:
     """Contacts and bonds of the grains of a case, at its nominal stiffness, in SI.
 
-    Two grains, or a grain and a wall, act as two springs in series. Raises CaseError for Hertz
-    contacts without a pressure in Pa.
+    Two grains, or a grain and a wall, act as two springs in series. Hertz contacts have the
+    tangent stiffness under the mean force of the pack at an isotropic pressure. Raises CaseError
+    for Hertz contacts without a pressure in Pa.
     """
-    one = case.grains
-    if case.contact.model == "hertz":
-        normal, shear = _hertz_springs(case, grains, pressure_Pa)
-    else:
+    one, bonds = case.grains, case.bonds
+    if case.contact.model != "hertz":
         normal = series(one.normal_stiffness_N_m, one.normal_stiffness_N_m)
         shear = series(one.tangential_stiffness, one.tangential_stiffness)
-    return Material(
+    elif pressure_Pa is None:
+        raise CaseError(
+            "contact.model: 'hertz' contacts have no stiffness without a load; give "
+            "--confining_MPa, or take contact.model = 'hooke'"
+        )
+    elif not np.any((joints := find_joints(grains, case.periodic)).branch):
+        normal, shear = 1.0, 1.0
+    else:
+        elastic, radius = pair_elastic(case, ("grain", "grain"), 1.0), 0.5 * one.mean_radius_m
+        force = mean_force(grains, joints, pressure_Pa)
+        overlap = overlap_under(force, elastic.modulus, radius)
+        normal = 1.5 * secant_stiffness(elastic.modulus, radius, overlap)
+        shear = tangential_stiffness(elastic.shear, radius, overlap)
+    cement = None
+    if bonds is not None:
+        tensile, sheared = bonds.tensile_strength_Pa, bonds.shear_strength_Pa
+        cement = Cement(
+            radius_ratio=bonds.radius_ratio,
+            normal=bonds.normal_stiffness_Pa_m,
+            shear=bonds.shear_stiffness_Pa_m,
+            tensile_strength=np.inf if tensile is None else tensile,
+            shear_strength=np.inf if sheared is None else sheared,
+            gap_ratio=bonds.gap_ratio,
+        )
+    return PackMaterial(
         normal=normal,
         shear=shear,
         friction=one.friction,
         wall_friction=case.wall_friction,
         density=one.mean_density_kg_m3,
-        cement=None if case.bonds is None else _cement(case.bonds),
+        cement=cement,
     )
-
-
-def _cement(bonds: Bonds) -> Cement:
-    tensile, shear = bonds.tensile_strength_Pa, bonds.shear_strength_Pa
-    return Cement(
-        radius_ratio=bonds.radius_ratio,
-        normal=bonds.normal_stiffness_Pa_m,
-        shear=bonds.shear_stiffness_Pa_m,
-        tensile_strength=np.inf if tensile is None else tensile,
-        shear_strength=np.inf if shear is None else shear,
-        gap_ratio=bonds.gap_ratio,
-    )
-
-
-def _hertz_springs(case: Case, grains: Snapshot, pressure_Pa: float | None) -> tuple[float, float]:
-    """Tangent stiffnesses, N/m, of a contact that bears the mean force of the pack.
-
-    An isotropic pressure p makes F = 3 p V / sum(b) in joints with branches b (Digby 1981).
-    """
-    if pressure_Pa is None:
-        raise CaseError(
-            "contact.model: 'hertz' contacts have no stiffness without a load; give "
-            "--confining_MPa, or take contact.model = 'hooke'"
-        )
-    joints = find_joints(grains, case.periodic)
-    branches = float(np.sum(np.linalg.norm(joints.branch, axis=1)))
-    if branches == 0:
-        return 1.0, 1.0
-    volume = float(np.prod(np.diff(grains.box, axis=1)))
-    force = 3 * pressure_Pa * volume / branches
-    elastic: Moduli = pair_elastic(case, ("grain", "grain"), 1.0)
-    radius = 0.5 * case.grains.mean_radius_m
-    overlap = overlap_under(force, elastic.modulus, radius)
-    normal = 1.5 * secant_stiffness(elastic.modulus, radius, overlap)
-    return normal, tangential_stiffness(elastic.shear, radius, overlap)
 
 
 def warnings_of(result: Elastic, case: Case) -> list[str]:

@@ -1,17 +1,14 @@
-"""Springs between the grains and the forces in them.
-
-Joints of a pack: where two grains, or a grain and a wall, touch or are bonded.
-"""
+"""Joints of a pack, where two grains, or a grain and a wall, touch or are bonded, as springs."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
-import pymetis
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from fdnet.errors import MechanicsError
+from fdnet.network.flow.solver import conjugate_gradients, dissected, factored
 from fdnet.spheres.geometry import touching_pairs, wrapped
 from fdnet.spheres.snapshot import Array, Snapshot, one_line
 
@@ -33,7 +30,6 @@ class Joints:
         arm_first: (K, 3) m, from the centre of the first grain to the point of contact.
         arm_second: (K, 3) m, from the centre of the second grain; zero for a wall.
         radius: (K,) m, of the smaller of the two grains.
-        joint_radius: (K,) m, R1 R2 / (R1 + R2); at a wall that of the grain.
     """
 
     first: Array
@@ -43,7 +39,6 @@ class Joints:
     arm_first: Array
     arm_second: Array
     radius: Array
-    joint_radius: Array
 
     __repr__ = one_line
 
@@ -72,16 +67,6 @@ def find_joints(
 
     Sides that are not periodic are walls. The point of contact halves the overlap, as in PFC.
     """
-    pairs, walls = _pair_joints(grains, periodic, gap), _wall_joints(grains, periodic, gap)
-    return Joints(
-        **{
-            name: np.concatenate([getattr(pairs, name), getattr(walls, name)])
-            for name in Joints.__slots__
-        }
-    )
-
-
-def _pair_joints(grains: Snapshot, periodic: tuple[bool, bool, bool], gap: float) -> Joints:
     pairs, overlap = touching_pairs(grains, periodic, gap=gap)
     order = np.lexsort((pairs[:, 1], pairs[:, 0]))
     pairs, overlap = pairs[order], overlap[order]
@@ -93,40 +78,48 @@ def _pair_joints(grains: Snapshot, periodic: tuple[bool, bool, bool], gap: float
     normal = apart / np.where(distance > 0, distance, 1.0)[:, None]
     radius = grains.radius[pairs]
     reach = radius[:, 0] - 0.5 * overlap
+    kinds = [
+        Joints(
+            first=pairs[:, 0],
+            second=pairs[:, 1],
+            overlap=overlap,
+            normal=normal,
+            arm_first=normal * reach[:, None],
+            arm_second=-normal * (distance - reach)[:, None],
+            radius=radius.min(axis=1),
+        )
+    ]
+    for axis, end in product(np.flatnonzero(~np.array(periodic)), (0, 1)):
+        sign = 2.0 * end - 1.0
+        away = sign * (grains.box[axis, end] - grains.position[:, axis])
+        near = np.flatnonzero(away < grains.radius * (1 + 2 * gap))
+        normal = np.repeat(sign * np.eye(3)[None, axis], len(near), axis=0)
+        kinds.append(
+            Joints(
+                first=near,
+                second=np.full(len(near), WALL),
+                overlap=grains.radius[near] - away[near],
+                normal=normal,
+                arm_first=normal * away[near, None],
+                arm_second=np.zeros((len(near), 3)),
+                radius=grains.radius[near],
+            )
+        )
     return Joints(
-        first=pairs[:, 0],
-        second=pairs[:, 1],
-        overlap=overlap,
-        normal=normal,
-        arm_first=normal * reach[:, None],
-        arm_second=-normal * (distance - reach)[:, None],
-        radius=radius.min(axis=1),
-        joint_radius=radius.prod(axis=1) / radius.sum(axis=1),
+        **{
+            name: np.concatenate([getattr(one, name) for one in kinds])
+            for name in Joints.__slots__
+        }
     )
 
 
-def _wall_joints(grains: Snapshot, periodic: tuple[bool, bool, bool], gap: float) -> Joints:
-    owner, normal, distance = [], [], []
-    for axis in (axis for axis in range(3) if not periodic[axis]):
-        for end, sign in ((0, -1.0), (1, 1.0)):
-            away = sign * (grains.box[axis, end] - grains.position[:, axis])
-            near = np.flatnonzero(away < grains.radius * (1 + 2 * gap))
-            owner.append(near)
-            distance.append(away[near])
-            normal.append(np.repeat(sign * np.eye(3)[None, axis], len(near), axis=0))
-    which = np.concatenate([np.empty(0, int), *owner])
-    length = np.concatenate([np.empty(0), *distance])
-    facing = np.concatenate([np.empty((0, 3)), *normal])
-    return Joints(
-        first=which,
-        second=np.full(len(which), WALL),
-        overlap=grains.radius[which] - length,
-        normal=facing,
-        arm_first=facing * length[:, None],
-        arm_second=np.zeros((len(which), 3)),
-        radius=grains.radius[which],
-        joint_radius=grains.radius[which],
-    )
+def mean_force(grains: Snapshot, joints: Joints, pressure: float) -> float:
+    """Mean force of a contact, N, under an isotropic `pressure`, Pa: 3 p V / sum(b).
+
+    b are the branches of the joints (Digby 1981).
+    """
+    volume = float(np.prod(np.diff(grains.box, axis=1)))
+    return 3 * pressure * volume / float(np.sum(np.linalg.norm(joints.branch, axis=1)))
 
 
 # ------------------------------------------------------------------------------------------------
@@ -163,10 +156,21 @@ class Kinematics:
 def kinematics(joints: Joints, count: int, *, length: float) -> Kinematics:
     """The maps of the joints between `count` grains."""
     frame = frames(joints.normal)
-    near = _block(frame, joints.arm_first, length)
-    far = _block(frame, joints.arm_second, length)
+    kept, place = ~joints.at_wall, np.arange(6)
+    grain = np.concatenate([joints.first, joints.second[kept]])
+    block = np.concatenate(
+        [
+            -_block(frame, joints.arm_first, length),
+            _block(frame, joints.arm_second, length)[kept],
+        ]
+    )
+    row = 6 * np.arange(len(joints))[:, None, None] + place[None, :, None]
+    row = np.broadcast_to(np.concatenate([row, row[kept]]), block.shape)
+    column = np.broadcast_to(6 * grain[:, None, None] + place, block.shape)
     return Kinematics(
-        of_grains=_sparse(joints, near, far, count),
+        of_grains=sparse.csr_matrix(
+            (block.ravel(), (row.ravel(), column.ravel())), shape=(6 * len(joints), 6 * count)
+        ),
         of_strain=_of_strain(frame, joints.branch),
         frame=frame,
         length=length,
@@ -183,49 +187,24 @@ def frames(normal: Array) -> Array:
 
 def _block(frame: Array, arm: Array, length: float) -> Array:
     """(K, 6, 6) displacements at the end of `arm` by the motion of the grain it belongs to."""
-    block = np.zeros((len(arm), 6, 6))
-    block[:, :3, :3] = frame
-    block[:, :3, 3:] = -frame @ _crossed(arm) / length
-    block[:, 3:, 3:] = frame / length
-    return block
-
-
-def _crossed(arm: Array) -> Array:
-    """(K, 3, 3) matrices whose product with a vector v is arm x v."""
     x, y, z = arm.T
     none = np.zeros_like(x)
-    return np.stack([none, -z, y, z, none, -x, -y, x, none], axis=1).reshape(-1, 3, 3)
-
-
-def _sparse(joints: Joints, near: Array, far: Array, count: int) -> sparse.csr_matrix:
-    row = 6 * np.arange(len(joints))[:, None, None] + np.arange(6)[None, :, None]
-    column = np.arange(6)[None, None, :]
-    kept = ~joints.at_wall
-    parts = [(joints.first, -near, row), (joints.second[kept], far[kept], row[kept])]
-    rows, columns, values = [], [], []
-    for grain, block, line in parts:
-        place = 6 * grain[:, None, None] + column
-        rows.append(np.broadcast_to(line, block.shape).ravel())
-        columns.append(np.broadcast_to(place, block.shape).ravel())
-        values.append(block.ravel())
-    shape = (6 * len(joints), 6 * count)
-    return sparse.csr_matrix(
-        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape
-    )
+    # the product of `crossed` with a vector v is arm x v
+    crossed = np.stack([none, -z, y, z, none, -x, -y, x, none], axis=1).reshape(-1, 3, 3)
+    block = np.zeros((len(arm), 6, 6))
+    block[:, :3, :3] = frame
+    block[:, :3, 3:] = -frame @ crossed / length
+    block[:, 3:, 3:] = frame / length
+    return block
 
 
 def _of_strain(frame: Array, branch: Array) -> Array:
     """(6 K, 6): the strain times the branch, in the frame; the rotations stay 0."""
     x, y, z = branch.T
-    none = np.zeros_like(x)
-    moved = np.stack(
-        [
-            np.stack([x, none, none, none, z / 2, y / 2], axis=1),
-            np.stack([none, y, none, z / 2, none, x / 2], axis=1),
-            np.stack([none, none, z, y / 2, x / 2, none], axis=1),
-        ],
-        axis=1,
-    )
+    moved = np.zeros((len(branch), 3, 6))
+    moved[:, 0, 0], moved[:, 1, 1], moved[:, 2, 2] = x, y, z
+    moved[:, 1, 3], moved[:, 0, 4], moved[:, 0, 5] = z / 2, z / 2, y / 2
+    moved[:, 2, 3], moved[:, 2, 4], moved[:, 1, 5] = y / 2, x / 2, x / 2
     result = np.zeros((len(branch), 6, 6))
     result[:, :3] = frame @ moved
     return result.reshape(-1, 6)
@@ -235,74 +214,61 @@ def _of_strain(frame: Array, branch: Array) -> Array:
 # Engineering constants of a stiffness tensor (6, 6), in the order xx, yy, zz, yz, xz, xy.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Moduli:
     """Elastic constants of an isotropic material, Pa.
 
     Attributes:
-        young: 9 K G / (3 K + G).
-        poisson: (3 K - 2 G) / (6 K + 2 G).
         bulk: K.
         shear: G.
     """
 
-    young: float
-    poisson: float
     bulk: float
     shear: float
+
+    @property
+    def young(self) -> float:
+        """9 K G / (3 K + G)."""
+        return 9 * self.bulk * self.shear / (3 * self.bulk + self.shear)
+
+    @property
+    def poisson(self) -> float:
+        """(3 K - 2 G) / (6 K + 2 G)."""
+        return (3 * self.bulk - 2 * self.shear) / (6 * self.bulk + 2 * self.shear)
 
 
 def voigt_average(tensor: Array) -> Moduli:
     """The isotropic material with the mean stiffness over all directions (Voigt; Hill 1952)."""
     normal, sideways = np.trace(tensor[:3, :3]), tensor[0, 1] + tensor[0, 2] + tensor[1, 2]
     bulk = float(normal + 2 * sideways) / 9
-    shear = float(normal - sideways + 3 * np.trace(tensor[3:, 3:])) / 15
-    return moduli(bulk, shear)
+    return Moduli(bulk, float(normal - sideways + 3 * np.trace(tensor[3:, 3:])) / 15)
 
 
-def reuss_average(tensor: Array) -> Moduli | None:
-    """The one with the mean compliance over all directions; None where something yields freely."""
-    if np.linalg.cond(tensor) > 1e12:
-        return None
-    soft = np.linalg.inv(tensor)
-    normal, sideways = np.trace(soft[:3, :3]), soft[0, 1] + soft[0, 2] + soft[1, 2]
-    bulk = 1 / float(normal + 2 * sideways)
-    shear = 15 / float(4 * normal - 4 * sideways + 3 * np.trace(soft[3:, 3:]))
-    return moduli(bulk, shear)
-
-
-def moduli(bulk: float, shear: float) -> Moduli:
-    """From the bulk and the shear modulus, Pa."""
-    return Moduli(
-        young=9 * bulk * shear / (3 * bulk + shear),
-        poisson=(3 * bulk - 2 * shear) / (6 * bulk + 2 * shear),
-        bulk=bulk,
-        shear=shear,
-    )
+def compliance(tensor: Array) -> Array | None:
+    """The inverse (6, 6), 1/Pa, of the tensor; None where something yields freely."""
+    return None if np.linalg.cond(tensor) > 1e12 else np.linalg.inv(tensor)
 
 
 def anisotropy_of(tensor: Array) -> float | None:
     """5 G_V / G_R + K_V / K_R - 6: 0 when isotropic (Ranganathan and Ostoja-Starzewski 2008).
 
-    None where the tensor has no inverse.
+    V is the mean stiffness over all directions, R the mean compliance (Reuss). None where the
+    tensor has no inverse.
     """
-    stiff, soft = voigt_average(tensor), reuss_average(tensor)
+    soft = compliance(tensor)
     if soft is None:
         return None
-    return 5 * stiff.shear / soft.shear + stiff.bulk / soft.bulk - 6
+    normal, sideways = np.trace(soft[:3, :3]), soft[0, 1] + soft[0, 2] + soft[1, 2]
+    bulk = 1 / float(normal + 2 * sideways)
+    shear = 15 / float(4 * normal - 4 * sideways + 3 * np.trace(soft[3:, 3:]))
+    stiff = voigt_average(tensor)
+    return 5 * stiff.shear / shear + stiff.bulk / bulk - 6
 
 
 def young_along(tensor: Array) -> tuple[float, ...] | None:
     """Young's modulus, Pa, of a test along x, y and z with free sides: 1 / S_ii; None as above."""
-    if np.linalg.cond(tensor) > 1e12:
-        return None
-    return tuple(float(1 / value) for value in np.diag(np.linalg.inv(tensor))[:3])
-
-
-def wave_speeds(averaged: Moduli, density: float) -> tuple[float, float]:
-    """P wave sqrt((K + 4 G / 3) / rho) and S wave sqrt(G / rho), m/s, at `density` kg/m3."""
-    p_wave = np.sqrt((averaged.bulk + 4 / 3 * averaged.shear) / density)
-    return float(p_wave), float(np.sqrt(averaged.shear / density))
+    soft = compliance(tensor)
+    return None if soft is None else tuple(float(1 / value) for value in np.diag(soft)[:3])
 
 
 # ------------------------------------------------------------------------------------------------
@@ -334,7 +300,7 @@ class Cement:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Material:
+class PackMaterial:
     """How grains act on each other, in SI.
 
     Attributes:
@@ -361,38 +327,13 @@ class Material:
         return max(CONTACT_GAP, 0.0 if self.cement is None else self.cement.gap_ratio)
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Discs:
-    """The discs of K bonds (Potyondy and Cundall 2004, equation 14).
-
-    Attributes:
-        radius: (K,) m; 0 where there is no bond.
-        area: (K,) pi R^2, m2.
-        bending: (K,) second moment of area I = pi R^4 / 4, m4.
-        twist: (K,) polar moment J = pi R^4 / 2, m4.
-    """
-
-    radius: Array
-    area: Array
-    bending: Array
-    twist: Array
-
-    __repr__ = one_line
-
-
-def discs_of(joints: Joints, material: Material) -> Discs:
-    """The disc of each joint; walls are bonded where the grains are glued to them."""
+def disc_radius(joints: Joints, material: PackMaterial) -> Array:
+    """Radius (K,) m of the disc of each bond; 0 without one, as at walls that do not glue."""
     ratio = 0.0 if material.cement is None else material.cement.radius_ratio
-    radius = np.where(joints.at_wall & (not material.glued), 0.0, ratio * joints.radius)
-    return Discs(
-        radius=radius,
-        area=np.pi * radius**2,
-        bending=np.pi * radius**4 / 4,
-        twist=np.pi * radius**4 / 2,
-    )
+    return np.where(joints.at_wall & (not material.glued), 0.0, ratio * joints.radius)
 
 
-def contact_springs(joints: Joints, material: Material) -> Array:
+def contact_springs(joints: Joints, material: PackMaterial) -> Array:
     """(K, 6) stiffness of the contacts: N/m, and 0 N m for rotations; 0 across a gap."""
     touches = joints.overlap > -2 * CONTACT_GAP * joints.radius
     slides = joints.at_wall & (not material.glued and material.wall_friction == 0)
@@ -402,35 +343,39 @@ def contact_springs(joints: Joints, material: Material) -> Array:
     return np.column_stack([normal, shear, shear, none, none, none])
 
 
-def bond_springs(joints: Joints, material: Material) -> Array:
+def bond_springs(joints: Joints, material: PackMaterial) -> Array:
     """(K, 6) stiffness of the bonds: kn A, ks A twice, N/m, then ks J, kn I twice, N m.
 
-    Source: Potyondy and Cundall (2004), equation 15.
+    Of the disc of radius R the area is A = pi R^2, the second moment of area I = pi R^4 / 4 and
+    the polar moment J = pi R^4 / 2 (Potyondy and Cundall 2004, equations 14 and 15).
     """
     cement = material.cement
     if cement is None:
         return np.zeros((len(joints), 6))
-    disc = discs_of(joints, material)
-    across, bend = cement.shear * disc.area, cement.normal * disc.bending
+    radius = disc_radius(joints, material)
+    area, bending, twist = np.pi * radius**2, np.pi * radius**4 / 4, np.pi * radius**4 / 2
+    across, bend = cement.shear * area, cement.normal * bending
     return np.column_stack(
-        [cement.normal * disc.area, across, across, cement.shear * disc.twist, bend, bend]
+        [cement.normal * area, across, across, cement.shear * twist, bend, bend]
     )
 
 
-def bond_stress(force: Array, disc: Discs) -> tuple[Array, Array]:
+def bond_stress(force: Array, radius: Array) -> tuple[Array, Array]:
     """Largest tensile and shear stress (K,), Pa, in bonds with the forces (K, 6), N and N m.
 
     By the theory of beams: Fn / A + |Mb| R / I and |Fs| / A + |Mt| R / J, with Fn > 0 in tension
-    (Potyondy and Cundall 2004, equation 16). Zero where there is no bond.
+    and the `radius` R (K,) m of the disc (Potyondy and Cundall 2004, equation 16). Zero where
+    there is no bond.
     """
-    there = disc.area > 0
+    there = radius > 0
     area, bending, twist = (
-        np.where(there, moment, 1.0) for moment in (disc.area, disc.bending, disc.twist)
+        np.where(there, moment, 1.0)
+        for moment in (np.pi * radius**2, np.pi * radius**4 / 4, np.pi * radius**4 / 2)
     )
     bent = np.hypot(force[:, 4], force[:, 5])
     sheared = np.hypot(force[:, 1], force[:, 2])
-    tension = force[:, 0] / area + bent * disc.radius / bending
-    shear = sheared / area + np.abs(force[:, 3]) * disc.radius / twist
+    tension = force[:, 0] / area + bent * radius / bending
+    shear = sheared / area + np.abs(force[:, 3]) * radius / twist
     return np.where(there, tension, 0.0), np.where(there, shear, 0.0)
 
 
@@ -445,10 +390,10 @@ WITHIN, MOST_STEPS = 1e-10, 20_000
 _FLOOR = 1e-11
 """Stiffness, over the largest, that keeps motions which no spring resists from growing."""
 
-Solve = Callable[[Array], Array]
+SolveLoad = Callable[[Array], Array]
 
 
-def stiffness(of_grains: sparse.csr_matrix, springs: Array) -> sparse.csr_matrix:
+def stiffness_matrix(of_grains: sparse.csr_matrix, springs: Array) -> sparse.csr_matrix:
     """Stiffness matrix B^T D B (6 N, 6 N), N/m, of joints with the springs (K, 6).
 
     Motions that nothing resists get 1e-11 of the largest stiffness, so that the system can be
@@ -459,88 +404,58 @@ def stiffness(of_grains: sparse.csr_matrix, springs: Array) -> sparse.csr_matrix
     return matrix + floor * sparse.identity(matrix.shape[0], format="csr")
 
 
-def solver_of(matrix: sparse.csr_matrix) -> Solve:
+def solver_of(matrix: sparse.csr_matrix) -> SolveLoad:
     """Solves systems with the stiffness matrix (6 N, 6 N) for one load (6 N,) at a time."""
-    if matrix.shape[0] > 6 * LARGEST_DIRECT:
-        return conjugate_gradients(matrix)
-    return direct(matrix)
+    large = matrix.shape[0] > 6 * LARGEST_DIRECT
+    return iterative_solver(matrix) if large else direct_solver(matrix)
 
 
-def direct(matrix: sparse.csr_matrix) -> Solve:
-    """By SuperLU in symmetric mode, with the grains ordered by METIS nested dissection."""
-    order = (6 * _grain_order(matrix)[:, None] + np.arange(6)).ravel()
-    try:
-        factor = splu(
-            matrix[order][:, order].tocsc(),
-            permc_spec="NATURAL",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError as error:
-        raise MechanicsError(
-            f"stiffness of {matrix.shape[0] // 6} grains cannot be factored ({error}); raise the "
-            "stiffness of the contacts or add bonds"
-        ) from error
+def direct_solver(matrix: sparse.csr_matrix) -> SolveLoad:
+    """By one factorisation (`flow.solver.factored`), the six motions of a grain together.
 
-    def solve(load: Array) -> Array:
-        moved = np.zeros_like(load)
-        for _ in range(2):
-            moved[order] += factor.solve((load - matrix @ moved)[order])
-        return moved
-
-    return solve
-
-
-def _grain_order(matrix: sparse.csr_matrix) -> Array:
-    """Order (N,) of the grains by nested dissection."""
-    count = matrix.shape[0] // 6
-    blocks = matrix.tobsr((6, 6))
+    Raises MechanicsError where the matrix cannot be factored.
+    """
+    blocks, count = matrix.tobsr((6, 6)), matrix.shape[0] // 6
     links = sparse.csr_matrix(
         (np.ones(len(blocks.indices)), blocks.indices, blocks.indptr), shape=(count, count)
     )
-    links.setdiag(0.0)
-    links.eliminate_zeros()
-    if links.nnz == 0:
-        return np.arange(count)
-    adjacency = pymetis.CSRAdjacency(links.indptr, links.indices)
-    return np.asarray(pymetis.nested_dissection(adjacency=adjacency)[0])
+    try:
+        return factored(matrix, (6 * dissected(links)[:, None] + np.arange(6)).ravel())
+    except RuntimeError as error:
+        raise MechanicsError(
+            f"stiffness of {count} grains cannot be factored ({error}); raise the "
+            "stiffness of the contacts or add bonds"
+        ) from error
 
 
-def conjugate_gradients(matrix: sparse.csr_matrix) -> Solve:
+def iterative_solver(matrix: sparse.csr_matrix) -> SolveLoad:
     """By conjugate gradients, preconditioned with the inverse 6 x 6 block of each grain.
 
     The solution raises MechanicsError where it does not reach the residual `WITHIN`.
     """
-    inverse = np.linalg.inv(_diagonal_blocks(matrix))
+    blocks = matrix.tobsr((6, 6))
+    row = np.repeat(np.arange(len(blocks.indptr) - 1), np.diff(blocks.indptr))
+    own = row == blocks.indices
+    diagonal = np.zeros((matrix.shape[0] // 6, 6, 6))
+    diagonal[row[own]] = blocks.data[own]
+    inverse = np.linalg.inv(diagonal)
 
     def better(missing: Array) -> Array:
         return np.einsum("nij,nj->ni", inverse, missing.reshape(-1, 6)).ravel()
 
+    def norm(missing: Array) -> float:
+        return float(np.linalg.norm(missing))
+
     def solve(load: Array) -> Array:
-        moved, missing = np.zeros_like(load), load.copy()
-        along, before = np.zeros_like(load), 1.0
-        target = WITHIN * float(np.linalg.norm(load))
-        for _ in range(MOST_STEPS):
-            if float(np.linalg.norm(missing)) <= target:
-                return moved
-            step = better(missing)
-            gain = float(np.einsum("i,i", missing, step))
-            along = step + (gain / before) * along
-            pulled = matrix @ along
-            size = gain / float(np.einsum("i,i", along, pulled))
-            moved, missing, before = moved + size * along, missing - size * pulled, gain
+        within = WITHIN * norm(load)
+        moved = conjugate_gradients(
+            matrix, load, better, within=within, size=norm, steps=MOST_STEPS
+        )
+        if np.all(np.isfinite(moved)):
+            return moved
         raise MechanicsError(
-            f"solve of {len(load) // 6} grains: residual {np.linalg.norm(missing):.1e} N after "
-            f"{MOST_STEPS} steps, expected {target:.1e} N; take a smaller or a stiffer pack"
+            f"solve of {len(load) // 6} grains: the residual is not {within:.1e} N after "
+            f"{MOST_STEPS} steps; take a smaller or a stiffer pack"
         )
 
     return solve
-
-
-def _diagonal_blocks(matrix: sparse.csr_matrix) -> Array:
-    blocks = matrix.tobsr((6, 6))
-    row = np.repeat(np.arange(len(blocks.indptr) - 1), np.diff(blocks.indptr))
-    own = row == blocks.indices
-    result = np.zeros((matrix.shape[0] // 6, 6, 6))
-    result[row[own]] = blocks.data[own]
-    return result

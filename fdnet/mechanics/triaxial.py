@@ -1,7 +1,8 @@
-"""A pack while it is deformed: places, box, and what its joints remember."""
+"""A pack confined and compressed, quasi-statically: its joints, load steps and the test."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -11,18 +12,42 @@ from fdnet.mechanics.springs import (
     CONTACT_GAP,
     Joints,
     Kinematics,
-    Material,
+    PackMaterial,
     bond_springs,
     bond_stress,
-    direct,
-    discs_of,
+    direct_solver,
+    disc_radius,
     find_joints,
     kinematics,
+    mean_force,
 )
 from fdnet.spheres.snapshot import Array, Snapshot, one_line, resting
 
 SOUND, TENSION, SHEAR = 0, 1, 2
 """State of a bond: whole, or broken in tension or in shear."""
+
+
+class Memory(NamedTuple):
+    """What K joints remember.
+
+    Attributes:
+        rest: (K,) m, overlap at which the contact bears nothing.
+        shear: (K, 3) tangential force of the contact, N.
+        bond: (K, 6) force and moment of the bond, N and N m, along x, y, z.
+        bonded: (K,) whether there was a bond.
+        broken: (K,) `SOUND`, `TENSION` or `SHEAR`.
+    """
+
+    rest: Array
+    shear: Array
+    bond: Array
+    bonded: Array
+    broken: Array
+
+    @property
+    def whole(self) -> Array:
+        """(K,) whether there is a bond that is not broken."""
+        return self.bonded & (self.broken == SOUND)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -32,41 +57,20 @@ class Deformed:
     Attributes:
         grains: where the grains and the faces of the box are.
         key: (M,) numbers of the joints that remember something, sorted; see `keys_of`.
-        rest: (M,) m, overlap at which the contact bears nothing.
-        shear: (M, 3) tangential force of the contact, N.
-        bond: (M, 6) force and moment of the bond, N and N m, along x, y, z.
-        bonded: (M,) whether there was a bond.
-        broken: (M,) `SOUND`, `TENSION` or `SHEAR`.
+        memory: of these joints.
         strain: (3,) of the box since the start, logarithmic; compression is below 0.
     """
 
     grains: Snapshot
     key: Array
-    rest: Array
-    shear: Array
-    bond: Array
-    bonded: Array
-    broken: Array
+    memory: Memory
     strain: Array
 
     __repr__ = one_line
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Memory:
-    """What K joints remember, in the order of the joints; the fields are those of `Deformed`."""
-
-    rest: Array
-    shear: Array
-    bond: Array
-    bonded: Array
-    broken: Array
-
-    __repr__ = one_line
-
-
 def at_rest(
-    grains: Snapshot, material: Material, periodic: tuple[bool, bool, bool], *, relieved: bool
+    grains: Snapshot, material: PackMaterial, periodic: tuple[bool, bool, bool], *, relieved: bool
 ) -> Deformed:
     """A pack before any load.
 
@@ -74,21 +78,17 @@ def at_rest(
     springs. Bonds hold no force yet.
     """
     joints = find_joints(grains, periodic, gap=material.gap)
-    key = keys_of(joints, len(grains))
+    key, count = keys_of(joints, len(grains)), len(joints)
     order = np.argsort(key)
     touches = joints.overlap > -2 * CONTACT_GAP * joints.radius
-    count = len(joints)
-    rest = np.where(touches & relieved, joints.overlap, 0.0)
-    return Deformed(
-        grains=grains,
-        key=key[order],
-        rest=rest[order],
+    memory = Memory(
+        rest=np.where(touches & relieved, joints.overlap, 0.0)[order],
         shear=np.zeros((count, 3)),
         bond=np.zeros((count, 6)),
         bonded=(~joints.at_wall & (material.cement is not None))[order],
         broken=np.full(count, SOUND),
-        strain=np.zeros(3),
     )
+    return Deformed(grains=grains, key=key[order], memory=memory, strain=np.zeros(3))
 
 
 def keys_of(joints: Joints, count: int) -> Array:
@@ -97,54 +97,6 @@ def keys_of(joints: Joints, count: int) -> Array:
     side = np.take_along_axis(joints.normal, axis[:, None], axis=1)[:, 0] > 0
     other = np.where(joints.at_wall, count + 2 * axis + side, joints.second)
     return joints.first * (count + 6) + other
-
-
-def remembered(pack: Deformed, joints: Joints) -> Memory:
-    """What the joints of the pack remember; new ones remember nothing.
-
-    Forces across the normal are turned with it, at their size.
-    """
-    key = keys_of(joints, len(pack.grains))
-    place = np.minimum(np.searchsorted(pack.key, key), max(0, len(pack.key) - 1))
-    known = pack.key[place] == key if len(pack.key) else np.zeros(len(key), bool)
-    column = known[:, None]
-    return Memory(
-        rest=np.where(known, pack.rest[place], 0.0),
-        shear=_across(np.where(column, pack.shear[place], 0.0), joints.normal),
-        bond=np.where(column, pack.bond[place], 0.0),
-        bonded=known & pack.bonded[place],
-        broken=np.where(known, pack.broken[place], SOUND),
-    )
-
-
-def _across(force: Array, normal: Array) -> Array:
-    size = np.linalg.norm(force, axis=1)
-    flat = force - np.einsum("ki,ki->k", force, normal)[:, None] * normal
-    length = np.linalg.norm(flat, axis=1)
-    return flat * (size / np.where(length > 0, length, 1.0))[:, None]
-
-
-def moved(pack: Deformed, joints: Joints, memory: Memory, shift: Array, strain: Array) -> Deformed:
-    """The pack after its grains moved by `shift` (N, 3) m on top of a strain (3,) of the box."""
-    grains = pack.grains
-    low = grains.box[:, :1]
-    box = low + (grains.box - low) * (1 + strain)[:, None]
-    place = low[:, 0] + (grains.position - low[:, 0]) * (1 + strain) + shift
-    key = keys_of(joints, len(grains))
-    kept = np.argsort(key)
-    lost = pack.bonded & ~np.isin(pack.key, key)
-    key = np.concatenate([key[kept], pack.key[lost]])
-    order = np.argsort(key)
-    values = {
-        name: np.concatenate([getattr(memory, name)[kept], getattr(pack, name)[lost]])[order]
-        for name in Memory.__slots__
-    }
-    return Deformed(
-        grains=resting(place, grains.radius, box, grains.kind),
-        key=key[order],
-        strain=pack.strain + np.log1p(strain),
-        **values,
-    )
 
 
 # ------------------------------------------------------------------------------------------------
@@ -163,11 +115,12 @@ NEWTON_STEPS, _HALVES = 12, 12
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Scene:
+class LoadedPack:
     """A pack as one step sees it.
 
     Attributes:
         pack: before the step.
+        material: of its contacts and bonds.
         joints: K joints, also across gaps that may close.
         maps: to the displacements in the joints.
         memory: of the joints.
@@ -180,6 +133,7 @@ class Scene:
     """
 
     pack: Deformed
+    material: PackMaterial
     joints: Joints
     maps: Kinematics
     memory: Memory
@@ -192,9 +146,14 @@ class Scene:
 
     __repr__ = one_line
 
+    def moves(self, motion: Array, strain: Array) -> Array:
+        """Displacements (K, 6) in the joints by a motion (6 N,) and a strain (3,)."""
+        given = self.maps.of_grains @ motion + self.maps.of_strain[:, :3] @ strain
+        return given.reshape(-1, 6)
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Forces:
+class JointForces:
     """What K joints bear.
 
     Attributes:
@@ -235,216 +194,196 @@ class Load:
     __repr__ = one_line
 
 
-def scene_of(pack: Deformed, material: Material, periodic: tuple[bool, bool, bool]) -> Scene:
-    """The pack with its joints, maps and limits of friction."""
+def loaded_pack(
+    pack: Deformed, material: PackMaterial, periodic: tuple[bool, bool, bool]
+) -> LoadedPack:
+    """The pack with its joints, what they remember, maps and limits of friction.
+
+    Forces across the normal are turned with it, at their size.
+    """
     joints = find_joints(pack.grains, periodic, gap=max(REACH, material.gap))
     maps = kinematics(joints, len(pack.grains), length=float(pack.grains.radius.mean()))
-    memory = remembered(pack, joints)
-    whole = memory.bonded & (memory.broken == SOUND)
-    overlap = joints.overlap - memory.rest
-    friction = np.where(joints.at_wall, material.wall_friction, material.friction)
-    springs = np.where(whole[:, None], bond_springs(joints, material), 0.0)
-    turned = np.concatenate(
-        [
-            np.einsum("kij,kj->ki", maps.frame, memory.bond[:, :3]),
-            np.einsum("kij,kj->ki", maps.frame, memory.bond[:, 3:]),
-        ],
-        axis=1,
+    key, kept = keys_of(joints, len(pack.grains)), pack.memory
+    place = np.minimum(np.searchsorted(pack.key, key), max(0, len(pack.key) - 1))
+    known = pack.key[place] == key if len(pack.key) else np.zeros(len(key), bool)
+    force = np.where(known[:, None], kept.shear[place], 0.0)
+    across = force - np.einsum("ki,ki->k", force, joints.normal)[:, None] * joints.normal
+    length = np.linalg.norm(across, axis=1)
+    turn = np.linalg.norm(force, axis=1) / np.where(length > 0, length, 1.0)
+    memory = Memory(
+        rest=np.where(known, kept.rest[place], 0.0),
+        shear=across * turn[:, None],
+        bond=np.where(known[:, None], kept.bond[place], 0.0),
+        bonded=known & kept.bonded[place],
+        broken=np.where(known, kept.broken[place], SOUND),
     )
-    return Scene(
+    whole, overlap = memory.whole[:, None], joints.overlap - memory.rest
+    friction = np.where(joints.at_wall, material.wall_friction, material.friction)
+    force, moment = (
+        np.einsum("kij,kj->ki", maps.frame, one)
+        for one in (memory.bond[:, :3], memory.bond[:, 3:])
+    )
+    return LoadedPack(
         pack=pack,
+        material=material,
         joints=joints,
         maps=maps,
         memory=memory,
         overlap=overlap,
         held=np.einsum("kij,kj->ki", maps.frame, memory.shear)[:, 1:],
-        bond=np.where(whole[:, None], turned, 0.0),
-        springs=springs,
+        bond=np.where(whole, np.concatenate([force, moment], axis=1), 0.0),
+        springs=np.where(whole, bond_springs(joints, material), 0.0),
         limit=friction * material.normal * np.maximum(overlap, 0.0),
         volume=float(np.prod(np.diff(pack.grains.box, axis=1))),
     )
 
 
-def forces_at(scene: Scene, material: Material, moved_by: Array) -> Forces:
+def forces_at(loaded: LoadedPack, moved_by: Array) -> JointForces:
     """Forces in the joints after the displacements `moved_by` (K, 6) in them."""
-    overlap = scene.overlap - moved_by[:, 0]
+    material, overlap = loaded.material, loaded.overlap - moved_by[:, 0]
     closed = overlap >= 0
     normal = np.where(closed, material.normal * overlap, 0.0)
-    trial = scene.held + np.where(scene.limit > 0, material.shear, 0.0)[:, None] * moved_by[:, 1:3]
+    stiff = np.where(loaded.limit > 0, material.shear, 0.0)
+    trial = loaded.held + stiff[:, None] * moved_by[:, 1:3]
     size = np.linalg.norm(trial, axis=1)
-    sliding = size > scene.limit
-    share = np.where(sliding, scene.limit / np.where(size > 0, size, 1.0), 1.0)
-    shear = trial * share[:, None]
-    bond = scene.bond + scene.springs * moved_by
-    along = trial / np.where(size > 0, size, 1.0)[:, None]
+    sliding, least = size > loaded.limit, np.where(size > 0, size, 1.0)
+    share = np.where(sliding, loaded.limit / least, 1.0)
+    shear, along = trial * share[:, None], trial / least[:, None]
     across = np.eye(2) - np.where(sliding, 1.0, 0.0)[:, None, None] * (
         along[:, :, None] * along[:, None, :]
     )
-    tangent = scene.springs[:, :, None] * np.eye(6)
+    bond = loaded.bond + loaded.springs * moved_by
+    tangent = loaded.springs[:, :, None] * np.eye(6)
     tangent[:, 0, 0] += np.where(closed, material.normal, 0.0)
-    tangent[:, 1:3, 1:3] += (np.where(scene.limit > 0, material.shear, 0.0) * share)[
-        :, None, None
-    ] * across
+    tangent[:, 1:3, 1:3] += (stiff * share)[:, None, None] * across
     total = bond.copy()
     total[:, 0] -= normal
     total[:, 1:3] += shear
-    return Forces(
+    return JointForces(
         total=total, tangent=tangent, normal=normal, shear=shear, bond=bond, sliding=sliding
     )
 
 
-def balance(scene: Scene, material: Material, load: Load) -> tuple[Array, Array, int]:
+def balance(loaded: LoadedPack, load: Load) -> tuple[Array, Array, int]:
     """Motion (6 N,) of the grains and strain (3,) of the box that balance the step.
 
     The third is the number of Newton steps that it took. What is missing after `NEWTON_STEPS` of
     them is left to the next step.
     """
-    count = scene.maps.of_grains.shape[1]
     strain: Array = np.where(np.isnan(load.strain), 0.0, load.strain)
     free = np.flatnonzero(np.isnan(load.strain))
-    motion, across = np.zeros(count), scene.maps.of_strain[:, :3][:, free]
-    missing = _missing(scene, material, load, motion, strain)
+    motion = np.zeros(loaded.maps.of_grains.shape[1])
+    missing = _missing(loaded, load, motion, strain)
     taken = 0
-    while taken < NEWTON_STEPS and _norm(missing) > load.within:
+    while taken < NEWTON_STEPS and np.sqrt(np.einsum("i,i", missing, missing)) > load.within:
         taken += 1
-        forces = forces_at(scene, material, inner_moves(scene, motion, strain))
-        step, widening = _newton(scene, forces, across, load, missing)
+        forces = forces_at(loaded, loaded.moves(motion, strain))
+        step, widening = _newton(loaded, forces, free, load, missing)
         way = np.zeros(3)
         way[free] = widening
-        start, change = (motion, strain), (step, way)
-        slope = _along(scene, material, load, start, change)
-        along = np.concatenate([step, widening * scene.maps.length])
-        part, missing = _least(slope, float(np.einsum("i,i", missing, along)))
+        along = np.concatenate([step, widening * loaded.maps.length])
+        start = abs(float(np.einsum("i,i", missing, along)))
+        # the energy is convex: its slope changes from downhill to uphill once
+        low, high, part = 0.0, np.inf, 1.0
+        for _ in range(_HALVES):
+            missing = _missing(loaded, load, motion + part * step, strain + part * way)
+            slope = float(np.einsum("i,i", missing, along))
+            if abs(slope) <= 0.5 * start:
+                break
+            low, high = (part, high) if slope > 0 else (low, part)
+            part = 0.5 * (low + high) if high < np.inf else 2 * part
+            if part > 8:
+                break
         motion, strain = motion + part * step, strain + part * way
     return motion, strain, taken
 
 
-def _along(
-    scene: Scene,
-    material: Material,
-    load: Load,
-    start: tuple[Array, Array],
-    change: tuple[Array, Array],
-) -> Callable[[float], tuple[float, Array]]:
-    """Fall of the energy, N m, along a change of motion and strain, and what is missing there."""
-    free = np.isnan(load.strain)
-    along = np.concatenate([change[0], change[1][free] * scene.maps.length])
-
-    def slope(part: float) -> tuple[float, Array]:
-        motion, strain = (one + part * way for one, way in zip(start, change, strict=True))
-        left = _missing(scene, material, load, motion, strain)
-        return float(np.einsum("i,i", left, along)), left
-
-    return slope
-
-
-def _least(slope: Callable[[float], tuple[float, Array]], start: float) -> tuple[float, Array]:
-    """The part of a step at which the energy hardly falls any more, and what is missing there.
-
-    The energy is convex, so its slope only changes from downhill to uphill once.
-    """
-    low, high, part = 0.0, np.inf, 1.0
-    for _ in range(_HALVES):
-        now, missing = slope(part)
-        if abs(now) <= 0.5 * abs(start):
-            break
-        low, high = (part, high) if now > 0 else (low, part)
-        part = 0.5 * (low + high) if high < np.inf else 2 * part
-        if part > 8:
-            break
-    return part, missing
-
-
-def _norm(values: Array) -> float:
-    return float(np.sqrt(np.einsum("i,i", values, values)))
-
-
-def inner_moves(scene: Scene, motion: Array, strain: Array) -> Array:
-    given = scene.maps.of_grains @ motion + scene.maps.of_strain[:, :3] @ strain
-    return given.reshape(-1, 6)
-
-
-def _missing(scene: Scene, material: Material, load: Load, motion: Array, strain: Array) -> Array:
+def _missing(loaded: LoadedPack, load: Load, motion: Array, strain: Array) -> Array:
     """Forces (6 N + F,) that are missing for balance, N.
 
     The last F are those of the stresses that are given, times volume over a length.
     """
-    forces = forces_at(scene, material, inner_moves(scene, motion, strain)).total.ravel()
-    free = np.isnan(load.strain)
-    grains = -(scene.maps.of_grains.T @ forces) - load.drag * motion
-    stress = scene.maps.of_strain[:, :3].T @ forces / scene.volume
-    box = ((load.stress - stress) * scene.volume)[free] / scene.maps.length
+    forces = forces_at(loaded, loaded.moves(motion, strain)).total.ravel()
+    grains = -(loaded.maps.of_grains.T @ forces) - load.drag * motion
+    stress = loaded.maps.of_strain[:, :3].T @ forces / loaded.volume
+    box = ((load.stress - stress) * loaded.volume)[np.isnan(load.strain)] / loaded.maps.length
     return np.concatenate([grains, box])
 
 
 def _newton(
-    scene: Scene, forces: Forces, across: Array, load: Load, missing: Array
+    loaded: LoadedPack, forces: JointForces, free: Array, load: Load, missing: Array
 ) -> tuple[Array, Array]:
-    """Change of the motion (6 N,) and of the free strains (F,) by the tangent stiffness."""
-    of_grains = scene.maps.of_grains
+    """Change of the motion (6 N,) and of the `free` (F,) strains by the tangent stiffness."""
+    of_grains, across = loaded.maps.of_grains, loaded.maps.of_strain[:, :3][:, free]
     joints, count = np.arange(len(forces.tangent)), of_grains.shape[1]
     springs = sparse.bsr_matrix((forces.tangent, joints, np.arange(len(joints) + 1))).tocsr()
     matrix = (of_grains.T @ springs @ of_grains).tocsr()
-    matrix = matrix + load.drag * sparse.identity(count, format="csr")
-    solve = direct(matrix)
+    solve = direct_solver(matrix + load.drag * sparse.identity(count, format="csr"))
     moved_by = solve(missing[:count])
-    if across.shape[1] == 0:
+    if not len(free):
         return moved_by, np.empty(0)
     pulled = springs @ across
     coupling = of_grains.T @ pulled
     reply = np.column_stack([solve(column) for column in coupling.T])
-    own = across.T @ pulled - coupling.T @ reply
-    own += 1e-9 * np.trace(own) * np.eye(len(own)) + load.drag * scene.maps.length**2 * np.eye(
-        len(own)
-    )
-    wanted = missing[count:] * scene.maps.length - coupling.T @ moved_by
+    own, square = across.T @ pulled - coupling.T @ reply, loaded.maps.length**2
+    own += 1e-9 * np.trace(own) * np.eye(len(own)) + load.drag * square * np.eye(len(own))
+    wanted = missing[count:] * loaded.maps.length - coupling.T @ moved_by
     widening = np.linalg.solve(own, wanted)
     return moved_by - reply @ widening, widening
 
 
-# ------------------------------------------------------------------------------------------------
-# A pack after a load step: where it is, what its joints remember, which bonds are overloaded.
+def carried_out(loaded: LoadedPack, motion: Array, strain: Array) -> tuple[Deformed, JointForces]:
+    """The pack after a motion (6 N,) on top of a strain (3,) of the box, and what it bears.
 
-
-def carried_out(
-    scene: Scene, material: Material, motion: Array, strain: Array
-) -> tuple[Deformed, Forces]:
-    """The pack after a step, and the forces in its joints."""
-    forces = forces_at(scene, material, inner_moves(scene, motion, strain))
-    frame = scene.maps.frame
-    memory = Memory(
-        rest=scene.memory.rest,
+    Bonds that no longer have a joint within reach are remembered as they were.
+    """
+    forces = forces_at(loaded, loaded.moves(motion, strain))
+    pack, frame = loaded.pack, loaded.maps.frame
+    force, moment = (
+        np.einsum("kji,kj->ki", frame, one) for one in (forces.bond[:, :3], forces.bond[:, 3:])
+    )
+    memory = loaded.memory._replace(
         shear=np.einsum("kji,kj->ki", frame[:, 1:], forces.shear),
-        bond=np.concatenate(
-            [
-                np.einsum("kji,kj->ki", frame, forces.bond[:, :3]),
-                np.einsum("kji,kj->ki", frame, forces.bond[:, 3:]),
-            ],
-            axis=1,
-        ),
-        bonded=scene.memory.bonded,
-        broken=scene.memory.broken,
+        bond=np.concatenate([force, moment], axis=1),
     )
-    shift = motion.reshape(-1, 6)[:, :3]
-    return moved(scene.pack, scene.joints, memory, shift, strain), forces
+    grains, shift = pack.grains, motion.reshape(-1, 6)[:, :3]
+    low = grains.box[:, :1]
+    box = low + (grains.box - low) * (1 + strain)[:, None]
+    place = low[:, 0] + (grains.position - low[:, 0]) * (1 + strain) + shift
+    key = keys_of(loaded.joints, len(grains))
+    kept, lost = np.argsort(key), pack.memory.bonded & ~np.isin(pack.key, key)
+    key = np.concatenate([key[kept], pack.key[lost]])
+    order = np.argsort(key)
+    values = [
+        np.concatenate([now[kept], before[lost]])[order]
+        for now, before in zip(memory, pack.memory, strict=True)
+    ]
+    after = Deformed(
+        grains=resting(place, grains.radius, box, grains.kind),
+        key=key[order],
+        memory=Memory(*values),
+        strain=pack.strain + np.log1p(strain),
+    )
+    return after, forces
 
 
-def overloaded(scene: Scene, forces: Forces, material: Material) -> tuple[Array, Array]:
+def overloaded(loaded: LoadedPack, forces: JointForces) -> tuple[Array, Array]:
     """Stress over strength (K,) of each whole bond, and how it would break."""
-    if material.cement is None:
-        return np.zeros(len(scene.joints)), np.full(len(scene.joints), SOUND)
-    tension, shear = bond_stress(forces.bond, discs_of(scene.joints, material))
-    pulled, cut = (
-        tension / material.cement.tensile_strength,
-        shear / material.cement.shear_strength,
-    )
-    whole = scene.memory.bonded & (scene.memory.broken == SOUND)
-    ratio = np.where(whole, np.maximum(pulled, cut), 0.0)
+    cement = loaded.material.cement
+    if cement is None:
+        return np.zeros(len(loaded.joints)), np.full(len(loaded.joints), SOUND)
+    tension, shear = bond_stress(forces.bond, disc_radius(loaded.joints, loaded.material))
+    pulled = tension / cement.tensile_strength
+    cut = shear / cement.shear_strength
+    ratio = np.where(loaded.memory.whole, np.maximum(pulled, cut), 0.0)
     return ratio, np.where(pulled >= cut, TENSION, SHEAR)
 
 
 # ------------------------------------------------------------------------------------------------
-# A pack brought to rest under a load: steps at that load until the forces balance.
+# The triaxial test: confining stress held on the sides, axial strain rising, quasi-statically.
+#
+# Each load step raises the axial strain; then the pack is brought to rest at that strain, bonds
+# beyond their strength break, those nearest to it first, and it is brought to rest again.
 
 
 MOST_DRAG = 1e-1
@@ -453,6 +392,12 @@ MOST_DRAG = 1e-1
 It falls to `Triaxial.drag` as the steps get easy."""
 _GROUP = 0.8
 """Bonds break together whose stress over strength is above this share of the largest."""
+MOST_OVERLAP = 0.05
+"""Overlap over diameter that a confining stress may cause; springs hold no more."""
+CONFINING_STEPS = 4
+"""Steps in which the confining stress is put on."""
+PROBE = 0.1
+"""Part of the first load step that gives the initial slope."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -483,7 +428,7 @@ class Triaxial:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
+class LoadStep:
     """The pack at rest after one load step; stresses in Pa, compression above 0.
 
     Attributes:
@@ -516,94 +461,6 @@ class Row:
         return self.axial - self.side
 
 
-def brought_to_rest(
-    pack: Deformed,
-    material: Material,
-    test: Triaxial,
-    periodic: tuple[bool, bool, bool],
-    *,
-    strain: Array,
-    stress: Array,
-) -> tuple[Deformed, Row, bool]:
-    """The pack after a strain (3,) and steps at rest, its row, and whether it came to rest.
-
-    Where the strain is nan the stress (3,), Pa, is held.
-    """
-    drag, now, before = MOST_DRAG, strain, np.inf
-    still = np.where(np.isnan(strain), np.nan, 0.0)
-    within = 0.1 * test.tolerance * test.confining * 4 * float(pack.grains.radius.mean()) ** 2
-    for rests in range(1, test.rests + 1):
-        scene = scene_of(pack, material, periodic)
-        load = Load(strain=now, stress=stress, drag=drag * material.normal, within=within)
-        motion, given, taken = balance(scene, material, load)
-        pack, forces = carried_out(scene, material, motion, given)
-        pack, fell = _broken(pack, scene, forces, material)
-        now = still
-        row = _row_of(pack, scene, forces, rests)
-        drag = min(max(drag * _eased(taken), test.drag), MOST_DRAG)
-        change = abs(row.axial - before) / max(abs(row.axial), 1e-300)
-        before = row.axial
-        if not fell and row.unbalanced <= test.tolerance and change <= test.tolerance:
-            return pack, row, True
-    return pack, row, False
-
-
-def _eased(taken: int) -> float:
-    """Factor on the drag after a step of `taken` Newton steps."""
-    if taken < NEWTON_STEPS // 2:
-        return 0.25
-    return 1.0 if taken < NEWTON_STEPS else 4.0
-
-
-def _broken(
-    pack: Deformed, scene: Scene, forces: Forces, material: Material
-) -> tuple[Deformed, bool]:
-    """The pack without the bonds that are nearest beyond their strength."""
-    ratio, how = overloaded(scene, forces, material)
-    worst = float(ratio.max(initial=0.0))
-    if worst <= 1:
-        return pack, False
-    gone = ratio >= max(1.0, _GROUP * worst)
-    place = np.searchsorted(pack.key, keys_of(scene.joints, len(pack.grains))[gone])
-    broken, bond = pack.broken.copy(), pack.bond.copy()
-    broken[place], bond[place] = how[gone], 0.0
-    return replace(pack, broken=broken, bond=bond), True
-
-
-def _row_of(pack: Deformed, scene: Scene, forces: Forces, rests: int) -> Row:
-    total = scene.maps.of_strain[:, :3].T @ forces.total.ravel() / scene.volume
-    left = scene.maps.of_grains.T @ forces.total.ravel()
-    pairs = (forces.normal > 0) & ~scene.joints.at_wall
-    mean = float(forces.normal[pairs].mean()) if pairs.any() else 1e-300
-    return Row(
-        axial_strain=0.0,
-        volume_strain=0.0,
-        axial=-float(total[0]),
-        side=-float(total[1:].mean()),
-        tension=int(np.sum(pack.broken == TENSION)),
-        shear=int(np.sum(pack.broken == SHEAR)),
-        contacts=2 * float(pairs.sum()) / len(pack.grains),
-        sliding=float(np.mean(forces.sliding[pairs])) if pairs.any() else 0.0,
-        unbalanced=float(np.abs(left).max()) / mean,
-        rests=rests,
-    )
-
-
-# ------------------------------------------------------------------------------------------------
-# The triaxial test: confining stress held on the sides, axial strain rising, quasi-statically.
-#
-# Each load step raises the axial strain; then the pack is brought to rest at that strain, bonds
-# beyond their strength break, those nearest to it first, and it is brought to rest again.
-
-
-MOST_OVERLAP = 0.05
-"""Overlap over diameter that a confining stress may cause; springs hold no more."""
-CONFINING_STEPS = 4
-"""Steps in which the confining stress is put on."""
-PROBE = 0.1
-"""Part of the first load step that gives the initial slope."""
-
-
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Sheared:
     """A finished triaxial test.
@@ -611,15 +468,13 @@ class Sheared:
     Attributes:
         test: what was done.
         rows: the pack after the confining stress, then after each load step.
-        confined: the pack under the confining stress.
         pack: at the end.
         bonds: number of bonds at the start.
         restless: load steps that never came within the tolerance.
     """
 
     test: Triaxial
-    rows: tuple[Row, ...]
-    confined: Deformed
+    rows: tuple[LoadStep, ...]
     pack: Deformed
     bonds: int
     restless: int
@@ -640,18 +495,18 @@ class Sheared:
         return 0.5 * (1 - (second.volume_strain - first.volume_strain) / axial)
 
     @property
-    def peak(self) -> Row:
+    def peak(self) -> LoadStep:
         """The row of the largest deviatoric stress."""
         return max(self.rows, key=lambda row: row.deviatoric)
 
 
 def triaxial(
     grains: Snapshot,
-    material: Material,
+    material: PackMaterial,
     test: Triaxial,
     *,
     periodic: tuple[bool, bool, bool],
-    follow: Callable[[Row], None] = lambda row: None,
+    follow: Callable[[LoadStep], None] = lambda row: None,
 ) -> Sheared:
     """Confine a pack of grains and compress it along x.
 
@@ -661,100 +516,49 @@ def triaxial(
     carries none.
     """
     material = replace(material, glued=False)
-    refuse_stress(grains, material, test.confining, periodic)
-    start = at_rest(grains, material, periodic, relieved=test.relieved)
-    pack, row, restless = _confined(start, material, test, periodic)
-    begun = pack = replace(pack, strain=np.zeros(3))
+    pack, row, restless = confined(grains, material, test, periodic)
+    pack = replace(pack, strain=np.zeros(3))
     rows = [_since(row, pack)]
     follow(rows[0])
-    sides = np.nan if test.sides else 0.0
-    for share in _shares(test.steps):
-        pack, row, calm = brought_to_rest(
-            pack,
-            material,
-            test,
-            periodic,
-            strain=np.array([-share * test.strain, sides, sides]),
-            stress=np.full(3, -test.confining),
-        )
+    sides, step = np.nan if test.sides else 0.0, 1 / test.steps
+    # the first step is divided, for the initial slope
+    for share in (PROBE * step, (1 - PROBE) * step, *[step] * (test.steps - 1)):
+        strain = np.array([-share * test.strain, sides, sides])
+        stress = np.full(3, -test.confining)
+        pack, row, calm = _brought_to_rest(pack, material, test, periodic, strain, stress)
         restless += not calm
         rows.append(_since(row, pack))
         follow(rows[-1])
     return Sheared(
         test=test,
         rows=tuple(rows),
-        confined=begun,
         pack=pack,
-        bonds=int(pack.bonded.sum()),
+        bonds=int(pack.memory.bonded.sum()),
         restless=restless,
     )
 
 
-def _shares(steps: int) -> list[float]:
-    """Parts of the strain in each step; the first is divided, for the initial slope."""
-    step = 1 / steps
-    return [PROBE * step, (1 - PROBE) * step, *[step] * (steps - 1)]
-
-
-def _confined(
-    pack: Deformed, material: Material, test: Triaxial, periodic: tuple[bool, bool, bool]
-) -> tuple[Deformed, Row, int]:
-    """The pack under the confining stress, its row, and steps that did not come to rest."""
-    restless, parts = 0, CONFINING_STEPS if test.relieved else 1
-    for part in range(1, parts + 1):
-        stress = np.full(3, -test.confining * part / parts)
-        pack, row, calm = brought_to_rest(
-            pack, material, test, periodic, strain=np.full(3, np.nan), stress=stress
-        )
-        restless += not calm
-    if row.contacts == 0 or not row.axial > 0.5 * test.confining:
-        raise MechanicsError(
-            f"pack of {len(pack.grains)} grains does not hold {test.confining:.3g} Pa: it bears "
-            f"{row.axial:.3g} Pa along x; take a denser pack"
-        )
-    return pack, row, restless
-
-
-def confined(
-    grains: Snapshot,
-    material: Material,
-    stress: float,
-    *,
-    periodic: tuple[bool, bool, bool],
-    tolerance: float = 1e-2,
-) -> Snapshot:
-    """The grains under an isotropic stress, Pa; their box has shrunk with them.
-
-    The overlaps of the pack are its state without stress. Raises what `triaxial` raises.
-    """
-    material = replace(material, glued=False)
-    refuse_stress(grains, material, stress, periodic)
-    start = at_rest(grains, material, periodic, relieved=True)
-    test = Triaxial(confining=stress, tolerance=tolerance)
-    pack, _, _ = _confined(start, material, test, periodic)
-    return pack.grains
-
-
-def _since(row: Row, pack: Deformed) -> Row:
+def _since(row: LoadStep, pack: Deformed) -> LoadStep:
     return replace(
         row, axial_strain=-float(pack.strain[0]), volume_strain=-float(pack.strain.sum())
     )
 
 
-def refuse_stress(
-    grains: Snapshot, material: Material, stress: float, periodic: tuple[bool, bool, bool]
-) -> None:
-    """Raise CaseError where the mean contact would overlap by more than `MOST_OVERLAP`."""
+def confined(
+    grains: Snapshot, material: PackMaterial, test: Triaxial, periodic: tuple[bool, bool, bool]
+) -> tuple[Deformed, LoadStep, int]:
+    """The pack under the confining stress, its row, and steps that did not come to rest.
+
+    Raises what `triaxial` raises.
+    """
     joints = find_joints(grains, periodic, gap=material.gap)
     if len(joints) == 0:
         raise MechanicsError(
             f"pack of {len(grains)} grains has no contacts; make it denser, or bridge its gaps "
             "with bonds.gap_ratio"
         )
-    volume = float(np.prod(np.diff(grains.box, axis=1)))
-    reach = float(np.sum(np.linalg.norm(joints.branch, axis=1)))
-    diameter = 2 * float(grains.radius.mean())
-    overlap = 3 * stress * volume / reach / material.normal / diameter
+    stress, diameter = test.confining, 2 * float(grains.radius.mean())
+    overlap = mean_force(grains, joints, stress) / material.normal / diameter
     if overlap > MOST_OVERLAP:
         raise CaseError(
             f"--confining_MPa: {stress / 1e6:g} presses grains {100 * overlap:.3g} % of a "
@@ -762,3 +566,75 @@ def refuse_stress(
             f"({stress / 1e6 * MOST_OVERLAP / overlap:.3g} MPa); lower the stress or raise "
             "grains.normal_stiffness_N_m"
         )
+    pack = at_rest(grains, material, periodic, relieved=test.relieved)
+    restless, parts = 0, CONFINING_STEPS if test.relieved else 1
+    for part in range(1, parts + 1):
+        held = np.full(3, -stress * part / parts)
+        pack, row, calm = _brought_to_rest(
+            pack, material, test, periodic, np.full(3, np.nan), held
+        )
+        restless += not calm
+    if row.contacts == 0 or not row.axial > 0.5 * stress:
+        raise MechanicsError(
+            f"pack of {len(pack.grains)} grains does not hold {stress:.3g} Pa: it bears "
+            f"{row.axial:.3g} Pa along x; take a denser pack"
+        )
+    return pack, row, restless
+
+
+def _brought_to_rest(
+    pack: Deformed,
+    material: PackMaterial,
+    test: Triaxial,
+    periodic: tuple[bool, bool, bool],
+    strain: Array,
+    stress: Array,
+) -> tuple[Deformed, LoadStep, bool]:
+    """The pack after a strain (3,) and steps at rest, its row, and whether it came to rest.
+
+    Where the strain is nan the stress (3,), Pa, is held.
+    """
+    drag, before = MOST_DRAG, np.inf
+    within = 0.1 * test.tolerance * test.confining * 4 * float(pack.grains.radius.mean()) ** 2
+    for rests in range(1, test.rests + 1):
+        loaded = loaded_pack(pack, material, periodic)
+        load = Load(strain=strain, stress=stress, drag=drag * material.normal, within=within)
+        motion, given, taken = balance(loaded, load)
+        strain = np.where(np.isnan(strain), np.nan, 0.0)
+        pack, forces = carried_out(loaded, motion, given)
+        # the bonds that are farthest beyond their strength break
+        ratio, how = overloaded(loaded, forces)
+        worst = float(ratio.max(initial=0.0))
+        if worst > 1:
+            gone = ratio >= max(1.0, _GROUP * worst)
+            place = np.searchsorted(pack.key, keys_of(loaded.joints, len(pack.grains))[gone])
+            broken, bond = pack.memory.broken.copy(), pack.memory.bond.copy()
+            broken[place], bond[place] = how[gone], 0.0
+            pack = replace(pack, memory=pack.memory._replace(broken=broken, bond=bond))
+        row = _row_of(pack, loaded, forces, rests)
+        easier = 0.25 if taken < NEWTON_STEPS // 2 else 1.0 if taken < NEWTON_STEPS else 4.0
+        drag = min(max(drag * easier, test.drag), MOST_DRAG)
+        change = abs(row.axial - before) / max(abs(row.axial), 1e-300)
+        before = row.axial
+        if worst <= 1 and row.unbalanced <= test.tolerance and change <= test.tolerance:
+            return pack, row, True
+    return pack, row, False
+
+
+def _row_of(pack: Deformed, loaded: LoadedPack, forces: JointForces, rests: int) -> LoadStep:
+    total = loaded.maps.of_strain[:, :3].T @ forces.total.ravel() / loaded.volume
+    left = loaded.maps.of_grains.T @ forces.total.ravel()
+    pairs = (forces.normal > 0) & ~loaded.joints.at_wall
+    mean = float(forces.normal[pairs].mean()) if pairs.any() else 1e-300
+    return LoadStep(
+        axial_strain=0.0,
+        volume_strain=0.0,
+        axial=-float(total[0]),
+        side=-float(total[1:].mean()),
+        tension=int(np.sum(pack.memory.broken == TENSION)),
+        shear=int(np.sum(pack.memory.broken == SHEAR)),
+        contacts=2 * float(pairs.sum()) / len(pack.grains),
+        sliding=float(np.mean(forces.sliding[pairs])) if pairs.any() else 0.0,
+        unbalanced=float(np.abs(left).max()) / mean,
+        rests=rests,
+    )

@@ -1,20 +1,14 @@
 """The network of a grain pack: one pore in each tetrahedron, one throat per shared facet."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from fdnet.errors import NetworkError
-from fdnet.network.tessellation.delaunay import PlacedGrains, place_grains
-from fdnet.network.tessellation.facets import Tessellation, join_polyhedra, tessellate
-from fdnet.network.tessellation.pores import (
-    LENGTH_FLOOR,
-    Pores,
-    Throats,
-    measure_pores,
-    measure_throats,
-)
+from fdnet.network.tessellation.delaunay import place_grains
+from fdnet.network.tessellation.facets import join_polyhedra, tessellate
+from fdnet.network.tessellation.pores import LENGTH_FLOOR, measure_pores, measure_throats
 from fdnet.spheres.snapshot import Array, Directions, Kind, Snapshot, sides_of
 
 __all__ = ["LENGTH_FLOOR", "WALLS", "Network", "build_network"]
@@ -39,7 +33,7 @@ class Network:
         area: m2, cross-section of the box.
         image_grain: (M,) index of the grain.
         image_fine: (M,) whether the image is one of a fine (`Snapshot.kind`), where grains and
-            fines are tessellated alike, or of a grain that lies mostly inside another one.
+            fines are tessellated alike, or of a grain with its centre inside another one.
         image_position: (M, 3) m.
         image_radius: (M,) m.
         image_height: (M,) m, how far the image reaches from its centre along x. It is the radius,
@@ -200,31 +194,15 @@ def build_network(
     placed = place_grains(grains, periodic=sides)
     tessellation = tessellate(placed)
     polyhedra = join_polyhedra(tessellation)
-    pores = measure_pores(tessellation, polyhedra)
-    throats = measure_throats(tessellation, polyhedra, pores)
-    counts = {
-        "grains_outside_box": len(grains) - len(placed.index) - placed.dropped,
-        "grains_inside_others": placed.dropped,
-        "grains_centred_in_others": int(placed.inside.sum()),
-        "grains_centred_beyond_walls": placed.beyond,
-        "grains_hidden": tessellation.tetrahedra.hidden,
-        **pores.counts,
-        **throats.counts,
-    }
-    network = _assembled(placed, tessellation, pores, throats)
-    return replace(network, walls=walls, counts=counts)
-
-
-def _assembled(
-    placed: PlacedGrains, tessellation: Tessellation, pores: Pores, throats: Throats
-) -> Network:
-    """The network of these parts, its arrays read-only."""
+    pores, pore_counts = measure_pores(tessellation, polyhedra)
+    throats, throat_counts = measure_throats(tessellation, polyhedra, pores)
     points = tessellation.tetrahedra.points
     outward = placed.outward[points.owner]
     beyond_low = points.position[:, 0] < tessellation.box[0].mean()
     network = Network(
         box=tessellation.box,
         periodic=tessellation.periodic,
+        walls=walls,
         grain_radius=tessellation.scale,
         area=float(tessellation.size[1] * tessellation.size[2]),
         image_grain=placed.index[points.owner],
@@ -233,26 +211,17 @@ def _assembled(
         image_radius=points.radius,
         image_height=placed.height[points.owner],
         image_outward=np.where(beyond_low, -outward, outward),
-        pore_images=pores.vertex,
-        pore_wrap=pores.wrap,
-        pore_position=pores.position,
-        pore_radius=pores.radius,
-        pore_power_centre=pores.power_centre,
-        pore_tetra_volume=pores.volume,
-        pore_volume=pores.void,
-        pore_wall_surface=pores.wall_surface,
-        pore_group=pores.group,
-        pore_share=pores.share,
-        throat_pores=throats.pores,
-        throat_shift=throats.shift,
-        throat_images=throats.vertex,
-        throat_share=throats.share,
-        throat_heights=throats.heights,
-        throat_radius=throats.radius,
-        throat_radius_effective=np.sqrt(throats.area / np.pi),
-        throat_area=throats.area,
-        throat_length=throats.length,
-        counts={},
+        counts={
+            "grains_outside_box": len(grains) - len(placed.index) - placed.dropped,
+            "grains_inside_others": placed.dropped,
+            "grains_centred_in_others": int(placed.inside.sum()),
+            "grains_centred_beyond_walls": placed.beyond,
+            "grains_hidden": tessellation.tetrahedra.hidden,
+            **pore_counts,
+            **throat_counts,
+        },
+        **pores,
+        **throats,
     )
     for field in fields(network):
         value = getattr(network, field.name)

@@ -47,22 +47,35 @@ def nodes_of(network: Network) -> Nodes:
     """The nodes of all pores."""
     alone = np.bincount(network.pore_group)[network.pore_group] == 1
     node, moved = np.array(network.pore_power_centre), np.zeros(len(alone), bool)
-    points = (network.image_position, np.ptp(network.box, axis=1))
-    _move_inside(points, (network.pore_images, network.pore_wrap, alone), (node, moved))
-    height = np.array(network.throat_heights)
-    throats = network.throat_images, network.throat_pores, network.throat_shift, network.pore_wrap
-    _set_heights(points, throats, (node, moved), height)
+    height, size = np.array(network.throat_heights), np.ptp(network.box, axis=1)
+    _move_inside(
+        node, moved, network.image_position, size, network.pore_images, network.pore_wrap, alone
+    )
+    _set_heights(
+        height,
+        node,
+        moved,
+        network.image_position,
+        size,
+        network.throat_images,
+        network.throat_pores,
+        network.throat_shift,
+        network.pore_wrap,
+    )
     return Nodes(position=frozen(node), heights=frozen(height))
 
 
 @compiled_for_loops
 def _move_inside(
-    points: tuple[Array, Array], pores: tuple[Array, Array, Array], out: tuple[Array, Array]
+    node: Array,
+    moved: Array,
+    position: Array,
+    size: Array,
+    vertex: Array,
+    wrap: Array,
+    alone: Array,
 ) -> None:
     """Moves the nodes of pores that stand alone into their tetrahedra, and marks the moved."""
-    position, size = points
-    vertex, wrap, alone = pores
-    node, moved = out
     corner, best, place = np.empty((5, 3)), np.empty(3), np.empty(3)
     for p in range(len(node)):
         if not alone[p]:
@@ -128,15 +141,17 @@ def _set_nearest(corner: Array, k: int, nearest: Array) -> float:
 
 @compiled_for_loops
 def _set_heights(
-    points: tuple[Array, Array],
-    throats: tuple[Array, Array, Array, Array],
-    nodes: tuple[Array, Array],
     height: Array,
+    node: Array,
+    moved: Array,
+    position: Array,
+    size: Array,
+    facets: Array,
+    pores: Array,
+    shift: Array,
+    wrap: Array,
 ) -> None:
     """Sets the heights (T, 2) m of nodes that were moved."""
-    position, size = points
-    facets, pores, shift, wrap = throats
-    node, moved = nodes
     facet = np.empty((3, 3))
     for t in range(len(facets)):
         if not (moved[pores[t, 0]] or moved[pores[t, 1]]):

@@ -1,12 +1,9 @@
-"""Permeability of a pack before and after fines: the whole network analysis of one specimen.
-
-What the analysis of a specimen gives.
-"""
+"""Permeability of a pack before and after fines: the whole network analysis of one specimen."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any, Unpack
+from typing import Unpack
 
 import numpy as np
 
@@ -18,31 +15,29 @@ from fdnet.network.flow.sections import (
     Layers,
     Profile,
     Section,
+    inplace_permeability,
     layer_edges,
-    make_layers,
     make_profile,
     make_sections,
+    plane_pressures,
     reduction,
     thin_slabs,
 )
-from fdnet.network.laws.damage import CLEAN, Damage
+from fdnet.network.laws.damage import CLEAN
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import Network
 from fdnet.network.specimen import (
-    Specimen,
     measure_specimen,
     require_snapshots,
     specimen_doubts,
 )
 from fdnet.network.states import (
-    AllSpheres,
     Log,
     Measured,
     Sides,
     State,
     at_most_the_grains,
     few_throats,
-    solved,
 )
 from fdnet.spheres.snapshot import Array, Directions, Snapshot, frozen, sides_of
 
@@ -161,20 +156,6 @@ def laws_apart(taken: tuple[str, float], other: tuple[str, float]) -> Iterator[s
         )
     else:
         yield f"{start}, {name} {k:.4g} m2; one of them finds no open path"
-
-
-def worst_solve(flows: Sequence[Flow]) -> dict[str, str | float | None]:
-    """Method of the first solve, and the worst residual and mass balance of all."""
-    balances = [flow.mass_balance for flow in flows if flow.mass_balance is not None]
-    return {
-        "method": flows[0].method,
-        "residual": max(flow.residual for flow in flows),
-        "mass_balance": max(balances) if balances else None,
-    }
-
-
-# ------------------------------------------------------------------------------------------------
-# Permeability of a pack before and after fines: the whole network analysis of one specimen.
 
 
 @with_visible_choices
@@ -296,42 +277,57 @@ def _chosen(options: AnalysisChoices | None, choices: AnalysisKeys) -> AnalysisC
 
 def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysis:
     specimen, law, name = measured.specimen, options.law, options.damage_law
+    fines, porosity, invaded = specimen.fines, specimen.porosity, specimen.invaded
     clean, clean_slabs = measured.clean(law, log)
     base = measured.base(law, log)
     whole = measured.all_spheres(options, log)
     of_grains = SECTION_ARCHIE if name in (AUTO, ALL_SPHERES) else name
     final, damage = measured.damaged(options, of_grains, log)
     k, slabs, flow = clean.k, clean_slabs, final.flow
-    counts: dict[str, int] = {}
+    counts = dict(base.network.counts)
+    counts["throats_not_conducting"] = int(np.sum(base.conductance == 0))
+    if specimen.occupancy is not None and damage is not None:
+        counts |= {**specimen.occupancy.counts, **damage.counts}
+        counts["throats_blocked"] = int(specimen.occupancy.blocked.sum())
+    counts["isolated_pores"] = final.flow.isolated_pores
+    counts["spheres_dropped"] = specimen.inner.grains + specimen.inner.fines
+    layers = None
     if whole is not None:
         log.warnings += [*whole.refused, *few_throats(whole.slabs)]
-        grains = (base.k, None if specimen.moved else clean_slabs)
+        of_sections = None if specimen.moved else clean_slabs
         empty = specimen.empty_sections()
-        whole, counts = at_most_the_grains(whole, grains, specimen.edges, empty)
-        if counts["all_spheres_above_grains"]:
+        whole, above = at_most_the_grains(whole, base.k, of_sections, specimen.edges, empty)
+        counts |= above
+        if above["all_spheres_above_grains"]:
             log.warnings.append(
                 "the damage is too light for the law all-spheres: its network gave more "
                 "permeability with the fines than that of the grains without them, so each "
                 "section is taken as at most the latter; "
                 f"{of_grains} gives {final.k:.4g} m2 with fines"
             )
-        k, slabs, flow = whole.k, whole.slabs, whole.solved.flow
+        k, slabs, flow = whole.k, whole.slabs, whole.state.flow
         log.warnings += laws_apart((ALL_SPHERES, k), (of_grains, final.k))
+        if fines is not None and clean.halves is not None:
+            edges = layer_edges(clean.network.box, 2.0 * float(fines.radius.mean()))
+            layers = _layers(clean, whole.state, edges, specimen.depth)
     elif final is not clean:
         k, slabs = final.k, measured.damaged_slabs(final, options, of_grains, log)
-    sections = make_sections(
-        specimen.edges, specimen.porosity, (clean_slabs, slabs), specimen.depth
-    )
-    _warn(log, clean, flow, sections)
+    sections = make_sections(specimen.edges, porosity, (clean_slabs, slabs), specimen.depth)
+    for which, one in (("k_initial", clean.flow), ("k_damaged", flow)):
+        if one.reason:
+            log.warnings.append(f"{which} = 0: {one.reason}")
+    log.warnings += thin_slabs(sections, 2.0 * clean.network.grain_radius)
     log.warnings += specimen_doubts(specimen, clean.k, options.walls)
     law_used = np.full(len(final.conductance), CLEAN) if damage is None else damage.law_used
     flows = [clean.flow, base.flow, final.flow, flow, *clean_slabs.flows, *slabs.flows]
+    balances = [one.mass_balance for one in flows if one.mass_balance is not None]
+    used = of_grains if whole is None else ALL_SPHERES
     return Analysis(
         network=base.network,
         occupancy=specimen.occupancy,
         law=law,
         damage_law=name,
-        damage_law_used=_used(specimen, whole, of_grains),
+        damage_law_used=used if fines is not None and len(fines) else None,
         damage_law_other=None if whole is None else of_grains,
         k_damaged_other=None if whole is None else final.k,
         conductance_initial=base.conductance,
@@ -343,68 +339,46 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
         k_damaged=k,
         k_moved=base.k if specimen.moved else None,
         k_reduction=reduction(clean.k, k),
+        porosity_initial=porosity[0].mean,
+        porosity_initial_error=porosity[0].standard_error,
+        porosity_initial_sum=porosity[0].sum,
+        porosity_damaged=porosity[1].mean,
         sections=sections,
-        layers=_layers(specimen, clean, whole),
-        solver=worst_solve(flows),
+        profile=make_profile(specimen.bins, porosity, specimen.depth),
+        layers=layers,
+        invaded_count=invaded.count,
+        invaded_volume=invaded.volume,
+        invasion_depth=invaded.depth,
+        invasion_depth_p95=invaded.depth_p95,
+        cake_thickness=invaded.cake_thickness,
+        solver={
+            "method": flows[0].method,
+            "residual": max(one.residual for one in flows),
+            "mass_balance": max(balances) if balances else None,
+        },
         copies=specimen.copies,
-        counts=_counts(base, specimen.occupancy, damage, final.flow)
-        | {"spheres_dropped": specimen.inner.grains + specimen.inner.fines}
-        | counts,
+        counts=counts,
         warnings=tuple(log.warnings),
         seconds=log.seconds,
-        **_without_laws(specimen),
     )
 
 
-def _without_laws(specimen: Specimen) -> dict[str, Any]:
-    """The values of an `Analysis` that depend on no law."""
-    porosity, invaded = specimen.porosity, specimen.invaded
-    return {
-        "porosity_initial": porosity[0].mean,
-        "porosity_initial_error": porosity[0].standard_error,
-        "porosity_initial_sum": porosity[0].sum,
-        "porosity_damaged": porosity[1].mean,
-        "profile": make_profile(specimen.bins, porosity, specimen.depth),
-        "invaded_count": invaded.count,
-        "invaded_volume": invaded.volume,
-        "invasion_depth": invaded.depth,
-        "invasion_depth_p95": invaded.depth_p95,
-        "cake_thickness": invaded.cake_thickness,
-    }
-
-
-def _used(specimen: Specimen, whole: AllSpheres | None, of_grains: str) -> str | None:
-    if specimen.fines is None or not len(specimen.fines):
-        return None
-    return of_grains if whole is None else ALL_SPHERES
-
-
-def _layers(specimen: Specimen, clean: State, whole: AllSpheres | None) -> Layers | None:
-    """Layers of the mean diameter of a fine, from the network that resolves them."""
-    initial, fines = solved(clean), specimen.fines
-    if initial is None or fines is None or whole is None:
-        return None
-    edges = layer_edges(clean.network.box, 2.0 * float(fines.radius.mean()))
-    return make_layers(initial, whole.solved, edges=edges, depth=specimen.depth)
-
-
-def _warn(log: Log, clean: State, damaged: Flow, sections: tuple[Section, ...]) -> None:
-    for name, flow in (("k_initial", clean.flow), ("k_damaged", damaged)):
-        if flow.reason:
-            log.warnings.append(f"{name} = 0: {flow.reason}")
-    log.warnings += thin_slabs(sections, 2.0 * clean.network.grain_radius)
-
-
-def _counts(
-    base: State, occupancy: Occupancy | None, damage: Damage | None, flow: Flow
-) -> dict[str, int]:
-    counts = dict(base.network.counts) | {
-        "throats_not_conducting": int(np.sum(base.conductance == 0))
-    }
-    if occupancy is not None and damage is not None:
-        counts |= {
-            **occupancy.counts,
-            **damage.counts,
-            "throats_blocked": int(occupancy.blocked.sum()),
-        }
-    return counts | {"isolated_pores": flow.isolated_pores}
+def _layers(initial: State, damaged: State, edges: Array, depth: Array) -> Layers:
+    """Layers between `edges` (B+1,) m of a specimen before and after; `depth` (F,) m of fines."""
+    drops, k = [], []
+    for state in (initial, damaged):
+        network, flow = state.network, state.flow
+        k.append(inplace_permeability(network, flow, edges, state.halves))
+        drops.append(
+            -np.diff(plane_pressures(network, flow, edges, state.halves))
+            if flow.inflow
+            else np.full(len(edges) - 1, np.nan)
+        )
+    return Layers(
+        edges=frozen(edges),
+        k_initial=frozen(k[0]),
+        k_damaged=frozen(k[1]),
+        drop_initial=frozen(drops[0]),
+        drop_damaged=frozen(drops[1]),
+        fines_count=frozen(np.histogram(depth, edges)[0]),
+    )

@@ -1,7 +1,4 @@
-"""A specimen: its grains, its fines, what of them has invaded, and what is doubtful.
-
-Where the fines ended: how many invaded, how deep, and the cake before the formation face.
-"""
+"""A specimen: its grains, its fines, what of them has invaded, the cake, and what is doubtful."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
@@ -60,24 +57,17 @@ def measure_invaded(spheres: Snapshot, *, periodic: Sequence[bool]) -> Invaded:
     fines = spheres.fines()
     low, high = spheres.box[0]
     within = (fines.position[:, 0] >= low) & (fines.position[:, 0] < high)
-    depth = fines.position[within, 0] - low
+    depth, front = fines.position[within, 0] - low, low
+    if np.any(fines.position[:, 0] < low):
+        cake = cake_of(spheres, periodic)
+        front = (cake.position[:, 0] - cake.radius).min(initial=low)
     return Invaded(
         count=int(within.sum()),
         volume=float(4.0 / 3.0 * np.pi * np.sum(fines.radius[within] ** 3)),
         depth=float(depth.max(initial=0.0)),
         depth_p95=float(np.quantile(depth, 0.95)) if len(depth) else 0.0,
-        cake_thickness=_cake_thickness(spheres, fines, periodic),
+        cake_thickness=float(max(low - front, 0.0)),
     )
-
-
-def _cake_thickness(spheres: Snapshot, fines: Snapshot, periodic: Sequence[bool]) -> float:
-    """How far upstream of the face, m, the cake reaches."""
-    low = float(spheres.box[0, 0])
-    if not np.any(fines.position[:, 0] < low):
-        return 0.0
-    cake = cake_of(spheres, periodic)
-    front = cake.position[:, 0] - cake.radius
-    return float(max(low - front.min(initial=low), 0.0))
 
 
 def cake_of(spheres: Snapshot, periodic: Sequence[bool]) -> Snapshot:
@@ -149,12 +139,6 @@ def wide_fines(grains: Snapshot, fines: Snapshot) -> str:
     return ""
 
 
-def fines_outside_sides(fines: Snapshot, periodic: tuple[bool, bool, bool]) -> int:
-    """Number of fines that are centred beyond a side wall (across y or z) of the box."""
-    beyond = (fines.position < fines.box[:, 0]) | (fines.position > fines.box[:, 1])
-    return int(np.sum(np.any(beyond & ~np.array([True, *periodic[1:]]), axis=1)))
-
-
 def doubts(
     *,
     porosity: float,
@@ -177,39 +161,6 @@ def doubts(
             f"the permeability without fines, {permeability:.3g} m2, is above that of the empty "
             f"box with the same walls, {empty:.3g} m2, which is impossible: do not use it; there "
             "are too few grains for the box, so check the box and the units"
-        )
-
-
-def packing_doubts(
-    grains: Snapshot, porosity: float, permeability: float, periodic: tuple[bool, bool, bool]
-) -> Iterator[str]:
-    """Why grains, or their permeability (m2) without fines, are those of no sand pack."""
-    least, most = 2.0 * float(grains.radius.min()), 2.0 * float(grains.radius.max())
-    if most > SAND[1] or least < SAND[0]:
-        yield (
-            f"the grains are {least:.3g} to {most:.3g} m wide, which is no sand ({SAND[0]:g} to "
-            f"{SAND[1]:g} m): the unit of length is probably another one, and the permeability "
-            "goes with its square"
-        )
-    likely = kozeny(grains, porosity)
-    # spheres that are far apart have the drag of single ones
-    volume = float(np.prod(np.ptp(grains.box, axis=1)))
-    lone = volume / (6.0 * np.pi * float(grains.radius.sum()))
-    high = min(CARMAN_KOZENY[1] * likely, 2.0 * lone)
-    low, (dense, sparse) = CARMAN_KOZENY[0] * likely, VALIDATED_POROSITY
-    if permeability > high or (0.0 < permeability < low and dense <= porosity <= sparse):
-        yield (
-            f"the permeability without fines, {permeability:.3g} m2, is "
-            f"{permeability / likely:.3g} times what Carman and Kozeny give for these radii and "
-            f"this porosity ({likely:.3g} m2), which no packing has: do not use it; check the "
-            "box, which sides are periodic, and whether radii and places have one unit"
-        )
-    for axis, pairs, expected in _walls_at_periodic_sides(grains, periodic):
-        yield (
-            f"no grain crosses the periodic sides {axis}, and {pairs} neighbours meet across them "
-            f"where {expected:.0f} are expected: the pack stands as between walls, and the gap "
-            f"there carries flow; leave {axis} out of the periodic directions unless the pack "
-            "repeats like this"
         )
 
 
@@ -270,6 +221,8 @@ def empty_duct_permeability(box: Array, periodic: tuple[bool, bool, bool]) -> fl
 
 MOVED = 1e-9
 """A grain that is displaced by more than this, m, has moved."""
+MANY_CENTRED = 0.1
+"""Share of the grains with their centre inside another one, from which a warning says so."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -356,17 +309,20 @@ def measure_specimen(
     if len(before):
         check_lengths(before, periodic)
     before, after, fines, inner = _without_inner(before, after, fines, periodic)
+    size, shift = np.ptp(box, axis=1), after.position - before.position
+    shift -= np.where(periodic, np.round(shift / size) * size, 0.0)  # whole periods do not count
+    moved = bool(np.max(np.linalg.norm(shift, axis=1), initial=0.0) > MOVED)
     with timed("tessellate"):
-        moved = _displaced(before, after, periodic)
         packs = [before, *([after] if moved else [])]
         if fines is not None and len(after) + len(fines) < LARGE_CELL:
             packs.append(after.joined(fines))
         copies = copies_of_cell(packs, periodic)
         grains = repeated(before, copies), repeated(after, copies)
-        first = build_network(grains[0], periodic=periodic, walls=choices.walls)
-        network = (
-            build_network(grains[1], periodic=periodic, walls=choices.walls) if moved else first
+        first, *ended = (
+            build_network(one, periodic=periodic, walls=choices.walls)
+            for one in grains[: 1 + moved]
         )
+        network = ended[0] if moved else first
     occupancy = None
     if fines is not None:
         with timed("occupancy"):
@@ -382,7 +338,8 @@ def measure_specimen(
         filled = (
             clean if fines is None else measure_porosity(spheres, periodic=periodic, edges=cuts)
         )
-    x = spheres.fines().position[:, 0]
+    place = spheres.fines().position
+    x, beyond = place[:, 0], (place < box[:, 0]) | (place > box[:, 1])
     return Specimen(
         grains=grains,
         fines=None if fines is None else repeated(fines, copies),
@@ -397,7 +354,7 @@ def measure_specimen(
         porosity=(clean, filled),
         depth=x[(x >= box[0, 0]) & (x < box[0, 1])],
         invaded=measure_invaded(spheres, periodic=periodic),
-        outside_sides=fines_outside_sides(spheres.fines(), periodic),
+        outside_sides=int(np.sum(np.any(beyond[:, 1:] & ~np.array(periodic[1:]), axis=1))),
     )
 
 
@@ -427,7 +384,7 @@ def specimen_doubts(specimen: Specimen, permeability: float, walls: str) -> Iter
             f"none of the {occupancy.counts['fines_outside_box']} fines is centred in the box: "
             "no pore holds any; check the box if some should"
         )
-    inner = specimen.inner
+    grains, inner = specimen.grains[0], specimen.inner
     for count, name in ((inner.grains, "grains"), (inner.fines, "fines")):
         if count:
             yield (
@@ -442,7 +399,33 @@ def specimen_doubts(specimen: Specimen, permeability: float, walls: str) -> Iter
         periodic=network.periodic,
         walls=walls,
     )
-    yield from packing_doubts(specimen.grains[0], porosity, permeability, network.periodic)
+    least, most = 2.0 * float(grains.radius.min()), 2.0 * float(grains.radius.max())
+    if most > SAND[1] or least < SAND[0]:
+        yield (
+            f"the grains are {least:.3g} to {most:.3g} m wide, which is no sand ({SAND[0]:g} to "
+            f"{SAND[1]:g} m): the unit of length is probably another one, and the permeability "
+            "goes with its square"
+        )
+    likely = kozeny(grains, porosity)
+    # spheres that are far apart have the drag of single ones
+    volume = float(np.prod(np.ptp(grains.box, axis=1)))
+    lone = volume / (6.0 * np.pi * float(grains.radius.sum()))
+    high = min(CARMAN_KOZENY[1] * likely, 2.0 * lone)
+    low, (dense, sparse) = CARMAN_KOZENY[0] * likely, VALIDATED_POROSITY
+    if permeability > high or (0.0 < permeability < low and dense <= porosity <= sparse):
+        yield (
+            f"the permeability without fines, {permeability:.3g} m2, is "
+            f"{permeability / likely:.3g} times what Carman and Kozeny give for these radii and "
+            f"this porosity ({likely:.3g} m2), which no packing has: do not use it; check the "
+            "box, which sides are periodic, and whether radii and places have one unit"
+        )
+    for axis, pairs, expected in _walls_at_periodic_sides(grains, network.periodic):
+        yield (
+            f"no grain crosses the periodic sides {axis}, and {pairs} neighbours meet across them "
+            f"where {expected:.0f} are expected: the pack stands as between walls, and the gap "
+            f"there carries flow; leave {axis} out of the periodic directions unless the pack "
+            "repeats like this"
+        )
     if specimen.outside_sides:
         yield (
             f"{specimen.outside_sides} fines are centred beyond the side walls of the box and "
@@ -483,11 +466,3 @@ def _same_grains(before: Snapshot, after: Snapshot) -> Snapshot:
     index = np.empty(len(before), int)
     index[wanted] = order
     return after.where(index)
-
-
-def _displaced(before: Snapshot, after: Snapshot, periodic: tuple[bool, bool, bool]) -> bool:
-    """Whether any grain moved; whole periods do not count."""
-    size = before.box[:, 1] - before.box[:, 0]
-    shift = after.position - before.position
-    shift = shift - np.where(periodic, np.round(shift / size) * size, 0.0)
-    return bool(np.max(np.linalg.norm(shift, axis=1), initial=0.0) > MOVED)

@@ -1,19 +1,17 @@
 """States of a specimen: its network, flow and sections, without fines and with them.
 
-A slab across the flow as a specimen of its own: what its two planes cut out of the spheres.
-
-The planes are inlet and outlet: the pressure is held on them, and the fluid crosses them at right
+A slab across the flow is a specimen of its own: what its two planes cut out of the spheres. The
+planes are inlet and outlet: the pressure is held on them, and the fluid crosses them at right
 angles. So the slab with its mirror image is a periodic pack, and its network is that of the
-spheres in a box of this length (`tessellation.placed_grains`). Cutting the throats of the whole
+spheres in a box of this length (`tessellation.place_grains`). Cutting the throats of the whole
 specimen at the planes instead leaves stumps of oblique throats, and misses that a pore which a
 plane cuts is open to it.
 """
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -32,8 +30,6 @@ from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.flow.flow import Flow
 from fdnet.network.flow.sections import (
     SlabK,
-    Solved,
-    depth_permeability,
     inplace_permeability,
     slab_permeability,
     whole_permeability,
@@ -175,7 +171,7 @@ class Log:
 class State:
     """A network with the conductance (T,) m3 of its throats, its flow through the box and k, m2.
 
-    `halves` (T, 2) 1/m3 are the clean resistances of the two halves of the throats, by which the
+    `halves` (T, 2) 1/m3 are the resistances of the two halves of the throats, by which the
     pressure falls along them; None for laws that have none.
     """
 
@@ -197,42 +193,34 @@ def make_state(
     return State(network=network, conductance=conductance, flow=flow, k=k, halves=halves)
 
 
-def solved(state: State) -> Solved | None:
-    """The state as `depth` needs it; None for laws without halves."""
-    if state.halves is None:
-        return None
-    return Solved(network=state.network, flow=state.flow, halves=state.halves)
-
-
-def clean_halves(network: Network, law: str) -> Array | None:
-    """Resistances (T, 2) 1/m3 of the halves of clean throats; None for laws that have none."""
-    return grain_resistances(network) if law == DEFAULT_LAW else None
+def clean_state(network: Network, law: str, log: Log) -> State:
+    """The state of a network without fines by a conductance law."""
+    with log.timed("conductance"):
+        halves = grain_resistances(network) if law == DEFAULT_LAW else None
+        conductance = LAWS[law](network) if halves is None else 1.0 / halves.sum(axis=1)
+    return make_state(network, frozen(conductance), log, halves=halves)
 
 
 def state_slabs(
-    state: State, edges: Array, log: Log, *, cut: tuple[CutNetworks, Conduct] | None
+    state: State, edges: Array, log: Log, *, cut: CutNetworks | None, conduct: Conduct
 ) -> SlabK:
     """Permeability of the slabs between `edges` (S+1,) m, cut out and in place.
 
-    `cut` are the slabs' own networks and their conductance. Without it the throats of the whole
-    network are cut at the planes (Shi 2011, section 3.3.1).
+    `cut` are the slabs' own networks, whose throats have the conductance `conduct`. Without it the
+    throats of the whole network are cut at the planes (Shi 2011, section 3.3.1).
     """
     network = state.network
     with log.timed("solve"):
         if len(edges) == 2 and not network.periodic[0]:  # one slab is the whole box
             parts = [(state.k, state.flow)]
         elif cut is not None:
-            parts = slab_permeabilities(*cut, (network, state.conductance))
+            parts = slab_permeabilities(cut, conduct, (network, state.conductance))
         else:
             parts = [
                 slab_permeability(network, state.conductance, (float(low), float(high)))
                 for low, high in pairwise(edges)
             ]
-        inplace = (
-            inplace_permeability(network, state.flow, edges)
-            if state.halves is None
-            else depth_permeability(network, state.flow, state.halves, edges)
-        )
+        inplace = inplace_permeability(network, state.flow, edges, state.halves)
     return SlabK(
         cut_out=frozen([k for k, _ in parts]),
         inplace=frozen(inplace),
@@ -249,21 +237,18 @@ def state_slabs(
 # count with what they have inside, as grains do.
 
 
-Timed = Callable[[str], AbstractContextManager[None]]
-
-
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class AllSpheres:
     """Permeability of grains and fines from the network of all spheres.
 
     Attributes:
-        solved: the network, its flow, and the resistances of its throats.
+        state: the network, its flow, and the resistances of its throats.
         k: m2, of the whole specimen.
         slabs: of each section, cut out and in place.
         refused: sections whose spheres make no network of their own, one sentence each.
     """
 
-    solved: Solved
+    state: State
     k: float
     slabs: SlabK
     refused: tuple[str, ...]
@@ -276,15 +261,13 @@ def all_conductances(network: Network) -> Array:
     return 1.0 / deposit_resistances(network).sum(axis=1)
 
 
-def measure_all_spheres(
-    spheres: Snapshot, edges: Array, *, sides: Sides, timed: Timed
-) -> AllSpheres:
+def measure_all_spheres(spheres: Snapshot, edges: Array, *, sides: Sides, log: Log) -> AllSpheres:
     """Permeability of all `spheres` together, of the whole and of the slabs between `edges` m.
 
-    `timed` takes the name of the stage that its block belongs to. Raises NetworkError where grains
-    and fines make no network (`build_network`), and FlowError as `solve_flow` does.
+    Raises NetworkError where grains and fines make no network (`build_network`), and FlowError as
+    `solve_flow` does.
     """
-    with timed("tessellate"):
+    with log.timed("tessellate"):
         try:
             network = build_network(spheres, periodic=sides.periodic, walls=sides.walls)
         except NetworkError as error:
@@ -292,29 +275,17 @@ def measure_all_spheres(
                 f"all-spheres: grains and fines together make no network: {error}; use "
                 "analysis.damage_law = 'section-archie'"
             ) from error
-    with timed("conductance"):
+    with log.timed("conductance"):
         halves = deposit_resistances(network)
-    conductance = 1.0 / halves.sum(axis=1)
-    with timed("solve"):
-        k, flow = whole_permeability(network, conductance)
-        inplace = depth_permeability(network, flow, halves, edges)
-    parts: list[tuple[float, Flow]] = [(k, flow)]
-    refused: tuple[str, ...] = ()
-    if len(edges) > 2 or sides.periodic[0]:  # else one slab is the whole box
-        with timed("tessellate"):
-            slabs = cut_networks(spheres, edges, sides)
-        with timed("solve"):
-            parts = slab_permeabilities(slabs, all_conductances, (network, conductance))
-        refused = slabs.refused
+    state, cut = make_state(network, 1.0 / halves.sum(axis=1), log, halves=halves), None
+    if len(edges) > 2 or sides.periodic[0]:
+        with log.timed("tessellate"):
+            cut = cut_networks(spheres, edges, sides)
     return AllSpheres(
-        solved=Solved(network=network, flow=flow, halves=halves),
-        k=k,
-        slabs=SlabK(
-            cut_out=frozen([one for one, _ in parts]),
-            inplace=frozen(inplace),
-            flows=tuple(one for _, one in parts),
-        ),
-        refused=refused,
+        state=state,
+        k=state.k,
+        slabs=state_slabs(state, edges, log, cut=cut, conduct=all_conductances),
+        refused=() if cut is None else cut.refused,
     )
 
 
@@ -324,7 +295,7 @@ permeability with fines is off by 5 % (rms), above which by 2 % (docs/accuracy.m
 
 
 def at_most_the_grains(
-    whole: AllSpheres, grains: tuple[float, SlabK | None], edges: Array, empty: Array
+    whole: AllSpheres, k_grains: float, grains: SlabK | None, edges: Array, empty: Array
 ) -> tuple[AllSpheres, dict[str, int]]:
     """The permeabilities with fines, at most those of the grains, and how many were above.
 
@@ -333,20 +304,23 @@ def at_most_the_grains(
 
     Args:
         whole: the network of all spheres.
-        grains: k (m2) of the grains where they ended, and of their sections; None for these where
-            the invasion moved the grains.
+        k_grains: m2, of the grains where they ended.
+        grains: of their sections; None where the invasion moved the grains.
         edges: (S+1,) m, of the sections.
         empty: (S,) whether no fine reaches into a section.
     """
-    (most, clean), k, slabs = grains, whole.k, whole.slabs
-    network, above, sections_above = whole.solved.network, int(k > most), 0
-    if clean is not None:
-        cut = (slabs.cut_out > clean.cut_out) & ~empty
+    k, slabs, network = whole.k, whole.slabs, whole.state.network
+    above, sections_above = int(k > k_grains), 0
+    if grains is not None:
+        cut = (slabs.cut_out > grains.cut_out) & ~empty
         sections_above = int(cut.sum())
-        slabs = replace(slabs, cut_out=frozen(np.where(empty | cut, clean.cut_out, slabs.cut_out)))
+        cut_out = frozen(np.where(empty | cut, grains.cut_out, slabs.cut_out))
+        slabs = replace(slabs, cut_out=cut_out)
         if above:
-            slabs = replace(slabs, inplace=frozen(np.minimum(slabs.inplace, clean.inplace)))
-            k = in_series(slabs.inplace, edges)
+            slabs = replace(slabs, inplace=frozen(np.minimum(slabs.inplace, grains.inplace)))
+            thick = np.diff(edges)
+            flows = np.all(slabs.inplace > 0.0)
+            k = float(thick.sum() / np.sum(thick / slabs.inplace)) if flows else 0.0
     counts = {
         "all_spheres_pores": len(network.pore_radius),
         "all_spheres_throats": len(network.throat_radius),
@@ -354,13 +328,7 @@ def at_most_the_grains(
         "all_spheres_above_grains": above,
         "all_spheres_sections_above_grains": sections_above,
     }
-    return replace(whole, k=min(k, most), slabs=slabs), counts
-
-
-def in_series(inplace: Array, edges: Array) -> float:
-    """Permeability m2 of the whole between `edges` (S+1,) m, from its sections (S,) in place."""
-    thick = np.diff(edges)
-    return float(thick.sum() / np.sum(thick / inplace)) if np.all(inplace > 0.0) else 0.0
+    return replace(whole, k=min(k, k_grains), slabs=slabs), counts
 
 
 def few_throats(slabs: SlabK) -> Iterator[str]:
@@ -399,8 +367,10 @@ class Measured:
     def clean(self, law: str, log: Log) -> tuple[State, SlabK]:
         """The first grains without fines by a conductance law, and its sections."""
         if law not in self._first:
-            state = _clean_state(self.specimen.first, law, log)
-            self._first[law] = state, self._clean_slabs(state, law, log, final=False)
+            state = clean_state(self.specimen.first, law, log)
+            cut = self._own_slabs(law, log, final=False)
+            slabs = state_slabs(state, self.specimen.edges, log, cut=cut, conduct=LAWS[law])
+            self._first[law] = state, slabs
         return self._first[law]
 
     def base(self, law: str, log: Log) -> State:
@@ -408,7 +378,7 @@ class Measured:
         if not self.specimen.moved:
             return self.clean(law, log)[0]
         if law not in self._final:
-            self._final[law] = _clean_state(self.specimen.network, law, log)
+            self._final[law] = clean_state(self.specimen.network, law, log)
         return self._final[law]
 
     def damaged(
@@ -427,9 +397,16 @@ class Measured:
 
     def damaged_slabs(self, state: State, choices: AnalysisChoices, name: str, log: Log) -> SlabK:
         """The sections of `damaged`; their own networks hold their own part of the fines."""
+        fines = self.specimen.fines
+
+        def conduct(network: Network) -> Array:
+            assert fines is not None
+            clean = LAWS[choices.law](network)
+            occupancy = measure_occupancy(network, fines, overlap=choices.throat_overlap)
+            return _law(choices, name)(network, occupancy, clean).conductance
+
         cut = self._own_slabs(choices.law, log, final=True)
-        parts = None if cut is None else (cut, partial(self._damaged_conductance, choices, name))
-        return state_slabs(state, self.specimen.edges, log, cut=parts)
+        return state_slabs(state, self.specimen.edges, log, cut=cut, conduct=conduct)
 
     def all_spheres(self, choices: AnalysisChoices, log: Log) -> AllSpheres | None:
         """The network of grains and fines where the damage law asks for it, else None.
@@ -447,25 +424,12 @@ class Measured:
         try:
             if self._all is None:
                 together, edges = self.specimen.grains[1].joined(fines), self.specimen.edges
-                self._all = measure_all_spheres(together, edges, sides=self.sides, timed=log.timed)
+                self._all = measure_all_spheres(together, edges, sides=self.sides, log=log)
         except (NetworkError, FlowError) as error:
             if name == ALL_SPHERES:
                 raise
             log.warnings.append(f"the damage law {SECTION_ARCHIE} was taken: {error}")
         return self._all
-
-    def _damaged_conductance(self, choices: AnalysisChoices, name: str, network: Network) -> Array:
-        """Conductance (T,) m3 of the throats of a slab's own network with its fines."""
-        fines, clean = self.specimen.fines, LAWS[choices.law](network)
-        assert fines is not None
-        occupancy = measure_occupancy(network, fines, overlap=choices.throat_overlap)
-        return _law(choices, name)(network, occupancy, clean).conductance
-
-    def _clean_slabs(self, state: State, law: str, log: Log, *, final: bool) -> SlabK:
-        """The sections of the grains without fines, as they were or where they ended."""
-        cut = self._own_slabs(law, log, final=final)
-        parts = None if cut is None else (cut, LAWS[law])
-        return state_slabs(state, self.specimen.edges, log, cut=parts)
 
     def _own_slabs(self, law: str, log: Log, *, final: bool) -> CutNetworks | None:
         """The networks of the sections for the law `lubrication`; None for other laws.
@@ -490,10 +454,3 @@ def _law(choices: AnalysisChoices, name: str) -> DamageLaw:
         clogging_threshold=choices.clogging_threshold,
         middle_band=choices.middle_band,
     )
-
-
-def _clean_state(network: Network, law: str, log: Log) -> State:
-    with log.timed("conductance"):
-        halves = clean_halves(network, law)
-        conductance = LAWS[law](network) if halves is None else 1.0 / halves.sum(axis=1)
-    return make_state(network, frozen(conductance), log, halves=halves)

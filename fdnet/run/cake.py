@@ -11,7 +11,6 @@ cake with too few of these has none.
 
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,7 +18,7 @@ import numpy as np
 
 from fdnet.errors import FlowError, NetworkError
 from fdnet.network.specimen import cake_of
-from fdnet.network.states import Sides, cut_out, measure_all_spheres
+from fdnet.network.states import Log, Sides, cut_out, measure_all_spheres
 from fdnet.report.tables import in_millidarcy, percent
 from fdnet.scales.flow import carman_kozeny
 from fdnet.spheres.geometry import measure_porosity
@@ -178,15 +177,12 @@ def _resolved(
         return None, f"the cake {' and '.join(missed)}"
     around = replace(sides, periodic=(False, *sides.periodic[1:]))
     try:
-        whole = measure_all_spheres(
-            bed, edges[[0, -1]], sides=around, timed=lambda _: nullcontext()
-        )
+        state = measure_all_spheres(bed, edges[[0, -1]], sides=around, log=Log()).state
     except (NetworkError, FlowError) as error:
         return None, f"the cake makes no network: {error}"
-    from fdnet.network.flow.sections import depth_permeability
+    from fdnet.network.flow.sections import inplace_permeability
 
-    one = whole.solved
-    return depth_permeability(one.network, one.flow, one.halves, edges), ""
+    return inplace_permeability(state.network, state.flow, edges, state.halves), ""
 
 
 def cake_rows(cake: Cake) -> list[dict[str, Any]]:

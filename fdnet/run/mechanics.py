@@ -15,12 +15,12 @@ from fdnet.files import write_text
 from fdnet.mechanics.of_case import (
     elastic_moduli,
     elastic_numbers,
-    material_of,
+    pack_material,
     triaxial_numbers,
     triaxial_warnings,
     warnings_of,
 )
-from fdnet.mechanics.triaxial import Row, Sheared, Triaxial, triaxial
+from fdnet.mechanics.triaxial import LoadStep, Triaxial, triaxial
 from fdnet.report.html import put_mechanics
 from fdnet.report.tables import plain_json
 from fdnet.run.folder import CASE, START_OVER, check_files, is_run_folder, read_record
@@ -47,6 +47,11 @@ class Packed:
     folder: Path
 
 
+_SPRINGS = ("normal_stiffness_N_m", "shear_stiffness_N_m", "friction", "density_kg_m3")
+"""Keys of [grains] that a test may set anew on grains that are packed: no place depends on them
+where the grains were packed without friction, as all are."""
+
+
 def packed_case(source: Path, options: RunOptions, assignments: list[str]) -> Packed:
     """The pack of a case file, made in `options.out` if need be, or that of a run folder.
 
@@ -54,107 +59,79 @@ def packed_case(source: Path, options: RunOptions, assignments: list[str]) -> Pa
     pack of a run folder; LiggghtsError when packing fails.
     """
     if source.is_dir():
-        return _of_folder(source, assignments)
-    case = read_case(source, assignments=assignments)
-    folder = options.out / case.name if options.out == Path("runs") else options.out
-    if read_record(folder, "pack") is None:
-        from fdnet.run.pipeline import run_stages
+        folder, file = source, source / CASE
+        if not is_run_folder(folder) or not file.is_file():
+            raise CaseError(f"{folder}: holds no fdnet run; give a case file or a run folder")
+        case = case_from(set_keys(recorded_case(file).data(), assignments), source=str(file))
+        if read_record(folder, "pack") is None:
+            raise CaseError(
+                f"{folder}: holds no finished pack; run the stage pack first (fdnet run "
+                f"{shlex.quote(str(file))} --out {shlex.quote(str(folder))} --stages pack "
+                "--resume)"
+            )
+    else:
+        case = read_case(source, assignments=assignments)
+        folder = options.out / case.name if options.out == Path("runs") else options.out
+        if read_record(folder, "pack") is None:
+            from fdnet.run.pipeline import run_stages
 
-        run_stages(case, replace(options, out=folder, stages=("pack",)))
-    return Packed(case=case, grains=_grains_of(folder, case), folder=folder)
-
-
-def _of_folder(folder: Path, assignments: list[str]) -> Packed:
-    if not is_run_folder(folder) or not (folder / CASE).is_file():
-        raise CaseError(f"{folder}: holds no fdnet run; give a case file or a run folder")
-    recorded = recorded_case(folder / CASE)
-    case = case_from(set_keys(recorded.data(), assignments), source=str(folder / CASE))
-    if read_record(folder, "pack") is None:
-        raise CaseError(
-            f"{folder}: holds no finished pack; run the stage pack first "
-            f"(fdnet run {shlex.quote(str(folder / CASE))} --out {shlex.quote(str(folder))} "
-            "--stages pack --resume)"
-        )
-    return Packed(case=case, grains=_grains_of(folder, case), folder=folder)
-
-
-def _grains_of(folder: Path, case: Case) -> Snapshot:
+            run_stages(case, replace(options, out=folder, stages=("pack",)))
     record = read_record(folder, "pack") or {}
     frame = read_frame(folder / "pack" / PACK_DUMP)
     check_files(folder / "pack", record, START_OVER)
-    if record["digest"] != _pack_digest(case, folder):
+    recorded = recorded_case(folder / CASE).grains
+    same = case.grains.model_copy(update={key: getattr(recorded, key) for key in _SPRINGS})
+    if record["digest"] != case.model_copy(update={"grains": same}).digest("pack"):
         raise CaseError(
             f"{folder}: its pack belongs to another case; give another --out, or leave out --set "
             "of keys that change the pack"
         )
-    return snapshot_of(frame, case, time_s=0.0)
-
-
-def _pack_digest(case: Case, folder: Path) -> str:
-    """Of the pack of `case`, which keeps its grains when only their springs are changed."""
-    recorded = recorded_case(folder / CASE)
-    same = case.grains.model_copy(update={key: getattr(recorded.grains, key) for key in _SPRINGS})
-    return case.model_copy(update={"grains": same}).digest("pack")
-
-
-_SPRINGS = ("normal_stiffness_N_m", "shear_stiffness_N_m", "friction", "density_kg_m3")
-"""Keys of [grains] that a test may set anew on grains that are packed: no place depends on them
-where the grains were packed without friction, as all are."""
+    return Packed(case=case, grains=snapshot_of(frame, case, time_s=0.0), folder=folder)
 
 
 def measure_elastic(packed: Packed, pressure_Pa: float | None) -> dict[str, Any]:
     """Elastic moduli of the pack as keys of mechanics.json, with warnings and seconds."""
-    start = time.monotonic()
-    result = elastic_moduli(packed.grains, packed.case, pressure_Pa=pressure_Pa)
+    start, case = time.monotonic(), packed.case
+    result = elastic_moduli(packed.grains, case, pressure_Pa=pressure_Pa)
+    data = case.data()
+    springs = {f"grains.{key}": data["grains"][key] for key in _SPRINGS if key in data["grains"]}
     return {
-        "case": packed.case.name,
-        "seed": packed.case.seed,
+        "case": case.name,
+        "seed": case.seed,
         **elastic_numbers(result),
-        "springs": _springs(packed.case),
-        "warnings": warnings_of(result, packed.case),
+        "springs": springs | {f"bonds.{key}": one for key, one in data.get("bonds", {}).items()},
+        "warnings": warnings_of(result, case),
         "seconds": time.monotonic() - start,
     }
 
 
 def measure_triaxial(
-    packed: Packed, test: Triaxial, follow: Callable[[Row], None]
-) -> tuple[Sheared, dict[str, Any]]:
-    """A triaxial test of the pack, and its numbers with warnings and seconds."""
-    start, case = time.monotonic(), packed.case
-    material = material_of(case, packed.grains, test.confining)
-    result = triaxial(packed.grains, material, test, periodic=case.periodic, follow=follow)
-    numbers = triaxial_numbers(result)
-    numbers["warnings"] = triaxial_warnings(result)
-    numbers["seconds"] = time.monotonic() - start
-    return result, numbers
+    packed: Packed, test: Triaxial, follow: Callable[[LoadStep], None]
+) -> dict[str, Any]:
+    """A triaxial test of the pack, as its numbers with warnings and seconds.
 
-
-def write_curve(packed: Packed, result: Sheared) -> Path:
-    """Write stress_strain.csv and its figure to the folder of the mechanics; the table's path."""
+    Writes stress_strain.csv and its figure to the folder of the mechanics.
+    """
     from fdnet.report.figures import draw_stress_strain
 
+    start, case = time.monotonic(), packed.case
+    material = pack_material(case, packed.grains, test.confining)
+    result = triaxial(packed.grains, material, test, periodic=case.periodic, follow=follow)
+    numbers = {**triaxial_numbers(result), "warnings": triaxial_warnings(result)}
+    numbers["seconds"] = time.monotonic() - start
     folder = packed.folder / FOLDER
     folder.mkdir(parents=True, exist_ok=True)
-    names = [one.name for one in fields(Row)]
+    names = [one.name for one in fields(LoadStep)]
     lines = [",".join(_COLUMNS.get(name, name) for name in names)]
     lines += [",".join(f"{getattr(row, name):.9g}" for name in names) for row in result.rows]
-    path = write_text(folder / CURVE, "\n".join(lines) + "\n")
+    write_text(folder / CURVE, "\n".join(lines) + "\n")
     draw_stress_strain(result.rows, folder / "stress_strain.png", bonds=result.bonds)
-    return path
+    return numbers
 
 
 _COLUMNS = {"axial": "axial_Pa", "side": "side_Pa", "tension": "broken_in_tension"} | {
     "shear": "broken_in_shear"
 }
-
-
-def _springs(case: Case) -> dict[str, Any]:
-    data = case.data()
-    grains = data["grains"]
-    return {
-        **{f"grains.{key}": grains[key] for key in _SPRINGS if key in grains},
-        **{f"bonds.{key}": value for key, value in data.get("bonds", {}).items()},
-    }
 
 
 def write_mechanics(packed: Packed, numbers: dict[str, Any]) -> Path:

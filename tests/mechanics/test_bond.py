@@ -5,20 +5,20 @@ import pytest
 
 from fdnet.mechanics.springs import (
     Cement,
-    Material,
+    PackMaterial,
     bond_springs,
     bond_stress,
-    direct,
-    discs_of,
+    direct_solver,
+    disc_radius,
     find_joints,
     kinematics,
-    stiffness,
+    stiffness_matrix,
 )
 from fdnet.spheres.snapshot import resting
 
 R1, R2 = 0.3e-3, 0.2e-3
 CEMENT = Cement(radius_ratio=0.5, normal=9e13, shear=4e13)
-MATERIAL = Material(normal=1.0, shear=1.0, cement=CEMENT)
+MATERIAL = PackMaterial(normal=1.0, shear=1.0, cement=CEMENT)
 RADIUS = 0.5 * R2
 AREA, BENDING, TWIST = np.pi * RADIUS**2, np.pi * RADIUS**4 / 4, np.pi * RADIUS**4 / 2
 FORCE, MOMENT = 0.7, 2e-5
@@ -37,9 +37,11 @@ def loaded(axis, force, moment):
     joints, maps = bonded(axis)
     springs = bond_springs(joints, MATERIAL)
     free = maps.of_grains[:, 6:]
-    motion = direct(stiffness(free, springs))(np.concatenate([force, np.array(moment) / R1]))
+    motion = direct_solver(stiffness_matrix(free, springs))(
+        np.concatenate([force, np.array(moment) / R1])
+    )
     inner = (springs.ravel() * (free @ motion)).reshape(-1, 6)
-    tension, shear = bond_stress(inner, discs_of(joints, MATERIAL))
+    tension, shear = bond_stress(inner, disc_radius(joints, MATERIAL))
     return motion[:3], motion[3:] / R1, float(tension[0]), float(shear[0])
 
 

@@ -7,11 +7,11 @@ from fdnet.errors import MechanicsError
 from fdnet.mechanics.elastic import elastic_of
 from fdnet.mechanics.springs import (
     Cement,
-    Material,
+    Moduli,
+    PackMaterial,
     anisotropy_of,
-    conjugate_gradients,
-    direct,
-    moduli,
+    direct_solver,
+    iterative_solver,
     voigt_average,
     young_along,
 )
@@ -19,7 +19,7 @@ from fdnet.spheres.snapshot import resting
 
 R = 0.3e-3
 ALL = (True, True, True)
-SPRINGS = Material(normal=3e6, shear=1e6)
+SPRINGS = PackMaterial(normal=3e6, shear=1e6)
 
 
 def lattice(basis, side, cells):
@@ -67,7 +67,7 @@ def test_a_face_centred_lattice_in_closed_form():
 
 def test_bonds_stiffen_a_simple_cubic_lattice_by_their_discs():
     cement = Cement(radius_ratio=0.5, normal=8e13, shear=2e13)
-    material = Material(normal=3e6, shear=1e6, cement=cement)
+    material = PackMaterial(normal=3e6, shear=1e6, cement=cement)
     area = np.pi * (0.5 * R) ** 2
     tensor = elastic_of(simple_cubic(), material, periodic=ALL).tensor * 2 * R
     assert tensor[0, 0] == pytest.approx(3e6 + 8e13 * area, rel=1e-8)
@@ -78,7 +78,7 @@ def test_plates_carry_a_column_as_its_springs_in_series():
     """Six grains and two plates are seven springs in series; the sides hang free of it."""
     place = np.column_stack([(2 * np.arange(6) + 1) * R, np.full(6, R), np.full(6, R)])
     box = np.array([[0, 12 * R], [0, 2 * R], [0, 2 * R]])
-    smooth = Material(normal=3e6, shear=1e-3)
+    smooth = PackMaterial(normal=3e6, shear=1e-3)
     tensor = elastic_of(resting(place, R, box), smooth, periodic=(False,) * 3).tensor
     assert tensor[0, 0] == pytest.approx(3e6 / 7 * 12 * R / (4 * R**2), rel=1e-6)
 
@@ -89,7 +89,7 @@ def test_a_column_gives_way_under_the_flow_as_an_even_load_on_springs():
 
     place = np.column_stack([(2 * np.arange(5) + 1) * R, np.full(5, R), np.full(5, R)])
     box = np.array([[0, 10 * R], [0, 2 * R], [0, 2 * R]])
-    smooth = Material(normal=3e6, shear=1e-3)
+    smooth = PackMaterial(normal=3e6, shear=1e-3)
     force = 1e9 * 8 * R**3
     moved = displacement_under_flow(resting(place, R, box), smooth, 1e9, periodic=(False,) * 3)
     assert moved[2, 0] == pytest.approx(4.5 * force / 3e6, rel=1e-6)
@@ -112,13 +112,13 @@ def test_numbering_and_units_do_not_matter():
     largest = first.max()
     renumbered = elastic_of(again, SPRINGS, periodic=ALL).tensor
     assert np.allclose(renumbered, first, rtol=0, atol=1e-6 * largest)
-    in_mm = elastic_of(other, Material(normal=3e3, shear=1e3), periodic=ALL).tensor * 1e6
+    in_mm = elastic_of(other, PackMaterial(normal=3e3, shear=1e3), periodic=ALL).tensor * 1e6
     assert np.allclose(in_mm, first, rtol=0, atol=1e-6 * largest)
 
 
 def test_the_two_solvers_agree():
     from fdnet.mechanics.elastic import carrying
-    from fdnet.mechanics.springs import contact_springs, kinematics, stiffness
+    from fdnet.mechanics.springs import contact_springs, kinematics, stiffness_matrix
 
     pack = random_pack()
     joints, kept = carrying(pack, SPRINGS, ALL)
@@ -126,8 +126,8 @@ def test_the_two_solvers_agree():
     springs = contact_springs(joints, SPRINGS)
     live = maps.of_grains[:, np.flatnonzero(np.repeat(kept, 6))]
     load = live.T @ (springs.ravel() * maps.of_strain[:, 0])
-    matrix = stiffness(live, springs)
-    one, other = direct(matrix)(load), conjugate_gradients(matrix)(load)
+    matrix = stiffness_matrix(live, springs)
+    one, other = direct_solver(matrix)(load), iterative_solver(matrix)(load)
     assert load @ one == pytest.approx(load @ other, rel=1e-8)
 
 
@@ -160,4 +160,4 @@ def test_constants_of_a_cubic_tensor():
     assert young_along(tensor)[0] == pytest.approx(6 * 21 / 16)
     reuss = 5 / (2 * 2 / 6 + 3 / 4)
     assert anisotropy_of(tensor) == pytest.approx(5 * 3.6 / reuss - 5)
-    assert moduli(7.0, 3.6).young == pytest.approx(9 * 7 * 3.6 / (21 + 3.6))
+    assert Moduli(7.0, 3.6).young == pytest.approx(9 * 7 * 3.6 / (21 + 3.6))

@@ -71,17 +71,17 @@ def test_stiffness_and_bonds_may_be_set_anew_on_a_pack(packed, capsys):
 
 @pytest.mark.liggghts
 def test_hertz_contacts_stiffen_with_the_third_root_of_pressure(packed):
-    from fdnet.mechanics.of_case import material_of
+    from fdnet.mechanics.of_case import pack_material
     from fdnet.spheres.snapshot import resting
 
     data = recorded_case(packed / "case.toml").data()
     del data["grains"]["normal_stiffness_N_m"], data["grains"]["shear_stiffness_N_m"]
     case = case_from(data | {"contact": {"model": "hertz"}})
     pair = resting([[1e-3, 1e-3, 1e-3], [1.5e-3, 1e-3, 1e-3]], 2.5e-4, [[0, 2.4e-3]] * 3)
-    soft, stiff = (material_of(case, pair, pressure) for pressure in (1e6, 8e6))
+    soft, stiff = (pack_material(case, pair, pressure) for pressure in (1e6, 8e6))
     assert stiff.normal / soft.normal == pytest.approx(2.0, rel=1e-9)
     with pytest.raises(CaseError, match="--confining_MPa"):
-        material_of(case, pair)
+        pack_material(case, pair)
 
 
 @pytest.mark.liggghts

@@ -8,7 +8,7 @@ from test_elastic import R, random_pack, simple_cubic
 
 from fdnet.errors import CaseError, MechanicsError
 from fdnet.mechanics.elastic import elastic_of
-from fdnet.mechanics.springs import Cement, Material, young_along
+from fdnet.mechanics.springs import Cement, PackMaterial, young_along
 from fdnet.mechanics.triaxial import (
     SHEAR,
     SOUND,
@@ -18,14 +18,14 @@ from fdnet.mechanics.triaxial import (
     at_rest,
     balance,
     carried_out,
+    loaded_pack,
     overloaded,
-    scene_of,
     triaxial,
 )
 from fdnet.spheres.snapshot import resting
 
 ALL = (True, True, True)
-SAND = Material(normal=5e7, shear=2e7, friction=0.5)
+SAND = PackMaterial(normal=5e7, shear=2e7, friction=0.5)
 SIDE = 2 * R
 
 
@@ -36,10 +36,10 @@ def column():
 
 
 def strained(pack, material, strain, stress=0.0):
-    scene = scene_of(pack, replace(material, glued=False), ALL)
+    loaded = loaded_pack(pack, replace(material, glued=False), ALL)
     load = Load(strain=np.array(strain), stress=np.full(3, stress), drag=1e-3, within=1e-12)
-    motion, given, _ = balance(scene, material, load)
-    return scene, *carried_out(scene, material, motion, given)
+    motion, given, _ = balance(loaded, load)
+    return loaded, *carried_out(loaded, motion, given)
 
 
 def test_a_contact_opens_and_pulls_nothing():
@@ -59,24 +59,24 @@ def test_bonds_break_in_tension_at_their_strength():
     pack = at_rest(column(), material, ALL, relieved=True)
     at_strength = 1e7 / (1e14 * SIDE)
     for share in (0.99, 1.01):
-        scene, _, forces = strained(pack, material, [share * at_strength, 0, 0])
-        ratio, how = overloaded(scene, forces, material)
+        loaded, _, forces = strained(pack, material, [share * at_strength, 0, 0])
+        ratio, how = overloaded(loaded, forces)
         assert ratio.max() == pytest.approx(share, rel=1e-3)
         assert how[np.argmax(ratio)] == TENSION
-    assert np.all(pack.broken == SOUND)
+    assert np.all(pack.memory.broken == SOUND)
 
 
 def test_a_bond_twisted_beyond_its_shear_strength_breaks_in_shear():
-    from fdnet.mechanics.springs import bond_stress, discs_of
+    from fdnet.mechanics.springs import bond_stress, disc_radius
 
     cement = Cement(radius_ratio=0.5, normal=1e14, shear=1e14)
-    scene = scene_of(
+    loaded = loaded_pack(
         at_rest(column(), replace(SAND, cement=cement), ALL, relieved=True),
         replace(SAND, cement=cement),
         ALL,
     )
-    disc = discs_of(scene.joints, replace(SAND, cement=cement))
-    force = np.zeros((len(scene.joints), 6))
+    disc = disc_radius(loaded.joints, replace(SAND, cement=cement))
+    force = np.zeros((len(loaded.joints), 6))
     force[:, 3] = 1e-6
     tension, shear = bond_stress(force, disc)
     assert shear[0] == pytest.approx(2 * 1e-6 / (np.pi * (R / 2) ** 3), rel=1e-12)
@@ -97,7 +97,7 @@ def test_a_simple_cubic_lattice_bears_an_oedometer_as_its_springs():
 def test_a_bonded_pack_starts_with_the_young_modulus_of_the_sparse_solve():
     """Bonds without friction or opening are linear: two methods, one answer."""
     cement = Cement(radius_ratio=0.7, normal=5e13, shear=2e13)
-    material = Material(normal=5e7, shear=2e7, friction=1e3, cement=cement)
+    material = PackMaterial(normal=5e7, shear=2e7, friction=1e3, cement=cement)
     pack = random_pack(count=60)
     test = Triaxial(confining=5e6, strain=1e-5, steps=1, tolerance=1e-5)
     result = triaxial(pack, material, test, periodic=ALL)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fdnet.errors import CaseError, NetworkError
-from fdnet.network.flow.sections import Solved, depth_pressures, layer_edges, whole_permeability
+from fdnet.network.flow.sections import layer_edges, plane_pressures, whole_permeability
 from fdnet.network.laws.cross_section import (
     aim,
     aim_at_fourth,
@@ -170,10 +170,9 @@ def test_values_in_place_and_layers_add_up_to_the_whole(pack, analysis):
     halves = half_resistances(network)
     flow = whole_permeability(network, 1.0 / halves.sum(axis=1))[1]
     planes = np.linspace(*pack.box[0], 30)
-    pressure = depth_pressures(network, flow, halves, planes)
+    pressure = plane_pressures(network, flow, planes, halves)
     assert pressure[[0, -1]] == pytest.approx([1.0, 0.0])
     assert np.all(np.diff(pressure) < 0)
-    assert Solved(network=network, flow=flow, halves=halves).flow is flow
 
 
 def test_layers_are_as_thick_as_a_fine_and_fill_the_first_millimetre():
@@ -211,19 +210,18 @@ def test_fines_that_seem_to_raise_k_are_capped_section_by_section_and_counted(pa
     """k of the whole is then the series of its sections, each at most that of the grains."""
     edges = np.linspace(*pack.box[0], 4)
     sides = Sides(periodic=(False, True, True), walls="no-slip")
-    timed = Log().timed
-    whole = measure_all_spheres(pack, edges, sides=sides, timed=timed)
+    whole = measure_all_spheres(pack, edges, sides=sides, log=Log())
     k, cut, place = whole.k, whole.slabs.cut_out, whole.slabs.inplace
     factor = np.array([0.9, 1.2, 0.8])
     grains = replace(whole.slabs, cut_out=factor * cut, inplace=factor * place)
     empty = np.array([False, True, False])
-    least, counts = at_most_the_grains(whole, (0.85 * k, grains), edges, empty)
+    least, counts = at_most_the_grains(whole, 0.85 * k, grains, edges, empty)
     assert least.slabs.cut_out == pytest.approx(factor * cut)
     assert least.slabs.inplace == pytest.approx(np.minimum(factor, 1.0) * place)
     assert least.k == pytest.approx(min(3.0 / np.sum(1.0 / least.slabs.inplace), 0.85 * k))
     above = ("all_spheres_above_grains", "all_spheres_sections_above_grains")
     assert [counts[name] for name in above] == [1, 2]
-    same, counts = at_most_the_grains(whole, (2.0 * k, None), edges, empty)
+    same, counts = at_most_the_grains(whole, 2.0 * k, None, edges, empty)
     assert (same.k, same.slabs.inplace.tolist()) == (k, place.tolist())
     assert [counts[name] for name in above] == [0, 0]
 

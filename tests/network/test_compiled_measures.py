@@ -1,4 +1,4 @@
-"""The compiled measures of tetrahedra and facets are the closed forms of `geometry`."""
+"""The compiled measures of tetrahedra and facets are the `closed_forms`."""
 
 import numpy as np
 import pytest
@@ -6,6 +6,7 @@ import pytest
 from fdnet.network import geometry
 from fdnet.network.tessellation import delaunay as tetrahedron
 from fdnet.network.tessellation import facets as section
+from tests.network import closed_forms
 
 COUNT = 400
 
@@ -21,7 +22,7 @@ def bodies(corners: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def test_touching_spheres_and_whether_their_centres_are_within():
     points, radius, vertex = bodies(4)
     centre, touching, within = tetrahedron.touching_spheres(points, radius, vertex, 1e-5)
-    expected_centre, expected = geometry.touching_sphere(points[vertex], radius[vertex])
+    expected_centre, expected = closed_forms.touching_sphere(points[vertex], radius[vertex])
     real = np.isfinite(expected)
     assert np.array_equal(np.isfinite(touching), real)
     assert 50 < real.sum() < COUNT
@@ -43,7 +44,7 @@ def test_touching_spheres_and_whether_their_centres_are_within():
 def test_solids_in_tetrahedra():
     points, radius, vertex = bodies(4)
     measured = tetrahedron.solids(points, radius, vertex)
-    expected = geometry.solid_in_tetrahedra(points[vertex], radius[vertex])
+    expected = closed_forms.solid_in_tetrahedra(points[vertex], radius[vertex])
     for one, other in zip(measured, expected, strict=True):
         assert one == pytest.approx(other, rel=1e-9, abs=1e-12)
 
@@ -53,11 +54,9 @@ def test_power_centres_volumes_and_reaches():
     shaken = points + 1e-7
     volume = np.abs(geometry.signed_volume(points[vertex]))
     flattest = float(np.quantile(volume, 0.1))
-    centre, reach, given, flat = tetrahedron.centres(
-        points, shaken, radius, vertex, (flattest, 2.0)
-    )
+    centre, reach, given, flat = tetrahedron.centres(points, shaken, radius, vertex, flattest, 2.0)
     place = np.where((volume < flattest)[:, None, None], shaken[vertex], points[vertex])
-    expected, power = geometry.power_centre(place, radius[vertex])
+    expected, power = closed_forms.power_centre(place, radius[vertex])
     assert given == pytest.approx(volume, rel=1e-12)
     assert np.array_equal(flat, volume < flattest)
     assert np.max(np.abs(centre - expected) / np.abs(expected).max(axis=1)[:, None]) < 1e-9
@@ -68,12 +67,12 @@ def test_sections():
     points, radius, vertex = bodies(3)
     inscribed, area, overlap = section.sections(points, radius, vertex, 1e-6)
     corner, disc = points[vertex], radius[vertex]
-    expected = geometry.touching_circle(corner, disc)
+    expected = closed_forms.touching_circle(corner, disc)
     real = np.isfinite(expected)
     assert np.array_equal(np.isfinite(inscribed), real)
     assert 50 < real.sum() < COUNT
     assert inscribed[real] == pytest.approx(expected[real], rel=1e-8)
-    assert area == pytest.approx(geometry.open_area(corner, disc), rel=1e-9, abs=1e-12)
+    assert area == pytest.approx(closed_forms.open_area(corner, disc), rel=1e-9, abs=1e-12)
     apart = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2)
     assert np.array_equal(overlap, np.any(apart < disc + np.roll(disc, 1, axis=1), axis=1))
 
@@ -83,10 +82,12 @@ def test_heights_are_those_of_the_places_and_sides_those_of_the_shaken():
     shaken = points + np.array([[0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, -1e-7]])
     centre = np.array([[0.2, 0.2, -0.5], [0.2, 0.2, -0.75]])
     measured = section.heights(
-        (points, shaken),
+        points,
+        shaken,
         np.array([[0, 1, 2]], np.int32),
         np.array([3]),
         centre,
-        (np.array([[0, 1]], np.int32), np.array([[0.0, 0.0, 1.0]])),
+        np.array([[0, 1]], np.int32),
+        np.array([[0.0, 0.0, 1.0]]),
     )
     assert measured[0] == pytest.approx([0.5, 0.25], rel=1e-14)

@@ -17,9 +17,9 @@ from fdnet.network.fines.occupancy import (
     measure_occupancy,
     two_plane_volume,
 )
-from fdnet.network.geometry import disc_lens_area
 from fdnet.network.network import build_network
 from fdnet.spheres.snapshot import Kind
+from tests.network.closed_forms import disc_lens_area
 from tests.network.networks import chain
 from tests.network.packs import random_pack, snapshot, with_fines
 

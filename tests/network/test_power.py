@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from fdnet.network import geometry
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import build_network
 from fdnet.network.tessellation import delaunay
 from fdnet.spheres.geometry import measure_porosity
+from tests.network import closed_forms
 from tests.network.packs import random_pack, snapshot
 
 ALL = (True,) * 3
@@ -59,7 +59,7 @@ def test_power_centres_of_a_body_centred_lattice_of_two_sizes():
 
 def test_radical_centre_of_three_discs_on_paper():
     """Discs of radius 1, 1, 2 at (0,0), (4,0), (0,4): lines x = 2 and y = (16 + 1 - 4) / 8."""
-    centre, power = geometry.power_centre(
+    centre, power = closed_forms.power_centre(
         np.array([[0.0, 0], [4, 0], [0, 4]]), np.array([1.0, 1, 2])
     )
     assert centre == pytest.approx([2, 13 / 8])

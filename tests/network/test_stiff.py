@@ -6,7 +6,12 @@ import pytest
 from fdnet.errors import FlowError
 from fdnet.network.flow import solver as stiff
 from fdnet.network.flow.flow import solve_flow
-from fdnet.network.flow.solver import balance_links, groups, heights, stiffness, winding_groups
+from fdnet.network.flow.solver import (
+    balance_links,
+    cancelling_pressures,
+    stiffness,
+    winding_groups,
+)
 from tests.network.exact import exact_balance, random_links
 from tests.network.networks import chain, network_of
 
@@ -78,7 +83,7 @@ def test_stiffness_counts_contrasts_above_the_weakest_link_of_the_best_way():
 def test_heights_take_up_the_jumps_of_a_forest():
     ends = np.array([(0, 1), (2, 1), (2, 3), (4, 5)])
     jump = np.array([1.0, 0.0, -2.0, 3.0])
-    height = heights(ends, jump, groups(ends, 6))
+    height = cancelling_pressures(ends, jump, 6)
     assert (jump + height[ends[:, 0]] - height[ends[:, 1]]).tolist() == [0, 0, 0, 0]
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.errors import FlowError
-from fdnet.network.flow.solver import Balance, balance_links, groups, winding_groups
+from fdnet.network.flow.solver import balance_links, groups, winding_groups
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array, frozen, one_line
 
@@ -41,12 +41,6 @@ class Links:
     throat: Array
 
     __repr__ = one_line
-
-    def where(self, kept: Array) -> "Links":
-        """The links for which `kept` (K,) is true."""
-        return Links(
-            ends=self.ends[kept], conductance=self.conductance[kept], throat=self.throat[kept]
-        )
 
 
 def open_links(network: Network, conductance: Array) -> Links:
@@ -86,12 +80,19 @@ def links_between(
         place: (G,) INLET, OUTLET or BETWEEN for each group of pores.
         free: (G,) true for groups between the planes that open links tie to both.
     """
-    low, high = span
     first = np.unique(network.pore_group, return_index=True)[1]
-    place = _places(network, network.pore_position[first, 0], low, high)
-    links = _cut_links(network, conductance * network.throat_share, low, high)
-    free = _tied_to_both(links, place)
-    return links.where(np.all((links.ends < 0) | free[links.ends], axis=1)), place, free
+    place = _places(network, network.pore_position[first, 0], span)
+    links = _cut_links(network, conductance * network.throat_share, span)
+    cluster = groups(links.ends[np.all(links.ends >= 0, axis=1)], len(place))
+    free = place == BETWEEN
+    for plane in (INLET, OUTLET):
+        near = links.ends[np.any(links.ends == plane, axis=1)].max(axis=1, initial=-1)
+        free &= np.isin(cluster, cluster[near[near >= 0]])
+    kept = np.all((links.ends < 0) | free[links.ends], axis=1)
+    carrying = Links(
+        ends=links.ends[kept], conductance=links.conductance[kept], throat=links.throat[kept]
+    )
+    return carrying, place, free
 
 
 def links_around(network: Network, conductance: Array) -> tuple[Links, Array]:
@@ -111,13 +112,14 @@ def links_around(network: Network, conductance: Array) -> tuple[Links, Array]:
     return Links(ends=ends[throat], conductance=carried[throat], throat=throat), live
 
 
-def _places(network: Network, x: Array, low: float, high: float) -> Array:
+def _places(network: Network, x: Array, span: tuple[float, float]) -> Array:
     """INLET or OUTLET where `x` m is on or beyond that plane, else BETWEEN."""
     tolerance = PLANE_TOLERANCE * float(network.box[0, 1] - network.box[0, 0])
-    return np.where(x <= low + tolerance, INLET, np.where(x >= high - tolerance, OUTLET, BETWEEN))
+    low, high = span[0] + tolerance, span[1] - tolerance
+    return np.where(x <= low, INLET, np.where(x >= high, OUTLET, BETWEEN))
 
 
-def _cut_links(network: Network, conductance: Array, low: float, high: float) -> Links:
+def _cut_links(network: Network, conductance: Array, span: tuple[float, float]) -> Links:
     """Open throats with a part between the planes; those that cross a plane are cut there."""
     turned = np.flatnonzero(network.throat_shift[:, 0] != 0)
     throat = np.concatenate([np.arange(len(conductance)), turned])
@@ -126,13 +128,13 @@ def _cut_links(network: Network, conductance: Array, low: float, high: float) ->
     x[:, 1] += network.throat_shift[throat, 0] * length
     # a throat across a periodic x face appears at both ends of the box
     x[len(conductance) :] -= (network.throat_shift[turned, 0] * length)[:, None]
-    place = _places(network, x, low, high)
+    place = _places(network, x, span)
     group = network.pore_group[network.throat_pores[throat]]
     on_planes = place != BETWEEN
     use = ((place[:, 0] == BETWEEN) | (place[:, 0] != place[:, 1])) & (conductance[throat] > 0)
     use &= on_planes.any(axis=1) | (group[:, 0] != group[:, 1])
     throat, x, place, group = throat[use], x[use], place[use], group[use]
-    inside, whole = np.diff(np.clip(x, low, high), axis=1)[:, 0], np.diff(x, axis=1)[:, 0]
+    inside, whole = np.diff(np.clip(x, *span), axis=1)[:, 0], np.diff(x, axis=1)[:, 0]
     share = np.divide(inside, whole, out=np.ones(len(x)), where=on_planes[use].any(axis=1))
     return Links(
         ends=np.where(place == BETWEEN, group, place),
@@ -141,22 +143,11 @@ def _cut_links(network: Network, conductance: Array, low: float, high: float) ->
     )
 
 
-def _tied_to_both(links: Links, place: Array) -> Array:
-    """True (G,) for groups of pores between the planes that open links tie to both planes."""
-    inner = links.ends[np.all(links.ends >= 0, axis=1)]
-    cluster = groups(inner, len(place))
-    free = place == BETWEEN
-    for plane in (INLET, OUTLET):
-        near = links.ends[np.any(links.ends == plane, axis=1)].max(axis=1, initial=-1)
-        free &= np.isin(cluster, cluster[near[near >= 0]])
-    return free
-
-
 # ------------------------------------------------------------------------------------------------
 # Steady flow through a network: pressures from the mass balance of each pore.
 #
 # Viscosity is factored out, so conductances and fluxes are in m3. Pressure is held on two planes
-# across x: 1 on the inlet plane, 0 on the outlet plane (`links`). Where x is periodic and no slab
+# across x: 1 on the inlet plane, 0 on the outlet plane (`Links`). Where x is periodic and no slab
 # is cut out, the pressure drops by 1 per period instead.
 
 
@@ -231,45 +222,57 @@ def solve_flow(
         k = 2.5e-09 m2
     """
     check_conductance(conductance, len(network.throat_pores))
-    if span is None and network.periodic[0]:
-        return _solve_period(network, conductance)
-    low, high = map(float, network.box[0] if span is None else span)
-    links, place, free = links_between(network, conductance, (low, high))
-    isolated = int(np.sum(((place == BETWEEN) & ~free)[network.pore_group]))
-    pressure = np.where(place == INLET, 1.0, np.where(place == OUTLET, 0.0, np.nan))
+    group, around = network.pore_group, span is None and network.periodic[0]
+    if around:
+        links, free = links_around(network, conductance)
+        lost, pressure = ~free, np.full(len(free), np.nan)
+        # one pore of each connected group is the reference of that group
+        node = (np.cumsum(free) - 1)[links.ends]
+        jump = network.throat_shift[links.throat, 0].astype(float)
+        reason, bounds = "no open path around the period along x", (-np.inf, np.inf)
+    else:
+        low, high = map(float, network.box[0] if span is None else span)
+        links, place, free = links_between(network, conductance, (low, high))
+        lost = (place == BETWEEN) & ~free
+        pressure = np.where(place == INLET, 1.0, np.where(place == OUTLET, 0.0, np.nan))
+        # both planes are node 0, before the free groups
+        node = np.where(links.ends < 0, 0, np.cumsum(free)[links.ends])
+        jump = 1.0 * (links.ends[:, 0] == INLET) - 1.0 * (links.ends[:, 1] == INLET)
+        reason, bounds = f"no open path from x = {low:g} m to x = {high:g} m", (0.0, 1.0)
+    isolated = int(np.sum(lost[group]))
     if not len(links.throat):
-        reason = f"no open path from x = {low:g} m to x = {high:g} m"
-        return _no_flow(pressure[network.pore_group], len(conductance), isolated, reason)
-    balance = _solve(links, free)
-    pressure[free], flux = balance.pressure[1:], balance.flux
-    inflow, outflow = _through(links, flux, INLET), -_through(links, flux, OUTLET)
-    per_throat = np.bincount(links.throat, weights=flux, minlength=len(conductance))
-    return _checked(
-        Flow(
-            pore_pressure=frozen(pressure[network.pore_group]),
-            throat_flux=frozen(per_throat),
-            method=balance.method,
-            inflow=inflow,
-            residual=balance.defect,
-            mass_balance=_apart(inflow, outflow),
+        return Flow(
+            pore_pressure=frozen(pressure[group]),
+            throat_flux=frozen(np.zeros(len(conductance))),
+            method=NOT_SOLVED,
+            residual=0.0,
+            mass_balance=None,
+            inflow=0.0,
             isolated_pores=isolated,
-            carrying_throats=_carrying(balance.flux, links.conductance),
-            reason="",
-        ),
-        bounds=(0.0, 1.0),
+            carrying_throats=0.0,
+            reason=reason,
+        )
+    solved = balance_links(node, links.conductance, jump, int(free.sum()) + (not around))
+    pressure[free], flux = solved.pressure[0 if around else 1 :], solved.flux
+    if around:
+        inflow, other = float(flux @ jump), float(np.sum(flux**2 / links.conductance))
+    else:
+        inflow, other = _through(links, flux, INLET), -_through(links, flux, OUTLET)
+    drop = np.abs(flux) / links.conductance
+    energy = np.abs(flux) / np.abs(flux).max() * (drop / drop.max())
+    flow = Flow(
+        pore_pressure=frozen(pressure[group]),
+        throat_flux=frozen(np.bincount(links.throat, weights=flux, minlength=len(conductance))),
+        method=solved.method,
+        inflow=inflow,
+        residual=solved.defect,
+        mass_balance=abs(inflow - other) / inflow if inflow > 0 else np.inf,
+        isolated_pores=isolated,
+        carrying_throats=float(energy.sum() ** 2 / np.sum(energy**2)),
+        reason="",
     )
-
-
-def _solve(links: Links, free: Array) -> Balance:
-    """Balance of the `free` (G,) groups, in their order after node 0, which is both planes."""
-    node = np.where(links.ends < 0, 0, np.cumsum(free)[links.ends])
-    jump = 1.0 * (links.ends[:, 0] == INLET) - 1.0 * (links.ends[:, 1] == INLET)
-    return balance_links(node, links.conductance, jump, int(free.sum()) + 1)
-
-
-def _apart(inflow: float, other: float) -> float:
-    """|inflow - other| / inflow, infinite for an inflow that is not positive."""
-    return abs(inflow - other) / inflow if inflow > 0 else np.inf
+    _check(flow, bounds)
+    return flow
 
 
 def _through(links: Links, flux: Array, plane: int) -> float:
@@ -277,30 +280,8 @@ def _through(links: Links, flux: Array, plane: int) -> float:
     return float(np.sum(flux[links.ends[:, 0] == plane]) - np.sum(flux[links.ends[:, 1] == plane]))
 
 
-def _carrying(flux: Array, conductance: Array) -> float:
-    """`Flow.carrying_throats` of links (K,) with these `flux` and `conductance`, m3."""
-    drop = np.abs(flux) / conductance
-    energy = np.abs(flux) / np.abs(flux).max() * (drop / drop.max())
-    return float(energy.sum() ** 2 / np.sum(energy**2))
-
-
-def _no_flow(pressure: Array, throats: int, isolated: int, reason: str) -> Flow:
-    """The flow where no open path joins inlet and outlet."""
-    return Flow(
-        pore_pressure=frozen(pressure),
-        throat_flux=frozen(np.zeros(throats)),
-        method=NOT_SOLVED,
-        residual=0.0,
-        mass_balance=None,
-        inflow=0.0,
-        isolated_pores=isolated,
-        carrying_throats=0.0,
-        reason=reason,
-    )
-
-
-def _checked(flow: Flow, *, bounds: tuple[float, float]) -> Flow:
-    """The same flow. Raises FlowError if it does not balance or leaves the pressure `bounds`."""
+def _check(flow: Flow, bounds: tuple[float, float]) -> None:
+    """Raise FlowError if the flow does not balance or leaves the pressure `bounds`."""
     pressure = flow.pore_pressure[np.isfinite(flow.pore_pressure)]
     low, high = float(pressure.min(initial=np.inf)), float(pressure.max(initial=-np.inf))
     within = not len(pressure) or (low >= bounds[0] - TOLERANCE and high <= bounds[1] + TOLERANCE)
@@ -313,41 +294,3 @@ def _checked(flow: Flow, *, bounds: tuple[float, float]) -> Flow:
             f"{balance:.2g}, pressures {low:.6g} to {high:.6g}; expected <= {TOLERANCE:g} and "
             f"pressures within {bounds}"
         )
-    return flow
-
-
-def _solve_period(network: Network, conductance: Array) -> Flow:
-    """Flow for a pressure drop of 1 per period along x.
-
-    The pressure of one pore in each connected group is the reference of that group.
-    """
-    group = network.pore_group
-    links, live = links_around(network, conductance)
-    isolated = int(np.sum(~live[group]))
-    if not live.any():
-        nowhere = np.full(len(group), np.nan)
-        return _no_flow(
-            nowhere, len(conductance), isolated, "no open path around the period along x"
-        )
-    throat, g = links.throat, links.conductance
-    node, jump = (np.cumsum(live) - 1)[links.ends], network.throat_shift[throat, 0].astype(float)
-    balance = balance_links(node, g, jump, int(live.sum()))
-    pressure = np.full(len(live), np.nan)
-    pressure[live] = balance.pressure
-    inflow, spent = float(balance.flux @ jump), float(np.sum(balance.flux**2 / g))
-    return _checked(
-        Flow(
-            pore_pressure=frozen(pressure[group]),
-            throat_flux=frozen(
-                np.bincount(throat, weights=balance.flux, minlength=len(conductance))
-            ),
-            method=balance.method,
-            residual=balance.defect,
-            inflow=inflow,
-            mass_balance=_apart(inflow, spent),
-            isolated_pores=isolated,
-            carrying_throats=_carrying(balance.flux, links.conductance),
-            reason="",
-        ),
-        bounds=(-np.inf, np.inf),
-    )

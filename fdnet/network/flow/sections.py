@@ -1,7 +1,4 @@
-"""Permeability by depth: slabs cut out and in place, thin layers, sections and profile.
-
-Permeability of slabs across the flow: cut out, and from the pressures of the whole specimen.
-"""
+"""Permeability by depth: slabs cut out and in place, thin layers, sections and profile."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -47,62 +44,86 @@ def slab_permeability(
     return flow.inflow * (span[1] - span[0]) / network.area, flow
 
 
-def inplace_permeability(network: Network, flow: Flow, edges: Array) -> Array:
+def inplace_permeability(
+    network: Network, flow: Flow, edges: Array, halves: Array | None = None
+) -> Array:
     """Permeability (S,) m2 of the slabs between `edges` (S+1,) m in the whole specimen.
 
     k = Q mu dx / (A dp), with the thickness dx of the slab, the cross-section A of the box, the
     flow Q, the viscosity mu and the difference dp between the flux-weighted mean pressures of the
-    two planes. That is the energy which the slab spends over the flow: it is always positive, and
-    the differences add up to that of the whole. Without flow the permeability is 0.
+    two planes (`plane_pressures`). That is the energy which the slab spends over the flow: it is
+    always positive, and the differences add up to that of the whole. Without flow the permeability
+    is 0.
     """
     if flow.inflow == 0:
         return np.zeros(len(edges) - 1)
-    pressure = plane_pressures(network, flow, edges)
+    pressure = plane_pressures(network, flow, edges, halves)
     return flow.inflow * np.diff(edges) / (network.area * -np.diff(pressure))
 
 
-def plane_pressures(network: Network, flow: Flow, planes: Array) -> Array:
-    """Flux-weighted mean pressure (n,) on `planes` (n,) m: 1 on the low x face, 0 on the high."""
-    if not network.periodic[0]:
-        inner = [_crossing_sums(network, flow, plane) for plane in planes]
-        low, high = network.box[0]
-        return np.array(
-            [
-                1.0 if plane <= low else 0.0 if plane >= high else total / net
-                for plane, (total, net) in zip(planes, inner, strict=True)
-            ]
-        )
-    length = float(network.box[0, 1] - network.box[0, 0])
-    means = []
-    for plane in (float(network.box[0, 0]), *planes):
-        # the plane one period on has the pressure of this one less 1
-        sums = [
-            (turn, *_crossing_sums(network, flow, plane + turn * length)) for turn in (-1, 0, 1)
-        ]
-        means.append(
-            sum(total + turn * net for turn, total, net in sums) / sum(net for _, _, net in sums)
-        )
-    return np.array(means[1:]) - means[0] + 1.0
+def plane_pressures(
+    network: Network, flow: Flow, planes: Array, halves: Array | None = None
+) -> Array:
+    """Flux-weighted mean pressure (n,) on `planes` (n,) m: 1 on the low x face, 0 on the high.
 
-
-def _crossing_sums(network: Network, flow: Flow, plane: float) -> tuple[float, float]:
-    """Sum of flux times pressure and sum of flux along x, of the throats that cross `plane` m."""
-    x = network.throat_ends[:, :, 0]
-    crosses = np.flatnonzero(
-        (x.min(axis=1) <= plane) & (x.max(axis=1) > plane) & (flow.throat_flux != 0)
-    )
-    x, flux = x[crosses], flow.throat_flux[crosses]
-    pressure = flow.pore_pressure[network.throat_pores[crosses]]
+    With the resistances `halves` (T, 2) 1/m3 of the throats the pressure falls from the first node
+    (`nodes`) to the facet by the first of them, and from there to the second node by the other.
+    Most of a throat's drop is in its neck, so this places it where it is. Without them it falls
+    evenly along each throat. Where x is periodic the pressure is 1 on the low face and falls by 1
+    per period.
+    """
+    x, pressure, flux = _pieces(network, flow, halves)
+    low, high = map(float, network.box[0])
+    turns = (-1, 0, 1) if network.periodic[0] else (0,)
+    least, most, means = x.min(axis=1), x.max(axis=1), []
+    for plane in (low, *map(float, planes)):
+        total = net = 0.0
+        for turn in turns:
+            # the plane one period on has the pressure of this one less 1
+            there = plane + turn * (high - low)
+            crosses = np.flatnonzero((least <= there) & (most > there))
+            (one, two), (start, end) = x[crosses].T, pressure[crosses].T
+            mean = start + (there - one) / (two - one) * (end - start)
+            signed = flux[crosses] * np.sign(two - one)
+            net_here = float(np.sum(signed))
+            total, net = total + float(np.sum(signed * mean)) + turn * net_here, net + net_here
+        means.append(total / net if net else np.nan)
+    result = np.array(means[1:])
     if network.periodic[0]:
-        pressure = pressure - network.throat_shift[crosses, 0, None] * np.array([0.0, 1.0])
-    along = (plane - x[:, 0]) / (x[:, 1] - x[:, 0])
-    there = pressure[:, 0] + along * (pressure[:, 1] - pressure[:, 0])
-    signed = flux * np.sign(x[:, 1] - x[:, 0])
-    return float(np.sum(signed * there)), float(np.sum(signed))
+        return result - means[0] + 1.0
+    return np.where(planes <= low, 1.0, np.where(planes >= high, 0.0, result))
+
+
+def _pieces(network: Network, flow: Flow, halves: Array | None) -> tuple[Array, Array, Array]:
+    """Pieces of the throats with flux: ends (K, 2) m along x, pressures (K, 2), flux (K,).
+
+    A throat is one piece without `halves` and two with them, one on each side of its facet. Both
+    ends of a throat whose nodes lie on one side of its facet make one piece.
+    """
+    use = np.flatnonzero(flow.throat_flux != 0)
+    pores, flux = network.throat_pores[use], flow.throat_flux[use]
+    nodes = None if halves is None else nodes_of(network)
+    x = (network.pore_position if nodes is None else nodes.position)[pores, 0]
+    x[:, 1] += network.throat_shift[use, 0] * float(np.ptp(network.box[0]))
+    pressure = flow.pore_pressure[pores]
+    if network.periodic[0]:
+        pressure[:, 1] -= network.throat_shift[use, 0]
+    if nodes is None or halves is None:
+        return x, pressure, flux
+    if not network.periodic[0]:
+        x = np.clip(x, *network.box[0])
+    heights, first = nodes.heights[use], halves[use, 0] / halves[use].sum(axis=1)
+    inside = np.all(heights > 0, axis=1)
+    way = np.divide(heights[:, 0], heights.sum(axis=1), out=np.zeros(len(use)), where=inside)
+    middle = x[:, 0] + np.where(inside, way, first) * (x[:, 1] - x[:, 0])
+    there = pressure[:, 0] + first * (pressure[:, 1] - pressure[:, 0])
+    ends = [np.column_stack([x[:, 0], middle]), np.column_stack([middle, x[:, 1]])]
+    falls = [np.column_stack([pressure[:, 0], there]), np.column_stack([there, pressure[:, 1]])]
+    return np.concatenate(ends), np.concatenate(falls), np.concatenate([flux, flux])
 
 
 # ------------------------------------------------------------------------------------------------
-# Pressure by depth: how the pressure falls between the pores, and thin layers of a specimen.
+# Thin layers of the first millimetre of a specimen.
 
 
 FIRST = 1e-3
@@ -144,110 +165,6 @@ def layer_edges(box: Array, thickness: float) -> Array:
     count = min(max(int(np.ceil(depth / thickness * (1.0 - 1e-9))), 1), MOST_LAYERS)
     thick = max(thickness, depth / MOST_LAYERS)
     return np.append(low + thick * np.arange(count), low + depth)
-
-
-def depth_pressures(network: Network, flow: Flow, halves: Array, planes: Array) -> Array:
-    """Flux-weighted mean pressure (n,) on `planes` (n,) m: 1 on the low x face, 0 on the high.
-
-    The pressure falls from the first node (`nodes`) to the facet by the first of the resistances
-    `halves` (T, 2) 1/m3 of a throat, and from there to the second by the other. Most of a throat's
-    drop is in its neck, so this places it where it is; `slabs.plane_pressures` spreads it evenly.
-    Where x is periodic the pressure is 1 on the low face and falls by 1 per period.
-    """
-    place, pressure, flux = _pieces(network, flow, halves)
-    low, high = map(float, network.box[0])
-    turns = (-1, 0, 1) if network.periodic[0] else (0,)
-    means = []
-    for plane in (low, *map(float, planes)):
-        total = net = 0.0
-        for turn in turns:
-            added = _crossing(place, pressure, flux, plane + turn * (high - low))
-            total, net = total + added[0] + turn * added[1], net + added[1]
-        means.append(total / net if net else np.nan)
-    result = np.array(means[1:])
-    if network.periodic[0]:
-        return result - means[0] + 1.0
-    return np.where(planes <= low, 1.0, np.where(planes >= high, 0.0, result))
-
-
-def _pieces(network: Network, flow: Flow, halves: Array) -> tuple[Array, Array, Array]:
-    """The two pieces of each throat with flux: ends (K, 2) m along x, pressures (K, 2), flux (K,).
-
-    Both ends of a throat whose nodes lie on one side of its facet make one piece.
-    """
-    use = np.flatnonzero(flow.throat_flux != 0)
-    nodes, pores = nodes_of(network), network.throat_pores[use]
-    heights, x = nodes.heights[use], nodes.position[pores, 0]
-    x[:, 1] += network.throat_shift[use, 0] * float(np.ptp(network.box[0]))
-    if not network.periodic[0]:
-        x = np.clip(x, *network.box[0])
-    pressure = flow.pore_pressure[pores]
-    if network.periodic[0]:
-        pressure[:, 1] -= network.throat_shift[use, 0]
-    first = halves[use, 0] / halves[use].sum(axis=1)
-    inside = np.all(heights > 0, axis=1)
-    way = np.divide(heights[:, 0], heights.sum(axis=1), out=np.zeros(len(use)), where=inside)
-    middle = x[:, 0] + np.where(inside, way, first) * (x[:, 1] - x[:, 0])
-    there = pressure[:, 0] + first * (pressure[:, 1] - pressure[:, 0])
-    flux = flow.throat_flux[use]
-    ends = [np.column_stack([x[:, 0], middle]), np.column_stack([middle, x[:, 1]])]
-    falls = [np.column_stack([pressure[:, 0], there]), np.column_stack([there, pressure[:, 1]])]
-    return np.concatenate(ends), np.concatenate(falls), np.concatenate([flux, flux])
-
-
-def _crossing(place: Array, pressure: Array, flux: Array, plane: float) -> tuple[float, float]:
-    """Sum of flux times pressure and sum of flux along x, of the pieces that cross `plane` m."""
-    crosses = np.flatnonzero((place.min(axis=1) <= plane) & (place.max(axis=1) > plane))
-    x, p = place[crosses], pressure[crosses]
-    there = p[:, 0] + (plane - x[:, 0]) / (x[:, 1] - x[:, 0]) * (p[:, 1] - p[:, 0])
-    signed = flux[crosses] * np.sign(x[:, 1] - x[:, 0])
-    return float(np.sum(signed * there)), float(np.sum(signed))
-
-
-def depth_permeability(network: Network, flow: Flow, halves: Array, edges: Array) -> Array:
-    """Permeability (B,) m2 in place between `edges` (B+1,) m, with `depth_pressures`.
-
-    k = Q mu dx / (A dp), as `slabs.inplace_permeability`; 0 without flow.
-    """
-    if flow.inflow == 0:
-        return np.zeros(len(edges) - 1)
-    drop = -np.diff(depth_pressures(network, flow, halves, edges))
-    return flow.inflow * np.diff(edges) / (network.area * drop)
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Solved:
-    """A network with its flow and the resistances (T, 2) 1/m3 of the halves of its throats."""
-
-    network: Network
-    flow: Flow
-    halves: Array
-
-    __repr__ = one_line
-
-
-def make_layers(initial: Solved, damaged: Solved, *, edges: Array, depth: Array) -> Layers:
-    """Layers between `edges` (B+1,) m of a specimen before and after; `depth` (F,) m of fines."""
-    drops = [
-        -np.diff(depth_pressures(one.network, one.flow, one.halves, edges))
-        if one.flow.inflow
-        else np.full(len(edges) - 1, np.nan)
-        for one in (initial, damaged)
-    ]
-    k = [
-        one.flow.inflow * np.diff(edges) / (one.network.area * drop)
-        if one.flow.inflow
-        else np.zeros(len(drop))
-        for one, drop in zip((initial, damaged), drops, strict=True)
-    ]
-    return Layers(
-        edges=frozen(edges),
-        k_initial=frozen(k[0]),
-        k_damaged=frozen(k[1]),
-        drop_initial=frozen(drops[0]),
-        drop_damaged=frozen(drops[1]),
-        fines_count=frozen(np.histogram(depth, edges)[0]),
-    )
 
 
 # ------------------------------------------------------------------------------------------------
@@ -407,13 +324,11 @@ def make_profile(edges: Array, porosity: tuple[Porosity, Porosity], depth: Array
 
     `depth` (F,) m are the places of the invaded fines along x.
     """
-    before, after = (frozen(pooled(one, edges)) for one in porosity)
-    share = np.histogram(depth, edges)[0] / max(len(depth), 1)
     return Profile(
         edges=frozen(edges),
-        porosity_initial=before,
-        porosity_damaged=after,
-        fines_fraction=frozen(share),
+        porosity_initial=frozen(pooled(porosity[0], edges)),
+        porosity_damaged=frozen(pooled(porosity[1], edges)),
+        fines_fraction=frozen(np.histogram(depth, edges)[0] / max(len(depth), 1)),
     )
 
 
@@ -422,10 +337,8 @@ def pooled(porosity: Porosity, edges: Array) -> Array:
 
     The edges must be among those of the profile.
     """
-    first, end = (
-        np.searchsorted(porosity.edges, edges[:-1]),
-        np.searchsorted(porosity.edges, edges[-1]),
-    )
+    first = np.searchsorted(porosity.edges, edges[:-1])
+    end = np.searchsorted(porosity.edges, edges[-1])
     width, void = np.diff(porosity.edges)[:end], porosity.profile[:end]
     return np.add.reduceat(width * void, first) / np.add.reduceat(width, first)
 

@@ -1,124 +1,31 @@
-"""Solvers of the pressures of a network.
+"""Pressures and fluxes of a network of links: mass balances, direct or by multigrid.
 
-One level of a multigrid cycle: both Gauss-Seidel sweeps, and the way to the next level.
-
-The operations are those of pyamg and scipy, in the same order, so the numbers are the same to the
-last digit. Called one by one from Python they took most of the time of a cycle, for the levels of
-a pack hold a few thousand pores at most.
+Systems are symmetric and positive definite.
 """
 
+import contextlib
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pyamg
 import pymetis
 from scipy import sparse
-from scipy.sparse.csgraph import breadth_first_order, reverse_cuthill_mckee
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
 from fdnet.errors import FlowError
 from fdnet.network.compiled import compiled, compiled_in_place
 from fdnet.spheres.snapshot import Array, one_line
 
-Rows = tuple[Array, Array, Array]
-"""Where the rows of a matrix begin, the columns of its entries, and their values."""
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Level:
-    """A level of n nodes above one of m nodes.
-
-    Attributes:
-        matrix: of the level, (n, n).
-        prolongation: (n, m), from the nodes of the next level to those of this one.
-        count: m.
-    """
-
-    matrix: Rows
-    prolongation: Rows
-    count: int
-
-    __repr__ = one_line
-
-    def down(self, source: Array) -> tuple[Array, Array]:
-        """The solution (n,) after a forward sweep from 0, and what is left for the next level."""
-        solution, coarse = np.zeros(len(source)), np.zeros(self.count)
-        _down(self.matrix, self.prolongation, (solution, source), coarse)
-        return solution, coarse
-
-    def up(self, solution: Array, source: Array, coarse: Array) -> None:
-        """Adds what the next level gives, `coarse` (m,), and sweeps backward; in place."""
-        _up(self.matrix, self.prolongation, (solution, source), coarse)
-
-
-def level_of(matrix: sparse.csr_matrix, prolongation: sparse.csr_matrix) -> Level:
-    """The level of a `matrix` (n, n) and the `prolongation` (n, m) to it."""
-    return Level(
-        matrix=_rows(matrix), prolongation=_rows(prolongation), count=prolongation.shape[1]
-    )
-
-
-def _rows(matrix: sparse.csr_matrix) -> Rows:
-    return matrix.indptr, matrix.indices, matrix.data
-
-
-@compiled_in_place
-def _relax(matrix: Rows, row: int, solution: Array, source: Array) -> None:
-    """Sets the solution of one row to what balances it; a row without a diagonal stays."""
-    first, column, value = matrix
-    total, diagonal = 0.0, 0.0
-    for entry in range(first[row], first[row + 1]):
-        if column[entry] == row:
-            diagonal = value[entry]
-        else:
-            total += value[entry] * solution[column[entry]]
-    if diagonal != 0.0:
-        solution[row] = (source[row] - total) / diagonal
-
-
-@compiled_in_place
-def _down(matrix: Rows, prolongation: Rows, state: tuple[Array, Array], coarse: Array) -> None:
-    first, column, value = matrix
-    upward, to, weight = prolongation
-    solution, source = state
-    for row in range(len(source)):
-        _relax(matrix, row, solution, source)
-    for row in range(len(source)):
-        total = 0.0
-        for entry in range(first[row], first[row + 1]):
-            total += value[entry] * solution[column[entry]]
-        missing = source[row] - total
-        for entry in range(upward[row], upward[row + 1]):
-            coarse[to[entry]] += weight[entry] * missing
-
-
-@compiled_in_place
-def _up(matrix: Rows, prolongation: Rows, state: tuple[Array, Array], coarse: Array) -> None:
-    upward, to, weight = prolongation
-    solution, source = state
-    for row in range(len(solution)):
-        total = 0.0
-        for entry in range(upward[row], upward[row + 1]):
-            total += weight[entry] * coarse[to[entry]]
-        solution[row] += total
-    for row in range(len(solution) - 1, -1, -1):
-        _relax(matrix, row, solution, source)
-
-
-# ------------------------------------------------------------------------------------------------
-# Mass balances of a network of links: a direct solver, and multigrid for larger networks.
-#
-# The systems are symmetric and positive definite.
-
-
 DIRECT, MULTIGRID = "splu, METIS nested dissection", "CG, Ruge-Stuben AMG"
 DIRECT_UP_TO = 3_000
 """Number of nodes up to which the direct solver is used."""
 DIRECT_BYTES, DIRECT_GROWTH = 55.0, 1.41
-"""Factor and exponent of the memory of the direct solver, see `direct_memory`."""
+"""A direct solve of n nodes takes 55 n^1.41 bytes, measured on packs of 1e4 to 3e5 pores."""
 MEMORY_CAP = 8e9
 """Most memory, bytes, that a direct solve may take."""
 MEMORY_SHARE = 0.8
@@ -173,7 +80,7 @@ class Balances:
         if self._solve is None:
             self._solve = (direct if self._direct else multigrid)(self._matrix)
         source = source / self._unit
-        within = CG_TOLERANCE * total(source) if imbalance is None else imbalance / self._unit
+        within = CG_TOLERANCE * _total(source) if imbalance is None else imbalance / self._unit
         pressure = self._solve(source, within)
         if not self._direct and not np.all(np.isfinite(pressure)):
             _check_memory(len(source))
@@ -197,46 +104,53 @@ def laplacian(pair: Array, conductance: Array, tied: Array) -> sparse.csr_matrix
 
 
 def direct(matrix: sparse.csr_matrix) -> Solve:
-    """Direct solver of the system `matrix` (n, n).
+    """Direct solver of the system `matrix` (n, n), scaled to a unit diagonal (`factored`).
 
-    The matrix is scaled to a unit diagonal, ordered by METIS nested dissection (Karypis and Kumar
-    1998) and factored by SuperLU in symmetric mode; a solution takes one step of iterative
-    refinement. Raises FlowError when the system is singular.
+    Raises FlowError when the system is singular.
     """
-    count = matrix.shape[0]
-    diagonal = matrix.diagonal()
+    count, diagonal = matrix.shape[0], matrix.diagonal()
     if np.any(diagonal <= 0):
         raise FlowError(
             f"solve of {count} pores failed: {np.sum(diagonal <= 0)} pores have no way out"
         )
     scale = 1.0 / np.sqrt(diagonal)
     scaled = (sparse.diags(scale) @ matrix @ sparse.diags(scale)).tocsr()
-    order = _order(scaled)
     try:
-        factor = splu(
-            scaled[order][:, order].tocsc(),
-            permc_spec="NATURAL",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
+        solve = factored(scaled, dissected(scaled.copy()))
     except RuntimeError as error:
         raise FlowError(
             f"solve of {count} pores failed: {error}; a group of pores has no way out"
         ) from error
+    return lambda source, _: solve(source * scale) * scale
 
-    def solve(source: Array, _: float) -> Array:
-        scaled_pressure = np.zeros(count)
+
+def factored(matrix: sparse.csr_matrix, order: Array) -> Callable[[Array], Array]:
+    """Solves systems with `matrix` (n, n) by SuperLU in symmetric mode, eliminated in `order`.
+
+    A solution takes one step of iterative refinement. Raises RuntimeError where the matrix is
+    singular.
+    """
+    factor = splu(
+        matrix[order][:, order].tocsc(),
+        permc_spec="NATURAL",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    )
+
+    def solve(source: Array) -> Array:
+        solution = np.zeros_like(source)
         for _ in range(2):
-            missing = source * scale - scaled @ scaled_pressure
-            scaled_pressure[order] += factor.solve(missing[order])
-        return scaled_pressure * scale
+            solution[order] += factor.solve((source - matrix @ solution)[order])
+        return solution
 
     return solve
 
 
-def _order(matrix: sparse.csr_matrix) -> Array:
-    """Order (n,) of the nodes by nested dissection."""
-    links = matrix.copy()
+def dissected(links: sparse.csr_matrix) -> Array:
+    """Order (n,) of nodes by METIS nested dissection (Karypis and Kumar 1998).
+
+    `links` (n, n) has an entry for each link; those on its diagonal are taken out.
+    """
     links.setdiag(0.0)
     links.eliminate_zeros()
     if links.nnz == 0:
@@ -266,11 +180,20 @@ def multigrid(matrix: sparse.csr_matrix) -> Solve:
     return solve
 
 
+class Rows(NamedTuple):
+    """Where the rows of a matrix begin, the columns of its entries, and their values."""
+
+    first: Array
+    column: Array
+    value: Array
+
+
 def ruge_stuben(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
     """One symmetric V-cycle of classical multigrid (Ruge and Stuben 1987) as a preconditioner.
 
-    The levels are pyamg's, and the numbers of a cycle are those of its own, which takes several
-    times as long (`cycle`) and also computes two norms that conjugate gradients do not need.
+    The levels are pyamg's, and the numbers of a cycle are those of its own to the last digit.
+    Called one by one from Python its operations take several times as long, for the levels of a
+    pack hold a few thousand pores at most; it also computes two norms that are not needed.
     """
     hierarchy = pyamg.ruge_stuben_solver(
         matrix,
@@ -281,25 +204,71 @@ def ruge_stuben(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
         max_coarse=10,
         coarse_solver="splu",
     )
-    levels = [level_of(level.A, level.P) for level in hierarchy.levels[:-1]]
+    levels = [
+        (
+            *(Rows(one.indptr, one.indices, one.data) for one in (level.A, level.P)),
+            level.P.shape[1],
+        )
+        for level in hierarchy.levels[:-1]
+    ]
     last = hierarchy.levels[-1].A
 
     def cycle(source: Array) -> Array:
         passed = []
-        for level in levels:
-            solution, missing = level.down(source)
-            passed.append((level, solution, source))
-            source = missing
+        for own, prolongation, count in levels:
+            solution, coarse = np.zeros(len(source)), np.zeros(count)
+            _down(own, prolongation, solution, source, coarse)
+            passed.append((own, prolongation, solution, source))
+            source = coarse
         below = np.asarray(hierarchy.coarse_solver(last, source))
-        for level, solution, own in reversed(passed):
-            level.up(solution, own, below)
+        for own, prolongation, solution, given in reversed(passed):
+            _up(own, prolongation, solution, given, below)
             below = solution
         return below
 
     return cycle
 
 
-def total(values: Array) -> float:
+@compiled_in_place
+def _relax(matrix: Rows, row: int, solution: Array, source: Array) -> None:
+    """Sets the solution of one row to what balances it; a row without a diagonal stays."""
+    total, diagonal = 0.0, 0.0
+    for entry in range(matrix.first[row], matrix.first[row + 1]):
+        if matrix.column[entry] == row:
+            diagonal = matrix.value[entry]
+        else:
+            total += matrix.value[entry] * solution[matrix.column[entry]]
+    if diagonal != 0.0:
+        solution[row] = (source[row] - total) / diagonal
+
+
+@compiled_in_place
+def _down(matrix: Rows, prolongation: Rows, solution: Array, source: Array, coarse: Array) -> None:
+    """A forward sweep from a solution of 0, and what is left added to the next level, `coarse`."""
+    for row in range(len(source)):
+        _relax(matrix, row, solution, source)
+    for row in range(len(source)):
+        total = 0.0
+        for entry in range(matrix.first[row], matrix.first[row + 1]):
+            total += matrix.value[entry] * solution[matrix.column[entry]]
+        missing = source[row] - total
+        for entry in range(prolongation.first[row], prolongation.first[row + 1]):
+            coarse[prolongation.column[entry]] += prolongation.value[entry] * missing
+
+
+@compiled_in_place
+def _up(matrix: Rows, prolongation: Rows, solution: Array, source: Array, coarse: Array) -> None:
+    """Adds what the next level gives, `coarse`, to the solution, and sweeps backward."""
+    for row in range(len(solution)):
+        total = 0.0
+        for entry in range(prolongation.first[row], prolongation.first[row + 1]):
+            total += prolongation.value[entry] * coarse[prolongation.column[entry]]
+        solution[row] += total
+    for row in range(len(solution) - 1, -1, -1):
+        _relax(matrix, row, solution, source)
+
+
+def _total(values: Array) -> float:
     """Sum of the absolute values."""
     return float(np.abs(values).sum())
 
@@ -310,7 +279,7 @@ def conjugate_gradients(
     precondition: Callable[[Array], Array],
     *,
     within: float,
-    size: Callable[[Array], float] = total,
+    size: Callable[[Array], float] = _total,
     steps: int | None = None,
 ) -> Array:
     """Solution (n,) whose residual is at most `within` (Hestenes and Stiefel 1952).
@@ -325,49 +294,32 @@ def conjugate_gradients(
         if size(missing) <= within:
             return solution
         better = precondition(missing)
-        gain = _dot(missing, better)
+        gain = float(np.einsum("i,i", missing, better))
         along = better + (gain / before) * along
         turned = matrix @ along
-        step = gain / _dot(along, turned)
+        step = gain / float(np.einsum("i,i", along, turned))
         solution += step * along
         missing -= step * turned
         before = gain
     return np.full(len(source), np.nan)
 
 
-def _dot(one: Array, other: Array) -> float:
-    return float(np.einsum("i,i", one, other))
-
-
-def direct_memory(count: int) -> float:
-    """Bytes that a direct solve of n = `count` pores takes: 55 n^1.41.
-
-    Measured on packs of 1e4 to 3e5 pores.
-    """
-    return DIRECT_BYTES * count**DIRECT_GROWTH
-
-
 def _check_memory(count: int) -> None:
     """Raise FlowError when a direct solve of `count` pores would not fit into memory."""
-    wanted, limit = direct_memory(count), min(MEMORY_CAP, MEMORY_SHARE * _free_memory())
+    free, report = np.inf, Path("/proc/meminfo")
+    if report.exists():
+        rows = dict(row.split(":") for row in report.read_text().splitlines())
+        free = 1024.0 * float(rows["MemAvailable"].split()[0])
+    else:
+        with contextlib.suppress(AttributeError, OSError, ValueError):  # not reported
+            free = float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    wanted, limit = DIRECT_BYTES * count**DIRECT_GROWTH, min(MEMORY_CAP, MEMORY_SHARE * free)
     if wanted > limit:
         raise FlowError(
             f"solve of {count} pores: multigrid did not converge in {CG_STEPS} steps and a direct "
             f"solve would take some {wanted / 1e9:.1f} GB of {limit / 1e9:.1f} GB; analyse a "
             "shorter specimen"
         )
-
-
-def _free_memory() -> float:
-    """Bytes that are free now; infinite where the system does not report it."""
-    report = Path("/proc/meminfo")
-    if report.exists():
-        rows = dict(row.split(":") for row in report.read_text().splitlines())
-        return 1024.0 * float(rows["MemAvailable"].split()[0])
-    try:
-        return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-    except (AttributeError, OSError, ValueError):
-        return np.inf
 
 
 # ------------------------------------------------------------------------------------------------
@@ -388,46 +340,27 @@ def groups(ends: Array, count: int) -> Array:
     return winding_groups(ends, np.zeros(len(ends)), count)[0]
 
 
-def heights(ends: Array, jump: Array, group: Array) -> Array:
-    """Pressures (n,) that cancel the jump of every link of a spanning forest: p_b = p_a + jump.
-
-    The forest is made breadth first from the first node of each `group` (n,), in a graph whose
-    vertices are the nodes and the links, so that parallel links remain distinct.
-    """
-    count, links = len(group), len(ends)
-    root = count + links
-    first = np.unique(group, return_index=True)[1]
-    vertex = np.arange(count, root)
-    rows = np.concatenate([ends[:, 0], vertex, ends[:, 1], vertex, np.full(len(first), root)])
-    columns = np.concatenate([vertex, ends[:, 0], vertex, ends[:, 1], first])
-    graph = sparse.csr_matrix(
-        (np.ones(len(rows), np.int8), (rows, columns)), shape=(root + 1, root + 1)
-    )
-    _, before = breadth_first_order(graph, root, directed=True)
-    link = before[:count] - count
-    inner = link < links
-    parent = np.arange(count)
-    parent[inner] = before[count + link[inner]]
-    rise = np.zeros(count)
-    reached = link[inner]
-    rise[inner] = jump[reached] * np.where(ends[reached, 1] == np.flatnonzero(inner), 1.0, -1.0)
-    while np.any(parent != parent[parent]):
-        rise += rise[parent]
-        parent = parent[parent]
-    return rise
-
-
 def winding_groups(ends: Array, jump: Array, count: int) -> tuple[Array, Array]:
     """Connected group (n,) of each of `count` nodes, and whether that group winds (n,)."""
-    group, winds = _joined(
+    group, winds, _ = _joined(
         np.ascontiguousarray(ends, np.int64), np.ascontiguousarray(jump, float), count
     )
     return group, winds[group]
 
 
+def cancelling_pressures(ends: Array, jump: Array, count: int) -> Array:
+    """Pressures (n,) of groups that do not wind, which cancel the jump of every link.
+
+    p_b = p_a + jump, from 0 at the first node of each group.
+    """
+    ends = np.ascontiguousarray(ends, np.int64)
+    rise: Array = _joined(ends, np.ascontiguousarray(jump, float), count)[2]
+    return rise
+
+
 @compiled
-def _joined(ends: Array, jump: Array, count: int) -> tuple[Array, Array]:
-    """Group (n,) of each node, and whether each group (G,) winds.
+def _joined(ends: Array, jump: Array, count: int) -> tuple[Array, Array, Array]:
+    """Group (n,) of each node, whether each group (G,) winds, and the pressure (n,) of each node.
 
     Every node knows another of its group and the pressure over it; links join two trees of such
     nodes or close a loop (Tarjan 1975, J. ACM 22, 215). The root of a tree is its first node.
@@ -452,7 +385,7 @@ def _joined(ends: Array, jump: Array, count: int) -> tuple[Array, Array]:
             roots += 1
         else:
             group[node] = group[root]
-    return group, winds
+    return group, winds, rise
 
 
 @compiled
@@ -510,8 +443,7 @@ class Balance:
     __repr__ = one_line
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Stage:
+class _Stage(NamedTuple):
     """The links of one level of stiffness; the nodes that higher levels join are one node.
 
     Attributes:
@@ -546,7 +478,7 @@ def balance_links(
     tried = []
     for contrast in CONTRASTS:
         level = stiffness(ends, conductance, jump, count, contrast=contrast)
-        tried.append(_balance(ends, conductance, jump, (level, count), direct_up_to))
+        tried.append(_balance(ends, conductance, jump, level, count, direct_up_to))
         if tried[-1].defect <= SETTLED or not level.any():
             break
     return min(tried, key=lambda one: one.defect)
@@ -556,37 +488,37 @@ def _balance(
     ends: Array,
     conductance: Array,
     jump: Array,
-    levels: tuple[Array, int],
+    level: Array,
+    count: int,
     direct_up_to: int | None,
 ) -> Balance:
-    """Balance level by level, repeated for what is left over.
+    """Balance level by level, with the `level` (K,) of each link, repeated for what is left over.
 
     Left over are the imbalances, and the pressure differences within the contracted groups, which
     the links next to them did not see. Fluxes add up by increments, never as differences of nearly
-    equal pressures. `levels` holds the level (K,) of each link and the number of nodes.
+    equal pressures.
     """
-    level, count = levels
-    stiff = level > 0
-    height = (
-        heights(ends[stiff], jump[stiff], groups(ends[stiff], count))
-        if stiff.any()
-        else np.zeros(count)
-    )
-    drive = jump + _difference(height, ends)
-    level = _with_inner_links(ends, level, count)
-    parts = [_contracted(ends, level, at, count) for at in range(int(level.max(initial=0)) + 1)]
-    stages = [_stage(ends, conductance, part, direct_up_to) for part in parts]
-    pressure, flux, defect, allowed = height, np.zeros(len(ends)), np.inf, None
+    stiff, pressure = level > 0, np.zeros(count)
+    if stiff.any():
+        pressure = cancelling_pressures(ends[stiff], jump[stiff], count)
+    drive, level = jump + _difference(pressure, ends), level.copy()
+    for at in range(int(level.max(initial=0))):
+        # links between nodes that higher levels contract into one belong to these
+        label = groups(ends[level > at], count)
+        level[(level == at) & (label[ends[:, 0]] == label[ends[:, 1]])] = at + 1
+    stages = [
+        _stage(ends, conductance, level, at, count, direct_up_to)
+        for at in range(int(level.max(initial=0)) + 1)
+    ]
+    flux, defect, allowed = np.zeros(len(ends)), np.inf, None
     for _ in range(MOST_SWEEPS):
-        step, gain, drive = _sweep(
-            stages, ends, conductance, drive, (_net(ends, flux, count), allowed)
-        )
-        pressure, flux = pressure + step, flux + gain
-        before, defect = (
-            defect,
-            _defect(_net(ends, flux, count), conductance * drive, float(flux @ jump)),
-        )
-        allowed = 0.3 * SETTLED * abs(float(flux @ jump))
+        net = _net(ends, flux, count)
+        step, gain, drive = _sweep(stages, ends, conductance, drive, net, allowed)
+        pressure, flux, before = pressure + step, flux + gain, defect
+        throughput = float(flux @ jump)
+        off = _total(_net(ends, flux, count)) + _total(conductance * drive)
+        defect = off / throughput if throughput > 0 else np.inf
+        allowed = 0.3 * SETTLED * abs(throughput)
         if defect <= SETTLED or not defect < 0.7 * before:
             break
     return Balance(
@@ -623,25 +555,11 @@ def stiffness(
     return np.maximum(np.ceil(np.log(ratio) / np.log(contrast)).astype(int) - 1, 0)
 
 
-def _with_inner_links(ends: Array, level: Array, count: int) -> Array:
-    """The levels (K,), raised for links between nodes that higher levels contract into one."""
-    level = level.copy()
-    for at in range(int(level.max(initial=0))):
-        label = groups(ends[level > at], count)
-        level[(level == at) & (label[ends[:, 0]] == label[ends[:, 1]])] = at + 1
-    return level
-
-
-def _contracted(ends: Array, level: Array, at: int, count: int) -> tuple[Array, Array]:
-    """Links of level `at`, and labels (n,) of the nodes with all higher levels contracted."""
-    return np.flatnonzero(level == at), groups(ends[level > at], count)
-
-
 def _stage(
-    ends: Array, conductance: Array, contracted: tuple[Array, Array], direct_up_to: int | None
+    ends: Array, conductance: Array, level: Array, at: int, count: int, direct_up_to: int | None
 ) -> _Stage:
-    """The stage of links and labels as `_contracted` gives them."""
-    links, label = contracted
+    """The stage of the links of level `at`."""
+    links, label = np.flatnonzero(level == at), groups(ends[level > at], count)
     pair, size = label[ends[links]], int(label.max(initial=-1)) + 1
     free = np.ones(size, bool)
     free[np.unique(groups(pair, size), return_index=True)[1]] = False
@@ -661,15 +579,15 @@ def _sweep(
     ends: Array,
     conductance: Array,
     drive: Array,
-    state: tuple[Array, float | None],
+    net: Array,
+    allowed: float | None,
 ) -> tuple[Array, Array, Array]:
     """Increments of pressure (n,) and flux (K,), and the drive (K,) left for the next sweep.
 
-    The increments balance what drives the links, `drive` (K,), and what the nodes lack. The drive
-    that is left is what the lower stages have since set up for the stiffer links. `state` holds
-    the net flux (n,) out of each node, and the sum of imbalances that may stay.
+    The increments balance what drives the links, `drive` (K,), and what the nodes lack by the
+    `net` flux (n,) out of them, but for a sum of imbalances that is `allowed`. The drive that is
+    left is what the lower stages have since set up for the stiffer links.
     """
-    net, allowed = state
     flux, late, steps = np.zeros(len(ends)), np.zeros(len(ends)), []
     for stage in stages:
         own, pushed = conductance[stage.links], drive[stage.links]
@@ -697,9 +615,3 @@ def _net(ends: Array, flux: Array, count: int) -> Array:
     return np.bincount(ends[:, 0], weights=flux, minlength=count) - np.bincount(
         ends[:, 1], weights=flux, minlength=count
     )
-
-
-def _defect(net: Array, late: Array, throughput: float) -> float:
-    """Imbalances of nodes `net` (n,) and of links `late` (K,) over the throughput."""
-    off = float(np.abs(net).sum() + np.abs(late).sum())
-    return off / throughput if throughput > 0 else np.inf

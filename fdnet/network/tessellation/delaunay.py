@@ -1,7 +1,4 @@
-"""Grains in their box with images and mirror images, and the tetrahedra between them.
-
-The grains that are tessellated: checked, and placed with their centres in the box.
-"""
+"""Grains in their box with images and mirror images, and the tetrahedra between them."""
 
 from dataclasses import dataclass, replace
 
@@ -9,7 +6,6 @@ import numpy as np
 from scipy.spatial import ConvexHull, Delaunay, QhullError
 
 from fdnet.errors import NetworkError
-from fdnet.network import geometry
 from fdnet.network.compiled import compiled
 from fdnet.network.tessellation.triangulation import triangulate
 from fdnet.spheres.geometry import (
@@ -25,7 +21,7 @@ from fdnet.spheres.snapshot import Array, Snapshot, one_line
 LENGTHS = (1e-60, 1e60)
 """Shortest radius and longest length, m; no double number holds the cubes of lengths beyond."""
 COARSE = 1e-8
-"""Largest rounding of a coordinate, in mean grain radii: a tenth of the shake (`points.SHAKE`),
+"""Largest rounding of a coordinate, in mean grain radii: a tenth of the shake (`SHAKE`),
 which coarser coordinates could not hold."""
 COINCIDENT = 1e-3
 """Grains that are placed nearer than this, in radii of the smallest grain, coincide."""
@@ -44,6 +40,7 @@ class PlacedGrains:
         grains: the n grains, their positions and radii as they are tessellated.
         height: (n,) m, how far what stands for each grain reaches from its centre along x: less
             than the radius for the flat cap of a grain centred beyond an x face.
+        outward: (n,) m, how far beyond an x face such a grain is centred; 0 for all others.
         index: (n,) which of the given grains they are.
         periodic: whether the sides x, y and z are periodic; the other faces are mirror planes.
         scale: m, mean radius of these grains as given.
@@ -74,13 +71,19 @@ def place_grains(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Plac
     """
     if len(grains):
         check_lengths(grains, periodic)
-    reaching = _reaching(grains, periodic) if len(grains) else np.zeros(0, int)
+    reaches = (_beyond(grains) < grains.radius[:, None]) | np.array(periodic)
+    reaching = np.flatnonzero(reaches.all(axis=1))
     wholly, centred = inside_others(grains.where(reaching), periodic)
     index, centred = reaching[~wholly], centred[~wholly]
     placed, beyond = onto_walls(grains.where(index), periodic)
-    if len(double := _coinciding(placed, periodic)):
-        index, centred = np.delete(index, double), np.delete(centred, double)
-        placed, beyond = onto_walls(grains.where(index), periodic)
+    if len(index):
+        tree = neighbour_tree(placed.position, placed.box, periodic=periodic)
+        close = tree.query_pairs(COINCIDENT * float(placed.radius.min()), output_type="ndarray")
+        first, second = close.T
+        if len(close):  # the smaller of two grains that coincide
+            double = np.unique(np.where(placed.radius[first] < placed.radius[second], *close.T))
+            index, centred = np.delete(index, double), np.delete(centred, double)
+            placed, beyond = onto_walls(grains.where(index), periodic)
     if len(index) < 4:
         dropped = f", {len(reaching)} with those inside others" * (len(index) < len(reaching))
         raise NetworkError(
@@ -88,19 +91,32 @@ def place_grains(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Plac
             "tetrahedron needs at least 4, give more grains, repeat a periodic cell, or mend the "
             "box"
         )
-    inside = grains.where(index)
-    outward = _outward(inside, periodic)
+    # A grain centred beyond an x face, but beyond no side wall, shows the box a flat cap of height
+    # h on a disc of radius a. The half ellipsoid on that disc with the volume of the cap has the
+    # height h (3 a^2 + h^2) / (4 a^2).
+    given = grains.where(index)
+    out, scale = _beyond(given), float(given.radius.mean())
+    past = (out > ON_FACE_TOLERANCE * scale) & ~np.array(periodic)
+    outward = np.where(past[:, 0] & ~past[:, 1:].any(axis=1), out[:, 0], 0.0)
+    tall = given.radius - outward
+    base = tall * (2.0 * given.radius - tall)
+    cap = tall * (3.0 * base + tall**2) / (4.0 * base)
     return PlacedGrains(
         grains=placed,
-        height=_heights_along_x(inside, placed, outward),
+        height=np.where(outward > 0.0, cap, placed.radius),
         outward=outward,
         index=index,
         periodic=periodic,
-        scale=float(inside.radius.mean()),
+        scale=scale,
         beyond=beyond,
         inside=centred,
         dropped=len(reaching) - len(index),
     )
+
+
+def _beyond(grains: Snapshot) -> Array:
+    """How far (n, 3) m the grains are centred beyond the nearer face along each axis."""
+    return np.maximum(grains.box[:, 0] - grains.position, grains.position - grains.box[:, 1])
 
 
 def check_lengths(spheres: Snapshot, periodic: tuple[bool, ...]) -> None:
@@ -132,12 +148,6 @@ def check_lengths(spheres: Snapshot, periodic: tuple[bool, ...]) -> None:
         raise NetworkError("tessellation: a box side is not positive; check the input lengths")
 
 
-def _reaching(grains: Snapshot, periodic: tuple[bool, ...]) -> Array:
-    """Indices (n,) of the grains whose sphere reaches into the box."""
-    beyond = np.maximum(grains.box[:, 0] - grains.position, grains.position - grains.box[:, 1])
-    return np.flatnonzero(np.all((beyond < grains.radius[:, None]) | np.array(periodic), axis=1))
-
-
 def onto_walls(grains: Snapshot, periodic: tuple[bool, ...]) -> tuple[Snapshot, int]:
     """Grains with every centre inside or on the mirrored faces, and how many were centred beyond.
 
@@ -156,60 +166,19 @@ def onto_walls(grains: Snapshot, periodic: tuple[bool, ...]) -> tuple[Snapshot, 
         beyond = np.maximum(low - position[:, axis], position[:, axis] - high)
         outside = beyond > tolerance
         height = np.where(outside, radius - beyond, radius)
-        # half sphere 2 pi r^3 / 3 against cap pi h^2 (3 R - h) / 3
         depth = INSET * scale if axis == 0 else 0.0
-        radius = np.where(outside, _same_cap(radius, height, depth), radius)
+        # the sphere centred `depth` inside whose part in the box has the volume of the cap:
+        # half sphere 2 pi r^3 / 3 against cap pi h^2 (3 R - h) / 3
+        cap = 0.5 * height**2 * (3.0 * radius - height)
+        same = np.cbrt(cap)
+        for _ in range(ITERATIONS):
+            same = np.cbrt(np.maximum(cap - 1.5 * depth * same**2 + 0.5 * depth**3, 0.0))
+        radius = np.where(outside, np.maximum(same, depth), radius)
         near = beyond > -max(tolerance, depth)
         middle = 0.5 * (low + high)
         position[near, axis] = np.where(position[near, axis] < middle, low + depth, high - depth)
         moved |= outside
     return replace(grains, position=position, radius=radius), int(moved.sum())
-
-
-def _same_cap(radius: Array, height: Array, depth: float) -> Array:
-    """Radius (n,) m of the sphere whose part inside a face has the volume of a given cap.
-
-    The sphere is centred `depth` m inside the face; the cap has `height` (n,) m and belongs to a
-    sphere of `radius` (n,) m.
-    """
-    cap = 0.5 * height**2 * (3.0 * radius - height)
-    same = np.cbrt(cap)
-    for _ in range(ITERATIONS):
-        same = np.cbrt(np.maximum(cap - 1.5 * depth * same**2 + 0.5 * depth**3, 0.0))
-    return np.maximum(same, depth)
-
-
-def _outward(given: Snapshot, periodic: tuple[bool, ...]) -> Array:
-    """How far beyond an x face (n,) m the grains are centred that show the box a flat cap.
-
-    It is 0 for all other grains, those that lie beyond a side wall as well among them.
-    """
-    beyond = np.maximum(given.box[:, 0] - given.position, given.position - given.box[:, 1])
-    outside = (beyond > ON_FACE_TOLERANCE * float(given.radius.mean())) & ~np.array(periodic)
-    return np.where(outside[:, 0] & ~outside[:, 1:].any(axis=1), beyond[:, 0], 0.0)
-
-
-def _heights_along_x(given: Snapshot, placed: Snapshot, outward: Array) -> Array:
-    """Semi-axis along x (n,) m of the half ellipsoids that stand for caps at the x faces.
-
-    Of a grain centred beyond an x face, by `outward` (n,) m, a cap of height h on a disc of radius
-    a is in the box. The half ellipsoid on that disc with the volume of the cap has the height
-    h (3 a^2 + h^2) / (4 a^2); `placed` has the radius of the half sphere of that volume. All other
-    grains are spheres: their height is their radius.
-    """
-    tall = given.radius - outward
-    base = tall * (2.0 * given.radius - tall)
-    return np.where(outward > 0.0, tall * (3.0 * base + tall**2) / (4.0 * base), placed.radius)
-
-
-def _coinciding(grains: Snapshot, periodic: tuple[bool, ...]) -> Array:
-    """Indices of placed grains that coincide with one that is not smaller."""
-    if not len(grains):
-        return np.zeros(0, int)
-    tree = neighbour_tree(grains.position, grains.box, periodic=periodic)
-    close = tree.query_pairs(COINCIDENT * float(grains.radius.min()), output_type="ndarray")
-    first, second = close.T
-    return np.unique(np.where(grains.radius[first] < grains.radius[second], first, second))
 
 
 # ------------------------------------------------------------------------------------------------
@@ -230,14 +199,14 @@ SHAKE_SEED = 3_141_592
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Points:
+class ImagePoints:
     """M images of n grains, the grains themselves among them.
 
     Attributes:
         owner: (M,) index of the grain.
         position: (M, 3) m, centre of the image.
         shift: (M, 3) whole periods by which the image is moved along each axis.
-        mirror: (M, 3) one of INSIDE, MIRROR_LOW, MIRROR_HIGH, ON_FACE of `spheres.images`.
+        mirror: (M, 3) one of INSIDE, MIRROR_LOW, MIRROR_HIGH, ON_FACE of `spheres.geometry`.
         radius: (M,) m.
         shaken: (M, 3) m, centre after the shake.
         scaled: (M, 3) shaken centre from the low corner of the box, in mean grain radii.
@@ -258,7 +227,7 @@ class Points:
     __repr__ = one_line
 
 
-def make_points(grains: Snapshot, *, periodic: tuple[bool, ...], margin: Array) -> Points:
+def make_points(grains: Snapshot, *, periodic: tuple[bool, ...], margin: Array) -> ImagePoints:
     """All images of `grains` within `margin` (3,) m of the box."""
     scale = float(grains.radius.mean())
     images = make_images(
@@ -270,9 +239,16 @@ def make_points(grains: Snapshot, *, periodic: tuple[bool, ...], margin: Array) 
     )
     name = label(images)
     key = name.astype(np.int64) * 2**30 + packed_shift(images.shift)
-    shake = _shake(grains, images.owner, name)
-    scaled = (images.position - grains.box[:, 0]) / scale + shake
-    return Points(
+    # the shake is drawn by the rank of the grain in the order of x, y, z, so that another
+    # numbering of the grains changes nothing
+    rank = np.empty(len(grains), int)
+    rank[np.lexsort(grains.position.T[::-1])] = np.arange(len(grains))
+    mirrors, code = np.unique(name % 27, return_inverse=True)
+    noise = np.random.default_rng(SHAKE_SEED).uniform(
+        -SHAKE, SHAKE, (len(mirrors), len(grains), 3)
+    )
+    scaled = (images.position - grains.box[:, 0]) / scale + noise[code, rank[images.owner]]
+    return ImagePoints(
         owner=images.owner,
         position=images.position,
         shift=images.shift,
@@ -285,26 +261,11 @@ def make_points(grains: Snapshot, *, periodic: tuple[bool, ...], margin: Array) 
     )
 
 
-def _shake(grains: Snapshot, owner: Array, name: Array) -> Array:
-    """Displacement (M, 3) of the images in mean radii, the same for those that differ by periods.
-
-    It is drawn by the rank of the grain in the order of x, y, z, so that another numbering of the
-    grains changes nothing.
-    """
-    rank = np.empty(len(grains), int)
-    rank[np.lexsort(grains.position.T[::-1])] = np.arange(len(grains))
-    mirrors, code = np.unique(name % 27, return_inverse=True)
-    noise = np.random.default_rng(SHAKE_SEED).uniform(
-        -SHAKE, SHAKE, (len(mirrors), len(grains), 3)
-    )
-    return noise[code, rank[owner]]
-
-
 # ------------------------------------------------------------------------------------------------
 # What is measured on one tetrahedron after the other, in one compiled pass.
 #
-# The formulas are those of `geometry`, which has their sources. Here they are written for the
-# corners of one tetrahedron, so that a whole pack needs no arrays in between.
+# Written for the corners of one tetrahedron, so that a whole pack needs no arrays in between. The
+# solid angle is that of van Oosterom and Strackee 1983 (IEEE Trans. Biomed. Eng. 30, 125, eq. 8).
 
 
 Vector = tuple[float, float, float]
@@ -334,19 +295,20 @@ def along(left: Vector, right: Vector) -> float:
 
 @compiled
 def centres(
-    position: Array, shaken: Array, radius: Array, vertex: Array, given: tuple[float, float]
+    position: Array, shaken: Array, radius: Array, vertex: Array, flattest: float, largest: float
 ) -> tuple[Array, Array, Array, Array]:
     """Power centre (P, 3) m, reach (P,) m, volume (P,) m3 and flatness (P,) of tetrahedra.
 
-    `position` and `shaken` (M, 3) m are the points, `radius` (M,) m their spheres, `vertex` (P, 4)
-    the corners. `given` is the volume m3 below which a tetrahedron is flat and takes the centre of
-    its shaken corners, and the radius m of the largest sphere: the reach is that of the sphere
-    about the power centre in which the centre of the largest would have less power.
+    The power of a point x to a sphere of centre p and radius r is |x - p|^2 - r^2; the centre has
+    equal power to the four corners (Aurenhammer 1987, SIAM J. Comput. 16, 78). `position` and
+    `shaken` (M, 3) m are the points, `radius` (M,) m their spheres, `vertex` (P, 4) the corners. A
+    tetrahedron of less volume than `flattest` m3 is flat and takes the centre of its shaken
+    corners. The reach is the radius about the centre in which the centre of a sphere of radius
+    `largest` m would have less power.
     """
     count = len(vertex)
     centre, reach = np.empty((count, 3)), np.empty(count)
     volume, flat = np.empty(count), np.empty(count, np.bool_)
-    flattest, largest = given
     for t in range(count):
         a, b, c, d = vertex[t, 0], vertex[t, 1], vertex[t, 2], vertex[t, 3]
         one, two, three = less(position, b, a), less(position, c, a), less(position, d, a)
@@ -393,7 +355,9 @@ def touching_spheres(
     """Sphere that touches the four on the corners: centre (P, 3) m, radius (P,) m, and if within.
 
     The radius is NaN where there is none. The last (P,) is true where the centre lies in the
-    tetrahedron; a barycentric coordinate may be negative by `tolerance`.
+    tetrahedron; a barycentric coordinate may be negative by `tolerance`. Subtracting
+    |x - p_i|^2 = (s + r_i)^2 pairwise leaves x = u + v s for the centre x and the radius s
+    (Apollonius' problem), then one quadratic equation for s.
     """
     count = len(vertex)
     centre, touching = np.empty((count, 3)), np.empty(count)
@@ -443,7 +407,9 @@ def _within(one: Vector, two: Vector, three: Vector, offset: Vector, tolerance: 
 def solids(points: Array, radius: Array, vertex: Array) -> tuple[Array, Array]:
     """Volume (P,) m3 and surface (P,) m2 of the spheres on the corners in each tetrahedron.
 
-    As `geometry.solid_in_tetrahedra`.
+    Sphere wedges by solid angle, less the overlap of each pair by dihedral angle: exact over a
+    whole tessellation, and in one tetrahedron as long as no sphere reaches through the opposite
+    face and no three overlap.
     """
     count = len(vertex)
     volume, surface = np.zeros(count), np.zeros(count)
@@ -461,7 +427,7 @@ def solids(points: Array, radius: Array, vertex: Array) -> tuple[Array, Array]:
                 side = less(points, vertex[t, j], own)
                 apart, other = np.sqrt(along(side, side)), radius[vertex[t, j]]
                 if apart < r + other:
-                    turn = _edge_angle(points, vertex[t], (i, j), triple) / (2.0 * np.pi)
+                    turn = _edge_angle(points, vertex[t], i, j, triple) / (2.0 * np.pi)
                     shared, hidden = _lens(r, other, apart)
                     volume[t] -= turn * shared
                     surface[t] -= turn * hidden
@@ -480,9 +446,8 @@ def _corner_angle(points: Array, corner: Array, i: int, triple: float) -> float:
 
 
 @compiled
-def _edge_angle(points: Array, corner: Array, ends: tuple[int, int], triple: float) -> float:
-    """Angle rad between the faces at the edge from corner i to j, `ends`."""
-    i, j = ends
+def _edge_angle(points: Array, corner: Array, i: int, j: int, triple: float) -> float:
+    """Angle rad between the faces at the edge from corner `i` to `j`."""
     k = 0
     while k in (i, j):
         k += 1
@@ -538,7 +503,7 @@ class Tetrahedra:
         hidden: number of grains without any tetrahedron.
     """
 
-    points: Points
+    points: ImagePoints
     vertex: Array
     neighbour: Array
     centre: Array
@@ -558,15 +523,19 @@ def make_tetrahedra(
     The power tessellation is used where the radii spread by more than 1e-3 of their mean. Raises
     NetworkError on grains in one plane and on grains that coincide with an image.
     """
-    scale = float(grains.radius.mean())
+    scale, box = float(grains.radius.mean()), grains.box
     points = make_points(grains, periodic=periodic, margin=margin)
     unequal = float(np.ptp(grains.radius)) > EQUAL_SPREAD * scale
     simplices, neighbours = _tessellated(points, len(grains), scale, unequal=unequal)
-    kept = _unique(points, simplices, grains.box, periodic)
+    kept = _unique(points, simplices, box, periodic)
     index = np.full(len(simplices) + 1, -1, np.int32)
     index[kept] = np.arange(len(kept))
     vertex = simplices[kept]
-    centre, reach, volume, flat = _centres(points, vertex, scale)
+    flattest, largest = FLAT * scale**3, float(points.radius.max())
+    centre, reach, volume, flat = centres(
+        points.position, points.shaken, points.radius, vertex, flattest, largest
+    )
+    low = (box[:, 0] - centre + reach[:, None]).max(axis=0, initial=0.0)
     seen = np.zeros(len(grains), bool)
     seen[points.owner[vertex]] = True
     return Tetrahedra(
@@ -576,13 +545,13 @@ def make_tetrahedra(
         centre=centre,
         volume=volume,
         flat=flat,
-        margin=_needed_margin(centre, reach, grains.box),
+        margin=np.maximum(low, (centre + reach[:, None] - box[:, 1]).max(axis=0, initial=0.0)),
         hidden=int(np.sum(~seen)),
     )
 
 
 def _tessellated(
-    points: Points, grains: int, scale: float, *, unequal: bool
+    points: ImagePoints, grains: int, scale: float, *, unequal: bool
 ) -> tuple[Array, Array]:
     """Tetrahedra and neighbours (-1: none), by the compiled tessellation or by Qhull."""
     radius = points.radius / scale if unequal else np.zeros(len(points.radius))
@@ -625,7 +594,9 @@ def _power_hull(points: Array, radius: Array) -> tuple[Array, Array]:
     return hull.simplices[lower], index[hull.neighbors[lower]]
 
 
-def _unique(points: Points, simplices: Array, box: Array, periodic: tuple[bool, ...]) -> Array:
+def _unique(
+    points: ImagePoints, simplices: Array, box: Array, periodic: tuple[bool, ...]
+) -> Array:
     """Indices of the tetrahedra to keep.
 
     Their power centre is inside the mirrored faces or on them. Of tetrahedra that differ by
@@ -639,53 +610,29 @@ def _unique(points: Points, simplices: Array, box: Array, periodic: tuple[bool, 
     corner = simplices[doubtful]
     least = np.argmin(points.key[corner], axis=1)[:, None]
     good = unshifted[np.take_along_axis(corner, least, axis=1)[:, 0]]
-    beyond = np.zeros(len(corner), bool)
-    for axis in np.flatnonzero(~np.array(periodic)):
+    beyond, walled = np.zeros(len(corner), bool), ~np.array(periodic)
+    for axis in np.flatnonzero(walled):
         beyond |= ~np.any(points.mirror[corner, axis] == INSIDE, axis=1)
     # tetrahedra beyond a face belong to the specimen when their centre is on the face:
     # they are then parts of a polyhedron that the face cuts
     check = np.flatnonzero(good & beyond)
-    place, radius = points.shaken[corner[check]], points.radius[corner[check]]
-    good[check] = _cut_by_face(place, radius, box, periodic)
+    vertex = corner[check]
+    place, scale = (
+        points.shaken[vertex],
+        float(points.radius[vertex].mean()) if len(check) else 0.0,
+    )
+    tolerance, flattest = SAME_CENTRE * scale, FLAT * scale**3
+    centre, _, _, flat = centres(
+        points.shaken, points.shaken, points.radius, vertex, flattest, 0.0
+    )
+    # The centre of a flat tetrahedron is arbitrary, so its centroid decides: where it stands
+    # across a face it is part of what separates two polyhedra; where it lies in the face it has no
+    # volume to give.
+    centre = np.where(flat[:, None], place.mean(axis=1), centre)
+    away = np.maximum(box[:, 0] - centre, centre - box[:, 1])
+    good[check] = np.all((away <= tolerance) | ~walled, axis=1)
+    for face in box.T:
+        in_face = np.all(np.abs(place - face) <= tolerance, axis=1) & walled
+        good[check] &= ~np.any(in_face, axis=1)
     kept[doubtful] = good
     return np.flatnonzero(kept)
-
-
-def _cut_by_face(corner: Array, radius: Array, box: Array, periodic: tuple[bool, ...]) -> Array:
-    """True (K,) where a power centre lies within the mirrored faces or on them.
-
-    `corner` (K, 4, 3) m and `radius` (K, 4) m are the grains of the tetrahedra. The centre of a
-    flat tetrahedron is arbitrary, so its centroid decides: where it stands across a face it is
-    part of what separates two polyhedra; where it lies in the face it has no volume to give.
-    """
-    tolerance = SAME_CENTRE * float(radius.mean()) if len(radius) else 0.0
-    walled = ~np.array(periodic)
-    centre, _ = geometry.power_centre(corner, radius)
-    flat = np.abs(geometry.signed_volume(corner)) < FLAT * (tolerance / SAME_CENTRE) ** 3
-    centre = np.where(flat[:, None], corner.mean(axis=1), centre)
-    beyond = np.maximum(box[:, 0] - centre, centre - box[:, 1])
-    inside = np.all((beyond <= tolerance) | ~walled, axis=1)
-    in_face = [
-        np.any(np.all(np.abs(corner - face) <= tolerance, axis=1) & walled, axis=1)
-        for face in box.T
-    ]
-    return inside & ~(in_face[0] | in_face[1])
-
-
-def _centres(points: Points, vertex: Array, scale: float) -> tuple[Array, Array, Array, Array]:
-    """Power centre (P, 3) m, reach (P,) m, volume (P,) m3 and flatness (P,) of tetrahedra.
-
-    The reach is the radius about the centre in which the centre of another grain would have
-    changed the tetrahedron. Flat tetrahedra take the centre of their shaken corners.
-    """
-    given = (FLAT * scale**3, float(points.radius.max()))
-    made: tuple[Array, Array, Array, Array] = centres(
-        points.position, points.shaken, points.radius, vertex, given
-    )
-    return made
-
-
-def _needed_margin(centre: Array, reach: Array, box: Array) -> Array:
-    """How far (3,) m spheres of radius `reach` (P,) m about `centre` (P, 3) m leave the box."""
-    low = (box[:, 0] - centre + reach[:, None]).max(axis=0, initial=0.0)
-    return np.maximum(low, (centre + reach[:, None] - box[:, 1]).max(axis=0, initial=0.0))

@@ -1,7 +1,4 @@
-"""Facets of the tetrahedra, and the polyhedra that these make.
-
-Facets that two tetrahedra share.
-"""
+"""Facets that two tetrahedra share, and the polyhedra that tetrahedra make."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -62,13 +59,34 @@ class Facets:
 def share_facets(tetrahedra: Tetrahedra, box: Array, *, periodic: tuple[bool, ...]) -> Facets:
     """Pairs of tetrahedra with a common facet.
 
-    These are neighbours, and across periods tetrahedra whose facets have the same grains.
+    These are neighbours, and across periods tetrahedra whose facets have the same grains at the
+    same relative shifts.
     """
-    neighbour = tetrahedra.neighbour
+    neighbour, points = tetrahedra.neighbour, tetrahedra.points
     one, opposite = np.nonzero(neighbour > np.arange(len(neighbour))[:, None])
     two = neighbour[one, opposite]
     back = np.argmax(neighbour[two] == one[:, None], axis=1)
-    first, second, shift, unmatched = _across_periods(tetrahedra, box, periodic)
+    # a facet is the index of its tetrahedron times 4 plus the corner opposite
+    single = np.flatnonzero(neighbour.ravel() < 0)
+    corner = np.take_along_axis(
+        tetrahedra.vertex[single // 4], geometry.FACETS[single % 4], axis=1
+    )
+    corner = np.take_along_axis(corner, np.argsort(points.key[corner], axis=1), axis=1)
+    names, shifts = points.name[corner], points.shift[corner]
+    relative = packed_shift(shifts - shifts[:, :1])
+    columns = [names[:, 0], names[:, 1], names[:, 2], relative[:, 1], relative[:, 2]]
+    order = np.lexsort(columns)
+    same = np.all([column[order][1:] == column[order][:-1] for column in columns], axis=0)
+    at, to = order[:-1][same], order[1:][same]
+    alone = np.ones(len(single), bool)
+    alone[at] = alone[to] = False
+    # a facet on or beyond one mirrored face needs no partner: symmetry closes the space
+    place = points.position[corner[alone]]
+    tolerance = SAME_CENTRE * float(points.radius.mean())
+    below = np.all(place <= box[:, 0] + tolerance, axis=1)
+    above = np.all(place >= box[:, 1] - tolerance, axis=1)
+    beyond = np.any((below | above) & ~np.array(periodic), axis=1)
+    first, second = single[at], single[to]
     pore = np.concatenate(
         [np.stack([one, two], axis=1), np.stack([first // 4, second // 4], axis=1)]
     ).astype(np.int32)
@@ -79,43 +97,10 @@ def share_facets(tetrahedra: Tetrahedra, box: Array, *, periodic: tuple[bool, ..
     return Facets(
         pore=pore,
         opposite=ends,
-        shift=np.concatenate([np.zeros((len(one), 3), np.int16), shift]),
+        shift=np.concatenate([np.zeros((len(one), 3), np.int16), shifts[at, 0] - shifts[to, 0]]),
         vertex=np.take_along_axis(tetrahedra.vertex[pore[:, 0]], corners, axis=1),
-        unmatched=unmatched,
+        unmatched=int(np.sum(~beyond)),
     )
-
-
-def _across_periods(
-    tetrahedra: Tetrahedra, box: Array, periodic: tuple[bool, ...]
-) -> tuple[Array, Array, Array, int]:
-    """Pairs of facets without neighbour that have the same grains and relative shifts.
-
-    Returns the first and second facet (K,), each the index of its tetrahedron times 4 plus the
-    corner opposite, the shift (K, 3) of the second, and how many facets away from the mirrored
-    faces stay without partner.
-    """
-    points = tetrahedra.points
-    single = np.flatnonzero(tetrahedra.neighbour.ravel() < 0)
-    corner = np.take_along_axis(
-        tetrahedra.vertex[single // 4], geometry.FACETS[single % 4], axis=1
-    )
-    corner = np.take_along_axis(corner, np.argsort(points.key[corner], axis=1), axis=1)
-    names, shifts = points.name[corner], points.shift[corner]
-    relative = packed_shift(shifts - shifts[:, :1])
-    columns = [names[:, 0], names[:, 1], names[:, 2], relative[:, 1], relative[:, 2]]
-    order = np.lexsort(columns)
-    same = np.all([column[order][1:] == column[order][:-1] for column in columns], axis=0)
-    first, second = order[:-1][same], order[1:][same]
-    alone = np.ones(len(single), bool)
-    alone[first] = alone[second] = False
-    # a facet on or beyond one mirrored face needs no partner: symmetry closes the space
-    place = points.position[corner[alone]]
-    tolerance = SAME_CENTRE * float(points.radius.mean())
-    below = np.all(place <= box[:, 0] + tolerance, axis=1)
-    above = np.all(place >= box[:, 1] - tolerance, axis=1)
-    beyond = np.any((below | above) & ~np.array(periodic), axis=1)
-    shift = shifts[first, 0] - shifts[second, 0]
-    return single[first], single[second], shift, int(np.sum(~beyond))
 
 
 # ------------------------------------------------------------------------------------------------
@@ -179,7 +164,17 @@ def tessellate(placed: PlacedGrains) -> Tessellation:
     margin = np.full(3, FIRST_MARGIN * float(grains.radius.max()))
     for _ in range(ROUNDS):
         margin = np.where(periodic, margin, np.minimum(margin, size))
-        _refuse_crowd(count, np.where(periodic, margin, 0.0), size)
+        beyond = np.where(periodic, margin, 0.0)
+        images = count * float(np.prod(1.0 + 2.0 * beyond / size))
+        most, axis = MOST_IMAGES + IMAGES_A_GRAIN * count, int(np.argmax(beyond / size))
+        if images > most or beyond[axis] > MOST_PERIODS * size[axis]:
+            raise NetworkError(
+                f"tessellation of {count} grains: {images:.3g} images up to {beyond[axis]:.3g} m "
+                f"beyond the periodic side {'xyz'[axis]} of {size[axis]:.3g} m are needed, "
+                f"expected at most {most} and {MOST_PERIODS} periods; grains or voids are far "
+                "larger than the box (check units and box), or a periodic cell of few grains is "
+                "to be repeated"
+            )
         widest = ~np.array(periodic) & (margin >= size)
         tetrahedra = make_tetrahedra(grains, periodic=periodic, margin=margin)
         needed = tetrahedra.margin
@@ -196,7 +191,16 @@ def tessellate(placed: PlacedGrains) -> Tessellation:
             f"{size.tolist()} m, further than the images around it; give more grains or a smaller "
             "box"
         )
-    _check_facets(facets, count)
+    if facets.unmatched > max(4, UNMATCHED_SHARE * len(facets.pore)):
+        raise NetworkError(
+            f"tessellation: {facets.unmatched} of {len(facets.pore)} facets have no partner; the "
+            "grains do not tile the box, check the box and the periodic sides"
+        )
+    if not len(facets.pore):
+        raise NetworkError(
+            f"tessellation: no throat joins two pores of these {count} grains; the box is too "
+            "narrow for its side walls, give more grains or periodic sides"
+        )
     return Tessellation(
         tetrahedra=tetrahedra,
         facets=facets,
@@ -226,52 +230,20 @@ def copies_of_cell(
         if np.prod(wanted) * count > MOST_IMAGES / IMAGES_A_GRAIN:
             break
         times = int(wanted[0]), int(wanted[1]), int(wanted[2])
-        if all(_tiles(repeated(pack, times), periodic) for pack in packs):
-            return times
+        try:
+            for pack in (repeated(pack, times) for pack in packs):
+                facets = tessellate(place_grains(pack, periodic=periodic)).facets
+                if facets.unmatched > len(pack) // GRAINS_A_FLAW:
+                    break
+            else:
+                return times
+        except NetworkError:
+            continue
     return 1, 1, 1
-
-
-def _tiles(grains: Snapshot, periodic: tuple[bool, bool, bool]) -> bool:
-    """Whether the tetrahedra of the grains fill their box, next to all facets with a partner."""
-    try:
-        made = tessellate(place_grains(grains, periodic=periodic))
-    except NetworkError:
-        return False
-    return made.facets.unmatched <= len(grains) // GRAINS_A_FLAW
-
-
-def _refuse_crowd(count: int, margin: Array, size: Array) -> None:
-    """Raise NetworkError when the images of `count` grains in `margin` (3,) m are too many."""
-    images = count * float(np.prod(1.0 + 2.0 * margin / size))
-    axis = int(np.argmax(margin / size))
-    most = MOST_IMAGES + IMAGES_A_GRAIN * count
-    if images > most or margin[axis] > MOST_PERIODS * size[axis]:
-        raise NetworkError(
-            f"tessellation of {count} grains: {images:.3g} images up to {margin[axis]:.3g} m "
-            f"beyond the periodic side {'xyz'[axis]} of {size[axis]:.3g} m are needed, expected "
-            f"at most {most} and {MOST_PERIODS} periods; grains or voids are far larger than the "
-            "box (check units and box), or a periodic cell of few grains is to be repeated"
-        )
-
-
-def _check_facets(facets: Facets, count: int) -> None:
-    """Raise NetworkError when the tetrahedra of `count` grains do not fill the box or touch."""
-    if facets.unmatched > max(4, UNMATCHED_SHARE * len(facets.pore)):
-        raise NetworkError(
-            f"tessellation: {facets.unmatched} of {len(facets.pore)} facets have no partner; the "
-            "grains do not tile the box, check the box and the periodic sides"
-        )
-    if not len(facets.pore):
-        raise NetworkError(
-            f"tessellation: no throat joins two pores of these {count} grains; the box is too "
-            "narrow for its side walls, give more grains or periodic sides"
-        )
 
 
 # ------------------------------------------------------------------------------------------------
 # What is measured on one facet after the other, in one compiled pass.
-#
-# The formulas are those of `geometry`, which has their sources.
 
 
 SIDE_ENDS = (1, 2, 0)
@@ -285,8 +257,10 @@ def sections(
     """Inscribed radius (T,) m, open area (T,) m2, and whether two of the three spheres overlap.
 
     `vertex` (T, 3) are the corners among `points` (M, 3) m with spheres of `radius` (M,) m. The
-    radius is NaN where no circle touches the three discs. Spheres overlap that are nearer than the
-    sum of their radii by more than the share `touching` of it.
+    radius is NaN where no circle touches the three discs. The area is the triangle less the
+    sectors, plus half the lens of each overlapping pair, which is so counted once (Shi 2011,
+    section 3.1.2); it is negative where discs cover more than the triangle. Spheres overlap that
+    are nearer than the sum of their radii by more than the share `touching` of it.
     """
     count = len(vertex)
     inscribed, area, overlap = np.empty(count), np.empty(count), np.zeros(count, np.bool_)
@@ -295,8 +269,9 @@ def sections(
         one, two = less(points, b, a), less(points, c, a)
         product = times(one, two)
         twice, base = np.sqrt(along(product, product)), np.sqrt(along(one, one))
-        place = (base, along(one, two) / base, twice / base)
-        inscribed[t] = _inscribed(place, (radius[a], radius[b], radius[c]))
+        inscribed[t] = _inscribed(
+            base, along(one, two) / base, twice / base, radius[a], radius[b], radius[c]
+        )
         open_part = 0.5 * twice
         for i in range(3):
             own, after = vertex[t, i], vertex[t, SIDE_ENDS[i]]
@@ -311,24 +286,23 @@ def sections(
 
 
 @compiled
-def _inscribed(place: tuple[float, float, float], disc: tuple[float, float, float]) -> float:
+def _inscribed(a: float, x: float, y: float, r: float, second: float, third: float) -> float:
     """Radius m of the circle that touches three discs from outside, NaN where there is none.
 
-    The corners are (0, 0), (a, 0) and (x, y) m with `place` = (a, x, y).
+    The corners are (0, 0), (a, 0) and (x, y) m, the discs there have the radii r, `second` and
+    `third` m. Solved as `touching_spheres`.
     """
-    a, x, y = place
-    r = disc[0]
-    ux = 0.5 * (a * a + r * r - disc[1] ** 2) / a
-    vx = (r - disc[1]) / a
-    uy = (0.5 * (x * x + y * y + r * r - disc[2] ** 2) - x * ux) / y
-    vy = (r - disc[2] - x * vx) / y
+    ux = 0.5 * (a * a + r * r - second**2) / a
+    vx = (r - second) / a
+    uy = (0.5 * (x * x + y * y + r * r - third**2) - x * ux) / y
+    vy = (r - third - x * vx) / y
     half, rest = r - ux * vx - uy * vy, ux * ux + uy * uy - r * r
     under = half * half - (vx * vx + vy * vy - 1.0) * rest
     if not under >= 0.0:
         return np.nan
     below = half + np.sqrt(under)
     touching = rest / below if below != 0.0 else np.nan
-    return touching if touching > -min(disc) else np.nan
+    return touching if touching > -min(r, second, third) else np.nan
 
 
 @compiled
@@ -350,20 +324,21 @@ def _lens_area(first: float, second: float, apart: float) -> float:
 
 @compiled
 def heights(
-    places: tuple[Array, Array],
+    points: Array,
+    shaken: Array,
     vertex: Array,
     apex: Array,
     centre: Array,
-    ends: tuple[Array, Array],
+    pore: Array,
+    shift: Array,
 ) -> Array:
     """Distances (T, 2) m of two power centres from each facet, positive on their own side.
 
-    `places` are the points (M, 3) m and their shaken places. Which side is whose follows from the
-    shaken ones, for a flat tetrahedron has none without. `vertex` (T, 3) are the corners, `apex`
-    (T,) is the point on the side of the first; `ends` are the indices (T, 2) of the tetrahedra,
-    whose centres are `centre` (P, 3) m, and what moves the second next to the first (T, 3) m.
+    Which side is whose follows from the `shaken` places (M, 3) m of the `points`, for a flat
+    tetrahedron has none without. `vertex` (T, 3) are the corners, `apex` (T,) is the point on the
+    side of the first tetrahedron of the pair `pore` (T, 2), whose centres are among `centre`
+    (P, 3) m; `shift` (T, 3) m moves the second next to the first.
     """
-    (points, shaken), (pore, shift) = places, ends
     height = np.empty((len(vertex), 2))
     for t in range(len(vertex)):
         a, b, c = vertex[t, 0], vertex[t, 1], vertex[t, 2]
@@ -411,10 +386,19 @@ class Polyhedra:
 
 def join_polyhedra(tessellation: Tessellation) -> Polyhedra:
     """Power centres, heights over the facets, groups, and the walls they lie on."""
-    centre = _adopted_centres(tessellation)
-    height = _heights(tessellation, centre)
+    tetrahedra, facets = tessellation.tetrahedra, tessellation.facets
+    points, centre = tetrahedra.points, _adopted_centres(tessellation)
+    height = heights(
+        points.position,
+        points.shaken,
+        facets.vertex,
+        tetrahedra.vertex[facets.pore[:, 0], facets.opposite[:, 0]],
+        centre,
+        facets.pore,
+        facets.shift * tessellation.size,
+    )
     joined = np.abs(height.sum(axis=1)) < SAME_CENTRE * tessellation.scale
-    pairs, count = tessellation.facets.pore[joined], len(centre)
+    pairs, count = facets.pore[joined], len(centre)
     graph = coo_matrix((np.ones(len(pairs), np.int8), pairs.T), shape=(count, count))
     group = connected_components(graph, directed=False)[1]
     return Polyhedra(
@@ -470,16 +454,6 @@ def _on_face(tessellation: Tessellation, centre: Array) -> Array:
     return (near[0] | near[1]) & ~np.array(tessellation.periodic)
 
 
-def _heights(tessellation: Tessellation, centre: Array) -> Array:
-    """Distances (T, 2) m of the two power centres from the facet, positive on their own side."""
-    tetrahedra, facets = tessellation.tetrahedra, tessellation.facets
-    apex = tetrahedra.vertex[facets.pore[:, 0], facets.opposite[:, 0]]
-    ends = (facets.pore, facets.shift * tessellation.size)
-    places = (tetrahedra.points.position, tetrahedra.points.shaken)
-    result: Array = heights(places, facets.vertex, apex, centre, ends)
-    return result
-
-
 def _walls(tessellation: Tessellation, centre: Array, group: Array) -> Array:
     """Mirrored faces (P, 3) that cut each polyhedron: -1 the low one, 1 the high one, 0 none.
 
@@ -523,60 +497,49 @@ def pierced_facets(tessellation: Tessellation, facets: Facets, open_facet: Array
     apexes of the two tetrahedra of the facet and of those across their other facets. The section
     is examined on a triangular grid of 91 points.
     """
-    tetrahedra = tessellation.tetrahedra
-    beyond, turn = _apexes_beyond(tetrahedra, facets)
-    points = tetrahedra.points
-    size = np.asarray(tessellation.size, float)
-    result: Array = _pierced(
-        (points.position, points.radius),
-        (tetrahedra.vertex, beyond, turn),
-        (facets.vertex, facets.pore, facets.opposite, facets.shift),
-        open_facet,
-        size,
-    )
-    return result
-
-
-def _apexes_beyond(tetrahedra: Tetrahedra, facets: Facets) -> tuple[Array, Array]:
-    """Point (P, 4) opposite each facet on its other side, -1 beyond a wall; periods (P, 4, 3)."""
-    beyond = np.full(tetrahedra.vertex.shape, -1, np.int32)
-    turn = np.zeros((*beyond.shape, 3), np.int8)
-    one, two = facets.pore.T
-    first, second = facets.opposite.T
-    beyond[one, first] = tetrahedra.vertex[two, second]
-    beyond[two, second] = tetrahedra.vertex[one, first]
+    points, vertex = tessellation.tetrahedra.points, tessellation.tetrahedra.vertex
+    # the point opposite each facet of a tetrahedron on its other side, -1 beyond a wall
+    beyond, turn = np.full(vertex.shape, -1, np.int32), np.zeros((*vertex.shape, 3), np.int8)
+    (one, two), (first, second) = facets.pore.T, facets.opposite.T
+    beyond[one, first] = vertex[two, second]
+    beyond[two, second] = vertex[one, first]
     across = np.flatnonzero(np.any(facets.shift != 0, axis=1))
     turn[one[across], first[across]] = facets.shift[across]
     turn[two[across], second[across]] = -facets.shift[across]
-    return beyond, turn
-
-
-@compiled
-def _pierced(
-    spheres: tuple[Array, Array],
-    tetrahedra: tuple[Array, Array, Array],
-    facets: tuple[Array, Array, Array, Array],
-    open_facet: Array,
-    size: Array,
-) -> Array:
-    """As `pierced_facets`, with the parts of `Tetrahedra`, `_apexes_beyond` and `Facets`."""
     pierced = np.zeros(len(open_facet), np.bool_)
-    _set_pierced(spheres, tetrahedra, facets, (open_facet, size), pierced)
+    _set_pierced(
+        pierced,
+        points.position,
+        points.radius,
+        vertex,
+        beyond,
+        turn,
+        facets.vertex,
+        facets.pore,
+        facets.opposite,
+        facets.shift,
+        open_facet,
+        np.asarray(tessellation.size, float),
+    )
     return pierced
 
 
 @compiled_in_place
 def _set_pierced(
-    spheres: tuple[Array, Array],
-    tetrahedra: tuple[Array, Array, Array],
-    facets: tuple[Array, Array, Array, Array],
-    more: tuple[Array, Array],
     pierced: Array,
+    points: Array,
+    grain: Array,
+    vertex: Array,
+    beyond: Array,
+    turn: Array,
+    corner: Array,
+    pore: Array,
+    opposite: Array,
+    shift: Array,
+    open_facet: Array,
+    size: Array,
 ) -> None:
     """Sets which open facets (T,) a grain of their two tetrahedra or of a neighbour pierces."""
-    vertex, beyond, turn = tetrahedra
-    corner, pore, opposite, shift = facets
-    open_facet, size = more
     for t in range(len(corner)):
         if not open_facet[t]:
             continue
@@ -597,13 +560,12 @@ def _set_pierced(
                         z + turn[own, k - 1, 2],
                     )
                 moved = (x * size[0], y * size[1], z * size[2])
-                pierced[t] = _pierces(spheres, corner[t], other, moved)
+                pierced[t] = _pierces(points, grain, corner[t], other, moved)
 
 
 @compiled_in_place
-def _pierces(spheres: tuple[Array, Array], corner: Array, other: int, moved: Vector) -> bool:
+def _pierces(points: Array, grain: Array, corner: Array, other: int, moved: Vector) -> bool:
     """Whether the grain `other`, `moved` by a vector m, covers part of an open section."""
-    points, grain = spheres
     a, b, c = corner[0], corner[1], corner[2]
     one, two = less(points, b, a), less(points, c, a)
     normal = times(one, two)
@@ -623,37 +585,25 @@ def _pierces(spheres: tuple[Array, Array], corner: Array, other: int, moved: Vec
         and -_outside(two, normal, place, size) < disc
     ):
         return False
-    return _covers((one, two, place), (grain[a], grain[b], grain[c], radius))
+    # whether the ball covers a grid point of the triangle outside its three grains
+    for step in STEPS:
+        x = step[1] * one[0] + step[2] * two[0]
+        y = step[1] * one[1] + step[2] * two[1]
+        z = step[1] * one[2] + step[2] * two[2]
+        if (
+            _square(x, y, z, place) < radius**2
+            and x * x + y * y + z * z > grain[a] ** 2
+            and _square(x, y, z, one) > grain[b] ** 2
+            and _square(x, y, z, two) > grain[c] ** 2
+        ):
+            return True
+    return False
 
 
 @compiled_in_place
 def _outside(side: Vector, normal: Vector, place: Vector, size: float) -> float:
     """How far m `place` lies to the right of a side of a triangle; `size` m2 is that of normal."""
     return along(place, times(side, normal)) / (size * np.sqrt(along(side, side)))
-
-
-@compiled_in_place
-def _covers(
-    places: tuple[Vector, Vector, Vector], radii: tuple[float, float, float, float]
-) -> bool:
-    """Whether a ball covers a grid point of the triangle outside the three grains.
-
-    `places` m are the second and third corner and the ball, from the first corner; `radii` m are
-    those of the three grains and of the ball.
-    """
-    one, two, place = places
-    for step in STEPS:
-        x = step[1] * one[0] + step[2] * two[0]
-        y = step[1] * one[1] + step[2] * two[1]
-        z = step[1] * one[2] + step[2] * two[2]
-        if (
-            _square(x, y, z, place) < radii[3] ** 2
-            and x * x + y * y + z * z > radii[0] ** 2
-            and _square(x, y, z, one) > radii[1] ** 2
-            and _square(x, y, z, two) > radii[2] ** 2
-        ):
-            return True
-    return False
 
 
 @compiled

@@ -1,9 +1,7 @@
-"""The regular triangulation of weighted points, with exact predicates.
-
-The order in which points are inserted into a tessellation.
-"""
+"""The regular triangulation of weighted points, with exact predicates."""
 
 from itertools import combinations, permutations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -90,17 +88,14 @@ ROUNDINGS = 24.0
 PLANE_BOUND, SPHERE_BOUND = 6.0 * ROUNDINGS, 24.0 * ROUNDINGS
 SPLITTER = 2.0**27 + 1.0
 Pair = tuple[float, float]
+Corners = tuple[int, int, int, int]
 
 
 def _orders(count: int) -> Array:
     """All orders of `count` columns with their signs (count!, count + 1)."""
-    rows = [(*order, _sign(order)) for order in permutations(range(count))]
-    return np.array(rows, np.int64)
-
-
-def _sign(order: tuple[int, ...]) -> int:
-    turns = sum(one > other for one, other in combinations(order, 2))
-    return -1 if turns % 2 else 1
+    every = list(permutations(range(count)))
+    turns = [sum(one > other for one, other in combinations(order, 2)) for order in every]
+    return np.array([(*order, (-1) ** turn) for order, turn in zip(every, turns, strict=True)])
 
 
 PLANE_ORDERS, SPHERE_ORDERS = _orders(3), _orders(4)
@@ -200,7 +195,7 @@ def _certain(value: float, bound: float) -> int:
 
 
 @compiled
-def in_sphere(points: Array, weight: Array, corner: tuple[int, int, int, int], e: int) -> int:
+def in_sphere(points: Array, weight: Array, corner: Corners, e: int) -> int:
     """1 where point `e` changes the tetrahedron of `corner`, -1 where it does not.
 
     It changes the tetrahedron when its power to the sphere that is orthogonal to the four corners
@@ -237,9 +232,7 @@ def in_sphere(points: Array, weight: Array, corner: tuple[int, int, int, int], e
 
 
 @compiled
-def _sphere_in_pairs(
-    points: Array, weight: Array, corner: tuple[int, int, int, int], e: int, most: float
-) -> int:
+def _sphere_in_pairs(points: Array, weight: Array, corner: Corners, e: int, most: float) -> int:
     high, low = np.empty((4, 4)), np.empty((4, 4))
     for k in range(4):
         lifted = _sum(weight[e], -weight[corner[k]])
@@ -257,7 +250,7 @@ def _sphere_in_pairs(
 # Bowyer (1981, Comput. J. 24, 162) and Watson (1981, Comput. J. 24, 167): a new point removes the
 # tetrahedra that it changes, and is joined to the facets of the hole. With weights the same makes
 # the power tessellation (Edelsbrunner and Shah 1996, Algorithmica 15, 223). The points come in the
-# order of `curve`, so that the next tetrahedron is found within a few steps of the last.
+# order of `insertion_order`, so that the next tetrahedron is found within a few steps of the last.
 #
 # All points lie in one tetrahedron of four distant points. What these four are part of is left out
 # at the end. A tetrahedron is missed only where its sphere reaches that far.
@@ -272,8 +265,28 @@ TETRAHEDRA_A_POINT = 8
 HOLE, MOST_HOLE = 256, 8192
 """Numbers of tetrahedra of a hole that there is room for, first and at most."""
 DEGENERATE, SMALL = -1, -2
-Mesh = tuple[Array, Array, Array, Array]
-Room = tuple[Array, Array, Array, Array]
+IN, USED, FREE, NEAR, TRIES = range(5)
+"""Places in the state of the work: points that are in, tetrahedra ever used, those on the free
+list, a tetrahedron near the next point, and the number of tries."""
+
+
+class Mesh(NamedTuple):
+    """Room for tetrahedra: corners and neighbours (K, 4), -1 where free, marks and a free list."""
+
+    vertex: Array
+    neighbour: Array
+    mark: Array
+    spare: Array
+
+
+class Room(NamedTuple):
+    """Room for a hole: its tetrahedra, its facets (tetrahedron within and corner opposite),
+    numbers of the corners of these, and what waits at their edges, -1 for nothing."""
+
+    hole: Array
+    rim: Array
+    number: Array
+    edge: Array
 
 
 def triangulate(points: Array, weight: Array) -> tuple[Array, Array] | None:
@@ -292,20 +305,22 @@ def triangulate(points: Array, weight: Array) -> tuple[Array, Array] | None:
     mesh = _insert_all(every, weights, insertion_order(points))
     if mesh is None:
         return None
-    vertex, neighbour = mesh
-    finite = np.all((vertex >= 0) & (vertex < count), axis=1)
-    index = np.full(len(vertex) + 1, -1, np.int32)
+    finite = np.all((mesh.vertex >= 0) & (mesh.vertex < count), axis=1)
+    index = np.full(len(finite) + 1, -1, np.int32)
     kept = np.flatnonzero(finite)
     index[kept] = np.arange(len(kept))
-    return vertex[kept], index[neighbour[kept]]
+    return mesh.vertex[kept], index[mesh.neighbour[kept]]
 
 
-def _insert_all(points: Array, weight: Array, order: Array) -> tuple[Array, Array] | None:
-    """Corners and neighbours of all tetrahedra, -1 in those that are free; None if degenerate.
+def _insert_all(points: Array, weight: Array, order: Array) -> Mesh | None:
+    """The tetrahedra of all points; None if degenerate. The last four points are the distant ones.
 
-    The last four points are the distant ones.
+    They are the corners of the first tetrahedron.
     """
-    mesh = _first_mesh(len(order))
+    count, most = len(order), TETRAHEDRA_A_POINT * len(order) + 4 * HOLE
+    corners = np.full((most, 4), -1, np.int32)
+    mesh = Mesh(corners, corners.copy(), np.zeros(most, np.int32), np.zeros(most, np.int32))
+    mesh.vertex[0] = count + np.arange(4)
     room = _room(len(points), HOLE)
     state = np.array([0, 1, 0, 0, 0])
     while True:
@@ -313,82 +328,65 @@ def _insert_all(points: Array, weight: Array, order: Array) -> tuple[Array, Arra
         if code == DEGENERATE:
             return None
         if code != SMALL:
-            return mesh[0], mesh[1]
-        if state[1] + len(room[0]) > len(mesh[0]):
-            mesh = (_doubled(mesh[0]), _doubled(mesh[1]), _doubled(mesh[2]), _doubled(mesh[3]))
-        elif len(room[0]) < MOST_HOLE:
-            room = _room(len(points), 2 * len(room[0]))
+            return mesh
+        if state[USED] + len(room.hole) > len(mesh.vertex):
+            more = (np.full_like(one, -1 if one.ndim == 2 else 0) for one in mesh)
+            mesh = Mesh(*(np.concatenate(pair) for pair in zip(mesh, more, strict=True)))
+        elif len(room.hole) < MOST_HOLE:
+            room = _room(len(points), 2 * len(room.hole))
         else:
             return None
 
 
-def _first_mesh(count: int) -> Mesh:
-    """Room for the tetrahedra of `count` points: corners, neighbours, marks and a free list.
-
-    The first tetrahedron is that of the four distant points.
-    """
-    most = TETRAHEDRA_A_POINT * count + 4 * HOLE
-    vertex = np.full((most, 4), -1, np.int32)
-    neighbour = np.full((most, 4), -1, np.int32)
-    vertex[0] = count + np.arange(4)
-    return vertex, neighbour, np.zeros(most, np.int32), np.zeros(most, np.int32)
-
-
 def _room(count: int, size: int) -> Room:
-    """Room for a hole: its tetrahedra, its facets, numbers of its corners, and their edges."""
-    return (
-        np.zeros(size, np.int32),
-        np.zeros((size, 2), np.int32),
-        np.full(count, -1, np.int32),
-        np.full((size, size), -1, np.int32),
+    """Room for a hole of `size` tetrahedra among `count` points."""
+    return Room(
+        hole=np.zeros(size, np.int32),
+        rim=np.zeros((size, 2), np.int32),
+        number=np.full(count, -1, np.int32),
+        edge=np.full((size, size), -1, np.int32),
     )
-
-
-def _doubled(one: Array) -> Array:
-    return np.concatenate([one, np.full_like(one, -1 if one.ndim == 2 else 0)])
 
 
 @compiled_in_place
 def _insert(
     points: Array, weight: Array, order: Array, mesh: Mesh, room: Room, state: Array
 ) -> int:
-    """Inserts `order` from where `state` stands; 0, or DEGENERATE, or SMALL for want of room.
-
-    `state` holds the number of points that are in, the number of tetrahedra ever used, that of
-    those on the free list, a tetrahedron near the next point, and the number of tries.
-    """
-    vertex = mesh[0]
-    while state[0] < len(order):
-        new = order[state[0]]
-        start = _containing(points, mesh, state[3], new)
-        corner = (vertex[start, 0], vertex[start, 1], vertex[start, 2], vertex[start, 3])
+    """Inserts `order` from where `state` stands; 0, or DEGENERATE, or SMALL for want of room."""
+    while state[IN] < len(order):
+        new = order[state[IN]]
+        start = _containing(points, mesh, state[NEAR], new)
+        corner = _corners(mesh, start)
         sign = in_sphere(points, weight, corner, new)
-        state[3] = start
-        state[4] += 1
+        state[NEAR] = start
+        state[TRIES] += 1
         if sign > 0:
-            hole, rim = _hole(points, weight, mesh, room, (start, new, 2 * state[4]))
+            # an even mark that was never used
+            hole, rim = _hole(points, weight, mesh, room, start, new, 2 * state[TRIES])
             if hole < 0:
                 return hole
-            if state[1] + rim > len(vertex):
+            if state[USED] + rim > len(mesh.vertex):
                 return SMALL
-            _fill(mesh, room, (hole, rim, new), state)
-        elif sign == 0 or not _strictly_within(points, corner, new):
+            _fill(mesh, room, hole, rim, new, state)
+        elif sign == 0:
             return DEGENERATE
-        state[0] += 1
+        else:
+            for i in range(4):
+                if _side(points, corner, i, new) <= 0:  # not certain to lie in a tetrahedron
+                    return DEGENERATE
+        state[IN] += 1
     return 0
 
 
 @compiled_in_place
-def _strictly_within(points: Array, corner: tuple[int, int, int, int], new: int) -> bool:
-    """Whether `new` is certain to lie in a tetrahedron."""
-    certain = True
-    for i in range(4):
-        certain = certain and _side(points, corner, i, new) > 0
-    return certain
+def _corners(mesh: Mesh, at: int) -> Corners:
+    """The corners of tetrahedron `at`."""
+    vertex = mesh.vertex
+    return vertex[at, 0], vertex[at, 1], vertex[at, 2], vertex[at, 3]
 
 
 @compiled_in_place
-def _side(points: Array, corner: tuple[int, int, int, int], i: int, new: int) -> int:
+def _side(points: Array, corner: Corners, i: int, new: int) -> int:
     """1 where `new` lies on the side of corner `i` of the facet opposite to it, -1 beyond."""
     return side_of_plane(
         points,
@@ -402,13 +400,12 @@ def _side(points: Array, corner: tuple[int, int, int, int], i: int, new: int) ->
 @compiled_in_place
 def _containing(points: Array, mesh: Mesh, start: int, new: int) -> int:
     """The tetrahedron in which `new` lies, by steps from `start` across facets towards it."""
-    vertex, neighbour = mesh[0], mesh[1]
     at, before = start, -1
     while True:
-        corner = (vertex[at, 0], vertex[at, 1], vertex[at, 2], vertex[at, 3])
+        corner = _corners(mesh, at)
         step = -1
         for i in range(4):
-            beyond = neighbour[at, i]
+            beyond = mesh.neighbour[at, i]
             if beyond == before or beyond < 0:
                 continue
             side = _side(points, corner, i, new)
@@ -422,16 +419,14 @@ def _containing(points: Array, mesh: Mesh, start: int, new: int) -> int:
 
 @compiled_in_place
 def _hole(
-    points: Array, weight: Array, mesh: Mesh, room: Room, given: tuple[int, int, int]
+    points: Array, weight: Array, mesh: Mesh, room: Room, start: int, new: int, stamp: int
 ) -> tuple[int, int]:
     """Numbers of the tetrahedra that a point changes and of the facets around them, in `room`.
 
-    `given` is the tetrahedron in which the point lies, the point, and an even mark that was never
-    used. A facet is the tetrahedron within and the number of the corner opposite.
+    The point `new` lies in the tetrahedron `start`. The changed ones are marked by the even
+    number `stamp`, those that were looked at by the next.
     """
-    vertex, neighbour, mark, _ = mesh
-    hole, rim = room[0], room[1]
-    start, new, stamp = given
+    hole, rim, mark = room.hole, room.rim, mesh.mark
     hole[0], mark[start] = start, stamp
     count, facets, at = 1, 0, 0
     while at < count:
@@ -440,12 +435,11 @@ def _hole(
         if count + 4 > len(hole) or facets + 4 > len(rim):
             return SMALL, 0
         for i in range(4):
-            outer = neighbour[inner, i]
+            outer = mesh.neighbour[inner, i]
             if outer >= 0 and mark[outer] == stamp:
                 continue
             if outer >= 0 and mark[outer] != stamp + 1:
-                corner = (vertex[outer, 0], vertex[outer, 1], vertex[outer, 2], vertex[outer, 3])
-                sign = in_sphere(points, weight, corner, new)
+                sign = in_sphere(points, weight, _corners(mesh, outer), new)
                 if sign == 0:
                     return DEGENERATE, 0
                 if sign > 0:
@@ -460,28 +454,26 @@ def _hole(
 
 
 @compiled_in_place
-def _fill(mesh: Mesh, room: Room, given: tuple[int, int, int], state: Array) -> None:
-    """Joins a point to the facets of its hole, and frees what was in it.
+def _fill(mesh: Mesh, room: Room, count: int, facets: int, new: int, state: Array) -> None:
+    """Joins the point `new` to the `facets` of its hole, and frees the `count` tetrahedra in it.
 
-    `given` are the numbers of tetrahedra and of facets of the hole, and the point. A new
-    tetrahedron is that within the facet with the point in place of the corner opposite. Two of
-    them meet at each edge of the rim.
+    A new tetrahedron is that within the facet with the point in place of the corner opposite. Two
+    of them meet at each edge of the rim, where the first waits for the second.
     """
-    vertex, neighbour, _, spare = mesh
-    hole, rim, number, edge = room
-    count, facets, new = given
+    vertex, neighbour, spare = mesh.vertex, mesh.neighbour, mesh.spare
+    rim, number, edge = room.rim, room.number, room.edge
     for f in range(facets):
         for k in range(4):
             number[vertex[rim[f, 0], k]] = -1
     corners = 0
     for f in range(facets):
         inner, i = rim[f, 0], rim[f, 1]
-        if state[2] > 0:
-            state[2] -= 1
-            made = spare[state[2]]
+        if state[FREE] > 0:
+            state[FREE] -= 1
+            made = spare[state[FREE]]
         else:
-            made = state[1]
-            state[1] += 1
+            made = state[USED]
+            state[USED] += 1
         outer = neighbour[inner, i]
         for k in range(4):
             corner = vertex[inner, k]
@@ -494,37 +486,23 @@ def _fill(mesh: Mesh, room: Room, given: tuple[int, int, int], state: Array) -> 
             for k in range(4):
                 if neighbour[outer, k] == inner:
                     neighbour[outer, k] = made
-        _join(vertex, neighbour, number, edge, made, i)
-        state[3] = made
+        for k in range(4):
+            if k == i:
+                continue
+            one, other = -1, -1
+            for m in range(4):
+                if m != k and m != i:
+                    one, other = other, number[vertex[made, m]]
+            low, high = min(one, other), max(one, other)
+            known = edge[low, high]
+            if known < 0:
+                edge[low, high] = 4 * made + k
+            else:
+                neighbour[known // 4, known % 4] = made
+                neighbour[made, k] = known // 4
+                edge[low, high] = -1
+        state[NEAR] = made
     for k in range(count):
-        spare[state[2]] = hole[k]
-        vertex[hole[k], 0] = -1
-        state[2] += 1
-
-
-@compiled_in_place
-def _join(
-    vertex: Array, neighbour: Array, number: Array, edge: Array, made: int, apex: int
-) -> None:
-    """Makes `made` the neighbour of those made before it that share an edge of the rim with it.
-
-    `edge` is -1 wherever it waits for no second tetrahedron.
-    """
-    for k in range(4):
-        if k == apex:
-            continue
-        one, other = -1, -1
-        for m in range(4):
-            if m != k and m != apex:
-                if one < 0:
-                    one = number[vertex[made, m]]
-                else:
-                    other = number[vertex[made, m]]
-        low, high = min(one, other), max(one, other)
-        known = edge[low, high]
-        if known < 0:
-            edge[low, high] = 4 * made + k
-        else:
-            neighbour[known // 4, known % 4] = made
-            neighbour[made, k] = known // 4
-            edge[low, high] = -1
+        spare[state[FREE]] = room.hole[k]
+        vertex[room.hole[k], 0] = -1
+        state[FREE] += 1

@@ -1,6 +1,7 @@
 """Porosity and permeability of sand under stress, and how far bonds hold grains in the flow."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,17 +9,17 @@ import numpy as np
 from fdnet.case.case import Case
 from fdnet.case.file import case_from
 from fdnet.mechanics.elastic import carrying
-from fdnet.mechanics.of_case import material_of
+from fdnet.mechanics.of_case import pack_material
 from fdnet.mechanics.springs import (
     Cement,
-    Material,
+    PackMaterial,
     bond_springs,
     contact_springs,
     kinematics,
     solver_of,
-    stiffness,
+    stiffness_matrix,
 )
-from fdnet.mechanics.triaxial import confined
+from fdnet.mechanics.triaxial import Triaxial, confined
 from fdnet.network.permeability import analyse
 from fdnet.spheres.snapshot import Array, Snapshot
 from fdnet.studies.dem.mechanics_figure import Panel, draw_ranges
@@ -84,8 +85,10 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
     """Porosity and permeability under a stress, or the largest displacement of a bonded grain."""
     if point.series in BONDS:
         case = _case(point.seed, STIFFNESS[QUARTZ], float(point.value))
-        springs = material_of(case, grains_of(case, work))
-        material = Material(normal=springs.normal, shear=springs.shear, cement=BONDS[point.series])
+        springs = pack_material(case, grains_of(case, work))
+        material = PackMaterial(
+            normal=springs.normal, shear=springs.shear, cement=BONDS[point.series]
+        )
         moved = displacement_under_flow(
             grains_of(case, work), material, GRADIENT, periodic=case.periodic
         )
@@ -93,9 +96,9 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
     case = _case(point.seed, STIFFNESS[point.series], 0.36)
     grains = grains_of(case, work)
     if point.value:
-        material = material_of(case, grains)
-        stress = 1e6 * float(point.value)
-        grains = confined(grains, material, stress, periodic=case.periodic)
+        material = replace(pack_material(case, grains), glued=False)
+        test = Triaxial(confining=1e6 * float(point.value))
+        grains = confined(grains, material, test, case.periodic)[0].grains
     result = analyse(grains, None, periodic=case.periodic)
     return {"porosity": result.porosity_initial, "k": result.k_initial}
 
@@ -143,7 +146,7 @@ STUDY = Study(
 
 def displacement_under_flow(
     grains: Snapshot,
-    material: Material,
+    material: PackMaterial,
     gradient: float,
     *,
     periodic: tuple[bool, bool, bool],
@@ -163,5 +166,5 @@ def displacement_under_flow(
     volume = float(np.prod(np.diff(grains.box, axis=1)))
     push[kept, 0] = gradient * volume / max(1, int(kept.sum()))
     moved = np.zeros(6 * len(grains))
-    moved[moving] = solver_of(stiffness(live, springs))(push.ravel()[moving])
+    moved[moving] = solver_of(stiffness_matrix(live, springs))(push.ravel()[moving])
     return moved.reshape(-1, 6)[:, :3]

@@ -9,7 +9,7 @@ import numpy as np
 from fdnet.case.case import Case
 from fdnet.case.file import case_from
 from fdnet.mechanics.elastic import elastic_of
-from fdnet.mechanics.of_case import material_of
+from fdnet.mechanics.of_case import pack_material
 from fdnet.mechanics.springs import Cement
 from fdnet.mechanics.triaxial import Sheared, Triaxial, triaxial
 from fdnet.spheres.snapshot import Array, Snapshot
@@ -91,7 +91,7 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
         sides = "walls" if point.series == WALLS else "periodic"
         case = pack_case(point.seed, float(point.value), sides)
         grains = grains_of(case, work)
-        result = elastic_of(grains, material_of(case, grains), periodic=case.periodic)
+        result = elastic_of(grains, pack_material(case, grains), periodic=case.periodic)
         return {"young": result.averaged.young, "shear": result.averaged.shear}
     if point.series in (BARE, BONDED):
         return _load_steps(point, work)
@@ -103,14 +103,14 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
         curve = run_servo(case, pressed, servo, work / point.slug)
         return _numbers(*_of_servo(curve))
     test = Triaxial(confining=PRESSURE, strain=STRAIN, steps=40, relieved=False)
-    material = material_of(case, pressed)
+    material = pack_material(case, pressed)
     return _numbers(*_of_rows(triaxial(pressed, material, test, periodic=(False,) * 3)))
 
 
 def _load_steps(point: Point, work: Path) -> Mapping[str, float]:
     case = pack_case(point.seed, 1.9, "periodic")
     grains = grains_of(case, work)
-    material = material_of(case, grains)
+    material = pack_material(case, grains)
     if point.series == BONDED:
         material = replace(material, cement=_CEMENT)
     test = Triaxial(confining=_CONFINED, strain=_TO, steps=int(point.value))

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from fdnet.network import geometry
-from fdnet.network.geometry import solid_in_tetrahedra
+from fdnet.network.tessellation.delaunay import solids, touching_spheres
+from fdnet.network.tessellation.facets import sections
 from fdnet.spheres.snapshot import Array
 from fdnet.studies.thesis.numbers.examine import Examined
 from fdnet.studies.thesis.numbers.pore_sizes import PoreSizes
@@ -32,18 +33,18 @@ def sizes_of_grains_alone(examined: Examined) -> PoreSizes:
         if tessellation is not None
         else (np.zeros((0, 4), int), np.zeros((0, 4), int))
     )
-    corner, radius = section.position[vertex], section.radius[vertex]
-    centre, sphere = geometry.touching_sphere(corner, radius)
+    corner = section.position[vertex]
+    centre, sphere, _ = touching_spheres(section.position, section.radius, vertex, 0.0)
     own = _lies_inside(corner, centre) & (sphere > 0)
     centre = np.where(own[:, None], centre, corner.mean(axis=1))
     # Each facet counts once: it is taken from the tetrahedron with the higher number.
     pore, opposite = np.nonzero((neighbour >= 0) & (neighbour < np.arange(len(vertex))[:, None]))
     facet = np.take_along_axis(vertex[pore], geometry.FACETS[opposite], axis=1)
-    inscribed = geometry.touching_circle(section.position[facet], section.radius[facet])
+    inscribed = sections(section.position, section.radius, facet, 0.0)[0]
     return PoreSizes(
         pore_radius=np.where(own, sphere, 0.0),
         pore_volume=np.abs(geometry.signed_volume(corner))
-        - solid_in_tetrahedra(corner, radius)[0],
+        - solids(section.position, section.radius, vertex)[0],
         throat_radius=np.nan_to_num(np.maximum(inscribed, 0.0)),
         throat_length=np.linalg.norm(centre[pore] - centre[neighbour[pore, opposite]], axis=1),
         pore_weight=np.ones(len(vertex)),
