@@ -221,8 +221,6 @@ def empty_duct_permeability(box: Array, periodic: tuple[bool, bool, bool]) -> fl
 
 MOVED = 1e-9
 """A grain that is displaced by more than this, m, has moved."""
-MANY_CENTRED = 0.1
-"""Share of the grains with their centre inside another one, from which a warning says so."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
