@@ -13,13 +13,13 @@ each of these is drawn many more times (`last_places`) before it counts as one w
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fdnet.case.case import InvasionCase
 from fdnet.case.rules import concentration_text
-from fdnet.case.spheres import Fines
 from fdnet.errors import CaseError
 from fdnet.scales.scales import InvasionScales
 from fdnet.sizes import dealt
@@ -48,10 +48,15 @@ def places_by_size(
     size: Array,
     *,
     rng: np.random.Generator,
+    width: Array | None = None,
     others: tuple[Array, Array] = NOBODY,
     patient: bool = True,
+    at_once: bool = False,
 ) -> tuple[Array, int]:
     """Random places that touch nothing, by random sequential addition of whole classes.
+
+    It goes in rounds: of two spheres that overlap the later one, which is no larger, is drawn
+    again.
 
     Args:
         radius: (N,) m.
@@ -59,22 +64,25 @@ def places_by_size(
         high: (N, 3) m, largest ones.
         size: (3,) m, period along each axis, 0 where there is none.
         rng: gives the places.
+        width: (N, 3) m, from `low` to `high`, where it was rounded otherwise.
         others: places (M, 3) m and radii (M,) m of spheres that are there already.
         patient: whether the last spheres of a class are drawn `LAST_TRIES` times.
+        at_once: whether all sizes are one class.
 
     Returns:
         Places (N, 3) m, and how many spheres got none; those places mean nothing then.
     """
     count = len(radius)
+    width = high - low if width is None else width
     place = np.concatenate([np.empty((count, 3)), others[0]])
     done = np.arange(len(place)) >= count
     radius = np.concatenate([radius, others[1]])
-    for members in _classes(radius[:count]):
-        waiting = members
+    order = np.argsort(-radius[:count], kind="stable")
+    for waiting in [order] if at_once else _classes(radius[:count], order):
         for _ in range(ROUNDS):
             if not len(waiting):
                 break
-            place[waiting] = low[waiting] + rng.random((len(waiting), 3)) * (high - low)[waiting]
+            place[waiting] = low[waiting] + rng.random((len(waiting), 3)) * width[waiting]
             clear = _clear(place, radius, waiting, np.flatnonzero(done), size)
             done[waiting[clear]] = True
             waiting = waiting[~clear]
@@ -117,45 +125,29 @@ def last_places(
         rng: gives the places.
         others: places (M, 3) m and radii (M,) m of spheres that are there already.
     """
+    from scipy.spatial import cKDTree
+
     place, there = others
     for one, low, high in zip(radius, *span, strict=True):
-        free = _place_of_one(one, (low, high), size, rng=rng, others=(place, there))
-        if free is None:
+        tree = cKDTree(place, boxsize=size)
+        reach = CLEARANCE * (one + float(there.max(initial=0.0)))
+        for _ in range(LAST_TRIES // _BLOCK):
+            drawn = low + rng.random((_BLOCK, 3)) * (high - low)
+            near = cKDTree(drawn, boxsize=size).sparse_distance_matrix(
+                tree, reach, output_type="ndarray"
+            )
+            clear = np.ones(_BLOCK, bool)
+            clear[near["i"][near["v"] < CLEARANCE * (one + there[near["j"]])]] = False
+            if clear.any():
+                break
+        else:
             break
-        place, there = np.vstack([place, free]), np.append(there, one)
+        place, there = np.vstack([place, drawn[np.argmax(clear)]]), np.append(there, one)
     return place[len(others[0]) :]
 
 
-def _place_of_one(
-    radius: float,
-    span: tuple[Array, Array],
-    size: Array,
-    *,
-    rng: np.random.Generator,
-    others: tuple[Array, Array],
-) -> Array | None:
-    """The first of `LAST_TRIES` random places (3,) m that is clear of the `others`, or None."""
-    from scipy.spatial import cKDTree
-
-    low, high = span
-    place, there = others
-    tree = cKDTree(place, boxsize=size)
-    reach = CLEARANCE * (radius + float(there.max(initial=0.0)))
-    for _ in range(LAST_TRIES // _BLOCK):
-        drawn = low + rng.random((_BLOCK, 3)) * (high - low)
-        near = cKDTree(drawn, boxsize=size).sparse_distance_matrix(
-            tree, reach, output_type="ndarray"
-        )
-        clear = np.ones(_BLOCK, bool)
-        clear[near["i"][near["v"] < CLEARANCE * (radius + there[near["j"]])]] = False
-        if clear.any():
-            return np.asarray(drawn[np.argmax(clear)])
-    return None
-
-
-def _classes(radius: Array) -> Iterator[Indices]:
-    """Indices of the spheres of each class, from the largest."""
-    order = np.argsort(-radius, kind="stable")
+def _classes(radius: Array, order: Indices) -> Iterator[Indices]:
+    """Indices of the spheres of each class, from the largest; in `order` they go by size."""
     start = 0
     while start < len(order):
         alike = radius[order[start:]] > radius[order[start]] / _CLASS
@@ -281,14 +273,8 @@ def batches_of(case: InvasionCase, scales: InvasionScales) -> Batches:
 # Fines of measured sizes: which radius and density each has, and in which batch it comes.
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Drawn:
-    """Some fines.
-
-    Attributes:
-        radius: (N,) m.
-        density: (N,) kg/m3.
-    """
+class Drawn(NamedTuple):
+    """Radius, m, and density, kg/m3, of some fines, (N,) each."""
 
     radius: Array
     density: Array
@@ -297,14 +283,21 @@ class Drawn:
 def drawn_fines(case: InvasionCase, counts: Sequence[int]) -> list[Drawn]:
     """Fines of measured sizes for batches of `counts`, each with the curve of the whole mud.
 
-    All fines are drawn at once, as strata of the curve of each material, and then dealt out.
+    All fines are drawn at once, as strata of the curve of each material, and then dealt out. How
+    many are of each material follows by the largest remainder.
     """
-    whole = _whole(case.fines, sum(counts))
+    fines, count = case.fines.components, sum(counts)
+    rates = [one.share * one.curve.kept / one.curve.mean(3) for one in fines]
+    exact = [count * rate / sum(rates) for rate in rates]
+    numbers = [int(one) for one in exact]
+    missing = count - sum(numbers)
+    for index in sorted(range(len(exact)), key=lambda i: numbers[i] - exact[i])[:missing]:
+        numbers[index] += 1
+    parts = list(zip(fines, numbers, strict=True))
+    radius = np.concatenate([0.5 * one.curve.strata(number) for one, number in parts])
+    density = np.concatenate([np.full(number, one.density) for one, number in parts])
     rng = np.random.default_rng([case.seed, 13])
-    return [
-        Drawn(radius=whole.radius[index], density=whole.density[index])
-        for index in dealt(counts, rng)
-    ]
+    return [Drawn(radius[index], density[index]) for index in dealt(counts, rng)]
 
 
 def densities(case: InvasionCase, counts: Sequence[int]) -> Array:
@@ -314,45 +307,16 @@ def densities(case: InvasionCase, counts: Sequence[int]) -> Array:
     return np.concatenate([batch.density for batch in drawn_fines(case, counts)])
 
 
-def _whole(fines: Fines, count: int) -> Drawn:
-    """`count` fines sorted by material and size."""
-    parts = list(zip(fines.components, _numbers(fines, count), strict=True))
-    return Drawn(
-        radius=np.concatenate([0.5 * one.curve.strata(number) for one, number in parts]),
-        density=np.concatenate([np.full(number, one.density) for one, number in parts]),
-    )
-
-
-def _numbers(fines: Fines, count: int) -> list[int]:
-    """How many of `count` fines are of each material, by the largest remainder."""
-    solids = [(one, one.curve.mean(3)) for one in fines.components]
-    rates = [one.share * one.curve.kept / cube for one, cube in solids]
-    exact = [count * rate / sum(rates) for rate in rates]
-    numbers = [int(one) for one in exact]
-    missing = count - sum(numbers)
-    for index in sorted(range(len(exact)), key=lambda i: numbers[i] - exact[i])[:missing]:
-        numbers[index] += 1
-    return numbers
-
-
 # ------------------------------------------------------------------------------------------------
 # The slab of fines upstream of the face: random, at the given concentration, touching nothing.
 #
-# With `fines.supply` = "batches" it comes in batches (`batches`).
+# With `fines.supply` = "batches" it comes in batches.
 
 
 SURE_CROWDING = 0.2
 """Up to this `crowding` every fine gets a place. Random sequential addition of equal spheres
 saturates at 0.38 (Talbot et al. 1991), and none of 8,465 draws at 0.2 failed (docs/physics.md).
 """
-
-
-def front_of(grains: Snapshot) -> float:
-    """x (m) below which no grain reaches, at most 0.
-
-    Surfaces of grains stand up to 0.07 mm beyond the face of a dense pack.
-    """
-    return float(min(0.0, np.min(grains.position[:, 0] - grains.radius)))
 
 
 def refuse_crowded_supply(case: InvasionCase, scales: InvasionScales) -> None:
@@ -362,10 +326,8 @@ def refuse_crowded_supply(case: InvasionCase, scales: InvasionScales) -> None:
     """
     if crowding(case) <= SURE_CROWDING:
         return
-    if case.fines.supply == "slab":
-        _draw(case, scales, end=0.0)
-    else:
-        list(_draw_batches(case, scales, end=0.0))
+    draw = _draw_slab if case.fines.supply == "slab" else _draw_batches
+    list(draw(case, scales, end=0.0))
 
 
 def crowding(case: InvasionCase) -> float:
@@ -398,13 +360,17 @@ def place_fines(case: InvasionCase, scales: InvasionScales, grains: Snapshot) ->
 
     Raises CaseError when the slab cannot hold them without overlap.
     """
-    position, radius = _draw(case, scales, end=slab_end(case, grains))
+    ((position, radius),) = _draw_slab(case, scales, end=slab_end(case, grains))
     return _moving(case, scales, grains, position, radius, first=int(grains.id.max()) + 1)
 
 
 def slab_end(case: InvasionCase, grains: Snapshot) -> float:
-    """x (m) where the slab ends: one diameter of the largest fine upstream of all grains."""
-    return front_of(grains) - 2 * case.fines.radius_range_m[1]
+    """x (m) where the slab ends: one diameter of the largest fine upstream of all grains.
+
+    Surfaces of grains stand up to 0.07 mm beyond the face of a dense pack.
+    """
+    front = float(min(0.0, np.min(grains.position[:, 0] - grains.radius)))
+    return front - 2 * case.fines.radius_range_m[1]
 
 
 def _moving(
@@ -462,19 +428,17 @@ def later_batch(
         radius = drawn_fines(case, batches.counts)[number].radius
     else:
         radius = rng.uniform(*case.fines.radius_range_m, batches.counts[number])
-    size, high = np.array(case.size_m), slab_end(case, grains) + moved - number * batches.length
-    near = high + 2.5 * case.fines.radius_range_m[1]
-    some = there.where(there.position[:, 0] < near)
-    period, place = np.where(case.periodic, size, 0.0), some.position
-    place = wrapped(place, spheres.box, case.periodic)
+    size, period, margin = _across(case, radius)
+    high = slab_end(case, grains) + moved - number * batches.length
+    some = there.where(there.position[:, 0] < high + 2.5 * case.fines.radius_range_m[1])
+    place = wrapped(some.position, spheres.box, case.periodic)
     # rounding may leave a wrapped place at the size itself
     others = (np.where((period > 0) & (place >= period), 0.0, place), some.radius)
-    margin = np.where(period > 0, 0.0, radius[:, None]) * np.array([0.0, 1.0, 1.0])
     own = min(batches.length, scales.slab_length - number * batches.length)
     lost, lengths = 0, np.linspace(own, 2.0 * batches.length, 5)
     # the last fines of a batch that has its full length are drawn many more times
     for length, patient in [*((one, False) for one in lengths), (lengths[-1], True)]:
-        low, most = margin.copy(), np.tile(size, (len(radius), 1)) - margin
+        low, most = margin.copy(), size - margin
         low[:, 0], most[:, 0] = high - length, high
         place, lost = places_by_size(
             radius, low, most, period, rng=rng, others=others, patient=patient
@@ -489,120 +453,90 @@ def later_batch(
     )
 
 
+def _across(case: InvasionCase, radius: Array) -> tuple[Array, Array, Array]:
+    """Size and period (3,) m of the box, margins (N, 3) m of fines of `radius` to its walls."""
+    size = np.array(case.size_m)
+    period = np.where(case.periodic, size, 0.0)
+    return size, period, np.where(period > 0, 0.0, radius[:, None]) * np.array([0.0, 1.0, 1.0])
+
+
+def _draw_slab(
+    case: InvasionCase, scales: InvasionScales, *, end: float
+) -> Iterator[tuple[Array, Array]]:
+    """Places (N, 3) and radii (N,) m of the slab's fines, as one batch; it ends at x = `end`."""
+    if case.fines.measured:
+        yield from _draw_measured(case, scales, end=end)
+        return
+    rng = np.random.default_rng([case.seed, 11])
+    radius = rng.uniform(*case.fines.radius_range_m, scales.supplied_count)
+    yield _in_slab(case, radius, end - scales.slab_length, end, rng, NOBODY), radius
+
+
 def _draw_batches(
     case: InvasionCase, scales: InvasionScales, *, end: float
 ) -> Iterator[tuple[Array, Array]]:
     """Places (n, 3) m in the slab and radii (n,) m of each batch, clear of the one before."""
-    batches, before = batches_of(case, scales), (np.empty((0, 3)), np.empty(0))
     if case.fines.measured:
-        yield from _draw_measured(case, scales, batches, end=end)
+        yield from _draw_measured(case, scales, end=end)
         return
+    batches, before = batches_of(case, scales), NOBODY
     for number, count in enumerate(batches.counts):
         rng = np.random.default_rng([case.seed, 11, number])
         radius = rng.uniform(*case.fines.radius_range_m, count)
         high = end - number * batches.length
         low = max(high - batches.length, end - scales.slab_length)
-        before = (_add_sequentially(case, radius, (low, high), rng, others=before), radius)
+        before = (_in_slab(case, radius, low, high, rng, before), radius)
         yield before
 
 
 def _draw_measured(
-    case: InvasionCase, scales: InvasionScales, batches: Batches, *, end: float
+    case: InvasionCase, scales: InvasionScales, *, end: float
 ) -> Iterator[tuple[Array, Array]]:
     """The same for measured sizes, placed all at once."""
+    batches = batches_of(case, scales)
     radius = [batch.radius for batch in drawn_fines(case, batches.counts)]
     every, batch = np.concatenate(radius), np.repeat(np.arange(len(radius)), batches.counts)
-    size = np.array(case.size_m)
+    size, period, margin = _across(case, every)
     low, high = np.zeros((len(every), 3)), np.tile(size, (len(every), 1))
     high[:, 0] = end - batch * batches.length
     low[:, 0] = np.maximum(high[:, 0] - batches.length, end - scales.slab_length)
-    period = np.where(case.periodic, size, 0.0)
-    margin = np.where(period > 0, 0.0, every[:, None]) * np.array([0.0, 1.0, 1.0])
     rng = np.random.default_rng([case.seed, 11])
     place, lost = places_by_size(every, low + margin, high - margin, period, rng=rng)
-    if lost:
-        raise _no_place(case, lost, len(every), scales.slab_length)
+    _refuse_lost(case, lost, len(every), scales.slab_length)
     yield from zip(np.split(place, np.cumsum(batches.counts)[:-1]), radius, strict=True)
 
 
-def _no_place(case: InvasionCase, lost: int, count: int, length: float) -> CaseError:
-    return CaseError(
-        f"{concentration_text(case.fines)} leaves {lost} of {count} fines without a place in a "
-        f"slab of {1e3 * length:.3g} mm; lower it or lengthen fines.slab_mm"
-    )
-
-
-def _draw(case: InvasionCase, scales: InvasionScales, *, end: float) -> tuple[Array, Array]:
-    """Places (N, 3) and radii (N,) m of the slab's fines; it ends at x = `end`."""
-    if case.fines.measured:
-        return next(_draw_measured(case, scales, batches_of(case, scales), end=end))
-    rng = np.random.default_rng([case.seed, 11])
-    radius = rng.uniform(*case.fines.radius_range_m, scales.supplied_count)
-    return _add_sequentially(case, radius, (end - scales.slab_length, end), rng), radius
-
-
-def _add_sequentially(
+def _in_slab(
     case: InvasionCase,
     radius: Array,
-    slab: tuple[float, float],
+    low: float,
+    high: float,
     rng: np.random.Generator,
-    others: tuple[Array, Array] = (np.empty((0, 3)), np.empty(0)),
+    others: tuple[Array, Array],
 ) -> Array:
-    """Places (N, 3) m by random sequential addition, largest first, between the x of `slab`, m.
+    """Places (N, 3) m between the x `low` and `high`, m, clear of the `others`.
 
-    It goes in rounds: of two fines that overlap the later one is drawn again. `others` are places
-    (M, 3) and radii (M,) m of spheres to keep clear of. After `ROUNDS` rounds the last ones are
-    drawn many more times, one by one. Raises CaseError where one has no place even then.
+    Raises CaseError where a fine finds none.
     """
-    size = np.array([slab[1] - slab[0], *case.size_m[1:]])
-    period = np.where(case.periodic, size, 0.0)
-    order = np.argsort(-radius, kind="stable")
-    corner = np.array([slab[0], 0.0, 0.0])
-    placed = others[0] - corner
-    position = np.empty((len(radius), 3))
-    waiting = order
-    done = others[1]
-    margins = np.where(period > 0, 0.0, radius[:, None]) * np.array([0.0, 1.0, 1.0])
-    for _ in range(ROUNDS):
-        if not len(waiting):
-            break
-        margin = margins[waiting]
-        drawn = margin + rng.random((len(waiting), 3)) * (size - 2 * margin)
-        free = _free(
-            np.concatenate([placed, drawn]),
-            np.concatenate([done, radius[waiting]]),
-            len(placed),
-            period,
+    _, period, margin = _across(case, radius)
+    size, corner = np.array([high - low, *case.size_m[1:]]), np.array([low, 0.0, 0.0])
+    place, lost = places_by_size(
+        radius,
+        margin,
+        size - margin,
+        period,
+        rng=rng,
+        width=size - 2 * margin,
+        others=(others[0] - corner, others[1]),
+        at_once=True,
+    )
+    _refuse_lost(case, lost, len(radius), size[0])
+    return place + corner
+
+
+def _refuse_lost(case: InvasionCase, lost: int, count: int, length: float) -> None:
+    if lost:
+        raise CaseError(
+            f"{concentration_text(case.fines)} leaves {lost} of {count} fines without a place in "
+            f"a slab of {1e3 * length:.3g} mm; lower it or lengthen fines.slab_mm"
         )
-        position[waiting[free]] = drawn[free]
-        done, placed = (
-            np.concatenate([done, radius[waiting[free]]]),
-            np.concatenate([placed, drawn[free]]),
-        )
-        waiting = waiting[~free]
-    if few(len(waiting), len(radius)):
-        span = margins[waiting], size - margins[waiting]
-        last = last_places(radius[waiting], span, period, rng=rng, others=(placed, done))
-        position[waiting[: len(last)]] = last
-        waiting = waiting[len(last) :]
-    if len(waiting):
-        raise _no_place(case, len(waiting), len(radius), size[0])
-    return position + corner
-
-
-def _free(points: Array, radius: Array, placed: int, period: Array) -> Array:
-    """Whether each newly drawn sphere clears all others: (N - placed,) truth values.
-
-    `points` (N, 3) m and `radius` (N,) m hold the `placed` spheres first, which all stay, and then
-    the drawn ones. Of two drawn ones that overlap the first stays.
-    """
-    from scipy.spatial import cKDTree
-
-    tree = cKDTree(points, boxsize=period)
-    pairs = tree.query_pairs(2 * CLEARANCE * radius.max(), output_type="ndarray")
-    gap = points[pairs[:, 0]] - points[pairs[:, 1]]
-    gap -= np.where(period > 0, period * np.round(gap / np.where(period > 0, period, 1.0)), 0.0)
-    clash = np.sqrt(np.sum(gap**2, axis=1)) < CLEARANCE * radius[pairs].sum(axis=1)
-    free = np.ones(len(points), bool)
-    free[np.max(pairs[clash], axis=1, initial=0)] = False
-    return free[placed:]

@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 
 from fdnet.case.case import InvasionCase
-from fdnet.dem.checkpoint import checkpoint_files, read_history, read_updates, state_at
+from fdnet.dem.checkpoint import Checkpoints, read_history, read_updates, state_at
 from fdnet.dem.deck import snapshot_of
 from fdnet.dem.invasion import invade
 from fdnet.dem.packing import check_radii, make_pack
@@ -58,7 +58,7 @@ def invade_stage(session: Session, case: InvasionCase) -> None:
 def _refuse_mixed_ranks(session: Session, folder: Path) -> None:
     """A run that was cut between pack and invasion goes on with the ranks that it began with."""
     ranks, record = session.options.ranks, session.folder.record("pack")
-    begun = any(True for _ in checkpoint_files(folder))
+    begun = Checkpoints(folder=folder, digest="").files()
     made = None if record is None else ranks_of(record)
     if session.options.resume and not begun and made not in (None, ranks):
         raise CaseError(

@@ -23,7 +23,7 @@ smaller by pi z^2 / 2 in all, since the angles of a triangle add up to pi.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -45,21 +45,12 @@ from fdnet.spheres.geometry import neighbour_tree, wrapped
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Facets:
-    """The facets of the throats (T).
+def facet_areas(network: Network) -> tuple[Array, Array]:
+    """Areas (T, 3) m2 of the facets of the throats, and the shares (T, 2) that feel a bed.
 
-    Attributes:
-        area: (T, 3) m2, area inside the box times the normal from the first to the second pore.
-        section: (T, 2) share of it on which a bed of fines in either side is pressed.
+    An area is that inside the box times the normal from the first to the second pore. A share is
+    that of it on which a bed of fines in either side is pressed.
     """
-
-    area: Array
-    section: Array
-
-
-def facets_of(network: Network) -> Facets:
-    """The facets of a network."""
     corner = network.throat_corner
     whole = geometry.triangle_area(corner)
     normal = 0.5 * np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
@@ -67,10 +58,8 @@ def facets_of(network: Network) -> Facets:
     middle[:, 1] += network.throat_shift * np.ptp(network.box, axis=1)
     forth = np.sum((middle[:, 1] - middle[:, 0]) * normal, axis=1)
     turned = np.where(forth < 0, -network.throat_share, network.throat_share)
-    return Facets(
-        area=frozen(turned[:, None] * normal),
-        section=frozen(np.minimum(bed_section(network) / whole[:, None], 1.0)),
-    )
+    section = np.minimum(bed_section(network) / whole[:, None], 1.0)
+    return frozen(turned[:, None] * normal), frozen(section)
 
 
 def bed_section(network: Network) -> Array:
@@ -82,8 +71,7 @@ def bed_section(network: Network) -> Array:
     return narrow * wider
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Pressed:
+class Pressed(NamedTuple):
     """Forces of the fluid over the drop of pressure, m2.
 
     Attributes:
@@ -95,43 +83,6 @@ class Pressed:
     groups: Array
 
 
-def pressed_by(
-    network: Network, facets: Facets, sides: tuple[Array, Array], flow: Flow, fines: Array
-) -> Pressed:
-    """The forces in a `flow` on grains, and on fines in the pores.
-
-    What the fines add to a side acts on those in its pore. A fine also narrows sides whose pores
-    it does not reach: that acts on the fines in the pore behind the throat, and on the grains
-    where that has none either.
-
-    Args:
-        network: pores and throats.
-        facets: of the throats.
-        sides: their clean resistances (T, 2) 1/m3, and the shares (T, 2), above 0, that they keep
-            of their conductances.
-        flow: through the damaged network.
-        fines: (P,) m3, volume of the fines in each pore.
-    """
-    halves, factor = sides
-    first, second = flow.pore_pressure[network.throat_pores].T
-    drop = np.nan_to_num(first - second)
-    raised = halves / factor
-    whole = raised.sum(axis=1, keepdims=True)
-    added = (raised - halves) / np.where(whole > 0, whole, 1.0)
-    on_fines = (drop[:, None] * added * facets.section)[..., None] * facets.area[:, None]
-    group = network.pore_group[network.throat_pores]
-    count = int(network.pore_group.max()) + 1
-    holding = np.bincount(network.pore_group, fines, count) > 0
-    group = np.where(holding[group], group, group[:, ::-1])
-    on_fines *= holding[group][..., None]
-    groups = np.stack(
-        [np.bincount(group.ravel(), on_fines[..., axis].ravel(), count) for axis in range(3)],
-        axis=1,
-    )
-    everything = drop @ facets.area
-    return Pressed(grains=frozen(everything - groups.sum(axis=0)), groups=frozen(groups))
-
-
 def on_each_fine(pressed: Pressed, deposit: KeptDeposit) -> Array:
     """Force (N, 3) m2 on each fine of a deposit: what its pores feel, by its share of the fines.
 
@@ -139,12 +90,13 @@ def on_each_fine(pressed: Pressed, deposit: KeptDeposit) -> Array:
     """
     group = deposit.holders.network.pore_group[deposit.pore]
     held = np.bincount(group, deposit.volume, len(pressed.groups))
-    share = deposit.volume / held[group]
-    force = pressed.groups[group] * share[:, None]
-    count = len(deposit.fines)
-    return np.stack(
-        [np.bincount(deposit.fine, force[:, axis], count) for axis in range(3)], axis=1
-    )
+    force = pressed.groups[group] * (deposit.volume / held[group])[:, None]
+    return _summed(deposit.fine, force, len(deposit.fines))
+
+
+def _summed(where: Array, force: Array, count: int) -> Array:
+    """Sums (count, 3) of the forces (N, 3) that belong to the same of `count` bodies."""
+    return np.stack([np.bincount(where, force[:, axis], count) for axis in range(3)], axis=1)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -200,7 +152,8 @@ class PackFlow:
         network: pores and throats of the grains.
         clean: (T,) m3, conductances.
         halves: (T, 2) 1/m3, resistances of the sides of the clean throats; 0 where infinite.
-        facets: of the throats.
+        facet_area: (T, 3) m2, area of the facet times its normal.
+        bed_share: (T, 2) share of it on which a bed of fines in either side is pressed.
         holders: the pores, which hold the deposit.
         parts: what the damage of the throats needs and does not depend on the fines.
         flow: through the clean network.
@@ -212,7 +165,8 @@ class PackFlow:
     network: Network
     clean: Array
     halves: Array
-    facets: Facets
+    facet_area: Array
+    bed_share: Array
     holders: Holders
     parts: Sequence[Part]
     flow: Flow
@@ -257,8 +211,29 @@ class PackFlow:
             k_over_k0=flow.inflow / self.flow.inflow,
             ratio=np.divide(share, self.through, out=np.ones_like(share), where=moving),
             stagnant=int(np.sum(~moving)),
-            pressed=pressed_by(self.network, self.facets, (self.halves, factor), flow, fines),
+            pressed=self._pressed(factor, flow, fines),
         )
+
+    def _pressed(self, factor: Array, flow: Flow, fines: Array) -> Pressed:
+        """The forces in a `flow` on grains, and on fines in the pores.
+
+        What the fines add to a side acts on those in its pore. A fine also narrows sides whose
+        pores it does not reach: that acts on the fines in the pore behind the throat, and on the
+        grains where that has none either. `factor` (T, 2) is the share that the sides keep of
+        their conductances, `fines` (P,) m3 the volume of the fines in each pore.
+        """
+        first, second = flow.pore_pressure[self.network.throat_pores].T
+        drop, raised = np.nan_to_num(first - second), self.halves / factor
+        whole = raised.sum(axis=1, keepdims=True)
+        added = (raised - self.halves) / np.where(whole > 0, whole, 1.0)
+        on_fines = (drop[:, None] * added * self.bed_share)[..., None] * self.facet_area[:, None]
+        group, count = self.network.pore_group, int(self.network.pore_group.max()) + 1
+        holding, pair = np.bincount(group, fines, count) > 0, group[self.network.throat_pores]
+        pair = np.where(holding[pair], pair, pair[:, ::-1])
+        on_fines *= holding[pair][..., None]
+        groups = _summed(pair.ravel(), on_fines.reshape(-1, 3), count)
+        everything = drop @ self.facet_area
+        return Pressed(frozen(everything - groups.sum(axis=0)), frozen(groups))
 
     def share_at(self, position: Array, carried: Carried) -> Array:
         """Flux (N,) of the pores at (N, 3) m over that when intact; 1 before and beyond them."""
@@ -282,6 +257,7 @@ class PackFlow:
 def pack_flow(grains: Snapshot, periodic: tuple[bool, bool, bool], walls: str) -> PackFlow:
     """The flow through an intact pack. Raises NetworkError or FlowError where there is none."""
     network = build_network(grains, periodic=periodic, walls=walls)
+    facet_area, bed_share = facet_areas(network)
     halves = half_resistances(network)
     clean = 1.0 / halves.sum(axis=1)
     flow = solve_flow(network, clean)
@@ -289,7 +265,8 @@ def pack_flow(grains: Snapshot, periodic: tuple[bool, bool, bool], walls: str) -
         network=network,
         clean=clean,
         halves=np.where(np.isfinite(halves), halves, 0.0),
-        facets=facets_of(network),
+        facet_area=facet_area,
+        bed_share=bed_share,
         holders=holders_of(network),
         parts=tuple(parts_of(network)),
         flow=flow,

@@ -21,7 +21,7 @@ from typing import Any
 from fdnet.case.case import Case
 from fdnet.dem.checkpoint import HISTORY, UPDATES, WATCH, Deepest, overlap_text
 from fdnet.dem.invasion import Invasion
-from fdnet.dem.liggghts import KNOWN_VERSION, Binary, Launch, Run, find_binary
+from fdnet.dem.liggghts import KNOWN_VERSION, Binary, Execution, Launch, find_binary
 from fdnet.dem.packing import Pack
 from fdnet.errors import CaseError
 from fdnet.names import STAGES
@@ -125,7 +125,7 @@ def ranks_of(record: dict[str, Any]) -> int | None:
     return record.get("ranks", runs[0].get("ranks"))
 
 
-def run_record(run: Run) -> dict[str, Any]:
+def run_record(run: Execution) -> dict[str, Any]:
     """One LIGGGHTS execution, with the digests of its decks."""
     decks = {
         path.name: hashlib.sha256(path.read_bytes()).hexdigest()

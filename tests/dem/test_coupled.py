@@ -16,8 +16,8 @@ from builders import TINY, followed, resting_spheres, tiny
 from cut_and_continue import StopError, differences
 
 from fdnet.case.file import case_from
-from fdnet.dem.checkpoint import UPDATES, last_checkpoint, read_updates
-from fdnet.dem.deck import box_of, snapshot_of, write_data
+from fdnet.dem.checkpoint import UPDATES, Checkpoints, read_updates
+from fdnet.dem.deck import snapshot_of, specimen_box, write_data
 from fdnet.dem.invade_deck import (
     FluidForces,
     Moment,
@@ -114,15 +114,15 @@ def test_a_lost_or_changed_record_of_updates_makes_the_checkpoint_unusable(done,
     folder, result = done
     shutil.copytree(folder, tmp_path / "cut")
     path = tmp_path / "cut" / UPDATES
-    assert last_checkpoint(tmp_path / "cut", small()) == result.history[-1]
+    points = Checkpoints(folder=tmp_path / "cut", digest=small().digest("invade"))
+    assert points.last() == result.history[-1]
     lines = path.read_text().splitlines()
     column = lines[0].split(",").index("factor_mean")
     row = lines[-2].split(",")
     row[column] = "1.0"
     lines[-2] = ",".join(row)
     path.write_text("\n".join(lines) + "\n")
-    kept = last_checkpoint(tmp_path / "cut", small())
-    assert kept == result.history[-2]
+    assert points.last() == result.history[-2]
 
 
 def test_liggghts_that_is_killed_is_reported_and_the_run_goes_on_bit_for_bit(
@@ -236,7 +236,7 @@ def test_the_fluid_is_asked_with_the_density_of_each_fine(binary, grains, tmp_pa
 def test_explicit_drag_is_judged_by_the_fine_that_follows_the_fluid_fastest():
     """C t / m of the lighter one of two equal fines: m = 4/3 pi r^3 rho."""
     two = resting_spheres(
-        [[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0]], 5e-5, box_of(tiny()), kind=Kind.FINE
+        [[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0]], 5e-5, specimen_box(tiny()), kind=Kind.FINE
     )
     forces = FluidForces(
         coefficient=np.array([2e-6, 2e-6]),
@@ -350,7 +350,7 @@ def test_a_standing_bed_of_fines_takes_up_its_pressure_drop(binary, tmp_path):
 def test_liggghts_shows_the_densities_and_takes_in_only_the_last_forces(binary, tmp_path):
     """No number of the first forces is left after the second ones, where zeros have no rows."""
     case = tiny("drag.crowd=beetstra", "drag.scheme=implicit")
-    box, place = box_of(case), [[2e-4, 5e-4, 5e-4], [6e-4, 5e-4, 5e-4]]
+    box, place = specimen_box(case), [[2e-4, 5e-4, 5e-4], [6e-4, 5e-4, 5e-4]]
     fines = resting_spheres(place, 5e-5, box, kind=Kind.FINE, first=2)
     write_scene(case, fines, tmp_path, density=[2650.0, 2650.0, 1100.5])
     given = np.array([[[1.0, 2.0, -3.0], [4.0, 5.0, 6.0]], [[7.0, 0.0, 0.0], [0.0, -8.0, 0.0]]])

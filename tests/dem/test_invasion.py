@@ -9,13 +9,11 @@ from builders import tiny
 
 from fdnet.dem import checkpoint, supply
 from fdnet.dem.checkpoint import (
-    HISTORY_HEADER,
+    Checkpoint,
+    Checkpoints,
     file_digest,
-    last_checkpoint,
     plug_allowance,
     read_history,
-    read_record,
-    store_record,
 )
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
@@ -28,6 +26,12 @@ from fdnet.spheres.geometry import touching_pairs
 from fdnet.spheres.snapshot import Kind
 
 pytestmark = pytest.mark.liggghts
+HISTORY_HEADER = ",".join(Checkpoint._fields)
+
+
+def points(folder, case) -> Checkpoints:
+    """The checkpoints of an invasion."""
+    return Checkpoints(folder=folder, digest=case.digest("invade"))
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +93,7 @@ def test_every_fine_finds_a_place_up_to_the_sure_crowding(monkeypatch, radius_mm
         full = case.model_copy(update={"fines": full, "seed": seed})
         assert crowding(full) > SURE_CROWDING
         refuse_crowded_supply(full, scales_of(full))
-    monkeypatch.setattr(supply, "_draw", None)
+    monkeypatch.setattr(supply, "_draw_slab", None)
     sure = case.model_copy(
         update={"fines": fines.model_copy(update={"concentration": 0.999 * fines.concentration})}
     )
@@ -226,13 +230,13 @@ def test_broken_checkpoints_are_passed_over(binary, packed, tmp_path):
     dump = tmp_path / "post" / f"invade_{last.step}.dump"
     whole_dump = dump.read_bytes()
     dump.write_bytes(whole_dump[:-40])
-    assert last_checkpoint(tmp_path, case) == before
+    assert points(tmp_path, case).last() == before
     text = whole_dump.replace(b"ITEM: NUMBER OF ATOMS\n300\n", b"ITEM: NUMBER OF ATOMS\n299\n")
     assert text != whole_dump
     dump.write_bytes(text[: text.rstrip(b"\n").rindex(b"\n") + 1])
-    assert last_checkpoint(tmp_path, case) == before
+    assert points(tmp_path, case).last() == before
     (tmp_path / "post" / f"invade_{before.step}.restart").write_bytes(b"")
-    assert last_checkpoint(tmp_path, case) is None
+    assert points(tmp_path, case).last() is None
     again = invade(case, scales, grains, tmp_path, Launch(binary=binary))
     assert np.array_equal(again.damaged.position, whole.damaged.position)
 
@@ -246,9 +250,9 @@ def test_a_restart_cut_by_a_full_disk_is_set_aside(binary, packed, tmp_path):
     kept = whole.history[-2]
     restart = tmp_path / "post" / f"invade_{kept.step}.restart"
     restart.write_bytes(restart.read_bytes()[: int(0.9 * restart.stat().st_size)])
-    cut = replace(read_record(tmp_path, kept.step), restart=file_digest(restart))
-    store_record(tmp_path, kept.step, cut)
-    assert last_checkpoint(tmp_path, case) == kept
+    cut = points(tmp_path, case).record(kept.step)._replace(restart=file_digest(restart))
+    points(tmp_path, case).store(kept.step, cut)
+    assert points(tmp_path, case).last() == kept
     again = invade(case, scales, grains, tmp_path, Launch(binary=binary))
     assert again.history == whole.history
     assert np.array_equal(again.damaged.position, whole.damaged.position)
