@@ -235,17 +235,17 @@ class Checkpoints:
         record was cut itself, which needs no warning.
         """
         newest = max((step for step, _ in self.files("record")), default=0)
+        warnings = self.doubts()
         if last is None and (newest or len(read_rows(self.folder, self.kind)) > 1):
-            text = "no checkpoint of the cut run could be used, it was started over"
+            warnings.append("no checkpoint of the cut run could be used, it was started over")
         elif last is not None and newest > last.step:
-            text = (
+            warnings.append(
                 f"files of the cut run were not those that were recorded (checkpoint at step "
                 f"{newest}): it went on from the checkpoint at step {last.step}"
             )
-        else:
-            return
-        lines = dict.fromkeys([*self.doubts(), text])
-        write_text(self.folder / DOUBTS, "".join(f"{line}\n" for line in lines))
+        if warnings:
+            text = "".join(f"{line}\n" for line in dict.fromkeys(warnings))
+            write_text(self.folder / DOUBTS, text)
 
     def doubts(self) -> list[str]:
         """The warnings that this and earlier sessions kept."""

@@ -44,7 +44,7 @@ from fdnet.dem.deck import (
     write_data,
 )
 from fdnet.dem.packing import write_pack_inputs
-from fdnet.dem.supply import AT_ONCE, batches_of, densities, place_batches, place_fines, slab_end
+from fdnet.dem.supply import AT_ONCE, batches_of, densities, place_batches, slab_end
 from fdnet.errors import CaseError
 from fdnet.files import expanded, refuse_folder_name, write_text
 from fdnet.names import LIGGGHTS_STAGES
@@ -207,12 +207,7 @@ def write_invade_inputs(
 
     Raises CaseError when the slab cannot hold its fines.
     """
-    batched = case.fines.supply == "batches"
-    spheres = grains.joined(
-        write_batches(case, scales, grains, folder)
-        if batched
-        else place_fines(case, scales, grains)
-    )
+    spheres = grains.joined(write_batches(case, scales, grains, folder))
     pairs, _ = touching_pairs(spheres, case.periodic)
     if np.any(spheres.kind[pairs] == Kind.FINE):
         raise CaseError(

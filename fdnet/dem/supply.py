@@ -1,10 +1,9 @@
-"""Where the fines come from: places, batches, slabs.
+"""Where the fines come from: a slab of suspension upstream of the face, cut into batches.
 
-Random places for fines of a wide range of sizes: class by class, from the largest.
-
-A large sphere finds no place among small ones that are there already. So every class of sizes is
-placed to the last sphere before the next one begins, in the whole slab at once: a batch that is
-filled before its neighbour would leave no place for large ones at their boundary.
+They get random places, class of sizes by class of sizes, from the largest. A large sphere finds no
+place among small ones that are there already. So every class is placed to the last sphere before
+the next one begins, in the whole slab at once: a batch that is filled before its neighbour would
+leave no place for large ones at their boundary.
 
 Rounds in which every sphere without a place is drawn again leave the last ones over by chance. So
 each of these is drawn many more times (`last_places`) before it counts as one without a place.
@@ -324,10 +323,8 @@ def refuse_crowded_supply(case: InvasionCase, scales: InvasionScales) -> None:
 
     The fines are drawn only where they might not fit, since that takes seconds for a million.
     """
-    if crowding(case) <= SURE_CROWDING:
-        return
-    draw = _draw_slab if case.fines.supply == "slab" else _draw_batches
-    list(draw(case, scales, end=0.0))
+    if crowding(case) > SURE_CROWDING:
+        list(_draw(case, scales, end=0.0))
 
 
 def crowding(case: InvasionCase) -> float:
@@ -355,15 +352,6 @@ def crowding(case: InvasionCase) -> float:
     return case.fines.placed_fraction * shut / math.prod(reach) if min(reach) > 0 else math.inf
 
 
-def place_fines(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> Snapshot:
-    """Fines (N) in the slab upstream of all grains, moving with the fluid.
-
-    Raises CaseError when the slab cannot hold them without overlap.
-    """
-    ((position, radius),) = _draw_slab(case, scales, end=slab_end(case, grains))
-    return _moving(case, scales, grains, position, radius, first=int(grains.id.max()) + 1)
-
-
 def slab_end(case: InvasionCase, grains: Snapshot) -> float:
     """x (m) where the slab ends: one diameter of the largest fine upstream of all grains.
 
@@ -373,15 +361,26 @@ def slab_end(case: InvasionCase, grains: Snapshot) -> float:
     return front - 2 * case.fines.radius_range_m[1]
 
 
+def place_batches(
+    case: InvasionCase, scales: InvasionScales, grains: Snapshot
+) -> Iterator[Snapshot]:
+    """The slab batch by batch, each where the fluid has carried it when it enters.
+
+    The ids are numbered through all batches. A batch does not depend on how many follow, but for
+    measured sizes, of which each batch gets its part of the whole. Raises CaseError when the slab
+    cannot hold its fines without overlap.
+    """
+    batches, first = batches_of(case, scales), int(grains.id.max()) + 1
+    for number, (place, radius) in enumerate(_draw(case, scales, end=slab_end(case, grains))):
+        carried = max(0, number + 1 - AT_ONCE) * batches.travel
+        yield _moving(scales, grains, place + np.array([carried, 0.0, 0.0]), radius, first)
+        first += len(radius)
+
+
 def _moving(
-    case: InvasionCase,
-    scales: InvasionScales,
-    grains: Snapshot,
-    position: Array,
-    radius: Array,
-    *,
-    first: int,
+    scales: InvasionScales, grains: Snapshot, position: Array, radius: Array, first: int
 ) -> Snapshot:
+    """Fines that move with the mud; `first` is the id of the first one."""
     velocity = np.zeros((len(radius), 3))
     velocity[:, 0] = scales.upstream_velocity
     return Snapshot(
@@ -394,23 +393,6 @@ def _moving(
         radius=radius,
         velocity=velocity,
     )
-
-
-def place_batches(
-    case: InvasionCase, scales: InvasionScales, grains: Snapshot
-) -> Iterator[Snapshot]:
-    """The slab batch by batch, each where the fluid has carried it when it enters.
-
-    The ids are numbered through all batches. A batch does not depend on how many follow, but for
-    measured sizes, of which each batch gets its part of the whole.
-    """
-    batches, first = batches_of(case, scales), int(grains.id.max()) + 1
-    for number, (position, radius) in enumerate(
-        _draw_batches(case, scales, end=slab_end(case, grains))
-    ):
-        carried = np.array([batches.distance_of(number), 0.0, 0.0])
-        yield _moving(case, scales, grains, position + carried, radius, first=first)
-        first += len(radius)
 
 
 def later_batch(
@@ -445,7 +427,7 @@ def later_batch(
         )
         if not lost:
             first = int(grains.id.max()) + 1 + batches.supplied(number)
-            return _moving(case, scales, grains, place, radius, first=first)
+            return _moving(scales, grains, place, radius, first)
     raise CaseError(
         f"{concentration_text(case.fines)}: {lost} of the {len(radius)} fines of batch "
         f"{number + 1} find no room among the fines that wait upstream, over "
@@ -460,78 +442,45 @@ def _across(case: InvasionCase, radius: Array) -> tuple[Array, Array, Array]:
     return size, period, np.where(period > 0, 0.0, radius[:, None]) * np.array([0.0, 1.0, 1.0])
 
 
-def _draw_slab(
+def _draw(
     case: InvasionCase, scales: InvasionScales, *, end: float
 ) -> Iterator[tuple[Array, Array]]:
-    """Places (N, 3) and radii (N,) m of the slab's fines, as one batch; it ends at x = `end`."""
-    if case.fines.measured:
-        yield from _draw_measured(case, scales, end=end)
-        return
-    rng = np.random.default_rng([case.seed, 11])
-    radius = rng.uniform(*case.fines.radius_range_m, scales.supplied_count)
-    yield _in_slab(case, radius, end - scales.slab_length, end, rng, NOBODY), radius
+    """Places (n, 3) m and radii (n,) m of each batch of the slab, which ends at x = `end`.
 
-
-def _draw_batches(
-    case: InvasionCase, scales: InvasionScales, *, end: float
-) -> Iterator[tuple[Array, Array]]:
-    """Places (n, 3) m in the slab and radii (n,) m of each batch, clear of the one before."""
-    if case.fines.measured:
-        yield from _draw_measured(case, scales, end=end)
-        return
-    batches, before = batches_of(case, scales), NOBODY
-    for number, count in enumerate(batches.counts):
-        rng = np.random.default_rng([case.seed, 11, number])
-        radius = rng.uniform(*case.fines.radius_range_m, count)
-        high = end - number * batches.length
-        low = max(high - batches.length, end - scales.slab_length)
-        before = (_in_slab(case, radius, low, high, rng, before), radius)
-        yield before
-
-
-def _draw_measured(
-    case: InvasionCase, scales: InvasionScales, *, end: float
-) -> Iterator[tuple[Array, Array]]:
-    """The same for measured sizes, placed all at once."""
-    batches = batches_of(case, scales)
-    radius = [batch.radius for batch in drawn_fines(case, batches.counts)]
-    every, batch = np.concatenate(radius), np.repeat(np.arange(len(radius)), batches.counts)
-    size, period, margin = _across(case, every)
-    low, high = np.zeros((len(every), 3)), np.tile(size, (len(every), 1))
-    high[:, 0] = end - batch * batches.length
-    low[:, 0] = np.maximum(high[:, 0] - batches.length, end - scales.slab_length)
-    rng = np.random.default_rng([case.seed, 11])
-    place, lost = places_by_size(every, low + margin, high - margin, period, rng=rng)
-    _refuse_lost(case, lost, len(every), scales.slab_length)
-    yield from zip(np.split(place, np.cumsum(batches.counts)[:-1]), radius, strict=True)
-
-
-def _in_slab(
-    case: InvasionCase,
-    radius: Array,
-    low: float,
-    high: float,
-    rng: np.random.Generator,
-    others: tuple[Array, Array],
-) -> Array:
-    """Places (N, 3) m between the x `low` and `high`, m, clear of the `others`.
-
-    Raises CaseError where a fine finds none.
+    Fines of measured sizes are placed all at once. Others are clear of the batch before.
     """
-    _, period, margin = _across(case, radius)
-    size, corner = np.array([high - low, *case.size_m[1:]]), np.array([low, 0.0, 0.0])
-    place, lost = places_by_size(
-        radius,
-        margin,
-        size - margin,
-        period,
-        rng=rng,
-        width=size - 2 * margin,
-        others=(others[0] - corner, others[1]),
-        at_once=True,
-    )
-    _refuse_lost(case, lost, len(radius), size[0])
-    return place + corner
+    batches, before, slab = batches_of(case, scales), NOBODY, case.fines.supply == "slab"
+    highs = end - np.arange(len(batches.counts)) * batches.length
+    lows = np.maximum(highs - batches.length, end - scales.slab_length)
+    if case.fines.measured:
+        radii = [batch.radius for batch in drawn_fines(case, batches.counts)]
+        every, batch = np.concatenate(radii), np.repeat(np.arange(len(radii)), batches.counts)
+        size, period, margin = _across(case, every)
+        low, high = np.zeros((len(every), 3)), np.tile(size, (len(every), 1))
+        low[:, 0], high[:, 0] = lows[batch], highs[batch]
+        rng = np.random.default_rng([case.seed, 11])
+        place, lost = places_by_size(every, low + margin, high - margin, period, rng=rng)
+        _refuse_lost(case, lost, len(every), scales.slab_length)
+        yield from zip(np.split(place, np.cumsum(batches.counts)[:-1]), radii, strict=True)
+        return
+    for number, count in enumerate(batches.counts):
+        rng = np.random.default_rng([case.seed, 11, *([] if slab else [number])])
+        radius = rng.uniform(*case.fines.radius_range_m, count)
+        size, period, margin = _across(case, radius)
+        size[0], corner = highs[number] - lows[number], np.array([lows[number], 0.0, 0.0])
+        place, lost = places_by_size(
+            radius,
+            margin,
+            size - margin,
+            period,
+            rng=rng,
+            width=size - 2 * margin,
+            others=(before[0] - corner, before[1]),
+            at_once=True,
+        )
+        _refuse_lost(case, lost, count, size[0])
+        before = (place + corner, radius)
+        yield before
 
 
 def _refuse_lost(case: InvasionCase, lost: int, count: int, length: float) -> None:

@@ -18,7 +18,13 @@ from fdnet.dem.checkpoint import (
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
-from fdnet.dem.supply import CLEARANCE, SURE_CROWDING, crowding, place_fines, refuse_crowded_supply
+from fdnet.dem.supply import (
+    CLEARANCE,
+    SURE_CROWDING,
+    crowding,
+    place_batches,
+    refuse_crowded_supply,
+)
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.run import pipeline
 from fdnet.scales.scales import scales_of
@@ -32,6 +38,12 @@ HISTORY_HEADER = ",".join(Checkpoint._fields)
 def points(folder, case) -> Checkpoints:
     """The checkpoints of an invasion."""
     return Checkpoints(folder=folder, digest=case.digest("invade"))
+
+
+def the_slab(case, scales, grains):
+    """All fines of a slab that is there at the start."""
+    assert case.fines.supply == "slab"
+    return next(place_batches(case, scales, grains))
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +66,7 @@ def test_fines_start_clear_of_everything(packed, assignments):
     case = tiny(*assignments)
     scales = scales_of(case)
     grains = packed[case.box.sides]
-    fines = place_fines(case, scales, grains)
+    fines = the_slab(case, scales, grains)
     assert len(fines) == scales.supplied_count
     pairs, _ = touching_pairs(grains.joined(fines), case.periodic, gap=0.5 * (CLEARANCE - 1))
     assert not np.any(grains.joined(fines).kind[pairs] == Kind.FINE)
@@ -65,12 +77,12 @@ def test_fines_start_clear_of_everything(packed, assignments):
 
 
 def test_a_slab_that_cannot_hold_the_fines_is_an_error(packed):
-    case = tiny("fines={radius_mm=0.05, count=300, concentration=0.3}")
+    case = tiny("fines={radius_mm=0.05, count=300, concentration=0.3, supply='slab'}")
     crowded = case.model_copy(
         update={"fines": case.fines.model_copy(update={"concentration": 0.6})}
     )
     with pytest.raises(CaseError, match=r"fines\.concentration: 0\.6 leaves"):
-        place_fines(crowded, scales_of(crowded), packed["walls"])
+        the_slab(crowded, scales_of(crowded), packed["walls"])
 
 
 @pytest.mark.parametrize("radius_mm", ["0.05", "[0.015,0.05]", "0.2"])
@@ -93,7 +105,7 @@ def test_every_fine_finds_a_place_up_to_the_sure_crowding(monkeypatch, radius_mm
         full = case.model_copy(update={"fines": full, "seed": seed})
         assert crowding(full) > SURE_CROWDING
         refuse_crowded_supply(full, scales_of(full))
-    monkeypatch.setattr(supply, "_draw_slab", None)
+    monkeypatch.setattr(supply, "_draw", None)
     sure = case.model_copy(
         update={"fines": fines.model_copy(update={"concentration": 0.999 * fines.concentration})}
     )
@@ -271,7 +283,7 @@ def test_fines_that_vanish_are_an_error(packed, tmp_path):
         most_crossed=95,
         quiet=0,
     )
-    damaged = packed["walls"].joined(place_fines(case, scales_of(case), packed["walls"]))
+    damaged = packed["walls"].joined(the_slab(case, scales_of(case), packed["walls"]))
     with pytest.raises(LiggghtsError, match="fines inside"):
         checkpoint.check_counts(tmp_path, row, damaged, 300)
     row = checkpoint.Checkpoint(
