@@ -56,7 +56,7 @@ from fdnet.dem.invade_deck import (
     write_invade_inputs,
     write_parts,
 )
-from fdnet.dem.liggghts import SCREEN, Execution, Feed, Launch, run_deck, run_fed
+from fdnet.dem.liggghts import SCREEN, Execution, Feed, Launch, run_deck
 from fdnet.dem.supply import batches_of, densities, later_batch
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.files import disk_is_full, write_text
@@ -144,10 +144,8 @@ class ChunkedStage(ABC):
                     return deck, ()
             launch = replace(self.launch, follow=Keeper(self))
             try:
-                if self.fluid is None:
-                    return deck, (run_deck(self.folder, name, launch),)
-                play = partial(self._play, name, last)
-                return deck, (run_fed(self.folder, name, launch, play),)
+                play = None if self.fluid is None else partial(self._play, name, last)
+                return deck, (run_deck(self.folder, name, launch, play),)
             except LiggghtsError:
                 if last is None:
                     raise

@@ -121,61 +121,19 @@ MOST_BYTES = 1 << 29
 
 @contextlib.contextmanager
 def started(
-    folder: Path,
-    command: list[str],
-    *,
-    ranks: int,
-    lock: int,
-    fed: bool,
+    folder: Path, command: list[str], *, ranks: int, fed: bool
 ) -> Iterator[subprocess.Popen]:
-    """A process of LIGGGHTS in `folder` that inherits the `lock` of `only_writer`.
+    """A process of LIGGGHTS in `folder`; its output is a pipe, its input too where it is `fed`.
 
-    Its output is a pipe, and so is its input where it is `fed`. It is stopped with its children
-    when the `with` block is left by an exception. Raises LiggghtsError when it cannot be started.
+    It inherits a lock on the folder, which holds until the last process that inherited it has
+    ended. One that MPI started may outlive LIGGGHTS by a moment, so this waits for a lock that is
+    taken. The process is stopped with its children, first gently, when the `with` block is left by
+    an exception. Raises LiggghtsError when it cannot be started.
     """
     libc = ctypes.CDLL(None, use_errno=True)
     last = signal.SIGKILL if ranks == 1 else signal.SIGTERM
-    # while the child is being started SIGINT and SIGTERM wait: Python would swallow an exception
-    # that is raised inside the fork, and the run would go on
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
-
-    def prepare() -> None:
-        """Let the kernel end the child when fdnet dies, so that no orphan writes on."""
-        libc.prctl(1, last, 0, 0, 0)
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-    try:
-        process = subprocess.Popen(
-            command,
-            cwd=folder,
-            stdin=subprocess.PIPE if fed else subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            env=environment(ranks),
-            start_new_session=True,
-            pass_fds=(lock,),
-            preexec_fn=prepare,
-        )
-    except OSError as error:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        raise LiggghtsError(f"{command[0]}: cannot be started: {error}") from error
-    try:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        yield process
-    except BaseException:
-        _stop(process)
-        raise
-
-
-@contextlib.contextmanager
-def only_writer(folder: Path) -> Iterator[int]:
-    """A lock on the folder of a stage that LIGGGHTS inherits.
-
-    It holds until the last process that inherited it has ended. One that MPI started may outlive
-    LIGGGHTS by a moment, so this waits for a lock that is taken.
-    """
-    lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
     deadline = time.monotonic() + LOCK_PATIENCE
+    lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
     try:
         while True:
             try:
@@ -188,19 +146,43 @@ def only_writer(folder: Path) -> Iterator[int]:
                         "until it ends"
                     ) from None
                 time.sleep(0.05)
-        yield lock
+        # while the child is being started SIGINT and SIGTERM wait: Python would swallow an
+        # exception that is raised inside the fork, and the run would go on
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+
+        def prepare() -> None:
+            """Let the kernel end the child when fdnet dies, so that no orphan writes on."""
+            libc.prctl(1, last, 0, 0, 0)
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+        try:
+            process = subprocess.Popen(
+                command,
+                cwd=folder,
+                stdin=subprocess.PIPE if fed else subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                env=environment(ranks),
+                start_new_session=True,
+                pass_fds=(lock,),
+                preexec_fn=prepare,
+            )
+        except OSError as error:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            raise LiggghtsError(f"{command[0]}: cannot be started: {error}") from error
+        try:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            yield process
+        except BaseException:
+            for end in (signal.SIGTERM, signal.SIGKILL):
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(process.pid, end)
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    process.wait(5.0)
+                    break
+            raise
     finally:
         os.close(lock)
-
-
-def _stop(process: subprocess.Popen) -> None:
-    """End the process and its children, first gently."""
-    for end, patience in ((signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0)):
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, end)
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(patience)
-            return
 
 
 # ------------------------------------------------------------------------------------------------
@@ -420,7 +402,7 @@ class Feed:
         """Carry out the commands, in order.
 
         Raises LiggghtsError after the time limit or when the screen is flooded, and what `follow`
-        raises. `run_fed` reports a LIGGGHTS that ends before it has done them.
+        raises. `run_deck` reports a LIGGGHTS that ends before it has done them.
         """
         self._fed, began = self._fed + 1, time.monotonic()
         mark = f"FDNET fed {self._fed}"
@@ -432,7 +414,7 @@ class Feed:
     def play(self, play: Callable[["Feed"], None] | None) -> None:
         """Let `play` feed LIGGGHTS, if it is fed, and print its end mark; wait until it has ended.
 
-        Raises as `run_fed` does.
+        Raises as `run_deck` does.
         """
         try:
             if play is not None:
@@ -503,36 +485,22 @@ class Feed:
                 )
 
 
-def run_deck(folder: Path, deck: str, launch: Launch) -> Execution:
-    """Run `folder/deck` to its end mark.
-
-    Raises LiggghtsError with the evidence when the run did not really finish. On KeyboardInterrupt
-    the run is stopped and what it wrote is kept.
-    """
-    if not (folder / deck).is_file():
-        raise LiggghtsError(f"{folder / deck}: deck not found; render it first")
-    return _run(folder, deck, launch, None)
-
-
-def run_fed(folder: Path, deck: str, launch: Launch, play: Callable[[Feed], None]) -> Execution:
-    """Run LIGGGHTS in `folder` on the commands that `play` feeds it; `deck` is their main file.
+def run_deck(
+    folder: Path, deck: str, launch: Launch, play: Callable[[Feed], None] | None = None
+) -> Execution:
+    """Run `folder/deck` to its end mark, or the commands that `play` feeds LIGGGHTS instead.
 
     Raises LiggghtsError with the evidence when the run did not really finish, and what `play`
-    raises. LIGGGHTS is stopped then, and what it wrote is kept.
+    raises. LIGGGHTS is stopped then, as on KeyboardInterrupt, and what it wrote is kept.
     """
-    return _run(folder, deck, launch, play)
-
-
-def _run(
-    folder: Path, deck: str, launch: Launch, play: Callable[[Feed], None] | None
-) -> Execution:
+    if play is None and not (folder / deck).is_file():
+        raise LiggghtsError(f"{folder / deck}: deck not found; render it first")
     command = launch.binary.command(deck if play is None else None, launch.ranks)
     start = time.monotonic()
     deadline = None if launch.timeout is None else start + launch.timeout
     with (
-        only_writer(folder) as lock,
+        started(folder, command, ranks=launch.ranks, fed=play is not None) as process,
         (folder / SCREEN).open("wb", buffering=0) as screen,
-        started(folder, command, ranks=launch.ranks, lock=lock, fed=play is not None) as process,
     ):
         feed = Feed(process, folder, screen, follow=launch.follow, deadline=deadline)
         try:

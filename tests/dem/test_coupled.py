@@ -30,7 +30,7 @@ from fdnet.dem.invade_deck import (
     write_parts,
 )
 from fdnet.dem.invasion import invade, steps_between
-from fdnet.dem.liggghts import Launch, run_fed
+from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.packing import make_pack
 from fdnet.dem.supply import batches_of, densities
 from fdnet.errors import CaseError, LiggghtsError
@@ -150,7 +150,7 @@ ORPHAN = """
 import sys
 from pathlib import Path
 from fdnet.dem.liggghts import find_binary
-from fdnet.dem.liggghts import run_fed
+from fdnet.dem.liggghts import run_deck
 from fdnet.dem.liggghts import Launch
 
 def play(feed):
@@ -158,7 +158,7 @@ def play(feed):
     feed('shell sleep 0.1', 'print "alive"')
     sys.stdin.read()
 
-run_fed(Path(sys.argv[1]), "in.none", Launch(binary=find_binary()), play)
+run_deck(Path(sys.argv[1]), "in.none", Launch(binary=find_binary()), play)
 """
 
 
@@ -176,13 +176,13 @@ def test_liggghts_ends_when_fdnet_is_killed(tmp_path):
 
 def test_an_error_of_liggghts_is_reported_with_its_line(binary, tmp_path):
     with pytest.raises(LiggghtsError, match="ERROR: Unknown command: nonsense"):
-        run_fed(tmp_path, "in.none", Launch(binary=binary), lambda feed: feed("nonsense 1"))
+        run_deck(tmp_path, "in.none", Launch(binary=binary), lambda feed: feed("nonsense 1"))
 
 
 def test_a_time_limit_ends_a_liggghts_that_hangs(binary, tmp_path):
     launch = Launch(binary=binary, timeout=1.0)
     with pytest.raises(LiggghtsError, match="did not end within its time limit"):
-        run_fed(tmp_path, "in.none", launch, lambda feed: feed("shell sleep 30"))
+        run_deck(tmp_path, "in.none", launch, lambda feed: feed("shell sleep 30"))
 
 
 def test_what_follow_raises_stops_liggghts(binary, grains, tmp_path):
@@ -370,7 +370,7 @@ def test_liggghts_shows_the_densities_and_takes_in_only_the_last_forces(binary, 
             show = f"write_dump fines custom post/{number}.dump id f_uf[1] f_uf[2] f_uf[3]"
             feed("include fluid.in", f"{show} modify sort id")
 
-    run_fed(tmp_path, "in.invade", Launch(binary=binary), play)
+    run_deck(tmp_path, "in.invade", Launch(binary=binary), play)
     for number, velocity in enumerate(given):
         frame = read_frame(tmp_path / "post" / f"{number}.dump")
         shown = np.column_stack([frame.column(f"f_uf[{axis}]") for axis in (1, 2, 3)])
@@ -413,6 +413,6 @@ def applied_force(case, fines, folder, binary) -> np.ndarray:
         write_forces(folder, shown, fluid_of(case, scales, grain).forces(shown, moment))
         feed("include fluid.in", "run 0", show.format("with"))
 
-    run_fed(folder, "in.invade", Launch(binary=binary), play)
+    run_deck(folder, "in.invade", Launch(binary=binary), play)
     first, second = (read_frame(folder / "post" / f"{name}.dump") for name in ("without", "with"))
     return second.column("fx") - first.column("fx")
