@@ -26,7 +26,7 @@ from fdnet.dem.deck import (
     wall_variables,
     write_data,
 )
-from fdnet.dem.liggghts import Execution, Launch, run_deck
+from fdnet.dem.liggghts import SCREEN, Execution, Launch, run_deck
 from fdnet.errors import CaseError, DumpError, LiggghtsError
 from fdnet.scales.contacts import restitution_of, sphere_mass
 from fdnet.scales.pack import (
@@ -305,11 +305,9 @@ def _at_rest(case: Case, scales: Scales, folder: Path, launch: Launch, *, count:
     """
     for places in range(PLACES):
         try:
-            pack = _attempt(case, scales, folder, launch, count=count, places=places)
+            return _attempt(case, scales, folder, launch, count=count, places=places)
         except RestlessError as error:
             last = error
-        else:
-            return replace(pack, restless=places)
     raise RestlessError(f"{last} (tried {PLACES} times from other places)") from last
 
 
@@ -330,15 +328,14 @@ def _attempt(
             f"{key}: {count} grains needs more room than the box has, some were pushed out of it "
             "while growing; raise the porosity, lower the count or enlarge the box"
         ) from error
-    frame = read_frame(folder / "post" / "pack.dump")
-    screen = (folder / "screen.txt").read_text(encoding="utf-8", errors="replace")
+    dump = folder / "post" / "pack.dump"
+    frame = read_frame(dump)
     grains = snapshot_of(frame, case, time_s=0.0)
-    creep = _creep(case, scales, folder, grains) if "FDNET restless" in screen else 0.0
+    restless = "FDNET restless" in (folder / SCREEN).read_text("utf-8", errors="replace")
+    creep = _creep(case, scales, folder, grains) if restless else 0.0
     if len(grains) != count:
-        raise LiggghtsError(
-            f"{folder}/post/pack.dump: {len(grains)} grains, expected {count}: some were lost"
-        )
-    check_radii(grains, case, folder / "post" / "pack.dump")
+        raise LiggghtsError(f"{dump}: {len(grains)} grains, expected {count}: some were lost")
+    check_radii(grains, case, dump)
     porosity = measure_porosity(grains, periodic=case.periodic)
     return Pack(
         grains=grains,
@@ -352,6 +349,7 @@ def _attempt(
         left_out=deck.left_out,
         run=run,
         creep=creep,
+        restless=places,
     )
 
 

@@ -407,35 +407,51 @@ class NetworkFluid:
         moving = np.where(within & ~held, crowd, 0.0) / pack.network.area
         slow, gain = float(moving @ shape[:, 0]), float(moving @ fines.velocity[:, 0])
         speed = self._velocity(carried, cake + slow, gain)
-        loose, drop = slow * speed - gain, self._drop(carried, speed)
+        # drops of pressure as simulated, Pa: of what moves in the pack, and of all that stands
+        loose = slow * speed - gain
+        drop = self._viscosity * speed * pack.length / pack.permeability / carried.k_over_k0
 
         pressed, fluid = drop * pressed, speed * shape
         pace = np.maximum(_speed(speed * intact.velocity), speed)
-        force = np.linalg.norm(pressed, axis=1)
+        force, volume = _speed(pressed), 4.0 / 3.0 * np.pi * fines.radius**3
         going = np.divide(force, pace, out=np.zeros_like(force), where=pace > 0)
         coefficient = np.where(held, np.maximum(going, lone), crowd)
         velocity = np.where(held[:, None], pressed / coefficient[:, None], fluid)
-        push = self._push(fines, intact.gradient, speed * np.where(within, share, 0.0))
-        acting = coefficient * np.where(held, velocity[:, 0], (velocity - fines.velocity)[:, 0])
+        push = np.where(held[:, None], 0.0, pressed)
+        if self.case.drag.pressure_gradient:
+            local = self._viscosity * volume * (speed * np.where(within, share, 0.0))
+            push = -pack.scale * intact.gradient * local[:, None] + push
+
+        # the push of the intact pack's gradient is part of what the network gives to the grains
+        drag = coefficient * np.where(held, velocity[:, 0], (velocity - fines.velocity)[:, 0])
+        outside = ~within & np.any(pressed != 0.0, axis=1)
+        on_fines = float(drag[within].sum()) + float(pressed[outside, 0].sum())
+        on_grains, on_held = drop * float(carried.pressed.grains[0]), float(pressed[held, 0].sum())
+        whole, law = (drop + loose) * pack.network.area, float(crowd[held] @ fluid[held, 0])
+        dense = float(np.mean(1.0 - near.porosity[caked])) if caked.any() else 0.0
+        # rates and pressures are those of the fluid itself, which is slower than a driven one
+        driven, filtrate = scales.force_factor, 0.0
+        if moment.before is not None:
+            passed = (moment.time - moment.before["time_s"]) * driven
+            filtrate = moment.before["filtrate_m3"] + moment.before["rate_m3_s"] * passed
         return FluidForces(
             coefficient=coefficient,
             velocity=velocity,
-            push=push + np.where(held[:, None], 0.0, pressed),
+            push=push,
             pace=speed / scales.porosity,
-            measures=self._pressures(carried, cake, loose, speed)
-            | self._ledger(speed, moment)
-            | crowd_measures(factor, near)
-            | self._momentum(
-                acting,
-                pressed,
-                held,
-                within,
-                grains=drop * float(carried.pressed.grains[0]),
-                drop=drop + loose,
-                crowd_drag=float(crowd[held] @ fluid[held, 0]),
-            )
+            measures=crowd_measures(factor, near)
             | {
-                "cake_thickness_m": self._thickness(fines.radius[caked], near, caked),
+                "velocity_m_s": speed,
+                "rate_m3_s": speed / driven * pack.network.area,
+                "rate_over_initial": speed / self.first_velocity,
+                "filtrate_m3": filtrate,
+                "k_over_k0": carried.k_over_k0,
+                "pressure_cake_Pa": cake * speed / driven,
+                "pressure_pack_Pa": (drop + loose) / driven,
+                "momentum_defect": _over(abs(on_fines + on_grains - whole), whole),
+                "fines_share": _over(on_held, whole),
+                "crowd_over_network": _over(law, on_held),
+                "cake_thickness_m": _over(float(np.sum(volume[caked])), pack.network.area * dense),
                 "pores_stagnant": carried.stagnant,
                 "fines_standing": int(np.sum(standing & within)),
             },
@@ -464,33 +480,6 @@ class NetworkFluid:
         )
         return mean / pace
 
-    def _momentum(
-        self,
-        acting: Array,
-        pressed: Array,
-        held: Array,
-        within: Array,
-        *,
-        grains: float,
-        drop: float,
-        crowd_drag: float,
-    ) -> dict[str, float]:
-        """By how much forces and drop of pressure `drop` Pa differ; what the crowd's law says.
-
-        `acting` (N,) N along x is what drag does to the fines, `pressed` (N, 3) N the network's
-        pressure, `grains` N what acts on the grains. The push of the intact pack's gradient is
-        part of what the network gives to the grains.
-        """
-        cake = ~within & np.any(pressed != 0.0, axis=1)
-        on_fines = float(acting[within].sum()) + float(pressed[cake, 0].sum())
-        whole = drop * self.pack.network.area
-        network = float(pressed[held, 0].sum())
-        return {
-            "momentum_defect": abs(on_fines + grains - whole) / whole if whole > 0 else 0.0,
-            "fines_share": network / whole if whole > 0 else 0.0,
-            "crowd_over_network": crowd_drag / network if network > 0 else 0.0,
-        }
-
     def _velocity(self, carried: Carried, more: float, gain: float = 0.0) -> float:
         """Superficial velocity U, m/s.
 
@@ -509,53 +498,10 @@ class NetworkFluid:
     def _viscosity(self) -> float:
         return self.case.fluid.viscosity_Pa_s
 
-    def _push(self, fines: Snapshot, gradient: Array, speed: Array) -> Array:
-        """V (-grad p) of the grains, (N, 3) N, for the local `speed` (N,) m/s over the shape."""
-        if not self.case.drag.pressure_gradient:
-            return np.zeros((len(fines), 3))
-        volume = 4.0 / 3.0 * np.pi * fines.radius**3
-        return -self.pack.scale * gradient * (self._viscosity * volume * speed)[:, None]
 
-    def _pressures(
-        self, carried: Carried, cake: float, loose: float, speed: float
-    ) -> dict[str, float]:
-        """Drops of pressure of the fluid itself, Pa, and the permeability.
-
-        `loose` Pa is what moving fines take.
-        """
-        factor = self.scales.force_factor
-        return {
-            "k_over_k0": carried.k_over_k0,
-            "pressure_cake_Pa": cake * speed / factor,
-            "pressure_pack_Pa": (self._drop(carried, speed) + loose) / factor,
-        }
-
-    def _drop(self, carried: Carried, speed: float) -> float:
-        """Drop of pressure over the pack with its deposit as simulated, Pa."""
-        intact = self._viscosity * speed * self.pack.length / self.pack.permeability
-        return intact / carried.k_over_k0
-
-    def _ledger(self, speed: float, moment: Moment) -> dict[str, float]:
-        """Rate and filtrate of the fluid itself, which is slower than a driven one."""
-        factor, before = self.scales.force_factor, moment.before
-        rate, filtrate = speed / factor * self.pack.network.area, 0.0
-        if before is not None:
-            passed = (moment.time - before["time_s"]) * factor
-            filtrate = before["filtrate_m3"] + before["rate_m3_s"] * passed
-        return {
-            "velocity_m_s": speed,
-            "rate_m3_s": rate,
-            "rate_over_initial": speed / self.first_velocity,
-            "filtrate_m3": filtrate,
-        }
-
-    def _thickness(self, radius: Array, near: Neighbourhood, standing: Array) -> float:
-        """Thickness, m, of a cake of the standing fines with their own mean solid fraction."""
-        if not len(radius):
-            return 0.0
-        solid = float(np.sum(4.0 / 3.0 * np.pi * radius**3))
-        dense = float(np.mean(1.0 - near.porosity[standing]))
-        return solid / (self.pack.network.area * dense) if dense > 0 else 0.0
+def _over(part: float, whole: float) -> float:
+    """`part` over `whole`; 0 where that is not above 0."""
+    return part / whole if whole > 0 else 0.0
 
 
 # ------------------------------------------------------------------------------------------------

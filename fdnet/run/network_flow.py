@@ -45,23 +45,6 @@ from fdnet.spheres.geometry import neighbour_tree, wrapped
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
 
-def facet_areas(network: Network) -> tuple[Array, Array]:
-    """Areas (T, 3) m2 of the facets of the throats, and the shares (T, 2) that feel a bed.
-
-    An area is that inside the box times the normal from the first to the second pore. A share is
-    that of it on which a bed of fines in either side is pressed.
-    """
-    corner = network.throat_corner
-    whole = geometry.triangle_area(corner)
-    normal = 0.5 * np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    middle = network.pore_corner.mean(axis=1)[network.throat_pores]
-    middle[:, 1] += network.throat_shift * np.ptp(network.box, axis=1)
-    forth = np.sum((middle[:, 1] - middle[:, 0]) * normal, axis=1)
-    turned = np.where(forth < 0, -network.throat_share, network.throat_share)
-    section = np.minimum(bed_section(network) / whole[:, None], 1.0)
-    return frozen(turned[:, None] * normal), frozen(section)
-
-
 def bed_section(network: Network) -> Array:
     """S_h (T, 2) m2 of the sides of each throat; 0 where grains close the facet."""
     height = np.abs(network.throat_heights)
@@ -152,7 +135,8 @@ class PackFlow:
         network: pores and throats of the grains.
         clean: (T,) m3, conductances.
         halves: (T, 2) 1/m3, resistances of the sides of the clean throats; 0 where infinite.
-        facet_area: (T, 3) m2, area of the facet times its normal.
+        facet_area: (T, 3) m2, area of the facet inside the box times its normal, from the first
+            to the second pore.
         bed_share: (T, 2) share of it on which a bed of fines in either side is pressed.
         holders: the pores, which hold the deposit.
         parts: what the damage of the throats needs and does not depend on the fines.
@@ -257,16 +241,21 @@ class PackFlow:
 def pack_flow(grains: Snapshot, periodic: tuple[bool, bool, bool], walls: str) -> PackFlow:
     """The flow through an intact pack. Raises NetworkError or FlowError where there is none."""
     network = build_network(grains, periodic=periodic, walls=walls)
-    facet_area, bed_share = facet_areas(network)
-    halves = half_resistances(network)
+    corner, halves = network.throat_corner, half_resistances(network)
     clean = 1.0 / halves.sum(axis=1)
     flow = solve_flow(network, clean)
+    normal = 0.5 * np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    middle = network.pore_corner.mean(axis=1)[network.throat_pores]
+    middle[:, 1] += network.throat_shift * np.ptp(network.box, axis=1)
+    forth = np.sum((middle[:, 1] - middle[:, 0]) * normal, axis=1)
+    turned = np.where(forth < 0, -network.throat_share, network.throat_share)
+    whole = geometry.triangle_area(corner)[:, None]
     return PackFlow(
         network=network,
         clean=clean,
         halves=np.where(np.isfinite(halves), halves, 0.0),
-        facet_area=facet_area,
-        bed_share=bed_share,
+        facet_area=frozen(turned[:, None] * normal),
+        bed_share=frozen(np.minimum(bed_section(network) / whole, 1.0)),
         holders=holders_of(network),
         parts=tuple(parts_of(network)),
         flow=flow,
@@ -321,15 +310,14 @@ class Renewal:
         The network is solved when enough of them changed, and where `anew` asks. What a solve
         gives does not depend on earlier ones, to the last digit.
         """
-        inside = fines.where(reaching_inside(self.pack.network, fines))
-        self.deposit = (
-            measured_deposit(self.pack.holders, inside)
-            if self.deposit is None
-            else self.deposit.changed_to(inside)
-        )
+        inside, pack = fines.where(reaching_inside(self.pack.network, fines)), self.pack
+        if self.deposit is None:
+            self.deposit = measured_deposit(pack.holders, inside)
+        else:
+            self.deposit = self.deposit.changed_to(inside)
         if anew or self.carried is None or changed_share(self.solved, inside) > self.renewed:
-            self.sections = self.pack.sections(inside, self.sections)
-            self.carried = self.pack.carried(self.sections.factor, self.deposit.in_pores)
+            self.sections = pack.sections(inside, self.sections)
+            self.carried = pack.carried(self.sections.factor, self.deposit.in_pores)
             self.solved, self.solves = inside, self.solves + 1
         return self.carried, self.deposit
 
