@@ -506,7 +506,7 @@ def watch_left_out(case: InvasionCase, *, packed: bool) -> list[LeftOut]:
         why = "which grains touch is known once they are packed"
     else:
         return []
-    return [LeftOut(what="overlap between checkpoints", why=why)]
+    return [LeftOut("overlap between checkpoints", why)]
 
 
 def write_watch_parts(case: InvasionCase, grains: Snapshot, folder: Path) -> None:

@@ -20,7 +20,6 @@ from fdnet.dem.checkpoint import (
 from fdnet.dem.deck import (
     BELOW_ZERO,
     Deck,
-    LeftOut,
     drag_variables,
     forces_left_out,
     gravity_variables,
@@ -35,8 +34,8 @@ from fdnet.dem.invade_deck import (
     moving_variables,
     specimen_regions,
 )
-from fdnet.dem.invasion import ChunkedStage
-from fdnet.dem.liggghts import Execution, Launch
+from fdnet.dem.invasion import ChunkedStage, EndedStage
+from fdnet.dem.liggghts import Launch
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.files import write_text
 from fdnet.scales.scales import BackFlow
@@ -58,29 +57,6 @@ class Start:
     invaded: Snapshot
     invasion: Path
     digest: str
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class CleanedUp:
-    """A finished clean-up.
-
-    Attributes:
-        state: grains and remaining fines at the end.
-        history: one row a checkpoint.
-        stop_reason: "quiet" (nothing came out any more), "duration", "empty" or "cap".
-        warnings: doubts about how it ended, one sentence each.
-        left_out: what the deck does without.
-        runs: executions of LIGGGHTS; empty when an earlier session had come to the end.
-        ranks: MPI ranks.
-    """
-
-    state: Snapshot
-    history: tuple[Cleaned, ...]
-    stop_reason: str
-    warnings: tuple[str, ...]
-    left_out: tuple[LeftOut, ...]
-    runs: tuple[Execution, ...]
-    ranks: int
 
 
 def cleaned_points(folder: Path, digest: str) -> Checkpoints:
@@ -172,16 +148,6 @@ class CleanUpStage(ChunkedStage):
     deck = "in.clean_up"
     mark = "FDNET cleaned"
 
-    @property
-    def first_step(self) -> int:
-        """Step at which it begins: steps count on from those of the invasion."""
-        return self.start.invaded.step
-
-    @property
-    def points(self) -> Checkpoints:
-        """Its checkpoints."""
-        return cleaned_points(self.folder, self.start.digest)
-
     def write(self, last: Cleaned | None) -> Deck:
         """Write the inputs of a start, or of a restart from `last`."""
         flow, start, name = self.flow, self.start, self.deck
@@ -230,19 +196,21 @@ def clean_up(
     launch: Launch,
     *,
     fluid: DrivingFluid | None = None,
-) -> CleanedUp:
+) -> EndedStage:
     """Turn the flow back; continues from the last whole checkpoint when `folder` holds one.
 
-    A coupled case needs the `fluid` that answers for its fines. Raises LiggghtsError when a run
+    A coupled case needs the `fluid` that answers for its fines. The `stop_reason` is also "quiet"
+    (nothing came out any more) or "empty". Raises LiggghtsError when a run
     fails or fines are lost, CaseError when the restart of the invasion is not there.
     """
     stage = CleanUpStage(
         case=flow.case,
         scales=flow.scales,
         grains=start.grains,
-        folder=folder,
+        points=cleaned_points(folder, start.digest),
         launch=launch,
         fluid=fluid,
+        first_step=start.invaded.step,
         flow=flow,
         start=start,
     )
@@ -263,7 +231,7 @@ def clean_up(
             "lower run.time_step_factor"
         )
     reason, warnings = stage.ending(last)
-    return CleanedUp(
+    return EndedStage(
         state=state,
         history=history,
         stop_reason=reason,
@@ -271,4 +239,5 @@ def clean_up(
         left_out=deck.left_out,
         runs=runs,
         ranks=launch.ranks,
+        step_s=flow.step,
     )

@@ -1,11 +1,10 @@
 """Decks: the text of a LIGGGHTS input, from a template, and the lines that several decks share."""
 
 import math
-from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import jinja2
 import numpy as np
@@ -21,14 +20,8 @@ from fdnet.spheres.dump import Frame
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LeftOut:
-    """Something that a deck does without.
-
-    Attributes:
-        what: is left out.
-        why: it is not needed.
-    """
+class LeftOut(NamedTuple):
+    """Something that a deck does without, and why it is not needed."""
 
     what: str
     why: str
@@ -37,13 +30,12 @@ class LeftOut:
         return f"{self.what} ({self.why})"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Deck:
+class Deck(NamedTuple):
     """A rendered deck.
 
     Attributes:
         text: LIGGGHTS input.
-        stage: "pack" or "invade".
+        stage: "pack", "invade" or "clean_up".
         digest: of what the stage depends on in its case.
         left_out: what a general deck would have and this one does without.
     """
@@ -110,7 +102,6 @@ def number(value: float) -> str:
 
 
 _MATERIALS = {"pack": ("grain", "wall"), "invade": ("grain", "fine", "wall")}
-_NORMAL = {"hooke": "hooke/stiffness", "hertz": "hertz"}
 SOFTEST, HARDEST = 5e6, 1e9
 """Young's moduli, Pa, beyond which LIGGGHTS asks for a confirmation in the deck."""
 
@@ -138,7 +129,7 @@ def contact_variables(case: Case, scales: Scales, stage: str, *, friction: bool)
         "friction": matrix("friction") if friction else "",
         "rolling": " ".join([number(contact.rolling_friction)] * size**2) if rolls else "",
         "cohesion": _cohesion(case, stage),
-        "pair_model": _models(case, stage, friction) + _settings(case, stage, friction),
+        "pair_model": "".join(_law(case, stage, friction)),
     }
     if contact.model == "hooke":
         return shared | {
@@ -160,30 +151,23 @@ def contact_variables(case: Case, scales: Scales, stage: str, *, friction: bool)
 
 def wall_law(case: Case, stage: str, *, friction: bool) -> dict[str, Any]:
     """Contact model, material and settings of a plane."""
-    return {
-        "model": _models(case, stage, friction),
-        "material": len(_MATERIALS[stage]),
-        "settings": _settings(case, stage, friction),
-    }
+    model, settings = _law(case, stage, friction)
+    return {"model": model, "material": len(_MATERIALS[stage]), "settings": settings}
 
 
-def _models(case: Case, stage: str, friction: bool) -> str:
-    """LIGGGHTS's models in its order; packing knows neither friction nor cohesion."""
-    words = [_NORMAL[case.contact.model]]
-    if friction:
-        words.append("tangential history")
-    if _cohesion(case, stage):
-        words.append("cohesion sjkr")
-    if friction and case.contact.rolling_friction:
-        words.append("rolling_friction epsd2")
-    return " ".join(words)
+def _law(case: Case, stage: str, friction: bool) -> tuple[str, str]:
+    """LIGGGHTS's models in its order, and settings; packing knows no friction or cohesion.
 
-
-def _settings(case: Case, stage: str, friction: bool) -> str:
-    """A contact that a liquid damps may pull: the film resists parting as it does approach."""
-    pulls = stage == "invade" and case.contact.restitution == "liquid"
+    A contact that a liquid damps may pull: the film resists parting as it does approach.
+    """
+    contact = case.contact
+    words = ["hertz" if contact.model == "hertz" else "hooke/stiffness"]
+    words += ["tangential history"] if friction else []
+    words += ["cohesion sjkr"] if _cohesion(case, stage) else []
+    words += ["rolling_friction epsd2"] if friction and contact.rolling_friction else []
+    pulls = stage == "invade" and contact.restitution == "liquid"
     tangential = " tangential_damping off" if friction else ""
-    return tangential + (" limitForce off" if pulls else " limitForce on")
+    return " ".join(words), tangential + (" limitForce off" if pulls else " limitForce on")
 
 
 def _cohesion(case: Case, stage: str) -> str:
@@ -214,11 +198,11 @@ def gravity_variables(
     gravity, what = case.gravity, "gravity and buoyancy"
     size = math.hypot(*gravity.acceleration_m_s2)
     if gravity.mode == "off" or size == 0:
-        return [], [LeftOut(what=what, why="switched off")]
+        return [], [LeftOut(what, "switched off")]
     if gravity.mode == "auto" and scales.gravity_over_drag < gravity.negligible_below:
         ratio, limit = scales.gravity_over_drag, gravity.negligible_below
         why = f"gravity is {ratio:.1e} of the drag, below {limit:g}"
-        return [], [LeftOut(what=what, why=why)]
+        return [], [LeftOut(what, why)]
     groups = {"fines": {one.density for one in case.fines.components}}
     if case.grains.motion == "mobile":
         groups["grains"] = {case.grains.density_kg_m3}
@@ -241,7 +225,7 @@ def gravity_variables(
                 "lift": [number(-rate * one + 0.0) for one in lifted],
             }
         )
-    return pulls, [] if gravity.buoyancy else [LeftOut(what="buoyancy", why="switched off")]
+    return pulls, [] if gravity.buoyancy else [LeftOut("buoyancy", "switched off")]
 
 
 # ------------------------------------------------------------------------------------------------
@@ -321,7 +305,7 @@ def forces_left_out(case: InvasionCase) -> list[LeftOut]:
         ("drag at finite Reynolds numbers", "not asked for", drag.inertia == "none"),
         ("drag in a crowd", "not asked for", drag.crowd == "none"),
     ]
-    return [LeftOut(what=what, why=why) for what, why, left in reasons if left]
+    return [LeftOut(what, why) for what, why, left in reasons if left]
 
 
 # ------------------------------------------------------------------------------------------------

@@ -412,7 +412,7 @@ def _left_out(case: InvasionCase, scales: InvasionScales, ranks: int) -> list[Le
         ("fines far upstream", batches, case.fines.supply == "batches"),
         ("MPI processor grid", "one rank", ranks == 1),
     ]
-    return [LeftOut(what=what, why=why) for what, why, left in reasons if left]
+    return [LeftOut(what, why) for what, why, left in reasons if left]
 
 
 # ------------------------------------------------------------------------------------------------

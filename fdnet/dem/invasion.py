@@ -76,17 +76,19 @@ class ChunkedStage(ABC):
         case: what is run.
         scales: of the case.
         grains: of the pack.
-        folder: of the stage.
+        points: its checkpoints, in its folder.
         launch: how LIGGGHTS is started.
         fluid: answers for the fines of a coupled case; None where the deck holds the forces.
+        first_step: at which it begins.
     """
 
     case: InvasionCase
     scales: InvasionScales
     grains: Snapshot
-    folder: Path
+    points: Checkpoints
     launch: Launch
     fluid: DrivingFluid | None = None
+    first_step: int = 0
 
     deck = "in.invade"
     """Name of the deck; that of a continued stage ends in .resume."""
@@ -94,14 +96,9 @@ class ChunkedStage(ABC):
     """What LIGGGHTS prints at a checkpoint, before the chunk and its last step."""
 
     @property
-    def first_step(self) -> int:
-        """Step at which it begins."""
-        return 0
-
-    @property
-    @abstractmethod
-    def points(self) -> Checkpoints:
-        """Its checkpoints."""
+    def folder(self) -> Path:
+        """Where it runs."""
+        return self.points.folder
 
     @abstractmethod
     def write(self, last: Any | None) -> Deck:
@@ -235,6 +232,31 @@ def steps_between(case: InvasionCase, scales: InvasionScales, pace: float) -> in
     return max(1, math.floor(min(refreshes, most))) * scales.hold_steps
 
 
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class EndedStage:
+    """A finished stage.
+
+    Attributes:
+        state: grains and remaining fines at the end.
+        history: one row a checkpoint.
+        stop_reason: "duration" (what the case asks for has gone by), "cap", or that of the stage.
+        warnings: doubts about how it ended, one sentence each.
+        left_out: what the deck does without.
+        runs: executions of LIGGGHTS; empty when an earlier session had come to the end.
+        ranks: MPI ranks of them.
+        step_s: s, time step.
+    """
+
+    state: Snapshot
+    history: tuple[Any, ...]
+    stop_reason: str
+    warnings: tuple[str, ...]
+    left_out: tuple[LeftOut, ...]
+    runs: tuple[Execution, ...]
+    ranks: int
+    step_s: float
+
+
 class Keeper:
     """Follows the screen of a stage and passes every line on.
 
@@ -277,36 +299,24 @@ class Keeper:
 # The invasion: fines are driven into the pack until it is plugged.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Invasion:
-    """A finished invasion.
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Invasion(EndedStage):
+    """A finished invasion; its `stop_reason` is also "plugged" or "supply_exhausted".
 
     Attributes:
-        damaged: grains and remaining fines at the end, those upstream too.
-        history: one row a checkpoint.
-        stop_reason: "plugged", "supply_exhausted", "duration" (the time or volume that the
-            case asks for) or "cap".
         supplied: number of fines that took part: all, or those of the batches that had come.
         overlap: largest overlap of a fine with any sphere.
-        step_s: s, time step.
-        left_out: what the deck does without.
-        warnings: doubts about how it ended, one sentence each.
-        ranks: MPI ranks of all executions of LIGGGHTS.
-        runs: executions of LIGGGHTS; empty when an earlier session had come to the end.
         updates: the record of a coupled invasion, one row an update; empty when it is not coupled.
     """
 
-    damaged: Snapshot
-    history: tuple[Checkpoint, ...]
-    stop_reason: str
     supplied: int
     overlap: Deepest
-    step_s: float
-    left_out: tuple[LeftOut, ...]
-    warnings: tuple[str, ...]
-    ranks: int
-    runs: tuple[Execution, ...]
     updates: tuple[Mapping[str, float], ...]
+
+    @property
+    def damaged(self) -> Snapshot:
+        """Grains and remaining fines at the end, those upstream too."""
+        return self.state
 
     @property
     def max_overlap(self) -> float:
@@ -316,11 +326,6 @@ class Invasion:
 
 class InvadeStage(ChunkedStage):
     """An invasion as it is run."""
-
-    @property
-    def points(self) -> Checkpoints:
-        """Its checkpoints."""
-        return Checkpoints(folder=self.folder, digest=self.case.digest("invade"))
 
     def write(self, last: Checkpoint | None) -> Deck:
         """Write the inputs of a start, or of a restart from `last`."""
@@ -437,8 +442,9 @@ def invade(
     Raises LiggghtsError when a run fails or fines are lost, CaseError when the fines cannot be
     placed or the invasion was begun on another number of MPI ranks.
     """
+    points = Checkpoints(folder=folder, digest=case.digest("invade"))
     stage = InvadeStage(
-        case=case, scales=scales, grains=grains, folder=folder, launch=launch, fluid=fluid
+        case=case, scales=scales, grains=grains, points=points, launch=launch, fluid=fluid
     )
     deck, runs = stage.drive()
     history, batches = read_history(folder), batches_of(case, scales)
@@ -446,14 +452,14 @@ def invade(
     for _, damaged in readable_states(folder, history, case, scales, grains):
         overlaps.append(overlap_in(case, damaged))
     reason, warnings = stage.ending(history)
-    warnings += stage.points.doubts()
+    warnings += points.doubts()
     if len(overlaps) < len(history):
         warnings.append(
             f"{len(history) - len(overlaps)} of {len(history)} checkpoint dumps cannot be read: "
             "they are missing from the largest overlap and from invasion.pvd"
         )
     return Invasion(
-        damaged=damaged,
+        state=damaged,
         history=history,
         stop_reason=reason,
         supplied=batches.supplied(entered_by(case, batches, history[-1])),

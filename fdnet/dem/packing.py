@@ -127,12 +127,12 @@ def render_pack(
     low, high = case.grains.radius_range_m
     mass = sphere_mass(low, case.grains.density_kg_m3)
     left_out = [
-        LeftOut(what="friction and tangential history", why="grains are packed frictionless"),
-        LeftOut(what="gravity", why="only the geometry of the pack is wanted"),
-        LeftOut(what="fines and fluid", why="the pack is made before the invasion"),
+        LeftOut("friction and tangential history", "grains are packed frictionless"),
+        LeftOut("gravity", "only the geometry of the pack is wanted"),
+        LeftOut("fines and fluid", "the pack is made before the invasion"),
     ]
     if ranks == 1:
-        left_out.append(LeftOut(what="MPI processor grid", why="one rank"))
+        left_out.append(LeftOut("MPI processor grid", "one rank"))
     contacts = contact_variables(case, scales, "pack", friction=False)
     damping = ("damping", 0.8 * math.sqrt(stiffness / mass))
     if case.contact.model == "hertz":

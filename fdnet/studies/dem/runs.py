@@ -15,7 +15,7 @@ import numpy as np
 
 from fdnet.case.case import Case, InvasionCase, with_fines
 from fdnet.case.file import case_from, set_keys
-from fdnet.dem.checkpoint import state_at
+from fdnet.dem.checkpoint import Checkpoints, state_at
 from fdnet.dem.deck import snapshot_of, specimen_box
 from fdnet.dem.invade_deck import write_invade_inputs
 from fdnet.dem.invasion import InvadeStage, Invasion, Keeper, invade
@@ -167,8 +167,9 @@ def edited_run(
     text, count = re.subn(f"(?m){edit[0]}", edit[1], deck)
     assert count == 1, f"{count} lines of the deck have the pattern {edit[0]}, expected 1"
     write_text(folder / "in.invade", text)
-    stage = InvadeStage(case=case, scales=scales, grains=grains, folder=folder, launch=launch)
-    stage.points.cut(None)
+    points = Checkpoints(folder=folder, digest=case.digest("invade"))
+    points.cut(None)
+    stage = InvadeStage(case=case, scales=scales, grains=grains, points=points, launch=launch)
     return run_deck(folder, "in.invade", replace(launch, follow=Keeper(stage)))
 
 
