@@ -80,16 +80,16 @@ class Cleaned(NamedTuple):
 
 
 class Record(NamedTuple):
-    """What a checkpoint was when its files were whole.
+    """What a checkpoint was when its files were whole, in SHA-256 but for `ranks` and `row`.
 
     Attributes:
-        case: digest of what the stage depends on.
+        case: what the stage depends on.
         ranks: MPI ranks of LIGGGHTS.
         row: line of history.csv.
-        overlap: SHA-256 of the overlaps that were watched since the checkpoint before.
-        dump: SHA-256 of the dump.
-        restart: SHA-256 of the restart.
-        updates: SHA-256 of the updates of a coupled stage before the checkpoint.
+        overlap: the overlaps that were watched since the checkpoint before.
+        dump: the dump.
+        restart: the restart.
+        updates: the updates of a coupled stage before the checkpoint.
     """
 
     case: str

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import (
     HISTORY,
     Checkpoints,
@@ -62,22 +61,6 @@ class Start:
 def cleaned_points(folder: Path, digest: str) -> Checkpoints:
     """The checkpoints of a clean-up in `folder`."""
     return Checkpoints(folder=folder, digest=digest, stage="clean", kind=Cleaned)
-
-
-def invasion_restart(folder: Path, step: int, case: InvasionCase) -> Path:
-    """The restart at the end of the invasion in `folder`, checked against its record.
-
-    Raises CaseError where it is missing or changed.
-    """
-    points = Checkpoints(folder=folder, digest=case.digest("invade"))
-    path, record = points.path(step, "restart"), points.record(step)
-    if record is None or not path.is_file() or file_digest(path) != record.restart:
-        raise CaseError(
-            f"{path}: the clean-up begins with this file, and it is missing or is not the one "
-            "that the invasion wrote; put it back, or run the invasion again with --stages "
-            "invade,clean_up,analyse,report --force"
-        )
-    return path
 
 
 def render_clean_up(
@@ -149,18 +132,29 @@ class CleanUpStage(ChunkedStage):
     mark = "FDNET cleaned"
 
     def write(self, last: Cleaned | None) -> Deck:
-        """Write the inputs of a start, or of a restart from `last`."""
-        flow, start, name = self.flow, self.start, self.deck
+        """Write the inputs of a start, or of a restart from `last`.
+
+        Raises CaseError where the restart of the invasion is missing or changed.
+        """
+        start, name, case = self.start, self.deck, self.flow.case
         if last is None:
-            path = invasion_restart(start.invasion, start.invaded.step, flow.case)
+            before = Checkpoints(folder=start.invasion, digest=case.digest("invade"))
+            path = before.path(self.first_step, "restart")
+            record = before.record(self.first_step)
+            if record is None or not path.is_file() or file_digest(path) != record.restart:
+                raise CaseError(
+                    f"{path}: the clean-up begins with this file, and it is missing or is not the "
+                    "one that the invasion wrote; put it back, or run the invasion again with "
+                    "--stages invade,clean_up,analyse,report --force"
+                )
             restart = f"../{start.invasion.name}/post/{path.name}"
         else:
             restart, name = f"post/clean_{last.step}.restart", f"{name}.resume"
-        deck = render_clean_up(flow, start.digest, restart, last, ranks=self.launch.ranks)
+        deck = render_clean_up(self.flow, start.digest, restart, last, ranks=self.launch.ranks)
         write_text(self.folder / name, deck.text)
-        parts = coupled_parts(flow.case, flow.scales)
+        parts = coupled_parts(case, self.flow.scales)
         if parts:
-            parts["checkpoint.in"] = render_text("cleaned.in.j2", dump_variables(flow.case))
+            parts["checkpoint.in"] = render_text("cleaned.in.j2", dump_variables(case))
         for part, text in parts.items():
             write_text(self.folder / part, text)
         return deck

@@ -183,12 +183,9 @@ def _cohesion(case: Case, stage: str) -> str:
 # ------------------------------------------------------------------------------------------------
 # Gravity and buoyancy in the invasion deck: what acts on the fines, and on grains that move.
 #
-# A sphere of mass m and density rho_p in a fluid of density rho_f at rest feels
-# m g (1 - rho_f / rho_p), gravity and Archimedes's buoyancy, in any direction of g. That is
-# LIGGGHTS's `fix gravity` with a magnitude for each group of equal density, and exact. Fines of
-# several densities have the whole of gravity, and buoyancy -rho_f g 4/3 pi r^3 as a force of its
-# own.
-# A simulation that is driven faster than the fluid multiplies it as all forces.
+# A sphere of density rho_p in a fluid of density rho_f at rest feels m g (1 - rho_f / rho_p), in
+# any direction of g: LIGGGHTS's `fix gravity` with a magnitude for each group of equal density.
+# Fines of several densities have the whole of gravity, and buoyancy as a force of its own.
 
 
 def gravity_variables(

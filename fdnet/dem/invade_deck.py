@@ -60,7 +60,8 @@ SUPPLY = "supply"
 """Folder of the batches."""
 SCRATCH = "post/contacts.restart"
 """File that a continued deck writes only to store the contacts with the spheres."""
-_GIVEN = ("f_uf[1]", "f_uf[2]", "f_uf[3]")
+GIVEN = ("f_uf[1]", "f_uf[2]", "f_uf[3]")
+"""Columns with the w that each fine was given; shown where the flow follows the deposit."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -122,20 +123,12 @@ class DrivingFluid(Protocol):
 
 
 def _shown_columns(case: InvasionCase) -> str:
-    """The columns that LIGGGHTS shows; where the flow follows the deposit with the w given."""
-    return " ".join((COLUMNS, "density", *(_GIVEN if case.drag.field == "network" else ())))
+    return " ".join((COLUMNS, "density", *(GIVEN if case.drag.field == "network" else ())))
 
 
 def read_state(folder: Path, case: InvasionCase) -> Frame:
     """The spheres that LIGGGHTS shows. Raises DumpError when it did not write all of them."""
     return read_binary_frame(folder / STATE, tuple(_shown_columns(case).split()))
-
-
-def given_speed(frame: Frame) -> Array | None:
-    """The speed w (N,) m/s that each sphere of a state was given, None where that is not shown."""
-    if _GIVEN[0] not in frame.columns:
-        return None
-    return np.linalg.norm([frame.column(name) for name in _GIVEN], axis=0)
 
 
 def fine_density(frame: Frame) -> Array:

@@ -15,6 +15,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import (
     HISTORY,
@@ -41,12 +43,12 @@ from fdnet.dem.checkpoint import (
 )
 from fdnet.dem.deck import Deck, LeftOut, snapshot_of
 from fdnet.dem.invade_deck import (
+    GIVEN,
     SCRATCH,
     SUPPLY,
     DrivingFluid,
     Moment,
     fine_density,
-    given_speed,
     largest_share,
     read_state,
     render_invade,
@@ -184,6 +186,7 @@ class ChunkedStage(ABC):
         """
         frame, dt = self.shown(feed), self.scales.time_step
         spheres, density = self.spheres(frame, step * dt), fine_density(frame)
+        shows = GIVEN[0] in frame.columns
         moment = Moment(
             step=step,
             time=step * dt,
@@ -191,7 +194,7 @@ class ChunkedStage(ABC):
             first=updates.first,
             fresh=fresh,
             left=(end - step) * dt,
-            given=given_speed(frame),
+            given=np.linalg.norm([frame.column(one) for one in GIVEN], axis=0) if shows else None,
             density=density,
         )
         assert self.fluid is not None

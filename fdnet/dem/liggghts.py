@@ -1,7 +1,4 @@
-"""Running the LIGGGHTS binary: finding it, starting it, feeding it, and what its end means.
-
-The environment in which LIGGGHTS is started, with what Open MPI reads of it.
-"""
+"""Running the LIGGGHTS binary: finding it, starting it, feeding it, and what its end means."""
 
 import contextlib
 import ctypes
@@ -379,24 +376,29 @@ class _EndedError(Exception):
     """LIGGGHTS has ended although more was to come."""
 
 
+@dataclass(slots=True, eq=False, kw_only=True)
 class Feed:
     """A LIGGGHTS that waits for commands; call it with some, and it returns when they are done.
 
-    `busy` are the seconds that it has worked on them, `waited` those in between.
+    Attributes:
+        process: its process.
+        folder: that it runs in.
+        screen: takes what it prints.
+        follow: is called with each line of that.
+        deadline: s of the monotonic clock; None: no limit.
+        busy: s, that it has worked on the commands.
+        waited: s, in between.
     """
 
-    def __init__(
-        self,
-        process: subprocess.Popen,
-        folder: Path,
-        screen: IO[bytes],
-        *,
-        follow: Callable[[str], None] | None,
-        deadline: float | None,
-    ) -> None:
-        self.process, self.folder, self.screen = process, folder, screen
-        self.follow, self.deadline = follow, deadline
-        self.busy, self.waited, self._fed, self._rest = 0.0, 0.0, 0, b""
+    process: subprocess.Popen
+    folder: Path
+    screen: IO[bytes]
+    follow: Callable[[str], None] | None
+    deadline: float | None
+    busy: float = 0.0
+    waited: float = 0.0
+    _fed: int = 0
+    _rest: bytes = b""
 
     def __call__(self, *commands: str) -> None:
         """Carry out the commands, in order.
@@ -502,7 +504,9 @@ def run_deck(
         started(folder, command, ranks=launch.ranks, fed=play is not None) as process,
         (folder / SCREEN).open("wb", buffering=0) as screen,
     ):
-        feed = Feed(process, folder, screen, follow=launch.follow, deadline=deadline)
+        feed = Feed(
+            process=process, folder=folder, screen=screen, follow=launch.follow, deadline=deadline
+        )
         try:
             feed.play(play)
         finally:

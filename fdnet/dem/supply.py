@@ -117,12 +117,8 @@ def last_places(
 
     K is N, or as many as there are before the first one that `LAST_TRIES` draws give no place.
 
-    Args:
-        radius: (N,) m.
-        span: smallest and largest coordinates (N, 3) m of each centre.
-        size: (3,) m, period along each axis, 0 where there is none.
-        rng: gives the places.
-        others: places (M, 3) m and radii (M,) m of spheres that are there already.
+    `radius` (N,) m is that of each, `span` the smallest and largest coordinates (N, 3) m of each
+    centre. For the other arguments see `places_by_size`.
     """
     from scipy.spatial import cKDTree
 
@@ -181,16 +177,9 @@ def _clear(
 # ------------------------------------------------------------------------------------------------
 # How the slab of fines is cut into batches, and when each of them enters.
 #
-# With `fines.supply` = "batches" the slab is cut across the flow. A batch enters the simulation at
-# the start of a chunk, where the fluid would have carried it by then. The length of a batch is
-# what the suspension moves in a chunk of time t against a cake that grows towards it, to a
-# thickness h = c (u t + h) / phi with the concentration c, the velocity u and phi =
-# `LOOSEST_CAKE`. So no cake overtakes a batch as long as one more batch is present than needed.
-#
-# Where the deposit slows the mud down (`Drag.slowed`), the distance that the mud has moved takes
-# the place of u t. A batch enters at the start of the chunk in which the mud will have moved far
-# enough. Its fines are drawn then, at the mud's velocity, where the mud would have carried them
-# and clear of all fines that are there: those move with the mud only in the mean.
+# A batch enters at the start of a chunk, where the fluid would have carried it by then. No cake of
+# `LOOSEST_CAKE` overtakes a batch. Where the deposit slows the mud down (`Drag.slowed`) a batch
+# follows from the distance that the mud has moved (docs/physics.md, "Supply of fines").
 
 
 LOOSEST_CAKE = 0.5
@@ -308,8 +297,6 @@ def densities(case: InvasionCase, counts: Sequence[int]) -> Array:
 
 # ------------------------------------------------------------------------------------------------
 # The slab of fines upstream of the face: random, at the given concentration, touching nothing.
-#
-# With `fines.supply` = "batches" it comes in batches.
 
 
 SURE_CROWDING = 0.2

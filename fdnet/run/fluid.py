@@ -1,18 +1,12 @@
-"""The fluid that drives the fines: uniform, or by the network.
+"""The fluid that drives the fines: uniform with drag in a crowd, or by the network.
 
-Drag in a crowd of fines in the uniform field: Beetstra's law of the porosity around each fine.
-
-The uniform velocity u is the volume of suspension that passes a unit area of pores in a unit
-of time. Where fines of porosity phi stand in it, the fluid flows at u / phi between them; where
-they move with it, there is no slip. So the superficial slip is u - v in either case, and
+In the uniform field the superficial slip is u - v, and the force on a fine
 
     F = 6 pi mu r M Y F_b / phi (u - v) + V G,
 
-with Beetstra's factor F_b and the size factor Y (`fdnet.scales.drag`). The first part is
-the total force of the fluid in the crowd, the fall of pressure that the crowd itself causes among
-it: fines that fill a cross-section A and stand take up dp A. G is the gradient of the intact pack
-without fines, which acts inside the pack where `drag.pressure_gradient` asks for it. So the two
-gradients add, and none is counted twice.
+with Beetstra's factor F_b of the porosity phi around the fine and the size factor Y
+(`fdnet.scales.drag`); G is the gradient of the intact pack. docs/physics.md, "Drag in a crowd",
+tells why the two gradients add and none is counted twice.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -150,10 +144,7 @@ def mirrored(spheres: Snapshot) -> Snapshot:
 
 
 # ------------------------------------------------------------------------------------------------
-# What moving fines meet until they are looked at again.
-#
-# Between two updates a fine passes places where the fluid is faster or slower. It is given the
-# mean over its way, and not what is at its place when the way begins.
+# What moving fines meet until they are looked at again: the mean over their way.
 
 
 PARTS = 4
@@ -293,19 +284,8 @@ def history_rows(
 # ------------------------------------------------------------------------------------------------
 # The fluid of `drag.field` = "network": it follows the deposit, and the deposit follows it.
 #
-# The force on a fine that moves is that of the uniform field with local values: u is the volume
-# of suspension that passes a unit area of pores at its place (`network_flow`), G the fall of
-# pressure that this flow causes in the grains alone. A fine that stands in the pack feels what the
-# network's pressure does there, and G. Upstream of the face the mud moves at the rate over the
-# cross-section, and fines that stand there feel the drag of the crowd.
-#
-# When a standing fine comes loose its throat opens, so it is not pushed on by all that force, but
-# goes on with the flow of the intact pack: C = F / u, with u the larger of the velocity there and
-# the superficial one, and at least the coefficient of a lone fine.
-#
-# The rate U follows from the resistances in series: the pack with its deposit (network), the cake
-# (the drag on the fines that stand upstream), the drag on fines that move in the pack, and the
-# rest of the way on which the overbalance is lost, which stays as it is.
+# The forces, the rate, and what happens when a standing fine comes loose are derived on
+# docs/physics.md, "The field of the network".
 
 
 STANDING = 0.5
@@ -502,10 +482,6 @@ class NetworkFluid:
 def _over(part: float, whole: float) -> float:
     """`part` over `whole`; 0 where that is not above 0."""
     return part / whole if whole > 0 else 0.0
-
-
-# ------------------------------------------------------------------------------------------------
-# The fluid that drives the fines of a case, where fdnet computes it while LIGGGHTS waits.
 
 
 def fluid_of(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> DrivingFluid | None:

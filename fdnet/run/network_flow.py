@@ -1,23 +1,6 @@
-"""The flow that follows the deposit, on the pore network.
+"""The flow that follows the deposit, on the pore network, and what it does to grains and fines.
 
-What the fall of pressure in a damaged network does to grains and fines.
-
-The pressure of a pore acts on the facets of its tetrahedron. The facets of a closed body add up to
-nothing, so over all throats t, with the fall of pressure dp, the area a of the whole facet and its
-normal n from the first to the second pore,
-
-    sum of dp a n_x = (drop of pressure) A
-
-holds exactly, however the flow is: it is the momentum of fluid, grains and fines together. Each
-fall of pressure is the sum of what the clean sides take and of what the fines add. What they add
-acts on the open section, which they fill, and on the grains around it. Fines that fill a section
-S(z) as a bed feel the sum of dp S over the height z, and in a bed dp goes with dz / S. So it acts
-on the harmonic mean of S,
-
-    S_h = h / (integral of dz / S(z)),  S(z) = S_0 + pi z^2 / 2,
-
-where S_0 is the open area of the facet: the discs that three grains show at the height z are
-smaller by pi z^2 / 2 in all, since the angles of a triangle add up to pi.
+The derivation is on docs/physics.md, "The field of the network".
 """
 
 import math
@@ -83,19 +66,15 @@ def _summed(where: Array, force: Array, count: int) -> Array:
 
 
 # ------------------------------------------------------------------------------------------------
-# The flow through a pack with its deposit: shape from the intact pack, share from the network.
-#
-# The resolved Stokes flow of the intact pack (`fdnet.network.field`) is solved once and says how
-# the fluid moves inside each pore. The pore network, damaged by the fines that are there now, says
-# how much of it each pore still carries. In a pore the velocity is that of the intact pack times
-# the ratio of the damaged to the clean flux, both at the same rate through the specimen.
+# The flow through a pack with its deposit: in a pore the velocity is that of the resolved flow
+# through the intact pack, times the ratio of the damaged to the clean flux of the network.
 
 
 STAGNANT = 1e-2
 """A pore that carries less than this share of the mean flux of a pore, clean, keeps ratio 1."""
 RENEWED = 0.2
 """Share of the deposit by volume that may change before the network is solved anew
-(`scripts/solve_lag.py`, `fdnet study flow-updates`)."""
+(`scripts/solve_lag.py`, docs/validation/flow-updates.md)."""
 STEP = 1.0 / 3.0
 """Greatest step between two sections of a throat, in radii of its smallest fine. The analysis
 takes an eighth (`scripts/solve_lag.py`)."""
@@ -105,9 +84,8 @@ LEAK = 1e-6
 """Share of its clean conductance that a side keeps at least, so that pressures are known beyond
 what the fines close."""
 CELLS, SLIP = 10.0, 0.15
-"""Cells of the resolved field across a grain (`fdnet study velocity-field`), and the rms velocity
-over the superficial one that it leaves at the walls. The default of `velocity_field` takes half as
-many iterations again (docs/velocity_field.md)."""
+"""Cells of the resolved field across a grain (docs/validation/velocity-field.md), and the rms
+velocity over the superficial one that it leaves at the walls (docs/velocity_field.md)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
