@@ -11,6 +11,8 @@ NETWORK = ("drag.field=network", "drag.upstream=darcy", "drag.scheme=implicit")
 LIFTED = ("clean_up.drawdown_MPa=1.0",)
 RECORD = {
     "format": 1,
+    "ranks": 1,
+    "files": {},
     "seconds": 1.0,
     "max_overlap": 0.0,
     "steps": 1,

@@ -119,12 +119,6 @@ def _defects(updates: Sequence[Mapping[str, float]]) -> dict[str, Any]:
     return {"momentum_defect_most": max(defects), "momentum_open": over}
 
 
-def ranks_of(record: dict[str, Any]) -> int | None:
-    """MPI ranks of a finished stage; None where an older version kept none."""
-    runs = record.get("runs") or [{}]
-    return record.get("ranks", runs[0].get("ranks"))
-
-
 def run_record(run: Execution) -> dict[str, Any]:
     """One LIGGGHTS execution, with the digests of its decks."""
     decks = {
@@ -376,9 +370,9 @@ def _refuse_other(session: Session, source: Path, record: dict[str, Any]) -> Non
             f"--pack-from {source}: its pack is that of another case or seed (digest "
             f"{record['digest']}, this case {session.case.digest('pack')}); leave the option out"
         )
-    if ranks_of(record) != session.options.ranks:
+    if record["ranks"] != session.options.ranks:
         raise CaseError(
-            f"--pack-from {source}: its pack was made with --np {ranks_of(record)}, this run has "
+            f"--pack-from {source}: its pack was made with --np {record['ranks']}, this run has "
             f"--np {session.options.ranks}, which would give another pack; use the same number"
         )
 
