@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fdnet.case.case import Case, InvasionCase
-from fdnet.dem.deck import LeftOut, number, render_text, snapshot_of
+from fdnet.dem.deck import number, render_text, snapshot_of
 from fdnet.dem.supply import Batches, batches_of
 from fdnet.errors import CaseError, DumpError, LiggghtsError
 from fdnet.files import write_text
@@ -494,19 +494,6 @@ def watch_variables(
         "turns": turns,
         "grains": GRAINS_APART,
     }
-
-
-def watch_left_out(case: InvasionCase, *, packed: bool) -> list[LeftOut]:
-    """Why a deck does not watch the overlap, for grains that are `packed` or not yet."""
-    if case.grains.motion == "mobile":
-        why = "pairs of grains overlap too"
-    elif not case.fines.one_size:
-        why = "fines are of unequal size"
-    elif not packed:
-        why = "which grains touch is known once they are packed"
-    else:
-        return []
-    return [LeftOut("overlap between checkpoints", why)]
 
 
 def write_watch_parts(case: InvasionCase, grains: Snapshot, folder: Path) -> None:

@@ -24,7 +24,6 @@ from fdnet.dem.checkpoint import (
     empty_chunks,
     plug_allowance,
     quiet_chunks,
-    watch_left_out,
     watch_variables,
     write_watch_parts,
 )
@@ -314,8 +313,7 @@ def render_invade(
     Grains that are not `packed` stand for those of a pack that is not made yet.
     """
     gravity, left_out = gravity_variables(case, scales)
-    left_out += [*forces_left_out(case), *_left_out(case, scales, ranks)]
-    left_out += watch_left_out(case, packed=packed)
+    left_out += [*forces_left_out(case), *_left_out(case, scales, ranks, packed)]
     batches = len(batches_of(case, scales).counts)
     behind = _bounds(case, scales, grains)[0, 0] + _margin(case, scales)
     sides = "INF INF INF INF"
@@ -392,9 +390,14 @@ def _friction(case: InvasionCase, scales: InvasionScales, *, walls_only: bool = 
     return any(c.friction > 0 for c in slipping if "wall" in c.pair or not walls_only)
 
 
-def _left_out(case: InvasionCase, scales: InvasionScales, ranks: int) -> list[LeftOut]:
+def _left_out(
+    case: InvasionCase, scales: InvasionScales, ranks: int, packed: bool
+) -> list[LeftOut]:
     contact, unasked = case.contact, "not asked for"
     batches = "they come in batches, each when it is about to arrive"
+    unseen = "" if packed else "which grains touch is known once they are packed"
+    unseen = unseen if case.fines.one_size else "fines are of unequal size"
+    unseen = unseen if case.grains.motion == "fixed" else "pairs of grains overlap too"
     reasons = [
         ("motion of grains, end planes", "grains are fixed", case.grains.motion == "fixed"),
         ("tangential history", "no pair has friction", not _friction(case, scales)),
@@ -404,6 +407,7 @@ def _left_out(case: InvasionCase, scales: InvasionScales, ranks: int) -> list[Le
         ("side walls", "sides are periodic", case.box.sides == "periodic"),
         ("fines far upstream", batches, case.fines.supply == "batches"),
         ("MPI processor grid", "one rank", ranks == 1),
+        ("overlap between checkpoints", unseen, bool(unseen)),
     ]
     return [LeftOut(what, why) for what, why, left in reasons if left]
 

@@ -9,7 +9,7 @@ up, as in a stage that is not coupled; so a cut one goes on bit for bit.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -141,7 +141,7 @@ class ChunkedStage(ABC):
                 self.look_at(read_history(self.folder, self.points.kind), read_watch(self.folder))
                 if self.over(last):
                     return deck, ()
-            launch = replace(self.launch, follow=Keeper(self))
+            launch = replace(self.launch, follow=self.keeper())
             try:
                 play = None if self.fluid is None else partial(self._play, name, last)
                 return deck, (run_deck(self.folder, name, launch, play),)
@@ -156,6 +156,42 @@ class ChunkedStage(ABC):
                 restart.rename(restart.with_suffix(".unreadable"))
             finally:
                 (self.folder / SCRATCH).unlink(missing_ok=True)
+
+    def keeper(self) -> Callable[[str], None]:
+        """What follows the screen and passes every line on.
+
+        At each checkpoint it records what is whole now, keeps the two newest restarts, and stops a
+        run that writes to a full disk or whose fines overlap too much. LIGGGHTS itself goes on
+        after a failed write and ends with exit code 0. Older restarts are removed only while there
+        is room on the disk.
+        """
+        watch = WatchReader(self.folder)
+
+        def follow(line: str) -> None:
+            if line.startswith(self.mark):
+                self._keep(int(line.split()[3]), watch)
+            if self.launch.follow:
+                self.launch.follow(line)
+
+        return follow
+
+    def _keep(self, step: int, watch: WatchReader) -> None:
+        if disk_is_full(self.folder):
+            raise LiggghtsError(
+                f"{self.folder}: the disk is full, LIGGGHTS was stopped; make room and "
+                "continue with --resume"
+            )
+        rows = [row for row in read_rows(self.folder, self.points.kind) if row.step == step][-1:]
+        overlaps = watch.upto(step)
+        for row in rows:
+            self.points.keep(row, ranks=self.launch.ranks, overlaps=overlaps)
+        if not rows and self.case.run.on_overlap == "stop":
+            raise LiggghtsError(
+                f"{self.folder / HISTORY}: no row for the checkpoint at step {step}; continue "
+                "with --resume"
+            )
+        self.points.remove_restarts(step)
+        self.look_at(rows, overlaps)
 
     def _play(self, name: str, last: Any | None, feed: Feed) -> None:
         """Feed LIGGGHTS a coupled stage, from the deck `name`.
@@ -258,44 +294,6 @@ class EndedStage:
     runs: tuple[Execution, ...]
     ranks: int
     step_s: float
-
-
-class Keeper:
-    """Follows the screen of a stage and passes every line on.
-
-    At each checkpoint it records what is whole now, keeps the two newest restarts, and stops a run
-    that writes to a full disk or whose fines overlap too much. LIGGGHTS itself goes on after a
-    failed write and ends with exit code 0. Older restarts are removed only while there is room on
-    the disk.
-    """
-
-    def __init__(self, stage: ChunkedStage) -> None:
-        self.stage, self.watch = stage, WatchReader(stage.folder)
-
-    def __call__(self, line: str) -> None:
-        if line.startswith(self.stage.mark):
-            self._keep(int(line.split()[3]))
-        if self.stage.launch.follow:
-            self.stage.launch.follow(line)
-
-    def _keep(self, step: int) -> None:
-        stage, points = self.stage, self.stage.points
-        if disk_is_full(stage.folder):
-            raise LiggghtsError(
-                f"{stage.folder}: the disk is full, LIGGGHTS was stopped; make room and "
-                "continue with --resume"
-            )
-        rows = [row for row in read_rows(stage.folder, points.kind) if row.step == step][-1:]
-        overlaps = self.watch.upto(step)
-        for row in rows:
-            points.keep(row, ranks=stage.launch.ranks, overlaps=overlaps)
-        if not rows and stage.case.run.on_overlap == "stop":
-            raise LiggghtsError(
-                f"{stage.folder / HISTORY}: no row for the checkpoint at step {step}; continue "
-                "with --resume"
-            )
-        points.remove_restarts(step)
-        stage.look_at(rows, overlaps)
 
 
 # ------------------------------------------------------------------------------------------------

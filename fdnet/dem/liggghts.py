@@ -461,9 +461,10 @@ class Feed:
         self._rest = self._rest[-_LONGEST_OUTPUT_LINE:]
         self._refuse()
         lines = [line.rstrip(b"\r").decode(errors="replace") for line in parts]
-        for line in lines if self.follow else ():
+        for line in lines:
             self._refuse_late()
-            self.follow(line)
+            if self.follow:
+                self.follow(line)
         if not part and not lines:
             raise _EndedError
         return lines

@@ -18,7 +18,7 @@ from fdnet.case.file import case_from, set_keys
 from fdnet.dem.checkpoint import Checkpoints, state_at
 from fdnet.dem.deck import snapshot_of, specimen_box
 from fdnet.dem.invade_deck import write_invade_inputs
-from fdnet.dem.invasion import InvadeStage, Invasion, Keeper, invade
+from fdnet.dem.invasion import InvadeStage, Invasion, invade
 from fdnet.dem.liggghts import Binary, Execution, Launch, find_binary, run_deck
 from fdnet.dem.packing import make_pack
 from fdnet.files import write_text
@@ -170,7 +170,7 @@ def edited_run(
     points = Checkpoints(folder=folder, digest=case.digest("invade"))
     points.cut(None)
     stage = InvadeStage(case=case, scales=scales, grains=grains, points=points, launch=launch)
-    return run_deck(folder, "in.invade", replace(launch, follow=Keeper(stage)))
+    return run_deck(folder, "in.invade", replace(launch, follow=stage.keeper()))
 
 
 def invasion_observed(case: InvasionCase, grains: Snapshot, result: Invasion) -> dict[str, float]:
