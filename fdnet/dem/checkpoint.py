@@ -178,8 +178,9 @@ class Checkpoints:
         steps, lines = [row.step for row in rows], {row.step: csv_row(row) for row in rows}
         records = {step: self.record(step) for step, _ in self.files("record")}
         for step, record in records.items():
-            ours = record is not None and record.case == self.digest
-            if rows and ours and step <= steps[-1] and lines.get(step) != record.row:
+            if record is None or record.case != self.digest or not rows or step > steps[-1]:
+                continue
+            if lines.get(step) != record.row:
                 raise LiggghtsError(
                     f"{self.folder / HISTORY}: the row of step {step} is "
                     f"{lines.get(step, 'missing')!r}, expected {record.row!r} as "
@@ -536,7 +537,8 @@ class WatchReader:
     """
 
     def __init__(self, folder: Path) -> None:
-        self.path, self.waiting = folder / WATCH, []
+        self.path = folder / WATCH
+        self.waiting: list[Deepest] = []
         self.offset = self.path.stat().st_size if self.path.exists() else 0
 
     def upto(self, step: int) -> list[Deepest]:
@@ -549,7 +551,7 @@ class WatchReader:
             self.offset += len(whole)
             self.waiting += _watched(whole.decode(errors="replace").splitlines())
         rows = [row for row in self.waiting if row.step <= step]
-        self.waiting: list[Deepest] = [row for row in self.waiting if row.step > step]
+        self.waiting = [row for row in self.waiting if row.step > step]
         return rows
 
 

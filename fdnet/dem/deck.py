@@ -121,13 +121,13 @@ def contact_variables(case: Case, scales: Scales, stage: str, *, friction: bool)
         )
         return " ".join(number(getattr(pair, value)) for pair in pairs)
 
-    rolls = friction and contact.rolling_friction is not None
+    rolling = contact.rolling_friction if friction else None
     shared = {
         "model": contact.model,
         "materials": " ".join(names),
         "size": size,
         "friction": matrix("friction") if friction else "",
-        "rolling": " ".join([number(contact.rolling_friction)] * size**2) if rolls else "",
+        "rolling": "" if rolling is None else " ".join([number(rolling)] * size**2),
         "cohesion": _cohesion(case, stage),
         "pair_model": "".join(_law(case, stage, friction)),
     }

@@ -225,7 +225,8 @@ def make_pack(case: Case, scales: Scales, folder: Path, launch: Launch) -> Pack:
     not come to rest.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    count, tried, target = grain_count(case), [], scales.porosity
+    count, target = grain_count(case), scales.porosity
+    tried: list[dict[str, Any]] = []
     while True:
         attempt = folder / f"attempt_{len(tried) + 1}"
         pack = _at_rest(case, scales, attempt, launch, count=count)
