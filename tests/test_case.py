@@ -9,19 +9,15 @@ import tomllib
 from pathlib import Path
 
 import pytest
-import tomli_w
 from builders import TINY, tiny
 
 from fdnet.case.case import (
-    AS_BEFORE,
     KEYS,
     Case,
     InvasionCase,
-    completed,
     with_fines,
-    without_added,
 )
-from fdnet.case.file import case_from, known_keys, read_case, recorded_case, set_keys
+from fdnet.case.file import case_from, known_keys, read_case, set_keys
 from fdnet.errors import CaseError
 from fdnet.scales.scales import InvasionScales, Scales, scales_of
 from fdnet.studies.thesis.runs.carry_out import find_state, state_path
@@ -279,35 +275,12 @@ def test_shipped_cases_keep_their_digests_and_their_text(root: Path):
     assert shipped == {Path(f"{row['case']}.toml") for row in rows}
     for row in rows:
         case = read_case(root / "cases" / f"{row['case']}.toml")
-        text = tomli_w.dumps(without_added(case.data()))
+        text = case.toml()
         assert row == {
             "case": row["case"],
             **{stage: case.digest(stage) for stage in ("pack", "invade", "analyse")},
             "text": hashlib.sha256(text.encode()).hexdigest()[:16],
         }
-
-
-def test_new_keys_that_mean_as_before_are_in_no_digest():
-    before = {"name": "a", "fluid": {"viscosity_cP": 50.0}}
-    after = {"name": "a", "fluid": {"viscosity_cP": 50.0, "law": "old"}, "new": {"key": 1.0}}
-    meaning = {"fluid.law": "old", "new.key": 1.0}
-    assert without_added(after, meaning) == before
-    after["fluid"]["law"] = "other"
-    assert without_added(after, meaning) == before | {"fluid": after["fluid"]}
-    assert set(AS_BEFORE) <= set(known_keys())
-
-
-def test_a_recorded_case_that_lacks_new_keys_is_the_case_of_its_time(tmp_path: Path):
-    """A case file that lacks them takes the defaults of today instead."""
-    path, data = tmp_path / "case.toml", without_added(tiny().data())
-    path.write_text(tomli_w.dumps(data))
-    then = set_keys(data, [f"{key}={str(value).lower()}" for key, value in AS_BEFORE.items()])
-    assert recorded_case(path) == case_from(then)
-    assert recorded_case(path).same_specimen(path.read_bytes())
-    assert completed({"drag": {"scheme": "held"}}, {"drag.new": 1, "fines.new": 2}) == {
-        "drag": {"scheme": "held", "new": 1}
-    }
-    assert completed({}, {"well.new": 1}) == {"well": {"new": 1}}
 
 
 def test_stored_states_still_belong_to_their_cases(root: Path):

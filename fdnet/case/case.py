@@ -1,11 +1,9 @@
-"""The whole case, what differs between two, and keys of earlier files.
+"""The whole case, and what differs between two.
 
-Keys that cases did not have when their digests were first kept.
-
-A digest names what a result was made from. A new key whose value means "as before" changes no
-result, so it must change no digest either: run folders and stored states would be orphaned. They
-hold their case with every key written out, so a key that they lack means "as before" too, whatever
-its default is now.
+A case says what the specimen is. It is validated when it is made and never changes. It holds no
+paths and no binary: `fdnet.case.file` reads one from TOML, `Case.toml()` writes it back with every
+default. Its tables are in the modules next to this one, what must hold between them is in
+`fdnet.case.rules`.
 """
 
 import hashlib
@@ -35,61 +33,6 @@ from fdnet.case.tables import (
 )
 from fdnet.errors import CaseError
 from fdnet.names import LIGGGHTS_STAGES, STAGES, Stage
-
-AS_BEFORE: dict[str, Any] = {
-    "contact.model": "hooke",
-    "contact.restitution": "dry",
-    "drag.crowd": "none",
-    "drag.inertia": "none",
-    "drag.pressure_gradient": False,
-    "fluid.darcy_law": "darcy",
-}
-"""New dotted keys, with the value that means what a case without the key meant. A key that is
-absent by default (None) needs no entry: it is not among the data of a case."""
-
-
-def without_added(
-    data: Mapping[str, Any], as_before: Mapping[str, Any] = AS_BEFORE
-) -> dict[str, Any]:
-    """The tables of a case without the new keys that mean "as before", and without empty tables.
-
-    `data` holds tables of keys, each at most one level deep, as `Case.data` gives them.
-    """
-    kept: dict[str, Any] = {}
-    for name, table in data.items():
-        if not isinstance(table, Mapping):
-            kept[name] = table
-            continue
-        keys = {
-            key: value
-            for key, value in table.items()
-            if (dotted := f"{name}.{key}") not in as_before or as_before[dotted] != value
-        }
-        if keys:
-            kept[name] = keys
-    return kept
-
-
-def completed(data: Mapping[str, Any], as_before: Mapping[str, Any] = AS_BEFORE) -> dict[str, Any]:
-    """The tables of a recorded case, as `Case.data` gave them once, with the new keys they lack.
-
-    A case without fines gets no table of fines.
-    """
-    tables = dict(data)
-    for dotted, value in as_before.items():
-        name, key = dotted.split(".")
-        if name in data or name != "fines":
-            tables[name] = {key: value} | tables.get(name, {})
-    return tables
-
-
-# ------------------------------------------------------------------------------------------------
-# A case: what the specimen is. It is validated when it is made and never changes.
-#
-# A case holds no paths and no binary. `fdnet.case.file` reads one from TOML, `Case.toml()` writes
-# it back with every default. Its tables are in the modules next to this one, what must hold
-# between them is in `fdnet.case.rules`.
-
 
 POLICIES = ("max_hours", "max_overlap", "on_overlap")
 """Keys of [run] that decide whether a run may go on, not what it computes."""
@@ -212,10 +155,9 @@ class Case(Part):
         (`run.stiffness_N_m` = "auto"); "invade" ignores the analysis and the clean-up,
         "clean_up" the analysis, but for side walls that let a fluid slip which is made with them
         (`walls_of_the_fluid`). No result depends on `POLICIES` or on the bonds, which mechanics
-        alone reads, so no digest does. A key that was added later counts only where its value
-        differs from what a case meant before (`fdnet.case.case`).
+        alone reads, so no digest does.
         """
-        data = without_added(self.data())
+        data = self.data()
         data.pop("given", None)
         data.pop("bonds", None)
         data["run"] = {key: value for key, value in data["run"].items() if key not in POLICIES}
@@ -245,7 +187,7 @@ class Case(Part):
     def same_specimen(self, text: bytes) -> bool:
         """Whether a case.toml as `toml` wrote it is this case but for `POLICIES`."""
         try:
-            data = completed(tomllib.loads(text.decode()))
+            data = tomllib.loads(text.decode())
             return case_type(data).model_validate(data).digest() == self.digest()
         except ValueError:
             return False
@@ -281,17 +223,15 @@ class InvasionCase(Case):
 def walls_of_the_fluid(stage: str, data: Mapping[str, Any]) -> dict[str, str]:
     """The key of the analysis that the fluid of `stage` depends on, if it does.
 
-    The network of `drag.field` = "network" is made with `analysis.walls`. Walls that hold the
-    fluid are not named, so that the digests of cases without that key are as they were.
+    The network of `drag.field` = "network" is made with `analysis.walls`.
 
     Args:
         stage: "pack", "invade" or "clean_up".
         data: the tables of a case.
     """
     network = stage != "pack" and data["drag"]["field"] == "network"
-    walls = data["analysis"]["walls"]
-    named = data["box"]["sides"] == "walls" and walls == "slip" and network
-    return {"walls": walls} if named else {}
+    named = network and data["box"]["sides"] == "walls"
+    return {"walls": data["analysis"]["walls"]} if named else {}
 
 
 def case_type(data: Mapping[str, Any]) -> type[Case]:

@@ -17,7 +17,7 @@ from typing import Any, get_args
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from fdnet.case.case import Case, InvasionCase, case_type, completed
+from fdnet.case.case import Case, InvasionCase, case_type
 from fdnet.case.rules import cross_problems
 from fdnet.case.spheres import Sizes
 from fdnet.case.tables import Part
@@ -651,11 +651,8 @@ def read_case(
 
 
 def recorded_case(path: Path) -> Case:
-    """The case that a run folder holds, perhaps of an earlier version (`fdnet.case.case`).
-
-    Raises CaseError as `read_case` does.
-    """
-    return case_from(completed(_tables(path)), source=str(path), folder=path.parent)
+    """The case that a run folder holds. Raises CaseError as `read_case` does."""
+    return case_from(_tables(path), source=str(path), folder=path.parent)
 
 
 def _tables(path: str | Path) -> dict[str, Any]:

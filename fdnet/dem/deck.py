@@ -1,15 +1,10 @@
-"""Decks: the text, and the lines that several decks share.
-
-Decks: the text of a LIGGGHTS input, rendered from the templates under StrictUndefined.
-"""
+"""Decks: the text of a LIGGGHTS input, from a template, and the lines that several decks share."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import jinja2
 import numpy as np
@@ -18,21 +13,15 @@ from jinja2 import meta
 from fdnet.case.case import Case, InvasionCase
 from fdnet.errors import DeckError, DumpError
 from fdnet.files import write_text
-from fdnet.scales.contacts import Contact, material_of, restitution_of
+from fdnet.scales.contacts import material_of
 from fdnet.scales.drag import COEFFICIENT, EXPONENT
 from fdnet.scales.scales import InvasionScales, Scales
 from fdnet.spheres.dump import Frame
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LeftOut:
-    """Something that a deck does without.
-
-    Attributes:
-        what: is left out.
-        why: it is not needed.
-    """
+class LeftOut(NamedTuple):
+    """Something that a deck does without, and why it is not needed."""
 
     what: str
     why: str
@@ -41,13 +30,12 @@ class LeftOut:
         return f"{self.what} ({self.why})"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Deck:
+class Deck(NamedTuple):
     """A rendered deck.
 
     Attributes:
         text: LIGGGHTS input.
-        stage: "pack" or "invade".
+        stage: "pack", "invade" or "clean_up".
         digest: of what the stage depends on in its case.
         left_out: what a general deck would have and this one does without.
     """
@@ -58,12 +46,15 @@ class Deck:
     left_out: tuple[LeftOut, ...]
 
 
+def _source(name: str) -> str | None:
+    entry = files("liggghts_templates") / name
+    return entry.read_text(encoding="utf-8") if entry.is_file() else None
+
+
 @cache
 def _environment() -> jinja2.Environment:
-    folder = files("liggghts_templates")
-    loader = jinja2.FunctionLoader(lambda name: _source(folder, name))
     return jinja2.Environment(
-        loader=loader,
+        loader=jinja2.FunctionLoader(_source),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -72,30 +63,15 @@ def _environment() -> jinja2.Environment:
     )
 
 
-def _source(folder: Any, name: str) -> str | None:
-    entry = folder / name
-    return entry.read_text(encoding="utf-8") if entry.is_file() else None
-
-
-def used_variables(template: str) -> set[str]:
+@cache
+def used_variables(template: str) -> frozenset[str]:
     """Names the template and everything it includes take from outside."""
-    return set(_used(template))
-
-
-def _used(template: str) -> Iterator[str]:
-    environment = _environment()
-    try:
-        loader = environment.loader
-        source, _, _ = loader.get_source(environment, template)  # type: ignore[union-attr]
-    except jinja2.TemplateNotFound as error:
-        raise DeckError(
-            f"liggghts_templates/{error.name}: template not found; reinstall fdnet"
-        ) from error
-    tree = environment.parse(source)
-    yield from meta.find_undeclared_variables(tree)
-    for name in meta.find_referenced_templates(tree):
-        if name:
-            yield from _used(name)
+    source = _source(template)
+    if source is None:
+        raise DeckError(f"liggghts_templates/{template}: template not found; reinstall fdnet")
+    tree = _environment().parse(source)
+    parts = [used_variables(name) for name in meta.find_referenced_templates(tree) if name]
+    return frozenset(meta.find_undeclared_variables(tree)).union(*parts)
 
 
 def render_text(template: str, variables: dict[str, Any]) -> str:
@@ -126,92 +102,72 @@ def number(value: float) -> str:
 
 
 _MATERIALS = {"pack": ("grain", "wall"), "invade": ("grain", "fine", "wall")}
-_NORMAL = {"hooke": "hooke/stiffness", "hertz": "hertz"}
 SOFTEST, HARDEST = 5e6, 1e9
 """Young's moduli, Pa, beyond which LIGGGHTS asks for a confirmation in the deck."""
 
 
 def contact_variables(case: Case, scales: Scales, stage: str, *, friction: bool) -> dict[str, Any]:
     """Variables of `_contacts.in.j2`: symmetric matrices row by row, and the contact model."""
-    materials = _MATERIALS[stage]
-    size = len(materials)
+    names, contact = _MATERIALS[stage], case.contact
+    size = len(names)
+
+    def matrix(value: str) -> str:
+        """A value of all pairs, row by row; of two walls, which never touch, any value serves."""
+        known = scales.contacts
+        pairs = (
+            known.get(f"{a}-{b}") or known.get(f"{b}-{a}") or known["grain-wall"]
+            for a in names
+            for b in names
+        )
+        return " ".join(number(getattr(pair, value)) for pair in pairs)
+
+    rolling = contact.rolling_friction if friction else None
     shared = {
-        "model": case.contact.model,
-        "materials": " ".join(materials),
+        "model": contact.model,
+        "materials": " ".join(names),
         "size": size,
-        "friction": _matrix(scales, stage, "friction") if friction else "",
-        "rolling": _rolling(case, size) if friction else "",
+        "friction": matrix("friction") if friction else "",
+        "rolling": "" if rolling is None else " ".join([number(rolling)] * size**2),
         "cohesion": _cohesion(case, stage),
-        "pair_model": _models(case, stage, friction) + _settings(case, stage, friction),
+        "pair_model": "".join(_law(case, stage, friction)),
     }
-    if case.contact.model == "hertz":
-        return shared | _hertz(case, scales, stage)
+    if contact.model == "hooke":
+        return shared | {
+            "normal": matrix("normal_stiffness"),
+            "damping": matrix("damping_rate"),
+            "shear": matrix("shear_stiffness"),
+            "no_damping": " ".join(["0"] * size**2),
+        }
+    elastic = [material_of(case, name, scales.stiffness_factor) for name in names]
+    moduli = [modulus for modulus, _ in elastic]
     return shared | {
-        "normal": _matrix(scales, stage, "normal_stiffness"),
-        "damping": _matrix(scales, stage, "damping_rate"),
-        "shear": _matrix(scales, stage, "shear_stiffness"),
-        "no_damping": " ".join(["0"] * size**2),
+        "modulus": " ".join(number(modulus) for modulus in moduli),
+        "poisson": " ".join(number(ratio) for _, ratio in elastic),
+        "soft": min(moduli) < SOFTEST,
+        "hard": max(moduli) > HARDEST,
+        "restitution": matrix("restitution"),
     }
-
-
-def damped_alike(
-    case: Case, contacts: dict[str, Any], ratio: float, rate: float
-) -> dict[str, Any]:
-    """The same contacts with one damping for all pairs.
-
-    `ratio` is over the critical damping, `rate` in 1/s is what linear contacts take for it.
-    """
-    if case.contact.model == "hertz":
-        key, value = "restitution", restitution_of(ratio)
-    else:
-        key, value = "damping", rate
-    return contacts | {key: " ".join([number(value)] * contacts["size"] ** 2)}
 
 
 def wall_law(case: Case, stage: str, *, friction: bool) -> dict[str, Any]:
     """Contact model, material and settings of a plane."""
-    return {
-        "model": _models(case, stage, friction),
-        "material": len(_MATERIALS[stage]),
-        "settings": _settings(case, stage, friction),
-    }
+    model, settings = _law(case, stage, friction)
+    return {"model": model, "material": len(_MATERIALS[stage]), "settings": settings}
 
 
-def left_out_of_contacts(case: Case) -> list[LeftOut]:
-    """What contacts could do and the case does not ask for."""
+def _law(case: Case, stage: str, friction: bool) -> tuple[str, str]:
+    """LIGGGHTS's models in its order, and settings; packing knows no friction or cohesion.
+
+    A contact that a liquid damps may pull: the film resists parting as it does approach.
+    """
     contact = case.contact
-    asked = {
-        "loss of rebound in the liquid": contact.restitution == "liquid",
-        "rolling resistance": contact.rolling_friction is not None,
-        "cohesion": contact.cohesion_J_m3 is not None,
-    }
-    return [LeftOut(what=what, why="not asked for") for what, given in asked.items() if not given]
-
-
-def _models(case: Case, stage: str, friction: bool) -> str:
-    """LIGGGHTS's models in its order; packing knows neither friction nor cohesion."""
-    words = [_NORMAL[case.contact.model]]
-    if friction:
-        words.append("tangential history")
-    if _cohesion(case, stage):
-        words.append("cohesion sjkr")
-    if friction and case.contact.rolling_friction:
-        words.append("rolling_friction epsd2")
-    return " ".join(words)
-
-
-def _settings(case: Case, stage: str, friction: bool) -> str:
-    """A contact that a liquid damps may pull: the film resists parting as it does approach."""
-    pulls = stage == "invade" and case.contact.restitution == "liquid"
+    words = ["hertz" if contact.model == "hertz" else "hooke/stiffness"]
+    words += ["tangential history"] if friction else []
+    words += ["cohesion sjkr"] if _cohesion(case, stage) else []
+    words += ["rolling_friction epsd2"] if friction and contact.rolling_friction else []
+    pulls = stage == "invade" and contact.restitution == "liquid"
     tangential = " tangential_damping off" if friction else ""
-    return tangential + (" limitForce off" if pulls else " limitForce on")
-
-
-def _rolling(case: Case, size: int) -> str:
-    """The same coefficient for all pairs."""
-    if case.contact.rolling_friction is None:
-        return ""
-    return " ".join([number(case.contact.rolling_friction)] * size**2)
+    return " ".join(words), tangential + (" limitForce off" if pulls else " limitForce on")
 
 
 def _cohesion(case: Case, stage: str) -> str:
@@ -224,87 +180,49 @@ def _cohesion(case: Case, stage: str) -> str:
     )
 
 
-def _hertz(case: Case, scales: Scales, stage: str) -> dict[str, Any]:
-    materials = [material_of(case, name, scales.stiffness_factor) for name in _MATERIALS[stage]]
-    moduli = [modulus for modulus, _ in materials]
-    return {
-        "modulus": " ".join(number(modulus) for modulus in moduli),
-        "poisson": " ".join(number(ratio) for _, ratio in materials),
-        "soft": min(moduli) < SOFTEST,
-        "hard": max(moduli) > HARDEST,
-        "restitution": _matrix(scales, stage, "restitution"),
-    }
-
-
-def _matrix(scales: Scales, stage: str, value: str) -> str:
-    """A value of all pairs of the scene's materials, row by row."""
-    materials = _MATERIALS[stage]
-    return " ".join(
-        number(getattr(_contact(scales, a, b), value)) for a in materials for b in materials
-    )
-
-
-def _contact(scales: Scales, first: str, second: str) -> Contact:
-    """The pair's contact in either order; walls do not touch each other, so any value serves."""
-    for pair in (f"{first}-{second}", f"{second}-{first}"):
-        if pair in scales.contacts:
-            return scales.contacts[pair]
-    return scales.contacts["grain-wall"]
-
-
 # ------------------------------------------------------------------------------------------------
 # Gravity and buoyancy in the invasion deck: what acts on the fines, and on grains that move.
 #
-# A sphere of mass m and density rho_p in a fluid of density rho_f at rest feels
-# m g (1 - rho_f / rho_p), gravity and Archimedes's buoyancy, in any direction of g. That is
-# LIGGGHTS's `fix gravity` with a magnitude for each group of equal density, and exact. Fines of
-# several densities have the whole of gravity, and buoyancy -rho_f g 4/3 pi r^3 as a force of its
-# own.
-# A simulation that is driven faster than the fluid multiplies it as all forces.
-
-
-WHAT = "gravity and buoyancy"
+# A sphere of density rho_p in a fluid of density rho_f at rest feels m g (1 - rho_f / rho_p), in
+# any direction of g: LIGGGHTS's `fix gravity` with a magnitude for each group of equal density.
+# Fines of several densities have the whole of gravity, and buoyancy as a force of its own.
 
 
 def gravity_variables(
     case: InvasionCase, scales: InvasionScales
 ) -> tuple[list[dict[str, Any]], list[LeftOut]]:
     """One `fix gravity` for each group that it moves, and what is left out of the deck."""
-    mode, vector = case.gravity.mode, case.gravity.acceleration_m_s2
-    if mode == "off" or math.hypot(*vector) == 0:
-        return [], [LeftOut(what=WHAT, why="switched off")]
-    if mode == "auto" and scales.gravity_over_drag < case.gravity.negligible_below:
-        ratio, limit = scales.gravity_over_drag, case.gravity.negligible_below
+    gravity, what = case.gravity, "gravity and buoyancy"
+    size = math.hypot(*gravity.acceleration_m_s2)
+    if gravity.mode == "off" or size == 0:
+        return [], [LeftOut(what, "switched off")]
+    if gravity.mode == "auto" and scales.gravity_over_drag < gravity.negligible_below:
+        ratio, limit = scales.gravity_over_drag, gravity.negligible_below
         why = f"gravity is {ratio:.1e} of the drag, below {limit:g}"
-        return [], [LeftOut(what=WHAT, why=why)]
+        return [], [LeftOut(what, why)]
     groups = {"fines": {one.density for one in case.fines.components}}
     if case.grains.motion == "mobile":
         groups["grains"] = {case.grains.density_kg_m3}
-    pulls = []
+    pulls, fluid = [], case.fluid.density_kg_m3
     for name, densities in groups.items():
         mixed = len(densities) > 1
-        share = 1.0 if mixed else share_of_gravity(min(densities), case)
-        lift = _lift(case, scales) if mixed and case.gravity.buoyancy else []
-        pulls.append(_pull(name, scales.force_factor * share, vector) | {"lift": lift})
-    left_out = [] if case.gravity.buoyancy else [LeftOut(what="buoyancy", why="switched off")]
-    return pulls, left_out
-
-
-def share_of_gravity(density: float, case: InvasionCase) -> float:
-    """1 - rho_f / rho_p of spheres of `density` kg/m3; below 0 they rise. 1 without buoyancy."""
-    return 1 - case.fluid.density_kg_m3 / density * case.gravity.buoyancy
-
-
-def _lift(case: InvasionCase, scales: InvasionScales) -> list[str]:
-    """Buoyancy over the cube of the radius along x, y and z, N/m3, as simulated."""
-    rate = 4 / 3 * math.pi * case.fluid.density_kg_m3 * scales.force_factor
-    return [number(-rate * one + 0.0) for one in case.gravity.acceleration_m_s2]
-
-
-def _pull(group: str, share: float, vector: tuple[float, float, float]) -> dict[str, Any]:
-    magnitude, turn = abs(share) * math.hypot(*vector), math.copysign(1.0, share)
-    direction = " ".join(number(turn * one / math.hypot(*vector) + 0.0) for one in vector)
-    return {"group": group, "magnitude": number(magnitude), "direction": direction}
+        # below 0 they rise
+        share = 1.0 if mixed else 1 - fluid / min(densities) * gravity.buoyancy
+        turn = math.copysign(1.0, scales.force_factor * share)
+        # buoyancy over the cube of the radius, N/m3, as simulated
+        rate = 4 / 3 * math.pi * fluid * scales.force_factor
+        lifted = gravity.acceleration_m_s2 if mixed and gravity.buoyancy else ()
+        pulls.append(
+            {
+                "group": name,
+                "magnitude": number(abs(scales.force_factor * share) * size),
+                "direction": " ".join(
+                    number(turn * one / size + 0.0) for one in gravity.acceleration_m_s2
+                ),
+                "lift": [number(-rate * one + 0.0) for one in lifted],
+            }
+        )
+    return pulls, [] if gravity.buoyancy else [LeftOut("buoyancy", "switched off")]
 
 
 # ------------------------------------------------------------------------------------------------
@@ -319,24 +237,41 @@ BELOW_ZERO = -5e-324
 
 
 def drag_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]:
-    """Variables of the drag block: the scheme and, as text, the numbers that it needs."""
+    """Variables of the drag block: the scheme and, as text, the numbers that it needs.
+
+    The drag on a fine of radius r and velocity v is 6 pi mu M r (u - v): mu the viscosity, M the
+    multiplier, u the velocity of the fluid, at x < 0 that of the mud.
+    """
+    hold = scales.hold_steps if scales.hold_steps > 1 else 0
     if case.drag.coupled:
-        hold = scales.hold_steps if scales.hold_steps > 1 else 0
         return {"coupled": True, "scheme": case.drag.scheme, "hold_steps": hold}
     coefficient = case.fluid.stokes_coefficient_Pa_s * case.drag.multiplier
-    slower = scales.drive_velocity - scales.upstream_velocity
-    own = (
-        _viscous(case, scales, coefficient, slower)
-        if case.drag.scheme == "viscous"
-        else _by_radius(scales, slower)
-    )
-    return {
+    slower, slope = scales.drive_velocity - scales.upstream_velocity, scales.push.reynolds_slope
+    shared = {
         "coupled": False,
         "scheme": case.drag.scheme,
         "coefficient": number(coefficient),
         "velocity": number(scales.drive_velocity),
         "gradient": _gradient(case, scales),
-        **own,
+    }
+    if case.drag.scheme == "viscous":
+        # for fines of one radius, as a constant force and viscous damping
+        damping = coefficient * case.fines.mean_radius_m
+        return shared | {
+            "damping": number(damping),
+            "push": number(damping * scales.drive_velocity),
+            "slower": number(-damping * slower) if slower else "",
+            "face": number(BELOW_ZERO),
+        }
+    schiller_naumann = {
+        "factor": number(COEFFICIENT),
+        "exponent": number(EXPONENT),
+        "reynolds": number(slope),
+    }
+    return shared | {
+        "fluid_x": f"(f_uf[1]-(x<0.0)*{number(slower)})" if slower else "f_uf[1]",
+        "hold_steps": hold,
+        "inertia": schiller_naumann if slope else None,
     }
 
 
@@ -345,79 +280,29 @@ def _gradient(case: InvasionCase, scales: InvasionScales) -> dict[str, str] | No
 
     Where all have one density V is taken from the mass, which is the cheaper formula.
     """
-    push = scales.push
+    push, densities = scales.push, {one.density for one in case.fines.components}
     if not push.gradient:
         return None
+    force, formula = "", f"{number(push.gradient_force(1.0))}*r*r*r"
+    if case.fines.one_size:
+        force, formula = number(push.gradient_force(case.fines.mean_radius_m)), ""
+    elif len(densities) == 1:
+        formula = f"{number(push.gradient / min(densities))}*mass"
     end = number(np.nextafter(case.size_m[0], 0))
-    densities = {one.density for one in case.fines.components}
-    formula = (
-        f"{number(push.gradient / min(densities))}*mass"
-        if len(densities) == 1
-        else f"{number(push.gradient_force(1.0))}*r*r*r"
-    )
-    one_size = case.fines.one_size
-    return {
-        "pores": f"0.0 {end} INF INF INF INF",
-        "force": number(push.gradient_force(case.fines.mean_radius_m)) if one_size else "",
-        "formula": "" if one_size else formula,
-    }
+    return {"pores": f"0.0 {end} INF INF INF INF", "force": force, "formula": formula}
 
 
 def forces_left_out(case: InvasionCase) -> list[LeftOut]:
     """The forces of the fluid that the deck does without."""
-    drag = case.drag
-    return [
-        LeftOut(what=what, why=why)
-        for what, left, why in (
-            ("force of the pressure gradient", not drag.pressure_gradient, "switched off"),
-            (
-                "force of the pressure gradient on the grains",
-                drag.pressure_gradient and case.grains.motion == "mobile",
-                "the fluid pushes the fines only",
-            ),
-            ("drag at finite Reynolds numbers", drag.inertia == "none", "not asked for"),
-            ("drag in a crowd", drag.crowd == "none", "not asked for"),
-        )
-        if left
+    drag, on_grains = case.drag, "force of the pressure gradient on the grains"
+    pushed = drag.pressure_gradient and case.grains.motion == "mobile"
+    reasons = [
+        ("force of the pressure gradient", "switched off", not drag.pressure_gradient),
+        (on_grains, "the fluid pushes the fines only", pushed),
+        ("drag at finite Reynolds numbers", "not asked for", drag.inertia == "none"),
+        ("drag in a crowd", "not asked for", drag.crowd == "none"),
     ]
-
-
-def _by_radius(scales: InvasionScales, slower: float) -> dict[str, Any]:
-    """F = 6 pi mu M r (u - v), for each fine by its own radius r.
-
-    mu is the viscosity, M the multiplier, u the fluid's and v the fine's velocity.
-    """
-    fluid = f"(f_uf[1]-(x<0.0)*{number(slower)})" if slower else "f_uf[1]"
-    return {
-        "fluid_x": fluid,
-        "hold_steps": scales.hold_steps if scales.hold_steps > 1 else 0,
-        "inertia": _inertia(scales) if scales.push.reynolds_slope else None,
-    }
-
-
-def _inertia(scales: InvasionScales) -> dict[str, str]:
-    """Schiller and Naumann's factor."""
-    return {
-        "factor": number(COEFFICIENT),
-        "exponent": number(EXPONENT),
-        "reynolds": number(scales.push.reynolds_slope),
-    }
-
-
-def _viscous(
-    case: InvasionCase, scales: InvasionScales, coefficient: float, slower: float
-) -> dict[str, Any]:
-    """The same force for fines of one radius, as a constant force and viscous damping.
-
-    The constant force is 6 pi mu M r u, at x < 0 with the fluid's velocity upstream.
-    """
-    damping = coefficient * case.fines.mean_radius_m
-    return {
-        "damping": number(damping),
-        "push": number(damping * scales.drive_velocity),
-        "slower": number(-damping * slower) if slower else "",
-        "face": number(BELOW_ZERO),
-    }
+    return [LeftOut(what, why) for what, why, left in reasons if left]
 
 
 # ------------------------------------------------------------------------------------------------
@@ -451,21 +336,18 @@ def wall_variables(case: Case, stage: str, *, friction: bool) -> list[dict[str, 
         if case.box.sides == "periodic"
         else ("all" if stage == "pack" or ends_hold else "fines")
     )
-    walls = []
-    for axis, held in ((0, ends_hold), (1, sides_hold), (2, sides_hold)):
-        for end, position in enumerate((0.0, size[axis])):
-            if held:
-                walls.append(_wall(f"w{'xyz'[axis]}{end}", held, position) | law)
-    return walls
-
-
-def _wall(name: str, group: str, position: float) -> dict[str, Any]:
-    return {
-        "id": name,
-        "group": group,
-        "plane": f"{name[1]}plane",
-        "position": number(position),
-    }
+    return [
+        {
+            "id": f"w{'xyz'[axis]}{end}",
+            "group": held,
+            "plane": f"{'xyz'[axis]}plane",
+            "position": number(position),
+            **law,
+        }
+        for axis, held in ((0, ends_hold), (1, sides_hold), (2, sides_hold))
+        for end, position in enumerate((0.0, size[axis]))
+        if held
+    ]
 
 
 def write_data(
@@ -477,55 +359,44 @@ def write_data(
     number of atom types.
     """
     lines = ["spheres", "", f"{len(spheres)} atoms", f"{types} atom types", ""]
-    lines += [
-        f"{number(low)} {number(high)} {axis}lo {axis}hi"
-        for (low, high), axis in zip(bounds, "xyz", strict=True)
-    ]
+    for (low, high), axis in zip(bounds, "xyz", strict=True):
+        lines.append(f"{number(low)} {number(high)} {axis}lo {axis}hi")
     lines += ["", "Atoms", ""]
-    table = np.column_stack(
-        [spheres.id, spheres.kind, 2 * spheres.radius, density, spheres.position]
-    )
-    lines += [
-        f"{atom:.0f} {kind:.0f} " + " ".join(f"{value:.17g}" for value in rest)
-        for atom, kind, *rest in table
-    ]
+    columns = [spheres.id, spheres.kind, 2 * spheres.radius, density, spheres.position]
+    for atom, kind, *rest in np.column_stack(columns):
+        lines.append(f"{atom:.0f} {kind:.0f} " + " ".join(f"{value:.17g}" for value in rest))
     write_text(path, "\n".join(lines) + "\n")
 
 
-def box_of(case: Case) -> Array:
+def specimen_box(case: Case) -> Array:
     """Corners (3, 2) m of the specimen's box."""
     return np.column_stack([np.zeros(3), case.size_m])
-
-
-def _check_spheres(frame: Frame) -> None:
-    """Raise DumpError on a type that is neither grain nor fine, or a radius not above 0."""
-    for name, good, expected in (
-        ("type", np.isin(frame.column("type"), list(Kind)), "1 (grain) or 2 (fine)"),
-        ("radius", frame.column("radius") > 0, "a number above 0"),
-    ):
-        bad = np.flatnonzero(~good)
-        if len(bad):
-            raise DumpError(
-                f"dump at step {frame.step}: the sphere with id {frame.column('id')[bad[0]]:.0f} "
-                f"has {name} {frame.column(name)[bad[0]]:g}, expected {expected}; the file was "
-                "changed, start over with --force"
-            )
 
 
 def snapshot_of(frame: Frame, case: Case, *, time_s: float) -> Snapshot:
     """A frame of a dump as a Snapshot in the specimen's box.
 
-    Positions beyond a periodic side are moved into the box.
+    Positions beyond a periodic side are moved into the box. Raises DumpError on a type that is
+    neither grain nor fine, or a radius not above 0.
     """
+    for name, good, expected in (
+        ("type", np.isin(frame.column("type"), list(Kind)), "1 (grain) or 2 (fine)"),
+        ("radius", frame.column("radius") > 0, "a number above 0"),
+    ):
+        for bad in np.flatnonzero(~good)[:1]:
+            raise DumpError(
+                f"dump at step {frame.step}: the sphere with id {frame.column('id')[bad]:.0f} "
+                f"has {name} {frame.column(name)[bad]:g}, expected {expected}; the file was "
+                "changed, start over with --force"
+            )
     position = np.column_stack([frame.column(c) for c in "xyz"])
-    _check_spheres(frame)
     for axis, periodic in enumerate(case.periodic):
         if periodic:
             position[:, axis] = np.mod(position[:, axis], case.size_m[axis])
     return Snapshot(
         step=frame.step,
         time_s=time_s,
-        box=box_of(case),
+        box=specimen_box(case),
         id=frame.column("id"),
         kind=frame.column("type"),
         position=position,

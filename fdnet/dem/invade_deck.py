@@ -1,17 +1,16 @@
-"""The deck of an invasion, and the decks of a case.
+"""The decks of an invasion and of a clean-up, and what a coupled one hands to LIGGGHTS.
 
-What the fluid does to each fine, and how it is handed to LIGGGHTS: files of one value an atom.
-
-The force on a fine of velocity v is F = C (u - v) + P: C its drag coefficient, u the velocity of
-the fluid at it, and P a force that does not depend on v, such as its volume times the fall of
-pressure. LIGGGHTS is given C and w = u + P / C, since F = C (w - v).
+What the fluid does to each fine is handed over in files of one value an atom. The force on a fine
+of velocity v is F = C (u - v) + P: C its drag coefficient, u the velocity of the fluid at it, and
+P a force that does not depend on v, such as its volume times the fall of pressure. LIGGGHTS is
+given C and w = u + P / C, since F = C (w - v).
 """
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import reduce
 from itertools import islice
 from pathlib import Path
 from typing import Any, Protocol
@@ -25,7 +24,6 @@ from fdnet.dem.checkpoint import (
     empty_chunks,
     plug_allowance,
     quiet_chunks,
-    watch_left_out,
     watch_variables,
     write_watch_parts,
 )
@@ -33,20 +31,19 @@ from fdnet.dem.deck import (
     BELOW_ZERO,
     Deck,
     LeftOut,
-    box_of,
     contact_variables,
     drag_variables,
     forces_left_out,
     gravity_variables,
     header_variables,
-    left_out_of_contacts,
     number,
     render_text,
+    specimen_box,
     wall_variables,
     write_data,
 )
 from fdnet.dem.packing import write_pack_inputs
-from fdnet.dem.supply import AT_ONCE, batches_of, densities, place_batches, place_fines, slab_end
+from fdnet.dem.supply import AT_ONCE, batches_of, densities, place_batches, slab_end
 from fdnet.errors import CaseError
 from fdnet.files import expanded, refuse_folder_name, write_text
 from fdnet.names import LIGGGHTS_STAGES
@@ -58,8 +55,12 @@ from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
 
 STATE = "post/fluid.bin"
 """File in which LIGGGHTS shows the spheres when it asks for the fluid, all digits of them."""
-_FILES = ("cd", "ux", "uy", "uz")
-_GIVEN = ("f_uf[1]", "f_uf[2]", "f_uf[3]")
+SUPPLY = "supply"
+"""Folder of the batches."""
+SCRATCH = "post/contacts.restart"
+"""File that a continued deck writes only to store the contacts with the spheres."""
+GIVEN = ("f_uf[1]", "f_uf[2]", "f_uf[3]")
+"""Columns with the w that each fine was given; shown where the flow follows the deposit."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -71,7 +72,7 @@ class FluidForces:
         velocity: (N, 3) m/s, u.
         push: (N, 3) N, P.
         pace: m/s, speed with which the fines move on; it decides when they are looked at again.
-        measures: what the record of updates keeps, by the names of `Fluid.measured`.
+        measures: what the record of updates keeps, by the names of `DrivingFluid.measured`.
     """
 
     coefficient: Array
@@ -109,30 +110,7 @@ class Moment:
     density: Array | None = None
 
 
-def shown_columns(case: InvasionCase) -> str:
-    """The columns that LIGGGHTS shows; where the flow follows the deposit with the w given."""
-    given = _GIVEN if case.drag.field == "network" else ()
-    return " ".join((COLUMNS, "density", *given))
-
-
-def read_state(folder: Path, case: InvasionCase) -> Frame:
-    """The spheres that LIGGGHTS shows. Raises DumpError when it did not write all of them."""
-    return read_binary_frame(folder / STATE, tuple(shown_columns(case).split()))
-
-
-def given_speed(frame: Frame) -> Array | None:
-    """The speed w (N,) m/s that each sphere of a state was given, None where that is not shown."""
-    if _GIVEN[0] not in frame.columns:
-        return None
-    return np.linalg.norm([frame.column(name) for name in _GIVEN], axis=0)
-
-
-def fine_density(frame: Frame) -> Array:
-    """The density (N,) kg/m3 of each fine of a state."""
-    return frame.column("density")[frame.column("type") == Kind.FINE]
-
-
-class Fluid(Protocol):
+class DrivingFluid(Protocol):
     """A fluid that answers for all fines of a state."""
 
     @property
@@ -143,6 +121,20 @@ class Fluid(Protocol):
         """What acts on the fines of `spheres`, in their order."""
 
 
+def _shown_columns(case: InvasionCase) -> str:
+    return " ".join((COLUMNS, "density", *(GIVEN if case.drag.field == "network" else ())))
+
+
+def read_state(folder: Path, case: InvasionCase) -> Frame:
+    """The spheres that LIGGGHTS shows. Raises DumpError when it did not write all of them."""
+    return read_binary_frame(folder / STATE, tuple(_shown_columns(case).split()))
+
+
+def fine_density(frame: Frame) -> Array:
+    """The density (N,) kg/m3 of each fine of a state."""
+    return frame.column("density")[frame.column("type") == Kind.FINE]
+
+
 def write_forces(folder: Path, spheres: Snapshot, forces: FluidForces) -> None:
     """Write the files that the deck reads: the number of rows, then id and value of a fine each.
 
@@ -150,7 +142,8 @@ def write_forces(folder: Path, spheres: Snapshot, forces: FluidForces) -> None:
     """
     fines = spheres.fines()
     carried = forces.velocity + forces.push / forces.coefficient[:, None]
-    for name, value in zip(_FILES, (forces.coefficient, *carried.T), strict=True):
+    values = zip(("cd", "ux", "uy", "uz"), (forces.coefficient, *carried.T), strict=True)
+    for name, value in values:
         some = value != 0.0
         form = f"{np.sum(some)}\n" + "".join([f"{one} %.12g\n" for one in fines.id[some].tolist()])
         (folder / "post" / f"fluid.{name}").write_text(form % tuple(value[some].tolist()))
@@ -158,9 +151,8 @@ def write_forces(folder: Path, spheres: Snapshot, forces: FluidForces) -> None:
 
 def largest_share(spheres: Snapshot, forces: FluidForces, density: Array, time: float) -> float:
     """`time` s over the shortest relaxation time m / C of a fine of `density` (N,) kg/m3."""
-    if not len(forces.coefficient):
-        return 0.0
-    return float(np.max(drag_rate(spheres.fines(), forces.coefficient, density))) * time
+    rate = drag_rate(spheres.fines(), forces.coefficient, density)
+    return float(np.max(rate, initial=0.0)) * time
 
 
 def drag_rate(fines: Snapshot, coefficient: Array, density: Array | float) -> Array:
@@ -171,103 +163,33 @@ def drag_rate(fines: Snapshot, coefficient: Array, density: Array | float) -> Ar
     return coefficient / (density * 4.0 / 3.0 * np.pi * fines.radius**3)
 
 
-# ------------------------------------------------------------------------------------------------
-# The files of a coupled deck that LIGGGHTS includes as the invasion goes on.
-
-
-def write_coupled_parts(case: InvasionCase, scales: InvasionScales, folder: Path) -> None:
-    """Write the files that a coupled deck is continued by."""
-    for name, text in coupled_parts(case, scales).items():
-        write_text(folder / name, text)
-
-
 def coupled_parts(case: InvasionCase, scales: InvasionScales) -> dict[str, str]:
     """Name and text of each file that a coupled deck is continued by; empty when it is not."""
     if not case.drag.coupled:
         return {}
-    shown = {"dump_columns": COLUMNS, "dump_group": dumped_group(case)}
     coefficient = "Ksl" if case.drag.scheme == "implicit" else "cd"
-    drag = drag_variables(case, scales)
+    shown = dump_variables(case)
+    asked = {"dump_columns": _shown_columns(case), "dump_group": shown["dump_group"]}
+    counted = shown | {"allowance": plug_allowance(case, scales)}
     parts = {
-        "ask.in": render_text(
-            "ask.in.j2", shown | {"dump_columns": shown_columns(case), "state": STATE}
-        ),
+        "ask.in": render_text("ask.in.j2", asked | {"state": STATE}),
         "fluid.in": render_text("fluid.in.j2", {"coefficient": coefficient}),
-        "checkpoint.in": render_text(
-            "checkpoint.in.j2",
-            shown | {"dump_format": FORMAT, "allowance": plug_allowance(case, scales)},
-        ),
+        "checkpoint.in": render_text("checkpoint.in.j2", counted),
     }
+    drag = drag_variables(case, scales)
     if drag["hold_steps"]:
         parts["held.in"] = render_text("held.in.j2", {"drag": drag})
     return parts
 
 
-def dumped_group(case: InvasionCase) -> str:
-    """The group of spheres that move, which dumps hold."""
-    return "all" if case.grains.motion == "mobile" else "fines"
+def dump_variables(case: InvasionCase) -> dict[str, str]:
+    """What dumps hold: the spheres that move."""
+    group = "all" if case.grains.motion == "mobile" else "fines"
+    return {"dump_group": group, "dump_columns": COLUMNS, "dump_format": FORMAT}
 
 
 # ------------------------------------------------------------------------------------------------
-# The files by which a batch of fines enters LIGGGHTS.
-
-
-SUPPLY = "supply"
-"""Folder of the batches."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class BatchFiles:
-    """The files of the batches of an invasion.
-
-    Attributes:
-        case: what is run.
-        folder: of the invasion.
-        counts: number of fines in each batch.
-        first: id of the first fine.
-        bounds: (3, 2) m, of the simulation box.
-        drag: variables of the drag in a deck.
-    """
-
-    case: InvasionCase
-    folder: Path
-    counts: Sequence[int]
-    first: int
-    bounds: Array
-    drag: Mapping[str, Any]
-
-    @cached_property
-    def density(self) -> Array:
-        """(N,) kg/m3, of the fines of all batches in the order of their ids."""
-        return densities(self.case, self.counts)
-
-    def write(self, which: int, fines: Snapshot, velocity: float) -> str:
-        """Write supply/batch_N.data and .in of batch `which` (from 0), which moves at `velocity`.
-
-        Returns the name of the second in the folder of the invasion.
-        """
-        name = f"{SUPPLY}/batch_{which}"
-        (self.folder / SUPPLY).mkdir(exist_ok=True)
-        density = self.density[fines.id.astype(int) - self.first]
-        path = self.folder / f"{name}.data"
-        write_data(path, fines, bounds=self.bounds, density=density, types=3)
-        values = {
-            "name": name,
-            "first": int(fines.id[0]),
-            "last": int(fines.id[-1]),
-            "start_velocity": number(velocity),
-            "drag": self.drag,
-        }
-        write_text(self.folder / f"{name}.in", render_text("batch.in.j2", values))
-        return f"{name}.in"
-
-
-# ------------------------------------------------------------------------------------------------
-# The invasion deck and its data file.
-
-
-SCRATCH = "post/contacts.restart"
-"""File that a continued deck writes only to store the contacts with the spheres."""
+# The files that a deck of an invasion reads: the first fines, and the batches that come later.
 
 
 def write_invade_inputs(
@@ -277,31 +199,17 @@ def write_invade_inputs(
 
     Raises CaseError when the slab cannot hold its fines.
     """
-    batched = case.fines.supply == "batches"
-    spheres = grains.joined(
-        write_batches(case, scales, grains, folder)
-        if batched
-        else place_fines(case, scales, grains)
-    )
+    spheres = grains.joined(write_batches(case, scales, grains, folder))
     pairs, _ = touching_pairs(spheres, case.periodic)
     if np.any(spheres.kind[pairs] == Kind.FINE):
         raise CaseError(
             "fines: a fine would start in contact; this is an fdnet fault, please report the case "
             "and seed"
         )
-    density = np.concatenate(
-        [
-            np.full(len(grains), case.grains.density_kg_m3),
-            densities(case, batches_of(case, scales).counts)[: len(spheres) - len(grains)],
-        ]
-    )
-    write_data(
-        folder / "invade.data",
-        spheres,
-        bounds=_bounds(case, scales, grains),
-        density=density,
-        types=3,
-    )
+    fines = densities(case, batches_of(case, scales).counts)[: len(spheres) - len(grains)]
+    density = np.concatenate([np.full(len(grains), case.grains.density_kg_m3), fines])
+    bounds = _bounds(case, scales, grains)
+    write_data(folder / "invade.data", spheres, bounds=bounds, density=density, types=3)
     deck = render_invade(case, scales, grains, ranks=ranks)
     write_text(folder / "in.invade", deck.text)
     write_parts(case, scales, grains, folder)
@@ -312,7 +220,8 @@ def write_parts(
     case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path
 ) -> None:
     """Write the files that a deck of the invasion includes, apart from the batches."""
-    write_coupled_parts(case, scales, folder)
+    for name, text in coupled_parts(case, scales).items():
+        write_text(folder / name, text)
     write_watch_parts(case, grains, folder)
 
 
@@ -324,40 +233,53 @@ def write_batches(
     Where the deposit slows the mud down they are written when they are due (`later_batch`).
     Returns the fines that are there from the start.
     """
-    batches, files = place_batches(case, scales, grains), batch_files(case, scales, grains, folder)
+    batches = place_batches(case, scales, grains)
     first = list(islice(batches, AT_ONCE))
     if not case.drag.slowed:
-        for number, fines in enumerate(batches, AT_ONCE):
-            files.write(number, fines, scales.upstream_velocity)
+        density = densities(case, batches_of(case, scales).counts)
+        for which, fines in enumerate(batches, AT_ONCE):
+            velocity = scales.upstream_velocity
+            write_batch(case, scales, grains, folder, which, fines, velocity, density)
     return reduce(Snapshot.joined, first)
 
 
-def batch_files(
-    case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path
-) -> BatchFiles:
-    """The files of the batches of an invasion in `folder`."""
-    return BatchFiles(
-        case=case,
-        folder=folder,
-        counts=batches_of(case, scales).counts,
-        first=int(grains.id.max()) + 1,
-        bounds=_bounds(case, scales, grains),
-        drag=drag_variables(case, scales),
-    )
+def write_batch(
+    case: InvasionCase,
+    scales: InvasionScales,
+    grains: Snapshot,
+    folder: Path,
+    which: int,
+    fines: Snapshot,
+    velocity: float,
+    density: Array,
+) -> str:
+    """Write supply/batch_N.data and .in of batch `which` (from 0), which moves at `velocity` m/s.
 
-
-def _feeding(case: InvasionCase, scales: InvasionScales) -> dict[str, int] | None:
-    """First and last chunk that take in a batch; None when all fines are there from the start.
-
-    They hold for mud of constant velocity. In mud that slows down only whether there are any
-    matters: the chunks follow from the distance that the mud has moved.
+    `density` kg/m3 is that of the fines of all batches in the order of their ids. Returns the name
+    of the second file in the folder of the invasion.
     """
-    count = len(batches_of(case, scales).counts)
-    return {"first": AT_ONCE, "last": count - 1} if count > AT_ONCE else None
+    name = f"{SUPPLY}/batch_{which}"
+    (folder / SUPPLY).mkdir(exist_ok=True)
+    own = density[fines.id.astype(int) - (int(grains.id.max()) + 1)]
+    bounds = _bounds(case, scales, grains)
+    write_data(folder / f"{name}.data", fines, bounds=bounds, density=own, types=3)
+    values = {
+        "name": name,
+        "first": int(fines.id[0]),
+        "last": int(fines.id[-1]),
+        "start_velocity": number(velocity),
+        "drag": drag_variables(case, scales),
+    }
+    write_text(folder / f"{name}.in", render_text("batch.in.j2", values))
+    return f"{name}.in"
+
+
+# ------------------------------------------------------------------------------------------------
+# The decks in which fines move among grains.
 
 
 def _margin(case: InvasionCase, scales: InvasionScales) -> float:
-    """How far a fine could go in one chunk at twice its free velocity, plus two diameters."""
+    """How far a fine could go in one chunk at twice its free velocity, plus two diameters, m."""
     travel = 2 * scales.drift_velocity * scales.checkpoint_steps * scales.time_step
     return travel + 4 * case.fines.radius_range_m[1]
 
@@ -390,45 +312,57 @@ def render_invade(
 
     Grains that are not `packed` stand for those of a pack that is not made yet.
     """
-    friction = _friction(case, scales)
     gravity, left_out = gravity_variables(case, scales)
-    left_out += [*forces_left_out(case), *_left_out(case, friction=friction, ranks=ranks)]
-    left_out += watch_left_out(case, packed=packed)
+    left_out += [*forces_left_out(case), *_left_out(case, scales, ranks, packed)]
+    batches = len(batches_of(case, scales).counts)
+    behind = _bounds(case, scales, grains)[0, 0] + _margin(case, scales)
+    sides = "INF INF INF INF"
     text = render_text(
         "invade.in.j2",
         header_variables(case, "invade", left_out, ranks)
         | moving_variables(case, scales)
         | {
             "gravity": gravity,
-            "resume": _restart(resume) if resume else None,
-            "dump_group": dumped_group(case),
+            "resume": resume
+            and {"restart": f"post/invade_{resume.step}.restart", "scratch": SCRATCH},
             "start_velocity": number(scales.upstream_velocity),
             "drag": drag_variables(case, scales),
             "overlap": watch_variables(case, scales, grains) if packed else None,
-            "regions": _regions(case, scales, grains),
+            "regions": specimen_regions(case)
+            | {
+                "upstream": f"{number(np.nextafter(behind, 0))} {number(BELOW_ZERO)} {sides}",
+                "behind": f"INF {number(behind)} {sides}",
+            },
             "quiet_checkpoints": quiet_chunks(scales),
             "empty_checkpoints": empty_chunks(case, scales),
             "allowance": plug_allowance(case, scales),
-            "start": _start(resume),
-            "feeding": _feeding(case, scales),
+            "start": {
+                "chunk": resume.chunk + 1 if resume else 1,
+                "passed": resume.passed if resume else 0,
+                "behind": resume.removed_upstream if resume else 0,
+                "most": resume.most_crossed if resume else 0,
+                "quiet": resume.quiet if resume else 0,
+            },
+            # the chunks that take in a batch of mud of constant velocity; in mud that slows down
+            # they follow from the distance that it has moved
+            "feeding": {"first": AT_ONCE, "last": batches - 1} if batches > AT_ONCE else None,
             "slowed": case.drag.slowed,
             "supply": SUPPLY,
             "chunks": chunks_of(case, scales),
-            "chunk_steps": scales.checkpoint_steps,
             "stop_when_plugged": case.run.duration_s is None,
-            "dump_columns": COLUMNS,
-            "dump_format": FORMAT,
         },
     )
     return Deck(text=text, stage="invade", digest=case.digest("invade"), left_out=tuple(left_out))
 
 
 def moving_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]:
-    """The variables of any deck in which fines move among grains: contacts, walls, neighbours."""
+    """The variables of any deck in which fines move among grains."""
     mobile = case.grains.motion == "mobile"
+    # a skin of 0.3 to 0.8 of the diameter of the smallest fine was measured to be fastest
+    skin = case.fines.radius_range_m[0] if case.run.skin_m is None else case.run.skin_m
     walls = _friction(case, scales, walls_only=True)
-    return {
-        "skin": number(_neighbour_skin(case)),
+    return dump_variables(case) | {
+        "skin": number(skin),
         "neighbour_bin": number(case.run.neighbour_bin_m) if case.run.neighbour_bin_m else "",
         "contacts": contact_variables(case, scales, "invade", friction=_friction(case, scales)),
         "time_step": number(scales.time_step),
@@ -436,6 +370,16 @@ def moving_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, An
         "fixed_grains": not mobile,
         "moving": "all" if mobile else "fines",
         "thermo_steps": max(1, scales.checkpoint_steps // 4),
+        "chunk_steps": scales.checkpoint_steps,
+    }
+
+
+def specimen_regions(case: InvasionCase) -> dict[str, str]:
+    """The specimen, 0 <= x < length, and what lies beyond its outlet."""
+    length, sides = case.size_m[0], "INF INF INF INF"
+    return {
+        "specimen": f"0.0 {number(np.nextafter(length, 0))} {sides}",
+        "beyond": f"{number(length)} INF {sides}",
     }
 
 
@@ -446,61 +390,26 @@ def _friction(case: InvasionCase, scales: InvasionScales, *, walls_only: bool = 
     return any(c.friction > 0 for c in slipping if "wall" in c.pair or not walls_only)
 
 
-def _neighbour_skin(case: InvasionCase) -> float:
-    """The neighbour skin, m: given, or the radius of the smallest fine.
-
-    A skin of 0.3 to 0.8 of its diameter was measured to be fastest.
-    """
-    return case.fines.radius_range_m[0] if case.run.skin_m is None else case.run.skin_m
-
-
-def _restart(resume: Checkpoint) -> dict[str, str]:
-    return {"restart": f"post/invade_{resume.step}.restart", "scratch": SCRATCH}
-
-
-def _start(resume: Checkpoint | None) -> dict[str, int]:
-    if resume is None:
-        return {"chunk": 1, "passed": 0, "behind": 0, "most": 0, "quiet": 0}
-    return {
-        "chunk": resume.chunk + 1,
-        "passed": resume.passed,
-        "behind": resume.removed_upstream,
-        "most": resume.most_crossed,
-        "quiet": resume.quiet,
-    }
-
-
-def _regions(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> dict[str, str]:
-    bounds, length, margin = _bounds(case, scales, grains), case.size_m[0], _margin(case, scales)
-    behind = bounds[0, 0] + margin
-    sides = "INF INF INF INF"
-    return {
-        "specimen": f"0.0 {number(np.nextafter(length, 0))} {sides}",
-        "upstream": f"{number(np.nextafter(behind, 0))} {number(BELOW_ZERO)} {sides}",
-        "beyond": f"{number(length)} INF {sides}",
-        "behind": f"INF {number(behind)} {sides}",
-    }
-
-
-def _left_out(case: InvasionCase, *, friction: bool, ranks: int) -> list[LeftOut]:
-    left_out = []
-    if case.grains.motion == "fixed":
-        left_out.append(LeftOut(what="motion of grains, end planes", why="grains are fixed"))
-    if not friction:
-        left_out.append(LeftOut(what="tangential history", why="no pair has friction"))
-    left_out += left_out_of_contacts(case)
-    if case.box.sides == "periodic":
-        left_out.append(LeftOut(what="side walls", why="sides are periodic"))
-    if case.fines.supply == "batches":
-        left_out.append(
-            LeftOut(
-                what="fines far upstream",
-                why="they come in batches, each when it is about to arrive",
-            )
-        )
-    if ranks == 1:
-        left_out.append(LeftOut(what="MPI processor grid", why="one rank"))
-    return left_out
+def _left_out(
+    case: InvasionCase, scales: InvasionScales, ranks: int, packed: bool
+) -> list[LeftOut]:
+    contact, unasked = case.contact, "not asked for"
+    batches = "they come in batches, each when it is about to arrive"
+    unseen = "" if packed else "which grains touch is known once they are packed"
+    unseen = unseen if case.fines.one_size else "fines are of unequal size"
+    unseen = unseen if case.grains.motion == "fixed" else "pairs of grains overlap too"
+    reasons = [
+        ("motion of grains, end planes", "grains are fixed", case.grains.motion == "fixed"),
+        ("tangential history", "no pair has friction", not _friction(case, scales)),
+        ("loss of rebound in the liquid", unasked, contact.restitution != "liquid"),
+        ("rolling resistance", unasked, contact.rolling_friction is None),
+        ("cohesion", unasked, contact.cohesion_J_m3 is None),
+        ("side walls", "sides are periodic", case.box.sides == "periodic"),
+        ("fines far upstream", batches, case.fines.supply == "batches"),
+        ("MPI processor grid", "one rank", ranks == 1),
+        ("overlap between checkpoints", unseen, bool(unseen)),
+    ]
+    return [LeftOut(what, why) for what, why, left in reasons if left]
 
 
 # ------------------------------------------------------------------------------------------------
@@ -511,8 +420,8 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
     """Write the decks of a case without LIGGGHTS: the pack with its data file, and the invasion.
 
     The data file of the invasion needs a finished pack, so `fdnet run` writes it. The deck of the
-    invasion is written for grains that stand out beyond the face as those of a dense pack do. It
-    leaves out the watch of overlaps, which depends on the contacts of the grains.
+    invasion is written for one grain that stands out beyond the face as those of a dense pack do;
+    only that matters. It leaves out the watch of overlaps, which depends on contacts of grains.
 
     Raises CaseError when a file that would be written is there already.
     """
@@ -521,9 +430,15 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
     decks = {
         stage: out / stage / f"in.{stage}" for stage in case.stages if stage in LIGGGHTS_STAGES
     }
-    texts = _invasion_files(case, ranks) if isinstance(case, InvasionCase) else {}
-    invasion = {out / "invade" / name: text for name, text in texts.items()}
-    files = (decks["pack"], out / "pack" / "pack.data", *invasion)
+    invasion = {}
+    if isinstance(case, InvasionCase):
+        radius, box = case.grains.radius_range_m[1], specimen_box(case)
+        grain = resting(np.array([[0.7 * radius, *(box[1:, 1] / 2)]]), radius, box)
+        flow = scales_of(case)
+        deck = render_invade(case, flow, grain, ranks=ranks, packed=False)
+        invasion = {"in.invade": deck.text, **coupled_parts(case, flow)}
+    texts = {out / "invade" / name: text for name, text in invasion.items()}
+    files = (decks["pack"], out / "pack" / "pack.data", *texts)
     there = [path for path in files if os.path.lexists(path)]
     if there:
         raise CaseError(f"{there[0]}: is there already; give another --out (nothing was changed)")
@@ -531,20 +446,6 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
         path.parent.mkdir(parents=True, exist_ok=True)
     folder = decks["pack"].parent
     write_pack_inputs(case, scales, folder, count=grain_count(case), ranks=ranks)
-    for path, text in invasion.items():
+    for path, text in texts.items():
         path.write_text(text, encoding="utf-8")
     return list(decks.values())
-
-
-def _invasion_files(case: InvasionCase, ranks: int) -> dict[str, str]:
-    """Name and text of the invasion's deck and of the files that it is continued by."""
-    scales = scales_of(case)
-    deck = render_invade(case, scales, _expected_grains(case), ranks=ranks, packed=False)
-    return {"in.invade": deck.text, **coupled_parts(case, scales)}
-
-
-def _expected_grains(case: Case) -> Snapshot:
-    """One grain that stands out beyond the face as those of a dense pack do; only that matters."""
-    radius = case.grains.radius_range_m[1]
-    box = box_of(case)
-    return resting(np.array([[0.7 * radius, *(box[1:, 1] / 2)]]), radius, box)

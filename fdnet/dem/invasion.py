@@ -1,210 +1,241 @@
-"""A coupled invasion: what the fluid does to each fine is computed anew while LIGGGHTS waits.
+"""A stage that LIGGGHTS runs in chunks of steps; the invasion, which drives fines into the pack.
 
-fdnet feeds LIGGGHTS the commands of an invasion: the deck, then for each chunk the batch of fines
-that comes, for each update the files `ask.in` and `fluid.in` with a `run` after them, and
-`checkpoint.in`. Every chunk begins with an update and a `run` that sets everything up, as in an
-invasion that is not coupled; so a cut one goes on bit for bit.
+A checkpoint after every chunk lets a cut run go on. Where the stage is coupled, what the fluid
+does to each fine is computed anew while LIGGGHTS waits: fdnet feeds it the deck, then for each
+chunk the batch of fines that comes, for each update the files `ask.in` and `fluid.in` with a `run`
+after them, and `checkpoint.in`. Every chunk begins with an update and a `run` that sets everything
+up, as in a stage that is not coupled; so a cut one goes on bit for bit.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import (
     HISTORY,
-    HISTORY_HEADER,
-    UPDATES,
-    WATCH,
     WATCHED,
     Checkpoint,
+    Checkpoints,
     Deepest,
     Updates,
     WatchReader,
-    checkpoint_files,
     chunks_of,
-    csv_row,
-    cut_watch,
     deepest_of,
     entered_by,
+    flow_says,
     is_watched,
-    keep_doubts,
-    kept_doubts,
-    last_checkpoint,
     overlap_in,
-    passed_over,
+    overlap_text,
     quiet_chunks,
     quiet_enough,
-    rate_is_low,
     read_history,
+    read_rows,
     read_updates,
     read_watch,
     readable_states,
-    refuse_other_ranks,
-    refuse_overlap,
-    volume_has_passed,
-    write_record,
 )
 from fdnet.dem.deck import Deck, LeftOut, snapshot_of
 from fdnet.dem.invade_deck import (
+    GIVEN,
     SCRATCH,
     SUPPLY,
-    Fluid,
-    FluidForces,
+    DrivingFluid,
     Moment,
-    batch_files,
     fine_density,
-    given_speed,
     largest_share,
     read_state,
     render_invade,
+    write_batch,
     write_batches,
     write_forces,
     write_invade_inputs,
     write_parts,
 )
-from fdnet.dem.liggghts import SCREEN, Feed, Launch, Run, run_deck, run_fed
-from fdnet.dem.supply import Batches, batches_of, later_batch
+from fdnet.dem.liggghts import SCREEN, Execution, Feed, Launch, run_deck
+from fdnet.dem.supply import batches_of, densities, later_batch
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.files import disk_is_full, write_text
 from fdnet.scales.clock import DRAG_LIMIT
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.dump import Frame
-from fdnet.spheres.snapshot import Array, Snapshot
+from fdnet.spheres.snapshot import Snapshot
+
+_START_OF_SCREEN = 1 << 20
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Coupling:
-    """A coupled invasion.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ChunkedStage(ABC):
+    """A stage that is run in chunks of steps.
 
     Attributes:
         case: what is run.
         scales: of the case.
         grains: of the pack.
-        folder: of the invasion.
-        fluid: answers for the fines.
-        last: checkpoint from which it goes on; None from the start.
-        over: whether a checkpoint is the end.
+        points: its checkpoints, in its folder.
+        launch: how LIGGGHTS is started.
+        fluid: answers for the fines of a coupled case; None where the deck holds the forces.
+        first_step: at which it begins.
     """
 
     case: InvasionCase
     scales: InvasionScales
     grains: Snapshot
-    folder: Path
-    fluid: Fluid
-    last: Checkpoint | None
-    over: Callable[[Checkpoint], bool]
+    points: Checkpoints
+    launch: Launch
+    fluid: DrivingFluid | None = None
+    first_step: int = 0
+
+    deck = "in.invade"
+    """Name of the deck; that of a continued stage ends in .resume."""
+    mark = "FDNET checkpoint"
+    """What LIGGGHTS prints at a checkpoint, before the chunk and its last step."""
 
     @property
-    def deck(self) -> str:
-        """Name of the deck that LIGGGHTS begins with."""
-        return "in.invade" if self.last is None else "in.invade.resume"
+    def folder(self) -> Path:
+        """Where it runs."""
+        return self.points.folder
 
-    def play(self, feed: Feed) -> None:
-        """Feed LIGGGHTS the whole invasion.
+    @abstractmethod
+    def write(self, last: Any | None) -> Deck:
+        """Write the inputs of a start, or of a restart from `last`."""
+
+    @abstractmethod
+    def over(self, last: Any) -> bool:
+        """Whether the checkpoint `last` is the end."""
+
+    def look_at(self, history: Sequence[Any], overlaps: Sequence[Deepest]) -> None:  # noqa: B027
+        """Raise LiggghtsError where what was seen at the checkpoints must stop the run."""
+
+    def begin_chunk(self, feed: Feed, updates: Updates, last: Any | None) -> None:  # noqa: B027
+        """Feed what a coupled stage takes in before the chunk after `last`."""
+
+    def drive(self) -> tuple[Deck, tuple[Execution, ...]]:
+        """Run to the end, from the last whole checkpoint; nothing is run where that is the end.
+
+        A restart that LIGGGHTS cannot read, since a full disk cut it silently, is set aside; then
+        the checkpoint before it is tried. Raises LiggghtsError when a run fails, CaseError when
+        the stage was begun on another number of MPI ranks.
+        """
+        if self.case.drag.coupled != (self.fluid is not None):
+            needs, some = ("needs", "a") if self.case.drag.coupled else ("takes", "no")
+            raise CaseError(
+                f"drag.crowd: {self.case.drag.crowd!r} with drag.field {self.case.drag.field!r} "
+                f"{needs} {some} fluid that fdnet computes; run the case with fdnet run or "
+                "fdnet.run_case"
+            )
+        (self.folder / "post").mkdir(parents=True, exist_ok=True)
+        self.points.refuse_other_ranks(self.launch.ranks)
+        while True:
+            last = self.points.last()
+            self.points.doubt(last)
+            self.points.cut(last)
+            deck, name = self.write(last), self.deck if last is None else f"{self.deck}.resume"
+            if last is not None:
+                self.look_at(read_history(self.folder, self.points.kind), read_watch(self.folder))
+                if self.over(last):
+                    return deck, ()
+            launch = replace(self.launch, follow=self.keeper())
+            try:
+                play = None if self.fluid is None else partial(self._play, name, last)
+                return deck, (run_deck(self.folder, name, launch, play),)
+            except LiggghtsError:
+                if last is None:
+                    raise
+                with (self.folder / SCREEN).open("rb") as file:
+                    screen = file.read(_START_OF_SCREEN)
+                if b"FDNET restoring" not in screen or b"FDNET restored" in screen:
+                    raise
+                restart = self.points.path(last.step, "restart")
+                restart.rename(restart.with_suffix(".unreadable"))
+            finally:
+                (self.folder / SCRATCH).unlink(missing_ok=True)
+
+    def keeper(self) -> Callable[[str], None]:
+        """What follows the screen and passes every line on.
+
+        At each checkpoint it records what is whole now, keeps the two newest restarts, and stops a
+        run that writes to a full disk or whose fines overlap too much. LIGGGHTS itself goes on
+        after a failed write and ends with exit code 0. Older restarts are removed only while there
+        is room on the disk.
+        """
+        watch = WatchReader(self.folder)
+
+        def follow(line: str) -> None:
+            if line.startswith(self.mark):
+                self._keep(int(line.split()[3]), watch)
+            if self.launch.follow:
+                self.launch.follow(line)
+
+        return follow
+
+    def _keep(self, step: int, watch: WatchReader) -> None:
+        if disk_is_full(self.folder):
+            raise LiggghtsError(
+                f"{self.folder}: the disk is full, LIGGGHTS was stopped; make room and "
+                "continue with --resume"
+            )
+        rows = [row for row in read_rows(self.folder, self.points.kind) if row.step == step][-1:]
+        overlaps = watch.upto(step)
+        for row in rows:
+            self.points.keep(row, ranks=self.launch.ranks, overlaps=overlaps)
+        if not rows and self.case.run.on_overlap == "stop":
+            raise LiggghtsError(
+                f"{self.folder / HISTORY}: no row for the checkpoint at step {step}; continue "
+                "with --resume"
+            )
+        self.points.remove_restarts(step)
+        self.look_at(rows, overlaps)
+
+    def _play(self, name: str, last: Any | None, feed: Feed) -> None:
+        """Feed LIGGGHTS a coupled stage, from the deck `name`.
 
         Raises LiggghtsError when explicit drag would overshoot, DumpError when LIGGGHTS did not
         show its spheres, and what the fluid raises.
         """
-        step, chunk = (self.last.step, self.last.chunk) if self.last else (0, 0)
-        updates = Updates(self.folder, self.fluid.measured, upto=step)
-        batches = batches_of(self.case, self.scales)
-        entered = entered_by(self.case, batches, self.last) if self.last else batches.entered_at(1)
-        feed(f"include {self.deck}")
-        while chunk < chunks_of(self.case, self.scales):
-            chunk += 1
-            entered = self._supply(feed, updates, (chunk, step), (batches, entered))
-            if is_watched(self.case):
-                feed(f"include {WATCHED}")
-            step = self.chunk(feed, updates, step)
+        assert self.fluid is not None
+        updates = Updates(self.folder, self.fluid.measured, upto=last.step if last else 0)
+        step = last.step if last else self.first_step
+        feed(f"include {name}")
+        while last is None or not self.over(last):
+            self.begin_chunk(feed, updates, last)
+            end, fresh = step + self.scales.checkpoint_steps, True
+            while step < end:
+                steps = min(self._update(feed, updates, step, end, fresh), end - step)
+                if fresh and self.case.drag.scheme == "held" and self.scales.hold_steps > 1:
+                    feed("include held.in")
+                feed(f"run {steps}" + ("" if fresh else " pre no post no"))
+                step, fresh = step + steps, False
             feed("include checkpoint.in")
-            if self.over(read_history(self.folder)[-1]):
-                return
+            last = read_history(self.folder, self.points.kind)[-1]
 
-    def _supply(
-        self, feed: Feed, updates: Updates, at: tuple[int, int], supply: tuple[Batches, int]
-    ) -> int:
-        """Feed the batches that are due `at` a chunk and its first step.
-
-        `supply` are the batches, and the number of those that have entered; returns the new one.
-        """
-        (chunk, step), (batches, entered) = at, supply
-        if not self.case.drag.slowed:
-            due = batches.entered_at(chunk)
-            for number in range(entered, due):
-                feed(f"include {SUPPLY}/batch_{number}.in")
-            return due
-        time = step * self.scales.time_step
-        moved, velocity = self._mud(updates, time)
-        ahead = velocity * self.scales.checkpoint_steps * self.scales.time_step
-        due = max(entered, batches.entered_after(moved + ahead))
-        files = batch_files(self.case, self.scales, self.grains, self.folder)
-        for number in range(entered, due):
-            spheres = self._spheres(self._shown(feed), time)
-            fines = later_batch(self.case, self.scales, spheres, number, moved)
-            feed(f"include {files.write(number, fines, velocity)}")
-        return due
-
-    def _mud(self, updates: Updates, time: float) -> tuple[float, float]:
-        """By how much the mud has moved at the `time` s, m, and its velocity upstream, m/s."""
-        last = updates.last
-        if last is None:
-            return 0.0, self.scales.upstream_velocity
-        since = time - last["time_s"]
-        area = self.case.size_m[1] * self.case.size_m[2]
-        velocity = float(last["velocity_m_s"])
-        return float(last["filtrate_m3"]) / area + velocity * since, velocity
-
-    def chunk(self, feed: Feed, updates: Updates, step: int) -> int:
-        """A chunk of steps from `step`; returns its last one."""
-        end, fresh = step + self.scales.checkpoint_steps, True
-        while step < end:
-            steps = min(self._update(feed, updates, (step, end), fresh), end - step)
-            if fresh and self.case.drag.scheme == "held" and self.scales.hold_steps > 1:
-                feed("include held.in")
-            feed(f"run {steps}" + ("" if fresh else " pre no post no"))
-            step, fresh = step + steps, False
-        return step
-
-    def _update(self, feed: Feed, updates: Updates, at: tuple[int, int], fresh: bool) -> int:
-        """Compute the fluid's forces for the state `at` a step of a chunk with its last one.
+    def _update(self, feed: Feed, updates: Updates, step: int, end: int, fresh: bool) -> int:
+        """Compute the fluid's forces for the state at a `step` of a chunk that ends at `end`.
 
         Returns the steps they hold for.
         """
-        step, end = at
-        time, frame = step * self.scales.time_step, self._shown(feed)
-        spheres, density = self._spheres(frame, time), fine_density(frame)
+        frame, dt = self.shown(feed), self.scales.time_step
+        spheres, density = self.spheres(frame, step * dt), fine_density(frame)
+        shows = GIVEN[0] in frame.columns
         moment = Moment(
             step=step,
-            time=time,
+            time=step * dt,
             before=updates.last,
             first=updates.first,
             fresh=fresh,
-            left=(end - step) * self.scales.time_step,
-            given=given_speed(frame),
+            left=(end - step) * dt,
+            given=np.linalg.norm([frame.column(one) for one in GIVEN], axis=0) if shows else None,
             density=density,
         )
+        assert self.fluid is not None
         forces = self.fluid.forces(spheres, moment)
-        self._refuse_overshoot(spheres, forces, density)
-        write_forces(self.folder, spheres, forces)
-        updates.add(step, time, forces.measures)
-        feed("include fluid.in")
-        return steps_between(self.case, self.scales, forces.pace)
-
-    def _shown(self, feed: Feed) -> Frame:
-        """The state that LIGGGHTS shows when it is asked."""
-        feed("include ask.in")
-        return read_state(self.folder, self.case)
-
-    def _spheres(self, frame: Frame, time: float) -> Snapshot:
-        moved = snapshot_of(frame, self.case, time_s=time)
-        return moved if self.case.grains.motion == "mobile" else self.grains.joined(moved)
-
-    def _refuse_overshoot(self, spheres: Snapshot, forces: FluidForces, density: Array) -> None:
-        held = self.scales.time_step * self.scales.hold_steps
-        share = largest_share(spheres, forces, density, held)
+        share = largest_share(spheres, forces, density, dt * self.scales.hold_steps)
         if self.case.drag.scheme != "implicit" and share > DRAG_LIMIT:
             raise LiggghtsError(
                 f"{self.folder}: at step {spheres.step} drag is constant for {share:.3g} "
@@ -212,6 +243,20 @@ class Coupling:
                 "would overshoot; take drag.scheme = 'implicit', or lower run.time_step_factor, "
                 "and start over with --force"
             )
+        write_forces(self.folder, spheres, forces)
+        updates.add(step, step * dt, forces.measures)
+        feed("include fluid.in")
+        return steps_between(self.case, self.scales, forces.pace)
+
+    def shown(self, feed: Feed) -> Frame:
+        """The state that LIGGGHTS shows when it is asked."""
+        feed("include ask.in")
+        return read_state(self.folder, self.case)
+
+    def spheres(self, frame: Frame, time: float) -> Snapshot:
+        """All spheres of a state at a `time` s, fixed grains too."""
+        moved = snapshot_of(frame, self.case, time_s=time)
+        return moved if self.case.grains.motion == "mobile" else self.grains.joined(moved)
 
 
 def steps_between(case: InvasionCase, scales: InvasionScales, pace: float) -> int:
@@ -226,109 +271,160 @@ def steps_between(case: InvasionCase, scales: InvasionScales, pace: float) -> in
     return max(1, math.floor(min(refreshes, most))) * scales.hold_steps
 
 
-# ------------------------------------------------------------------------------------------------
-# What fdnet does at each checkpoint while LIGGGHTS runs.
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class EndedStage:
+    """A finished stage.
 
-
-class CheckpointKeeper:
-    """Follows the screen of a run and passes every line on.
-
-    At each checkpoint it records what is whole now, keeps the two newest restarts, and stops a run
-    that writes to a full disk or whose fines overlap too much. LIGGGHTS itself goes on after a
-    failed write and ends with exit code 0. Older restarts are removed only while there is room on
-    the disk.
+    Attributes:
+        state: grains and remaining fines at the end.
+        history: one row a checkpoint.
+        stop_reason: "duration" (what the case asks for has gone by), "cap", or that of the stage.
+        warnings: doubts about how it ended, one sentence each.
+        left_out: what the deck does without.
+        runs: executions of LIGGGHTS; empty when an earlier session had come to the end.
+        ranks: MPI ranks of them.
+        step_s: s, time step.
     """
 
-    def __init__(
-        self,
-        folder: Path,
-        case: InvasionCase,
-        scales: InvasionScales,
-        grains: Snapshot,
-        *,
-        launch: Launch,
-    ) -> None:
-        self.folder, self.case, self.scales, self.grains = folder, case, scales, grains
-        self.ranks, self.follow, self.watch = launch.ranks, launch.follow, WatchReader(folder)
-
-    def __call__(self, line: str) -> None:
-        if line.startswith("FDNET checkpoint"):
-            self._keep(int(line.split()[3]))
-        if self.follow:
-            self.follow(line)
-
-    def _keep(self, step: int) -> None:
-        if disk_is_full(self.folder):
-            raise LiggghtsError(
-                f"{self.folder}: the disk is full, LIGGGHTS was stopped; make room and "
-                "continue with --resume"
-            )
-        rows = [row for row in read_history(self.folder) if row.step == step]
-        overlaps = self.watch.upto(step)
-        if rows:
-            write_record(self.folder, rows[-1], self.case, ranks=self.ranks, overlaps=overlaps)
-        elif self.case.run.on_overlap == "stop":
-            raise LiggghtsError(
-                f"{self.folder / HISTORY}: no row for the checkpoint at step {step}; continue "
-                "with --resume"
-            )
-        restarts = [
-            (at, path)
-            for at, path in checkpoint_files(self.folder)
-            if path.suffix == ".restart" and at <= step
-        ]
-        for _, old in sorted(restarts)[:-2]:
-            old.unlink(missing_ok=True)
-        for row in rows[-1:]:
-            refuse_overlap(
-                self.case, self.scales, self.grains, self.folder, history=[row], last=row
-            )
+    state: Snapshot
+    history: tuple[Any, ...]
+    stop_reason: str
+    warnings: tuple[str, ...]
+    left_out: tuple[LeftOut, ...]
+    runs: tuple[Execution, ...]
+    ranks: int
+    step_s: float
 
 
 # ------------------------------------------------------------------------------------------------
 # The invasion: fines are driven into the pack until it is plugged.
-#
-# A checkpoint after every chunk of steps lets a cut run go on.
 
 
-_START_OF_SCREEN = 1 << 20
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Invasion:
-    """A finished invasion.
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Invasion(EndedStage):
+    """A finished invasion; its `stop_reason` is also "plugged" or "supply_exhausted".
 
     Attributes:
-        damaged: grains and remaining fines at the end, those upstream too.
-        history: one row a checkpoint.
-        stop_reason: "plugged", "supply_exhausted", "duration" (the time or volume that the
-            case asks for) or "cap".
         supplied: number of fines that took part: all, or those of the batches that had come.
         overlap: largest overlap of a fine with any sphere.
-        step_s: s, time step.
-        left_out: what the deck does without.
-        warnings: doubts about how it ended, one sentence each.
-        ranks: MPI ranks of all executions of LIGGGHTS.
-        runs: executions of LIGGGHTS; empty when an earlier session had come to the end.
         updates: the record of a coupled invasion, one row an update; empty when it is not coupled.
     """
 
-    damaged: Snapshot
-    history: tuple[Checkpoint, ...]
-    stop_reason: str
     supplied: int
     overlap: Deepest
-    step_s: float
-    left_out: tuple[LeftOut, ...]
-    warnings: tuple[str, ...]
-    ranks: int
-    runs: tuple[Run, ...]
     updates: tuple[Mapping[str, float], ...]
+
+    @property
+    def damaged(self) -> Snapshot:
+        """Grains and remaining fines at the end, those upstream too."""
+        return self.state
 
     @property
     def max_overlap(self) -> float:
         """Largest overlap of a fine with any sphere, over the smaller diameter."""
         return self.overlap.fraction
+
+
+class InvadeStage(ChunkedStage):
+    """An invasion as it is run."""
+
+    def write(self, last: Checkpoint | None) -> Deck:
+        """Write the inputs of a start, or of a restart from `last`."""
+        case, scales, grains, folder = self.case, self.scales, self.grains, self.folder
+        ranks = self.launch.ranks
+        if last is None:
+            return write_invade_inputs(case, scales, grains, folder, ranks=ranks)
+        if case.fines.supply == "batches":
+            write_batches(case, scales, grains, folder)
+        write_parts(case, scales, grains, folder)
+        deck = render_invade(case, scales, grains, ranks=ranks, resume=last)
+        write_text(folder / f"{self.deck}.resume", deck.text)
+        return deck
+
+    def over(self, last: Checkpoint) -> bool:
+        """Whether the checkpoint `last` is the end."""
+        case, scales = self.case, self.scales
+        if last.chunk >= chunks_of(case, scales) or flow_says(
+            self.folder, case, scales, last.step
+        ):
+            return True
+        return case.run.duration_s is None and quiet_enough(case, scales, last)
+
+    def look_at(self, history: Sequence[Checkpoint], overlaps: Sequence[Deepest]) -> None:
+        """Raise LiggghtsError when a fine overlapped too much and `run.on_overlap` is "stop".
+
+        Everything up to the last checkpoint of the `history` stays on disk.
+        """
+        case = self.case
+        if case.run.on_overlap != "stop" or not history:
+            return
+        states = readable_states(self.folder, history, case, self.scales, self.grains)
+        deepest = deepest_of([*overlaps, *(overlap_in(case, state) for _, state in states)])
+        if deepest.fraction > case.run.max_overlap:
+            raise LiggghtsError(
+                f"{self.folder}: {overlap_text(case, deepest)}; stopped at checkpoint "
+                f"{history[-1].chunk} (step {history[-1].step}) because of run.on_overlap = "
+                "'stop'; raise run.stiffness_N_m and start over with --force, or go on from here "
+                "with --resume --set run.on_overlap=warn (or a larger run.max_overlap)"
+            )
+
+    def begin_chunk(self, feed: Feed, updates: Updates, last: Checkpoint | None) -> None:
+        """Feed the batches that are due, and the grains that are watched next."""
+        case, scales = self.case, self.scales
+        batches, chunk = batches_of(case, scales), last.chunk + 1 if last else 1
+        entered = entered_by(case, batches, last) if last else batches.entered_at(1)
+        if not case.drag.slowed:
+            for which in range(entered, batches.entered_at(chunk)):
+                feed(f"include {SUPPLY}/batch_{which}.in")
+        else:
+            time = (last.step if last else self.first_step) * scales.time_step
+            moved, velocity = 0.0, scales.upstream_velocity  # of the mud, m and m/s
+            if updates.last is not None:
+                area, since = case.size_m[1] * case.size_m[2], time - updates.last["time_s"]
+                velocity = float(updates.last["velocity_m_s"])
+                moved = float(updates.last["filtrate_m3"]) / area + velocity * since
+            ahead = velocity * scales.checkpoint_steps * scales.time_step
+            for which in range(entered, batches.entered_after(moved + ahead)):
+                spheres = self.spheres(self.shown(feed), time)
+                fines = later_batch(case, scales, spheres, which, moved)
+                density = densities(case, batches.counts)
+                inputs = case, scales, self.grains, self.folder
+                feed(f"include {write_batch(*inputs, which, fines, velocity, density)}")
+        if is_watched(case):
+            feed(f"include {WATCHED}")
+
+    def ending(self, history: Sequence[Checkpoint]) -> tuple[str, list[str]]:
+        """The stop reason, and warnings.
+
+        An empty slab decides nothing about plugging, so it is a reason of its own.
+        """
+        case, scales, last = self.case, self.scales, history[-1]
+        waiting, warnings = last.upstream - last.removed_upstream, []
+        reason = flow_says(self.folder, case, scales, last.step)
+        if reason is None and case.run.duration_s is not None:
+            reason = "duration"
+        elif reason is None and quiet_enough(case, scales, last):
+            reason = "plugged" if waiting > 0 else "supply_exhausted"
+        elif reason is None:
+            reason, cap = "cap", scales.cap_time * scales.force_factor
+            warnings.append(
+                f"invasion stopped at its cap of {1e3 * cap:.3g} ms before the stop rule "
+                "held: raise run.cap_ms"
+            )
+        if waiting == 0:
+            warnings.append(
+                "no fine is left upstream: the end was decided by an empty slab, raise "
+                "fines.count or fines.slab_mm"
+            )
+        before = history[-min(len(history), quiet_chunks(scales) + 1)]
+        if reason == "plugged" and last.passed > before.passed:
+            warnings.append(
+                f"the face was plugged, but {last.passed - before.passed} fines still left "
+                "through the outlet meanwhile: raise run.plug_time_ms to follow them"
+            )
+        if last.removed_upstream:
+            warnings.append(f"{last.removed_upstream} fines bounced out upstream and were removed")
+        return reason, warnings
 
 
 def invade(
@@ -338,7 +434,7 @@ def invade(
     folder: Path,
     launch: Launch,
     *,
-    fluid: Fluid | None = None,
+    fluid: DrivingFluid | None = None,
 ) -> Invasion:
     """Drive the fines in; continues from the last complete checkpoint when `folder` holds one.
 
@@ -347,24 +443,24 @@ def invade(
     Raises LiggghtsError when a run fails or fines are lost, CaseError when the fines cannot be
     placed or the invasion was begun on another number of MPI ranks.
     """
-    _refuse_uncoupled(case, fluid)
-    (folder / "post").mkdir(parents=True, exist_ok=True)
-    refuse_other_ranks(folder, case, launch.ranks)
-    deck, run = _drive(case, scales, grains, folder, launch, fluid)
+    points = Checkpoints(folder=folder, digest=case.digest("invade"))
+    stage = InvadeStage(
+        case=case, scales=scales, grains=grains, points=points, launch=launch, fluid=fluid
+    )
+    deck, runs = stage.drive()
     history, batches = read_history(folder), batches_of(case, scales)
     overlaps, damaged = [], grains
     for _, damaged in readable_states(folder, history, case, scales, grains):
         overlaps.append(overlap_in(case, damaged))
-    reason, warnings = _ending(case, scales, folder, history)
-    warnings += kept_doubts(folder)
+    reason, warnings = stage.ending(history)
+    warnings += points.doubts()
     if len(overlaps) < len(history):
-        lost = len(history) - len(overlaps)
         warnings.append(
-            f"{lost} of {len(history)} checkpoint dumps cannot be read: they are missing from the "
-            "largest overlap and from invasion.pvd"
+            f"{len(history) - len(overlaps)} of {len(history)} checkpoint dumps cannot be read: "
+            "they are missing from the largest overlap and from invasion.pvd"
         )
     return Invasion(
-        damaged=damaged,
+        state=damaged,
         history=history,
         stop_reason=reason,
         supplied=batches.supplied(entered_by(case, batches, history[-1])),
@@ -373,159 +469,6 @@ def invade(
         left_out=deck.left_out,
         warnings=tuple(warnings),
         ranks=launch.ranks,
-        runs=(run,) if run else (),
+        runs=runs,
         updates=tuple(read_updates(folder)),
     )
-
-
-def _refuse_uncoupled(case: InvasionCase, fluid: Fluid | None) -> None:
-    """Raise CaseError unless a coupled case, and no other, has a fluid."""
-    if case.drag.coupled != (fluid is not None):
-        raise CaseError(
-            f"drag.crowd: {case.drag.crowd!r} with drag.field {case.drag.field!r} "
-            f"{'needs' if case.drag.coupled else 'takes'} "
-            f"{'a' if case.drag.coupled else 'no'} fluid that fdnet computes; run the case with "
-            "fdnet run or fdnet.run_case"
-        )
-
-
-def _drive(
-    case: InvasionCase,
-    scales: InvasionScales,
-    grains: Snapshot,
-    folder: Path,
-    launch: Launch,
-    fluid: Fluid | None,
-) -> tuple[Deck, Run | None]:
-    """Run to the end of the invasion; no run when the last checkpoint was the end already."""
-    while True:
-        last = last_checkpoint(folder, case)
-        keep_doubts(folder, passed_over(folder, case, last))
-        deck = _prepare(case, scales, grains, folder, ranks=launch.ranks, last=last)
-        if last is not None:
-            refuse_overlap(case, scales, grains, folder, history=read_history(folder), last=last)
-        if _over(case, scales, folder, last):
-            return deck, None
-        keeper = CheckpointKeeper(folder, case, scales, grains, launch=launch)
-        follower, coupling = replace(launch, follow=keeper), None
-        if fluid is not None:
-            coupling = Coupling(
-                case=case,
-                scales=scales,
-                grains=grains,
-                folder=folder,
-                fluid=fluid,
-                last=last,
-                over=partial(_over, case, scales, folder),
-            )
-        run = _run(folder, last, follower, coupling)
-        if run is not None:
-            return deck, run
-
-
-def _run(
-    folder: Path, last: Checkpoint | None, launch: Launch, coupling: Coupling | None
-) -> Run | None:
-    """The run, or None when LIGGGHTS could not read the restart (a full disk cuts it silently).
-
-    The restart is then set aside, so that the checkpoint before it is tried next.
-    """
-    deck = "in.invade" if last is None else "in.invade.resume"
-    try:
-        if coupling is not None:
-            return run_fed(folder, deck, launch, coupling.play)
-        return run_deck(folder, deck, launch)
-    except LiggghtsError:
-        with (folder / SCREEN).open("rb") as file:
-            screen = file.read(_START_OF_SCREEN)
-        if last is None or b"FDNET restoring" not in screen or b"FDNET restored" in screen:
-            raise
-        restart = folder / "post" / f"invade_{last.step}.restart"
-        restart.rename(restart.with_suffix(".unreadable"))
-        return None
-    finally:
-        (folder / SCRATCH).unlink(missing_ok=True)
-
-
-def _over(
-    case: InvasionCase, scales: InvasionScales, folder: Path, last: Checkpoint | None
-) -> bool:
-    """Whether the last checkpoint is the end of the invasion."""
-    if last is None:
-        return False
-    if last.chunk >= chunks_of(case, scales) or rate_is_low(folder, case, last.step):
-        return True
-    if volume_has_passed(folder, case, scales, last.step):
-        return True
-    return case.run.duration_s is None and quiet_enough(case, scales, last)
-
-
-def _prepare(
-    case: InvasionCase,
-    scales: InvasionScales,
-    grains: Snapshot,
-    folder: Path,
-    *,
-    ranks: int,
-    last: Checkpoint | None,
-) -> Deck:
-    """Write the inputs of a start, or of a restart from `last` with later files removed."""
-    if last is None:
-        old = (path for _, path in checkpoint_files(folder))
-        for stale in [folder / HISTORY, folder / WATCH, folder / UPDATES, *old]:
-            stale.unlink(missing_ok=True)
-        deck = write_invade_inputs(case, scales, grains, folder, ranks=ranks)
-        write_text(folder / HISTORY, HISTORY_HEADER + "\n")
-        return deck
-    rows = [row for row in read_history(folder) if row.step <= last.step]
-    write_text(
-        folder / HISTORY, "\n".join([HISTORY_HEADER, *(csv_row(row) for row in rows)]) + "\n"
-    )
-    cut_watch(folder, last.step)
-    for step, path in checkpoint_files(folder):
-        if step > last.step:
-            path.unlink()
-    if case.fines.supply == "batches":
-        write_batches(case, scales, grains, folder)
-    write_parts(case, scales, grains, folder)
-    deck = render_invade(case, scales, grains, ranks=ranks, resume=last)
-    write_text(folder / "in.invade.resume", deck.text)
-    return deck
-
-
-def _ending(
-    case: InvasionCase, scales: InvasionScales, folder: Path, history: tuple[Checkpoint, ...]
-) -> tuple[str, list[str]]:
-    """The stop reason, and warnings.
-
-    An empty slab decides nothing about plugging, so it is a reason of its own.
-    """
-    last = history[-1]
-    waiting = last.upstream - last.removed_upstream
-    warnings = []
-    if rate_is_low(folder, case, last.step):
-        reason = "plugged"
-    elif case.run.duration_s is not None or volume_has_passed(folder, case, scales, last.step):
-        reason = "duration"
-    elif quiet_enough(case, scales, last):
-        reason = "plugged" if waiting > 0 else "supply_exhausted"
-    else:
-        reason, cap = "cap", scales.cap_time * scales.force_factor
-        warnings.append(
-            f"invasion stopped at its cap of {1e3 * cap:.3g} ms before the stop rule "
-            "held: raise run.cap_ms"
-        )
-    if waiting == 0:
-        warnings.append(
-            "no fine is left upstream: the end was decided by an empty slab, raise fines.count or "
-            "fines.slab_mm"
-        )
-    before = history[-min(len(history), quiet_chunks(scales) + 1)]
-    if reason == "plugged" and last.passed > before.passed:
-        warnings.append(
-            f"the face was plugged, but {last.passed - before.passed} fines still left through "
-            "the outlet meanwhile: raise run.plug_time_ms to follow them"
-        )
-    if last.removed_upstream:
-        warnings.append(f"{last.removed_upstream} fines bounced out upstream and were removed")
-    return reason, warnings

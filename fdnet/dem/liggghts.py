@@ -1,7 +1,4 @@
-"""Running the LIGGGHTS binary: finding it, starting it, feeding it, and what its end means.
-
-The environment in which LIGGGHTS is started, with what Open MPI reads of it.
-"""
+"""Running the LIGGGHTS binary: finding it, starting it, feeding it, and what its end means."""
 
 import contextlib
 import ctypes
@@ -16,18 +13,16 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.files import disk_is_full
 
-_ALWAYS = {
-    "OMP_NUM_THREADS": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-}
+_ALWAYS = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM"), "1"
+)
 _ALONE = {
     "OMPI_MCA_ess_singleton_isolated": "1",
     "OMPI_MCA_orte_create_session_dirs": "0",
@@ -58,38 +53,8 @@ _BAD_LINE = re.compile(
     r"^(ERROR|Lost atoms)|Signal: |Segmentation fault|Forced restart written|No space left"
 )
 _NAN = re.compile(r"(?i)(?:^|\s)[-+]?(?:nan|inf)(?:\s|$)")
-
-
-@dataclass(slots=True)
-class _Seen:
-    """What a screen says.
-
-    Attributes:
-        bad: the first lines that report a failure.
-        ended: whether it holds the end mark.
-        last: the last line; None without any.
-        not_a_number: the first line with a not-a-number, "" without one.
-    """
-
-    bad: list[str] = field(default_factory=list)
-    ended: bool = False
-    last: str | None = None
-    not_a_number: str = ""
-
-
-def _read_screen(path: Path) -> _Seen:
-    """Look through a screen line by line, for it can be large."""
-    seen = _Seen()
-    with path.open(encoding="utf-8", errors="replace") as file:
-        for line in iter(lambda: file.readline(_LONGEST_LINE), ""):
-            seen.last = line.strip()
-            seen.ended = seen.ended or seen.last == END_MARK
-            if _BAD_LINE.search(line) and len(seen.bad) < _MOST_BAD:
-                seen.bad.append(seen.last)
-            if not seen.not_a_number and _NAN.search(line):
-                silent = line.lstrip().startswith(("#", "print", "fix"))
-                seen.not_a_number = "" if silent else seen.last
-    return seen
+_ECHOED = ("#", "print", "fix")
+"""What lines begin with that LIGGGHTS repeats from the deck."""
 
 
 def verify(folder: Path, deck: str, code: int) -> None:
@@ -97,23 +62,31 @@ def verify(folder: Path, deck: str, code: int) -> None:
 
     `code` is its exit code. A finished run has printed `END_MARK`, no error and no not-a-number.
     """
-    where, seen = f"{folder / deck}", _read_screen(folder / SCREEN)
-    if code == 0 and not seen.bad and seen.ended:
-        if seen.not_a_number:
+    bad: list[str] = []
+    ended, evidence, not_a_number = False, "no output", ""
+    with (folder / SCREEN).open(encoding="utf-8", errors="replace") as file:
+        for line in iter(lambda: file.readline(_LONGEST_LINE), ""):
+            text = line.strip()
+            evidence = f"the last line is {text!r}"
+            ended = ended or text == END_MARK
+            if _BAD_LINE.search(line) and len(bad) < _MOST_BAD:
+                bad.append(text)
+            if not not_a_number and _NAN.search(line) and not text.startswith(_ECHOED):
+                not_a_number = text
+    if code == 0 and not bad and ended:
+        if not_a_number:
             raise LiggghtsError(
-                f"{where}: not-a-number in the output ({seen.not_a_number[:80]!r}); "
+                f"{folder / deck}: not-a-number in the output ({not_a_number[:80]!r}); "
                 "lower run.time_step_factor and start over with --force or another --out"
             )
         return
-    bad = seen.bad
-    last = f"the last line is {seen.last!r}" if seen.last is not None else "no output"
-    evidence = bad[0] if bad else last
+    evidence = bad[0] if bad else evidence
     if disk_is_full(folder):
         evidence = f"the disk is full ({evidence})"
     state = f"ended by signal {-code}" if code < 0 else f"exit {code}"
     finished = "" if bad else f", no {END_MARK} line"
     raise LiggghtsError(
-        f"{where}: LIGGGHTS failed ({state}{finished}): {evidence[:200]}; "
+        f"{folder / deck}: LIGGGHTS failed ({state}{finished}): {evidence[:200]}; "
         f"see {folder / SCREEN}; {_advice(bad)}"
     )
 
@@ -141,124 +114,72 @@ LOCK_PATIENCE = 20.0
 """Seconds to wait for processes of an earlier run to end."""
 MOST_BYTES = 1 << 29
 """Largest screen or log of a run; a checkpoint takes some 3 kB of either."""
-_STOP_SIGNALS = {signal.SIGINT, signal.SIGTERM}
 
 
 @contextlib.contextmanager
 def started(
-    folder: Path,
-    command: list[str],
-    *,
-    ranks: int,
-    lock: int,
-    stdin: IO[bytes] | int,
-    stdout: IO[bytes] | int,
+    folder: Path, command: list[str], *, ranks: int, fed: bool
 ) -> Iterator[subprocess.Popen]:
-    """A process of LIGGGHTS in `folder` that inherits the `lock` of `only_writer`.
+    """A process of LIGGGHTS in `folder`; its output is a pipe, its input too where it is `fed`.
 
-    It is stopped with its children when the `with` block is left by an exception. Raises
-    LiggghtsError when it cannot be started.
-    """
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOP_SIGNALS)
-    try:
-        process = subprocess.Popen(
-            command,
-            cwd=folder,
-            stdin=stdin,
-            stdout=stdout,
-            stderr=subprocess.STDOUT,
-            env=environment(ranks),
-            start_new_session=True,
-            pass_fds=(lock,),
-            preexec_fn=_prepare_child(ranks, before),
-        )
-    except OSError as error:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        raise LiggghtsError(f"{command[0]}: cannot be started: {error}") from error
-    try:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        yield process
-    except BaseException:
-        _stop(process)
-        raise
-
-
-@contextlib.contextmanager
-def only_writer(folder: Path) -> Iterator[int]:
-    """A lock on the folder of a stage that LIGGGHTS inherits.
-
-    It holds until the last process that inherited it has ended. One that MPI started may outlive
-    LIGGGHTS by a moment, so this waits for a lock that is taken.
-    """
-    lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
-    deadline = time.monotonic() + LOCK_PATIENCE
-    try:
-        while not _locked(lock):
-            if time.monotonic() > deadline:
-                raise LiggghtsError(
-                    f"{folder}: a LIGGGHTS of an earlier run is still writing here; "
-                    "wait until it ends"
-                )
-            time.sleep(0.05)
-        yield lock
-    finally:
-        os.close(lock)
-
-
-def _locked(lock: int) -> bool:
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True
-
-
-def _prepare_child(ranks: int, mask: set[int]) -> Callable[[], None]:
-    """What the child does before it becomes LIGGGHTS.
-
-    It asks the kernel to end it when fdnet dies, so that no orphan writes into a resumed run. Then
-    it restores `mask`, the signals that were blocked before the start. While the child is being
-    started SIGINT and SIGTERM wait: Python would swallow an exception that is raised inside the
-    fork, and the run would go on.
+    It inherits a lock on the folder, which holds until the last process that inherited it has
+    ended. One that MPI started may outlive LIGGGHTS by a moment, so this waits for a lock that is
+    taken. The process is stopped with its children, first gently, when the `with` block is left by
+    an exception. Raises LiggghtsError when it cannot be started.
     """
     libc = ctypes.CDLL(None, use_errno=True)
     last = signal.SIGKILL if ranks == 1 else signal.SIGTERM
+    deadline = time.monotonic() + LOCK_PATIENCE
+    lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        while True:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except OSError:
+                if time.monotonic() > deadline:
+                    raise LiggghtsError(
+                        f"{folder}: a LIGGGHTS of an earlier run is still writing here; wait "
+                        "until it ends"
+                    ) from None
+                time.sleep(0.05)
+        # while the child is being started SIGINT and SIGTERM wait: Python would swallow an
+        # exception that is raised inside the fork, and the run would go on
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
 
-    def prepare() -> None:
-        libc.prctl(1, last, 0, 0, 0)
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        def prepare() -> None:
+            """Let the kernel end the child when fdnet dies, so that no orphan writes on."""
+            libc.prctl(1, last, 0, 0, 0)
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
-    return prepare
-
-
-def refuse_late(folder: Path, deadline: float | None) -> None:
-    """Raises LiggghtsError after `deadline`, s of the monotonic clock."""
-    if deadline is not None and time.monotonic() > deadline:
-        raise LiggghtsError(
-            f"{folder}: LIGGGHTS did not end within its time limit and was stopped; raise "
-            "--timeout and continue with --resume"
-        )
-
-
-def refuse_flood(folder: Path) -> None:
-    """Raises LiggghtsError when the screen or the log is larger than any sound run makes it."""
-    for path in (folder / SCREEN, folder / "log.liggghts"):
-        if path.exists() and path.stat().st_size > MOST_BYTES:
-            raise LiggghtsError(
-                f"{folder}: LIGGGHTS wrote more than {MOST_BYTES >> 20} MiB into {path.name} and "
-                "was stopped: it repeats a message without end; read the beginning of the file, "
-                "then mend the cause and continue with --resume"
+        try:
+            process = subprocess.Popen(
+                command,
+                cwd=folder,
+                stdin=subprocess.PIPE if fed else subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                env=environment(ranks),
+                start_new_session=True,
+                pass_fds=(lock,),
+                preexec_fn=prepare,
             )
-
-
-def _stop(process: subprocess.Popen) -> None:
-    """End the process and its children, first gently."""
-    for end, patience in ((signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0)):
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, end)
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(patience)
-            return
+        except OSError as error:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            raise LiggghtsError(f"{command[0]}: cannot be started: {error}") from error
+        try:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            yield process
+        except BaseException:
+            for end in (signal.SIGTERM, signal.SIGKILL):
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(process.pid, end)
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    process.wait(5.0)
+                    break
+            raise
+    finally:
+        os.close(lock)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -308,14 +229,8 @@ class Binary:
                 f"--np {ranks}: no mpirun next to {self.path} or on PATH; install openmpi-bin or "
                 "use --np 1"
             )
-        return [
-            str(self.launcher),
-            "--allow-run-as-root",
-            "--oversubscribe",
-            "-np",
-            str(ranks),
-            *base,
-        ]
+        options = ["--allow-run-as-root", "--oversubscribe", "-np", str(ranks)]
+        return [str(self.launcher), *options, *base]
 
 
 def find_binary(option: str | None = None, *, launcher: str | None = None) -> Binary:
@@ -329,7 +244,18 @@ def find_binary(option: str | None = None, *, launcher: str | None = None) -> Bi
     template = _template(launcher)
     given = os.path.expanduser(option or os.environ.get("FDNET_LIGGGHTS") or "")
     places = [given] if given else ["liggghts", str(_PROJECT / ".prefix" / "bin" / "liggghts")]
-    _refuse_surroundings()
+    scratch = os.environ.get("TMPDIR")
+    if scratch and not (os.path.isdir(scratch) and os.access(scratch, os.W_OK | os.X_OK)):
+        raise LiggghtsError(
+            f"TMPDIR: {scratch} is no folder that can be written to, and temporary files go "
+            "there; set TMPDIR to such a folder, or unset it"
+        )
+    handles = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    if 0 <= handles < FEWEST_HANDLES:
+        raise LiggghtsError(
+            f"ulimit -n: only {handles} files may be open at a time, expected at least "
+            f"{FEWEST_HANDLES}; raise the limit with ulimit -n {16 * FEWEST_HANDLES}"
+        )
     hit = next(filter(None, map(shutil.which, places)), None)
     if hit is None:
         raise LiggghtsError(
@@ -337,7 +263,10 @@ def find_binary(option: str | None = None, *, launcher: str | None = None) -> Bi
             "the Debian package liggghts, or give its path with --liggghts"
         )
     path = Path(hit).absolute()
-    return Binary(path=path, version=_version(path), launcher=_launcher(path), template=template)
+    own = path.parent / "mpirun"  # the binary was built with it
+    mpirun = str(own) if own.exists() else shutil.which("mpirun") or shutil.which("orterun")
+    version, start = _version(path), Path(mpirun) if mpirun else None
+    return Binary(path=path, version=version, launcher=start, template=template)
 
 
 def _template(launcher: str | None) -> tuple[str, ...]:
@@ -359,31 +288,6 @@ def _template(launcher: str | None) -> tuple[str, ...]:
             "out for mpirun"
         )
     return words
-
-
-def _refuse_surroundings() -> None:
-    """Raise LiggghtsError on surroundings in which no LIGGGHTS can run, named by their cause."""
-    folder = os.environ.get("TMPDIR")
-    if folder and not (os.path.isdir(folder) and os.access(folder, os.W_OK | os.X_OK)):
-        raise LiggghtsError(
-            f"TMPDIR: {folder} is no folder that can be written to, and temporary files go there; "
-            "set TMPDIR to such a folder, or unset it"
-        )
-    handles = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
-    if 0 <= handles < FEWEST_HANDLES:
-        raise LiggghtsError(
-            f"ulimit -n: only {handles} files may be open at a time, expected at least "
-            f"{FEWEST_HANDLES}; raise the limit with ulimit -n {16 * FEWEST_HANDLES}"
-        )
-
-
-def _launcher(binary: Path) -> Path | None:
-    """The mpirun in the folder of the binary, which was built with it, or one on PATH."""
-    own = binary.parent / "mpirun"
-    if own.exists():
-        return own
-    hit = shutil.which("mpirun") or shutil.which("orterun")
-    return Path(hit) if hit else None
 
 
 def _version(path: Path) -> str:
@@ -419,9 +323,15 @@ def _version(path: Path) -> str:
 
 # ------------------------------------------------------------------------------------------------
 # Runs of LIGGGHTS: started, followed, stopped, and only accepted when they really finished.
+#
+# One that is fed takes blocks of commands on its standard input and waits in between. fdnet
+# computes something then and puts it into files, which the next block reads. The process ends when
+# its standard input does, so it cannot outlive fdnet.
 
 
 _PART, _LONGEST_OUTPUT_LINE = 1 << 16, 1 << 20
+_PATIENCE = 0.1
+"""Longest time, s, to wait for a line before the process and its time limit are looked at."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -442,7 +352,7 @@ class Launch:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Run:
+class Execution:
     """One run that really finished; there is none of a run that did not.
 
     Attributes:
@@ -450,8 +360,8 @@ class Run:
         command: command line.
         version: of LIGGGHTS.
         seconds: s, from start to end.
-        waited: s of them, in which LIGGGHTS waited for fdnet to compute something.
         ranks: MPI ranks.
+        waited: s of them, in which LIGGGHTS waited for fdnet to compute something.
     """
 
     directory: Path
@@ -462,111 +372,39 @@ class Run:
     waited: float = 0.0
 
 
-def run_deck(folder: Path, deck: str, launch: Launch) -> Run:
-    """Run `folder/deck` to its end mark.
-
-    Raises LiggghtsError with the evidence when the run did not really finish. On KeyboardInterrupt
-    the run is stopped and what it wrote is kept.
-    """
-    if not (folder / deck).is_file():
-        raise LiggghtsError(f"{folder / deck}: deck not found; render it first")
-    command, start = launch.binary.command(deck, launch.ranks), time.monotonic()
-    deadline = None if launch.timeout is None else start + launch.timeout
-    with (
-        only_writer(folder) as lock,
-        (folder / SCREEN).open("wb") as screen,
-        started(
-            folder,
-            command,
-            ranks=launch.ranks,
-            lock=lock,
-            stdin=subprocess.DEVNULL,
-            stdout=screen,
-        ) as process,
-    ):
-        _wait(process, folder / SCREEN, launch.follow, deadline)
-    verify(folder, deck, process.returncode)
-    seconds = time.monotonic() - start
-    return Run(
-        directory=folder,
-        command=tuple(command),
-        version=launch.binary.version,
-        seconds=seconds,
-        ranks=launch.ranks,
-    )
-
-
-def _wait(
-    process: subprocess.Popen,
-    screen: Path,
-    follow: Callable[[str], None] | None,
-    deadline: float | None,
-) -> None:
-    """Wait until the process has ended, with each line of its screen given to `follow`.
-
-    Raises LiggghtsError after `deadline`, s, and when the screen or the log is flooded.
-    """
-    with screen.open("rb") as file:
-        rest = b""
-        while True:
-            ended = process.poll() is not None
-            part = file.read(_PART)
-            *lines, rest = (rest + part).split(b"\n")
-            if ended and not part and rest:
-                lines, rest = [*lines, rest], b""
-            for line in lines:
-                refuse_late(screen.parent, deadline)
-                if follow:
-                    follow(line.rstrip(b"\r").decode(errors="replace"))
-            refuse_late(screen.parent, deadline)
-            refuse_flood(screen.parent)
-            rest = rest[-_LONGEST_OUTPUT_LINE:]
-            if not part:
-                if ended:
-                    return
-                time.sleep(0.05)
-
-
-# ------------------------------------------------------------------------------------------------
-# LIGGGHTS fed on its standard input: it takes blocks of commands and waits in between.
-#
-# fdnet computes something between two blocks and puts it into files, which the next block reads.
-# The process ends when its standard input does, so it cannot outlive fdnet.
-
-
-_FEED_PART, _LONGEST_FEED_LINE = 1 << 16, 1 << 20
-_PATIENCE = 0.1
-"""Longest time, s, to wait for a line before the process and its time limit are looked at."""
-
-
 class _EndedError(Exception):
     """LIGGGHTS has ended although more was to come."""
 
 
+@dataclass(slots=True, eq=False, kw_only=True)
 class Feed:
     """A LIGGGHTS that waits for commands; call it with some, and it returns when they are done.
 
-    `busy` are the seconds that it has worked on them.
+    Attributes:
+        process: its process.
+        folder: that it runs in.
+        screen: takes what it prints.
+        follow: is called with each line of that.
+        deadline: s of the monotonic clock; None: no limit.
+        busy: s, that it has worked on the commands.
+        waited: s, in between.
     """
 
-    def __init__(
-        self,
-        process: subprocess.Popen,
-        folder: Path,
-        screen: IO[bytes],
-        *,
-        follow: Callable[[str], None] | None,
-        deadline: float | None,
-    ) -> None:
-        self.process, self.folder, self.screen = process, folder, screen
-        self.follow, self.deadline = follow, deadline
-        self.busy, self._fed, self._rest = 0.0, 0, b""
+    process: subprocess.Popen
+    folder: Path
+    screen: IO[bytes]
+    follow: Callable[[str], None] | None
+    deadline: float | None
+    busy: float = 0.0
+    waited: float = 0.0
+    _fed: int = 0
+    _rest: bytes = b""
 
     def __call__(self, *commands: str) -> None:
         """Carry out the commands, in order.
 
         Raises LiggghtsError after the time limit or when the screen is flooded, and what `follow`
-        raises. `run_fed` reports a LIGGGHTS that ends before it has done them.
+        raises. `run_deck` reports a LIGGGHTS that ends before it has done them.
         """
         self._fed, began = self._fed + 1, time.monotonic()
         mark = f"FDNET fed {self._fed}"
@@ -575,16 +413,25 @@ class Feed:
             pass
         self.busy += time.monotonic() - began
 
-    def finish(self) -> None:
-        """Let LIGGGHTS print its end mark and end."""
-        self._write(f'print "{END_MARK}"\n')
-        assert self.process.stdin is not None
+    def play(self, play: Callable[["Feed"], None] | None) -> None:
+        """Let `play` feed LIGGGHTS, if it is fed, and print its end mark; wait until it has ended.
+
+        Raises as `run_deck` does.
+        """
         try:
-            self.process.stdin.close()
+            if play is not None:
+                began = time.monotonic()
+                play(self)
+                self.waited = time.monotonic() - began - self.busy
+                self._write(f'print "{END_MARK}"\n')
+                assert self.process.stdin is not None
+                self.process.stdin.close()
             while True:
                 self._lines()
         except (_EndedError, BrokenPipeError):
-            self.process.wait()
+            while self.process.poll() is None:  # it may close its output before
+                self._refuse()
+                time.sleep(0.02)
 
     def _write(self, text: str) -> None:
         assert self.process.stdin is not None
@@ -603,70 +450,77 @@ class Feed:
         assert self.process.stdout is not None
         pipe = self.process.stdout.fileno()
         while not select.select([pipe], [], [], _PATIENCE)[0]:
-            refuse_late(self.folder, self.deadline)
+            self._refuse()
             if self.process.poll() is not None:  # a daemon of MPI may keep the pipe open
                 raise _EndedError
-        part = os.read(pipe, _FEED_PART)
+        part = os.read(pipe, _PART)
         self.screen.write(part)
         *parts, self._rest = (self._rest + part).split(b"\n")
         if not part and self._rest:
             parts, self._rest = [*parts, self._rest], b""
-        self._rest = self._rest[-_LONGEST_FEED_LINE:]
-        refuse_late(self.folder, self.deadline)
-        refuse_flood(self.folder)
+        self._rest = self._rest[-_LONGEST_OUTPUT_LINE:]
+        self._refuse()
         lines = [line.rstrip(b"\r").decode(errors="replace") for line in parts]
         for line in lines:
+            self._refuse_late()
             if self.follow:
                 self.follow(line)
         if not part and not lines:
             raise _EndedError
         return lines
 
+    def _refuse_late(self) -> None:
+        if self.deadline is not None and time.monotonic() > self.deadline:
+            raise LiggghtsError(
+                f"{self.folder}: LIGGGHTS did not end within its time limit and was stopped; "
+                "raise --timeout and continue with --resume"
+            )
 
-def run_fed(folder: Path, deck: str, launch: Launch, play: Callable[[Feed], None]) -> Run:
-    """Run LIGGGHTS in `folder` on the commands that `play` feeds it; `deck` is their main file.
+    def _refuse(self) -> None:
+        """Raise LiggghtsError after the time limit, or when the screen or the log is flooded."""
+        self._refuse_late()
+        for path in (self.folder / SCREEN, self.folder / LOG):
+            if path.exists() and path.stat().st_size > MOST_BYTES:
+                raise LiggghtsError(
+                    f"{self.folder}: LIGGGHTS wrote more than {MOST_BYTES >> 20} MiB into "
+                    f"{path.name} and was stopped: it repeats a message without end; read the "
+                    "beginning of the file, then mend the cause and continue with --resume"
+                )
+
+
+def run_deck(
+    folder: Path, deck: str, launch: Launch, play: Callable[[Feed], None] | None = None
+) -> Execution:
+    """Run `folder/deck` to its end mark, or the commands that `play` feeds LIGGGHTS instead.
 
     Raises LiggghtsError with the evidence when the run did not really finish, and what `play`
-    raises. LIGGGHTS is stopped then, and what it wrote is kept.
+    raises. LIGGGHTS is stopped then, as on KeyboardInterrupt, and what it wrote is kept.
     """
-    command, start = launch.binary.command(None, launch.ranks), time.monotonic()
-    deadline, waited = None if launch.timeout is None else start + launch.timeout, 0.0
+    if play is None and not (folder / deck).is_file():
+        raise LiggghtsError(f"{folder / deck}: deck not found; render it first")
+    command = launch.binary.command(deck if play is None else None, launch.ranks)
+    start = time.monotonic()
+    deadline = None if launch.timeout is None else start + launch.timeout
     with (
-        only_writer(folder) as lock,
+        started(folder, command, ranks=launch.ranks, fed=play is not None) as process,
         (folder / SCREEN).open("wb", buffering=0) as screen,
-        started(
-            folder,
-            command,
-            ranks=launch.ranks,
-            lock=lock,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-        ) as process,
     ):
-        feed = Feed(process, folder, screen, follow=launch.follow, deadline=deadline)
+        feed = Feed(
+            process=process, folder=folder, screen=screen, follow=launch.follow, deadline=deadline
+        )
         try:
-            began = time.monotonic()
-            play(feed)
-            waited = time.monotonic() - began - feed.busy
-            feed.finish()
-        except _EndedError:
-            process.wait()
+            feed.play(play)
         finally:
-            _close(process)
+            for pipe in (process.stdin, process.stdout):
+                if pipe is not None:
+                    with contextlib.suppress(BrokenPipeError):
+                        pipe.close()
     verify(folder, deck, process.returncode)  # no run that was cut short gets beyond this
-    return Run(
+    return Execution(
         directory=folder,
         command=tuple(command),
         version=launch.binary.version,
         seconds=time.monotonic() - start,
         ranks=launch.ranks,
-        waited=waited,
+        waited=feed.waited,
     )
-
-
-def _close(process: subprocess.Popen) -> None:
-    """Close both ends of the pipes; LIGGGHTS ends at the end of its input."""
-    for pipe in (process.stdin, process.stdout):
-        if pipe is not None:
-            with contextlib.suppress(BrokenPipeError):
-                pipe.close()

@@ -1,6 +1,6 @@
-"""Making a pack.
+"""The dense pack of grains (thesis, appendix A).
 
-The packing deck and its data file: small spheres at random places, to be grown and relaxed.
+Small spheres are put at random, grown in stages, and relaxed until they are at rest.
 """
 
 import json
@@ -17,19 +17,18 @@ from fdnet.case.case import Case
 from fdnet.dem.deck import (
     Deck,
     LeftOut,
-    box_of,
     contact_variables,
-    damped_alike,
     header_variables,
     number,
     render_text,
     snapshot_of,
+    specimen_box,
     wall_variables,
     write_data,
 )
-from fdnet.dem.liggghts import Launch, Run, run_deck
+from fdnet.dem.liggghts import SCREEN, Execution, Launch, run_deck
 from fdnet.errors import CaseError, DumpError, LiggghtsError
-from fdnet.scales.contacts import sphere_mass
+from fdnet.scales.contacts import restitution_of, sphere_mass
 from fdnet.scales.pack import (
     PACK_RELAX_STEPS,
     PACK_STAGE_STEPS,
@@ -73,21 +72,15 @@ def write_pack_inputs(
     """
     deck = render_pack(case, scales, count=count, ranks=ranks, shown=shown)
     (folder / "in.pack").write_text(deck.text)
-    radii = draw_radii(case, count)
+    radii, box = draw_radii(case, count), specimen_box(case)
     rng = np.random.default_rng([case.seed, count, *([places] if places else [])])
     small, size = PACK_START * radii, np.array(case.size_m)
-    margin = small[:, None] * np.array(
-        [1.0, *([0.0, 0.0] if case.box.sides == "periodic" else [1.0, 1.0])]
-    )
+    sides = 0.0 if case.box.sides == "periodic" else 1.0
+    margin = small[:, None] * np.array([1.0, sides, sides])
     place = margin + rng.random((count, 3)) * (size - 2 * margin)
-    seeds = resting(place, small, box_of(case))
-    write_data(
-        folder / "pack.data",
-        seeds,
-        bounds=box_of(case),
-        density=np.full(count, case.grains.density_kg_m3),
-        types=2,
-    )
+    density = np.full(count, case.grains.density_kg_m3)
+    seeds = resting(place, small, box)
+    write_data(folder / "pack.data", seeds, bounds=box, density=density, types=2)
     return deck
 
 
@@ -134,16 +127,17 @@ def render_pack(
     low, high = case.grains.radius_range_m
     mass = sphere_mass(low, case.grains.density_kg_m3)
     left_out = [
-        LeftOut(what="friction and tangential history", why="grains are packed frictionless"),
-        LeftOut(what="gravity", why="only the geometry of the pack is wanted"),
-        LeftOut(what="fines and fluid", why="the pack is made before the invasion"),
+        LeftOut("friction and tangential history", "grains are packed frictionless"),
+        LeftOut("gravity", "only the geometry of the pack is wanted"),
+        LeftOut("fines and fluid", "the pack is made before the invasion"),
     ]
     if ranks == 1:
-        left_out.append(LeftOut(what="MPI processor grid", why="one rank"))
-    rate = 0.8 * math.sqrt(stiffness / mass)
-    contacts = damped_alike(
-        case, contact_variables(case, scales, "pack", friction=False), PACK_DAMPING, rate
-    )
+        left_out.append(LeftOut("MPI processor grid", "one rank"))
+    contacts = contact_variables(case, scales, "pack", friction=False)
+    damping = ("damping", 0.8 * math.sqrt(stiffness / mass))
+    if case.contact.model == "hertz":
+        damping = ("restitution", restitution_of(PACK_DAMPING))
+    contacts[damping[0]] = " ".join([number(damping[1])] * contacts["size"] ** 2)
     text = render_text(
         "pack.in.j2",
         header_variables(case, "pack", left_out, ranks)
@@ -172,9 +166,7 @@ def render_pack(
 
 
 # ------------------------------------------------------------------------------------------------
-# The dense pack of grains (thesis, appendix A).
-#
-# Small spheres are put at random, grown in stages, and relaxed until they are at rest.
+# Packs are made until one has the porosity that is asked for.
 
 
 POROSITY_TOLERANCE = 0.003
@@ -217,7 +209,7 @@ class Pack:
     step_s: float
     attempts: tuple[dict[str, Any], ...]
     left_out: tuple[LeftOut, ...]
-    run: Run
+    run: Execution
     creep: float
     restless: int = 0
 
@@ -233,10 +225,11 @@ def make_pack(case: Case, scales: Scales, folder: Path, launch: Launch) -> Pack:
     not come to rest.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    counts, tried = [grain_count(case)], []
+    count, target = grain_count(case), scales.porosity
+    tried: list[dict[str, Any]] = []
     while True:
-        attempt = folder / f"attempt_{len(counts)}"
-        pack = _at_rest(case, scales, attempt, launch, count=counts[-1])
+        attempt = folder / f"attempt_{len(tried) + 1}"
+        pack = _at_rest(case, scales, attempt, launch, count=count)
         tried.append(
             {
                 "grains": len(pack.grains),
@@ -248,34 +241,35 @@ def make_pack(case: Case, scales: Scales, folder: Path, launch: Launch) -> Pack:
             }
         )
         _refuse_overlap(case, pack)
-        if case.grains.count is not None or _is_met(scales.porosity, pack):
-            return _accept(folder, attempt, pack, tried)
-        counts.append(_next_count(case, scales.porosity, tried))
+        off = abs(pack.porosity - target) + pack.porosity_error
+        if case.grains.count is not None or off <= POROSITY_TOLERANCE:
+            break
+        count = _next_count(case, target, tried)
         shutil.rmtree(attempt)
+    for path in attempt.iterdir():
+        final = folder / path.name
+        if final.is_dir():
+            shutil.rmtree(final)
+        os.replace(path, final)
+    attempt.rmdir()
+    (folder / "attempts.json").write_text(json.dumps(tried, indent=1) + "\n")
+    return replace(pack, attempts=tuple(tried), run=replace(pack.run, directory=folder))
 
 
 def _refuse_overlap(case: Case, pack: Pack) -> None:
-    if pack.max_overlap > case.grains.max_overlap:
-        key = "grains.porosity" if case.grains.count is None else "grains.count"
-        value = case.grains.porosity if case.grains.count is None else case.grains.count
-        raise CaseError(
-            f"{key}: {value} needs grains that overlap by {100 * pack.max_overlap:.1f} % of a "
-            f"diameter (limit grains.max_overlap {case.grains.max_overlap:g}); "
-            f"{_what_can_be(case, pack)}take a looser pack or raise the limit"
-        )
-
-
-def _what_can_be(case: Case, pack: Pack) -> str:
-    """The porosities that these grains can have, in words; empty where the pack is loose."""
-    rigid = densest_porosity(case.grains)
-    if pack.porosity >= rigid:
-        return ""
-    limit = within_limit(rigid, pack.porosity, pack.max_overlap, case.grains.max_overlap)
-    return f"{reach_text(rigid)}, and about {limit:.2f} within the limit: "
-
-
-def _is_met(target: float, pack: Pack) -> bool:
-    return abs(pack.porosity - target) + pack.porosity_error <= POROSITY_TOLERANCE
+    if pack.max_overlap <= case.grains.max_overlap:
+        return
+    key = "grains.porosity" if case.grains.count is None else "grains.count"
+    value = case.grains.porosity if case.grains.count is None else case.grains.count
+    rigid, can_be = densest_porosity(case.grains), ""
+    if pack.porosity < rigid:
+        limit = within_limit(rigid, pack.porosity, pack.max_overlap, case.grains.max_overlap)
+        can_be = f"{reach_text(rigid)}, and about {limit:.2f} within the limit: "
+    raise CaseError(
+        f"{key}: {value} needs grains that overlap by {100 * pack.max_overlap:.1f} % of a "
+        f"diameter (limit grains.max_overlap {case.grains.max_overlap:g}); "
+        f"{can_be}take a looser pack or raise the limit"
+    )
 
 
 def _next_count(case: Case, target: float, tried: list[dict[str, Any]]) -> int:
@@ -294,11 +288,8 @@ def _next_count(case: Case, target: float, tried: list[dict[str, Any]]) -> int:
         slope = min(max(secant, -1.5 * grain), -0.4 * grain)
     guess = round(nearest[0]["grains"] + (target - nearest[0]["porosity"]) / slope)
     done = {row["grains"] for row in tried}
-    around = [
-        count
-        for count in (guess, guess + 1, guess - 1, guess + 2, guess - 2)
-        if count > 0 and count not in done
-    ]
+    near = (guess, guess + 1, guess - 1, guess + 2, guess - 2)
+    around = [count for count in near if count > 0 and count not in done]
     if not around or len(tried) >= ATTEMPTS:
         raise CaseError(
             f"grains.porosity: {target} not met within {POROSITY_TOLERANCE} after {len(tried)} "
@@ -308,17 +299,6 @@ def _next_count(case: Case, target: float, tried: list[dict[str, Any]]) -> int:
     return around[0]
 
 
-def _accept(folder: Path, attempt: Path, pack: Pack, tried: list[dict[str, Any]]) -> Pack:
-    for path in attempt.iterdir():
-        target = folder / path.name
-        if target.is_dir():
-            shutil.rmtree(target)
-        os.replace(path, target)
-    attempt.rmdir()
-    (folder / "attempts.json").write_text(json.dumps(tried, indent=1) + "\n")
-    return replace(pack, attempts=tuple(tried), run=replace(pack.run, directory=folder))
-
-
 def _at_rest(case: Case, scales: Scales, folder: Path, launch: Launch, *, count: int) -> Pack:
     """A pack of `count` grains, from the next random places where it does not come to rest.
 
@@ -326,11 +306,9 @@ def _at_rest(case: Case, scales: Scales, folder: Path, launch: Launch, *, count:
     """
     for places in range(PLACES):
         try:
-            pack = _attempt(case, scales, folder, launch, count=count, places=places)
+            return _attempt(case, scales, folder, launch, count=count, places=places)
         except RestlessError as error:
             last = error
-        else:
-            return replace(pack, restless=places)
     raise RestlessError(f"{last} (tried {PLACES} times from other places)") from last
 
 
@@ -341,16 +319,24 @@ def _attempt(
         shutil.rmtree(folder)
     (folder / "post").mkdir(parents=True)
     deck = write_pack_inputs(case, scales, folder, count=count, ranks=launch.ranks, places=places)
-    run = _run(case, folder, count, launch)
-    frame = read_frame(folder / "post" / "pack.dump")
-    screen = (folder / "screen.txt").read_text(encoding="utf-8", errors="replace")
+    try:
+        run = run_deck(folder, "in.pack", launch)
+    except LiggghtsError as error:
+        if "Lost atoms" not in str(error):
+            raise
+        key = "grains.porosity" if case.grains.count is None else "grains.count"
+        raise CaseError(
+            f"{key}: {count} grains needs more room than the box has, some were pushed out of it "
+            "while growing; raise the porosity, lower the count or enlarge the box"
+        ) from error
+    dump = folder / "post" / "pack.dump"
+    frame = read_frame(dump)
     grains = snapshot_of(frame, case, time_s=0.0)
-    creep = _creep(case, scales, folder, grains) if "FDNET restless" in screen else 0.0
+    restless = "FDNET restless" in (folder / SCREEN).read_text("utf-8", errors="replace")
+    creep = _creep(case, scales, folder, grains) if restless else 0.0
     if len(grains) != count:
-        raise LiggghtsError(
-            f"{folder}/post/pack.dump: {len(grains)} grains, expected {count}: some were lost"
-        )
-    check_radii(grains, case, folder / "post" / "pack.dump")
+        raise LiggghtsError(f"{dump}: {len(grains)} grains, expected {count}: some were lost")
+    check_radii(grains, case, dump)
     porosity = measure_porosity(grains, periodic=case.periodic)
     return Pack(
         grains=grains,
@@ -364,6 +350,7 @@ def _attempt(
         left_out=deck.left_out,
         run=run,
         creep=creep,
+        restless=places,
     )
 
 
@@ -382,16 +369,3 @@ def _creep(case: Case, scales: Scales, folder: Path, grains: Snapshot) -> float:
             "another seed or porosity"
         )
     return speed
-
-
-def _run(case: Case, folder: Path, count: int, launch: Launch) -> Run:
-    try:
-        return run_deck(folder, "in.pack", launch)
-    except LiggghtsError as error:
-        if "Lost atoms" not in str(error):
-            raise
-        key = "grains.porosity" if case.grains.count is None else "grains.count"
-        raise CaseError(
-            f"{key}: {count} grains needs more room than the box has, some were pushed out of it "
-            "while growing; raise the porosity, lower the count or enlarge the box"
-        ) from error

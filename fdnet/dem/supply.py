@@ -1,10 +1,9 @@
-"""Where the fines come from: places, batches, slabs.
+"""Where the fines come from: a slab of suspension upstream of the face, cut into batches.
 
-Random places for fines of a wide range of sizes: class by class, from the largest.
-
-A large sphere finds no place among small ones that are there already. So every class of sizes is
-placed to the last sphere before the next one begins, in the whole slab at once: a batch that is
-filled before its neighbour would leave no place for large ones at their boundary.
+They get random places, class of sizes by class of sizes, from the largest. A large sphere finds no
+place among small ones that are there already. So every class is placed to the last sphere before
+the next one begins, in the whole slab at once: a batch that is filled before its neighbour would
+leave no place for large ones at their boundary.
 
 Rounds in which every sphere without a place is drawn again leave the last ones over by chance. So
 each of these is drawn many more times (`last_places`) before it counts as one without a place.
@@ -13,13 +12,13 @@ each of these is drawn many more times (`last_places`) before it counts as one w
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fdnet.case.case import InvasionCase
 from fdnet.case.rules import concentration_text
-from fdnet.case.spheres import Fines
 from fdnet.errors import CaseError
 from fdnet.scales.scales import InvasionScales
 from fdnet.sizes import dealt
@@ -48,10 +47,15 @@ def places_by_size(
     size: Array,
     *,
     rng: np.random.Generator,
+    width: Array | None = None,
     others: tuple[Array, Array] = NOBODY,
     patient: bool = True,
+    at_once: bool = False,
 ) -> tuple[Array, int]:
     """Random places that touch nothing, by random sequential addition of whole classes.
+
+    It goes in rounds: of two spheres that overlap the later one, which is no larger, is drawn
+    again.
 
     Args:
         radius: (N,) m.
@@ -59,22 +63,25 @@ def places_by_size(
         high: (N, 3) m, largest ones.
         size: (3,) m, period along each axis, 0 where there is none.
         rng: gives the places.
+        width: (N, 3) m, from `low` to `high`, where it was rounded otherwise.
         others: places (M, 3) m and radii (M,) m of spheres that are there already.
         patient: whether the last spheres of a class are drawn `LAST_TRIES` times.
+        at_once: whether all sizes are one class.
 
     Returns:
         Places (N, 3) m, and how many spheres got none; those places mean nothing then.
     """
     count = len(radius)
+    width = high - low if width is None else width
     place = np.concatenate([np.empty((count, 3)), others[0]])
     done = np.arange(len(place)) >= count
     radius = np.concatenate([radius, others[1]])
-    for members in _classes(radius[:count]):
-        waiting = members
+    order = np.argsort(-radius[:count], kind="stable")
+    for waiting in [order] if at_once else _classes(radius[:count], order):
         for _ in range(ROUNDS):
             if not len(waiting):
                 break
-            place[waiting] = low[waiting] + rng.random((len(waiting), 3)) * (high - low)[waiting]
+            place[waiting] = low[waiting] + rng.random((len(waiting), 3)) * width[waiting]
             clear = _clear(place, radius, waiting, np.flatnonzero(done), size)
             done[waiting[clear]] = True
             waiting = waiting[~clear]
@@ -110,52 +117,32 @@ def last_places(
 
     K is N, or as many as there are before the first one that `LAST_TRIES` draws give no place.
 
-    Args:
-        radius: (N,) m.
-        span: smallest and largest coordinates (N, 3) m of each centre.
-        size: (3,) m, period along each axis, 0 where there is none.
-        rng: gives the places.
-        others: places (M, 3) m and radii (M,) m of spheres that are there already.
+    `radius` (N,) m is that of each, `span` the smallest and largest coordinates (N, 3) m of each
+    centre. For the other arguments see `places_by_size`.
     """
+    from scipy.spatial import cKDTree
+
     place, there = others
     for one, low, high in zip(radius, *span, strict=True):
-        free = _place_of_one(one, (low, high), size, rng=rng, others=(place, there))
-        if free is None:
+        tree = cKDTree(place, boxsize=size)
+        reach = CLEARANCE * (one + float(there.max(initial=0.0)))
+        for _ in range(LAST_TRIES // _BLOCK):
+            drawn = low + rng.random((_BLOCK, 3)) * (high - low)
+            near = cKDTree(drawn, boxsize=size).sparse_distance_matrix(
+                tree, reach, output_type="ndarray"
+            )
+            clear = np.ones(_BLOCK, bool)
+            clear[near["i"][near["v"] < CLEARANCE * (one + there[near["j"]])]] = False
+            if clear.any():
+                break
+        else:
             break
-        place, there = np.vstack([place, free]), np.append(there, one)
+        place, there = np.vstack([place, drawn[np.argmax(clear)]]), np.append(there, one)
     return place[len(others[0]) :]
 
 
-def _place_of_one(
-    radius: float,
-    span: tuple[Array, Array],
-    size: Array,
-    *,
-    rng: np.random.Generator,
-    others: tuple[Array, Array],
-) -> Array | None:
-    """The first of `LAST_TRIES` random places (3,) m that is clear of the `others`, or None."""
-    from scipy.spatial import cKDTree
-
-    low, high = span
-    place, there = others
-    tree = cKDTree(place, boxsize=size)
-    reach = CLEARANCE * (radius + float(there.max(initial=0.0)))
-    for _ in range(LAST_TRIES // _BLOCK):
-        drawn = low + rng.random((_BLOCK, 3)) * (high - low)
-        near = cKDTree(drawn, boxsize=size).sparse_distance_matrix(
-            tree, reach, output_type="ndarray"
-        )
-        clear = np.ones(_BLOCK, bool)
-        clear[near["i"][near["v"] < CLEARANCE * (radius + there[near["j"]])]] = False
-        if clear.any():
-            return np.asarray(drawn[np.argmax(clear)])
-    return None
-
-
-def _classes(radius: Array) -> Iterator[Indices]:
-    """Indices of the spheres of each class, from the largest."""
-    order = np.argsort(-radius, kind="stable")
+def _classes(radius: Array, order: Indices) -> Iterator[Indices]:
+    """Indices of the spheres of each class, from the largest; in `order` they go by size."""
     start = 0
     while start < len(order):
         alike = radius[order[start:]] > radius[order[start]] / _CLASS
@@ -190,16 +177,9 @@ def _clear(
 # ------------------------------------------------------------------------------------------------
 # How the slab of fines is cut into batches, and when each of them enters.
 #
-# With `fines.supply` = "batches" the slab is cut across the flow. A batch enters the simulation at
-# the start of a chunk, where the fluid would have carried it by then. The length of a batch is
-# what the suspension moves in a chunk of time t against a cake that grows towards it, to a
-# thickness h = c (u t + h) / phi with the concentration c, the velocity u and phi =
-# `LOOSEST_CAKE`. So no cake overtakes a batch as long as one more batch is present than needed.
-#
-# Where the deposit slows the mud down (`Drag.slowed`), the distance that the mud has moved takes
-# the place of u t. A batch enters at the start of the chunk in which the mud will have moved far
-# enough. Its fines are drawn then, at the mud's velocity, where the mud would have carried them
-# and clear of all fines that are there: those move with the mud only in the mean.
+# A batch enters at the start of a chunk, where the fluid would have carried it by then. No cake of
+# `LOOSEST_CAKE` overtakes a batch. Where the deposit slows the mud down (`Drag.slowed`) a batch
+# follows from the distance that the mud has moved (docs/physics.md, "Supply of fines").
 
 
 LOOSEST_CAKE = 0.5
@@ -281,14 +261,8 @@ def batches_of(case: InvasionCase, scales: InvasionScales) -> Batches:
 # Fines of measured sizes: which radius and density each has, and in which batch it comes.
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Drawn:
-    """Some fines.
-
-    Attributes:
-        radius: (N,) m.
-        density: (N,) kg/m3.
-    """
+class Drawn(NamedTuple):
+    """Radius, m, and density, kg/m3, of some fines, (N,) each."""
 
     radius: Array
     density: Array
@@ -297,14 +271,21 @@ class Drawn:
 def drawn_fines(case: InvasionCase, counts: Sequence[int]) -> list[Drawn]:
     """Fines of measured sizes for batches of `counts`, each with the curve of the whole mud.
 
-    All fines are drawn at once, as strata of the curve of each material, and then dealt out.
+    All fines are drawn at once, as strata of the curve of each material, and then dealt out. How
+    many are of each material follows by the largest remainder.
     """
-    whole = _whole(case.fines, sum(counts))
+    fines, count = case.fines.components, sum(counts)
+    rates = [one.share * one.curve.kept / one.curve.mean(3) for one in fines]
+    exact = [count * rate / sum(rates) for rate in rates]
+    numbers = [int(one) for one in exact]
+    missing = count - sum(numbers)
+    for index in sorted(range(len(exact)), key=lambda i: numbers[i] - exact[i])[:missing]:
+        numbers[index] += 1
+    parts = list(zip(fines, numbers, strict=True))
+    radius = np.concatenate([0.5 * one.curve.strata(number) for one, number in parts])
+    density = np.concatenate([np.full(number, one.density) for one, number in parts])
     rng = np.random.default_rng([case.seed, 13])
-    return [
-        Drawn(radius=whole.radius[index], density=whole.density[index])
-        for index in dealt(counts, rng)
-    ]
+    return [Drawn(radius[index], density[index]) for index in dealt(counts, rng)]
 
 
 def densities(case: InvasionCase, counts: Sequence[int]) -> Array:
@@ -314,31 +295,8 @@ def densities(case: InvasionCase, counts: Sequence[int]) -> Array:
     return np.concatenate([batch.density for batch in drawn_fines(case, counts)])
 
 
-def _whole(fines: Fines, count: int) -> Drawn:
-    """`count` fines sorted by material and size."""
-    parts = list(zip(fines.components, _numbers(fines, count), strict=True))
-    return Drawn(
-        radius=np.concatenate([0.5 * one.curve.strata(number) for one, number in parts]),
-        density=np.concatenate([np.full(number, one.density) for one, number in parts]),
-    )
-
-
-def _numbers(fines: Fines, count: int) -> list[int]:
-    """How many of `count` fines are of each material, by the largest remainder."""
-    solids = [(one, one.curve.mean(3)) for one in fines.components]
-    rates = [one.share * one.curve.kept / cube for one, cube in solids]
-    exact = [count * rate / sum(rates) for rate in rates]
-    numbers = [int(one) for one in exact]
-    missing = count - sum(numbers)
-    for index in sorted(range(len(exact)), key=lambda i: numbers[i] - exact[i])[:missing]:
-        numbers[index] += 1
-    return numbers
-
-
 # ------------------------------------------------------------------------------------------------
 # The slab of fines upstream of the face: random, at the given concentration, touching nothing.
-#
-# With `fines.supply` = "batches" it comes in batches (`batches`).
 
 
 SURE_CROWDING = 0.2
@@ -347,25 +305,13 @@ saturates at 0.38 (Talbot et al. 1991), and none of 8,465 draws at 0.2 failed (d
 """
 
 
-def front_of(grains: Snapshot) -> float:
-    """x (m) below which no grain reaches, at most 0.
-
-    Surfaces of grains stand up to 0.07 mm beyond the face of a dense pack.
-    """
-    return float(min(0.0, np.min(grains.position[:, 0] - grains.radius)))
-
-
 def refuse_crowded_supply(case: InvasionCase, scales: InvasionScales) -> None:
     """Raises CaseError when the slab cannot hold its fines, whatever the grains.
 
     The fines are drawn only where they might not fit, since that takes seconds for a million.
     """
-    if crowding(case) <= SURE_CROWDING:
-        return
-    if case.fines.supply == "slab":
-        _draw(case, scales, end=0.0)
-    else:
-        list(_draw_batches(case, scales, end=0.0))
+    if crowding(case) > SURE_CROWDING:
+        list(_draw(case, scales, end=0.0))
 
 
 def crowding(case: InvasionCase) -> float:
@@ -393,29 +339,35 @@ def crowding(case: InvasionCase) -> float:
     return case.fines.placed_fraction * shut / math.prod(reach) if min(reach) > 0 else math.inf
 
 
-def place_fines(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> Snapshot:
-    """Fines (N) in the slab upstream of all grains, moving with the fluid.
-
-    Raises CaseError when the slab cannot hold them without overlap.
-    """
-    position, radius = _draw(case, scales, end=slab_end(case, grains))
-    return _moving(case, scales, grains, position, radius, first=int(grains.id.max()) + 1)
-
-
 def slab_end(case: InvasionCase, grains: Snapshot) -> float:
-    """x (m) where the slab ends: one diameter of the largest fine upstream of all grains."""
-    return front_of(grains) - 2 * case.fines.radius_range_m[1]
+    """x (m) where the slab ends: one diameter of the largest fine upstream of all grains.
+
+    Surfaces of grains stand up to 0.07 mm beyond the face of a dense pack.
+    """
+    front = float(min(0.0, np.min(grains.position[:, 0] - grains.radius)))
+    return front - 2 * case.fines.radius_range_m[1]
+
+
+def place_batches(
+    case: InvasionCase, scales: InvasionScales, grains: Snapshot
+) -> Iterator[Snapshot]:
+    """The slab batch by batch, each where the fluid has carried it when it enters.
+
+    The ids are numbered through all batches. A batch does not depend on how many follow, but for
+    measured sizes, of which each batch gets its part of the whole. Raises CaseError when the slab
+    cannot hold its fines without overlap.
+    """
+    batches, first = batches_of(case, scales), int(grains.id.max()) + 1
+    for number, (place, radius) in enumerate(_draw(case, scales, end=slab_end(case, grains))):
+        carried = max(0, number + 1 - AT_ONCE) * batches.travel
+        yield _moving(scales, grains, place + np.array([carried, 0.0, 0.0]), radius, first)
+        first += len(radius)
 
 
 def _moving(
-    case: InvasionCase,
-    scales: InvasionScales,
-    grains: Snapshot,
-    position: Array,
-    radius: Array,
-    *,
-    first: int,
+    scales: InvasionScales, grains: Snapshot, position: Array, radius: Array, first: int
 ) -> Snapshot:
+    """Fines that move with the mud; `first` is the id of the first one."""
     velocity = np.zeros((len(radius), 3))
     velocity[:, 0] = scales.upstream_velocity
     return Snapshot(
@@ -428,23 +380,6 @@ def _moving(
         radius=radius,
         velocity=velocity,
     )
-
-
-def place_batches(
-    case: InvasionCase, scales: InvasionScales, grains: Snapshot
-) -> Iterator[Snapshot]:
-    """The slab batch by batch, each where the fluid has carried it when it enters.
-
-    The ids are numbered through all batches. A batch does not depend on how many follow, but for
-    measured sizes, of which each batch gets its part of the whole.
-    """
-    batches, first = batches_of(case, scales), int(grains.id.max()) + 1
-    for number, (position, radius) in enumerate(
-        _draw_batches(case, scales, end=slab_end(case, grains))
-    ):
-        carried = np.array([batches.distance_of(number), 0.0, 0.0])
-        yield _moving(case, scales, grains, position + carried, radius, first=first)
-        first += len(radius)
 
 
 def later_batch(
@@ -462,26 +397,24 @@ def later_batch(
         radius = drawn_fines(case, batches.counts)[number].radius
     else:
         radius = rng.uniform(*case.fines.radius_range_m, batches.counts[number])
-    size, high = np.array(case.size_m), slab_end(case, grains) + moved - number * batches.length
-    near = high + 2.5 * case.fines.radius_range_m[1]
-    some = there.where(there.position[:, 0] < near)
-    period, place = np.where(case.periodic, size, 0.0), some.position
-    place = wrapped(place, spheres.box, case.periodic)
+    size, period, margin = _across(case, radius)
+    high = slab_end(case, grains) + moved - number * batches.length
+    some = there.where(there.position[:, 0] < high + 2.5 * case.fines.radius_range_m[1])
+    place = wrapped(some.position, spheres.box, case.periodic)
     # rounding may leave a wrapped place at the size itself
     others = (np.where((period > 0) & (place >= period), 0.0, place), some.radius)
-    margin = np.where(period > 0, 0.0, radius[:, None]) * np.array([0.0, 1.0, 1.0])
     own = min(batches.length, scales.slab_length - number * batches.length)
     lost, lengths = 0, np.linspace(own, 2.0 * batches.length, 5)
     # the last fines of a batch that has its full length are drawn many more times
     for length, patient in [*((one, False) for one in lengths), (lengths[-1], True)]:
-        low, most = margin.copy(), np.tile(size, (len(radius), 1)) - margin
+        low, most = margin.copy(), size - margin
         low[:, 0], most[:, 0] = high - length, high
         place, lost = places_by_size(
             radius, low, most, period, rng=rng, others=others, patient=patient
         )
         if not lost:
             first = int(grains.id.max()) + 1 + batches.supplied(number)
-            return _moving(case, scales, grains, place, radius, first=first)
+            return _moving(scales, grains, place, radius, first)
     raise CaseError(
         f"{concentration_text(case.fines)}: {lost} of the {len(radius)} fines of batch "
         f"{number + 1} find no room among the fines that wait upstream, over "
@@ -489,120 +422,57 @@ def later_batch(
     )
 
 
-def _draw_batches(
+def _across(case: InvasionCase, radius: Array) -> tuple[Array, Array, Array]:
+    """Size and period (3,) m of the box, margins (N, 3) m of fines of `radius` to its walls."""
+    size = np.array(case.size_m)
+    period = np.where(case.periodic, size, 0.0)
+    return size, period, np.where(period > 0, 0.0, radius[:, None]) * np.array([0.0, 1.0, 1.0])
+
+
+def _draw(
     case: InvasionCase, scales: InvasionScales, *, end: float
 ) -> Iterator[tuple[Array, Array]]:
-    """Places (n, 3) m in the slab and radii (n,) m of each batch, clear of the one before."""
-    batches, before = batches_of(case, scales), (np.empty((0, 3)), np.empty(0))
+    """Places (n, 3) m and radii (n,) m of each batch of the slab, which ends at x = `end`.
+
+    Fines of measured sizes are placed all at once. Others are clear of the batch before.
+    """
+    batches, before, slab = batches_of(case, scales), NOBODY, case.fines.supply == "slab"
+    highs = end - np.arange(len(batches.counts)) * batches.length
+    lows = np.maximum(highs - batches.length, end - scales.slab_length)
     if case.fines.measured:
-        yield from _draw_measured(case, scales, batches, end=end)
+        radii = [batch.radius for batch in drawn_fines(case, batches.counts)]
+        every, batch = np.concatenate(radii), np.repeat(np.arange(len(radii)), batches.counts)
+        size, period, margin = _across(case, every)
+        low, high = np.zeros((len(every), 3)), np.tile(size, (len(every), 1))
+        low[:, 0], high[:, 0] = lows[batch], highs[batch]
+        rng = np.random.default_rng([case.seed, 11])
+        place, lost = places_by_size(every, low + margin, high - margin, period, rng=rng)
+        _refuse_lost(case, lost, len(every), scales.slab_length)
+        yield from zip(np.split(place, np.cumsum(batches.counts)[:-1]), radii, strict=True)
         return
     for number, count in enumerate(batches.counts):
-        rng = np.random.default_rng([case.seed, 11, number])
+        rng = np.random.default_rng([case.seed, 11, *([] if slab else [number])])
         radius = rng.uniform(*case.fines.radius_range_m, count)
-        high = end - number * batches.length
-        low = max(high - batches.length, end - scales.slab_length)
-        before = (_add_sequentially(case, radius, (low, high), rng, others=before), radius)
+        size, period, margin = _across(case, radius)
+        size[0], corner = highs[number] - lows[number], np.array([lows[number], 0.0, 0.0])
+        place, lost = places_by_size(
+            radius,
+            margin,
+            size - margin,
+            period,
+            rng=rng,
+            width=size - 2 * margin,
+            others=(before[0] - corner, before[1]),
+            at_once=True,
+        )
+        _refuse_lost(case, lost, count, size[0])
+        before = (place + corner, radius)
         yield before
 
 
-def _draw_measured(
-    case: InvasionCase, scales: InvasionScales, batches: Batches, *, end: float
-) -> Iterator[tuple[Array, Array]]:
-    """The same for measured sizes, placed all at once."""
-    radius = [batch.radius for batch in drawn_fines(case, batches.counts)]
-    every, batch = np.concatenate(radius), np.repeat(np.arange(len(radius)), batches.counts)
-    size = np.array(case.size_m)
-    low, high = np.zeros((len(every), 3)), np.tile(size, (len(every), 1))
-    high[:, 0] = end - batch * batches.length
-    low[:, 0] = np.maximum(high[:, 0] - batches.length, end - scales.slab_length)
-    period = np.where(case.periodic, size, 0.0)
-    margin = np.where(period > 0, 0.0, every[:, None]) * np.array([0.0, 1.0, 1.0])
-    rng = np.random.default_rng([case.seed, 11])
-    place, lost = places_by_size(every, low + margin, high - margin, period, rng=rng)
+def _refuse_lost(case: InvasionCase, lost: int, count: int, length: float) -> None:
     if lost:
-        raise _no_place(case, lost, len(every), scales.slab_length)
-    yield from zip(np.split(place, np.cumsum(batches.counts)[:-1]), radius, strict=True)
-
-
-def _no_place(case: InvasionCase, lost: int, count: int, length: float) -> CaseError:
-    return CaseError(
-        f"{concentration_text(case.fines)} leaves {lost} of {count} fines without a place in a "
-        f"slab of {1e3 * length:.3g} mm; lower it or lengthen fines.slab_mm"
-    )
-
-
-def _draw(case: InvasionCase, scales: InvasionScales, *, end: float) -> tuple[Array, Array]:
-    """Places (N, 3) and radii (N,) m of the slab's fines; it ends at x = `end`."""
-    if case.fines.measured:
-        return next(_draw_measured(case, scales, batches_of(case, scales), end=end))
-    rng = np.random.default_rng([case.seed, 11])
-    radius = rng.uniform(*case.fines.radius_range_m, scales.supplied_count)
-    return _add_sequentially(case, radius, (end - scales.slab_length, end), rng), radius
-
-
-def _add_sequentially(
-    case: InvasionCase,
-    radius: Array,
-    slab: tuple[float, float],
-    rng: np.random.Generator,
-    others: tuple[Array, Array] = (np.empty((0, 3)), np.empty(0)),
-) -> Array:
-    """Places (N, 3) m by random sequential addition, largest first, between the x of `slab`, m.
-
-    It goes in rounds: of two fines that overlap the later one is drawn again. `others` are places
-    (M, 3) and radii (M,) m of spheres to keep clear of. After `ROUNDS` rounds the last ones are
-    drawn many more times, one by one. Raises CaseError where one has no place even then.
-    """
-    size = np.array([slab[1] - slab[0], *case.size_m[1:]])
-    period = np.where(case.periodic, size, 0.0)
-    order = np.argsort(-radius, kind="stable")
-    corner = np.array([slab[0], 0.0, 0.0])
-    placed = others[0] - corner
-    position = np.empty((len(radius), 3))
-    waiting = order
-    done = others[1]
-    margins = np.where(period > 0, 0.0, radius[:, None]) * np.array([0.0, 1.0, 1.0])
-    for _ in range(ROUNDS):
-        if not len(waiting):
-            break
-        margin = margins[waiting]
-        drawn = margin + rng.random((len(waiting), 3)) * (size - 2 * margin)
-        free = _free(
-            np.concatenate([placed, drawn]),
-            np.concatenate([done, radius[waiting]]),
-            len(placed),
-            period,
+        raise CaseError(
+            f"{concentration_text(case.fines)} leaves {lost} of {count} fines without a place in "
+            f"a slab of {1e3 * length:.3g} mm; lower it or lengthen fines.slab_mm"
         )
-        position[waiting[free]] = drawn[free]
-        done, placed = (
-            np.concatenate([done, radius[waiting[free]]]),
-            np.concatenate([placed, drawn[free]]),
-        )
-        waiting = waiting[~free]
-    if few(len(waiting), len(radius)):
-        span = margins[waiting], size - margins[waiting]
-        last = last_places(radius[waiting], span, period, rng=rng, others=(placed, done))
-        position[waiting[: len(last)]] = last
-        waiting = waiting[len(last) :]
-    if len(waiting):
-        raise _no_place(case, len(waiting), len(radius), size[0])
-    return position + corner
-
-
-def _free(points: Array, radius: Array, placed: int, period: Array) -> Array:
-    """Whether each newly drawn sphere clears all others: (N - placed,) truth values.
-
-    `points` (N, 3) m and `radius` (N,) m hold the `placed` spheres first, which all stay, and then
-    the drawn ones. Of two drawn ones that overlap the first stays.
-    """
-    from scipy.spatial import cKDTree
-
-    tree = cKDTree(points, boxsize=period)
-    pairs = tree.query_pairs(2 * CLEARANCE * radius.max(), output_type="ndarray")
-    gap = points[pairs[:, 0]] - points[pairs[:, 1]]
-    gap -= np.where(period > 0, period * np.round(gap / np.where(period > 0, period, 1.0)), 0.0)
-    clash = np.sqrt(np.sum(gap**2, axis=1)) < CLEARANCE * radius[pairs].sum(axis=1)
-    free = np.ones(len(points), bool)
-    free[np.max(pairs[clash], axis=1, initial=0)] = False
-    return free[placed:]

@@ -250,16 +250,12 @@ def read_mesh(path: Path) -> Any:
 
 
 def read_balls(path: Path) -> Any:
-    """The spheres in a .vtp file as balls, m, with `radius_m`, `kind` and `id` on them.
-
-    In files of earlier versions the array is named `radius`.
-    """
+    """The spheres in a .vtp file as balls, m, with `radius_m`, `kind` and `id` on them."""
     import pyvista as pv
 
     points = read_mesh(path)
     ball = pv.Sphere(radius=1.0, theta_resolution=ROUNDNESS, phi_resolution=ROUNDNESS)
-    name = "radius_m" if "radius_m" in points.point_data else "radius"
-    return points.glyph(geom=ball, scale=name, orient=False)
+    return points.glyph(geom=ball, scale="radius_m", orient=False)
 
 
 # ------------------------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from fdnet.case.spheres import Spheres
 from fdnet.case.tables import Run
 from fdnet.names import ALL_SPHERES
 from fdnet.report.tables import in_millidarcy, millimetres, percent, two_digits
-from fdnet.run.bridging import Throats, open_throats, width_rows
+from fdnet.run.bridging import OpenThroats, open_throats, width_rows
 from fdnet.run.cake import cake_words
 from fdnet.scales.pack import SHARES
 from fdnet.scales.scales import InvasionScales
@@ -654,7 +654,7 @@ def _scatter_keys(grains: int) -> dict[str, Any]:
     }
 
 
-def _sizes(case: InvasionCase, throats: Throats) -> Sizes:
+def _sizes(case: InvasionCase, throats: OpenThroats) -> Sizes:
     """Of throats between grains; where all are at walls or end faces, of those."""
     width = throats.width[throats.between | ~throats.between.any()]
     middle, largest = np.quantile(width, (0.5, LARGEST))

@@ -1,24 +1,14 @@
 """The stage clean_up of a run: the flow is turned back, and what it gives is measured."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fdnet.case.case import InvasionCase
-from fdnet.dem.checkpoint import UPDATES, overlap_in
-from fdnet.dem.clean_up import (
-    DECK,
-    CleanedUp,
-    Start,
-    clean_up,
-    cleaned_state,
-    dump_name,
-    read_cleaned,
-)
-from fdnet.dem.invade_deck import Fluid
-from fdnet.errors import CaseError
+from fdnet.dem.checkpoint import HISTORY, UPDATES, Cleaned, overlap_in, read_history, state_at
+from fdnet.dem.clean_up import CleanUpStage, Start, clean_up, fines_inside
+from fdnet.dem.invade_deck import DrivingFluid
 from fdnet.run.dem_stages import invaded, is_done, packed_grains
 from fdnet.run.fluid import Mirrored, UniformCrowd, fluid_of, mirrored
 from fdnet.run.folder import RECORD_FORMAT, START_OVER, check_files, digests_of
@@ -37,58 +27,46 @@ def clean_up_stage(session: Session, case: InvasionCase) -> None:
     """Turn the flow back, unless that is done. Raises what `clean_up` raises."""
     if is_done(session, STAGE):
         return
-    grains, flow = packed_grains(session), back_flow(case)
-    before, folder = invaded(session, case, grains), session.path / STAGE
+    grains, flow, folder = packed_grains(session), back_flow(case), session.path / STAGE
+    start = Start(
+        grains=grains,
+        invaded=invaded(session, case, grains).damaged,
+        invasion=session.path / "invade",
+        digest=case.digest(STAGE),
+    )
     progress = Progress("clean_up", flow.chunks * flow.scales.checkpoint_steps, show=False)
     with session.timed(STAGE), progress:
-        launch = session.launch(progress)
-        start = Start(
-            grains=grains,
-            invaded=before.damaged,
-            invasion=session.path / "invade",
-            digest=case.digest(STAGE),
-        )
-        fluid = fluid_turned_back(flow, grains)
+        launch, fluid = session.launch(progress), fluid_turned_back(flow, grains)
         result = clean_up(flow, start, folder, launch, fluid=fluid)
-    record = _record(session, case, flow, result, folder)
-    session.folder.finish(STAGE, record)
-
-
-def fluid_turned_back(flow: BackFlow, grains: Snapshot) -> Fluid | None:
-    """The fluid of a coupled clean-up, turned back."""
-    fluid = fluid_of(flow.case, flow.scales, mirrored(grains))
-    if isinstance(fluid, UniformCrowd):
-        fluid = replace(fluid, mud_beyond=True)
-    return None if fluid is None else Mirrored(fluid=fluid)
-
-
-def _record(
-    session: Session, case: InvasionCase, flow: BackFlow, result: CleanedUp, folder: Path
-) -> dict[str, Any]:
-    """clean_up/stage.json: how the clean-up in `folder` ended."""
-    known = set(session.scales.warnings)
+    known, last = set(session.scales.warnings), result.history[-1]
     doubts = [f"clean-up: {text}" for text in flow.scales.warnings if text not in known]
-    dumps = (dump_name(row.step) for row in result.history)
-    last = result.history[-1]
-    return {
+    dumps = (f"post/clean_{row.step}.dump" for row in result.history)
+    steps = last.chunk * flow.scales.checkpoint_steps
+    record = {
         "format": RECORD_FORMAT,
-        "digest": case.digest(STAGE),
+        "digest": start.digest,
         "seconds": session.seconds[STAGE],
         "stop_reason": result.stop_reason,
         "out": last.out,
         "max_overlap": overlap_in(case, result.state).fraction,
         "steps": last.step,
         "dt_s": flow.step,
-        "physical_time_s": last.chunk
-        * flow.scales.checkpoint_steps
-        * flow.step
-        * flow.scales.force_factor,
+        "physical_time_s": steps * flow.step * flow.scales.force_factor,
         "warnings": [*doubts, *result.warnings],
         "ranks": result.ranks,
-        "files": digests_of(folder, [DECK, "history.csv", UPDATES, *dumps]),
+        "files": digests_of(folder, [CleanUpStage.deck, HISTORY, UPDATES, *dumps]),
         "runs": [run_record(run) for run in result.runs],
         "left_out": [str(item) for item in result.left_out],
     }
+    session.folder.finish(STAGE, record)
+
+
+def fluid_turned_back(flow: BackFlow, grains: Snapshot) -> DrivingFluid | None:
+    """The fluid of a coupled clean-up, turned back."""
+    fluid = fluid_of(flow.case, flow.scales, mirrored(grains))
+    if isinstance(fluid, UniformCrowd):
+        fluid = replace(fluid, mud_beyond=True)
+    return None if fluid is None else Mirrored(fluid=fluid)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -111,29 +89,24 @@ class Returned:
 def returned(session: Session, case: InvasionCase, grains: Snapshot) -> Snapshot:
     """The state at the end of the finished clean-up.
 
-    Raises CaseError when a file is not what the stage made, DumpError when one cannot be read.
+    Raises CaseError when a file is not what the stage made, DumpError or LiggghtsError when one
+    cannot be read.
     """
     folder = session.path / STAGE
     record = session.folder.record(STAGE) or {}
     check_files(folder, record, START_OVER, may_lack=lambda name: name.endswith(".dump"))
-    history = read_cleaned(folder)
-    if not history:
-        raise CaseError(f"{folder}/history.csv: no checkpoint is recorded; {START_OVER}")
-    return cleaned_state(folder, history[-1], back_flow(case), grains)
+    flow, last = back_flow(case), read_history(folder, Cleaned)[-1]
+    return state_at(folder, last, flow.case, flow.scales, grains)
 
 
 def compared(damaged: Snapshot, state: Snapshot, analysis: "Analysis") -> Returned:
     """The fines of two states, matched by their id; `analysis` is of the second `state`."""
-    low, high = damaged.box[0]
-    fines, left = damaged.fines(), state.fines()
-    x, end = fines.position[:, 0], left.position[:, 0]
-    inside = (x >= low) & (x < high)
-    still = left.id[(end >= low) & (end < high)]
+    inside, fines = fines_inside(damaged), damaged.fines()
     return Returned(
         state=state,
         analysis=analysis,
-        before=x[inside] - low,
-        stayed=np.isin(fines.id[inside], still),
+        before=fines.position[inside, 0] - damaged.box[0, 0],
+        stayed=np.isin(fines.id[inside], state.fines().id[fines_inside(state)]),
     )
 
 
@@ -159,8 +132,8 @@ def clean_up_rows(first: "Analysis", after: Returned) -> list[dict[str, Any]]:
                 "k_initial_inplace_m2": damaged.k_initial_inplace,
                 "k_damaged_inplace_m2": damaged.k_damaged_inplace,
                 "k_returned_inplace_m2": back.k_damaged_inplace,
-                "damaged_k_over_k0": ratio(damaged.k_damaged, damaged.k_initial),
-                "return_k_over_k0": ratio(back.k_damaged, back.k_initial),
+                "damaged_k_over_k0": _over(damaged.k_damaged, damaged.k_initial),
+                "return_k_over_k0": _over(back.k_damaged, back.k_initial),
                 "fines_before": int(within.sum()),
                 "fines_left_it": int(np.sum(within & ~after.stayed)),
                 "fines_after": back.fines_count,
@@ -169,7 +142,7 @@ def clean_up_rows(first: "Analysis", after: Returned) -> list[dict[str, Any]]:
     return rows
 
 
-def ratio(part: float, whole: float) -> float | None:
+def _over(part: float, whole: float) -> float | None:
     """`part` over `whole`; None where `whole` is 0."""
     return part / whole if whole > 0 else None
 
@@ -178,7 +151,7 @@ def clean_up_summary(first: "Analysis", after: Returned, record: dict[str, Any])
     """The keys that a clean-up adds to summary.json."""
     stayed = int(after.stayed.sum())
     return {
-        "return_k_over_k0": ratio(after.analysis.k_damaged, after.analysis.k_initial),
+        "return_k_over_k0": _over(after.analysis.k_damaged, after.analysis.k_initial),
         "k_returned_m2": after.analysis.k_damaged,
         "clean_up": {
             "stop_reason": record["stop_reason"],
@@ -186,7 +159,7 @@ def clean_up_summary(first: "Analysis", after: Returned, record: dict[str, Any])
             "inside_before": len(after.before),
             "came_out": len(after.before) - stayed,
             "stayed": stayed,
-            "damaged_k_over_k0": ratio(first.k_damaged, first.k_initial),
+            "damaged_k_over_k0": _over(first.k_damaged, first.k_initial),
             "damage_law_used": after.analysis.damage_law_used,
             "sections": clean_up_rows(first, after),
         },

@@ -1,10 +1,9 @@
 """The stages of a run that need LIGGGHTS: the pack and the invasion."""
 
 import math
-from pathlib import Path
 
 from fdnet.case.case import InvasionCase
-from fdnet.dem.checkpoint import checkpoint_files, read_history, read_updates, state_at
+from fdnet.dem.checkpoint import Checkpoints, read_history, read_updates, state_at
 from fdnet.dem.deck import snapshot_of
 from fdnet.dem.invasion import invade
 from fdnet.dem.packing import check_radii, make_pack
@@ -14,10 +13,10 @@ from fdnet.run.fluid import fluid_of
 from fdnet.run.folder import START_OVER, check_files, may_be_gone
 from fdnet.run.outputs import Invaded
 from fdnet.run.progress import Forecast, Progress
-from fdnet.run.records import PACK_DUMP, Session, invade_record, pack_record, ranks_of, take_pack
+from fdnet.run.records import PACK_DUMP, Session, invade_record, pack_record, take_pack
 from fdnet.scales.cost import expected_duration
 from fdnet.scales.pack import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES
-from fdnet.scales.scales import InvasionScales, scales_of
+from fdnet.scales.scales import scales_of
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Snapshot
 
@@ -29,54 +28,46 @@ def pack_stage(session: Session) -> None:
     if session.options.pack_from is not None:
         take_pack(session, session.options.pack_from)
         return
-    case, scales = session.case, session.scales
+    case, scales, folder = session.case, session.scales, session.path / "pack"
     expected = PACK_STAGES * PACK_STAGE_STEPS + PACK_RELAX_STEPS // 2
     progress = Progress("pack", Forecast(expected=expected), show=session.options.show_progress)
     with session.timed("pack"), progress:
-        pack = make_pack(case, scales, session.path / "pack", session.launch(progress))
-    folder, seconds = session.path / "pack", session.seconds["pack"]
-    record = pack_record(case, pack, folder, assumed=scales.porosity, seconds=seconds)
-    session.folder.finish("pack", record)
+        pack = make_pack(case, scales, folder, session.launch(progress))
+    seconds, assumed = session.seconds["pack"], scales.porosity
+    session.folder.finish(
+        "pack", pack_record(case, pack, folder, assumed=assumed, seconds=seconds)
+    )
 
 
 def invade_stage(session: Session, case: InvasionCase) -> None:
-    """Drive the fines in, unless that is done. Raises what `invade` raises."""
+    """Drive the fines in, unless that is done. Raises what `invade` raises.
+
+    A run that was cut between pack and invasion goes on with the ranks that it began with.
+    """
     if is_done(session, "invade"):
         return
     scales, grains, folder = scales_of(case), packed_grains(session), session.path / "invade"
-    _refuse_mixed_ranks(session, folder)
-    forecast = invasion_forecast(case, scales)
-    progress = Progress("invade", forecast, show=session.options.show_progress)
-    with session.timed("invade"), progress:
-        launch, fluid = session.launch(progress), fluid_of(case, scales, grains)
-        result = invade(case, scales, grains, folder, launch, fluid=fluid)
-    seconds = session.seconds["invade"]
-    record = invade_record(case, result, folder, seconds=seconds)
-    session.folder.finish("invade", record)
-
-
-def _refuse_mixed_ranks(session: Session, folder: Path) -> None:
-    """A run that was cut between pack and invasion goes on with the ranks that it began with."""
-    ranks, record = session.options.ranks, session.folder.record("pack")
-    begun = any(True for _ in checkpoint_files(folder))
-    made = None if record is None else ranks_of(record)
+    ranks, made = session.options.ranks, (session.folder.record("pack") or {}).get("ranks")
+    begun = Checkpoints(folder=folder, digest="").files()
     if session.options.resume and not begun and made not in (None, ranks):
         raise CaseError(
             f"{session.path}: this run was begun with --np {made}, and --np {ranks} would give "
             f"another result; continue with --np {made}, or start over with --force"
         )
-
-
-def invasion_forecast(case: InvasionCase, scales: InvasionScales) -> Forecast:
-    """When the invasion of a case ends, as far as it is known before."""
     step = scales.time_step
     arrivals = scales.supplied_count * scales.upstream_velocity / scales.slab_length
-    return Forecast(
+    forecast = Forecast(
         expected=round(expected_duration(case, scales) / step),
         plug=0 if case.run.duration_s is not None else round(scales.plug_time / step),
         cap=math.ceil(scales.cap_time / step),
         allowed=case.run.plug_rate * arrivals * step,
     )
+    progress = Progress("invade", forecast, show=session.options.show_progress)
+    with session.timed("invade"), progress:
+        launch, fluid = session.launch(progress), fluid_of(case, scales, grains)
+        result = invade(case, scales, grains, folder, launch, fluid=fluid)
+    record = invade_record(case, result, folder, seconds=session.seconds["invade"])
+    session.folder.finish("invade", record)
 
 
 def is_done(session: Session, stage: str) -> bool:
@@ -119,34 +110,24 @@ def invaded(session: Session, case: InvasionCase, grains: Snapshot) -> Invaded:
     cannot be read.
     """
     folder, scales = session.path / "invade", scales_of(case)
-    record = session.folder.record("invade") or {}
-    check_files(folder, record, START_OVER, may_lack=may_be_gone)
+    check_files(folder, session.folder.record("invade") or {}, START_OVER, may_lack=may_be_gone)
     history = read_history(folder)
-    damaged = state_at(folder, history[-1], case, scales, grains)
     return Invaded(
         case=case,
         scales=scales,
         history=history,
-        damaged=damaged,
+        damaged=state_at(folder, history[-1], case, scales, grains),
         updates=tuple(read_updates(folder)),
     )
 
 
 def file_warnings(session: Session) -> list[str]:
-    """What could not be checked, and dumps that are gone, one sentence each."""
+    """Dumps that are gone, one sentence a stage."""
     warnings = []
     for stage in LIGGGHTS_STAGES:
         record = session.folder.record(stage) if stage in session.case.stages else None
-        if record is None:
-            continue
-        if "files" not in record:
-            warnings.append(
-                f"{stage}/stage.json holds no digests of files, as older versions wrote it: it "
-                "was not checked that the files are those that the stage made"
-            )
-        lost = [
-            name for name in record.get("files", {}) if not (session.path / stage / name).exists()
-        ]
+        names = record["files"] if record else {}
+        lost = [name for name in names if not (session.path / stage / name).exists()]
         if lost:
             warnings.append(
                 f"{len(lost)} checkpoint dumps are gone, the first is {stage}/{lost[0]}: they are "

@@ -1,29 +1,24 @@
-"""The fluid that drives the fines: uniform, or by the network.
+"""The fluid that drives the fines: uniform with drag in a crowd, or by the network.
 
-Drag in a crowd of fines in the uniform field: Beetstra's law of the porosity around each fine.
-
-The uniform velocity u is the volume of suspension that passes a unit area of pores in a unit
-of time. Where fines of porosity phi stand in it, the fluid flows at u / phi between them; where
-they move with it, there is no slip. So the superficial slip is u - v in either case, and
+In the uniform field the superficial slip is u - v, and the force on a fine
 
     F = 6 pi mu r M Y F_b / phi (u - v) + V G,
 
-with Beetstra's factor F_b and the size factor Y (`fdnet.scales.drag`). The first part is
-the total force of the fluid in the crowd, the fall of pressure that the crowd itself causes among
-it: fines that fill a cross-section A and stand take up dp A. G is the gradient of the intact pack
-without fines, which acts inside the pack where `drag.pressure_gradient` asks for it. So the two
-gradients add, and none is counted twice.
+with Beetstra's factor F_b of the porosity phi around the fine and the size factor Y
+(`fdnet.scales.drag`); G is the gradient of the intact pack. docs/physics.md, "Drag in a crowd",
+tells why the two gradients add and none is counted twice.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoint, entered_by
-from fdnet.dem.invade_deck import Fluid, FluidForces, Moment, drag_rate
+from fdnet.dem.invade_deck import DrivingFluid, FluidForces, Moment, drag_rate
 from fdnet.dem.invasion import steps_between
 from fdnet.dem.supply import batches_of
 from fdnet.network.field.field import VelocityField
@@ -69,16 +64,15 @@ class UniformCrowd:
     def forces(self, spheres: Snapshot, moment: Moment) -> FluidForces:
         """What acts on the fines of `spheres`, in their order."""
         fines, scales = spheres.fines(), self.scales
-        depth = fines.position[:, 0]
+        depth, length = fines.position[:, 0], self.case.size_m[0]
         velocity, push = np.zeros((2, len(fines), 3))
-        mud = depth > self.case.size_m[0] if self.mud_beyond else depth < 0
+        mud = depth > length if self.mud_beyond else depth < 0
         velocity[:, 0] = np.where(mud, scales.upstream_velocity, scales.drive_velocity)
         volume = 4.0 / 3.0 * np.pi * fines.radius**3
-        within = (depth >= 0) & (depth < self.case.size_m[0])
+        within = (depth >= 0) & (depth < length)
         push[:, 0] = np.where(within, volume * scales.push.gradient, 0.0)
         near = local_porosity(spheres, self.case.periodic)
-        slip = np.linalg.norm(velocity - fines.velocity, axis=1)
-        factor = crowd_factor(scales, near, fines.radius, slip)
+        factor = crowd_factor(scales, near, fines.radius, _speed(velocity - fines.velocity))
         return FluidForces(
             coefficient=scales.push.coefficient * fines.radius * factor,
             velocity=velocity,
@@ -110,6 +104,10 @@ def crowd_measures(factor: Array, near: Neighbourhood) -> dict[str, float]:
     return dict(zip(CROWD_COLUMNS, values, strict=True))
 
 
+def _speed(velocity: Array) -> Array:
+    return np.linalg.norm(velocity, axis=1)
+
+
 # ------------------------------------------------------------------------------------------------
 # A fluid that flows the other way: the specimen is mirrored, asked, and mirrored back.
 
@@ -125,7 +123,7 @@ class Mirrored:
         fluid: flows along x through the mirrored specimen.
     """
 
-    fluid: Fluid
+    fluid: DrivingFluid
 
     @property
     def measured(self) -> tuple[str, ...]:
@@ -140,153 +138,44 @@ class Mirrored:
 
 def mirrored(spheres: Snapshot) -> Snapshot:
     """The spheres with x mirrored in the middle of their box."""
-    middle = float(spheres.box[0].sum())
     position = spheres.position * _TURN
-    position[:, 0] += middle
+    position[:, 0] += float(spheres.box[0].sum())
     return replace(spheres, position=position, velocity=spheres.velocity * _TURN)
 
 
 # ------------------------------------------------------------------------------------------------
-# The force on each fine: carried along, standing in the pack, or part of the cake.
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Deposit:
-    """The fines (N) that stand.
-
-    Attributes:
-        held: (N,) which stand in the pack.
-        pressed: (N, 3) N, what the network's pressure does to them; also to fines of the cake that
-            reach into the pack; 0 for all others.
-    """
-
-    held: Array
-    pressed: Array
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class FineForces:
-    """The force C (u - v) + P on each fine (N) of velocity v.
-
-    Attributes:
-        coefficient: (N,) N s/m, C.
-        velocity: (N, 3) m/s, u.
-        push: (N, 3) N, P.
-        held: (N,) which stand in the pack.
-        pressed: (N, 3) N, of `Deposit`.
-        crowd_drag: N, along x, what the law of the crowd would do to those that stand in the pack.
-    """
-
-    coefficient: Array
-    velocity: Array
-    push: Array
-    held: Array
-    pressed: Array
-    crowd_drag: float
-
-
-def forces_on(
-    fines: Snapshot,
-    deposit: Deposit,
-    *,
-    crowd: Array,
-    lone: Array,
-    carried: Array,
-    intact: Array,
-    push: Array,
-    pace: float,
-) -> FineForces:
-    """The forces on `fines`.
-
-    A fine that stands in the pack feels what the network's pressure does to it. When it comes
-    loose its throat opens, so it is not pushed on by all that force, but goes on with the flow of
-    the intact pack: C = F / u, with u the larger of the velocity there and the superficial one,
-    and at least the coefficient of a lone fine.
-
-    Args:
-        fines: N of them.
-        deposit: what stands.
-        crowd: (N,) N s/m, coefficients by the law of the crowd.
-        lone: (N,) N s/m, of a lone fine.
-        carried: (N, 3) m/s, velocity of the fluid at each fine.
-        intact: (N, 3) m/s, that of the intact pack at the same rate.
-        push: (N, 3) N, by the gradient of the grains alone.
-        pace: superficial velocity, m/s.
-    """
-    held, pressed = deposit.held, deposit.pressed
-    force = np.linalg.norm(pressed, axis=1)
-    speed = np.maximum(np.linalg.norm(intact, axis=1), pace)
-    loose = np.divide(force, speed, out=np.zeros_like(force), where=speed > 0)
-    coefficient = np.where(held, np.maximum(loose, lone), crowd)
-    at_rest = pressed / coefficient[:, None]
-    return FineForces(
-        coefficient=coefficient,
-        velocity=np.where(held[:, None], at_rest, carried),
-        push=push + np.where(held[:, None], 0.0, pressed),
-        held=held,
-        pressed=pressed,
-        crowd_drag=float(crowd[held] @ carried[held, 0]),
-    )
-
-
-# ------------------------------------------------------------------------------------------------
-# The intact pack's flow at the fines, taken again only where they moved.
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Sampled:
-    """What the intact pack's flow is at N fines.
-
-    Attributes:
-        id: (N,) of the fines.
-        position: (N, 3) m, where it was taken.
-        velocity: (N, 3) over the superficial velocity.
-        gradient: (N, 3) 1/m2, of the pressure over mu U.
-    """
-
-    id: Array
-    position: Array
-    velocity: Array
-    gradient: Array
-
-    def at(self, fines: Snapshot, shape: VelocityField) -> "Sampled":
-        """The same at other `fines`; it is kept for those at the same place."""
-        new, old = unmoved((fines.id, fines.position), (self.id, self.position))
-        moved = np.ones(len(fines), bool)
-        moved[new] = False
-        velocity, gradient = (np.empty((len(fines), 3)) for _ in range(2))
-        velocity[new], velocity[moved] = self.velocity[old], shape.at(fines.position[moved])
-        gradient[new] = self.gradient[old]
-        gradient[moved] = shape.pressure_gradient_at(fines.position[moved])
-        return Sampled(id=fines.id, position=fines.position, velocity=velocity, gradient=gradient)
-
-
-class Places:
-    """What is kept from one update to the next: the flow at the fines."""
-
-    def __init__(self) -> None:
-        none = np.zeros((0, 3))
-        self._last = Sampled(id=np.zeros(0, int), position=none, velocity=none, gradient=none)
-
-    def at(self, fines: Snapshot, shape: VelocityField) -> Sampled:
-        """The flow of the intact pack, `shape`, at the fines."""
-        self._last = self._last.at(fines, shape)
-        return self._last
-
-
-# ------------------------------------------------------------------------------------------------
-# The fluid that fines meet on the way that they will go until they are looked at again.
-#
-# Between two updates a fine passes places where the fluid is faster or slower. It is given the
-# mean over its way, and not what is at its place when the way begins.
+# What moving fines meet until they are looked at again: the mean over their way.
 
 
 PARTS = 4
 """Parts of the way; in each the fluid is taken half-way."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Movers:
+class IntactFlow:
+    """The intact pack's flow at the fines, taken again only where they moved.
+
+    Attributes:
+        velocity: (N, 3) over the superficial velocity.
+        gradient: (N, 3) 1/m2, of the pressure over mu U.
+    """
+
+    def __init__(self) -> None:
+        none = np.zeros((0, 3))
+        self._at, self.velocity, self.gradient = (np.zeros(0, int), none), none, none
+
+    def take(self, fines: Snapshot, shape: VelocityField) -> None:
+        """Take the flow `shape` of the intact pack at N `fines`."""
+        new, old = unmoved((fines.id, fines.position), self._at)
+        moved = np.ones(len(fines), bool)
+        moved[new] = False
+        velocity, gradient = (np.empty((len(fines), 3)) for _ in range(2))
+        velocity[new], velocity[moved] = self.velocity[old], shape.at(fines.position[moved])
+        gradient[new] = self.gradient[old]
+        gradient[moved] = shape.pressure_gradient_at(fines.position[moved])
+        self._at, self.velocity, self.gradient = (fines.id, fines.position), velocity, gradient
+
+
+class Movers(NamedTuple):
     """N fines that move.
 
     Attributes:
@@ -306,13 +195,7 @@ class Movers:
         """
         kept, slip = np.exp(-self.rate * time)[:, None], self.velocity - fluid
         way = fluid * time + slip * (1.0 - kept) / self.rate[:, None]
-        return Movers(position=self.position + way, velocity=fluid + slip * kept, rate=self.rate)
-
-    def where(self, some: Array) -> "Movers":
-        """Those of them for which `some` (N,) is true."""
-        return Movers(
-            position=self.position[some], velocity=self.velocity[some], rate=self.rate[some]
-        )
+        return Movers(self.position + way, fluid + slip * kept, self.rate)
 
 
 def mean_ahead(
@@ -327,24 +210,21 @@ def mean_ahead(
     mean = fluid(movers.position)
     fastest = np.maximum(movers.velocity[:, 0], mean[:, 0])
     some = movers.position[:, 0] + np.maximum(fastest, 0.0) * time >= even_to
-    mean[some] = _mean(movers.where(some), fluid, time, mean[some])
-    return mean
-
-
-def _mean(movers: Movers, fluid: Callable[[Array], Array], time: float, here: Array) -> Array:
-    met = np.zeros_like(movers.position)
+    own, here = Movers(*(values[some] for values in movers)), mean[some]
+    met = np.zeros_like(own.position)
     for left in reversed(range(PARTS)):
-        half = fluid(movers.after(0.5 * time / PARTS, here).position)
+        half = fluid(own.after(0.5 * time / PARTS, here).position)
         there = np.where(_wet(half), half, here)
         met += there / PARTS
         if left:
-            further = movers.after(time / PARTS, there)
+            further = own.after(time / PARTS, there)
             beyond = fluid(further.position)
             free = _wet(beyond)
             here = np.where(free, beyond, here)
-            place = np.where(free, further.position, movers.position)
-            movers = Movers(position=place, velocity=further.velocity, rate=movers.rate)
-    return met
+            place = np.where(free, further.position, own.position)
+            own = further._replace(position=place)
+    mean[some] = met
+    return mean
 
 
 def _wet(velocity: Array) -> Array:
@@ -383,40 +263,29 @@ def history_rows(
     the case drives the fines faster than the fluid moves (`drag.drive_velocity_m_s`). Where the
     flow follows the deposit the row holds what the last of the `updates` before it measured.
     """
-    batches = batches_of(case, scales)
-    return [
-        {
-            "time_s": row.step * scales.time_step,
-            "physical_time_s": row.step * scales.time_step * scales.force_factor,
-            "supplied_count": batches.supplied(entered_by(case, batches, row)),
-            "invaded_count": row.invaded,
-            "passed_count": row.passed,
-            "upstream_count": row.upstream,
-            "step": row.step,
-            **_flow_before(updates, row.step),
-        }
-        for row in checkpoints
-    ]
-
-
-def _flow_before(updates: Sequence[Mapping[str, float]], step: int) -> dict[str, float]:
-    """The columns of the flow from the last update before `step`; none without a flow."""
-    row = next((row for row in reversed(updates) if row["step"] < step), {})
-    return {name: row[name] for name in FLOW_COLUMNS if name in row}
+    batches, rows = batches_of(case, scales), []
+    for row in checkpoints:
+        flow = next((one for one in reversed(updates) if one["step"] < row.step), {})
+        rows.append(
+            {
+                "time_s": row.step * scales.time_step,
+                "physical_time_s": row.step * scales.time_step * scales.force_factor,
+                "supplied_count": batches.supplied(entered_by(case, batches, row)),
+                "invaded_count": row.invaded,
+                "passed_count": row.passed,
+                "upstream_count": row.upstream,
+                "step": row.step,
+                **{name: flow[name] for name in FLOW_COLUMNS if name in flow},
+            }
+        )
+    return rows
 
 
 # ------------------------------------------------------------------------------------------------
 # The fluid of `drag.field` = "network": it follows the deposit, and the deposit follows it.
 #
-# The force on a fine that moves is that of the uniform field (`uniform`) with local values: u is
-# the volume of suspension that passes a unit area of pores at its place (`network_flow`), G the
-# fall of pressure that this flow causes in the grains alone. A fine that stands in the pack feels
-# what the network's pressure does there (`pressed`), and G. Upstream of the face the mud moves at
-# the rate over the cross-section, and fines that stand there feel the drag of the crowd.
-#
-# The rate U follows from the resistances in series: the pack with its deposit (network), the cake
-# (the drag on the fines that stand upstream), the drag on fines that move in the pack, and the
-# rest of the way on which the overbalance is lost, which stays as it is.
+# The forces, the rate, and what happens when a standing fine comes loose are derived on
+# docs/physics.md, "The field of the network".
 
 
 STANDING = 0.5
@@ -463,8 +332,8 @@ class NetworkFluid:
         return Renewal(self.pack, renewed=self.renewed)
 
     @cached_property
-    def _places(self) -> Places:
-        return Places()
+    def _intact(self) -> IntactFlow:
+        return IntactFlow()
 
     @property
     def first_velocity(self) -> float:
@@ -486,76 +355,91 @@ class NetworkFluid:
 
     def forces(self, spheres: Snapshot, moment: Moment) -> FluidForces:
         """What acts on the fines of `spheres`, in their order."""
-        fines, pack = spheres.fines(), self.pack
-        depth = fines.position[:, 0]
+        fines, pack, scales = spheres.fines(), self.pack, self.scales
+        depth, lone = fines.position[:, 0], scales.push.coefficient * fines.radius
         within = (depth >= 0) & (depth < pack.length)
-        measured = placed(fines)
-        place = self._places.at(measured, pack.shape)
+        measured, intact = placed(fines), self._intact
+        intact.take(measured, pack.shape)
         before = self._before(moment)
-        standing = self._stands(fines, before * _speed(place.velocity), moment)
+        # a fine that comes out of a throat has the speed that it was given, slow for its place
+        usual = before * _speed(intact.velocity)
+        known = usual if moment.given is None else np.where(moment.given > 0, moment.given, usual)
+        standing = _speed(fines.velocity) < self.standing * known
         carried, deposit = self.renewal.of(measured.where(standing), anew=moment.fresh)
         near = local_porosity(spheres, self.case.periodic)
         share = pack.share_at(fines.position, carried)
-        shape = place.velocity * share[:, None]
-        caked = standing & (depth < 0)
-        factor = self._factor(near, fines, before * shape)
-        crowd = self.scales.push.coefficient * fines.radius * factor
-        goes, rate = ~standing, self._drag_rate(fines, crowd, moment)
+        shape = intact.velocity * share[:, None]
+        factor = np.ones(len(fines))
+        if self.case.drag.crowd != "none":
+            slip = _speed(before * shape - fines.velocity)
+            factor = crowd_factor(scales, near, fines.radius, slip)
+        crowd, goes = lone * factor, ~standing
+        density = self.case.fines.density_kg_m3 if moment.density is None else moment.density
+        rate = drag_rate(fines, crowd, density)
         shape[goes] = self._ahead(fines.where(goes), rate[goes], carried, moment)
+
         pressed = np.zeros((len(fines), 3))
-        pressed[_rows(fines, deposit.fines)] = on_each_fine(carried.pressed, deposit)
-        held = standing & within & np.any(pressed != 0.0, axis=1)
-        area = pack.network.area
-        cake = float(crowd[caked] @ shape[caked, 0]) / area
-        moving = np.where(within & ~held, crowd, 0.0) / area
+        order = np.argsort(fines.id)
+        rows = order[np.searchsorted(fines.id[order], deposit.fines.id)]
+        pressed[rows] = on_each_fine(carried.pressed, deposit)
+        held, caked = standing & within & np.any(pressed != 0.0, axis=1), standing & (depth < 0)
+        cake = float(crowd[caked] @ shape[caked, 0]) / pack.network.area
+        moving = np.where(within & ~held, crowd, 0.0) / pack.network.area
         slow, gain = float(moving @ shape[:, 0]), float(moving @ fines.velocity[:, 0])
         speed = self._velocity(carried, cake + slow, gain)
-        loose, drop = slow * speed - gain, self._drop(carried, speed)
-        made = forces_on(
-            fines,
-            Deposit(held=held, pressed=drop * pressed),
-            crowd=crowd,
-            lone=self.scales.push.coefficient * fines.radius,
-            carried=speed * shape,
-            intact=speed * place.velocity,
-            push=self._push(fines, place.gradient, speed * np.where(within, share, 0.0)),
-            pace=speed,
-        )
+        # drops of pressure as simulated, Pa: of what moves in the pack, and of all that stands
+        loose = slow * speed - gain
+        drop = self._viscosity * speed * pack.length / pack.permeability / carried.k_over_k0
+
+        pressed, fluid = drop * pressed, speed * shape
+        pace = np.maximum(_speed(speed * intact.velocity), speed)
+        force, volume = _speed(pressed), 4.0 / 3.0 * np.pi * fines.radius**3
+        going = np.divide(force, pace, out=np.zeros_like(force), where=pace > 0)
+        coefficient = np.where(held, np.maximum(going, lone), crowd)
+        velocity = np.where(held[:, None], pressed / coefficient[:, None], fluid)
+        push = np.where(held[:, None], 0.0, pressed)
+        if self.case.drag.pressure_gradient:
+            local = self._viscosity * volume * (speed * np.where(within, share, 0.0))
+            push = -pack.scale * intact.gradient * local[:, None] + push
+
+        # the push of the intact pack's gradient is part of what the network gives to the grains
+        drag = coefficient * np.where(held, velocity[:, 0], (velocity - fines.velocity)[:, 0])
+        outside = ~within & np.any(pressed != 0.0, axis=1)
+        on_fines = float(drag[within].sum()) + float(pressed[outside, 0].sum())
+        on_grains, on_held = drop * float(carried.pressed.grains[0]), float(pressed[held, 0].sum())
+        whole, law = (drop + loose) * pack.network.area, float(crowd[held] @ fluid[held, 0])
+        dense = float(np.mean(1.0 - near.porosity[caked])) if caked.any() else 0.0
+        # rates and pressures are those of the fluid itself, which is slower than a driven one
+        driven, filtrate = scales.force_factor, 0.0
+        if moment.before is not None:
+            passed = (moment.time - moment.before["time_s"]) * driven
+            filtrate = moment.before["filtrate_m3"] + moment.before["rate_m3_s"] * passed
         return FluidForces(
-            coefficient=made.coefficient,
-            velocity=made.velocity,
-            push=made.push,
-            pace=speed / self.scales.porosity,
-            measures=self._pressures(carried, cake, loose, speed)
-            | self._ledger(speed, moment)
-            | crowd_measures(factor, near)
-            | self._momentum(
-                made, fines, within, drop * float(carried.pressed.grains[0]), drop + loose
-            )
+            coefficient=coefficient,
+            velocity=velocity,
+            push=push,
+            pace=speed / scales.porosity,
+            measures=crowd_measures(factor, near)
             | {
-                "cake_thickness_m": self._thickness(fines.radius[caked], near, caked),
+                "velocity_m_s": speed,
+                "rate_m3_s": speed / driven * pack.network.area,
+                "rate_over_initial": speed / self.first_velocity,
+                "filtrate_m3": filtrate,
+                "k_over_k0": carried.k_over_k0,
+                "pressure_cake_Pa": cake * speed / driven,
+                "pressure_pack_Pa": (drop + loose) / driven,
+                "momentum_defect": _over(abs(on_fines + on_grains - whole), whole),
+                "fines_share": _over(on_held, whole),
+                "crowd_over_network": _over(law, on_held),
+                "cake_thickness_m": _over(float(np.sum(volume[caked])), pack.network.area * dense),
                 "pores_stagnant": carried.stagnant,
                 "fines_standing": int(np.sum(standing & within)),
             },
         )
 
-    def _stands(self, fines: Snapshot, flow: Array, moment: Moment) -> Array:
-        """Which fines (N,) belong to the deposit; the intact `flow` (N,) m/s is at their place.
-
-        Their forces carry them at the speed that was given. A fine that comes out of a throat has
-        that speed and is slow for its place.
-        """
-        given = flow if moment.given is None else np.where(moment.given > 0, moment.given, flow)
-        return _speed(fines.velocity) < self.standing * given
-
     def _before(self, moment: Moment) -> float:
         """Superficial velocity up to this moment, m/s."""
         return self.first_velocity if moment.before is None else moment.before["velocity_m_s"]
-
-    def _drag_rate(self, fines: Snapshot, crowd: Array, moment: Moment) -> Array:
-        """How fast the drag `crowd` (N,) N s/m takes up the slip of the fines, (N,) 1/s."""
-        known = moment.density
-        return drag_rate(fines, crowd, self.case.fines.density_kg_m3 if known is None else known)
 
     def _ahead(self, fines: Snapshot, rate: Array, carried: Carried, moment: Moment) -> Array:
         """Velocity (N, 3) of the fluid over U on the way of `fines` that move.
@@ -567,38 +451,14 @@ class NetworkFluid:
             return self.pack.shape_at(fines.position, carried)
         steps = steps_between(self.case, self.scales, pace / self.scales.porosity)
         time = min(steps * self.scales.time_step, moment.left)
-        movers = Movers(position=fines.position, velocity=fines.velocity, rate=rate)
-        field = float(self.pack.shape.lattice.low[0])
+        movers, field = Movers(fines.position, fines.velocity, rate), self.pack.shape.lattice
         mean = mean_ahead(
-            movers, lambda at: pace * self.pack.shape_at(at, carried), time, even_to=field
+            movers,
+            lambda at: pace * self.pack.shape_at(at, carried),
+            time,
+            even_to=float(field.low[0]),
         )
         return mean / pace
-
-    def _momentum(
-        self, made: FineForces, fines: Snapshot, within: Array, grains: float, drop: float
-    ) -> dict[str, float]:
-        """By how much forces and drop of pressure `drop` Pa differ; what the crowd's law says.
-
-        The push of the intact pack's gradient is part of what the network gives to the grains.
-        """
-        drag = made.coefficient * (made.velocity - fines.velocity)[:, 0]
-        at_rest = np.where(made.held, made.coefficient * made.velocity[:, 0], drag)
-        acting = within | np.any(made.pressed != 0.0, axis=1)
-        cake = ~within & acting
-        on_fines = float(at_rest[within].sum()) + float(made.pressed[cake, 0].sum())
-        whole = drop * self.pack.network.area
-        network = float(made.pressed[made.held, 0].sum())
-        return {
-            "momentum_defect": abs(on_fines + grains - whole) / whole if whole > 0 else 0.0,
-            "fines_share": network / whole if whole > 0 else 0.0,
-            "crowd_over_network": made.crowd_drag / network if network > 0 else 0.0,
-        }
-
-    def _factor(self, near: Neighbourhood, fines: Snapshot, velocity: Array) -> Array:
-        if self.case.drag.crowd == "none":
-            return np.ones(len(fines))
-        slip = np.linalg.norm(velocity - fines.velocity, axis=1)
-        return crowd_factor(self.scales, near, fines.radius, slip)
 
     def _velocity(self, carried: Carried, more: float, gain: float = 0.0) -> float:
         """Superficial velocity U, m/s.
@@ -618,70 +478,13 @@ class NetworkFluid:
     def _viscosity(self) -> float:
         return self.case.fluid.viscosity_Pa_s
 
-    def _push(self, fines: Snapshot, gradient: Array, speed: Array) -> Array:
-        """V (-grad p) of the grains, (N, 3) N, for the local `speed` (N,) m/s over the shape."""
-        if not self.case.drag.pressure_gradient:
-            return np.zeros((len(fines), 3))
-        volume = 4.0 / 3.0 * np.pi * fines.radius**3
-        return -self.pack.scale * gradient * (self._viscosity * volume * speed)[:, None]
 
-    def _pressures(
-        self, carried: Carried, cake: float, loose: float, speed: float
-    ) -> dict[str, float]:
-        """Drops of pressure of the fluid itself, Pa, and the permeability.
-
-        `loose` Pa is what moving fines take.
-        """
-        factor = self.scales.force_factor
-        return {
-            "k_over_k0": carried.k_over_k0,
-            "pressure_cake_Pa": cake * speed / factor,
-            "pressure_pack_Pa": (self._drop(carried, speed) + loose) / factor,
-        }
-
-    def _drop(self, carried: Carried, speed: float) -> float:
-        """Drop of pressure over the pack with its deposit as simulated, Pa."""
-        intact = self._viscosity * speed * self.pack.length / self.pack.permeability
-        return intact / carried.k_over_k0
-
-    def _ledger(self, speed: float, moment: Moment) -> dict[str, float]:
-        """Rate and filtrate of the fluid itself, which is slower than a driven one."""
-        factor, before = self.scales.force_factor, moment.before
-        rate, filtrate = speed / factor * self.pack.network.area, 0.0
-        if before is not None:
-            passed = (moment.time - before["time_s"]) * factor
-            filtrate = before["filtrate_m3"] + before["rate_m3_s"] * passed
-        return {
-            "velocity_m_s": speed,
-            "rate_m3_s": rate,
-            "rate_over_initial": speed / self.first_velocity,
-            "filtrate_m3": filtrate,
-        }
-
-    def _thickness(self, radius: Array, near: Neighbourhood, standing: Array) -> float:
-        """Thickness, m, of a cake of the standing fines with their own mean solid fraction."""
-        if not len(radius):
-            return 0.0
-        solid = float(np.sum(4.0 / 3.0 * np.pi * radius**3))
-        dense = float(np.mean(1.0 - near.porosity[standing]))
-        return solid / (self.pack.network.area * dense) if dense > 0 else 0.0
+def _over(part: float, whole: float) -> float:
+    """`part` over `whole`; 0 where that is not above 0."""
+    return part / whole if whole > 0 else 0.0
 
 
-def _rows(fines: Snapshot, some: Snapshot) -> Array:
-    """Where in `fines` each of `some` of them is, by their ids."""
-    order = np.argsort(fines.id)
-    return order[np.searchsorted(fines.id[order], some.id)]
-
-
-def _speed(velocity: Array) -> Array:
-    return np.linalg.norm(velocity, axis=1)
-
-
-# ------------------------------------------------------------------------------------------------
-# The fluid that drives the fines of a case, where fdnet computes it while LIGGGHTS waits.
-
-
-def fluid_of(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> Fluid | None:
+def fluid_of(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> DrivingFluid | None:
     """The fluid of a coupled case; None where the deck holds the forces itself."""
     if case.drag.field == "network":
         return NetworkFluid(case=case, scales=scales, grains=grains)

@@ -154,8 +154,7 @@ def check_files(
 ) -> list[str]:
     """Compare files below `folder` with the digests in `record`.
 
-    Returns the names of missing files that `may_lack` allows. A record of a stage without digests,
-    as older versions wrote it, is not checked.
+    Returns the names of missing files that `may_lack` allows.
 
     Raises CaseError that names the first file which is missing or is not what the stage made.
     """
@@ -258,8 +257,8 @@ class StageRecord(Checked):
     max_overlap: float
     steps: int
     dt_s: float
-    ranks: int | None = None
-    files: Mapping[str, str] = {}
+    ranks: int
+    files: Mapping[str, str]
     runs: list[_Execution]
     left_out: list[str]
 

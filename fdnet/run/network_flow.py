@@ -1,29 +1,12 @@
-"""The flow that follows the deposit, on the pore network.
+"""The flow that follows the deposit, on the pore network, and what it does to grains and fines.
 
-What the fall of pressure in a damaged network does to grains and fines.
-
-The pressure of a pore acts on the facets of its tetrahedron. The facets of a closed body add up to
-nothing, so over all throats t, with the fall of pressure dp, the area a of the whole facet and its
-normal n from the first to the second pore,
-
-    sum of dp a n_x = (drop of pressure) A
-
-holds exactly, however the flow is: it is the momentum of fluid, grains and fines together. Each
-fall of pressure is the sum of what the clean sides take and of what the fines add. What they add
-acts on the open section, which they fill, and on the grains around it. Fines that fill a section
-S(z) as a bed feel the sum of dp S over the height z, and in a bed dp goes with dz / S. So it acts
-on the harmonic mean of S,
-
-    S_h = h / (integral of dz / S(z)),  S(z) = S_0 + pi z^2 / 2,
-
-where S_0 is the open area of the facet: the discs that three grains show at the height z are
-smaller by pi z^2 / 2 in all, since the angles of a triangle add up to pi.
+The derivation is on docs/physics.md, "The field of the network".
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -45,34 +28,6 @@ from fdnet.spheres.geometry import neighbour_tree, wrapped
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Facets:
-    """The facets of the throats (T).
-
-    Attributes:
-        area: (T, 3) m2, area inside the box times the normal from the first to the second pore.
-        section: (T, 2) share of it on which a bed of fines in either side is pressed.
-    """
-
-    area: Array
-    section: Array
-
-
-def facets_of(network: Network) -> Facets:
-    """The facets of a network."""
-    corner = network.throat_corner
-    whole = geometry.triangle_area(corner)
-    normal = 0.5 * np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    middle = network.pore_corner.mean(axis=1)[network.throat_pores]
-    middle[:, 1] += network.throat_shift * np.ptp(network.box, axis=1)
-    forth = np.sum((middle[:, 1] - middle[:, 0]) * normal, axis=1)
-    turned = np.where(forth < 0, -network.throat_share, network.throat_share)
-    return Facets(
-        area=frozen(turned[:, None] * normal),
-        section=frozen(np.minimum(bed_section(network) / whole[:, None], 1.0)),
-    )
-
-
 def bed_section(network: Network) -> Array:
     """S_h (T, 2) m2 of the sides of each throat; 0 where grains close the facet."""
     height = np.abs(network.throat_heights)
@@ -82,8 +37,7 @@ def bed_section(network: Network) -> Array:
     return narrow * wider
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Pressed:
+class Pressed(NamedTuple):
     """Forces of the fluid over the drop of pressure, m2.
 
     Attributes:
@@ -95,43 +49,6 @@ class Pressed:
     groups: Array
 
 
-def pressed_by(
-    network: Network, facets: Facets, sides: tuple[Array, Array], flow: Flow, fines: Array
-) -> Pressed:
-    """The forces in a `flow` on grains, and on fines in the pores.
-
-    What the fines add to a side acts on those in its pore. A fine also narrows sides whose pores
-    it does not reach: that acts on the fines in the pore behind the throat, and on the grains
-    where that has none either.
-
-    Args:
-        network: pores and throats.
-        facets: of the throats.
-        sides: their clean resistances (T, 2) 1/m3, and the shares (T, 2), above 0, that they keep
-            of their conductances.
-        flow: through the damaged network.
-        fines: (P,) m3, volume of the fines in each pore.
-    """
-    halves, factor = sides
-    first, second = flow.pore_pressure[network.throat_pores].T
-    drop = np.nan_to_num(first - second)
-    raised = halves / factor
-    whole = raised.sum(axis=1, keepdims=True)
-    added = (raised - halves) / np.where(whole > 0, whole, 1.0)
-    on_fines = (drop[:, None] * added * facets.section)[..., None] * facets.area[:, None]
-    group = network.pore_group[network.throat_pores]
-    count = int(network.pore_group.max()) + 1
-    holding = np.bincount(network.pore_group, fines, count) > 0
-    group = np.where(holding[group], group, group[:, ::-1])
-    on_fines *= holding[group][..., None]
-    groups = np.stack(
-        [np.bincount(group.ravel(), on_fines[..., axis].ravel(), count) for axis in range(3)],
-        axis=1,
-    )
-    everything = drop @ facets.area
-    return Pressed(grains=frozen(everything - groups.sum(axis=0)), groups=frozen(groups))
-
-
 def on_each_fine(pressed: Pressed, deposit: KeptDeposit) -> Array:
     """Force (N, 3) m2 on each fine of a deposit: what its pores feel, by its share of the fines.
 
@@ -139,28 +56,25 @@ def on_each_fine(pressed: Pressed, deposit: KeptDeposit) -> Array:
     """
     group = deposit.holders.network.pore_group[deposit.pore]
     held = np.bincount(group, deposit.volume, len(pressed.groups))
-    share = deposit.volume / held[group]
-    force = pressed.groups[group] * share[:, None]
-    count = len(deposit.fines)
-    return np.stack(
-        [np.bincount(deposit.fine, force[:, axis], count) for axis in range(3)], axis=1
-    )
+    force = pressed.groups[group] * (deposit.volume / held[group])[:, None]
+    return _summed(deposit.fine, force, len(deposit.fines))
+
+
+def _summed(where: Array, force: Array, count: int) -> Array:
+    """Sums (count, 3) of the forces (N, 3) that belong to the same of `count` bodies."""
+    return np.stack([np.bincount(where, force[:, axis], count) for axis in range(3)], axis=1)
 
 
 # ------------------------------------------------------------------------------------------------
-# The flow through a pack with its deposit: shape from the intact pack, share from the network.
-#
-# The resolved Stokes flow of the intact pack (`fdnet.network.field`) is solved once and says how
-# the fluid moves inside each pore. The pore network, damaged by the fines that are there now, says
-# how much of it each pore still carries. In a pore the velocity is that of the intact pack times
-# the ratio of the damaged to the clean flux, both at the same rate through the specimen.
+# The flow through a pack with its deposit: in a pore the velocity is that of the resolved flow
+# through the intact pack, times the ratio of the damaged to the clean flux of the network.
 
 
 STAGNANT = 1e-2
 """A pore that carries less than this share of the mean flux of a pore, clean, keeps ratio 1."""
 RENEWED = 0.2
 """Share of the deposit by volume that may change before the network is solved anew
-(`scripts/solve_lag.py`, `fdnet study flow-updates`)."""
+(`scripts/solve_lag.py`, docs/validation/flow-updates.md)."""
 STEP = 1.0 / 3.0
 """Greatest step between two sections of a throat, in radii of its smallest fine. The analysis
 takes an eighth (`scripts/solve_lag.py`)."""
@@ -170,9 +84,8 @@ LEAK = 1e-6
 """Share of its clean conductance that a side keeps at least, so that pressures are known beyond
 what the fines close."""
 CELLS, SLIP = 10.0, 0.15
-"""Cells of the resolved field across a grain (`fdnet study velocity-field`), and the rms velocity
-over the superficial one that it leaves at the walls. The default of `velocity_field` takes half as
-many iterations again (docs/velocity_field.md)."""
+"""Cells of the resolved field across a grain (docs/validation/velocity-field.md), and the rms
+velocity over the superficial one that it leaves at the walls (docs/velocity_field.md)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -200,7 +113,9 @@ class PackFlow:
         network: pores and throats of the grains.
         clean: (T,) m3, conductances.
         halves: (T, 2) 1/m3, resistances of the sides of the clean throats; 0 where infinite.
-        facets: of the throats.
+        facet_area: (T, 3) m2, area of the facet inside the box times its normal, from the first
+            to the second pore.
+        bed_share: (T, 2) share of it on which a bed of fines in either side is pressed.
         holders: the pores, which hold the deposit.
         parts: what the damage of the throats needs and does not depend on the fines.
         flow: through the clean network.
@@ -212,7 +127,8 @@ class PackFlow:
     network: Network
     clean: Array
     halves: Array
-    facets: Facets
+    facet_area: Array
+    bed_share: Array
     holders: Holders
     parts: Sequence[Part]
     flow: Flow
@@ -257,8 +173,29 @@ class PackFlow:
             k_over_k0=flow.inflow / self.flow.inflow,
             ratio=np.divide(share, self.through, out=np.ones_like(share), where=moving),
             stagnant=int(np.sum(~moving)),
-            pressed=pressed_by(self.network, self.facets, (self.halves, factor), flow, fines),
+            pressed=self._pressed(factor, flow, fines),
         )
+
+    def _pressed(self, factor: Array, flow: Flow, fines: Array) -> Pressed:
+        """The forces in a `flow` on grains, and on fines in the pores.
+
+        What the fines add to a side acts on those in its pore. A fine also narrows sides whose
+        pores it does not reach: that acts on the fines in the pore behind the throat, and on the
+        grains where that has none either. `factor` (T, 2) is the share that the sides keep of
+        their conductances, `fines` (P,) m3 the volume of the fines in each pore.
+        """
+        first, second = flow.pore_pressure[self.network.throat_pores].T
+        drop, raised = np.nan_to_num(first - second), self.halves / factor
+        whole = raised.sum(axis=1, keepdims=True)
+        added = (raised - self.halves) / np.where(whole > 0, whole, 1.0)
+        on_fines = (drop[:, None] * added * self.bed_share)[..., None] * self.facet_area[:, None]
+        group, count = self.network.pore_group, int(self.network.pore_group.max()) + 1
+        holding, pair = np.bincount(group, fines, count) > 0, group[self.network.throat_pores]
+        pair = np.where(holding[pair], pair, pair[:, ::-1])
+        on_fines *= holding[pair][..., None]
+        groups = _summed(pair.ravel(), on_fines.reshape(-1, 3), count)
+        everything = drop @ self.facet_area
+        return Pressed(frozen(everything - groups.sum(axis=0)), frozen(groups))
 
     def share_at(self, position: Array, carried: Carried) -> Array:
         """Flux (N,) of the pores at (N, 3) m over that when intact; 1 before and beyond them."""
@@ -282,14 +219,21 @@ class PackFlow:
 def pack_flow(grains: Snapshot, periodic: tuple[bool, bool, bool], walls: str) -> PackFlow:
     """The flow through an intact pack. Raises NetworkError or FlowError where there is none."""
     network = build_network(grains, periodic=periodic, walls=walls)
-    halves = half_resistances(network)
+    corner, halves = network.throat_corner, half_resistances(network)
     clean = 1.0 / halves.sum(axis=1)
     flow = solve_flow(network, clean)
+    normal = 0.5 * np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    middle = network.pore_corner.mean(axis=1)[network.throat_pores]
+    middle[:, 1] += network.throat_shift * np.ptp(network.box, axis=1)
+    forth = np.sum((middle[:, 1] - middle[:, 0]) * normal, axis=1)
+    turned = np.where(forth < 0, -network.throat_share, network.throat_share)
+    whole = geometry.triangle_area(corner)[:, None]
     return PackFlow(
         network=network,
         clean=clean,
         halves=np.where(np.isfinite(halves), halves, 0.0),
-        facets=facets_of(network),
+        facet_area=frozen(turned[:, None] * normal),
+        bed_share=frozen(np.minimum(bed_section(network) / whole, 1.0)),
         holders=holders_of(network),
         parts=tuple(parts_of(network)),
         flow=flow,
@@ -344,15 +288,14 @@ class Renewal:
         The network is solved when enough of them changed, and where `anew` asks. What a solve
         gives does not depend on earlier ones, to the last digit.
         """
-        inside = fines.where(reaching_inside(self.pack.network, fines))
-        self.deposit = (
-            measured_deposit(self.pack.holders, inside)
-            if self.deposit is None
-            else self.deposit.changed_to(inside)
-        )
+        inside, pack = fines.where(reaching_inside(self.pack.network, fines)), self.pack
+        if self.deposit is None:
+            self.deposit = measured_deposit(pack.holders, inside)
+        else:
+            self.deposit = self.deposit.changed_to(inside)
         if anew or self.carried is None or changed_share(self.solved, inside) > self.renewed:
-            self.sections = self.pack.sections(inside, self.sections)
-            self.carried = self.pack.carried(self.sections.factor, self.deposit.in_pores)
+            self.sections = pack.sections(inside, self.sections)
+            self.carried = pack.carried(self.sections.factor, self.deposit.in_pores)
             self.solved, self.solves = inside, self.solves + 1
         return self.carried, self.deposit
 

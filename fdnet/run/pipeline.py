@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.tables import AnalysisChoices
-from fdnet.dem.checkpoint import has_history
+from fdnet.dem.checkpoint import read_rows
 from fdnet.dem.liggghts import find_binary
 from fdnet.dem.supply import refuse_crowded_supply
 from fdnet.errors import CaseError
@@ -95,7 +95,7 @@ def refuse(case: Case, options: RunOptions) -> None:
             "drawdown_MPa, or leave the stage out"
         )
     needed = _stages_to_run(case, options)
-    fresh = options.force or not has_history(options.out / "invade")
+    fresh = options.force or not read_rows(options.out / "invade")
     for refusal in refusals(
         case, scales_of(case), needed=needed, stages=options.stages, supply=fresh
     ):

@@ -21,7 +21,7 @@ from typing import Any
 from fdnet.case.case import Case
 from fdnet.dem.checkpoint import HISTORY, UPDATES, WATCH, Deepest, overlap_text
 from fdnet.dem.invasion import Invasion
-from fdnet.dem.liggghts import KNOWN_VERSION, Binary, Launch, Run, find_binary
+from fdnet.dem.liggghts import KNOWN_VERSION, Binary, Execution, Launch, find_binary
 from fdnet.dem.packing import Pack
 from fdnet.errors import CaseError
 from fdnet.names import STAGES
@@ -119,13 +119,7 @@ def _defects(updates: Sequence[Mapping[str, float]]) -> dict[str, Any]:
     return {"momentum_defect_most": max(defects), "momentum_open": over}
 
 
-def ranks_of(record: dict[str, Any]) -> int | None:
-    """MPI ranks of a finished stage; None where an older version kept none."""
-    runs = record.get("runs") or [{}]
-    return record.get("ranks", runs[0].get("ranks"))
-
-
-def run_record(run: Run) -> dict[str, Any]:
+def run_record(run: Execution) -> dict[str, Any]:
     """One LIGGGHTS execution, with the digests of its decks."""
     decks = {
         path.name: hashlib.sha256(path.read_bytes()).hexdigest()
@@ -376,9 +370,9 @@ def _refuse_other(session: Session, source: Path, record: dict[str, Any]) -> Non
             f"--pack-from {source}: its pack is that of another case or seed (digest "
             f"{record['digest']}, this case {session.case.digest('pack')}); leave the option out"
         )
-    if ranks_of(record) != session.options.ranks:
+    if record["ranks"] != session.options.ranks:
         raise CaseError(
-            f"--pack-from {source}: its pack was made with --np {ranks_of(record)}, this run has "
+            f"--pack-from {source}: its pack was made with --np {record['ranks']}, this run has "
             f"--np {session.options.ranks}, which would give another pack; use the same number"
         )
 

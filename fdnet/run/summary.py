@@ -23,7 +23,6 @@ from fdnet.report.tables import (
     section_rows,
     two_digits,
 )
-from fdnet.run.records import ranks_of
 from fdnet.scales.check import explained
 
 if TYPE_CHECKING:
@@ -69,7 +68,7 @@ def summarise(
         **({"sizes": sizes} if sizes else {}),
         "max_overlap_fraction": invasion["max_overlap"] if invasion else pack["max_overlap"],
         "grain_overlap_fraction": pack["max_overlap"],
-        "ranks": {"pack": ranks_of(pack), "invade": ranks_of(invasion) if invasion else None},
+        "ranks": {"pack": pack["ranks"], "invade": invasion["ranks"] if invasion else None},
         "dem_steps": pack["steps"] + (invasion["steps"] if invasion else 0),
         "dem_dt_s": invasion["dt_s"] if invasion else pack["dt_s"],
         "physical_time_s": physical_time_s,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from builders import resting_spheres, tiny
 
-from fdnet.dem.deck import box_of
+from fdnet.dem.deck import specimen_box
 from fdnet.dem.invade_deck import render_invade, write_batches
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
@@ -19,7 +19,7 @@ BATCHED = ("fines.supply=batches", "fines.count=900", "run.checkpoint_ms=0.005")
 
 
 def one_grain(case):
-    return resting_spheres([[1.5e-3, 0.8e-3, 0.8e-3]], 2.5e-4, box_of(case), kind=Kind.GRAIN)
+    return resting_spheres([[1.5e-3, 0.8e-3, 0.8e-3]], 2.5e-4, specimen_box(case), kind=Kind.GRAIN)
 
 
 def in_the_slab(case, scales, grains):
@@ -203,7 +203,7 @@ def test_free_fines_are_where_the_fluid_has_carried_them(binary, tmp_path):
     """Without a grain, after some chunks every fine has moved u t from its place in the slab."""
     case = tiny(*BATCHED, "drag.scheme=viscous", "run.cap_ms=0.06")
     scales = scales_of(case)
-    far = resting_spheres([[2.9e-3, 0.25e-3, 0.25e-3]], 1e-5, box_of(case), kind=Kind.GRAIN)
+    far = resting_spheres([[2.9e-3, 0.25e-3, 0.25e-3]], 1e-5, specimen_box(case), kind=Kind.GRAIN)
     result = invade(case, scales, far, tmp_path, Launch(binary=binary))
     last = result.history[-1]
     start = {

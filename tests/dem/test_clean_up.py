@@ -11,19 +11,13 @@ import pytest
 from builders import resting_spheres, tiny
 
 from fdnet.case.file import case_from
+from fdnet.dem.checkpoint import Cleaned, csv_row
 from fdnet.dem.clean_up import (
-    CLEANED_HEADER,
-    Beginning,
-    Cleaned,
     Start,
     clean_up,
-    dump_name,
-    fines_to_clean,
-    keep_record,
-    mark_of,
-    newest_whole,
+    cleaned_points,
+    fines_inside,
     render_clean_up,
-    restart_name,
     turned_drag,
 )
 from fdnet.dem.invade_deck import Moment
@@ -174,7 +168,7 @@ def test_a_clean_up_cut_at_every_checkpoint_goes_on_bit_for_bit(
     for column in ("id", "position", "velocity"):
         assert np.array_equal(getattr(rest.state, column), getattr(whole.state, column))
     ends = [
-        (tmp_path / one / "clean_up" / restart_name(whole.history[-1].step)).read_bytes()
+        (tmp_path / one / f"clean_up/post/clean_{whole.history[-1].step}.restart").read_bytes()
         for one in ("whole", "cut")
     ]
     assert ends[0] == ends[1]
@@ -219,16 +213,18 @@ def test_a_record_keeps_restarts_of_later_checkpoints(tmp_path):
     rows = [
         Cleaned(chunk=k, step=100 * k, inside=9, out=k, passed=0, quiet=0) for k in range(1, 6)
     ]
-    lines = [CLEANED_HEADER, *(row.line() for row in rows)]
+    lines = [",".join(Cleaned._fields), *map(csv_row, rows)]
+    points = cleaned_points(tmp_path, "case")
     (tmp_path / "history.csv").write_text("\n".join(lines) + "\n")
     for row in rows:
-        for name in (dump_name(row.step), restart_name(row.step)):
-            (tmp_path / name).write_text(name)
+        for suffix in ("dump", "restart"):
+            points.path(row.step, suffix).write_text(f"{suffix} {row.step}")
     for row in rows[:3]:
-        keep_record(tmp_path, row, "case", ranks=1)
+        points.keep(row, ranks=1)
+        points.remove_restarts(row.step)
     left = {path.name for path in (tmp_path / "post").glob("*.restart")}
     assert left == {f"clean_{step}.restart" for step in (200, 300, 400, 500)}
-    assert newest_whole(tmp_path, "case", ranks=1) == rows[2]
+    assert points.last() == rows[2]
 
 
 def test_friction_decides_what_stays(start, tmp_path, binary):
@@ -246,7 +242,7 @@ def test_the_fines_inside_take_part_and_the_cake_does_not(start):
     x = start.invaded.fines().position[:, 0]
     inside = int(np.sum((x >= 0) & (x < 2e-3)))
     assert int(np.sum((x < 0) & (x > -1e-4))) > 0
-    assert len(fines_to_clean(back_flow(small()), start)) == inside
+    assert fines_inside(start.invaded).sum() == inside
 
 
 def test_the_drag_is_that_of_the_drawdown_turned_back():
@@ -262,8 +258,8 @@ def test_the_drag_is_that_of_the_drawdown_turned_back():
     assert float(drag["gradient"]["force"]) == pytest.approx(gradient, rel=1e-12)
     outside = float(drag["push"]) + float(drag["slower"])
     assert outside == pytest.approx(push * ahead.porosity, rel=1e-12)
-    begin = Beginning(restart="../invade/post/invade_1.restart", row=None)
-    assert f"addforce {drag['push']} 0.0 0.0" in render_clean_up(flow, "0", begin).text
+    text = render_clean_up(flow, "0", "../invade/post/invade_1.restart", None).text
+    assert f"addforce {drag['push']} 0.0 0.0" in text
 
 
 def test_a_case_without_the_table_has_no_such_stage():
@@ -320,11 +316,3 @@ def test_the_mud_side_has_the_upstream_velocity_in_a_crowd_turned_back():
     assert flow.scales.upstream_velocity < 0.6 * flow.scales.drive_velocity
     assert made[:2] == pytest.approx(-flow.scales.upstream_velocity, rel=1e-12)
     assert made[2:] == pytest.approx(-flow.scales.drive_velocity, rel=1e-12)
-
-
-def test_a_checkpoint_of_a_crowd_with_the_ends_exchanged_is_not_continued(tmp_path):
-    spheres = fines_at([6e-4])
-    start = Start(grains=spheres.grains(), invaded=spheres, invasion=tmp_path, digest="test")
-    assert mark_of(back_flow(small(*CROWD, "drag.upstream=darcy")), start) != "test"
-    assert mark_of(back_flow(small(*CROWD)), start) == "test"
-    assert mark_of(back_flow(small("drag.scheme=held", "drag.upstream=darcy")), start) == "test"

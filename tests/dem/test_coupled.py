@@ -16,8 +16,8 @@ from builders import TINY, followed, resting_spheres, tiny
 from cut_and_continue import StopError, differences
 
 from fdnet.case.file import case_from
-from fdnet.dem.checkpoint import UPDATES, last_checkpoint, read_updates
-from fdnet.dem.deck import box_of, snapshot_of, write_data
+from fdnet.dem.checkpoint import UPDATES, Checkpoints, read_updates
+from fdnet.dem.deck import snapshot_of, specimen_box, write_data
 from fdnet.dem.invade_deck import (
     FluidForces,
     Moment,
@@ -30,7 +30,7 @@ from fdnet.dem.invade_deck import (
     write_parts,
 )
 from fdnet.dem.invasion import invade, steps_between
-from fdnet.dem.liggghts import Launch, run_fed
+from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.packing import make_pack
 from fdnet.dem.supply import batches_of, densities
 from fdnet.errors import CaseError, LiggghtsError
@@ -114,15 +114,15 @@ def test_a_lost_or_changed_record_of_updates_makes_the_checkpoint_unusable(done,
     folder, result = done
     shutil.copytree(folder, tmp_path / "cut")
     path = tmp_path / "cut" / UPDATES
-    assert last_checkpoint(tmp_path / "cut", small()) == result.history[-1]
+    points = Checkpoints(folder=tmp_path / "cut", digest=small().digest("invade"))
+    assert points.last() == result.history[-1]
     lines = path.read_text().splitlines()
     column = lines[0].split(",").index("factor_mean")
     row = lines[-2].split(",")
     row[column] = "1.0"
     lines[-2] = ",".join(row)
     path.write_text("\n".join(lines) + "\n")
-    kept = last_checkpoint(tmp_path / "cut", small())
-    assert kept == result.history[-2]
+    assert points.last() == result.history[-2]
 
 
 def test_liggghts_that_is_killed_is_reported_and_the_run_goes_on_bit_for_bit(
@@ -150,7 +150,7 @@ ORPHAN = """
 import sys
 from pathlib import Path
 from fdnet.dem.liggghts import find_binary
-from fdnet.dem.liggghts import run_fed
+from fdnet.dem.liggghts import run_deck
 from fdnet.dem.liggghts import Launch
 
 def play(feed):
@@ -158,7 +158,7 @@ def play(feed):
     feed('shell sleep 0.1', 'print "alive"')
     sys.stdin.read()
 
-run_fed(Path(sys.argv[1]), "in.none", Launch(binary=find_binary()), play)
+run_deck(Path(sys.argv[1]), "in.none", Launch(binary=find_binary()), play)
 """
 
 
@@ -176,13 +176,13 @@ def test_liggghts_ends_when_fdnet_is_killed(tmp_path):
 
 def test_an_error_of_liggghts_is_reported_with_its_line(binary, tmp_path):
     with pytest.raises(LiggghtsError, match="ERROR: Unknown command: nonsense"):
-        run_fed(tmp_path, "in.none", Launch(binary=binary), lambda feed: feed("nonsense 1"))
+        run_deck(tmp_path, "in.none", Launch(binary=binary), lambda feed: feed("nonsense 1"))
 
 
 def test_a_time_limit_ends_a_liggghts_that_hangs(binary, tmp_path):
     launch = Launch(binary=binary, timeout=1.0)
     with pytest.raises(LiggghtsError, match="did not end within its time limit"):
-        run_fed(tmp_path, "in.none", launch, lambda feed: feed("shell sleep 30"))
+        run_deck(tmp_path, "in.none", launch, lambda feed: feed("shell sleep 30"))
 
 
 def test_what_follow_raises_stops_liggghts(binary, grains, tmp_path):
@@ -236,7 +236,7 @@ def test_the_fluid_is_asked_with_the_density_of_each_fine(binary, grains, tmp_pa
 def test_explicit_drag_is_judged_by_the_fine_that_follows_the_fluid_fastest():
     """C t / m of the lighter one of two equal fines: m = 4/3 pi r^3 rho."""
     two = resting_spheres(
-        [[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0]], 5e-5, box_of(tiny()), kind=Kind.FINE
+        [[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0]], 5e-5, specimen_box(tiny()), kind=Kind.FINE
     )
     forces = FluidForces(
         coefficient=np.array([2e-6, 2e-6]),
@@ -350,7 +350,7 @@ def test_a_standing_bed_of_fines_takes_up_its_pressure_drop(binary, tmp_path):
 def test_liggghts_shows_the_densities_and_takes_in_only_the_last_forces(binary, tmp_path):
     """No number of the first forces is left after the second ones, where zeros have no rows."""
     case = tiny("drag.crowd=beetstra", "drag.scheme=implicit")
-    box, place = box_of(case), [[2e-4, 5e-4, 5e-4], [6e-4, 5e-4, 5e-4]]
+    box, place = specimen_box(case), [[2e-4, 5e-4, 5e-4], [6e-4, 5e-4, 5e-4]]
     fines = resting_spheres(place, 5e-5, box, kind=Kind.FINE, first=2)
     write_scene(case, fines, tmp_path, density=[2650.0, 2650.0, 1100.5])
     given = np.array([[[1.0, 2.0, -3.0], [4.0, 5.0, 6.0]], [[7.0, 0.0, 0.0], [0.0, -8.0, 0.0]]])
@@ -370,7 +370,7 @@ def test_liggghts_shows_the_densities_and_takes_in_only_the_last_forces(binary, 
             show = f"write_dump fines custom post/{number}.dump id f_uf[1] f_uf[2] f_uf[3]"
             feed("include fluid.in", f"{show} modify sort id")
 
-    run_fed(tmp_path, "in.invade", Launch(binary=binary), play)
+    run_deck(tmp_path, "in.invade", Launch(binary=binary), play)
     for number, velocity in enumerate(given):
         frame = read_frame(tmp_path / "post" / f"{number}.dump")
         shown = np.column_stack([frame.column(f"f_uf[{axis}]") for axis in (1, 2, 3)])
@@ -413,6 +413,6 @@ def applied_force(case, fines, folder, binary) -> np.ndarray:
         write_forces(folder, shown, fluid_of(case, scales, grain).forces(shown, moment))
         feed("include fluid.in", "run 0", show.format("with"))
 
-    run_fed(folder, "in.invade", Launch(binary=binary), play)
+    run_deck(folder, "in.invade", Launch(binary=binary), play)
     first, second = (read_frame(folder / "post" / f"{name}.dump") for name in ("without", "with"))
     return second.column("fx") - first.column("fx")

@@ -9,18 +9,22 @@ from builders import tiny
 
 from fdnet.dem import checkpoint, supply
 from fdnet.dem.checkpoint import (
-    HISTORY_HEADER,
+    Checkpoint,
+    Checkpoints,
     file_digest,
-    last_checkpoint,
     plug_allowance,
     read_history,
-    read_record,
-    store_record,
 )
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
-from fdnet.dem.supply import CLEARANCE, SURE_CROWDING, crowding, place_fines, refuse_crowded_supply
+from fdnet.dem.supply import (
+    CLEARANCE,
+    SURE_CROWDING,
+    crowding,
+    place_batches,
+    refuse_crowded_supply,
+)
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.run import pipeline
 from fdnet.scales.scales import scales_of
@@ -28,6 +32,18 @@ from fdnet.spheres.geometry import touching_pairs
 from fdnet.spheres.snapshot import Kind
 
 pytestmark = pytest.mark.liggghts
+HISTORY_HEADER = ",".join(Checkpoint._fields)
+
+
+def points(folder, case) -> Checkpoints:
+    """The checkpoints of an invasion."""
+    return Checkpoints(folder=folder, digest=case.digest("invade"))
+
+
+def the_slab(case, scales, grains):
+    """All fines of a slab that is there at the start."""
+    assert case.fines.supply == "slab"
+    return next(place_batches(case, scales, grains))
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +66,7 @@ def test_fines_start_clear_of_everything(packed, assignments):
     case = tiny(*assignments)
     scales = scales_of(case)
     grains = packed[case.box.sides]
-    fines = place_fines(case, scales, grains)
+    fines = the_slab(case, scales, grains)
     assert len(fines) == scales.supplied_count
     pairs, _ = touching_pairs(grains.joined(fines), case.periodic, gap=0.5 * (CLEARANCE - 1))
     assert not np.any(grains.joined(fines).kind[pairs] == Kind.FINE)
@@ -61,12 +77,12 @@ def test_fines_start_clear_of_everything(packed, assignments):
 
 
 def test_a_slab_that_cannot_hold_the_fines_is_an_error(packed):
-    case = tiny("fines={radius_mm=0.05, count=300, concentration=0.3}")
+    case = tiny("fines={radius_mm=0.05, count=300, concentration=0.3, supply='slab'}")
     crowded = case.model_copy(
         update={"fines": case.fines.model_copy(update={"concentration": 0.6})}
     )
     with pytest.raises(CaseError, match=r"fines\.concentration: 0\.6 leaves"):
-        place_fines(crowded, scales_of(crowded), packed["walls"])
+        the_slab(crowded, scales_of(crowded), packed["walls"])
 
 
 @pytest.mark.parametrize("radius_mm", ["0.05", "[0.015,0.05]", "0.2"])
@@ -226,13 +242,13 @@ def test_broken_checkpoints_are_passed_over(binary, packed, tmp_path):
     dump = tmp_path / "post" / f"invade_{last.step}.dump"
     whole_dump = dump.read_bytes()
     dump.write_bytes(whole_dump[:-40])
-    assert last_checkpoint(tmp_path, case) == before
+    assert points(tmp_path, case).last() == before
     text = whole_dump.replace(b"ITEM: NUMBER OF ATOMS\n300\n", b"ITEM: NUMBER OF ATOMS\n299\n")
     assert text != whole_dump
     dump.write_bytes(text[: text.rstrip(b"\n").rindex(b"\n") + 1])
-    assert last_checkpoint(tmp_path, case) == before
+    assert points(tmp_path, case).last() == before
     (tmp_path / "post" / f"invade_{before.step}.restart").write_bytes(b"")
-    assert last_checkpoint(tmp_path, case) is None
+    assert points(tmp_path, case).last() is None
     again = invade(case, scales, grains, tmp_path, Launch(binary=binary))
     assert np.array_equal(again.damaged.position, whole.damaged.position)
 
@@ -246,9 +262,9 @@ def test_a_restart_cut_by_a_full_disk_is_set_aside(binary, packed, tmp_path):
     kept = whole.history[-2]
     restart = tmp_path / "post" / f"invade_{kept.step}.restart"
     restart.write_bytes(restart.read_bytes()[: int(0.9 * restart.stat().st_size)])
-    cut = replace(read_record(tmp_path, kept.step), restart=file_digest(restart))
-    store_record(tmp_path, kept.step, cut)
-    assert last_checkpoint(tmp_path, case) == kept
+    cut = points(tmp_path, case).record(kept.step)._replace(restart=file_digest(restart))
+    points(tmp_path, case).store(kept.step, cut)
+    assert points(tmp_path, case).last() == kept
     again = invade(case, scales, grains, tmp_path, Launch(binary=binary))
     assert again.history == whole.history
     assert np.array_equal(again.damaged.position, whole.damaged.position)
@@ -267,7 +283,7 @@ def test_fines_that_vanish_are_an_error(packed, tmp_path):
         most_crossed=95,
         quiet=0,
     )
-    damaged = packed["walls"].joined(place_fines(case, scales_of(case), packed["walls"]))
+    damaged = packed["walls"].joined(the_slab(case, scales_of(case), packed["walls"]))
     with pytest.raises(LiggghtsError, match="fines inside"):
         checkpoint.check_counts(tmp_path, row, damaged, 300)
     row = checkpoint.Checkpoint(

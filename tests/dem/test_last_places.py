@@ -40,7 +40,7 @@ def test_a_slab_of_2000_fines_holds_all_that_a_case_may_ask_for(concentration, s
     """Rounds alone leave 1 and some 70 of them without a place."""
     case = slab(seed, concentration)
     refuse_crowded_supply(case, scales_of(case))
-    place, radius = supply._draw(case, scales_of(case), end=0.0)
+    ((place, radius),) = supply._draw(case, scales_of(case), end=0.0)
     size = np.array([0.0, 1.6e-3, 1.6e-3])
     assert len(place) == 2000
     assert closest(np.column_stack([place[:, 0] - place[:, 0].min(), place[:, 1:]]), size) >= (
@@ -52,10 +52,10 @@ def test_what_finds_its_places_in_the_rounds_keeps_them(monkeypatch):
     """Nothing more is drawn then."""
     monkeypatch.setattr(supply, "last_places", None)
     monkeypatch.setattr(size_classes, "last_places", None)
-    supply._draw(slab(2, 0.2), scales_of(slab(2, 0.2)), end=0.0)
+    list(supply._draw(slab(2, 0.2), scales_of(slab(2, 0.2)), end=0.0))
     monkeypatch.setattr(supply, "ROUNDS", 30)
     with pytest.raises(TypeError):
-        supply._draw(slab(2, 0.2), scales_of(slab(2, 0.2)), end=0.0)
+        list(supply._draw(slab(2, 0.2), scales_of(slab(2, 0.2)), end=0.0))
 
 
 def test_the_last_ones_of_a_class_are_drawn_more_often():

@@ -10,7 +10,7 @@ from builders import followed
 from cut_and_continue import differences
 from scipy.integrate import quad
 
-from fdnet.dem.checkpoint import last_checkpoint, read_record, store_record
+from fdnet.dem.checkpoint import Checkpoints
 from fdnet.dem.invade_deck import Moment
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
@@ -131,12 +131,12 @@ def test_batches_come_as_the_mud_that_slows_down_carries_them(binary, fluid, tmp
         filtrate = [line["filtrate_m3"] for line in result.updates if line["step"] < row.step][-1]
         assert count >= batches.entered_after(filtrate / area)
     assert differences(other.case, other.grains, tmp_path, binary) == []
-    newest = last_checkpoint(tmp_path / "a", other.case)
+    points = Checkpoints(folder=tmp_path / "a", digest=other.case.digest("invade"))
+    newest = points.last()
     assert newest is not None
     assert newest.step == last.step
-    record = read_record(tmp_path / "a", last.step)
-    store_record(tmp_path / "a", last.step, replace(record, case=other.case.digest("invade")))
-    older = last_checkpoint(tmp_path / "a", other.case)  # that one was made by another law
+    points.store(last.step, points.record(last.step)._replace(case="another"))
+    older = points.last()
     assert older is None or older.step < last.step
 
 

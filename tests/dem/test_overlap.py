@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from builders import resting_spheres, tiny
 
-from fdnet.dem import invade_deck, invasion
-from fdnet.dem import invasion as keeper
+from fdnet.dem import checkpoint, invade_deck, invasion
 from fdnet.dem.checkpoint import (
     Deepest,
     cut_watch,
@@ -17,7 +16,7 @@ from fdnet.dem.checkpoint import (
     watch_variables,
     write_watch_parts,
 )
-from fdnet.dem.deck import box_of, contact_variables, number, render_text, write_data
+from fdnet.dem.deck import contact_variables, number, render_text, specimen_box, write_data
 from fdnet.dem.invade_deck import render_invade, write_invade_inputs
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch, run_deck
@@ -45,7 +44,7 @@ def deck_of(*assignments: str):
 
 
 def grain_of(case):
-    return resting_spheres([[2e-4, 8e-4, 8e-4]], 2.5e-4, box_of(case), kind=Kind.GRAIN)
+    return resting_spheres([[2e-4, 8e-4, 8e-4]], 2.5e-4, specimen_box(case), kind=Kind.GRAIN)
 
 
 def test_the_deck_watches_where_it_can_and_says_where_it_cannot():
@@ -129,14 +128,14 @@ def test_the_deck_sees_the_overlap_of_an_impact(binary, tmp_path):
     case = tiny("fines.damping_ratio=0.0", "grains.damping_ratio=0.0", "fines.friction=0.0")
     scales, radius, speed = scales_of(case), 0.05e-3, 2.0
     places = [[2e-3, 8e-4, 8e-4], [2e-3 + 3.3e-4, 8e-4, 8e-4]]
-    pair = resting_spheres(places, 2.5e-4, box_of(case), kind=Kind.GRAIN)
+    pair = resting_spheres(places, 2.5e-4, specimen_box(case), kind=Kind.GRAIN)
     fine = resting_spheres(
-        [[2e-3 - 3.05e-4, 8e-4, 8e-4]], radius, box_of(case), kind=Kind.FINE, first=3
+        [[2e-3 - 3.05e-4, 8e-4, 8e-4]], radius, specimen_box(case), kind=Kind.FINE, first=3
     )
     write_data(
         tmp_path / "hit.data",
         pair.joined(fine),
-        bounds=box_of(case),
+        bounds=specimen_box(case),
         density=np.array([2650.0, 2650.0, 2146.0]),
         types=3,
     )
@@ -232,10 +231,12 @@ def test_a_checkpoint_without_its_row_is_named_where_it_is_looked_at(
         "fluid.velocity_m_s=1.0",
         f"run.on_overlap={policy}",
     )
-    real = invasion.read_history
-    for reader in (invasion, keeper):
-        monkeypatch.setattr(
-            reader, "read_history", lambda folder: tuple(r for r in real(folder) if r.chunk != 1)
-        )
+    real = checkpoint.read_rows
+
+    def without_the_first(folder, kind=checkpoint.Checkpoint):
+        return tuple(row for row in real(folder, kind) if row.chunk != 1)
+
+    for reader in (checkpoint, invasion):
+        monkeypatch.setattr(reader, "read_rows", without_the_first)
     with pytest.raises(LiggghtsError, match=raised) if raised else nullcontext():
         invade(case, scales_of(case), grains, tmp_path, Launch(binary=binary))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from builders import tiny
 
-from fdnet.dem.deck import box_of
+from fdnet.dem.deck import specimen_box
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import RestlessError, _creep, check_radii, draw_radii, make_pack
 from fdnet.errors import CaseError, DumpError, LiggghtsError
@@ -43,7 +43,7 @@ def test_a_pack_that_creeps_is_taken_and_one_that_moves_is_refused(tmp_path):
     scales = scales_of(case)
     mass = 2650 * 4 / 3 * math.pi * 0.25e-3**3
     natural = 0.5e-3 * math.sqrt(scales.contacts["grain-grain"].normal_stiffness / mass)
-    still = resting(np.random.default_rng(1).random((50, 3)) * 1e-3, 0.25e-3, box_of(case))
+    still = resting(np.random.default_rng(1).random((50, 3)) * 1e-3, 0.25e-3, specimen_box(case))
     direction = np.random.default_rng(2).normal(size=(50, 3))
     direction /= np.sqrt(np.mean(np.sum(direction**2, axis=1)))
     slow = replace(still, velocity=0.99e-5 * natural * direction)
@@ -58,7 +58,7 @@ def test_radii_that_the_case_does_not_ask_for_are_refused(tmp_path):
     """Also where the porosity is the same, and where the radii are those of another seed."""
     case = tiny("grains.radius_mm=[0.15,0.25]", "grains.count=50")
     asked = draw_radii(case, 50)
-    grains = resting(np.random.default_rng(1).random((50, 3)) * 1e-3, asked, box_of(case))
+    grains = resting(np.random.default_rng(1).random((50, 3)) * 1e-3, asked, specimen_box(case))
     check_radii(grains, case, tmp_path)
     one = asked.copy()
     one[7] *= 1 + 1e-8

@@ -8,14 +8,15 @@ import pytest
 from packs import simple_cubic
 
 from fdnet.network.network import build_network
-from fdnet.run.bridging import Throats, classes_of, open_throats, pooled, width_rows, wilsons_band
+from fdnet.run.bridging import OpenThroats, classes_of, open_throats, width_rows, wilsons_band
 from fdnet.spheres.snapshot import Snapshot
+from fdnet.studies.dem.bridging import pooled_classes
 
 
 def throats(ratio, clogged):
     """Throats of width 1 that hold a fine of the ratio each."""
     none = np.zeros(len(ratio), bool)
-    return Throats(
+    return OpenThroats(
         width=np.ones(len(ratio)),
         fine=np.array(ratio),
         held=~none,
@@ -55,7 +56,7 @@ def test_throats_fall_into_their_classes_and_runs_add_up():
     assert [row["closed"] for row in first] == [0, 1, 1]
     second = rows_of([0.25, 0.25], [1, 1], 0.1)
     other = rows_of([0.25], [0], 0.2)
-    rows = pooled([first, second, other])
+    rows = pooled_classes([first, second, other])
     assert [
         (row["concentration"], row["ratio_lo"], row["throats"], row["closed"]) for row in rows
     ] == [

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from fdnet.case.case import InvasionCase
 from fdnet.case.file import case_from, parse_sizes, read_case, read_size_file
-from fdnet.dem.deck import box_of
+from fdnet.dem.deck import specimen_box
 from fdnet.dem.packing import draw_radii
 from fdnet.dem.supply import (
     AT_ONCE,
@@ -214,7 +214,7 @@ def test_every_fine_has_the_density_of_its_material_in_its_data_file(tmp_path):
 
     case = made(mixed(supply="batches", slab="3 mm") | {"run": {"checkpoint_ms": 0.005}})
     scales = scales_of(case)
-    grain = resting(np.array([[1.5e-3, 1.2e-3, 1.2e-3]]), 2e-4, box_of(case))
+    grain = resting(np.array([[1.5e-3, 1.2e-3, 1.2e-3]]), 2e-4, specimen_box(case))
     write_invade_inputs(case, scales, grain, tmp_path)
     rows = {}
     for path in [tmp_path / "invade.data", *(tmp_path / "supply").glob("*.data")]:
@@ -330,7 +330,7 @@ def test_a_crowded_wide_supply_has_no_gaps_and_touches_nothing(sides):
     data |= {"box": {"size_mm": [1.8, 1.8, 1.8], "sides": sides}}
     case = made(data | {"run": {"checkpoint_ms": 0.002}})
     scales = scales_of(case)
-    grain = resting(np.array([[0.9e-3, 0.9e-3, 0.9e-3]]), 2e-4, box_of(case))
+    grain = resting(np.array([[0.9e-3, 0.9e-3, 0.9e-3]]), 2e-4, specimen_box(case))
     batches, placed = batches_of(case, scales), list(place_batches(case, scales, grain))
     assert len(placed) == len(batches.counts) > 3
     assert batches.length < 1.1 * 2 * CLEARANCE * case.fines.radius_range_m[1]

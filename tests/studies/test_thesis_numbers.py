@@ -15,7 +15,7 @@ import pytest
 from builders import resting_spheres, tiny
 from scipy.spatial import Delaunay
 
-from fdnet.dem.deck import box_of
+from fdnet.dem.deck import specimen_box
 from fdnet.errors import CaseError
 from fdnet.spheres.snapshot import Kind, resting
 from fdnet.studies.engine.bands import wilson_interval
@@ -200,7 +200,7 @@ def test_deep_fines_near_a_wall():
         [0.2, 0.8, 0.8, 0.8, 0.1, 0.1],
         [0.8, 0.8, 1.4, 1.3, 0.8, 0.8],
     )
-    spheres = resting(1e-3 * np.column_stack([x, y, z]), 1e-5, box_of(case), Kind.FINE)
+    spheres = resting(1e-3 * np.column_stack([x, y, z]), 1e-5, specimen_box(case), Kind.FINE)
     made = State(
         case=case, grains=spheres.grains(), damaged=spheres, history=np.zeros((1, 4)), ending={}
     )

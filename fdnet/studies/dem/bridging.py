@@ -1,13 +1,16 @@
 """The bridging statistics of several runs, added up."""
 
 import csv
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fdnet.errors import CaseError
 from fdnet.report.tables import write_rows
-from fdnet.run.bridging import pooled
+from fdnet.run.bridging import COUNTS, class_row
 
 
 def pooled_runs(runs: Sequence[Path], path: Path) -> list[dict[str, Any]]:
@@ -15,9 +18,24 @@ def pooled_runs(runs: Sequence[Path], path: Path) -> list[dict[str, Any]]:
 
     Raises CaseError where a run has no such table.
     """
-    rows = pooled([_classes(run / "bridging.csv") for run in runs])
+    rows = pooled_classes([_classes(run / "bridging.csv") for run in runs])
     write_rows(path, rows)
     return rows
+
+
+def pooled_classes(tables: Iterable[Sequence[Mapping[str, Any]]]) -> list[dict[str, Any]]:
+    """The rows of several runs added up by concentration and class, in that order."""
+    sums: dict[tuple[float, float, float], np.ndarray] = {}
+    for row in (row for table in tables for row in table):
+        upper = math.inf if row["ratio_hi"] in (None, "") else float(row["ratio_hi"])
+        key = float(row["concentration"]), float(row["ratio_lo"]), upper
+        counts = [float(row[name]) for name in COUNTS]
+        came = float(row["arrived_mean"]) * counts[0]
+        sums[key] = sums.get(key, 0.0) + np.array([*counts, came])
+    return [
+        class_row(*key, [round(count) for count in counts[:-1]], counts[-1])
+        for key, counts in sorted(sums.items(), key=lambda item: item[0])
+    ]
 
 
 def _classes(path: Path) -> list[dict[str, str]]:

@@ -15,11 +15,11 @@ import numpy as np
 
 from fdnet.case.case import Case, InvasionCase, with_fines
 from fdnet.case.file import case_from, set_keys
-from fdnet.dem.checkpoint import HISTORY, HISTORY_HEADER, state_at
-from fdnet.dem.deck import box_of, snapshot_of
+from fdnet.dem.checkpoint import Checkpoints, state_at
+from fdnet.dem.deck import snapshot_of, specimen_box
 from fdnet.dem.invade_deck import write_invade_inputs
-from fdnet.dem.invasion import CheckpointKeeper, Invasion, invade
-from fdnet.dem.liggghts import Binary, Launch, Run, find_binary, run_deck
+from fdnet.dem.invasion import InvadeStage, Invasion, invade
+from fdnet.dem.liggghts import Binary, Execution, Launch, find_binary, run_deck
 from fdnet.dem.packing import make_pack
 from fdnet.files import write_text
 from fdnet.names import SECTION_ARCHIE
@@ -147,7 +147,7 @@ def _fresh(
 
 def _gridded(
     case: InvasionCase, grains: Snapshot, folder: Path, grid: tuple[int, ...], launch: Launch
-) -> Run:
+) -> Execution:
     """The whole invasion under another processor grid than fdnet's; `invade` then reads it."""
     line = "processors " + " ".join(map(str, grid))
     return edited_run(case, grains, folder, launch, (r"^processors .*$", line))
@@ -155,7 +155,7 @@ def _gridded(
 
 def edited_run(
     case: InvasionCase, grains: Snapshot, folder: Path, launch: Launch, edit: tuple[str, str]
-) -> Run:
+) -> Execution:
     """The whole invasion with one line of its deck replaced; `invade` then reads the folder.
 
     `edit` is the pattern of the line and what takes its place. Raises AssertionError when not
@@ -167,9 +167,10 @@ def edited_run(
     text, count = re.subn(f"(?m){edit[0]}", edit[1], deck)
     assert count == 1, f"{count} lines of the deck have the pattern {edit[0]}, expected 1"
     write_text(folder / "in.invade", text)
-    write_text(folder / HISTORY, HISTORY_HEADER + "\n")
-    keeper = CheckpointKeeper(folder, case, scales, grains, launch=launch)
-    return run_deck(folder, "in.invade", replace(launch, follow=keeper))
+    points = Checkpoints(folder=folder, digest=case.digest("invade"))
+    points.cut(None)
+    stage = InvadeStage(case=case, scales=scales, grains=grains, points=points, launch=launch)
+    return run_deck(folder, "in.invade", replace(launch, follow=stage.keeper()))
 
 
 def invasion_observed(case: InvasionCase, grains: Snapshot, result: Invasion) -> dict[str, float]:
@@ -267,7 +268,7 @@ def relaxation_run(
 
 def _relaxed(case: InvasionCase, folder: Path, *, terminal: float, tau: float) -> dict[str, float]:
     scales, far = scales_of(case), np.array([[3.5e-3, 1.4e-3, 1.4e-3]])
-    lonely = resting(far, 2.5e-4, box_of(case), Kind.GRAIN)
+    lonely = resting(far, 2.5e-4, specimen_box(case), Kind.GRAIN)
     result, costs = _fresh(case, lonely, folder)
     errors = []
     for row in result.history:

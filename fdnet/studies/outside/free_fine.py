@@ -15,7 +15,7 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import case_from, set_keys
-from fdnet.dem.deck import box_of
+from fdnet.dem.deck import specimen_box
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.scales.scales import scales_of
@@ -117,7 +117,7 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
     """Distance of the last velocity from the balance, over the distance from the fluid's."""
     force, folder = str(point.value), work / point.slug
     case = case_of(force)
-    lonely = resting(np.array([[2.7e-3, 3e-4, 3e-4]]), 2.5e-4, box_of(case), Kind.GRAIN)
+    lonely = resting(np.array([[2.7e-3, 3e-4, 3e-4]]), 2.5e-4, specimen_box(case), Kind.GRAIN)
     end = invade(case, scales_of(case), lonely, folder, Launch(binary=the_binary()))
     seen, exact = end.damaged.fines().velocity[0], expected(force, case)
     slip = exact - [_SPEED, 0.0, 0.0]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.case.case import Case
-from fdnet.dem.deck import box_of, snapshot_of
+from fdnet.dem.deck import snapshot_of, specimen_box
 from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.packing import write_pack_inputs
 from fdnet.errors import CaseError
@@ -66,7 +66,7 @@ def read_growth(path: Path, case: Case) -> tuple[Snapshot, ...]:
         Snapshot(
             step=int(step),
             time_s=0.0,
-            box=box_of(case),
+            box=specimen_box(case),
             id=np.arange(1, len(table) + 1),
             kind=np.full(len(table), Kind.GRAIN),
             position=table[:, :3],

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.case.case import InvasionCase, completed, with_fines
+from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import case_from, recorded_case
 from fdnet.dem.checkpoint import read_history, state_at
-from fdnet.dem.deck import box_of, snapshot_of
+from fdnet.dem.deck import snapshot_of, specimen_box
 from fdnet.dem.packing import check_radii
 from fdnet.errors import CaseError
 from fdnet.files import write_bytes
@@ -134,7 +134,7 @@ def read_state(path: Path) -> State:
         with np.load(path) as file:
             arrays = dict(file)
         text = json.loads(arrays["text"].tobytes())
-        case = with_fines(case_from(completed(tomllib.loads(text["case"])), source=str(path)))
+        case = with_fines(case_from(tomllib.loads(text["case"]), source=str(path)))
         return State(
             case=case,
             grains=_spheres(arrays, "grains", case, 0, 0.0),
@@ -158,7 +158,7 @@ def _spheres(
     return Snapshot(
         step=step,
         time_s=time_s,
-        box=box_of(case),
+        box=specimen_box(case),
         id=arrays[f"{name}_id"],
         kind=np.where(kind == Kind.GRAIN, Kind.GRAIN, Kind.FINE),
         position=place[:, :3],
