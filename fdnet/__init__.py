@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from fdnet.network.network import build_network as build_network
     from fdnet.network.permeability import analyse as analyse
     from fdnet.network.permeability import compare as compare
-    from fdnet.run.open_run import open_run as open_run
-    from fdnet.run.open_run import run_case as run_case
+    from fdnet.run.finished import open_run as open_run
+    from fdnet.run.pipeline import run_case as run_case
     from fdnet.spheres.readers import read_spheres as read_spheres
     from fdnet.spheres.snapshot import Snapshot as Snapshot
 
@@ -53,8 +53,8 @@ _HOME = {
     "InvasionCase": "fdnet.case.case",
     "case_from": "fdnet.case.file",
     "read_case": "fdnet.case.file",
-    "run_case": "fdnet.run.open_run",
-    "open_run": "fdnet.run.open_run",
+    "run_case": "fdnet.run.pipeline",
+    "open_run": "fdnet.run.finished",
     "ensemble": "fdnet.campaign.api",
     "sweep": "fdnet.campaign.api",
     "compare_runs": "fdnet.campaign.api",

@@ -9,7 +9,7 @@ import pytest
 from builders import tiny
 
 import fdnet
-from fdnet.errors import CaseError, DumpError, FdnetError
+from fdnet.errors import CaseError, FdnetError
 from fdnet.run.folder import TABLES
 from fdnet.run.pipeline import run_stages
 from fdnet.run.records import RunOptions
@@ -132,28 +132,25 @@ def test_digests_of_the_wrong_shape_are_refused(copied, files):
         run_stages(CASE, options(copied, resume=True))
 
 
-def test_a_folder_of_an_older_version_is_taken_with_a_warning(copied):
-    (copied / "manifest.json").unlink()
-    for stage in ("pack", "invade"):
-        path = copied / stage / "stage.json"
-        record = json.loads(path.read_text())
-        del record["files"], record["ranks"]
-        path.write_text(json.dumps(record))
-    summary = run_stages(CASE, options(copied, resume=True))
-    assert sum("holds no digests of files" in text for text in summary["warnings"]) == 2
-    assert summary["ranks"] == {"pack": 1, "invade": 1}
-
-
-def test_a_radius_changed_in_a_folder_of_an_older_version_is_refused(copied):
-    """Its record has no digests, but the case says which radii the grains have."""
+@pytest.mark.parametrize("key", ["files", "ranks"])
+def test_a_record_without_its_digests_or_ranks_is_refused(copied, key):
     (copied / "manifest.json").unlink()
     path = copied / "pack" / "stage.json"
     record = json.loads(path.read_text())
-    del record["files"]
+    del record[key]
     path.write_text(json.dumps(record))
-    dump_with_another_radius(copied / "pack" / "post" / "pack.dump")
-    with pytest.raises(DumpError, match=r"pack\.dump: 1 of 66 grains have another radius"):
+    with pytest.raises(CaseError, match=rf"pack/stage\.json: .*the key {key} is missing"):
         run_stages(CASE, options(copied, resume=True))
+
+
+@pytest.mark.parametrize("spoil", [lambda manifest: manifest.pop("files"), dict.clear])
+def test_an_opened_run_refuses_a_manifest_without_digests(copied, spoil):
+    path = copied / "manifest.json"
+    manifest = json.loads(path.read_text())
+    spoil(manifest if spoil is not dict.clear else manifest["files"])
+    path.write_text(json.dumps(manifest))
+    with pytest.raises(CaseError, match=r"manifest\.json: .*files"):
+        fdnet.open_run(copied)
 
 
 def test_a_run_that_was_cut_after_its_pack_goes_on_with_its_ranks(copied):

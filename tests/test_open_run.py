@@ -11,8 +11,8 @@ from builders import tiny
 
 import fdnet
 from fdnet.errors import CaseError
+from fdnet.report.text import facts
 from fdnet.run.finished import FinishedRun
-from fdnet.run.summary import facts
 
 pytestmark = pytest.mark.liggghts
 

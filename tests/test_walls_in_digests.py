@@ -16,6 +16,8 @@ RECORD = {
     "max_overlap": 0.0,
     "steps": 1,
     "dt_s": 1e-7,
+    "ranks": 1,
+    "files": {},
     "runs": [{"version": "3.8.0", "seconds": 1.0}],
     "left_out": [],
     "porosity": 0.4,

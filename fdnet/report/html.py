@@ -1,7 +1,4 @@
-"""The report, and the sections that later commands add to it.
-
-Sections that a command adds to a report after the run, in places that its page keeps.
-"""
+"""The page report.html of a run, and the sections that later commands add to it."""
 
 import base64
 import html
@@ -11,23 +8,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fdnet.errors import CaseError
 from fdnet.files import write_text
 from fdnet.report.tables import (
     AGREES,
     SHOWS,
-    Checked,
+    JsonObject,
     in_millidarcy,
-    millimetres,
     percent,
     read_json,
-    two_digits,
 )
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
+from fdnet.report.text import facts
 
 
 def put_section(report: Path, name: str, section: str) -> bool:
@@ -81,8 +74,8 @@ _TRIAXIAL_ROWS = (
 )
 
 
-class _Test(Checked):
-    """The numbers of a triaxial test."""
+class _Test(JsonObject):
+    """The numbers of a triaxial test, named in `_TRIAXIAL_ROWS`."""
 
     confining_Pa: float
     young_modulus_Pa: float | None
@@ -93,8 +86,8 @@ class _Test(Checked):
     broken_in_shear: int
 
 
-class Mechanics(Checked):
-    """What mechanics.json holds."""
+class Mechanics(JsonObject):
+    """What mechanics.json holds, named in `_ROWS`."""
 
     young_modulus_Pa: float | None
     poisson_ratio: float | None
@@ -131,9 +124,8 @@ def mechanics_html(folder: Path) -> str:
         parts += ["<h3>Triaxial test</h3>", _table(numbers["triaxial"], _TRIAXIAL_ROWS)]
     figure = folder / "stress_strain.png"
     if numbers.get("triaxial") and figure.is_file():
-        data = base64.b64encode(figure.read_bytes()).decode("ascii")
         parts.append(
-            f'<figure class="wide"><img src="data:image/png;base64,{data}" alt="{figure.stem}">'
+            f'<figure class="wide"><img src="{_data_uri(figure)}" alt="{figure.stem}">'
             f"<figcaption><em>({figure.name})</em></figcaption></figure>"
         )
     return "\n".join(parts)
@@ -144,18 +136,15 @@ def put_mechanics(report: Path, folder: Path) -> bool:
     return put_section(report, MECHANICS, mechanics_html(folder))
 
 
-def _table(numbers: dict[str, Any], rows: tuple[tuple[str, str, float, str], ...]) -> str:
-    cells = [
-        f'<tr><th>{html.escape(name)}</th><td class="number">{_shown(numbers[key], factor)} '
-        f"{unit}</td></tr>"
-        for key, name, factor, unit in rows
-        if key in numbers
-    ]
+def _table(numbers: dict[str, Any], rows: Sequence[tuple[str, str, float, str]]) -> str:
+    cells = []
+    for key, name, factor, unit in rows:
+        if key in numbers:
+            value = "–" if numbers[key] is None else f"{numbers[key] * factor:.4g}"
+            cells.append(
+                f'<tr><th>{html.escape(name)}</th><td class="number">{value} {unit}</td></tr>'
+            )
     return '<table class="pairs">\n' + "\n".join(cells) + "\n</table>"
-
-
-def _shown(value: float | None, factor: float) -> str:
-    return "–" if value is None else f"{value * factor:.4g}"
 
 
 # ------------------------------------------------------------------------------------------------
@@ -184,31 +173,31 @@ _NOTE = (
 
 def stokes_html(rows: Sequence[Mapping[str, Any]]) -> str:
     """The section as HTML, one row for each section that was resolved."""
+
+    def lost(value: float | None) -> str:
+        return "&ndash;" if value is None else f"{value:.1%}"
+
+    lines = [
+        [
+            f"{1e3 * row['x_lo_m']:g} to {1e3 * row['x_hi_m']:g}",
+            f"{in_millidarcy(row['k_initial_m2'])} &plusmn; {row['k_initial_error']:.1%}",
+            in_millidarcy(row["network_k_initial_m2"]),
+            f"{in_millidarcy(row['k_damaged_m2'])} &plusmn; {row['k_damaged_error']:.1%}",
+            in_millidarcy(row["network_k_damaged_m2"]),
+            lost(row["k_reduction"]),
+            lost(row["network_k_reduction"]),
+            f"{1e6 * row['cell_initial_m']:.3g}, {1e6 * row['cell_damaged_m']:.3g}",
+        ]
+        for row in rows
+    ]
     head = "".join(f'<th class="number">{name}</th>' for name in _HEAD)
-    body = "\n".join(f"<tr>{_cells(row)}</tr>" for row in rows)
+    cells = ["".join(f'<td class="number">{text}</td>' for text in line) for line in lines]
+    body = "\n".join(f"<tr>{line}</tr>" for line in cells)
     return (
         "<h2>Sections by resolved Stokes flow</h2>\n"
         f'<div class="scroll"><table>\n<tr>{head}</tr>\n{body}\n</table></div>\n'
         f'<p class="note">{_NOTE.format(rows[0]["network_damage_law"])}</p>'
     )
-
-
-def _cells(row: Mapping[str, Any]) -> str:
-    texts = [
-        f"{1e3 * row['x_lo_m']:g} to {1e3 * row['x_hi_m']:g}",
-        f"{in_millidarcy(row['k_initial_m2'])} &plusmn; {row['k_initial_error']:.1%}",
-        in_millidarcy(row["network_k_initial_m2"]),
-        f"{in_millidarcy(row['k_damaged_m2'])} &plusmn; {row['k_damaged_error']:.1%}",
-        in_millidarcy(row["network_k_damaged_m2"]),
-        _share(row["k_reduction"]),
-        _share(row["network_k_reduction"]),
-        f"{1e6 * row['cell_initial_m']:.3g}, {1e6 * row['cell_damaged_m']:.3g}",
-    ]
-    return "".join(f'<td class="number">{text}</td>' for text in texts)
-
-
-def _share(value: float | None) -> str:
-    return "&ndash;" if value is None else f"{value:.1%}"
 
 
 # ------------------------------------------------------------------------------------------------
@@ -268,106 +257,43 @@ class ReportParts:
 def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportParts) -> Path:
     """Write the page, whole or not at all.
 
-    `summary` is the mapping of summary.json; keys that it lacks show as a dash.
+    `summary` is the mapping of summary.json; keys that it lacks show as a dash, and
+    without `supplied_count` there are no headline numbers.
 
     Raises CaseError for a figure that cannot be read.
     """
-    template = _environment().from_string(_template_text())
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    page = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    page.filters.update(quantity=quantity, millidarcy=in_millidarcy, percent=percent, times=times)
+    page.filters["fixed"] = lambda value: DASH if value is None else f"{value:.4f}"
+    page.globals.update(shows=SHOWS, agrees=AGREES, columns=SECTION_COLUMNS)
     figures = [
         {"data": _data_uri(Path(file)), "caption": caption, "name": Path(file).name}
         for file, caption in parts.figures
     ]
-    still = next((one for one in figures if one["name"] == STILL), None)
-    first = [one for one in figures if one["name"] == LEADING]
-    text = template.render(
+    # what the page writes without escaping is made here
+    view = (
+        {}
+        if parts.view is None
+        else {
+            "view_json": Markup(json.dumps(dict(parts.view))),
+            "view_script": Markup(_own("view.js")),
+        }
+    )
+    text = page.from_string(_own("report.html.j2")).render(
         summary=summary,
         parts=parts,
-        figures=[one for one in figures if one is not still and one not in first],
-        leading=first,
-        still=still,
-        **_view_parts(parts.view),
-        headline=headline(summary),
-        columns=SECTION_COLUMNS,
+        figures=[one for one in figures if one["name"] not in (STILL, LEADING)],
+        leading=[one for one in figures if one["name"] == LEADING],
+        still=next((one for one in figures if one["name"] == STILL), None),
+        headline=list(facts(summary)) if "supplied_count" in summary else [],
+        **view,
     )
     return write_text(path, text)
-
-
-def _view_parts(view: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Data and script of the 3-D view; what the page writes without escaping is made here."""
-    if view is None:
-        return {}
-    from markupsafe import Markup
-
-    script = resources.files("fdnet.report").joinpath("view.js").read_text(encoding="utf-8")
-    return {"view_json": Markup(json.dumps(dict(view))), "view_script": Markup(script)}
-
-
-def headline(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
-    """The numbers on top: label, value, remark."""
-    lost, invaded, supplied = (
-        summary.get(key) for key in ("k_reduction", "invaded_count", "supplied_count")
-    )
-    whole = [
-        (
-            "permeability intact",
-            f"{in_millidarcy(summary.get('k_initial_m2'))} mD",
-            quantity(summary.get("k_initial_m2"), "m²"),
-        ),
-        ("porosity intact", fixed(summary.get("porosity_initial")), "overlap counted once"),
-    ]
-    if summary.get("stop_reason") is None and not invaded:
-        return whole
-    reason, words = summary.get("stop_reason"), summary.get("words") or {}
-    loss = DASH if lost is None else f"{percent(lost)} % lost"
-    passed, upstream = (
-        quantity(summary.get("passed_count")),
-        quantity(summary.get("upstream_count")),
-    )
-    return [
-        (
-            "95 % of the fines above",
-            millimetres(summary.get("invasion_depth_p95_m")),
-            f"deepest {millimetres(summary.get('invasion_depth_m'))}",
-        ),
-        whole[0],
-        (
-            "permeability damaged",
-            f"{in_millidarcy(summary.get('k_damaged_m2'))} mD",
-            f"{quantity(summary.get('k_damaged_m2'), 'm²')}, {loss}{_other(summary)}",
-        ),
-        *_skin(summary),
-        whole[1],
-        ("porosity damaged", fixed(summary.get("porosity_damaged")), "overlap counted once"),
-        (
-            "fines invaded",
-            quantity(invaded),
-            f"of {quantity(supplied)} supplied; {passed} passed, {upstream} upstream",
-        ),
-        (
-            "cake thickness",
-            millimetres(summary.get("cake_thickness_m")),
-            words.get("cake", ""),
-        ),
-        ("end of the run", quantity(reason), words.get("end", "")),
-    ]
-
-
-def _skin(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
-    """Skin and the flow that it costs, where the case has a well."""
-    if "skin" not in summary:
-        return []
-    radius = millimetres(summary.get("skin_well_radius_m"))
-    value = "infinite" if summary["skin"] is None else f"{summary['skin']:.2g}"
-    cost = f"{two_digits(summary['skin_flow_lost'])} of the flow"
-    return [("skin", value, f"costs {cost} of a well of {radius} radius")]
-
-
-def _other(summary: Mapping[str, Any]) -> str:
-    """The damaged permeability by the other law, as a measure of the error."""
-    other = summary.get("k_damaged_other_m2")
-    if other is None:
-        return ""
-    return f"; by {summary.get('damage_law_other')}: {in_millidarcy(other)} mD"
 
 
 def quantity(value: Any, unit: str = "") -> str:
@@ -382,12 +308,7 @@ def quantity(value: Any, unit: str = "") -> str:
     return f"{_digits(value)} {unit}".strip()
 
 
-def fixed(value: Any) -> str:
-    """A porosity: four decimals."""
-    return DASH if value is None else f"{value:.4f}"
-
-
-def scaled(value: Any, factor: float | None) -> Any:
+def times(value: Any, factor: float | None) -> Any:
     """`value` times `factor`; None stays None."""
     return value if value is None or factor is None else value * factor
 
@@ -403,20 +324,8 @@ def _digits(value: float) -> str:
     return f"{mantissa}·10{str(int(power)).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
 
 
-def _environment() -> "Environment":
-    from jinja2 import Environment, StrictUndefined
-
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters.update(quantity=quantity, fixed=fixed, scaled=scaled)
-    environment.filters.update(millidarcy=in_millidarcy, percent=percent)
-    environment.globals.update(shows=SHOWS, agrees=AGREES)
-    return environment
-
-
-def _template_text() -> str:
-    return resources.files("fdnet.report").joinpath("report.html.j2").read_text(encoding="utf-8")
+def _own(name: str) -> str:
+    return resources.files("fdnet.report").joinpath(name).read_text(encoding="utf-8")
 
 
 def _data_uri(path: Path) -> str:

@@ -12,9 +12,15 @@ from fdnet.errors import CaseError
 from fdnet.names import LIGGGHTS_STAGES
 from fdnet.run.fluid import fluid_of
 from fdnet.run.folder import START_OVER, check_files, may_be_gone
-from fdnet.run.outputs import Invaded
 from fdnet.run.progress import Forecast, Progress
-from fdnet.run.records import PACK_DUMP, Session, invade_record, pack_record, ranks_of, take_pack
+from fdnet.run.records import (
+    PACK_DUMP,
+    FinishedInvasion,
+    Session,
+    invade_record,
+    pack_record,
+    take_pack,
+)
 from fdnet.scales.cost import expected_duration
 from fdnet.scales.pack import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES
 from fdnet.scales.scales import InvasionScales, scales_of
@@ -59,7 +65,7 @@ def _refuse_mixed_ranks(session: Session, folder: Path) -> None:
     """A run that was cut between pack and invasion goes on with the ranks that it began with."""
     ranks, record = session.options.ranks, session.folder.record("pack")
     begun = any(True for _ in checkpoint_files(folder))
-    made = None if record is None else ranks_of(record)
+    made = None if record is None else record["ranks"]
     if session.options.resume and not begun and made not in (None, ranks):
         raise CaseError(
             f"{session.path}: this run was begun with --np {made}, and --np {ranks} would give "
@@ -112,7 +118,7 @@ def packed_grains(session: Session) -> Snapshot:
     return grains
 
 
-def invaded(session: Session, case: InvasionCase, grains: Snapshot) -> Invaded:
+def invaded(session: Session, case: InvasionCase, grains: Snapshot) -> FinishedInvasion:
     """The finished invasion, as it is on disk.
 
     Raises CaseError when a file is not what the stage made, DumpError or LiggghtsError when one
@@ -123,7 +129,7 @@ def invaded(session: Session, case: InvasionCase, grains: Snapshot) -> Invaded:
     check_files(folder, record, START_OVER, may_lack=may_be_gone)
     history = read_history(folder)
     damaged = state_at(folder, history[-1], case, scales, grains)
-    return Invaded(
+    return FinishedInvasion(
         case=case,
         scales=scales,
         history=history,
