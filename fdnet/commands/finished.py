@@ -100,7 +100,7 @@ def _text(row: Mapping[str, Any]) -> str:
     from fdnet.report.tables import in_millidarcy
 
     keys = ("k_initial_m2", "k_damaged_m2")
-    lines = [("", "before, mD", "after, mD", "lost")]
+    lines: list[tuple[str, ...]] = [("", "before, mD", "after, mD", "lost")]
     for name, prefix in (("resolved flow", ""), ("network", "network_")):
         lost = row[f"{prefix}k_reduction"]
         both = (in_millidarcy(row[f"{prefix}{key}"]) for key in keys)

@@ -247,13 +247,13 @@ def _run(options: argparse.Namespace) -> int:
     from fdnet.run.records import RunOptions, cores
 
     case = case_of(options)
-    out, told = options.out or Path("runs") / case.name, []
+    out, printed = options.out or Path("runs") / case.name, []
 
     def tell(summary: Mapping[str, Any]) -> None:
         """The answer, as soon as it is known: the pictures may take longer than it did."""
         if summary and not options.json:
             print("\n".join(summary_lines(summary)), flush=True)
-            told.append(summary)
+            printed.append(summary)
 
     chosen = RunOptions(
         out=out,
@@ -281,7 +281,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(summary, indent=2))
         return 0
-    if not told:
+    if not printed:
         tell(summary)
     done = "done (the analysis was not among the stages)"
     print(seconds_line(summary) if summary else done)

@@ -280,7 +280,7 @@ def draw_all(work: dict[str, Any]) -> None:
 
     bounds, still, flow = np.array(work["box"]) * MM, pv.read(work["grains"]), bool(work["title"])
     view = BROADSIDE if flow else OBLIQUE
-    colours = None if flow else colours_of(pv.read(work["frames"][-1][0]), bounds)
+    colours = {} if flow else colours_of(pv.read(work["frames"][-1][0]), bounds)
     for spheres, lines, target in work["frames"]:
         state = pv.read(spheres)
         plotter: Any = pv.Plotter(off_screen=True, window_size=list(view.window))

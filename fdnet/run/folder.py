@@ -323,7 +323,10 @@ def is_run_folder(folder: Path) -> bool:
     """
     if _holds_mark(folder):
         return True
-    for name, model in ((MANIFEST, Manifest), *((RECORDS[one], _MODELS[one]) for one in _MODELS)):
+    models: dict[str, type[JsonObject]] = {MANIFEST: Manifest} | {
+        RECORDS[stage]: model for stage, model in _MODELS.items()
+    }
+    for name, model in models.items():
         with suppress(CaseError):
             read_json(folder / name, model, noun="", advice="")
             return True

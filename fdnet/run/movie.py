@@ -241,7 +241,7 @@ def moments_of(run: FinishedRun) -> Iterator[Moment]:
             f"{run.path / 'frames'}: holds no states to draw; write them with fdnet run CASE.toml "
             f"--out {shlex.quote(str(run.path))} --stages report --force"
         )
-    rows = {int(row["step"]): row for row in run.history.to_dict("records")}
+    rows: dict[int, Any] = {int(row["step"]): row for row in run.history.to_dict("records")}
     for step, name in files.items():
         if step not in rows or (kept and step not in kept):
             raise CaseError(

@@ -41,8 +41,8 @@ PACK_DUMP = "post/pack.dump"
 MOMENTUM_LIMIT = 0.01
 """Largest difference of the forces in the pack and its drop of pressure times area, over it."""
 POROSITY_WARNING = 0.02
-_PACKAGES = ("fdnet", "numpy", "scipy", "pandas", "jinja2", "pyvista", "matplotlib", "pydantic")
-_PACKAGES += ("overlap", "pymetis")
+_PACKAGES = ["fdnet", "numpy", "scipy", "pandas", "jinja2", "pyvista", "matplotlib", "pydantic"]
+_PACKAGES += ["overlap", "pymetis"]
 
 
 def pack_record(
