@@ -23,8 +23,8 @@ from fdnet.run.answer import (
     Step,
     flow_lost,
     hawkins,
-    in_series,
     layered_skin,
+    layers_in_series,
     rules_of,
     run_shows,
     steps_of,
@@ -103,7 +103,8 @@ def test_layers_and_what_is_left_of_a_section_are_the_section_in_series():
     """Two layers of 0.5 mm and a rest of 1 mm make a section of 2 mm, by either permeability."""
     thin = [(0.0, 5e-4, 4.0, 0.5), (5e-4, 1e-3, 2.0, 1.0)]
     whole = [
-        in_series([(5e-4, k[0]), (5e-4, k[1]), (1e-3, 3.0)]) for k in ((4.0, 2.0), (0.5, 1.0))
+        layers_in_series([(5e-4, k[0]), (5e-4, k[1]), (1e-3, 3.0)])
+        for k in ((4.0, 2.0), (0.5, 1.0))
     ]
     steps = steps_of(analysis_of([(0.0, 2e-3, *whole), (2e-3, 4e-3, 5.0, 5.0)], thin))
     assert [(s.near, s.far) for s in steps] == [
@@ -124,7 +125,10 @@ def test_layers_and_what_is_left_of_a_section_are_the_section_in_series():
 def test_a_layer_that_seems_to_gain_is_made_up_for_and_nothing_is_cut_off():
     """In place the fines turn the flow aside: layer and rest make the section in series."""
     thin = [(0.0, 1e-3, 2.0, 1.0)]
-    section = [in_series([(1e-3, 2.0), (1e-3, 3.0)]), in_series([(1e-3, 1.0), (1e-3, 3.6)])]
+    section = [
+        layers_in_series([(1e-3, 2.0), (1e-3, 3.0)]),
+        layers_in_series([(1e-3, 1.0), (1e-3, 3.6)]),
+    ]
     first, rest = steps_of(analysis_of([(0.0, 2e-3, *section)], thin))
     assert (rest.before, rest.after) == (pytest.approx(3.0), pytest.approx(3.6))
     assert zone_of([first, rest]).depth == 1e-3

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 from fdnet.errors import CaseError
 from fdnet.files import write_text
@@ -48,60 +48,46 @@ def put_section(report: Path, name: str, section: str) -> bool:
 
 
 MECHANICS = "mechanics"
-_ROWS = (
-    ("young_modulus_Pa", "Young's modulus", 1e-9, "GPa"),
-    ("poisson_ratio", "Poisson's ratio", 1.0, ""),
-    ("bulk_modulus_Pa", "bulk modulus", 1e-9, "GPa"),
-    ("shear_modulus_Pa", "shear modulus", 1e-9, "GPa"),
-    ("young_modulus_x_Pa", "Young's modulus along x", 1e-9, "GPa"),
-    ("young_modulus_y_Pa", "Young's modulus along y", 1e-9, "GPa"),
-    ("young_modulus_z_Pa", "Young's modulus along z", 1e-9, "GPa"),
-    ("anisotropy", "anisotropy (0 is isotropic)", 1.0, ""),
-    ("p_wave_m_s", "P wave", 1.0, "m/s"),
-    ("s_wave_m_s", "S wave", 1.0, "m/s"),
-    ("coordination", "contacts and bonds of a grain", 1.0, ""),
-    ("rattlers", "grains that carry nothing", 1.0, ""),
-    ("bonds", "bonds", 1.0, ""),
-)
-_TRIAXIAL_ROWS = (
-    ("confining_Pa", "confining stress", 1e-6, "MPa"),
-    ("young_modulus_Pa", "initial slope", 1e-9, "GPa"),
-    ("peak_Pa", "largest deviatoric stress", 1e-6, "MPa"),
-    ("peak_strain", "axial strain there", 100.0, "%"),
-    ("volume_strain_at_end", "volume strain at the end (compression above 0)", 100.0, "%"),
-    ("broken_in_tension", "bonds broken in tension", 1.0, ""),
-    ("broken_in_shear", "bonds broken in shear", 1.0, ""),
-)
+
+
+class Line(NamedTuple):
+    """A number of a table of two columns: its name, the unit, and the factor to it."""
+
+    name: str
+    unit: str = ""
+    factor: float = 1.0
 
 
 class _Test(JsonObject):
-    """The numbers of a triaxial test, named in `_TRIAXIAL_ROWS`."""
+    """The numbers of a triaxial test."""
 
-    confining_Pa: float
-    young_modulus_Pa: float | None
-    peak_Pa: float | None
-    peak_strain: float | None
-    volume_strain_at_end: float | None
-    broken_in_tension: int
-    broken_in_shear: int
+    confining_Pa: Annotated[float, Line("confining stress", "MPa", 1e-6)]
+    young_modulus_Pa: Annotated[float | None, Line("initial slope", "GPa", 1e-9)]
+    peak_Pa: Annotated[float | None, Line("largest deviatoric stress", "MPa", 1e-6)]
+    peak_strain: Annotated[float | None, Line("axial strain there", "%", 100.0)]
+    volume_strain_at_end: Annotated[
+        float | None, Line("volume strain at the end (compression above 0)", "%", 100.0)
+    ]
+    broken_in_tension: Annotated[int, Line("bonds broken in tension")]
+    broken_in_shear: Annotated[int, Line("bonds broken in shear")]
 
 
 class Mechanics(JsonObject):
-    """What mechanics.json holds, named in `_ROWS`."""
+    """What mechanics.json holds."""
 
-    young_modulus_Pa: float | None
-    poisson_ratio: float | None
-    bulk_modulus_Pa: float | None
-    shear_modulus_Pa: float | None
-    young_modulus_x_Pa: float | None
-    young_modulus_y_Pa: float | None
-    young_modulus_z_Pa: float | None
-    anisotropy: float | None
-    p_wave_m_s: float | None
-    s_wave_m_s: float | None
-    coordination: float | None
-    rattlers: int
-    bonds: int
+    young_modulus_Pa: Annotated[float | None, Line("Young's modulus", "GPa", 1e-9)]
+    poisson_ratio: Annotated[float | None, Line("Poisson's ratio")]
+    bulk_modulus_Pa: Annotated[float | None, Line("bulk modulus", "GPa", 1e-9)]
+    shear_modulus_Pa: Annotated[float | None, Line("shear modulus", "GPa", 1e-9)]
+    young_modulus_x_Pa: Annotated[float | None, Line("Young's modulus along x", "GPa", 1e-9)]
+    young_modulus_y_Pa: Annotated[float | None, Line("Young's modulus along y", "GPa", 1e-9)]
+    young_modulus_z_Pa: Annotated[float | None, Line("Young's modulus along z", "GPa", 1e-9)]
+    anisotropy: Annotated[float | None, Line("anisotropy (0 is isotropic)")]
+    p_wave_m_s: Annotated[float | None, Line("P wave", "m/s")]
+    s_wave_m_s: Annotated[float | None, Line("S wave", "m/s")]
+    coordination: Annotated[float | None, Line("contacts and bonds of a grain")]
+    rattlers: Annotated[int, Line("grains that carry nothing")]
+    bonds: Annotated[int, Line("bonds")]
     warnings: list[str]
     triaxial: _Test | None = None
 
@@ -116,12 +102,12 @@ def mechanics_html(folder: Path) -> str:
         return ""
     advice = "measure it anew with fdnet mechanics, or remove the folder"
     numbers = read_json(path, Mechanics, noun="result of fdnet mechanics", advice=advice)
-    parts = ["<h2>Mechanics of the pack</h2>", _table(numbers, _ROWS)]
+    parts = ["<h2>Mechanics of the pack</h2>", _table(numbers, Mechanics)]
     if numbers.get("warnings"):
         items = "".join(f"<li>{html.escape(text)}</li>" for text in numbers["warnings"])
         parts.append(f'<div class="warnings"><ul>{items}</ul></div>')
     if numbers.get("triaxial"):
-        parts += ["<h3>Triaxial test</h3>", _table(numbers["triaxial"], _TRIAXIAL_ROWS)]
+        parts += ["<h3>Triaxial test</h3>", _table(numbers["triaxial"], _Test)]
     figure = folder / "stress_strain.png"
     if numbers.get("triaxial") and figure.is_file():
         parts.append(
@@ -136,13 +122,15 @@ def put_mechanics(report: Path, folder: Path) -> bool:
     return put_section(report, MECHANICS, mechanics_html(folder))
 
 
-def _table(numbers: dict[str, Any], rows: Sequence[tuple[str, str, float, str]]) -> str:
+def _table(numbers: dict[str, Any], model: type[JsonObject]) -> str:
+    """The numbers that have a `Line` in the model."""
     cells = []
-    for key, name, factor, unit in rows:
-        if key in numbers:
-            value = "–" if numbers[key] is None else f"{numbers[key] * factor:.4g}"
+    for key, field_of in model.model_fields.items():
+        for one in (known for known in field_of.metadata if isinstance(known, Line)):
+            value = "–" if numbers[key] is None else f"{numbers[key] * one.factor:.4g}"
             cells.append(
-                f'<tr><th>{html.escape(name)}</th><td class="number">{value} {unit}</td></tr>'
+                f'<tr><th>{html.escape(one.name)}</th><td class="number">{value} {one.unit}</td>'
+                "</tr>"
             )
     return '<table class="pairs">\n' + "\n".join(cells) + "\n</table>"
 
@@ -268,7 +256,9 @@ def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportP
     page = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    page.filters.update(quantity=quantity, millidarcy=in_millidarcy, percent=percent, times=times)
+    page.filters.update(
+        quantity=quantity, millidarcy=in_millidarcy, percent=percent, multiplied=multiplied
+    )
     page.filters["fixed"] = lambda value: DASH if value is None else f"{value:.4f}"
     page.globals.update(shows=SHOWS, agrees=AGREES, columns=SECTION_COLUMNS)
     figures = [
@@ -308,7 +298,7 @@ def quantity(value: Any, unit: str = "") -> str:
     return f"{_digits(value)} {unit}".strip()
 
 
-def times(value: Any, factor: float | None) -> Any:
+def multiplied(value: Any, factor: float | None) -> Any:
     """`value` times `factor`; None stays None."""
     return value if value is None or factor is None else value * factor
 

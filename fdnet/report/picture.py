@@ -245,7 +245,7 @@ UPSTREAM_SHOWN = 0.12
 """Share of the length upstream of the face up to which fines are shown."""
 DEEPEST = 0.97
 """Share of the fines up to whose depth the colours reach; a few deep ones take the last colour."""
-FACETS = 6e5
+TRIANGLES = 6e5
 """About half the triangles all fines together may have: memory and time of the picture."""
 FACE_COLOUR, FINE_COLOUR, GRAIN_COLOUR, GLASS_COLOUR = "#0072B2", "#E66100", "#E2E2E2", "#B8B8B8"
 GLASS = 0.10
@@ -254,7 +254,7 @@ NOTHING = 1e-30
 """Drawn for a flux of 0, which has no logarithm."""
 WIDEST, LINE = 0.12, 0.030
 """Radius of the pipe of the largest flux, and of a streamline, in radii of a grain."""
-THINNEST = 0.12
+THINNEST_PIPE = 0.12
 """Radius of the pipe of a flux below the colours, over that of the largest."""
 FLOW_COLOURS = ["#E4F4CB", "#C7E9B4", "#7FCDBB", "#41B6C4", "#1D91C0", "#225EA8", "#253494"]
 FLOW_COLOURS += ["#081D58"]
@@ -274,7 +274,7 @@ BROADSIDE = View((-0.55, -1.9, 0.75), (1500, 760))
 """The mud upstream should not hide the flow in the specimen."""
 
 
-def draw_all(work: dict[str, Any]) -> None:
+def draw_pictures(work: dict[str, Any]) -> None:
     """Draw each frame of what `draw_frames` sends; the colours are the same in all of them."""
     import pyvista as pv
 
@@ -363,7 +363,7 @@ def _bar(title: str, *, labels: int) -> dict[str, Any]:
 def _add_fines(plotter: Any, spheres: Any, bounds: Array, **style: Any) -> None:
     mask = _shown_fines(spheres, bounds)
     if mask.any():
-        drawn = _balls(spheres, mask, int(np.clip(np.sqrt(FACETS / mask.sum()), 5, 16)))
+        drawn = _balls(spheres, mask, int(np.clip(np.sqrt(TRIANGLES / mask.sum()), 5, 16)))
         plotter.add_mesh(drawn, smooth_shading=True, **style)
 
 
@@ -395,7 +395,7 @@ def _pipes(mesh: Any, radius: float, most: float) -> Any:
     import pyvista as pv
 
     value = np.asarray(mesh.cell_data["value"])
-    width = WIDEST * radius * np.clip(value / most, THINNEST**4, 1.0) ** 0.25
+    width = WIDEST * radius * np.clip(value / most, THINNEST_PIPE**4, 1.0) ** 0.25
     ends = np.asarray(mesh.lines).reshape(-1, 3)[:, 1:]
     lines = np.insert(np.arange(ends.size).reshape(-1, 2), 0, 2, axis=1)
     apart = pv.PolyData(np.asarray(mesh.points)[ends.ravel()], lines=lines.ravel())
@@ -467,4 +467,4 @@ def _look(plotter: Any, bounds: Array, view: View) -> None:
 
 
 if __name__ == "__main__":
-    draw_all(json.load(sys.stdin))
+    draw_pictures(json.load(sys.stdin))

@@ -335,7 +335,7 @@ class JsonObject(BaseModel):
 
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
-Count = Annotated[int, Field(ge=0)]
+Number = Annotated[int, Field(ge=0)]
 AboveZero = Annotated[float, Field(ge=0.0)]
 Lost = Annotated[float, Field(le=1.0)] | None
 
@@ -350,14 +350,14 @@ class SummarySection(JsonObject):
     k_initial_m2: AboveZero
     k_damaged_m2: AboveZero
     k_reduction: Lost
-    fines_count: Count
+    fines_count: Number
 
 
 class Summary(JsonObject):
     """The numbers of a summary.json that every run has."""
 
     case: str
-    seed: Count
+    seed: Number
     law: str
     damage_law: str
     porosity_initial: Share
@@ -368,18 +368,18 @@ class Summary(JsonObject):
     damage_law_used: str | None = None
     damage_law_other: str | None = None
     k_damaged_other_m2: AboveZero | None = None
-    supplied_count: Count
-    invaded_count: Count
-    passed_count: Count
-    upstream_count: Count
+    supplied_count: Number
+    invaded_count: Number
+    passed_count: Number
+    upstream_count: Number
     invasion_depth_m: AboveZero
     invasion_depth_p95_m: AboveZero
     cake_thickness_m: AboveZero
     stop_reason: str | None
     sections: list[SummarySection]
-    pores: Count
-    throats: Count
-    throats_blocked: Count
+    pores: Number
+    throats: Number
+    throats_blocked: Number
     answer: str | None = None
     certainty: list[str] = []
     warnings: list[str]

@@ -389,20 +389,20 @@ def section_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
 
 def thesis_law_warning(chosen: "Analysis", default: "Analysis") -> str:
     """What laws that are off by factors give, with what fdnet's default laws give of the same."""
-
-    def states(analysis: "Analysis") -> str:
-        before = f"{in_millidarcy(analysis.k_initial)} mD"
-        if analysis.damage_law_used is None or analysis.k_reduction is None:
-            return f"{before} without fines"
-        after = f"{in_millidarcy(analysis.k_damaged)} mD"
-        return f"{before} before and {after} after ({100 * analysis.k_reduction:z.1f} % lost)"
-
     return (
         f"the laws {chosen.law} and {chosen.damage_law} are kept to compare with the thesis, and "
-        f"those of the thesis are wrong by factors: they give {states(chosen)}, where fdnet's "
+        f"those of the thesis are wrong by factors: they give {_states(chosen)}, where fdnet's "
         f"default laws ({' and '.join(filter(None, (default.law, default.damage_law_used)))}) "
-        f"give {states(default)}"
+        f"give {_states(default)}"
     )
+
+
+def _states(analysis: "Analysis") -> str:
+    before = f"{in_millidarcy(analysis.k_initial)} mD"
+    if analysis.damage_law_used is None or analysis.k_reduction is None:
+        return f"{before} without fines"
+    after = f"{in_millidarcy(analysis.k_damaged)} mD"
+    return f"{before} before and {after} after ({100 * analysis.k_reduction:z.1f} % lost)"
 
 
 def permeability_lines(

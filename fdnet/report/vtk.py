@@ -217,13 +217,13 @@ def read_balls(path: Path) -> Any:
 
 
 MM, MICRON = 1e3, 1e6
-MOST_SPHERES = 40_000
+MOST_IN_VIEW = 40_000
 """Spheres up to which a page has a 3-D view: half a megabyte."""
-STEPS = 65535
+VIEW_STEPS = 65535
 
 
 def view_of(spheres: Snapshot) -> Mapping[str, Any] | None:
-    """Grains and fines for the view; None where there are more than `MOST_SPHERES`, or none.
+    """Grains and fines for the view; None where there are more than `MOST_IN_VIEW`, or none.
 
     `data` is base64 of (N, 4) unsigned 16-bit numbers, little endian, grains first: x, y and z
     from `low` to `high` (mm), and the radius from 0 to `radius` (mm). `grains` is their number.
@@ -231,7 +231,7 @@ def view_of(spheres: Snapshot) -> Mapping[str, Any] | None:
     length = float(np.ptp(spheres.box[0]))
     shown = spheres.position[:, 0] > spheres.box[0, 0] - UPSTREAM_SHOWN * length
     grains, fines = spheres.grains(), spheres.where(shown).fines()
-    if not 0 < len(grains) + len(fines) <= MOST_SPHERES:
+    if not 0 < len(grains) + len(fines) <= MOST_IN_VIEW:
         return None
     position = np.concatenate([grains.position, fines.position]) * MM
     radius = np.concatenate([grains.radius, fines.radius]) * MM
@@ -239,7 +239,7 @@ def view_of(spheres: Snapshot) -> Mapping[str, Any] | None:
 
     def steps(value: Array, start: Any, end: Any) -> Array:
         span = np.where(np.asarray(end) > start, np.asarray(end) - start, 1.0)
-        return np.rint((value - start) / span * STEPS)
+        return np.rint((value - start) / span * VIEW_STEPS)
 
     table = np.column_stack([steps(position, low, high), steps(radius, 0.0, radius.max())])
     return {

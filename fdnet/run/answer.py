@@ -111,13 +111,13 @@ def zone_of(steps: Sequence[Step]) -> Zone:
     if not damaged:
         return Zone()
     inside = steps[: damaged[-1] + 1]
-    before = in_series([(one.far - one.near, one.before) for one in inside])
-    after = in_series([(one.far - one.near, one.after) for one in inside])
+    before = layers_in_series([(one.far - one.near, one.before) for one in inside])
+    after = layers_in_series([(one.far - one.near, one.after) for one in inside])
     ratio = after / before if before > 0 else 0.0
     return Zone(inside[-1].far, ratio, before, after, len(inside) == len(steps))
 
 
-def in_series(layers: Sequence[tuple[float, float]]) -> float:
+def layers_in_series(layers: Sequence[tuple[float, float]]) -> float:
     """Permeability, m2, of layers (thickness m, permeability m2) in series; 0 if one has 0."""
     if any(k <= 0 for _, k in layers):
         return 0.0

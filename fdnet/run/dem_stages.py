@@ -139,20 +139,13 @@ def invaded(session: Session, case: InvasionCase, grains: Snapshot) -> FinishedI
 
 
 def file_warnings(session: Session) -> list[str]:
-    """What could not be checked, and dumps that are gone, one sentence each."""
+    """Dumps of finished stages that are gone, one sentence for each stage."""
     warnings = []
     for stage in LIGGGHTS_STAGES:
         record = session.folder.record(stage) if stage in session.case.stages else None
         if record is None:
             continue
-        if "files" not in record:
-            warnings.append(
-                f"{stage}/stage.json holds no digests of files, as older versions wrote it: it "
-                "was not checked that the files are those that the stage made"
-            )
-        lost = [
-            name for name in record.get("files", {}) if not (session.path / stage / name).exists()
-        ]
+        lost = [name for name in record["files"] if not (session.path / stage / name).exists()]
         if lost:
             warnings.append(
                 f"{len(lost)} checkpoint dumps are gone, the first is {stage}/{lost[0]}: they are "

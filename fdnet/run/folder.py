@@ -214,14 +214,7 @@ _MODELS: dict[str, type[JsonObject]] = {
     "invade": InvadeRecord,
     "clean_up": CleanUpRecord,
 }
-
-
 ANEW = "start over with --force"
-
-
-def write_json(path: Path, value: Any) -> None:
-    """Write a mapping as JSON, whole or not at all."""
-    write_text(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
 
 
 def read_record(folder: Path, stage: str) -> dict[str, Any] | None:
@@ -250,7 +243,7 @@ def read_manifest(folder: Path) -> dict[str, Any] | None:
             if name not in OPTIONAL and not (folder / name).exists():
                 raise CaseError(
                     f"{folder}: the run is complete by its {MANIFEST}, but {name} is missing; "
-                    "start over with --force"
+                    f"{ANEW}"
                 )
     return manifest
 
@@ -371,7 +364,7 @@ class RunFolder:
 
     def finish(self, stage: str, record: dict[str, Any]) -> None:
         """Mark a stage as done: its record is only there when the stage is complete."""
-        write_json(self.path / RECORDS[stage], record)
+        _write_json(self.path / RECORDS[stage], record)
 
     def manifest(self) -> dict[str, Any] | None:
         """The manifest of the run, or None. Raises CaseError as `read_manifest` does."""
@@ -391,7 +384,7 @@ class RunFolder:
     def complete(self, manifest: dict[str, Any] | None) -> None:
         """End this session; a manifest makes the run complete (None: it is not analysed yet)."""
         if manifest is not None:
-            write_json(self.path / MANIFEST, {"format": RECORD_FORMAT} | manifest)
+            _write_json(self.path / MANIFEST, {"format": RECORD_FORMAT} | manifest)
         (self.path / UNFINISHED).unlink(missing_ok=True)
 
     def clear(self, stages: tuple[str, ...]) -> None:
@@ -429,6 +422,10 @@ class RunFolder:
         os.close(self.lock)
 
 
+def _write_json(path: Path, value: Any) -> None:
+    write_text(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
+
+
 def _remove(path: Path) -> None:
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
@@ -447,8 +444,28 @@ def open_folder(
     another run is writing there, when the folder holds another case or an unfinished run and
     neither `resume` nor `force` is set, or when it holds something that is not a run.
     """
-    _refuse_foreign(path)
-    _refuse_gap(path, case, stages)
+    refuse_folder_name(path)
+    if path.exists() and not path.is_dir():
+        raise CaseError(f"{path}: is a file, expected a folder for --out")
+    # names alone do not make a folder ours: case.toml, manifest.json or pack may be the user's
+    if path.is_dir() and not is_run_folder(path) and not is_unused(path):
+        raise CaseError(
+            f"{path}: is not empty and holds no fdnet run; give another --out (nothing was "
+            "changed)"
+        )
+    analysed = bool({"analyse", "report"} & set(stages))
+    cleaned = "clean_up" in case.stages
+    needed = {
+        "pack": stages != ("pack",),
+        "invade": "invade" in case.stages and (analysed or (cleaned and "clean_up" in stages)),
+        "clean_up": cleaned and analysed,
+    }
+    for stage, what in (("pack", "pack"), ("invade", "invasion"), ("clean_up", "clean-up")):
+        if needed[stage] and stage not in stages and not (path / RECORDS[stage]).exists():
+            raise CaseError(
+                f"{path}: no finished {what} here; run the stage {stage} first "
+                f"(--stages {stage},...)"
+            )
     made = tuple(folder for folder in (path, *path.parents) if not folder.exists())
     was_empty = bool(made) or is_unused(path)
     lock = _take_lock(path, make=True)
@@ -496,39 +513,6 @@ def _take_lock(path: Path, *, make: bool = False) -> int:
             "another --out to a run"
         ) from error
     return lock
-
-
-def _refuse_foreign(path: Path) -> None:
-    """Raise CaseError unless `path` is new, empty or a run folder.
-
-    Names alone do not make a folder ours: case.toml, manifest.json or pack may be the user's.
-    """
-    refuse_folder_name(path)
-    if path.exists() and not path.is_dir():
-        raise CaseError(f"{path}: is a file, expected a folder for --out")
-    if path.is_dir() and not is_run_folder(path) and not is_unused(path):
-        raise CaseError(
-            f"{path}: is not empty and holds no fdnet run; give another --out (nothing was "
-            "changed)"
-        )
-
-
-def _refuse_gap(path: Path, case: Case, stages: tuple[str, ...]) -> None:
-    """A stage needs the finished ones before it that run LIGGGHTS."""
-    analysed = bool({"analyse", "report"} & set(stages))
-    cleaned = "clean_up" in case.stages
-    needed = {
-        "pack": stages != ("pack",),
-        "invade": "invade" in case.stages and (analysed or (cleaned and "clean_up" in stages)),
-        "clean_up": cleaned and analysed,
-    }
-    for stage, what in (("pack", "pack"), ("invade", "invasion"), ("clean_up", "clean-up")):
-        missing = stage not in stages and not (path / RECORDS[stage]).exists()
-        if needed[stage] and missing:
-            raise CaseError(
-                f"{path}: no finished {what} here; run the stage {stage} first "
-                f"(--stages {stage},...)"
-            )
 
 
 def _admit(

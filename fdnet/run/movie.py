@@ -27,7 +27,7 @@ from fdnet.spheres.snapshot import Array, Snapshot
 
 LINES = 200
 """About so many streamlines, evenly spaced in the mud: each carries the same flow."""
-CELLS = 14.0
+FIELD_CELLS = 14.0
 """Cells across a grain: fewer lose more lines among the fines, more take minutes."""
 STEP, AHEAD = 0.02, 0.3
 """Step along a streamline, and how far before the deposit it begins, in diameters of a grain."""
@@ -84,7 +84,7 @@ def flux_of(run: FinishedRun) -> FlowOf:
     return flow_of
 
 
-def streamlines_of(run: FinishedRun, *, cells: float = CELLS) -> FlowOf:
+def streamlines_of(run: FinishedRun, *, cells: float = FIELD_CELLS) -> FlowOf:
     """Streamlines of the resolved flow around grains and deposit, with the speed of the fluid.
 
     The speed is over the first superficial velocity; where no rate is known, over the present
@@ -152,7 +152,7 @@ SHOWN = {
 """What can be shown, and the title of its colours."""
 
 
-class Moment(NamedTuple):
+class DrawnState(NamedTuple):
     """One state of a run: the file of its spheres, None before the first fine came in, and its row
     of the history."""
 
@@ -230,7 +230,7 @@ def movie_of(
         return write_movie(path, frames, scene, per_second=per_second)
 
 
-def moments_of(run: FinishedRun) -> Iterator[Moment]:
+def moments_of(run: FinishedRun) -> Iterator[DrawnState]:
     """The states that the run kept, in order of time; the first is the clean specimen."""
     if not isinstance(run.case, InvasionCase):
         raise CaseError(f"{run.path}: has no fines, so there is no invasion to show")
@@ -247,9 +247,9 @@ def moments_of(run: FinishedRun) -> Iterator[Moment]:
             raise CaseError(
                 f"{run.path / name}: is no state that this run wrote; move it out of this folder"
             )
-    yield Moment(None, dict.fromkeys(map(str, run.history.columns), 0.0))
+    yield DrawnState(None, dict.fromkeys(map(str, run.history.columns), 0.0))
     for step, name in sorted(files.items()):
-        yield Moment(_whole(run, name), rows[step])
+        yield DrawnState(_whole(run, name), rows[step])
 
 
 def _whole(run: FinishedRun, name: str) -> Path:

@@ -209,7 +209,7 @@ def test_the_view_holds_every_sphere_to_the_sixteenth_bit(tmp_path):
 
 
 def test_a_view_of_too_many_spheres_is_left_to_the_picture(monkeypatch):
-    monkeypatch.setattr(view, "MOST_SPHERES", len(demo_damaged()) - 1)
+    monkeypatch.setattr(view, "MOST_IN_VIEW", len(demo_damaged()) - 1)
     assert view_of(demo_damaged()) is None
 
 
