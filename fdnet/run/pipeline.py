@@ -263,7 +263,7 @@ def _manifest(session: Session, pack: dict[str, Any]) -> dict[str, Any]:
 
 
 def _analyse_and_report(session: Session, pack: dict[str, Any]) -> dict[str, Any]:
-    """Tables and the summary, which is told before figures and report are made of them."""
+    """Tables and the summary, which is given out before figures and report are made of them."""
     invasion, cleaned = session.folder.record("invade"), _clean_up_record(session)
     with session.timed("analyse"):
         results = with_added(_analysed(session, (invasion or {}).get("supplied", 0)), cleaned)
