@@ -167,34 +167,29 @@ def _inside(spheres: Snapshot) -> Snapshot:
 # The invasion against time: counts of fines, and rate and permeability where they are known.
 
 
-FLOW_CURVES = (
-    ("rate_over_initial", "rate of flow", BLUE, "-"),
-    ("k_over_k0", "permeability of the specimen", ORANGE, "--"),
-)
-"""Columns of history.csv of a flow that follows the deposit, with label, colour and line."""
-
-
 def fill_history(figure: Any, *, history: Sequence[Mapping[str, float]]) -> None:
     """Counts of fines against time, and under them rate and permeability where they are known."""
-    flow = [name for name, *_ in FLOW_CURVES if all(name in row for row in history)]
-    rows = figure.subplots(1 + bool(flow), 1, sharex=True, squeeze=False)[:, 0]
-    time = np.array([row["physical_time_s"] for row in history])
-    scale, unit = (1.0, "s") if time.max() >= 1 else (1e3, "ms")
-    for name, label, colour, line in (
+    counts = (
         ("invaded_count", "inside the specimen", BLUE, "-"),
         ("passed_count", "passed the outlet", GREEN, "--"),
         ("upstream_count", "upstream of the face", ORANGE, ":"),
-    ):
-        rows[0].plot(time * scale, [row[name] for row in history], line, color=colour, label=label)
-    rows[0].set(ylabel="number of fines (–)", ylim=(0, None))
-    for name, label, colour, line in FLOW_CURVES:
-        if name in flow:
+    )
+    flow = (
+        ("rate_over_initial", "rate of flow", BLUE, "-"),
+        ("k_over_k0", "permeability of the specimen", ORANGE, "--"),
+    )
+    known = [curve for curve in flow if all(curve[0] in row for row in history)]
+    panels = [(counts, "number of fines (–)"), *([(known, "over the first (–)")] if known else [])]
+    rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    time = np.array([row["physical_time_s"] for row in history])
+    scale, unit = (1.0, "s") if time.max() >= 1 else (1e3, "ms")
+    for axes, (curves, title) in zip(rows, panels, strict=True):
+        for name, label, colour, line in curves:
             values = [row[name] for row in history]
-            rows[-1].plot(time * scale, values, line, color=colour, label=label)
-            rows[-1].set(ylabel="over the first (–)", ylim=(0, None))
-    rows[-1].set_xlabel(f"time since the fines were released ({unit})")
-    for axes in rows:
+            axes.plot(time * scale, values, line, color=colour, label=label)
+        axes.set(ylabel=title, ylim=(0, None))
         legend_above(axes)
+    rows[-1].set_xlabel(f"time since the fines were released ({unit})")
 
 
 # ------------------------------------------------------------------------------------------------
@@ -265,7 +260,7 @@ def fill_network(figure: Any, *, analysis: "Analysis") -> None:
 # The true cut through the specimen in the x-z plane of its middle.
 
 
-GRAIN_FACE, GRAIN_EDGE, FINE_FACE = "#D9D9D9", "#8C8C8C", "#D55E00"
+GRAIN_FACE, GRAIN_EDGE = "#D9D9D9", "#8C8C8C"
 
 
 def cut_circles(spheres: Snapshot, plane: float) -> tuple[Array, Array, Array]:
@@ -292,9 +287,9 @@ def fill_side_view(figure: Any, *, snapshot: Snapshot) -> None:
     index, centre, _ = cut_circles(fines, plane)
     edge = {"edgecolor": "black", "linewidth": 0.3}
     if len(fines) and _one_size(fines.radius):
-        _circles(axes, centre, fines.radius[index], facecolor=FINE_FACE, **edge)
+        _circles(axes, centre, fines.radius[index], facecolor=ORANGE, **edge)
         label = f"fines, radius {fines.radius.max() * MICRON:.3g} µm"
-        axes.plot([], [], "o", color=FINE_FACE, label=label)
+        axes.plot([], [], "o", color=ORANGE, label=label)
         axes.legend(loc="lower right", bbox_to_anchor=(1, 1), fontsize=9, frameon=False)
     elif len(fines):
         circles = _circles(axes, centre, fines.radius[index], cmap="plasma", **edge)
@@ -352,8 +347,7 @@ def _side_frame(figure: Any, axes: Any, snapshot: Snapshot) -> None:
 # The curves of sizes: asked for, placed, and of the fines that invaded.
 
 
-KIND_COLOURS = {"grains": "#7F7F7F", "fines": "#D55E00"}
-INVADED = "#0072B2"
+KIND_COLOURS = {"grains": GREY, "fines": ORANGE}
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -395,7 +389,7 @@ def fill_size_curves(figure: Any, *, sizes: Sequence[PlacedSizes]) -> None:
         )
         if one.invaded is not None and len(one.invaded):
             label = f"{len(one.invaded)} of them invaded"
-            _size_steps(axes, one.invaded, curve, color=INVADED, linestyle="--", label=label)
+            _size_steps(axes, one.invaded, curve, color=BLUE, linestyle="--", label=label)
     axes.set_xscale("log")
     axes.set(xlabel="diameter (µm)", ylabel="finer by volume (%)", ylim=(0, 100))
     axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
@@ -412,9 +406,7 @@ def _size_steps(axes: Any, diameter: Array, curve: SizeCurve, **style: Any) -> N
 
 
 # ------------------------------------------------------------------------------------------------
-# PNG figures of one specimen; depth is x, from the formation face.
-#
-# The colours are those of Okabe and Ito (2008), which colour-blind readers can tell apart.
+# All figures of one specimen, and those against depth.
 
 
 CAPTIONS = {
