@@ -40,45 +40,33 @@ if TYPE_CHECKING:
     from fdnet.network.network import build_network as build_network
     from fdnet.network.permeability import analyse as analyse
     from fdnet.network.permeability import compare as compare
-    from fdnet.run.open_run import open_run as open_run
-    from fdnet.run.open_run import run_case as run_case
+    from fdnet.run.finished import open_run as open_run
+    from fdnet.run.pipeline import run_case as run_case
     from fdnet.spheres.readers import read_spheres as read_spheres
     from fdnet.spheres.snapshot import Snapshot as Snapshot
 
     __version__: str
 
-# Each public name, and the module that it comes from.
-_HOME = {
-    "Case": "fdnet.case.case",
-    "InvasionCase": "fdnet.case.case",
-    "case_from": "fdnet.case.file",
-    "read_case": "fdnet.case.file",
-    "run_case": "fdnet.run.open_run",
-    "open_run": "fdnet.run.open_run",
-    "ensemble": "fdnet.campaign.api",
-    "sweep": "fdnet.campaign.api",
-    "compare_runs": "fdnet.campaign.api",
-    "Snapshot": "fdnet.spheres.snapshot",
-    "read_spheres": "fdnet.spheres.readers",
-    "analyse": "fdnet.network.permeability",
-    "compare": "fdnet.network.permeability",
-    "build_network": "fdnet.network.network",
-    "measure_occupancy": "fdnet.network.fines.occupancy",
-    "solve_flow": "fdnet.network.flow.flow",
-    "velocity_field": "fdnet.network.field.field",
-    "elastic_moduli": "fdnet.mechanics.of_case",
-    "triaxial_test": "fdnet.mechanics.of_case",
-    "LAWS": "fdnet.network.laws.named",
-    "DAMAGE_LAWS": "fdnet.network.laws.named",
-    "FdnetError": "fdnet.errors",
-    "CaseError": "fdnet.errors",
-    "DeckError": "fdnet.errors",
-    "LiggghtsError": "fdnet.errors",
-    "DumpError": "fdnet.errors",
-    "NetworkError": "fdnet.errors",
-    "FlowError": "fdnet.errors",
-    "MechanicsError": "fdnet.errors",
+# Public names, by the module that they come from.
+_HOMES = {
+    "fdnet.case.case": "Case InvasionCase",
+    "fdnet.case.file": "case_from read_case",
+    "fdnet.run.pipeline": "run_case",
+    "fdnet.run.finished": "open_run",
+    "fdnet.campaign.api": "ensemble sweep compare_runs",
+    "fdnet.spheres.snapshot": "Snapshot",
+    "fdnet.spheres.readers": "read_spheres",
+    "fdnet.network.permeability": "analyse compare",
+    "fdnet.network.network": "build_network",
+    "fdnet.network.fines.occupancy": "measure_occupancy",
+    "fdnet.network.flow.flow": "solve_flow",
+    "fdnet.network.field.field": "velocity_field",
+    "fdnet.mechanics.of_case": "elastic_moduli triaxial_test",
+    "fdnet.network.laws.named": "LAWS DAMAGE_LAWS",
+    "fdnet.errors": "FdnetError CaseError DeckError LiggghtsError DumpError NetworkError "
+    "FlowError MechanicsError",
 }
+_HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
 __all__ = ["__version__", *_HOME]  # noqa: PLE0604
 
 

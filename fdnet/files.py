@@ -1,7 +1,4 @@
-"""Files: written whole or not at all, and paths that users give.
-
-Files that are either the old one or the complete new one, never half of it.
-"""
+"""Files, each the old one or the complete new one and never half of it, and paths of users."""
 
 import argparse
 import codecs
@@ -30,14 +27,6 @@ def disk_is_full(folder: str | Path) -> bool:
     return full or shutil.disk_usage(folder).free < _FULL_BYTES
 
 
-def refuse_special(path: Path) -> None:
-    """Raise CaseError where `path` is a device, a pipe or a folder, which no file may replace."""
-    if path.exists() and not path.is_file():
-        raise CaseError(
-            f"{path}: is no ordinary file (a folder, a device or a pipe); give another"
-        )
-
-
 def remove_half_written(folder: Path) -> None:
     """Remove the temporary files in and below a folder that no other process writes to."""
     for path in folder.rglob(".*.part*"):
@@ -45,15 +34,8 @@ def remove_half_written(folder: Path) -> None:
             path.unlink(missing_ok=True)
 
 
-def _remove_remains(final: Path) -> None:
-    """Remove temporary files of `final` whose processes have ended."""
-    with suppress(OSError):
-        for path in final.parent.iterdir():
-            match = _PART.fullmatch(path.name)
-            if match is None or _temporary(final, match.group(1)) != path:
-                continue
-            if not _is_running(int(match.group(1))):
-                path.unlink(missing_ok=True)
+def _temporary(final: Path, process: object) -> Path:
+    return final.with_name(f".{final.stem}.{process}.part{final.suffix}")
 
 
 def _is_running(process: int) -> bool:
@@ -62,12 +44,8 @@ def _is_running(process: int) -> bool:
     except (ProcessLookupError, OverflowError):
         return False
     except PermissionError:
-        return True
+        pass
     return True
-
-
-def _temporary(final: Path, process: object) -> Path:
-    return final.with_name(f".{final.stem}.{process}.part{final.suffix}")
 
 
 @contextmanager
@@ -80,8 +58,16 @@ def replacing(path: str | Path) -> Iterator[Path]:
     device, a pipe or a folder has the name.
     """
     final = Path(path)
-    refuse_special(final)
-    _remove_remains(final)
+    if final.exists() and not final.is_file():
+        raise CaseError(
+            f"{final}: is no ordinary file (a folder, a device or a pipe); give another"
+        )
+    with suppress(OSError):
+        for left in final.parent.iterdir():
+            match = _PART.fullmatch(left.name)
+            ours = match is not None and _temporary(final, match.group(1)) == left
+            if match is not None and ours and not _is_running(int(match.group(1))):
+                left.unlink(missing_ok=True)
     part = _temporary(final, os.getpid())
     try:
         yield part

@@ -44,7 +44,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> FinishedRun:
     """A tiny run of all stages: fixed grains, periodic sides. Tests leave its folder as it is."""
     from builders import tiny
 
-    from fdnet.run.open_run import run_case
+    from fdnet.run.pipeline import run_case
 
     out = tmp_path_factory.mktemp("fixed") / "run"
     return run_case(tiny("run.cap_ms=0.35", "box.sides=periodic"), out)

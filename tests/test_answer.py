@@ -9,22 +9,24 @@ import pytest
 
 from fdnet.case.file import read_case
 from fdnet.report.tables import in_millidarcy, millidarcy, percent
-from fdnet.run.answer import (
-    FULL,
-    QUICK,
-    Sizes,
-    Step,
+from fdnet.report.text import (
     answer_sentence,
     case_words,
     certainty,
     end_words,
+    in_place_words,
+)
+from fdnet.run.answer import (
+    FULL,
+    QUICK,
+    BridgingSizes,
+    Step,
     flow_lost,
     hawkins,
-    in_place_words,
     layered_skin,
+    layers_in_series,
     rules_of,
     run_shows,
-    series,
     steps_of,
     zone_of,
 )
@@ -100,7 +102,10 @@ def analysis_of(sections, layers=None, law="all-spheres"):
 def test_layers_and_what_is_left_of_a_section_are_the_section_in_series():
     """Two layers of 0.5 mm and a rest of 1 mm make a section of 2 mm, by either permeability."""
     thin = [(0.0, 5e-4, 4.0, 0.5), (5e-4, 1e-3, 2.0, 1.0)]
-    whole = [series([(5e-4, k[0]), (5e-4, k[1]), (1e-3, 3.0)]) for k in ((4.0, 2.0), (0.5, 1.0))]
+    whole = [
+        layers_in_series([(5e-4, k[0]), (5e-4, k[1]), (1e-3, 3.0)])
+        for k in ((4.0, 2.0), (0.5, 1.0))
+    ]
     steps = steps_of(analysis_of([(0.0, 2e-3, *whole), (2e-3, 4e-3, 5.0, 5.0)], thin))
     assert [(s.near, s.far) for s in steps] == [
         (0.0, 5e-4),
@@ -120,7 +125,10 @@ def test_layers_and_what_is_left_of_a_section_are_the_section_in_series():
 def test_a_layer_that_seems_to_gain_is_made_up_for_and_nothing_is_cut_off():
     """In place the fines turn the flow aside: layer and rest make the section in series."""
     thin = [(0.0, 1e-3, 2.0, 1.0)]
-    section = [series([(1e-3, 2.0), (1e-3, 3.0)]), series([(1e-3, 1.0), (1e-3, 3.6)])]
+    section = [
+        layers_in_series([(1e-3, 2.0), (1e-3, 3.0)]),
+        layers_in_series([(1e-3, 1.0), (1e-3, 3.6)]),
+    ]
     first, rest = steps_of(analysis_of([(0.0, 2e-3, *section)], thin))
     assert (rest.before, rest.after) == (pytest.approx(3.0), pytest.approx(3.6))
     assert zone_of([first, rest]).depth == 1e-3
@@ -149,7 +157,7 @@ def test_a_zone_without_damage_without_end_and_without_flow(after, depth, ratio,
 def sizes(**changed):
     fines = {"D50": 40e-6, "D85": 60e-6, "D90": 100e-6} | changed.pop("fines", {})
     given = {"throat_median": 100e-6, "throat_largest": 90e-6, "grain_d15": 270e-6}
-    return Sizes(fines=fines, **(given | {"concentration": 0.05} | changed))
+    return BridgingSizes(fines=fines, **(given | {"concentration": 0.05} | changed))
 
 
 @pytest.mark.parametrize(

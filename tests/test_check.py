@@ -14,8 +14,8 @@ from fdnet.case.file import case_from
 from fdnet.case.tables import AnalysisChoices
 from fdnet.cli import main
 from fdnet.report.html import ReportParts, write_report
+from fdnet.report.text import summary_lines, text_lines
 from fdnet.run.pipeline import with_default_laws
-from fdnet.run.summary import summary_lines, text_lines
 from fdnet.scales.check import PERIODIC, WALLS, WIDTHS, checked, width_error
 from fdnet.scales.clock import spoken_memory, spoken_time
 from fdnet.scales.scales import scales_of

@@ -108,11 +108,12 @@ def test_records_of_another_shape_are_named(tmp_path, stage, key, value):
     from fdnet.run.folder import read_manifest, read_record
 
     row = {"version": "3.8.0", "seconds": 1.0, "liggghts_s": 1.0}
+    files = {"files": {"x": "y"}, "ranks": 1}
     numbers = dict.fromkeys(
         ("seconds", "max_overlap", "steps", "dt_s", "supplied", "porosity", "porosity_assumed"), 1
     )
     texts = {"digest": "x", "stop_reason": "x", "left_out": [], "warnings": []}
-    good = {"format": 1, "stages": [], "invade": None, "runs": [row], "attempts": [row]}
+    good = {"format": 1, "stages": [], "invade": None, "runs": [row], "attempts": [row], **files}
     path = tmp_path / ("manifest.json" if stage == "manifest" else f"{stage}/stage.json")
     path.parent.mkdir(exist_ok=True)
     path.write_text(json.dumps(good | numbers | texts))

@@ -7,7 +7,7 @@ from PIL import Image
 
 from fdnet import solve_flow
 from fdnet.cli import main
-from fdnet.run.movie import LINES, _states, _words, colour_limits, flux_of, streamlines_of
+from fdnet.run.movie import LINES, colour_limits, flux_of, moments_of, streamlines_of
 
 pytestmark = pytest.mark.liggghts
 
@@ -58,11 +58,11 @@ def test_the_command_draws_before_and_after(finished, tmp_path, capsys):
 
 
 def test_words_say_what_is_known(finished):
-    clean, *_, last = _states(finished)
+    clean, *_, last = moments_of(finished)
     assert (clean.rate, last.rate) == (None, None), "a uniform flow has no rate of its own"
-    assert _words(clean) == "clean sand"
+    assert clean.words() == "clean sand"
     invaded = finished.summary["invaded_count"]
-    assert _words(last, measured=0.5) == (
+    assert last.words(measured=0.5) == (
         f"{1e3 * finished.summary['physical_time_s']:.3g} ms,   k/k0 0.50,   "
         f"{invaded} fines in the sand"
     )

@@ -84,10 +84,6 @@ def test_a_folder_of_ours_is_known_by_its_mark_or_its_content(tmp_path, case, ca
     assert (out / ".fdnet-run").read_text().startswith("fdnet run folder")
     (out / ".fdnet-run").unlink()
     assert answer(capsys, *pack)[0] == 0
-    (out / ".fdnet-run").unlink(missing_ok=True)
-    shutil.rmtree(out / "pack")
-    (out / ".unfinished").write_text("pack\n")
-    assert answer(capsys, *pack, "--resume")[0] == 0
 
 
 @pytest.mark.liggghts

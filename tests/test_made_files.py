@@ -133,14 +133,24 @@ def test_digests_of_the_wrong_shape_are_refused(copied, files):
 
 
 @pytest.mark.parametrize("key", ["files", "ranks"])
-def test_a_record_without_digests_or_ranks_is_refused(copied, key):
+def test_a_record_without_its_digests_or_ranks_is_refused(copied, key):
     (copied / "manifest.json").unlink()
     path = copied / "pack" / "stage.json"
     record = json.loads(path.read_text())
     del record[key]
     path.write_text(json.dumps(record))
-    with pytest.raises(CaseError, match="cannot be understood"):
+    with pytest.raises(CaseError, match=rf"pack/stage\.json: .*the key {key} is missing"):
         run_stages(CASE, options(copied, resume=True))
+
+
+@pytest.mark.parametrize("spoil", [lambda manifest: manifest.pop("files"), dict.clear])
+def test_an_opened_run_refuses_a_manifest_without_digests(copied, spoil):
+    path = copied / "manifest.json"
+    manifest = json.loads(path.read_text())
+    spoil(manifest if spoil is not dict.clear else manifest["files"])
+    path.write_text(json.dumps(manifest))
+    with pytest.raises(CaseError, match=r"manifest\.json: .*files"):
+        fdnet.open_run(copied)
 
 
 def test_a_run_that_was_cut_after_its_pack_goes_on_with_its_ranks(copied):

@@ -1,5 +1,6 @@
 """A finished run as an object: tables, spheres, network, hand-over, and what is refused."""
 
+import errno
 import json
 import re
 import shutil
@@ -11,8 +12,8 @@ from builders import tiny
 
 import fdnet
 from fdnet.errors import CaseError
+from fdnet.report.text import facts
 from fdnet.run.finished import FinishedRun
-from fdnet.run.summary import facts
 
 pytestmark = pytest.mark.liggghts
 
@@ -207,6 +208,28 @@ def test_a_finished_run_is_opened_and_not_repeated(run):
     again = fdnet.run_case(run.case, run.path)
     assert (run.path / "manifest.json").stat().st_mtime_ns == before
     assert again.summary == run.summary
+
+
+def test_the_answer_is_printed_before_the_figures_whose_failure_is_said(
+    copied, monkeypatch, capsys
+):
+    from fdnet.cli import main
+    from fdnet.run import pipeline
+
+    printed = []
+
+    def fail(results):
+        printed.append(capsys.readouterr().out)
+        raise OSError(errno.ENOSPC, "No space left on device", "depth.png")
+
+    monkeypatch.setattr(pipeline, "draw_figures", fail)
+    again = ["--stages", "analyse,report", "--force", "--quiet"]
+    assert main(["run", str(copied / "case.toml"), "--out", str(copied), *again]) == 2
+    assert printed[0].startswith("95 % of the fines that entered lie within")
+    assert "permeability" in printed[0]
+    assert "depth.png: No space left on device" in capsys.readouterr().err
+    assert (copied / "summary.json").exists()
+    assert not (copied / "manifest.json").exists()
 
 
 def test_what_is_no_finished_run_is_refused(copied, tmp_path):

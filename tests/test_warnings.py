@@ -16,7 +16,6 @@ SHORT = {
     "no-picture": "no 3-D picture: no display",
     "drawing": "the drawing process left no complete PNG",
     "no-open-path": "k_damaged = 0: no open path",
-    "overlap": "a fine overlapped by 4 % of the smaller diameter at step 30 (limit 3 %)",
     "grains-overlap": "grains overlap by up to 4.7 % of a diameter: the pack is denser than rigid "
     "spheres get",
     "no-box": "no --box given: the box around all grains was used",

@@ -1,7 +1,4 @@
-"""`fdnet movie` and `fdnet stokes`: commands on a finished run.
-
-`fdnet movie`: the invasion of a finished run as a GIF or MP4, or as one picture.
-"""
+"""`fdnet movie` and `fdnet stokes`: commands on a finished run."""
 
 import argparse
 import json
@@ -102,30 +99,25 @@ def _stokes(options: argparse.Namespace) -> int:
 def _text(row: Mapping[str, Any]) -> str:
     from fdnet.report.tables import in_millidarcy
 
-    lines = [
-        f"section {row['section']}, {1e3 * row['x_lo_m']:g} to {1e3 * row['x_hi_m']:g} mm, "
-        "cut out",
-        f"damage law of the network: {row['network_damage_law']}",
-        _line("", "before, mD", "after, mD", "lost"),
-    ]
+    keys = ("k_initial_m2", "k_damaged_m2")
+    lines: list[tuple[str, ...]] = [("", "before, mD", "after, mD", "lost")]
     for name, prefix in (("resolved flow", ""), ("network", "network_")):
-        before, after, lost = (
-            row[f"{prefix}{key}"] for key in ("k_initial_m2", "k_damaged_m2", "k_reduction")
-        )
-        shown = "-" if lost is None else f"{lost:.1%}"
-        lines.append(_line(name, in_millidarcy(before), in_millidarcy(after), shown))
+        lost = row[f"{prefix}k_reduction"]
+        both = (in_millidarcy(row[f"{prefix}{key}"]) for key in keys)
+        lines.append((name, *both, "-" if lost is None else f"{lost:.1%}"))
     errors = (f"{row[f'{key}_error']:.1%}" for key in ("k_initial", "k_damaged"))
-    lines.append(_line("error of the flow", *errors))
     cells = (f"{1e6 * row[f'cell_{state}_m']:.3g}" for state in ("initial", "damaged"))
-    lines.append(_line("its finer cells, µm", *cells))
-    over = (f"{_over(row, key):+.1%}" for key in ("k_initial_m2", "k_damaged_m2"))
-    lines.append(_line("network over flow", *over))
-    return "\n".join(lines)
-
-
-def _line(name: str, before: str, after: str, lost: str = "") -> str:
-    return f"{name:<20}{before:>14}{after:>14}{lost:>10}".rstrip()
-
-
-def _over(row: Mapping[str, Any], key: str) -> float:
-    return float(row[f"network_{key}"] / row[key] - 1.0)
+    over = (f"{float(row[f'network_{key}'] / row[key] - 1.0):+.1%}" for key in keys)
+    lines += [
+        ("error of the flow", *errors, ""),
+        ("its finer cells, µm", *cells, ""),
+        ("network over flow", *over, ""),
+    ]
+    return "\n".join(
+        [
+            f"section {row['section']}, {1e3 * row['x_lo_m']:g} to {1e3 * row['x_hi_m']:g} mm, "
+            "cut out",
+            f"damage law of the network: {row['network_damage_law']}",
+            *(f"{one[0]:<20}{one[1]:>14}{one[2]:>14}{one[3]:>10}".rstrip() for one in lines),
+        ]
+    )

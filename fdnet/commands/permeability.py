@@ -307,7 +307,7 @@ def _along(
     options: argparse.Namespace,
 ) -> list[dict[str, Any]]:
     """What each pair of laws gives for flow along `axis`, the chosen pair first."""
-    from fdnet.report.permeability_text import thesis_law_warning
+    from fdnet.report.text import thesis_law_warning
     from fdnet.scales.check import explained
 
     spheres, along = given.spheres.turned(axis), "xyz".index(axis)
@@ -477,10 +477,10 @@ def _print(
         first = results[0]
         print(plain_json({**first, "laws": results} if options.compare_laws else first)[1])
         return
-    from fdnet.report.permeability_text import Given, answer_lines
+    from fdnet.report.text import permeability_lines
 
-    given = Given(sides=sides, sections=options.sections > 1, fines=fines > 0)
-    for line in answer_lines(results, given):
+    sections = options.sections > 1
+    for line in permeability_lines(results, sides=sides, sections=sections, fines=fines > 0):
         print(line)
 
 

@@ -1,11 +1,9 @@
-"""`fdnet run`, `check`, `render` and `cases`: commands on a case.
-
-Options of every command that takes a case file.
-"""
+"""`fdnet run`, `check`, `render` and `cases`: commands on a case, and options they share."""
 
 import argparse
 import json
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -118,32 +116,24 @@ def add_cases(commands: Any, common: argparse.ArgumentParser) -> None:
 
 
 def _cases(options: argparse.Namespace) -> int:
-    from fdnet.case.file import shipped_cases
-    from fdnet.files import write_new
-
-    if options.name is None:
-        for case in shipped_cases():
-            print(f"{case.name:<24} {case.about}")
-        return 0
-    out = options.out or Path(f"{options.name}.toml")
-    text = _text_of(options.name)
-    write_new(out, text, force=options.force)
-    print(f"{out}: written; fdnet check {out} looks at it, fdnet run {out} runs it")
-    return 0
-
-
-def _text_of(name: str) -> str:
     import difflib
 
     from fdnet.case.file import shipped_cases
-    from fdnet.errors import CaseError
+    from fdnet.files import write_new
 
-    known = {case.name: case for case in shipped_cases()}
+    known, name = {case.name: case for case in shipped_cases()}, options.name
+    if name is None:
+        for case in known.values():
+            print(f"{case.name:<24} {case.about}")
+        return 0
     if name not in known:
         near = difflib.get_close_matches(name, list(known), n=1)
         hint = f"; did you mean {near[0]}?" if near else ""
         raise CaseError(f"{name}: no case of this name comes with fdnet{hint} (fdnet cases)")
-    return known[name].path.read_text(encoding="utf-8")
+    out = options.out or Path(f"{name}.toml")
+    write_new(out, known[name].path.read_text(encoding="utf-8"), force=options.force)
+    print(f"{out}: written; fdnet check {out} looks at it, fdnet run {out} runs it")
+    return 0
 
 
 # ------------------------------------------------------------------------------------------------
@@ -252,11 +242,19 @@ def add_run(commands: Any, common: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    from fdnet.report.text import seconds_line, summary_lines
     from fdnet.run.pipeline import run_stages
     from fdnet.run.records import RunOptions, cores
 
     case = case_of(options)
-    out = options.out or Path("runs") / case.name
+    out, printed = options.out or Path("runs") / case.name, []
+
+    def tell(summary: Mapping[str, Any]) -> None:
+        """The answer, as soon as it is known: the pictures may take longer than it did."""
+        if summary and not options.json:
+            print("\n".join(summary_lines(summary)), flush=True)
+            printed.append(summary)
+
     chosen = RunOptions(
         out=out,
         ranks=options.np,
@@ -269,6 +267,7 @@ def _run(options: argparse.Namespace) -> int:
         timeout=options.timeout,
         show_progress=not options.quiet,
         command=options.command_line,
+        answered=tell,
     )
     if options.np > cores():
         _warn(
@@ -281,20 +280,14 @@ def _run(options: argparse.Namespace) -> int:
             _warn(text)
     if options.json:
         print(json.dumps(summary, indent=2))
-    else:
-        _print_summary(summary, out)
+        return 0
+    if not printed:
+        tell(summary)
+    done = "done (the analysis was not among the stages)"
+    print(seconds_line(summary) if summary else done)
+    print(f"run folder: {out}")
     return 0
 
 
 def _warn(text: str) -> None:
     print(f"fdnet: warning: {text}", file=sys.stderr, flush=True)
-
-
-def _print_summary(summary: dict[str, Any], out: Path) -> None:
-    from fdnet.run.summary import summary_lines
-
-    for line in (
-        summary_lines(summary) if summary else ["done (the analysis was not among the stages)"]
-    ):
-        print(line)
-    print(f"run folder: {out}")

@@ -1,7 +1,4 @@
-"""The report, and the sections that later commands add to it.
-
-Sections that a command adds to a report after the run, in places that its page keeps.
-"""
+"""The page report.html of a run, and the sections that later commands add to it."""
 
 import base64
 import html
@@ -11,23 +8,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Annotated, Any, NamedTuple
 
 from fdnet.errors import CaseError
 from fdnet.files import write_text
 from fdnet.report.tables import (
     AGREES,
     SHOWS,
-    Checked,
+    JsonObject,
     in_millidarcy,
-    millimetres,
     percent,
     read_json,
-    two_digits,
 )
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
+from fdnet.report.text import facts
 
 
 def put_section(report: Path, name: str, section: str) -> bool:
@@ -55,60 +48,46 @@ def put_section(report: Path, name: str, section: str) -> bool:
 
 
 MECHANICS = "mechanics"
-_ROWS = (
-    ("young_modulus_Pa", "Young's modulus", 1e-9, "GPa"),
-    ("poisson_ratio", "Poisson's ratio", 1.0, ""),
-    ("bulk_modulus_Pa", "bulk modulus", 1e-9, "GPa"),
-    ("shear_modulus_Pa", "shear modulus", 1e-9, "GPa"),
-    ("young_modulus_x_Pa", "Young's modulus along x", 1e-9, "GPa"),
-    ("young_modulus_y_Pa", "Young's modulus along y", 1e-9, "GPa"),
-    ("young_modulus_z_Pa", "Young's modulus along z", 1e-9, "GPa"),
-    ("anisotropy", "anisotropy (0 is isotropic)", 1.0, ""),
-    ("p_wave_m_s", "P wave", 1.0, "m/s"),
-    ("s_wave_m_s", "S wave", 1.0, "m/s"),
-    ("coordination", "contacts and bonds of a grain", 1.0, ""),
-    ("rattlers", "grains that carry nothing", 1.0, ""),
-    ("bonds", "bonds", 1.0, ""),
-)
-_TRIAXIAL_ROWS = (
-    ("confining_Pa", "confining stress", 1e-6, "MPa"),
-    ("young_modulus_Pa", "initial slope", 1e-9, "GPa"),
-    ("peak_Pa", "largest deviatoric stress", 1e-6, "MPa"),
-    ("peak_strain", "axial strain there", 100.0, "%"),
-    ("volume_strain_at_end", "volume strain at the end (compression above 0)", 100.0, "%"),
-    ("broken_in_tension", "bonds broken in tension", 1.0, ""),
-    ("broken_in_shear", "bonds broken in shear", 1.0, ""),
-)
 
 
-class _Test(Checked):
+class Line(NamedTuple):
+    """A number of a table of two columns: its name, the unit, and the factor to it."""
+
+    name: str
+    unit: str = ""
+    factor: float = 1.0
+
+
+class _Test(JsonObject):
     """The numbers of a triaxial test."""
 
-    confining_Pa: float
-    young_modulus_Pa: float | None
-    peak_Pa: float | None
-    peak_strain: float | None
-    volume_strain_at_end: float | None
-    broken_in_tension: int
-    broken_in_shear: int
+    confining_Pa: Annotated[float, Line("confining stress", "MPa", 1e-6)]
+    young_modulus_Pa: Annotated[float | None, Line("initial slope", "GPa", 1e-9)]
+    peak_Pa: Annotated[float | None, Line("largest deviatoric stress", "MPa", 1e-6)]
+    peak_strain: Annotated[float | None, Line("axial strain there", "%", 100.0)]
+    volume_strain_at_end: Annotated[
+        float | None, Line("volume strain at the end (compression above 0)", "%", 100.0)
+    ]
+    broken_in_tension: Annotated[int, Line("bonds broken in tension")]
+    broken_in_shear: Annotated[int, Line("bonds broken in shear")]
 
 
-class Mechanics(Checked):
+class Mechanics(JsonObject):
     """What mechanics.json holds."""
 
-    young_modulus_Pa: float | None
-    poisson_ratio: float | None
-    bulk_modulus_Pa: float | None
-    shear_modulus_Pa: float | None
-    young_modulus_x_Pa: float | None
-    young_modulus_y_Pa: float | None
-    young_modulus_z_Pa: float | None
-    anisotropy: float | None
-    p_wave_m_s: float | None
-    s_wave_m_s: float | None
-    coordination: float | None
-    rattlers: int
-    bonds: int
+    young_modulus_Pa: Annotated[float | None, Line("Young's modulus", "GPa", 1e-9)]
+    poisson_ratio: Annotated[float | None, Line("Poisson's ratio")]
+    bulk_modulus_Pa: Annotated[float | None, Line("bulk modulus", "GPa", 1e-9)]
+    shear_modulus_Pa: Annotated[float | None, Line("shear modulus", "GPa", 1e-9)]
+    young_modulus_x_Pa: Annotated[float | None, Line("Young's modulus along x", "GPa", 1e-9)]
+    young_modulus_y_Pa: Annotated[float | None, Line("Young's modulus along y", "GPa", 1e-9)]
+    young_modulus_z_Pa: Annotated[float | None, Line("Young's modulus along z", "GPa", 1e-9)]
+    anisotropy: Annotated[float | None, Line("anisotropy (0 is isotropic)")]
+    p_wave_m_s: Annotated[float | None, Line("P wave", "m/s")]
+    s_wave_m_s: Annotated[float | None, Line("S wave", "m/s")]
+    coordination: Annotated[float | None, Line("contacts and bonds of a grain")]
+    rattlers: Annotated[int, Line("grains that carry nothing")]
+    bonds: Annotated[int, Line("bonds")]
     warnings: list[str]
     triaxial: _Test | None = None
 
@@ -123,17 +102,16 @@ def mechanics_html(folder: Path) -> str:
         return ""
     advice = "measure it anew with fdnet mechanics, or remove the folder"
     numbers = read_json(path, Mechanics, noun="result of fdnet mechanics", advice=advice)
-    parts = ["<h2>Mechanics of the pack</h2>", _table(numbers, _ROWS)]
+    parts = ["<h2>Mechanics of the pack</h2>", _table(numbers, Mechanics)]
     if numbers.get("warnings"):
         items = "".join(f"<li>{html.escape(text)}</li>" for text in numbers["warnings"])
         parts.append(f'<div class="warnings"><ul>{items}</ul></div>')
     if numbers.get("triaxial"):
-        parts += ["<h3>Triaxial test</h3>", _table(numbers["triaxial"], _TRIAXIAL_ROWS)]
+        parts += ["<h3>Triaxial test</h3>", _table(numbers["triaxial"], _Test)]
     figure = folder / "stress_strain.png"
     if numbers.get("triaxial") and figure.is_file():
-        data = base64.b64encode(figure.read_bytes()).decode("ascii")
         parts.append(
-            f'<figure class="wide"><img src="data:image/png;base64,{data}" alt="{figure.stem}">'
+            f'<figure class="wide"><img src="{_data_uri(figure)}" alt="{figure.stem}">'
             f"<figcaption><em>({figure.name})</em></figcaption></figure>"
         )
     return "\n".join(parts)
@@ -144,18 +122,17 @@ def put_mechanics(report: Path, folder: Path) -> bool:
     return put_section(report, MECHANICS, mechanics_html(folder))
 
 
-def _table(numbers: dict[str, Any], rows: tuple[tuple[str, str, float, str], ...]) -> str:
-    cells = [
-        f'<tr><th>{html.escape(name)}</th><td class="number">{_shown(numbers[key], factor)} '
-        f"{unit}</td></tr>"
-        for key, name, factor, unit in rows
-        if key in numbers
-    ]
+def _table(numbers: dict[str, Any], model: type[JsonObject]) -> str:
+    """The numbers that have a `Line` in the model."""
+    cells = []
+    for key, field_of in model.model_fields.items():
+        for one in (known for known in field_of.metadata if isinstance(known, Line)):
+            value = "–" if numbers[key] is None else f"{numbers[key] * one.factor:.4g}"
+            cells.append(
+                f'<tr><th>{html.escape(one.name)}</th><td class="number">{value} {one.unit}</td>'
+                "</tr>"
+            )
     return '<table class="pairs">\n' + "\n".join(cells) + "\n</table>"
-
-
-def _shown(value: float | None, factor: float) -> str:
-    return "–" if value is None else f"{value * factor:.4g}"
 
 
 # ------------------------------------------------------------------------------------------------
@@ -184,31 +161,31 @@ _NOTE = (
 
 def stokes_html(rows: Sequence[Mapping[str, Any]]) -> str:
     """The section as HTML, one row for each section that was resolved."""
+
+    def lost(value: float | None) -> str:
+        return "&ndash;" if value is None else f"{value:.1%}"
+
+    lines = [
+        [
+            f"{1e3 * row['x_lo_m']:g} to {1e3 * row['x_hi_m']:g}",
+            f"{in_millidarcy(row['k_initial_m2'])} &plusmn; {row['k_initial_error']:.1%}",
+            in_millidarcy(row["network_k_initial_m2"]),
+            f"{in_millidarcy(row['k_damaged_m2'])} &plusmn; {row['k_damaged_error']:.1%}",
+            in_millidarcy(row["network_k_damaged_m2"]),
+            lost(row["k_reduction"]),
+            lost(row["network_k_reduction"]),
+            f"{1e6 * row['cell_initial_m']:.3g}, {1e6 * row['cell_damaged_m']:.3g}",
+        ]
+        for row in rows
+    ]
     head = "".join(f'<th class="number">{name}</th>' for name in _HEAD)
-    body = "\n".join(f"<tr>{_cells(row)}</tr>" for row in rows)
+    cells = ["".join(f'<td class="number">{text}</td>' for text in line) for line in lines]
+    body = "\n".join(f"<tr>{line}</tr>" for line in cells)
     return (
         "<h2>Sections by resolved Stokes flow</h2>\n"
         f'<div class="scroll"><table>\n<tr>{head}</tr>\n{body}\n</table></div>\n'
         f'<p class="note">{_NOTE.format(rows[0]["network_damage_law"])}</p>'
     )
-
-
-def _cells(row: Mapping[str, Any]) -> str:
-    texts = [
-        f"{1e3 * row['x_lo_m']:g} to {1e3 * row['x_hi_m']:g}",
-        f"{in_millidarcy(row['k_initial_m2'])} &plusmn; {row['k_initial_error']:.1%}",
-        in_millidarcy(row["network_k_initial_m2"]),
-        f"{in_millidarcy(row['k_damaged_m2'])} &plusmn; {row['k_damaged_error']:.1%}",
-        in_millidarcy(row["network_k_damaged_m2"]),
-        _share(row["k_reduction"]),
-        _share(row["network_k_reduction"]),
-        f"{1e6 * row['cell_initial_m']:.3g}, {1e6 * row['cell_damaged_m']:.3g}",
-    ]
-    return "".join(f'<td class="number">{text}</td>' for text in texts)
-
-
-def _share(value: float | None) -> str:
-    return "&ndash;" if value is None else f"{value:.1%}"
 
 
 # ------------------------------------------------------------------------------------------------
@@ -268,106 +245,45 @@ class ReportParts:
 def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportParts) -> Path:
     """Write the page, whole or not at all.
 
-    `summary` is the mapping of summary.json; keys that it lacks show as a dash.
+    `summary` is the mapping of summary.json; keys that it lacks show as a dash, and
+    without `supplied_count` there are no headline numbers.
 
     Raises CaseError for a figure that cannot be read.
     """
-    template = _environment().from_string(_template_text())
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    page = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    page.filters.update(
+        quantity=quantity, millidarcy=in_millidarcy, percent=percent, multiplied=multiplied
+    )
+    page.filters["fixed"] = lambda value: DASH if value is None else f"{value:.4f}"
+    page.globals.update(shows=SHOWS, agrees=AGREES, columns=SECTION_COLUMNS)
     figures = [
         {"data": _data_uri(Path(file)), "caption": caption, "name": Path(file).name}
         for file, caption in parts.figures
     ]
-    still = next((one for one in figures if one["name"] == STILL), None)
-    first = [one for one in figures if one["name"] == LEADING]
-    text = template.render(
+    # what the page writes without escaping is made here
+    view = (
+        {}
+        if parts.view is None
+        else {
+            "view_json": Markup(json.dumps(dict(parts.view))),
+            "view_script": Markup(_own("view.js")),
+        }
+    )
+    text = page.from_string(_own("report.html.j2")).render(
         summary=summary,
         parts=parts,
-        figures=[one for one in figures if one is not still and one not in first],
-        leading=first,
-        still=still,
-        **_view_parts(parts.view),
-        headline=headline(summary),
-        columns=SECTION_COLUMNS,
+        figures=[one for one in figures if one["name"] not in (STILL, LEADING)],
+        leading=[one for one in figures if one["name"] == LEADING],
+        still=next((one for one in figures if one["name"] == STILL), None),
+        headline=list(facts(summary)) if "supplied_count" in summary else [],
+        **view,
     )
     return write_text(path, text)
-
-
-def _view_parts(view: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Data and script of the 3-D view; what the page writes without escaping is made here."""
-    if view is None:
-        return {}
-    from markupsafe import Markup
-
-    script = resources.files("fdnet.report").joinpath("view.js").read_text(encoding="utf-8")
-    return {"view_json": Markup(json.dumps(dict(view))), "view_script": Markup(script)}
-
-
-def headline(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
-    """The numbers on top: label, value, remark."""
-    lost, invaded, supplied = (
-        summary.get(key) for key in ("k_reduction", "invaded_count", "supplied_count")
-    )
-    whole = [
-        (
-            "permeability intact",
-            f"{in_millidarcy(summary.get('k_initial_m2'))} mD",
-            quantity(summary.get("k_initial_m2"), "m²"),
-        ),
-        ("porosity intact", fixed(summary.get("porosity_initial")), "overlap counted once"),
-    ]
-    if summary.get("stop_reason") is None and not invaded:
-        return whole
-    reason, words = summary.get("stop_reason"), summary.get("words") or {}
-    loss = DASH if lost is None else f"{percent(lost)} % lost"
-    passed, upstream = (
-        quantity(summary.get("passed_count")),
-        quantity(summary.get("upstream_count")),
-    )
-    return [
-        (
-            "95 % of the fines above",
-            millimetres(summary.get("invasion_depth_p95_m")),
-            f"deepest {millimetres(summary.get('invasion_depth_m'))}",
-        ),
-        whole[0],
-        (
-            "permeability damaged",
-            f"{in_millidarcy(summary.get('k_damaged_m2'))} mD",
-            f"{quantity(summary.get('k_damaged_m2'), 'm²')}, {loss}{_other(summary)}",
-        ),
-        *_skin(summary),
-        whole[1],
-        ("porosity damaged", fixed(summary.get("porosity_damaged")), "overlap counted once"),
-        (
-            "fines invaded",
-            quantity(invaded),
-            f"of {quantity(supplied)} supplied; {passed} passed, {upstream} upstream",
-        ),
-        (
-            "cake thickness",
-            millimetres(summary.get("cake_thickness_m")),
-            words.get("cake", ""),
-        ),
-        ("end of the run", quantity(reason), words.get("end", "")),
-    ]
-
-
-def _skin(summary: Mapping[str, Any]) -> list[tuple[str, str, str]]:
-    """Skin and the flow that it costs, where the case has a well."""
-    if "skin" not in summary:
-        return []
-    radius = millimetres(summary.get("skin_well_radius_m"))
-    value = "infinite" if summary["skin"] is None else f"{summary['skin']:.2g}"
-    cost = f"{two_digits(summary['skin_flow_lost'])} of the flow"
-    return [("skin", value, f"costs {cost} of a well of {radius} radius")]
-
-
-def _other(summary: Mapping[str, Any]) -> str:
-    """The damaged permeability by the other law, as a measure of the error."""
-    other = summary.get("k_damaged_other_m2")
-    if other is None:
-        return ""
-    return f"; by {summary.get('damage_law_other')}: {in_millidarcy(other)} mD"
 
 
 def quantity(value: Any, unit: str = "") -> str:
@@ -382,12 +298,7 @@ def quantity(value: Any, unit: str = "") -> str:
     return f"{_digits(value)} {unit}".strip()
 
 
-def fixed(value: Any) -> str:
-    """A porosity: four decimals."""
-    return DASH if value is None else f"{value:.4f}"
-
-
-def scaled(value: Any, factor: float | None) -> Any:
+def multiplied(value: Any, factor: float | None) -> Any:
     """`value` times `factor`; None stays None."""
     return value if value is None or factor is None else value * factor
 
@@ -403,20 +314,8 @@ def _digits(value: float) -> str:
     return f"{mantissa}·10{str(int(power)).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
 
 
-def _environment() -> "Environment":
-    from jinja2 import Environment, StrictUndefined
-
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters.update(quantity=quantity, fixed=fixed, scaled=scaled)
-    environment.filters.update(millidarcy=in_millidarcy, percent=percent)
-    environment.globals.update(shows=SHOWS, agrees=AGREES)
-    return environment
-
-
-def _template_text() -> str:
-    return resources.files("fdnet.report").joinpath("report.html.j2").read_text(encoding="utf-8")
+def _own(name: str) -> str:
+    return resources.files("fdnet.report").joinpath(name).read_text(encoding="utf-8")
 
 
 def _data_uri(path: Path) -> str:

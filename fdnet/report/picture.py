@@ -1,51 +1,315 @@
-"""The 3-D picture of a sphere file, drawn in a process of its own, which OpenGL may end.
+"""Pictures and movies of spheres and flow, drawn by OpenGL in a process of its own.
 
-Usage: python -m fdnet.report.picture SPHERES.vtp --box=x0,x1,y0,y1,z0,z1 PICTURE.png
-The bounds are in m. See `fdnet.report.child.render_spheres_png`.
+Without usable OpenGL, VTK ends its process with no Python error; in a child that costs the
+picture alone. The child is `python -m fdnet.report.picture`; what it draws comes on standard
+input.
 """
 
+import json
+import os
+import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from fdnet.errors import CaseError
+from fdnet.files import replacing
 from fdnet.spheres.snapshot import Array, Kind
 
 MM, MICRON = 1e3, 1e6
-WINDOW = [1500, 950]
+PNG_START, PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND"
+
+
+class MovieFrame(NamedTuple):
+    """One state: its file of spheres (.vtp), what stands above it, and its flow (.vtp) if any."""
+
+    spheres: Path
+    words: str = ""
+    lines: Path | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Scene:
+    """What all frames share.
+
+    Attributes:
+        grains: a file of spheres (.vtp) with the grains; states may hold the fines alone.
+        box: (3, 2) m.
+        title: of the colours of the flow; "" where no flow is shown.
+        limits: of these colours.
+    """
+
+    grains: Path
+    box: Array
+    title: str = ""
+    limits: tuple[float, float] = (0.0, 0.0)
+
+
+def render_spheres_png(
+    path: str | Path, spheres_vtp: str | Path, box: Array, *, seconds: float = 120.0
+) -> str:
+    """Draw the 3-D view of `spheres_vtp` into `path`; `box` is (3, 2) m.
+
+    Returns "" or the reason why there is no picture; nothing is raised, and only a complete
+    picture replaces `path`.
+    """
+    spheres = Path(spheres_vtp)
+    try:
+        with replacing(path) as part:
+            scene = Scene(grains=spheres, box=box)
+            draw_frames(scene, [MovieFrame(spheres)], [part], seconds=seconds)
+    except subprocess.TimeoutExpired:
+        return f"the 3-D picture was given up after {seconds:g} s"
+    except OSError as error:
+        return f"no 3-D picture: {error}"
+    return ""
+
+
+def draw_frames(
+    scene: Scene, frames: Sequence[MovieFrame], targets: Sequence[Path], *, seconds: float
+) -> None:
+    """Draw each frame into its target (.png) in a child process.
+
+    Raises subprocess.TimeoutExpired after `seconds`, OSError when the child fails or leaves no
+    complete picture.
+    """
+    rows = [
+        [str(path.absolute()) if path else "" for path in (one.spheres, one.lines, target)]
+        for one, target in zip(frames, targets, strict=True)
+    ]
+    work = {
+        "grains": str(scene.grains.absolute()),
+        "box": np.asarray(scene.box).tolist(),
+        "title": scene.title,
+        "limits": scene.limits,
+        "frames": rows,
+    }
+    package = str(Path(__file__).resolve().parents[2])
+    before = os.environ.get("PYTHONPATH")
+    done = subprocess.run(
+        _command(),
+        input=json.dumps(work),
+        capture_output=True,
+        text=True,
+        errors="replace",
+        timeout=seconds,
+        check=False,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, (package, before)))},
+    )
+    if done.returncode:
+        printed = [line.strip() for line in (done.stderr or "").splitlines() if line.strip()]
+        kind = "exit code" if done.returncode > 0 else "signal"
+        why = printed[-1][:200] if printed else "no usable OpenGL?"
+        raise OSError(f"the drawing process ended with {kind} {abs(done.returncode)}; {why}")
+    for target in targets:
+        picture = target.read_bytes() if target.is_file() else b""
+        if not (picture.startswith(PNG_START) and PNG_END in picture[-12:]):
+            raise OSError("the drawing process left no complete PNG")
+
+
+def _command() -> list[str]:
+    """The child, with the software OpenGL that the set-up may have installed."""
+    libraries = Path(__file__).resolve().parents[2] / ".prefix" / "bin" / "with-libraries"
+    first = [str(libraries)] if os.access(libraries, os.X_OK) else []
+    return [*first, sys.executable, "-m", "fdnet.report.picture"]
+
+
+# ------------------------------------------------------------------------------------------------
+# States of a run as a movie, one after the other (GIF or MP4), or below each other (PNG).
+
+
+SECONDS_PER_FRAME = 30.0
+"""Time that drawing one state may take."""
+WIDTH, PANEL_WIDTH = 880, 1200
+"""Pixels of a movie, and of pictures below each other, across."""
+TITLE = 44
+"""Pixels above each of the pictures below each other."""
+LAST_FRAMES = 6
+"""How long the last state stays, in frames."""
+COLOURS, GIF_COLOURS = 256, 128
+INK = (20, 20, 20)
+
+
+def write_movie(
+    target: Path, frames: Sequence[MovieFrame], scene: Scene, *, per_second: float
+) -> Path:
+    """Draw the states and write them as one file.
+
+    Args:
+        target: the movie, .gif or .mp4, or a picture of all states below each other, .png.
+        frames: at least one, in order.
+        scene: what all frames share.
+        per_second: frames a second.
+
+    Raises:
+        CaseError: another suffix, nothing could be drawn, or MP4 without imageio-ffmpeg.
+    """
+    refuse_suffix(target)
+    write = {".gif": _write_gif, ".mp4": _write_mp4, ".png": _write_panels}[target.suffix.lower()]
+    still = write is _write_panels
+    seconds = 60 + SECONDS_PER_FRAME * len(frames)
+    with tempfile.TemporaryDirectory() as folder:
+        files = [Path(folder, f"{number:04d}.png") for number in range(len(frames))]
+        try:
+            draw_frames(scene, frames, files, seconds=seconds)
+        except (OSError, subprocess.TimeoutExpired) as error:
+            late = isinstance(error, subprocess.TimeoutExpired)
+            reason = f"the drawing was given up after {seconds:g} s" if late else str(error)
+            raise CaseError(
+                f"{target}: not drawn, because {reason}; the set-up installs software OpenGL, and "
+                "invasion.pvd opens in ParaView without it"
+            ) from error
+        pairs = zip(files, frames, strict=True)
+        pictures = [_worded(file, frame.words, above=still) for file, frame in pairs]
+        with replacing(target) as part:
+            write(part, pictures, per_second)
+    return target
+
+
+def refuse_suffix(target: Path) -> None:
+    """Raise CaseError where the name ends in nothing that a movie can be written as."""
+    if target.suffix.lower() not in (".gif", ".mp4", ".png"):
+        raise CaseError(f"{target}: ends in {target.suffix!r}, expected .gif, .mp4 or .png")
+    if target.suffix.lower() == ".mp4" and find_spec("imageio_ffmpeg") is None:
+        raise CaseError(
+            f"{target}: MP4 needs the package imageio-ffmpeg; install it with pip install "
+            "imageio-ffmpeg, or give a name that ends in .gif"
+        )
+
+
+def _worded(path: Path, words: str, *, above: bool) -> Any:
+    """A picture with words above it, or on it; then both sides are even, as MP4 wants them."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    with Image.open(path) as picture:
+        share = picture.height / picture.width
+        height = round(PANEL_WIDTH * share) if above else 2 * round(0.5 * WIDTH * share)
+        drawn = picture.convert("RGB").resize((PANEL_WIDTH if above else WIDTH, height))
+    if above:
+        whole = Image.new("RGB", (PANEL_WIDTH, height + TITLE), "white")
+        whole.paste(drawn, (0, TITLE))
+        drawn = whole
+    font = ImageFont.load_default(size=26 if above else 22)
+    ImageDraw.Draw(drawn).text((16, 12), words, fill=INK, font=font)
+    return drawn
+
+
+def _write_panels(path: Path, pictures: Sequence[Any], _: float) -> None:
+    from PIL import Image
+
+    places = np.cumsum([0, *(picture.height for picture in pictures)]).tolist()
+    whole = Image.new("RGB", (PANEL_WIDTH, places[-1]), "white")
+    for picture, place in zip(pictures, places, strict=False):
+        whole.paste(picture, (0, place))
+    whole.quantize(COLOURS).save(path, "PNG", optimize=True)
+
+
+def _write_gif(path: Path, pictures: Sequence[Any], per_second: float) -> None:
+    colours = pictures[-1].quantize(GIF_COLOURS)
+    small = [picture.quantize(palette=colours, dither=0) for picture in _lingering(pictures)]
+    milliseconds = round(1000 / per_second)
+    small[0].save(
+        path, "GIF", save_all=True, append_images=small[1:], duration=milliseconds, loop=0
+    )
+
+
+def _write_mp4(path: Path, pictures: Sequence[Any], per_second: float) -> None:
+    import imageio_ffmpeg
+
+    stream = imageio_ffmpeg.write_frames(
+        str(path), pictures[0].size, fps=per_second, output_params=["-f", "mp4"]
+    )
+    stream.send(None)
+    for picture in _lingering(pictures):
+        stream.send(picture.tobytes())
+    stream.close()
+
+
+def _lingering(pictures: Sequence[Any]) -> list[Any]:
+    """The pictures of a movie, which stays on the last."""
+    return [*pictures, *[pictures[-1]] * LAST_FRAMES]
+
+
+# ------------------------------------------------------------------------------------------------
+# What the child draws: fines in colour before the grains of the far half, or, where the flow is
+# shown, orange fines and coloured lines among grains of glass. Lengths are in mm.
+
+
 UPSTREAM_SHOWN = 0.12
+"""Share of the length upstream of the face up to which fines are shown."""
 DEEPEST = 0.97
 """Share of the fines up to whose depth the colours reach; a few deep ones take the last colour."""
-FACETS = (
-    6e5  # about half the triangles all fines together may have: memory and time of the picture
-)
-FACE_COLOUR = "#0072B2"
-OBLIQUE = (-1.1, -1.9, 0.9)
-"""Where the view is from, as seen from the middle of the box."""
+TRIANGLES = 6e5
+"""About half the triangles all fines together may have: memory and time of the picture."""
+FACE_COLOUR, FINE_COLOUR, GRAIN_COLOUR, GLASS_COLOUR = "#0072B2", "#E66100", "#E2E2E2", "#B8B8B8"
+GLASS = 0.10
+"""Opacity of a grain where the flow is shown."""
+NOTHING = 1e-30
+"""Drawn for a flux of 0, which has no logarithm."""
+WIDEST, LINE = 0.12, 0.030
+"""Radius of the pipe of the largest flux, and of a streamline, in radii of a grain."""
+THINNEST_PIPE = 0.12
+"""Radius of the pipe of a flux below the colours, over that of the largest."""
+FLOW_COLOURS = ["#E4F4CB", "#C7E9B4", "#7FCDBB", "#41B6C4", "#1D91C0", "#225EA8", "#253494"]
+FLOW_COLOURS += ["#081D58"]
+"""From the lower to the upper limit (YlGnBu of ColorBrewer)."""
 
 
-def render(source: str, box: Array, target: str) -> None:
-    """Draw `source` into `target`: grains of the far half grey, fines in colour, axes in mm.
+class View(NamedTuple):
+    """Where a picture is seen from, as seen from the middle of the box, and its pixels."""
 
-    Fines further upstream than `UPSTREAM_SHOWN` of the length stay out of the picture.
-    """
+    toward: tuple[float, float, float]
+    window: tuple[int, int]
+
+
+OBLIQUE = View((-1.1, -1.9, 0.9), (1500, 950))
+"""From the front, a little from upstream and above."""
+BROADSIDE = View((-0.55, -1.9, 0.75), (1500, 760))
+"""The mud upstream should not hide the flow in the specimen."""
+
+
+def draw_pictures(work: dict[str, Any]) -> None:
+    """Draw each frame of what `draw_frames` sends; the colours are the same in all of them."""
     import pyvista as pv
 
-    spheres = pv.read(source)
-    bounds = box * MM
-    plotter: Any = pv.Plotter(off_screen=True, window_size=WINDOW)
-    plotter.set_background("white")
-    add_grains(plotter, spheres, bounds)
-    add_fines(plotter, spheres, bounds, colours_of(spheres, bounds))
-    add_frame(plotter, bounds)
-    look(plotter, bounds)
-    plotter.screenshot(target)
-    plotter.close()
+    bounds, still, flow = np.array(work["box"]) * MM, pv.read(work["grains"]), bool(work["title"])
+    view = BROADSIDE if flow else OBLIQUE
+    colours = {} if flow else colours_of(pv.read(work["frames"][-1][0]), bounds)
+    for spheres, lines, target in work["frames"]:
+        state = pv.read(spheres)
+        plotter: Any = pv.Plotter(off_screen=True, window_size=list(view.window))
+        plotter.set_background("white")
+        if flow:
+            grains = still.point_data["kind"] == Kind.GRAIN
+            glass = {"color": GLASS_COLOUR, "opacity": GLASS, "smooth_shading": True}
+            plotter.add_mesh(_balls(still, grains, 24), **glass)
+            _add_fines(plotter, state, bounds, color=FINE_COLOUR, ambient=0.25)
+            radius = float(still.point_data["radius_m"].mean()) * MM
+            _add_lines(plotter, pv.read(lines), bounds, radius, work["title"], work["limits"])
+        else:
+            own = state.n_points and np.any(state.point_data["kind"] == Kind.GRAIN)
+            packed = state if own else still
+            far = (packed.point_data["kind"] == Kind.GRAIN) & (
+                packed.points[:, 1] * MM > bounds[1].mean()
+            )
+            if far.any():
+                grey = {"color": GRAIN_COLOUR, "smooth_shading": True, "ambient": 0.15}
+                plotter.add_mesh(_balls(packed, far, 32), **grey)
+            _add_fines(plotter, state, bounds, **colours)
+        _add_frame(plotter, bounds, depth_only=flow)
+        _look(plotter, bounds, view)
+        plotter.screenshot(target)
+        plotter.close()
 
 
-def balls(spheres: Any, mask: Array, resolution: int) -> Any:
-    """Spheres as triangles in mm, carrying `radius` in um and `depth` in mm."""
+def _balls(spheres: Any, mask: Array, resolution: int) -> Any:
+    """Spheres as triangles in mm, carrying `radius_um` and `depth_mm`."""
     import pyvista as pv
 
     points = pv.PolyData(spheres.points[mask] * MM)
@@ -57,75 +321,96 @@ def balls(spheres: Any, mask: Array, resolution: int) -> Any:
     return points.glyph(geom=ball, scale="diameter", orient=False)
 
 
-def add_grains(plotter: Any, spheres: Any, bounds: Array) -> None:
-    """The grains of the far half, grey; `bounds` are in mm."""
-    far = (spheres.point_data["kind"] == Kind.GRAIN) & (
-        spheres.points[:, 1] * MM > bounds[1].mean()
-    )
-    if far.any():
-        plotter.add_mesh(
-            balls(spheres, far, 32), color="#E2E2E2", smooth_shading=True, ambient=0.15
-        )
-
-
-def colours_of(spheres: Any, bounds: Array) -> tuple[str, str, list[float]]:
-    """What the fines are coloured by: by radius, or by depth when they are (nearly) of one size.
-
-    Returns the name of the array, the title of the scale and its limits; `bounds` are in mm.
-    """
-    mask = shown_fines(spheres, bounds)
-    radius = spheres.point_data["radius_m"][mask] if spheres.n_points else np.zeros(0)
-    if len(radius) and np.ptp(radius) >= 0.02 * radius.max():
-        limits = [radius.min() * MICRON, radius.max() * MICRON]
-        return "radius_um", "fines, radius (µm)", limits
-    depth = spheres.points[mask, 0] * MM if len(radius) else np.zeros(1)
-    deepest = min(float(np.quantile(depth, DEEPEST)), bounds[0, 1])
-    limits = [bounds[0, 0], max(deepest, 0.1 * bounds[0, 1])]
-    return "depth_mm", "fines, depth (mm)", limits
-
-
-def shown_fines(spheres: Any, bounds: Array) -> Array:
-    """Which of the spheres are fines that are not far upstream; `bounds` are in mm."""
+def _shown_fines(spheres: Any, bounds: Array) -> Array:
+    """Which of the spheres are fines that are not far upstream."""
     if not spheres.n_points:
         return np.zeros(0, bool)
     shown = spheres.points[:, 0] * MM > bounds[0, 0] - UPSTREAM_SHOWN * np.ptp(bounds[0])
     return np.asarray((spheres.point_data["kind"] == Kind.FINE) & shown)
 
 
-def add_fines(
-    plotter: Any, spheres: Any, bounds: Array, colours: tuple[str, str, list[float]]
-) -> None:
-    """Fines that are not far upstream, coloured as `colours_of` says; `bounds` are in mm."""
-    mask, (name, title, limits) = shown_fines(spheres, bounds), colours
-    if not mask.any():
-        return
-    drawn = balls(spheres, mask, int(np.clip(np.sqrt(FACETS / mask.sum()), 5, 16)))
-    bar = {
+def colours_of(spheres: Any, bounds: Array) -> dict[str, Any]:
+    """How the fines are coloured: by radius, or by depth where they are (nearly) of one size."""
+    mask = _shown_fines(spheres, bounds)
+    radius = spheres.point_data["radius_m"][mask] * MICRON if spheres.n_points else np.zeros(0)
+    if len(radius) and np.ptp(radius) >= 0.02 * radius.max():
+        name, title, limits = "radius_um", "fines, radius (µm)", [radius.min(), radius.max()]
+    else:
+        depth = spheres.points[mask, 0] * MM if len(radius) else np.zeros(1)
+        deepest = min(float(np.quantile(depth, DEEPEST)), bounds[0, 1])
+        name, title = "depth_mm", "fines, depth (mm)"
+        limits = [bounds[0, 0], max(deepest, 0.1 * bounds[0, 1])]
+    bar = _bar(title, labels=5)
+    return {"scalars": name, "clim": limits, "cmap": "plasma", "scalar_bar_args": bar}
+
+
+def _bar(title: str, *, labels: int) -> dict[str, Any]:
+    return {
         "title": f"{title}\n",
         "color": "black",
         "title_font_size": 22,
         "label_font_size": 22,
         "fmt": "%.3g",
-        "n_labels": 5,
+        "n_labels": labels,
         "vertical": True,
         "position_x": 0.88,
         "position_y": 0.15,
         "width": 0.07,
         "height": 0.65,
     }
+
+
+def _add_fines(plotter: Any, spheres: Any, bounds: Array, **style: Any) -> None:
+    mask = _shown_fines(spheres, bounds)
+    if mask.any():
+        drawn = _balls(spheres, mask, int(np.clip(np.sqrt(TRIANGLES / mask.sum()), 5, 16)))
+        plotter.add_mesh(drawn, smooth_shading=True, **style)
+
+
+def _add_lines(
+    plotter: Any, mesh: Any, bounds: Array, radius: float, title: str, limits: Sequence[float]
+) -> None:
+    """Pipes among grains of a mean `radius`: throats as wide as their flux, streamlines alike."""
+    mesh.points = mesh.points * MM
+    throats = "value" in mesh.cell_data
+    if mesh.n_points and not throats:  # not as far upstream as fines are not shown either
+        start = bounds[0, 0] - UPSTREAM_SHOWN * np.ptp(bounds[0])
+        mesh = mesh.clip(normal="x", origin=(start, 0.0, 0.0), invert=False)
+    if not mesh.n_points:
+        return
     plotter.add_mesh(
-        drawn, scalars=name, clim=limits, cmap="plasma", smooth_shading=True, scalar_bar_args=bar
+        _pipes(mesh, radius, limits[1]) if throats else mesh.tube(radius=LINE * radius, n_sides=6),
+        scalars="value",
+        log_scale=True,
+        clim=limits,
+        cmap=FLOW_COLOURS,
+        ambient=0.35,
+        smooth_shading=True,
+        scalar_bar_args=_bar(title, labels=3),
     )
 
 
-def add_frame(plotter: Any, bounds: Array, *, depth_only: bool = False) -> None:
+def _pipes(mesh: Any, radius: float, most: float) -> Any:
+    """Pipes whose radius grows like the fourth root of the flux, as that of Poiseuille's does."""
+    import pyvista as pv
+
+    value = np.asarray(mesh.cell_data["value"])
+    width = WIDEST * radius * np.clip(value / most, THINNEST_PIPE**4, 1.0) ** 0.25
+    ends = np.asarray(mesh.lines).reshape(-1, 3)[:, 1:]
+    lines = np.insert(np.arange(ends.size).reshape(-1, 2), 0, 2, axis=1)
+    apart = pv.PolyData(np.asarray(mesh.points)[ends.ravel()], lines=lines.ravel())
+    apart.point_data["width"] = np.repeat(width, 2)
+    apart.point_data["value"] = np.repeat(np.maximum(value, NOTHING), 2)
+    return apart.tube(scalars="width", absolute=True, n_sides=10, capping=True)
+
+
+def _add_frame(plotter: Any, bounds: Array, *, depth_only: bool) -> None:
     """The box with its scales (mm), or that of the depth alone, and the formation face."""
     import pyvista as pv
 
     (x0, x1), (y0, y1), (z0, z1) = bounds
-    plotter.add_mesh(
-        pv.Box((x0, x1, y0, y1, z0, z1)), style="wireframe", color="black", line_width=2
-    )
+    box = pv.Box((x0, x1, y0, y1, z0, z1))
+    plotter.add_mesh(box, style="wireframe", color="black", line_width=2)
     face = pv.Plane(
         center=(x0, (y0 + y1) / 2, (z0 + z1) / 2),
         direction=(1, 0, 0),
@@ -134,14 +419,8 @@ def add_frame(plotter: Any, bounds: Array, *, depth_only: bool = False) -> None:
         i_resolution=1,
         j_resolution=1,
     )
-    plotter.add_mesh(
-        face,
-        color=FACE_COLOUR,
-        opacity=0.18,
-        show_edges=True,
-        edge_color=FACE_COLOUR,
-        line_width=3,
-    )
+    edge = {"show_edges": True, "edge_color": FACE_COLOUR, "line_width": 3}
+    plotter.add_mesh(face, color=FACE_COLOUR, opacity=0.18, **edge)
     plotter.add_point_labels(
         [(x0, y1, z1 + 0.12 * (z1 - z0))],
         ["formation face x = 0"],
@@ -169,27 +448,17 @@ def add_frame(plotter: Any, bounds: Array, *, depth_only: bool = False) -> None:
     )
 
 
-def look(
-    plotter: Any,
-    bounds: Array,
-    *,
-    toward: tuple[float, float, float] = OBLIQUE,
-    window: Sequence[int] = WINDOW,
-) -> None:
-    """Look from the direction `toward`, by default the front, a little from upstream and above.
-
-    The projected box fills the `window` (pixels) left of the scalar bar.
-    """
-    eye = np.array(toward) / np.linalg.norm(toward)
+def _look(plotter: Any, bounds: Array, view: View) -> None:
+    """Look at the box so that it fills the window left of the scalar bar."""
+    eye = np.array(view.toward) / np.linalg.norm(view.toward)
     right = np.cross([0.0, 0.0, 1.0], eye)
     right /= np.linalg.norm(right)
     up = np.cross(eye, right)
+    wide, high = view.window
     corners = np.stack(np.meshgrid(*bounds), axis=-1).reshape(-1, 3) - bounds.mean(axis=1)
     width, height = np.ptp(corners @ right), np.ptp(corners @ up)
-    scale = max(
-        0.62 * height, 0.7 * width * window[1] / window[0]
-    )  # half the height of the window, mm
-    focus = bounds.mean(axis=1) + 0.08 * scale * window[0] / window[1] * right - 0.05 * scale * up
+    scale = max(0.62 * height, 0.7 * width * high / wide)  # half the height of the window, mm
+    focus = bounds.mean(axis=1) + 0.08 * scale * wide / high * right - 0.05 * scale * up
     distance = 4.6 * scale  # the axis labels grow with it
     plotter.camera_position = [tuple(focus + distance * eye), tuple(focus), (0, 0, 1)]
     plotter.enable_parallel_projection()
@@ -197,17 +466,5 @@ def look(
     plotter.reset_camera_clipping_range()
 
 
-def parsed_box(text: str) -> Array:
-    """The box (3, 2) of an argument --box=x0,x1,y0,y1,z0,z1."""
-    return np.array([float(value) for value in text.removeprefix("--box=").split(",")]).reshape(
-        3, 2
-    )
-
-
-def main(arguments: list[str]) -> None:
-    source, bounds, target = arguments
-    render(source, parsed_box(bounds), target)
-
-
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    draw_pictures(json.load(sys.stdin))

@@ -1,7 +1,4 @@
-"""Tables of a run, written and read.
-
-Numbers and words for a reader, each written in one way in text, pages and notebooks.
-"""
+"""Tables and JSON of a run, written and read, and numbers as a reader wants them."""
 
 import json
 import math
@@ -18,7 +15,7 @@ from pydantic_core import from_json
 from fdnet.case.tables import M2_PER_MD
 from fdnet.errors import CaseError
 from fdnet.files import replacing, write_text
-from fdnet.network.flow.flow import INLET, OUTLET, Links, open_links
+from fdnet.network.flow.flow import INLET, OUTLET, open_links
 from fdnet.network.network import Network
 from fdnet.spheres.dump import exact_numbers
 from fdnet.spheres.snapshot import Array
@@ -27,7 +24,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from fdnet.network.flow.sections import Layers
-    from fdnet.network.network import Network
     from fdnet.network.permeability import Analysis
 
 MILLIDARCY = M2_PER_MD
@@ -79,39 +75,53 @@ AGREES = {True: "agrees", False: "disagrees", None: "not decided"}
 FLOAT_FORMAT = "%.9g"
 
 
+_SECTION = (
+    "section",
+    *("x_lo_m", "x_hi_m", "porosity_initial", "porosity_damaged"),
+    *("k_initial_m2", "k_damaged_m2", "k_reduction"),
+    *("k_initial_inplace_m2", "k_damaged_inplace_m2", "fines_count", "fines_fraction"),
+)
+"""Columns of sections.csv, named as the attributes of a section with their unit."""
+
+
 def section_rows(analysis: "Analysis") -> list[dict[str, Any]]:
     """The sections as `sections.csv` and `summary.json` name their values."""
+    names = {column: column.removesuffix("_m2").removesuffix("_m") for column in _SECTION}
     return [
-        {
-            "section": s.section,
-            "x_lo_m": s.x_lo,
-            "x_hi_m": s.x_hi,
-            "porosity_initial": s.porosity_initial,
-            "porosity_damaged": s.porosity_damaged,
-            "k_initial_m2": s.k_initial,
-            "k_damaged_m2": s.k_damaged,
-            "k_reduction": s.k_reduction,
-            "k_initial_inplace_m2": s.k_initial_inplace,
-            "k_damaged_inplace_m2": s.k_damaged_inplace,
-            "fines_count": s.fines_count,
-            "fines_fraction": s.fines_fraction,
-        }
-        for s in analysis.sections
+        {column: getattr(section, name) for column, name in names.items()}
+        for section in analysis.sections
     ]
+
+
+def write_rows(path: str | Path, rows: Any) -> Path:
+    """A table of rows of equal keys, or of columns by their name; empty where a value is None.
+
+    Edges of slabs and layers stand at full precision, other numbers with nine digits.
+    """
+    import pandas as pd
+
+    frame = pd.DataFrame(rows)
+    for edge in ("x_lo_m", "x_hi_m"):
+        if edge in frame:
+            frame[edge] = [repr(float(x)) for x in frame[edge]]
+    with replacing(path) as part:
+        frame.to_csv(part, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
+    return Path(path)
 
 
 def write_sections(path: str | Path, analysis: "Analysis") -> Path:
-    """One row for each section, edges at full precision; k_reduction is empty where k is 0.
+    """One row for each section; k_reduction is empty where k is 0.
 
     The permeabilities of the slab cut out stand in mD as well.
     """
-    rows = [
-        row
-        | {edge: repr(float(row[edge])) for edge in ("x_lo_m", "x_hi_m")}
-        | {f"k_{name}_mD": millidarcy(row[f"k_{name}_m2"]) for name in ("initial", "damaged")}
-        for row in section_rows(analysis)
-    ]
-    return _write(path, _frame(rows))
+    both = ("initial", "damaged")
+    return write_rows(
+        path,
+        [
+            row | {f"k_{name}_mD": millidarcy(row[f"k_{name}_m2"]) for name in both}
+            for row in section_rows(analysis)
+        ],
+    )
 
 
 def write_laws(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> Path:
@@ -119,19 +129,11 @@ def write_laws(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> Path:
 
     Where the three directions were asked for, also `k_x_m2`, `k_x_damaged_m2` and so on.
     """
-    names = (
-        "law",
-        "damage_law",
-        "k_initial_m2",
-        "k_damaged_m2",
-        "k_reduction",
-        "porosity_initial",
-        "porosity_damaged",
-        *(f"k_{axis}_m2" for axis in "xyz"),
-        *(f"k_{axis}_damaged_m2" for axis in "xyz"),
-    )
+    names = ["law", "damage_law", "k_initial_m2", "k_damaged_m2", "k_reduction"]
+    names += ["porosity_initial", "porosity_damaged"]
+    names += [f"k_{axis}{state}_m2" for state in ("", "_damaged") for axis in "xyz"]
     kept = [name for name in names if name in rows[0]]
-    return _write(path, _frame({name: [row[name] for row in rows] for name in kept}))
+    return write_rows(path, {name: [row[name] for row in rows] for name in kept})
 
 
 def write_profile(path: str | Path, analysis: "Analysis") -> Path:
@@ -140,22 +142,16 @@ def write_profile(path: str | Path, analysis: "Analysis") -> Path:
     porosity_reduction is the difference initial - damaged (Shi 2011, Figure 16).
     """
     profile = analysis.profile
-    edges = [repr(float(x)) for x in profile.edges]
-    return _write(
-        path,
-        _frame(
-            {
-                "x_lo_m": edges[:-1],
-                "x_hi_m": edges[1:],
-                "porosity_initial": profile.porosity_initial,
-                "porosity_damaged": profile.porosity_damaged,
-                "porosity_reduction": np.subtract(
-                    profile.porosity_initial, profile.porosity_damaged
-                ),
-                "fines_fraction": profile.fines_fraction,
-            }
-        ),
-    )
+    before, after = profile.porosity_initial, profile.porosity_damaged
+    columns = {
+        "x_lo_m": profile.edges[:-1],
+        "x_hi_m": profile.edges[1:],
+        "porosity_initial": before,
+        "porosity_damaged": after,
+        "porosity_reduction": np.subtract(before, after),
+        "fines_fraction": profile.fines_fraction,
+    }
+    return write_rows(path, columns)
 
 
 def write_layers(path: str | Path, layers: "Layers") -> Path:
@@ -163,17 +159,16 @@ def write_layers(path: str | Path, layers: "Layers") -> Path:
 
     The pressure drops are over that of the specimen; empty where nothing flows.
     """
-    edges = [repr(float(x)) for x in layers.edges]
     columns = {
-        "x_lo_m": edges[:-1],
-        "x_hi_m": edges[1:],
+        "x_lo_m": layers.edges[:-1],
+        "x_hi_m": layers.edges[1:],
         "k_initial_m2": layers.k_initial,
         "k_damaged_m2": layers.k_damaged,
         "pressure_drop_initial": layers.drop_initial,
         "pressure_drop_damaged": layers.drop_damaged,
         "fines_count": layers.fines_count,
     }
-    return _write(path, _frame(columns))
+    return write_rows(path, columns)
 
 
 def write_pores(path: str | Path, analysis: "Analysis") -> Path:
@@ -184,23 +179,23 @@ def write_pores(path: str | Path, analysis: "Analysis") -> Path:
     0 at the outlet plane), empty where a pore is cut off. `initial` is without fines, at the final
     positions of the grains where they moved.
     """
-    network, occupancy = analysis.network, analysis.occupancy
-    count = len(network.pore_radius)
-    columns: dict[str, Any] = {"pore": np.arange(count)}
-    columns |= _split("pore_coords", network.pore_position, "_m")
-    columns |= _split("grain", network.pore_grains)
-    columns |= {
+    network, fines = analysis.network, analysis.occupancy
+    none = np.zeros(len(network.pore_radius))
+    columns: dict[str, Any] = {
+        "pore": np.arange(len(none)),
+        **_split("pore_coords", network.pore_position, "_m"),
+        **_split("grain", network.pore_grains),
         "pore_radius_m": network.pore_radius,
         "pore_volume_m3": network.pore_volume,
         "pore_wall_surface_m2": network.pore_wall_surface,
         "pore_share": network.pore_share,
-        "fines_volume_m3": np.zeros(count) if occupancy is None else occupancy.pore_solid_volume,
-        "fines_surface_m2": np.zeros(count) if occupancy is None else occupancy.pore_solid_surface,
+        "fines_volume_m3": none if fines is None else fines.pore_solid_volume,
+        "fines_surface_m2": none if fines is None else fines.pore_solid_surface,
         "porosity": pore_porosity(analysis),
         "pressure_initial": analysis.flow_initial.pore_pressure,
         "pressure_damaged": analysis.flow_damaged.pore_pressure,
     }
-    return _write(path, _frame(columns))
+    return write_rows(path, columns)
 
 
 def write_throats(path: str | Path, analysis: "Analysis") -> Path:
@@ -212,24 +207,22 @@ def write_throats(path: str | Path, analysis: "Analysis") -> Path:
     (`throat_share`), positive from `throat_conns_0` to `throat_conns_1`. `initial` is without
     fines, at the final positions of the grains where they moved.
     """
-    network, occupancy = analysis.network, analysis.occupancy
-    count = len(network.throat_radius)
-    columns: dict[str, Any] = {"throat": np.arange(count)}
-    columns |= _split("throat_conns", network.throat_pores)
-    columns |= _split("throat_shift", np.asarray(network.throat_shift, int))
-    columns |= _split("grain", network.throat_grains)
-    columns |= {
+    network, fines = analysis.network, analysis.occupancy
+    none = np.zeros(len(network.throat_radius))
+    columns: dict[str, Any] = {
+        "throat": np.arange(len(none)),
+        **_split("throat_conns", network.throat_pores),
+        **_split("throat_shift", np.asarray(network.throat_shift, int)),
+        **_split("grain", network.throat_grains),
         "throat_radius_m": network.throat_radius,
         "throat_radius_effective_m": network.throat_radius_effective,
         "throat_area_m2": network.throat_area,
         "throat_length_m": network.throat_length,
         "throat_share": network.throat_share,
-        "fines_count": np.zeros(count, int) if occupancy is None else occupancy.throat_fines,
-        "fines_volume_m3": np.zeros(count) if occupancy is None else occupancy.throat_solid_volume,
-        "fines_radius_mean_m": np.zeros(count)
-        if occupancy is None
-        else occupancy.throat_fine_radius,
-        "porosity": np.ones(count) if occupancy is None else occupancy.throat_porosity,
+        "fines_count": none.astype(int) if fines is None else fines.throat_fines,
+        "fines_volume_m3": none if fines is None else fines.throat_solid_volume,
+        "fines_radius_mean_m": none if fines is None else fines.throat_fine_radius,
+        "porosity": none + 1.0 if fines is None else fines.throat_porosity,
         "blocked": blocked_throats(analysis).astype(int),
         "law_used": analysis.law_used,
         "conductance_initial_m3": analysis.conductance_initial,
@@ -237,21 +230,7 @@ def write_throats(path: str | Path, analysis: "Analysis") -> Path:
         "flux_initial_m3": analysis.flow_initial.throat_flux,
         "flux_damaged_m3": analysis.flow_damaged.throat_flux,
     }
-    return _write(path, _frame(columns))
-
-
-def write_history(path: str | Path, rows: Sequence[Mapping[str, float]]) -> Path:
-    """history.csv: one row a checkpoint, with times in s and numbers of fines."""
-    return _write(path, _frame(rows))
-
-
-def write_rows(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> Path:
-    """Rows of equal keys; edges of slabs at full precision, empty where a value is None."""
-    edges = ("x_lo_m", "x_hi_m")
-    exact = [
-        {**row, **{edge: repr(float(row[edge])) for edge in edges if edge in row}} for row in rows
-    ]
-    return _write(path, _frame(exact))
+    return write_rows(path, columns)
 
 
 def plain_json(mapping: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
@@ -281,7 +260,7 @@ def blocked_throats(analysis: "Analysis") -> Array:
     return np.asarray(analysis.occupancy.blocked, dtype=bool)
 
 
-def between_grains(network: "Network", corners: Array) -> Array:
+def between_grains(network: Network, corners: Array) -> Array:
     """Whether all `corners` (N, n), images of a throat or pore, are grains inside the box; (N,).
 
     The others lie at a side wall or an end face and run out to mirror images of the grains.
@@ -302,18 +281,6 @@ def pore_porosity(analysis: "Analysis") -> Array:
 def _split(name: str, values: Array, unit: str = "") -> dict[str, Array]:
     """The columns of an (N, k) array as `name_0`, `name_1` ..., each with its unit."""
     return {f"{name}_{i}{unit}": column for i, column in enumerate(np.asarray(values).T)}
-
-
-def _frame(columns: Any) -> "pd.DataFrame":
-    import pandas as pd
-
-    return pd.DataFrame(columns)
-
-
-def _write(path: str | Path, frame: "pd.DataFrame") -> Path:
-    with replacing(path) as part:
-        frame.to_csv(part, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
-    return Path(path)
 
 
 def _plain(value: Any, where: str, refused: list[str]) -> Any:
@@ -339,72 +306,41 @@ def _plain(value: Any, where: str, refused: list[str]) -> Any:
 # Tables and JSON of a run folder, read back strictly.
 
 
-_EDGES = ("x_lo_m", "x_hi_m", "porosity_initial", "porosity_damaged")
 COLUMNS: Mapping[str, tuple[str, ...]] = {
-    "sections": (
-        "section",
-        *_EDGES,
-        "k_initial_m2",
-        "k_damaged_m2",
-        "k_reduction",
-        "k_initial_inplace_m2",
-        "k_damaged_inplace_m2",
-        "fines_count",
-        "fines_fraction",
-    ),
-    "profile": (*_EDGES, "porosity_reduction", "fines_fraction"),
+    "sections": _SECTION,
+    "profile": (*_SECTION[1:5], "porosity_reduction", "fines_fraction"),
     "layers": (
-        "x_lo_m",
-        "x_hi_m",
-        "k_initial_m2",
-        "k_damaged_m2",
-        "pressure_drop_initial",
-        "pressure_drop_damaged",
-        "fines_count",
+        *("x_lo_m", "x_hi_m", "k_initial_m2", "k_damaged_m2"),
+        *("pressure_drop_initial", "pressure_drop_damaged", "fines_count"),
     ),
     "pores": (
-        "pore",
-        "pore_coords_0_m",
-        "pore_coords_1_m",
-        "pore_coords_2_m",
-        "pore_radius_m",
-        "pore_volume_m3",
-        "pressure_initial",
-        "pressure_damaged",
+        *("pore", "pore_coords_0_m", "pore_coords_1_m", "pore_coords_2_m"),
+        *("pore_radius_m", "pore_volume_m3", "pressure_initial", "pressure_damaged"),
     ),
     "throats": (
-        "throat",
-        "throat_conns_0",
-        "throat_conns_1",
-        "throat_radius_m",
-        "throat_length_m",
-        "blocked",
-        "law_used",
-        "conductance_initial_m3",
-        "conductance_damaged_m3",
-        "flux_initial_m3",
-        "flux_damaged_m3",
+        *("throat", "throat_conns_0", "throat_conns_1", "throat_radius_m", "throat_length_m"),
+        *("blocked", "law_used", "conductance_initial_m3", "conductance_damaged_m3"),
+        *("flux_initial_m3", "flux_damaged_m3"),
     ),
 }
 """Columns that a table of a run must have; further ones are read too."""
 HISTORY_COLUMNS = ("chunk", "step", "upstream", "invaded", "passed")
 TEXT_COLUMNS = ("law_used",)
-_AGAIN = "write it anew with fdnet run CASE.toml --out {folder} --stages analyse,report --force"
 
 
-class Checked(BaseModel):
+class JsonObject(BaseModel):
     """What a JSON file must hold: its keys with their types; further keys are not looked at."""
 
     model_config = ConfigDict(strict=True, extra="allow", allow_inf_nan=False)
 
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
-Count = Annotated[int, Field(ge=0)]
+Number = Annotated[int, Field(ge=0)]
 AboveZero = Annotated[float, Field(ge=0.0)]
 Lost = Annotated[float, Field(le=1.0)] | None
 
 
-class Section(Checked):
+class SummarySection(JsonObject):
     """One section of a summary."""
 
     x_lo_m: float
@@ -414,14 +350,14 @@ class Section(Checked):
     k_initial_m2: AboveZero
     k_damaged_m2: AboveZero
     k_reduction: Lost
-    fines_count: Count
+    fines_count: Number
 
 
-class Summary(Checked):
+class Summary(JsonObject):
     """The numbers of a summary.json that every run has."""
 
     case: str
-    seed: Count
+    seed: Number
     law: str
     damage_law: str
     porosity_initial: Share
@@ -432,24 +368,24 @@ class Summary(Checked):
     damage_law_used: str | None = None
     damage_law_other: str | None = None
     k_damaged_other_m2: AboveZero | None = None
-    supplied_count: Count
-    invaded_count: Count
-    passed_count: Count
-    upstream_count: Count
+    supplied_count: Number
+    invaded_count: Number
+    passed_count: Number
+    upstream_count: Number
     invasion_depth_m: AboveZero
     invasion_depth_p95_m: AboveZero
     cake_thickness_m: AboveZero
     stop_reason: str | None
-    sections: list[Section]
-    pores: Count
-    throats: Count
-    throats_blocked: Count
+    sections: list[SummarySection]
+    pores: Number
+    throats: Number
+    throats_blocked: Number
     answer: str | None = None
     certainty: list[str] = []
     warnings: list[str]
 
 
-def read_json(path: Path, model: type[Checked], *, noun: str, advice: str) -> dict[str, Any]:
+def read_json(path: Path, model: type[JsonObject], *, noun: str, advice: str) -> dict[str, Any]:
     """The JSON object in the file at `path`, as it is written, checked by `model`.
 
     Raises CaseError where the file is missing, is not UTF-8 or JSON, holds NaN, or is not what
@@ -498,24 +434,30 @@ def read_table(
     """
     import pandas as pd
 
+    problem = ""
     if not path.is_file():
-        raise _refusal(path, "is no ordinary file" if path.exists() else "is missing")
+        problem = "is no ordinary file" if path.exists() else "is missing"
+        raise CaseError(f"{path}: {problem}; {_again(path)}")
     try:
         table = pd.read_csv(path, **exact_numbers())
     except (OSError, ValueError) as error:
-        raise _refusal(path, f"cannot be read as a table ({str(error).strip()})") from error
+        why = f"cannot be read as a table ({str(error).strip()})"
+        raise CaseError(f"{path}: {why}; {_again(path)}") from error
     missing = [name for name in columns if name not in table.columns]
+    allowed = table.columns if texts is None else texts
+    worded = [
+        name
+        for name in table.columns
+        if name not in allowed and not pd.api.types.is_numeric_dtype(table[name])
+    ]
     if missing:
-        raise _refusal(path, f"has no column {', '.join(missing)}")
-    for name in table.columns:
-        if (
-            texts is not None
-            and name not in texts
-            and not pd.api.types.is_numeric_dtype(table[name])
-        ):
-            raise _refusal(path, f"column {name} holds a value that is no number")
-    if rows is not None and len(table) != rows:
-        raise _refusal(path, f"has {len(table)} rows, expected {rows} by summary.json")
+        problem = f"has no column {', '.join(missing)}"
+    elif worded:
+        problem = f"column {worded[0]} holds a value that is no number"
+    elif rows is not None and len(table) != rows:
+        problem = f"has {len(table)} rows, expected {rows} by summary.json"
+    if problem:
+        raise CaseError(f"{path}: {problem}; {_again(path)}")
     return table
 
 
@@ -532,11 +474,8 @@ def read_summary(path: Path) -> dict[str, Any]:
 
 
 def _again(path: Path) -> str:
-    return _AGAIN.format(folder=shlex.quote(str(path.parent)))
-
-
-def _refusal(path: Path, what: str) -> CaseError:
-    return CaseError(f"{path}: {what}; {_again(path)}")
+    folder = shlex.quote(str(path.parent))
+    return f"write it anew with fdnet run CASE.toml --out {folder} --stages analyse,report --force"
 
 
 # ------------------------------------------------------------------------------------------------
@@ -593,16 +532,25 @@ def openpnm_arrays(network: Network, conductance: Array, *, viscosity: float) ->
     links = open_links(network, conductance)
     if not len(links.throat):
         raise CaseError("OpenPNM: no open path leads from the inlet to the outlet face")
-    conns, groups, faces = _numbered(links)
+    # the groups that occur are the first pores, then each end on a face, by link and place in it
+    groups, faces = np.unique(links.ends[links.ends >= 0]), np.argwhere(links.ends < 0)
+    conns = np.searchsorted(groups, links.ends)
+    conns[*faces.T] = len(groups) + np.arange(len(faces))
     pore = np.unique(network.pore_group, return_index=True)[1][groups]
     inside, none, plane = np.zeros(len(pore), bool), np.zeros(len(faces)), links.ends[*faces.T]
     volume = np.bincount(
         network.pore_group, weights=np.maximum(network.pore_volume, 0.0) * network.pore_share
     )
+    # where the throats cross the face at which they end
+    link, end = faces.T
+    ends, rows = network.throat_ends[links.throat[link]], np.arange(len(faces))
+    here, there = ends[rows, end], ends[rows, 1 - end]
+    run = here[:, 0] - there[:, 0]
+    x = np.where(plane == INLET, network.box[0, 0], network.box[0, 1]) - there[:, 0]
+    share = np.divide(x, run, out=np.ones(len(rows)), where=run != 0)
+    crossing = there + share[:, None] * (here - there)
     return {
-        "pore.coords": np.concatenate(
-            [network.pore_position[pore], _on_faces(network, links, faces)]
-        ),
+        "pore.coords": np.concatenate([network.pore_position[pore], crossing]),
         "throat.conns": np.sort(conns, axis=1),
         "pore.diameter": np.append(2.0 * network.pore_radius[pore], none),
         "pore.volume": np.append(volume[groups], none),
@@ -615,27 +563,3 @@ def openpnm_arrays(network: Network, conductance: Array, *, viscosity: float) ->
         "throat.fdnet_throat": links.throat,
         "throat.periodic": np.any(network.throat_shift[links.throat], axis=1),
     }
-
-
-def _numbered(links: Links) -> tuple[Array, Array, Array]:
-    """Pores (K, 2) of each link: first the groups that occur (G,), then each end on a face (E, 2).
-
-    An end on a face is given by its link and its place in it (0 or 1).
-    """
-    groups = np.unique(links.ends[links.ends >= 0])
-    faces = np.argwhere(links.ends < 0)
-    conns = np.searchsorted(groups, links.ends)
-    conns[*faces.T] = len(groups) + np.arange(len(faces))
-    return conns, groups, faces
-
-
-def _on_faces(network: Network, links: Links, faces: Array) -> Array:
-    """(E, 3) where the throats of `faces` cross the face at which they end, m."""
-    link, end = faces.T
-    ends = network.throat_ends[links.throat[link]]
-    rows = np.arange(len(faces))
-    here, there = ends[rows, end], ends[rows, 1 - end]
-    x = np.where(links.ends[link, end] == INLET, network.box[0, 0], network.box[0, 1])
-    run = here[:, 0] - there[:, 0]
-    share = np.divide(x - there[:, 0], run, out=np.ones(len(rows)), where=run != 0)
-    return there + share[:, None] * (here - there)

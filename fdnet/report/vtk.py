@@ -1,13 +1,9 @@
-"""ParaView files, meshes and the view in the report.
-
-ParaView files (.vtp, .pvd) of one specimen.
-"""
+"""ParaView files (.vtp, .pvd) of a run, written and read, and the view in the report."""
 
 import base64
 import errno
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +13,7 @@ import numpy as np
 
 from fdnet.errors import CaseError
 from fdnet.files import write_bytes, write_text
+from fdnet.report.picture import UPSTREAM_SHOWN
 from fdnet.report.tables import blocked_throats, pore_porosity
 from fdnet.spheres.snapshot import Array, Snapshot
 
@@ -37,15 +34,71 @@ def write_network_vtp(path: str | Path, analysis: "Analysis") -> Path:
     viscosity over the pressure drop, m3), share of the conductance lost, blocked, law_used as in
     `LAW_CODES`. Point data: pressure over the pressure drop, radius (m), volume (m3).
     """
-    import pyvista as pv
-
-    drawing = _drawing(analysis.network)
-    mesh = pv.PolyData(drawing.points, lines=np.insert(drawing.lines, 0, 2, axis=1).ravel())
-    for name, values in _throat_data(analysis).items():
+    network, occupancy = analysis.network, analysis.occupancy
+    mesh, source, periods = _network_mesh(network)
+    clean, damaged = (
+        np.asarray(one) for one in (analysis.conductance_initial, analysis.conductance_damaged)
+    )
+    none = np.zeros(len(clean))
+    codes = [LAW_CODES.get(str(name), -1) for name in analysis.law_used]
+    cells = {
+        "throat_radius_m": network.throat_radius,
+        "throat_length_m": network.throat_length,
+        "throat_share": network.throat_share,
+        "porosity": none + 1.0 if occupancy is None else occupancy.throat_porosity,
+        "fines": none.astype(int) if occupancy is None else occupancy.throat_fines,
+        "blocked": blocked_throats(analysis).astype(np.uint8),
+        "law_used": np.array(codes, np.int8),
+        "conductance_initial_m3": clean,
+        "conductance_damaged_m3": damaged,
+        "flux_initial_m3": analysis.flow_initial.throat_flux,
+        "flux_damaged_m3": analysis.flow_damaged.throat_flux,
+        "conductance_lost": 1.0 - np.divide(damaged, clean, out=none + 1.0, where=clean > 0),
+    }
+    for name, values in cells.items():
         mesh.cell_data[name] = values
-    for name, values in _pore_data(analysis, drawing).items():
+
+    def with_ends(values: Array, inlet: float, outlet: float) -> Array:
+        """Values of the pores, then of the ends: those of their pores, or of the faces."""
+        ends = np.where(source == -1, inlet, outlet)
+        ends[source >= 0] = np.asarray(values)[source[source >= 0]]
+        return np.append(values, ends)
+
+    # along a periodic x the pressure falls by 1 per period
+    fall = np.append(np.zeros(len(network.pore_radius)), periods * network.periodic[0])
+    nothing = np.zeros(len(source))
+    points = {
+        "pressure_initial": with_ends(analysis.flow_initial.pore_pressure, 1.0, 0.0) - fall,
+        "pressure_damaged": with_ends(analysis.flow_damaged.pore_pressure, 1.0, 0.0) - fall,
+        "radius_m": with_ends(network.pore_radius, 0.0, 0.0),
+        "porosity": with_ends(pore_porosity(analysis), np.nan, np.nan),
+        "volume_m3": np.append(network.pore_volume, nothing),
+        "share": np.append(network.pore_share, nothing),
+        "end": np.repeat(np.array([0, 1], np.uint8), [len(network.pore_radius), len(source)]),
+    }
+    for name, values in points.items():
         mesh.point_data[name] = values
     return _save(path, mesh)
+
+
+def _network_mesh(network: Any) -> tuple[Any, Array, Array]:
+    """The throats as lines, m: the P pores are the first points, then E further ends.
+
+    With the pore (E,) that each end is an image of, -1 and -2 beyond the inlet and outlet face,
+    and the number (E,) of periods along x between both.
+    """
+    import pyvista as pv
+
+    pores, lines = np.asarray(network.pore_position), np.array(network.throat_pores)
+    ends, source = np.asarray(network.throat_ends).reshape(-1, 3), lines.ravel().copy()
+    away = source < 0
+    away[~away] = np.linalg.norm(ends[~away] - pores[source[~away]], axis=1) > 1e-9
+    points, source = ends[away], source[away]
+    lines[away.reshape(lines.shape)] = len(pores) + np.arange(len(points))
+    periods = np.rint((points[:, 0] - pores[source, 0]) / np.ptp(network.box[0]))
+    places = np.concatenate([pores, points])
+    mesh = pv.PolyData(places, lines=np.insert(lines, 0, 2, axis=1).ravel())
+    return mesh, source, np.where(source < 0, 0, periods)
 
 
 def write_spheres_vtp(path: str | Path, snapshot: Snapshot) -> Path:
@@ -101,107 +154,9 @@ def _save(path: str | Path, mesh: Any) -> Path:
     return write_bytes(path, writer.GetOutputString().encode())
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Drawing:
-    """The network as points and lines, with E extra ends for P pores and T throats.
-
-    Attributes:
-        points: (P+E, 3) m, pores first.
-        lines: (T, 2) indices of points.
-        source: (E,) pore that the end is an image of; -1 and -2 beyond the inlet and outlet face.
-        periods: (E,) number of periods along x between the end and that pore.
-    """
-
-    points: Array
-    lines: Array
-    source: Array
-    periods: Array
-
-
-def _drawing(network: Any) -> _Drawing:
-    pores, lines = np.asarray(network.pore_position), np.array(network.throat_pores)
-    ends, source = np.asarray(network.throat_ends).reshape(-1, 3), lines.ravel().copy()
-    away = source < 0
-    away[~away] = np.linalg.norm(ends[~away] - pores[source[~away]], axis=1) > 1e-9
-    points, source = ends[away], source[away]
-    lines[away.reshape(lines.shape)] = len(pores) + np.arange(len(points))
-    periods = np.where(
-        source < 0, 0, np.rint((points[:, 0] - pores[source, 0]) / np.ptp(network.box[0]))
-    )
-    return _Drawing(
-        points=np.concatenate([pores, points]), lines=lines, source=source, periods=periods
-    )
-
-
-def _throat_data(analysis: "Analysis") -> dict[str, Array]:
-    network, occupancy, count = (
-        analysis.network,
-        analysis.occupancy,
-        len(analysis.network.throat_radius),
-    )
-    codes = [LAW_CODES.get(str(name), -1) for name in analysis.law_used]
-    return {
-        "throat_radius_m": network.throat_radius,
-        "throat_length_m": network.throat_length,
-        "throat_share": network.throat_share,
-        "porosity": np.ones(count) if occupancy is None else occupancy.throat_porosity,
-        "fines": np.zeros(count, int) if occupancy is None else occupancy.throat_fines,
-        "blocked": blocked_throats(analysis).astype(np.uint8),
-        "law_used": np.array(codes, np.int8),
-        "conductance_initial_m3": analysis.conductance_initial,
-        "conductance_damaged_m3": analysis.conductance_damaged,
-        "flux_initial_m3": analysis.flow_initial.throat_flux,
-        "flux_damaged_m3": analysis.flow_damaged.throat_flux,
-        "conductance_lost": _lost(analysis),
-    }
-
-
-def _lost(analysis: "Analysis") -> Array:
-    """(T,) share of the conductance that each throat lost; 0 where it had none."""
-    clean = np.asarray(analysis.conductance_initial)
-    damaged = np.asarray(analysis.conductance_damaged)
-    return 1.0 - np.divide(damaged, clean, out=np.ones(len(clean)), where=clean > 0)
-
-
-def _pore_data(analysis: "Analysis", drawing: _Drawing) -> dict[str, Array]:
-    """Values of each point; an extra end has those of its pore or its face, and no volume."""
-    network, count = analysis.network, len(analysis.network.pore_radius)
-    source, none = drawing.source, np.zeros(len(drawing.source))
-    porosity = pore_porosity(analysis)
-    pressures = {
-        "pressure_initial": analysis.flow_initial.pore_pressure,
-        "pressure_damaged": analysis.flow_damaged.pore_pressure,
-    }
-    fall = (
-        drawing.periods if network.periodic[0] else none
-    )  # periodic x: the pressure falls by 1 per period
-    data = {
-        name: np.append(p, _of_ends(p, source, (1.0, 0.0)) - fall) for name, p in pressures.items()
-    }
-    return data | {
-        "radius_m": np.append(
-            network.pore_radius, _of_ends(network.pore_radius, source, (0.0, 0.0))
-        ),
-        "porosity": np.append(porosity, _of_ends(porosity, source, (np.nan, np.nan))),
-        "volume_m3": np.append(network.pore_volume, none),
-        "share": np.append(network.pore_share, none),
-        "end": np.append(np.zeros(count, np.uint8), np.ones(len(source), np.uint8)),
-    }
-
-
-def _of_ends(values: Array, source: Array, faces: tuple[float, float]) -> Array:
-    """Value (E,) of the pore that each extra end is an image of, or of its face in `faces`."""
-    ends = np.where(source == -1, *faces)
-    ends[source >= 0] = np.asarray(values)[source[source >= 0]]
-    return ends
-
-
 def write_flux_vtp(path: str | Path, network: Any, values: Array) -> Path:
     """The throats of a network as lines, m, with `values` (T,) as `value`, for a picture."""
-    import pyvista as pv
-
-    drawing = _drawing(network)
-    mesh = pv.PolyData(drawing.points, lines=np.insert(drawing.lines, 0, 2, axis=1).ravel())
+    mesh, *_ = _network_mesh(network)
     mesh.cell_data["value"] = np.asarray(values, float)
     return _save(path, mesh)
 
@@ -253,9 +208,8 @@ def read_balls(path: Path) -> Any:
     """The spheres in a .vtp file as balls, m, with `radius_m`, `kind` and `id` on them."""
     import pyvista as pv
 
-    points = read_mesh(path)
     ball = pv.Sphere(radius=1.0, theta_resolution=ROUNDNESS, phi_resolution=ROUNDNESS)
-    return points.glyph(geom=ball, scale="radius_m", orient=False)
+    return read_mesh(path).glyph(geom=ball, scale="radius_m", orient=False)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -263,15 +217,13 @@ def read_balls(path: Path) -> Any:
 
 
 MM, MICRON = 1e3, 1e6
-MOST_SPHERES = 40_000
+MOST_IN_VIEW = 40_000
 """Spheres up to which a page has a 3-D view: half a megabyte."""
-UPSTREAM_SHOWN = 0.12
-"""Share of the length upstream of the face up to which fines are shown."""
-STEPS = 65535
+VIEW_STEPS = 65535
 
 
 def view_of(spheres: Snapshot) -> Mapping[str, Any] | None:
-    """Grains and fines for the view; None where there are more than `MOST_SPHERES`, or none.
+    """Grains and fines for the view; None where there are more than `MOST_IN_VIEW`, or none.
 
     `data` is base64 of (N, 4) unsigned 16-bit numbers, little endian, grains first: x, y and z
     from `low` to `high` (mm), and the radius from 0 to `radius` (mm). `grains` is their number.
@@ -279,13 +231,17 @@ def view_of(spheres: Snapshot) -> Mapping[str, Any] | None:
     length = float(np.ptp(spheres.box[0]))
     shown = spheres.position[:, 0] > spheres.box[0, 0] - UPSTREAM_SHOWN * length
     grains, fines = spheres.grains(), spheres.where(shown).fines()
-    if not 0 < len(grains) + len(fines) <= MOST_SPHERES:
+    if not 0 < len(grains) + len(fines) <= MOST_IN_VIEW:
         return None
     position = np.concatenate([grains.position, fines.position]) * MM
     radius = np.concatenate([grains.radius, fines.radius]) * MM
     low, high = position.min(axis=0), position.max(axis=0)
-    table = np.column_stack([_steps(position, low, high), _steps(radius, 0.0, radius.max())])
-    sizes = np.unique(np.round(fines.radius * MICRON, 6)) if len(fines) else np.zeros(0)
+
+    def steps(value: Array, start: Any, end: Any) -> Array:
+        span = np.where(np.asarray(end) > start, np.asarray(end) - start, 1.0)
+        return np.rint((value - start) / span * VIEW_STEPS)
+
+    table = np.column_stack([steps(position, low, high), steps(radius, 0.0, radius.max())])
     return {
         "grains": len(grains),
         "spheres": len(radius),
@@ -293,12 +249,6 @@ def view_of(spheres: Snapshot) -> Mapping[str, Any] | None:
         "high": high.tolist(),
         "radius": float(radius.max()),
         "box": (np.asarray(spheres.box) * MM).tolist(),
-        "one_size": len(sizes) <= 1,
+        "one_size": len(np.unique(np.round(fines.radius * MICRON, 6))) <= 1,
         "data": base64.b64encode(table.astype("<u2").tobytes()).decode("ascii"),
     }
-
-
-def _steps(value: Array, low: Any, high: Any) -> Array:
-    """`value` as whole steps of 0 to `STEPS` between `low` and `high`."""
-    span = np.where(np.asarray(high) > low, np.asarray(high) - low, 1.0)
-    return np.rint((value - low) / span * STEPS)

@@ -19,7 +19,6 @@ import numpy as np
 from fdnet.errors import FlowError, NetworkError
 from fdnet.network.specimen import cake_of
 from fdnet.network.states import Log, Sides, cut_out, measure_all_spheres
-from fdnet.report.tables import in_millidarcy, percent
 from fdnet.scales.flow import carman_kozeny
 from fdnet.spheres.geometry import measure_porosity
 from fdnet.spheres.snapshot import Array, Snapshot, one_line
@@ -33,13 +32,6 @@ PACKED = 0.7
 """Porosity up to which a slice is a packed bed: above it Carman's and Kozeny's constant of 5 is
 low by more than a sixth (5.8 for spheres at 0.7, 7.2 at 0.8, 11.3 at 0.9; Happel and Brenner 1965,
 Low Reynolds number hydrodynamics, table 8-4.2)."""
-
-BY = {
-    "flow": "the flow of the last update",
-    "network": "the network of the cake",
-    "kozeny": "Carman and Kozeny",
-}
-"""What says the cake's share of the resistance, in words."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -84,7 +76,10 @@ class Cake:
     @property
     def packed_permeability(self) -> float | None:
         """By Carman and Kozeny, m2, of the packed slices in series; None where `too_thin`."""
-        return None if self.too_thin else self.packed_thickness / self._packed_resistance
+        if self.too_thin:
+            return None
+        resistance = np.sum((np.diff(self.edges) / self.k_kozeny)[self.packed])
+        return self.packed_thickness / float(resistance)
 
     @property
     def too_thin(self) -> str:
@@ -98,15 +93,6 @@ class Cake:
             f"packed for {layers:.1f} diameters of a fine, too thin for a permeability of its own "
             f"({THICK:g} are needed)"
         )
-
-    @property
-    def _packed_resistance(self) -> float:
-        return float(np.sum((np.diff(self.edges) / self.k_kozeny)[self.packed]))
-
-    @property
-    def best_resistance(self) -> float:
-        """By the network where it is resolved, else by Carman and Kozeny, 1/m."""
-        return self.resistance(self.k_kozeny if self.k_network is None else self.k_network)
 
     def resistance(self, permeability: Array) -> float:
         """Of the slices in series, 1/m."""
@@ -125,54 +111,40 @@ def measure_cake(spheres: Snapshot, sides: Sides) -> Cake | None:
     slices = max(1, math.ceil(thickness / mean - 0.5))
     edges = face - thickness * np.linspace(1.0, 0.0, slices + 1)
     edges[-1] = face
-    bed = _bed(spheres, cake, (float(edges[0]), face), sides)
+    reaching = spheres.where(spheres.position[:, 0] >= face).joined(cake)
+    bed = cut_out(reaching, (float(edges[0]), face), (False, *sides.periodic[1:]))
     porosity = measure_porosity(bed, periodic=sides.periodic, edges=edges).profile
     where = np.clip(np.searchsorted(edges, cake.position[:, 0], "right") - 1, 0, slices - 1)
-    count = np.bincount(where, minlength=slices)
-    diameter = _sauter(cake.radius, where, slices)
+    cube, square = (np.bincount(where, cake.radius**power, slices) for power in (3, 2))
+    diameter = np.full(slices, float(np.sum(cake.radius**3) / np.sum(cake.radius**2)))
+    diameter = 2.0 * np.divide(cube, square, out=diameter, where=square > 0)
     resolved, unresolved = _resolved(bed, edges, sides, fines=len(cake), layers=thickness / mean)
+    kozeny = [
+        carman_kozeny(void, d) if void < 1.0 else math.inf
+        for void, d in zip(porosity, diameter, strict=True)
+    ]
     return Cake(
         edges=edges,
-        count=count,
+        count=np.bincount(where, minlength=slices),
         porosity=porosity,
         diameter=diameter,
-        k_kozeny=np.array([_kozeny(*pair) for pair in zip(porosity, diameter, strict=True)]),
+        k_kozeny=np.array(kozeny),
         k_network=resolved,
         unresolved=unresolved,
     )
-
-
-def _bed(spheres: Snapshot, cake: Snapshot, span: tuple[float, float], sides: Sides) -> Snapshot:
-    """The cake and what of the pack reaches out of its face, in a box of the cake's length."""
-    pack = spheres.where(spheres.position[:, 0] >= span[1])
-    return cut_out(pack.joined(cake), span, (False, *sides.periodic[1:]))
-
-
-def _sauter(radius: Array, where: Array, slices: int) -> Array:
-    """Sauter diameter (B,) m of the fines by slice, sum d^3 / sum d^2; of all in an empty one."""
-    cube = np.bincount(where, radius**3, slices)
-    square = np.bincount(where, radius**2, slices)
-    whole = float(np.sum(radius**3) / np.sum(radius**2))
-    return 2.0 * np.divide(cube, square, out=np.full(slices, whole), where=square > 0)
-
-
-def _kozeny(porosity: float, diameter: float) -> float:
-    return carman_kozeny(porosity, diameter) if porosity < 1.0 else math.inf
 
 
 def _resolved(
     bed: Snapshot, edges: Array, sides: Sides, *, fines: int, layers: float
 ) -> tuple[Array | None, str]:
     """Permeability (B,) m2 of the slices in place in the network of the bed, or why not."""
-    missed = [
-        *([f"has {fines} fines, and a network needs {ENOUGH}"] if fines < ENOUGH else []),
-        *([f"has {fines} fines, and a network takes {MOST}"] if fines > MOST else []),
-        *(
-            [f"is {layers:.1f} diameters of a fine thick, and a network needs {THICK:g}"]
-            if layers < THICK
-            else []
-        ),
-    ]
+    missed = []
+    if fines < ENOUGH:
+        missed.append(f"has {fines} fines, and a network needs {ENOUGH}")
+    if fines > MOST:
+        missed.append(f"has {fines} fines, and a network takes {MOST}")
+    if layers < THICK:
+        missed.append(f"is {layers:.1f} diameters of a fine thick, and a network needs {THICK:g}")
     if missed:
         return None, f"the cake {' and '.join(missed)}"
     around = replace(sides, periodic=(False, *sides.periodic[1:]))
@@ -254,23 +226,6 @@ def cake_summary(
         "cake_by_depth": table,
         "cake": None if k is None else bed,
     }
-
-
-def cake_words(summary: Mapping[str, Any]) -> str:
-    """How the cake lets the fluid through, in words; `summary` has the keys of `cake_summary`."""
-    table = summary.get("cake_by_depth")
-    if table is None:
-        return "no fine upstream touches the pack"
-    k, network, own = table["k_kozeny_m2"], table["k_network_m2"], table["too_thin"]
-    if k is not None:
-        porosity = f"at a porosity of {table['porosity']:.2f}"
-        own = f"{in_millidarcy(k)} mD by Carman and Kozeny {porosity}"
-    if network is not None:
-        own += f", {in_millidarcy(network)} mD by its own network"
-    return (
-        f"{table['fines']} fines, {own}; about {percent(summary['cake_resistance_share'])} % of "
-        f"the resistance of cake and specimen by {BY[table['share_by']]}"
-    )
 
 
 # ------------------------------------------------------------------------------------------------
@@ -358,35 +313,29 @@ def fit_filtration(time: Array, volume: Array, cake_share: float = 1.0) -> Filtr
     columns = np.stack([unit**2, unit, np.ones_like(unit)], axis=1)
     (a, b, c), *_ = np.linalg.lstsq(columns, time, rcond=None)
     misfit = float(np.sqrt(np.mean((columns @ (a, b, c) - time) ** 2)) / whole)
-    fit = {"a": float(a / scale**2), "b": float(b / scale), "c": float(c)}
     rates = np.diff(volume) / np.diff(time)
-    return Filtration(
-        **fit,
-        misfit=misfit,
-        until=float(time[-1]),
-        unsupported=_unsupported(
-            len(time), fit["a"], misfit, float(rates[-1] / rates[0]), cake_share
-        ),
-    )
-
-
-def _unsupported(
-    points: int, curvature: float, misfit: float, rate: float, cake_share: float
-) -> str:
-    if points < FEWEST:
-        return f"{points} points of the history; {FEWEST} are needed"
-    if rate > FALLEN:
-        return f"the rate only fell to {rate:.2f} of the first; below {FALLEN:g} is needed"
-    if cake_share < CAKE_SHARE:
-        return (
+    rate, unsupported = float(rates[-1] / rates[0]), ""
+    if len(time) < FEWEST:
+        unsupported = f"{len(time)} points of the history; {FEWEST} are needed"
+    elif rate > FALLEN:
+        unsupported = f"the rate only fell to {rate:.2f} of the first; below {FALLEN:g} is needed"
+    elif cake_share < CAKE_SHARE:
+        unsupported = (
             f"the cake has {100 * cake_share:.0f} % of the resistance of cake and pack, at least "
             f"{100 * CAKE_SHARE:g} % is needed: the pack shapes the history"
         )
-    if curvature <= 0:
-        return "the history is not curved as that of a growing cake"
-    if misfit > MISFIT:
-        return (
+    elif a / scale**2 <= 0:
+        unsupported = "the history is not curved as that of a growing cake"
+    elif misfit > MISFIT:
+        unsupported = (
             f"t is not quadratic in V: the misfit is {100 * misfit:.2g} % of the time, at most "
             f"{100 * MISFIT:g} % is needed"
         )
-    return ""
+    return Filtration(
+        a=float(a / scale**2),
+        b=float(b / scale),
+        c=float(c),
+        misfit=misfit,
+        until=float(time[-1]),
+        unsupported=unsupported,
+    )

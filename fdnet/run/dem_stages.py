@@ -11,9 +11,15 @@ from fdnet.errors import CaseError
 from fdnet.names import LIGGGHTS_STAGES
 from fdnet.run.fluid import fluid_of
 from fdnet.run.folder import START_OVER, check_files, may_be_gone
-from fdnet.run.outputs import Invaded
 from fdnet.run.progress import Forecast, Progress
-from fdnet.run.records import PACK_DUMP, Session, invade_record, pack_record, take_pack
+from fdnet.run.records import (
+    PACK_DUMP,
+    FinishedInvasion,
+    Session,
+    invade_record,
+    pack_record,
+    take_pack,
+)
 from fdnet.scales.cost import expected_duration
 from fdnet.scales.pack import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES
 from fdnet.scales.scales import scales_of
@@ -103,7 +109,7 @@ def packed_grains(session: Session) -> Snapshot:
     return grains
 
 
-def invaded(session: Session, case: InvasionCase, grains: Snapshot) -> Invaded:
+def invaded(session: Session, case: InvasionCase, grains: Snapshot) -> FinishedInvasion:
     """The finished invasion, as it is on disk.
 
     Raises CaseError when a file is not what the stage made, DumpError or LiggghtsError when one
@@ -112,7 +118,7 @@ def invaded(session: Session, case: InvasionCase, grains: Snapshot) -> Invaded:
     folder, scales = session.path / "invade", scales_of(case)
     check_files(folder, session.folder.record("invade") or {}, START_OVER, may_lack=may_be_gone)
     history = read_history(folder)
-    return Invaded(
+    return FinishedInvasion(
         case=case,
         scales=scales,
         history=history,

@@ -8,12 +8,23 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.errors import CaseError
+from fdnet.files import expanded
 from fdnet.names import ALL_SPHERES
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import Network, build_network
 from fdnet.network.states import all_conductances
-from fdnet.run.folder import ANALYSE_AGAIN, START_OVER, check_one
-from fdnet.run.summary import html_lines, text_lines
+from fdnet.report.tables import (
+    COLUMNS,
+    HISTORY_COLUMNS,
+    empty_table,
+    read_summary,
+    read_table,
+    to_openpnm,
+)
+from fdnet.report.text import html_lines, text_lines
+from fdnet.report.vtk import read_balls, read_mesh
+from fdnet.run.folder import ANALYSE_AGAIN, START_OVER, check_one, finished_manifest
+from fdnet.spheres.readers import read_spheres
 from fdnet.spheres.snapshot import Array, Snapshot
 
 if TYPE_CHECKING:
@@ -42,11 +53,7 @@ class FinishedRun:
     @cached_property
     def summary(self) -> Mapping[str, Any]:
         """The numbers of summary.json, SI; a length is in m, a permeability in m2."""
-        from fdnet.report.tables import read_summary
-
-        summary = read_summary(self.path / "summary.json")
-        self._check("summary.json")
-        return summary
+        return self._read("summary.json", read_summary)
 
     @cached_property
     def sections(self) -> "pd.DataFrame":
@@ -64,11 +71,9 @@ class FinishedRun:
 
         They are from the network of all spheres; where that was not solved there are no rows.
         """
-        from fdnet.report.tables import COLUMNS, empty_table
-
-        if not self._has("layers.csv"):
-            return empty_table(COLUMNS["layers"])
-        return self._table("layers", None)
+        if "layers.csv" in self.manifest["files"]:
+            return self._table("layers", None)
+        return empty_table(COLUMNS["layers"])
 
     @cached_property
     def pores(self) -> "pd.DataFrame":
@@ -84,21 +89,15 @@ class FinishedRun:
     def history(self) -> "pd.DataFrame":
         """The invasion over time, one row for each checkpoint, `time_s` of the simulation first.
 
-        It joins history.csv of the run folder, where there is one, with the counts that the deck
-        wrote to invade/history.csv. A run without fines has no history: the table has no rows.
+        It joins history.csv of the run folder with the counts that the deck wrote to
+        invade/history.csv. A run without fines has no history: the table has no rows.
         """
-        from fdnet.report.tables import HISTORY_COLUMNS, empty_table, read_table
-
         if not isinstance(self.case, InvasionCase):
             return empty_table(["time_s", *HISTORY_COLUMNS])
         counts = read_table(self.path / "invade" / "history.csv", HISTORY_COLUMNS)
         check_one(self.path / "invade", self.manifest["invade"], "history.csv", START_OVER)
-        whole = self.path / "history.csv"
-        if not self._has("history.csv"):
-            counts.insert(0, "time_s", counts["step"] * self.manifest["invade"]["dt_s"])
-            return counts
-        times = read_table(whole, ["time_s", "physical_time_s", "step"])
-        self._check("history.csv")
+        names = ["time_s", "physical_time_s", "step"]
+        times = self._read("history.csv", lambda path: read_table(path, names))
         return times.merge(counts, on="step", how="left")
 
     def spheres(self, state: State = "damaged") -> Snapshot:
@@ -108,14 +107,9 @@ class FinishedRun:
         spheres_initial.csv; the box is that of the case, m. Fines upstream of the formation face
         (x < 0) are among the damaged ones.
         """
-        from fdnet.spheres.readers import read_spheres
-
         _check_state(state)
-        size = self.case.size_m
-        path = self.path / f"spheres_{state}.csv"
-        spheres = read_spheres(path, box=[(0.0, side) for side in size])
-        self._check(path.name)
-        return spheres
+        box = [(0.0, side) for side in self.case.size_m]
+        return self._read(f"spheres_{state}.csv", lambda path: read_spheres(path, box=box))
 
     def network(self) -> Network:
         """The pore network of the grains where they ended, built anew from spheres_damaged.csv.
@@ -149,8 +143,6 @@ class FinishedRun:
         See `fdnet.report.tables.to_openpnm`; the viscosity is that of the case's fluid. Raises
         CaseError where OpenPNM is not installed, or the run has no number by that law.
         """
-        from fdnet.report.tables import to_openpnm
-
         _check_state(state)
         used, other = (self.summary.get(f"damage_law_{one}") for one in ("used", "other"))
         if damage_law not in (None, used, other):
@@ -173,9 +165,7 @@ class FinishedRun:
 
         It is read from network.vtp, which the stage "report" writes.
         """
-        from fdnet.report.vtk import read_mesh
-
-        return self._mesh("network.vtp", read_mesh)
+        return self._read("network.vtp", read_mesh)
 
     def sphere_mesh(self, state: State = "damaged") -> Any:
         """The spheres as a pyvista mesh of balls, m, with `kind` (1 grain, 2 fine) to colour them.
@@ -183,30 +173,17 @@ class FinishedRun:
         They are read from spheres_damaged.vtp or spheres_initial.vtp, which the stage "report"
         writes.
         """
-        from fdnet.report.vtk import read_balls
-
         _check_state(state)
-        return self._mesh(f"spheres_{state}.vtp", read_balls)
+        return self._read(f"spheres_{state}.vtp", read_balls)
 
     def _table(self, name: str, rows: int | None) -> "pd.DataFrame":
-        from fdnet.report.tables import COLUMNS, read_table
+        return self._read(f"{name}.csv", lambda path: read_table(path, COLUMNS[name], rows=rows))
 
-        table = read_table(self.path / f"{name}.csv", COLUMNS[name], rows=rows)
-        self._check(f"{name}.csv")
-        return table
-
-    def _mesh(self, name: str, read: Callable[[Path], Any]) -> Any:
-        mesh = read(self.path / name)
-        self._check(name)
-        return mesh
-
-    def _has(self, name: str) -> bool:
-        """Whether the run wrote this file, which some runs do not have."""
-        return name in self.manifest.get("files", {}) or (self.path / name).exists()
-
-    def _check(self, name: str) -> None:
-        """Raises CaseError when the file is not the one that the run wrote."""
+    def _read(self, name: str, read: Callable[[Path], Any]) -> Any:
+        """A file of the run as `read` gives it; CaseError where the run wrote another one."""
+        content = read(self.path / name)
         check_one(self.path, self.manifest, name, ANALYSE_AGAIN)
+        return content
 
     def __str__(self) -> str:
         return "\n".join(text_lines(self.path, self.summary))
@@ -221,3 +198,32 @@ class FinishedRun:
 def _check_state(state: str) -> None:
     if state not in ("initial", "damaged"):
         raise CaseError(f"state: {state!r}, expected 'initial' (no fines) or 'damaged'")
+
+
+def open_run(path: str | Path) -> FinishedRun:
+    """A finished run, read from its folder.
+
+    Args:
+        path: the run folder, for example "runs/quick".
+
+    Returns:
+        The run, with `summary` (mapping), `sections`, `profile`, `pores`, `throats` and `history`
+        (pandas, units in the column names, SI), `spheres()`, `network()`, `to_openpnm()`,
+        `network_mesh()`, `sphere_mesh()`. It prints itself in mD and m2, mm and percent.
+
+    Raises:
+        CaseError: there is no folder, it holds no run or an unfinished one, or its records cannot
+            be read. The message names the path and what to do.
+
+    Examples:
+        >>> import fdnet
+        >>> run = fdnet.open_run("runs/quick")
+        >>> run.summary["k_damaged_m2"] < run.summary["k_initial_m2"]
+        True
+        >>> list(run.sections.columns[:5])
+        ['section', 'x_lo_m', 'x_hi_m', 'porosity_initial', 'porosity_damaged']
+        >>> axes = run.sections.plot(x="x_lo_m", y=["k_initial_m2", "k_damaged_m2"])
+    """
+    folder = expanded(path)
+    manifest, case = finished_manifest(folder)
+    return FinishedRun(path=folder, case=case, manifest=manifest)

@@ -1,7 +1,4 @@
-"""The run folder: its mark, what it holds, records read from it, and the lock.
-
-Which folders are run folders of fdnet, and so may be written to and cleared.
-"""
+"""The run folder: its records, the digests of its files, and who may write into it."""
 
 import fcntl
 import json
@@ -10,7 +7,7 @@ import re
 import shlex
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -23,79 +20,14 @@ from fdnet.dem.checkpoint import file_digest
 from fdnet.errors import CaseError
 from fdnet.files import refuse_folder_name, remove_half_written, write_text
 from fdnet.names import LIGGGHTS_STAGES, STAGES
-from fdnet.report.tables import Checked, read_json
+from fdnet.report.tables import JsonObject, read_json
 
 RECORD_FORMAT = 1
 MANIFEST, CASE, LOCK, UNFINISHED = "manifest.json", "case.toml", ".lock", ".unfinished"
 MARK = ".fdnet-run"
 RECORDS: dict[str, str] = {stage: f"{stage}/stage.json" for stage in LIGGGHTS_STAGES}
 _MARK_TEXT = "fdnet run folder, format 1\n"
-_MANIFEST_KEYS = {"case", "digests", "stages"}
-_RECORD_KEYS = {"digest", "seconds", "runs"}
 _HALF_MARK = re.compile(r"\.\.fdnet-run\.\d+\.part")
-
-
-def mark_folder(folder: Path) -> None:
-    """Write the mark that makes `folder` a run folder, unless it is there."""
-    if not _holds_mark(folder):
-        write_text(folder / MARK, _MARK_TEXT)
-
-
-def is_run_folder(folder: Path) -> bool:
-    """Whether fdnet made this folder.
-
-    The mark says so. A folder of an fdnet that wrote no mark yet is known by the content of its
-    manifest, of a stage's record, or of the list of unfinished stages; names alone are no proof.
-    """
-    return (
-        _holds_mark(folder)
-        or _holds_keys(folder / MANIFEST, _MANIFEST_KEYS)
-        or any(_holds_keys(folder / name, _RECORD_KEYS) for name in RECORDS.values())
-        or _names_stages(folder)
-    )
-
-
-def is_unused(folder: Path) -> bool:
-    """Whether `folder` is empty but for the empty lock and half mark of a session just killed."""
-    return all(
-        (child.name == LOCK and child.is_file() and child.stat().st_size == 0)
-        or _HALF_MARK.fullmatch(child.name) is not None
-        for child in folder.iterdir()
-    )
-
-
-def _holds_mark(folder: Path) -> bool:
-    return _start_of(folder / MARK) == _MARK_TEXT
-
-
-def _names_stages(folder: Path) -> bool:
-    """A list of unfinished stages next to a case is the start of a run."""
-    words = _start_of(folder / UNFINISHED).split()
-    return bool(words) and set(words) <= set(STAGES) and (folder / CASE).is_file()
-
-
-def _start_of(path: Path) -> str:
-    try:
-        if not path.is_file():
-            return ""
-        with path.open("rb") as file:
-            return file.read(200).decode("utf-8", "replace")
-    except OSError:
-        return ""
-
-
-def _holds_keys(path: Path, keys: set[str]) -> bool:
-    record = _json_of(path)
-    return (
-        isinstance(record, dict) and record.get("format") == RECORD_FORMAT and keys <= set(record)
-    )
-
-
-def _json_of(path: Path) -> Any:
-    try:
-        return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
-    except (OSError, ValueError, RecursionError):
-        return None
 
 
 # ------------------------------------------------------------------------------------------------
@@ -151,20 +83,14 @@ def check_files(
     advice: str,
     *,
     may_lack: Callable[[str], bool] = lambda name: False,
-) -> list[str]:
-    """Compare files below `folder` with the digests in `record`.
-
-    Returns the names of missing files that `may_lack` allows.
+) -> None:
+    """Compare files below `folder` with the digests in `record`; some it `may_lack`.
 
     Raises CaseError that names the first file which is missing or is not what the stage made.
     """
-    missing = []
     for name, digest in record.get("files", {}).items():
         if (folder / name).exists() or not may_lack(name):
             check_file(folder / name, digest, advice)
-        else:
-            missing.append(name)
-    return missing
 
 
 def check_one(folder: Path, record: Mapping[str, Any], name: str, advice: str) -> None:
@@ -198,49 +124,29 @@ OUTPUTS = {
     "pack": ("pack", "mechanics"),
     "invade": ("invade", "stokes"),
     "clean_up": ("clean_up",),
-    "analyse": (
-        "spheres_initial.csv",
-        "spheres_damaged.csv",
-        "sections.csv",
-        "profile.csv",
-        "layers.csv",
-        "pores.csv",
-        "throats.csv",
-        *SOME_TABLES,
-        "summary.json",
-    ),
-    "report": (
-        "figures",
-        "frames",
-        "network.vtp",
-        "spheres_initial.vtp",
-        "spheres_damaged.vtp",
-        "spheres.pvd",
-        "invasion.pvd",
-        "report.html",
-    ),
+    "analyse": (*TABLES, *SOME_TABLES),
+    "report": ("figures", "frames", *MESHES, "spheres.pvd", "invasion.pvd", "report.html"),
 }
 """Files and folders that each stage writes, below the run folder."""
-OPTIONAL = ("layers.csv", *SOME_TABLES)
+OPTIONAL = ("layers.csv", "history.csv", *SOME_TABLES)
 """Those of them that a finished stage may lack."""
 
 
-class _Execution(Checked):
+class _Execution(JsonObject):
     """One execution of LIGGGHTS."""
 
     version: str
     seconds: float
     waited: float = 0.0
-    ranks: int | None = None
 
 
-class _Attempt(Checked):
+class _Attempt(JsonObject):
     """One attempt at the porosity of a pack."""
 
     liggghts_s: float
 
 
-class _Updates(Checked):
+class _Updates(JsonObject):
     """How often a flow was computed anew."""
 
     count: int
@@ -248,7 +154,7 @@ class _Updates(Checked):
     momentum_defect_most: float = 0.0
 
 
-class StageRecord(Checked):
+class StageRecord(JsonObject):
     """What the record of every stage holds."""
 
     format: Literal[1]
@@ -292,36 +198,23 @@ class CleanUpRecord(StageRecord):
     warnings: list[str]
 
 
-class Manifest(Checked):
+class Manifest(JsonObject):
     """The manifest of a run that is analysed."""
 
     format: Literal[1]
     case: str = ""
     stages: list[str]
     digests: Mapping[str, str] = {}
-    files: Mapping[str, str] = {}
+    files: Annotated[Mapping[str, str], Field(min_length=1)]
     invade: InvadeRecord | None
 
 
-_MODELS: dict[str, type[Checked]] = {
+_MODELS: dict[str, type[JsonObject]] = {
     "pack": PackRecord,
     "invade": InvadeRecord,
     "clean_up": CleanUpRecord,
 }
-
-
-def _expected(manifest: dict[str, Any], stage: str) -> tuple[str, ...]:
-    """Files that must exist when `stage` is listed as done."""
-    if stage not in manifest["stages"] or (stage == "invade" and manifest["invade"] is None):
-        return ()
-    if stage in RECORDS:
-        return (RECORDS[stage],)
-    return tuple(name for name in OUTPUTS[stage] if name not in OPTIONAL)
-
-
-def write_json(path: Path, value: Any) -> None:
-    """Write a mapping as JSON, whole or not at all."""
-    write_text(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
+ANEW = "start over with --force"
 
 
 def read_record(folder: Path, stage: str) -> dict[str, Any] | None:
@@ -329,7 +222,8 @@ def read_record(folder: Path, stage: str) -> dict[str, Any] | None:
 
     Raises CaseError when it cannot be understood.
     """
-    return _read(folder / RECORDS[stage], _MODELS[stage], "record of a stage")
+    path, noun = folder / RECORDS[stage], "record of a stage"
+    return read_json(path, _MODELS[stage], noun=noun, advice=ANEW) if path.exists() else None
 
 
 def read_manifest(folder: Path) -> dict[str, Any] | None:
@@ -337,23 +231,21 @@ def read_manifest(folder: Path) -> dict[str, Any] | None:
 
     Raises CaseError when it cannot be understood, or when a file that it implies is missing.
     """
-    manifest = _read(folder / MANIFEST, Manifest, "manifest of a run")
-    if manifest is None:
-        return None
-    expected = (name for stage in STAGES[:4] for name in _expected(manifest, stage))
-    missing = next((name for name in expected if not (folder / name).exists()), None)
-    if missing is not None:
-        raise CaseError(
-            f"{folder}: the run is complete by its {MANIFEST}, but {missing} is missing; start "
-            "over with --force"
-        )
-    return manifest
-
-
-def _read(path: Path, model: type[Checked], noun: str) -> dict[str, Any] | None:
+    path = folder / MANIFEST
     if not path.exists():
         return None
-    return read_json(path, model, noun=noun, advice="start over with --force")
+    manifest = read_json(path, Manifest, noun="manifest of a run", advice=ANEW)
+    for stage in STAGES[:4]:
+        if stage not in manifest["stages"] or (stage == "invade" and manifest["invade"] is None):
+            continue
+        record = RECORDS.get(stage)
+        for name in [record] if record else OUTPUTS[stage]:
+            if name not in OPTIONAL and not (folder / name).exists():
+                raise CaseError(
+                    f"{folder}: the run is complete by its {MANIFEST}, but {name} is missing; "
+                    f"{ANEW}"
+                )
+    return manifest
 
 
 def finished_manifest(folder: Path) -> tuple[dict[str, Any], Case]:
@@ -394,8 +286,6 @@ def check_finished(folder: Path) -> tuple[dict[str, Any], Case]:
     `finished_manifest` does, and where a file is missing or was changed.
     """
     manifest, case = finished_manifest(folder)
-    if not manifest.get("files"):
-        raise CaseError(f"{folder / MANIFEST}: holds no digests of files; {ANALYSE_AGAIN}")
     check_files(folder, manifest, ANALYSE_AGAIN, may_lack=may_be_gone)
     for stage in RECORDS:
         record = read_record(folder, stage) or {}
@@ -405,6 +295,44 @@ def check_finished(folder: Path) -> tuple[dict[str, Any], Case]:
 
 # ------------------------------------------------------------------------------------------------
 # A run folder: who may write into it, which stages are done, and when it is complete.
+
+
+def mark_folder(folder: Path) -> None:
+    """Write the mark that makes `folder` a run folder, unless it is there."""
+    if not _holds_mark(folder):
+        write_text(folder / MARK, _MARK_TEXT)
+
+
+def _holds_mark(folder: Path) -> bool:
+    with suppress(OSError):
+        return (folder / MARK).is_file() and (folder / MARK).read_bytes() == _MARK_TEXT.encode()
+    return False
+
+
+def is_run_folder(folder: Path) -> bool:
+    """Whether fdnet made this folder: by its mark, or, in a copy without it, by its records.
+
+    Names alone are no proof.
+    """
+    if _holds_mark(folder):
+        return True
+    models: dict[str, type[JsonObject]] = {MANIFEST: Manifest} | {
+        RECORDS[stage]: model for stage, model in _MODELS.items()
+    }
+    for name, model in models.items():
+        with suppress(CaseError):
+            read_json(folder / name, model, noun="", advice="")
+            return True
+    return False
+
+
+def is_unused(folder: Path) -> bool:
+    """Whether `folder` is empty but for the empty lock and half mark of a session just killed."""
+    return all(
+        (child.name == LOCK and child.is_file() and child.stat().st_size == 0)
+        or _HALF_MARK.fullmatch(child.name) is not None
+        for child in folder.iterdir()
+    )
 
 
 _OWN = (CASE, MANIFEST, UNFINISHED, LOCK, MARK)
@@ -436,7 +364,7 @@ class RunFolder:
 
     def finish(self, stage: str, record: dict[str, Any]) -> None:
         """Mark a stage as done: its record is only there when the stage is complete."""
-        write_json(self.path / RECORDS[stage], record)
+        _write_json(self.path / RECORDS[stage], record)
 
     def manifest(self) -> dict[str, Any] | None:
         """The manifest of the run, or None. Raises CaseError as `read_manifest` does."""
@@ -456,7 +384,7 @@ class RunFolder:
     def complete(self, manifest: dict[str, Any] | None) -> None:
         """End this session; a manifest makes the run complete (None: it is not analysed yet)."""
         if manifest is not None:
-            write_json(self.path / MANIFEST, {"format": RECORD_FORMAT} | manifest)
+            _write_json(self.path / MANIFEST, {"format": RECORD_FORMAT} | manifest)
         (self.path / UNFINISHED).unlink(missing_ok=True)
 
     def clear(self, stages: tuple[str, ...]) -> None:
@@ -494,6 +422,10 @@ class RunFolder:
         os.close(self.lock)
 
 
+def _write_json(path: Path, value: Any) -> None:
+    write_text(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
+
+
 def _remove(path: Path) -> None:
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
@@ -512,20 +444,33 @@ def open_folder(
     another run is writing there, when the folder holds another case or an unfinished run and
     neither `resume` nor `force` is set, or when it holds something that is not a run.
     """
-    _refuse_foreign(path)
-    _refuse_gap(path, case, stages)
+    refuse_folder_name(path)
+    if path.exists() and not path.is_dir():
+        raise CaseError(f"{path}: is a file, expected a folder for --out")
+    # names alone do not make a folder ours: case.toml, manifest.json or pack may be the user's
+    if path.is_dir() and not is_run_folder(path) and not is_unused(path):
+        raise CaseError(
+            f"{path}: is not empty and holds no fdnet run; give another --out (nothing was "
+            "changed)"
+        )
+    analysed = bool({"analyse", "report"} & set(stages))
+    cleaned = "clean_up" in case.stages
+    needed = {
+        "pack": stages != ("pack",),
+        "invade": "invade" in case.stages and (analysed or (cleaned and "clean_up" in stages)),
+        "clean_up": cleaned and analysed,
+    }
+    for stage, what in (("pack", "pack"), ("invade", "invasion"), ("clean_up", "clean-up")):
+        if needed[stage] and stage not in stages and not (path / RECORDS[stage]).exists():
+            raise CaseError(
+                f"{path}: no finished {what} here; run the stage {stage} first "
+                f"(--stages {stage},...)"
+            )
     made = tuple(folder for folder in (path, *path.parents) if not folder.exists())
     was_empty = bool(made) or is_unused(path)
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        lock = os.open(path / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
-    except OSError as error:
-        raise CaseError(
-            f"{path}: cannot be made or written: {error.strerror}; give another --out"
-        ) from error
+    lock = _take_lock(path, make=True)
     folder = RunFolder(path=path, lock=lock, was_empty=was_empty, made=made)
     try:
-        _take_lock(path, lock)
         if was_empty:
             mark_folder(path)
         remove_half_written(path)
@@ -543,69 +488,54 @@ def locked(path: Path) -> Iterator[None]:
 
     Raises CaseError when another command is writing there, or the folder cannot be written.
     """
+    lock = _take_lock(path)
     try:
-        lock = os.open(path / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
-    except OSError as error:
-        raise CaseError(f"{path}: cannot be written: {error.strerror}") from error
-    try:
-        _take_lock(path, lock)
         yield
     finally:
         os.close(lock)
 
 
-def _take_lock(path: Path, lock: int) -> None:
+def _take_lock(path: Path, *, make: bool = False) -> int:
+    """The descriptor of the locked file; `make` makes the folder."""
+    try:
+        if make:
+            path.mkdir(parents=True, exist_ok=True)
+        lock = os.open(path / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+    except OSError as error:
+        what, do = ("made or written", "; give another --out") if make else ("written", "")
+        raise CaseError(f"{path}: cannot be {what}: {error.strerror}{do}") from error
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
+        os.close(lock)
         raise CaseError(
             f"{path}: another fdnet run, or fdnet stokes, is writing here; wait for it, or give "
             "another --out to a run"
         ) from error
-
-
-def _refuse_foreign(path: Path) -> None:
-    """Raise CaseError unless `path` is new, empty or a run folder.
-
-    Names alone do not make a folder ours: case.toml, manifest.json or pack may be the user's.
-    """
-    refuse_folder_name(path)
-    if path.exists() and not path.is_dir():
-        raise CaseError(f"{path}: is a file, expected a folder for --out")
-    if path.is_dir() and not is_run_folder(path) and not is_unused(path):
-        raise CaseError(
-            f"{path}: is not empty and holds no fdnet run; give another --out (nothing was "
-            "changed)"
-        )
-
-
-def _refuse_gap(path: Path, case: Case, stages: tuple[str, ...]) -> None:
-    """A stage needs the finished ones before it that run LIGGGHTS."""
-    analysed = bool({"analyse", "report"} & set(stages))
-    cleaned = "clean_up" in case.stages
-    needed = {
-        "pack": stages != ("pack",),
-        "invade": "invade" in case.stages and (analysed or (cleaned and "clean_up" in stages)),
-        "clean_up": cleaned and analysed,
-    }
-    for stage, what in (("pack", "pack"), ("invade", "invasion"), ("clean_up", "clean-up")):
-        missing = stage not in stages and not (path / RECORDS[stage]).exists()
-        if needed[stage] and missing:
-            raise CaseError(
-                f"{path}: no finished {what} here; run the stage {stage} first "
-                f"(--stages {stage},...)"
-            )
+    return lock
 
 
 def _admit(
     folder: RunFolder, case: Case, stages: tuple[str, ...], resume: bool, force: bool
 ) -> None:
+    """Raise CaseError unless the folder is free for this case; with `force` clear it first."""
     written = folder.path / CASE
     if force:
-        _force(folder, case, stages)
+        first = min(STAGES.index(stage) for stage in stages)
+        for stage in RECORDS:
+            record = folder.record(stage) if STAGES.index(stage) < first else None
+            if record is not None and record["digest"] != case.digest(stage):
+                raise CaseError(
+                    f"{folder.path / stage}: belongs to another case; add {stage} to --stages, or "
+                    "give another --out (nothing was changed)"
+                )
+        folder.clear(STAGES[first:])
     elif written.exists() and not case.same_specimen(written.read_bytes()):
+        keys = f"see {written}"
+        with suppress(CaseError):
+            keys = difference_text(case, recorded_case(written).data()) or keys
         raise CaseError(
-            f"{folder.path}: holds a run of another case{_other_keys(written, case)}; give "
+            f"{folder.path}: holds a run of another case ({keys}); give "
             f"another --out, {'repeat the --set of these keys, ' if resume else ''}or --force to "
             "replace it"
         )
@@ -618,30 +548,3 @@ def _admit(
         write_text(folder.path / UNFINISHED, " ".join(stages) + "\n")
     if force or not written.exists() or not folder.holds(case, stages):
         write_text(written, case.toml())
-
-
-def _other_keys(written: Path, case: Case) -> str:
-    """What the case of the folder has otherwise; only its place where it cannot be read."""
-    try:
-        keys = difference_text(case, recorded_case(written).data())
-    except CaseError:
-        keys = ""
-    return f" ({keys})" if keys else f" (see {written})"
-
-
-def _force(folder: RunFolder, case: Case, stages: tuple[str, ...]) -> None:
-    """Clear these stages and every later one.
-
-    Raises CaseError when an earlier one, which is kept, belongs to another case.
-    """
-    first = min(STAGES.index(stage) for stage in stages)
-    for stage in RECORDS:
-        if STAGES.index(stage) >= first:
-            continue
-        record = folder.record(stage)
-        if record is not None and record["digest"] != case.digest(stage):
-            raise CaseError(
-                f"{folder.path / stage}: belongs to another case; add {stage} to --stages, or "
-                "give another --out (nothing was changed)"
-            )
-    folder.clear(STAGES[first:])

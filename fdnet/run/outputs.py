@@ -1,10 +1,8 @@
-"""Tables and figures of a finished invasion.
+"""What a run writes next to its summary: tables, figures, ParaView files."""
 
-Sizes of the spheres that a run placed, next to those that its case asks for.
-"""
-
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import accumulate
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,136 +11,37 @@ import numpy as np
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.spheres import Spheres
-from fdnet.dem.checkpoint import Checkpoint, readable_states
+from fdnet.dem.checkpoint import readable_states
 from fdnet.dem.supply import batches_of, drawn_fines
-from fdnet.report.figures import Added, draw_added, write_added
+from fdnet.network.states import Sides
+from fdnet.report import figures, tables, vtk
+from fdnet.report.figures import Added, PageTable, PlacedSizes
+from fdnet.report.picture import render_spheres_png
+from fdnet.report.tables import millimetres
+from fdnet.report.text import cake_words
+from fdnet.run.bridging import CLOGGED, ratio_rows
+from fdnet.run.cake import (
+    HALF_HOUR,
+    PACKED,
+    cake_rows,
+    cake_share,
+    cake_summary,
+    fit_filtration,
+    measure_cake,
+)
+from fdnet.run.clean_up import Returned, clean_up_rows, clean_up_summary
 from fdnet.run.fluid import history_rows
+from fdnet.run.records import FinishedInvasion
 from fdnet.scales.pack import SHARES, diameter_at
-from fdnet.scales.scales import InvasionScales, scales_of
-from fdnet.sizes import SizeCurve, volume_quantiles
+from fdnet.scales.scales import scales_of
+from fdnet.sizes import volume_quantiles
+from fdnet.spheres.readers import write_spheres
 from fdnet.spheres.snapshot import Array, Snapshot
 
 if TYPE_CHECKING:
     from fdnet.network.permeability import Analysis
 
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class PlacedSizes:
-    """One kind of spheres of measured sizes.
-
-    Attributes:
-        name: "grains" or "fines".
-        law: "log-normal", "rosin-rammler", "measured" or "mixture".
-        asked: diameters, m, by the share that is finer, as the case gives them.
-        curve: of the case.
-        placed: (N,) m, diameters of the spheres that were placed.
-        invaded: (M,) m, diameters of the fines that lie in the specimen at the end; None for
-            grains.
-    """
-
-    name: str
-    law: str
-    asked: Mapping[float, float]
-    curve: SizeCurve
-    placed: Array
-    invaded: Array | None = None
-
-
-def placed_sizes(
-    case: Case, grains: Snapshot, damaged: Snapshot | None, supplied: int
-) -> list[PlacedSizes]:
-    """Grains and fines, where their sizes are measured ones.
-
-    `damaged` is the specimen at the end and `supplied` the number of fines that entered.
-    """
-    result = []
-    if case.grains.measured:
-        result.append(_sizes("grains", case.grains, 2 * grains.radius))
-    if isinstance(case, InvasionCase) and case.fines.measured and damaged is not None:
-        fines = damaged.fines()
-        inside = (fines.position[:, 0] >= 0) & (fines.position[:, 0] < case.size_m[0])
-        placed = _supplied_fines(case, scales_of(case), supplied)
-        result.append(_sizes("fines", case.fines, placed, 2 * fines.radius[inside]))
-    return result
-
-
-def _supplied_fines(case: InvasionCase, scales: InvasionScales, supplied: int) -> Array:
-    """Diameters (N,) m of the fines of the batches that entered."""
-    counts = batches_of(case, scales).counts
-    entered = sum(total <= supplied for total in accumulate(counts))
-    drawn = drawn_fines(case, counts)[:entered]
-    return np.concatenate([2 * batch.radius for batch in drawn])
-
-
-def _sizes(
-    name: str, spheres: Spheres, placed: Array, invaded: Array | None = None
-) -> PlacedSizes:
-    sizes = spheres.sizes
-    law = "mixture" if sizes is None else ("measured" if sizes.fit is None else sizes.fit.name)
-    asked: dict[float, float] = {}
-    if sizes is not None:
-        asked = sizes.asked or dict(sizes.points)
-    return PlacedSizes(
-        name=name, law=law, asked=asked, curve=spheres.curve, placed=placed, invaded=invaded
-    )
-
-
-def size_summary(sizes: Sequence[PlacedSizes]) -> dict[str, Any]:
-    """The key `sizes` of summary.json: D10, D50 and D90 asked for, of the curve and placed, m.
-
-    All shares are of the whole solids, with those left out; a diameter that is left out is null.
-    """
-    return {one.name: _numbers(one) for one in sizes}
-
-
-def _numbers(one: PlacedSizes) -> dict[str, Any]:
-    names = {share: f"D{100 * share:.0f}" for share in SHARES}
-    result: dict[str, Any] = {
-        "law": one.law,
-        "asked_m": {name: one.asked[p] for p, name in names.items() if p in one.asked},
-        "curve_m": {name: diameter_at(one.curve, p) for p, name in names.items()},
-        "placed_m": {name: _placed_at(one, one.placed, p) for p, name in names.items()},
-        "placed_count": len(one.placed),
-        "smallest_m": float(one.placed.min()),
-        "largest_m": float(one.placed.max()),
-        "finer_left_out": one.curve.below,
-        "coarser_left_out": one.curve.above,
-    }
-    if one.invaded is not None and len(one.invaded):
-        values = volume_quantiles(one.invaded, SHARES)
-        result["invaded_m"] = dict(zip(names.values(), values, strict=True))
-    return result
-
-
-def _placed_at(one: PlacedSizes, diameter: Array, share: float) -> float | None:
-    inside = (share - one.curve.below) / one.curve.kept
-    return volume_quantiles(diameter, [inside])[0] if 0 <= inside <= 1 else None
-
-
-# ------------------------------------------------------------------------------------------------
-# What a run writes next to its summary: tables, figures, ParaView files.
-
-
 MOST_FRAMES = 24
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Invaded:
-    """A finished invasion.
-
-    Attributes:
-        case: what was run.
-        scales: of the case.
-        history: one row a checkpoint.
-        damaged: grains and all remaining fines at the end.
-        updates: the record of a coupled invasion, one row an update; empty of others.
-    """
-
-    case: InvasionCase
-    scales: InvasionScales
-    history: tuple[Checkpoint, ...]
-    damaged: Snapshot
-    updates: tuple[Mapping[str, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -155,16 +54,16 @@ class Results:
         invasion: None when the case has no fines.
         analysis: permeability, porosity and fines of the specimen.
         sizes: of grains and fines with measured curves.
-        cleaned: grains and fines after the clean-up; None without one.
+        cleaned: what the clean-up gave; None without one.
         added: results that only some runs have.
     """
 
     path: Path
     grains: Snapshot
-    invasion: Invaded | None
+    invasion: FinishedInvasion | None
     analysis: "Analysis"
     sizes: tuple[PlacedSizes, ...] = ()
-    cleaned: Snapshot | None = None
+    cleaned: Returned | None = None
     added: tuple[Added, ...] = ()
 
     @property
@@ -173,93 +72,293 @@ class Results:
         return self.grains if self.invasion is None else self.invasion.damaged
 
     @property
-    def history(self) -> tuple[Checkpoint, ...]:
-        """The checkpoints of the invasion; empty without one."""
-        return () if self.invasion is None else self.invasion.history
-
-    @property
     def history_rows(self) -> list[dict[str, float]]:
         """The rows of history.csv; none without an invasion."""
         one = self.invasion
         return [] if one is None else history_rows(one.case, one.scales, one.history, one.updates)
 
-    @property
-    def physical_time_s(self) -> float | None:
-        """How long the fluid drove the fines, s; None without an invasion."""
-        rows = self.history_rows
-        return rows[-1]["physical_time_s"] if rows else None
-
 
 def write_tables(results: Results) -> None:
     """The CSV files of the output contract."""
-    from fdnet.report import tables
-    from fdnet.spheres import readers as spheres
-
-    path = results.path
-    spheres.write_spheres(path / "spheres_initial.csv", results.grains)
-    spheres.write_spheres(path / "spheres_damaged.csv", results.shown)
-    tables.write_sections(path / "sections.csv", results.analysis)
-    tables.write_profile(path / "profile.csv", results.analysis)
-    if results.analysis.layers is not None:
-        tables.write_layers(path / "layers.csv", results.analysis.layers)
-    tables.write_pores(path / "pores.csv", results.analysis)
-    tables.write_throats(path / "throats.csv", results.analysis)
+    path, analysis = results.path, results.analysis
+    write_spheres(path / "spheres_initial.csv", results.grains)
+    write_spheres(path / "spheres_damaged.csv", results.shown)
+    tables.write_sections(path / "sections.csv", analysis)
+    tables.write_profile(path / "profile.csv", analysis)
+    if analysis.layers is not None:
+        tables.write_layers(path / "layers.csv", analysis.layers)
+    tables.write_pores(path / "pores.csv", analysis)
+    tables.write_throats(path / "throats.csv", analysis)
     if results.cleaned is not None:
-        spheres.write_spheres(path / "spheres_cleaned.csv", results.cleaned)
-    write_added(path, results.added)
+        write_spheres(path / "spheres_cleaned.csv", results.cleaned.state)
+    for one in results.added:
+        if one.rows:
+            tables.write_rows(path / f"{one.name}.csv", one.rows)
     if results.history_rows:
-        tables.write_history(path / "history.csv", results.history_rows)
+        tables.write_rows(path / "history.csv", results.history_rows)
 
 
 def write_paraview(results: Results) -> None:
-    """network.vtp, the spheres before and after, and the invasion for ParaView's time slider."""
-    from fdnet.report import vtk
+    """network.vtp, the spheres before and after, and the invasion for ParaView's time slider.
 
-    path, shown = results.path, results.shown
+    Of the invasion there are at most `MOST_FRAMES` evenly spaced states, the last among them.
+    """
+    path, shown, one = results.path, results.shown, results.invasion
     vtk.write_network_vtp(path / "network.vtp", results.analysis)
     vtk.write_spheres_vtp(path / "spheres_initial.vtp", results.grains)
     vtk.write_spheres_vtp(path / "spheres_damaged.vtp", shown)
     vtk.write_pvd(
         path / "spheres.pvd", [(0.0, "spheres_initial.vtp"), (shown.time_s, "spheres_damaged.vtp")]
     )
-    if results.invasion is not None:
-        _write_frames(path, results.grains, results.invasion)
+    if one is not None:
+        (path / "frames").mkdir(exist_ok=True)
+        stride, entries = -(-len(one.history) // MOST_FRAMES), []
+        chosen = one.history[::-1][::stride][::-1]
+        states = readable_states(path / "invade", chosen, one.case, one.scales, results.grains)
+        for row, state in states:
+            name = f"frames/spheres_{row.step}.vtp"
+            moving = state if one.case.grains.motion == "mobile" else state.fines()
+            vtk.write_spheres_vtp(path / name, moving)
+            entries.append((state.time_s, name))
+        vtk.write_pvd(path / "invasion.pvd", entries)
     vtk.write_macro(path / "paraview_view.py")
-
-
-def _write_frames(path: Path, grains: Snapshot, invasion: Invaded) -> None:
-    """At most `MOST_FRAMES` evenly spaced states; the last is always among them."""
-    from fdnet.report import vtk
-
-    case, history = invasion.case, invasion.history
-    stride = -(-len(history) // MOST_FRAMES)
-    (path / "frames").mkdir(exist_ok=True)
-    entries = []
-    chosen = history[::-1][::stride][::-1]
-    for row, state in readable_states(path / "invade", chosen, case, invasion.scales, grains):
-        name = f"frames/spheres_{row.step}.vtp"
-        moving = state if case.grains.motion == "mobile" else state.fines()
-        vtk.write_spheres_vtp(path / name, moving)
-        entries.append((state.time_s, name))
-    vtk.write_pvd(path / "invasion.pvd", entries)
 
 
 def draw_figures(results: Results) -> tuple[list[tuple[Path, str]], list[str]]:
     """All figures with their captions, and why the 3-D picture is missing if it is."""
-    from fdnet.report import child, figures
+    folder = results.path / "figures"
+    rows = results.history_rows or None
+    drawn = figures.draw_all(folder, results.analysis, results.shown, rows, results.sizes)
+    picture = folder / "spheres_3d.png"
+    reason = render_spheres_png(picture, results.path / "spheres_damaged.vtp", results.shown.box)
+    captioned = [
+        (file, figures.CAPTIONS[file.stem]) for file in ([] if reason else [picture]) + drawn
+    ]
+    for one in results.added:
+        if one.fill is not None:
+            captioned.append((figures.draw(folder / f"{one.name}.png", one.fill), one.caption))
+    return captioned, [reason] if reason else []
 
-    drawn = figures.draw_all(
-        results.path / "figures",
+
+# ------------------------------------------------------------------------------------------------
+# Sizes of the spheres that a run placed, next to those that its case asks for.
+
+
+def placed_sizes(
+    case: Case, grains: Snapshot, damaged: Snapshot | None, supplied: int
+) -> Iterator[PlacedSizes]:
+    """Grains and fines, where their sizes are measured ones.
+
+    `damaged` is the specimen at the end and `supplied` the number of fines that entered.
+    """
+    if case.grains.measured:
+        yield _placed("grains", case.grains, 2 * grains.radius)
+    if isinstance(case, InvasionCase) and case.fines.measured and damaged is not None:
+        fines = damaged.fines()
+        inside = (fines.position[:, 0] >= 0) & (fines.position[:, 0] < case.size_m[0])
+        counts = batches_of(case, scales_of(case)).counts
+        entered = sum(total <= supplied for total in accumulate(counts))
+        batches = drawn_fines(case, counts)[:entered]
+        placed = np.concatenate([2 * batch.radius for batch in batches])
+        yield _placed("fines", case.fines, placed, 2 * fines.radius[inside])
+
+
+def _placed(
+    name: str, spheres: Spheres, placed: Array, invaded: Array | None = None
+) -> PlacedSizes:
+    sizes, law, asked = spheres.sizes, "mixture", {}
+    if sizes is not None:
+        law = "measured" if sizes.fit is None else sizes.fit.name
+        asked = sizes.asked or dict(sizes.points)
+    return PlacedSizes(
+        name=name, law=law, asked=asked, curve=spheres.curve, placed=placed, invaded=invaded
+    )
+
+
+def size_numbers(one: PlacedSizes) -> dict[str, Any]:
+    """A row of the key `sizes` of summary.json: D10, D50 and D90 asked for, of the curve, placed.
+
+    All in m; the shares are of the whole solids, with those left out, and a diameter that is left
+    out is null.
+    """
+    names = {share: f"D{100 * share:.0f}" for share in SHARES}
+    placed: dict[str, float | None] = {}
+    for share, name in names.items():
+        inside = (share - one.curve.below) / one.curve.kept
+        here = 0 <= inside <= 1
+        placed[name] = volume_quantiles(one.placed, [inside])[0] if here else None
+    result: dict[str, Any] = {
+        "law": one.law,
+        "asked_m": {name: one.asked[p] for p, name in names.items() if p in one.asked},
+        "curve_m": {name: diameter_at(one.curve, p) for p, name in names.items()},
+        "placed_m": placed,
+        "placed_count": len(one.placed),
+        "smallest_m": float(one.placed.min()),
+        "largest_m": float(one.placed.max()),
+        "finer_left_out": one.curve.below,
+        "coarser_left_out": one.curve.above,
+    }
+    if one.invaded is not None and len(one.invaded):
+        values = volume_quantiles(one.invaded, SHARES)
+        result["invaded_m"] = dict(zip(names.values(), values, strict=True))
+    return result
+
+
+# ------------------------------------------------------------------------------------------------
+# Results that only some runs have: cake, filtrate, bridging, and what the clean-up returns.
+
+
+_CLEAN_UP_COLUMNS = (
+    ("section", "section", "", None),
+    ("x_lo_m", "from", "mm", 1e3),
+    ("x_hi_m", "to", "mm", 1e3),
+    ("k_initial_m2", "k intact", "m²", 1),
+    ("k_damaged_m2", "k damaged", "m²", 1),
+    ("k_returned_m2", "k after the clean-up", "m²", 1),
+    ("damaged_k_over_k0", "k/k0 damaged", "%", 1e2),
+    ("return_k_over_k0", "k/k0 after the clean-up", "%", 1e2),
+    ("fines_before", "fines before", "", None),
+    ("fines_left_it", "of these came out", "", None),
+    ("fines_after", "fines after", "", None),
+)
+_CAKE_COLUMNS = (
+    ("x_lo_m", "from", "mm", 1e3),
+    ("x_hi_m", "to", "mm", 1e3),
+    ("fines_count", "fines", "", None),
+    ("porosity", "porosity", "–", 1),
+    ("sauter_diameter_m", "Sauter diameter", "mm", 1e3),
+    ("k_network_m2", "k by the network", "mD", 1),
+    ("k_kozeny_m2", "k by Carman and Kozeny", "mD", 1),
+)
+
+
+def with_added(results: Results, record: dict[str, Any] | None) -> Results:
+    """The results with what only some runs have; `record` is that of the clean-up, if any."""
+    one, added = results.invasion, []
+    if one is not None:
+        added = [_cake(results, one), *_filtrate(one)]
+        if results.analysis.invaded_count:
+            added.append(_bridging(results, one))
+    if results.cleaned is not None and record is not None:
+        added.append(_clean_up(results, results.cleaned, record))
+    return replace(results, added=tuple(added))
+
+
+def _cake(results: Results, one: FinishedInvasion) -> Added:
+    """The external cake by depth, and its share of the resistance."""
+    case, analysis = one.case, results.analysis
+    cake = measure_cake(one.damaged, Sides(periodic=case.periodic, walls=case.analysis.walls))
+    pack = case.size_m[0] / analysis.k_damaged if analysis.k_damaged > 0 else np.inf
+    summary = cake_summary(cake, pack, flow=cake_share(one.updates))
+    if cake is None:
+        return Added(name="cake", summary=summary)
+    rows = cake_rows(cake)
+    said = [cake_words(summary), *filter(None, [cake.unresolved])]
+    return Added(
+        name="cake",
+        rows=rows,
+        summary=summary,
+        fill=partial(figures.fill_cake, rows=rows),
+        caption="The external cake in slices of a fine's diameter: porosity, and permeability by "
+        "the network of its own spheres and, of packed slices, by Carman and Kozeny.",
+        page=PageTable(
+            title="External cake",
+            columns=_CAKE_COLUMNS,
+            rows=rows,
+            note=f"The cake is {millimetres(cake.thickness)} thick: {'; '.join(said)}. Carman's "
+            f"and Kozeny's formula is for packed beds: slices of a porosity above {PACKED:g} are "
+            "loose and have a dash.",
+        ),
+    )
+
+
+def _filtrate(one: FinishedInvasion) -> Iterator[Added]:
+    """Filtrate against the root of time, where the flow follows the deposit."""
+    if not one.updates or "filtrate_m3" not in one.updates[-1]:
+        return
+    area = one.case.size_m[1] * one.case.size_m[2]
+    time = one.scales.force_factor * np.array([row["time_s"] for row in one.updates])
+    volume = np.array([row["filtrate_m3"] for row in one.updates]) / area
+    fit = fit_filtration(time, volume, cake_share(one.updates) or 0.0)
+    if fit is None:
+        return
+    usable = not fit.unsupported
+    said = f"30 minutes by extrapolation: {1e3 * fit.half_hour:.3g} mm"
+    yield Added(
+        name="filtrate",
+        summary={
+            "spurt_m3_m2": fit.spurt if usable else None,
+            "volume_30min_m3_m2": fit.half_hour if usable else None,
+            "filtrate_fit": {
+                "a_s_m2": fit.a,
+                "b_s_m": fit.b,
+                "c_s": fit.c,
+                "intercept_m3_m2": fit.intercept if usable else None,
+                "misfit": fit.misfit,
+                "until_s": fit.until,
+                "extrapolated_by": HALF_HOUR / fit.until,
+                "unsupported": fit.unsupported,
+            },
+        },
+        fill=partial(
+            figures.fill_filtrate,
+            time=time,
+            volume=volume,
+            fitted=np.array([fit.volume(at) for at in time]) if usable else None,
+            said=said if usable else "no extrapolation",
+        ),
+        caption="Filtrate per area of the face against the root of time. A cake that grows at "
+        "constant pressure makes t quadratic in V; where the history is that, it is extrapolated "
+        f"from {fit.until:.2g} s to 30 minutes."
+        + ("" if usable else f" Here it is not: {fit.unsupported}."),
+    )
+
+
+def _bridging(results: Results, one: FinishedInvasion) -> Added:
+    """Which throats the fines close, by the ratio of diameters."""
+    last = one.history[-1]
+    rows = ratio_rows(
         results.analysis,
-        results.shown,
-        results.history_rows or None,
-        results.sizes,
+        entered=last.invaded + last.passed,
+        fine_diameter=2.0 * float(np.mean(one.damaged.fines().radius)),
+        concentration=one.case.fines.placed_fraction,
     )
-    more = draw_added(results.path / "figures", results.added)
-    picture = results.path / "figures" / "spheres_3d.png"
-    reason = child.render_spheres_png(
-        picture, results.path / "spheres_damaged.vtp", results.shown.box
+    return Added(
+        name="bridging",
+        rows=rows,
+        fill=partial(figures.fill_bridging, rows=rows) if rows else None,
+        caption="Throats between grains, down to the depth above which 95 % of the fines lie: the "
+        "share that is closed, by the ratio of the fines' diameter to that of the throat, with "
+        "Wilson's 95 % band. Closed: one fine covers the whole section (blocked), or less than "
+        f"{CLOGGED:g} of the conductance is left (clogged).",
     )
-    if reason:
-        return [(file, figures.CAPTIONS[file.stem]) for file in drawn] + more, [reason]
-    return [(file, figures.CAPTIONS[file.stem]) for file in (picture, *drawn)] + more, []
+
+
+def _clean_up(results: Results, after: Returned, record: dict[str, Any]) -> Added:
+    rows = clean_up_rows(results.analysis, after)
+    summary = clean_up_summary(results.analysis, after, record)
+    counts = summary["clean_up"]
+    whole = counts["damaged_k_over_k0"], summary["return_k_over_k0"]
+    said = " and ".join("no path" if share is None else f"{share:.3f}" for share in whole)
+    return Added(
+        name="clean_up",
+        rows=rows,
+        summary=summary,
+        fill=partial(
+            figures.fill_clean_up,
+            rows=rows,
+            depths=(after.before, after.before[after.stayed]),
+            whole=whole,
+        ),
+        caption="The clean-up: permeability of each section over that of the intact pack, after "
+        "the invasion and after the flow was turned back; depth of the fines that were inside "
+        "before, and of those of them that stayed.",
+        page=PageTable(
+            title="Clean-up",
+            columns=_CLEAN_UP_COLUMNS,
+            rows=rows,
+            note=f"The flow was turned back. Of {counts['inside_before']} fines inside, "
+            f"{counts['came_out']} came out and {counts['stayed']} stayed. k/k0 of the whole "
+            f"specimen before and after: {said}. The damage law is that of the invasion.",
+        ),
+    )

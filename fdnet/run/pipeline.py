@@ -9,23 +9,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fdnet.case.case import Case, InvasionCase
+from fdnet.case.file import read_case
 from fdnet.case.tables import AnalysisChoices
 from fdnet.dem.checkpoint import read_rows
 from fdnet.dem.liggghts import find_binary
 from fdnet.dem.supply import refuse_crowded_supply
 from fdnet.errors import CaseError
+from fdnet.files import expanded
 from fdnet.names import AUTO, DEFAULT_LAW, LIGGGHTS_STAGES, STAGES, off_by_factors
-from fdnet.report.permeability_text import thesis_law_warning
-from fdnet.run.added_results import added_results
-from fdnet.run.answer import case_words, with_answer
+from fdnet.report import html, tables
+from fdnet.report.text import case_words, thesis_law_warning
+from fdnet.report.vtk import view_of
+from fdnet.run.answer import with_answer
 from fdnet.run.clean_up import Returned, clean_up_stage, compared, returned
-from fdnet.run.dem_stages import (
-    file_warnings,
-    invade_stage,
-    invaded,
-    pack_stage,
-    packed_grains,
-)
+from fdnet.run.dem_stages import file_warnings, invade_stage, invaded, pack_stage, packed_grains
+from fdnet.run.finished import FinishedRun, open_run
 from fdnet.run.folder import (
     MESHES,
     RECORDS,
@@ -41,14 +39,15 @@ from fdnet.run.outputs import (
     Results,
     draw_figures,
     placed_sizes,
-    size_summary,
+    size_numbers,
+    with_added,
     write_paraview,
     write_tables,
 )
 from fdnet.run.records import RunOptions, Session, record_warnings, stage_seconds, versions
 from fdnet.run.stokes_sections import report_section
 from fdnet.run.summary import summarise
-from fdnet.scales.check import every_finding
+from fdnet.scales.check import every_finding, explained
 from fdnet.scales.cost import over_limit
 from fdnet.scales.pack import grain_count, refuse_unreachable
 from fdnet.scales.scales import InvasionScales, Scales, back_flow, scales_of
@@ -57,6 +56,68 @@ from fdnet.spheres.snapshot import Directions, Snapshot
 
 if TYPE_CHECKING:
     from fdnet.network.permeability import Analysis
+
+
+def run_case(
+    case: Case | str | Path,
+    out: str | Path | None = None,
+    *,
+    resume: bool = False,
+    force: bool = False,
+    stages: Sequence[str] = STAGES,
+    ranks: int = 1,
+    liggghts: str | None = None,
+    timeout: float | None = None,
+    progress: bool = False,
+) -> FinishedRun:
+    """Pack the grains, drive the fines in, analyse the result and write the report.
+
+    It needs LIGGGHTS. A finished run is not repeated: it is opened.
+
+    Args:
+        case: a `Case`, or the path of a case file.
+        out: the run folder. Without it "runs/NAME", by the name of the case.
+        resume: continue an unfinished run in `out`.
+        force: replace what is in `out`.
+        stages: some of "pack", "invade", "analyse", "report", one of the last two among them.
+        ranks: number of MPI processes of LIGGGHTS.
+        liggghts: path of the LIGGGHTS program, if not the one that the set-up installed.
+        timeout: longest run time of LIGGGHTS, s.
+        progress: whether to show the progress on the terminal.
+
+    Returns:
+        The finished run, as `open_run` gives it; lengths in m, permeabilities in m2.
+
+    Raises:
+        CaseError: the case, `out` or `stages` cannot be used.
+        LiggghtsError: LIGGGHTS is missing or failed; `resume` continues from what was written.
+
+    Examples:
+        >>> import fdnet
+        >>> run = fdnet.run_case("cases/quick.toml", "runs/quick")
+        >>> run.summary["case"], run.summary["invaded_count"] > 0
+        ('quick', True)
+    """
+    unknown = [stage for stage in stages if stage not in STAGES]
+    if isinstance(stages, str) or unknown or not {"analyse", "report"} & set(stages):
+        raise CaseError(
+            f"stages: {stages!r}, expected some of {', '.join(STAGES)} with analyse or report "
+            "among them; for the pack or the invasion alone use fdnet run CASE.toml --stages"
+        )
+    given = case if isinstance(case, Case) else read_case(case)
+    options = RunOptions(
+        out=Path("runs") / given.name if out is None else expanded(out),
+        ranks=ranks,
+        resume=resume,
+        force=force,
+        stages=tuple(stage for stage in STAGES if stage in stages),
+        liggghts=liggghts,
+        timeout=timeout,
+        show_progress=progress,
+        command="fdnet.run_case",
+    )
+    run_stages(given, options)
+    return open_run(options.out)
 
 
 def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
@@ -94,7 +155,14 @@ def refuse(case: Case, options: RunOptions) -> None:
             f"--stages clean_up: case {case.name} has no table [clean_up]; add it with "
             "drawdown_MPa, or leave the stage out"
         )
-    needed = _stages_to_run(case, options)
+    needed = [
+        stage
+        for stage in LIGGGHTS_STAGES
+        if stage in options.stages
+        and stage in case.stages
+        and not (stage == "pack" and options.pack_from is not None)
+        and (options.force or not (options.out / stage / "stage.json").exists())
+    ]
     fresh = options.force or not read_rows(options.out / "invade")
     for refusal in refusals(
         case, scales_of(case), needed=needed, stages=options.stages, supply=fresh
@@ -141,19 +209,9 @@ def _refused(check: Callable[..., object], *arguments: Any) -> Iterator[str]:
         yield str(error)
 
 
-def _stages_to_run(case: Case, options: RunOptions) -> list[str]:
-    """The stages that will need LIGGGHTS."""
-    asked = [s for s in LIGGGHTS_STAGES if s in options.stages and s in case.stages]
-    if options.pack_from is not None:
-        asked = [s for s in asked if s != "pack"]
-    return [s for s in asked if options.force or not (options.out / s / "stage.json").exists()]
-
-
 def _read_summary(folder: RunFolder) -> dict[str, Any]:
-    from fdnet.report.tables import read_summary
-
     path = folder.path / "summary.json"
-    return read_summary(path) if path.exists() else {}
+    return tables.read_summary(path) if path.exists() else {}
 
 
 def _carry_out(session: Session) -> dict[str, Any]:
@@ -171,23 +229,24 @@ def _carry_out(session: Session) -> dict[str, Any]:
     if not {"analyse", "report"} & set(stages):
         session.folder.complete(None)
         return {}
-    summary = _analyse_and_report(session)
-    session.folder.complete(_manifest(session))
-    return summary
-
-
-def _pack_record(session: Session) -> dict[str, Any]:
     record = session.folder.record("pack")
     if record is None:
         raise CaseError(f"{session.path}: no finished pack here; run the stage pack first")
-    return record
+    summary = _analyse_and_report(session, record)
+    session.folder.complete(_manifest(session, record))
+    return summary
 
 
-def _manifest(session: Session) -> dict[str, Any]:
-    pack, invasion = _pack_record(session), session.folder.record("invade")
-    cleaned = _clean_up_record(session)
-    left_out = set() if cleaned else {"clean_up"}
-    done = [stage for stage in STAGES if stage not in left_out]
+def _clean_up_record(session: Session) -> dict[str, Any] | None:
+    """The record of the clean-up; None of a case without one."""
+    return session.folder.record("clean_up") if "clean_up" in session.case.stages else None
+
+
+def _manifest(session: Session, pack: dict[str, Any]) -> dict[str, Any]:
+    invasion, cleaned = session.folder.record("invade"), _clean_up_record(session)
+    done = [stage for stage in STAGES if cleaned or stage != "clean_up"]
+    frames = frames_in(session.path).values()
+    names = [*TABLES, *SOME_TABLES, *MESHES, *frames, *RECORDS.values()]
     return {
         "case": session.case.name,
         "digests": {stage: session.case.digest(stage) for stage in done if stage != "report"},
@@ -196,53 +255,55 @@ def _manifest(session: Session) -> dict[str, Any]:
         "command": session.options.command,
         "seconds": stage_seconds(pack, invasion, session.seconds, cleaned=cleaned),
         "versions": versions(pack),
-        "files": digests_of(
-            session.path,
-            [
-                *TABLES,
-                *SOME_TABLES,
-                *MESHES,
-                *frames_in(session.path).values(),
-                *RECORDS.values(),
-            ],
-        ),
+        "files": digests_of(session.path, names),
         "pack": pack,
         "invade": invasion,
         **({"clean_up": cleaned} if cleaned else {}),
     }
 
 
-def _clean_up_record(session: Session) -> dict[str, Any] | None:
-    """The record of the clean-up; None of a case without one."""
-    return session.folder.record("clean_up") if "clean_up" in session.case.stages else None
-
-
-def _analyse_and_report(session: Session) -> dict[str, Any]:
-    case, grains = session.case, packed_grains(session)
-    invasion = invaded(session, case, grains) if isinstance(case, InvasionCase) else None
-    damaged = None if invasion is None else invasion.damaged
-    supplied = (session.folder.record("invade") or {}).get("supplied", 0)
+def _analyse_and_report(session: Session, pack: dict[str, Any]) -> dict[str, Any]:
+    """Tables and the summary, which is given out before figures and report are made of them."""
+    invasion, cleaned = session.folder.record("invade"), _clean_up_record(session)
     with session.timed("analyse"):
-        first = with_default_laws(grains, damaged, periodic=case.periodic, options=case.analysis)
-        after = _returned(session, grains, damaged, first)
-        results = Results(
-            path=session.path,
-            grains=grains,
-            invasion=invasion,
-            analysis=first,
-            sizes=tuple(placed_sizes(case, grains, damaged, supplied)),
-            cleaned=None if after is None else after.state,
-        )
-        added = added_results(results, after, _clean_up_record(session))
-        results = replace(results, added=tuple(added))
+        results = with_added(_analysed(session, (invasion or {}).get("supplied", 0)), cleaned)
         write_tables(results)
-    figures: list[tuple[Path, str]] = []
-    notes: list[str] = []
+    summary = _summary(session, results, pack, invasion if results.invasion else None, cleaned)
+    summary = tables.write_summary(session.path / "summary.json", summary)
+    session.options.answered(summary)
     if "report" in session.options.stages:
         with session.timed("report"):
             write_paraview(results)
             figures, notes = draw_figures(results)
-    return _write_summary(session, results, figures, notes)
+        summary["warnings"] += [explained(note) for note in notes]
+        summary["seconds"] |= {"report": session.seconds["report"]}
+        tables.write_summary(session.path / "summary.json", summary)
+        _write_page(session, results, summary, figures, versions(pack))
+    return summary
+
+
+def _analysed(session: Session, supplied: int) -> Results:
+    """The specimen before, after the invasion and after a clean-up; `supplied` fines entered."""
+    from fdnet.network.permeability import analyse
+
+    case, grains = session.case, packed_grains(session)
+    invasion = invaded(session, case, grains) if isinstance(case, InvasionCase) else None
+    damaged = None if invasion is None else invasion.damaged
+    first = with_default_laws(grains, damaged, periodic=case.periodic, options=case.analysis)
+    after: Returned | None = None
+    if damaged is not None and isinstance(case, InvasionCase) and "clean_up" in case.stages:
+        state = returned(session, case, grains)
+        options = case.analysis.changed(damage_law=first.damage_law_used)
+        again = analyse(grains, state, periodic=case.periodic, options=options)
+        after = compared(damaged, state, again)
+    return Results(
+        path=session.path,
+        grains=grains,
+        invasion=invasion,
+        analysis=first,
+        sizes=tuple(placed_sizes(case, grains, damaged, supplied)),
+        cleaned=after,
+    )
 
 
 def with_default_laws(
@@ -263,65 +324,54 @@ def with_default_laws(
     return replace(first, warnings=(*said, *first.warnings))
 
 
-def _returned(
-    session: Session, grains: Snapshot, damaged: Snapshot | None, first: "Analysis"
-) -> Returned | None:
-    """The state after the clean-up, measured by the damage law of the first analysis."""
-    from fdnet.network.permeability import analyse
-
-    case = session.case
-    if damaged is None or not isinstance(case, InvasionCase) or "clean_up" not in case.stages:
-        return None
-    state = returned(session, case, grains)
-    options = case.analysis.changed(damage_law=first.damage_law_used)
-    analysis = analyse(grains, state, periodic=case.periodic, options=options)
-    return compared(damaged, state, analysis)
-
-
-def _write_summary(
-    session: Session, results: Results, figures: list[tuple[Path, str]], notes: list[str]
+def _summary(
+    session: Session,
+    results: Results,
+    pack: dict[str, Any],
+    invasion: dict[str, Any] | None,
+    cleaned: dict[str, Any] | None,
 ) -> dict[str, Any]:
-    from fdnet.report import html, tables
-    from fdnet.report.html import mechanics_html as section_html
-    from fdnet.report.vtk import view_of
-
-    case, scales = session.case, session.scales
-    pack = _pack_record(session)
-    invasion = session.folder.record("invade") if results.history else None
-    cleaned = _clean_up_record(session)
+    """The mapping of summary.json."""
+    case, history = session.case, results.history_rows
     summary = summarise(
         case,
         results.analysis,
         pack=pack,
         invasion=invasion,
-        sizes=size_summary(results.sizes),
-        last=results.history[-1] if results.history else None,
-        physical_time_s=results.physical_time_s,
+        sizes={one.name: size_numbers(one) for one in results.sizes},
+        last=results.invasion.history[-1] if results.invasion else None,
+        physical_time_s=history[-1]["physical_time_s"] if history else None,
         seconds=stage_seconds(pack, invasion, session.seconds, cleaned=cleaned),
         warnings=[
-            *(one.sentence for one in every_finding(case, scales)),
+            *(one.sentence for one in every_finding(case, session.scales)),
             *record_warnings(case, pack, invasion),
             *(cleaned["warnings"] if cleaned else []),
             *file_warnings(session),
-            *notes,
         ],
     )
     for one in results.added:
         summary |= one.summary
-    summary = with_answer(summary, case, results.analysis, results.shown)
-    summary = tables.write_summary(session.path / "summary.json", summary)
-    if "report" in session.options.stages:
-        parts = html.ReportParts(
-            figures=figures,
-            case_words=case_words(case, scales),
-            view=view_of(results.shown),
-            case_text=case.toml(),
-            scales=scale_rows(case, scales),
-            versions=versions(pack),
-            commands=[session.options.command] if session.options.command else [],
-            tables=[one.page for one in results.added if one.page is not None],
-            stokes=report_section(session.path, case, summary),
-            mechanics=section_html(session.path / "mechanics"),
-        )
-        html.write_report(session.path / "report.html", summary, parts=parts)
-    return summary
+    return with_answer(summary, case, results.analysis, results.shown)
+
+
+def _write_page(
+    session: Session,
+    results: Results,
+    summary: dict[str, Any],
+    figures: list[tuple[Path, str]],
+    programs: dict[str, str],
+) -> None:
+    case, command = session.case, session.options.command
+    parts = html.ReportParts(
+        figures=figures,
+        case_words=list(case_words(case, session.scales)),
+        view=view_of(results.shown),
+        case_text=case.toml(),
+        scales=scale_rows(case, session.scales),
+        versions=programs,
+        commands=[command] if command else [],
+        tables=[one.page for one in results.added if one.page is not None],
+        stokes=report_section(session.path, case, summary),
+        mechanics=html.mechanics_html(session.path / "mechanics"),
+    )
+    html.write_report(session.path / "report.html", summary, parts=parts)

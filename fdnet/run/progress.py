@@ -1,7 +1,4 @@
-"""What a run says while it goes on.
-
-The environment of a process that works on one core, while others have cores of their own.
-"""
+"""What a run says while it goes on, and when it is expected to end."""
 
 import math
 import re
@@ -9,14 +6,14 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType, TracebackType
+from types import MappingProxyType
 from typing import Self
 
 from fdnet.scales.clock import spoken_time
 
 _THREADS = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 ONE_CORE: Mapping[str, str] = MappingProxyType(dict.fromkeys(_THREADS, "1"))
-"""What numpy, scipy and numba read when they are loaded."""
+"""What numpy, scipy and numba read when they are loaded, for a process that works on one core."""
 
 
 # ------------------------------------------------------------------------------------------------
@@ -53,25 +50,20 @@ class Forecast:
         Args:
             seen: step and number of fines that have crossed the face, of each checkpoint.
         """
-        step = seen[-1][0]
-        quiet = self._quiet(seen)
-        if self.plug and quiet >= QUIET_SHARE * self.plug:
-            end = step + max(self.plug - quiet, LEAST_LEFT * self.plug)
-        else:
-            end = max(self.expected, step + max(self.plug, GROWTH * step))
-            end = self.expected if not self.plug and step < self.expected else end
-        most = math.inf if self.cap is None else self.cap
-        return max(step, round(min(most, end)))
-
-    def _quiet(self, seen: Sequence[tuple[int, int]]) -> int:
-        """Steps back from now in which no more have crossed than the rule lets pass."""
         step, crossed = seen[-1]
-        quiet = 0
+        quiet = 0  # steps back from now in which no more have crossed than the rule lets pass
         for before, then in reversed(seen[:-1]):
             if crossed - then > self.allowed * (step - before):
                 break
             quiet = step - before
-        return quiet
+        if self.plug and quiet >= QUIET_SHARE * self.plug:
+            end = step + max(self.plug - quiet, LEAST_LEFT * self.plug)
+        elif not self.plug and step < self.expected:
+            end = self.expected
+        else:
+            end = max(self.expected, step + max(self.plug, GROWTH * step))
+        most = math.inf if self.cap is None else self.cap
+        return max(step, round(min(most, end)))
 
 
 # ------------------------------------------------------------------------------------------------
@@ -113,19 +105,9 @@ class Progress:
         self._stop: Callable[[], None] = lambda: None
 
     def __enter__(self) -> Self:
-        if self.show and sys.stderr.isatty():
-            self._open_bar()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._stop()
-
-    def _open_bar(self) -> None:
+        """Opens a bar on a terminal."""
+        if not (self.show and sys.stderr.isatty()):
+            return self
         from rich.console import Console
         from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
         from rich.progress import Progress as Bar
@@ -144,6 +126,10 @@ class Progress:
             task, completed=self.step, total=max(self.end, self.step + 1), note=self._text()
         )
         self._stop = bar.stop
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop()
 
     def __call__(self, line: str) -> None:
         """Take one line of the screen."""

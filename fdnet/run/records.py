@@ -1,7 +1,4 @@
-"""A run as it is carried out: its session, records of its stages, and a shared pack.
-
-Records of finished stages, for later stages, for resuming and for the manifest.
-"""
+"""A run as it is carried out: its session, records of its stages, and a shared pack."""
 
 import hashlib
 import math
@@ -11,15 +8,15 @@ import shlex
 import shutil
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from fdnet.case.case import Case
-from fdnet.dem.checkpoint import HISTORY, UPDATES, WATCH, Deepest, overlap_text
+from fdnet.case.case import Case, InvasionCase
+from fdnet.dem.checkpoint import HISTORY, UPDATES, WATCH, Checkpoint, Deepest, overlap_text
 from fdnet.dem.invasion import Invasion
 from fdnet.dem.liggghts import KNOWN_VERSION, Binary, Execution, Launch, find_binary
 from fdnet.dem.packing import Pack
@@ -36,25 +33,16 @@ from fdnet.run.folder import (
     read_record,
 )
 from fdnet.run.progress import Progress
-from fdnet.scales.scales import Scales
+from fdnet.scales.scales import InvasionScales, Scales
 from fdnet.spheres.geometry import overlap_doubts
+from fdnet.spheres.snapshot import Snapshot
 
 PACK_DUMP = "post/pack.dump"
 MOMENTUM_LIMIT = 0.01
 """Largest difference of the forces in the pack and its drop of pressure times area, over it."""
 POROSITY_WARNING = 0.02
-_PACKAGES = (
-    "fdnet",
-    "numpy",
-    "scipy",
-    "pandas",
-    "jinja2",
-    "pyvista",
-    "matplotlib",
-    "pydantic",
-    "overlap",
-    "pymetis",
-)
+_PACKAGES = ["fdnet", "numpy", "scipy", "pandas", "jinja2", "pyvista", "matplotlib", "pydantic"]
+_PACKAGES += ["overlap", "pymetis"]
 
 
 def pack_record(
@@ -97,26 +85,26 @@ def invade_record(case: Case, result: Invasion, folder: Path, *, seconds: float)
         "supplied": result.supplied,
         "warnings": list(result.warnings),
         "ranks": result.ranks,
-        **({"updates": _updates(result)} if result.updates else {}),
+        **_updates(result.updates),
         "files": digests_of(folder, [HISTORY, WATCH, UPDATES, *dumps]),
         "runs": [run_record(run) for run in result.runs],
         "left_out": [str(item) for item in result.left_out],
     }
 
 
-def _updates(result: Invasion) -> dict[str, Any]:
-    """How often the forces were computed anew, and what the last update measured."""
-    last, defects = dict(result.updates[-1]), _defects(result.updates)
-    return {"count": len(result.updates), "last": last, **defects}
+def _updates(rows: Sequence[Mapping[str, float]]) -> dict[str, Any]:
+    """How often a fluid was computed anew, what its last update measured, and momentum.
 
-
-def _defects(updates: Sequence[Mapping[str, float]]) -> dict[str, Any]:
-    """Where the flow follows the deposit: how often momentum did not close, and by how much."""
-    defects = [row["momentum_defect"] for row in updates if "momentum_defect" in row]
-    if not defects:
+    Where the flow follows the deposit: how often momentum did not close, and by how much.
+    """
+    if not rows:
         return {}
-    over = sum(defect > MOMENTUM_LIMIT for defect in defects)
-    return {"momentum_defect_most": max(defects), "momentum_open": over}
+    result: dict[str, Any] = {"count": len(rows), "last": dict(rows[-1])}
+    defects = [row["momentum_defect"] for row in rows if "momentum_defect" in row]
+    if defects:
+        result["momentum_defect_most"] = max(defects)
+        result["momentum_open"] = sum(defect > MOMENTUM_LIMIT for defect in defects)
+    return {"updates": result}
 
 
 def run_record(run: Execution) -> dict[str, Any]:
@@ -142,31 +130,9 @@ def record_warnings(
 
     They are another LIGGGHTS than fdnet was measured with, large overlaps, and how the runs ended.
     """
-    if invasion is None:
-        return _pack_warnings(pack)
-    deepest = Deepest(
-        step=invasion.get("max_overlap_step", invasion["steps"]), fraction=invasion["max_overlap"]
-    )
-    too_deep = deepest.fraction > case.run.max_overlap
-    overlap = [f"{overlap_text(case, deepest)}: raise run.stiffness_N_m"] if too_deep else []
-    return [*invasion["warnings"], *_pack_warnings(pack), *overlap, *_momentum(invasion)]
-
-
-def _momentum(invasion: dict[str, Any]) -> list[str]:
-    """The forces in the pack did not always add up to its drop of pressure."""
-    updates = invasion.get("updates", {})
-    if not updates.get("momentum_open"):
-        return []
-    return [
-        f"the forces on fines and grains differ from the drop of pressure times area by up to "
-        f"{100 * updates['momentum_defect_most']:.2g} %, and by more than "
-        f"{100 * MOMENTUM_LIMIT:g} % in {updates['momentum_open']} of {updates['count']} updates "
-        "(history.csv, momentum_defect)"
-    ]
-
-
-def _pack_warnings(pack: dict[str, Any]) -> list[str]:
     warnings, version = [], pack["runs"][0]["version"]
+    if invasion is not None:
+        warnings += invasion["warnings"]
     if version != KNOWN_VERSION:
         warnings.append(f"LIGGGHTS {version}: fdnet was measured and tested with {KNOWN_VERSION}")
     warnings += overlap_doubts(pack["max_overlap"])
@@ -185,6 +151,20 @@ def _pack_warnings(pack: dict[str, Any]) -> list[str]:
             "the fluid's velocity follows from a porosity of "
             f"{pack['porosity_assumed']:.3f} (plain sum of grains.count), the pack has "
             f"{pack['porosity']:.3f}: give grains.porosity instead of the count"
+        )
+    if invasion is None:
+        return warnings
+    step = invasion.get("max_overlap_step", invasion["steps"])
+    deepest = Deepest(step=step, fraction=invasion["max_overlap"])
+    if deepest.fraction > case.run.max_overlap:
+        warnings.append(f"{overlap_text(case, deepest)}: raise run.stiffness_N_m")
+    updates = invasion.get("updates", {})
+    if updates.get("momentum_open"):
+        warnings.append(
+            "the forces on fines and grains differ from the drop of pressure times area by up to "
+            f"{100 * updates['momentum_defect_most']:.2g} %, and by more than "
+            f"{100 * MOMENTUM_LIMIT:g} % in {updates['momentum_open']} of {updates['count']} "
+            "updates (history.csv, momentum_defect)"
         )
     return warnings
 
@@ -228,6 +208,25 @@ def versions(pack: dict[str, Any] | None) -> dict[str, str]:
     return {**packages, "python": python, **liggghts, "system": system}
 
 
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class FinishedInvasion:
+    """A finished invasion.
+
+    Attributes:
+        case: what was run.
+        scales: of the case.
+        history: one row a checkpoint.
+        damaged: grains and all remaining fines at the end.
+        updates: the record of a coupled invasion, one row an update; empty of others.
+    """
+
+    case: InvasionCase
+    scales: InvasionScales
+    history: tuple[Checkpoint, ...]
+    damaged: Snapshot
+    updates: tuple[Mapping[str, float], ...] = ()
+
+
 # ------------------------------------------------------------------------------------------------
 # One session of a run: what is run, where, and how long each stage took.
 
@@ -248,6 +247,7 @@ class RunOptions:
         timeout: s, after which LIGGGHTS is stopped; None: never.
         show_progress: whether to write progress to standard error.
         command: command line that started the run, for its records.
+        answered: takes the summary when the analysis is done, before the pictures are drawn.
     """
 
     out: Path
@@ -261,6 +261,7 @@ class RunOptions:
     timeout: float | None = None
     show_progress: bool = True
     command: str = ""
+    answered: Callable[[Mapping[str, Any]], None] = lambda summary: None
 
     def __post_init__(self) -> None:
         """Raise CaseError on a time limit or a number of ranks that means nothing."""
@@ -352,19 +353,6 @@ def take_pack(session: Session, source: Path) -> None:
             f"--pack-from {source}: holds no finished pack; make it with fdnet run CASE.toml "
             f"--stages pack --out {shlex.quote(str(source))}"
         )
-    _refuse_other(session, source, record)
-    check_files(source / "pack", record, START_OVER)
-    with session.timed("pack"):
-        shutil.copytree(
-            source / "pack",
-            session.path / "pack",
-            ignore=shutil.ignore_patterns(LOCK, Path(RECORDS["pack"]).name),
-            dirs_exist_ok=True,
-        )
-    session.folder.finish("pack", _taken(record, source, session.seconds["pack"]))
-
-
-def _refuse_other(session: Session, source: Path, record: dict[str, Any]) -> None:
     if record["digest"] != session.case.digest("pack"):
         raise CaseError(
             f"--pack-from {source}: its pack is that of another case or seed (digest "
@@ -375,14 +363,19 @@ def _refuse_other(session: Session, source: Path, record: dict[str, Any]) -> Non
             f"--pack-from {source}: its pack was made with --np {record['ranks']}, this run has "
             f"--np {session.options.ranks}, which would give another pack; use the same number"
         )
-
-
-def _taken(record: dict[str, Any], source: Path, seconds: float) -> dict[str, Any]:
-    """The record of the copy; the time that it took to make is kept apart."""
-    return record | {
-        "seconds": seconds,
+    check_files(source / "pack", record, START_OVER)
+    with session.timed("pack"):
+        shutil.copytree(
+            source / "pack",
+            session.path / "pack",
+            ignore=shutil.ignore_patterns(LOCK, Path(RECORDS["pack"]).name),
+            dirs_exist_ok=True,
+        )
+    own = {
+        "seconds": session.seconds["pack"],
         "taken_from": str(source),
         "made_in_seconds": record["seconds"],
         "runs": [row | {"seconds": 0.0} for row in record["runs"]],
         "attempts": [row | {"liggghts_s": 0.0} for row in record["attempts"]],
     }
+    session.folder.finish("pack", record | own)

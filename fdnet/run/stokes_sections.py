@@ -19,9 +19,8 @@ from fdnet.network.stokes import Closed, Estimate, StokesFlow, estimate, solve_s
 from fdnet.report.html import STOKES as NAME
 from fdnet.report.html import put_section
 from fdnet.report.html import stokes_html as section_html
-from fdnet.run.finished import FinishedRun
+from fdnet.run.finished import FinishedRun, open_run
 from fdnet.run.folder import locked
-from fdnet.run.open_run import open_run
 from fdnet.run.records import cores
 from fdnet.spheres.snapshot import Array, Snapshot, one_line
 

@@ -20,7 +20,7 @@ from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
 from fdnet.network.network import Network, build_network
 from fdnet.network.permeability import Analysis, compare
 from fdnet.network.states import FEW_THROATS, all_conductances, cut_out
-from fdnet.run.open_run import open_run
+from fdnet.run.finished import open_run
 from fdnet.spheres.snapshot import Array, Snapshot
 from fdnet.studies.engine.csv_rows import DIGITS, read_named, write_named
 from fdnet.studies.engine.markdown import markdown_table

@@ -5,7 +5,8 @@ import pytest
 from packs import random_pack, simple_cubic
 
 from fdnet.network.states import Sides
-from fdnet.run.cake import cake_rows, cake_summary, cake_words, measure_cake, resistance_share
+from fdnet.report.text import cake_words
+from fdnet.run.cake import cake_rows, cake_summary, measure_cake, resistance_share
 from fdnet.spheres.snapshot import Kind, Snapshot
 
 SIDES = Sides(periodic=(False, True, True), walls="slip")

@@ -9,23 +9,21 @@ import pytest
 from PIL import Image
 
 from fdnet.errors import CaseError
-from fdnet.report import movie
-from fdnet.report.movie import LAST_FRAMES, MovieFrame, Scene, write_movie
+from fdnet.report import picture as pictures
+from fdnet.report.picture import LAST_FRAMES, MovieFrame, Scene, write_movie
+from fdnet.run import movie
 from fdnet.run.movie import movie_of
 
 BOX = np.array([[0.0, 4e-3], [0.0, 2e-3], [0.0, 2e-3]])
 GREYS = (40, 120, 200)
 
 
-def drawn(module, arguments, *, seconds):
+def drawn(scene, frames, targets, *, seconds):
     """Stands for the drawing process: one grey picture for each frame."""
-    _, box, *flow, folder = arguments[: 3 if module == "movie_frames" else 5]
-    frames = arguments[3:] if module == "movie_frames" else arguments[5::2]
-    assert flow == ([] if module == "movie_frames" else ["--title=flux", "--limits=0.1,10.0"])
-    assert box == "--box=0.0,0.004,0.0,0.002,0.0,0.002"
-    for number, grey in enumerate(GREYS[: len(frames)]):
-        Image.new("RGB", (1500, 950), (grey,) * 3).save(Path(folder, f"{number:04d}.png"))
-    return ""
+    assert (scene.title, scene.limits) in [("", (0.0, 0.0)), ("flux", (0.1, 10.0))]
+    assert all(bool(frame.lines) == bool(scene.title) for frame in frames)
+    for target, grey in zip(targets, GREYS, strict=False):
+        Image.new("RGB", (1500, 950), (grey,) * 3).save(target)
 
 
 def frames_of(folder):
@@ -37,7 +35,7 @@ def scene_of(folder, **flow):
 
 
 def test_a_gif_shows_the_states_in_order_and_stays_on_the_last(tmp_path, monkeypatch):
-    monkeypatch.setattr(movie, "draw_frames", drawn)
+    monkeypatch.setattr(pictures, "draw_frames", drawn)
     path = write_movie(tmp_path / "m.gif", frames_of(tmp_path), scene_of(tmp_path), per_second=4.0)
     seen, total = [], 0
     with Image.open(path) as picture:
@@ -50,7 +48,7 @@ def test_a_gif_shows_the_states_in_order_and_stays_on_the_last(tmp_path, monkeyp
 
 
 def test_a_png_has_the_states_below_each_other_with_the_flow_of_each(tmp_path, monkeypatch):
-    monkeypatch.setattr(movie, "draw_frames", drawn)
+    monkeypatch.setattr(pictures, "draw_frames", drawn)
     frames = [
         MovieFrame(spheres=tmp_path / f"{n}.vtp", words=f"{n}", lines=tmp_path / f"flow_{n}.vtp")
         for n in range(2)
@@ -68,7 +66,10 @@ def test_a_png_has_the_states_below_each_other_with_the_flow_of_each(tmp_path, m
     [("m.avi", "", r"expected .gif, .mp4 or .png"), ("m.gif", "no context", "because no context")],
 )
 def test_what_makes_no_movie_leaves_no_file(tmp_path, monkeypatch, name, reason, said):
-    monkeypatch.setattr(movie, "draw_frames", lambda *_, **__: reason)
+    def fail(*_, **__):
+        raise OSError(reason)
+
+    monkeypatch.setattr(pictures, "draw_frames", fail)
     with pytest.raises(CaseError, match=said):
         write_movie(tmp_path / name, frames_of(tmp_path), scene_of(tmp_path), per_second=4.0)
     assert not (tmp_path / name).exists()

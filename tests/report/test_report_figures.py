@@ -9,8 +9,7 @@ from matplotlib.image import imread
 from report_demo import demo_analysis, demo_damaged, demo_grains, snapshot_of
 
 from fdnet.report import figures
-from fdnet.report.figures import cut_circles, fill_size_curves
-from fdnet.run.outputs import PlacedSizes
+from fdnet.report.figures import PlacedSizes, cut_circles, fill_size_curves
 from fdnet.sizes import LogNormal, cut_curve
 from fdnet.spheres.snapshot import Kind
 

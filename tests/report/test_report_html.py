@@ -12,12 +12,12 @@ from report_demo import demo_damaged
 
 from fdnet.errors import CaseError
 from fdnet.report import vtk as view
-from fdnet.report.html import ReportParts, headline, quantity, write_report
+from fdnet.report.html import ReportParts, quantity, write_report
+from fdnet.report.text import facts, html_lines, summary_lines
 from fdnet.report.vtk import view_of
-from fdnet.run.answer import Sizes, rules_of
-from fdnet.run.summary import html_lines, summary_lines
+from fdnet.run.answer import BridgingSizes, rules_of
 
-SIZES = Sizes(
+SIZES = BridgingSizes(
     fines={"D50": 40e-6, "D85": 60e-6, "D90": 100e-6},
     throat_median=100e-6,
     throat_largest=90e-6,
@@ -112,16 +112,13 @@ def test_it_says_what_the_summary_says(tmp_path):
     )
     for said in (
         "specimen <1>",
-        "7.650·10⁻¹¹ m²",
-        "77,510 mD",
-        "33.3 % lost",
-        "0.3000",
-        "0.2900",
-        "704",
-        "of 3\u2009000 supplied",
-        "95 % of the fines above 2.5 mm deepest 4 mm",
-        "cake thickness 0.3 mm CAKE WORDS",
-        "plugged the face plugged: no fine crossed it",
+        "7.650·10⁻¹¹",
+        "permeability 77,510 → 51,680 mD (7.65e-11 → 5.1e-11 m²), 33.3 % lost",
+        "porosity 0.3000 → 0.2900",
+        "fines 704 invaded 6 passed, 2290 upstream of 3000 supplied",
+        "depth 95 % above 2.5 mm deepest 4 mm",
+        "cake 0.3 mm CAKE WORDS",
+        "end the face plugged no fine crossed it",
         "of them blocked: one fine covers the whole section 2",
         "34.6",
         "gravity: a & b",
@@ -212,7 +209,7 @@ def test_the_view_holds_every_sphere_to_the_sixteenth_bit(tmp_path):
 
 
 def test_a_view_of_too_many_spheres_is_left_to_the_picture(monkeypatch):
-    monkeypatch.setattr(view, "MOST_SPHERES", len(demo_damaged()) - 1)
+    monkeypatch.setattr(view, "MOST_IN_VIEW", len(demo_damaged()) - 1)
     assert view_of(demo_damaged()) is None
 
 
@@ -237,12 +234,14 @@ def test_scales_are_rows_of_objects_or_mappings(tmp_path):
 def test_a_summary_of_an_intact_pack_or_nothing_at_all_still_makes_a_page(tmp_path):
     intact = SUMMARY | {
         "stop_reason": None,
+        "supplied_count": 0,
         "invaded_count": 0,
         "k_damaged_m2": 7.65e-11,
         "warnings": [],
     }
     _, text = page_of(tmp_path, intact)
-    assert "permeability damaged" not in text
+    assert "permeability 77,510 mD" in text
+    assert "damaged by fines" not in text
     assert "No warnings" in text
     _, text = page_of(tmp_path, {})
     assert "fdnet run" in text
@@ -283,8 +282,8 @@ def test_text_page_and_notebook_say_the_same_numbers_and_words(tmp_path):
 
 
 def test_a_run_with_invaders_but_no_stop_reason_shows_the_damage():
-    labels = [label for label, _, _ in headline(SUMMARY | {"stop_reason": None})]
-    assert "permeability damaged" in labels
+    first = next(facts(SUMMARY | {"stop_reason": None}))
+    assert "77,510 -> 51,680 mD" in first.text
 
 
 def test_a_missing_figure_is_named(tmp_path):

@@ -12,7 +12,7 @@ import pyvista as pv
 from report_demo import BOX, demo_analysis, demo_damaged, demo_grains
 
 from fdnet.errors import CaseError
-from fdnet.report import child, vtk
+from fdnet.report import picture, vtk
 from fdnet.spheres.vtk_file import read_vtk
 
 
@@ -109,7 +109,7 @@ def test_a_collection_reads_back_with_its_times(tmp_path):
 
 def test_the_picture_is_drawn_or_the_process_was_killed_for_want_of_opengl(tmp_path):
     source = vtk.write_spheres_vtp(tmp_path / "spheres_damaged.vtp", demo_damaged())
-    reason = child.render_spheres_png(tmp_path / "spheres_3d.png", source, BOX)
+    reason = picture.render_spheres_png(tmp_path / "spheres_3d.png", source, BOX)
     assert "exit code" not in reason, reason  # a Python error in the child
     assert (tmp_path / "spheres_3d.png").exists() == (reason == "")
     if not reason:
@@ -125,7 +125,8 @@ CRASHES = {
     "error": ("raise RuntimeError('no context')", "exit code 1; RuntimeError: no context"),
     "nothing left": ("pass", "left no complete PNG"),
     "cut picture": (
-        r"import sys; open(sys.argv[1], 'wb').write(b'\x89PNG\r\n\x1a\nhalf')",
+        r"import json, sys; path = json.load(sys.stdin)['frames'][0][2]; "
+        r"open(path, 'wb').write(b'\x89PNG\r\n\x1a\nhalf')",
         "left no complete PNG",
     ),
 }
@@ -134,28 +135,28 @@ CRASHES = {
 @pytest.mark.parametrize("name", CRASHES)
 def test_a_dead_child_gives_a_reason_and_touches_nothing(tmp_path, monkeypatch, name):
     program, expected = CRASHES[name]
-    monkeypatch.setattr(child, "_command", lambda *_: [sys.executable, "-c", program])
-    picture = tmp_path / "spheres_3d.png"
-    picture.write_bytes(b"old")
-    assert expected in child.render_spheres_png(picture, "s.vtp", BOX)
-    assert picture.read_bytes() == b"old"
-    assert list(tmp_path.iterdir()) == [picture]
+    monkeypatch.setattr(picture, "_command", lambda *_: [sys.executable, "-c", program])
+    path = tmp_path / "spheres_3d.png"
+    path.write_bytes(b"old")
+    assert expected in picture.render_spheres_png(path, "s.vtp", BOX)
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_hanging_child_is_given_up(tmp_path, monkeypatch):
     monkeypatch.setattr(
-        child, "_command", lambda *_: [sys.executable, "-c", "import time; time.sleep(60)"]
+        picture, "_command", lambda *_: [sys.executable, "-c", "import time; time.sleep(60)"]
     )
     start = time.monotonic()
-    assert child.render_spheres_png(tmp_path / "v.png", "s.vtp", BOX, seconds=0.5).endswith(
+    assert picture.render_spheres_png(tmp_path / "v.png", "s.vtp", BOX, seconds=0.5).endswith(
         "given up after 0.5 s"
     )
     assert time.monotonic() - start < 20
 
 
 def test_an_unwritable_folder_or_missing_interpreter_is_a_reason_too(tmp_path, monkeypatch):
-    monkeypatch.setattr(child, "_command", lambda *_: [str(tmp_path / "no-python")])
-    assert "no 3-D picture" in child.render_spheres_png(tmp_path / "v.png", "s.vtp", BOX)
+    monkeypatch.setattr(picture, "_command", lambda *_: [str(tmp_path / "no-python")])
+    assert "no 3-D picture" in picture.render_spheres_png(tmp_path / "v.png", "s.vtp", BOX)
 
 
 def test_its_own_spheres_are_in_metres_and_no_other_unit_is_taken(tmp_path):

@@ -6,7 +6,7 @@ import pytest
 
 from fdnet.case.file import case_from
 from fdnet.errors import CaseError
-from fdnet.run.open_run import run_case
+from fdnet.run.pipeline import run_case
 
 
 def test_a_finished_run_is_read_and_one_of_another_case_refused(finished):

@@ -14,7 +14,7 @@ from pydantic import Field
 from fdnet.campaign.plan.job import Job, Plan
 from fdnet.errors import CaseError
 from fdnet.files import refuse_folder_name, write_text
-from fdnet.report.tables import Checked, read_json
+from fdnet.report.tables import JsonObject, read_json
 
 PLAN, CASES, RUNS, PACKS, LOGS, LOCK = "plan.json", "cases", "runs", "packs", "logs", ".lock"
 FORMAT = 1
@@ -23,18 +23,18 @@ FORMAT = 1
 FolderName = Annotated[str, Field(pattern=r"^[A-Za-z0-9=+_-][A-Za-z0-9.=+_-]*$")]
 
 
-class _Variant(Checked):
+class _Variant(JsonObject):
     name: FolderName
     keys: dict[str, Any]
 
 
-class _Run(Checked):
+class _Run(JsonObject):
     name: FolderName
     variant: FolderName
     seed: Annotated[int, Field(ge=0, lt=2**31)]
 
 
-class PlanRecord(Checked):
+class PlanRecord(JsonObject):
     """What plan.json holds."""
 
     fdnet_campaign: Literal[1]

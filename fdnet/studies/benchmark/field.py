@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.network.field.field import VelocityField, velocity_field
-from fdnet.run.open_run import open_run
+from fdnet.run.finished import open_run
 from fdnet.spheres.snapshot import Array
 
 

@@ -15,7 +15,7 @@ from fdnet.errors import CaseError
 from fdnet.report.figures import draw
 from fdnet.report.tables import write_rows
 from fdnet.run.bridging import CLOGGED
-from fdnet.run.open_run import open_run
+from fdnet.run.finished import open_run
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Array, one_line
 from fdnet.studies.dem.arrivals import arrivals

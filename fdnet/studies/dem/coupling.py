@@ -14,7 +14,7 @@ import numpy as np
 
 from fdnet.case.file import read_case
 from fdnet.run.folder import MANIFEST
-from fdnet.run.open_run import run_case
+from fdnet.run.pipeline import run_case
 from fdnet.studies.engine.csv_rows import write_named
 from fdnet.studies.engine.runner import child_core_seconds
 

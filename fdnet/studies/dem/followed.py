@@ -12,7 +12,7 @@ import numpy as np
 from fdnet.case.case import Case
 from fdnet.case.file import case_path, read_case
 from fdnet.run.finished import FinishedRun
-from fdnet.run.open_run import run_case
+from fdnet.run.pipeline import run_case
 from fdnet.studies.engine.csv_rows import read_named, write_named
 
 SUPPLIED = {

@@ -16,7 +16,7 @@ from fdnet.case.file import read_case
 from fdnet.dem.invade_deck import render_invade, write_invade_inputs
 from fdnet.dem.liggghts import SCREEN, Launch, run_deck
 from fdnet.files import write_text
-from fdnet.run.open_run import run_case
+from fdnet.run.pipeline import run_case
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Array, Snapshot
 from fdnet.studies.dem.runs import grains_of, slab_case, the_binary

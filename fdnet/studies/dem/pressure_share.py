@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.network.field.field import velocity_field
+from fdnet.run.finished import open_run
 from fdnet.run.network_flow import Renewal, pack_flow
-from fdnet.run.open_run import open_run
 from fdnet.spheres.snapshot import Snapshot
 
 

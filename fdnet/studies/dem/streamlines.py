@@ -8,7 +8,7 @@ import numpy as np
 
 from fdnet.network.field.field import velocity_field
 from fdnet.report.figures import draw
-from fdnet.run.open_run import open_run
+from fdnet.run.finished import open_run
 from fdnet.spheres.snapshot import Array, Snapshot
 
 MM = 1e3

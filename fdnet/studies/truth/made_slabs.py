@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from fdnet.run.open_run import run_case
+from fdnet.run.pipeline import run_case
 from fdnet.studies.truth.slabs import LATER, YES, Slab, write_specimen
 from fdnet.studies.truth.specimens import SPECIMENS
 

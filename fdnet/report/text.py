@@ -1,0 +1,467 @@
+"""Results in words: the answer of a run for a terminal, a notebook and the page, and its parts.
+
+Every sentence and every headline number of a run is worded here, once.
+"""
+
+import math
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from fdnet.case.case import Case, InvasionCase
+from fdnet.case.spheres import Spheres
+from fdnet.case.tables import Run
+from fdnet.names import STAGES
+from fdnet.report.tables import (
+    AGREES,
+    MILLIDARCY,
+    SHOWS,
+    in_millidarcy,
+    millimetres,
+    percent,
+    two_digits,
+)
+from fdnet.scales.pack import SHARES
+from fdnet.scales.scales import InvasionScales
+
+if TYPE_CHECKING:
+    from fdnet.network.permeability import Analysis
+
+UM, MM, PSI = 1e6, 1e3, 6894.757
+"""Micrometres and millimetres in a metre, and pascals in a pound-force per square inch."""
+
+# ------------------------------------------------------------------------------------------------
+# The case in sentences: sand, mud, drive and specimen, in the units of the field.
+
+
+def case_words(case: Case, scales: object = None) -> Iterator[str]:
+    """Some sentences that say what was run; `scales` adds the velocity of the fluid."""
+    porosity = case.grains.porosity
+    packed = f"packed to a porosity of {100 * porosity:.3g} %" if porosity else "packed by number"
+    yield f"Sand: grains of {_size_words(case.grains)}, {packed}."
+    if isinstance(case, InvasionCase):
+        solids, viscosity = 100 * case.fines.volume_fraction, 1e3 * case.fluid.viscosity_Pa_s
+        yield (
+            f"Mud: fines of {_size_words(case.fines)}, {solids:.3g} % of solids by volume, in a "
+            f"liquid of {viscosity:.3g} cP."
+        )
+        yield _drive(case, scales)
+    else:
+        yield "No mud."
+    sides = " x ".join(f"{MM * side:.3g}" for side in case.size_m)
+    held = {"walls": "between walls", "periodic": "periodic across the flow"}[case.box.sides]
+    yield (f"Specimen: {sides} mm, {held}; the flow goes along the first side. Seed {case.seed}.")
+
+
+def _size_words(spheres: Spheres) -> str:
+    """Sizes; of measured ones D10, D50 and D90 as the case gives them, and of what is placed."""
+    if spheres.one_size:
+        return f"{2 * MM * spheres.mean_radius_m:.3g} mm ({2 * UM * spheres.mean_radius_m:.4g} µm)"
+    if not spheres.measured:
+        low, high = (2 * UM * radius for radius in spheres.radius_range_m)
+        return f"{low:.3g} to {high:.3g} µm"
+
+    def three(sizes: Mapping[float, float]) -> str:
+        return ", ".join(f"D{100 * share:.0f} {UM * sizes[share]:.3g}" for share in SHARES) + " µm"
+
+    placed = three({share: spheres.curve.size_at(share) for share in SHARES})
+    asked = dict(spheres.sizes.asked or {}) if spheres.sizes is not None else {}
+    if set(asked) >= set(SHARES):
+        return f"{three(asked)} (of what is placed: {placed})"
+    return f"{placed} (of what is placed)"
+
+
+def _drive(case: InvasionCase, scales: object) -> str:
+    fluid, well = case.fluid, case.well
+    pressure = f"{fluid.overbalance_Pa / 1e6:.3g} MPa ({fluid.overbalance_Pa / PSI:.3g} psi)"
+    if fluid.velocity_m_s is not None:
+        text = "Drive: a given velocity of the fluid"
+    elif well is not None:
+        text = (
+            f"Drive: an overbalance of {pressure} around a well of {MM * well.radius_m:.3g} mm "
+            f"radius with a drainage radius of {well.drainage_radius_m:.3g} m"
+        )
+    else:
+        length = MM * (fluid.darcy_length_m or case.size_m[0])
+        text = f"Drive: an overbalance of {pressure}, lost over {length:.3g} mm"
+    if not isinstance(scales, InvasionScales):
+        return f"{text}."
+    speed = scales.interstitial_velocity
+    return f"{text}; between the grains the fluid moves at {speed:.2g} m/s."
+
+
+# ------------------------------------------------------------------------------------------------
+# The answer of a run: one sentence to act on, how the run ended, how sure it is.
+
+
+SMALL, LARGE = 0.02, 0.2
+"""Shares of the flow that a skin costs, below and above which words call it small and large."""
+ENDS = {
+    "supply_exhausted": "the supply of fines ran out (the face is still open)",
+    "duration": "the set time or volume was over (the face may still be open)",
+    "cap": "the run reached its cap before anything else ended it",
+}
+CAKE_BY = {
+    "flow": "the flow of the last update",
+    "network": "the network of the cake",
+    "kozeny": "Carman and Kozeny",
+}
+"""What says the cake's share of the resistance."""
+
+
+def end_words(summary: Mapping[str, Any], control: Run) -> str:
+    """Why the invasion ended, as a part of a sentence; the case's `control` has the rules."""
+    reason, rate = summary["stop_reason"], summary.get("rate_over_initial")
+    if reason != "plugged":
+        return ENDS[reason]
+    if control.stop_rate is not None and rate is not None and rate <= control.stop_rate:
+        return f"the rate of flow fell below {percent(control.stop_rate)} % of the first"
+    if control.plug_rate:
+        most = f"at most {percent(control.plug_rate)} % of the fines of the undisturbed mud"
+        return f"the face plugged: {most} crossed it for the set time"
+    return "the face plugged: no fine crossed it for the set time"
+
+
+def in_place_words(counts: Mapping[str, int]) -> str:
+    """Why values in place are above the intact ones, a sentence; "" where none is."""
+    sections, layers = counts["sections_inplace_above_intact"], counts["layers_above_intact"]
+    if not sections and not layers:
+        return ""
+    return (
+        f"In place, {sections} of the sections and {layers} of the thin layers seem to gain: they "
+        "take less of the pressure than before, because the fines turn the flow aside, and "
+        "because the pores that say the pressure are wider than a thin layer. Fines never raise "
+        "the permeability of the specimen or of a slab cut out."
+    )
+
+
+def cake_words(summary: Mapping[str, Any]) -> str:
+    """How the cake lets the fluid through; `summary` has the keys of `cake_summary`."""
+    table = summary.get("cake_by_depth")
+    if table is None:
+        return "no fine upstream touches the pack"
+    k, network, own = table["k_kozeny_m2"], table["k_network_m2"], table["too_thin"]
+    if k is not None:
+        porosity = f"at a porosity of {table['porosity']:.2f}"
+        own = f"{in_millidarcy(k)} mD by Carman and Kozeny {porosity}"
+    if network is not None:
+        own += f", {in_millidarcy(network)} mD by its own network"
+    return (
+        f"{table['fines']} fines, {own}; about {percent(summary['cake_resistance_share'])} % of "
+        f"the resistance of cake and specimen by {CAKE_BY[table['share_by']]}"
+    )
+
+
+def answer_sentence(summary: Mapping[str, Any]) -> str:
+    """One sentence to act on; `summary` has the keys of the answer where there are fines."""
+    if "damage" not in summary:
+        k, porosity = summary["k_initial_m2"], 100 * summary["porosity_initial"]
+        return f"The intact sand has {in_millidarcy(k)} mD at a porosity of {porosity:.1f} %."
+    if not summary["invaded_count"]:
+        return "No fine entered the sand, so it keeps its permeability."
+    depth = _depth_words(summary, summary["damage"])
+    return f"{depth} {_skin_words(summary)}" if "skin" in summary else depth
+
+
+def _depth_words(summary: Mapping[str, Any], damage: Mapping[str, Any]) -> str:
+    depth = millimetres(summary["invasion_depth_p95_m"])
+    p95, limit = (
+        f"95 % of the fines that entered lie within {depth}",
+        two_digits(damage["lost_from"]),
+    )
+    if summary["final"] is False:
+        return (
+            f"So far {p95}, but the run was cut at its cap and this is not final: raise "
+            "run.cap_ms and run it again (--force) before you use these numbers."
+        )
+    if not damage["zone_depth_m"]:
+        return f"{p95}, and no layer loses {limit} of its permeability: the damage is negligible."
+    share = f"{two_digits(damage['zone_k_over_k0'])} of the permeability"
+    if damage["reaches_the_end"]:
+        return (
+            f"{p95}, and the damage reaches the end of the specimen, which keeps {share}: "
+            "lengthen the box before you rely on the depth."
+        )
+    zone = millimetres(damage["zone_depth_m"])
+    return (
+        f"{p95} and the first {zone} keep {share}, so a perforation, a cut or a wash that reaches "
+        f"deeper than {zone} meets sand that lost less than {limit}."
+    )
+
+
+def _skin_words(summary: Mapping[str, Any]) -> str:
+    lost, skin = summary["skin_flow_lost"], summary["skin"]
+    if skin is None or math.isinf(skin):
+        return "Nothing flows through the plugged layer, so the skin is infinite."
+    well = f"a well of {millimetres(summary['skin_well_radius_m'])} radius"
+    if skin <= 0:
+        return f"For {well} this is no skin."
+    size = "small" if lost < SMALL else "large" if lost > LARGE else "moderate"
+    return (
+        f"For {well} this is a {size} skin of {skin:.2g}, which costs {two_digits(lost)} of the "
+        "flow."
+    )
+
+
+def certainty(summary: Mapping[str, Any]) -> Iterator[str]:
+    """How the run ended, whether that is final, and what one seed is worth; sentences."""
+    if summary.get("stop_reason") is None:
+        return
+    final = "final" if summary["final"] else "not final"
+    yield f"The result is {final}, because {summary['words']['end']}."
+    scatter = summary.get("scatter")
+    if scatter and summary.get("invaded_count"):
+        yield (
+            f"This is one run with one seed ({summary['seed']}). Repeated seeds of such "
+            f"specimens differ by {two_digits(scatter['depth_p95_relative'])} in the depth and by "
+            f"{100 * scatter['first_mm_loss']:.2g} points in the loss of the first millimetre "
+            f"(one standard deviation, {scatter['runs']} runs; {scatter['source']})."
+        )
+
+
+# ------------------------------------------------------------------------------------------------
+# A run in lines of text, and the same in a notebook; the page shows the same facts.
+
+
+WIDTH = 96
+"""Letters in a line of running text."""
+_HEAD = (
+    "depth mm", "porosity", "with fines", "k mD", "with fines", "lost %", "in place %", "fines"
+)  # fmt: skip
+
+
+class Fact(NamedTuple):
+    """A headline number: its name, the number with its unit, and what belongs to it."""
+
+    name: str
+    value: str
+    remark: str = ""
+
+    @property
+    def text(self) -> str:
+        """Number and remark in one line."""
+        return f"{self.value} {self.remark}".rstrip(" :,")
+
+    @property
+    def short(self) -> str:
+        """The number alone."""
+        return self.value.rstrip(":,")
+
+
+def facts(summary: Mapping[str, Any]) -> Iterator[Fact]:
+    """The headline numbers of a run."""
+    before, after = summary["k_initial_m2"], summary["k_damaged_m2"]
+    damaged = summary["supplied_count"] or summary["invaded_count"]
+    if damaged:
+        yield Fact(
+            "permeability",
+            f"{in_millidarcy(before)} -> {in_millidarcy(after)} mD",
+            f"({before:.3g} -> {after:.3g} m2), {percent(summary['k_reduction'])} % lost",
+        )
+    else:
+        yield Fact("permeability", f"{in_millidarcy(before)} mD", f"({before:.3g} m2)")
+    other = summary.get("k_damaged_other_m2")
+    if other is not None:
+        law = summary["damage_law_other"]
+        yield Fact(
+            "other law", f"{in_millidarcy(other)} mD", f"({other:.3g} m2) with fines by {law}"
+        )
+    porosity = f"{summary['porosity_initial']:.4f}"
+    yield Fact(
+        "porosity", f"{porosity} -> {summary['porosity_damaged']:.4f}" if damaged else porosity
+    )
+    if damaged:
+        yield from _facts_of_fines(summary)
+    else:
+        yield Fact("fines", "none supplied")
+    used = summary.get("damage_law_used") or summary["damage_law"]
+    yield Fact("laws", f"{summary['law']} and {used} (damage);", f"seed {summary['seed']}")
+
+
+def _facts_of_fines(summary: Mapping[str, Any]) -> Iterator[Fact]:
+    words, damage = summary.get("words", {}), summary.get("damage")
+    yield Fact(
+        "fines",
+        f"{summary['invaded_count']} invaded,",
+        f"{summary['passed_count']} passed, {summary['upstream_count']} upstream of "
+        f"{summary['supplied_count']} supplied",
+    )
+    end, colon, why = (words.get("end") or str(summary["stop_reason"])).partition(": ")
+    yield Fact("end", f"{end}{colon.strip()}", why)
+    yield Fact(
+        "depth",
+        f"95 % above {millimetres(summary['invasion_depth_p95_m'])},",
+        f"deepest {millimetres(summary['invasion_depth_m'])}",
+    )
+    if damage and damage["zone_depth_m"]:
+        kept = percent(damage["zone_k_over_k0"])
+        yield Fact(
+            "damaged zone",
+            f"{millimetres(damage['zone_depth_m'])},",
+            f"which keeps {kept} % of its permeability",
+        )
+    if "skin" in summary:
+        yield Fact(
+            "skin",
+            "infinite," if summary["skin"] is None else f"{summary['skin']:.2g},",
+            f"costs {two_digits(summary['skin_flow_lost'])} of the flow of a well of "
+            f"{millimetres(summary['skin_well_radius_m'])} radius",
+        )
+    yield Fact("cake", f"{millimetres(summary['cake_thickness_m'])}:", words.get("cake", ""))
+
+
+def _said(summary: Mapping[str, Any]) -> Iterator[str]:
+    yield from filter(None, (summary.get("answer"), *summary.get("certainty", ())))
+
+
+def summary_lines(summary: Mapping[str, Any]) -> Iterator[str]:
+    """The answer, headline numbers, the table of sections, rules of thumb, warnings."""
+    for text in _said(summary):
+        yield from textwrap.wrap(text, WIDTH)
+    yield ""
+    for one in facts(summary):
+        yield from textwrap.wrap(f"{one.name:<14}{one.text}", WIDTH, subsequent_indent=14 * " ")
+    yield ""
+    for cells in (_HEAD, *map(section_cells, summary["sections"])):
+        yield " ".join(f"{cell:>11}" for cell in cells)
+    yield from textwrap.wrap(summary.get("words", {}).get("in_place", ""), WIDTH)
+    yield ""
+    if summary.get("rules"):
+        yield f"rules of thumb (the run {SHOWS[summary['run_shows']]}):"
+        for rule in summary["rules"]:
+            author, agrees = rule["source"].split(",")[0], AGREES[rule["agrees"]]
+            yield (
+                f"  {author:<22} {rule['value']:>6.3g}  {rule['says']:<8} {agrees:<12} "
+                f"({rule['limit']})"
+            )
+        yield ""
+    yield from (f"warning: {warning}" for warning in summary["warnings"])
+
+
+def seconds_line(summary: Mapping[str, Any]) -> str:
+    """What the run took."""
+    seconds = summary["seconds"]
+    outside = sum(seconds.get(stage, 0.0) for stage in STAGES) - seconds["liggghts"]
+    return f"seconds       {seconds['liggghts']:.1f} in LIGGGHTS, {outside:.1f} outside"
+
+
+def text_lines(path: Path, summary: Mapping[str, Any]) -> Iterator[str]:
+    """The whole text of a finished run in the folder `path`."""
+    yield f"fdnet run {summary['case']} in {path}"
+    yield from summary_lines(summary)
+    yield seconds_line(summary)
+
+
+def html_lines(path: Path, summary: Mapping[str, Any]) -> Iterator[str]:
+    """The answer, headline numbers and the table of sections for a notebook."""
+    yield f"<p><b>fdnet run {escape(str(summary['case']))}</b> in {escape(str(path))}</p>"
+    yield from (f"<p>{escape(text)}</p>" for text in _said(summary))
+    rows = [
+        (f"<th>{escape(one.name)}</th>", f"<td>{escape(one.text)}</td>") for one in facts(summary)
+    ]
+    yield "<table>" + "\n".join(f"<tr>{''.join(row)}</tr>" for row in rows) + "</table><table>"
+    yield "<tr>" + "".join(f"<th>{escape(name)}</th>" for name in _HEAD) + "</tr>"
+    for row in summary["sections"]:
+        yield "<tr>" + "".join(f"<td>{cell}</td>" for cell in section_cells(row)) + "</tr>"
+    yield "</table>"
+
+
+def section_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
+    """A section as the cells of `_HEAD`."""
+    before, after = row["k_initial_inplace_m2"], row["k_damaged_inplace_m2"]
+    return (
+        f"{1e3 * row['x_lo_m']:.2f}-{1e3 * row['x_hi_m']:.2f}",
+        f"{row['porosity_initial']:.4f}",
+        f"{row['porosity_damaged']:.4f}",
+        in_millidarcy(row["k_initial_m2"]),
+        in_millidarcy(row["k_damaged_m2"]),
+        percent(row["k_reduction"]),
+        percent(1 - after / before if before else None),
+        str(row["fines_count"]),
+    )
+
+
+# ------------------------------------------------------------------------------------------------
+# The answer of `fdnet permeability` as lines for a terminal.
+
+
+def thesis_law_warning(chosen: "Analysis", default: "Analysis") -> str:
+    """What laws that are off by factors give, with what fdnet's default laws give of the same."""
+    return (
+        f"the laws {chosen.law} and {chosen.damage_law} are kept to compare with the thesis, and "
+        f"those of the thesis are wrong by factors: they give {_states(chosen)}, where fdnet's "
+        f"default laws ({' and '.join(filter(None, (default.law, default.damage_law_used)))}) "
+        f"give {_states(default)}"
+    )
+
+
+def _states(analysis: "Analysis") -> str:
+    before = f"{in_millidarcy(analysis.k_initial)} mD"
+    if analysis.damage_law_used is None or analysis.k_reduction is None:
+        return f"{before} without fines"
+    after = f"{in_millidarcy(analysis.k_damaged)} mD"
+    return f"{before} before and {after} after ({100 * analysis.k_reduction:z.1f} % lost)"
+
+
+def permeability_lines(
+    results: Sequence[Mapping[str, Any]], *, sides: str, sections: bool, fines: bool
+) -> Iterator[str]:
+    """The laws as a table, then the sections where there are any, and warnings.
+
+    Args:
+        results: one row for each pair of laws, the chosen pair first.
+        sides: what each side of the box is.
+        sections: whether sections are printed.
+        fines: whether there are fines; without them nothing is damaged.
+    """
+    first = results[0]
+    porosity = f"porosity {first['porosity_initial']:.5f}"
+    if fines:
+        porosity += f" -> {first['porosity_damaged']:.5f}"
+    yield f"{porosity}, {first['pores']} pores, {first['throats']} throats; {sides}"
+    axes = "xyz" if "k_x_m2" in first else ""
+    pairs = fines or len({row["damage_law"] for row in results}) > 1
+    names = f"{'k m2':>12} {'k mD':>12}"
+    names += f" {'k damaged m2':>13} {'k damaged mD':>13} {'k/k0':>8}" if fines else ""
+    head = f"{'law':<11} " + (f"{'damage law':<14} " if pairs else "") + ("axis " if axes else "")
+    yield head + names
+    for row in results:
+        laws = f"{row['law']:<11} " + (f"{row['damage_law']:<14} " if pairs else "")
+        for axis in axes:
+            values = row[f"k_{axis}_m2"], row[f"k_{axis}_damaged_m2"]
+            yield f"{laws}{axis:<4} {_values(*values, fines=fines)}"
+        if not axes:
+            yield laws + _values(row["k_initial_m2"], row["k_damaged_m2"], fines=fines)
+    if first.get("damage_law_used") not in (None, first["damage_law"]):
+        yield f"{first['damage_law']}: the damage law {first['damage_law_used']} was taken"
+    if first.get("k_damaged_other_m2") is not None:
+        other = first["k_damaged_other_m2"]
+        yield (
+            f"with fines by {first['damage_law_other']}: {other:.5g} m2, {other / MILLIDARCY:.5g} "
+            "mD; the difference is a measure of the error"
+        )
+    if sections:
+        used = first.get("damage_law_used") or first["damage_law"]
+        laws = f"{first['law']} and {used}" if fines else first["law"]
+        yield f"sections cut out{' along x' if axes else ''}, {laws}:"
+        damaged = f"{'damaged':>9} " if fines else ""
+        yield f"{'from m':>10} {'to m':>10} {'porosity':>9} {damaged}{names}"
+        for row in first["sections"]:
+            damaged = f"{row['porosity_damaged']:>9.5f} " if fines else ""
+            yield (
+                f"{row['x_lo_m']:>10.4g} {row['x_hi_m']:>10.4g} {row['porosity_initial']:>9.5f} "
+                + damaged
+                + _values(row["k_initial_m2"], row["k_damaged_m2"], fines=fines)
+            )
+    yield from (f"assumed: {fact}" for fact in first.get("assumptions", ()))
+    yield from (f"warning: {warning}" for warning in first["warnings"])
+
+
+def _values(before: float, after: float, *, fines: bool) -> str:
+    text = f"{before:>12.5g} {before / MILLIDARCY:>12.5g}"
+    if not fines:
+        return text
+    ratio = "-" if before == 0 else f"{after / before:.4f}"
+    return f"{text} {after:>13.5g} {after / MILLIDARCY:>13.5g} {ratio:>8}"
