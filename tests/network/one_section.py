@@ -67,7 +67,7 @@ def touching_flux(base: Array, disc: Array, table: Array) -> float:
 
 
 def wall_flux(place: Array, first: Array, second: Array, table: Array) -> Array:
-    """Fluxes (n,) m4 between the wall and discs of the radii `first` and `second` (n,) m.
+    """Fluxes m4 between the wall and discs of the radii `first` and `second` m, of one or more.
 
     `place` (3,) m is as in `WallCuts`.
     """
@@ -76,12 +76,13 @@ def wall_flux(place: Array, first: Array, second: Array, table: Array) -> Array:
 
 
 def edge_flux(place: Array, disc: Array, table: Array) -> Array:
-    """Fluxes (n,) m4 between two walls and discs of radius `disc` (n,) m, `place` (2,) m away."""
+    """Fluxes m4 between two walls and discs of radius `disc` m, `place` (2,) m away."""
     cuts = WallCuts(order=np.array([[0, -1]]), place=np.array([[*place, 0.0]]), part=np.ones(1))
     return _walled(edge_fluxes, np.stack([disc, disc, disc]), cuts, table)
 
 
 def _walled(law: Any, discs: Array, cuts: WallCuts, table: Array) -> Array:
-    flux = np.empty((1, discs.shape[1]))
-    law(FIRST, sections_with(discs), cuts, table, np.full((LANES, flux.size), np.nan), flux)
-    return flux[0]
+    flux = np.empty((1, discs[0].size))
+    lanes = np.full((LANES, flux.size), np.nan)
+    law(FIRST, sections_with(discs.reshape(3, -1)), cuts, table, lanes, flux)
+    return flux[0] if discs.ndim > 1 else flux[0, 0]

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from fdnet.network.laws import wedges as tube
-from fdnet.network.laws import wedges as wedge
 from fdnet.network.laws.wedges import ratio_table
 from tests.network.one_section import even_flux, touching_flux, uneven_flux
+from tests.network.wedge_table import exact_flux
 
 
 @pytest.mark.parametrize(
@@ -35,13 +35,13 @@ def triangle(*side: float) -> np.ndarray:
 
 def test_equilateral_section_is_six_exact_wedges() -> None:
     base = triangle(2.0, 2.0, 2.0)
-    exact = 6.0 * wedge.exact_flux(np.pi / 6.0, 0.9)
+    exact = 6.0 * exact_flux(np.pi / 6.0, 0.9)
     assert even_flux(base, 0.9, ratio_table()) == pytest.approx(exact, rel=1e-4)
 
 
 def test_half_a_square_is_four_exact_wedges() -> None:
     base = triangle(2.0, 2.0, np.sqrt(8.0))
-    exact = 4.0 * wedge.exact_flux(np.pi / 4.0, 0.95)
+    exact = 4.0 * exact_flux(np.pi / 4.0, 0.95)
     assert even_flux(base, 0.95, ratio_table()) == pytest.approx(exact, rel=2e-3)
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from fdnet.network.laws import wedges as wedge
 from fdnet.network.laws.wedges import ratio_table
 from tests.network.one_section import even_flux, touching_flux, uneven_flux
 from tests.network.section_flux import resolved_flux
+from tests.network.wedge_table import exact_flux
 
 RIGHT_ISOSCELES = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]])
 ACUTE = np.array([[0.0, 0.0], [2.0, 0.0], [1.1175, 1.7808]])
@@ -14,7 +14,7 @@ ACUTE = np.array([[0.0, 0.0], [2.0, 0.0], [1.1175, 1.7808]])
 
 def test_finite_elements_give_the_exact_wedges() -> None:
     """Half a square is four wedges of 45 degrees, by symmetry and without a law."""
-    exact = 4.0 * wedge.exact_flux(np.pi / 4.0, 0.95)
+    exact = 4.0 * exact_flux(np.pi / 4.0, 0.95)
     assert resolved_flux(RIGHT_ISOSCELES, np.full(3, 0.95)) == pytest.approx(exact, rel=1e-3)
 
 

@@ -44,14 +44,14 @@ NONE = (False,) * 3
     ],
 )
 def test_half_section_against_finite_differences(place, disc):
-    flux = wall_flux(np.array(place), *np.array(disc)[:, None], ratio_table())[0]
+    flux = wall_flux(np.array(place), *disc, ratio_table())
     assert flux == pytest.approx(resolved_flux(place, disc), rel=0.06)
 
 
 @pytest.mark.parametrize("disc", [1.0, 0.8, 0.5, 0.2])
 @pytest.mark.parametrize("far", [1.0, 1.5, 2.0])
 def test_quarter_section_of_an_edge_against_finite_differences(far, disc):
-    flux = edge_flux(np.array([1.0, far]), np.array([disc]), ratio_table())[0]
+    flux = edge_flux(np.array([1.0, far]), disc, ratio_table())
     exact = resolved_flux((1.0, 1.0, far), (disc, 0.0), edge=True)
     assert flux == pytest.approx(exact, rel=0.06)
 
@@ -71,7 +71,7 @@ def test_two_thin_discs_far_apart_leave_a_channel_with_one_wall():
 
 def test_centre_of_the_touching_circle_outside_still_leaves_a_flux():
     place, disc = (1.2, 2.8, 1.3), (1.0, 1.0)
-    flux = wall_flux(np.array(place), *np.array(disc)[:, None], ratio_table())[0]
+    flux = wall_flux(np.array(place), *disc, ratio_table())
     assert 0.5 * resolved_flux(place, disc) < flux < resolved_flux(place, disc)
 
 
@@ -238,5 +238,5 @@ def test_many_sections_at_once_are_those_asked_for_one_by_one():
     place, table = np.array([1.0, 1.6, 2.1]), ratio_table()
     discs = np.linspace(0.2, 1.0, 9), np.linspace(0.9, 0.1, 9)
     flux = wall_flux(place, *discs, table)
-    single = [wall_flux(place, *pair[:, None], table)[0] for pair in np.transpose(discs)]
+    single = [wall_flux(place, *pair, table) for pair in zip(*discs, strict=True)]
     assert flux == pytest.approx(single, rel=1e-13)

@@ -10,7 +10,7 @@ import numpy as np
 
 from fdnet.network import geometry
 from fdnet.network.compiled import loops_in_place, loops_inside, on_all_cores
-from fdnet.network.fines.deposit import cells_between, grid_of, mirrored_images, size_classes
+from fdnet.network.fines.deposit import cells_between, grid_of, images_near, size_classes
 from fdnet.network.laws.cross_section import depth_within, set_sides
 from fdnet.network.laws.lubrication import THROATS, TIP, half_resistances, spans_of
 from fdnet.network.laws.reaching_grains import facet_axes, own_radius
@@ -285,7 +285,7 @@ def solids_of(network: Network, place: Array, reach: Array) -> Solids:
     before = sphere = 0
     for some in size_classes(radius):
         widest = float(radius[some].max())
-        centre, owner = mirrored_images(network, position[some], low, high, widest)
+        centre, owner = images_near(network, position[some], low, high, widest)
         across = float(np.ptp(centre, axis=0).max())
         # as many cells as spheres along a side, none of them narrower than a sphere
         wide = max(2.0 * widest, across / len(centre) ** (1.0 / 3.0))

@@ -19,7 +19,7 @@ import numpy as np
 
 from fdnet.network import geometry
 from fdnet.network.compiled import loops_in_place
-from fdnet.network.fines.deposit import mirrored_images, points_in_boxes, size_classes
+from fdnet.network.fines.deposit import images_near, points_in_boxes, size_classes
 from fdnet.network.fines.occupancy import Occupancy, ratio
 from fdnet.network.laws.cross_section import Sections, inwards, set_sides, wall_cuts
 from fdnet.network.laws.damage import BLOCKED, CLEAN, SECTIONS, Damage
@@ -143,7 +143,7 @@ class FineImages:
         self._classes: list[tuple[Array, Array]] = []
         for some in size_classes(radius) if len(radius) else []:
             own = radius[some]
-            place, owner = mirrored_images(network, position[some], low, high, float(own.max()))
+            place, owner = images_near(network, position[some], low, high, float(own.max()))
             self._classes.append((place, own[owner]))
 
     def beside(self, part: ThroatPart, rows: Array | None = None) -> SpheresBeside:

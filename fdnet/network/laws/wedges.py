@@ -114,9 +114,9 @@ def angle_of(y: float, x: float) -> float:
 #
 # `ray_flux` neglects the shear between neighbouring rays from the tip: on each ray the flow is
 # that in the annulus of Happel (1959) whose free surface is at the far side. It is an upper bound.
-# `exact_flux` is the series of Sparrow and Loeffler (1959, AIChE J. 5, 325), fitted to the far
+# The exact flux is the series of Sparrow and Loeffler (1959, AIChE J. 5, 325), fitted to the far
 # side by least squares. Their ratio varies slowly; `ratio_table` reads it from wedge.csv, which
-# `python -m fdnet.network.laws.wedges` writes anew.
+# `python -m tests.network.wedge_table` writes anew.
 
 
 TABLE = Path(__file__).with_name("wedge.csv")
@@ -124,8 +124,6 @@ STEEPEST = np.radians(84.0)
 """Largest angle of the table, rad."""
 ANGLES = np.linspace(0.0, STEEPEST, 43)
 DISCS = np.linspace(0.0, 1.0, 21)
-THINNEST = 0.02
-"""Smallest disc, rho / h, for which the ratio is computed."""
 
 
 @loops_in_place
@@ -173,7 +171,7 @@ def table_row(angle: float) -> float:
 
 @loops_in_place
 def shear_ratio(angle: float, disc: float, table: Array) -> float:
-    """exact_flux / ray_flux, bilinear in `table`; steeper wedges take its last row."""
+    """Exact flux over `ray_flux`, bilinear in `table`; steeper wedges take its last row."""
     rows, columns = table.shape
     row, column = table_row(angle), min(disc, 1.0) * (columns - 1)
     i, j = min(int(row), rows - 2), min(int(column), columns - 2)
@@ -185,57 +183,8 @@ def shear_ratio(angle: float, disc: float, table: Array) -> float:
 
 @lru_cache(maxsize=1)
 def ratio_table() -> Array:
-    """exact_flux / ray_flux at ANGLES (rows) and DISCS (columns)."""
+    """Exact flux over `ray_flux` at ANGLES (rows) and DISCS (columns)."""
     return np.loadtxt(TABLE, delimiter=",")
-
-
-def exact_flux(angle: float, disc: float, *, terms: int = 24, points: int = 300) -> float:
-    """Flux over h^4 for 0 < angle < pi / 2 and 0 < disc <= 1.
-
-    The relative error is 1e-4 up to 60 degrees and 1e-2 at 80. `terms` is the number of terms of
-    the series, `points` that of the points on the far side.
-    """
-    place = 0.5 * (1.0 - np.cos(np.pi * (np.arange(points) + 0.5) / points))
-    height = place * np.tan(angle)
-    reach, turn = np.hypot(1.0, height), np.arctan2(height, 1.0)
-    order = np.pi / angle * np.arange(1, int(min(terms, max(6, 40.0 * angle / np.pi))) + 1)
-    longest = 1.0 / np.cos(angle)
-    log_term = (0.5 * np.tan(angle) - 0.5 * disc**2 * angle) / angle + 0.5 * disc**2
-    outward = reach[:, None] ** (order - 1.0) * np.cos((order - 1.0) * turn[:, None])
-    inward = (
-        disc ** (2.0 * order)
-        * reach[:, None] ** (-order - 1.0)
-        * np.cos((order + 1.0) * turn[:, None])
-    )
-    slopes = order * (outward + inward) / longest**order
-    wanted = np.cos(turn) * (0.5 * reach - log_term / reach)
-    weight = np.sqrt(np.sin(np.pi * (np.arange(points) + 0.5) / points))
-    factor = np.linalg.lstsq(slopes * weight[:, None], wanted * weight, rcond=1e-13)[0]
-    point, weight = np.polynomial.legendre.leggauss(48)
-    turn = 0.5 * angle * (1.0 + point)[:, None]
-    depth = 1.0 / np.cos(turn) - disc
-    r = disc + 0.5 * depth * (1.0 + point)
-    speed = 0.25 * (disc**2 - r**2) + log_term * np.log(r / disc)
-    for one, by in zip(order, factor, strict=True):
-        speed += (
-            by
-            * ((r / longest) ** one - (disc / longest) ** one * (disc / r) ** one)
-            * np.cos(one * turn)
-        )
-    return float(np.sum(0.25 * angle * weight[:, None] * weight * depth * speed * r))
-
-
-def make_table() -> Array:
-    """The ratios of `ratio_table`, computed; the ratio of a wedge of angle 0 is 1."""
-    table = np.ones((len(ANGLES), len(DISCS)))
-    for i, angle in enumerate(ANGLES[1:], start=1):
-        for j, disc in enumerate(np.maximum(DISCS, THINNEST)):
-            table[i, j] = exact_flux(angle, disc) / ray_flux(angle, np.tan(angle), disc)
-    return table
-
-
-if __name__ == "__main__":
-    np.savetxt(TABLE, make_table(), delimiter=",", fmt="%.6f")
 
 
 # ------------------------------------------------------------------------------------------------
