@@ -104,7 +104,7 @@ def prepared(network: Network, part: slice, walls: WallCuts) -> Prepared:
         even=~np.any(unlike | (tangent < -OBTUSE), axis=1),
         tangent=tangent,
         walls=WallCuts(*(one[part] for one in walls)),
-        is_cut=cut[:, :, 3].any(axis=1),
+        is_cut=np.any(cut[:, :, 3] > 0.0, axis=1),
         cut=cut,
     )
 
@@ -208,8 +208,8 @@ def _set_discs(sections: Sections, square: Array, flatness: Array) -> None:
 
 def clear_fluxes(given: Prepared, sections: Sections) -> Array:
     """Fluxes (S, n) m4 of laplacian(w) = -1 among the discs of sections, and side walls."""
-    table, flux = ratio_table(), np.empty(sections.disc[:, 0].shape)
-    walls, count = given.walls, flux.shape[1]
+    table, walls, count = ratio_table(), given.walls, sections.disc.shape[2]
+    flux = np.empty((len(sections.throat), count))
     order = walls.order[sections.throat]
     at_wall, in_edge = order[:, 1] >= 0, (order[:, 1] < 0) & (order[:, 0] >= 0)
     even = given.even[sections.throat] & (order[:, 0] < 0)

@@ -77,7 +77,7 @@ def _apex(network: Network, throats: Array, origin: Array, normal: Array, side: 
 
 
 class SpheresBeside(NamedTuple):
-    """Spheres beside K throats, as seen from their facets."""
+    """Spheres near K throats, as seen from their facets."""
 
     first: Array
     """(K+1,) the first sphere of each throat, and their number N at the end."""
@@ -183,7 +183,7 @@ class RayRoom(NamedTuple):
 
 
 def ray_room(most: int) -> RayRoom:
-    """Room for the three grains of a throat and `most` spheres beside it."""
+    """Room for the three grains of a throat and `most` spheres near it."""
     return RayRoom(
         side=np.empty((3, 3)),
         rays=np.empty((most + 3, 6, 3 * RAYS)),

@@ -263,7 +263,7 @@ def _steps(beside: SpheresBeside, heights: Array, step: float) -> tuple[Array, A
 def _without_and_with(
     given: Prepared, sections: Sections, beside: SpheresBeside
 ) -> tuple[Array, Array]:
-    """Resistances (S,) 1/m3 of sides of throats without and with the fines beside them."""
+    """Resistances (S,) 1/m3 of sides of throats without and with the fines near them."""
     flux = clear_fluxes(given, sections)
     cut_by_faces(given, sections, flux)
     own = given.walls.part[sections.throat]
