@@ -114,7 +114,7 @@ def spheres_around(
     middle = facet.mean(axis=1)
     corner = np.linalg.norm(facet - middle[:, None], axis=2).max(axis=1)
     reach = np.maximum(corner, np.abs(heights[open_row]).max(axis=1))
-    rows, found = [np.empty(0, int)], [np.empty(0, int)]
+    rows, which = [np.empty(0, int)], [np.empty(0, int)]
     for kind, tree in trees if len(middle) else []:
         radius = network.image_radius[kind]
         apart, closest = tree.query(
@@ -126,8 +126,8 @@ def spheres_around(
         one = closest[row, column]
         near = apart[row, column] - radius[one] < reach[row]
         rows.append(row[near])
-        found.append(kind[one[near]])
-    row, image = np.concatenate(rows), np.concatenate(found)
+        which.append(kind[one[near]])
+    row, image = np.concatenate(rows), np.concatenate(which)
     other = ~np.any(image[:, None] == images[open_row][row], axis=1)
     order = np.argsort(row[other], kind="stable")
     row, image = row[other][order], image[other][order]
