@@ -186,7 +186,8 @@ def compiled(function: Any, **options: Any) -> Any:
 
     `options` are those of numba's compiler. numba optimises a function anew in each that calls it,
     directly or not, so a short chain of calls is compiled faster than a long one. An array that is
-    made in compiled code, or set from another or from a tuple, costs half a second more.
+    made in compiled code, or set from another or from a tuple, costs half a second more. For a
+    whole number that is written out a function is compiled apart, for `np.int64(0)` it is not.
     """
     options = _PLAIN | options
     try:

@@ -163,7 +163,7 @@ def pieces(corner: Array, pairs: tuple[Array, Array], centre: Array, radius: Arr
         if p != last:
             _facet_normals(corner[p], normal)
             last = p
-        cuts = 0
+        cuts = np.int64(0)
         for f in range(4):
             depth[f] = _dot(normal[f], _apart(corner[p, OTHERS[f, 0]], centre[b])) / -radius[b]
             cuts += 1 if depth[f] < 1.0 else 0

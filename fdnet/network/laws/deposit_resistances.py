@@ -219,7 +219,7 @@ def held_flux(
     longest, most = 0.0, 0.0
     for i in range(3):
         longest = max(longest, abs(base[i, 0]), abs(base[i, 1]))
-    held, cutting, walled, flux = many, 0, many, 0.0
+    held, cutting, walled, flux = many, np.int64(0), many, 0.0
     for turn in range(MOST_PLANES):
         number = (turn + 2) % MOST_PLANES  # those of pressure, which come first, are the last
         if turn == MOST_PLANES - 2:

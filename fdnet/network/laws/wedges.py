@@ -263,7 +263,7 @@ def _set_resistances(
             least = min(least, part[s] * flux[s, k])
             narrow[k] = 1.0 / np.sqrt(np.sqrt(8.0 / np.pi * part[s] * flux[s, k]))
         if least > 0.0:
-            every = 1
+            every = np.int64(1)
             fine = summed(narrow, step[s], every, widening)
             coarse = summed(narrow, step[s], every + 1, widening)
             resistance[s] = (4.0 * fine - coarse) / 3.0
