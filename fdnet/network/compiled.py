@@ -168,7 +168,10 @@ def _checked(function: Any, files: IndexDataCacheFile) -> _CheckedFile:
     return _CheckedFile(str(folder), name, files._source_stamp)
 
 
-_PLAIN: dict[str, Any] = {"_nrt": True, "error_model": "python", "fastmath": False}
+_PLAIN: dict[str, Any] = {
+    **{"_nrt": True, "error_model": "python", "fastmath": False},
+    "no_cfunc_wrapper": True,  # for C, which never calls: a sixth of the time of the compiler
+}
 """Where these are not given, numba takes them from the function that makes the first call.
 
 No function may round other than written (`fastmath`). A function that several others call has a
@@ -181,7 +184,10 @@ _LOOPS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 def compiled(function: Any, **options: Any) -> Any:
     """The function, compiled by numba when it is first called, with its code kept on disk.
 
-    `options` are those of numba's compiler.
+    `options` are those of numba's compiler. numba optimises a function anew in each that calls it,
+    directly or not, so a short chain of calls is compiled faster than a long one. An array that is
+    made in compiled code, or set from another or from a tuple, costs half a second more. For a
+    whole number that is written out a function is compiled apart, for `np.int64(0)` it is not.
     """
     options = _PLAIN | options
     try:
@@ -215,12 +221,9 @@ def loops_in_place(function: Any) -> Any:
     return compiled(function, **_LOOPS, _nrt=False)
 
 
-def compiled_inline(function: Any) -> Any:
-    """`loops_in_place` for a function whose text takes the place of each call of it.
-
-    So it may return parts of the arrays that it is given. Only functions in place may call it.
-    """
-    return compiled(function, **_LOOPS, _nrt=False, inline="always")
+def loops_inside(function: Any) -> Any:
+    """`loops_in_place` for compiled functions alone: Python cannot call it. Compiled sooner."""
+    return compiled(function, **_LOOPS, _nrt=False, no_cpython_wrapper=True)
 
 
 def cores_of_numba() -> int:

@@ -22,7 +22,12 @@ from fdnet.network.fines.deposit import (
 from fdnet.network.fines.occupancy import ratio
 from fdnet.network.flow.flow import Flow, solve_flow
 from fdnet.network.laws.lubrication import half_resistances
-from fdnet.network.laws.section_archie import KeptSections, Part, measured_sections, parts_of
+from fdnet.network.laws.section_archie import (
+    KeptSections,
+    ThroatPart,
+    measured_sections,
+    parts_of,
+)
 from fdnet.network.network import Network, build_network
 from fdnet.spheres.geometry import neighbour_tree, wrapped
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
@@ -130,7 +135,7 @@ class PackFlow:
     facet_area: Array
     bed_share: Array
     holders: Holders
-    parts: Sequence[Part]
+    parts: Sequence[ThroatPart]
     flow: Flow
     through: Array
     shape: VelocityField

@@ -11,24 +11,20 @@ from fdnet.network.laws.cross_section import (
     aim,
     aim_at_fourth,
     aim_corners,
-    corner_room,
+    corner_rays,
+    depth_within,
     set_sides,
 )
 from fdnet.network.laws.deposit_resistances import deposit_resistances
 from fdnet.network.laws.lubrication import half_resistances
-from fdnet.network.laws.reaching_grains import (
-    bundles,
-    depth_within,
-    meet,
-    share_around,
-    share_left,
-)
+from fdnet.network.laws.reaching_grains import meet, ray_room, share_around, share_left
 from fdnet.network.laws.wedges import ratio_table
 from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse
 from fdnet.network.states import Log, Sides, at_most_the_grains, measure_all_spheres
 from fdnet.spheres.snapshot import Kind, Snapshot
 from fdnet.studies.truth.packs import read_pack, truth_folder
+from tests.network.one_section import from_python
 from tests.network.packs import random_pack, with_fines
 
 SIDES = "yz"
@@ -38,7 +34,7 @@ BASE = np.array([[0.0, 0.0], [1.0, 0.0], [0.3, 0.9]])
 def sides():
     """The sides of the triangle."""
     side = np.empty((3, 3))
-    set_sides(BASE, side)
+    from_python(set_sides)(BASE, side)
     return side
 
 
@@ -145,12 +141,12 @@ def test_a_mirrored_periodic_pack_has_the_same_throats(pack):
 
 def test_spheres_around_a_facet_leave_all_some_or_nothing():
     """Of a section whose third corner's sphere has ended."""
-    disc, side = np.array([0.3, 0.3, 1e-3]), sides()
+    disc = np.array([0.3, 0.3, 1e-3])
 
     def left(*spheres):
-        rays, seen = bundles(3 + len(spheres))
-        count = meet(disc, BASE, 0.5, np.array(spheres), seen)
-        return share_around(BASE, side, (count, seen), rays, ratio_table())
+        room = ray_room(len(spheres))._replace(side=sides())
+        count = from_python(meet)(disc, BASE, 0.5, np.array(spheres), room)
+        return from_python(share_around)(BASE, count, room, ratio_table())
 
     far, near, over = (0.3, 9.0, 0.5, 0.5, 1.0), (0.3, 1.2, 0.5, 0.5, 1.0), (0.4, 0.4, 0.5, 2.0, 1)
     assert left(far) == left((*near[:2], 1.1, *near[3:])) == 1.0
@@ -259,16 +255,16 @@ def test_fines_that_are_there_twice_count_once(pack):
 
 
 def test_a_fourth_disc_takes_all_some_or_nothing():
-    disc, side, corners = np.array([0.3, 0.2, 0.25]), sides(), corner_room()
-    own, room = np.empty((6, 36)), np.empty(36)
-    aim_corners(BASE, corners)
+    disc, side, corners = np.array([0.3, 0.2, 0.25]), sides(), corner_rays()
+    own, part, share = np.empty((6, 36)), np.empty(36), from_python(share_left)
+    from_python(aim_corners)(BASE, corners)
 
     def left(x, y, radius):
-        aim_at_fourth(BASE, x, y, corners)
-        rays = own, aim(BASE, side, x, y, own)
-        return share_left(disc, (x, y, radius), corners, rays, (BASE, room, ratio_table()))
+        from_python(aim_at_fourth)(BASE, x, y, corners)
+        count = from_python(aim)(BASE, side, x, y, own)
+        return share(BASE, disc, x, y, radius, own, count, part, corners, ratio_table())
 
-    assert depth_within(BASE, side, 0.5, -1.0) == pytest.approx(-1.0)
+    assert from_python(depth_within)(BASE, side, 0.5, -1.0) == pytest.approx(-1.0)
     assert left(0.4, 0.3, 2.0) == 0.0
     shares = [left(0.45, 0.3, radius) for radius in (0.02, 0.05, 0.1, 0.2)]
     assert np.all(np.diff(shares) < 0)

@@ -5,19 +5,19 @@ import pytest
 
 from fdnet import Snapshot, build_network
 from fdnet.network.flow.sections import whole_permeability
-from fdnet.network.laws.cross_section import RAYS
 from fdnet.network.laws.lubrication import half_resistances
-from fdnet.network.laws.reaching_grains import cut_corners, cut_room, share_of_cut
+from fdnet.network.laws.reaching_grains import cut_corners, ray_room, share_of_cut
 from fdnet.network.laws.wedges import ratio_table
 from fdnet.network.states import cut_out
 from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.truth.packs import MM
 from fdnet.studies.truth.slabs import SLAB_FOLDER, SLAB_TRUTH, read_specimen
-from tests.network.one_section import uneven_flux
+from tests.network.one_section import from_python, uneven_flux
 from tests.network.section_flux import resolved_flux
 
-ROOM = cut_room(), np.empty(3 * RAYS), ratio_table()
+ROOM = np.empty((2, 3, 3)), ray_room(0), ratio_table()
 BASE = np.array([[0.0, 0.0], [1.0, 0.0], [0.45, 0.85]])
+share = from_python(share_of_cut)
 
 
 @pytest.mark.parametrize(
@@ -32,9 +32,9 @@ def test_the_flux_is_that_of_finite_elements(away, radius, stand_in):
     centre = BASE + np.array([away, (0, 0), (0, 0)])
     exact = resolved_flux(BASE, own, centre=centre)
     flux = uneven_flux(BASE, corner, ratio_table())
-    share = share_of_cut(BASE, corner, 0.0, cut, ROOM)
+    left = share(BASE, corner, 0.0, cut, *ROOM)
     assert abs(flux / exact - 1.0) > 0.025
-    assert flux * share == pytest.approx(exact, rel=0.03)
+    assert flux * left == pytest.approx(exact, rel=0.03)
 
 
 def test_the_disc_follows_the_height_above_the_facet():
@@ -43,9 +43,9 @@ def test_the_disc_follows_the_height_above_the_facet():
     cut[0] = 0.0, 0.0, 0.2, 0.5
     flat = cut.copy()
     flat[0] = 0.0, 0.0, 0.0, 0.4
-    there = share_of_cut(BASE, corner, 0.5, cut, ROOM)
-    assert there == pytest.approx(share_of_cut(BASE, corner, 0.0, flat, ROOM), rel=1e-12)
-    assert share_of_cut(BASE, corner, 0.1, cut, ROOM) < there < 1.0
+    there = share(BASE, corner, 0.5, cut, *ROOM)
+    assert there == pytest.approx(share(BASE, corner, 0.0, flat, *ROOM), rel=1e-12)
+    assert share(BASE, corner, 0.1, cut, *ROOM) < there < 1.0
 
 
 def test_corners_know_the_grains_that_a_face_cuts():

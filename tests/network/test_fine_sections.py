@@ -10,11 +10,10 @@ from fdnet.network.laws import deposit_resistances as fine
 from fdnet.network.laws.deposit_resistances import (
     deposit_resistances,
     node_resistances,
-    parts_of_triangle,
+    point_room,
     set_near,
     solids_of,
 )
-from fdnet.network.laws.deposit_resistances import points_flux as points_flux_of
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.wedges import OPEN_WIDENING, WIDENING
 from fdnet.network.network import build_network
@@ -23,17 +22,19 @@ from fdnet.network.states import cut_out
 from fdnet.spheres.geometry import make_images
 from fdnet.spheres.snapshot import Kind
 from tests.network.networks import network_of
+from tests.network.one_section import from_python
 from tests.network.packs import random_pack, with_fines
 from tests.network.section_flux import resolved_flux
 
 EQUAL_SIDES = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, np.sqrt(0.75)]])
 
 
+flux_among = from_python(fine.points_flux)
+
+
 def points_flux(base, discs, divisions=fine.DIVISIONS):
-    points = np.array(parts_of_triangle(divisions))
     discs = np.column_stack([np.array(discs, float), np.full(len(discs), -np.inf)])
-    walls = np.empty((0, 3)), 0
-    return points_flux_of(base, (discs, len(discs)), walls, points, np.empty((7, points.shape[1])))
+    return flux_among(base, discs, len(discs), np.empty((0, 3)), 0, point_room(divisions))
 
 
 def lattice(radii):
@@ -108,9 +109,9 @@ def test_the_spheres_near_a_place_are_those_of_the_pack(pack):
         tolerance=0.0,
     )
     radius = pack.radius[images.owner]
-    near = np.empty(500, np.int64)
+    near, near_place = np.empty(500, np.int64), from_python(set_near)
     for one, far in zip(place, reach, strict=True):
-        count = set_near(tuple(one), far, (solids.body, solids.cells), near)
+        count = near_place(*one, far, solids, near)
         body = solids.body[near[:count]]
         within = np.linalg.norm(images.position - one, axis=1) < far + radius
         expected = np.column_stack([images.position, radius])[within]
@@ -144,9 +145,9 @@ def test_throats_without_a_fine_and_narrow_ones_keep_theirs(network):
 def test_more_steps_and_points_change_little(network, monkeypatch):
     throats = np.flatnonzero(fine.bounded_by_fines(network))
     whole, heights = np.ones(len(throats), bool), nodes_of(network).heights[throats]
-    coarse = fine.fine_resistances(network, throats, whole, heights)[0].sum(axis=1)
+    coarse = fine.bounded_resistances(network, throats, whole, heights)[0].sum(axis=1)
     monkeypatch.setattr(fine, "DIVISIONS", 24)
-    more = fine.fine_resistances(network, throats, whole, heights)[0].sum(axis=1)
+    more = fine.bounded_resistances(network, throats, whole, heights)[0].sum(axis=1)
     open_ = np.isfinite(coarse) & np.isfinite(more)
     assert open_.mean() > 0.9
     ratio = np.log(coarse[open_] / more[open_])
@@ -169,7 +170,7 @@ def test_what_spreading_behind_a_node_adds():
     ends = np.array([[1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [4.0, np.nan, 4.0], [4.0, 4.0, 4.0]])
     halves = np.array([[2.0, 3.0], [5.0, 5.0], [4.0, 6.0], [5.0, 5.0]])
     mixed = np.array([True, False, False, False, False])
-    added = node_resistances(network, np.arange(4), halves, (ends, mixed))
+    added = node_resistances(network, np.arange(4), halves, ends, mixed)
     wide = 5.0 / (2.0 + 1.0 / 8.0 + 2.0 / 64.0)
     each = 0.6 * 8.0 / (3.0 * np.pi) * np.sqrt(8.0 / 3.0)
     by_hand = [0.0, 2.0 * each * (8.0 - wide), 0.0, 3.0 * each * (64.0 - wide)]

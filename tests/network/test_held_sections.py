@@ -7,34 +7,35 @@ from fdnet.network.laws.deposit_resistances import (
     DIVISIONS,
     MOST_PLANES,
     bounded_by_fines,
+    bounded_resistances,
     deposit_resistances,
-    fine_resistances,
     held_flux,
-    parts_of_triangle,
     planes_of,
+    point_room,
 )
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.network import build_network
 from fdnet.network.nodes import nodes_of
+from tests.network.one_section import from_python
 from tests.network.packs import random_pack, with_fines
 from tests.network.walled_section import resolved_flux
 
-POINTS = np.array(parts_of_triangle(DIVISIONS))
+held = from_python(held_flux)
 EQUAL_SIDES = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, np.sqrt(0.75)]])
 AXES = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 """The sections lie across x: their first axis is z, their second y."""
 
 
-def flux_of(base, discs, planes, axes=AXES, divisions=POINTS):
+def flux_of(base, discs, planes, axes=AXES, divisions=DIVISIONS):
     """Flux m4; `planes` are (axis, sense, place m)."""
     given = np.array([[0.0, 1.0, -np.inf]] * MOST_PLANES)
     for axis, sense, place in planes:
         given[2 * axis + (sense < 0)] = axis, sense, place
     room = np.zeros((len(discs) + MOST_PLANES, 4))
     room[: len(discs), :3], room[: len(discs), 3] = discs, -np.inf
-    lanes, lines = np.empty((7, divisions.shape[1])), np.empty((MOST_PLANES, 3))
-    section = np.array(base, float), divisions, lanes, lines
-    return held_flux(section, (room, len(discs)), (given, np.zeros(3), np.array(axes), 0.0))
+    lines, origin = np.empty((MOST_PLANES, 3)), np.zeros(3)
+    base, axes, points = np.array(base, float), np.array(axes), point_room(divisions)
+    return held(base, room, len(discs), given, origin, axes, 0.0, lines, points)
 
 
 @pytest.mark.parametrize("disc", [(0.5, 0.5), (0.8, 0.3), (0.2, 0.6)])
@@ -110,7 +111,7 @@ def test_throats_with_fines_next_to_walls_carry_less_than_where_walls_slip(walle
     throats = np.flatnonzero(bounded_by_fines(held) & (ends[:, 0] != ends[:, 1]))
     some, heights = np.ones(len(throats), bool), nodes_of(held).heights[throats]
     slips, holds = (
-        fine_resistances(network, throats, some, heights)[0].sum(axis=1)
+        bounded_resistances(network, throats, some, heights)[0].sum(axis=1)
         for network in (open_, held)
     )
     share, both = held.throat_share[throats], np.isfinite(slips) & np.isfinite(holds)

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from fdnet.network.laws import cross_section as section
 from fdnet.network.laws import wedges as tube
-from fdnet.network.laws import wedges as wedge
 from fdnet.network.laws.wedges import ratio_table
-from tests.network.one_section import even_flux, uneven_flux
+from tests.network.one_section import even_flux, touching_flux, uneven_flux
+from tests.network.wedge_table import exact_flux
 
 
 @pytest.mark.parametrize(
@@ -36,13 +35,13 @@ def triangle(*side: float) -> np.ndarray:
 
 def test_equilateral_section_is_six_exact_wedges() -> None:
     base = triangle(2.0, 2.0, 2.0)
-    exact = 6.0 * wedge.exact_flux(np.pi / 6.0, 0.9)
+    exact = 6.0 * exact_flux(np.pi / 6.0, 0.9)
     assert even_flux(base, 0.9, ratio_table()) == pytest.approx(exact, rel=1e-4)
 
 
 def test_half_a_square_is_four_exact_wedges() -> None:
     base = triangle(2.0, 2.0, np.sqrt(8.0))
-    exact = 4.0 * wedge.exact_flux(np.pi / 4.0, 0.95)
+    exact = 4.0 * exact_flux(np.pi / 4.0, 0.95)
     assert even_flux(base, 0.95, ratio_table()) == pytest.approx(exact, rel=2e-3)
 
 
@@ -59,9 +58,7 @@ def test_a_disc_in_the_shadow_of_two_still_leaves_a_flux() -> None:
         np.array([[0.0, 0.0], [3.0, 0.0], [1.608, 0.2306]]),
         np.array([1.2458, 1.2458, 0.1584]),
     )
-    flux, room = np.empty(1), (section.uneven_room(1), ratio_table())
-    section.touching_fluxes(base, disc[None], room, flux)
-    assert flux[0] <= 0.0
+    assert touching_flux(base, disc, ratio_table()) <= 0.0
     assert 0.0 < uneven_flux(base, disc, ratio_table()) < 1e-2
 
 

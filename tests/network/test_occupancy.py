@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from scipy.spatial import cKDTree
 
 from fdnet.errors import CaseError
-from fdnet.network.fines.deposit import mirrored_images
+from fdnet.network.fines.deposit import images_near
 from fdnet.network.fines.occupancy import (
     Pairs,
     covers_section,
@@ -222,7 +222,7 @@ def test_walls_mirror_the_fines_as_a_doubled_periodic_pack_has_them(walls):
     position = box[:, 0] + rng.random((200, 3)) * (box[:, 1] - box[:, 0])
     network = replace(chain(1), box=box, periodic=tuple(axis not in walls for axis in range(3)))
     low, high = box[:, 0] - 1.5, box[:, 1] + 1.2
-    images, owner = mirrored_images(network, position, low, high, 0.3)
+    images, owner = images_near(network, position, low, high, 0.3)
     doubled, period = position, box[:, 1] - box[:, 0]
     for axis in walls:
         flipped = np.where(np.arange(3) == axis, 2 * box[axis, 1] - doubled, doubled)

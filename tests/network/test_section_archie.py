@@ -10,7 +10,7 @@ from fdnet.network.flow.sections import whole_permeability
 from fdnet.network.laws import section_archie
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
-from fdnet.network.laws.section_archie import FineImages, measured_sections, prisms_of
+from fdnet.network.laws.section_archie import FineImages, measured_sections, parts_of
 from fdnet.network.network import build_network
 from fdnet.network.nodes import nodes_of
 from fdnet.network.permeability import analyse
@@ -43,15 +43,13 @@ def conductances(network, fines):
 def test_a_throat_meets_the_fines_whose_bodies_reach_into_its_prism(network, pack):
     """Places in the prisms are tried one by one, against all images of all fines."""
     fines, size = pack.fines(), np.ptp(network.box, axis=1)
-    part, rng = slice(0, 25), np.random.default_rng(3)
-    beside = FineImages(network, fines.position, fines.radius).beside(
-        prisms_of(network, part, nodes_of(network).heights[part])
-    )
+    some, rng = 25, np.random.default_rng(3)
+    beside = FineImages(network, fines.position, fines.radius).beside(next(parts_of(network)))
     sides = [np.array([0.0, y, z]) * size for y in (-1, 0, 1) for z in (-1, 0, 1)]
     mirrored = [fines.position * (-1.0, 1.0, 1.0) + (2.0 * x, 0, 0) for x in network.box[0]]
     image = np.concatenate([one + side for one in (fines.position, *mirrored) for side in sides])
     met = 0
-    for t in range(part.stop):
+    for t in range(some):
         corner = network.image_position[network.throat_images[t]]
         normal = np.cross(corner[1] - corner[0], corner[2] - corner[0])
         normal /= np.linalg.norm(normal)

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from fdnet.network.laws import cross_section as section
-from fdnet.network.laws import wedges as wedge
 from fdnet.network.laws.wedges import ratio_table
-from tests.network.one_section import even_flux, uneven_flux
+from tests.network.one_section import even_flux, touching_flux, uneven_flux
 from tests.network.section_flux import resolved_flux
+from tests.network.wedge_table import exact_flux
 
 RIGHT_ISOSCELES = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]])
 ACUTE = np.array([[0.0, 0.0], [2.0, 0.0], [1.1175, 1.7808]])
@@ -15,7 +14,7 @@ ACUTE = np.array([[0.0, 0.0], [2.0, 0.0], [1.1175, 1.7808]])
 
 def test_finite_elements_give_the_exact_wedges() -> None:
     """Half a square is four wedges of 45 degrees, by symmetry and without a law."""
-    exact = 4.0 * wedge.exact_flux(np.pi / 4.0, 0.95)
+    exact = 4.0 * exact_flux(np.pi / 4.0, 0.95)
     assert resolved_flux(RIGHT_ISOSCELES, np.full(3, 0.95)) == pytest.approx(exact, rel=1e-3)
 
 
@@ -79,7 +78,6 @@ def test_sections_whose_signed_shares_cancel_are_summed_over_rays(
 ) -> None:
     """Signed shares and the law over finite elements."""
     base, discs, table = np.array([[0.0, 0.0], [1.0, 0.0], apex]), np.array(disc), ratio_table()
-    exact, shares = resolved_flux(base, discs, 400), np.empty(1)
-    section.touching_fluxes(base, discs[None], (section.uneven_room(1), table), shares)
-    assert shares[0] / exact == pytest.approx(signed, abs=0.04)
+    exact = resolved_flux(base, discs, 400)
+    assert touching_flux(base, discs, table) / exact == pytest.approx(signed, abs=0.04)
     assert uneven_flux(base, discs, table) / exact == pytest.approx(ratio, abs=0.02)

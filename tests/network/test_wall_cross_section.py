@@ -7,7 +7,7 @@ from fdnet.case.tables import AnalysisChoices
 from fdnet.errors import CaseError, NetworkError
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.laws import lubrication
-from fdnet.network.laws.cross_section import LANES, edge_fluxes, wall_cuts, wall_fluxes
+from fdnet.network.laws.cross_section import wall_cuts
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.named import LAWS
 from fdnet.network.laws.reaching_grains import cut_corners
@@ -15,7 +15,7 @@ from fdnet.network.laws.wedges import ratio_table
 from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse
 from fdnet.network.states import cut_out
-from tests.network.one_section import uneven_flux, wall_flux
+from tests.network.one_section import edge_flux, uneven_flux, wall_flux
 from tests.network.packs import random_pack, simple_cubic, snapshot, with_fines
 from tests.network.walled_section import resolved_flux
 
@@ -51,17 +51,13 @@ def test_half_section_against_finite_differences(place, disc):
 @pytest.mark.parametrize("disc", [1.0, 0.8, 0.5, 0.2])
 @pytest.mark.parametrize("far", [1.0, 1.5, 2.0])
 def test_quarter_section_of_an_edge_against_finite_differences(far, disc):
-    flux = np.empty(1)
-    room = np.empty((LANES, 1)), ratio_table()
-    edge_fluxes(np.array([1.0, far]), np.array([disc]), room, flux)
+    flux = edge_flux(np.array([1.0, far]), disc, ratio_table())
     exact = resolved_flux((1.0, 1.0, far), (disc, 0.0), edge=True)
-    assert flux[0] == pytest.approx(exact, rel=0.06)
+    assert flux == pytest.approx(exact, rel=0.06)
 
 
 def test_a_disc_over_the_edge_of_the_box_leaves_nothing():
-    flux = np.empty(2)
-    discs = np.array([1.5, 1.4])
-    edge_fluxes(np.array([1.0, 1.0]), discs, (np.empty((LANES, 2)), ratio_table()), flux)
+    flux = edge_flux(np.array([1.0, 1.0]), np.array([1.5, 1.4]), ratio_table())
     assert flux[0] == 0.0
     assert flux[1] > 0.0
 
@@ -239,10 +235,8 @@ def test_fines_beside_walls_that_hold_the_fluid_leave_less_of_it():
 
 
 def test_many_sections_at_once_are_those_asked_for_one_by_one():
-    """Whatever stands in the room before."""
     place, table = np.array([1.0, 1.6, 2.1]), ratio_table()
     discs = np.linspace(0.2, 1.0, 9), np.linspace(0.9, 0.1, 9)
-    flux = np.empty(9)
-    wall_fluxes(place, discs, (np.full((LANES, 9), np.nan), table), flux)
+    flux = wall_flux(place, *discs, table)
     single = [wall_flux(place, *pair, table) for pair in zip(*discs, strict=True)]
     assert flux == pytest.approx(single, rel=1e-13)

@@ -6,6 +6,7 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from fdnet.network.laws import wedges as wedge
+from tests.network.wedge_table import exact_flux
 
 
 def rays(angle: float, disc: float) -> float:
@@ -78,7 +79,7 @@ def grid_flux(angle: float, disc: float, cells: int) -> float:
 def test_series_agrees_with_finite_elements(degrees: float, disc: float) -> None:
     angle = np.radians(degrees)
     coarse, fine = grid_flux(angle, disc, 12), grid_flux(angle, disc, 24)
-    assert wedge.exact_flux(angle, disc) == pytest.approx(fine + (fine - coarse) / 3.0, rel=1e-3)
+    assert exact_flux(angle, disc) == pytest.approx(fine + (fine - coarse) / 3.0, rel=1e-3)
 
 
 def test_rays_are_an_upper_bound() -> None:
@@ -90,14 +91,14 @@ def test_rays_are_an_upper_bound() -> None:
 @pytest.mark.parametrize(("row", "column"), [(5, 4), (15, 20), (22, 10), (30, 18), (40, 1)])
 def test_the_table_holds_what_the_series_gives(row: int, column: int) -> None:
     angle, disc = wedge.ANGLES[row], wedge.DISCS[column]
-    expected = wedge.exact_flux(angle, disc) / wedge.ray_flux(angle, np.tan(angle), disc)
+    expected = exact_flux(angle, disc) / wedge.ray_flux(angle, np.tan(angle), disc)
     assert wedge.ratio_table()[row, column] == pytest.approx(expected, abs=1e-6)
 
 
 def test_between_its_points_the_table_is_good_to_a_thousandth() -> None:
     for degrees, disc in [(31, 0.52), (44.9, 0.77), (59.1, 0.93), (17.3, 0.4)]:
         angle = np.radians(degrees)
-        exact = wedge.exact_flux(angle, disc) / wedge.ray_flux(angle, np.tan(angle), disc)
+        exact = exact_flux(angle, disc) / wedge.ray_flux(angle, np.tan(angle), disc)
         assert wedge.shear_ratio(angle, disc, wedge.ratio_table()) == pytest.approx(
             exact, rel=1e-3
         )

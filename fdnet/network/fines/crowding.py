@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fdnet.network.compiled import compiled
-from fdnet.network.fines.deposit import Grid, grid_of
+from fdnet.network.compiled import compiled, compiled_in_place
+from fdnet.network.fines.deposit import Grid, cells_between, grid_of
 from fdnet.spheres.geometry import make_images, wrapped
 from fdnet.spheres.snapshot import Array, Snapshot, one_line
 
@@ -106,34 +106,32 @@ def _taken(
     grid, order = grid_of(images.position, max(0.5 * reach, room ** (1.0 / 3.0)))
     radius = others.radius[images.owner[order]]
     centre = np.ascontiguousarray(wrapped(fines.position, fines.box, periodic))
-    return _gather(grid, images.position[order], radius, centre, ball)
-
-
-@compiled
-def _gather(grid: Grid, place: Array, radius: Array, centre: Array, ball: Array) -> Array:
-    """Sums (N, 2) over the spheres at `place` (M, 3) m, in the order of the grid."""
-    start, edge, shape, first = grid
-    most = radius.max()
     total = np.zeros((len(centre), 2))
-    cell = np.empty((3, 2), np.intp)
+    _gather(grid, images.position[order], radius, radius.max(), centre, ball, total)
+    return total
+
+
+@compiled_in_place
+def _gather(
+    grid: Grid, place: Array, radius: Array, most: float, centre: Array, ball: Array, total: Array
+) -> None:
+    """Adds to sums (N, 2) over the spheres at `place` (M, 3) m, in the order of the grid."""
+    start, edge, shape, first = grid.start, grid.edge, grid.shape, grid.first
     for one in range(len(centre)):
-        for axis in range(3):
-            lower = (centre[one, axis] - ball[one] - most - start[axis]) / edge
-            upper = (centre[one, axis] + ball[one] + most - start[axis]) / edge + 1.0
-            cell[axis, 0] = int(min(max(lower, 0.0), float(shape[axis])))
-            cell[axis, 1] = int(min(max(upper, 0.0), float(shape[axis])))
-        for i in range(cell[0, 0], cell[0, 1]):
-            for j in range(cell[1, 0], cell[1, 1]):
+        x, y, z, far = centre[one, 0], centre[one, 1], centre[one, 2], ball[one]
+        i0, i1 = cells_between(x - far - most, x + far + most, start[0], edge, shape[0])
+        j0, j1 = cells_between(y - far - most, y + far + most, start[1], edge, shape[1])
+        k0, k1 = cells_between(z - far - most, z + far + most, start[2], edge, shape[2])
+        for i in range(i0, i1):
+            for j in range(j0, j1):
                 row = (i * shape[1] + j) * shape[2]
-                for k in range(first[row + cell[2, 0]], first[row + max(cell[2, 1], cell[2, 0])]):
-                    square = 0.0
-                    for axis in range(3):
-                        square += (place[k, axis] - centre[one, axis]) ** 2
-                    if square < (ball[one] + radius[k]) ** 2:
-                        part = weighted_volume(radius[k], np.sqrt(square), ball[one])
+                for k in range(first[row + k0], first[row + max(k1, k0)]):
+                    dx, dy, dz = place[k, 0] - x, place[k, 1] - y, place[k, 2] - z
+                    square = dx**2 + dy**2 + dz**2
+                    if square < (far + radius[k]) ** 2:
+                        part = weighted_volume(radius[k], np.sqrt(square), far)
                         total[one, 0] += part
                         total[one, 1] += part / radius[k]
-    return total
 
 
 @compiled
@@ -167,22 +165,14 @@ def _behind_walls(fines: Snapshot, ball: Array, periodic: tuple[bool, bool, bool
         if not periodic[axis]:
             for side, sign in zip(fines.box[axis], (1.0, -1.0), strict=True):
                 height = np.clip(sign * (fines.position[:, axis] - side), -ball, ball)
-                shell, width = _nodes(np.abs(height), ball)
+                # Gauss's nodes between the wall and the surface of the ball
+                width = 0.5 * (ball - np.abs(height))
+                shell = (np.abs(height) + width)[:, None] + width[:, None] * _NODE
                 share = 0.5 * (1.0 - height[:, None] / shell)
-                cut = _weight(shell, ball) * 4.0 * np.pi * shell**2 * share
-                beyond += (cut @ _WEIGHT) * width
+                weight = (1.0 - (shell / ball[:, None]) ** 2) ** 2
+                beyond += ((weight * 4.0 * np.pi * shell**2 * share) @ _WEIGHT) * width
                 beyond += np.where(height < 0, _of_ball(np.abs(height), ball), 0.0)
     return beyond
-
-
-def _nodes(low: Array, high: Array) -> tuple[Array, Array]:
-    """Nodes (K, 4) of the rule between `low` and `high`, and half the widths (K,)."""
-    width = 0.5 * (high - low)
-    return (low + width)[:, None] + width[:, None] * _NODE, width
-
-
-def _weight(distance: Array, ball: Array) -> Array:
-    return (1.0 - (distance / ball[:, None]) ** 2) ** 2
 
 
 def _of_ball(radius: Array, ball: Array) -> Array:

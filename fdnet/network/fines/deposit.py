@@ -3,8 +3,10 @@
 Points in given boxes, by sorting the points into cubic cells.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import atan2, copysign, pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,17 +31,25 @@ def points_in_boxes(point: Array, low: Array, high: Array) -> tuple[Array, Array
     if not len(point) or not len(low):
         return np.zeros(0, np.intp), np.zeros(0, np.intp)
     grid, order = grid_of(point)
-    placed = point[order]
-    count = _search(grid, placed, low, high, np.zeros(0, np.intp))
+    placed, count = point[order], np.empty(len(low), np.intp)
+    _search(grid, placed, low, high, count, np.zeros(0, np.intp))
     box = np.repeat(np.arange(len(low)), count)
     inside = np.empty(len(box), np.intp)
-    _search(grid, placed, low, high, inside)
+    _search(grid, placed, low, high, count, inside)
     return box, order[inside]
 
 
-Grid = tuple[Array, float, Array, Array]
-"""Low corner (3,) m, edge m of a cell, number of cells (3,) along each axis, and for each cell the
-index of its first point, with the number of points at the end."""
+class Grid(NamedTuple):
+    """Cubic cells that hold points."""
+
+    start: Array
+    """(3,) m, the low corner."""
+    edge: float
+    """m, of a cell."""
+    shape: Array
+    """(3,) number of cells along each axis."""
+    first: Array
+    """Of each cell the index of its first point, and the number of points at the end."""
 
 
 def grid_of(point: Array, edge: float | None = None) -> tuple[Grid, Array]:
@@ -58,7 +68,7 @@ def grid_of(point: Array, edge: float | None = None) -> tuple[Grid, Array]:
     flat = np.ravel_multi_index(tuple(cell.T), tuple(shape))
     order = np.argsort(flat, kind="stable")
     first = np.concatenate([[0], np.cumsum(np.bincount(flat, minlength=int(shape.prod())))])
-    return (start, edge, shape, first), order
+    return Grid(start, edge, shape, first), order
 
 
 @compiled_in_place
@@ -73,31 +83,29 @@ def cells_between(
     return int(min(max(lower, 0.0), float(number))), int(min(max(upper, 0.0), float(number)))
 
 
-@compiled
-def _search(grid: Grid, point: Array, low: Array, high: Array, inside: Array) -> Array:
-    """Number of points (M,) in each box; writes their indices to `inside` where that has room."""
-    start, edge, shape, first = grid
-    count = np.zeros(len(low), np.intp)
-    cell = np.empty((3, 2), np.intp)
+@compiled_in_place
+def _search(
+    grid: Grid, point: Array, low: Array, high: Array, count: Array, inside: Array
+) -> None:
+    """Sets the number of points (M,) in each box, and their indices where `inside` has room."""
+    start, edge, shape, first = grid.start, grid.edge, grid.shape, grid.first
     total = 0
     for box in range(len(low)):
         x, y, z = low[box, 0], low[box, 1], low[box, 2]
         u, v, w = high[box, 0], high[box, 1], high[box, 2]
-        for axis in range(3):
-            cell[axis, 0], cell[axis, 1] = cells_between(
-                low[box, axis], high[box, axis], start[axis], edge, shape[axis]
-            )
+        i0, i1 = cells_between(x, u, start[0], edge, shape[0])
+        j0, j1 = cells_between(y, v, start[1], edge, shape[1])
+        k0, k1 = cells_between(z, w, start[2], edge, shape[2])
         before = total
-        for i in range(cell[0, 0], cell[0, 1]):
-            for j in range(cell[1, 0], cell[1, 1]):
+        for i in range(i0, i1):
+            for j in range(j0, j1):
                 row = (i * shape[1] + j) * shape[2]
-                for k in range(first[row + cell[2, 0]], first[row + max(cell[2, 1], cell[2, 0])]):
+                for k in range(first[row + k0], first[row + max(k1, k0)]):
                     if x <= point[k, 0] <= u and y <= point[k, 1] <= v and z <= point[k, 2] <= w:
                         if total < len(inside):
                             inside[total] = k
                         total += 1
         count[box] = total - before
-    return count
 
 
 # ------------------------------------------------------------------------------------------------
@@ -155,7 +163,7 @@ def pieces(corner: Array, pairs: tuple[Array, Array], centre: Array, radius: Arr
         if p != last:
             _facet_normals(corner[p], normal)
             last = p
-        cuts = 0
+        cuts = np.int64(0)
         for f in range(4):
             depth[f] = _dot(normal[f], _apart(corner[p, OTHERS[f, 0]], centre[b])) / -radius[b]
             cuts += 1 if depth[f] < 1.0 else 0
@@ -379,77 +387,31 @@ def reaching_inside(network: Network, fines: Snapshot) -> Array:
     return np.all(inside | np.array(network.periodic), axis=1)
 
 
-def periodic_images(
-    network: Network, position: Array, low: Array, high: Array, largest: float
+def images_near(
+    network: Network,
+    position: Array,
+    low: Array,
+    high: Array,
+    largest: float,
+    *,
+    mirrored: bool = True,
 ) -> tuple[Array, Array]:
-    """Places (M, 3) m and owners (M,) of all images across the periodic sides, near a region.
+    """Places (M, 3) m and owners (M,) of all images near a region.
 
-    The region is [`low`, `high`] (3,) m, widened by `largest` m; `position` (N, 3) m.
+    They are those across periodic sides, and the mirror images beyond the other faces where
+    `mirrored`. The region is [`low`, `high`] (3,) m, widened by `largest` m. A centre (`position`,
+    (N, 3) m) on or beyond a face that is not periodic has no mirror image there.
     """
-    margin = _margin(network, low, high, largest)
+    beyond = np.maximum(network.box[:, 0] - low, high - network.box[:, 1])
+    margin = np.maximum(beyond, 0.0) + largest
     images = make_images(
         position,
         network.box,
         periodic=network.periodic,
-        margin=np.where(network.periodic, margin, np.nan),
+        margin=margin if mirrored else np.where(network.periodic, margin, np.nan),
         tolerance=0.0,
     )
     return images.position, images.owner
-
-
-def mirrored_images(
-    network: Network, position: Array, low: Array, high: Array, largest: float
-) -> tuple[Array, Array]:
-    """Places (M, 3) m and owners (M,) of all images, periodic or mirrored, near a region.
-
-    The region is [`low`, `high`] (3,) m, widened by `largest` m. A centre (`position`, (N, 3) m)
-    on or beyond a face that is not periodic has no mirror image there.
-    """
-    margin = _margin(network, low, high, largest)
-    images = make_images(
-        position, network.box, periodic=network.periodic, margin=margin, tolerance=0.0
-    )
-    return images.position, images.owner
-
-
-def _margin(network: Network, low: Array, high: Array, largest: float) -> Array:
-    """How far (3,) m the region [`low`, `high`], widened by `largest`, leaves the box."""
-    beyond = np.maximum(network.box[:, 0] - low, high - network.box[:, 1])
-    return np.maximum(beyond, 0.0) + largest
-
-
-# ------------------------------------------------------------------------------------------------
-# What the fines fill of each pore, exact for every fine.
-
-
-def deposit_in_pores(network: Network, fines: Snapshot) -> tuple[Array, Array]:
-    """What `fines`, each reaching into the box, fill of each tetrahedron.
-
-    Only what lies inside the box counts, with the images across periodic sides. A pore that a
-    mirrored face cuts stands for the whole mirrored tetrahedron, so what the part inside holds is
-    divided by the share inside (`Network.pore_share`); this is exact for all pores of one
-    `pore_group` together. What fines hide of each other or of grains is not subtracted.
-
-    Returns:
-        Volume (P,) m3 and surface (P,) m2 of the fines inside.
-    """
-    corner = network.pore_corner
-    total = np.zeros((len(corner), 2))
-    piece, owner = clip_to_box(corner, network.box, network.periodic)
-    if len(fines) and len(piece):
-        piece = np.ascontiguousarray(piece)
-        filled = np.zeros((len(piece), 2))
-        low, high = piece.min(axis=1), piece.max(axis=1)
-        for fine in size_classes(fines.radius):
-            radius, largest = fines.radius[fine], float(fines.radius[fine].max())
-            position, image = periodic_images(
-                network, fines.position[fine], low.min(axis=0), high.max(axis=0), largest
-            )
-            pairs = points_in_boxes(position, low - largest, high + largest)
-            np.add.at(filled, pairs[0], pieces(piece, pairs, position, radius[image]))
-        np.add.at(total, owner, filled)
-    volume, surface = (total / network.pore_share[:, None]).T
-    return volume, surface
 
 
 def size_classes(radius: Array) -> list[Array]:
@@ -462,11 +424,7 @@ def size_classes(radius: Array) -> list[Array]:
 
 
 # ------------------------------------------------------------------------------------------------
-# The deposit of a pack measured fine by fine, so that only fines that moved are measured anew.
-#
-# The volume of each fine in each pore is kept as a piece. When fines come, leave or move, their
-# pieces are replaced. The order of the pieces does not depend on which were kept, and so neither
-# do sums over them, to the last digit.
+# What the fines fill of each pore, exact for every fine.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -500,6 +458,55 @@ def holders_of(network: Network) -> Holders:
         high=frozen(piece.max(axis=1)),
         pore=frozen(pore),
     )
+
+
+def _pieces(holders: Holders, fines: Snapshot) -> Iterator[tuple[Array, Array, Array]]:
+    """The tetrahedron and the fine (N,) of pairs that may touch, and what they share (N, 2).
+
+    That is the volume m3 and the surface m2 of the piece of the fine; it may be 0. The pairs of
+    one size of fines after the other are given, with the images across periodic sides.
+    """
+    for some in size_classes(fines.radius) if len(fines) and len(holders.piece) else []:
+        radius = fines.radius[some]
+        largest = float(radius.max())
+        low, high = holders.low.min(axis=0), holders.high.max(axis=0)
+        position, image = images_near(
+            holders.network, fines.position[some], low, high, largest, mirrored=False
+        )
+        pairs = points_in_boxes(position, holders.low - largest, holders.high + largest)
+        yield (
+            pairs[0],
+            some[image[pairs[1]]],
+            pieces(holders.piece, pairs, position, radius[image]),
+        )
+
+
+def deposit_in_pores(network: Network, fines: Snapshot) -> tuple[Array, Array]:
+    """What `fines`, each reaching into the box, fill of each tetrahedron.
+
+    Only what lies inside the box counts, with the images across periodic sides. A pore that a
+    mirrored face cuts stands for the whole mirrored tetrahedron, so what the part inside holds is
+    divided by the share inside (`Network.pore_share`); this is exact for all pores of one
+    `pore_group` together. What fines hide of each other or of grains is not subtracted.
+
+    Returns:
+        Volume (P,) m3 and surface (P,) m2 of the fines inside.
+    """
+    holders = holders_of(network)
+    filled, total = np.zeros((len(holders.piece), 2)), np.zeros((len(network.pore_corner), 2))
+    for piece, _, measured in _pieces(holders, fines):
+        np.add.at(filled, piece, measured)
+    np.add.at(total, holders.pore, filled)
+    volume, surface = (total / network.pore_share[:, None]).T
+    return volume, surface
+
+
+# ------------------------------------------------------------------------------------------------
+# The deposit of a pack measured fine by fine, so that only fines that moved are measured anew.
+#
+# The volume of each fine in each pore is kept as a piece. When fines come, leave or move, their
+# pieces are replaced. The order of the pieces does not depend on which were kept, and so neither
+# do sums over them, to the last digit.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -562,18 +569,10 @@ def _sorted(
 def _pieces_of(holders: Holders, fines: Snapshot) -> tuple[Array, Array, Array]:
     """Pore, fine and volume m3 of each piece of `fines`."""
     parts = [(np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros(0))]
-    low, high = holders.low, holders.high
-    for some in size_classes(fines.radius) if len(fines) else []:
-        radius = fines.radius[some]
-        largest = float(radius.max())
-        position, image = periodic_images(
-            holders.network, fines.position[some], low.min(axis=0), high.max(axis=0), largest
-        )
-        pairs = points_in_boxes(position, low - largest, high + largest)
-        volume = pieces(holders.piece, pairs, position, radius[image])[:, 0]
-        real = volume > 0.0
-        pore = holders.pore[pairs[0][real]]
-        fine = some[image[pairs[1][real]]]
-        parts.append((pore, fine, volume[real] / holders.network.pore_share[pore]))
+    for piece, fine, measured in _pieces(holders, fines):
+        real = measured[:, 0] > 0.0
+        pore = holders.pore[piece[real]]
+        share = holders.network.pore_share[pore]
+        parts.append((pore, fine[real], measured[real, 0] / share))
     pore, fine, volume = (np.concatenate(column) for column in zip(*parts, strict=True))
     return pore, fine, volume

@@ -15,7 +15,7 @@ from fdnet.network.compiled import compiled
 from fdnet.network.fines.deposit import (
     centred_inside,
     deposit_in_pores,
-    mirrored_images,
+    images_near,
     points_in_boxes,
     reaching_inside,
 )
@@ -121,7 +121,7 @@ def _crossing(
 
 
 @compiled
-def place_by_axis(
+def _place_by_axis(
     start: Array, end: Array, throat: Array, point: Array, image: Array
 ) -> tuple[Array, Array]:
     """Distance (K,) m of points from the axes of throats, and their place (K,) m along the axis.
@@ -187,81 +187,6 @@ OVERLAPS: dict[str, Callable[[Pairs], Array]] = {
     "two-plane": two_plane_volume,
 }
 """Estimates of the common volume by their names in a case."""
-
-
-# ------------------------------------------------------------------------------------------------
-# What fines fill of the throats; a throat here is a cylinder between the places of its pores.
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class FinesInThroats:
-    """Pairs (K) of a throat and a fine, or an image of it, that share volume.
-
-    Attributes:
-        throat: (K,) index of the throat.
-        fine: (K,) index of the fine.
-        pairs: place and size of the fine relative to the cylinder.
-        volume: (K,) m3 of the fine in the cylinder.
-        blocked: (T,) whether one fine covers a whole cross-section of the throat.
-    """
-
-    throat: Array
-    fine: Array
-    pairs: Pairs
-    volume: Array
-    blocked: Array
-
-    __repr__ = one_line
-
-
-def fines_in_throats(
-    network: Network, fines: Snapshot, overlap: str | Callable[[Pairs], Array]
-) -> FinesInThroats:
-    """Fines in the cylinder of each throat's inscribed radius (Shi 2011, section 3.2.2).
-
-    `overlap` is a key of `OVERLAPS`, or a function that gives the common volumes (K,) m3 of pairs.
-    Throats see the fines whose sphere reaches into the box, and their images.
-    """
-    throat, fine, pairs = _touching_pairs(network, fines)
-    volume = OVERLAPS[overlap](pairs) if isinstance(overlap, str) else overlap(pairs)
-    blocked = np.zeros(len(network.throat_radius), bool)
-    blocked[throat[covers_section(pairs)]] = True
-    use = volume > 0
-    return FinesInThroats(
-        throat=throat[use],
-        fine=fine[use],
-        pairs=pairs.where(use),
-        volume=volume[use],
-        blocked=blocked,
-    )
-
-
-def _touching_pairs(network: Network, fines: Snapshot) -> tuple[Array, Array, Pairs]:
-    """Throat and fine (K,) of the pairs that touch, with their relative places."""
-    index = np.flatnonzero(reaching_inside(network, fines))
-    throat = np.flatnonzero(network.throat_radius > 0)
-    ends = network.throat_ends[throat]
-    if not len(index) or not len(throat):
-        none = np.zeros(0)
-        pairs = Pairs(sphere=none, offset=none, depth=none, tube=none, length=none)
-        return throat[:0], index[:0], pairs
-    low, high = ends.min(axis=1), ends.max(axis=1)
-    largest = float(fines.radius[index].max())
-    # a throat shorter than the shortest allowed reaches beyond its ends
-    beyond = network.throat_length[throat] - np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    reach = (network.throat_radius[throat] + np.maximum(beyond, 0.0) + largest)[:, None]
-    low, high = low - reach, high + reach
-    position, owner = mirrored_images(
-        network, fines.position[index], low.min(axis=0), high.max(axis=0), 0.0
-    )
-    row, image = points_in_boxes(position, low, high)
-    offset, depth = place_by_axis(ends[:, 0], ends[:, 1], row, position, image)
-    throat, fine = throat[row], index[owner[image]]
-    sphere = fines.radius[fine]
-    tube, length = network.throat_radius[throat], network.throat_length[throat]
-    use = (offset < sphere + tube) & (depth > -sphere) & (depth < length + sphere)
-    pairs = Pairs(sphere=sphere, offset=offset, depth=depth, tube=tube, length=length)
-    return throat[use], fine[use], pairs.where(use)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -356,17 +281,42 @@ def measure_occupancy(
             f"analysis.throat_overlap: {overlap!r} is not known; choose one of {sorted(OVERLAPS)}"
         )
     refuse_wide(network, fines)
-    inside = centred_inside(network, fines.position)
-    throats = fines_in_throats(network, fines, overlap)
+    throat, fine, pairs = _touching_pairs(network, fines)
+    volume = OVERLAPS[overlap](pairs) if isinstance(overlap, str) else overlap(pairs)
+    count = len(network.throat_radius)
+    blocked = np.zeros(count, bool)
+    blocked[throat[covers_section(pairs)]] = True
+    use = volume > 0
+    throat, fine, volume, pairs = throat[use], fine[use], volume[use], pairs.where(use)
+    filled = np.bincount(throat, weights=volume, minlength=count)
+    number = np.bincount(throat, minlength=count)
+    radii = np.bincount(throat, weights=pairs.sphere, minlength=count)
+    porosity = 1.0 - ratio(filled, np.pi * network.throat_radius**2 * network.throat_length)
     reaching = fines.where(reaching_inside(network, fines))
-    fields = _throat_fields(network, throats) | _pore_fields(network, reaching)
-    counts = {
-        "fines_outside_box": int(np.sum(~inside)),
-        "throat_porosity_negative": int(np.sum(fields["throat_porosity"] < 0)),
-        "pore_porosity_negative": _overfilled(network, fields["pore_solid_volume"]),
+    solid, surface = deposit_in_pores(network, reaching)
+    values = {
+        "throat_solid_volume": filled,
+        "throat_porosity": porosity,
+        "throat_fine_radius": ratio(radii, number),
+        "throat_fines": number,
+        "blocked": blocked,
+        "pore_solid_volume": solid,
+        "pore_solid_surface": surface,
+        "pore_porosity": ratio(network.pore_volume - solid, network.pore_tetra_volume),
+        "pair_throat": throat,
+        "pair_fine": fine,
+        "pair_distance": pairs.offset / pairs.tube,
+        "pair_radius": pairs.sphere,
+        "pair_volume": volume,
     }
-    values = {name: frozen(value) for name, value in fields.items()}
-    return Occupancy(fines=reaching, counts=counts, **values)
+    counts = {
+        "fines_outside_box": int(np.sum(~centred_inside(network, fines.position))),
+        "throat_porosity_negative": int(np.sum(porosity < 0)),
+        "pore_porosity_negative": int(np.sum((solid > 0) & (solid > network.pore_volume))),
+    }
+    return Occupancy(
+        fines=reaching, counts=counts, **{name: frozen(value) for name, value in values.items()}
+    )
 
 
 def refuse_wide(network: Network, fines: Snapshot) -> None:
@@ -381,40 +331,35 @@ def refuse_wide(network: Network, fines: Snapshot) -> None:
         )
 
 
-def _throat_fields(network: Network, throats: FinesInThroats) -> dict[str, Array]:
-    """The fields by throat and by pair."""
-    count, pairs = len(network.throat_radius), throats.pairs
-    solid = np.bincount(throats.throat, weights=throats.volume, minlength=count)
-    number = np.bincount(throats.throat, minlength=count)
-    radii = np.bincount(throats.throat, weights=pairs.sphere, minlength=count)
-    tube = np.pi * network.throat_radius**2 * network.throat_length
-    return {
-        "throat_solid_volume": solid,
-        "throat_porosity": 1.0 - ratio(solid, tube),
-        "throat_fines": number,
-        "throat_fine_radius": ratio(radii, number),
-        "blocked": throats.blocked,
-        "pair_throat": throats.throat,
-        "pair_fine": throats.fine,
-        "pair_radius": pairs.sphere,
-        "pair_distance": pairs.offset / pairs.tube,
-        "pair_volume": throats.volume,
-    }
+def _touching_pairs(network: Network, fines: Snapshot) -> tuple[Array, Array, Pairs]:
+    """Throat and fine (K,) of the pairs that touch, with their relative places.
 
-
-def _pore_fields(network: Network, reaching: Snapshot) -> dict[str, Array]:
-    """The fields by pore, from the fines that reach into the box."""
-    solid, surface = deposit_in_pores(network, reaching)
-    return {
-        "pore_solid_volume": solid,
-        "pore_solid_surface": surface,
-        "pore_porosity": ratio(network.pore_volume - solid, network.pore_tetra_volume),
-    }
-
-
-def _overfilled(network: Network, solid: Array) -> int:
-    """Number of pores with more fines, `solid` (P,) m3, than void."""
-    return int(np.sum((solid > 0) & (solid > network.pore_volume)))
+    Throats see the fines whose sphere reaches into the box, and their images.
+    """
+    index = np.flatnonzero(reaching_inside(network, fines))
+    throat = np.flatnonzero(network.throat_radius > 0)
+    ends = network.throat_ends[throat]
+    if not len(index) or not len(throat):
+        none = np.zeros(0)
+        pairs = Pairs(sphere=none, offset=none, depth=none, tube=none, length=none)
+        return throat[:0], index[:0], pairs
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    largest = float(fines.radius[index].max())
+    # a throat shorter than the shortest allowed reaches beyond its ends
+    beyond = network.throat_length[throat] - np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    reach = (network.throat_radius[throat] + np.maximum(beyond, 0.0) + largest)[:, None]
+    low, high = low - reach, high + reach
+    position, owner = images_near(
+        network, fines.position[index], low.min(axis=0), high.max(axis=0), 0.0
+    )
+    row, image = points_in_boxes(position, low, high)
+    offset, depth = _place_by_axis(ends[:, 0], ends[:, 1], row, position, image)
+    throat, fine = throat[row], index[owner[image]]
+    sphere = fines.radius[fine]
+    tube, length = network.throat_radius[throat], network.throat_length[throat]
+    use = (offset < sphere + tube) & (depth > -sphere) & (depth < length + sphere)
+    pairs = Pairs(sphere=sphere, offset=offset, depth=depth, tube=tube, length=length)
+    return throat[use], fine[use], pairs.where(use)
 
 
 def ratio(top: Array, bottom: Array) -> Array:

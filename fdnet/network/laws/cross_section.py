@@ -1,15 +1,14 @@
-"""The flow through a section of a throat: between three grains, at a wall and in an edge.
+"""The flow through sections of throats: between three grains, at a wall and in an edge.
 
-The flow on rays from the three corners of a section, whatever discs lie on them.
-
-Each disc keeps what its rays see of the triangle before a line midway to the rim of another disc
-or the opposite side. The directions of the rays do not change with the radii of the discs, so they
-are set up once for all sections of a throat. A fourth disc may reach into the triangle.
+Each section is a plane parallel to the facet of its throat. The functions that end in `_fluxes`
+take the sections of many throats at once.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
-from fdnet.network.compiled import compiled, loops_in_place
+from fdnet.network.compiled import loops_in_place, loops_inside
 from fdnet.network.laws.wedges import (
     DISCS,
     FINE_POINTS,
@@ -31,31 +30,62 @@ from fdnet.network.laws.wedges import (
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array
 
+
+class Sections(NamedTuple):
+    """The sections of S sides of throats, n of each side at equal steps of height."""
+
+    throat: Array
+    """(S,) number of the throat among those of a part."""
+    side: Array
+    """(S,) 0 for the side of the first pore, 1 for that of the second."""
+    low: Array
+    """(S,) m, the first section above the facet, on its side."""
+    step: Array
+    """(S,) m between two sections."""
+    disc: Array
+    """(S, 3, n) m, radii of the discs of the grains on the corners."""
+
+
+# ------------------------------------------------------------------------------------------------
+# The flow on rays from the three corners of a section, whatever discs lie on them.
+#
+# Each disc keeps what its rays see of the triangle before a line midway to the rim of another disc
+# or the opposite side. The directions of the rays do not change with the radii of the discs, so
+# they are set up once for all sections of a throat. A fourth disc may reach into the triangle.
+
+
 RAYS = len(FINE_POINTS)
 """Rays of each corner."""
 STEEPEST = 1e-3
 """Smallest cosine of the angle between a ray and the normal of the opposite side."""
 
-CornerRoom = tuple[Array, Array, Array, Array]
-"""Of each corner (3, 4) the angle rad, the distances m to the next two and to a fourth disc; of
-each ray (3, 4, 12) the far side m, and the cosines of the angles to these three; and of each ray
-(3, 2, 12) where it ends, m, and its flux, m4."""
+
+class CornerRays(NamedTuple):
+    """The rays of the three corners of a triangle."""
+
+    corner: Array
+    """(3, 4): the angle rad, and the distances m to the next two corners and to a fourth disc."""
+    ray: Array
+    """(3, 4, 12): the far side m, and the cosines of the angles to these three."""
+    reach: Array
+    """(3, 12) m, where the rays end."""
+    part: Array
+    """(12,) m4, the fluxes of the rays of one corner."""
 
 
-@compiled
-def corner_room() -> CornerRoom:
+def corner_rays() -> CornerRays:
     """Room for the rays of a section."""
-    aimed = np.zeros(1, np.bool_)
-    return np.empty((3, 4)), np.empty((3, 4, RAYS)), np.empty((3, 2, RAYS)), aimed
+    return CornerRays(
+        corner=np.empty((3, 4)),
+        ray=np.empty((3, 4, RAYS)),
+        reach=np.empty((3, RAYS)),
+        part=np.empty(RAYS),
+    )
 
 
-@loops_in_place
-def aim_corners(base: Array, room: CornerRoom) -> None:
-    """Sets up the rays of the corners of a triangle `base` (3, 2) m, if that is not yet done."""
-    corner, ray, _, aimed = room
-    if aimed[0]:
-        return
-    aimed[0] = True
+@loops_inside
+def aim_corners(base: Array, rays: CornerRays) -> None:
+    """Sets up the rays of the corners of a triangle `base` (3, 2) m."""
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         jx, jy = base[j, 0] - base[i, 0], base[j, 1] - base[i, 1]
@@ -65,8 +95,8 @@ def aim_corners(base: Array, room: CornerRoom) -> None:
         twice, inner = abs(jx * ky - jy * kx), jx * kx + jy * ky
         height, foot = twice / across, -(jx * (kx - jx) + jy * (ky - jy)) / across
         opening = np.arctan2(twice, inner)
-        corner[i, 0], corner[i, 1], corner[i, 2] = opening, aj, ak
-        far, to_j, to_k = ray[i, 0], ray[i, 1], ray[i, 2]
+        rays.corner[i, 0], rays.corner[i, 1], rays.corner[i, 2] = opening, aj, ak
+        far, to_j, to_k = rays.ray[i, 0], rays.ray[i, 1], rays.ray[i, 2]
         for p in range(len(far)):
             turn = 0.5 * opening * (1.0 + FINE_POINTS[p]) - QUARTER
             cosine, sine = -sine_of(turn), cosine_of(turn)
@@ -75,63 +105,49 @@ def aim_corners(base: Array, room: CornerRoom) -> None:
             to_k[p] = (cosine * inner + sine * twice) / (aj * ak)
 
 
-@loops_in_place
-def aim_at_fourth(base: Array, x: float, y: float, room: CornerRoom) -> None:
+@loops_inside
+def aim_at_fourth(base: Array, x: float, y: float, rays: CornerRays) -> None:
     """Sets up the angles to a fourth disc centred at `x`, `y` m, after `aim_corners`."""
-    corner, ray, _, _ = room
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         jx, jy = base[j, 0] - base[i, 0], base[j, 1] - base[i, 1]
         kx, ky = base[k, 0] - base[i, 0], base[k, 1] - base[i, 1]
         qx, qy = x - base[i, 0], y - base[i, 1]
-        aj, aq = corner[i, 1], np.sqrt(qx * qx + qy * qy)
+        aj, aq = rays.corner[i, 1], np.sqrt(qx * qx + qy * qy)
         sense = 1.0 if jx * ky - jy * kx > 0.0 else -1.0
         along, across = 1.0, 0.0
         if aq > 0.0:
             along = (jx * qx + jy * qy) / (aj * aq)
             across = sense * (jx * qy - jy * qx) / (aj * aq)
-        corner[i, 3] = aq
-        to_q = ray[i, 3]
+        rays.corner[i, 3] = aq
+        to_q = rays.ray[i, 3]
         for p in range(len(to_q)):
-            turn = 0.5 * corner[i, 0] * (1.0 + FINE_POINTS[p]) - QUARTER
+            turn = 0.5 * rays.corner[i, 0] * (1.0 + FINE_POINTS[p]) - QUARTER
             to_q[p] = cosine_of(turn) * across - sine_of(turn) * along
 
 
-@loops_in_place
-def corner_reaches(room: CornerRoom, disc: Array) -> None:
-    """Sets where the rays end between discs of the radii `disc` (3,) m."""
-    corner, ray, out, _ = room
+@loops_inside
+def corner_flux(rays: CornerRays, disc: Array, fourth: float, table: Array) -> float:
+    """Flux m4 on the rays from discs of the radii `disc` (3,) m to the lines midway.
+
+    `fourth` m is the radius of a disc that `aim_at_fourth` has set up, or negative without one.
+    """
+    total, part = 0.0, rays.part
     for i in range(3):
-        aj, ak = corner[i, 1], corner[i, 2]
+        corner, ray, reach = rays.corner[i], rays.ray[i], rays.reach[i]
+        far, to_j, to_k, to_q = ray[0], ray[1], ray[2], ray[3]
+        aj, ak, aq = corner[1], corner[2], corner[3]
         ej, ek = disc[(i + 1) % 3] - disc[i], disc[(i + 2) % 3] - disc[i]
         half_j, half_k = 0.5 * (aj * aj - ej * ej), 0.5 * (ak * ak - ek * ek)
-        far, to_j, to_k, reach = ray[i, 0], ray[i, 1], ray[i, 2], out[i, 0]
         for p in range(len(reach)):
             before = midway(half_j, aj * to_j[p] + ej), midway(half_k, ak * to_k[p] + ek)
             reach[p] = min(far[p], before[0], before[1])
-
-
-@loops_in_place
-def fourth_reaches(room: CornerRoom, disc: Array, fourth: float) -> None:
-    """Ends the rays midway to a fourth disc of the radius `fourth` m, where that is nearer."""
-    corner, ray, out, _ = room
-    for i in range(3):
-        aq, wider = corner[i, 3], fourth - disc[i]
-        half = 0.5 * (aq * aq - wider * wider)
-        to_q, reach = ray[i, 3], out[i, 0]
-        hidden = aq <= wider
-        for p in range(len(reach)):
-            end = min(reach[p], midway(half, aq * to_q[p] + wider))
-            reach[p] = 0.0 if hidden else end
-
-
-@loops_in_place
-def corner_flux(room: CornerRoom, disc: Array, table: Array) -> float:
-    """Flux m4 on the rays from discs of the radii `disc` (3,) m to where they end."""
-    corner, _, out, _ = room
-    total = 0.0
-    for i in range(3):
-        reach, part = out[i, 0], out[i, 1]
+        if fourth >= 0.0:
+            wider = fourth - disc[i]
+            half, hidden = 0.5 * (aq * aq - wider * wider), aq <= wider
+            for p in range(len(reach)):
+                end = min(reach[p], midway(half, aq * to_q[p] + wider))
+                reach[p] = 0.0 if hidden else end
         for p in range(len(reach)):
             part[p] = FINE_WEIGHTS[p] * flux_on_ray(reach[p], disc[i])
         flux, nearest = 0.0, np.inf
@@ -140,7 +156,7 @@ def corner_flux(room: CornerRoom, disc: Array, table: Array) -> float:
             nearest = min(nearest, reach[p])
         if flux > 0.0:
             closest = min(disc[i] / nearest, 1.0) if nearest > 0.0 else 1.0
-            angle = 0.5 * corner[i, 0]
+            angle = 0.5 * corner[0]
             total += angle * flux * shear_ratio(angle, closest, table)
     return total
 
@@ -149,10 +165,9 @@ def corner_flux(room: CornerRoom, disc: Array, table: Array) -> float:
 # The flow through a triangle between any number of discs, summed over rays.
 #
 # Every disc keeps what its rays see inside the triangle, from its rim or from where they enter the
-# triangle to the far side, or to the line midway to the rim of another disc (`cross_section`). The
-# rays end in Gauss's points on the far sides, so the sum does not depend on the order of the
-# corners and is the same for a mirrored triangle. The directions of the rays do not change with
-# the radii of the discs, so they are set up once for all sections of a throat.
+# triangle to the far side, or to the line midway to the rim of another disc. The rays end in
+# Gauss's points on the far sides, so the sum does not depend on the order of the corners and is
+# the same for a mirrored triangle.
 
 
 SECTOR = np.pi / 3.0
@@ -163,7 +178,7 @@ UNTOUCHED, NARROWED, SWALLOWED = 0, 1, 2
 """What another disc does to the rays of a disc."""
 
 
-@loops_in_place
+@loops_inside
 def set_sides(base: Array, side: Array) -> None:
     """Sets `side` (3, 3): of each side of a triangle `base` (3, 2) m its normal inwards, length m.
 
@@ -176,82 +191,81 @@ def set_sides(base: Array, side: Array) -> None:
         nx, ny = -ey / length, ex / length
         if nx * (base[k, 0] - base[i, 0]) + ny * (base[k, 1] - base[i, 1]) < 0.0:
             nx, ny = -nx, -ny
-        side[i] = nx, ny, length
+        side[i, 0], side[i, 1], side[i, 2] = nx, ny, length
 
 
-@loops_in_place
+@loops_inside
 def inwards(base: Array, side: Array, i: int, x: float, y: float) -> float:
     """How far m the place `x`, `y` m lies inwards of the side `i`."""
     return side[i, 0] * (x - base[i, 0]) + side[i, 1] * (y - base[i, 1])
 
 
-@loops_in_place
+@loops_inside
+def depth_within(base: Array, side: Array, x: float, y: float) -> float:
+    """How far m a place lies within a triangle, from the nearest side line; negative outside.
+
+    A disc that is no larger than its place is far outside does not reach in.
+    """
+    least = np.inf
+    for i in range(3):
+        least = min(least, inwards(base, side, i, x, y))
+    return least
+
+
+@loops_inside
 def aim(base: Array, side: Array, x: float, y: float, rays: Array) -> int:
-    """Sets up the rays of a disc centred at `x`, `y` m, and gives their number.
+    """Sets up the rays of a disc centred at `x`, `y` m, 12 to each far side; gives their number.
 
     `side` is what `set_sides` sets. The rows of `rays` (6, 36) are the direction, where a ray
     meets the far side and where it enters the triangle, m, its angle rad, and room.
     """
-    depth = (_depth(base, side, 0, x, y), _depth(base, side, 1, x, y), _depth(base, side, 2, x, y))
-    count = 0
+    first = 0
     for far in range(3):
-        if depth[far] > 0.0:
-            _aim_at_side(base, side, (x, y, far, count), depth, rays)
-            count += RAYS
-    return count
+        depth = inwards(base, side, far, x, y)
+        if depth <= ON_SIDE * side[far, 2]:
+            continue
+        one = (far + 1) % 3
+        ex, ey = base[one, 0] - base[far, 0], base[one, 1] - base[far, 1]
+        vx, vy = base[far, 0] - x, base[far, 1] - y
+        of_turn = 0.5 * side[far, 2] * depth
+        ux, uy, end = rays[0, first:], rays[1, first:], rays[2, first:]
+        entry, turn = rays[3, first:], rays[4, first:]
+        for p in range(min(RAYS, len(entry))):
+            along = 0.5 * (1.0 + FINE_POINTS[p])
+            rx, ry = vx + along * ex, vy + along * ey
+            long = np.sqrt(rx * rx + ry * ry)
+            ux[p], uy[p], end[p] = rx / long, ry / long, long
+            entry[p] = 0.0
+            turn[p] = of_turn * FINE_WEIGHTS[p] / (long * long)
+        for near in range(1, 3):
+            i = (far + near) % 3
+            away = -inwards(base, side, i, x, y)
+            if away > ON_SIDE * side[i, 2]:
+                nx, ny = side[i, 0], side[i, 1]
+                for p in range(min(RAYS, len(entry))):
+                    speed = nx * ux[p] + ny * uy[p]
+                    begin = away / speed if speed > 0.0 else np.inf
+                    entry[p] = max(entry[p], begin)
+        first += RAYS
+    return first
 
 
-@loops_in_place
-def _depth(base: Array, side: Array, i: int, x: float, y: float) -> float:
-    """How far m a place lies inwards of the side `i`, 0 where it lies on it."""
-    depth = inwards(base, side, i, x, y)
-    return 0.0 if abs(depth) <= ON_SIDE * side[i, 2] else depth
-
-
-@loops_in_place
-def _aim_at_side(
-    base: Array,
-    side: Array,
-    given: tuple[float, float, int, int],
-    depth: tuple[float, float, float],
-    rays: Array,
-) -> None:
-    """The 12 rays to a side; `given` are the place of the disc, the side and the first ray."""
-    x, y, far, first = given
-    one, two = (far + 1) % 3, (far + 2) % 3
-    ex, ey = base[one, 0] - base[far, 0], base[one, 1] - base[far, 1]
-    vx, vy = base[far, 0] - x, base[far, 1] - y
-    of_turn = 0.5 * side[far, 2] * depth[far]
-    ux, uy, end = rays[0, first:], rays[1, first:], rays[2, first:]
-    entry, turn = rays[3, first:], rays[4, first:]
-    for p in range(min(RAYS, len(entry))):
-        along = 0.5 * (1.0 + FINE_POINTS[p])
-        rx, ry = vx + along * ex, vy + along * ey
-        long = np.sqrt(rx * rx + ry * ry)
-        ux[p], uy[p], end[p] = rx / long, ry / long, long
-        entry[p] = 0.0
-        turn[p] = of_turn * FINE_WEIGHTS[p] / (long * long)
-    for i in (one, two):
-        if depth[i] < 0.0:
-            nx, ny, away = side[i, 0], side[i, 1], -depth[i]
-            for p in range(min(RAYS, len(entry))):
-                speed = nx * ux[p] + ny * uy[p]
-                begin = away / speed if speed > 0.0 else np.inf
-                entry[p] = max(entry[p], begin)
-
-
-@loops_in_place
-def narrow(
+@loops_inside
+def end_midway(
     rays: Array,
     count: int,
-    disc: tuple[float, float, float],
-    other: tuple[float, float, float],
+    x: float,
+    y: float,
+    radius: float,
+    other_x: float,
+    other_y: float,
+    other_radius: float,
 ) -> int:
-    """Ends the first `count` rays of a disc midway to another one; x, y and radius m of both.
+    """Ends the first `count` rays of a disc midway to another one; centre and radius m of both.
 
     The last row of `rays` (6, 36) holds where they end. Returns what the other disc does.
     """
-    qx, qy, wider = other[0] - disc[0], other[1] - disc[1], other[2] - disc[2]
+    qx, qy, wider = other_x - x, other_y - y, other_radius - radius
     square = qx * qx + qy * qy
     if wider > 0.0 and square <= wider * wider:
         return SWALLOWED
@@ -262,15 +276,14 @@ def narrow(
     return NARROWED
 
 
-@loops_in_place
-def flux_on_rays(rays: Array, count: int, own: float, room: tuple[Array, Array]) -> float:
+@loops_inside
+def flux_on_rays(rays: Array, count: int, own: float, part: Array, table: Array) -> float:
     """Flux m4 on the first `count` rays of a disc of radius `own` m, to where they end.
 
-    `rays` (6, 36) is what `aim` and `narrow` set, `room` are 36 numbers, which are written to, and
-    the table of `shear_ratio`. A ray that enters the triangle outside its disc carries the part
-    from there of what `rays.flux_on_ray` sums from the rim.
+    `rays` (6, 36) is what `aim` and `end_midway` set, `part` (36,) is written to. A ray that
+    enters the triangle outside its disc carries the part from there of what `flux_on_ray` sums
+    from the rim.
     """
-    part, table = room
     entry, turn, reach = rays[3], rays[4], rays[5]
     r2, farthest = own * own, 0.0
     for p in range(count):
@@ -293,10 +306,10 @@ def flux_on_rays(rays: Array, count: int, own: float, room: tuple[Array, Array])
 
 
 # ------------------------------------------------------------------------------------------------
-# Flow along the axis through one plane section of a throat.
+# Flow along the axis through a section with a disc of each grain on its corners.
 #
-# The section is a triangle with a disc of each grain on its corners. Every disc slows the fluid
-# between its rim and the line midway to the next rim; these shares are cut into wedges (`wedge`).
+# Every disc slows the fluid between its rim and the line midway to the next rim; these shares are
+# cut into wedges (`wedges`).
 #
 # Equal discs in a triangle that holds its circumcentre: six right-angled wedges about it, in
 # closed form.
@@ -321,151 +334,182 @@ TURN = 0.05
 edge, the rays have taken over. Finite elements agree with them there (test_section_flux.py)."""
 
 
-@loops_in_place
-def set_wedges(base: Array, rows: Array) -> None:
-    """Sets the six wedges of a triangle `base` (3, 2) m with equal discs, for `even_fluxes`.
+def tangents(base: Array) -> Array:
+    """Tangents (K, 3) of half the angles that the edges of triangles `base` (K, 3, 2) m show.
 
-    There are two of each of the `rows` (3, 7): half edge m, tangent and angle rad, both negative
-    where the circumcentre lies beyond that edge; what of `ray_flux` depends on these alone, and
-    the row of the table of `shear_ratio`.
+    They are seen from the circumcentre; the angle at the far corner is that over half the edge. A
+    tangent is negative where the circumcentre lies beyond the edge.
     """
+    tangent = np.empty((len(base), 3))
     for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        ex, ey = base[j, 0] - base[i, 0], base[j, 1] - base[i, 1]
-        fx, fy = base[k, 0] - base[i, 0], base[k, 1] - base[i, 1]
-        gx, gy = base[k, 0] - base[j, 0], base[k, 1] - base[j, 1]
-        # the angle at the far corner is that at the centre over half the edge
-        slope = (fx * gx + fy * gy) / abs(ex * fy - ey * fx)
-        half, angle = 0.5 * np.hypot(ex, ey), np.arctan(slope)
-        constant, of_log = ray_parts(abs(angle), abs(slope))
-        rows[i] = half, slope, angle, constant, of_log, np.log(half), table_row(abs(angle))
+        e, f = base[:, (i + 1) % 3] - base[:, i], base[:, (i + 2) % 3] - base[:, i]
+        g = base[:, (i + 2) % 3] - base[:, (i + 1) % 3]
+        area = np.abs(e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0])
+        tangent[:, i] = (f[:, 0] * g[:, 0] + f[:, 1] * g[:, 1]) / area
+    return tangent
 
 
-@compiled
-def even_room(sections: int) -> tuple[Array, Array]:
-    """Room for so many sections in `even_fluxes`, and for a row of the table of `shear_ratio`."""
-    return np.empty((2, sections)), np.empty(len(DISCS))
+class EvenRoom(NamedTuple):
+    """Room for `even_fluxes`."""
+
+    wedge: Array
+    """(3, 5): half the edge m and its logarithm, the parts of `ray_parts`, and the angle rad."""
+    ratio: Array
+    """(3, 21): rows of the table of `shear_ratio`."""
+    log_disc: Array
+    """(n,)"""
+    rays: Array
+    """(n,) flux on rays."""
+
+
+def even_room(count: int) -> EvenRoom:
+    """Room for `count` sections."""
+    return EvenRoom(
+        wedge=np.empty((3, 5)),
+        ratio=np.empty((3, len(DISCS))),
+        log_disc=np.empty(count),
+        rays=np.empty(count),
+    )
 
 
 @loops_in_place
 def even_fluxes(
-    wedge: Array, discs: Array, room: tuple[tuple[Array, Array], Array], flux: Array
+    rows: Array,
+    sections: Sections,
+    base: Array,
+    tangent: Array,
+    table: Array,
+    room: EvenRoom,
+    flux: Array,
 ) -> None:
-    """Writes the flux (K,) m4 of laplacian(w) = -1 for the radii `discs` (K,) m of K sections.
+    """Writes the `flux` (S, n) m4 of laplacian(w) = -1 in the sides `rows` with equal discs.
 
-    `wedge` is what `set_wedges` sets. In an obtuse triangle the sum of the signed wedges is too
-    small, and `uneven_fluxes` does it.
+    Each edge has two wedges. In an obtuse triangle their signed sum is too small, and
+    `uneven_fluxes` does it.
 
-    `room` is what `even_room` gives, and the table of `shear_ratio`.
+    Args:
+        rows: numbers of the sides.
+        sections: of all sides.
+        base: (K, 3, 2) m, corners of the facets.
+        tangent: (K, 3) of `tangents`.
+        table: of `shear_ratio`.
+        room: written to.
+        flux: of all sides.
     """
-    (lanes, ratio), table = room
-    log_disc, rays = lanes[0], lanes[1]
-    for k in range(len(discs)):
-        log_disc[k] = log_of(discs[k])
-        flux[k] = 0.0
-    for i in range(3):
-        half, slope, angle = wedge[i, 0], abs(wedge[i, 1]), abs(wedge[i, 2])
-        constant, of_log, log_half = wedge[i, 3], wedge[i, 4], wedge[i, 5]
-        factor = 2.0 * half**4 if wedge[i, 1] > 0.0 else -2.0 * half**4
-        row = min(int(wedge[i, 6]), len(table) - 2)
-        part = wedge[i, 6] - row
-        low, high = table[row], table[row + 1]
-        for j in range(len(ratio)):
-            ratio[j] = (1.0 - part) * low[j] + part * high[j]
-        for k in range(len(discs)):
-            x = discs[k] / half
-            square = x * x
-            whole = constant - of_log * (log_disc[k] - log_half)
-            rays[k] = factor * (whole + square * (4.0 * slope - square * angle) / 16.0)
-        for k in range(len(discs)):
-            x = discs[k] / half
-            if x > 1.0:
-                rays[k] = factor * ray_flux(angle, slope, x)
-            column = min(x, 1.0) * (len(ratio) - 1)
-            j = min(int(column), len(ratio) - 2)
-            flux[k] += rays[k] * (ratio[j] + (column - j) * (ratio[j + 1] - ratio[j]))
+    log_disc, rays, wedge, before = room.log_disc, room.rays, room.wedge, -1
+    for s in rows:
+        t = sections.throat[s]
+        disc, out = sections.disc[s, 0], flux[s]
+        if t != before:
+            before = t
+            for i in range(3):
+                j, slope = (i + 1) % 3, abs(tangent[t, i])
+                half = 0.5 * np.hypot(base[t, j, 0] - base[t, i, 0], base[t, j, 1] - base[t, i, 1])
+                angle = np.arctan(slope)
+                wedge[i, 0], wedge[i, 1], wedge[i, 4] = half, np.log(half), angle
+                wedge[i, 2], wedge[i, 3] = ray_parts(angle, slope)
+                row, ratio = table_row(angle), room.ratio[i]
+                first = min(int(row), len(table) - 2)
+                part, low, high = row - first, table[first], table[first + 1]
+                for j in range(len(ratio)):
+                    ratio[j] = (1.0 - part) * low[j] + part * high[j]
+        for k in range(len(disc)):
+            log_disc[k] = log_of(disc[k])
+            out[k] = 0.0
+        for i in range(3):
+            half, log_half, constant, of_log = wedge[i, 0], wedge[i, 1], wedge[i, 2], wedge[i, 3]
+            slope, ratio = abs(tangent[t, i]), room.ratio[i]
+            angle = wedge[i, 4]
+            factor = 2.0 * half**4 if tangent[t, i] > 0.0 else -2.0 * half**4
+            for k in range(len(disc)):
+                x = disc[k] / half
+                square = x * x
+                whole = constant - of_log * (log_disc[k] - log_half)
+                rays[k] = factor * (whole + square * (4.0 * slope - square * angle) / 16.0)
+            for k in range(len(disc)):
+                x = disc[k] / half
+                if x > 1.0:
+                    rays[k] = factor * ray_flux(angle, slope, x)
+                column = min(x, 1.0) * (len(ratio) - 1)
+                j = min(int(column), len(ratio) - 2)
+                out[k] += rays[k] * (ratio[j] + (column - j) * (ratio[j + 1] - ratio[j]))
 
 
-@compiled
-def uneven_room(sections: int) -> tuple[Array, Array]:
-    """Room for the wedges of so many sections, and for the edges, in `uneven_fluxes`."""
-    return np.empty((7, 6 * sections)), np.empty((6, 4))
+class UnevenRoom(NamedTuple):
+    """Room for `uneven_fluxes`."""
+
+    wedge: Array
+    """(7, 6 n): of each wedge the excess of the radius of the other disc, half the gap squared,
+    the distance of the centres, the place of the circle along their line and across it, which
+    becomes its angle rad, the own radius, and the flux on rays."""
+    edges: Array
+    """(6, 4), from each corner to the two others: unit vector, length m, and 1 where the third
+    corner lies to the left, else -1."""
+    rays: CornerRays
+
+
+def uneven_room(count: int) -> UnevenRoom:
+    """Room for `count` sections."""
+    return UnevenRoom(wedge=np.empty((7, 6 * count)), edges=np.empty((6, 4)), rays=corner_rays())
 
 
 @loops_in_place
 def uneven_fluxes(
-    base: Array,
-    discs: Array,
-    room: tuple[tuple[Array, Array], CornerRoom, Array],
-    flux: Array,
+    rows: Array, sections: Sections, base: Array, table: Array, room: UnevenRoom, flux: Array
 ) -> None:
-    """Writes the flux (K,) m4 of laplacian(w) = -1 for the radii `discs` (K, 3) m of K sections.
+    """Writes the `flux` (S, n) m4 of the sides `rows`, whatever their discs; as `even_fluxes`.
 
-    The first corner of the triangle `base` (3, 2) m is the origin, the second lies on the x axis.
-    The flux is 0 where the discs close the triangle.
-
-    `room` is what `uneven_room` and `corner_room` give for this triangle, and the table of
-    `shear_ratio`.
+    The first corner of a facet is the origin, the second lies on the x axis. The flux is 0 where
+    the discs close the triangle.
     """
-    lanes, corners, table = room
-    wedge = lanes[0]
-    touching_fluxes(base, discs, (lanes, table), flux)
-    for k in range(len(discs)):
-        beyond = 0.0 if flux[k] > 0.0 else TURN
-        for m in range(6 * k, 6 * k + 6):
-            beyond = max(beyond, -wedge[4, m])
-        if beyond > 0.0:
-            aim_corners(base, corners)
-            corner_reaches(corners, discs[k])
-            more = corner_flux(corners, discs[k], table) - flux[k]
-            flux[k] += min(beyond / TURN, 1.0) * max(more, 0.0)
+    aimed = -1
+    for s in rows:
+        t = sections.throat[s]
+        disc, out = sections.disc[s], flux[s]
+        touching_fluxes(base[t], disc, table, room, out)
+        for k in range(len(out)):
+            beyond = 0.0 if out[k] > 0.0 else TURN
+            for m in range(6 * k, 6 * k + 6):
+                beyond = max(beyond, -room.wedge[4, m])
+            if beyond > 0.0:
+                if aimed != t:
+                    aim_corners(base[t], room.rays)
+                    aimed = t
+                more = corner_flux(room.rays, disc[:, k], -1.0, table) - out[k]
+                out[k] += min(beyond / TURN, 1.0) * max(more, 0.0)
 
 
-@loops_in_place
-def touching_fluxes(
-    base: Array, discs: Array, room: tuple[tuple[Array, Array], Array], flux: Array
-) -> None:
-    """Writes the flux (K,) m4 where a circle touches all three discs, else 0.
+@loops_inside
+def touching_fluxes(base: Array, disc: Array, table: Array, room: UnevenRoom, flux: Array) -> None:
+    """Writes the flux (n,) m4 where a circle touches all three discs (3, n) m, else 0.
 
     Shares are negative where the circle lies beyond an edge of the triangle.
     """
-    (wedge, edges), table = room
-    count = 6 * len(discs)
-    _set_edges(base, edges)
-    for k in range(len(discs)):
-        flux[k] = 1.0 if _set_wedges(edges, base, discs[k], wedge[:, 6 * k : 6 * k + 6]) else 0.0
-    _sum_wedges(wedge, count)
-    total = wedge[6]
-    for k in range(len(discs)):
-        if flux[k] > 0.0:
-            flux[k] = 0.0
-            for m in range(6 * k, 6 * k + 6):
-                disc_of_gap = wedge[5, m] / (0.5 * (wedge[2, m] - wedge[0, m]))
-                flux[k] += total[m] * shear_ratio(abs(wedge[4, m]), disc_of_gap, table)
-
-
-@loops_in_place
-def _set_edges(base: Array, edges: Array) -> None:
-    """Sets `edges` (6, 4), from each corner to the two others: unit vector, length m, sense.
-
-    The sense is 1 where the third corner lies to the left, else -1.
-    """
+    wedge, edges = room.wedge, room.edges
     for i in range(3):
-        for step in (1, 2):
+        for step in range(1, 3):
             j, k = (i + step) % 3, (i + 3 - step) % 3
             ex, ey = base[j, 0] - base[i, 0], base[j, 1] - base[i, 1]
             a = np.sqrt(ex * ex + ey * ey)
             turned = ex * (base[k, 1] - base[i, 1]) - ey * (base[k, 0] - base[i, 0])
-            edges[2 * i + step - 1] = ex / a, ey / a, a, 1.0 if turned > 0.0 else -1.0
+            edge = edges[2 * i + step - 1]
+            edge[0], edge[1], edge[2], edge[3] = ex / a, ey / a, a, 1.0 if turned > 0.0 else -1.0
+    for k in range(len(flux)):
+        touches = _set_wedges(edges, base, disc[:, k], wedge[:, 6 * k : 6 * k + 6])
+        flux[k] = 1.0 if touches else 0.0
+    _sum_wedges(wedge, 6 * len(flux))
+    wider, apart, turn, own, total = wedge[0], wedge[2], wedge[4], wedge[5], wedge[6]
+    for k in range(len(flux)):
+        if flux[k] > 0.0:
+            flux[k] = 0.0
+            for m in range(6 * k, 6 * k + 6):
+                disc_of_gap = own[m] / (0.5 * (apart[m] - wider[m]))
+                flux[k] += total[m] * shear_ratio(abs(turn[m]), disc_of_gap, table)
 
 
-@loops_in_place
+@loops_inside
 def _set_wedges(edges: Array, base: Array, disc: Array, wedge: Array) -> bool:
-    """Writes the six wedges (7, 6) of a section; whether a circle touches its three discs.
-
-    The rows are the excess of the radius of the other disc, half the gap squared, the distance of
-    the centres, the place of the circle along their line and across it, and the own radius.
-    """
+    """Sets five rows and the own radius of six wedges; whether a circle touches three discs."""
     cx, cy, radius = _inscribed(base, disc)
     touches = not np.isnan(radius)
     if not touches:
@@ -484,7 +528,7 @@ def _set_wedges(edges: Array, base: Array, disc: Array, wedge: Array) -> bool:
     return touches
 
 
-@loops_in_place
+@loops_inside
 def _sum_wedges(wedge: Array, count: int) -> None:
     """Turns the places of the circles into angles rad, and sums the flux m4 on rays up to them."""
     wider, gap, apart, along = wedge[0], wedge[1], wedge[2], wedge[3]
@@ -500,7 +544,7 @@ def _sum_wedges(wedge: Array, count: int) -> None:
             total[m] += weight * turn[m] * flux_on_ray(reach, own[m])
 
 
-@loops_in_place
+@loops_inside
 def _inscribed(base: Array, disc: Array) -> tuple[float, float, float]:
     """Centre and radius m of the circle that touches three discs; NaN where there is none."""
     a, px, py = base[1, 0], base[2, 0], base[2, 1]
@@ -531,7 +575,7 @@ def _inscribed(base: Array, disc: Array) -> tuple[float, float, float]:
 # image as corners. Its plane is normal to the wall, and inside the box every section parallel to
 # it is the trapezoid between the centres of two discs and their feet on the wall.
 #
-# Discs and wall share the fluid as in `cross_section`. The line midway between the rims of i and j
+# Discs and wall share the fluid as discs do. The line midway between the rims of i and j
 # is a hyperbola. The line midway between the rim of i (radius rho, centre H above the wall) and
 # the wall is a parabola: on the ray at the angle t from the normal of the wall it lies at the
 # distance (H + rho) / (1 + cos t) from the centre; at the distance x from the foot of i its height
@@ -550,25 +594,32 @@ LANES = 6
 """Numbers a section for which `wall_fluxes` needs room."""
 
 
-def wall_cuts(network: Network) -> tuple[Array, Array, Array]:
+class WallCuts(NamedTuple):
+    """How walls that hold the fluid cut each of K throats."""
+
+    order: Array
+    """(K, 2) which corners of the facet are i and j. On an edge j is -1, and both are -1 where no
+    wall cuts the throat."""
+    place: Array
+    """(K, 3) m, heights of i and j above the wall, and their distance along it; on an edge heights
+    of i above both walls, and 0."""
+    part: Array
+    """(K,) flux of the whole throat over that of the half-section, quarter-section, or slipping
+    section."""
+
+
+def wall_cuts(network: Network) -> WallCuts:
     """How walls that hold the fluid cut each throat.
 
     A trapezoid is two triangles, each with share 1/2, so each carries the half-section; a triangle
-    with j on the wall is alone and carries two. The rectangle of an edge (`edge_cross_section`) is
+    with j on the wall is alone and carries two. The rectangle of an edge (`edge_fluxes`) is
     two triangles, each with share 1/4, so each carries two quarter-sections. Only grains centred
     on walls have other edges; their throats carry `DOUBLE_EDGE_SHARE` of the slipping flux.
-
-    Returns:
-        order: (T, 2) which corners of the facet are i and j. On an edge j is -1, and both are -1
-        where no wall cuts the throat. place: (T, 3) m, heights of i and j above the wall, and
-        their distance along it; on an edge heights of i above both walls, and 0. part: (T,)
-        flux of the whole throat over that of the half-section, quarter-section, or slipping
-            section.
     """
     count = len(network.throat_share)
     order, place, part = np.full((count, 2), -1), np.zeros((count, 3)), np.ones(count)
     if network.walls == "slip":
-        return order, place, part
+        return WallCuts(order, place, part)
     single, double = (np.flatnonzero(network.throat_share == share) for share in (0.5, 0.25))
     corner, tolerance = network.corners_of(single), TOLERANCE * network.grain_radius
     own = network.image_grain[network.throat_images[single]]
@@ -584,8 +635,15 @@ def wall_cuts(network: Network) -> tuple[Array, Array, Array]:
             place[t, 0], place[t, 1] = 0.5 * np.abs(apart[pair, axis]), height
             place[t, 2] = np.linalg.norm(np.delete(across, axis, axis=1), axis=1)
             part[t] = np.where(height <= tolerance, 2.0, 1.0)
-    _set_wall_edges(network, double, (order, place, part))
-    return order, place, part
+    part[double] = DOUBLE_EDGE_SHARE
+    corner = network.corners_of(double)
+    for i, j, k in ((0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)):
+        one, two = corner[:, j] - corner[:, i], corner[:, k] - corner[:, i]
+        right = _mirrored(one, 1, tolerance) & _mirrored(two, 2, tolerance)
+        t = double[right]
+        order[t, 0], part[t] = i, 2.0
+        place[t, 0], place[t, 1] = 0.5 * np.abs(one[right, 1]), 0.5 * np.abs(two[right, 2])
+    return WallCuts(order, place, part)
 
 
 def _mirrored(apart: Array, axis: int, tolerance: float) -> Array:
@@ -594,96 +652,85 @@ def _mirrored(apart: Array, axis: int, tolerance: float) -> Array:
     return np.all(np.abs(rest) <= tolerance, axis=1) & (np.abs(apart[:, axis]) > tolerance)
 
 
-def _set_wall_edges(network: Network, double: Array, cuts: tuple[Array, Array, Array]) -> None:
-    """Sets what `wall_cuts` returns of the throats `double` (K,), which two walls cut."""
-    order, place, part = cuts
-    part[double] = DOUBLE_EDGE_SHARE
-    corner, tolerance = network.corners_of(double), TOLERANCE * network.grain_radius
-    for i, j, k in ((0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)):
-        one, two = corner[:, j] - corner[:, i], corner[:, k] - corner[:, i]
-        right = _mirrored(one, 1, tolerance) & _mirrored(two, 2, tolerance)
-        t = double[right]
-        order[t, 0], part[t] = i, 2.0
-        place[t, 0], place[t, 1] = 0.5 * np.abs(one[right, 1]), 0.5 * np.abs(two[right, 2])
-
-
 @loops_in_place
 def wall_fluxes(
-    place: Array, discs: tuple[Array, Array], room: tuple[Array, Array], flux: Array
+    rows: Array, sections: Sections, cuts: WallCuts, table: Array, lanes: Array, flux: Array
 ) -> None:
-    """Writes the flux (K,) m4 of laplacian(w) = -1 between the wall and two discs in K sections.
+    """Writes the `flux` (S, n) m4 of the sides `rows` between a wall and two discs.
 
-    `place` (3,) m are the heights of their centres above the wall and their distance along it,
-    `discs` (K,) m their radii. `room` is that (`LANES`, K) for the sections, and the table of
-    `shear_ratio`.
+    `lanes` (`LANES`, n) is written to; the others are as in `even_fluxes`.
     """
-    lanes, table = room
-    along, above, split, share = lanes[0], lanes[1], lanes[2], lanes[3]
-    first, last = lanes[4], lanes[5]
-    apart = np.hypot(place[2], place[0] - place[1])
-    _set_meeting(place, discs, lanes)
-    for k in range(len(flux)):
-        flux[k] = 0.0
-    for i in range(2):
-        height, other = place[i], place[1 - i]
-        disc, next_disc = discs[i], discs[1 - i]
-        edge = np.arctan2(place[2], height - other)
-        across = (height, place[2], apart, (height - other) / apart)
-        for k in range(len(flux)):
-            x = along[k] if i == 0 else place[2] - along[k]
-            split[k] = min(max(angle_of(x, height - above[k]), 0.0), edge)
-            first[k], last[k] = 0.0, edge
-        _set_shares(across, (disc, next_disc), (first, split), share)
-        for k in range(len(flux)):
-            flux[k] += share[k] * shear_ratio(split[k], 2.0 * disc[k] / (height + disc[k]), table)
-        _set_shares(across, (disc, next_disc), (split, last), share)
-        for k in range(len(flux)):
-            gap = max(apart - next_disc[k] + disc[k], disc[k])
-            ratio = shear_ratio(edge - split[k], min(2.0 * disc[k] / gap, 1.0), table)
-            flux[k] += share[k] * ratio
-    for k in range(len(flux)):
-        first[k], split[k], last[k] = 0.0, min(max(along[k], 0.0), place[2]), place[2]
-    _add_film(place, discs, (first, split), flux)
-    _add_film(place, discs, (split, last), flux)
+    for s in rows:
+        t = sections.throat[s]
+        place, out = cuts.place[t], flux[s]
+        one, two = sections.disc[s, cuts.order[t, 0]], sections.disc[s, cuts.order[t, 1]]
+        along, above, split, share = lanes[0], lanes[1], lanes[2], lanes[3]
+        first, last = lanes[4], lanes[5]
+        apart = np.hypot(place[2], place[0] - place[1])
+        # where the parabolas meet, along the wall and above it; midway where they do not
+        for k in range(len(out)):
+            wide, wide_2 = place[0] + one[k], place[1] + two[k]
+            near, far = place[0] ** 2 - one[k] ** 2, place[1] ** 2 - two[k] ** 2
+            middle = wide * place[2]
+            rest = wide_2 * near - wide * (place[2] ** 2 + far)
+            square = middle**2 - (wide_2 - wide) * rest
+            meeting = -rest / (middle + np.sqrt(max(square, 0.0)))
+            along[k] = meeting if square >= 0.0 else 0.5 * place[2]
+            above[k] = 0.5 * (along[k] ** 2 + near) / wide
+            out[k] = 0.0
+        for i in range(2):
+            height, other = place[i], place[1 - i]
+            disc, next_disc = (one, two) if i == 0 else (two, one)
+            edge = np.arctan2(place[2], height - other)
+            upright = (height - other) / apart
+            for k in range(len(out)):
+                x = along[k] if i == 0 else place[2] - along[k]
+                split[k] = min(max(angle_of(x, height - above[k]), 0.0), edge)
+                first[k], last[k] = 0.0, edge
+            for part in range(2):
+                low, high = (first, split) if part == 0 else (split, last)
+                _set_shares(height, place[2], apart, upright, disc, next_disc, low, high, share)
+                for k in range(len(out)):
+                    if part == 0:
+                        turn, closest = split[k], 2.0 * disc[k] / (height + disc[k])
+                    else:
+                        gap = max(apart - next_disc[k] + disc[k], disc[k])
+                        turn, closest = edge - split[k], min(2.0 * disc[k] / gap, 1.0)
+                    out[k] += share[k] * shear_ratio(turn, closest, table)
+        for k in range(len(out)):
+            first[k], split[k], last[k] = 0.0, min(max(along[k], 0.0), place[2]), place[2]
+        for part in range(2):
+            low, high = (first, split) if part == 0 else (split, last)
+            _add_film(place, one, two, low, high, out)
 
 
-@loops_in_place
-def _set_meeting(place: Array, discs: tuple[Array, Array], lanes: Array) -> None:
-    """Sets where the two parabolas meet: m along the wall from the first foot, and m above it.
-
-    That is the centre of the circle that touches both discs and the wall. Where the parabolas do
-    not meet, it is the place midway along the wall. The two numbers are the first two rows of
-    `lanes` (`LANES`, K).
-    """
-    along, above = lanes[0], lanes[1]
-    first, second = discs
-    for k in range(len(along)):
-        one, two = place[0] + first[k], place[1] + second[k]
-        near, far = place[0] ** 2 - first[k] ** 2, place[1] ** 2 - second[k] ** 2
-        middle = one * place[2]
-        rest = two * near - one * (place[2] ** 2 + far)
-        square = middle**2 - (two - one) * rest
-        meeting = -rest / (middle + np.sqrt(max(square, 0.0)))
-        along[k] = meeting if square >= 0.0 else 0.5 * place[2]
-        above[k] = 0.5 * (along[k] ** 2 + near) / one
-
-
-@loops_in_place
+@loops_inside
 def _set_shares(
-    across: tuple[float, float, float, float],
-    discs: tuple[Array, Array],
-    turns: tuple[Array, Array],
+    height: float,
+    far: float,
+    apart: float,
+    upright: float,
+    disc: Array,
+    other: Array,
+    low: Array,
+    high: Array,
     share: Array,
 ) -> None:
-    """Sets the flux (K,) m4 on the rays of a disc between two angles from the normal of the wall.
+    """Sets the flux (n,) m4 on the rays of a disc between two angles from the normal of the wall.
 
-    A ray ends at the nearest line midway, or at the far side of the trapezoid. `discs` (K,) m are
-    the radii, `turns` (K,) rad the angles. `across` is the height m of the disc, its distance m
-    from the other along the wall and in all, and the sine of the slope from the other up to it.
+    A ray ends at the nearest line midway, or at the far side of the trapezoid.
+
+    Args:
+        height: m, of the disc above the wall.
+        far: m to the other disc, along the wall.
+        apart: m to the other disc.
+        upright: sine of the slope from the other up to it.
+        disc: (n,) m, its radii.
+        other: (n,) m, those of the other.
+        low: (n,) rad, the lower angle.
+        high: (n,) rad, the upper one.
+        share: the flux.
     """
-    height, far, apart, upright = across
-    disc, other = discs
-    low, high = turns
     along = far / apart
     for k in range(len(share)):
         share[k] = 0.0
@@ -701,23 +748,19 @@ def _set_shares(
             share[k] += weight * width * flux_on_ray(reach, disc[k])
 
 
-@loops_in_place
-def _add_film(
-    place: Array, discs: tuple[Array, Array], ends: tuple[Array, Array], flux: Array
-) -> None:
-    """Adds the share of the wall, m4, between two distances (K,) m from the first foot."""
-    first, second = discs
-    low, high = ends
+@loops_inside
+def _add_film(place: Array, one: Array, two: Array, low: Array, high: Array, flux: Array) -> None:
+    """Adds the share of the wall, m4, between two distances (n,) m from the first foot."""
     for p in range(len(FINE_POINTS)):
         part, weight = 0.5 * (1.0 + FINE_POINTS[p]), 0.5 * FINE_WEIGHTS[p]
         for k in range(len(flux)):
             width = high[k] - low[k]
             x = low[k] + part * width
-            one = (x**2 + place[0] ** 2 - first[k] ** 2) / (2.0 * (place[0] + first[k]))
+            below = (x**2 + place[0] ** 2 - one[k] ** 2) / (2.0 * (place[0] + one[k]))
             rest = place[2] - x
-            two = (rest**2 + place[1] ** 2 - second[k] ** 2) / (2.0 * (place[1] + second[k]))
+            beyond = (rest**2 + place[1] ** 2 - two[k] ** 2) / (2.0 * (place[1] + two[k]))
             edge = place[0] + (place[1] - place[0]) * x / place[2]
-            flux[k] += weight * width * max(min(one, two, edge), 0.0) ** 3 / 3.0
+            flux[k] += weight * width * max(min(below, beyond, edge), 0.0) ** 3 / 3.0
 
 
 # ------------------------------------------------------------------------------------------------
@@ -728,67 +771,54 @@ def _add_film(
 # images, and a quarter of that lies inside the box: the rectangle between the centre of the disc,
 # of radius rho, its feet on the walls, H_1 and H_2 away, and the edge of the box.
 #
-# Disc and walls share the fluid as in `wall_cross_section`. The line midway between the rim and a
+# Disc and walls share the fluid as at one wall. The line midway between the rim and a
 # wall is a parabola, that between the two walls halves their angle, and all three lines meet at
 # the distance d from both walls,
 #
 #     d = b - sqrt(b^2 - H_1^2 - H_2^2 + rho^2),  b = H_1 + H_2 + rho.
 #
-# The film on a wall has the flux y^3 / 3 per length for the thickness y up to the nearest line.
 # There is no constant. Against finite differences the flux is within 5 % for H_2 / H_1 from 1 to 2
 # and rho / H_1 from 0.2 to 1.
 
 
 @loops_in_place
-def edge_fluxes(place: Array, disc: Array, room: tuple[Array, Array], flux: Array) -> None:
-    """Writes the flux (K,) m4 of laplacian(w) = -1 between two walls and a disc in K sections.
+def edge_fluxes(
+    rows: Array, sections: Sections, cuts: WallCuts, table: Array, lanes: Array, flux: Array
+) -> None:
+    """Writes the `flux` (S, n) m4 of the sides `rows` between two walls and a disc.
 
-    `place` (2,) m are the heights of its centre above the walls, `disc` (K,) m its radii. `room`
-    is as in `wall_fluxes`.
+    The arguments are those of `wall_fluxes`.
     """
-    lanes, table = room
-    near, turn, share = lanes[0], lanes[1], lanes[2]
-    for k in range(len(flux)):
-        b = place[0] + place[1] + disc[k]
-        rest = place[0] ** 2 + place[1] ** 2 - disc[k] ** 2
-        near[k] = b - np.sqrt(max(b * b - rest, 0.0))
-        flux[k] = 0.0
-    for i in range(2):
-        height, along = place[i], place[1 - i]
-        for k in range(len(flux)):
-            turn[k] = angle_of(max(along - near[k], 0.0), height - near[k])
-        _set_rays((height, along), disc, turn, share)
-        for k in range(len(flux)):
-            ratio = shear_ratio(turn[k], min(2.0 * disc[k] / (height + disc[k]), 1.0), table)
-            flux[k] += share[k] * ratio
-        _add_edge_film((height, along), disc, flux)
-
-
-@loops_in_place
-def _set_rays(place: tuple[float, float], disc: Array, turn: Array, share: Array) -> None:
-    """Sets the flux (K,) m4 on the rays of the disc up to `turn` (K,) rad from the normal.
-
-    `place` are the height m of the disc above the wall, and its distance m from the other wall.
-    """
-    height, along = place
-    for k in range(len(share)):
-        share[k] = 0.0
-    for p in range(len(FINE_POINTS)):
-        part, weight = 0.5 * (1.0 + FINE_POINTS[p]), 0.5 * FINE_WEIGHTS[p]
-        for k in range(len(share)):
-            angle = part * turn[k] - QUARTER
-            cosine, sine = -sine_of(angle), cosine_of(angle)
-            reach = min((height + disc[k]) / (1.0 + cosine), along / max(sine, TOLERANCE))
-            share[k] += weight * turn[k] * flux_on_ray(reach, disc[k])
-
-
-@loops_in_place
-def _add_edge_film(place: tuple[float, float], disc: Array, flux: Array) -> None:
-    """Adds the share of one wall, m4, from the foot of the disc to the edge of the box."""
-    height, along = place
-    for p in range(len(FINE_POINTS)):
-        x, weight = 0.5 * along * (1.0 + FINE_POINTS[p]), 0.5 * along * FINE_WEIGHTS[p]
-        for k in range(len(flux)):
-            midway = (x * x + height * height - disc[k] * disc[k]) / (2.0 * (height + disc[k]))
-            film = max(min(midway, along - x, height), 0.0)
-            flux[k] += weight * film**3 / 3.0
+    for s in rows:
+        t = sections.throat[s]
+        disc, place, out = sections.disc[s, cuts.order[t, 0]], cuts.place[t], flux[s]
+        near, turn, share = lanes[0], lanes[1], lanes[2]
+        for k in range(len(out)):
+            b = place[0] + place[1] + disc[k]
+            rest = place[0] ** 2 + place[1] ** 2 - disc[k] ** 2
+            near[k] = b - np.sqrt(max(b * b - rest, 0.0))
+            out[k] = 0.0
+        for i in range(2):
+            height, along = place[i], place[1 - i]
+            for k in range(len(out)):
+                turn[k] = angle_of(max(along - near[k], 0.0), height - near[k])
+                share[k] = 0.0
+            # on the rays of the disc up to `turn` from the normal of the wall
+            for p in range(len(FINE_POINTS)):
+                part, weight = 0.5 * (1.0 + FINE_POINTS[p]), 0.5 * FINE_WEIGHTS[p]
+                for k in range(len(out)):
+                    angle = part * turn[k] - QUARTER
+                    cosine, sine = -sine_of(angle), cosine_of(angle)
+                    reach = min((height + disc[k]) / (1.0 + cosine), along / max(sine, TOLERANCE))
+                    share[k] += weight * turn[k] * flux_on_ray(reach, disc[k])
+            for k in range(len(out)):
+                closest = min(2.0 * disc[k] / (height + disc[k]), 1.0)
+                out[k] += share[k] * shear_ratio(turn[k], closest, table)
+            # in the film on the wall, from the foot of the disc to the edge of the box
+            for p in range(len(FINE_POINTS)):
+                x = 0.5 * along * (1.0 + FINE_POINTS[p])
+                weight = 0.5 * along * FINE_WEIGHTS[p]
+                for k in range(len(out)):
+                    line = x * x + height * height - disc[k] * disc[k]
+                    film = min(line / (2.0 * (height + disc[k])), along - x, height)
+                    out[k] += weight * max(film, 0.0) ** 3 / 3.0

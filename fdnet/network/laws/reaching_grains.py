@@ -1,33 +1,31 @@
-"""Grains that reach into the sections of a throat besides its own three.
+"""Grains that reach into the sections of a throat besides its own three."""
 
-The directions in which places are measured from a facet.
-"""
-
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from fdnet.network import geometry
-from fdnet.network.compiled import compiled, compiled_for_loops, loops_in_place
+from fdnet.network.compiled import loops_in_place, loops_inside
 from fdnet.network.laws.cross_section import (
     RAYS,
     SWALLOWED,
     UNTOUCHED,
-    CornerRoom,
+    CornerRays,
+    Sections,
     aim,
+    aim_at_fourth,
+    aim_corners,
     corner_flux,
-    corner_reaches,
+    corner_rays,
+    depth_within,
+    end_midway,
     flux_on_rays,
-    fourth_reaches,
-    inwards,
-    narrow,
     set_sides,
 )
 from fdnet.network.network import Network
-from fdnet.network.tessellation.delaunay import along as inner
-from fdnet.network.tessellation.delaunay import less, times
-from fdnet.spheres.snapshot import Array, one_line
+from fdnet.network.tessellation.delaunay import along, less, times
+from fdnet.spheres.snapshot import Array
 
 
 def facet_axes(network: Network, throats: Array, facet: Array) -> tuple[Array, Array, Array]:
@@ -74,198 +72,385 @@ def _apex(network: Network, throats: Array, origin: Array, normal: Array, side: 
 # the facet holds the fluid on that side, but the spheres around it do. Without them the throats of
 # a light deposit of fine fines carry 2 to 16 times too much.
 #
-# The flow through such a section is multiplied by the share that the spheres around leave of it.
-# Both fluxes are summed over rays (`section_rays`). Adding a solid never adds flow, so the share
-# is at most 1.
+# The flow through such a section is multiplied by the share that the spheres around leave of it,
+# both summed over rays. Adding a solid never adds flow, so the share is at most 1.
+
+
+class SpheresBeside(NamedTuple):
+    """Spheres near K throats, as seen from their facets."""
+
+    first: Array
+    """(K+1,) the first sphere of each throat, and their number N at the end."""
+    place: Array
+    """(N, 5): m along the first edge of the facet, across it towards the third corner, and above
+    it towards the second pore, from the first corner to the centre; the radius m, and the flatness
+    (1 of a sphere)."""
+
+
+def sphere_trees(network: Network) -> list[tuple[Array, cKDTree]]:
+    """The images of a network of one size, to a factor of 2, and where they are; size by size."""
+    size = np.round(np.log2(network.image_radius / network.image_radius.min()))
+    kinds = [np.nonzero(size == one)[0] for one in np.unique(size)]
+    return [(kind, cKDTree(network.image_position[kind])) for kind in kinds]
 
 
 NEAREST = 12
-"""Spheres around a facet that are looked for among those of one size, to a factor of 2."""
+"""Spheres around a facet that are looked for among those of one size."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Around:
-    """Spheres around the facets of K throats.
+def spheres_around(
+    network: Network, part: slice, heights: Array, trees: list[tuple[Array, cKDTree]]
+) -> SpheresBeside:
+    """The spheres around the throats `part` (K) that have sections beyond a sphere's reach.
 
-    Attributes:
-        first: (K+1,) the first sphere of each throat, and their number at the end.
-        image: (N,) index of the image in the network.
-        place: (N, 3) m, along the first edge of the facet, across it towards the third corner,
-            and height above the facet towards the second pore, of its centre from the first
-            corner.
+    They are those nearer to the centroid of the facet than its farthest corner or node, which are
+    `heights` (K, 2) m above it. The spheres of the facet are not among them. `trees` are those of
+    `sphere_trees`.
     """
-
-    first: Array
-    image: Array
-    place: Array
-
-    __repr__ = one_line
-
-
-class Neighbourhood:
-    """The images of a network, sorted by size and place."""
-
-    def __init__(self, network: Network) -> None:
-        self.network = network
-        size = np.round(np.log2(network.image_radius / network.image_radius.min()))
-        self._kinds = [np.nonzero(size == one)[0] for one in np.unique(size)]
-        self._trees = [cKDTree(network.image_position[kind]) for kind in self._kinds]
-
-    def near_facets(self, part: slice, heights: Array) -> Around:
-        """The spheres around the throats `part` (K) that have sections beyond a sphere's reach.
-
-        They are those nearer to the centroid of the facet than its farthest corner or node, which
-        are `heights` (K, 2) m above it. The spheres of the facet are not among them.
-        """
-        network = self.network
-        images = network.throat_images[part]
-        low = np.minimum(network.image_radius, network.image_height)[images].min(axis=1)
-        open_row = np.nonzero(low < np.abs(heights).max(axis=1))[0]
-        facet = network.image_position[images[open_row]]
-        middle = facet.mean(axis=1)
-        corner = np.linalg.norm(facet - middle[:, None], axis=2).max(axis=1)
-        reach = np.maximum(corner, np.abs(heights[open_row]).max(axis=1))
-        row, image = self._nearest(middle, reach)
-        own = np.any(image[:, None] == images[open_row][row], axis=1)
-        order = np.argsort(row[~own], kind="stable")
-        row, image = row[~own][order], image[~own][order]
-        place = _from_facet(network, part, facet, (open_row, row, image))
-        first = np.searchsorted(open_row[row], np.arange(len(images) + 1))
-        return Around(first=first, image=image, place=place)
-
-    def _nearest(self, middle: Array, reach: Array) -> tuple[Array, Array]:
-        """Pairs of a row of `middle` (K, 3) m and an image whose body is within `reach` (K,)."""
-        rows, images = [np.empty(0, int)], [np.empty(0, int)]
-        for kind, tree in zip(self._kinds, self._trees, strict=True):
-            radius = self.network.image_radius[kind]
-            if not len(middle):
-                break
-            apart, closest = tree.query(
-                middle,
-                k=list(range(1, min(NEAREST, len(kind)) + 1)),
-                distance_upper_bound=float(reach.max() + radius.max()),
-            )
-            row, column = np.nonzero(np.isfinite(apart))
-            one = closest[row, column]
-            near = apart[row, column] - radius[one] < reach[row]
-            rows.append(row[near])
-            images.append(kind[one[near]])
-        return np.concatenate(rows), np.concatenate(images)
-
-
-def _from_facet(
-    network: Network, part: slice, facet: Array, of_row: tuple[Array, Array, Array]
-) -> Array:
-    """Places (N, 3) m of images from the first corner of their `facet` (K, 3, 3) m."""
-    open_row, row, image = of_row
+    images = network.throat_images[part]
+    low = np.minimum(network.image_radius, network.image_height)[images].min(axis=1)
+    open_row = np.nonzero(low < np.abs(heights).max(axis=1))[0]
+    facet = network.image_position[images[open_row]]
+    middle = facet.mean(axis=1)
+    corner = np.linalg.norm(facet - middle[:, None], axis=2).max(axis=1)
+    reach = np.maximum(corner, np.abs(heights[open_row]).max(axis=1))
+    rows, which = [np.empty(0, int)], [np.empty(0, int)]
+    for kind, tree in trees if len(middle) else []:
+        radius = network.image_radius[kind]
+        apart, closest = tree.query(
+            middle,
+            k=list(range(1, min(NEAREST, len(kind)) + 1)),
+            distance_upper_bound=float(reach.max() + radius.max()),
+        )
+        row, column = np.nonzero(np.isfinite(apart))
+        one = closest[row, column]
+        near = apart[row, column] - radius[one] < reach[row]
+        rows.append(row[near])
+        which.append(kind[one[near]])
+    row, image = np.concatenate(rows), np.concatenate(which)
+    other = ~np.any(image[:, None] == images[open_row][row], axis=1)
+    order = np.argsort(row[other], kind="stable")
+    row, image = row[other][order], image[other][order]
     axes = facet_axes(network, part.start + open_row, facet)
     apart = network.image_position[image] - facet[row, 0]
-    return np.stack([geometry.dot(apart, one[row]) for one in axes], axis=1)
+    place = np.stack([geometry.dot(apart, one[row]) for one in axes], axis=1)
+    radius, flatness = discs_of(network, image[:, None], facet[row])
+    return SpheresBeside(
+        first=np.searchsorted(open_row[row], np.arange(len(images) + 1)),
+        place=np.concatenate([place, radius, flatness], axis=1),
+    )
 
 
-Bundles = tuple[Array, Array, Array, Array]
-"""Rays (S, 6, 36) of discs (`section_rays.aim`), their numbers (S,) or -1 before they are aimed,
-the farthest end (S,) m of each, and room for 36 numbers."""
-Seen = tuple[Array, Array]
-"""Numbers (S,) of the discs that a section meets, and x, y and radius (S, 3) m of them."""
+def discs_of(network: Network, images: Array, corner: Array) -> tuple[Array, Array]:
+    """Radius (K, n) m of the discs of `images` (K, n) in the plane of a facet, and flatness.
+
+    The radius at the height z above the facet is sqrt(radius^2 - flatness z^2); a sphere has the
+    flatness 1. An ellipsoid of semi-axes h along x and a across reaches H above a plane whose
+    normal makes the angle t with x, H^2 = (h cos t)^2 + (a sin t)^2, and shows ellipses of the
+    area of a disc of radius sqrt(a^2 h / H (1 - z^2 / H^2)). `corner` (K, 3, 3) m is the facet.
+    """
+    radius, height = network.image_radius[images], network.image_height[images]
+    flatness = np.ones(radius.shape)
+    row, which = np.nonzero(height < radius)
+    if len(row):
+        normal = geometry.cross(corner[row, 1] - corner[row, 0], corner[row, 2] - corner[row, 0])
+        cosine = normal[:, 0] ** 2 / geometry.dot(normal, normal)
+        h, volume = height[row, which], radius[row, which] ** 3
+        reach = np.sqrt(cosine * h**2 + (1.0 - cosine) * volume / h)
+        radius[row, which] = np.sqrt(volume / reach)
+        flatness[row, which] = volume / reach**3
+    return radius, flatness
 
 
-@compiled
-def bundles(most: int) -> tuple[Bundles, Seen]:
-    """Room for the rays of `most` discs."""
-    rays = np.empty((most, 6, 3 * RAYS)), np.full(most, -1), np.empty(most), np.empty(3 * RAYS)
-    return rays, (np.empty(most, np.int64), np.empty((most, 3)))
+class RayRoom(NamedTuple):
+    """Room for the rays of the discs that the sections of a throat meet, D at most."""
+
+    side: Array
+    """(3, 3) of `set_sides`."""
+    rays: Array
+    """(D, 6, 36) of `aim`."""
+    number: Array
+    """(D,) of rays of each disc; -1 before they are aimed."""
+    longest: Array
+    """(D,) m, the farthest end of the rays of each disc."""
+    which: Array
+    """(D,) the discs that a section meets."""
+    disc: Array
+    """(D, 3) m, their centres x and y, and radii."""
+    part: Array
+    """(36,) for `flux_on_rays`."""
+    corners: CornerRays
 
 
-@loops_in_place
-def meet(disc: Array, base: Array, z: float, around: Array, seen: Seen) -> int:
+def ray_room(most: int) -> RayRoom:
+    """Room for the three grains of a throat and `most` spheres near it."""
+    return RayRoom(
+        side=np.empty((3, 3)),
+        rays=np.empty((most + 3, 6, 3 * RAYS)),
+        number=np.full(most + 3, -1),
+        longest=np.empty(most + 3),
+        which=np.empty(most + 3, np.int64),
+        disc=np.empty((most + 3, 3)),
+        part=np.empty(3 * RAYS),
+        corners=corner_rays(),
+    )
+
+
+@loops_inside
+def meet(disc: Array, base: Array, z: float, around: Array, room: RayRoom) -> int:
     """Sets the discs that the section at the height `z` m meets, and gives their number.
 
     They are those of radius `disc` (3,) m on the corners `base` (3, 2) m, and those of the spheres
-    `around` (N, 5): place (3) m, radius m and flatness (`lubrication`), heights as `z`.
+    `around` (N, 5) of `SpheresBeside`.
     """
-    which, place = seen
     for i in range(3):
-        which[i] = i
-        place[i] = base[i, 0], base[i, 1], disc[i]
+        room.which[i] = i
+        room.disc[i, 0], room.disc[i, 1], room.disc[i, 2] = base[i, 0], base[i, 1], disc[i]
     count = 3
     for i in range(len(around)):
         square = around[i, 3] ** 2 - around[i, 4] * (around[i, 2] - z) ** 2
         if square > 0.0:
-            which[count] = 3 + i
-            place[count] = around[i, 0], around[i, 1], np.sqrt(square)
+            own = room.disc[count]
+            room.which[count] = 3 + i
+            own[0], own[1], own[2] = around[i, 0], around[i, 1], np.sqrt(square)
             count += 1
     return count
 
 
-@loops_in_place
-def share_around(
-    base: Array, side: Array, discs: tuple[int, Seen], bundle: Bundles, table: Array
-) -> float:
+@loops_inside
+def share_around(base: Array, count: int, room: RayRoom, table: Array) -> float:
     """Share of the flux through a section that the spheres around its facet leave, 0 to 1.
 
-    Args:
-        base: (3, 2) m, corners of the facet.
-        side: what `section_rays.set_sides` sets for it.
-        discs: how many discs the section meets, and which (`meet`).
-        bundle: the rays of all discs of the facet, or room for them.
-        table: the table of `shear_ratio`.
+    `base` (3, 2) m are the corners of the facet, whose sides are set, and `count` is how many
+    discs the section meets (`meet`). Of each disc two fluxes on its rays are summed: between the
+    discs on the corners alone, for the first three, and among all.
     """
-    count, seen = discs
     if count == 3:
         return 1.0
     clear, left = 0.0, 0.0
     for number in range(count):
-        own, one = _flux_of_disc(base, side, (number, count, seen), bundle, table)
+        x, y, radius = room.disc[number, 0], room.disc[number, 1], room.disc[number, 2]
+        slot = room.which[number]
+        rays = room.rays[slot]
+        if room.number[slot] < 0:
+            room.number[slot] = aim(base, room.side, x, y, rays)
+            room.longest[slot] = 0.0
+            for p in range(room.number[slot]):
+                room.longest[slot] = max(room.longest[slot], rays[2, p])
+        many, longest, end, reach = room.number[slot], room.longest[slot], rays[2], rays[5]
+        for p in range(many):
+            reach[p] = end[p]
+        own, done = 0.0, UNTOUCHED
+        for k in range(count):
+            if k == 3 and number < 3 and done != SWALLOWED:
+                own = flux_on_rays(rays, many, radius, room.part, table)
+                done = UNTOUCHED
+            qx, qy, other = room.disc[k, 0], room.disc[k, 1], room.disc[k, 2]
+            apart = np.sqrt((qx - x) ** 2 + (qy - y) ** 2)
+            # the nearest point midway is on the line between the centres
+            if k == number or done == SWALLOWED or apart - other + radius >= 2.0 * longest:
+                continue
+            done = max(done, end_midway(rays, many, x, y, radius, qx, qy, other))
         clear += own
-        left += one
+        if done == UNTOUCHED and number < 3:
+            left += own
+        elif done != SWALLOWED:
+            left += flux_on_rays(rays, many, radius, room.part, table)
     return min(left / clear, 1.0) if clear > 0.0 else 1.0
 
 
-@loops_in_place
-def _flux_of_disc(
-    base: Array, side: Array, discs: tuple[int, int, Seen], bundle: Bundles, table: Array
-) -> tuple[float, float]:
-    """Fluxes m4 on the rays of one disc: between the discs on the corners alone, and among all.
+# ------------------------------------------------------------------------------------------------
+# How much of the flow through a section a fourth grain leaves that reaches into it.
+#
+# The section of a throat has three grains on its corners. It may also be entered by the fourth
+# grain of the tetrahedron on that side: by a large grain behind a small one, or by the mirror
+# image of a grain near a face. Among equal grains this does not happen.
+#
+# Each disc keeps what its rays see before a line midway to another rim or the far side of the
+# triangle. The rays of the fourth disc run from where they enter the triangle to where they leave
+# it or meet a line midway. Adding a solid never adds flow, so the share is at most 1.
 
-    The first is 0 for a disc that is not on a corner.
+
+def fourth_grains(network: Network, part: slice, corner: Array) -> Array:
+    """The fourth grains (K, 2, 5) of the tetrahedra on both sides of the throats `part` (K).
+
+    They are given as in `SpheresBeside`, but their heights above the facet on their own side.
+    `corner` (K, 3, 3) m is the facet. The fourth corner of a tetrahedron is the one farthest from
+    the nearest corner of the facet.
     """
-    number, count, (which, place) = discs
-    disc = (place[number, 0], place[number, 1], place[number, 2])
-    slot = which[number]
-    rays, room = bundle[0][slot], (bundle[3], table)
-    many = _aimed(base, side, (slot, disc[0], disc[1]), bundle)
-    longest, end, reach = bundle[2][slot], rays[2], rays[5]
-    for p in range(many):
-        reach[p] = end[p]
-    clear, done = 0.0, UNTOUCHED
-    for k in range(count):
-        if k == 3 and number < 3:
-            clear = flux_on_rays(rays, many, disc[2], room) if done != SWALLOWED else 0.0
-            done = UNTOUCHED if done != SWALLOWED else SWALLOWED
-        apart = np.sqrt((place[k, 0] - disc[0]) ** 2 + (place[k, 1] - disc[1]) ** 2)
-        # the nearest point midway is on the line between the centres
-        if k == number or done == SWALLOWED or apart - place[k, 2] + disc[2] >= 2.0 * longest:
-            continue
-        done = max(done, narrow(rays, many, disc, (place[k, 0], place[k, 1], place[k, 2])))
-    if done == SWALLOWED:
-        return clear, 0.0
-    if done == UNTOUCHED and number < 3:
-        return clear, clear
-    return clear, flux_on_rays(rays, many, disc[2], room)
+    pores = network.throat_pores[part]
+    image, place = np.empty(pores.shape, int), np.empty((*pores.shape, 3))
+    _find_fourth(
+        network.image_position,
+        np.ptp(network.box, axis=1),
+        network.throat_images[part],
+        pores,
+        network.throat_shift[part],
+        network.pore_images,
+        network.pore_wrap,
+        np.empty((5, 3)),
+        image,
+        place,
+    )
+    radius, flatness = discs_of(network, image, corner)
+    return np.concatenate([place, radius[..., None], flatness[..., None]], axis=2)
 
 
 @loops_in_place
-def _aimed(base: Array, side: Array, disc: tuple[int, float, float], bundle: Bundles) -> int:
-    """The number of rays of a disc, which are aimed when they are first asked for."""
-    rays, number, longest, _ = bundle
-    i, x, y = disc
-    if number[i] < 0:
-        number[i] = aim(base, side, x, y, rays[i])
-        longest[i] = 0.0
-        for p in range(number[i]):
-            longest[i] = max(longest[i], rays[i, 2, p])
-    return number[i]
+def _find_fourth(
+    position: Array,
+    size: Array,
+    facets: Array,
+    pores: Array,
+    shift: Array,
+    vertex: Array,
+    wrap: Array,
+    point: Array,
+    image: Array,
+    place: Array,
+) -> None:
+    """Sets the images (K, 2) and places (K, 2, 3) m; the others are parts of the network.
+
+    `point` (5, 3) m is room for the corners of the facet, a fourth one, and the farthest.
+    """
+    for t in range(len(facets)):
+        for k in range(3):
+            for axis in range(3):
+                turn = wrap[pores[t, 0], axis] * size[axis]
+                point[k, axis] = position[facets[t, k], axis] - turn
+        for side in range(2):
+            pore, farthest = pores[t, side], -1.0
+            for corner in range(4):
+                for axis in range(3):
+                    turn = shift[t, axis] * side - wrap[pore, axis]
+                    point[3, axis] = position[vertex[pore, corner], axis] + turn * size[axis]
+                nearest = np.inf
+                for k in range(3):
+                    square = 0.0
+                    for axis in range(3):
+                        square += (point[3, axis] - point[k, axis]) ** 2
+                    nearest = min(nearest, square)
+                if nearest > farthest:
+                    farthest, image[t, side] = nearest, vertex[pore, corner]
+                    for axis in range(3):
+                        point[4, axis] = point[3, axis]
+            edge, up, away = less(point, 1, 0), less(point, 2, 0), less(point, 4, 0)
+            long, normal = np.sqrt(along(edge, edge)), times(edge, up)
+            across, wide = times(normal, edge), np.sqrt(along(normal, normal))
+            place[t, side, 0] = along(away, edge) / long
+            place[t, side, 1] = along(away, across) / (wide * long)
+            place[t, side, 2] = abs(along(away, normal)) / wide
+
+
+@loops_inside
+def share_left(
+    base: Array,
+    disc: Array,
+    x: float,
+    y: float,
+    fourth: float,
+    rays: Array,
+    count: int,
+    part: Array,
+    corners: CornerRays,
+    table: Array,
+) -> float:
+    """Share of the flux through a triangle with discs that a fourth disc leaves, 0 to 1.
+
+    Args:
+        base: (3, 2) m, the corners.
+        disc: (3,) m, the radii of the discs on the corners.
+        x: m, of the centre of the fourth disc.
+        y: m, of the same.
+        fourth: m, its radius.
+        rays: the rays (6, 36) of the fourth disc (`aim`).
+        count: their number.
+        part: (36,) for `flux_on_rays`.
+        corners: the rays of the corners, aimed at the fourth disc (`aim_at_fourth`).
+        table: the table of `shear_ratio`.
+    """
+    clear = corner_flux(corners, disc, -1.0, table)
+    if not clear > 0.0:
+        return 1.0
+    left = corner_flux(corners, disc, fourth, table)
+    end, reach = rays[2], rays[5]
+    for p in range(count):
+        reach[p] = end[p]
+    done = UNTOUCHED
+    for i in range(3):
+        if done != SWALLOWED:
+            done = end_midway(rays, count, x, y, fourth, base[i, 0], base[i, 1], disc[i])
+    if done != SWALLOWED:
+        left += flux_on_rays(rays, count, fourth, part, table)
+    return min(left / clear, 1.0)
+
+
+@loops_in_place
+def narrow_fluxes(
+    sections: Sections,
+    base: Array,
+    square: Array,
+    flatness: Array,
+    fourth: Array,
+    around: SpheresBeside,
+    table: Array,
+    room: RayRoom,
+    own: Array,
+    flux: Array,
+) -> None:
+    """Multiplies the `flux` (S, n) by the shares that a fourth grain and the spheres around leave.
+
+    Args:
+        sections: of the sides.
+        base: (K, 3, 2) m, corners of the facets.
+        square: (K, 3) m2, of the radii of the discs in them.
+        flatness: (K, 3) of these.
+        fourth: (K, 2, 5) of `fourth_grains`.
+        around: of `spheres_around`.
+        table: the table of `shear_ratio`.
+        room: for so many spheres around a throat as there are at most.
+        own: (6, 36), room for the rays of a fourth disc.
+        flux: of the sections among the grains on the corners.
+    """
+    before = -1
+    for s in range(len(flux)):
+        t, side = sections.throat[s], sections.side[s]
+        corner, grain, sense = base[t], fourth[t, side], 2.0 * side - 1.0
+        spheres = around.place[around.first[t] : around.first[t + 1]]
+        set_sides(corner, room.side)
+        if t != before:
+            before = t
+            for i in range(len(spheres) + 3):
+                room.number[i] = -1
+        number, depth = -1, depth_within(corner, room.side, grain[0], grain[1])
+        for k in range(flux.shape[1]):
+            z, share = sections.low[s] + k * sections.step[s], 1.0
+            disc = sections.disc[s, :, k]
+            area = grain[3] ** 2 - grain[4] * (grain[2] - z) ** 2
+            if area > 0.0 and depth > -np.sqrt(area) and flux[s, k] > 0.0:
+                if number < 0:
+                    aim_corners(corner, room.corners)
+                    aim_at_fourth(corner, grain[0], grain[1], room.corners)
+                    number = aim(corner, room.side, grain[0], grain[1], own)
+                share = share_left(
+                    corner,
+                    disc,
+                    grain[0],
+                    grain[1],
+                    np.sqrt(area),
+                    own,
+                    number,
+                    room.part,
+                    room.corners,
+                    table,
+                )
+            beyond = False
+            for i in range(3):
+                beyond = beyond or square[t, i] - flatness[t, i] * z * z <= 0.0
+            if beyond and len(spheres) and flux[s, k] > 0.0:
+                count = meet(disc, corner, sense * z, spheres, room)
+                share = min(share, share_around(corner, count, room, table))
+            flux[s, k] *= share
 
 
 # ------------------------------------------------------------------------------------------------
@@ -278,23 +463,12 @@ def _aimed(base: Array, side: Array, disc: tuple[int, float, float], bundle: Bun
 #
 #     M_cut / M_corner,
 #
-# both summed over rays (`section_rays`), M_cut with the discs of the grains themselves and
-# M_corner with those on the corners. Only what lies in the triangle counts, as a ray begins where
-# it enters.
+# both summed over rays, M_cut with the discs of the grains themselves and M_corner with those on
+# the corners. Only what lies in the triangle counts, as a ray begins where it enters.
 
 
 LEAST = 1e-2
 """Smallest radius of the disc of a cut grain in a section, in radii of the grain."""
-
-CutRoom = tuple[Array, Array, Array]
-"""Room for the sides (3, 3) of a facet (`set_sides`), the rays (6, 36) of a disc, and for twice
-three discs (2, 3, 3). Whoever uses it sets it first: its numbers do not last from call to call."""
-
-
-@compiled
-def cut_room() -> CutRoom:
-    """Room for the discs of cut grains, for a fourth disc, or for discs of fines."""
-    return np.empty((3, 3)), np.empty((6, 3 * RAYS)), np.empty((2, 3, 3))
 
 
 def cut_corners(network: Network, part: slice, facet: Array) -> Array:
@@ -325,8 +499,38 @@ def own_radius(network: Network, images: Array) -> Array:
 
 
 @loops_in_place
+def cut_fluxes(
+    rows: Array,
+    sections: Sections,
+    base: Array,
+    cut: Array,
+    table: Array,
+    room: RayRoom,
+    discs: Array,
+    flux: Array,
+) -> None:
+    """Multiplies the `flux` (S, n) of the sides `rows` by M_cut / M_corner.
+
+    `cut` (K, 3, 4) m is of `cut_corners`, `discs` (2, 3, 3) is written to; the others are as in
+    `even_fluxes`.
+    """
+    for s in rows:
+        t = sections.throat[s]
+        for k in range(flux.shape[1]):
+            z = (2.0 * sections.side[s] - 1.0) * (sections.low[s] + k * sections.step[s])
+            disc = sections.disc[s, :, k]
+            flux[s, k] *= share_of_cut(base[t], disc, z, cut[t], discs, room, table)
+
+
+@loops_inside
 def share_of_cut(
-    base: Array, disc: Array, z: float, cut: Array, room: tuple[CutRoom, Array, Array]
+    base: Array,
+    disc: Array,
+    z: float,
+    cut: Array,
+    discs: Array,
+    room: RayRoom,
+    table: Array,
 ) -> float:
     """Flux at the height `z` m with the discs of cut grains, over that with discs on the corners.
 
@@ -335,172 +539,38 @@ def share_of_cut(
         disc: (3,) m, radii of the discs on them at this height.
         z: m above the facet, towards the second pore.
         cut: (3, 4) m of `cut_corners`.
-        room: `CutRoom` and 36 numbers, which are written to, and the table of `shear_ratio`.
+        discs: (2, 3, 3), room for twice three discs.
+        room: for the rays of a disc.
+        table: the table of `shear_ratio`.
     """
-    (side, _, places), _, _ = room
-    own, moved = places[0], places[1]
-    set_sides(base, side)
+    own, moved = discs[0], discs[1]
+    set_sides(base, room.side)
     for i in range(3):
-        moved[i] = base[i, 0], base[i, 1], disc[i]
-        own[i] = base[i, 0], base[i, 1], disc[i]
+        x, y, radius = base[i, 0], base[i, 1], disc[i]
+        moved[i, 0], moved[i, 1], moved[i, 2] = x, y, radius
         if cut[i, 3] > 0.0:
             square = cut[i, 3] ** 2 - (z - cut[i, 2]) ** 2
-            least = LEAST * cut[i, 3]
-            if square > least * least:
-                own[i] = base[i, 0] + cut[i, 0], base[i, 1] + cut[i, 1], np.sqrt(square)
-            else:
-                own[i, 2] = least
-    corner = _flux_between(base, moved, room)
-    return _flux_between(base, own, room) / corner if corner > 0.0 else 1.0
+            radius = LEAST * cut[i, 3]
+            if square > radius * radius:
+                x, y, radius = x + cut[i, 0], y + cut[i, 1], np.sqrt(square)
+        own[i, 0], own[i, 1], own[i, 2] = x, y, radius
+    corner = _flux_between(base, moved, room, table)
+    return _flux_between(base, own, room, table) / corner if corner > 0.0 else 1.0
 
 
-@loops_in_place
-def _flux_between(base: Array, discs: Array, room: tuple[CutRoom, Array, Array]) -> float:
+@loops_inside
+def _flux_between(base: Array, discs: Array, room: RayRoom, table: Array) -> float:
     """Flux m4 on the rays of three discs (3, 3), x, y and radius m, within the triangle."""
-    (side, rays, _), part, table = room
-    total = 0.0
+    rays, total = room.rays[0], 0.0
     for i in range(3):
-        disc = (discs[i, 0], discs[i, 1], discs[i, 2])
-        count, done = aim(base, side, disc[0], disc[1], rays), UNTOUCHED
+        x, y, radius = discs[i, 0], discs[i, 1], discs[i, 2]
+        count, done = aim(base, room.side, x, y, rays), UNTOUCHED
         for p in range(count):
             rays[5, p] = rays[2, p]
         for j in range(3):
-            other = (discs[j, 0], discs[j, 1], discs[j, 2])
             if j != i and done != SWALLOWED:
-                done = max(done, narrow(rays, count, disc, other))
+                qx, qy, other = discs[j, 0], discs[j, 1], discs[j, 2]
+                done = max(done, end_midway(rays, count, x, y, radius, qx, qy, other))
         if done != SWALLOWED and count > 0:
-            total += flux_on_rays(rays, count, disc[2], (part, table))
+            total += flux_on_rays(rays, count, radius, room.part, table)
     return total
-
-
-# ------------------------------------------------------------------------------------------------
-# How much of the flow through a section a fourth grain leaves that reaches into it.
-#
-# The section of a throat has three grains on its corners. It may also be entered by the fourth
-# grain of the tetrahedron on that side: by a large grain behind a small one, or by the mirror
-# image of a grain near a face. Among equal grains this does not happen.
-#
-# The section is shared as in `cross_section`: each disc keeps what its rays see before a line
-# midway to another rim or the far side of the triangle. The rays of the fourth disc run from where
-# they enter the triangle to where they leave it or meet a line midway. Adding a solid never adds
-# flow, so the share is at most 1.
-
-
-def fourth_grains(network: Network, part: slice) -> tuple[Array, Array]:
-    """The fourth grain of the tetrahedra on both sides of the throats `part` (K).
-
-    Returns:
-        image: (K, 2) index of its image in the network.
-        place: (K, 2, 3) m, along the first edge of the facet, across it towards the third corner,
-            and its height above the facet, of the centre of that image from the first corner.
-    """
-    pores = network.throat_pores[part]
-    image, place = np.empty(pores.shape, int), np.empty((*pores.shape, 3))
-    _find_fourth(
-        (network.image_position, np.ptp(network.box, axis=1)),
-        (network.throat_images[part], pores, network.throat_shift[part]),
-        (network.pore_images, network.pore_wrap),
-        (image, place),
-    )
-    return image, place
-
-
-@compiled_for_loops
-def _find_fourth(
-    points: tuple[Array, Array],
-    throats: tuple[Array, Array, Array],
-    tetrahedra: tuple[Array, Array],
-    out: tuple[Array, Array],
-) -> None:
-    """Sets the images and places of `fourth_grains`; the arguments are parts of the network.
-
-    The fourth corner of a tetrahedron is the one farthest from the nearest corner of the facet.
-    """
-    position, size = points
-    facets, pores, shift = throats
-    vertex, wrap = tetrahedra
-    image, place = out
-    facet, apex, best = np.empty((3, 3)), np.empty(3), np.empty(3)
-    for t in range(len(facets)):
-        for k in range(3):
-            for axis in range(3):
-                turn = wrap[pores[t, 0], axis] * size[axis]
-                facet[k, axis] = position[facets[t, k], axis] - turn
-        for side in range(2):
-            pore, farthest = pores[t, side], -1.0
-            for corner in range(4):
-                for axis in range(3):
-                    turn = shift[t, axis] * side - wrap[pore, axis]
-                    apex[axis] = position[vertex[pore, corner], axis] + turn * size[axis]
-                nearest = np.inf
-                for k in range(3):
-                    square = 0.0
-                    for axis in range(3):
-                        square += (apex[axis] - facet[k, axis]) ** 2
-                    nearest = min(nearest, square)
-                if nearest > farthest:
-                    farthest, image[t, side] = nearest, vertex[pore, corner]
-                    best[:] = apex
-            _set_place(facet, best, place[t, side])
-
-
-@loops_in_place
-def _set_place(facet: Array, apex: Array, place: Array) -> None:
-    """Sets the `place` (3,) m of an apex (3,) m as `fourth_grains` gives it."""
-    along, up = less(facet, 1, 0), less(facet, 2, 0)
-    away = (apex[0] - facet[0, 0], apex[1] - facet[0, 1], apex[2] - facet[0, 2])
-    long = np.sqrt(inner(along, along))
-    normal = times(along, up)
-    across = times(normal, along)
-    wide = np.sqrt(inner(normal, normal))
-    place[0] = inner(away, along) / long
-    place[1] = inner(away, across) / (wide * long)
-    place[2] = abs(inner(away, normal)) / wide
-
-
-@loops_in_place
-def share_left(
-    disc: Array,
-    fourth: tuple[float, float, float],
-    corners: CornerRoom,
-    rays: tuple[Array, int],
-    more: tuple[Array, Array, Array],
-) -> float:
-    """Share of the flux through a triangle with discs that a fourth disc leaves, 0 to 1.
-
-    Args:
-        disc: (3,) m, the radii of the discs on the corners.
-        fourth: the centre x, y and the radius m of the fourth disc.
-        corners: the rays of the corners, aimed at the fourth disc (`aim_at_fourth`).
-        rays: the rays (6, 36) of the fourth disc, and their number (`section_rays.aim`).
-        more: the corners (3, 2) m, room for 36 numbers, and the table of `shear_ratio`.
-    """
-    own, count = rays
-    base, room, table = more
-    corner_reaches(corners, disc)
-    clear = corner_flux(corners, disc, table)
-    if not clear > 0.0:
-        return 1.0
-    fourth_reaches(corners, disc, fourth[2])
-    left = corner_flux(corners, disc, table)
-    end, reach = own[2], own[5]
-    for p in range(count):
-        reach[p] = end[p]
-    done = UNTOUCHED
-    for i in range(3):
-        if done != SWALLOWED:
-            done = narrow(own, count, fourth, (base[i, 0], base[i, 1], disc[i]))
-    if done != SWALLOWED:
-        left += flux_on_rays(own, count, fourth[2], (room, table))
-    return min(left / clear, 1.0)
-
-
-@loops_in_place
-def depth_within(base: Array, side: Array, x: float, y: float) -> float:
-    """How far m a place lies within a triangle, from the nearest side line; negative outside.
-
-    A disc that is no larger than its place is far outside does not reach in.
-    """
-    return min(
-        inwards(base, side, 0, x, y), inwards(base, side, 1, x, y), inwards(base, side, 2, x, y)
-    )

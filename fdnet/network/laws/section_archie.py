@@ -1,189 +1,50 @@
 """The damage law of sections: what fines leave of the flow through each section of a throat.
 
-Which fines reach into the sections of a throat, and where they lie as seen from its facet.
+The sections of a throat are those of `lubrication`, with discs of the three grains. Every fine
+that reaches into the throat shows a disc in the sections that it meets. Together they leave the
+share s of the flux through the section, summed over rays (`share_around`). The section then
+carries s^m of its clean flux.
+
+With m = 1 the fluid would go straight through the gaps between the fines. But the gaps of one
+section do not lie behind those of the next, so its path winds. Archie (1942, Trans. AIME 146, 54)
+measured the same for an electric current in unconsolidated sand: its resistance grows as porosity
+to the power -1.3. The same power is taken here.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from fdnet.network import geometry
-from fdnet.network.compiled import compiled, compiled_for_loops, loops_in_place
-from fdnet.network.fines.deposit import mirrored_images, points_in_boxes, size_classes
+from fdnet.network.compiled import loops_in_place
+from fdnet.network.fines.deposit import images_near, points_in_boxes, size_classes
 from fdnet.network.fines.occupancy import Occupancy, ratio
-from fdnet.network.geometry import dot, flat
-from fdnet.network.laws.cross_section import inwards, set_sides, wall_cuts
+from fdnet.network.laws.cross_section import Sections, inwards, set_sides, wall_cuts
 from fdnet.network.laws.damage import BLOCKED, CLEAN, SECTIONS, Damage
 from fdnet.network.laws.lubrication import (
+    STEPS,
     THROATS,
-    WIDENING,
     Prepared,
-    SectionRoom,
-    Span,
-    forget,
+    clear_fluxes,
+    cut_by_faces,
     prepared,
-    resistance_of,
-    section_room,
-    set_fluxes,
+    sections_of,
     spans_of,
-    throat_at,
 )
-from fdnet.network.laws.reaching_grains import facet_axes, meet, share_around
-from fdnet.network.laws.wedges import ratio_table
+from fdnet.network.laws.reaching_grains import (
+    RayRoom,
+    SpheresBeside,
+    facet_axes,
+    meet,
+    ray_room,
+    share_around,
+)
+from fdnet.network.laws.wedges import WIDENING, ratio_table, resistance_of
 from fdnet.network.network import LENGTH_FLOOR, Network
 from fdnet.network.nodes import nodes_of
 from fdnet.spheres.snapshot import Array, Snapshot, frozen, one_line, unmoved
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class FinesBeside:
-    """Fines that reach into the prisms of K throats, from node to node.
-
-    Attributes:
-        first: (K+1,) the first fine of each throat, and their number N at the end.
-        place: (N, 5) m, along the first edge of the facet, across it towards the third corner,
-            and height above the facet towards the second pore, of its centre from the first
-            corner; its radius m, and 1 (a sphere is not flat).
-    """
-
-    first: Array
-    place: Array
-
-    __repr__ = one_line
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Prisms:
-    """The prisms of K throats, from node to node.
-
-    Attributes:
-        origin: (K, 3) m, the first corner of each facet.
-        axes: unit vectors (K, 3) of `facet_axes`.
-        base: (K, 3, 2) m, corners of the facets in their own planes.
-        height: (K, 2) m above the facets, of the lower and the upper end.
-        low: (K, 3) m, lower corners of the boxes around them.
-        high: (K, 3) m, their upper corners.
-    """
-
-    origin: Array
-    axes: tuple[Array, Array, Array]
-    base: Array
-    height: Array
-    low: Array
-    high: Array
-
-    __repr__ = one_line
-
-
-def prisms_of(network: Network, part: slice, heights: Array) -> Prisms:
-    """The prisms of the throats `part` (K), whose nodes are `heights` (K, 2) m above the facet."""
-    facet = network.image_position[network.throat_images[part]]
-    axes = facet_axes(network, np.arange(part.start, part.stop), facet)
-    height = heights * (-1.0, 1.0)
-    ends = (facet[:, None] + (height[:, :, None] * axes[2][:, None])[:, :, None]).reshape(
-        len(facet), 6, 3
-    )
-    return Prisms(
-        origin=facet[:, 0].copy(),
-        axes=axes,
-        base=flat(facet),
-        height=np.sort(height, axis=1),
-        low=ends.min(axis=1),
-        high=ends.max(axis=1),
-    )
-
-
-class FineImages:
-    """Spheres at `position` (N, 3) m of `radius` (N,) m, with their images near all throats.
-
-    The images are shifted or mirrored. A fine that is centred on or beyond a face that is not
-    periodic has no mirror image there: its body inside the box is that of the sphere itself.
-    """
-
-    def __init__(self, network: Network, position: Array, radius: Array) -> None:
-        used = np.zeros(len(network.image_position), bool)
-        used[network.throat_images] = True
-        corner = network.image_position[used]
-        low, high = corner.min(axis=0), corner.max(axis=0)
-        self._classes: list[tuple[Array, Array]] = []
-        for some in size_classes(radius) if len(radius) else []:
-            own = radius[some]
-            place, owner = mirrored_images(network, position[some], low, high, float(own.max()))
-            self._classes.append((place, own[owner]))
-
-    def beside(self, prisms: Prisms, rows: Array | None = None) -> FinesBeside:
-        """The fines that reach into the prisms (K), or into those of some `rows` alone."""
-        throats, places = [np.zeros(0, np.intp)], [np.zeros((0, 5))]
-        for throat, place in self._reaching(prisms, rows):
-            throats.append(throat)
-            places.append(place)
-        throat, place = np.concatenate(throats), np.concatenate(places)
-        order = np.lexsort((*place[:, 2::-1].T, throat))  # whatever order the search has
-        first = np.searchsorted(throat[order], np.arange(len(prisms.low) + 1))
-        return FinesBeside(first=frozen(first), place=frozen(place[order]))
-
-    def reached(self, prisms: Prisms) -> Array:
-        """Whether a fine reaches into each of the prisms (K,)."""
-        some = np.zeros(len(prisms.low), bool)
-        for throat, _ in self._reaching(prisms, None):
-            some[throat] = True
-        return some
-
-    def _reaching(self, prisms: Prisms, rows: Array | None) -> Iterator[tuple[Array, Array]]:
-        """The throat (N,) and `place` (N, 5) of fines of one size after the other, not sorted."""
-        low, high = prisms.low, prisms.high
-        if rows is not None:
-            low, high = low[rows], high[rows]
-        for position, radius in self._classes:
-            widest = float(radius.max())
-            row, image = points_in_boxes(position, low - widest, high + widest)
-            reach = radius[image, None]  # its own, whatever other fines are in the class
-            near = (position[image] >= low[row] - reach) & (position[image] <= high[row] + reach)
-            row, image = (one[near.all(axis=1)] for one in (row, image))
-            throat = row if rows is None else rows[row]
-            away = position[image] - prisms.origin[throat]
-            place = np.ones((len(throat), 5))
-            for k, axis in enumerate(prisms.axes):
-                place[:, k] = dot(away, axis[throat])
-            place[:, 3] = radius[image]
-            real = _reaching(prisms.base, prisms.height, throat, place)
-            yield throat[real], place[real]
-
-
-@compiled
-def _reaching(base: Array, height: Array, throat: Array, place: Array) -> Array:
-    """Whether spheres (N) reach between two heights (K, 2) m and within the lines of a triangle.
-
-    The triangles are `base` (K, 3, 2) m, `throat` (N,) says which, and `place` (N, 5) is that of
-    `FinesBeside`.
-    """
-    real, side = np.empty(len(throat), np.bool_), np.empty((3, 3))
-    for n in range(len(throat)):
-        t, x, y, z, r = throat[n], place[n, 0], place[n, 1], place[n, 2], place[n, 3]
-        real[n] = height[t, 0] - r < z < height[t, 1] + r
-        if real[n]:
-            set_sides(base[t], side)
-            for i in range(3):
-                real[n] = real[n] and inwards(base[t], side, i, x, y) > -r
-    return real
-
-
-# ------------------------------------------------------------------------------------------------
-# Damage by the share that the fines leave of each section of a throat.
-#
-# The sections of a throat are those of `lubrication`, with discs of the three grains. Every fine
-# that reaches into the throat shows a disc in the sections that it meets. Together they leave the
-# share s of the flux through the section, summed over rays (`outside.share_around`). The section
-# then carries s^m of its clean flux.
-#
-# With m = 1 the fluid would go straight through the gaps between the fines. But the gaps of one
-# section do not lie behind those of the next, so its path winds. Archie (1942, Trans. AIME 146,
-# 54) measured the same for an electric current in unconsolidated sand: its resistance grows as
-# porosity to the power -1.3. The same power is taken here.
-#
-# The factor of the widening tube (`lubrication`) is that of the narrowed sections.
-
 
 EXPONENT = 1.3
 """Power of the share that the fines leave: Archie's for unconsolidated sand."""
@@ -218,37 +79,131 @@ def section_archie_damage(network: Network, occupancy: Occupancy, clean: Array) 
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Part:
+# ------------------------------------------------------------------------------------------------
+# Which fines reach into the sections of a throat, and where they lie as seen from its facet.
+
+
+class ThroatPart(NamedTuple):
     """What does not depend on the fines, of throats (K) that are computed together.
 
     It takes some 0.5 kB a throat.
-
-    Attributes:
-        throats: their place among all throats.
-        prisms: in which fines are looked for.
-        given: of their sections, as `prepared` gives it.
-        heights: (K, 2) m of the nodes above the facets.
     """
 
     throats: slice
-    prisms: Prisms
+    """Their place among all throats."""
     given: Prepared
+    """Of their sections."""
     heights: Array
+    """(K, 2) m of the nodes above the facets."""
+    origin: Array
+    """(K, 3) m, the first corner of each facet."""
+    axes: tuple[Array, Array, Array]
+    """Unit vectors (K, 3) of `facet_axes`."""
+    ends: Array
+    """(K, 2) m above the facets, of the lower and the upper end of the prism from node to node."""
+    low: Array
+    """(K, 3) m, lower corners of the boxes around the prisms."""
+    high: Array
+    """(K, 3) m, their upper corners."""
 
-    __repr__ = one_line
 
-
-def parts_of(network: Network) -> Iterator[Part]:
+def parts_of(network: Network) -> Iterator[ThroatPart]:
     """All throats of a network, part by part."""
-    walls, heights = wall_cuts(network), nodes_of(network).heights
+    walls, nodes = wall_cuts(network), nodes_of(network).heights
     for part in geometry.slices(len(network.throat_pores), THROATS):
-        yield Part(
+        facet = network.image_position[network.throat_images[part]]
+        axes = facet_axes(network, np.arange(part.start, part.stop), facet)
+        height = nodes[part] * (-1.0, 1.0)
+        above = (height[:, :, None] * axes[2][:, None])[:, :, None]
+        corners = (facet[:, None] + above).reshape(len(facet), 6, 3)
+        yield ThroatPart(
             throats=part,
-            prisms=prisms_of(network, part, heights[part]),
             given=prepared(network, part, walls),
-            heights=np.ascontiguousarray(heights[part]),
+            heights=nodes[part],
+            origin=facet[:, 0].copy(),
+            axes=axes,
+            ends=np.sort(height, axis=1),
+            low=corners.min(axis=1),
+            high=corners.max(axis=1),
         )
+
+
+class FineImages:
+    """Spheres at `position` (N, 3) m of `radius` (N,) m, with their images near all throats.
+
+    The images are shifted or mirrored. A fine that is centred on or beyond a face that is not
+    periodic has no mirror image there: its body inside the box is that of the sphere itself.
+    """
+
+    def __init__(self, network: Network, position: Array, radius: Array) -> None:
+        used = np.zeros(len(network.image_position), bool)
+        used[network.throat_images] = True
+        corner = network.image_position[used]
+        low, high = corner.min(axis=0), corner.max(axis=0)
+        self._classes: list[tuple[Array, Array]] = []
+        for some in size_classes(radius) if len(radius) else []:
+            own = radius[some]
+            place, owner = images_near(network, position[some], low, high, float(own.max()))
+            self._classes.append((place, own[owner]))
+
+    def beside(self, part: ThroatPart, rows: Array | None = None) -> SpheresBeside:
+        """The fines that reach into the prisms of throats (K), or into those of `rows` alone."""
+        throats, places = [np.zeros(0, np.intp)], [np.zeros((0, 5))]
+        for throat, place in self._reaching(part, rows):
+            throats.append(throat)
+            places.append(place)
+        throat, place = np.concatenate(throats), np.concatenate(places)
+        order = np.lexsort((*place[:, 2::-1].T, throat))  # whatever order the search has
+        first = np.searchsorted(throat[order], np.arange(len(part.low) + 1))
+        return SpheresBeside(first=first, place=place[order])
+
+    def reached(self, part: ThroatPart) -> Array:
+        """Whether a fine reaches into the prism of each throat (K,)."""
+        some = np.zeros(len(part.low), bool)
+        for throat, _ in self._reaching(part, None):
+            some[throat] = True
+        return some
+
+    def _reaching(self, part: ThroatPart, rows: Array | None) -> Iterator[tuple[Array, Array]]:
+        """The throat (N,) and `place` (N, 5) of fines of one size after the other, not sorted."""
+        rows = np.arange(len(part.low)) if rows is None else rows
+        low, high = part.low[rows], part.high[rows]
+        for position, radius in self._classes:
+            widest = float(radius.max())
+            row, image = points_in_boxes(position, low - widest, high + widest)
+            reach = radius[image, None]  # its own, whatever other fines are in the class
+            near = (position[image] >= low[row] - reach) & (position[image] <= high[row] + reach)
+            row, image = (one[near.all(axis=1)] for one in (row, image))
+            throat = rows[row]
+            away = position[image] - part.origin[throat]
+            place = np.ones((len(throat), 5))
+            for k, axis in enumerate(part.axes):
+                place[:, k] = geometry.dot(away, axis[throat])
+            place[:, 3] = radius[image]
+            real = np.zeros(len(throat), bool)
+            _set_reaching(part.given.base, part.ends, throat, place, np.empty((3, 3)), real)
+            yield throat[real], place[real]
+
+
+@loops_in_place
+def _set_reaching(
+    base: Array, ends: Array, throat: Array, place: Array, side: Array, real: Array
+) -> None:
+    """Sets whether spheres (N) reach between the ends and the lines of the triangle of a prism.
+
+    `side` (3, 3) is written to.
+    """
+    for n in range(len(throat)):
+        t, x, y, z, r = throat[n], place[n, 0], place[n, 1], place[n, 2], place[n, 3]
+        real[n] = ends[t, 0] - r < z < ends[t, 1] + r
+        if real[n]:
+            set_sides(base[t], side)
+            for i in range(3):
+                real[n] = real[n] and inwards(base[t], side, i, x, y) > -r
+
+
+# ------------------------------------------------------------------------------------------------
+# The resistances without and with fines.
 
 
 def fine_resistances(
@@ -256,7 +211,7 @@ def fine_resistances(
     fines: Snapshot,
     *,
     among: Array | None = None,
-    parts: Iterable[Part] | None = None,
+    parts: Iterable[ThroatPart] | None = None,
     step: float = STEP,
 ) -> tuple[Array, Array, int]:
     """Resistances (T, 2) 1/m3 of the sides of throats without and with `fines`.
@@ -267,110 +222,81 @@ def fine_resistances(
     and are not counted. `parts` is what `parts_of` gives for the network, made anew without it.
     `step` is as `STEP`.
     """
-    images, table = FineImages(network, fines.position, fines.radius), ratio_table()
+    images = FineImages(network, fines.position, fines.radius)
     floor = LENGTH_FLOOR * network.grain_radius
-    coarse = 0
-    both = np.ones((2, len(network.throat_pores), 2))
+    coarse, both = 0, np.ones((2, len(network.throat_pores), 2))
     for part in parts_of(network) if parts is None else parts:
         rows = None if among is None else np.flatnonzero(among[part.throats])
-        beside = images.beside(part.prisms, rows)
-        height = np.abs(part.heights).max(axis=1)
-        some, steps = _steps(beside.first, beside.place, height, step)
+        beside = images.beside(part, rows)
+        some, steps = _steps(beside, part.heights, step)
         coarse += int(np.sum(steps > MOST_STEPS))
         steps = np.minimum(steps, MOST_STEPS)
-        for count in np.unique(steps):
+        for count in map(int, np.unique(steps)):
             chosen = some[steps == count]
-            both[:, part.throats.start + chosen] = _resistances(
-                (chosen, int(count) + 1),
-                part.given,
-                part.heights,
-                (floor, WIDENING, EXPONENT),
-                (beside.first, beside.place, table),
-            )
+            at_once = max(THROATS * STEPS // count, 1)  # so that they take no more room
+            for few in geometry.slices(len(chosen), at_once):
+                throats = chosen[few]
+                spans = spans_of(part.heights[throats], floor)
+                sections = sections_of(part.given, throats, spans, count + 1)
+                resistances = _without_and_with(part.given, sections, beside)
+                both[:, part.throats.start + throats] = 0.0
+                place = part.throats.start + sections.throat, sections.side
+                both[0][place], both[1][place] = resistances
     return both[0], both[1], coarse
 
 
-def _steps(first: Array, place: Array, height: Array, step: float) -> tuple[Array, Array]:
+def _steps(beside: SpheresBeside, heights: Array, step: float) -> tuple[Array, Array]:
     """Throats (K,) with fines, and the steps of each of their sides, a power of two.
 
     None is longer than `step` radii of the smallest fine in the throat. Where more than
     `MOST_STEPS` are wanted, they are twice as many.
     """
-    some = np.flatnonzero(np.diff(first))
+    some = np.flatnonzero(np.diff(beside.first))
     if not len(some):
         return some, some
-    smallest = np.minimum.reduceat(place[:, 3], first[some])
-    wanted = np.clip(height[some] / (step * smallest), LEAST_STEPS, 2 * MOST_STEPS)
+    smallest = np.minimum.reduceat(beside.place[:, 3], beside.first[some])
+    longest = np.abs(heights[some]).max(axis=1)
+    wanted = np.clip(longest / (step * smallest), LEAST_STEPS, 2 * MOST_STEPS)
     return some, 2 ** np.ceil(np.log2(wanted)).astype(int)
 
 
-@compiled_for_loops
-def _resistances(
-    which: tuple[Array, int],
-    given: Prepared,
-    heights: Array,
-    numbers: tuple[float, float, float],
-    fines: tuple[Array, Array, Array],
-) -> Array:
-    """Resistances (2, K, 2) 1/m3 of the throats `which` (K) without and with `fines`."""
-    chosen, count = which
-    first, most = fines[0], 0
-    for t in chosen:
-        most = max(most, first[t + 1] - first[t])
-    room, clear = section_room(most, count), (np.zeros(5), np.empty((0, 5)))
-    resistance = np.zeros((2, len(chosen), 2))
-    _set_sides(resistance, (chosen, given), heights, numbers, (clear, room, *fines))
-    return resistance
+def _without_and_with(
+    given: Prepared, sections: Sections, beside: SpheresBeside
+) -> tuple[Array, Array]:
+    """Resistances (S,) 1/m3 of sides of throats without and with the fines near them."""
+    flux = clear_fluxes(given, sections)
+    cut_by_faces(given, sections, flux)
+    own = given.walls.part[sections.throat]
+    without = resistance_of(flux, own, sections.step, WIDENING)
+    room = ray_room(int(np.diff(beside.first).max(initial=0)))
+    _leave_shares(sections, given.base, beside, EXPONENT, ratio_table(), room, flux)
+    return without, resistance_of(flux, own, sections.step, WIDENING)
 
 
 @loops_in_place
-def _set_sides(
-    resistance: Array,
-    which: tuple[Array, Prepared],
-    heights: Array,
-    numbers: tuple[float, float, float],
-    more: tuple[tuple[Array, Array], SectionRoom, Array, Array, Array],
-) -> None:
-    """Sets the `resistance` (2, K, 2) 1/m3 of `_resistances`."""
-    chosen, given = which
-    floor, widening, power = numbers
-    clear, room, first, spheres, table = more
-    for n in range(len(chosen)):
-        t = chosen[n]
-        throat, faces = throat_at(given, t, room)
-        spans = spans_of(heights[t], floor)
-        inside = spheres[first[t] : first[t + 1]]
-        forget(room, len(inside))
-        for side in range(2):
-            if spans[side][1] > 0.0:
-                set_fluxes(throat, faces, spans[side], clear, (room, table))
-                both = _both(
-                    throat[0], spans[side], (inside, faces[2], widening, power), (room, table)
-                )
-                resistance[0, n, side], resistance[1, n, side] = both
-
-
-@loops_in_place
-def _both(
+def _leave_shares(
+    sections: Sections,
     base: Array,
-    span: Span,
-    given: tuple[Array, float, float, float],
-    more: tuple[SectionRoom, Array],
-) -> tuple[float, float]:
-    """Resistances 1/m3 of one side without and with fines, from the clean fluxes in the room."""
-    fines, part, widening, power = given
-    room, table = more
-    flux, rows, (rays, seen), side = room[0], room[3][0], room[4], room[5][0]
-    clear = room[2][0][0]  # what the clean fluxes needed is free now
-    step = (span[1] - span[0]) / (len(flux) - 1)
-    set_sides(base, side)
-    for k in range(len(flux)):
-        clear[k] = flux[k]
-        z = span[2] * (span[0] + k * step)
-        count = meet(rows[k], base, z, fines, seen)
-        flux[k] *= share_around(base, side, (count, seen), rays, table) ** power
-    given_step = (part, step, widening)
-    return resistance_of(clear, given_step), resistance_of(flux, given_step)
+    beside: SpheresBeside,
+    power: float,
+    table: Array,
+    room: RayRoom,
+    flux: Array,
+) -> None:
+    """Multiplies the `flux` (S, n) by the share that fines leave, to a power."""
+    before = -1
+    for s in range(len(flux)):
+        t = sections.throat[s]
+        fines = beside.place[beside.first[t] : beside.first[t + 1]]
+        if t != before:
+            before = t
+            set_sides(base[t], room.side)
+            for i in range(len(fines) + 3):
+                room.number[i] = -1
+        for k in range(flux.shape[1]):
+            z = (2.0 * sections.side[s] - 1.0) * (sections.low[s] + k * sections.step[s])
+            count = meet(sections.disc[s, :, k], base[t], z, fines, room)
+            flux[s, k] *= share_around(base[t], count, room, table) ** power
 
 
 # ------------------------------------------------------------------------------------------------
@@ -395,7 +321,7 @@ class KeptSections:
     """
 
     network: Network
-    parts: Sequence[Part]
+    parts: Sequence[ThroatPart]
     step: float
     fines: Snapshot
     without: Array
@@ -438,14 +364,14 @@ class KeptSections:
     def _throats_beside(self, position: Array, radius: Array) -> Array:
         """Whether spheres at `position` (N, 3) m of `radius` (N,) m reach into each throat."""
         images = FineImages(self.network, position, radius)
-        return np.concatenate([images.reached(part.prisms) for part in self.parts])
+        return np.concatenate([images.reached(part) for part in self.parts])
 
 
 def measured_sections(
     network: Network,
     fines: Snapshot,
     *,
-    parts: Sequence[Part] | None = None,
+    parts: Sequence[ThroatPart] | None = None,
     step: float = STEP,
 ) -> KeptSections:
     """The resistances among `fines`, those of all throats summed; `parts` of the network."""

@@ -1,13 +1,9 @@
 """Flow in the wedges of a section: elementary functions, the table of a wedge, rays and tubes.
 
-Elementary functions for loops over many numbers at once.
-
-The functions of the C library take one number at a time. These have no branch and no call, so the
-compiler works on as many numbers of a loop as the processor takes together. They are a third to a
-half as long as those of the C library, and agree with them to a few units of the last digit.
-
-Sources: Abramowitz and Stegun 1964, 4.1.27 (logarithm by the inverse hyperbolic tangent), 4.3.65
-and 4.3.66 (sine and cosine), 4.4.42 (inverse tangent).
+The elementary functions are for loops over many numbers at once. They have no branch and no call,
+so the processor takes several numbers together. They agree with those of the C library to a few
+units of the last digit. Sources: Abramowitz and Stegun 1964, 4.1.27 (logarithm by the inverse
+hyperbolic tangent), 4.3.65 and 4.3.66 (sine and cosine), 4.4.42 (inverse tangent).
 """
 
 import math
@@ -16,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fdnet.network.compiled import bits_of, compiled_for_loops, loops_in_place, number_of
+from fdnet.network.compiled import bits_of, loops_in_place, loops_inside, number_of
 from fdnet.spheres.snapshot import Array
 
 QUARTER = 0.5 * math.pi
@@ -38,7 +34,7 @@ ARC = tuple((-1.0) ** k / (2 * k + 1) for k in range(20))
 """Coefficients of the series of sine, cosine and inverse tangent."""
 
 
-@compiled_for_loops
+@loops_inside
 def log_of(x: float) -> float:
     """Natural logarithm of a normal number above 0; any finite number for others.
 
@@ -59,7 +55,7 @@ def log_of(x: float) -> float:
     return (number_of(power | WHOLE) - OFFSET) * LN2 + (2.0 * s + 2.0 * s * z * series)
 
 
-@compiled_for_loops
+@loops_inside
 def sine_of(x: float) -> float:
     """Sine of an angle between -pi / 2 and pi / 2."""
     z = x * x
@@ -70,7 +66,7 @@ def sine_of(x: float) -> float:
     return x * (low + w * w * (middle + w * w * high))
 
 
-@compiled_for_loops
+@loops_inside
 def cosine_of(x: float) -> float:
     """Cosine of an angle between -pi / 2 and pi / 2."""
     z = x * x
@@ -81,7 +77,7 @@ def cosine_of(x: float) -> float:
     return low + w * w * (middle + w * w * high)
 
 
-@compiled_for_loops
+@loops_inside
 def angle_of(y: float, x: float) -> float:
     """Angle between -pi and pi of the vector (x, y), as arctan2; the vector is not 0.
 
@@ -118,9 +114,9 @@ def angle_of(y: float, x: float) -> float:
 #
 # `ray_flux` neglects the shear between neighbouring rays from the tip: on each ray the flow is
 # that in the annulus of Happel (1959) whose free surface is at the far side. It is an upper bound.
-# `exact_flux` is the series of Sparrow and Loeffler (1959, AIChE J. 5, 325), fitted to the far
+# The exact flux is the series of Sparrow and Loeffler (1959, AIChE J. 5, 325), fitted to the far
 # side by least squares. Their ratio varies slowly; `ratio_table` reads it from wedge.csv, which
-# `python -m fdnet.network.laws.wedges` writes anew.
+# `python -m tests.network.wedge_table` writes anew.
 
 
 TABLE = Path(__file__).with_name("wedge.csv")
@@ -128,8 +124,6 @@ STEEPEST = np.radians(84.0)
 """Largest angle of the table, rad."""
 ANGLES = np.linspace(0.0, STEEPEST, 43)
 DISCS = np.linspace(0.0, 1.0, 21)
-THINNEST = 0.02
-"""Smallest disc, rho / h, for which the ratio is computed."""
 
 
 @loops_in_place
@@ -149,14 +143,14 @@ def ray_flux(angle: float, slope: float, disc: float) -> float:
     return whole - _antiderivative(first, np.sqrt(disc * disc - 1.0), disc)
 
 
-@loops_in_place
+@loops_inside
 def _antiderivative(angle: float, slope: float, disc: float) -> float:
     constant, of_log = ray_parts(angle, slope)
     square = disc * disc
     return constant - of_log * np.log(disc) + square * (4.0 * slope - square * angle) / 16.0
 
 
-@loops_in_place
+@loops_inside
 def ray_parts(angle: float, slope: float) -> tuple[float, float]:
     """The parts C and D of a flux over h^4 for rho <= h, which depend on the wedge alone.
 
@@ -169,23 +163,17 @@ def ray_parts(angle: float, slope: float) -> tuple[float, float]:
     return (4.0 * spread - 3.0 * secant4) / 16.0, 0.25 * secant4
 
 
-@loops_in_place
-def shear_ratio(angle: float, disc: float, table: Array) -> float:
-    """exact_flux / ray_flux, bilinear in `table`; steeper wedges take its last row."""
-    return ratio_in_row(table_row(angle), disc, table)
-
-
-@loops_in_place
+@loops_inside
 def table_row(angle: float) -> float:
     """The row of the table of `shear_ratio` for an angle, with its fraction."""
     return min(angle / STEEPEST, 1.0) * (len(ANGLES) - 1)
 
 
 @loops_in_place
-def ratio_in_row(row: float, disc: float, table: Array) -> float:
-    """The ratio of `shear_ratio` at a row that `table_row` gives."""
+def shear_ratio(angle: float, disc: float, table: Array) -> float:
+    """Exact flux over `ray_flux`, bilinear in `table`; steeper wedges take its last row."""
     rows, columns = table.shape
-    column = min(disc, 1.0) * (columns - 1)
+    row, column = table_row(angle), min(disc, 1.0) * (columns - 1)
     i, j = min(int(row), rows - 2), min(int(column), columns - 2)
     u, v = row - i, column - j
     low = (1.0 - v) * table[i, j] + v * table[i, j + 1]
@@ -195,63 +183,8 @@ def ratio_in_row(row: float, disc: float, table: Array) -> float:
 
 @lru_cache(maxsize=1)
 def ratio_table() -> Array:
-    """exact_flux / ray_flux at ANGLES (rows) and DISCS (columns)."""
+    """Exact flux over `ray_flux` at ANGLES (rows) and DISCS (columns)."""
     return np.loadtxt(TABLE, delimiter=",")
-
-
-def exact_flux(angle: float, disc: float, *, terms: int = 24, points: int = 300) -> float:
-    """Flux over h^4 for 0 < angle < pi / 2 and 0 < disc <= 1.
-
-    The relative error is 1e-4 up to 60 degrees and 1e-2 at 80. `terms` is the number of terms of
-    the series, `points` that of the points on the far side.
-    """
-    place = 0.5 * (1.0 - np.cos(np.pi * (np.arange(points) + 0.5) / points))
-    height = place * np.tan(angle)
-    reach, turn = np.hypot(1.0, height), np.arctan2(height, 1.0)
-    order = np.pi / angle * np.arange(1, int(min(terms, max(6, 40.0 * angle / np.pi))) + 1)
-    longest = 1.0 / np.cos(angle)
-    log_term = (0.5 * np.tan(angle) - 0.5 * disc**2 * angle) / angle + 0.5 * disc**2
-    outward = reach[:, None] ** (order - 1.0) * np.cos((order - 1.0) * turn[:, None])
-    inward = (
-        disc ** (2.0 * order)
-        * reach[:, None] ** (-order - 1.0)
-        * np.cos((order + 1.0) * turn[:, None])
-    )
-    slopes = order * (outward + inward) / longest**order
-    wanted = np.cos(turn) * (0.5 * reach - log_term / reach)
-    weight = np.sqrt(np.sin(np.pi * (np.arange(points) + 0.5) / points))
-    factor = np.linalg.lstsq(slopes * weight[:, None], wanted * weight, rcond=1e-13)[0]
-    return _total(angle, disc, log_term, order, factor, longest)
-
-
-def _total(
-    angle: float, disc: float, log_term: float, order: Array, factor: Array, longest: float
-) -> float:
-    point, weight = np.polynomial.legendre.leggauss(48)
-    turn = 0.5 * angle * (1.0 + point)[:, None]
-    depth = 1.0 / np.cos(turn) - disc
-    r = disc + 0.5 * depth * (1.0 + point)
-    speed = 0.25 * (disc**2 - r**2) + log_term * np.log(r / disc)
-    for one, by in zip(order, factor, strict=True):
-        speed += (
-            by
-            * ((r / longest) ** one - (disc / longest) ** one * (disc / r) ** one)
-            * np.cos(one * turn)
-        )
-    return float(np.sum(0.25 * angle * weight[:, None] * weight * depth * speed * r))
-
-
-def make_table() -> Array:
-    """The ratios of `ratio_table`, computed; the ratio of a wedge of angle 0 is 1."""
-    table = np.ones((len(ANGLES), len(DISCS)))
-    for i, angle in enumerate(ANGLES[1:], start=1):
-        for j, disc in enumerate(np.maximum(DISCS, THINNEST)):
-            table[i, j] = exact_flux(angle, disc) / ray_flux(angle, np.tan(angle), disc)
-    return table
-
-
-if __name__ == "__main__":
-    np.savetxt(TABLE, make_table(), delimiter=",", fmt="%.6f")
 
 
 # ------------------------------------------------------------------------------------------------
@@ -266,7 +199,7 @@ POINTS, WEIGHTS = np.polynomial.legendre.leggauss(6)
 FINE_POINTS, FINE_WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
-@compiled_for_loops
+@loops_inside
 def flux_on_ray(reach: float, disc: float) -> float:
     """Flux m4 per angle on a ray from the rim of a disc to the distance `reach` m from its centre.
 
@@ -277,7 +210,7 @@ def flux_on_ray(reach: float, disc: float) -> float:
     return flux if reach > disc else 0.0
 
 
-@compiled_for_loops
+@loops_inside
 def midway(half: float, below: float) -> float:
     """Distance m from the centre of a disc to the line midway between its rim and that of another.
 
@@ -307,26 +240,38 @@ OPEN_WIDENING = 0.6 * WIDENING
 """Factor of da^2 in an open section."""
 
 
-@loops_in_place
-def resistance_of(flux: Array, given: tuple[float, float, float]) -> float:
-    """Integral of dR, 1/m3, over sections of the fluxes `flux` (K,) m4, which are written over.
+def resistance_of(flux: Array, part: Array, step: Array, widening: float) -> Array:
+    """Integral of dR (S,), 1/m3, over the sections of S sides of throats of the fluxes (S, n) m4.
 
-    `given` are the share of the sections inside the box, m between two of them, and the factor of
-    da^2. 1/a is linear within a step; the integral is extrapolated from all and from half of the
-    steps.
+    `part` (S,) is the share of the sections inside the box, `step` (S,) m lies between two of
+    them, and `widening` is the factor of da^2. 1/a is linear within a step; the integral is
+    extrapolated from all and from half of the steps. It is infinite where a section is closed.
     """
-    part, step, widening = given
-    for k in range(len(flux)):
-        if not part * flux[k] > 0.0:
-            return np.inf
-    for k in range(len(flux)):
-        flux[k] = 1.0 / np.sqrt(np.sqrt(8.0 / np.pi * part * flux[k]))
-    return (4.0 * summed(flux, step, 1, widening) - summed(flux, step, 2, widening)) / 3.0
+    resistance = np.full(len(flux), np.inf)
+    _set_resistances(flux, part, step, widening, np.empty(flux.shape[1]), resistance)
+    return resistance
+
+
+@loops_in_place
+def _set_resistances(
+    flux: Array, part: Array, step: Array, widening: float, narrow: Array, resistance: Array
+) -> None:
+    """Sets the `resistance` of sides without a closed section; `narrow` (n,) is room for 1/a."""
+    for s in range(len(flux)):
+        least = np.inf
+        for k in range(len(narrow)):
+            least = min(least, part[s] * flux[s, k])
+            narrow[k] = 1.0 / np.sqrt(np.sqrt(8.0 / np.pi * part[s] * flux[s, k]))
+        if least > 0.0:
+            every = np.int64(1)
+            fine = summed(narrow, step[s], every, widening)
+            coarse = summed(narrow, step[s], every + 1, widening)
+            resistance[s] = (4.0 * fine - coarse) / 3.0
 
 
 @loops_in_place
 def summed(narrow: Array, step: float, every: int, widening: float) -> float:
-    """Resistance 1/m3 between sections of 1/a = `narrow` (K,) 1/m that lie `step` m apart.
+    """Resistance 1/m3 between sections of 1/a = `narrow` (n,) 1/m that lie `step` m apart.
 
     It is the sum of dR over the intervals between every `every`-th of them.
     """
