@@ -8,7 +8,7 @@ import pytest
 from fdnet.case.file import known_keys
 
 LAYERS = [
-    ["errors", "names"],
+    ["doubts", "errors", "names"],
     ["files"],
     ["sizes", "statistics"],
     ["spheres", "case"],

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fdnet.doubts import Doubt, explained
 from fdnet.errors import CaseError
 from fdnet.files import path_option
 from fdnet.names import (
@@ -212,7 +213,6 @@ _MANY = 0.25
 side walls are reported."""
 _LARGE_FINE = 0.5
 """Part of the smallest grain's radius up to which spheres of type 2 are fines unasked."""
-_BOX_MISSING = "no --box given: the box around all grains was used"
 
 
 def run(options: argparse.Namespace) -> int:
@@ -308,11 +308,12 @@ def _along(
 ) -> list[dict[str, Any]]:
     """What each pair of laws gives for flow along `axis`, the chosen pair first."""
     from fdnet.report.permeability_text import thesis_law_warning
-    from fdnet.scales.check import explained
 
     spheres, along = given.spheres.turned(axis), "xyz".index(axis)
     around = (periodic[along], periodic[(along + 1) % 3], periodic[(along + 2) % 3])
-    notes = [*given.warnings, *([_BOX_MISSING] if given.around_grains else [])]
+    notes = list(given.warnings)
+    if given.around_grains:
+        notes.append(Doubt("no-box", "no --box given: the box around all grains was used"))
     if options.walls == "no-slip":
         notes += _crossing(given.spheres, periodic, axis)
     notes += _overlaps(spheres, around)
@@ -412,9 +413,10 @@ def _crossing(spheres: "Snapshot", periodic: tuple[bool, bool, bool], axis: str)
             for name, crossed, repeats in zip("xyz", beyond.any(axis=0), periodic, strict=True)
             if crossed or repeats
         )
-        yield (
+        yield Doubt(
+            "crossing-walls",
             f"{count} of {len(spheres)} spheres cross the side walls; if the pack is periodic "
-            f"give --periodic {sides}"
+            f"give --periodic {sides}",
         )
 
 

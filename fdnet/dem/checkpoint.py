@@ -18,6 +18,7 @@ import numpy as np
 from fdnet.case.case import Case, InvasionCase
 from fdnet.dem.deck import LeftOut, number, render_text, snapshot_of
 from fdnet.dem.supply import Batches, batches_of
+from fdnet.doubts import Doubt, explained
 from fdnet.errors import CaseError, DumpError, LiggghtsError
 from fdnet.files import write_text
 from fdnet.names import SECTION_ARCHIE
@@ -675,12 +676,20 @@ def passed_over(folder: Path, case: InvasionCase, last: Checkpoint | None) -> li
         if path.suffix == ".record" and (last is None or step > last.step)
     ]
     if last is None and (records or _has_rows(folder)):
-        return ["no checkpoint of the cut invasion could be used, it was started over"]
+        return [
+            Doubt(
+                "started-over",
+                "no checkpoint of the cut invasion could be used, it was started over",
+            )
+        ]
     if records:
         newest = max(records)
         return [
-            f"files of the cut invasion were not those that were recorded (checkpoint at step "
-            f"{newest}): it went on from the checkpoint at step {last.step if last else 0}"
+            Doubt(
+                "earlier-checkpoint",
+                f"files of the cut invasion were not those that were recorded (checkpoint at step "
+                f"{newest}): it went on from the checkpoint at step {last.step if last else 0}",
+            )
         ]
     return []
 
@@ -688,7 +697,9 @@ def passed_over(folder: Path, case: InvasionCase, last: Checkpoint | None) -> li
 def keep_doubts(folder: Path, doubts: Sequence[str]) -> None:
     """Keep warnings on the invasion in `folder` until it is finished, in whichever session."""
     if doubts:
-        text = "".join(f"{line}\n" for line in dict.fromkeys([*kept_doubts(folder), *doubts]))
+        text = "".join(
+            f"{line}\n" for line in dict.fromkeys([*kept_doubts(folder), *map(explained, doubts)])
+        )
         write_text(folder / DOUBTS, text)
 
 

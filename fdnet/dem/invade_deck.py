@@ -51,7 +51,7 @@ from fdnet.errors import CaseError
 from fdnet.files import expanded, refuse_folder_name, write_text
 from fdnet.names import LIGGGHTS_STAGES
 from fdnet.scales.pack import grain_count
-from fdnet.scales.scales import InvasionScales, scales_of
+from fdnet.scales.scales import InvasionScales, invasion_scales, scales_of
 from fdnet.spheres.dump import COLUMNS, FORMAT, Frame, read_binary_frame
 from fdnet.spheres.geometry import touching_pairs
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
@@ -538,7 +538,7 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
 
 def _invasion_files(case: InvasionCase, ranks: int) -> dict[str, str]:
     """Name and text of the invasion's deck and of the files that it is continued by."""
-    scales = scales_of(case)
+    scales = invasion_scales(case)
     deck = render_invade(case, scales, _expected_grains(case), ranks=ranks, packed=False)
     return {"in.invade": deck.text, **coupled_parts(case, scales)}
 

@@ -67,6 +67,7 @@ from fdnet.dem.invade_deck import (
 )
 from fdnet.dem.liggghts import SCREEN, Feed, Launch, Run, run_deck, run_fed
 from fdnet.dem.supply import Batches, batches_of, later_batch
+from fdnet.doubts import Doubt
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.files import disk_is_full, write_text
 from fdnet.scales.clock import DRAG_LIMIT
@@ -360,8 +361,11 @@ def invade(
     if len(overlaps) < len(history):
         lost = len(history) - len(overlaps)
         warnings.append(
-            f"{lost} of {len(history)} checkpoint dumps cannot be read: they are missing from the "
-            "largest overlap and from invasion.pvd"
+            Doubt(
+                "dumps-cannot-be-read",
+                f"{lost} of {len(history)} checkpoint dumps cannot be read: they are missing from "
+                "the largest overlap and from invasion.pvd",
+            )
         )
     return Invasion(
         damaged=damaged,
@@ -502,7 +506,7 @@ def _ending(
     """
     last = history[-1]
     waiting = last.upstream - last.removed_upstream
-    warnings = []
+    warnings: list[str] = []
     if rate_is_low(folder, case, last.step):
         reason = "plugged"
     elif case.run.duration_s is not None or volume_has_passed(folder, case, scales, last.step):
@@ -512,20 +516,34 @@ def _ending(
     else:
         reason, cap = "cap", scales.cap_time * scales.force_factor
         warnings.append(
-            f"invasion stopped at its cap of {1e3 * cap:.3g} ms before the stop rule "
-            "held: raise run.cap_ms"
+            Doubt(
+                "stopped-at-the-cap",
+                f"invasion stopped at its cap of {1e3 * cap:.3g} ms before the stop rule "
+                "held: raise run.cap_ms",
+            )
         )
     if waiting == 0:
         warnings.append(
-            "no fine is left upstream: the end was decided by an empty slab, raise fines.count or "
-            "fines.slab_mm"
+            Doubt(
+                "empty-slab",
+                "no fine is left upstream: the end was decided by an empty slab, raise "
+                "fines.count or fines.slab_mm",
+            )
         )
     before = history[-min(len(history), quiet_chunks(scales) + 1)]
     if reason == "plugged" and last.passed > before.passed:
         warnings.append(
-            f"the face was plugged, but {last.passed - before.passed} fines still left through "
-            "the outlet meanwhile: raise run.plug_time_ms to follow them"
+            Doubt(
+                "still-leaving",
+                f"the face was plugged, but {last.passed - before.passed} fines still left "
+                "through the outlet meanwhile: raise run.plug_time_ms to follow them",
+            )
         )
     if last.removed_upstream:
-        warnings.append(f"{last.removed_upstream} fines bounced out upstream and were removed")
+        warnings.append(
+            Doubt(
+                "bounced-out",
+                f"{last.removed_upstream} fines bounced out upstream and were removed",
+            )
+        )
     return reason, warnings

@@ -11,6 +11,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from fdnet.case.tables import AnalysisChoices, AnalysisKeys, with_visible_choices
+from fdnet.doubts import Doubt
 from fdnet.names import ALL_SPHERES, AUTO, SECTION_ARCHIE, law_pairs
 from fdnet.network.fines.occupancy import Occupancy
 from fdnet.network.flow.flow import Flow
@@ -155,12 +156,13 @@ def laws_apart(taken: tuple[str, float], other: tuple[str, float]) -> Iterator[s
     start = f"two ways of measuring the damage differ: {second} gives {k_second:.4g} m2"
     if low > 0:
         more = "above" if k_second > k else "below"
-        yield (
+        yield Doubt(
+            "laws-apart",
             f"{start}, {more} the {k:.4g} m2 of {name} (the larger is {high / low:.2f} times the "
-            "smaller); take the difference as the error of the damaged permeability"
+            "smaller); take the difference as the error of the damaged permeability",
         )
     else:
-        yield f"{start}, {name} {k:.4g} m2; one of them finds no open path"
+        yield Doubt("laws-apart", f"{start}, {name} {k:.4g} m2; one of them finds no open path")
 
 
 def worst_solve(flows: Sequence[Flow]) -> dict[str, str | float | None]:
@@ -309,10 +311,13 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
         whole, counts = at_most_the_grains(whole, grains, specimen.edges, empty)
         if counts["all_spheres_above_grains"]:
             log.warnings.append(
-                "the damage is too light for the law all-spheres: its network gave more "
-                "permeability with the fines than that of the grains without them, so each "
-                "section is taken as at most the latter; "
-                f"{of_grains} gives {final.k:.4g} m2 with fines"
+                Doubt(
+                    "light-damage",
+                    "the damage is too light for the law all-spheres: its network gave more "
+                    "permeability with the fines than that of the grains without them, so each "
+                    "section is taken as at most the latter; "
+                    f"{of_grains} gives {final.k:.4g} m2 with fines",
+                )
             )
         k, slabs, flow = whole.k, whole.slabs, whole.solved.flow
         log.warnings += laws_apart((ALL_SPHERES, k), (of_grains, final.k))
@@ -390,7 +395,7 @@ def _layers(specimen: Specimen, clean: State, whole: AllSpheres | None) -> Layer
 def _warn(log: Log, clean: State, damaged: Flow, sections: tuple[Section, ...]) -> None:
     for name, flow in (("k_initial", clean.flow), ("k_damaged", damaged)):
         if flow.reason:
-            log.warnings.append(f"{name} = 0: {flow.reason}")
+            log.warnings.append(Doubt("no-open-path", f"{name} = 0: {flow.reason}"))
     log.warnings += thin_slabs(sections, 2.0 * clean.network.grain_radius)
 
 

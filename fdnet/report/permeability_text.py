@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from fdnet.doubts import Doubt
 from fdnet.report.tables import MILLIDARCY, in_millidarcy
 
 if TYPE_CHECKING:
@@ -30,11 +31,12 @@ class Given:
 def thesis_law_warning(chosen: "Analysis", default: "Analysis") -> str:
     """What laws that are off by factors give, with what fdnet's default laws give of the same."""
     used = default.damage_law_used
-    return (
+    return Doubt(
+        "laws-of-the-thesis",
         f"the laws {chosen.law} and {chosen.damage_law} are kept to compare with the thesis, and "
         f"those of the thesis are wrong by factors: they give {_states(chosen)}, where fdnet's "
         f"default laws ({' and '.join(filter(None, (default.law, used)))}) give "
-        f"{_states(default)}"
+        f"{_states(default)}",
     )
 
 

@@ -1,6 +1,7 @@
 """The stages of a run that need LIGGGHTS: the pack and the invasion."""
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
 
 from fdnet.case.case import InvasionCase
@@ -8,6 +9,7 @@ from fdnet.dem.checkpoint import checkpoint_files, read_history, read_updates, s
 from fdnet.dem.deck import snapshot_of
 from fdnet.dem.invasion import invade
 from fdnet.dem.packing import check_radii, make_pack
+from fdnet.doubts import Doubt
 from fdnet.errors import CaseError
 from fdnet.names import LIGGGHTS_STAGES
 from fdnet.run.fluid import fluid_of
@@ -17,7 +19,7 @@ from fdnet.run.progress import Forecast, Progress
 from fdnet.run.records import PACK_DUMP, Session, invade_record, pack_record, ranks_of, take_pack
 from fdnet.scales.cost import expected_duration
 from fdnet.scales.pack import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES
-from fdnet.scales.scales import InvasionScales, scales_of
+from fdnet.scales.scales import InvasionScales, invasion_scales
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Snapshot
 
@@ -43,7 +45,7 @@ def invade_stage(session: Session, case: InvasionCase) -> None:
     """Drive the fines in, unless that is done. Raises what `invade` raises."""
     if is_done(session, "invade"):
         return
-    scales, grains, folder = scales_of(case), packed_grains(session), session.path / "invade"
+    scales, grains, folder = invasion_scales(case), packed_grains(session), session.path / "invade"
     _refuse_mixed_ranks(session, folder)
     forecast = invasion_forecast(case, scales)
     progress = Progress("invade", forecast, show=session.options.show_progress)
@@ -118,7 +120,7 @@ def invaded(session: Session, case: InvasionCase, grains: Snapshot) -> Invaded:
     Raises CaseError when a file is not what the stage made, DumpError or LiggghtsError when one
     cannot be read.
     """
-    folder, scales = session.path / "invade", scales_of(case)
+    folder, scales = session.path / "invade", invasion_scales(case)
     record = session.folder.record("invade") or {}
     check_files(folder, record, START_OVER, may_lack=may_be_gone)
     history = read_history(folder)
@@ -132,24 +134,24 @@ def invaded(session: Session, case: InvasionCase, grains: Snapshot) -> Invaded:
     )
 
 
-def file_warnings(session: Session) -> list[str]:
+def file_warnings(session: Session) -> Iterator[str]:
     """What could not be checked, and dumps that are gone, one sentence each."""
-    warnings = []
     for stage in LIGGGHTS_STAGES:
         record = session.folder.record(stage) if stage in session.case.stages else None
         if record is None:
             continue
         if "files" not in record:
-            warnings.append(
+            yield Doubt(
+                "no-digests",
                 f"{stage}/stage.json holds no digests of files, as older versions wrote it: it "
-                "was not checked that the files are those that the stage made"
+                "was not checked that the files are those that the stage made",
             )
         lost = [
             name for name in record.get("files", {}) if not (session.path / stage / name).exists()
         ]
         if lost:
-            warnings.append(
+            yield Doubt(
+                "dumps-are-gone",
                 f"{len(lost)} checkpoint dumps are gone, the first is {stage}/{lost[0]}: they are "
-                "missing from invasion.pvd"
+                "missing from invasion.pvd",
             )
-    return warnings

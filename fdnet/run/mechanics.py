@@ -111,7 +111,7 @@ def measure_elastic(packed: Packed, pressure_Pa: float | None) -> dict[str, Any]
         "seed": packed.case.seed,
         **elastic_numbers(result),
         "springs": _springs(packed.case),
-        "warnings": warnings_of(result, packed.case),
+        "warnings": list(warnings_of(result, packed.case)),
         "seconds": time.monotonic() - start,
     }
 
@@ -124,7 +124,7 @@ def measure_triaxial(
     material = material_of(case, packed.grains, test.confining)
     result = triaxial(packed.grains, material, test, periodic=case.periodic, follow=follow)
     numbers = triaxial_numbers(result)
-    numbers["warnings"] = triaxial_warnings(result)
+    numbers["warnings"] = list(triaxial_warnings(result))
     numbers["seconds"] = time.monotonic() - start
     return result, numbers
 

@@ -15,10 +15,11 @@ from fdnet.case.case import Case, InvasionCase
 from fdnet.case.spheres import Spheres
 from fdnet.dem.checkpoint import Checkpoint, readable_states
 from fdnet.dem.supply import batches_of, drawn_fines
+from fdnet.doubts import Doubt
 from fdnet.report.figures import Added, draw_added, write_added
 from fdnet.run.fluid import history_rows
 from fdnet.scales.pack import SHARES, diameter_at
-from fdnet.scales.scales import InvasionScales, scales_of
+from fdnet.scales.scales import InvasionScales, invasion_scales
 from fdnet.sizes import SizeCurve, volume_quantiles
 from fdnet.spheres.snapshot import Array, Snapshot
 
@@ -61,7 +62,7 @@ def placed_sizes(
     if isinstance(case, InvasionCase) and case.fines.measured and damaged is not None:
         fines = damaged.fines()
         inside = (fines.position[:, 0] >= 0) & (fines.position[:, 0] < case.size_m[0])
-        placed = _supplied_fines(case, scales_of(case), supplied)
+        placed = _supplied_fines(case, invasion_scales(case), supplied)
         result.append(_sizes("fines", case.fines, placed, 2 * fines.radius[inside]))
     return result
 
@@ -261,5 +262,7 @@ def draw_figures(results: Results) -> tuple[list[tuple[Path, str]], list[str]]:
         picture, results.path / "spheres_damaged.vtp", results.shown.box
     )
     if reason:
-        return [(file, figures.CAPTIONS[file.stem]) for file in drawn] + more, [reason]
+        return [(file, figures.CAPTIONS[file.stem]) for file in drawn] + more, [
+            Doubt("no-picture", reason)
+        ]
     return [(file, figures.CAPTIONS[file.stem]) for file in (picture, *drawn)] + more, []

@@ -23,6 +23,7 @@ from fdnet.dem.checkpoint import HISTORY, UPDATES, WATCH, Deepest, overlap_text
 from fdnet.dem.invasion import Invasion
 from fdnet.dem.liggghts import KNOWN_VERSION, Binary, Launch, Run, find_binary
 from fdnet.dem.packing import Pack
+from fdnet.doubts import Doubt, explained
 from fdnet.errors import CaseError
 from fdnet.names import STAGES
 from fdnet.run.folder import (
@@ -95,7 +96,7 @@ def invade_record(case: Case, result: Invasion, folder: Path, *, seconds: float)
         "steps": result.history[-1].step,
         "dt_s": result.step_s,
         "supplied": result.supplied,
-        "warnings": list(result.warnings),
+        "warnings": [explained(one) for one in result.warnings],
         "ranks": result.ranks,
         **({"updates": _updates(result)} if result.updates else {}),
         "files": digests_of(folder, [HISTORY, WATCH, UPDATES, *dumps]),
@@ -149,12 +150,16 @@ def record_warnings(
     They are another LIGGGHTS than fdnet was measured with, large overlaps, and how the runs ended.
     """
     if invasion is None:
-        return _pack_warnings(pack)
+        return [*_pack_warnings(pack)]
     deepest = Deepest(
         step=invasion.get("max_overlap_step", invasion["steps"]), fraction=invasion["max_overlap"]
     )
     too_deep = deepest.fraction > case.run.max_overlap
-    overlap = [f"{overlap_text(case, deepest)}: raise run.stiffness_N_m"] if too_deep else []
+    overlap = (
+        [Doubt("overlap", f"{overlap_text(case, deepest)}: raise run.stiffness_N_m")]
+        if too_deep
+        else []
+    )
     return [*invasion["warnings"], *_pack_warnings(pack), *overlap, *_momentum(invasion)]
 
 
@@ -164,35 +169,43 @@ def _momentum(invasion: dict[str, Any]) -> list[str]:
     if not updates.get("momentum_open"):
         return []
     return [
-        f"the forces on fines and grains differ from the drop of pressure times area by up to "
-        f"{100 * updates['momentum_defect_most']:.2g} %, and by more than "
-        f"{100 * MOMENTUM_LIMIT:g} % in {updates['momentum_open']} of {updates['count']} updates "
-        "(history.csv, momentum_defect)"
+        Doubt(
+            "momentum",
+            f"the forces on fines and grains differ from the drop of pressure times area by up to "
+            f"{100 * updates['momentum_defect_most']:.2g} %, and by more than "
+            f"{100 * MOMENTUM_LIMIT:g} % in {updates['momentum_open']} of {updates['count']} "
+            "updates (history.csv, momentum_defect)",
+        )
     ]
 
 
-def _pack_warnings(pack: dict[str, Any]) -> list[str]:
-    warnings, version = [], pack["runs"][0]["version"]
+def _pack_warnings(pack: dict[str, Any]) -> Iterator[str]:
+    version = pack["runs"][0]["version"]
     if version != KNOWN_VERSION:
-        warnings.append(f"LIGGGHTS {version}: fdnet was measured and tested with {KNOWN_VERSION}")
-    warnings += overlap_doubts(pack["max_overlap"])
+        yield Doubt(
+            "another-liggghts",
+            f"LIGGGHTS {version}: fdnet was measured and tested with {KNOWN_VERSION}",
+        )
+    yield from overlap_doubts(pack["max_overlap"])
     if pack.get("restless"):
-        warnings.append(
+        yield Doubt(
+            "restless-pack",
             f"{pack['restless']} packs did not come to rest and were made again from other random "
-            "places: the pack is not that of the seed's first places"
+            "places: the pack is not that of the seed's first places",
         )
     if pack.get("creep_m_s"):
-        warnings.append(
+        yield Doubt(
+            "creeping-pack",
             f"the pack is barely jammed and still creeps, at {pack['creep_m_s']:.2g} m/s; it is "
-            "used as it is"
+            "used as it is",
         )
     if abs(pack["porosity"] - pack["porosity_assumed"]) > POROSITY_WARNING:
-        warnings.append(
+        yield Doubt(
+            "assumed-porosity",
             "the fluid's velocity follows from a porosity of "
             f"{pack['porosity_assumed']:.3f} (plain sum of grains.count), the pack has "
-            f"{pack['porosity']:.3f}: give grains.porosity instead of the count"
+            f"{pack['porosity']:.3f}: give grains.porosity instead of the count",
         )
-    return warnings
 
 
 def stage_seconds(

@@ -13,6 +13,7 @@ import numpy as np
 
 from fdnet.case.case import Case
 from fdnet.dem.checkpoint import Checkpoint
+from fdnet.doubts import explained
 from fdnet.names import STAGES
 from fdnet.report.tables import (
     AGREES,
@@ -24,7 +25,6 @@ from fdnet.report.tables import (
     two_digits,
 )
 from fdnet.run.records import ranks_of
-from fdnet.scales.check import explained
 
 if TYPE_CHECKING:
     from fdnet.network.permeability import Analysis

@@ -1,21 +1,15 @@
-"""What is doubtful in a case.
+"""What is doubtful in a case, and what its run takes: what `fdnet check` says."""
 
-One thing that is odd about a case.
-"""
-
-import re
 import textwrap
-import tomllib
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
-from functools import cache
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.rules import WIDEST_THROAT
+from fdnet.doubts import PAGE, catalogue, explained
 from fdnet.scales.clock import TAKEN_SOLIDS, spoken_memory, spoken_time, supplied_solids
 from fdnet.scales.cost import Cost, cost_of, peak_memory
 from fdnet.scales.drag import BRIDGING
@@ -29,7 +23,7 @@ class Finding:
 
     Attributes:
         key: of the case that it is about; empty where it is about no single one.
-        what: what is odd.
+        what: what is odd; a `Doubt` where it is one of the warnings of the scales.
         follows: what follows for the answer.
         do: what to do.
         read: the page that says more.
@@ -81,97 +75,6 @@ def width_error(width: float, *, periodic: bool) -> float:
     if width > widths[-1]:
         return errors[-1] * widths[-1] / width
     return float(np.interp(np.log(width), np.log(widths), errors))
-
-
-# ------------------------------------------------------------------------------------------------
-# Every warning of fdnet: what follows from it, what to do, and where to read on.
-
-
-PAGE = "docs/reference/warnings.md"
-GAP = "…"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Entry:
-    """One kind of warning.
-
-    Attributes:
-        key: its place on the page.
-        text: what it says, with `GAP` for what differs from case to case.
-        follows: what follows.
-        do: what to do.
-        read: page of the documentation.
-        says: which of "follows" and "do" the warning says itself.
-    """
-
-    key: str
-    text: str
-    follows: str
-    do: str
-    read: str
-    says: tuple[str, ...] = ()
-
-    def matches(self, warning: str) -> bool:
-        """Whether a warning is of this kind; what follows its text is free."""
-        pattern = ".*?".join(re.escape(part) for part in self.text.split(GAP))
-        return re.match(pattern, warning, re.DOTALL) is not None
-
-
-@cache
-def catalogue() -> tuple[Entry, ...]:
-    """All kinds of warnings."""
-    text = files("fdnet").joinpath("scales/warnings.toml").read_text(encoding="utf-8")
-    return tuple(
-        Entry(**{**one, "says": tuple(one.get("says", ()))})
-        for one in tomllib.loads(text)["warning"]
-    )
-
-
-def entry_of(warning: str) -> Entry | None:
-    """The kind of a warning; None for one that is not in the catalogue."""
-    return next((entry for entry in catalogue() if entry.matches(warning)), None)
-
-
-def explained(warning: str) -> str:
-    """The warning with what it does not say itself: what follows, what to do, where to read."""
-    entry = entry_of(warning)
-    if entry is None or warning.endswith(f"{PAGE}#{entry.key})"):
-        return warning
-    missing = [
-        f"{label}: {getattr(entry, name)}"
-        for name, label in (("follows", "what follows"), ("do", "what to do"))
-        if name not in entry.says
-    ]
-    return "; ".join([warning.rstrip("."), *missing]) + f" (see {PAGE}#{entry.key})"
-
-
-def _filled_lines(text: str, indent: str = "  ") -> list[str]:
-    return textwrap.wrap(text, 97, subsequent_indent=indent, break_on_hyphens=False)
-
-
-def page() -> str:
-    """The page of all warnings."""
-    lines = [
-        "# Warnings",
-        "",
-        "This page lists every warning of fdnet: what follows from it, and what to do. A warning",
-        "names something that is valid but doubtful, and the run goes on. … stands for what",
-        "differs from case to case. What `fdnet check` finds odd about the sizes, the speed and",
-        "the supply of a case comes first in the summary; it says all this itself.",
-    ]
-    for entry in catalogue():
-        lines += [
-            "",
-            f"({entry.key})=",
-            f"## {entry.key.replace('-', ' ').capitalize()}",
-            "",
-            *_filled_lines(f"> {entry.text}", "> "),
-            "",
-            *_filled_lines(f"- **What follows:** {entry.follows}."),
-            *_filled_lines(f"- **What to do:** {entry.do}."),
-            f"- **Read:** [{entry.read}](../{entry.read})",
-        ]
-    return "\n".join(lines) + "\n"
 
 
 # ------------------------------------------------------------------------------------------------
@@ -330,9 +233,6 @@ def _costly_range(case: InvasionCase, scales: InvasionScales) -> Iterator[Findin
 # A case looked at: all that is odd, and what the run takes.
 
 
-_WIDTH = 96
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Checked:
     """What is odd about a case, and what it takes.
@@ -364,24 +264,29 @@ class Checked:
 
     def lines(self) -> list[str]:
         """As text."""
-        count = len(self.findings)
-        plural = "" if count == 1 else "s"
-        head = f"{self.name}: {count} thing{plural} to look at" if count else f"{self.name}: fine"
-        rows = [*(line for one in self.findings for line in _finding(one)), *self._takes()]
-        return [head, *(line for row in rows for line in _wrapped(row))]
-
-    def _takes(self) -> list[str]:
-        cost = self.cost
+        rows = []
+        for one in self.findings:
+            key = f"{one.key}: " if one.key and not one.what.startswith(one.key) else ""
+            rows.append(f"warning: {key}{one.what}")
+            more = (("what follows", one.follows), ("what to do", one.do), ("read", one.read))
+            rows += [f"    {name}: {text}" for name, text in more if text]
+        cost, count = self.cost, len(self.findings)
         parts = f"pack {spoken_time(cost.pack_seconds)}"
         if cost.invade_seconds:
             parts += f", invasion {spoken_time(cost.invade_seconds)}"
         if cost.update_seconds:
             parts += f" ({spoken_time(cost.update_seconds)} of them for the flow)"
         parts += f", analysis and report {spoken_time(cost.analyse_seconds)}"
-        return [
+        rows += [
             f"time: {spoken_time(cost.seconds)} on one idle core, within a factor of 2 ({parts})",
             f"memory: {spoken_memory(self.memory)}",
         ]
+        plural = "" if count == 1 else "s"
+        head = f"{count} thing{plural} to look at" if count else "fine"
+        wrapped = textwrap.TextWrapper(
+            96, subsequent_indent=" " * 8, break_on_hyphens=False, break_long_words=False
+        )
+        return [f"{self.name}: {head}", *(line for row in rows for line in wrapped.wrap(row))]
 
 
 def checked(case: Case, scales: Scales, refusals: Iterable[str] = ()) -> Checked:
@@ -407,26 +312,15 @@ def checked(case: Case, scales: Scales, refusals: Iterable[str] = ()) -> Checked
 
 def every_finding(case: Case, scales: Scales) -> list[Finding]:
     """All that is odd about a case: what `fdnet check` says, and the summary of its run."""
-    return [*findings(case, scales), *map(_of_warning, scales.warnings)]
-
-
-def _of_warning(text: str) -> Finding:
-    entry = entry_of(text)
-    if entry is None:
-        return Finding(key="", what=text, follows="", do="", read=PAGE)
-    return Finding(
-        key="", what=text, follows=entry.follows, do=entry.do, read=f"{PAGE}#{entry.key}"
-    )
-
-
-def _finding(finding: Finding) -> list[str]:
-    what = finding.what
-    key = f"{finding.key}: " if finding.key and not what.startswith(finding.key) else ""
-    rows = (("what follows", finding.follows), ("what to do", finding.do), ("read", finding.read))
-    return [f"warning: {key}{what}", *(f"    {name}: {text}" for name, text in rows if text)]
-
-
-def _wrapped(row: str) -> list[str]:
-    return textwrap.wrap(
-        row, _WIDTH, subsequent_indent=" " * 8, break_on_hyphens=False, break_long_words=False
-    )
+    known = catalogue()
+    of_scales = [
+        Finding(
+            key="",
+            what=one,
+            follows=known[one.kind].follows,
+            do=known[one.kind].do,
+            read=f"{PAGE}#{one.kind}",
+        )
+        for one in scales.warnings
+    ]
+    return [*findings(case, scales), *of_scales]
