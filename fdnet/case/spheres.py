@@ -18,12 +18,12 @@ from pydantic_core import PydanticCustomError
 from fdnet.case.tables import (
     MAX_CONCENTRATION,
     Fraction,
+    InSI,
     NonNegative,
     Part,
     Positive,
     Radius,
     as_tuple,
-    scaled,
 )
 from fdnet.sizes import (
     NUMBER,
@@ -305,10 +305,8 @@ class Spheres(Part):
         given = self.shear_stiffness_N_m
         return SHEAR_RATIO * self.normal_stiffness_N_m if given is None else given
 
-    @property
-    def youngs_modulus_Pa(self) -> float:
-        """Young's modulus of the material, Pa."""
-        return self.youngs_modulus_GPa * 1e9
+    youngs_modulus_Pa = InSI[float]("youngs_modulus_GPa", 1e9)
+    """Young's modulus of the material, Pa."""
 
     @cached_property
     def components(self) -> tuple[Solid, ...]:
@@ -513,10 +511,8 @@ class Fines(Spheres):
         "batches are much faster for a long slab.",
     )
 
-    @property
-    def slab_m(self) -> float | None:
-        """Length of the slab of suspension, m; None: it follows from the count."""
-        return scaled(self.slab_mm, 1e-3)
+    slab_m = InSI[float | None]("slab_mm", 1e-3)
+    """Length of the slab of suspension, m; None: it follows from the count."""
 
     @model_validator(mode="before")
     @classmethod

@@ -1,13 +1,9 @@
-"""The tables of a case: their keys, units, ranges and defaults.
-
-The kinds of value that a case file may hold, and their bounds.
-"""
+"""The tables of a case: their keys, units, ranges and defaults."""
 
 import inspect
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Annotated, Any, Literal, TypedDict, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypedDict, TypeVar
 
 import numpy as np
 from pydantic import (
@@ -66,15 +62,24 @@ Vector = Annotated[tuple[Finite, Finite, Finite], BeforeValidator(as_tuple)]
 Radius = Annotated[Positive | Pair, Field(union_mode="smart")]
 
 
-def scaled(value: float | None, factor: float) -> float | None:
-    """`value` times `factor`, which turns the unit of a key into SI; None stays None."""
-    return None if value is None else value * factor
+Value = TypeVar("Value", float, float | None)
+
+
+class InSI(Generic[Value]):
+    """The value of a key times the factor from its unit to SI; None stays None."""
+
+    def __init__(self, key: str, factor: float) -> None:
+        self.key, self.factor = key, factor
+
+    def __get__(self, table: Any, owner: Any = None) -> Value:
+        given = getattr(table, self.key)
+        return given if given is None else given * self.factor
 
 
 class Part(BaseModel):
     """A table of the case file: frozen, no unknown keys, no conversion of text to numbers."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, ignored_types=(InSI,))
 
 
 def still_there(name: Any, removed: Mapping[str, str]) -> Any:
@@ -83,28 +88,6 @@ def still_there(name: Any, removed: Mapping[str, str]) -> Any:
         text = "is no longer there; take '{instead}'"
         raise PydanticCustomError("removed", text, {"instead": removed[name]})
     return name
-
-
-# ------------------------------------------------------------------------------------------------
-# One check of some keys of a case against each other.
-
-
-@dataclass(frozen=True, slots=True)
-class Rule:
-    """A check of some keys against each other.
-
-    Attributes:
-        keys: dotted keys that the check reads.
-        check: yields what is wrong; it is given the tables of `keys`, each once, in order.
-    """
-
-    keys: tuple[str, ...]
-    check: Callable[..., Iterator[str]]
-
-    @property
-    def tables(self) -> tuple[str, ...]:
-        """Names of the tables that the check is given."""
-        return tuple(dict.fromkeys(key.split(".")[0] for key in self.keys))
 
 
 # ------------------------------------------------------------------------------------------------
@@ -145,25 +128,18 @@ class Fluid(Part):
         'more, "darcy" warns.',
     )
 
-    @property
-    def viscosity_Pa_s(self) -> float:
-        """Dynamic viscosity, Pa s."""
-        return self.viscosity_cP * 1e-3
+    viscosity_Pa_s = InSI[float]("viscosity_cP", 1e-3)
+    """Dynamic viscosity, Pa s."""
 
     @property
     def stokes_coefficient_Pa_s(self) -> float:
         """6 pi viscosity: the drag force over radius and relative velocity, Pa s (Stokes 1851)."""
         return 6 * math.pi * self.viscosity_cP * 1e-3
 
-    @property
-    def darcy_length_m(self) -> float | None:
-        """Length over which the overbalance is lost, m; None: the length of the box."""
-        return scaled(self.darcy_length_mm, 1e-3)
-
-    @property
-    def overbalance_Pa(self) -> float:
-        """Pressure of the mud above that of the formation, Pa."""
-        return self.overbalance_MPa * 1e6
+    darcy_length_m = InSI[float | None]("darcy_length_mm", 1e-3)
+    """Length over which the overbalance is lost, m; None: the length of the box."""
+    overbalance_Pa = InSI[float]("overbalance_MPa", 1e6)
+    """Pressure of the mud above that of the formation, Pa."""
 
 
 class Well(Part):
@@ -182,15 +158,10 @@ class Well(Part):
         "the pack by Carman and Kozeny.",
     )
 
-    @property
-    def radius_m(self) -> float:
-        """Radius of the well, m."""
-        return self.radius_mm * 1e-3
-
-    @property
-    def formation_permeability_m2(self) -> float | None:
-        """Permeability of the formation, m2; None: that of the pack."""
-        return scaled(self.formation_permeability_mD, M2_PER_MD)
+    radius_m = InSI[float]("radius_mm", 1e-3)
+    """Radius of the well, m."""
+    formation_permeability_m2 = InSI[float | None]("formation_permeability_mD", M2_PER_MD)
+    """Permeability of the formation, m2; None: that of the pack."""
 
 
 # ------------------------------------------------------------------------------------------------
@@ -272,25 +243,14 @@ class Bonds(Part):
         description="Widest gap that a bond bridges, over the smaller diameter of its two grains.",
     )
 
-    @property
-    def normal_stiffness_Pa_m(self) -> float:
-        """Normal stiffness per area, Pa/m."""
-        return self.normal_stiffness_GPa_m * 1e9
-
-    @property
-    def shear_stiffness_Pa_m(self) -> float:
-        """Shear stiffness per area, Pa/m."""
-        return self.shear_stiffness_GPa_m * 1e9
-
-    @property
-    def tensile_strength_Pa(self) -> float | None:
-        """Tensile strength, Pa; None: bonds never break."""
-        return scaled(self.tensile_strength_MPa, 1e6)
-
-    @property
-    def shear_strength_Pa(self) -> float | None:
-        """Shear strength, Pa; None: bonds never break."""
-        return scaled(self.shear_strength_MPa, 1e6)
+    normal_stiffness_Pa_m = InSI[float]("normal_stiffness_GPa_m", 1e9)
+    """Normal stiffness per area, Pa/m."""
+    shear_stiffness_Pa_m = InSI[float]("shear_stiffness_GPa_m", 1e9)
+    """Shear stiffness per area, Pa/m."""
+    tensile_strength_Pa = InSI[float | None]("tensile_strength_MPa", 1e6)
+    """Tensile strength, Pa; None: bonds never break."""
+    shear_strength_Pa = InSI[float | None]("shear_strength_MPa", 1e6)
+    """Shear strength, Pa; None: bonds never break."""
 
 
 # ------------------------------------------------------------------------------------------------
@@ -534,35 +494,18 @@ class Run(Part):
         description="Bin width of LIGGGHTS's neighbour search. When absent LIGGGHTS chooses it.",
     )
 
-    @property
-    def duration_s(self) -> float | None:
-        """Length of the invasion, s; None: until the stop rule holds."""
-        return scaled(self.duration_ms, 1e-3)
-
-    @property
-    def plug_time_s(self) -> float | None:
-        """Time without a crossing after which the face counts as plugged, s, if given."""
-        return scaled(self.plug_time_ms, 1e-3)
-
-    @property
-    def cap_s(self) -> float | None:
-        """Time at which the invasion ends at the latest, s, if given."""
-        return scaled(self.cap_ms, 1e-3)
-
-    @property
-    def checkpoint_s(self) -> float | None:
-        """Time between checkpoints, s, if given."""
-        return scaled(self.checkpoint_ms, 1e-3)
-
-    @property
-    def skin_m(self) -> float | None:
-        """Skin of the neighbour search, m, if given."""
-        return scaled(self.skin_mm, 1e-3)
-
-    @property
-    def neighbour_bin_m(self) -> float | None:
-        """Bin width of the neighbour search, m, if given."""
-        return scaled(self.neighbour_bin_mm, 1e-3)
+    duration_s = InSI[float | None]("duration_ms", 1e-3)
+    """Length of the invasion, s; None: until the stop rule holds."""
+    plug_time_s = InSI[float | None]("plug_time_ms", 1e-3)
+    """Time without a crossing after which the face counts as plugged, s, if given."""
+    cap_s = InSI[float | None]("cap_ms", 1e-3)
+    """Time at which the invasion ends at the latest, s, if given."""
+    checkpoint_s = InSI[float | None]("checkpoint_ms", 1e-3)
+    """Time between checkpoints, s, if given."""
+    skin_m = InSI[float | None]("skin_mm", 1e-3)
+    """Skin of the neighbour search, m, if given."""
+    neighbour_bin_m = InSI[float | None]("neighbour_bin_mm", 1e-3)
+    """Bin width of the neighbour search, m, if given."""
 
 
 # ------------------------------------------------------------------------------------------------
@@ -594,10 +537,8 @@ class CleanUp(Part):
         "time in which the fluid passes the specimen.",
     )
 
-    @property
-    def drawdown_Pa(self) -> float:
-        """Pressure of the formation above that of the well, Pa."""
-        return self.drawdown_MPa * 1e6
+    drawdown_Pa = InSI[float]("drawdown_MPa", 1e6)
+    """Pressure of the formation above that of the well, Pa."""
 
     def fluid_of(self, fluid: Fluid) -> Fluid:
         """The fluid with the drawdown for its overbalance."""
@@ -608,47 +549,12 @@ class CleanUp(Part):
         own = dict.fromkeys(("cap_ms", "plug_time_ms", "checkpoint_ms"))
         return run.model_copy(update=own | {"duration_ms": self.duration_ms})
 
-    @property
-    def duration_s(self) -> float | None:
-        """Length of the clean-up, s; None: until the stop rule holds."""
-        return scaled(self.duration_ms, 1e-3)
-
-    @property
-    def quiet_s(self) -> float | None:
-        """Time without a fine that comes out which ends the clean-up, s, if given."""
-        return scaled(self.quiet_ms, 1e-3)
-
-    @property
-    def cap_s(self) -> float | None:
-        """Time at which the clean-up ends at the latest, s, if given."""
-        return scaled(self.cap_ms, 1e-3)
-
-
-def _known_way(clean_up: CleanUp, fluid: Fluid) -> Iterator[str]:
-    if fluid.velocity_m_s is not None:
-        yield (
-            f"clean_up.drawdown_MPa: {clean_up.drawdown_MPa:g} with fluid.velocity_m_s "
-            f"{fluid.velocity_m_s:g}: nothing says on which way the drawdown is lost; give "
-            "fluid.overbalance_MPa with the table [well] or with fluid.darcy_length_mm instead of "
-            "the velocity"
-        )
-
-
-def _one_end(clean_up: CleanUp) -> Iterator[str]:
-    if clean_up.duration_ms is None:
-        return
-    for name in ("cap_ms", "quiet_ms"):
-        if (value := getattr(clean_up, name)) is not None:
-            yield (
-                f"clean_up.{name}: {value:g} together with clean_up.duration_ms "
-                f"{clean_up.duration_ms:g}: give one of the two"
-            )
-
-
-CLEAN_UP_RULES = (
-    Rule(("clean_up.drawdown_MPa", "fluid.velocity_m_s"), _known_way),
-    Rule(("clean_up.duration_ms", "clean_up.cap_ms", "clean_up.quiet_ms"), _one_end),
-)
+    duration_s = InSI[float | None]("duration_ms", 1e-3)
+    """Length of the clean-up, s; None: until the stop rule holds."""
+    quiet_s = InSI[float | None]("quiet_ms", 1e-3)
+    """Time without a fine that comes out which ends the clean-up, s, if given."""
+    cap_s = InSI[float | None]("cap_ms", 1e-3)
+    """Time at which the clean-up ends at the latest, s, if given."""
 
 
 # ------------------------------------------------------------------------------------------------
@@ -733,10 +639,8 @@ class AnalysisChoices(Part):
                 f"{DEFAULT_LAW!r}, or another damage law"
             )
 
-    @property
-    def profile_bin_m(self) -> float | None:
-        """Width of the depth bins, m; None stands for the mean radius of the grains."""
-        return None if self.profile_bin_mm is None else self.profile_bin_mm * 1e-3
+    profile_bin_m = InSI[float | None]("profile_bin_mm", 1e-3)
+    """Width of the depth bins, m; None stands for the mean radius of the grains."""
 
     @classmethod
     def of_pack(cls, **keys: Any) -> "AnalysisChoices":

@@ -65,7 +65,7 @@ def _designed(options: argparse.Namespace, out: Path) -> "Design":
     """The design of the answers; on a terminal those that make no case are asked for again."""
     from fdnet.errors import CaseError
     from fdnet.run.pipeline import refusals
-    from fdnet.scales.design import BUDGETS, answers_of, designed, filled
+    from fdnet.scales.design import BUDGETS, designed, filled
     from fdnet.scales.questions import named_in
 
     ask = _ask if sys.stdin.isatty() else None
@@ -73,7 +73,7 @@ def _designed(options: argparse.Namespace, out: Path) -> "Design":
     while True:
         try:
             return designed(
-                answers_of(options.name, texts),
+                texts,
                 BUDGETS[options.size],
                 folder=out.absolute().parent,
                 refusals=refusals,
@@ -92,7 +92,7 @@ def _given(options: argparse.Namespace, out: Path) -> dict[str, str]:
     """The options that were given; files as seen from the folder of the case."""
     from fdnet.scales.questions import QUESTIONS
 
-    given = {
+    given = {"name": options.name} | {
         question.key: text
         for question in QUESTIONS
         if (text := getattr(options, question.key)) is not None

@@ -1,6 +1,7 @@
 """What `fdnet init` asks for."""
 
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 
 from fdnet.case.units import converted, share_of
@@ -32,10 +33,17 @@ class Question:
         """As on the command line."""
         return f"--{self.key.replace('_', '-')}"
 
-    def problem(self, text: str) -> str:
-        """Why a text is no answer; empty for one that can be read."""
-        if text == self.default:
-            return ""
+    def read(self, text: str) -> tuple[str, str]:
+        """An answer as it is read, and why it is none; that is empty for one that can be read.
+
+        A share may be a number between 0 and 1, which becomes a percentage.
+        """
+        text = text.strip()
+        if "%" in self.unit:
+            with suppress(ValueError):
+                text = f"{100 * float(text):g} %" if 0 < float(text) < 1 else text
+        if text in ("", self.default):
+            return text, ""
         _, _, suffix = self.unit.rpartition("%")
         try:
             if "%" in self.unit and (not suffix or text.rstrip().endswith("%")):
@@ -43,8 +51,8 @@ class Question:
             else:
                 converted(text, suffix)
         except ValueError as error:
-            return f"{self.option}: {text!r}: {error}"
-        return ""
+            return text, f"{self.option}: {text!r}: {error}"
+        return text, ""
 
 
 QUESTIONS = (
