@@ -1,16 +1,14 @@
-"""The tables [grains] and [fines] of a case, and their sizes.
+"""The tables [grains] and [fines] of a case, and their curves of sizes.
 
-The table `sizes` of grains, fines and materials: a measured curve of sizes.
-
-All sizes in it are diameters, as sieves and laser instruments give them.
+All sizes of a curve are diameters, as sieves and laser instruments give them.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -125,12 +123,12 @@ class Sizes(Part):
 
 
 def _problems(sizes: Sizes) -> Iterator[str]:
-    given = {share: size for share, size in sizes.asked.items() if size is not None}
+    given, cut = sizes.asked, sizes.cut_percent
     measured = sizes.size_mm is not None or sizes.passing_percent is not None
     if measured and given:
         yield "gives D10, D50 or D90 beside a measured curve; give one of the two"
     elif measured:
-        yield from _measured_problems(sizes)
+        yield from _measured_problem(sizes)
     elif len(given) < 2:
         yield (
             f"gives {len(given)} of D10, D50 and D90, expected two or three of them (one diameter "
@@ -142,33 +140,33 @@ def _problems(sizes: Sizes) -> Iterator[str]:
             f"{texts}: must rise from D10 to D90, each {LEAST_RATIO} to {MOST_RATIO:g} times the "
             "one before"
         )
-    if sizes.cut_percent[0] >= sizes.cut_percent[1]:
-        yield f"cut_percent {list(sizes.cut_percent)} must rise, [finest, coarsest]"
-    elif not measured and not 0 < sizes.cut_percent[0] < sizes.cut_percent[1] < 100:
+    if cut[0] >= cut[1]:
+        yield f"cut_percent {list(cut)} must rise, [finest, coarsest]"
+    elif not measured and not 0 < cut[0] < cut[1] < 100:
         yield (
-            f"cut_percent {list(sizes.cut_percent)}: the law of D10, D50 and D90 has no ends, "
+            f"cut_percent {list(cut)}: the law of D10, D50 and D90 has no ends, "
             "expected cuts above 0 and below 100"
         )
 
 
-def _measured_problems(sizes: Sizes) -> Iterator[str]:
+def _measured_problem(sizes: Sizes) -> Iterator[str]:
+    """The first problem of a measured curve."""
     size, finer = sizes.size_mm, sizes.passing_percent
     if size is None or finer is None:
         yield "a measured curve needs both size_mm and passing_percent"
-    elif len(size) != len(finer):
+        return
+    if len(size) != len(finer):
         yield f"{len(size)} sizes with {len(finer)} percentages, expected as many of both"
-    elif sizes.shape is not None:
+        return
+    if sizes.shape is not None:
         yield f"shape {sizes.shape!r} belongs to D10, D50 and D90, not to a measured curve"
-    elif finer[0] > 0 and sizes.by in ("number", "surface"):
+        return
+    if finer[0] > 0 and sizes.by in ("number", "surface"):
         yield (
             f"the curve by {sizes.by} begins at {finer[0]:g} %, expected 0 %: spheres of unknown "
             "size have no volume"
         )
-    else:
-        yield from _order_problems(size, finer)
-
-
-def _order_problems(size: tuple[float, ...], finer: tuple[float, ...]) -> Iterator[str]:
+        return
     for (a, b), (p, q) in zip(pairwise(size), pairwise(finer), strict=True):
         if b < (1 + _ROUNDING) * a:
             yield f"size_mm must rise, but {b:g} mm follows {a:g} mm"
@@ -223,31 +221,6 @@ class Material(Part):
         description="Coefficient of sliding friction; for now it must be that of all fines, "
         "`fines.friction`, which is also the default.",
     )
-
-
-def components_of(
-    materials: Sequence[Material], *, density: float, finest: float
-) -> tuple[Solid, ...]:
-    """The materials with their shares by volume of all solids.
-
-    `density` kg/m3 is for those without one; nothing finer than `finest` m is kept.
-    """
-    volumes = [one.share / (one.density_kg_m3 or density) for one in materials]
-    return tuple(
-        Solid(
-            name=one.name,
-            share=volume / sum(volumes),
-            curve=one.sizes.curve(finest),
-            density=one.density_kg_m3 or density,
-        )
-        for one, volume in zip(materials, volumes, strict=True)
-    )
-
-
-def mixed_density(materials: Sequence[Material], density: float) -> float:
-    """Mass over volume, kg/m3, of materials by their shares of mass; see `components_of`."""
-    mass = sum(one.share for one in materials)
-    return mass / sum(one.share / (one.density_kg_m3 or density) for one in materials)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -305,7 +278,7 @@ class Spheres(Part):
         given = self.shear_stiffness_N_m
         return SHEAR_RATIO * self.normal_stiffness_N_m if given is None else given
 
-    youngs_modulus_Pa = InSI[float]("youngs_modulus_GPa", 1e9)
+    youngs_modulus_Pa: ClassVar = InSI[float]("youngs_modulus_GPa", 1e9)
     """Young's modulus of the material, Pa."""
 
     @cached_property
@@ -511,7 +484,7 @@ class Fines(Spheres):
         "batches are much faster for a long slab.",
     )
 
-    slab_m = InSI[float | None]("slab_mm", 1e-3)
+    slab_m: ClassVar = InSI[float | None]("slab_mm", 1e-3)
     """Length of the slab of suspension, m; None: it follows from the count."""
 
     @model_validator(mode="before")
@@ -548,14 +521,25 @@ class Fines(Spheres):
         """The materials that the fines are of, with their shares by volume of what is kept."""
         if self.materials is None:
             return super().components
-        return components_of(self.materials, density=self.density_kg_m3, finest=self.finest_m)
+        usual = self.density_kg_m3
+        volumes = [one.share / (one.density_kg_m3 or usual) for one in self.materials]
+        return tuple(
+            Solid(
+                name=one.name,
+                share=volume / sum(volumes),
+                curve=one.sizes.curve(self.finest_m),
+                density=one.density_kg_m3 or usual,
+            )
+            for one, volume in zip(self.materials, volumes, strict=True)
+        )
 
     @property
     def solids_density_kg_m3(self) -> float:
         """Mass over volume of all solids of the mud, those that are left out as well."""
         if self.materials is None:
             return self.density_kg_m3
-        return mixed_density(self.materials, self.density_kg_m3)
+        mass, usual = sum(one.share for one in self.materials), self.density_kg_m3
+        return mass / sum(one.share / (one.density_kg_m3 or usual) for one in self.materials)
 
     @property
     def has_one_concentration(self) -> bool:

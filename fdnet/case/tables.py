@@ -3,7 +3,7 @@
 import inspect
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Annotated, Any, Generic, Literal, TypedDict, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, Literal, TypedDict, TypeVar
 
 import numpy as np
 from pydantic import (
@@ -72,14 +72,15 @@ class InSI(Generic[Value]):
         self.key, self.factor = key, factor
 
     def __get__(self, table: Any, owner: Any = None) -> Value:
-        given = getattr(table, self.key)
-        return given if given is None else given * self.factor
+        given: Any = getattr(table, self.key)
+        value: Any = None if given is None else given * self.factor
+        return value
 
 
 class Part(BaseModel):
     """A table of the case file: frozen, no unknown keys, no conversion of text to numbers."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, ignored_types=(InSI,))
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
 
 def still_there(name: Any, removed: Mapping[str, str]) -> Any:
@@ -128,7 +129,7 @@ class Fluid(Part):
         'more, "darcy" warns.',
     )
 
-    viscosity_Pa_s = InSI[float]("viscosity_cP", 1e-3)
+    viscosity_Pa_s: ClassVar = InSI[float]("viscosity_cP", 1e-3)
     """Dynamic viscosity, Pa s."""
 
     @property
@@ -136,9 +137,9 @@ class Fluid(Part):
         """6 pi viscosity: the drag force over radius and relative velocity, Pa s (Stokes 1851)."""
         return 6 * math.pi * self.viscosity_cP * 1e-3
 
-    darcy_length_m = InSI[float | None]("darcy_length_mm", 1e-3)
+    darcy_length_m: ClassVar = InSI[float | None]("darcy_length_mm", 1e-3)
     """Length over which the overbalance is lost, m; None: the length of the box."""
-    overbalance_Pa = InSI[float]("overbalance_MPa", 1e6)
+    overbalance_Pa: ClassVar = InSI[float]("overbalance_MPa", 1e6)
     """Pressure of the mud above that of the formation, Pa."""
 
 
@@ -158,9 +159,11 @@ class Well(Part):
         "the pack by Carman and Kozeny.",
     )
 
-    radius_m = InSI[float]("radius_mm", 1e-3)
+    radius_m: ClassVar = InSI[float]("radius_mm", 1e-3)
     """Radius of the well, m."""
-    formation_permeability_m2 = InSI[float | None]("formation_permeability_mD", M2_PER_MD)
+    formation_permeability_m2: ClassVar = InSI[float | None](
+        "formation_permeability_mD", M2_PER_MD
+    )
     """Permeability of the formation, m2; None: that of the pack."""
 
 
@@ -243,13 +246,13 @@ class Bonds(Part):
         description="Widest gap that a bond bridges, over the smaller diameter of its two grains.",
     )
 
-    normal_stiffness_Pa_m = InSI[float]("normal_stiffness_GPa_m", 1e9)
+    normal_stiffness_Pa_m: ClassVar = InSI[float]("normal_stiffness_GPa_m", 1e9)
     """Normal stiffness per area, Pa/m."""
-    shear_stiffness_Pa_m = InSI[float]("shear_stiffness_GPa_m", 1e9)
+    shear_stiffness_Pa_m: ClassVar = InSI[float]("shear_stiffness_GPa_m", 1e9)
     """Shear stiffness per area, Pa/m."""
-    tensile_strength_Pa = InSI[float | None]("tensile_strength_MPa", 1e6)
+    tensile_strength_Pa: ClassVar = InSI[float | None]("tensile_strength_MPa", 1e6)
     """Tensile strength, Pa; None: bonds never break."""
-    shear_strength_Pa = InSI[float | None]("shear_strength_MPa", 1e6)
+    shear_strength_Pa: ClassVar = InSI[float | None]("shear_strength_MPa", 1e6)
     """Shear strength, Pa; None: bonds never break."""
 
 
@@ -494,17 +497,17 @@ class Run(Part):
         description="Bin width of LIGGGHTS's neighbour search. When absent LIGGGHTS chooses it.",
     )
 
-    duration_s = InSI[float | None]("duration_ms", 1e-3)
+    duration_s: ClassVar = InSI[float | None]("duration_ms", 1e-3)
     """Length of the invasion, s; None: until the stop rule holds."""
-    plug_time_s = InSI[float | None]("plug_time_ms", 1e-3)
+    plug_time_s: ClassVar = InSI[float | None]("plug_time_ms", 1e-3)
     """Time without a crossing after which the face counts as plugged, s, if given."""
-    cap_s = InSI[float | None]("cap_ms", 1e-3)
+    cap_s: ClassVar = InSI[float | None]("cap_ms", 1e-3)
     """Time at which the invasion ends at the latest, s, if given."""
-    checkpoint_s = InSI[float | None]("checkpoint_ms", 1e-3)
+    checkpoint_s: ClassVar = InSI[float | None]("checkpoint_ms", 1e-3)
     """Time between checkpoints, s, if given."""
-    skin_m = InSI[float | None]("skin_mm", 1e-3)
+    skin_m: ClassVar = InSI[float | None]("skin_mm", 1e-3)
     """Skin of the neighbour search, m, if given."""
-    neighbour_bin_m = InSI[float | None]("neighbour_bin_mm", 1e-3)
+    neighbour_bin_m: ClassVar = InSI[float | None]("neighbour_bin_mm", 1e-3)
     """Bin width of the neighbour search, m, if given."""
 
 
@@ -537,7 +540,7 @@ class CleanUp(Part):
         "time in which the fluid passes the specimen.",
     )
 
-    drawdown_Pa = InSI[float]("drawdown_MPa", 1e6)
+    drawdown_Pa: ClassVar = InSI[float]("drawdown_MPa", 1e6)
     """Pressure of the formation above that of the well, Pa."""
 
     def fluid_of(self, fluid: Fluid) -> Fluid:
@@ -549,11 +552,11 @@ class CleanUp(Part):
         own = dict.fromkeys(("cap_ms", "plug_time_ms", "checkpoint_ms"))
         return run.model_copy(update=own | {"duration_ms": self.duration_ms})
 
-    duration_s = InSI[float | None]("duration_ms", 1e-3)
+    duration_s: ClassVar = InSI[float | None]("duration_ms", 1e-3)
     """Length of the clean-up, s; None: until the stop rule holds."""
-    quiet_s = InSI[float | None]("quiet_ms", 1e-3)
+    quiet_s: ClassVar = InSI[float | None]("quiet_ms", 1e-3)
     """Time without a fine that comes out which ends the clean-up, s, if given."""
-    cap_s = InSI[float | None]("cap_ms", 1e-3)
+    cap_s: ClassVar = InSI[float | None]("cap_ms", 1e-3)
     """Time at which the clean-up ends at the latest, s, if given."""
 
 
@@ -639,7 +642,7 @@ class AnalysisChoices(Part):
                 f"{DEFAULT_LAW!r}, or another damage law"
             )
 
-    profile_bin_m = InSI[float | None]("profile_bin_mm", 1e-3)
+    profile_bin_m: ClassVar = InSI[float | None]("profile_bin_mm", 1e-3)
     """Width of the depth bins, m; None stands for the mean radius of the grains."""
 
     @classmethod

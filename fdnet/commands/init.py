@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 SIZES = ("quick", "standard")
 
 
-def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
+def add_init(commands: Any, common: argparse.ArgumentParser) -> None:
     """Adds the command to the command line."""
     from fdnet.scales.questions import QUESTIONS
 
