@@ -214,7 +214,7 @@ def nearest(path: str) -> str:
 
     def near_in(keys: Mapping[str, str]) -> Iterator[str]:
         """The key of nearly the same spelling; tables and units count for nothing."""
-        first = {stem: one for one, stem in reversed(keys.items())}
+        first = {stem: one for one, stem in reversed([*keys.items()])}
         close = difflib.get_close_matches(stem_of(key), first, n=1, cutoff=0.65)
         return (first[one] for one in close)
 

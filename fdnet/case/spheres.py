@@ -340,6 +340,17 @@ class Spheres(Part):
         return self._given_range
 
     @property
+    def ends(self) -> list[tuple[float, float]]:
+        """Radius, m, and density of the smallest and the largest sphere of each material."""
+        if not self.measured:
+            return [(radius, self.density_kg_m3) for radius in self.radius_range_m]
+        return [
+            (0.5 * diameter, one.density)
+            for one in self.components
+            for diameter in (one.curve.low, one.curve.high)
+        ]
+
+    @property
     def one_size(self) -> bool:
         """Whether all radii are equal."""
         return isinstance(self.radius_mm, float | int)

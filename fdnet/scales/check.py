@@ -92,141 +92,108 @@ MOST_COARSE = 0.25
 WHOLE_GRAIN = 1 - 1e-6
 
 
-def findings(case: Case, scales: Scales) -> list[Finding]:
+def findings(case: Case, scales: Scales) -> Iterator[Finding]:
     """All that is odd about the sizes of a case; its warnings are said by `scales`."""
-    odd = [*_narrow(case), *_thin_sections(case)]
-    if isinstance(case, InvasionCase) and isinstance(scales, InvasionScales):
-        odd += [
-            *_fast(case, scales),
-            *_short_supply(case, scales),
-            *_too_coarse(case),
-            *_costly_range(case, scales),
-        ]
-    return odd
-
-
-def _narrow(case: Case) -> Iterator[Finding]:
-    diameter, periodic = case.grains.sauter_diameter_m, case.periodic[1]
-    side = min(case.size_m[1:])
-    error = width_error(side / diameter, periodic=periodic)
-    if abs(error) < MOST_WIDTH_ERROR:
-        return
-    wider = next(
-        n for n in range(2, 200) if abs(width_error(n, periodic=periodic)) < MOST_WIDTH_ERROR
-    )
-    sides = "" if periodic else "box.sides = 'periodic', or "
-    yield Finding(
-        key="box.size_mm",
-        what=f"the specimen is {side / diameter:.2g} mean grains wide ({1e3 * side:.3g} mm)",
-        follows=f"its intact permeability is about {100 * abs(error):.0f} % "
-        f"{'below' if error < 0 else 'above'} that of the bulk sand (packs of equal grains); the "
-        "ratio of damaged to intact suffers less",
-        do=f"take {sides}a width of {1e3 * wider * diameter:.2g} mm for less than "
-        f"{100 * MOST_WIDTH_ERROR:.0f} %, or use the ratio only",
-        read="docs/validation/specimen-size.md",
-    )
-
-
-def _thin_sections(case: Case) -> Iterator[Finding]:
-    diameter = 2 * case.grains.mean_radius_m
-    count = case.analysis.sections
+    mean, periodic, side = case.grains.sauter_diameter_m, case.periodic[1], min(case.size_m[1:])
+    error = width_error(side / mean, periodic=periodic)
+    if abs(error) >= MOST_WIDTH_ERROR:
+        wider = next(
+            n for n in range(2, 200) if abs(width_error(n, periodic=periodic)) < MOST_WIDTH_ERROR
+        )
+        sides = "" if periodic else "box.sides = 'periodic', or "
+        yield Finding(
+            key="box.size_mm",
+            what=f"the specimen is {side / mean:.2g} mean grains wide ({1e3 * side:.3g} mm)",
+            follows=f"its intact permeability is about {100 * abs(error):.0f} % "
+            f"{'below' if error < 0 else 'above'} that of the bulk sand (packs of equal grains); "
+            "the ratio of damaged to intact suffers less",
+            do=f"take {sides}a width of {1e3 * wider * mean:.2g} mm for less than "
+            f"{100 * MOST_WIDTH_ERROR:.0f} %, or use the ratio only",
+            read="docs/validation/specimen-size.md",
+        )
+    diameter, count = 2 * case.grains.mean_radius_m, case.analysis.sections
     assert isinstance(count, int)
     thickness = case.size_m[0] / count
-    if thickness >= WHOLE_GRAIN * diameter:
-        return
-    most = int(case.size_m[0] / diameter)
-    yield Finding(
-        key="analysis.sections",
-        what=f"sections of {1e3 * thickness:.3g} mm are thinner than a grain "
-        f"({1e3 * diameter:.3g} mm)",
-        follows="the permeability of each is that of a few throats",
-        do=f"take {most} sections or fewer" if most else "take a longer box",
-        read="docs/how-to/choose_sections.md",
-    )
+    if thickness < WHOLE_GRAIN * diameter:
+        most = int(case.size_m[0] / diameter)
+        yield Finding(
+            key="analysis.sections",
+            what=f"sections of {1e3 * thickness:.3g} mm are thinner than a grain "
+            f"({1e3 * diameter:.3g} mm)",
+            follows="the permeability of each is that of a few throats",
+            do=f"take {most} sections or fewer" if most else "take a longer box",
+            read="docs/how-to/choose_sections.md",
+        )
+    if isinstance(case, InvasionCase) and isinstance(scales, InvasionScales):
+        yield from _of_the_invasion(case, scales)
 
 
-def _fast(case: InvasionCase, scales: InvasionScales) -> Iterator[Finding]:
-    radius, outer = USUAL_WELL
-    path = radial(radius, outer)
+def _of_the_invasion(case: InvasionCase, scales: InvasionScales) -> Iterator[Finding]:
+    (radius, outer), fines = USUAL_WELL, case.fines
     losses = Losses(viscous=case.fluid.viscosity_Pa_s / scales.permeability)
-    usual = losses.velocity(case.fluid.overbalance_Pa, path) / scales.porosity
+    usual = losses.velocity(case.fluid.overbalance_Pa, radial(radius, outer)) / scales.porosity
     ratio = scales.interstitial_velocity / usual
-    if 1 / ABSURD <= ratio <= ABSURD:
-        return
-    yield Finding(
-        key="well",
-        what=f"the fluid moves at {scales.interstitial_velocity:.3g} m/s in the pores, "
-        f"{ratio:.2g} times as fast as {usual:.2g} m/s at the face of a well of "
-        f"{1e3 * radius:.0f} mm with this overbalance",
-        follows="drag and depth are not those around a well",
-        do="give the table [well] with radius and drainage_radius, unless the case is a plug in "
-        "a laboratory",
-        read="docs/how-to/choose_the_velocity.md",
-    )
-
-
-def _short_supply(case: InvasionCase, scales: InvasionScales) -> Iterator[Finding]:
-    """The slab runs out, or the time, before as much has come as plugged the shipped cases."""
+    if not 1 / ABSURD <= ratio <= ABSURD:
+        yield Finding(
+            key="well",
+            what=f"the fluid moves at {scales.interstitial_velocity:.3g} m/s in the pores, "
+            f"{ratio:.2g} times as fast as {usual:.2g} m/s at the face of a well of "
+            f"{1e3 * radius:.0f} mm with this overbalance",
+            follows="drag and depth are not those around a well",
+            do="give the table [well] with radius and drainage_radius, unless the case is a plug "
+            "in a laboratory",
+            read="docs/how-to/choose_the_velocity.md",
+        )
+    # the slab runs out, or the time, before as much has come as plugged the shipped cases
     solids = supplied_solids(case, scales.slab_length)
     feeding = scales.slab_length / scales.upstream_velocity
     come = solids * min(1.0, scales.cap_time / feeding)
-    if scales.throat_ratio < BRIDGING or come >= TAKEN_SOLIDS:
-        return
-    length = TAKEN_SOLIDS / solids * scales.slab_length
-    by_time = scales.cap_time < feeding
-    key = "fines.count" if case.fines.count is not None else "fines.slab_mm"
-    yield Finding(
-        key="run.cap_ms" if by_time else key,
-        what=f"the fines that come would fill {come:.2g} of a median grain's depth; the shipped "
-        f"cases were plugged by 0.1 to {TAKEN_SOLIDS:g}",
-        follows="the mud, or the time, may run out before the face plugs; then more mud would do "
-        "more damage",
-        do="give the run more time (run.cap_ms or run.duration_ms)"
-        if by_time
-        else f"supply {1e3 * length:.2g} mm of mud ({TAKEN_SOLIDS / solids:.2g} times as much)",
-        read="docs/start/first_answer.md",
-    )
-
-
-def _too_coarse(case: InvasionCase) -> Iterator[Finding]:
-    """Solids that pass no throat between the largest grains."""
-    widest = 2 * WIDEST_THROAT * case.grains.radius_range_m[1]
-    curve = case.fines.curve
-    if curve.high <= widest:
-        return
+    if scales.throat_ratio >= BRIDGING and come < TAKEN_SOLIDS:
+        length = TAKEN_SOLIDS / solids * scales.slab_length
+        by_time = scales.cap_time < feeding
+        key = "fines.count" if fines.count is not None else "fines.slab_mm"
+        yield Finding(
+            key="run.cap_ms" if by_time else key,
+            what=f"the fines that come would fill {come:.2g} of a median grain's depth; the "
+            f"shipped cases were plugged by 0.1 to {TAKEN_SOLIDS:g}",
+            follows="the mud, or the time, may run out before the face plugs; then more mud would "
+            "do more damage",
+            do="give the run more time (run.cap_ms or run.duration_ms)"
+            if by_time
+            else f"supply {1e3 * length:.2g} mm of mud "
+            f"({TAKEN_SOLIDS / solids:.2g} times as much)",
+            read="docs/start/first_answer.md",
+        )
+    # solids that pass no throat between the largest grains
+    widest, curve = 2 * WIDEST_THROAT * case.grains.radius_range_m[1], fines.curve
     share = 1 - float(curve.share_finer(np.array(widest))) if curve.low < widest else 1.0
-    if share < MOST_COARSE:
+    if curve.high > widest and share >= MOST_COARSE:
+        yield Finding(
+            key="fines.sizes" if fines.measured else "fines.radius_mm",
+            what=f"{100 * share:.0f} % of the fines are wider than every throat between "
+            f"touching grains (at most {1e3 * widest:.3g} mm)",
+            follows="they enter only where grains stand apart; most build a cake",
+            do="check the units of both sizes; if they are right, a shorter box is enough",
+            read="docs/how-to/your_sand_and_your_mud.md",
+        )
+    # the finest tenth of the solids makes most of the time
+    if not fines.measured or curve.low == curve.high:
         return
-    yield Finding(
-        key="fines.sizes" if case.fines.measured else "fines.radius_mm",
-        what=f"{100 * share:.0f} % of the fines are wider than every throat between "
-        f"touching grains (at most {1e3 * widest:.3g} mm)",
-        follows="they enter only where grains stand apart; most build a cake",
-        do="check the units of both sizes; if they are right, a shorter box is enough",
-        read="docs/how-to/your_sand_and_your_mud.md",
-    )
-
-
-def _costly_range(case: InvasionCase, scales: InvasionScales) -> Iterator[Finding]:
-    """The finest tenth of the solids makes most of the time."""
-    if not case.fines.measured or case.fines.curve.low == case.fines.curve.high:
-        return
-    cut = case.fines.curve.size_at(FINE_SHARE)
+    cut = float(f"{1e6 * curve.size_at(FINE_SHARE):.2g}")
     data = case.data()
-    data["fines"]["cut_um"] = float(f"{1e6 * cut:.2g}")
+    data["fines"]["cut_um"] = cut
     without = type(case).model_validate(data)
     seconds = cost_of(case, scales).invade_seconds
     less = cost_of(without, scales_of(without)).invade_seconds
-    if seconds < 60 or seconds < MOST_FINE_COST * less:
-        return
-    yield Finding(
-        key="fines.cut_um",
-        what=f"the finest {100 * FINE_SHARE:.0f} % of the solids (below {1e6 * cut:.2g} um) take "
-        f"most of the time, {spoken_time(seconds)} instead of {spoken_time(less)}",
-        follows="the run is long for what these sizes add",
-        do=f"set fines.cut_um = {1e6 * cut:.2g} unless they matter",
-        read="docs/how-to/your_sand_and_your_mud.md",
-    )
+    if seconds >= 60 and seconds >= MOST_FINE_COST * less:
+        yield Finding(
+            key="fines.cut_um",
+            what=f"the finest {100 * FINE_SHARE:.0f} % of the solids (below {cut:.2g} um) take "
+            f"most of the time, {spoken_time(seconds)} instead of {spoken_time(less)}",
+            follows="the run is long for what these sizes add",
+            do=f"set fines.cut_um = {cut:.2g} unless they matter",
+            read="docs/how-to/your_sand_and_your_mud.md",
+        )
 
 
 # ------------------------------------------------------------------------------------------------

@@ -8,16 +8,9 @@ from fdnet.case.case import Case, InvasionCase
 from fdnet.case.tables import CONTACT_STEP_LIMIT, DEFAULT_STIFFNESS
 from fdnet.doubts import Doubt
 from fdnet.errors import CaseError
-from fdnet.scales.contacts import (
-    Contact,
-    Overlaps,
-    contacts_of,
-    deposit_force,
-    overlaps_of,
-    two_digits_up,
-)
-from fdnet.scales.drag import Crowd, crowd_drag_factor, push_of, throat_width
-from fdnet.scales.flow import Drive, Velocity, drive_of, driving_pressure, velocity_of
+from fdnet.scales.contacts import Contact, contacts_of, overlaps_of, two_digits_up
+from fdnet.scales.drag import Crowd, crowd_drag_factor, push_of
+from fdnet.scales.flow import Drive, Velocity, drive_of, velocity_of
 from fdnet.scales.pack import target_porosity
 
 PLUG_SOLIDS = 0.6
@@ -353,25 +346,8 @@ def drive_in(case: InvasionCase, velocity: Velocity) -> Drive:
 def relaxation_times(case: InvasionCase) -> tuple[float, float]:
     """The shortest and the longest of the fines, s; with one material smallest and largest."""
     viscosity, multiplier = case.fluid.viscosity_Pa_s, case.drag.multiplier
-    if not case.fines.measured:
-        ends = [(radius, case.fines.density_kg_m3) for radius in case.fines.radius_range_m]
-    else:
-        ends = [
-            (0.5 * diameter, one.density)
-            for one in case.fines.components
-            for diameter in (one.curve.low, one.curve.high)
-        ]
-    times = [relaxation_time(radius, density, viscosity, multiplier) for radius, density in ends]
+    times = [relaxation_time(*end, viscosity, multiplier) for end in case.fines.ends]
     return min(times), max(times)
-
-
-def pressed_in(case: InvasionCase, velocity: Velocity, drive: Drive, contact: Contact) -> Overlaps:
-    """The overlaps of fines in the `contact` of a grain and a fine, as simulated."""
-    push = push_of(case, drive.velocity, velocity.pressure_gradient, factor=drive.factor)
-    porosity = target_porosity(case)
-    pressure = drive.factor * driving_pressure(case, velocity.pressure_gradient)
-    plug = deposit_force(case, pressure, throat_width(porosity, velocity.permeability))
-    return overlaps_of(case, contact, push, porosity, deposit=plug)
 
 
 def stiff_enough(case: AnyCase) -> AnyCase:
@@ -383,22 +359,22 @@ def stiff_enough(case: AnyCase) -> AnyCase:
     """
     if case.run.stiffness_N_m != "auto":
         return case
-    soft = _with(case, DEFAULT_STIFFNESS)
+
+    def stiff(value: float) -> AnyCase:
+        run = case.run.model_copy(update={"stiffness_N_m": value})
+        return case.model_copy(update={"run": run})
+
+    soft = stiff(DEFAULT_STIFFNESS)
     if not isinstance(soft, InvasionCase):
         return soft
-    velocity = velocity_of(soft, target_porosity(soft))
-    contact = contacts_of(soft, velocity.interstitial)["grain-fine"]
-    deep = pressed_in(soft, velocity, drive_in(soft, velocity), contact)
+    porosity = target_porosity(soft)
+    flow = velocity_of(soft, porosity)
+    contact = contacts_of(soft, flow.interstitial)["grain-fine"]
+    deep = overlaps_of(soft, contact, flow, drive_in(soft, flow), porosity)
     held, struck = (1.5, 2.5) if soft.contact.model == "hertz" else (1.0, 2.0)
     raised = max(
         1.0,
         (max(deep.drag, deep.deposit) / PRESSED) ** held,
         (deep.impact / PRESSED) ** struck,
     )
-    return _with(case, two_digits_up(raised * DEFAULT_STIFFNESS))
-
-
-def _with(case: AnyCase, stiffness: float) -> AnyCase:
-    return case.model_copy(
-        update={"run": case.run.model_copy(update={"stiffness_N_m": stiffness})}
-    )
+    return stiff(two_digits_up(raised * DEFAULT_STIFFNESS))

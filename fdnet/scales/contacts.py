@@ -8,7 +8,8 @@ from fdnet.case.case import Case, InvasionCase
 from fdnet.case.spheres import Spheres
 from fdnet.doubts import Doubt
 from fdnet.errors import CaseError
-from fdnet.scales.drag import Push, arrival_velocity, pore_width
+from fdnet.scales.drag import Push, arrival_velocity, pore_width, push_of, throat_width
+from fdnet.scales.flow import Drive, Velocity, driving_pressure
 
 # ------------------------------------------------------------------------------------------------
 # Hertz-Mindlin contacts in closed form, for pairs of spheres and for a sphere and a plane.
@@ -113,11 +114,9 @@ def restitution_of(damping: float) -> float:
 # ------------------------------------------------------------------------------------------------
 # Rebound in a liquid: the restitution of a contact from the impact Stokes number.
 #
-# The liquid film between two spheres takes the energy of the impact. Experiments with spheres and
-# walls show no rebound below an impact Stokes number of about 10, and the dry restitution from
-# about 500 on (Joseph and others, J. Fluid Mech. 433, 329, 2001; Gondret and others, Phys. Fluids
-# 14, 643, 2002). exp(-35 / St) of the dry restitution follows them (Legendre and others, Phys.
-# Fluids 17, 097105, 2005, and Chem. Eng. Sci. 61, 3543, 2006).
+# No rebound below an impact Stokes number of about 10, the dry restitution from about 500 on (Joseph
+# and others, J. Fluid Mech. 433, 329, 2001; Gondret and others, Phys. Fluids 14, 643, 2002);
+# exp(-35 / St) of it between them (Legendre and others, Phys. Fluids 17, 097105, 2005).
 
 
 FILM = 35.0
@@ -212,18 +211,9 @@ def sphere_mass(radius: float, density: float) -> float:
 
 
 def mass_range(spheres: Spheres) -> tuple[float, float]:
-    """Mass of the smallest and of the largest sphere, kg."""
-    if not spheres.measured:
-        low, high = spheres.radius_range_m
-        return sphere_mass(low, spheres.density_kg_m3), sphere_mass(high, spheres.density_kg_m3)
-    ends = [
-        (
-            sphere_mass(0.5 * one.curve.low, one.density),
-            sphere_mass(0.5 * one.curve.high, one.density),
-        )
-        for one in spheres.components
-    ]
-    return min(low for low, _ in ends), max(high for _, high in ends)
+    """Mass of the lightest and of the heaviest sphere, kg."""
+    masses = [sphere_mass(radius, density) for radius, density in spheres.ends]
+    return min(masses), max(masses)
 
 
 def contacts_of(case: Case, velocity: float) -> dict[str, Contact]:
@@ -391,7 +381,7 @@ class Overlaps:
     Attributes:
         drag: by drag and pressure gradient F on a fine at rest: F / k, or by Hertz.
         impact: by a fine that arrives at its fastest velocity w: w sqrt(m / k), or by Hertz.
-        deposit: where the flow follows the deposit, by `deposit_force`; 0 in the uniform field.
+        deposit: where the flow follows the deposit, by the force of the pressure on it; else 0.
     """
 
     drag: float
@@ -399,26 +389,21 @@ class Overlaps:
     deposit: float
 
 
-def deposit_force(case: InvasionCase, pressure: float, throat: float) -> float:
-    """Largest force, N, on a fine of a deposit that takes up all the `pressure` Pa.
-
-    The pressure acts on the section of a throat, of the width `throat` m. Contacts hand the forces
-    on to each other, so that some bear several times as much (`LARGEST_CHAIN`). The uniform field
-    knows of no such pressure: 0.
-    """
-    if case.drag.field != "network":
-        return 0.0
-    return LARGEST_CHAIN * pressure * math.pi / 4.0 * throat**2
-
-
 def overlaps_of(
-    case: InvasionCase, contact: Contact, push: Push, porosity: float, *, deposit: float
+    case: InvasionCase, contact: Contact, flow: Velocity, drive: Drive, porosity: float
 ) -> Overlaps:
-    """The overlaps in the `contact` of a grain and a fine, in a pack of a porosity.
+    """The overlaps in the `contact` of a grain and a fine, as simulated, in a pack of a porosity.
 
-    A fine comes with the fluid and gains speed by the pressure gradient across a pore. In a
-    deposit it bears the force `deposit`, N.
+    A fine comes with the fluid and gains speed by the pressure gradient across a pore. A deposit
+    takes up all the pressure, which acts on the section of a throat; contacts hand the forces on
+    to each other, so that some bear several times as much (`LARGEST_CHAIN`).
     """
+    push = push_of(case, drive.velocity, flow.pressure_gradient, factor=drive.factor)
+    deposit = 0.0
+    if case.drag.field == "network":
+        pressure = drive.factor * driving_pressure(case, flow.pressure_gradient)
+        throat = throat_width(porosity, flow.permeability)
+        deposit = LARGEST_CHAIN * pressure * math.pi / 4.0 * throat**2
     radius, mass = case.fines.radius_range_m[1], mass_range(case.fines)[1]
     width = pore_width(porosity, case.grains.sauter_diameter_m)
     lightest = min(one.density for one in case.fines.components)
@@ -547,17 +532,10 @@ def cohesion_warnings(case: InvasionCase, contact: Contact) -> list[Doubt]:
 # ------------------------------------------------------------------------------------------------
 # Whether fines lock in the groove between two grains, from which the fluid should roll them.
 #
-# A fine that rolls around the neck of two grains sits in a groove whose sides have the slope
-# t = sqrt((1 + q)^2 - 1), q the radius of the fine over that of the grain. Friction f can hold it
-# there only if f > t. Two things press it in. Both need a stiff tangential spring:
-#
-# - The spring itself. The normal springs throw back a fine that ran into the groove, until the
-#   tangential ones hold it. Where both balance, the fine is still pressed in if k_t / k_n > f t
-#   (derived in docs/physics.md, section 1).
-# - LIGGGHTS's integrator. It adds the slip of half a step ago along the normal of now, so a fine
-#   that turns about the neck gains a slip that did not happen (Vyas and others, Comput. Phys.
-#   Commun. 310, 109524). In a quarter turn the force of it is F' = (pi/4) k_t v dt, with the time
-#   step dt and the velocity v of the fine.
+# Friction can hold a fine in the groove at the neck of two grains only if it is above the slope of
+# its sides. Two things press it in, and both need a stiff tangential spring (docs/physics.md,
+# section 1): the spring itself, if k_t / k_n > f t, and LIGGGHTS's integrator, which adds the slip
+# of half a step ago along the normal of now (Vyas and others, Comput. Phys. Commun. 310, 109524).
 
 
 MOST_FALSE_FORCE = 0.5

@@ -577,8 +577,8 @@ def _notes(design: Design) -> dict[str, str]:
         )
     if choice.mud_cut < 99.0:
         notes["fines.sizes"] += (
-            f" The coarsest {100 * case.fines.curve.above:.2g} % are left out: they are as large as "
-            "the smallest grains and would only lie in the cake."
+            f" The coarsest {100 * case.fines.curve.above:.2g} % are left out: they are as large "
+            "as the smallest grains and would only lie in the cake."
         )
     if choice.cut:
         notes["fines.cut"] = _cut_note(design, throat)

@@ -17,22 +17,12 @@ CARMAN_KOZENY, ERGUN_VISCOUS, ERGUN_INERTIAL = 180.0, 150.0, 1.75
 # Drag on a sphere in a crowd of others: Beetstra, van der Hoef and Kuipers.
 #
 # Monodisperse law F(phi, Re): R. Beetstra, M. A. van der Hoef, J. A. M. Kuipers, AIChE J. 53
-# (2007) 489-501, from lattice-Boltzmann flow through random arrays of spheres (solid fractions 0.1
-# to 0.6, Reynolds numbers up to 1000). Mixtures: the same authors, Chem. Eng. Sci. 62 (2007)
-# 246-255, and van der Hoef, Beetstra and Kuipers, J. Fluid Mech. 528 (2005) 233-254.
-#
-# In their papers F is the drag without the force of the pressure gradient ("model A"), over
-# Stokes's drag 3 pi mu d U at the superficial velocity U = phi u of the slip u. The total force of
-# the fluid is F / phi: with it a bed of solid fraction s obeys Carman and Kozeny's law, 10 s /
-# phi^3. Here the porosity is phi, and every factor is over Stokes's drag 6 pi mu r u at the
-# interstitial slip u. So
-#
-# - the drag part is phi Y F where V (-grad p) acts as a force of its own,
-# - the total force, where no gradient acts apart, is Y F,
-#
-# with the size factor Y, which is 1 for spheres of one size. The published Y has a third term,
-# 0.064 phi y^3, a fit to mixtures. It breaks the sum over a mixture (the pressure drop of the bed
-# of the Sauter mean diameter), and the drag on a lone sphere by 6.4 %; it is left out.
+# (2007) 489-501 (solid fractions 0.1 to 0.6, Reynolds numbers up to 1000). Mixtures: the same
+# authors, Chem. Eng. Sci. 62 (2007) 246-255, and van der Hoef, Beetstra and Kuipers, J. Fluid
+# Mech. 528 (2005) 233-254. Here every factor is over Stokes's drag 6 pi mu r u at the interstitial
+# slip u, and Y F is the total force of the fluid, that of the pressure gradient in it
+# (docs/physics.md). The published size factor Y has a third term, 0.064 phi y^3, a fit to mixtures;
+# it breaks the sum over a mixture, and the drag on a lone sphere by 6.4 %, and is left out.
 
 
 Array = NDArray[np.float64]

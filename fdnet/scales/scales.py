@@ -14,7 +14,6 @@ from fdnet.scales.clock import (
     drive_in,
     hold_steps,
     plug_warnings,
-    pressed_in,
     relaxation_times,
     slab_of,
     slab_warnings,
@@ -28,6 +27,7 @@ from fdnet.scales.contacts import (
     cohesion_warnings,
     contacts_of,
     overlap_warnings,
+    overlaps_of,
     sticking_of,
     sticking_warnings,
     stiffness_factor,
@@ -185,7 +185,7 @@ def _invasion(case: InvasionCase, flow: Velocity, shared: Scales) -> InvasionSca
     hold = hold_steps(case, step, shortest / densest_factor(case), times.chunk)
     chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
     contact = shared.contacts["grain-fine"]
-    overlaps = pressed_in(case, flow, drive, contact)
+    overlaps = overlaps_of(case, contact, flow, drive, shared.porosity)
     sticking = sticking_of(case, contact, push, step)
     if chunk_steps > MOST_STEPS:
         raise CaseError(
