@@ -426,8 +426,8 @@ def best_fit(points: Mapping[float, float], name: str | None = None) -> Fit:
     """The law that is nearest to diameters (m) by the share finer (0 to 1).
 
     It is the law called `name`, or of the two the one with the smaller misfit in the mean square.
-    Two points are met by both; then it is the log-normal law. Least squares of ln d over the normal
-    quantile, or over ln(-ln(1 - share)) for the law of Rosin and Rammler.
+    Two points are met by both; then it is the log-normal law. Least squares of ln d over the
+    normal quantile, or over ln(-ln(1 - share)) for the law of Rosin and Rammler.
     """
     names = [LOG_NORMAL, ROSIN_RAMMLER] if name is None else [name]
     fits = [_fit(one, points) for one in (names[:1] if len(points) <= 2 else names)]

@@ -58,29 +58,24 @@ Cut = Annotated[tuple[Percent, Percent], BeforeValidator(as_tuple)]
 class Sizes(Part):
     """A curve of sizes: D10, D50 and D90, or the points of a sieve or laser measurement."""
 
-    D10_mm: Positive | None = Field(None, description="Diameter that 10 % are finer than.")
-    D50_mm: Positive | None = Field(None, description="Median diameter.")
-    D90_mm: Positive | None = Field(None, description="Diameter that 90 % are finer than.")
-    shape: Literal["log-normal", "rosin-rammler"] | None = Field(
-        None,
-        description="Law through D10, D50 and D90. When absent: the one of the two that misses "
-        "them least, for two given diameters the log-normal one.",
-    )
-    size_mm: Lengths | None = Field(
-        None, description="Diameters of a measured curve, rising; it is straight over ln d."
-    )
-    passing_percent: Percents | None = Field(
-        None, description="What is finer than each of `size_mm`, rising to 100."
-    )
-    by: Literal["mass", "volume", "surface", "number"] = Field(
-        "mass",
-        description="What the percentages count. Mass and volume are the same for one material.",
-    )
-    cut_percent: Cut = Field(
-        (1.0, 99.0),
-        description="Ends of the curve, by volume: finer and coarser sizes are left out, and the "
-        "summary says what share of the solids they are.",
-    )
+    D10_mm: Positive | None = None
+    """Diameter that 10 % are finer than."""
+    D50_mm: Positive | None = None
+    """Median diameter."""
+    D90_mm: Positive | None = None
+    """Diameter that 90 % are finer than."""
+    shape: Literal["log-normal", "rosin-rammler"] | None = None
+    """Law through D10, D50 and D90. When absent: the one of the two that misses them least, for
+    two given diameters the log-normal one."""
+    size_mm: Lengths | None = None
+    """Diameters of a measured curve, rising; it is straight over ln d."""
+    passing_percent: Percents | None = None
+    """What is finer than each of `size_mm`, rising to 100."""
+    by: Literal["mass", "volume", "surface", "number"] = "mass"
+    """What the percentages count. Mass and volume are the same for one material."""
+    cut_percent: Cut = (1.0, 99.0)
+    """Ends of the curve, by volume: finer and coarser sizes are left out, and the summary says
+    what share of the solids they are."""
 
     @model_validator(mode="after")
     def _is_a_curve(self) -> Self:
@@ -208,19 +203,17 @@ class Solid:
 class Material(Part):
     """One kind of solids in the mud."""
 
-    name: str = Field(min_length=1, max_length=60, description="Name of the material.")
-    share: Positive = Field(
-        description="Its share of the solids by mass; the shares are relative to their sum."
-    )
-    sizes: Sizes = Field(description="Its curve of diameters, as `fines.sizes`.")
-    density_kg_m3: Positive | None = Field(
-        None, description="Density of the material. When absent: `fines.density_kg_m3`."
-    )
-    friction: NonNegative | None = Field(
-        None,
-        description="Coefficient of sliding friction; for now it must be that of all fines, "
-        "`fines.friction`, which is also the default.",
-    )
+    name: str = Field(min_length=1, max_length=60)
+    """Name of the material."""
+    share: Positive
+    """Its share of the solids by mass; the shares are relative to their sum."""
+    sizes: Sizes
+    """Its curve of diameters, as `fines.sizes`."""
+    density_kg_m3: Positive | None = None
+    """Density of the material. When absent: `fines.density_kg_m3`."""
+    friction: NonNegative | None = None
+    """Coefficient of sliding friction; for now it must be that of all fines, `fines.friction`,
+    which is also the default."""
 
 
 # ------------------------------------------------------------------------------------------------
@@ -235,42 +228,29 @@ than 1/370 of a grain at friction 0.55 locks between two grains (`fdnet.scales.c
 class Spheres(Part):
     """What grains and fines share: sizes, density and the parameters of their contacts."""
 
-    radius_mm: Radius | None = Field(
-        None,
-        description="Radius of a sphere. A list of two values, [smallest, largest], gives radii "
-        "that are uniform by number between them. Give this or `sizes`.",
-    )
-    sizes: Sizes | None = Field(
-        None,
-        description="A measured curve of diameters instead of `radius_mm`; its keys are below.",
-    )
-    density_kg_m3: Positive = Field(description="Density of the solid.")
-    normal_stiffness_N_m: Positive = Field(
-        description="Normal contact stiffness of the material. Two spheres in contact act as two "
-        "springs in series. `run.stiffness_N_m` scales all contact stiffnesses by one factor."
-    )
-    shear_stiffness_N_m: Positive | None = Field(
-        None,
-        description="Tangential contact stiffness of the material, scaled like the normal one. "
-        "When absent: 0.04 of the normal one, so that friction lets go of fines that roll around "
-        "the neck of two grains.",
-    )
-    youngs_modulus_GPa: Positive = Field(
-        description='Young\'s modulus of the material, for contact.model = "hertz".'
-    )
-    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = Field(
-        description='Poisson\'s ratio of the material, for contact.model = "hertz".'
-    )
-    friction: NonNegative = Field(
-        0.55,
-        description="Coefficient of sliding friction. A contact takes the smaller value of its "
-        "two materials.",
-    )
-    damping_ratio: Annotated[float, Field(ge=0, lt=1)] = Field(
-        0.2,
-        description="Damping of a contact over its critical damping. A contact takes the mean of "
-        "its two materials.",
-    )
+    radius_mm: Radius | None = None
+    """Radius of a sphere. A list of two values, [smallest, largest], gives radii that are uniform
+    by number between them. Give this or `sizes`."""
+    sizes: Sizes | None = None
+    """A measured curve of diameters instead of `radius_mm`; its keys are below."""
+    density_kg_m3: Positive
+    """Density of the solid."""
+    normal_stiffness_N_m: Positive
+    """Normal contact stiffness of the material. Two spheres in contact act as two springs in
+    series. `run.stiffness_N_m` scales all contact stiffnesses by one factor."""
+    shear_stiffness_N_m: Positive | None = None
+    """Tangential contact stiffness of the material, scaled like the normal one. When absent: 0.04
+    of the normal one, so that friction lets go of fines that roll around the neck of two grains.
+    """
+    youngs_modulus_GPa: Positive
+    """Young's modulus of the material, for contact.model = "hertz"."""
+    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)]
+    """Poisson's ratio of the material, for contact.model = "hertz"."""
+    friction: NonNegative = 0.55
+    """Coefficient of sliding friction. A contact takes the smaller value of its two materials."""
+    damping_ratio: Annotated[float, Field(ge=0, lt=1)] = 0.2
+    """Damping of a contact over its critical damping. A contact takes the mean of its two
+    materials."""
 
     @property
     def tangential_stiffness(self) -> float:
@@ -394,47 +374,32 @@ Materials = Annotated[
 class Grains(Spheres):
     """The skeleton: the sand grains of the formation. Give either `porosity` or `count`."""
 
-    porosity: Fraction | None = Field(
-        None,
-        description="Porosity of the finished pack, with overlaps of grains counted once. The "
-        "number of grains is adjusted until it is met within 0.003.",
-    )
-    count: Annotated[int, Field(ge=1)] | None = Field(
-        None, description="Number of grains. It overrides `porosity`."
-    )
-    density_kg_m3: Positive = Field(2650.0, description="Density of the grains.")
-    normal_stiffness_N_m: Positive = Field(
-        94.3e9,
-        description="Normal contact stiffness of the grains' material, and of the walls. "
-        "`run.stiffness_N_m` scales all contact stiffnesses by one factor.",
-    )
-    shear_stiffness_N_m: Positive | None = Field(
-        None,
-        description="Tangential contact stiffness of the grains' material, and of the walls. When "
-        "absent: 0.04 of the normal one, so that friction lets go of fines that roll around the "
-        "neck of two grains. The thesis has 34e9.",
-    )
-    youngs_modulus_GPa: Positive = Field(
-        94.3,
-        description="Young's modulus of the grains' material, and of the walls, for "
-        'contact.model = "hertz". The default is the thesis\'s (quartz). `run.stiffness_N_m` '
-        "scales all moduli by one factor.",
-    )
-    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = Field(
-        0.387,
-        description="Poisson's ratio of the grains' material, and of the walls, for "
-        'contact.model = "hertz". The default is E / 2G - 1 of the thesis\'s 94.3 and 34 GPa.',
-    )
-    motion: Literal["fixed", "mobile"] = Field(
-        "fixed",
-        description='Motion of the grains during the invasion: "fixed" keeps them in place, '
-        '"mobile" lets the fines push them. The fluid itself does not push grains.',
-    )
-    max_overlap: Fraction = Field(
-        0.15,
-        description="Largest accepted overlap of two grains in the pack, over the smaller "
-        "diameter. A denser pack is refused.",
-    )
+    porosity: Fraction | None = None
+    """Porosity of the finished pack, with overlaps of grains counted once. The number of grains is
+    adjusted until it is met within 0.003."""
+    count: Annotated[int, Field(ge=1)] | None = None
+    """Number of grains. It overrides `porosity`."""
+    density_kg_m3: Positive = 2650.0
+    """Density of the grains."""
+    normal_stiffness_N_m: Positive = 94.3e9
+    """Normal contact stiffness of the grains' material, and of the walls. `run.stiffness_N_m`
+    scales all contact stiffnesses by one factor."""
+    shear_stiffness_N_m: Positive | None = None
+    """Tangential contact stiffness of the grains' material, and of the walls. When absent: 0.04 of
+    the normal one, so that friction lets go of fines that roll around the neck of two grains. The
+    thesis has 34e9."""
+    youngs_modulus_GPa: Positive = 94.3
+    """Young's modulus of the grains' material, and of the walls, for contact.model = "hertz". The
+    default is the thesis's (quartz). `run.stiffness_N_m` scales all moduli by one factor."""
+    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = 0.387
+    """Poisson's ratio of the grains' material, and of the walls, for contact.model = "hertz". The
+    default is E / 2G - 1 of the thesis's 94.3 and 34 GPa."""
+    motion: Literal["fixed", "mobile"] = "fixed"
+    """Motion of the grains during the invasion: "fixed" keeps them in place, "mobile" lets the
+    fines push them. The fluid itself does not push grains."""
+    max_overlap: Fraction = 0.15
+    """Largest accepted overlap of two grains in the pack, over the smaller diameter. A denser pack
+    is refused."""
 
 
 class Fines(Spheres):
@@ -443,57 +408,38 @@ class Fines(Spheres):
     A case without this table has no invasion: only the intact pack is made and analysed.
     """
 
-    density_kg_m3: Positive = Field(2146.0, description="Density of the fines.")
-    normal_stiffness_N_m: Positive = Field(
-        63.0e9, description="Normal contact stiffness of the fines' material."
-    )
-    shear_stiffness_N_m: Positive | None = Field(
-        None,
-        description="Tangential contact stiffness of the fines' material. When absent: 0.04 of "
-        "the normal one. The thesis has 26e9.",
-    )
-    youngs_modulus_GPa: Positive = Field(
-        63.0,
-        description="Young's modulus of the fines' material, for contact.model = \"hertz\". The "
-        "default is the thesis's.",
-    )
-    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = Field(
-        0.212,
-        description="Poisson's ratio of the fines' material, for contact.model = \"hertz\". The "
-        "default is E / 2G - 1 of the thesis's 63 and 26 GPa.",
-    )
-    materials: Materials | None = Field(
-        None,
-        description="Several materials, each a table with its own sizes, instead of `radius_mm` "
-        "or `sizes`; their keys are below.",
-    )
-    cut_um: Positive | None = Field(
-        None,
-        description="Diameter below which solids of measured sizes are left out. Their share is "
-        "said in the warnings of the summary, and the suspension is thinner by it.",
-    )
-    concentration: Annotated[float, Field(gt=0, le=MAX_CONCENTRATION)] | None = Field(
-        0.10,
-        description="Volume of solids over the volume of suspension in the slab upstream. It has "
-        "no default where `solids_kg_m3` is given.",
-    )
-    solids_kg_m3: Positive | None = Field(
-        None, description="Mass of solids in a volume of mud, instead of `concentration`."
-    )
-    count: Annotated[int, Field(ge=1)] | None = Field(
-        None, description="Number of fines supplied. The length of the slab follows from it."
-    )
-    slab_mm: Positive | None = Field(
-        None,
-        description="Length of the slab of suspension along the flow. The number of fines follows "
-        "from it.",
-    )
-    supply: Literal["slab", "batches"] = Field(
-        "batches",
-        description='How the fines enter: "batches" puts each part of the slab in when it is '
-        'about to arrive, "slab" puts all of them in at the start. The suspension is the same; '
-        "batches are much faster for a long slab.",
-    )
+    density_kg_m3: Positive = 2146.0
+    """Density of the fines."""
+    normal_stiffness_N_m: Positive = 63.0e9
+    """Normal contact stiffness of the fines' material."""
+    shear_stiffness_N_m: Positive | None = None
+    """Tangential contact stiffness of the fines' material. When absent: 0.04 of the normal one.
+    The thesis has 26e9."""
+    youngs_modulus_GPa: Positive = 63.0
+    """Young's modulus of the fines' material, for contact.model = "hertz". The default is the
+    thesis's."""
+    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = 0.212
+    """Poisson's ratio of the fines' material, for contact.model = "hertz". The default is E / 2G -
+    1 of the thesis's 63 and 26 GPa."""
+    materials: Materials | None = None
+    """Several materials, each a table with its own sizes, instead of `radius_mm` or `sizes`; their
+    keys are below."""
+    cut_um: Positive | None = None
+    """Diameter below which solids of measured sizes are left out. Their share is said in the
+    warnings of the summary, and the suspension is thinner by it."""
+    concentration: Annotated[float, Field(gt=0, le=MAX_CONCENTRATION)] | None = 0.10
+    """Volume of solids over the volume of suspension in the slab upstream. It has no default where
+    `solids_kg_m3` is given."""
+    solids_kg_m3: Positive | None = None
+    """Mass of solids in a volume of mud, instead of `concentration`."""
+    count: Annotated[int, Field(ge=1)] | None = None
+    """Number of fines supplied. The length of the slab follows from it."""
+    slab_mm: Positive | None = None
+    """Length of the slab of suspension along the flow. The number of fines follows from it."""
+    supply: Literal["slab", "batches"] = "batches"
+    """How the fines enter: "batches" puts each part of the slab in when it is about to arrive,
+    "slab" puts all of them in at the start. The suspension is the same; batches are much faster
+    for a long slab."""
 
     slab_m: ClassVar = InSI[float | None]("slab_mm", 1e-3)
     """Length of the slab of suspension, m; None: it follows from the count."""

@@ -114,9 +114,9 @@ def restitution_of(damping: float) -> float:
 # ------------------------------------------------------------------------------------------------
 # Rebound in a liquid: the restitution of a contact from the impact Stokes number.
 #
-# No rebound below an impact Stokes number of about 10, the dry restitution from about 500 on (Joseph
-# and others, J. Fluid Mech. 433, 329, 2001; Gondret and others, Phys. Fluids 14, 643, 2002);
-# exp(-35 / St) of it between them (Legendre and others, Phys. Fluids 17, 097105, 2005).
+# No rebound below an impact Stokes number of about 10, the dry restitution from about 500 on
+# (Joseph and others, J. Fluid Mech. 433, 329, 2001; Gondret and others, Phys. Fluids 14, 643,
+# 2002); exp(-35 / St) of it between them (Legendre and others, Phys. Fluids 17, 097105, 2005).
 
 
 FILM = 35.0

@@ -450,10 +450,10 @@ def _design(answers: Answers, choice: Choice, budget: Budget, folder: Path) -> D
         choice = driven if scales(driven).force_factor > 1.1 else choice
     except CaseError:
         pass
-    case, found = _case(answers, choice, folder), scales(choice)
-    cost = cost_of(case, found)
-    arrival = found.slab_length / found.upstream_velocity
-    cap = _up(PATIENCE * max(cost.duration, arrival) * found.force_factor)
+    case, sized = _case(answers, choice, folder), scales(choice)
+    cost = cost_of(case, sized)
+    arrival = sized.slab_length / sized.upstream_velocity
+    cap = _up(PATIENCE * max(cost.duration, arrival) * sized.force_factor)
     choice = replace(choice, cap=cap)
     return Design(
         answers=answers,

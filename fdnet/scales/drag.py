@@ -21,8 +21,8 @@ CARMAN_KOZENY, ERGUN_VISCOUS, ERGUN_INERTIAL = 180.0, 150.0, 1.75
 # authors, Chem. Eng. Sci. 62 (2007) 246-255, and van der Hoef, Beetstra and Kuipers, J. Fluid
 # Mech. 528 (2005) 233-254. Here every factor is over Stokes's drag 6 pi mu r u at the interstitial
 # slip u, and Y F is the total force of the fluid, that of the pressure gradient in it
-# (docs/physics.md). The published size factor Y has a third term, 0.064 phi y^3, a fit to mixtures;
-# it breaks the sum over a mixture, and the drag on a lone sphere by 6.4 %, and is left out.
+# (docs/physics.md). The published size factor Y has a third term, 0.064 phi y^3, a fit to
+# mixtures; it breaks their sum, and the drag on a lone sphere by 6.4 %, and is left out.
 
 
 Array = NDArray[np.float64]

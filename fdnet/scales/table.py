@@ -1,6 +1,6 @@
-"""The table of scales that `fdnet render` prints; its words are in `table.toml`."""
+"""The table of scales that `fdnet render` prints; its words are in `table.csv`."""
 
-import tomllib
+import csv
 from collections.abc import Iterator
 from functools import cache
 from importlib.resources import files
@@ -43,12 +43,13 @@ class Quantity(NamedTuple):
 
 @cache
 def _words() -> dict[str, list[str]]:
-    text = files("fdnet").joinpath("scales/table.toml").read_text(encoding="utf-8")
-    return tomllib.loads(text)
+    """Name, symbol, unit, formula and source by key, with {...} for what differs by case."""
+    text = files("fdnet").joinpath("scales/table.csv").read_text(encoding="utf-8")
+    return {key: words for key, *words in csv.reader(text.splitlines())}
 
 
 def row(key: str, value: float, **words: Any) -> Quantity:
-    """The row `key` of `table.toml` with its value; `words` fill in what differs by case."""
+    """The row `key` of `table.csv` with its value; `words` fill in what differs by case."""
     name, symbol, unit, formula, source = (text.format(**words) for text in _words()[key])
     return Quantity(name, symbol, value, unit, formula, source)
 
