@@ -71,8 +71,18 @@ def within_limit(rigid: float, porosity: float, overlap: float, limit: float) ->
 
 
 def close_packing(curve: SizeCurve) -> float:
-    """Share of space that spheres of these sizes fill at random close packing."""
-    rods = _rods(curve)
+    """Share of space that spheres of these sizes fill at random close packing.
+
+    The rods are chords, longest first: a line meets spheres by their cross-section, at a random
+    distance, and cuts one of diameter D in a chord above L with the probability 1 - (L / D)^2. The
+    diameters and the distances are taken evenly, in an order that mixes them (golden ratio).
+    """
+    even = (np.arange(RODS) + 0.5) / RODS
+    mixed = np.mod(even * RODS * (math.sqrt(5) - 1) / 2, 1.0)
+    diameter = np.full(RODS, curve.low)
+    if curve.low != curve.high:
+        diameter = np.exp(np.interp(even, curve.finer(SURFACE), np.log(curve.edges)))
+    rods = sorted((diameter * np.sqrt(1 - mixed)).tolist(), reverse=True)
     gaps, total_gap = [-GAP * rods[0]], GAP * rods[0]
     for rod in rods[1:]:
         least = GAP * rod
@@ -82,22 +92,6 @@ def close_packing(curve: SizeCurve) -> float:
         heapq.heappush(gaps, -left)
         heapq.heappush(gaps, -least)
     return math.fsum(rods) / (math.fsum(rods) + total_gap)
-
-
-def _rods(curve: SizeCurve) -> list[float]:
-    """Chords, longest first: a line meets spheres by their cross-section, at a random distance.
-
-    A sphere of diameter D is cut in a chord above L with the probability 1 - (L / D)^2. The
-    diameters and the distances are taken evenly, in an order that mixes them (golden ratio).
-    """
-    even = (np.arange(RODS) + 0.5) / RODS
-    mixed = np.mod(even * RODS * (math.sqrt(5) - 1) / 2, 1.0)
-    if curve.low == curve.high:
-        diameter = np.full(RODS, curve.low)
-    else:
-        diameter = np.exp(np.interp(even, curve.finer(SURFACE), np.log(curve.edges)))
-    chords = diameter * np.sqrt(1 - mixed)
-    return sorted(chords.tolist(), reverse=True)
 
 
 # ------------------------------------------------------------------------------------------------
