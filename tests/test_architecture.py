@@ -8,7 +8,7 @@ import pytest
 from fdnet.case.file import known_keys
 
 LAYERS = [
-    ["doubts", "errors", "names"],
+    ["errors", "names"],
     ["files"],
     ["sizes", "statistics"],
     ["spheres", "case"],

@@ -6,7 +6,7 @@ import pickle
 from collections.abc import Iterator
 from pathlib import Path
 
-from fdnet.doubts import GAP, PAGE, Doubt, catalogue, explained, page
+from fdnet.errors import GAP, PAGE, Doubt, catalogue, explained, page
 
 
 def raised(root: Path) -> Iterator[tuple[str, str]]:

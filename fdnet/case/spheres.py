@@ -179,10 +179,6 @@ def _measured_problem(sizes: Sizes) -> Iterator[str]:
         )
 
 
-# ------------------------------------------------------------------------------------------------
-# The materials of a mud: the list `fines.materials`, such as CaCO3, barite and drilled solids.
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Solid:
     """One material of some spheres.
@@ -214,10 +210,6 @@ class Material(Part):
     friction: NonNegative | None = None
     """Coefficient of sliding friction; for now it must be that of all fines, `fines.friction`,
     which is also the default."""
-
-
-# ------------------------------------------------------------------------------------------------
-# What the tables [grains] and [fines] share: sizes, density and contact of spheres.
 
 
 SHEAR_RATIO = 0.04
@@ -362,17 +354,16 @@ class Spheres(Part):
         )
 
 
-# ------------------------------------------------------------------------------------------------
-# The tables [grains] and [fines] of a case file: material and number of the spheres.
-
-
 Materials = Annotated[
     tuple[Material, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=20)
 ]
 
 
 class Grains(Spheres):
-    """The skeleton: the sand grains of the formation. Give either `porosity` or `count`."""
+    """[grains], the skeleton: the sand grains of the formation.
+
+    Give either `porosity` or `count`.
+    """
 
     porosity: Fraction | None = None
     """Porosity of the finished pack, with overlaps of grains counted once. The number of grains is
@@ -403,7 +394,9 @@ class Grains(Spheres):
 
 
 class Fines(Spheres):
-    """The invading particles: a slab of suspension upstream. Give either `count` or `slab_mm`.
+    """[fines], the invading particles: a slab of suspension upstream.
+
+    Give either `count` or `slab_mm`.
 
     A case without this table has no invasion: only the intact pack is made and analysed.
     """

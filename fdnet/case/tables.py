@@ -1,4 +1,7 @@
-"""The tables of a case: their keys, units, ranges and defaults."""
+"""The tables of a case: their keys, units, ranges and defaults.
+
+The keys carry the unit of the user; properties give the same values in SI for everything else.
+"""
 
 import inspect
 import math
@@ -80,9 +83,7 @@ class InSI(Generic[Value]):
 class Part(BaseModel):
     """A table of the case file: frozen, no unknown keys, no conversion of text to numbers."""
 
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", strict=True, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
 
 def still_there(name: Any, removed: Mapping[str, str]) -> Any:
@@ -93,16 +94,15 @@ def still_there(name: Any, removed: Mapping[str, str]) -> Any:
     return name
 
 
-# ------------------------------------------------------------------------------------------------
-# The tables [fluid] and [well] of a case file: the liquid of the mud and what drives it.
-
-
 M2_PER_MD = 9.869233e-16
 """One millidarcy in m2."""
 
 
 class Fluid(Part):
-    """The mud's liquid. Its velocity is given, or follows from the overbalance by Darcy's law."""
+    """[fluid], the mud's liquid.
+
+    Its velocity is given, or follows from the overbalance by Darcy's law.
+    """
 
     viscosity_cP: Positive = 50.0
     """Dynamic viscosity."""
@@ -137,7 +137,7 @@ class Fluid(Part):
 
 
 class Well(Part):
-    """A vertical well in its formation: the overbalance is lost in radial flow around it.
+    """[well], a vertical well in its formation: the overbalance is lost in radial flow around it.
 
     The specimen is a piece of the formation at the face of the well.
     """
@@ -158,10 +158,6 @@ class Well(Part):
     """Permeability of the formation, m2; None: that of the pack."""
 
 
-# ------------------------------------------------------------------------------------------------
-# The table [contact] of a case file: the law of contacts, and what acts in them besides.
-
-
 MODEL_KEYS = {
     "hooke": frozenset({"normal_stiffness_N_m", "shear_stiffness_N_m"}),
     "hertz": frozenset({"youngs_modulus_GPa", "poissons_ratio"}),
@@ -172,7 +168,7 @@ DEEPEST_DAMPING = 0.69
 
 
 class ContactLaw(Part):
-    """The law of all contacts; what is not asked for is left out of the deck."""
+    """[contact], the law of all contacts; what is not asked for is left out of the deck."""
 
     model: Literal["hooke", "hertz"] = "hooke"
     """Contact law: "hooke", linear springs of `normal_stiffness_N_m` and `shear_stiffness_N_m`, or
@@ -195,12 +191,8 @@ class ContactLaw(Part):
         return frozenset().union(*(MODEL_KEYS[name] for name in MODEL_KEYS if name != self.model))
 
 
-# ------------------------------------------------------------------------------------------------
-# The table [bonds] of a case file: cement between the grains.
-
-
 class Bonds(Part):
-    """Parallel bonds: a disc of elastic cement between two grains.
+    """[bonds], parallel bonds: a disc of elastic cement between two grains.
 
     Only `fdnet mechanics` reads them; the invasion has no bonds.
     """
@@ -229,18 +221,15 @@ class Bonds(Part):
     """Shear strength, Pa; None: bonds never break."""
 
 
-# ------------------------------------------------------------------------------------------------
-# Tables of a case file: [box], [drag] and [gravity].
-#
-# The keys carry the unit of the user; properties give the same values in SI for everything else.
-
-
 CROWD_TRAVEL, FLOW_TRAVEL, MOST_TRAVEL = 0.5, 1.0, 10.0
 """Diameters of the smallest fine between two updates: by default, and at most."""
 
 
 class Box(Part):
-    """The specimen: flow and depth run along the first side; x = 0 is the formation face."""
+    """[box], the specimen.
+
+    Flow and depth run along the first side; x = 0 is the formation face.
+    """
 
     size_mm: Triple
     """Three side lengths of the box. The mud flows along the first side."""
@@ -264,7 +253,10 @@ class Box(Part):
 
 
 class Drag(Part):
-    """Forces of the fluid on every fine: drag by its slip, and that of the pressure gradient."""
+    """[drag], the forces of the fluid on every fine.
+
+    Drag by its slip, and that of the pressure gradient.
+    """
 
     field: Literal["uniform", "network"] = "uniform"
     """Velocity field of the fluid: "uniform" is the same velocity everywhere. "network" follows
@@ -329,7 +321,7 @@ class Drag(Part):
 
 
 class Gravity(Part):
-    """Weight and buoyancy of the moving spheres."""
+    """[gravity], weight and buoyancy of the moving spheres."""
 
     mode: Literal["auto", "on", "off"] = "auto"
     """"auto" leaves gravity out where weight over drag is below `negligible_below`; the run
@@ -343,16 +335,12 @@ class Gravity(Part):
     """Ratio of weight to drag below which mode "auto" leaves gravity out."""
 
 
-# ------------------------------------------------------------------------------------------------
-# The table [run] of a case file: what controls a simulation, apart from the specimen.
-
-
 DEFAULT_STIFFNESS = 1.0e4
 """N/m, of the stiffest contact."""
 
 
 class Run(Part):
-    """Run control: contact stiffness, time step, when to stop and what to refuse.
+    """[run], run control: contact stiffness, time step, when to stop and what to refuse.
 
     `max_hours`, `max_overlap` and `on_overlap` decide only whether a run may go on. No result
     depends on them, so they may be changed when a run is resumed. Times in ms are physical times;
@@ -420,12 +408,10 @@ class Run(Part):
     """Bin width of the neighbour search, m, if given."""
 
 
-# ------------------------------------------------------------------------------------------------
-# The table [clean_up] of a case file: the flow is turned back after the invasion.
-
-
 class CleanUp(Part):
-    """Production after the invasion: the flow is turned back, from the formation to the well.
+    """[clean_up], production after the invasion.
+
+    The flow is turned back, from the formation to the well.
 
     Friction, rolling resistance and cohesion are those of the invasion.
     """
@@ -462,10 +448,6 @@ class CleanUp(Part):
     """Time at which the clean-up ends at the latest, s, if given."""
 
 
-# ------------------------------------------------------------------------------------------------
-# How permeability is computed: the table [analysis] of a case, or the same without one.
-
-
 def _count_or_edges(value: Any) -> str:
     """A case file gives a count; only Python gives edges, as a tuple."""
     return "[edges]" if isinstance(value, tuple) else "[count]"
@@ -491,7 +473,10 @@ class AnalysisKeys(TypedDict, total=False):
 
 
 class AnalysisChoices(Part):
-    """How permeability is computed; the default laws are fdnet's most accurate pair."""
+    """[analysis], how permeability is computed.
+
+    The default laws are fdnet's most accurate pair.
+    """
 
     sections: Sections = 8
     """Number of equal slabs along the flow in `sections.csv`. In Python also the edges (S+1,) of

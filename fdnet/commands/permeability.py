@@ -7,8 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fdnet.doubts import Doubt, explained
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt, explained
 from fdnet.files import path_option
 from fdnet.names import (
     ALL_SPHERES,

@@ -18,8 +18,7 @@ import numpy as np
 from fdnet.case.case import Case, InvasionCase
 from fdnet.dem.deck import LeftOut, number, render_text, snapshot_of
 from fdnet.dem.supply import Batches, batches_of
-from fdnet.doubts import Doubt, explained
-from fdnet.errors import CaseError, DumpError, LiggghtsError
+from fdnet.errors import CaseError, Doubt, DumpError, LiggghtsError, explained
 from fdnet.files import write_text
 from fdnet.names import SECTION_ARCHIE
 from fdnet.scales.clock import arrival_time

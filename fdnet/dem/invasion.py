@@ -67,8 +67,7 @@ from fdnet.dem.invade_deck import (
 )
 from fdnet.dem.liggghts import SCREEN, Feed, Launch, Run, run_deck, run_fed
 from fdnet.dem.supply import Batches, batches_of, later_batch
-from fdnet.doubts import Doubt
-from fdnet.errors import CaseError, LiggghtsError
+from fdnet.errors import CaseError, Doubt, LiggghtsError
 from fdnet.files import disk_is_full, write_text
 from fdnet.scales.clock import DRAG_LIMIT
 from fdnet.scales.scales import InvasionScales

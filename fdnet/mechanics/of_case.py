@@ -7,8 +7,7 @@ import numpy as np
 
 from fdnet.case.case import Case
 from fdnet.case.tables import Bonds
-from fdnet.doubts import Doubt
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt
 from fdnet.mechanics.elastic import Elastic, elastic_of
 from fdnet.mechanics.springs import Cement, Material, find_joints
 from fdnet.mechanics.triaxial import Sheared, Triaxial, triaxial

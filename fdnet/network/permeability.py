@@ -11,7 +11,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from fdnet.case.tables import AnalysisChoices, AnalysisKeys, with_visible_choices
-from fdnet.doubts import Doubt
+from fdnet.errors import Doubt
 from fdnet.names import ALL_SPHERES, AUTO, SECTION_ARCHIE, law_pairs
 from fdnet.network.fines.occupancy import Occupancy
 from fdnet.network.flow.flow import Flow

@@ -13,8 +13,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from fdnet.case.tables import AnalysisChoices
-from fdnet.doubts import Doubt
-from fdnet.errors import CaseError, NetworkError
+from fdnet.errors import CaseError, Doubt, NetworkError
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.flow.sections import profile_edges, section_edges
 from fdnet.network.network import Network, build_network

@@ -19,8 +19,7 @@ from itertools import pairwise
 import numpy as np
 
 from fdnet.case.tables import AnalysisChoices
-from fdnet.doubts import Doubt
-from fdnet.errors import FlowError, NetworkError
+from fdnet.errors import Doubt, FlowError, NetworkError
 from fdnet.names import (
     ALL_SPHERES,
     AUTO,

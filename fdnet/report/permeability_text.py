@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from fdnet.doubts import Doubt
+from fdnet.errors import Doubt
 from fdnet.report.tables import MILLIDARCY, in_millidarcy
 
 if TYPE_CHECKING:

@@ -16,8 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import from_json
 
 from fdnet.case.tables import M2_PER_MD
-from fdnet.doubts import Doubt
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt
 from fdnet.files import replacing, write_text
 from fdnet.network.flow.flow import INLET, OUTLET, Links, open_links
 from fdnet.network.network import Network

@@ -9,8 +9,7 @@ from fdnet.dem.checkpoint import checkpoint_files, read_history, read_updates, s
 from fdnet.dem.deck import snapshot_of
 from fdnet.dem.invasion import invade
 from fdnet.dem.packing import check_radii, make_pack
-from fdnet.doubts import Doubt
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt
 from fdnet.names import LIGGGHTS_STAGES
 from fdnet.run.fluid import fluid_of
 from fdnet.run.folder import START_OVER, check_files, may_be_gone

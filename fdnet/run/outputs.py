@@ -15,7 +15,7 @@ from fdnet.case.case import Case, InvasionCase
 from fdnet.case.spheres import Spheres
 from fdnet.dem.checkpoint import Checkpoint, readable_states
 from fdnet.dem.supply import batches_of, drawn_fines
-from fdnet.doubts import Doubt
+from fdnet.errors import Doubt
 from fdnet.report.figures import Added, draw_added, write_added
 from fdnet.run.fluid import history_rows
 from fdnet.scales.pack import SHARES, diameter_at

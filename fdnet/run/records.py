@@ -23,8 +23,7 @@ from fdnet.dem.checkpoint import HISTORY, UPDATES, WATCH, Deepest, overlap_text
 from fdnet.dem.invasion import Invasion
 from fdnet.dem.liggghts import KNOWN_VERSION, Binary, Launch, Run, find_binary
 from fdnet.dem.packing import Pack
-from fdnet.doubts import Doubt, explained
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt, explained
 from fdnet.names import STAGES
 from fdnet.run.folder import (
     LOCK,

@@ -13,7 +13,7 @@ import numpy as np
 
 from fdnet.case.case import Case
 from fdnet.dem.checkpoint import Checkpoint
-from fdnet.doubts import explained
+from fdnet.errors import explained
 from fdnet.names import STAGES
 from fdnet.report.tables import (
     AGREES,

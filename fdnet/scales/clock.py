@@ -6,8 +6,7 @@ from typing import TypeVar
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.tables import CONTACT_STEP_LIMIT, DEFAULT_STIFFNESS
-from fdnet.doubts import Doubt
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt
 from fdnet.scales.contacts import Contact, contacts_of, overlaps_of, two_digits_up
 from fdnet.scales.drag import Crowd, crowd_drag_factor, push_of
 from fdnet.scales.flow import Drive, Velocity, drive_of, velocity_of

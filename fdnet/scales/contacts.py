@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.spheres import Spheres
-from fdnet.doubts import Doubt
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt
 from fdnet.scales.drag import Push, arrival_velocity, pore_width, push_of, throat_width
 from fdnet.scales.flow import Drive, Velocity, driving_pressure
 

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fdnet.case.case import Case, InvasionCase
-from fdnet.doubts import Doubt
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt
 
 CARMAN_KOZENY, ERGUN_VISCOUS, ERGUN_INERTIAL = 180.0, 150.0, 1.75
 """Constants of the laws: viscous by Carman (1937), viscous and inertial by Ergun (1952)."""

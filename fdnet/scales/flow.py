@@ -5,8 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from fdnet.case.case import Case, InvasionCase
-from fdnet.doubts import Doubt
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt
 from fdnet.scales.drag import CARMAN_KOZENY, ERGUN_INERTIAL, ERGUN_VISCOUS
 
 ERGUN_RATIO = ERGUN_INERTIAL / ERGUN_VISCOUS

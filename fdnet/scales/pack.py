@@ -15,8 +15,7 @@ import numpy as np
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.spheres import Spheres
-from fdnet.doubts import Doubt
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt
 from fdnet.scales.contacts import REFERENCE_OVERLAP, Contact, mass_range
 from fdnet.sizes import SURFACE, SizeCurve
 

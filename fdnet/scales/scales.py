@@ -5,8 +5,7 @@ from dataclasses import dataclass, fields
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.tables import CleanUp
-from fdnet.doubts import Doubt
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt
 from fdnet.scales.clock import (
     chunk_refreshes,
     densest_factor,

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fdnet.doubts import Doubt
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt
 from fdnet.network.flow.flow import Flow, solve_flow
 from fdnet.network.network import Network
 from fdnet.network.nodes import nodes_of
