@@ -20,10 +20,10 @@ from fdnet.commands.permeability import joined_box
 from fdnet.errors import FdnetError, words_of
 
 COMMANDS = (
-    *(init.add_command, run.add_cases, run.add_check, run.add_run),
+    *(init.add_init, run.add_cases, run.add_check, run.add_run),
     *(campaign.add_ensemble, campaign.add_sweep, campaign.add_compare, campaign.add_design),
     *(run.add_render, permeability.add_permeability, finished.add_stokes),
-    *(mechanics.add_command, finished.add_movie, study.add_command),
+    *(mechanics.add_mechanics, finished.add_movie, study.add_study),
 )
 """What adds each command to the parser, in the order that `fdnet --help` shows."""
 

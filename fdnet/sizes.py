@@ -1,16 +1,14 @@
-"""Curves of sphere sizes.
-
-Laws of size: the share of the solids that is finer than a diameter.
+"""Curves of sphere sizes: laws of size, what is between two cuts of them, and samples.
 
 A law counts by number, by surface or by volume (equal to mass where all solids have one density);
-`fdnet.sizes` says by which. It gives its integrals over ranges of size, from which all
-moments and conversions follow.
+a `SizeCurve` says by which. It gives its integrals over ranges of size, from which all moments and
+conversions follow.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import pairwise
 from statistics import NormalDist
 from typing import Protocol
@@ -20,17 +18,14 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_GAUSS_POINTS = 8
-"""Points of the Gauss-Legendre rule in a cell; on cells of 1/4096 of a curve it is exact to
-rounding, on a whole curve the caller divides it first."""
-
 
 class Law(Protocol):
     """A law of size, F(d): the share that is finer than the diameter d."""
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Diameters, m, at which the density of the law jumps."""
+        """Diameters, m, at which the density of the law jumps; none where it is smooth."""
+        return ()
 
     def cells(self, power: float, edges: Array) -> Array:
         """(K,) integrals of d^power dF between neighbours of `edges` (K + 1,) m, which rise."""
@@ -40,7 +35,7 @@ class Law(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class LogNormal:
+class LogNormal(Law):
     """ln d is normal, with the mean ln `median` and the standard deviation `spread`.
 
     Attributes:
@@ -50,11 +45,6 @@ class LogNormal:
 
     median: float
     spread: float
-
-    @property
-    def knots(self) -> tuple[float, ...]:
-        """None: the density is smooth."""
-        return ()
 
     def cells(self, power: float, edges: Array) -> Array:
         """exp(p mu + p^2 s^2 / 2) times the normal distribution shifted by p s^2.
@@ -80,7 +70,7 @@ class LogNormal:
 
 
 @dataclass(frozen=True, slots=True)
-class RosinRammler:
+class RosinRammler(Law):
     """F = 1 - exp(-(d / scale)^exponent) (Rosin and Rammler 1933, Weibull).
 
     Attributes:
@@ -91,23 +81,20 @@ class RosinRammler:
     scale: float
     exponent: float
 
-    @property
-    def knots(self) -> tuple[float, ...]:
-        """None: the density is smooth."""
-        return ()
-
     def cells(self, power: float, edges: Array) -> Array:
         """scale^p times the integral of u^(p/n) exp(-u) du, u = (d / scale)^n.
 
-        It is a difference of incomplete gamma functions, by Gauss and Legendre in ln u.
+        It is a difference of incomplete gamma functions, by 8 points of Gauss and Legendre in ln u
+        in each cell; on cells of 1/4096 of a curve they are exact to rounding.
         """
         order = 1 + power / self.exponent
-
-        def density(log_u: Array) -> Array:
-            return np.asarray(np.exp(order * log_u - np.exp(log_u)))
-
-        log_u = self.exponent * (np.log(edges) - math.log(self.scale))
-        return np.asarray(self.scale**power * _gauss(density, log_u))
+        nodes, weights = np.polynomial.legendre.leggauss(8)
+        ends = self.exponent * (np.log(edges) - math.log(self.scale))
+        half, middle = 0.5 * np.diff(ends), 0.5 * (ends[1:] + ends[:-1])
+        log_u = middle[:, None] + half[:, None] * nodes
+        return np.asarray(
+            self.scale**power * (half * (np.exp(order * log_u - np.exp(log_u)) @ weights))
+        )
 
     def quantile(self, share: float) -> float:
         """scale (-ln(1 - share))^(1 / exponent)."""
@@ -115,7 +102,7 @@ class RosinRammler:
 
 
 @dataclass(frozen=True, slots=True)
-class Uniform:
+class Uniform(Law):
     """All diameters between two ends are equally frequent.
 
     Attributes:
@@ -125,11 +112,6 @@ class Uniform:
 
     low: float
     high: float
-
-    @property
-    def knots(self) -> tuple[float, ...]:
-        """None inside its ends."""
-        return ()
 
     def cells(self, power: float, edges: Array) -> Array:
         """Integral of d^p over the width of the range."""
@@ -144,7 +126,7 @@ class Uniform:
 
 
 @dataclass(frozen=True, slots=True)
-class Points:
+class Points(Law):
     """Measured points, joined by straight lines over ln d (as on the usual paper).
 
     Attributes:
@@ -187,19 +169,6 @@ def _normal_shares(z: Array) -> Array:
     below, above = z[:-1] < 0, z[1:] > 0
     same_side = np.where(below, tail[1:] - tail[:-1], tail[:-1] - tail[1:])
     return np.asarray(np.where(below & above, 1 - tail[1:] - tail[:-1], same_side))
-
-
-def _gauss(density: Callable[[Array], Array], edges: Array) -> Array:
-    """(K,) integrals of `density` between neighbours of `edges` (K + 1,)."""
-    nodes, weights = _rule()
-    half, middle = 0.5 * np.diff(edges), 0.5 * (edges[1:] + edges[:-1])
-    return np.asarray(half * (density(middle[:, None] + half[:, None] * nodes) @ weights))
-
-
-@lru_cache(maxsize=1)
-def _rule() -> tuple[Array, Array]:
-    nodes, weights = np.polynomial.legendre.leggauss(_GAUSS_POINTS)
-    return nodes, weights
 
 
 # ------------------------------------------------------------------------------------------------
@@ -301,7 +270,7 @@ class SizeCurve:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Blend:
+class Blend(Law):
     """Several solids together, as a law that counts by volume.
 
     Attributes:
@@ -453,44 +422,27 @@ class Fit:
         return max(abs(one) for one in self.misfit.values())
 
 
-def fit_log_normal(points: Mapping[float, float]) -> Fit:
-    """The log-normal law that is nearest in ln d to diameters (m) by the share finer (0 to 1).
-
-    Least squares of ln d over the normal quantile; two points are met exactly.
-    """
-    quantiles = [NormalDist().inv_cdf(share) for share in points]
-    spread, mean = _line(quantiles, [math.log(size) for size in points.values()])
-    return _fit(LOG_NORMAL, LogNormal(math.exp(mean), spread), points)
-
-
-def fit_rosin_rammler(points: Mapping[float, float]) -> Fit:
-    """The same for the law of Rosin and Rammler: ln d over ln(-ln(1 - share))."""
-    quantiles = [math.log(-math.log1p(-share)) for share in points]
-    slope, mean = _line(quantiles, [math.log(size) for size in points.values()])
-    return _fit(ROSIN_RAMMLER, RosinRammler(math.exp(mean), 1 / slope), points)
-
-
 def best_fit(points: Mapping[float, float], name: str | None = None) -> Fit:
-    """The law called `name`, or of the two the one with the smaller misfit in the mean square.
+    """The law that is nearest to diameters (m) by the share finer (0 to 1).
 
-    Two points are met by both; then it is the log-normal law.
+    It is the law called `name`, or of the two the one with the smaller misfit in the mean square.
+    Two points are met by both; then it is the log-normal law. Least squares of ln d over the
+    normal quantile, or over ln(-ln(1 - share)) for the law of Rosin and Rammler.
     """
-    fits = {fit.name: fit for fit in (fit_log_normal(points), fit_rosin_rammler(points))}
-    if name is not None:
-        return fits[name]
-    if len(points) <= 2:
-        return fits[LOG_NORMAL]
-    return min(
-        fits.values(), key=lambda fit: sum(math.log1p(one) ** 2 for one in fit.misfit.values())
-    )
+    names = [LOG_NORMAL, ROSIN_RAMMLER] if name is None else [name]
+    fits = [_fit(one, points) for one in (names[:1] if len(points) <= 2 else names)]
+    return min(fits, key=lambda fit: sum(math.log1p(one) ** 2 for one in fit.misfit.values()))
 
 
-def _line(x: list[float], y: list[float]) -> tuple[float, float]:
-    """Slope and value at 0 of the straight line of least squares."""
-    slope, start = np.polynomial.Polynomial.fit(x, y, 1).convert().coef[::-1]
-    return float(slope), float(start)
-
-
-def _fit(name: str, law: LogNormal | RosinRammler, points: Mapping[float, float]) -> Fit:
+def _fit(name: str, points: Mapping[float, float]) -> Fit:
+    if name == LOG_NORMAL:
+        place = [NormalDist().inv_cdf(share) for share in points]
+    else:
+        place = [math.log(-math.log1p(-share)) for share in points]
+    logs = [math.log(size) for size in points.values()]
+    slope, mean = map(float, np.polynomial.Polynomial.fit(place, logs, 1).convert().coef[::-1])
+    law: LogNormal | RosinRammler = LogNormal(math.exp(mean), slope)
+    if name == ROSIN_RAMMLER:
+        law = RosinRammler(math.exp(mean), 1 / slope)
     misfit = {share: law.quantile(share) / size - 1 for share, size in points.items()}
     return Fit(name=name, law=law, misfit=misfit)

@@ -50,6 +50,8 @@ def test_layers_count_from_what_imports_nothing():
 
 
 def test_every_key_of_a_case_has_a_meaning():
+    from case_keys import meaning_of
+
     from fdnet.case.case import InvasionCase
 
     def check(model, path):
@@ -60,7 +62,7 @@ def test_every_key_of_a_case_has_a_meaning():
                 assert part.__doc__
                 check(part, [*path, name])
             if not parts:
-                meaning = field.description or ""
+                meaning = meaning_of(model, name)
                 assert len(meaning) > 10, ".".join([*path, name])
                 assert meaning.endswith("."), ".".join([*path, name])
 

@@ -1,6 +1,11 @@
 """The keys of a case file as rows of a table, made from the models themselves."""
 
+import ast
+import inspect
+import textwrap
 from collections.abc import Iterator
+from functools import cache
+from itertools import pairwise
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel
@@ -49,8 +54,28 @@ def key_rows(part: str) -> Iterator[tuple[str, ...]]:
                 unit_of(name),
                 _default(field),
                 _range(field),
-                field.description or "",
+                meaning_of(model, name),
             )
+
+
+def meaning_of(model: type[BaseModel], name: str) -> str:
+    """What a key means: its `description`, or the text below it in its class."""
+    described = model.model_fields[name].description
+    classes = [one for one in model.__mro__ if name in inspect.get_annotations(one)]
+    return described or _texts(classes[0]).get(name, "")
+
+
+@cache
+def _texts(model: type) -> dict[str, str]:
+    """The text below each key of a class."""
+    body = ast.parse(textwrap.dedent(inspect.getsource(model))).body[0]
+    assert isinstance(body, ast.ClassDef)
+    return {
+        key.target.id: " ".join(str(text.value.value).split())
+        for key, text in pairwise(body.body)
+        if isinstance(key, ast.AnnAssign) and isinstance(key.target, ast.Name)
+        if isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
+    }
 
 
 def part_model(annotation: Any) -> type[BaseModel] | None:

@@ -14,7 +14,7 @@ from pathlib import Path
 from case_keys import key_rows
 from command_options import commands, option_rows, usage_of
 
-from fdnet.scales.check import PAGE, page
+from fdnet.errors import PAGE, page
 
 PAGES = ("docs/reference/case.md", "docs/reference/commands.md")
 BLOCK = re.compile(

@@ -75,13 +75,11 @@ class Case(Part):
         True
     """
 
-    name: Annotated[str, Field(min_length=1, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")] = Field(
-        description="Name of the case: letters, digits, dot, underscore and hyphen. It also names "
-        "the run folder."
-    )
-    seed: Annotated[int, Field(ge=0, lt=2**31)] = Field(
-        1, description="Seed of all random numbers. The same case and seed give the same result."
-    )
+    name: Annotated[str, Field(min_length=1, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")]
+    """Name of the case: letters, digits, dot, underscore and hyphen. It also names the run folder.
+    """
+    seed: Annotated[int, Field(ge=0, lt=2**31)] = 1
+    """Seed of all random numbers. The same case and seed give the same result."""
     box: Box
     grains: Grains
     fluid: Fluid = Fluid()
@@ -92,11 +90,9 @@ class Case(Part):
     bonds: Bonds | None = None
     run: Run = Run()
     analysis: AnalysisChoices = AnalysisChoices()
-    given: dict[str, str] = Field(
-        {},
-        description="Written by fdnet: what the case gave with units or as a file, by dotted key. "
-        "The other keys hold the same as numbers, and only they count.",
-    )
+    given: dict[str, str] = Field({})
+    """Written by fdnet: what the case gave with units or as a file, by dotted key. The other keys
+    hold the same as numbers, and only they count."""
 
     @model_validator(mode="after")
     def _tables_fit(self) -> Self:

@@ -1,7 +1,4 @@
-"""Reading a case file: size tables, keys, values with units, and the cases that come with fdnet.
-
-Curves of sizes in CSV files: tables of sieves and of laser instruments.
-"""
+"""Reading a case file: its curves of sizes, keys, and values with units; the shipped cases."""
 
 import copy
 import csv
@@ -11,8 +8,9 @@ import tomllib
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.resources import files
+from itertools import chain
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, NamedTuple, get_args
 
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
@@ -24,6 +22,10 @@ from fdnet.case.tables import Part
 from fdnet.case.units import SUFFIXES, converted, length_factor, share_of, stem_of, suffix_of
 from fdnet.errors import CaseError
 from fdnet.files import SMALL, expanded, file_bytes, text_of
+
+# ------------------------------------------------------------------------------------------------
+# Curves of sizes in CSV files: tables of sieves and of laser instruments.
+
 
 _BRACKETS = re.compile(r"[(\[]([^)\]]*)[)\]]")
 _FINER = r"passing|finer|under|smaller|less|<"
@@ -40,7 +42,6 @@ _POWERS = {
     "length or intensity": r"length|intensity|q1",
 }
 """What the shares of a column may count, with the words that say it."""
-_AS_MASS = {"mass", "volume"}
 _MOST_FRACTION = 1.0 + 1e-9
 
 
@@ -151,20 +152,14 @@ def _share_column(header: list[str], sizes: int, by: str) -> tuple[int, bool, fl
             f"{len(columns)} columns of {header} are cumulative percentages, expected one, named "
             "such as 'passing %', 'cumulative % finer' or 'cumulative % retained'"
         )
-    _refuse_other_shares(header[columns[0][0]], by)
-    return columns[0]
-
-
-def _refuse_other_shares(name: str, by: str) -> None:
-    """Raise ValueError where a column says that it counts another thing than `by`."""
+    name, own = header[columns[0][0]], "mass" if by == "volume" else by
     said = {power for power, words in _POWERS.items() if re.search(words, name.lower())}
-    own = "mass" if by in _AS_MASS else by
     if said - {own}:
-        known = "mass, volume, surface or number"
         raise ValueError(
-            f"column {name!r}: counts {' and '.join(sorted(said))}, but the case says by "
-            f"{by!r}; give by = what the column counts ({known}) next to the file"
+            f"column {name!r}: counts {' and '.join(sorted(said))}, but the case says by {by!r}; "
+            "give by = what the column counts (mass, volume, surface or number) next to the file"
         )
+    return columns[0]
 
 
 def _row(row: list[str], sizes: int, percents: int, *, comma: bool) -> tuple[float, float]:
@@ -191,26 +186,16 @@ def known_keys(model: type[Part] = InvasionCase, prefix: str = "") -> Iterator[s
     """Every dotted key that a case file may hold."""
     for name, info in model.model_fields.items():
         yield prefix + name
-        table = table_of(info)
-        for inner in [table] if table is not None else _inner_tables(info.annotation):
-            yield from known_keys(inner, f"{prefix}{name}.")
+        table = table_of(info.annotation)
+        if table is not None:
+            yield from known_keys(table, f"{prefix}{name}.")
 
 
-def table_of(field: FieldInfo) -> type[Part] | None:
-    """The class of a table's keys, also where the table may be absent; None for a plain key."""
-    for kind in (field.annotation, *get_args(field.annotation)):
-        if isinstance(kind, type) and issubclass(kind, Part):
-            return kind
-    return None
-
-
-def _inner_tables(annotation: Any) -> Iterator[type[Part]]:
-    """The tables that a key may hold, one or a list of them."""
-    for kind in get_args(annotation):
-        if isinstance(kind, type) and issubclass(kind, Part):
-            yield kind
-        else:
-            yield from _inner_tables(kind)
+def table_of(annotation: Any) -> type[Part] | None:
+    """The table that a key holds, one or a list of them, or none; None for a plain value."""
+    if isinstance(annotation, type) and issubclass(annotation, Part):
+        return annotation
+    return next((one for kind in get_args(annotation) if (one := table_of(kind))), None)
 
 
 REMOVED_KEYS = {"clean_up.lift_cake": "the cake is always lifted, remove the key"}
@@ -224,22 +209,25 @@ def nearest(path: str) -> str:
         return f"; {REMOVED_KEYS[path]}"
     if table in ("grains", "fines") and _DIAMETER.match(key):
         return f'; did you mean {table}.sizes = {{ D10 = "20 um", D50 = "40 um", ... }}?'
-    here = [one for one in known_keys() if one.rpartition(".")[0] == table]
-    stems = {one: stem_of(one.rpartition(".")[2]) for one in here}
-    same = [one for one in here if stems[one] == stem_of(key)]
-    near = same or _near(key, here) or _named_alike(key) or _near(key, list(known_keys()))
-    return f"; did you mean {near[0]}?" if near else ""
+    stems = {one: stem_of(one.rpartition(".")[2]) for one in known_keys()}
+    here = {one: stem for one, stem in stems.items() if one.rpartition(".")[0] == table}
 
+    def near_in(keys: Mapping[str, str]) -> Iterator[str]:
+        """The key of nearly the same spelling; tables and units count for nothing."""
+        first = {stem: one for one, stem in reversed([*keys.items()])}
+        close = difflib.get_close_matches(stem_of(key), first, n=1, cutoff=0.65)
+        return (first[one] for one in close)
 
-def _near(key: str, keys: list[str]) -> list[str]:
-    """The key of nearly the same spelling; tables and units count for nothing."""
-    stems = {stem_of(one.rpartition(".")[2]): one for one in reversed(keys)}
-    return [stems[one] for one in difflib.get_close_matches(stem_of(key), stems, n=1, cutoff=0.65)]
-
-
-def _named_alike(key: str) -> list[str]:
-    """A key of another table with the same name."""
-    return [one for one in known_keys() if stem_of(one.rpartition(".")[2]) == stem_of(key)]
+    near = next(
+        chain(
+            (one for one, stem in here.items() if stem == stem_of(key)),
+            near_in(here),
+            (one for one, stem in stems.items() if stem == stem_of(key)),
+            near_in(stems),
+        ),
+        None,
+    )
+    return f"; did you mean {near}?" if near else ""
 
 
 # ------------------------------------------------------------------------------------------------
@@ -286,7 +274,11 @@ def plain_tables(model: type[Part], data: Mapping[str, Any], folder: Path) -> Sp
     if isinstance(earlier, Mapping):
         data = {key: value for key, value in data.items() if key != "given"}
     spoken.data = _table(spoken, model, data, path="", folder=folder)
-    _drop_bad(spoken)
+    for dotted in spoken.bad:  # so that nothing else is said of these keys
+        name, _, key = dotted.partition(".")
+        table = spoken.data if not key else spoken.data.get(name)
+        if isinstance(table, dict):
+            table.pop(key or name, None)
     if isinstance(earlier, Mapping):
         kept = {str(key): text for key, text in earlier.items() if _holds(key, text, spoken.data)}
         spoken.given = kept | spoken.given
@@ -301,7 +293,7 @@ def _table(
     result: dict[str, Any] = {}
     for key, value in table.items():
         dotted, fields = f"{path}{key}", model.model_fields
-        inner = _inner(fields[key].annotation) if key in fields else None
+        inner = table_of(fields[key].annotation) if key in fields else None
         if inner is not None and isinstance(value, Mapping):
             result[key] = _table(spoken, inner, value, path=f"{dotted}.", folder=folder)
         elif inner is not None and isinstance(value, list) and key == "materials":
@@ -314,31 +306,12 @@ def _table(
         elif key in fields:
             result[key] = _percentage(spoken, dotted, key, value)
         elif model is Sizes and key == FILE:
-            _put_absent(result, _curve(spoken, dotted, value, table, folder))
+            more = _curve(spoken, dotted, value, table, folder)
+            result = {**result, **more, **result}
         else:
-            _put_absent(result, _with_unit(spoken, model, table, key=key, dotted=dotted))
+            more = _with_unit(spoken, model, table, key=key, dotted=dotted)
+            result = {**result, **more, **result}
     return result
-
-
-def _drop_bad(spoken: Spoken) -> None:
-    """Take out the keys that were refused, so that nothing else is said of them."""
-    for dotted in spoken.bad:
-        name, _, key = dotted.partition(".")
-        table = spoken.data if not key else spoken.data.get(name)
-        if isinstance(table, dict):
-            table.pop(key or name, None)
-
-
-def _put_absent(result: dict[str, Any], more: Mapping[str, Any]) -> None:
-    for key, value in more.items():
-        result.setdefault(key, value)
-
-
-def _inner(annotation: Any) -> type[Part] | None:
-    """The table that a key holds, one or a list of them; None for a plain value."""
-    if isinstance(annotation, type) and issubclass(annotation, Part):
-        return annotation
-    return next((inner for kind in get_args(annotation) if (inner := _inner(kind))), None)
 
 
 def _percentage(spoken: Spoken, dotted: str, key: str, value: Any) -> Any:
@@ -516,32 +489,36 @@ def _problems(
     items = [item for item in error.errors() if item["type"] != "value_error"]
     items = [item for item in items if ".".join(map(str, item["loc"][:2])) not in refused]
     bad = {".".join(map(str, item["loc"][:2])) for item in items} | set(refused)
-    tables = {name: _good_keys(name, field, data, bad) for name, field in _tables_of(model)}
+    tables = {
+        name: _good_keys(name, table, info, data, bad)
+        for name, info in model.model_fields.items()
+        if (table := table_of(info.annotation)) is not None
+    }
     return [*dict.fromkeys(_problem(dict(item)) for item in items), *cross_problems(tables, bad)]
 
 
 def _good_keys(
-    name: str, field: FieldInfo, data: Mapping[str, Any], bad: Collection[str]
+    name: str, table: type[Part], info: FieldInfo, data: Mapping[str, Any], bad: Collection[str]
 ) -> Part | None:
     """A table without its bad keys; None where it is missing or cannot do without them."""
     if name not in data:
-        return None if field.is_required() else field.default
-    table, values = table_of(field), data[name]
-    if table is None or not isinstance(values, dict):
+        return None if info.is_required() else info.default
+    if not isinstance(data[name], dict):
         return None
-    good = {key: value for key, value in values.items() if f"{name}.{key}" not in bad}
     try:
-        return table.model_validate(good)
+        return table.model_validate(
+            {key: value for key, value in data[name].items() if f"{name}.{key}" not in bad}
+        )
     except ValidationError:
         return None
 
 
-def _tables_of(model: type[Part]) -> list[tuple[str, FieldInfo]]:
-    return [(name, field) for name, field in model.model_fields.items() if table_of(field)]
-
-
 def _problem(item: dict[str, Any]) -> str:
-    path = ".".join(str(part) for part in item["loc"] if not _is_union_tag(part))
+    path = ".".join(
+        str(part)
+        for part in item["loc"]
+        if part not in ("float", "int", "constrained-float") and "[" not in str(part)
+    )
     given = item["input"]
     if item["type"] == "extra_forbidden":
         return f"{path}: unknown key (given {given!r}){nearest(path)}"
@@ -556,10 +533,6 @@ def _problem(item: dict[str, Any]) -> str:
     if isinstance(given, str) and suffix_of(key) and given[:1].isdigit():
         message += f"; a value with its unit goes to {stem_of(key)}"
     return f"{path}: {given!r} {message}"
-
-
-def _is_union_tag(part: Any) -> bool:
-    return isinstance(part, str) and ("[" in part or part in ("float", "int", "constrained-float"))
 
 
 _LONGEST_WORD = 1000
@@ -644,7 +617,7 @@ def read_case(
         3
     """
     try:
-        data = put_keys(set_keys(_tables(path), assignments or []), values or {})
+        data = put_keys(set_keys(toml_tables(path), assignments or []), values or {})
         return case_from(data, source=str(path), folder=expanded(path).parent)
     except RecursionError as error:
         raise CaseError(f"{path}: its tables or lists are nested too deeply for a case") from error
@@ -652,14 +625,10 @@ def read_case(
 
 def recorded_case(path: Path) -> Case:
     """The case that a run folder holds. Raises CaseError as `read_case` does."""
-    return case_from(_tables(path), source=str(path), folder=path.parent)
+    return case_from(toml_tables(path), source=str(path), folder=path.parent)
 
 
-def _tables(path: str | Path) -> dict[str, Any]:
-    return toml_tables(path, "a case file")
-
-
-def toml_tables(path: str | Path, what: str) -> dict[str, Any]:
+def toml_tables(path: str | Path, what: str = "a case file") -> dict[str, Any]:
     """The tables of a TOML file; `what` names it in messages.
 
     Raises CaseError where it cannot be read or is no TOML.
@@ -683,8 +652,7 @@ QUICK = "quick-"
 _SENTENCE = re.compile(r"(.+?)[.:](\s|$)")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ShippedCase:
+class ShippedCase(NamedTuple):
     """A case file that comes with fdnet.
 
     Attributes:
@@ -711,12 +679,8 @@ def cases_folder() -> Path:
 
 def case_path(name: str) -> Path:
     """The file of a shipped case; "quick-NAME" is the quick form of NAME."""
-    quick = name.startswith(QUICK)
-    return (
-        cases_folder()
-        / ("quick" if quick else "")
-        / f"{name.removeprefix(QUICK) if quick else name}.toml"
-    )
+    stem = name.removeprefix(QUICK)
+    return cases_folder() / ("quick" if stem != name else "") / f"{stem}.toml"
 
 
 def shipped_cases() -> tuple[ShippedCase, ...]:
@@ -725,7 +689,7 @@ def shipped_cases() -> tuple[ShippedCase, ...]:
     full = [(path.stem, path) for path in sorted(folder.glob("*.toml"))]
     quick = [(QUICK + path.stem, path) for path in sorted(folder.glob("quick/*.toml"))]
     return tuple(
-        ShippedCase(name=name, path=path, about=first_sentence(path.read_text(encoding="utf-8")))
+        ShippedCase(name, path, first_sentence(path.read_text(encoding="utf-8")))
         for name, path in [*full, *quick]
     )
 

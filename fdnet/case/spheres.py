@@ -1,16 +1,14 @@
-"""The tables [grains] and [fines] of a case, and their sizes.
+"""The tables [grains] and [fines] of a case, and their curves of sizes.
 
-The table `sizes` of grains, fines and materials: a measured curve of sizes.
-
-All sizes in it are diameters, as sieves and laser instruments give them.
+All sizes of a curve are diameters, as sieves and laser instruments give them.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -18,12 +16,12 @@ from pydantic_core import PydanticCustomError
 from fdnet.case.tables import (
     MAX_CONCENTRATION,
     Fraction,
+    InSI,
     NonNegative,
     Part,
     Positive,
     Radius,
     as_tuple,
-    scaled,
 )
 from fdnet.sizes import (
     NUMBER,
@@ -60,29 +58,24 @@ Cut = Annotated[tuple[Percent, Percent], BeforeValidator(as_tuple)]
 class Sizes(Part):
     """A curve of sizes: D10, D50 and D90, or the points of a sieve or laser measurement."""
 
-    D10_mm: Positive | None = Field(None, description="Diameter that 10 % are finer than.")
-    D50_mm: Positive | None = Field(None, description="Median diameter.")
-    D90_mm: Positive | None = Field(None, description="Diameter that 90 % are finer than.")
-    shape: Literal["log-normal", "rosin-rammler"] | None = Field(
-        None,
-        description="Law through D10, D50 and D90. When absent: the one of the two that misses "
-        "them least, for two given diameters the log-normal one.",
-    )
-    size_mm: Lengths | None = Field(
-        None, description="Diameters of a measured curve, rising; it is straight over ln d."
-    )
-    passing_percent: Percents | None = Field(
-        None, description="What is finer than each of `size_mm`, rising to 100."
-    )
-    by: Literal["mass", "volume", "surface", "number"] = Field(
-        "mass",
-        description="What the percentages count. Mass and volume are the same for one material.",
-    )
-    cut_percent: Cut = Field(
-        (1.0, 99.0),
-        description="Ends of the curve, by volume: finer and coarser sizes are left out, and the "
-        "summary says what share of the solids they are.",
-    )
+    D10_mm: Positive | None = None
+    """Diameter that 10 % are finer than."""
+    D50_mm: Positive | None = None
+    """Median diameter."""
+    D90_mm: Positive | None = None
+    """Diameter that 90 % are finer than."""
+    shape: Literal["log-normal", "rosin-rammler"] | None = None
+    """Law through D10, D50 and D90. When absent: the one of the two that misses them least, for
+    two given diameters the log-normal one."""
+    size_mm: Lengths | None = None
+    """Diameters of a measured curve, rising; it is straight over ln d."""
+    passing_percent: Percents | None = None
+    """What is finer than each of `size_mm`, rising to 100."""
+    by: Literal["mass", "volume", "surface", "number"] = "mass"
+    """What the percentages count. Mass and volume are the same for one material."""
+    cut_percent: Cut = (1.0, 99.0)
+    """Ends of the curve, by volume: finer and coarser sizes are left out, and the summary says
+    what share of the solids they are."""
 
     @model_validator(mode="after")
     def _is_a_curve(self) -> Self:
@@ -125,12 +118,12 @@ class Sizes(Part):
 
 
 def _problems(sizes: Sizes) -> Iterator[str]:
-    given = {share: size for share, size in sizes.asked.items() if size is not None}
+    given, cut = sizes.asked, sizes.cut_percent
     measured = sizes.size_mm is not None or sizes.passing_percent is not None
     if measured and given:
         yield "gives D10, D50 or D90 beside a measured curve; give one of the two"
     elif measured:
-        yield from _measured_problems(sizes)
+        yield from _measured_problem(sizes)
     elif len(given) < 2:
         yield (
             f"gives {len(given)} of D10, D50 and D90, expected two or three of them (one diameter "
@@ -142,33 +135,33 @@ def _problems(sizes: Sizes) -> Iterator[str]:
             f"{texts}: must rise from D10 to D90, each {LEAST_RATIO} to {MOST_RATIO:g} times the "
             "one before"
         )
-    if sizes.cut_percent[0] >= sizes.cut_percent[1]:
-        yield f"cut_percent {list(sizes.cut_percent)} must rise, [finest, coarsest]"
-    elif not measured and not 0 < sizes.cut_percent[0] < sizes.cut_percent[1] < 100:
+    if cut[0] >= cut[1]:
+        yield f"cut_percent {list(cut)} must rise, [finest, coarsest]"
+    elif not measured and not 0 < cut[0] < cut[1] < 100:
         yield (
-            f"cut_percent {list(sizes.cut_percent)}: the law of D10, D50 and D90 has no ends, "
+            f"cut_percent {list(cut)}: the law of D10, D50 and D90 has no ends, "
             "expected cuts above 0 and below 100"
         )
 
 
-def _measured_problems(sizes: Sizes) -> Iterator[str]:
+def _measured_problem(sizes: Sizes) -> Iterator[str]:
+    """The first problem of a measured curve."""
     size, finer = sizes.size_mm, sizes.passing_percent
     if size is None or finer is None:
         yield "a measured curve needs both size_mm and passing_percent"
-    elif len(size) != len(finer):
+        return
+    if len(size) != len(finer):
         yield f"{len(size)} sizes with {len(finer)} percentages, expected as many of both"
-    elif sizes.shape is not None:
+        return
+    if sizes.shape is not None:
         yield f"shape {sizes.shape!r} belongs to D10, D50 and D90, not to a measured curve"
-    elif finer[0] > 0 and sizes.by in ("number", "surface"):
+        return
+    if finer[0] > 0 and sizes.by in ("number", "surface"):
         yield (
             f"the curve by {sizes.by} begins at {finer[0]:g} %, expected 0 %: spheres of unknown "
             "size have no volume"
         )
-    else:
-        yield from _order_problems(size, finer)
-
-
-def _order_problems(size: tuple[float, ...], finer: tuple[float, ...]) -> Iterator[str]:
+        return
     for (a, b), (p, q) in zip(pairwise(size), pairwise(finer), strict=True):
         if b < (1 + _ROUNDING) * a:
             yield f"size_mm must rise, but {b:g} mm follows {a:g} mm"
@@ -184,10 +177,6 @@ def _order_problems(size: tuple[float, ...], finer: tuple[float, ...]) -> Iterat
             f"the curve ends at {finer[-1]:g} % at {size[-1]:g} mm, expected 100 %: add the size "
             "that all passes"
         )
-
-
-# ------------------------------------------------------------------------------------------------
-# The materials of a mud: the list `fines.materials`, such as CaCO3, barite and drilled solids.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -210,48 +199,17 @@ class Solid:
 class Material(Part):
     """One kind of solids in the mud."""
 
-    name: str = Field(min_length=1, max_length=60, description="Name of the material.")
-    share: Positive = Field(
-        description="Its share of the solids by mass; the shares are relative to their sum."
-    )
-    sizes: Sizes = Field(description="Its curve of diameters, as `fines.sizes`.")
-    density_kg_m3: Positive | None = Field(
-        None, description="Density of the material. When absent: `fines.density_kg_m3`."
-    )
-    friction: NonNegative | None = Field(
-        None,
-        description="Coefficient of sliding friction; for now it must be that of all fines, "
-        "`fines.friction`, which is also the default.",
-    )
-
-
-def components_of(
-    materials: Sequence[Material], *, density: float, finest: float
-) -> tuple[Solid, ...]:
-    """The materials with their shares by volume of all solids.
-
-    `density` kg/m3 is for those without one; nothing finer than `finest` m is kept.
-    """
-    volumes = [one.share / (one.density_kg_m3 or density) for one in materials]
-    return tuple(
-        Solid(
-            name=one.name,
-            share=volume / sum(volumes),
-            curve=one.sizes.curve(finest),
-            density=one.density_kg_m3 or density,
-        )
-        for one, volume in zip(materials, volumes, strict=True)
-    )
-
-
-def mixed_density(materials: Sequence[Material], density: float) -> float:
-    """Mass over volume, kg/m3, of materials by their shares of mass; see `components_of`."""
-    mass = sum(one.share for one in materials)
-    return mass / sum(one.share / (one.density_kg_m3 or density) for one in materials)
-
-
-# ------------------------------------------------------------------------------------------------
-# What the tables [grains] and [fines] share: sizes, density and contact of spheres.
+    name: str = Field(min_length=1, max_length=60)
+    """Name of the material."""
+    share: Positive
+    """Its share of the solids by mass; the shares are relative to their sum."""
+    sizes: Sizes
+    """Its curve of diameters, as `fines.sizes`."""
+    density_kg_m3: Positive | None = None
+    """Density of the material. When absent: `fines.density_kg_m3`."""
+    friction: NonNegative | None = None
+    """Coefficient of sliding friction; for now it must be that of all fines, `fines.friction`,
+    which is also the default."""
 
 
 SHEAR_RATIO = 0.04
@@ -262,42 +220,29 @@ than 1/370 of a grain at friction 0.55 locks between two grains (`fdnet.scales.c
 class Spheres(Part):
     """What grains and fines share: sizes, density and the parameters of their contacts."""
 
-    radius_mm: Radius | None = Field(
-        None,
-        description="Radius of a sphere. A list of two values, [smallest, largest], gives radii "
-        "that are uniform by number between them. Give this or `sizes`.",
-    )
-    sizes: Sizes | None = Field(
-        None,
-        description="A measured curve of diameters instead of `radius_mm`; its keys are below.",
-    )
-    density_kg_m3: Positive = Field(description="Density of the solid.")
-    normal_stiffness_N_m: Positive = Field(
-        description="Normal contact stiffness of the material. Two spheres in contact act as two "
-        "springs in series. `run.stiffness_N_m` scales all contact stiffnesses by one factor."
-    )
-    shear_stiffness_N_m: Positive | None = Field(
-        None,
-        description="Tangential contact stiffness of the material, scaled like the normal one. "
-        "When absent: 0.04 of the normal one, so that friction lets go of fines that roll around "
-        "the neck of two grains.",
-    )
-    youngs_modulus_GPa: Positive = Field(
-        description='Young\'s modulus of the material, for contact.model = "hertz".'
-    )
-    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = Field(
-        description='Poisson\'s ratio of the material, for contact.model = "hertz".'
-    )
-    friction: NonNegative = Field(
-        0.55,
-        description="Coefficient of sliding friction. A contact takes the smaller value of its "
-        "two materials.",
-    )
-    damping_ratio: Annotated[float, Field(ge=0, lt=1)] = Field(
-        0.2,
-        description="Damping of a contact over its critical damping. A contact takes the mean of "
-        "its two materials.",
-    )
+    radius_mm: Radius | None = None
+    """Radius of a sphere. A list of two values, [smallest, largest], gives radii that are uniform
+    by number between them. Give this or `sizes`."""
+    sizes: Sizes | None = None
+    """A measured curve of diameters instead of `radius_mm`; its keys are below."""
+    density_kg_m3: Positive
+    """Density of the solid."""
+    normal_stiffness_N_m: Positive
+    """Normal contact stiffness of the material. Two spheres in contact act as two springs in
+    series. `run.stiffness_N_m` scales all contact stiffnesses by one factor."""
+    shear_stiffness_N_m: Positive | None = None
+    """Tangential contact stiffness of the material, scaled like the normal one. When absent: 0.04
+    of the normal one, so that friction lets go of fines that roll around the neck of two grains.
+    """
+    youngs_modulus_GPa: Positive
+    """Young's modulus of the material, for contact.model = "hertz"."""
+    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)]
+    """Poisson's ratio of the material, for contact.model = "hertz"."""
+    friction: NonNegative = 0.55
+    """Coefficient of sliding friction. A contact takes the smaller value of its two materials."""
+    damping_ratio: Annotated[float, Field(ge=0, lt=1)] = 0.2
+    """Damping of a contact over its critical damping. A contact takes the mean of its two
+    materials."""
 
     @property
     def tangential_stiffness(self) -> float:
@@ -305,10 +250,8 @@ class Spheres(Part):
         given = self.shear_stiffness_N_m
         return SHEAR_RATIO * self.normal_stiffness_N_m if given is None else given
 
-    @property
-    def youngs_modulus_Pa(self) -> float:
-        """Young's modulus of the material, Pa."""
-        return self.youngs_modulus_GPa * 1e9
+    youngs_modulus_Pa: ClassVar = InSI[float]("youngs_modulus_GPa", 1e9)
+    """Young's modulus of the material, Pa."""
 
     @cached_property
     def components(self) -> tuple[Solid, ...]:
@@ -369,6 +312,17 @@ class Spheres(Part):
         return self._given_range
 
     @property
+    def ends(self) -> list[tuple[float, float]]:
+        """Radius, m, and density of the smallest and the largest sphere of each material."""
+        if not self.measured:
+            return [(radius, self.density_kg_m3) for radius in self.radius_range_m]
+        return [
+            (0.5 * diameter, one.density)
+            for one in self.components
+            for diameter in (one.curve.low, one.curve.high)
+        ]
+
+    @property
     def one_size(self) -> bool:
         """Whether all radii are equal."""
         return isinstance(self.radius_mm, float | int)
@@ -400,123 +354,88 @@ class Spheres(Part):
         )
 
 
-# ------------------------------------------------------------------------------------------------
-# The tables [grains] and [fines] of a case file: material and number of the spheres.
-
-
 Materials = Annotated[
     tuple[Material, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=20)
 ]
 
 
 class Grains(Spheres):
-    """The skeleton: the sand grains of the formation. Give either `porosity` or `count`."""
+    """[grains], the skeleton: the sand grains of the formation.
 
-    porosity: Fraction | None = Field(
-        None,
-        description="Porosity of the finished pack, with overlaps of grains counted once. The "
-        "number of grains is adjusted until it is met within 0.003.",
-    )
-    count: Annotated[int, Field(ge=1)] | None = Field(
-        None, description="Number of grains. It overrides `porosity`."
-    )
-    density_kg_m3: Positive = Field(2650.0, description="Density of the grains.")
-    normal_stiffness_N_m: Positive = Field(
-        94.3e9,
-        description="Normal contact stiffness of the grains' material, and of the walls. "
-        "`run.stiffness_N_m` scales all contact stiffnesses by one factor.",
-    )
-    shear_stiffness_N_m: Positive | None = Field(
-        None,
-        description="Tangential contact stiffness of the grains' material, and of the walls. When "
-        "absent: 0.04 of the normal one, so that friction lets go of fines that roll around the "
-        "neck of two grains. The thesis has 34e9.",
-    )
-    youngs_modulus_GPa: Positive = Field(
-        94.3,
-        description="Young's modulus of the grains' material, and of the walls, for "
-        'contact.model = "hertz". The default is the thesis\'s (quartz). `run.stiffness_N_m` '
-        "scales all moduli by one factor.",
-    )
-    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = Field(
-        0.387,
-        description="Poisson's ratio of the grains' material, and of the walls, for "
-        'contact.model = "hertz". The default is E / 2G - 1 of the thesis\'s 94.3 and 34 GPa.',
-    )
-    motion: Literal["fixed", "mobile"] = Field(
-        "fixed",
-        description='Motion of the grains during the invasion: "fixed" keeps them in place, '
-        '"mobile" lets the fines push them. The fluid itself does not push grains.',
-    )
-    max_overlap: Fraction = Field(
-        0.15,
-        description="Largest accepted overlap of two grains in the pack, over the smaller "
-        "diameter. A denser pack is refused.",
-    )
+    Give either `porosity` or `count`.
+    """
+
+    porosity: Fraction | None = None
+    """Porosity of the finished pack, with overlaps of grains counted once. The number of grains is
+    adjusted until it is met within 0.003."""
+    count: Annotated[int, Field(ge=1)] | None = None
+    """Number of grains. It overrides `porosity`."""
+    density_kg_m3: Positive = 2650.0
+    """Density of the grains."""
+    normal_stiffness_N_m: Positive = 94.3e9
+    """Normal contact stiffness of the grains' material, and of the walls. `run.stiffness_N_m`
+    scales all contact stiffnesses by one factor."""
+    shear_stiffness_N_m: Positive | None = None
+    """Tangential contact stiffness of the grains' material, and of the walls. When absent: 0.04 of
+    the normal one, so that friction lets go of fines that roll around the neck of two grains. The
+    thesis has 34e9."""
+    youngs_modulus_GPa: Positive = 94.3
+    """Young's modulus of the grains' material, and of the walls, for contact.model = "hertz". The
+    default is the thesis's (quartz). `run.stiffness_N_m` scales all moduli by one factor."""
+    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = 0.387
+    """Poisson's ratio of the grains' material, and of the walls, for contact.model = "hertz". The
+    default is E / 2G - 1 of the thesis's 94.3 and 34 GPa."""
+    motion: Literal["fixed", "mobile"] = "fixed"
+    """Motion of the grains during the invasion: "fixed" keeps them in place, "mobile" lets the
+    fines push them. The fluid itself does not push grains."""
+    max_overlap: Fraction = 0.15
+    """Largest accepted overlap of two grains in the pack, over the smaller diameter. A denser pack
+    is refused."""
 
 
 class Fines(Spheres):
-    """The invading particles: a slab of suspension upstream. Give either `count` or `slab_mm`.
+    """[fines], the invading particles: a slab of suspension upstream.
+
+    Give either `count` or `slab_mm`.
 
     A case without this table has no invasion: only the intact pack is made and analysed.
     """
 
-    density_kg_m3: Positive = Field(2146.0, description="Density of the fines.")
-    normal_stiffness_N_m: Positive = Field(
-        63.0e9, description="Normal contact stiffness of the fines' material."
-    )
-    shear_stiffness_N_m: Positive | None = Field(
-        None,
-        description="Tangential contact stiffness of the fines' material. When absent: 0.04 of "
-        "the normal one. The thesis has 26e9.",
-    )
-    youngs_modulus_GPa: Positive = Field(
-        63.0,
-        description="Young's modulus of the fines' material, for contact.model = \"hertz\". The "
-        "default is the thesis's.",
-    )
-    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = Field(
-        0.212,
-        description="Poisson's ratio of the fines' material, for contact.model = \"hertz\". The "
-        "default is E / 2G - 1 of the thesis's 63 and 26 GPa.",
-    )
-    materials: Materials | None = Field(
-        None,
-        description="Several materials, each a table with its own sizes, instead of `radius_mm` "
-        "or `sizes`; their keys are below.",
-    )
-    cut_um: Positive | None = Field(
-        None,
-        description="Diameter below which solids of measured sizes are left out. Their share is "
-        "said in the warnings of the summary, and the suspension is thinner by it.",
-    )
-    concentration: Annotated[float, Field(gt=0, le=MAX_CONCENTRATION)] | None = Field(
-        0.10,
-        description="Volume of solids over the volume of suspension in the slab upstream. It has "
-        "no default where `solids_kg_m3` is given.",
-    )
-    solids_kg_m3: Positive | None = Field(
-        None, description="Mass of solids in a volume of mud, instead of `concentration`."
-    )
-    count: Annotated[int, Field(ge=1)] | None = Field(
-        None, description="Number of fines supplied. The length of the slab follows from it."
-    )
-    slab_mm: Positive | None = Field(
-        None,
-        description="Length of the slab of suspension along the flow. The number of fines follows "
-        "from it.",
-    )
-    supply: Literal["slab", "batches"] = Field(
-        "batches",
-        description='How the fines enter: "batches" puts each part of the slab in when it is '
-        'about to arrive, "slab" puts all of them in at the start. The suspension is the same; '
-        "batches are much faster for a long slab.",
-    )
+    density_kg_m3: Positive = 2146.0
+    """Density of the fines."""
+    normal_stiffness_N_m: Positive = 63.0e9
+    """Normal contact stiffness of the fines' material."""
+    shear_stiffness_N_m: Positive | None = None
+    """Tangential contact stiffness of the fines' material. When absent: 0.04 of the normal one.
+    The thesis has 26e9."""
+    youngs_modulus_GPa: Positive = 63.0
+    """Young's modulus of the fines' material, for contact.model = "hertz". The default is the
+    thesis's."""
+    poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = 0.212
+    """Poisson's ratio of the fines' material, for contact.model = "hertz". The default is E / 2G -
+    1 of the thesis's 63 and 26 GPa."""
+    materials: Materials | None = None
+    """Several materials, each a table with its own sizes, instead of `radius_mm` or `sizes`; their
+    keys are below."""
+    cut_um: Positive | None = None
+    """Diameter below which solids of measured sizes are left out. Their share is said in the
+    warnings of the summary, and the suspension is thinner by it."""
+    concentration: Annotated[float, Field(gt=0, le=MAX_CONCENTRATION)] | None = 0.10
+    """Volume of solids over the volume of suspension in the slab upstream. It has no default where
+    `solids_kg_m3` is given."""
+    solids_kg_m3: Positive | None = None
+    """Mass of solids in a volume of mud, instead of `concentration`."""
+    count: Annotated[int, Field(ge=1)] | None = None
+    """Number of fines supplied. The length of the slab follows from it."""
+    slab_mm: Positive | None = None
+    """Length of the slab of suspension along the flow. The number of fines follows from it."""
+    supply: Literal["slab", "batches"] = "batches"
+    """How the fines enter: "batches" puts each part of the slab in when it is about to arrive,
+    "slab" puts all of them in at the start. The suspension is the same; batches are much faster
+    for a long slab."""
 
-    @property
-    def slab_m(self) -> float | None:
-        """Length of the slab of suspension, m; None: it follows from the count."""
-        return scaled(self.slab_mm, 1e-3)
+    slab_m: ClassVar = InSI[float | None]("slab_mm", 1e-3)
+    """Length of the slab of suspension, m; None: it follows from the count."""
 
     @model_validator(mode="before")
     @classmethod
@@ -552,14 +471,25 @@ class Fines(Spheres):
         """The materials that the fines are of, with their shares by volume of what is kept."""
         if self.materials is None:
             return super().components
-        return components_of(self.materials, density=self.density_kg_m3, finest=self.finest_m)
+        usual = self.density_kg_m3
+        volumes = [one.share / (one.density_kg_m3 or usual) for one in self.materials]
+        return tuple(
+            Solid(
+                name=one.name,
+                share=volume / sum(volumes),
+                curve=one.sizes.curve(self.finest_m),
+                density=one.density_kg_m3 or usual,
+            )
+            for one, volume in zip(self.materials, volumes, strict=True)
+        )
 
     @property
     def solids_density_kg_m3(self) -> float:
         """Mass over volume of all solids of the mud, those that are left out as well."""
         if self.materials is None:
             return self.density_kg_m3
-        return mixed_density(self.materials, self.density_kg_m3)
+        mass, usual = sum(one.share for one in self.materials), self.density_kg_m3
+        return mass / sum(one.share / (one.density_kg_m3 or usual) for one in self.materials)
 
     @property
     def has_one_concentration(self) -> bool:

@@ -1,13 +1,12 @@
 """The tables of a case: their keys, units, ranges and defaults.
 
-The kinds of value that a case file may hold, and their bounds.
+The keys carry the unit of the user; properties give the same values in SI for everything else.
 """
 
 import inspect
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Annotated, Any, Literal, TypedDict, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, Literal, TypedDict, TypeVar
 
 import numpy as np
 from pydantic import (
@@ -66,9 +65,19 @@ Vector = Annotated[tuple[Finite, Finite, Finite], BeforeValidator(as_tuple)]
 Radius = Annotated[Positive | Pair, Field(union_mode="smart")]
 
 
-def scaled(value: float | None, factor: float) -> float | None:
-    """`value` times `factor`, which turns the unit of a key into SI; None stays None."""
-    return None if value is None else value * factor
+Value = TypeVar("Value", float, float | None)
+
+
+class InSI(Generic[Value]):
+    """The value of a key times the factor from its unit to SI; None stays None."""
+
+    def __init__(self, key: str, factor: float) -> None:
+        self.key, self.factor = key, factor
+
+    def __get__(self, table: Any, owner: Any = None) -> Value:
+        given: Any = getattr(table, self.key)
+        value: Any = None if given is None else given * self.factor
+        return value
 
 
 class Part(BaseModel):
@@ -85,116 +94,68 @@ def still_there(name: Any, removed: Mapping[str, str]) -> Any:
     return name
 
 
-# ------------------------------------------------------------------------------------------------
-# One check of some keys of a case against each other.
-
-
-@dataclass(frozen=True, slots=True)
-class Rule:
-    """A check of some keys against each other.
-
-    Attributes:
-        keys: dotted keys that the check reads.
-        check: yields what is wrong; it is given the tables of `keys`, each once, in order.
-    """
-
-    keys: tuple[str, ...]
-    check: Callable[..., Iterator[str]]
-
-    @property
-    def tables(self) -> tuple[str, ...]:
-        """Names of the tables that the check is given."""
-        return tuple(dict.fromkeys(key.split(".")[0] for key in self.keys))
-
-
-# ------------------------------------------------------------------------------------------------
-# The tables [fluid] and [well] of a case file: the liquid of the mud and what drives it.
-
-
 M2_PER_MD = 9.869233e-16
 """One millidarcy in m2."""
 
 
 class Fluid(Part):
-    """The mud's liquid. Its velocity is given, or follows from the overbalance by Darcy's law."""
+    """[fluid], the mud's liquid.
 
-    viscosity_cP: Positive = Field(50.0, description="Dynamic viscosity.")
-    density_kg_m3: Positive = Field(
-        1095.0, description="Density; it decides buoyancy and the particle Reynolds number."
-    )
-    overbalance_MPa: Positive = Field(
-        3.5,
-        description="Pressure of the mud above that of the formation. Darcy's law turns it into "
-        "the fluid's velocity.",
-    )
-    velocity_m_s: Positive | None = Field(
-        None,
-        description="Interstitial velocity of the fluid along x. When absent it follows from "
-        "`overbalance_MPa` and either the table `[well]` or `darcy_length_mm`.",
-    )
-    darcy_length_mm: Positive | None = Field(
-        None,
-        description="Length of a plug over which the whole overbalance is lost. Without it and "
-        "without the table `[well]` it is the length of the box, which warns: around a well the "
-        "gradient is about a hundred times less.",
-    )
-    darcy_law: Literal["darcy", "ergun"] = Field(
-        "darcy",
-        description='How the overbalance becomes a velocity: "darcy" takes the viscous loss '
-        'alone, "ergun" adds the loss by inertia. Where this loss lowers the velocity by 5 % or '
-        'more, "darcy" warns.',
-    )
+    Its velocity is given, or follows from the overbalance by Darcy's law.
+    """
 
-    @property
-    def viscosity_Pa_s(self) -> float:
-        """Dynamic viscosity, Pa s."""
-        return self.viscosity_cP * 1e-3
+    viscosity_cP: Positive = 50.0
+    """Dynamic viscosity."""
+    density_kg_m3: Positive = 1095.0
+    """Density; it decides buoyancy and the particle Reynolds number."""
+    overbalance_MPa: Positive = 3.5
+    """Pressure of the mud above that of the formation. Darcy's law turns it into the fluid's
+    velocity."""
+    velocity_m_s: Positive | None = None
+    """Interstitial velocity of the fluid along x. When absent it follows from `overbalance_MPa`
+    and either the table `[well]` or `darcy_length_mm`."""
+    darcy_length_mm: Positive | None = None
+    """Length of a plug over which the whole overbalance is lost. Without it and without the table
+    `[well]` it is the length of the box, which warns: around a well the gradient is about a
+    hundred times less."""
+    darcy_law: Literal["darcy", "ergun"] = "darcy"
+    """How the overbalance becomes a velocity: "darcy" takes the viscous loss alone, "ergun" adds
+    the loss by inertia. Where this loss lowers the velocity by 5 % or more, "darcy" warns."""
+
+    viscosity_Pa_s: ClassVar = InSI[float]("viscosity_cP", 1e-3)
+    """Dynamic viscosity, Pa s."""
 
     @property
     def stokes_coefficient_Pa_s(self) -> float:
         """6 pi viscosity: the drag force over radius and relative velocity, Pa s (Stokes 1851)."""
         return 6 * math.pi * self.viscosity_cP * 1e-3
 
-    @property
-    def darcy_length_m(self) -> float | None:
-        """Length over which the overbalance is lost, m; None: the length of the box."""
-        return scaled(self.darcy_length_mm, 1e-3)
-
-    @property
-    def overbalance_Pa(self) -> float:
-        """Pressure of the mud above that of the formation, Pa."""
-        return self.overbalance_MPa * 1e6
+    darcy_length_m: ClassVar = InSI[float | None]("darcy_length_mm", 1e-3)
+    """Length over which the overbalance is lost, m; None: the length of the box."""
+    overbalance_Pa: ClassVar = InSI[float]("overbalance_MPa", 1e6)
+    """Pressure of the mud above that of the formation, Pa."""
 
 
 class Well(Part):
-    """A vertical well in its formation: the overbalance is lost in radial flow around it.
+    """[well], a vertical well in its formation: the overbalance is lost in radial flow around it.
 
     The specimen is a piece of the formation at the face of the well.
     """
 
-    radius_mm: Positive = Field(description="Radius of the well, to the formation face.")
-    drainage_radius_m: Positive = Field(
-        description="Radius at which the pressure is that of the undisturbed formation."
+    radius_mm: Positive
+    """Radius of the well, to the formation face."""
+    drainage_radius_m: Positive
+    """Radius at which the pressure is that of the undisturbed formation."""
+    formation_permeability_mD: Positive | None = None
+    """Permeability of the formation around the well. When absent it is that of the pack by Carman
+    and Kozeny."""
+
+    radius_m: ClassVar = InSI[float]("radius_mm", 1e-3)
+    """Radius of the well, m."""
+    formation_permeability_m2: ClassVar = InSI[float | None](
+        "formation_permeability_mD", M2_PER_MD
     )
-    formation_permeability_mD: Positive | None = Field(
-        None,
-        description="Permeability of the formation around the well. When absent it is that of "
-        "the pack by Carman and Kozeny.",
-    )
-
-    @property
-    def radius_m(self) -> float:
-        """Radius of the well, m."""
-        return self.radius_mm * 1e-3
-
-    @property
-    def formation_permeability_m2(self) -> float | None:
-        """Permeability of the formation, m2; None: that of the pack."""
-        return scaled(self.formation_permeability_mD, M2_PER_MD)
-
-
-# ------------------------------------------------------------------------------------------------
-# The table [contact] of a case file: the law of contacts, and what acts in them besides.
+    """Permeability of the formation, m2; None: that of the pack."""
 
 
 MODEL_KEYS = {
@@ -207,32 +168,22 @@ DEEPEST_DAMPING = 0.69
 
 
 class ContactLaw(Part):
-    """The law of all contacts; what is not asked for is left out of the deck."""
+    """[contact], the law of all contacts; what is not asked for is left out of the deck."""
 
-    model: Literal["hooke", "hertz"] = Field(
-        "hooke",
-        description='Contact law: "hooke", linear springs of `normal_stiffness_N_m` and '
-        '`shear_stiffness_N_m`, or "hertz", Hertz-Mindlin contacts of `youngs_modulus_GPa` and '
-        "`poissons_ratio`.",
-    )
+    model: Literal["hooke", "hertz"] = "hooke"
+    """Contact law: "hooke", linear springs of `normal_stiffness_N_m` and `shear_stiffness_N_m`, or
+    "hertz", Hertz-Mindlin contacts of `youngs_modulus_GPa` and `poissons_ratio`."""
 
-    restitution: Literal["dry", "liquid"] = Field(
-        "dry",
-        description='Rebound of fines: "dry" takes `damping_ratio` as it is, "liquid" lowers the '
-        "restitution of every contact of a fine by exp(-35 / St), St being the impact Stokes "
-        "number at the velocity of the fluid. Below a St of 10 nothing rebounds.",
-    )
-    rolling_friction: Positive | None = Field(
-        None,
-        description="Coefficient of rolling friction of all contacts with friction: the largest "
-        "rolling torque over normal force and effective radius. When absent nothing resists "
-        "rolling.",
-    )
-    cohesion_J_m3: Positive | None = Field(
-        None,
-        description="Cohesion of every contact of a fine: attraction over the area of contact "
-        '(LIGGGHTS\'s SJKR). It needs contact.model = "hertz". When absent nothing attracts.',
-    )
+    restitution: Literal["dry", "liquid"] = "dry"
+    """Rebound of fines: "dry" takes `damping_ratio` as it is, "liquid" lowers the restitution of
+    every contact of a fine by exp(-35 / St), St being the impact Stokes number at the velocity of
+    the fluid. Below a St of 10 nothing rebounds."""
+    rolling_friction: Positive | None = None
+    """Coefficient of rolling friction of all contacts with friction: the largest rolling torque
+    over normal force and effective radius. When absent nothing resists rolling."""
+    cohesion_J_m3: Positive | None = None
+    """Cohesion of every contact of a fine: attraction over the area of contact (LIGGGHTS's SJKR).
+    It needs contact.model = "hertz". When absent nothing attracts."""
 
     @property
     def other_keys(self) -> frozenset[str]:
@@ -240,63 +191,34 @@ class ContactLaw(Part):
         return frozenset().union(*(MODEL_KEYS[name] for name in MODEL_KEYS if name != self.model))
 
 
-# ------------------------------------------------------------------------------------------------
-# The table [bonds] of a case file: cement between the grains.
-
-
 class Bonds(Part):
-    """Parallel bonds: a disc of elastic cement between two grains.
+    """[bonds], parallel bonds: a disc of elastic cement between two grains.
 
     Only `fdnet mechanics` reads them; the invasion has no bonds.
     """
 
-    radius_ratio: Annotated[float, Field(gt=0, le=1)] = Field(
-        description="Radius of a bond over that of the smaller of its two grains."
-    )
-    normal_stiffness_GPa_m: Positive = Field(
-        95.0, description="Normal stiffness of a bond per area of its disc."
-    )
-    shear_stiffness_GPa_m: Positive = Field(
-        40.0, description="Shear stiffness of a bond per area of its disc."
-    )
-    tensile_strength_MPa: Positive | None = Field(
-        None,
-        description="Largest tensile stress of a bond. When absent, bonds never break; give it "
-        "together with the shear strength.",
-    )
-    shear_strength_MPa: Positive | None = Field(
-        None, description="Largest shear stress of a bond; see the tensile strength."
-    )
-    gap_ratio: Annotated[float, Field(ge=0, le=0.5)] = Field(
-        0.01,
-        description="Widest gap that a bond bridges, over the smaller diameter of its two grains.",
-    )
+    radius_ratio: Annotated[float, Field(gt=0, le=1)]
+    """Radius of a bond over that of the smaller of its two grains."""
+    normal_stiffness_GPa_m: Positive = 95.0
+    """Normal stiffness of a bond per area of its disc."""
+    shear_stiffness_GPa_m: Positive = 40.0
+    """Shear stiffness of a bond per area of its disc."""
+    tensile_strength_MPa: Positive | None = None
+    """Largest tensile stress of a bond. When absent, bonds never break; give it together with the
+    shear strength."""
+    shear_strength_MPa: Positive | None = None
+    """Largest shear stress of a bond; see the tensile strength."""
+    gap_ratio: Annotated[float, Field(ge=0, le=0.5)] = 0.01
+    """Widest gap that a bond bridges, over the smaller diameter of its two grains."""
 
-    @property
-    def normal_stiffness_Pa_m(self) -> float:
-        """Normal stiffness per area, Pa/m."""
-        return self.normal_stiffness_GPa_m * 1e9
-
-    @property
-    def shear_stiffness_Pa_m(self) -> float:
-        """Shear stiffness per area, Pa/m."""
-        return self.shear_stiffness_GPa_m * 1e9
-
-    @property
-    def tensile_strength_Pa(self) -> float | None:
-        """Tensile strength, Pa; None: bonds never break."""
-        return scaled(self.tensile_strength_MPa, 1e6)
-
-    @property
-    def shear_strength_Pa(self) -> float | None:
-        """Shear strength, Pa; None: bonds never break."""
-        return scaled(self.shear_strength_MPa, 1e6)
-
-
-# ------------------------------------------------------------------------------------------------
-# Tables of a case file: [box], [drag] and [gravity].
-#
-# The keys carry the unit of the user; properties give the same values in SI for everything else.
+    normal_stiffness_Pa_m: ClassVar = InSI[float]("normal_stiffness_GPa_m", 1e9)
+    """Normal stiffness per area, Pa/m."""
+    shear_stiffness_Pa_m: ClassVar = InSI[float]("shear_stiffness_GPa_m", 1e9)
+    """Shear stiffness per area, Pa/m."""
+    tensile_strength_Pa: ClassVar = InSI[float | None]("tensile_strength_MPa", 1e6)
+    """Tensile strength, Pa; None: bonds never break."""
+    shear_strength_Pa: ClassVar = InSI[float | None]("shear_strength_MPa", 1e6)
+    """Shear strength, Pa; None: bonds never break."""
 
 
 CROWD_TRAVEL, FLOW_TRAVEL, MOST_TRAVEL = 0.5, 1.0, 10.0
@@ -304,21 +226,18 @@ CROWD_TRAVEL, FLOW_TRAVEL, MOST_TRAVEL = 0.5, 1.0, 10.0
 
 
 class Box(Part):
-    """The specimen: flow and depth run along the first side; x = 0 is the formation face."""
+    """[box], the specimen.
 
-    size_mm: Triple = Field(
-        description="Three side lengths of the box. The mud flows along the first side."
-    )
-    sides: Literal["walls", "periodic"] = Field(
-        "periodic",
-        description="What bounds the box in y and z: periodic images of itself, or solid walls.",
-    )
-    wall_friction: NonNegative | None = Field(
-        None,
-        description="Coefficient of sliding friction of the side walls, if there are any. When "
-        "absent it is that of the grains. A contact takes the smaller value of the wall and the "
-        "sphere.",
-    )
+    Flow and depth run along the first side; x = 0 is the formation face.
+    """
+
+    size_mm: Triple
+    """Three side lengths of the box. The mud flows along the first side."""
+    sides: Literal["walls", "periodic"] = "periodic"
+    """What bounds the box in y and z: periodic images of itself, or solid walls."""
+    wall_friction: NonNegative | None = None
+    """Coefficient of sliding friction of the side walls, if there are any. When absent it is that
+    of the grains. A contact takes the smaller value of the wall and the sphere."""
 
     @property
     def size_m(self) -> tuple[float, float, float]:
@@ -334,62 +253,44 @@ class Box(Part):
 
 
 class Drag(Part):
-    """Forces of the fluid on every fine: drag by its slip, and that of the pressure gradient."""
+    """[drag], the forces of the fluid on every fine.
 
-    field: Literal["uniform", "network"] = Field(
-        "uniform",
-        description='Velocity field of the fluid: "uniform" is the same velocity everywhere. '
-        '"network" follows the pores of the pack and the deposit in them: fdnet solves it anew '
-        "while LIGGGHTS waits.",
-    )
-    multiplier: Positive = Field(1.0, description="Factor on the Stokes drag.")
-    scheme: Literal["held", "implicit", "viscous"] = Field(
-        "held",
-        description='How the force is integrated: "held" keeps it for `refresh_steps` steps, '
-        '"viscous" splits it into a constant force and viscous damping (fines of one size only), '
-        '"implicit" solves it for the new velocity and is stable at any step.',
-    )
-    refresh_steps: Annotated[int, Field(ge=1)] | None = Field(
-        None,
-        description='Steps for which scheme "held" keeps the force. When absent the force is kept '
-        "for at most 0.05 of the drag relaxation time.",
-    )
-    drive_velocity_m_s: Positive | Literal["auto"] | None = Field(
-        None,
-        description="Velocity of the fluid in the pores of the simulation, to shorten a run with "
-        "a weak push: every force is scaled by the same factor, and the physical clock runs "
-        "faster by it. Allowed where the fines' inertia does not matter, up to an impact Stokes "
-        'number of 1. "auto" drives to 0.1, or as fast as the fluid itself.',
-    )
-    upstream: Literal["interstitial", "darcy"] = Field(
-        "darcy",
-        description="Velocity of the fluid upstream of the formation face: the Darcy velocity of "
-        "the mud, or the interstitial one of the pack, which brings the mud faster than it flows "
-        "in.",
-    )
-    pressure_gradient: bool = Field(
-        True,
-        description="Whether the pressure gradient of the pack acts on every fine inside it, with "
-        "the volume of the fine times the fall of pressure with x. The thesis's cases leave it "
-        "out.",
-    )
-    inertia: Literal["none", "schiller-naumann"] = Field(
-        "none",
-        description='Drag at finite Reynolds numbers: "none" is Stokes\'s at any speed, '
-        '"schiller-naumann" multiplies it by 1 + 0.15 Re^0.687 (Re up to 800; scheme "held").',
-    )
-    crowd: Literal["none", "beetstra"] = Field(
-        "none",
-        description='How other fines nearby change the drag on a fine: "none" leaves it that of a '
-        'lone sphere, "beetstra" takes the law of Beetstra, van der Hoef and Kuipers (2007) with '
-        "the porosity around each fine, which fdnet computes while LIGGGHTS waits.",
-    )
-    drive: Literal["pressure", "rate"] | None = Field(
-        None,
-        description='What stays constant where the field is "network": the pressure over pack, '
-        "cake and the rest of the way on which the overbalance is lost, or the rate. When absent: "
-        '"pressure".',
-    )
+    Drag by its slip, and that of the pressure gradient.
+    """
+
+    field: Literal["uniform", "network"] = "uniform"
+    """Velocity field of the fluid: "uniform" is the same velocity everywhere. "network" follows
+    the pores of the pack and the deposit in them: fdnet solves it anew while LIGGGHTS waits."""
+    multiplier: Positive = 1.0
+    """Factor on the Stokes drag."""
+    scheme: Literal["held", "implicit", "viscous"] = "held"
+    """How the force is integrated: "held" keeps it for `refresh_steps` steps, "viscous" splits it
+    into a constant force and viscous damping (fines of one size only), "implicit" solves it for
+    the new velocity and is stable at any step."""
+    refresh_steps: Annotated[int, Field(ge=1)] | None = None
+    """Steps for which scheme "held" keeps the force. When absent the force is kept for at most
+    0.05 of the drag relaxation time."""
+    drive_velocity_m_s: Positive | Literal["auto"] | None = None
+    """Velocity of the fluid in the pores of the simulation, to shorten a run with a weak push:
+    every force is scaled by the same factor, and the physical clock runs faster by it. Allowed
+    where the fines' inertia does not matter, up to an impact Stokes number of 1. "auto" drives to
+    0.1, or as fast as the fluid itself."""
+    upstream: Literal["interstitial", "darcy"] = "darcy"
+    """Velocity of the fluid upstream of the formation face: the Darcy velocity of the mud, or the
+    interstitial one of the pack, which brings the mud faster than it flows in."""
+    pressure_gradient: bool = True
+    """Whether the pressure gradient of the pack acts on every fine inside it, with the volume of
+    the fine times the fall of pressure with x. The thesis's cases leave it out."""
+    inertia: Literal["none", "schiller-naumann"] = "none"
+    """Drag at finite Reynolds numbers: "none" is Stokes's at any speed, "schiller-naumann"
+    multiplies it by 1 + 0.15 Re^0.687 (Re up to 800; scheme "held")."""
+    crowd: Literal["none", "beetstra"] = "none"
+    """How other fines nearby change the drag on a fine: "none" leaves it that of a lone sphere,
+    "beetstra" takes the law of Beetstra, van der Hoef and Kuipers (2007) with the porosity around
+    each fine, which fdnet computes while LIGGGHTS waits."""
+    drive: Literal["pressure", "rate"] | None = None
+    """What stays constant where the field is "network": the pressure over pack, cake and the rest
+    of the way on which the overbalance is lost, or the rate. When absent: "pressure"."""
     update_travel: Annotated[float, Field(gt=0, le=MOST_TRAVEL)] | None = Field(
         None,
         description="How far the fluid carries a fine, in diameters of the smallest fine, before "
@@ -420,28 +321,18 @@ class Drag(Part):
 
 
 class Gravity(Part):
-    """Weight and buoyancy of the moving spheres."""
+    """[gravity], weight and buoyancy of the moving spheres."""
 
-    mode: Literal["auto", "on", "off"] = Field(
-        "auto",
-        description='"auto" leaves gravity out where weight over drag is below '
-        "`negligible_below`; the run summary then says so.",
-    )
-    acceleration_m_s2: Vector = Field(
-        (0.0, 0.0, -9.81), description="Gravity vector (x, y, z), in any direction."
-    )
-    buoyancy: bool = Field(
-        True,
-        description="Whether the fluid's buoyancy acts: gravity times 1 - fluid over sphere "
-        "density, for fines and for mobile grains.",
-    )
-    negligible_below: NonNegative = Field(
-        1e-3, description='Ratio of weight to drag below which mode "auto" leaves gravity out.'
-    )
-
-
-# ------------------------------------------------------------------------------------------------
-# The table [run] of a case file: what controls a simulation, apart from the specimen.
+    mode: Literal["auto", "on", "off"] = "auto"
+    """"auto" leaves gravity out where weight over drag is below `negligible_below`; the run
+    summary then says so."""
+    acceleration_m_s2: Vector = (0.0, 0.0, -9.81)
+    """Gravity vector (x, y, z), in any direction."""
+    buoyancy: bool = True
+    """Whether the fluid's buoyancy acts: gravity times 1 - fluid over sphere density, for fines
+    and for mobile grains."""
+    negligible_below: NonNegative = 1e-3
+    """Ratio of weight to drag below which mode "auto" leaves gravity out."""
 
 
 DEFAULT_STIFFNESS = 1.0e4
@@ -449,155 +340,96 @@ DEFAULT_STIFFNESS = 1.0e4
 
 
 class Run(Part):
-    """Run control: contact stiffness, time step, when to stop and what to refuse.
+    """[run], run control: contact stiffness, time step, when to stop and what to refuse.
 
     `max_hours`, `max_overlap` and `on_overlap` decide only whether a run may go on. No result
     depends on them, so they may be changed when a run is resumed. Times in ms are physical times;
     they differ from those of the simulation with `drag.drive_velocity_m_s`.
     """
 
-    stiffness_N_m: Positive | Literal["nominal", "auto"] = Field(
-        DEFAULT_STIFFNESS,
-        description="Stiffness of the stiffest contact; all others keep their ratio to it. With "
-        'contact.model = "hertz": force over overlap of the stiffest contact of a fine, at an '
-        "overlap of 1 % of its diameter. "
-        '"nominal" keeps the materials\' own stiffness, which needs a far smaller time step. '
-        '"auto" takes the least that keeps the predicted overlaps of a fine at 3 % of its '
-        "diameter, and at least the default.",
-    )
-    max_hours: Positive = Field(
-        24.0, description="A case that is expected to run longer is refused before it starts."
-    )
-    max_overlap: Fraction = Field(
-        0.03,
-        description="Overlap of a fine with another sphere, over the smaller diameter, above "
-        "which `on_overlap` applies.",
-    )
-    on_overlap: Literal["warn", "stop"] = Field(
-        "warn",
-        description="What follows when `max_overlap` is exceeded: a warning in the summary, or "
-        "the run stops with its state kept.",
-    )
-    time_step_factor: Annotated[float, Field(gt=0, le=CONTACT_STEP_LIMIT)] = Field(
-        0.2,
-        description="Time step over sqrt(m/k) of the lightest sphere and stiffest contact. Linear "
-        "contacts without rolling friction are stable up to 0.3 where damping ratios are at most "
-        "0.48, and up to somewhat less with more damping; all others take at most 0.2.",
-    )
-    time_step_s: Positive | None = Field(
-        None,
-        description="Time step of the invasion. When absent it follows from `time_step_factor`, "
-        "and explicit drag keeps it below 0.1 of the drag relaxation time.",
-    )
-    duration_ms: Positive | None = Field(
-        None,
-        description="Length of the invasion. It replaces the stop rule and excludes `cap_ms`.",
-    )
-    plug_time_ms: Positive | None = Field(
-        None,
-        description="The face counts as plugged when no fine has crossed it for this time. When "
-        "absent: the longer of the time in which the fluid passes four grain diameters and the "
-        "time in which ten fines arrive.",
-    )
-    plug_rate: Annotated[float, Field(ge=0, lt=1)] = Field(
-        0.0,
-        description="Share of the undisturbed supply that may still cross the face while it "
-        "counts as plugged.",
-    )
-    stop_rate: Fraction | None = Field(
-        None,
-        description="Share of the first rate below which the invasion counts as plugged, where "
-        'drag.field is "network" at constant pressure.',
-    )
-    stop_pore_volumes: Positive | None = Field(
-        None,
-        description="The invasion ends when so much fluid has passed the specimen, in volumes of "
-        'its intact pores, where drag.field is "network".',
-    )
-    cap_ms: Positive | None = Field(
-        None,
-        description="The invasion ends at this time at the latest. When absent it is derived from "
-        "the length of the slab, the plug time and the passage of the fluid.",
-    )
-    checkpoint_ms: Positive | None = Field(
-        None,
-        description="Time between checkpoints (dump and restart). When absent: the time in which "
-        "the fluid passes about one grain diameter.",
-    )
-    skin_mm: Positive | None = Field(
-        None,
-        description="Skin of LIGGGHTS's neighbour search. When absent: the radius of the smallest "
-        "fine. It changes run time and the order of sums, not the physics.",
-    )
-    neighbour_bin_mm: Positive | None = Field(
-        None,
-        description="Bin width of LIGGGHTS's neighbour search. When absent LIGGGHTS chooses it.",
-    )
+    stiffness_N_m: Positive | Literal["nominal", "auto"] = DEFAULT_STIFFNESS
+    """Stiffness of the stiffest contact; all others keep their ratio to it. With contact.model =
+    "hertz": force over overlap of the stiffest contact of a fine, at an overlap of 1 % of its
+    diameter. "nominal" keeps the materials' own stiffness, which needs a far smaller time step.
+    "auto" takes the least that keeps the predicted overlaps of a fine at 3 % of its diameter, and
+    at least the default."""
+    max_hours: Positive = 24.0
+    """A case that is expected to run longer is refused before it starts."""
+    max_overlap: Fraction = 0.03
+    """Overlap of a fine with another sphere, over the smaller diameter, above which `on_overlap`
+    applies."""
+    on_overlap: Literal["warn", "stop"] = "warn"
+    """What follows when `max_overlap` is exceeded: a warning in the summary, or the run stops with
+    its state kept."""
+    time_step_factor: Annotated[float, Field(gt=0, le=CONTACT_STEP_LIMIT)] = 0.2
+    """Time step over sqrt(m/k) of the lightest sphere and stiffest contact. Linear contacts
+    without rolling friction are stable up to 0.3 where damping ratios are at most 0.48, and up to
+    somewhat less with more damping; all others take at most 0.2."""
+    time_step_s: Positive | None = None
+    """Time step of the invasion. When absent it follows from `time_step_factor`, and explicit drag
+    keeps it below 0.1 of the drag relaxation time."""
+    duration_ms: Positive | None = None
+    """Length of the invasion. It replaces the stop rule and excludes `cap_ms`."""
+    plug_time_ms: Positive | None = None
+    """The face counts as plugged when no fine has crossed it for this time. When absent: the
+    longer of the time in which the fluid passes four grain diameters and the time in which ten
+    fines arrive."""
+    plug_rate: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    """Share of the undisturbed supply that may still cross the face while it counts as plugged."""
+    stop_rate: Fraction | None = None
+    """Share of the first rate below which the invasion counts as plugged, where drag.field is
+    "network" at constant pressure."""
+    stop_pore_volumes: Positive | None = None
+    """The invasion ends when so much fluid has passed the specimen, in volumes of its intact
+    pores, where drag.field is "network"."""
+    cap_ms: Positive | None = None
+    """The invasion ends at this time at the latest. When absent it is derived from the length of
+    the slab, the plug time and the passage of the fluid."""
+    checkpoint_ms: Positive | None = None
+    """Time between checkpoints (dump and restart). When absent: the time in which the fluid passes
+    about one grain diameter."""
+    skin_mm: Positive | None = None
+    """Skin of LIGGGHTS's neighbour search. When absent: the radius of the smallest fine. It
+    changes run time and the order of sums, not the physics."""
+    neighbour_bin_mm: Positive | None = None
+    """Bin width of LIGGGHTS's neighbour search. When absent LIGGGHTS chooses it."""
 
-    @property
-    def duration_s(self) -> float | None:
-        """Length of the invasion, s; None: until the stop rule holds."""
-        return scaled(self.duration_ms, 1e-3)
-
-    @property
-    def plug_time_s(self) -> float | None:
-        """Time without a crossing after which the face counts as plugged, s, if given."""
-        return scaled(self.plug_time_ms, 1e-3)
-
-    @property
-    def cap_s(self) -> float | None:
-        """Time at which the invasion ends at the latest, s, if given."""
-        return scaled(self.cap_ms, 1e-3)
-
-    @property
-    def checkpoint_s(self) -> float | None:
-        """Time between checkpoints, s, if given."""
-        return scaled(self.checkpoint_ms, 1e-3)
-
-    @property
-    def skin_m(self) -> float | None:
-        """Skin of the neighbour search, m, if given."""
-        return scaled(self.skin_mm, 1e-3)
-
-    @property
-    def neighbour_bin_m(self) -> float | None:
-        """Bin width of the neighbour search, m, if given."""
-        return scaled(self.neighbour_bin_mm, 1e-3)
-
-
-# ------------------------------------------------------------------------------------------------
-# The table [clean_up] of a case file: the flow is turned back after the invasion.
+    duration_s: ClassVar = InSI[float | None]("duration_ms", 1e-3)
+    """Length of the invasion, s; None: until the stop rule holds."""
+    plug_time_s: ClassVar = InSI[float | None]("plug_time_ms", 1e-3)
+    """Time without a crossing after which the face counts as plugged, s, if given."""
+    cap_s: ClassVar = InSI[float | None]("cap_ms", 1e-3)
+    """Time at which the invasion ends at the latest, s, if given."""
+    checkpoint_s: ClassVar = InSI[float | None]("checkpoint_ms", 1e-3)
+    """Time between checkpoints, s, if given."""
+    skin_m: ClassVar = InSI[float | None]("skin_mm", 1e-3)
+    """Skin of the neighbour search, m, if given."""
+    neighbour_bin_m: ClassVar = InSI[float | None]("neighbour_bin_mm", 1e-3)
+    """Bin width of the neighbour search, m, if given."""
 
 
 class CleanUp(Part):
-    """Production after the invasion: the flow is turned back, from the formation to the well.
+    """[clean_up], production after the invasion.
+
+    The flow is turned back, from the formation to the well.
 
     Friction, rolling resistance and cohesion are those of the invasion.
     """
 
-    drawdown_MPa: Positive = Field(
-        description="Pressure of the formation above that of the well. It is lost on the same way "
-        "as the overbalance was, and makes the fluid's velocity by the same law."
-    )
-    duration_ms: Positive | None = Field(
-        None,
-        description="Length of the clean-up. It replaces the stop rule and excludes `cap_ms`.",
-    )
-    quiet_ms: Positive | None = Field(
-        None,
-        description="The clean-up ends when no fine has come out for this time. When absent: the "
-        "time in which the fluid passes the specimen once.",
-    )
-    cap_ms: Positive | None = Field(
-        None,
-        description="The clean-up ends at this time at the latest. When absent: twenty times the "
-        "time in which the fluid passes the specimen.",
-    )
+    drawdown_MPa: Positive
+    """Pressure of the formation above that of the well. It is lost on the same way as the
+    overbalance was, and makes the fluid's velocity by the same law."""
+    duration_ms: Positive | None = None
+    """Length of the clean-up. It replaces the stop rule and excludes `cap_ms`."""
+    quiet_ms: Positive | None = None
+    """The clean-up ends when no fine has come out for this time. When absent: the time in which
+    the fluid passes the specimen once."""
+    cap_ms: Positive | None = None
+    """The clean-up ends at this time at the latest. When absent: twenty times the time in which
+    the fluid passes the specimen."""
 
-    @property
-    def drawdown_Pa(self) -> float:
-        """Pressure of the formation above that of the well, Pa."""
-        return self.drawdown_MPa * 1e6
+    drawdown_Pa: ClassVar = InSI[float]("drawdown_MPa", 1e6)
+    """Pressure of the formation above that of the well, Pa."""
 
     def fluid_of(self, fluid: Fluid) -> Fluid:
         """The fluid with the drawdown for its overbalance."""
@@ -608,51 +440,12 @@ class CleanUp(Part):
         own = dict.fromkeys(("cap_ms", "plug_time_ms", "checkpoint_ms"))
         return run.model_copy(update=own | {"duration_ms": self.duration_ms})
 
-    @property
-    def duration_s(self) -> float | None:
-        """Length of the clean-up, s; None: until the stop rule holds."""
-        return scaled(self.duration_ms, 1e-3)
-
-    @property
-    def quiet_s(self) -> float | None:
-        """Time without a fine that comes out which ends the clean-up, s, if given."""
-        return scaled(self.quiet_ms, 1e-3)
-
-    @property
-    def cap_s(self) -> float | None:
-        """Time at which the clean-up ends at the latest, s, if given."""
-        return scaled(self.cap_ms, 1e-3)
-
-
-def _known_way(clean_up: CleanUp, fluid: Fluid) -> Iterator[str]:
-    if fluid.velocity_m_s is not None:
-        yield (
-            f"clean_up.drawdown_MPa: {clean_up.drawdown_MPa:g} with fluid.velocity_m_s "
-            f"{fluid.velocity_m_s:g}: nothing says on which way the drawdown is lost; give "
-            "fluid.overbalance_MPa with the table [well] or with fluid.darcy_length_mm instead of "
-            "the velocity"
-        )
-
-
-def _one_end(clean_up: CleanUp) -> Iterator[str]:
-    if clean_up.duration_ms is None:
-        return
-    for name in ("cap_ms", "quiet_ms"):
-        if (value := getattr(clean_up, name)) is not None:
-            yield (
-                f"clean_up.{name}: {value:g} together with clean_up.duration_ms "
-                f"{clean_up.duration_ms:g}: give one of the two"
-            )
-
-
-CLEAN_UP_RULES = (
-    Rule(("clean_up.drawdown_MPa", "fluid.velocity_m_s"), _known_way),
-    Rule(("clean_up.duration_ms", "clean_up.cap_ms", "clean_up.quiet_ms"), _one_end),
-)
-
-
-# ------------------------------------------------------------------------------------------------
-# How permeability is computed: the table [analysis] of a case, or the same without one.
+    duration_s: ClassVar = InSI[float | None]("duration_ms", 1e-3)
+    """Length of the clean-up, s; None: until the stop rule holds."""
+    quiet_s: ClassVar = InSI[float | None]("quiet_ms", 1e-3)
+    """Time without a fine that comes out which ends the clean-up, s, if given."""
+    cap_s: ClassVar = InSI[float | None]("cap_ms", 1e-3)
+    """Time at which the clean-up ends at the latest, s, if given."""
 
 
 def _count_or_edges(value: Any) -> str:
@@ -680,44 +473,36 @@ class AnalysisKeys(TypedDict, total=False):
 
 
 class AnalysisChoices(Part):
-    """How permeability is computed; the default laws are fdnet's most accurate pair."""
+    """[analysis], how permeability is computed.
 
-    sections: Sections = Field(
-        8,
-        description="Number of equal slabs along the flow in `sections.csv`. In Python also the "
-        "edges (S+1,) of the slabs, m.",
-    )
-    law: LawName = Field(DEFAULT_LAW, description="Conductance of a clean throat.")
+    The default laws are fdnet's most accurate pair.
+    """
+
+    sections: Sections = 8
+    """Number of equal slabs along the flow in `sections.csv`. In Python also the edges (S+1,) of
+    the slabs, m."""
+    law: LawName = DEFAULT_LAW
+    """Conductance of a clean throat."""
     damage_law: DamageLawName = Field(
         AUTO,
         description='How fines lower the permeability: "all-spheres", the network of grains and '
         "fines together, or a law that damages the throats between grains. "
         f'"auto" takes "all-spheres" up to {MOST_SPHERES:,} spheres and "section-archie" above.',
     )
-    clogging_threshold: Fraction | None = Field(
-        None,
-        description="Throat porosity below which the thesis's damage laws take a throat as "
-        'clogged. When absent: 0.40 ("thesis") or 0.36 ("thesis-code").',
-    )
-    middle_band: Literal["threshold", "position"] = Field(
-        "threshold",
-        description="Rule of the thesis's damage laws for a throat porosity of 0.36 to 0.80: "
-        "by `clogging_threshold` alone, or by where the fines lie in the throat.",
-    )
-    throat_overlap: Literal["exact", "two-plane"] = Field(
-        "exact",
-        description="Volume of a fine inside a throat: exact, or by the thesis's two planes.",
-    )
-    profile_bin_mm: Positive | None = Field(
-        0.25,
-        description="Width of the depth bins in `profile.csv`. In Python also None, the mean "
-        "radius of the grains.",
-    )
-    walls: WallName = Field(
-        "no-slip",
-        description="Whether side walls hold the fluid or let it slip; known to "
-        '"lubrication", "section-archie" and "all-spheres".',
-    )
+    clogging_threshold: Fraction | None = None
+    """Throat porosity below which the thesis's damage laws take a throat as clogged. When absent:
+    0.40 ("thesis") or 0.36 ("thesis-code")."""
+    middle_band: Literal["threshold", "position"] = "threshold"
+    """Rule of the thesis's damage laws for a throat porosity of 0.36 to 0.80: by
+    `clogging_threshold` alone, or by where the fines lie in the throat."""
+    throat_overlap: Literal["exact", "two-plane"] = "exact"
+    """Volume of a fine inside a throat: exact, or by the thesis's two planes."""
+    profile_bin_mm: Positive | None = 0.25
+    """Width of the depth bins in `profile.csv`. In Python also None, the mean radius of the
+    grains."""
+    walls: WallName = "no-slip"
+    """Whether side walls hold the fluid or let it slip; known to "lubrication", "section-archie"
+    and "all-spheres"."""
 
     @field_validator("law", "damage_law", mode="before")
     @classmethod
@@ -733,10 +518,8 @@ class AnalysisChoices(Part):
                 f"{DEFAULT_LAW!r}, or another damage law"
             )
 
-    @property
-    def profile_bin_m(self) -> float | None:
-        """Width of the depth bins, m; None stands for the mean radius of the grains."""
-        return None if self.profile_bin_mm is None else self.profile_bin_mm * 1e-3
+    profile_bin_m: ClassVar = InSI[float | None]("profile_bin_mm", 1e-3)
+    """Width of the depth bins, m; None stands for the mean radius of the grains."""
 
     @classmethod
     def of_pack(cls, **keys: Any) -> "AnalysisChoices":

@@ -7,7 +7,6 @@ millidebye. Conversions are decimal, so that "40 um" is exactly the number 0.04 
 import re
 from collections.abc import Iterator
 from decimal import Decimal
-from types import MappingProxyType
 
 _POUND, _INCH = Decimal("0.45359237"), Decimal("0.0254")
 _BARREL = 42 * 231 * _INCH**3
@@ -16,103 +15,71 @@ _PSI = _POUND * Decimal("9.80665") / _INCH**2
 _DARCY = Decimal("1e-3") * Decimal("1e-4") / Decimal("101325")
 """The darcy, m2: 1 cP times 1 cm2/s over 1 atm (API RP 27)."""
 
-UNITS: dict[str, dict[str, Decimal]] = {
-    "length": {
-        "m": Decimal(1),
-        "cm": Decimal("0.01"),
-        "mm": Decimal("1e-3"),
-        "um": Decimal("1e-6"),
-        "micron": Decimal("1e-6"),
-        "microns": Decimal("1e-6"),
-        "nm": Decimal("1e-9"),
-        "in": _INCH,
-        "inch": _INCH,
-        "ft": 12 * _INCH,
-    },
-    "pressure": {
-        "Pa": Decimal(1),
-        "kPa": Decimal("1e3"),
-        "MPa": Decimal("1e6"),
-        "GPa": Decimal("1e9"),
-        "bar": Decimal("1e5"),
-        "atm": Decimal(101325),
-        "psi": _PSI,
-        "ksi": 1000 * _PSI,
-        "J/m3": Decimal(1),
-    },
-    "viscosity": {
-        "Pa s": Decimal(1),
-        "mPa s": Decimal("1e-3"),
-        "cP": Decimal("1e-3"),
-        "P": Decimal("0.1"),
-    },
-    "density": {
-        "kg/m3": Decimal(1),
-        "g/cm3": Decimal(1000),
-        "g/cc": Decimal(1000),
-        "g/ml": Decimal(1000),
-        "kg/l": Decimal(1000),
-        "g/l": Decimal(1),
-        "lb/bbl": _POUND / _BARREL,
-        "lb/gal": 42 * _POUND / _BARREL,
-        "ppg": 42 * _POUND / _BARREL,
-        "lb/ft3": _POUND / (12 * _INCH) ** 3,
-    },
-    "permeability": {
-        "m2": Decimal(1),
-        "um2": Decimal("1e-12"),
-        "D": _DARCY,
-        "mD": _DARCY / 1000,
-    },
-    "time": {
-        "s": Decimal(1),
-        "ms": Decimal("1e-3"),
-        "us": Decimal("1e-6"),
-        "min": Decimal(60),
-        "h": Decimal(3600),
-        "hours": Decimal(3600),
-    },
-    "velocity": {
-        "m/s": Decimal(1),
-        "cm/s": Decimal("0.01"),
-        "mm/s": Decimal("1e-3"),
-        "ft/s": 12 * _INCH,
-        "ft/min": 12 * _INCH / 60,
-    },
-    "acceleration": {"m/s2": Decimal(1)},
-    "stiffness": {
-        "N/m": Decimal(1),
-        "kN/m": Decimal("1e3"),
-        "MN/m": Decimal("1e6"),
-        "GN/m": Decimal("1e9"),
-    },
-    "stiffness per area": {"Pa/m": Decimal(1), "MPa/m": Decimal("1e6"), "GPa/m": Decimal("1e9")},
-    "share": {"%": Decimal(1)},
+_FACTORS = {
+    "psi": _PSI,
+    "ksi": 1000 * _PSI,
+    "lb/bbl": _POUND / _BARREL,
+    "lb/gal": 42 * _POUND / _BARREL,
+    "ppg": 42 * _POUND / _BARREL,
+    "lb/ft3": _POUND / (12 * _INCH) ** 3,
+    "D": _DARCY,
+    "mD": _DARCY / 1000,
+    "ft/min": 12 * _INCH / 60,
+}
+_UNITS = """
+length: m 1, cm 0.01, mm 1e-3, um 1e-6, micron 1e-6, microns 1e-6, nm 1e-9, in 0.0254,
+    inch 0.0254, ft 0.3048
+pressure: Pa 1, kPa 1e3, MPa 1e6, GPa 1e9, bar 1e5, atm 101325, psi, ksi, J/m3 1
+viscosity: Pa s 1, mPa s 1e-3, cP 1e-3, P 0.1
+density: kg/m3 1, g/cm3 1000, g/cc 1000, g/ml 1000, kg/l 1000, g/l 1, lb/bbl, lb/gal, ppg, lb/ft3
+permeability: m2 1, um2 1e-12, D, mD
+time: s 1, ms 1e-3, us 1e-6, min 60, h 3600, hours 3600
+velocity: m/s 1, cm/s 0.01, mm/s 1e-3, ft/s 0.3048, ft/min
+acceleration: m/s2 1
+stiffness: N/m 1, kN/m 1e3, MN/m 1e6, GN/m 1e9
+stiffness per area: Pa/m 1, MPa/m 1e6, GPa/m 1e9
+share: % 1
+"""
+
+
+def _units(text: str) -> dict[str, Decimal]:
+    """Units and factors of a line of `_UNITS`; those without a factor are in `_FACTORS`."""
+    units = {}
+    for word in map(str.strip, text.split(",")):
+        name, _, factor = word.rpartition(" ")
+        units[word if word in _FACTORS else name] = _FACTORS.get(word) or Decimal(factor)
+    return units
+
+
+UNITS = {
+    line.split(":")[0]: _units(line.split(":")[1])
+    for line in _UNITS.strip().replace(",\n", ",").splitlines()
 }
 """Units by dimension, each with its factor to SI; a share is kept in percent."""
 
-SUFFIXES = MappingProxyType(
-    {
-        "_GPa_m": ("stiffness per area", Decimal("1e9")),
-        "_kg_m3": ("density", Decimal(1)),
-        "_J_m3": ("pressure", Decimal(1)),
-        "_m_s2": ("acceleration", Decimal(1)),
-        "_N_m": ("stiffness", Decimal(1)),
-        "_m_s": ("velocity", Decimal(1)),
-        "_GPa": ("pressure", Decimal("1e9")),
-        "_MPa": ("pressure", Decimal("1e6")),
-        "_Pa": ("pressure", Decimal(1)),
-        "_cP": ("viscosity", Decimal("1e-3")),
-        "_mD": ("permeability", _DARCY / 1000),
-        "_mm": ("length", Decimal("1e-3")),
-        "_um": ("length", Decimal("1e-6")),
-        "_ms": ("time", Decimal("1e-3")),
-        "_hours": ("time", Decimal(3600)),
-        "_percent": ("share", Decimal(1)),
-        "_s": ("time", Decimal(1)),
-        "_m": ("length", Decimal(1)),
-    }
-)
+SUFFIXES = {
+    f"_{suffix}": (dimension, UNITS[dimension][unit])
+    for dimension, suffix, unit in (
+        ("stiffness per area", "GPa_m", "GPa/m"),
+        ("density", "kg_m3", "kg/m3"),
+        ("pressure", "J_m3", "J/m3"),
+        ("acceleration", "m_s2", "m/s2"),
+        ("stiffness", "N_m", "N/m"),
+        ("velocity", "m_s", "m/s"),
+        ("pressure", "GPa", "GPa"),
+        ("pressure", "MPa", "MPa"),
+        ("pressure", "Pa", "Pa"),
+        ("viscosity", "cP", "cP"),
+        ("permeability", "mD", "mD"),
+        ("length", "mm", "mm"),
+        ("length", "um", "um"),
+        ("time", "ms", "ms"),
+        ("time", "hours", "hours"),
+        ("share", "percent", "%"),
+        ("time", "s", "s"),
+        ("length", "m", "m"),
+    )
+}
 """Ends of keys, longer ones first, with the dimension and the factor to SI that they stand for."""
 
 _VALUE = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(\D.*?)?\s*")

@@ -1,7 +1,4 @@
-"""`fdnet ensemble`, `sweep`, `compare` and `design`: commands on many runs.
-
-Options of the commands that run many cases, and what they print at the end.
-"""
+"""`fdnet ensemble`, `sweep`, `compare` and `design`: commands on many runs."""
 
 import argparse
 import json
@@ -44,7 +41,8 @@ def add_result(parser: argparse.ArgumentParser) -> None:
 
 
 def add_engine(parser: argparse.ArgumentParser) -> None:
-    """Adds what decides where and how the runs are carried out."""
+    """Adds the options of the result, and what decides where and how the runs are carried out."""
+    add_result(parser)
     add_ranks(parser)
     add_program(parser)
     parser.add_argument(
@@ -79,11 +77,6 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
         metavar="OPTIONS",
         help="only write scripts for sbatch, with its options, e.g. partition=short,time=60",
     )
-    _add_budget(parser)
-
-
-def _add_budget(parser: argparse.ArgumentParser) -> None:
-    """Adds how many runs there may be."""
     parser.add_argument(
         "--until",
         metavar="GOAL",
@@ -204,11 +197,11 @@ def run_campaign(
 
 
 # ------------------------------------------------------------------------------------------------
-# `fdnet ensemble`: one case with several seeds, and the band of every number.
+# The commands.
 
 
 def add_ensemble(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Adds the command to the command line."""
+    """Adds `fdnet ensemble`: one case with several seeds, and the band of every number."""
     parser = commands.add_parser(
         "ensemble", parents=[common], help="one case with several seeds, with 95 %% bands"
     )
@@ -220,7 +213,6 @@ def add_ensemble(commands: Any, common: argparse.ArgumentParser) -> None:
         metavar="N",
         help="number of seeds, from that of the case on (default 4)",
     )
-    add_result(parser)
     add_engine(parser)
     parser.set_defaults(action=_run_ensemble)
 
@@ -232,17 +224,12 @@ def _run_ensemble(options: argparse.Namespace) -> int:
     return run_campaign(options, plan)
 
 
-# ------------------------------------------------------------------------------------------------
-# `fdnet sweep`: every combination of keys, variants, cases and seeds of a sweep file.
-
-
 def add_sweep(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Adds the command to the command line."""
+    """Adds `fdnet sweep`: every combination of keys, variants, cases and seeds of a file."""
     parser = commands.add_parser(
         "sweep", parents=[common], help="many cases and seeds, compared with 95 %% bands"
     )
     parser.add_argument("sweep", type=path_option, metavar="SWEEP.toml", help="the sweep file")
-    add_result(parser)
     add_engine(parser)
     parser.set_defaults(action=_run_sweep)
 
@@ -250,16 +237,11 @@ def add_sweep(commands: Any, common: argparse.ArgumentParser) -> None:
 def _run_sweep(options: argparse.Namespace) -> int:
     from fdnet.campaign.plan.sweep import plan_of, read_sweep
 
-    plan = plan_of(read_sweep(options.sweep), **plan_options(options))
-    return run_campaign(options, plan)
-
-
-# ------------------------------------------------------------------------------------------------
-# `fdnet compare`: finished runs against each other, grouped by what differs in their cases.
+    return run_campaign(options, plan_of(read_sweep(options.sweep), **plan_options(options)))
 
 
 def add_compare(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Adds the command to the command line."""
+    """Adds `fdnet compare`: finished runs, grouped by what differs in their cases."""
     parser = commands.add_parser(
         "compare", parents=[common], help="compare finished runs, with 95 %% bands over seeds"
     )
@@ -284,12 +266,8 @@ def _run_compare(options: argparse.Namespace) -> int:
         return finish(options, comparison)
 
 
-# ------------------------------------------------------------------------------------------------
-# `fdnet design`: candidate muds for a sand, ranked by targets with their reasons.
-
-
 def add_design(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Adds the command to the command line."""
+    """Adds `fdnet design`: candidate muds for a sand, ranked by targets with their reasons."""
     parser = commands.add_parser(
         "design", parents=[common], help="rank candidate muds for a sand by targets"
     )
@@ -299,7 +277,6 @@ def add_design(commands: Any, common: argparse.ArgumentParser) -> None:
         metavar="DESIGN.toml",
         help="a sweep file with the table [targets]",
     )
-    add_result(parser)
     add_engine(parser)
     parser.set_defaults(action=_run_design)
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 SIZES = ("quick", "standard")
 
 
-def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
+def add_init(commands: Any, common: argparse.ArgumentParser) -> None:
     """Adds the command to the command line."""
     from fdnet.scales.questions import QUESTIONS
 
@@ -65,18 +65,22 @@ def _designed(options: argparse.Namespace, out: Path) -> "Design":
     """The design of the answers; on a terminal those that make no case are asked for again."""
     from fdnet.errors import CaseError
     from fdnet.run.pipeline import refusals
-    from fdnet.scales.design import BUDGETS, answers_of, designed, filled
-    from fdnet.scales.questions import named_in
+    from fdnet.scales.design import BUDGETS, designed, filled
+    from fdnet.scales.questions import QUESTIONS, named_in
 
+    texts = {"name": options.name}
+    for question in QUESTIONS:
+        if (text := getattr(options, question.key)) is not None:
+            texts[question.key] = text
+    for group in ("sand", "mud"):
+        if (file := getattr(options, f"{group}_file")) is not None:  # as seen from the case
+            texts[f"{group}_file"] = os.path.relpath(file.absolute(), out.absolute().parent)
     ask = _ask if sys.stdin.isatty() else None
-    texts = filled(_given(options, out), ask)
     while True:
+        texts = filled(texts, ask)
         try:
             return designed(
-                answers_of(options.name, texts),
-                BUDGETS[options.size],
-                folder=out.absolute().parent,
-                refusals=refusals,
+                texts, BUDGETS[options.size], folder=out.absolute().parent, refusals=refusals
             )
         except CaseError as error:
             again = [one for one in named_in(str(error)) if not texts.get(f"{one.group}_file")]
@@ -85,24 +89,6 @@ def _designed(options: argparse.Namespace, out: Path) -> "Design":
             print(" ".join(str(error).split()), file=sys.stderr)
         for question in again:
             del texts[question.key]
-        texts = filled(texts, ask)
-
-
-def _given(options: argparse.Namespace, out: Path) -> dict[str, str]:
-    """The options that were given; files as seen from the folder of the case."""
-    from fdnet.scales.questions import QUESTIONS
-
-    given = {
-        question.key: text
-        for question in QUESTIONS
-        if (text := getattr(options, question.key)) is not None
-    }
-    folder = out.absolute().parent
-    for group in ("sand", "mud"):
-        file = getattr(options, f"{group}_file")
-        if file is not None:
-            given[f"{group}_file"] = os.path.relpath(file.absolute(), folder)
-    return given
 
 
 def _ask(question: "Question", problem: str) -> str | None:

@@ -11,7 +11,7 @@ from fdnet.errors import CaseError
 from fdnet.files import path_option
 
 
-def add_command(commands: Any, common: argparse.ArgumentParser) -> None:
+def add_mechanics(commands: Any, common: argparse.ArgumentParser) -> None:
     """Adds the command to the command line."""
     parser = commands.add_parser(
         "mechanics",

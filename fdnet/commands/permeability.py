@@ -1,7 +1,4 @@
-"""`fdnet permeability`: its options, and what it does and prints.
-
-The options of `fdnet permeability` and how each is read.
-"""
+"""`fdnet permeability`: the permeability of spheres in a file, without LIGGGHTS."""
 
 import argparse
 import math
@@ -10,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt, explained
 from fdnet.files import path_option
 from fdnet.names import (
     ALL_SPHERES,
@@ -36,8 +33,14 @@ ALL_AXES = "all"
 _LAWS_START = b"law,damage_law,"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of the command."""
+def add_permeability(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Adds the command to the command line."""
+    parser = commands.add_parser(
+        "permeability",
+        parents=[common],
+        help="permeability of a file of spheres, without LIGGGHTS",
+    )
+    parser.set_defaults(action=run)
     parser.add_argument(
         "spheres",
         type=path_option,
@@ -46,7 +49,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "text dump (its last whole frame), .vtp, .vtu or .vtk with point data radius or "
         "diameter; each also as .gz",
     )
-    _add_file_choices(parser)
+    parser.add_argument(
+        "--units",
+        choices=UNITS,
+        help="unit of length of the file, of --box and of --fines-below (not with x_m columns; "
+        "default for a dump or VTK file: m)",
+    )
+    parser.add_argument(
+        "--box",
+        metavar="x0,x1,y0,y1,z0,z1",
+        help="the specimen, in the unit of the file (default: the box of the dump, else the box "
+        "around all grains)",
+    )
+    parser.add_argument(
+        "--fines-below",
+        type=float,
+        metavar="RADIUS",
+        help="spheres of a smaller radius are fines, in the unit of the file",
+    )
+    parser.add_argument(
+        "--types",
+        metavar="TYPE=KIND,...",
+        help="which types of a dump are grains and which fines (default 1=grain,2=fine)",
+    )
     parser.add_argument(
         "--axis",
         choices=("x", "y", "z", ALL_AXES),
@@ -100,33 +125,6 @@ def joined_box(arguments: Sequence[str]) -> list[str]:
         else:
             result.append(argument)
     return result
-
-
-def _add_file_choices(parser: argparse.ArgumentParser) -> None:
-    """How the file is to be read."""
-    parser.add_argument(
-        "--units",
-        choices=UNITS,
-        help="unit of length of the file, of --box and of --fines-below (not with x_m columns; "
-        "default for a dump or VTK file: m)",
-    )
-    parser.add_argument(
-        "--box",
-        metavar="x0,x1,y0,y1,z0,z1",
-        help="the specimen, in the unit of the file (default: the box of the dump, else the box "
-        "around all grains)",
-    )
-    parser.add_argument(
-        "--fines-below",
-        type=float,
-        metavar="RADIUS",
-        help="spheres of a smaller radius are fines, in the unit of the file",
-    )
-    parser.add_argument(
-        "--types",
-        metavar="TYPE=KIND,...",
-        help="which types of a dump are grains and which fines (default 1=grain,2=fine)",
-    )
 
 
 def _count(text: str) -> int:
@@ -201,7 +199,7 @@ def types_of(text: str) -> dict[int, str]:
 
 
 # ------------------------------------------------------------------------------------------------
-# `fdnet permeability`: the permeability of spheres in a file, without LIGGGHTS.
+# What the command does and prints.
 
 
 PROFILE_BINS = 32
@@ -212,7 +210,6 @@ _MANY = 0.25
 side walls are reported."""
 _LARGE_FINE = 0.5
 """Part of the smallest grain's radius up to which spheres of type 2 are fines unasked."""
-_BOX_MISSING = "no --box given: the box around all grains was used"
 
 
 def run(options: argparse.Namespace) -> int:
@@ -222,13 +219,12 @@ def run(options: argparse.Namespace) -> int:
     """
     from fdnet.network.tessellation.delaunay import check_lengths
 
-    chosen = None if options.periodic is None else directions_of(options.periodic)
     table = None if options.csv is None else table_file(options.csv, options.spheres)
-    given = _read(options, chosen)
+    given = _read(options)
     periodic = given.periodic
     check_lengths(given.spheres, periodic)
     axes = "xyz" if options.axis == ALL_AXES else options.axis
-    by_axis = {axis: _along(axis, given, periodic, options) for axis in axes}
+    by_axis = {axis: _along(axis, given, options) for axis in axes}
     results = by_axis[axes[0]]
     if options.axis == ALL_AXES:
         results = [row | _by_axis(by_axis, number) for number, row in enumerate(results)]
@@ -236,12 +232,27 @@ def run(options: argparse.Namespace) -> int:
         from fdnet.report.tables import write_laws
 
         write_laws(table, results)
-    _print(results, options, sides=_sides(periodic, options), fines=len(given.spheres.fines()))
+    if options.json:
+        from fdnet.report.tables import plain_json
+
+        first = results[0]
+        print(plain_json({**first, "laws": results} if options.compare_laws else first)[1])
+        return 0
+    from fdnet.report.text import permeability_lines
+
+    fines = len(given.spheres.fines()) > 0
+    sides, sections = _sides(periodic, options), options.sections > 1
+    for line in permeability_lines(results, sides=sides, sections=sections, fines=fines):
+        print(line)
     return 0
 
 
-def _read(options: argparse.Namespace, periodic: tuple[bool, bool, bool] | None) -> "SphereFile":
-    """The spheres of the file. Raises CaseError for bad input."""
+def _read(options: argparse.Namespace) -> "SphereFile":
+    """The spheres of the file. Raises CaseError for bad input, and on fines as large as grains.
+
+    A type that was taken for that of the fines unasked must be clearly smaller.
+    """
+    from fdnet.network.specimen import wide_fines
     from fdnet.spheres.readers import read_sphere_file
 
     given = read_sphere_file(
@@ -250,36 +261,20 @@ def _read(options: argparse.Namespace, periodic: tuple[bool, bool, bool] | None)
         box=None if options.box is None else box_of(options.box),
         fines_below=options.fines_below,
         types=None if options.types is None else types_of(options.types),
-        periodic=periodic,
+        periodic=None if options.periodic is None else directions_of(options.periodic),
     )
-    grains = len(given.spheres.grains())
-    if grains < (1 if any(given.periodic) else 4):
+    grains, fines = given.spheres.grains(), given.spheres.fines()
+    if len(grains) < (1 if any(given.periodic) else 4):
         why = (
             "for a tetrahedron; a periodic cell of fewer needs --periodic"
-            if grains
+            if len(grains)
             else "for a tetrahedron; the dump of an invasion holds fines alone (give the run's "
             "spheres_damaged.csv instead)"
         )
         raise CaseError(
-            f"{options.spheres}: {grains} grains, expected at least 4 {why}; if grains and fines "
-            "were taken for each other, use --fines-below or --types"
+            f"{options.spheres}: {len(grains)} grains, expected at least 4 {why}; if grains and "
+            "fines were taken for each other, use --fines-below or --types"
         )
-    _refuse_large_fines(given, options)
-    if given.around_grains and any(given.periodic):
-        raise CaseError(
-            "--box: missing, a periodic direction needs its length; give --box x0,x1,y0,y1,z0,z1"
-        )
-    return given
-
-
-def _refuse_large_fines(given: "SphereFile", options: argparse.Namespace) -> None:
-    """Raise CaseError on fines that are as large as grains.
-
-    A type that was taken for that of the fines unasked must be clearly smaller.
-    """
-    from fdnet.network.specimen import wide_fines
-
-    grains, fines = given.spheres.grains(), given.spheres.fines()
     why = wide_fines(grains, fines)
     unasked = any("type 2 a fine" in one for one in given.assumptions)
     if unasked and not why and len(fines):
@@ -298,21 +293,22 @@ def _refuse_large_fines(given: "SphereFile", options: argparse.Namespace) -> Non
             else "; name them grains, or tell them apart with --types or --fines-below"
         )
         raise CaseError(f"{options.spheres}: {why}{kinds}")
+    if given.around_grains and any(given.periodic):
+        raise CaseError(
+            "--box: missing, a periodic direction needs its length; give --box x0,x1,y0,y1,z0,z1"
+        )
+    return given
 
 
-def _along(
-    axis: str,
-    given: "SphereFile",
-    periodic: tuple[bool, bool, bool],
-    options: argparse.Namespace,
-) -> list[dict[str, Any]]:
+def _along(axis: str, given: "SphereFile", options: argparse.Namespace) -> list[dict[str, Any]]:
     """What each pair of laws gives for flow along `axis`, the chosen pair first."""
     from fdnet.report.text import thesis_law_warning
-    from fdnet.scales.check import explained
 
-    spheres, along = given.spheres.turned(axis), "xyz".index(axis)
+    spheres, along, periodic = given.spheres.turned(axis), "xyz".index(axis), given.periodic
     around = (periodic[along], periodic[(along + 1) % 3], periodic[(along + 2) % 3])
-    notes = [*given.warnings, *([_BOX_MISSING] if given.around_grains else [])]
+    notes = list(given.warnings)
+    if given.around_grains:
+        notes.append(Doubt("no-box", "no --box given: the box around all grains was used"))
     if options.walls == "no-slip":
         notes += _crossing(given.spheres, periodic, axis)
     notes += _overlaps(spheres, around)
@@ -412,9 +408,10 @@ def _crossing(spheres: "Snapshot", periodic: tuple[bool, bool, bool], axis: str)
             for name, crossed, repeats in zip("xyz", beyond.any(axis=0), periodic, strict=True)
             if crossed or repeats
         )
-        yield (
+        yield Doubt(
+            "crossing-walls",
             f"{count} of {len(spheres)} spheres cross the side walls; if the pack is periodic "
-            f"give --periodic {sides}"
+            f"give --periodic {sides}",
         )
 
 
@@ -466,34 +463,3 @@ def _by_axis(by_axis: dict[str, list[dict[str, Any]]], number: int) -> dict[str,
         | {f"k_{axis}_damaged_m2": row["k_damaged_m2"] for axis, row in rows.items()}
         | {"warnings": warnings, "seconds": sum(row["seconds"] for row in rows.values())}
     )
-
-
-def _print(
-    results: list[dict[str, Any]], options: argparse.Namespace, *, sides: str, fines: int
-) -> None:
-    if options.json:
-        from fdnet.report.tables import plain_json
-
-        first = results[0]
-        print(plain_json({**first, "laws": results} if options.compare_laws else first)[1])
-        return
-    from fdnet.report.text import permeability_lines
-
-    sections = options.sections > 1
-    for line in permeability_lines(results, sides=sides, sections=sections, fines=fines > 0):
-        print(line)
-
-
-# ------------------------------------------------------------------------------------------------
-# `fdnet permeability`: permeability of a file of spheres, without LIGGGHTS.
-
-
-def add_permeability(commands: Any, common: Any) -> None:
-    """Adds the command to the command line."""
-    command = commands.add_parser(
-        "permeability",
-        parents=[common],
-        help="permeability of a file of spheres, without LIGGGHTS",
-    )
-    add_arguments(command)
-    command.set_defaults(action=run)

@@ -3,7 +3,7 @@
 from typing import Any
 
 
-def add_command(commands: Any, common: Any) -> None:
+def add_study(commands: Any, common: Any) -> None:
     """Adds the command to the command line."""
     from fdnet.studies.command import add_arguments, run
 

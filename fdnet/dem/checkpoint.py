@@ -21,7 +21,7 @@ import numpy as np
 from fdnet.case.case import Case, InvasionCase
 from fdnet.dem.deck import number, render_text, snapshot_of
 from fdnet.dem.supply import Batches, batches_of
-from fdnet.errors import CaseError, DumpError, LiggghtsError
+from fdnet.errors import CaseError, Doubt, DumpError, LiggghtsError, explained
 from fdnet.files import write_text
 from fdnet.scales.clock import arrival_time
 from fdnet.scales.scales import InvasionScales
@@ -238,14 +238,22 @@ class Checkpoints:
         newest = max((step for step, _ in self.files("record")), default=0)
         warnings = self.doubts()
         if last is None and (newest or len(read_rows(self.folder, self.kind)) > 1):
-            warnings.append("no checkpoint of the cut run could be used, it was started over")
+            warnings.append(
+                Doubt(
+                    "started-over",
+                    "no checkpoint of the cut run could be used, it was started over",
+                )
+            )
         elif last is not None and newest > last.step:
             warnings.append(
-                f"files of the cut run were not those that were recorded (checkpoint at step "
-                f"{newest}): it went on from the checkpoint at step {last.step}"
+                Doubt(
+                    "earlier-checkpoint",
+                    f"files of the cut run were not those that were recorded (checkpoint at step "
+                    f"{newest}): it went on from the checkpoint at step {last.step}",
+                )
             )
         if warnings:
-            text = "".join(f"{line}\n" for line in dict.fromkeys(warnings))
+            text = "".join(f"{line}\n" for line in dict.fromkeys(map(explained, warnings)))
             write_text(self.folder / DOUBTS, text)
 
     def doubts(self) -> list[str]:

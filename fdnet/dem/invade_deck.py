@@ -48,7 +48,7 @@ from fdnet.errors import CaseError
 from fdnet.files import expanded, refuse_folder_name, write_text
 from fdnet.names import LIGGGHTS_STAGES
 from fdnet.scales.pack import grain_count
-from fdnet.scales.scales import InvasionScales, scales_of
+from fdnet.scales.scales import InvasionScales, invasion_scales, scales_of
 from fdnet.spheres.dump import COLUMNS, FORMAT, Frame, read_binary_frame
 from fdnet.spheres.geometry import touching_pairs
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
@@ -434,7 +434,7 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
     if isinstance(case, InvasionCase):
         radius, box = case.grains.radius_range_m[1], specimen_box(case)
         grain = resting(np.array([[0.7 * radius, *(box[1:, 1] / 2)]]), radius, box)
-        flow = scales_of(case)
+        flow = invasion_scales(case)
         deck = render_invade(case, flow, grain, ranks=ranks, packed=False)
         invasion = {"in.invade": deck.text, **coupled_parts(case, flow)}
     texts = {out / "invade" / name: text for name, text in invasion.items()}

@@ -60,7 +60,7 @@ from fdnet.dem.invade_deck import (
 )
 from fdnet.dem.liggghts import SCREEN, Execution, Feed, Launch, run_deck
 from fdnet.dem.supply import batches_of, densities, later_batch
-from fdnet.errors import CaseError, LiggghtsError
+from fdnet.errors import CaseError, Doubt, LiggghtsError
 from fdnet.files import disk_is_full, write_text
 from fdnet.scales.clock import DRAG_LIMIT
 from fdnet.scales.scales import InvasionScales
@@ -399,7 +399,8 @@ class InvadeStage(ChunkedStage):
         An empty slab decides nothing about plugging, so it is a reason of its own.
         """
         case, scales, last = self.case, self.scales, history[-1]
-        waiting, warnings = last.upstream - last.removed_upstream, []
+        waiting = last.upstream - last.removed_upstream
+        warnings: list[str] = []
         reason = flow_says(self.folder, case, scales, last.step)
         if reason is None and case.run.duration_s is not None:
             reason = "duration"
@@ -408,22 +409,36 @@ class InvadeStage(ChunkedStage):
         elif reason is None:
             reason, cap = "cap", scales.cap_time * scales.force_factor
             warnings.append(
-                f"invasion stopped at its cap of {1e3 * cap:.3g} ms before the stop rule "
-                "held: raise run.cap_ms"
+                Doubt(
+                    "stopped-at-the-cap",
+                    f"invasion stopped at its cap of {1e3 * cap:.3g} ms before the stop rule "
+                    "held: raise run.cap_ms",
+                )
             )
         if waiting == 0:
             warnings.append(
-                "no fine is left upstream: the end was decided by an empty slab, raise "
-                "fines.count or fines.slab_mm"
+                Doubt(
+                    "empty-slab",
+                    "no fine is left upstream: the end was decided by an empty slab, raise "
+                    "fines.count or fines.slab_mm",
+                )
             )
         before = history[-min(len(history), quiet_chunks(scales) + 1)]
         if reason == "plugged" and last.passed > before.passed:
             warnings.append(
-                f"the face was plugged, but {last.passed - before.passed} fines still left "
-                "through the outlet meanwhile: raise run.plug_time_ms to follow them"
+                Doubt(
+                    "still-leaving",
+                    f"the face was plugged, but {last.passed - before.passed} fines still left "
+                    "through the outlet meanwhile: raise run.plug_time_ms to follow them",
+                )
             )
         if last.removed_upstream:
-            warnings.append(f"{last.removed_upstream} fines bounced out upstream and were removed")
+            warnings.append(
+                Doubt(
+                    "bounced-out",
+                    f"{last.removed_upstream} fines bounced out upstream and were removed",
+                )
+            )
         return reason, warnings
 
 
@@ -456,8 +471,11 @@ def invade(
     warnings += points.doubts()
     if len(overlaps) < len(history):
         warnings.append(
-            f"{len(history) - len(overlaps)} of {len(history)} checkpoint dumps cannot be read: "
-            "they are missing from the largest overlap and from invasion.pvd"
+            Doubt(
+                "dumps-cannot-be-read",
+                f"{len(history) - len(overlaps)} of {len(history)} checkpoint dumps cannot be "
+                "read: they are missing from the largest overlap and from invasion.pvd",
+            )
         )
     return Invasion(
         state=damaged,

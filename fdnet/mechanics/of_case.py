@@ -1,11 +1,12 @@
 """The moduli of a pack as keys of mechanics.json."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from fdnet.case.case import Case
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt
 from fdnet.mechanics.elastic import Elastic, elastic_of
 from fdnet.mechanics.springs import Cement, PackMaterial, find_joints, mean_force
 from fdnet.mechanics.triaxial import Sheared, Triaxial, triaxial
@@ -67,21 +68,21 @@ def triaxial_numbers(result: Sheared) -> dict[str, Any]:
     }
 
 
-def triaxial_warnings(result: Sheared) -> list[str]:
+def triaxial_warnings(result: Sheared) -> Iterator[str]:
     """What a reader of the curve must know, one sentence each."""
-    warnings: list[str] = []
     if result.restless:
-        warnings.append(
+        yield Doubt(
+            "load-steps-not-at-rest",
             f"{result.restless} of {len(result.rows)} load steps of the triaxial test did not "
             f"come to rest within the tolerance {result.test.tolerance:g}: the curve is uncertain "
-            "there; take more load steps"
+            "there; take more load steps",
         )
     if result.peak is result.rows[-1]:
-        warnings.append(
+        yield Doubt(
+            "peak-at-the-last-step",
             "the largest deviatoric stress of the triaxial test is that of its last step: the "
-            "peak may lie beyond; raise --strain"
+            "peak may lie beyond; raise --strain",
         )
-    return warnings
 
 
 # ------------------------------------------------------------------------------------------------
@@ -208,25 +209,26 @@ def pack_material(case: Case, grains: Snapshot, pressure_Pa: float | None = None
     )
 
 
-def warnings_of(result: Elastic, case: Case) -> list[str]:
+def warnings_of(result: Elastic, case: Case) -> Iterator[str]:
     """What a reader of the moduli must know, one sentence each."""
-    warnings: list[str] = []
     young = result.averaged.young
     if young > QUARTZ_YOUNG:
         real = 4 * QUARTZ_YOUNG * case.grains.mean_radius_m
-        warnings.append(
+        yield Doubt(
+            "stiffer-than-quartz",
             f"Young's modulus {young:.3g} Pa is above that of solid quartz, {QUARTZ_YOUNG:.3g} "
             "Pa: no sand is as stiff as these contacts make it; for quartz grains of this size "
-            f"take grains.normal_stiffness_N_m = {real:.2g} (4 E R)"
+            f"take grains.normal_stiffness_N_m = {real:.2g} (4 E R)",
         )
     if result.rattlers > MANY_RATTLERS * result.grains:
-        warnings.append(
+        yield Doubt(
+            "loose-grains",
             f"{result.rattlers} of {result.grains} grains carry nothing; the moduli are those of "
-            "a loose pack and change with the seed: run several seeds"
+            "a loose pack and change with the seed: run several seeds",
         )
     if case.bonds is None:
-        warnings.append(
+        yield Doubt(
+            "no-bonds",
             "no table [bonds]: the moduli hold while a pressure keeps every contact closed; add "
-            "[bonds] for cemented grains"
+            "[bonds] for cemented grains",
         )
-    return warnings

@@ -8,6 +8,7 @@ from typing import Unpack
 import numpy as np
 
 from fdnet.case.tables import AnalysisChoices, AnalysisKeys, with_visible_choices
+from fdnet.errors import Doubt
 from fdnet.names import ALL_SPHERES, AUTO, SECTION_ARCHIE, law_pairs
 from fdnet.network.fines.occupancy import Occupancy
 from fdnet.network.flow.flow import Flow
@@ -150,12 +151,13 @@ def laws_apart(taken: tuple[str, float], other: tuple[str, float]) -> Iterator[s
     start = f"two ways of measuring the damage differ: {second} gives {k_second:.4g} m2"
     if low > 0:
         more = "above" if k_second > k else "below"
-        yield (
+        yield Doubt(
+            "laws-apart",
             f"{start}, {more} the {k:.4g} m2 of {name} (the larger is {high / low:.2f} times the "
-            "smaller); take the difference as the error of the damaged permeability"
+            "smaller); take the difference as the error of the damaged permeability",
         )
     else:
-        yield f"{start}, {name} {k:.4g} m2; one of them finds no open path"
+        yield Doubt("laws-apart", f"{start}, {name} {k:.4g} m2; one of them finds no open path")
 
 
 @with_visible_choices
@@ -300,10 +302,13 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
         counts |= above
         if above["all_spheres_above_grains"]:
             log.warnings.append(
-                "the damage is too light for the law all-spheres: its network gave more "
-                "permeability with the fines than that of the grains without them, so each "
-                "section is taken as at most the latter; "
-                f"{of_grains} gives {final.k:.4g} m2 with fines"
+                Doubt(
+                    "light-damage",
+                    "the damage is too light for the law all-spheres: its network gave more "
+                    "permeability with the fines than that of the grains without them, so each "
+                    "section is taken as at most the latter; "
+                    f"{of_grains} gives {final.k:.4g} m2 with fines",
+                )
             )
         k, slabs, flow = whole.k, whole.slabs, whole.state.flow
         log.warnings += laws_apart((ALL_SPHERES, k), (of_grains, final.k))
@@ -315,7 +320,7 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
     sections = make_sections(specimen.edges, porosity, (clean_slabs, slabs), specimen.depth)
     for which, one in (("k_initial", clean.flow), ("k_damaged", flow)):
         if one.reason:
-            log.warnings.append(f"{which} = 0: {one.reason}")
+            log.warnings.append(Doubt("no-open-path", f"{which} = 0: {one.reason}"))
     log.warnings += thin_slabs(sections, 2.0 * clean.network.grain_radius)
     log.warnings += specimen_doubts(specimen, clean.k, options.walls)
     law_used = np.full(len(final.conductance), CLEAN) if damage is None else damage.law_used

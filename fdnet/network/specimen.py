@@ -10,7 +10,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from fdnet.case.tables import AnalysisChoices
-from fdnet.errors import CaseError, NetworkError
+from fdnet.errors import CaseError, Doubt, NetworkError
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.flow.sections import profile_edges, section_edges
 from fdnet.network.network import Network, build_network
@@ -150,17 +150,19 @@ def doubts(
     """Why the permeability (m2) of a pack without fines is to be doubted, one sentence each."""
     low, high = VALIDATED_POROSITY
     if not low <= porosity <= high:
-        yield (
+        yield Doubt(
+            "outside-the-validated-porosity",
             f"the porosity without fines is {porosity:.3f}, outside {low:.2f} to {high:.2f}, "
             "where fdnet was compared with resolved flow: the permeability may be wrong by more "
-            "than the documented error; check the box and the units, or use a resolved solver"
+            "than the documented error; check the box and the units, or use a resolved solver",
         )
     empty = empty_duct_permeability(box, periodic) if walls == "no-slip" else np.inf
     if permeability > empty:
-        yield (
+        yield Doubt(
+            "impossible-permeability",
             f"the permeability without fines, {permeability:.3g} m2, is above that of the empty "
             f"box with the same walls, {empty:.3g} m2, which is impossible: do not use it; there "
-            "are too few grains for the box, so check the box and the units"
+            "are too few grains for the box, so check the box and the units",
         )
 
 
@@ -372,22 +374,25 @@ def specimen_doubts(specimen: Specimen, permeability: float, walls: str) -> Iter
     """Warnings on a specimen and its permeability without fines, m2."""
     network, occupancy = specimen.first, specimen.occupancy
     if network.counts["grains_outside_box"]:
-        yield f"{network.counts['grains_outside_box']} grains lie outside the box and play no part"
+        count = network.counts["grains_outside_box"]
+        yield Doubt("outside-the-box", f"{count} grains lie outside the box and play no part")
     if (
         occupancy is not None
         and occupancy.counts["fines_outside_box"]
         and not occupancy.pore_solid_volume.any()
     ):
-        yield (
+        yield Doubt(
+            "no-fine-in-the-box",
             f"none of the {occupancy.counts['fines_outside_box']} fines is centred in the box: "
-            "no pore holds any; check the box if some should"
+            "no pore holds any; check the box if some should",
         )
     grains, inner = specimen.grains[0], specimen.inner
     for count, name in ((inner.grains, "grains"), (inner.fines, "fines")):
         if count:
-            yield (
+            yield Doubt(
+                "inside-others",
                 f"{count} {name} lie wholly inside other spheres: they add nothing to the solid "
-                "and were left out"
+                "and were left out",
             )
     porosity = specimen.porosity[0].mean
     yield from doubts(
@@ -399,10 +404,11 @@ def specimen_doubts(specimen: Specimen, permeability: float, walls: str) -> Iter
     )
     least, most = 2.0 * float(grains.radius.min()), 2.0 * float(grains.radius.max())
     if most > SAND[1] or least < SAND[0]:
-        yield (
+        yield Doubt(
+            "no-sand",
             f"the grains are {least:.3g} to {most:.3g} m wide, which is no sand ({SAND[0]:g} to "
             f"{SAND[1]:g} m): the unit of length is probably another one, and the permeability "
-            "goes with its square"
+            "goes with its square",
         )
     likely = kozeny(grains, porosity)
     # spheres that are far apart have the drag of single ones
@@ -411,23 +417,26 @@ def specimen_doubts(specimen: Specimen, permeability: float, walls: str) -> Iter
     high = min(CARMAN_KOZENY[1] * likely, 2.0 * lone)
     low, (dense, sparse) = CARMAN_KOZENY[0] * likely, VALIDATED_POROSITY
     if permeability > high or (0.0 < permeability < low and dense <= porosity <= sparse):
-        yield (
+        yield Doubt(
+            "no-packing",
             f"the permeability without fines, {permeability:.3g} m2, is "
             f"{permeability / likely:.3g} times what Carman and Kozeny give for these radii and "
             f"this porosity ({likely:.3g} m2), which no packing has: do not use it; check the "
-            "box, which sides are periodic, and whether radii and places have one unit"
+            "box, which sides are periodic, and whether radii and places have one unit",
         )
     for axis, pairs, expected in _walls_at_periodic_sides(grains, network.periodic):
-        yield (
+        yield Doubt(
+            "walls-at-periodic-sides",
             f"no grain crosses the periodic sides {axis}, and {pairs} neighbours meet across them "
             f"where {expected:.0f} are expected: the pack stands as between walls, and the gap "
             f"there carries flow; leave {axis} out of the periodic directions unless the pack "
-            "repeats like this"
+            "repeats like this",
         )
     if specimen.outside_sides:
-        yield (
+        yield Doubt(
+            "fines-beyond-the-sides",
             f"{specimen.outside_sides} fines are centred beyond the side walls of the box and "
-            "block nothing there: check the box, the units and the periodic directions"
+            "block nothing there: check the box, the units and the periodic directions",
         )
 
 

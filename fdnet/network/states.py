@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from fdnet.case.tables import AnalysisChoices
-from fdnet.errors import FlowError, NetworkError
+from fdnet.errors import Doubt, FlowError, NetworkError
 from fdnet.names import (
     ALL_SPHERES,
     AUTO,
@@ -117,8 +117,11 @@ def cut_networks(spheres: Snapshot, edges: Array, sides: Sides) -> CutNetworks:
 
     results = on_all_cores(cut, pairwise(map(float, edges)))
     refused = [
-        f"section {number + 1} is no specimen of its own, so it was cut out of the network of the "
-        f"whole, which is less accurate: {error}"
+        Doubt(
+            "section-without-a-network",
+            f"section {number + 1} is no specimen of its own, so it was cut out of the network of "
+            f"the whole, which is less accurate: {error}",
+        )
         for number, error in enumerate(results)
         if isinstance(error, NetworkError)
     ]
@@ -339,10 +342,11 @@ def few_throats(slabs: SlabK) -> Iterator[str]:
         if 0.0 < flow.carrying_throats < FEW_THROATS
     ]
     if few:
-        yield (
+        yield Doubt(
+            "few-throats",
             f"few throats carry the flow with fines ({', '.join(few)}): with fewer than "
             f"{FEW_THROATS} the permeability of a section is off by some 5 % (rms), at worst by "
-            "20 %; `fdnet stokes` gives the sections of a run by resolved flow"
+            "20 %; `fdnet stokes` gives the sections of a run by resolved flow",
         )
 
 
@@ -428,7 +432,9 @@ class Measured:
         except (NetworkError, FlowError) as error:
             if name == ALL_SPHERES:
                 raise
-            log.warnings.append(f"the damage law {SECTION_ARCHIE} was taken: {error}")
+            log.warnings.append(
+                Doubt("other-damage-law", f"the damage law {SECTION_ARCHIE} was taken: {error}")
+            )
         return self._all
 
     def _own_slabs(self, law: str, log: Log, *, final: bool) -> CutNetworks | None:

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt
 from fdnet.files import replacing
 from fdnet.spheres.snapshot import Array, Kind
 
@@ -65,9 +65,9 @@ def render_spheres_png(
             scene = Scene(grains=spheres, box=box)
             draw_frames(scene, [MovieFrame(spheres)], [part], seconds=seconds)
     except subprocess.TimeoutExpired:
-        return f"the 3-D picture was given up after {seconds:g} s"
+        return Doubt("no-picture", f"the 3-D picture was given up after {seconds:g} s")
     except OSError as error:
-        return f"no 3-D picture: {error}"
+        return Doubt("no-picture", f"no 3-D picture: {error}")
     return ""
 
 

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import from_json
 
 from fdnet.case.tables import M2_PER_MD
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt
 from fdnet.files import replacing, write_text
 from fdnet.network.flow.flow import INLET, OUTLET, open_links
 from fdnet.network.network import Network
@@ -297,7 +297,12 @@ def _plain(value: Any, where: str, refused: list[str]) -> Any:
     if isinstance(value, Enum | Path):
         return value.name.lower() if isinstance(value, Enum) else str(value)
     if isinstance(value, float) and not math.isfinite(value):
-        refused.append(f"summary {where}: {value} is not a number JSON can hold; written as null")
+        refused.append(
+            Doubt(
+                "not-a-number",
+                f"summary {where}: {value} is not a number JSON can hold; written as null",
+            )
+        )
         return None
     return value
 

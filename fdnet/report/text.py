@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.spheres import Spheres
 from fdnet.case.tables import Run
+from fdnet.errors import Doubt
 from fdnet.names import STAGES
 from fdnet.report.tables import (
     AGREES,
@@ -389,11 +390,12 @@ def section_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
 
 def thesis_law_warning(chosen: "Analysis", default: "Analysis") -> str:
     """What laws that are off by factors give, with what fdnet's default laws give of the same."""
-    return (
+    return Doubt(
+        "laws-of-the-thesis",
         f"the laws {chosen.law} and {chosen.damage_law} are kept to compare with the thesis, and "
         f"those of the thesis are wrong by factors: they give {_states(chosen)}, where fdnet's "
         f"default laws ({' and '.join(filter(None, (default.law, default.damage_law_used)))}) "
-        f"give {_states(default)}"
+        f"give {_states(default)}",
     )
 
 

@@ -1,13 +1,14 @@
 """The stages of a run that need LIGGGHTS: the pack and the invasion."""
 
 import math
+from collections.abc import Iterator
 
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import Checkpoints, read_history, read_updates, state_at
 from fdnet.dem.deck import snapshot_of
 from fdnet.dem.invasion import invade
 from fdnet.dem.packing import check_radii, make_pack
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt
 from fdnet.names import LIGGGHTS_STAGES
 from fdnet.run.fluid import fluid_of
 from fdnet.run.folder import START_OVER, check_files, may_be_gone
@@ -22,7 +23,7 @@ from fdnet.run.records import (
 )
 from fdnet.scales.cost import expected_duration
 from fdnet.scales.pack import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES
-from fdnet.scales.scales import scales_of
+from fdnet.scales.scales import invasion_scales
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Snapshot
 
@@ -52,7 +53,7 @@ def invade_stage(session: Session, case: InvasionCase) -> None:
     """
     if is_done(session, "invade"):
         return
-    scales, grains, folder = scales_of(case), packed_grains(session), session.path / "invade"
+    scales, grains, folder = invasion_scales(case), packed_grains(session), session.path / "invade"
     ranks, made = session.options.ranks, (session.folder.record("pack") or {}).get("ranks")
     begun = Checkpoints(folder=folder, digest="").files()
     if session.options.resume and not begun and made not in (None, ranks):
@@ -115,7 +116,7 @@ def invaded(session: Session, case: InvasionCase, grains: Snapshot) -> FinishedI
     Raises CaseError when a file is not what the stage made, DumpError or LiggghtsError when one
     cannot be read.
     """
-    folder, scales = session.path / "invade", scales_of(case)
+    folder, scales = session.path / "invade", invasion_scales(case)
     check_files(folder, session.folder.record("invade") or {}, START_OVER, may_lack=may_be_gone)
     history = read_history(folder)
     return FinishedInvasion(
@@ -127,16 +128,15 @@ def invaded(session: Session, case: InvasionCase, grains: Snapshot) -> FinishedI
     )
 
 
-def file_warnings(session: Session) -> list[str]:
+def file_warnings(session: Session) -> Iterator[str]:
     """Dumps that are gone, one sentence a stage."""
-    warnings = []
     for stage in LIGGGHTS_STAGES:
         record = session.folder.record(stage) if stage in session.case.stages else None
         names = record["files"] if record else {}
         lost = [name for name in names if not (session.path / stage / name).exists()]
         if lost:
-            warnings.append(
+            yield Doubt(
+                "dumps-are-gone",
                 f"{len(lost)} checkpoint dumps are gone, the first is {stage}/{lost[0]}: they are "
-                "missing from invasion.pvd"
+                "missing from invasion.pvd",
             )
-    return warnings

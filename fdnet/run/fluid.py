@@ -32,8 +32,7 @@ from fdnet.run.network_flow import (
     pack_flow,
     placed,
 )
-from fdnet.scales.drag import Crowd
-from fdnet.scales.drag import crowd_drag_factor as drag_factor
+from fdnet.scales.drag import Crowd, crowd_drag_factor
 from fdnet.scales.flow import path_of
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array, Snapshot, unmoved
@@ -90,7 +89,7 @@ def crowd_factor(scales: InvasionScales, near: Neighbourhood, radius: Array, sli
     """
     reynolds = scales.push.reynolds_slope * radius / near.size_ratio * slip
     crowd = Crowd(porosity=near.porosity, size_ratio=near.size_ratio, reynolds=reynolds)
-    return drag_factor(crowd, gradient_apart=False) / near.porosity
+    return crowd_drag_factor(crowd) / near.porosity
 
 
 def crowd_measures(factor: Array, near: Neighbourhood) -> dict[str, float]:

@@ -33,7 +33,7 @@ from fdnet.run.clean_up import Returned, clean_up_rows, clean_up_summary
 from fdnet.run.fluid import history_rows
 from fdnet.run.records import FinishedInvasion
 from fdnet.scales.pack import SHARES, diameter_at
-from fdnet.scales.scales import scales_of
+from fdnet.scales.scales import invasion_scales
 from fdnet.sizes import volume_quantiles
 from fdnet.spheres.readers import write_spheres
 from fdnet.spheres.snapshot import Array, Snapshot
@@ -156,7 +156,7 @@ def placed_sizes(
     if isinstance(case, InvasionCase) and case.fines.measured and damaged is not None:
         fines = damaged.fines()
         inside = (fines.position[:, 0] >= 0) & (fines.position[:, 0] < case.size_m[0])
-        counts = batches_of(case, scales_of(case)).counts
+        counts = batches_of(case, invasion_scales(case)).counts
         entered = sum(total <= supplied for total in accumulate(counts))
         batches = drawn_fines(case, counts)[:entered]
         placed = np.concatenate([2 * batch.radius for batch in batches])

@@ -20,7 +20,7 @@ from fdnet.dem.checkpoint import HISTORY, UPDATES, WATCH, Checkpoint, Deepest, o
 from fdnet.dem.invasion import Invasion
 from fdnet.dem.liggghts import KNOWN_VERSION, Binary, Execution, Launch, find_binary
 from fdnet.dem.packing import Pack
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt, explained
 from fdnet.names import STAGES
 from fdnet.run.folder import (
     LOCK,
@@ -83,7 +83,7 @@ def invade_record(case: Case, result: Invasion, folder: Path, *, seconds: float)
         "steps": result.history[-1].step,
         "dt_s": result.step_s,
         "supplied": result.supplied,
-        "warnings": list(result.warnings),
+        "warnings": [explained(one) for one in result.warnings],
         "ranks": result.ranks,
         **_updates(result.updates),
         "files": digests_of(folder, [HISTORY, WATCH, UPDATES, *dumps]),
@@ -125,48 +125,54 @@ def run_record(run: Execution) -> dict[str, Any]:
 
 def record_warnings(
     case: Case, pack: dict[str, Any], invasion: dict[str, Any] | None
-) -> list[str]:
+) -> Iterator[str]:
     """Doubts about the DEM runs, from the records of their stages.
 
     They are another LIGGGHTS than fdnet was measured with, large overlaps, and how the runs ended.
     """
-    warnings, version = [], pack["runs"][0]["version"]
+    version = pack["runs"][0]["version"]
     if invasion is not None:
-        warnings += invasion["warnings"]
+        yield from invasion["warnings"]
     if version != KNOWN_VERSION:
-        warnings.append(f"LIGGGHTS {version}: fdnet was measured and tested with {KNOWN_VERSION}")
-    warnings += overlap_doubts(pack["max_overlap"])
+        yield Doubt(
+            "another-liggghts",
+            f"LIGGGHTS {version}: fdnet was measured and tested with {KNOWN_VERSION}",
+        )
+    yield from overlap_doubts(pack["max_overlap"])
     if pack.get("restless"):
-        warnings.append(
+        yield Doubt(
+            "restless-pack",
             f"{pack['restless']} packs did not come to rest and were made again from other random "
-            "places: the pack is not that of the seed's first places"
+            "places: the pack is not that of the seed's first places",
         )
     if pack.get("creep_m_s"):
-        warnings.append(
+        yield Doubt(
+            "creeping-pack",
             f"the pack is barely jammed and still creeps, at {pack['creep_m_s']:.2g} m/s; it is "
-            "used as it is"
+            "used as it is",
         )
     if abs(pack["porosity"] - pack["porosity_assumed"]) > POROSITY_WARNING:
-        warnings.append(
+        yield Doubt(
+            "assumed-porosity",
             "the fluid's velocity follows from a porosity of "
             f"{pack['porosity_assumed']:.3f} (plain sum of grains.count), the pack has "
-            f"{pack['porosity']:.3f}: give grains.porosity instead of the count"
+            f"{pack['porosity']:.3f}: give grains.porosity instead of the count",
         )
     if invasion is None:
-        return warnings
+        return
     step = invasion.get("max_overlap_step", invasion["steps"])
     deepest = Deepest(step=step, fraction=invasion["max_overlap"])
     if deepest.fraction > case.run.max_overlap:
-        warnings.append(f"{overlap_text(case, deepest)}: raise run.stiffness_N_m")
+        yield Doubt("overlap", f"{overlap_text(case, deepest)}: raise run.stiffness_N_m")
     updates = invasion.get("updates", {})
     if updates.get("momentum_open"):
-        warnings.append(
+        yield Doubt(
+            "momentum",
             "the forces on fines and grains differ from the drop of pressure times area by up to "
             f"{100 * updates['momentum_defect_most']:.2g} %, and by more than "
             f"{100 * MOMENTUM_LIMIT:g} % in {updates['momentum_open']} of {updates['count']} "
-            "updates (history.csv, momentum_defect)"
+            "updates (history.csv, momentum_defect)",
         )
-    return warnings
 
 
 def stage_seconds(

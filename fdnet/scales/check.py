@@ -1,21 +1,15 @@
-"""What is doubtful in a case.
+"""What is doubtful in a case, and what its run takes: what `fdnet check` says."""
 
-One thing that is odd about a case.
-"""
-
-import re
 import textwrap
-import tomllib
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
-from functools import cache
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.rules import WIDEST_THROAT
+from fdnet.errors import PAGE, catalogue, explained
 from fdnet.scales.clock import TAKEN_SOLIDS, spoken_memory, spoken_time, supplied_solids
 from fdnet.scales.cost import Cost, cost_of, peak_memory
 from fdnet.scales.drag import BRIDGING
@@ -29,7 +23,7 @@ class Finding:
 
     Attributes:
         key: of the case that it is about; empty where it is about no single one.
-        what: what is odd.
+        what: what is odd; a `Doubt` where it is one of the warnings of the scales.
         follows: what follows for the answer.
         do: what to do.
         read: the page that says more.
@@ -84,97 +78,6 @@ def width_error(width: float, *, periodic: bool) -> float:
 
 
 # ------------------------------------------------------------------------------------------------
-# Every warning of fdnet: what follows from it, what to do, and where to read on.
-
-
-PAGE = "docs/reference/warnings.md"
-GAP = "…"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Entry:
-    """One kind of warning.
-
-    Attributes:
-        key: its place on the page.
-        text: what it says, with `GAP` for what differs from case to case.
-        follows: what follows.
-        do: what to do.
-        read: page of the documentation.
-        says: which of "follows" and "do" the warning says itself.
-    """
-
-    key: str
-    text: str
-    follows: str
-    do: str
-    read: str
-    says: tuple[str, ...] = ()
-
-    def matches(self, warning: str) -> bool:
-        """Whether a warning is of this kind; what follows its text is free."""
-        pattern = ".*?".join(re.escape(part) for part in self.text.split(GAP))
-        return re.match(pattern, warning, re.DOTALL) is not None
-
-
-@cache
-def catalogue() -> tuple[Entry, ...]:
-    """All kinds of warnings."""
-    text = files("fdnet").joinpath("scales/warnings.toml").read_text(encoding="utf-8")
-    return tuple(
-        Entry(**{**one, "says": tuple(one.get("says", ()))})
-        for one in tomllib.loads(text)["warning"]
-    )
-
-
-def entry_of(warning: str) -> Entry | None:
-    """The kind of a warning; None for one that is not in the catalogue."""
-    return next((entry for entry in catalogue() if entry.matches(warning)), None)
-
-
-def explained(warning: str) -> str:
-    """The warning with what it does not say itself: what follows, what to do, where to read."""
-    entry = entry_of(warning)
-    if entry is None or warning.endswith(f"{PAGE}#{entry.key})"):
-        return warning
-    missing = [
-        f"{label}: {getattr(entry, name)}"
-        for name, label in (("follows", "what follows"), ("do", "what to do"))
-        if name not in entry.says
-    ]
-    return "; ".join([warning.rstrip("."), *missing]) + f" (see {PAGE}#{entry.key})"
-
-
-def _filled_lines(text: str, indent: str = "  ") -> list[str]:
-    return textwrap.wrap(text, 97, subsequent_indent=indent, break_on_hyphens=False)
-
-
-def page() -> str:
-    """The page of all warnings."""
-    lines = [
-        "# Warnings",
-        "",
-        "This page lists every warning of fdnet: what follows from it, and what to do. A warning",
-        "names something that is valid but doubtful, and the run goes on. … stands for what",
-        "differs from case to case. What `fdnet check` finds odd about the sizes, the speed and",
-        "the supply of a case comes first in the summary; it says all this itself.",
-    ]
-    for entry in catalogue():
-        lines += [
-            "",
-            f"({entry.key})=",
-            f"## {entry.key.replace('-', ' ').capitalize()}",
-            "",
-            *_filled_lines(f"> {entry.text}", "> "),
-            "",
-            *_filled_lines(f"- **What follows:** {entry.follows}."),
-            *_filled_lines(f"- **What to do:** {entry.do}."),
-            f"- **Read:** [{entry.read}](../{entry.read})",
-        ]
-    return "\n".join(lines) + "\n"
-
-
-# ------------------------------------------------------------------------------------------------
 # What is odd about the sizes and the supply of a case.
 
 
@@ -189,148 +92,112 @@ MOST_COARSE = 0.25
 WHOLE_GRAIN = 1 - 1e-6
 
 
-def findings(case: Case, scales: Scales) -> list[Finding]:
+def findings(case: Case, scales: Scales) -> Iterator[Finding]:
     """All that is odd about the sizes of a case; its warnings are said by `scales`."""
-    odd = [*_narrow(case), *_thin_sections(case)]
-    if isinstance(case, InvasionCase) and isinstance(scales, InvasionScales):
-        odd += [
-            *_fast(case, scales),
-            *_short_supply(case, scales),
-            *_too_coarse(case),
-            *_costly_range(case, scales),
-        ]
-    return odd
-
-
-def _narrow(case: Case) -> Iterator[Finding]:
-    diameter, periodic = case.grains.sauter_diameter_m, case.periodic[1]
-    side = min(case.size_m[1:])
-    error = width_error(side / diameter, periodic=periodic)
-    if abs(error) < MOST_WIDTH_ERROR:
-        return
-    wider = next(
-        n for n in range(2, 200) if abs(width_error(n, periodic=periodic)) < MOST_WIDTH_ERROR
-    )
-    sides = "" if periodic else "box.sides = 'periodic', or "
-    yield Finding(
-        key="box.size_mm",
-        what=f"the specimen is {side / diameter:.2g} mean grains wide ({1e3 * side:.3g} mm)",
-        follows=f"its intact permeability is about {100 * abs(error):.0f} % "
-        f"{'below' if error < 0 else 'above'} that of the bulk sand (packs of equal grains); the "
-        "ratio of damaged to intact suffers less",
-        do=f"take {sides}a width of {1e3 * wider * diameter:.2g} mm for less than "
-        f"{100 * MOST_WIDTH_ERROR:.0f} %, or use the ratio only",
-        read="docs/validation/specimen-size.md",
-    )
-
-
-def _thin_sections(case: Case) -> Iterator[Finding]:
-    diameter = 2 * case.grains.mean_radius_m
-    count = case.analysis.sections
+    mean, periodic, side = case.grains.sauter_diameter_m, case.periodic[1], min(case.size_m[1:])
+    error = width_error(side / mean, periodic=periodic)
+    if abs(error) >= MOST_WIDTH_ERROR:
+        wider = next(
+            n for n in range(2, 200) if abs(width_error(n, periodic=periodic)) < MOST_WIDTH_ERROR
+        )
+        sides = "" if periodic else "box.sides = 'periodic', or "
+        yield Finding(
+            key="box.size_mm",
+            what=f"the specimen is {side / mean:.2g} mean grains wide ({1e3 * side:.3g} mm)",
+            follows=f"its intact permeability is about {100 * abs(error):.0f} % "
+            f"{'below' if error < 0 else 'above'} that of the bulk sand (packs of equal grains); "
+            "the ratio of damaged to intact suffers less",
+            do=f"take {sides}a width of {1e3 * wider * mean:.2g} mm for less than "
+            f"{100 * MOST_WIDTH_ERROR:.0f} %, or use the ratio only",
+            read="docs/validation/specimen-size.md",
+        )
+    diameter, count = 2 * case.grains.mean_radius_m, case.analysis.sections
     assert isinstance(count, int)
     thickness = case.size_m[0] / count
-    if thickness >= WHOLE_GRAIN * diameter:
-        return
-    most = int(case.size_m[0] / diameter)
-    yield Finding(
-        key="analysis.sections",
-        what=f"sections of {1e3 * thickness:.3g} mm are thinner than a grain "
-        f"({1e3 * diameter:.3g} mm)",
-        follows="the permeability of each is that of a few throats",
-        do=f"take {most} sections or fewer" if most else "take a longer box",
-        read="docs/how-to/check_the_face.md",
-    )
+    if thickness < WHOLE_GRAIN * diameter:
+        most = int(case.size_m[0] / diameter)
+        yield Finding(
+            key="analysis.sections",
+            what=f"sections of {1e3 * thickness:.3g} mm are thinner than a grain "
+            f"({1e3 * diameter:.3g} mm)",
+            follows="the permeability of each is that of a few throats",
+            do=f"take {most} sections or fewer" if most else "take a longer box",
+            read="docs/how-to/check_the_face.md",
+        )
+    if isinstance(case, InvasionCase) and isinstance(scales, InvasionScales):
+        yield from _of_the_invasion(case, scales)
 
 
-def _fast(case: InvasionCase, scales: InvasionScales) -> Iterator[Finding]:
-    radius, outer = USUAL_WELL
-    path = radial(radius, outer)
+def _of_the_invasion(case: InvasionCase, scales: InvasionScales) -> Iterator[Finding]:
+    (radius, outer), fines = USUAL_WELL, case.fines
     losses = Losses(viscous=case.fluid.viscosity_Pa_s / scales.permeability)
-    usual = losses.velocity(case.fluid.overbalance_Pa, path) / scales.porosity
+    usual = losses.velocity(case.fluid.overbalance_Pa, radial(radius, outer)) / scales.porosity
     ratio = scales.interstitial_velocity / usual
-    if 1 / ABSURD <= ratio <= ABSURD:
-        return
-    yield Finding(
-        key="well",
-        what=f"the fluid moves at {scales.interstitial_velocity:.3g} m/s in the pores, "
-        f"{ratio:.2g} times as fast as {usual:.2g} m/s at the face of a well of "
-        f"{1e3 * radius:.0f} mm with this overbalance",
-        follows="drag and depth are not those around a well",
-        do="give the table [well] with radius and drainage_radius, unless the case is a plug in "
-        "a laboratory",
-        read="docs/how-to/choose_the_velocity.md",
-    )
-
-
-def _short_supply(case: InvasionCase, scales: InvasionScales) -> Iterator[Finding]:
-    """The slab runs out, or the time, before as much has come as plugged the shipped cases."""
+    if not 1 / ABSURD <= ratio <= ABSURD:
+        yield Finding(
+            key="well",
+            what=f"the fluid moves at {scales.interstitial_velocity:.3g} m/s in the pores, "
+            f"{ratio:.2g} times as fast as {usual:.2g} m/s at the face of a well of "
+            f"{1e3 * radius:.0f} mm with this overbalance",
+            follows="drag and depth are not those around a well",
+            do="give the table [well] with radius and drainage_radius, unless the case is a plug "
+            "in a laboratory",
+            read="docs/how-to/choose_the_velocity.md",
+        )
+    # the slab runs out, or the time, before as much has come as plugged the shipped cases
     solids = supplied_solids(case, scales.slab_length)
     feeding = scales.slab_length / scales.upstream_velocity
     come = solids * min(1.0, scales.cap_time / feeding)
-    if scales.throat_ratio < BRIDGING or come >= TAKEN_SOLIDS:
-        return
-    length = TAKEN_SOLIDS / solids * scales.slab_length
-    by_time = scales.cap_time < feeding
-    key = "fines.count" if case.fines.count is not None else "fines.slab_mm"
-    yield Finding(
-        key="run.cap_ms" if by_time else key,
-        what=f"the fines that come would fill {come:.2g} of a median grain's depth; the shipped "
-        f"cases were plugged by 0.1 to {TAKEN_SOLIDS:g}",
-        follows="the mud, or the time, may run out before the face plugs; then more mud would do "
-        "more damage",
-        do="give the run more time (run.cap_ms or run.duration_ms)"
-        if by_time
-        else f"supply {1e3 * length:.2g} mm of mud ({TAKEN_SOLIDS / solids:.2g} times as much)",
-        read="docs/start/first_answer.md",
-    )
-
-
-def _too_coarse(case: InvasionCase) -> Iterator[Finding]:
-    """Solids that pass no throat between the largest grains."""
-    widest = 2 * WIDEST_THROAT * case.grains.radius_range_m[1]
-    curve = case.fines.curve
-    if curve.high <= widest:
-        return
+    if scales.throat_ratio >= BRIDGING and come < TAKEN_SOLIDS:
+        length = TAKEN_SOLIDS / solids * scales.slab_length
+        by_time = scales.cap_time < feeding
+        key = "fines.count" if fines.count is not None else "fines.slab_mm"
+        yield Finding(
+            key="run.cap_ms" if by_time else key,
+            what=f"the fines that come would fill {come:.2g} of a median grain's depth; the "
+            f"shipped cases were plugged by 0.1 to {TAKEN_SOLIDS:g}",
+            follows="the mud, or the time, may run out before the face plugs; then more mud would "
+            "do more damage",
+            do="give the run more time (run.cap_ms or run.duration_ms)"
+            if by_time
+            else f"supply {1e3 * length:.2g} mm of mud "
+            f"({TAKEN_SOLIDS / solids:.2g} times as much)",
+            read="docs/start/first_answer.md",
+        )
+    # solids that pass no throat between the largest grains
+    widest, curve = 2 * WIDEST_THROAT * case.grains.radius_range_m[1], fines.curve
     share = 1 - float(curve.share_finer(np.array(widest))) if curve.low < widest else 1.0
-    if share < MOST_COARSE:
+    if curve.high > widest and share >= MOST_COARSE:
+        yield Finding(
+            key="fines.sizes" if fines.measured else "fines.radius_mm",
+            what=f"{100 * share:.0f} % of the fines are wider than every throat between "
+            f"touching grains (at most {1e3 * widest:.3g} mm)",
+            follows="they enter only where grains stand apart; most build a cake",
+            do="check the units of both sizes; if they are right, a shorter box is enough",
+            read="docs/how-to/your_sand_and_your_mud.md",
+        )
+    # the finest tenth of the solids makes most of the time
+    if not fines.measured or curve.low == curve.high:
         return
-    yield Finding(
-        key="fines.sizes" if case.fines.measured else "fines.radius_mm",
-        what=f"{100 * share:.0f} % of the fines are wider than every throat between "
-        f"touching grains (at most {1e3 * widest:.3g} mm)",
-        follows="they enter only where grains stand apart; most build a cake",
-        do="check the units of both sizes; if they are right, a shorter box is enough",
-        read="docs/how-to/your_sand_and_your_mud.md",
-    )
-
-
-def _costly_range(case: InvasionCase, scales: InvasionScales) -> Iterator[Finding]:
-    """The finest tenth of the solids makes most of the time."""
-    if not case.fines.measured or case.fines.curve.low == case.fines.curve.high:
-        return
-    cut = case.fines.curve.size_at(FINE_SHARE)
+    cut = float(f"{1e6 * curve.size_at(FINE_SHARE):.2g}")
     data = case.data()
-    data["fines"]["cut_um"] = float(f"{1e6 * cut:.2g}")
+    data["fines"]["cut_um"] = cut
     without = type(case).model_validate(data)
     seconds = cost_of(case, scales).invade_seconds
     less = cost_of(without, scales_of(without)).invade_seconds
-    if seconds < 60 or seconds < MOST_FINE_COST * less:
-        return
-    yield Finding(
-        key="fines.cut_um",
-        what=f"the finest {100 * FINE_SHARE:.0f} % of the solids (below {1e6 * cut:.2g} um) take "
-        f"most of the time, {spoken_time(seconds)} instead of {spoken_time(less)}",
-        follows="the run is long for what these sizes add",
-        do=f"set fines.cut_um = {1e6 * cut:.2g} unless they matter",
-        read="docs/how-to/your_sand_and_your_mud.md",
-    )
+    if seconds >= 60 and seconds >= MOST_FINE_COST * less:
+        yield Finding(
+            key="fines.cut_um",
+            what=f"the finest {100 * FINE_SHARE:.0f} % of the solids (below {cut:.2g} um) take "
+            f"most of the time, {spoken_time(seconds)} instead of {spoken_time(less)}",
+            follows="the run is long for what these sizes add",
+            do=f"set fines.cut_um = {cut:.2g} unless they matter",
+            read="docs/how-to/your_sand_and_your_mud.md",
+        )
 
 
 # ------------------------------------------------------------------------------------------------
 # A case looked at: all that is odd, and what the run takes.
-
-
-_WIDTH = 96
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -364,24 +231,29 @@ class Checked:
 
     def lines(self) -> list[str]:
         """As text."""
-        count = len(self.findings)
-        plural = "" if count == 1 else "s"
-        head = f"{self.name}: {count} thing{plural} to look at" if count else f"{self.name}: fine"
-        rows = [*(line for one in self.findings for line in _finding(one)), *self._takes()]
-        return [head, *(line for row in rows for line in _wrapped(row))]
-
-    def _takes(self) -> list[str]:
-        cost = self.cost
+        rows = []
+        for one in self.findings:
+            key = f"{one.key}: " if one.key and not one.what.startswith(one.key) else ""
+            rows.append(f"warning: {key}{one.what}")
+            more = (("what follows", one.follows), ("what to do", one.do), ("read", one.read))
+            rows += [f"    {name}: {text}" for name, text in more if text]
+        cost, count = self.cost, len(self.findings)
         parts = f"pack {spoken_time(cost.pack_seconds)}"
         if cost.invade_seconds:
             parts += f", invasion {spoken_time(cost.invade_seconds)}"
         if cost.update_seconds:
             parts += f" ({spoken_time(cost.update_seconds)} of them for the flow)"
         parts += f", analysis and report {spoken_time(cost.analyse_seconds)}"
-        return [
+        rows += [
             f"time: {spoken_time(cost.seconds)} on one idle core, within a factor of 2 ({parts})",
             f"memory: {spoken_memory(self.memory)}",
         ]
+        plural = "" if count == 1 else "s"
+        head = f"{count} thing{plural} to look at" if count else "fine"
+        wrapped = textwrap.TextWrapper(
+            96, subsequent_indent=" " * 8, break_on_hyphens=False, break_long_words=False
+        )
+        return [f"{self.name}: {head}", *(line for row in rows for line in wrapped.wrap(row))]
 
 
 def checked(case: Case, scales: Scales, refusals: Iterable[str] = ()) -> Checked:
@@ -407,26 +279,15 @@ def checked(case: Case, scales: Scales, refusals: Iterable[str] = ()) -> Checked
 
 def every_finding(case: Case, scales: Scales) -> list[Finding]:
     """All that is odd about a case: what `fdnet check` says, and the summary of its run."""
-    return [*findings(case, scales), *map(_of_warning, scales.warnings)]
-
-
-def _of_warning(text: str) -> Finding:
-    entry = entry_of(text)
-    if entry is None:
-        return Finding(key="", what=text, follows="", do="", read=PAGE)
-    return Finding(
-        key="", what=text, follows=entry.follows, do=entry.do, read=f"{PAGE}#{entry.key}"
-    )
-
-
-def _finding(finding: Finding) -> list[str]:
-    what = finding.what
-    key = f"{finding.key}: " if finding.key and not what.startswith(finding.key) else ""
-    rows = (("what follows", finding.follows), ("what to do", finding.do), ("read", finding.read))
-    return [f"warning: {key}{what}", *(f"    {name}: {text}" for name, text in rows if text)]
-
-
-def _wrapped(row: str) -> list[str]:
-    return textwrap.wrap(
-        row, _WIDTH, subsequent_indent=" " * 8, break_on_hyphens=False, break_long_words=False
-    )
+    known = catalogue()
+    of_scales = [
+        Finding(
+            key="",
+            what=one,
+            follows=known[one.kind].follows,
+            do=known[one.kind].do,
+            read=f"{PAGE}#{one.kind}",
+        )
+        for one in scales.warnings
+    ]
+    return [*findings(case, scales), *of_scales]

@@ -1,7 +1,4 @@
-"""Steps, times and the supply of fines.
-
-How much mud plugs a face, and how many fines are in the simulation until then.
-"""
+"""Steps, times and the supply of fines: what the clock of an invasion follows from."""
 
 import math
 from dataclasses import dataclass
@@ -9,18 +6,10 @@ from typing import TypeVar
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.tables import CONTACT_STEP_LIMIT, DEFAULT_STIFFNESS
-from fdnet.errors import CaseError
-from fdnet.scales.contacts import (
-    Contact,
-    Overlaps,
-    contacts_of,
-    deposit_force,
-    overlaps_of,
-    two_digits_up,
-)
-from fdnet.scales.drag import Crowd, push_of, throat_width
-from fdnet.scales.drag import crowd_drag_factor as drag_factor
-from fdnet.scales.flow import Drive, Velocity, drive_of, driving_pressure, velocity_of
+from fdnet.errors import CaseError, Doubt
+from fdnet.scales.contacts import Contact, contacts_of, overlaps_of, two_digits_up
+from fdnet.scales.drag import Crowd, crowd_drag_factor, push_of
+from fdnet.scales.flow import Drive, Velocity, drive_of, velocity_of
 from fdnet.scales.pack import target_porosity
 
 PLUG_SOLIDS = 0.6
@@ -115,15 +104,14 @@ def arrival_time(case: InvasionCase, upstream: float) -> float:
     )
 
 
-def slab_warnings(case: InvasionCase, slab: Slab) -> list[str]:
+def slab_warnings(case: InvasionCase, slab: Slab) -> list[Doubt]:
     """The slab was lengthened to the largest fine; empty when it was not."""
     diameter = 2 * case.fines.radius_range_m[1]
-    if slab.length > diameter:
-        return []
-    return [
+    text = (
         f"the slab is lengthened to one fine's diameter, {1e3 * diameter:.3g} mm, so it is "
         "thinner than fines.concentration"
-    ]
+    )
+    return [] if slab.length > diameter else [Doubt("slab-lengthened", text)]
 
 
 # ------------------------------------------------------------------------------------------------
@@ -177,18 +165,18 @@ def chunk_refreshes(case: InvasionCase, chunk: float, refresh: float) -> int:
     return max(1, math.ceil(refreshes) if case.run.duration_s is None else round(refreshes))
 
 
-def plug_warnings(case: InvasionCase, plug: float, drive: Drive, upstream: float) -> list[str]:
+def plug_warnings(case: InvasionCase, plug: float, drive: Drive, upstream: float) -> list[Doubt]:
     """The plug time is too short for the suspension; empty when it is not.
 
     `plug` is in s and `upstream` in m/s, both as simulated.
     """
     if plug >= ARRIVALS * arrival_time(case, upstream):
         return []
-    physical_ms = 1e3 * plug * drive.factor
-    return [
-        f"run.plug_time_ms: in {physical_ms:.3g} ms fewer than {ARRIVALS} fines of the suspension "
-        "arrive at the face: the invasion may be called plugged too early"
-    ]
+    text = (
+        f"run.plug_time_ms: in {1e3 * plug * drive.factor:.3g} ms fewer than {ARRIVALS} fines of "
+        "the suspension arrive at the face: the invasion may be called plugged too early"
+    )
+    return [Doubt("short-plug-time", text)]
 
 
 # ------------------------------------------------------------------------------------------------
@@ -308,10 +296,10 @@ def densest_factor(case: Case) -> float:
     if case.drag.crowd == "none":
         return 1.0
     crowd = Crowd(porosity=RANDOM_CLOSE)
-    return float(drag_factor(crowd, gradient_apart=False)) / RANDOM_CLOSE
+    return float(crowd_drag_factor(crowd)) / RANDOM_CLOSE
 
 
-def drag_warnings(case: Case, held: float) -> list[str]:
+def drag_warnings(case: Case, held: float) -> list[Doubt]:
     """What a drag that is constant for `held` tau costs in accuracy, in words.
 
     Empty up to 0.1 tau, with the implicit scheme up to 1 tau.
@@ -321,17 +309,19 @@ def drag_warnings(case: Case, held: float) -> list[str]:
     if held <= limit * _ROUNDING:
         return []
     if implicit:
-        return [
+        text = (
             f"implicit drag with a time step of {held:.3g} relaxation times (above {limit:g}): "
             "the difference of a fine's velocity to the fluid's turns into "
             f"{(2 - held) / (2 + held):.2g} of it each step instead of {math.exp(-held):.2g}; "
             "lower run.time_step_s to resolve it"
-        ]
+        )
+        return [Doubt("implicit-drag", text)]
     remedy = "drag.refresh_steps or " if case.drag.scheme == "held" else ""
-    return [
+    text = (
         f"drag is held for {held:.2g} of the relaxation time (above {limit:g}: a fine's velocity "
         f"is off by over 2 %): lower {remedy}run.time_step_s"
-    ]
+    )
+    return [Doubt("drag-held", text)]
 
 
 # ------------------------------------------------------------------------------------------------
@@ -349,31 +339,14 @@ def drive_in(case: InvasionCase, velocity: Velocity) -> Drive:
     """How fast the simulation is driven; a free fine outruns the fluid by its drift."""
     own = push_of(case, velocity.interstitial, velocity.pressure_gradient)
     free = own.velocity + own.drift(case.fines.radius_range_m[1])
-    return drive_of(case, own.velocity, relaxation_times(case)[1], free=free)
+    return drive_of(case, own.velocity, relaxation_times(case)[1], free)
 
 
 def relaxation_times(case: InvasionCase) -> tuple[float, float]:
     """The shortest and the longest of the fines, s; with one material smallest and largest."""
     viscosity, multiplier = case.fluid.viscosity_Pa_s, case.drag.multiplier
-    if not case.fines.measured:
-        ends = [(radius, case.fines.density_kg_m3) for radius in case.fines.radius_range_m]
-    else:
-        ends = [
-            (0.5 * diameter, one.density)
-            for one in case.fines.components
-            for diameter in (one.curve.low, one.curve.high)
-        ]
-    times = [relaxation_time(radius, density, viscosity, multiplier) for radius, density in ends]
+    times = [relaxation_time(*end, viscosity, multiplier) for end in case.fines.ends]
     return min(times), max(times)
-
-
-def pressed_in(case: InvasionCase, velocity: Velocity, drive: Drive, contact: Contact) -> Overlaps:
-    """The overlaps of fines in the `contact` of a grain and a fine, as simulated."""
-    push = push_of(case, drive.velocity, velocity.pressure_gradient, factor=drive.factor)
-    porosity = target_porosity(case)
-    pressure = drive.factor * driving_pressure(case, velocity.pressure_gradient)
-    plug = deposit_force(case, pressure, throat_width(porosity, velocity.permeability))
-    return overlaps_of(case, contact, push, porosity, deposit=plug)
 
 
 def stiff_enough(case: AnyCase) -> AnyCase:
@@ -385,22 +358,22 @@ def stiff_enough(case: AnyCase) -> AnyCase:
     """
     if case.run.stiffness_N_m != "auto":
         return case
-    soft = _with(case, DEFAULT_STIFFNESS)
+
+    def stiff(value: float) -> AnyCase:
+        run = case.run.model_copy(update={"stiffness_N_m": value})
+        return case.model_copy(update={"run": run})
+
+    soft = stiff(DEFAULT_STIFFNESS)
     if not isinstance(soft, InvasionCase):
         return soft
-    velocity = velocity_of(soft, target_porosity(soft))
-    contact = contacts_of(soft, velocity.interstitial)["grain-fine"]
-    deep = pressed_in(soft, velocity, drive_in(soft, velocity), contact)
+    porosity = target_porosity(soft)
+    flow = velocity_of(soft, porosity)
+    contact = contacts_of(soft, flow.interstitial)["grain-fine"]
+    deep = overlaps_of(soft, contact, flow, drive_in(soft, flow), porosity)
     held, struck = (1.5, 2.5) if soft.contact.model == "hertz" else (1.0, 2.0)
     raised = max(
         1.0,
         (max(deep.drag, deep.deposit) / PRESSED) ** held,
         (deep.impact / PRESSED) ** struck,
     )
-    return _with(case, two_digits_up(raised * DEFAULT_STIFFNESS))
-
-
-def _with(case: AnyCase, stiffness: float) -> AnyCase:
-    return case.model_copy(
-        update={"run": case.run.model_copy(update={"stiffness_N_m": stiffness})}
-    )
+    return stiff(two_digits_up(raised * DEFAULT_STIFFNESS))

@@ -1,13 +1,4 @@
-"""Contacts: stiffness, restitution, overlap and cohesion.
-
-Rebound in a liquid: the restitution of a contact from the impact Stokes number.
-
-The liquid film between two spheres takes the energy of the impact. Experiments with spheres and
-walls show no rebound below an impact Stokes number of about 10, and the dry restitution from about
-500 on (Joseph and others, J. Fluid Mech. 433, 329, 2001; Gondret and others, Phys. Fluids 14, 643,
-2002). exp(-35 / St) of the dry restitution follows them (Legendre and others, Phys. Fluids 17,
-097105, 2005, and Chem. Eng. Sci. 61, 3543, 2006).
-"""
+"""Contacts: stiffness, restitution, overlap, cohesion, and fines that lock between grains."""
 
 import math
 from collections.abc import Mapping
@@ -15,40 +6,9 @@ from dataclasses import dataclass
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.spheres import Spheres
-from fdnet.errors import CaseError
-from fdnet.scales.drag import Push, arrival_velocity, pore_width
-
-FILM = 35.0
-"""Stokes number at which the liquid leaves exp(-1) of the dry restitution (Legendre 2005)."""
-LEAST: Mapping[str, float] = {"hooke": 1e-6, "hertz": 0.0501}
-"""Least restitution by contact model, below which nothing is lowered further. LIGGGHTS's Hertz
-model takes 0.05 and less for an error; for linear contacts it keeps the damping ratio below 1."""
-
-
-def pair_stokes(mass: float, radius: float, velocity: float, viscosity: float) -> float:
-    """m_eff v / (6 pi mu R*^2), the impact Stokes number of a pair.
-
-    For the effective mass in kg, R* in m, the velocity of approach in m/s, and the viscosity in
-    Pa s. Of a sphere and a wall it is 2 r rho v / (9 mu) (Joseph and others 2001).
-    """
-    return mass * velocity / (6 * math.pi * viscosity * radius**2)
-
-
-def wet_ratio(dry_ratio: float, stokes: float, *, least: float) -> float:
-    """Damping ratio of a contact with exp(-35 / St) of the restitution of `dry_ratio`.
-
-    z = -ln e / sqrt(ln^2 e + pi^2), with e at least `least`.
-    """
-    log = -math.pi * dry_ratio / math.sqrt(1 - dry_ratio**2) - FILM / stokes
-    log = max(log, math.log(least))
-    return -log / math.hypot(log, math.pi)
-
-
-def is_wet(case: Case, pair: tuple[str, str]) -> bool:
-    """Whether the liquid decides the restitution of a pair."""
-    wanted = isinstance(case, InvasionCase) and case.contact.restitution == "liquid"
-    return wanted and "fine" in pair
-
+from fdnet.errors import CaseError, Doubt
+from fdnet.scales.drag import Push, arrival_velocity, pore_width, push_of, throat_width
+from fdnet.scales.flow import Drive, Velocity, driving_pressure
 
 # ------------------------------------------------------------------------------------------------
 # Hertz-Mindlin contacts in closed form, for pairs of spheres and for a sphere and a plane.
@@ -63,13 +23,10 @@ REFERENCE_OVERLAP = 0.01
 STEP_OVERLAP = 0.04
 """Overlap over the smaller diameter whose tangent stiffness sets the time step. It is three times
 the stiffness at `REFERENCE_OVERLAP`."""
-_COLLISION = 0.8 * math.sqrt(math.pi) * math.gamma(0.4) / math.gamma(0.9)
-"""Duration of a collision times v over the largest overlap, 2.943; times (15/16)^(2/5) it is the
-2.87 of the textbooks."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Elastic:
+class Moduli:
     """Elastic constants of a pair of materials, as they are used.
 
     Attributes:
@@ -81,10 +38,10 @@ class Elastic:
     shear: float
 
 
-def elastic(first: tuple[float, float], second: tuple[float, float]) -> Elastic:
+def elastic(first: tuple[float, float], second: tuple[float, float]) -> Moduli:
     """Of two materials, each with Young's modulus in Pa and Poisson's ratio."""
     (e1, nu1), (e2, nu2) = first, second
-    return Elastic(
+    return Moduli(
         modulus=1 / ((1 - nu1**2) / e1 + (1 - nu2**2) / e2),
         shear=1 / (2 * (2 - nu1) * (1 + nu1) / e1 + 2 * (2 - nu2) * (1 + nu2) / e2),
     )
@@ -127,8 +84,12 @@ def overlap_of_impact(
 
 
 def collision_time(mass: float, velocity: float, modulus: float, radius: float) -> float:
-    """2.87 (m^2 / (R* E*^2 v))^(1/5), s, of an undamped collision."""
-    return _COLLISION * overlap_of_impact(mass, velocity, modulus, radius) / velocity
+    """2.87 (m^2 / (R* E*^2 v))^(1/5), s, of an undamped collision.
+
+    Times v and over the largest overlap it is 2.943; times (15/16)^(2/5) that is 2.87.
+    """
+    constant = 0.8 * math.sqrt(math.pi) * math.gamma(0.4) / math.gamma(0.9)
+    return constant * overlap_of_impact(mass, velocity, modulus, radius) / velocity
 
 
 def rayleigh_time(radius: float, density: float, young: float, poisson: float) -> float:
@@ -150,7 +111,43 @@ def restitution_of(damping: float) -> float:
 
 
 # ------------------------------------------------------------------------------------------------
-# Contacts of pairs of materials, and linear (Hooke) ones: springs in series, viscous damping.
+# Rebound in a liquid: the restitution of a contact from the impact Stokes number.
+#
+# No rebound below an impact Stokes number of about 10, the dry restitution from about 500 on
+# (Joseph and others, J. Fluid Mech. 433, 329, 2001; Gondret and others, Phys. Fluids 14, 643,
+# 2002); exp(-35 / St) of it between them (Legendre and others, Phys. Fluids 17, 097105, 2005).
+
+
+FILM = 35.0
+"""Stokes number at which the liquid leaves exp(-1) of the dry restitution (Legendre 2005)."""
+LEAST: Mapping[str, float] = {"hooke": 1e-6, "hertz": 0.0501}
+"""Least restitution by contact model, below which nothing is lowered further. LIGGGHTS's Hertz
+model takes 0.05 and less for an error; for linear contacts it keeps the damping ratio below 1."""
+
+
+def pair_stokes(mass: float, radius: float, velocity: float, viscosity: float) -> float:
+    """m_eff v / (6 pi mu R*^2), the impact Stokes number of a pair.
+
+    For the effective mass in kg, R* in m, the velocity of approach in m/s, and the viscosity in
+    Pa s. Of a sphere and a wall it is 2 r rho v / (9 mu) (Joseph and others 2001).
+    """
+    return mass * velocity / (6 * math.pi * viscosity * radius**2)
+
+
+def wet_ratio(dry_ratio: float, stokes: float, *, least: float) -> float:
+    """Damping ratio of a contact with exp(-35 / St) of the restitution of `dry_ratio`.
+
+    z = -ln e / sqrt(ln^2 e + pi^2), with e at least `least`.
+    """
+    log = -math.pi * dry_ratio / math.sqrt(1 - dry_ratio**2) - FILM / stokes
+    log = max(log, math.log(least))
+    return -log / math.hypot(log, math.pi)
+
+
+# ------------------------------------------------------------------------------------------------
+# The contacts of a case: linear (Hooke) springs in series, or Hertz-Mindlin, viscously damped.
+#
+# Walls are of the grains' material. One factor softens all stiffnesses, or Young's moduli.
 
 
 PAIRS = (
@@ -193,7 +190,7 @@ class Contact:
     damping_rate: float
     contact_time: float
     step_limit: float
-    elastic: Elastic | None = None
+    elastic: Moduli | None = None
     stokes: float | None = None
 
     @property
@@ -213,92 +210,132 @@ def sphere_mass(radius: float, density: float) -> float:
 
 
 def mass_range(spheres: Spheres) -> tuple[float, float]:
-    """Mass of the smallest and of the largest sphere, kg."""
-    if not spheres.measured:
-        low, high = spheres.radius_range_m
-        return sphere_mass(low, spheres.density_kg_m3), sphere_mass(high, spheres.density_kg_m3)
-    ends = [
-        (
-            sphere_mass(0.5 * one.curve.low, one.density),
-            sphere_mass(0.5 * one.curve.high, one.density),
-        )
-        for one in spheres.components
-    ]
-    return min(low for low, _ in ends), max(high for _, high in ends)
+    """Mass of the lightest and of the heaviest sphere, kg."""
+    masses = [sphere_mass(radius, density) for radius, density in spheres.ends]
+    return min(masses), max(masses)
 
 
-def _nominal(case: Case) -> dict[str, tuple[float, float, float]]:
-    """Per material: normal and shear stiffness, friction. Walls are of the grains' material."""
-    table = {
-        name: (spheres.normal_stiffness_N_m, spheres.tangential_stiffness, spheres.friction)
-        for name, spheres in case.spheres.items()
-    }
-    return table | {"wall": (*table["grain"][:2], case.wall_friction)}
+def contacts_of(case: Case, velocity: float) -> dict[str, Contact]:
+    """The contact of each pair of materials, by its name, in a fluid of a velocity in m/s."""
+    contact = _hertz_contact if case.contact.model == "hertz" else _hooke_contact
+    factor = stiffness_factor(case)
+    return {"-".join(pair): contact(case, pair, factor, velocity) for pair in _pairs_of(case)}
 
 
-def pairs_of(case: Case) -> list[tuple[str, str]]:
+def stiffness_factor(case: Case) -> float:
+    """Factor from the materials' stiffness, or Young's moduli, to those that are used.
+
+    It is run.stiffness_N_m over that of the stiffest pair. With Hertz contacts pairs of a fine
+    count, those of grains only in a case without fines.
+    """
+    given, pairs = case.run.stiffness_N_m, _pairs_of(case)
+    if given == "nominal":
+        return 1.0
+    assert not isinstance(given, str)  # `stiff_enough` has put a number for "auto"
+    if case.contact.model == "hertz":
+        pairs = [pair for pair in pairs if "fine" in pair] or pairs
+        return given / max(_secant(case, pair, 1.0) for pair in pairs)
+    normal = {name: _spheres(case, name).normal_stiffness_N_m for pair in pairs for name in pair}
+    return given / max(series(normal[a], normal[b]) for a, b in pairs)
+
+
+def _pairs_of(case: Case) -> list[tuple[str, str]]:
     """Pairs of materials that may touch; walls do not touch each other."""
     return [pair for pair in PAIRS if set(pair) <= {*case.spheres, "wall"}]
 
 
-def stiffness_of(case: Case) -> float:
-    """`run.stiffness_N_m` where it is a number; `stiff_enough` has put one for "auto"."""
-    given = case.run.stiffness_N_m
-    assert not isinstance(given, str)
-    return given
+def _spheres(case: Case, name: str) -> Spheres:
+    """The spheres of a material's name, or the lighter ones of a pair of names."""
+    return case.spheres["fine" if "fine" in name else "grain"]
 
 
-def hooke_factor(case: Case) -> float:
-    """Factor on all contact stiffnesses: run.stiffness_N_m over that of the stiffest pair."""
-    if case.run.stiffness_N_m == "nominal":
-        return 1.0
-    nominal = _nominal(case)
-    return stiffness_of(case) / max(
-        series(nominal[a][0], nominal[b][0]) for a, b in pairs_of(case)
-    )
-
-
-def hooke_contacts(case: Case, velocity: float) -> dict[str, Contact]:
-    """The linear contact of each pair of materials, in a fluid of a velocity in m/s."""
-    return {f"{a}-{b}": _contact(case, (a, b), velocity) for a, b in pairs_of(case)}
-
-
-def _contact(case: Case, pair: tuple[str, str], velocity: float) -> Contact:
-    nominal, factor = _nominal(case), hooke_factor(case)
-    first, second = pair
-    normal = factor * series(nominal[first][0], nominal[second][0])
-    damping, stokes = damping_and_stokes(case, pair, velocity)
-    frequency = math.sqrt(normal / effective_mass(case, pair))
-    lightest = case.spheres["fine" if "fine" in pair else "grain"]
+def _hooke_contact(case: Case, pair: tuple[str, str], factor: float, velocity: float) -> Contact:
+    first, second = (_spheres(case, name) for name in pair)
+    normal = factor * series(first.normal_stiffness_N_m, second.normal_stiffness_N_m)
+    damping, stokes = _damping_and_stokes(case, pair, velocity)
+    frequency = math.sqrt(normal / _effective_mass(case, pair))
     return Contact(
-        pair=f"{first}-{second}",
+        pair="-".join(pair),
         normal_stiffness=normal,
-        shear_stiffness=factor * series(nominal[first][1], nominal[second][1]),
-        friction=min(nominal[first][2], nominal[second][2]),
+        shear_stiffness=factor * series(first.tangential_stiffness, second.tangential_stiffness),
+        friction=_friction(case, pair),
         damping_ratio=damping,
         damping_rate=2 * damping * frequency,
         contact_time=math.pi / (frequency * math.sqrt(1 - damping**2)),
-        step_limit=math.sqrt(mass_range(lightest)[0] / normal),
+        step_limit=math.sqrt(mass_range(_spheres(case, "".join(pair)))[0] / normal),
         stokes=stokes,
     )
 
 
-def damping_and_stokes(
+def _hertz_contact(case: Case, pair: tuple[str, str], factor: float, velocity: float) -> Contact:
+    lighter = _spheres(case, "".join(pair))
+    constants, mass = pair_elastic(case, pair, factor), _effective_mass(case, pair)
+    radius = pair_radius(case, pair, lighter.mean_radius_m)
+    overlap = REFERENCE_OVERLAP * 2 * lighter.mean_radius_m
+    normal = _secant(case, pair, factor)
+    damping, stokes = _damping_and_stokes(case, pair, velocity)
+    least = lighter.radius_range_m[0]
+    stiffest = 1.5 * secant_stiffness(
+        constants.modulus, pair_radius(case, pair, least), STEP_OVERLAP * 2 * least
+    )
+    return Contact(
+        pair="-".join(pair),
+        normal_stiffness=normal,
+        shear_stiffness=tangential_stiffness(constants.shear, radius, overlap),
+        friction=_friction(case, pair),
+        damping_ratio=damping,
+        damping_rate=2 * damping * math.sqrt(1.25 * normal / mass),
+        contact_time=collision_time(mass, velocity, constants.modulus, radius),
+        step_limit=math.sqrt(mass_range(lighter)[0] / stiffest),
+        elastic=constants,
+        stokes=stokes,
+    )
+
+
+def _secant(case: Case, pair: tuple[str, str], factor: float) -> float:
+    """Force over overlap at the reference overlap, N/m, of spheres of mean size."""
+    radius = _spheres(case, "".join(pair)).mean_radius_m
+    return secant_stiffness(
+        pair_elastic(case, pair, factor).modulus,
+        pair_radius(case, pair, radius),
+        REFERENCE_OVERLAP * 2 * radius,
+    )
+
+
+def _friction(case: Case, pair: tuple[str, str]) -> float:
+    """The smaller friction of the two materials."""
+    return min(
+        case.wall_friction if name == "wall" else case.spheres[name].friction for name in pair
+    )
+
+
+def _damping_and_stokes(
     case: Case, pair: tuple[str, str], velocity: float
 ) -> tuple[float, float | None]:
-    """Damping ratio of a contact, and the impact Stokes number where that decides it.
+    """Damping ratio of a contact, and the impact Stokes number where the liquid decides it.
 
     Dry it is the mean of the two materials, a wall taking the sphere's. `velocity` is the fluid's,
     m/s.
     """
     spheres = [case.spheres[name] for name in pair if name != "wall"]
     dry = sum(one.damping_ratio for one in spheres) / len(spheres)
-    if not is_wet(case, pair):
+    if "fine" not in pair or case.contact.restitution != "liquid":
         return dry, None
     radius = pair_radius(case, pair, case.spheres["fine"].mean_radius_m)
-    mass = effective_mass(case, pair)
+    mass = _effective_mass(case, pair)
     stokes = pair_stokes(mass, radius, velocity, case.fluid.viscosity_Pa_s)
     return wet_ratio(dry, stokes, least=LEAST[case.contact.model]), stokes
+
+
+def material_of(case: Case, name: str, factor: float) -> tuple[float, float]:
+    """Young's modulus, Pa, times `factor`, and Poisson's ratio."""
+    spheres = _spheres(case, name)
+    return factor * spheres.youngs_modulus_Pa, spheres.poissons_ratio
+
+
+def pair_elastic(case: Case, pair: tuple[str, str], factor: float) -> Moduli:
+    """Elastic constants of a pair of materials, softened by `factor`."""
+    return elastic(material_of(case, pair[0], factor), material_of(case, pair[1], factor))
 
 
 def pair_radius(case: Case, pair: tuple[str, str], radius: float) -> float:
@@ -309,113 +346,18 @@ def pair_radius(case: Case, pair: tuple[str, str], radius: float) -> float:
     return joint_radius(radius, case.grains.mean_radius_m if mixed else radius)
 
 
-def effective_mass(case: Case, pair: tuple[str, str]) -> float:
+def _effective_mass(case: Case, pair: tuple[str, str]) -> float:
     """m1 m2 / (m1 + m2) of a typical contact, kg.
 
     Walls have infinite mass, and fixed grains too while fines invade; so it is in LIGGGHTS.
     """
     fixed = {"wall", "grain"} if "fine" in pair and case.grains.motion == "fixed" else {"wall"}
-    return 1 / sum(0.0 if name in fixed else _inverse_mass(case.spheres[name]) for name in pair)
-
-
-def _inverse_mass(spheres: Spheres) -> float:
-    return 1 / sphere_mass(spheres.mean_radius_m, spheres.mean_density_kg_m3)
-
-
-# ------------------------------------------------------------------------------------------------
-# Hertz-Mindlin contacts of a case: moduli, softened by one factor, and their stable step.
-
-
-def hertz_contacts(case: Case, velocity: float) -> dict[str, Contact]:
-    """The Hertz-Mindlin contact of each pair of materials, in a fluid of a velocity in m/s."""
-    factor = hertz_factor(case)
-    return {f"{a}-{b}": _hertz_contact(case, (a, b), factor, velocity) for a, b in pairs_of(case)}
-
-
-def hertz_factor(case: Case) -> float:
-    """Factor on all Young's moduli: run.stiffness_N_m over the stiffness of the stiffest pair.
-
-    Pairs of a fine count, those of grains only in a case without fines.
-    """
-    if case.run.stiffness_N_m == "nominal":
-        return 1.0
-    pairs = [pair for pair in pairs_of(case) if "fine" in pair] or pairs_of(case)
-    return stiffness_of(case) / max(_stiffness(case, pair, 1.0) for pair in pairs)
-
-
-def material_of(case: Case, name: str, factor: float) -> tuple[float, float]:
-    """Young's modulus, Pa, times `factor`, and Poisson's ratio; walls are of grains' material."""
-    spheres = case.spheres["grain" if name == "wall" else name]
-    return factor * spheres.youngs_modulus_Pa, spheres.poissons_ratio
-
-
-def pair_elastic(case: Case, pair: tuple[str, str], factor: float) -> Elastic:
-    """Elastic constants of a pair of materials, softened by `factor`."""
-    return elastic(material_of(case, pair[0], factor), material_of(case, pair[1], factor))
-
-
-def _lighter(pair: tuple[str, str]) -> str:
-    return "fine" if "fine" in pair else "grain"
-
-
-def _stiffness(case: Case, pair: tuple[str, str], factor: float) -> float:
-    """Force over overlap at the reference overlap, N/m, of spheres of mean size."""
-    radius = case.spheres[_lighter(pair)].mean_radius_m
-    return secant_stiffness(
-        pair_elastic(case, pair, factor).modulus,
-        pair_radius(case, pair, radius),
-        REFERENCE_OVERLAP * 2 * radius,
-    )
-
-
-def tangent_stiffness(case: Case, pair: tuple[str, str], factor: float, overlap: float) -> float:
-    """dF/d(delta), N/m, of the smallest sphere at an overlap over its diameter."""
-    radius = case.spheres[_lighter(pair)].radius_range_m[0]
-    return 1.5 * secant_stiffness(
-        pair_elastic(case, pair, factor).modulus,
-        pair_radius(case, pair, radius),
-        overlap * 2 * radius,
-    )
-
-
-def _hertz_contact(case: Case, pair: tuple[str, str], factor: float, velocity: float) -> Contact:
-    lighter = case.spheres[_lighter(pair)]
-    constants, mass = pair_elastic(case, pair, factor), effective_mass(case, pair)
-    radius = pair_radius(case, pair, lighter.mean_radius_m)
-    overlap = REFERENCE_OVERLAP * 2 * lighter.mean_radius_m
-    normal = _stiffness(case, pair, factor)
-    damping, stokes = damping_and_stokes(case, pair, velocity)
-    stiffest = tangent_stiffness(case, pair, factor, STEP_OVERLAP)
-    frictions = [
-        case.wall_friction if name == "wall" else case.spheres[name].friction for name in pair
-    ]
-    return Contact(
-        pair="-".join(pair),
-        normal_stiffness=normal,
-        shear_stiffness=tangential_stiffness(constants.shear, radius, overlap),
-        friction=min(frictions),
-        damping_ratio=damping,
-        damping_rate=2 * damping * math.sqrt(1.25 * normal / mass),
-        contact_time=collision_time(mass, velocity, constants.modulus, radius),
-        step_limit=math.sqrt(mass_range(lighter)[0] / stiffest),
-        elastic=constants,
-        stokes=stokes,
-    )
-
-
-# ------------------------------------------------------------------------------------------------
-# The contacts of a case by its contact model.
-
-
-def contacts_of(case: Case, velocity: float) -> dict[str, Contact]:
-    """The contact of each pair of materials, by its name, in a fluid of a velocity in m/s."""
-    contacts = hertz_contacts if case.contact.model == "hertz" else hooke_contacts
-    return contacts(case, velocity)
-
-
-def stiffness_factor(case: Case) -> float:
-    """Factor from the materials' stiffness, or moduli, to those that are used."""
-    return hertz_factor(case) if case.contact.model == "hertz" else hooke_factor(case)
+    inverse = 0.0
+    for name in pair:
+        if name not in fixed:
+            one = case.spheres[name]
+            inverse += 1 / sphere_mass(one.mean_radius_m, one.mean_density_kg_m3)
+    return 1 / inverse
 
 
 # ------------------------------------------------------------------------------------------------
@@ -438,7 +380,7 @@ class Overlaps:
     Attributes:
         drag: by drag and pressure gradient F on a fine at rest: F / k, or by Hertz.
         impact: by a fine that arrives at its fastest velocity w: w sqrt(m / k), or by Hertz.
-        deposit: where the flow follows the deposit, by `deposit_force`; 0 in the uniform field.
+        deposit: where the flow follows the deposit, by the force of the pressure on it; else 0.
     """
 
     drag: float
@@ -446,26 +388,21 @@ class Overlaps:
     deposit: float
 
 
-def deposit_force(case: InvasionCase, pressure: float, throat: float) -> float:
-    """Largest force, N, on a fine of a deposit that takes up all the `pressure` Pa.
-
-    The pressure acts on the section of a throat, of the width `throat` m. Contacts hand the forces
-    on to each other, so that some bear several times as much (`LARGEST_CHAIN`). The uniform field
-    knows of no such pressure: 0.
-    """
-    if case.drag.field != "network":
-        return 0.0
-    return LARGEST_CHAIN * pressure * math.pi / 4.0 * throat**2
-
-
 def overlaps_of(
-    case: InvasionCase, contact: Contact, push: Push, porosity: float, *, deposit: float
+    case: InvasionCase, contact: Contact, flow: Velocity, drive: Drive, porosity: float
 ) -> Overlaps:
-    """The overlaps in the `contact` of a grain and a fine, in a pack of a porosity.
+    """The overlaps in the `contact` of a grain and a fine, as simulated, in a pack of a porosity.
 
-    A fine comes with the fluid and gains speed by the pressure gradient across a pore. In a
-    deposit it bears the force `deposit`, N.
+    A fine comes with the fluid and gains speed by the pressure gradient across a pore. A deposit
+    takes up all the pressure, which acts on the section of a throat; contacts hand the forces on
+    to each other, so that some bear several times as much (`LARGEST_CHAIN`).
     """
+    push = push_of(case, drive.velocity, flow.pressure_gradient, factor=drive.factor)
+    deposit = 0.0
+    if case.drag.field == "network":
+        pressure = drive.factor * driving_pressure(case, flow.pressure_gradient)
+        throat = throat_width(porosity, flow.permeability)
+        deposit = LARGEST_CHAIN * pressure * math.pi / 4.0 * throat**2
     radius, mass = case.fines.radius_range_m[1], mass_range(case.fines)[1]
     width = pore_width(porosity, case.grains.sauter_diameter_m)
     lightest = min(one.density for one in case.fines.components)
@@ -483,53 +420,16 @@ def overlaps_of(
     )
 
 
-def overlap_warnings(case: InvasionCase, overlaps: Overlaps) -> list[str]:
+def overlap_warnings(case: InvasionCase, overlaps: Overlaps) -> list[Doubt]:
     """Overlaps above `run.max_overlap`, in words.
 
     Raises CaseError when one of them alone would press a fine half through a grain.
     """
-    _refuse_deep(overlaps)
-    return _deposit_warnings(case, overlaps.deposit) + [
-        f"predicted overlap under {name} is {100 * getattr(overlaps, name):.2g} % of a fine's "
-        f"diameter (above run.max_overlap, {100 * case.run.max_overlap:.3g} %): raise "
-        "run.stiffness_N_m"
-        for name in ("impact", "drag")
-        if getattr(overlaps, name) > case.run.max_overlap
-    ]
-
-
-def _deposit_warnings(case: InvasionCase, overlap: float) -> list[str]:
-    """A deposit that presses its fines too deep into each other, with the stiffness it needs."""
-    if overlap <= case.run.max_overlap:
-        return []
-    hertz = case.contact.model == "hertz"
-    raised = (overlap / case.run.max_overlap) ** (1.5 if hertz else 1.0)
-    given = case.run.stiffness_N_m
-    remedy = (
-        "; the materials are too soft for this pressure"
-        if given == "nominal"
-        else f": set run.stiffness_N_m = {two_digits_up(raised * given):g}, or 'auto'"
-    )
-    return [
-        f"predicted overlap of fines that hold the whole pressure is {100 * overlap:.2g} % of a "
-        f"fine's diameter (above run.max_overlap, {100 * case.run.max_overlap:.3g} %){remedy}"
-    ]
-
-
-def two_digits_up(value: float) -> float:
-    """The next number of two digits that is not below `value`, above 0."""
-    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
-    return math.ceil(value / unit - 1e-9) * unit
-
-
-def _refuse_deep(overlaps: Overlaps) -> None:
-    """Raises CaseError when one of them alone would press a fine half through a grain."""
-    remedies = {
+    for name, remedy in {
         "drag": "drag.multiplier, fluid.viscosity_cP or fluid.velocity_m_s",
         "impact": "the velocity (fluid.velocity_m_s)",
         "deposit": "the pressure (fluid.overbalance_MPa, fluid.velocity_m_s)",
-    }
-    for name, remedy in remedies.items():
+    }.items():
         overlap = getattr(overlaps, name)
         if overlap > MOST_OVERLAP:
             raise CaseError(
@@ -537,6 +437,31 @@ def _refuse_deep(overlaps: Overlaps) -> None:
                 f"diameter into a grain (limit {100 * MOST_OVERLAP:.0f} %); set it to "
                 f"'auto', raise it, or lower {remedy}"
             )
+    limit, warnings = case.run.max_overlap, []
+    above = f"of a fine's diameter (above run.max_overlap, {100 * limit:.3g} %)"
+    if overlaps.deposit > limit:
+        given, power = case.run.stiffness_N_m, 1.5 if case.contact.model == "hertz" else 1.0
+        if isinstance(given, str):
+            remedy = "; the materials are too soft for this pressure"
+        else:
+            enough = two_digits_up((overlaps.deposit / limit) ** power * given)
+            remedy = f": set run.stiffness_N_m = {enough:g}, or 'auto'"
+        text = (
+            "predicted overlap of fines that hold the whole pressure is "
+            f"{100 * overlaps.deposit:.2g} % {above}{remedy}"
+        )
+        warnings.append(Doubt("pressure-on-the-deposit", text))
+    for name, overlap in (("impact", overlaps.impact), ("drag", overlaps.drag)):
+        if overlap > limit:
+            text = f"predicted overlap under {name} is {100 * overlap:.2g} % {above}"
+            warnings.append(Doubt("predicted-overlap", f"{text}: raise run.stiffness_N_m"))
+    return warnings
+
+
+def two_digits_up(value: float) -> float:
+    """The next number of two digits that is not below `value`, above 0."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return math.ceil(value / unit - 1e-9) * unit
 
 
 # ------------------------------------------------------------------------------------------------
@@ -581,12 +506,12 @@ def pull_off_of(case: InvasionCase, contact: Contact) -> PullOff:
     return pull_off(density, contact.elastic.modulus, joint)
 
 
-def cohesion_warnings(case: InvasionCase, contact: Contact) -> list[str]:
+def cohesion_warnings(case: InvasionCase, contact: Contact) -> list[Doubt]:
     """A resting overlap above `run.max_overlap`, in words.
 
     Raises CaseError when cohesion alone would draw a fine half into a grain.
     """
-    share = _resting_share(case, contact)
+    share = pull_off_of(case, contact).resting / (2 * case.fines.radius_range_m[1])
     if share > MOST_OVERLAP:
         raise CaseError(
             f"contact.cohesion_J_m3: {case.contact.cohesion_J_m3:g} draws a fine "
@@ -595,31 +520,21 @@ def cohesion_warnings(case: InvasionCase, contact: Contact) -> list[str]:
         )
     if share <= case.run.max_overlap:
         return []
-    return [
+    text = (
         f"cohesion draws a fine {100 * share:.2g} % of its diameter into a grain (above "
         f"run.max_overlap, {100 * case.run.max_overlap:.3g} %): lower contact.cohesion_J_m3 or "
         "raise run.stiffness_N_m"
-    ]
-
-
-def _resting_share(case: InvasionCase, contact: Contact) -> float:
-    return pull_off_of(case, contact).resting / (2 * case.fines.radius_range_m[1])
+    )
+    return [Doubt("cohesion", text)]
 
 
 # ------------------------------------------------------------------------------------------------
 # Whether fines lock in the groove between two grains, from which the fluid should roll them.
 #
-# A fine that rolls around the neck of two grains sits in a groove whose sides have the slope
-# t = sqrt((1 + q)^2 - 1), q the radius of the fine over that of the grain. Friction f can hold it
-# there only if f > t. Two things press it in. Both need a stiff tangential spring:
-#
-# - The spring itself. The normal springs throw back a fine that ran into the groove, until the
-#   tangential ones hold it. Where both balance, the fine is still pressed in if k_t / k_n > f t
-#   (derived in docs/physics.md, section 1).
-# - LIGGGHTS's integrator. It adds the slip of half a step ago along the normal of now, so a fine
-#   that turns about the neck gains a slip that did not happen (Vyas and others, Comput. Phys.
-#   Commun. 310, 109524). In a quarter turn the force of it is F' = (pi/4) k_t v dt, with the time
-#   step dt and the velocity v of the fine.
+# Friction can hold a fine in the groove at the neck of two grains only if it is above the slope of
+# its sides. Two things press it in, and both need a stiff tangential spring (docs/physics.md,
+# section 1): the spring itself, if k_t / k_n > f t, and LIGGGHTS's integrator, which adds the slip
+# of half a step ago along the normal of now (Vyas and others, Comput. Phys. Commun. 310, 109524).
 
 
 MOST_FALSE_FORCE = 0.5
@@ -705,30 +620,30 @@ def sticking_of(case: InvasionCase, contact: Contact, push: Push, step: float) -
     )
 
 
-def sticking_warnings(sticking: Sticking) -> list[str]:
+def sticking_warnings(sticking: Sticking) -> list[Doubt]:
     """Fines that may lock between grains, in words; empty when none do."""
-    if not (sticking.by_springs or sticking.by_integrator):
-        return []
-    who = (
+    text = (
         f"fines of 1/{1 / sticking.size_ratio:.3g} of a grain may lock between grains: friction "
         f"{sticking.friction:g} (above the slope {sticking.slope:.2g} of the groove), "
-        f"push F/(k r) {sticking.push:.1e}"
+        f"push F/(k r) {sticking.push:.1e}, "
     )
     if sticking.by_springs:
-        most = sticking.friction * sticking.slope
         remedy = (
             "leave out grains.shear_stiffness_N_m and fines.shear_stiffness_N_m"
             if sticking.linear
             else "take contact.model = 'hooke'"
         )
-        return [
-            f"{who}, tangential over normal stiffness {sticking.shear_ratio:.2g} (above "
-            f"{most:.2g}): {remedy}, or lower friction to {sticking.slope:.2g}"
-        ]
-    excess = sticking.false_force / MOST_FALSE_FORCE
-    return [
-        f"{who}, false force of the integrator over the push {sticking.false_force:.2g} (above "
-        f"{MOST_FALSE_FORCE:g}): divide run.time_step_factor by {excess:.2g}, or "
-        f"run.stiffness_N_m by {excess**2:.2g} as far as overlaps allow, or lower friction to "
-        f"{sticking.slope:.2g}"
-    ]
+        text += (
+            f"tangential over normal stiffness {sticking.shear_ratio:.2g} (above "
+            f"{sticking.friction * sticking.slope:.2g}): {remedy}"
+        )
+    elif sticking.by_integrator:
+        excess = sticking.false_force / MOST_FALSE_FORCE
+        text += (
+            f"false force of the integrator over the push {sticking.false_force:.2g} (above "
+            f"{MOST_FALSE_FORCE:g}): divide run.time_step_factor by {excess:.2g}, or "
+            f"run.stiffness_N_m by {excess**2:.2g} as far as overlaps allow"
+        )
+    else:
+        return []
+    return [Doubt("fines-lock", f"{text}, or lower friction to {sticking.slope:.2g}")]

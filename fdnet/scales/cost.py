@@ -78,40 +78,27 @@ def cost_of(case: Case, scales: Scales) -> Cost:
     python = START_SECONDS + REPORT_SECONDS
     if not isinstance(case, InvasionCase) or not isinstance(scales, InvasionScales):
         return Cost(pack_seconds=pack, analyse_seconds=python + grains * SPHERE_SECONDS)
-    duration = expected_duration(case, scales)
+    duration, drag = expected_duration(case, scales), case.drag
     steps = math.ceil(duration / scales.time_step)
     feeding = scales.slab_length / scales.upstream_velocity
     fines = scales.supplied_count * present_share(case, duration=duration, feeding=feeding)
-    updates = _updates(case, scales, duration) * _update_seconds(case, grains + fines)
+    updates = 0.0
+    if drag.coupled:  # the travel of the fluid over that of one update
+        falling = FALLING_RATE if drag.field == "network" else 1.0
+        way = falling * scales.drive_velocity * duration
+        count = way / (drag.travel_diameters * 2 * case.fines.radius_range_m[0])
+        least, each = UPDATE_SECONDS[drag.field]
+        updates = count * (least + each * (grains + fines))
+    grain = MOVING_GRAIN_SECONDS if case.grains.motion == "mobile" else FIXED_GRAIN_SECONDS
+    fine = FINE_SECONDS[drag.scheme] * (1 + fines / (fines + CACHED_FINES))
     return Cost(
         pack_seconds=pack,
-        invade_seconds=steps * _step_seconds(case, grains, fines) + updates,
+        invade_seconds=steps * (STEP_SECONDS + grains * grain + fines * fine) + updates,
         update_seconds=updates,
         analyse_seconds=python + (grains + fines) * SPHERE_SECONDS,
         steps=steps,
         duration=duration,
     )
-
-
-def _step_seconds(case: InvasionCase, grains: int, fines: float) -> float:
-    grain = MOVING_GRAIN_SECONDS if case.grains.motion == "mobile" else FIXED_GRAIN_SECONDS
-    fine = FINE_SECONDS[case.drag.scheme] * (1 + fines / (fines + CACHED_FINES))
-    return STEP_SECONDS + grains * grain + fines * fine
-
-
-def _updates(case: InvasionCase, scales: InvasionScales, duration: float) -> float:
-    """Updates of the forces that fdnet computes: the travel of the fluid over that of one."""
-    if not case.drag.coupled:
-        return 0.0
-    travel = case.drag.travel_diameters
-    falling = FALLING_RATE if case.drag.field == "network" else 1.0
-    way = falling * scales.drive_velocity * duration
-    return way / (travel * 2 * case.fines.radius_range_m[0])
-
-
-def _update_seconds(case: InvasionCase, spheres: float) -> float:
-    least, each = UPDATE_SECONDS[case.drag.field]
-    return least + each * spheres
 
 
 def expected_duration(case: InvasionCase, scales: InvasionScales) -> float:
@@ -165,23 +152,18 @@ def over_limit(case: Case, scales: Scales, *, pack: bool = True, invade: bool = 
             f"{refusal}, most of it packing {grain_count(case):.3g} grains: take a smaller box, "
             "or raise run.max_hours"
         )
-    reason, remedy = _step_reason(case, scales)
+    sound = case.run.time_step_factor * contact_step(case, scales.contacts)
+    if case.run.time_step_s is not None:
+        reason, remedy = "as given", "raise run.time_step_s"
+    elif scales.time_step < 0.999 * sound:
+        reason, remedy = "a tenth of the drag relaxation time", "take drag.scheme = 'implicit'"
+    else:
+        stiffness = max(contact.normal_stiffness for contact in scales.contacts.values())
+        reason = f"set by contacts of {stiffness:.3g} N/m"
+        remedy = "lower run.stiffness_N_m (the time goes with its square root)"
     return (
         f"{refusal}: {cost.steps:.3g} steps of {scales.time_step:.3g} s ({reason}) with "
         f"{scales.supplied_count} fines and {grain_count(case)} {case.grains.motion} grains: "
         f"{remedy}, supply fewer fines, shorten run.duration_ms or run.cap_ms, or raise "
         "run.max_hours"
-    )
-
-
-def _step_reason(case: Case, scales: InvasionScales) -> tuple[str, str]:
-    """What sets the time step, and what would make it longer."""
-    if case.run.time_step_s is not None:
-        return "as given", "raise run.time_step_s"
-    if scales.time_step < 0.999 * case.run.time_step_factor * contact_step(case, scales.contacts):
-        return "a tenth of the drag relaxation time", "take drag.scheme = 'implicit'"
-    stiffness = max(contact.normal_stiffness for contact in scales.contacts.values())
-    return (
-        f"set by contacts of {stiffness:.3g} N/m",
-        "lower run.stiffness_N_m (the time goes with its square root)",
     )

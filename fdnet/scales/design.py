@@ -1,6 +1,7 @@
-"""A case from a sand and a mud (`fdnet init`).
+"""A case from a sand, a mud and a well (`fdnet init`): how it is sized, and its file with reasons.
 
-What an engineer knows of a sand, a mud and a well, as it is written: with its units.
+The answers are texts with their units by the keys of `QUESTIONS`, and `name`, `sand_file` and
+`mud_file`.
 """
 
 import json
@@ -8,10 +9,9 @@ import math
 import re
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,73 +26,15 @@ from fdnet.scales.drag import MOST_REYNOLDS, STOKES_REYNOLDS, throat_width
 from fdnet.scales.flow import carman_kozeny
 from fdnet.scales.pack import grain_count
 from fdnet.scales.questions import QUESTIONS, Question, by_options
-from fdnet.scales.scales import InvasionScales, scales_of
+from fdnet.scales.scales import InvasionScales, invasion_scales
 from fdnet.sizes import SizeCurve
 
-DIAMETERS = ("D10", "D50", "D90")
+Answers = Mapping[str, str]
+ASSUMED = {"mud_d10": 0.5, "mud_d90": 2.0}
+"""Diameters of the mud over its median where they are not given."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Curve:
-    """A curve of sizes as it is given.
-
-    Attributes:
-        diameters: texts such as "0.25 mm" by the names of `DIAMETERS`.
-        file: path of a CSV file instead, as seen from the case file; empty without one.
-    """
-
-    diameters: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
-    file: str = ""
-
-    @property
-    def table(self) -> dict[str, Any]:
-        """The keys of the table `sizes`."""
-        return {"file": self.file} if self.file else dict(self.diameters)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Answers:
-    """A sand, a mud and a well. Every value is a text with its unit.
-
-    Attributes:
-        name: of the case.
-        sand: sizes of the grains.
-        porosity: of the sand.
-        mud: sizes of the solids.
-        assumed_spread: whether D10 and D90 of the mud were made up from its D50.
-        solids: by volume, "5 %", or in mass a volume of mud, "25 lb/bbl".
-        solids_density: of the solids.
-        viscosity: of the liquid.
-        liquid_density: of the liquid.
-        overbalance: pressure of the mud above that of the formation.
-        well_radius: to the formation face.
-        drainage_radius: at which the pressure is that of the formation.
-        formation_permeability: of the formation; empty: that of the pack.
-    """
-
-    name: str
-    sand: Curve
-    porosity: str
-    mud: Curve
-    assumed_spread: bool
-    solids: str
-    solids_density: str
-    viscosity: str
-    liquid_density: str
-    overbalance: str
-    well_radius: str
-    drainage_radius: str
-    formation_permeability: str = ""
-
-    @property
-    def solids_key(self) -> str:
-        """The key of the case that takes the solids: a share, or a mass."""
-        return "concentration" if self.solids.rstrip().endswith("%") else "solids"
-
-
-def filled(
-    given: Mapping[str, str], ask: Callable[[Question, str], str | None] | None
-) -> dict[str, str]:
+def filled(given: Answers, ask: Callable[[Question, str], str | None] | None) -> dict[str, str]:
     """The answers with what is missing asked for, or with defaults.
 
     Args:
@@ -107,15 +49,13 @@ def filled(
     for question in QUESTIONS:
         if answers.get(f"{question.group}_file"):
             continue
-        text = _read(question, answers.get(question.key, ""))
-        problem = question.problem(text) if text else ""
+        text, problem = question.read(answers.get(question.key, ""))
         while ask is not None and (problem or not text):
             reply = ask(question, problem)
             if reply is None:
                 ask = None
                 break
-            text = _read(question, reply or question.default or "")
-            problem = question.problem(text) if text else ""
+            text, problem = question.read(reply or question.default or "")
             if not reply and question.default is not None:
                 break
         answers[question.key] = text or question.default or ""
@@ -134,59 +74,24 @@ def filled(
     return answers
 
 
-def _read(question: Question, text: str) -> str:
-    """An answer as it is read: shares also as a number between 0 and 1."""
-    return _share(text.strip()) if "%" in question.unit else text.strip()
+def _assumed(answers: Answers) -> dict[str, float]:
+    """The diameters of the mud that are made up from its median, and their factors."""
+    if answers.get("mud_file"):
+        return {}
+    default = {question.key: question.default for question in QUESTIONS}
+    return {key: factor for key, factor in ASSUMED.items() if answers[key] == default[key]}
 
 
-def answers_of(name: str, texts: Mapping[str, str]) -> Answers:
-    """The answers from texts that `filled` has read."""
-    mud, assumed = _mud(texts)
-    return Answers(
-        name=name,
-        sand=_curve("sand", texts),
-        porosity=texts["porosity"],
-        mud=mud,
-        assumed_spread=assumed,
-        solids=texts["solids"],
-        **{
-            key: texts[key]
-            for key in (
-                *("solids_density", "viscosity", "liquid_density", "overbalance"),
-                *("well_radius", "drainage_radius", "formation_permeability"),
-            )
-        },
-    )
-
-
-def _curve(group: str, texts: Mapping[str, str]) -> Curve:
-    file = texts.get(f"{group}_file", "")
-    return Curve(
-        file=file,
-        diameters={} if file else {name: texts[f"{group}_{name.lower()}"] for name in DIAMETERS},
-    )
-
-
-def _mud(texts: Mapping[str, str]) -> tuple[Curve, bool]:
-    """The solids; a D10 or D90 that is not given is half or twice the D50."""
-    if texts.get("mud_file"):
-        return _curve("mud", texts), False
+def _curve(group: str, answers: Answers) -> dict[str, Any]:
+    """The table `sizes` of the sand or the mud."""
+    if answers.get(f"{group}_file"):
+        return {"file": answers[f"{group}_file"]}
     made_up = {
-        question.key: factor
-        for question, factor in zip(QUESTIONS[5:7], (0.5, 2.0), strict=True)
-        if texts[question.key] == question.default
+        key: f"{factor * converted(answers['mud_d50'], '_um'):g} um"
+        for key, factor in (_assumed(answers) if group == "mud" else {}).items()
     }
-    median = converted(texts["mud_d50"], "_um")
-    spread = {key: f"{factor * median:g} um" for key, factor in made_up.items()}
-    return _curve("mud", {**texts, **spread}), bool(made_up)
-
-
-def _share(text: str) -> str:
-    """A share between 0 and 1 as a percentage, "0.38" as "38 %"; anything else as it is."""
-    try:
-        return f"{100 * float(text):g} %" if 0 < float(text) < 1 else text
-    except ValueError:
-        return text
+    texts = {**answers, **made_up}
+    return {name: texts[f"{group}_{name.lower()}"] for name in ("D10", "D50", "D90")}
 
 
 # ------------------------------------------------------------------------------------------------
@@ -197,8 +102,7 @@ PLUG_RATE = 0.05
 """Share of the supply that still enters a plugged face."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Budget:
+class Budget(NamedTuple):
     """How large a specimen may be, and how long it may take.
 
     Attributes:
@@ -215,8 +119,8 @@ class Budget:
 
 
 BUDGETS = {
-    "quick": Budget(name="quick", width=5.0, length=8.0, seconds=600.0),
-    "standard": Budget(name="standard", width=8.0, length=10.0, seconds=4 * 3600.0),
+    "quick": Budget("quick", width=5.0, length=8.0, seconds=600.0),
+    "standard": Budget("standard", width=8.0, length=10.0, seconds=4 * 3600.0),
 }
 
 
@@ -258,7 +162,7 @@ class Design:
     """A case with the reasons for its sizes.
 
     Attributes:
-        answers: what was given.
+        answers: what was given, by key.
         choice: what fdnet chose.
         case: the two together.
         scales: of the case.
@@ -276,34 +180,36 @@ class Design:
 
 def tables_of(answers: Answers, choice: Choice) -> dict[str, Any]:
     """The tables of the case file."""
-    drive = {"drive_velocity_m_s": "auto"} if choice.driven else {}
-    inertia = {"inertia": "schiller-naumann"} if choice.inertia else {}
     kept = {"cut_percent": [1.0, choice.mud_cut]} if choice.mud_cut != 99.0 else {}
     sand = {"cut_percent": [choice.sand_cut, 99.0]} if choice.sand_cut != 1.0 else {}
-    known = answers.formation_permeability
+    known = answers["formation_permeability"]
+    solids = "concentration" if answers["solids"].rstrip().endswith("%") else "solids"
     return {
-        "name": answers.name,
+        "name": answers["name"],
         "seed": 1,
         "box": {"size": [mm(choice.length), mm(choice.width), mm(choice.width)]},
-        "grains": {"sizes": answers.sand.table | sand, "porosity": answers.porosity},
+        "grains": {"sizes": _curve("sand", answers) | sand, "porosity": answers["porosity"]},
         "fines": {
-            "sizes": answers.mud.table | kept,
+            "sizes": _curve("mud", answers) | kept,
             **({"cut": um(choice.cut)} if choice.cut else {}),
-            answers.solids_key: answers.solids,
-            "density": answers.solids_density,
+            solids: answers["solids"],
+            "density": answers["solids_density"],
             "slab": mm(choice.slab),
         },
         "fluid": {
-            "viscosity": answers.viscosity,
-            "density": answers.liquid_density,
-            "overbalance": answers.overbalance,
+            "viscosity": answers["viscosity"],
+            "density": answers["liquid_density"],
+            "overbalance": answers["overbalance"],
         },
         "well": {
-            "radius": answers.well_radius,
-            "drainage_radius": answers.drainage_radius,
+            "radius": answers["well_radius"],
+            "drainage_radius": answers["drainage_radius"],
             **({"formation_permeability": known} if known else {}),
         },
-        "drag": drive | inertia,
+        "drag": {
+            **({"drive_velocity_m_s": "auto"} if choice.driven else {}),
+            **({"inertia": "schiller-naumann"} if choice.inertia else {}),
+        },
         "run": {
             "stiffness": f"{choice.stiffness:g} N/m",
             "plug_rate": PLUG_RATE,
@@ -344,8 +250,11 @@ MOST_COARSE = 0.35
 """Share of the coarsest solids that may be left out."""
 PATIENCE = 1.5
 """Cap over the expected time, and over that in which all of the mud arrives."""
-USUAL_SAND = Curve(diameters={"D10": "0.3 mm", "D50": "0.5 mm", "D90": "0.7 mm"})
-USUAL_MUD = Curve(diameters={"D10": "60 um", "D50": "80 um", "D90": "100 um"})
+OF_CONTACTS = {"predicted-overlap", "pressure-on-the-deposit", "cohesion", "fines-lock"}
+"""Warnings that contacts are too soft, or hold fines."""
+USUAL_SIZES = {"sand_d10": "0.3 mm", "sand_d50": "0.5 mm", "sand_d90": "0.7 mm"}
+USUAL_SIZES |= {"mud_d10": "60 um", "mud_d50": "80 um", "mud_d90": "100 um"}
+USUAL_SIZES |= {"sand_file": "", "mud_file": ""}
 USUAL_CHOICE = Choice(
     width=5e-3,
     length=5e-3,
@@ -357,7 +266,7 @@ USUAL_CHOICE = Choice(
     supply_share=1.0,
     stiffness=STIFFNESSES[-1],
 )
-"""A specimen in which answers that are not about sizes are looked at."""
+"""Sizes and a specimen in which answers that are not about sizes are looked at."""
 
 
 def designed(
@@ -378,7 +287,8 @@ def designed(
     """
     sand, mud = _sizes(answers, folder)
     first = _first_choice(answers, budget, sand, mud)
-    choices = list(_candidates(first, _mud_curve(mud, first.mud_cut)))
+    solids = _mud_curve(mud, first.mud_cut)
+    choices = list(_candidates(first, solids))
     low, high, why = 0, len(choices) - 1, ""
     while low < high:
         middle = (low + high) // 2
@@ -395,7 +305,7 @@ def designed(
             why = str(error)
         if not why:
             return design
-    raise CaseError(_no_specimen(why, _mud_curve(mud, first.mud_cut), choices[0]))
+    raise CaseError(_no_specimen(why, solids, choices[0]))
 
 
 def _no_specimen(why: str, solids: SizeCurve, first: Choice) -> str:
@@ -404,9 +314,7 @@ def _no_specimen(why: str, solids: SizeCurve, first: Choice) -> str:
     if reason.startswith("--"):
         return f"{reason}: change it"
     key, _, words = reason.partition(": ")
-    reason = {"run.max_hours": "at most ", "run.time_step_s": "a time step of "}.get(
-        key, ""
-    ) + words
+    subject = {"run.max_hours": "at most ", "run.time_step_s": "a time step of "}.get(key, "")
     passing = ""
     if _kept_above(solids, first.passing) < LEAST_KEPT * solids.kept:
         passing = (
@@ -415,8 +323,8 @@ def _no_specimen(why: str, solids: SizeCurve, first: Choice) -> str:
         )
     return (
         "no specimen of this sand and mud can be run, with as much of the finest "
-        f"solids and of the mud left out as may be{passing}: {reason}; give coarser or fewer "
-        "solids (--mud-d10, --mud-d50, --mud-d90, --solids), a finer sand (--sand-d10, "
+        f"solids and of the mud left out as may be{passing}: {subject}{words}; give coarser or "
+        "fewer solids (--mud-d10, --mud-d50, --mud-d90, --solids), a finer sand (--sand-d10, "
         "--sand-d50, --sand-d90), or another flow (--overbalance, --viscosity)"
     )
 
@@ -428,13 +336,13 @@ def _sizes(answers: Answers, folder: Path) -> tuple[Sizes, Sizes]:
     sizes is seen in a case of usual ones.
     """
     curves, problems = [], []
-    for source, given in (("--sand", answers.sand), ("--mud", answers.mud)):
+    for group in ("sand", "mud"):
         try:
-            curves.append(sizes_from(given.table, source=source, folder=folder))
+            curves.append(sizes_from(_curve(group, answers), source=f"--{group}", folder=folder))
         except CaseError as error:
             problems.append(str(error))
     try:
-        _case(replace(answers, sand=USUAL_SAND, mud=USUAL_MUD), USUAL_CHOICE, folder)
+        _case({**answers, **USUAL_SIZES}, USUAL_CHOICE, folder)
     except CaseError as error:
         problems.append(_spoken(str(error)))
     if problems:
@@ -460,7 +368,7 @@ def _first_choice(answers: Answers, budget: Budget, sand: Sizes, mud: Sizes) -> 
     mean = grains.mean(3) / grains.mean(2)
     width = _up(max(budget.width * mean, 2.02 * grains.high))
     length = _up(max(budget.length * mean, 2 * grains.high))
-    porosity = share_of(answers.porosity)
+    porosity = share_of(answers["porosity"])
     throat = throat_width(porosity, carman_kozeny(porosity, mean))
     return Choice(
         width=width,
@@ -508,7 +416,7 @@ def _candidates(first: Choice, curve: SizeCurve) -> Iterator[Choice]:
     choice = replace(first, cut=finest if finest > curve.low else 0.0)
     yield choice
     while _kept_above(curve, finest := 1.1 * finest) >= LEAST_KEPT:
-        choice = replace(first, cut=_tidy(finest))
+        choice = replace(first, cut=float(f"{finest:.2g}"))
         yield choice
     while choice.supply_share > 0.3:
         choice = replace(choice, supply_share=0.85 * choice.supply_share)
@@ -517,57 +425,44 @@ def _candidates(first: Choice, curve: SizeCurve) -> Iterator[Choice]:
 
 def _design(answers: Answers, choice: Choice, budget: Budget, folder: Path) -> Design:
     """The candidate with its supply, contacts, drag and cap."""
-    choice = replace(choice, slab=_slab(_case(answers, choice, folder), choice.supply_share))
-    choice = _softest(answers, choice, folder)
-    choice = _with_drag(answers, choice, folder)
-    case = _case(answers, choice, folder)
-    scales = scales_of(case)
-    cost = cost_of(case, scales)
-    arrival = scales.slab_length / scales.upstream_velocity
-    cap = _up(PATIENCE * max(cost.duration, arrival) * scales.force_factor)
-    choice = replace(choice, cap=cap)
-    case = _case(answers, choice, folder)
-    return Design(
-        answers=answers,
-        choice=choice,
-        case=case,
-        scales=scales_of(case),
-        budget=budget,
-        seconds=cost.seconds,
-    )
 
+    def scales(trial: Choice) -> InvasionScales:
+        return invasion_scales(_case(answers, trial, folder))
 
-def _softest(answers: Answers, choice: Choice, folder: Path) -> Choice:
-    """The softest contacts whose predicted overlaps stay below run.max_overlap."""
+    case = _case(answers, choice, folder)
+    median = case.grains.curve.size_at(0.5)
+    plugs = choice.supply_share * PLUG_SOLIDS * median / case.fines.placed_fraction
+    choice = replace(choice, slab=_up(plugs))
+    # the softest contacts whose predicted overlaps stay below run.max_overlap
     for stiffness in STIFFNESSES:
         trial = replace(choice, stiffness=stiffness)
         try:
-            warnings = scales_of(_case(answers, trial, folder)).warnings
+            if not OF_CONTACTS & {one.kind for one in scales(trial).warnings}:
+                choice = trial
+                break
         except CaseError:
             continue
-        of_fines = [one for one in warnings if not one.startswith("grains.")]
-        if not any("overlap" in one or "may lock" in one for one in of_fines):
-            return trial
-    return choice
-
-
-def _with_drag(answers: Answers, choice: Choice, folder: Path) -> Choice:
-    """Drag of finite Reynolds numbers where they are, fines that are driven where they may be."""
-    scales = scales_of(_case(answers, choice, folder))
-    inertia = STOKES_REYNOLDS < scales.reynolds < MOST_REYNOLDS
+    # drag of finite Reynolds numbers where they are, fines that are driven where they may be
+    inertia = STOKES_REYNOLDS < scales(choice).reynolds < MOST_REYNOLDS
     choice = replace(choice, inertia=inertia)
-    driven = replace(choice, driven=True)
     try:
-        faster = scales_of(_case(answers, driven, folder)).force_factor > 1.1
+        driven = replace(choice, driven=True)
+        choice = driven if scales(driven).force_factor > 1.1 else choice
     except CaseError:
-        return choice
-    return driven if faster else choice
-
-
-def _slab(case: InvasionCase, share: float) -> float:
-    """Length of mud, m, whose fines are `share` of what plugs the face."""
-    median = case.grains.curve.size_at(0.5)
-    return _up(share * PLUG_SOLIDS * median / case.fines.placed_fraction)
+        pass
+    case, sized = _case(answers, choice, folder), scales(choice)
+    cost = cost_of(case, sized)
+    arrival = sized.slab_length / sized.upstream_velocity
+    cap = _up(PATIENCE * max(cost.duration, arrival) * sized.force_factor)
+    choice = replace(choice, cap=cap)
+    return Design(
+        answers=answers,
+        choice=choice,
+        case=_case(answers, choice, folder),
+        scales=scales(choice),
+        budget=budget,
+        seconds=cost.seconds,
+    )
 
 
 def _case(answers: Answers, choice: Choice, folder: Path) -> InvasionCase:
@@ -594,33 +489,24 @@ def _up(length: float) -> float:
     return step * math.ceil(length / step - 1e-9)
 
 
-def _tidy(length: float) -> float:
-    """Two digits of a length."""
-    return float(f"{length:.2g}")
-
-
 # ------------------------------------------------------------------------------------------------
 # The case file of a design, with the reason next to each value.
-
-
-_WIDTH = 96
 
 
 def case_text(design: Design) -> str:
     """A case file that reads as the case of the design."""
     tables, notes = tables_of(design.answers, design.choice), _notes(design)
-    lines = [*_comment(_top(design)), *_rows("", {k: tables[k] for k in ("name", "seed")}, {})]
+    lines = [
+        *_comment(_top(design)),
+        *(f"{key} = {_value(tables[key])}" for key in ("name", "seed")),
+    ]
     for name, table in tables.items():
         if isinstance(table, dict) and table:
-            lines += ["", f"[{name}]", *_rows(name, table, notes)]
+            lines += ["", f"[{name}]"]
+            for key, value in table.items():
+                lines += _comment(notes.get(f"{name}.{key}", ""))
+                lines.append(f"{key} = {_value(value)}")
     return "\n".join(lines) + "\n"
-
-
-def _rows(name: str, table: dict[str, Any], notes: dict[str, str]) -> Iterator[str]:
-    for key, value in table.items():
-        if f"{name}.{key}" in notes:
-            yield from _comment(notes[f"{name}.{key}"])
-        yield f"{key} = {_value(value)}"
 
 
 def _value(value: Any) -> str:
@@ -632,35 +518,26 @@ def _value(value: Any) -> str:
 
 
 def _comment(text: str) -> list[str]:
-    return [f"# {line}" for line in textwrap.wrap(text, _WIDTH)]
+    return [f"# {line}" for line in textwrap.wrap(text, 96)]
 
 
 def _top(design: Design) -> str:
-    answers, fines = design.answers, design.case.fines
-    median = (
-        um(fines.curve.size_at((0.5 - fines.curve.below) / fines.curve.kept))
-        if (fines.curve.below < 0.5)
-        else "the solids"
-    )
+    answers, curve = design.answers, design.case.fines.curve
+    median = um(curve.size_at((0.5 - curve.below) / curve.kept)) if curve.below < 0.5 else ""
     return (
-        f"A mud of {answers.solids} solids (half of them below {median}) at a sand of "
-        f"{answers.porosity} porosity, {answers.overbalance} over the formation. Written by "
-        f"fdnet init, size {design.budget.name}: the run is expected to take "
+        f"A mud of {answers['solids']} solids (half of them below {median or 'the solids'}) at a "
+        f"sand of {answers['porosity']} porosity, {answers['overbalance']} over the formation. "
+        f"Written by fdnet init, size {design.budget.name}: the run is expected to take "
         f"{spoken_time(design.seconds)} on one core. fdnet check looks at it, fdnet run runs it."
     )
 
 
 def _notes(design: Design) -> dict[str, str]:
-    return {
-        **_specimen_notes(design),
-        **_mud_notes(design),
-        **_run_notes(design),
-    }
-
-
-def _specimen_notes(design: Design) -> dict[str, str]:
-    case, choice = design.case, design.choice
+    """The reasons, by dotted key."""
+    case, choice, scales = design.case, design.choice, design.scales
     grains, mean = case.grains.curve, case.grains.sauter_diameter_m
+    throat = throat_width(scales.porosity, scales.permeability)
+    overlap = max(scales.impact_overlap, scales.drag_overlap)
     notes = {
         "box.size": (
             f"Depth, width, width. The width is {choice.width / mean:.2g} mean grains "
@@ -674,54 +551,52 @@ def _specimen_notes(design: Design) -> dict[str, str]:
         ),
         "well.radius": (
             "The overbalance is lost in radial flow around the well, from its face to the "
-            f"drainage radius: the mud moves at {design.scales.interstitial_velocity:.2g} m/s in "
+            f"drainage radius: the mud moves at {scales.interstitial_velocity:.2g} m/s in "
             "the pores."
         ),
+        "fines.sizes": f"The throats of the sand are some {um(throat)} wide.",
+        "fines.slab": _slab_note(design),
+        "run.stiffness": (
+            "Contacts as soft as they may be: the time of the run goes with the root of it, and "
+            f"the predicted overlap is {100 * overlap:.1f} % of a fine."
+        ),
+        "run.plug_rate": (
+            f"The face counts as plugged when less than {100 * PLUG_RATE:g} % of the fines that "
+            f"arrive still enter, for {_ms(scales.plug_time * scales.force_factor)}."
+        ),
+        "run.cap": "The end at the latest; a summary that says cap is not final.",
     }
     if choice.sand_cut > 1.0:
         notes["grains.sizes"] = (
             f"The finest {choice.sand_cut:g} % of the sand are left out, because the coarsest "
             "solids of the mud must stay below the smallest grain."
         )
-    return notes
-
-
-def _mud_notes(design: Design) -> dict[str, str]:
-    case, choice, scales = design.case, design.choice, design.scales
-    throat = throat_width(scales.porosity, scales.permeability)
-    curve = case.fines.curve
-    notes = {"fines.sizes": f"The throats of the sand are some {um(throat)} wide."}
-    if design.answers.assumed_spread:
+    if _assumed(design.answers):
         notes["fines.sizes"] += (
             " The spread is assumed, half and twice the median: give D10 and D90 if you know them."
         )
     if choice.mud_cut < 99.0:
         notes["fines.sizes"] += (
-            f" The coarsest {100 * curve.above:.2g} % are left out: they are as large as the "
-            "smallest grains and would only lie in the cake."
+            f" The coarsest {100 * case.fines.curve.above:.2g} % are left out: they are as large "
+            "as the smallest grains and would only lie in the cake."
         )
     if choice.cut:
         notes["fines.cut"] = _cut_note(design, throat)
-    notes["fines.slab"] = _slab_note(design)
+    if choice.driven:
+        notes["drag.drive_velocity_m_s"] = (
+            "The fines have no inertia to speak of, so the simulation runs "
+            f"{scales.force_factor:.2g} times as fast as the fluid."
+        )
+    if choice.inertia:
+        notes["drag.inertia"] = (
+            f"The Reynolds number of the largest fine is {scales.reynolds:.2g}: Stokes's drag "
+            "would be too small."
+        )
     return notes
 
 
-def left_out(design: Design) -> Iterator[str]:
-    """What of the sand and the mud is not in the case, and whether that was enough."""
-    choice, curve = design.choice, design.case.fines.curve
-    if choice.sand_cut > 1.0:
-        yield f"left out: the finest {choice.sand_cut:g} % of the sand"
-    if curve.below > 0.0:
-        yield f"left out: {100 * curve.below:.2g} % of the solids, finer than {um(curve.low)}"
-    if curve.above > 0.0:
-        yield f"left out: {100 * curve.above:.2g} % of the solids, coarser than {um(curve.high)}"
-    if choice.supply_share < 1.0:
-        yield f"mud: {100 * choice.supply_share:.0f} % of what surely plugs the face"
-    if design.seconds > 1.05 * design.budget.seconds:
-        yield (
-            f"longer than the {spoken_time(design.budget.seconds)} of --size "
-            f"{design.budget.name}: no more can be left out; coarser or fewer solids are faster"
-        )
+def _ms(seconds: float) -> str:
+    return f"{1e3 * seconds:.3g} ms"
 
 
 def _cut_note(design: Design, throat: float) -> str:
@@ -755,32 +630,19 @@ def _slab_note(design: Design) -> str:
     )
 
 
-def _run_notes(design: Design) -> dict[str, str]:
-    scales, choice = design.scales, design.choice
-    notes = {
-        "run.stiffness": (
-            "Contacts as soft as they may be: the time of the run goes with the root of it, and "
-            f"the predicted overlap is {100 * max(scales.impact_overlap, scales.drag_overlap):.1f}"
-            " % of a fine."
-        ),
-        "run.plug_rate": (
-            f"The face counts as plugged when less than {100 * PLUG_RATE:g} % of the fines that "
-            f"arrive still enter, for {_ms(scales.plug_time * scales.force_factor)}."
-        ),
-        "run.cap": "The end at the latest; a summary that says cap is not final.",
-    }
-    if choice.driven:
-        notes["drag.drive_velocity_m_s"] = (
-            "The fines have no inertia to speak of, so the simulation runs "
-            f"{scales.force_factor:.2g} times as fast as the fluid."
+def left_out(design: Design) -> Iterator[str]:
+    """What of the sand and the mud is not in the case, and whether that was enough."""
+    choice, curve = design.choice, design.case.fines.curve
+    if choice.sand_cut > 1.0:
+        yield f"left out: the finest {choice.sand_cut:g} % of the sand"
+    if curve.below > 0.0:
+        yield f"left out: {100 * curve.below:.2g} % of the solids, finer than {um(curve.low)}"
+    if curve.above > 0.0:
+        yield f"left out: {100 * curve.above:.2g} % of the solids, coarser than {um(curve.high)}"
+    if choice.supply_share < 1.0:
+        yield f"mud: {100 * choice.supply_share:.0f} % of what surely plugs the face"
+    if design.seconds > 1.05 * design.budget.seconds:
+        yield (
+            f"longer than the {spoken_time(design.budget.seconds)} of --size "
+            f"{design.budget.name}: no more can be left out; coarser or fewer solids are faster"
         )
-    if choice.inertia:
-        notes["drag.inertia"] = (
-            f"The Reynolds number of the largest fine is {scales.reynolds:.2g}: Stokes's drag "
-            "would be too small."
-        )
-    return notes
-
-
-def _ms(seconds: float) -> str:
-    return f"{1e3 * seconds:.3g} ms"

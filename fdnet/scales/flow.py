@@ -1,13 +1,11 @@
-"""What drives the fluid, and how fast.
-
-Flow through a pack in closed form: Carman and Kozeny, Darcy, Ergun, straight and radial.
-"""
+"""How fast the fluid moves: Carman and Kozeny, Darcy, Ergun, straight and radial; the drive."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from fdnet.case.case import Case, InvasionCase
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt
 from fdnet.scales.drag import CARMAN_KOZENY, ERGUN_INERTIAL, ERGUN_VISCOUS
 
 ERGUN_RATIO = ERGUN_INERTIAL / ERGUN_VISCOUS
@@ -117,22 +115,22 @@ class Velocity:
 def velocity_of(case: Case, porosity: float) -> Velocity:
     """The velocity that the case gives, or that of Darcy's or Ergun's law in the case."""
     permeability = carman_kozeny(porosity, case.grains.sauter_diameter_m)
-    pack = _losses(case, porosity, permeability)
-    given = case.fluid.velocity_m_s
+    pack, given = _losses(case, porosity, permeability), case.fluid.velocity_m_s
     if given is not None:
-        darcy = given * porosity
-        loss = _inertial_loss(pack, Losses(viscous=pack.viscous).gradient(darcy), straight(1.0))
+        way, path, darcy = pack, straight(1.0), given * porosity
+        pressure = Losses(viscous=pack.viscous).gradient(darcy)
     else:
+        around = None if case.well is None else case.well.formation_permeability_m2
+        way = _losses(case, porosity, permeability if around is None else around)
         path, pressure = path_of(case), case.fluid.overbalance_Pa
-        way = _losses(case, porosity, _permeability_of_way(case, permeability))
         darcy = _by_law(case, way).velocity(pressure, path)
-        loss = _inertial_loss(way, pressure, path)
+    without_inertia = Losses(viscous=way.viscous).velocity(pressure, path)
     return Velocity(
         permeability=permeability,
         darcy=darcy,
         interstitial=darcy / porosity if given is None else given,
         pressure_gradient=_by_law(case, pack).gradient(darcy),
-        inertial_loss=loss,
+        inertial_loss=1 - way.velocity(pressure, path) / without_inertia,
     )
 
 
@@ -153,11 +151,6 @@ def path_of(case: Case) -> Path:
     return straight(case.size_m[0] if given is None else given)
 
 
-def _permeability_of_way(case: Case, pack: float) -> float:
-    given = None if case.well is None else case.well.formation_permeability_m2
-    return pack if given is None else given
-
-
 def _losses(case: Case, porosity: float, permeability: float) -> Losses:
     """The losses with inertia, whatever law the case names."""
     diameter, density = case.grains.sauter_diameter_m, case.fluid.density_kg_m3
@@ -171,42 +164,29 @@ def _by_law(case: Case, losses: Losses) -> Losses:
     return losses if case.fluid.darcy_law == "ergun" else Losses(viscous=losses.viscous)
 
 
-def _inertial_loss(losses: Losses, pressure: float, path: Path) -> float:
-    darcy = Losses(viscous=losses.viscous).velocity(pressure, path)
-    return 1 - losses.velocity(pressure, path) / darcy
-
-
-def velocity_warnings(case: InvasionCase, porosity: float, velocity: Velocity) -> list[str]:
+def velocity_warnings(case: InvasionCase, porosity: float, velocity: Velocity) -> Iterator[Doubt]:
     """Doubts about the velocity: nothing says what drives it, or inertia is left out."""
-    return [*_plug_warning(case, porosity, velocity), *_inertia_warning(case, velocity)]
-
-
-def _plug_warning(case: InvasionCase, porosity: float, velocity: Velocity) -> list[str]:
-    """The whole overbalance is lost over the box because the case names no other way."""
     fluid = case.fluid
-    if (case.well, fluid.velocity_m_s, fluid.darcy_length_m) != (None, None, None):
-        return []
-    radius, outer = USUAL_WELL
-    losses = _by_law(case, _losses(case, porosity, velocity.permeability))
-    at_well = losses.velocity(fluid.overbalance_Pa, radial(radius, outer)) / porosity
-    gradient = fluid.overbalance_Pa / case.size_m[0] / 1e6
-    return [
-        f"the whole overbalance is lost over the {1e3 * case.size_m[0]:.3g} mm of the box "
-        f"({gradient:.3g} MPa/m), which gives the fluid {velocity.interstitial:.3g} m/s; at the "
-        f"face of a well of {1e3 * radius:.0f} mm with a drainage radius of {outer:.0f} m it "
-        f"would be {at_well:.2g} m/s: add the table [well] with radius_mm and drainage_radius_m, "
-        "or give fluid.darcy_length_mm for a plug, or fluid.velocity_m_s"
-    ]
-
-
-def _inertia_warning(case: InvasionCase, velocity: Velocity) -> list[str]:
-    loss, fluid = velocity.inertial_loss, case.fluid
-    if loss < INERTIA_WARNING or fluid.darcy_law == "ergun" or fluid.velocity_m_s is not None:
-        return []
-    return [
-        f"the velocity of {velocity.interstitial:.3g} m/s is Darcy's; the fluid's inertia would "
-        f"lower it by {100 * loss:.0f} % (Ergun): take fluid.darcy_law = 'ergun'"
-    ]
+    if (case.well, fluid.velocity_m_s, fluid.darcy_length_m) == (None, None, None):
+        radius, outer = USUAL_WELL
+        losses = _by_law(case, _losses(case, porosity, velocity.permeability))
+        at_well = losses.velocity(fluid.overbalance_Pa, radial(radius, outer)) / porosity
+        gradient = fluid.overbalance_Pa / case.size_m[0] / 1e6
+        yield Doubt(
+            "overbalance-over-the-box",
+            f"the whole overbalance is lost over the {1e3 * case.size_m[0]:.3g} mm of the box "
+            f"({gradient:.3g} MPa/m), which gives the fluid {velocity.interstitial:.3g} m/s; at "
+            f"the face of a well of {1e3 * radius:.0f} mm with a drainage radius of {outer:.0f} m "
+            f"it would be {at_well:.2g} m/s: add the table [well] with radius_mm and "
+            "drainage_radius_m, or give fluid.darcy_length_mm for a plug, or fluid.velocity_m_s",
+        )
+    loss, darcy = velocity.inertial_loss, fluid.darcy_law == "darcy"
+    if loss >= INERTIA_WARNING and darcy and fluid.velocity_m_s is None:
+        yield Doubt(
+            "inertia-of-the-fluid",
+            f"the velocity of {velocity.interstitial:.3g} m/s is Darcy's; the fluid's inertia "
+            f"would lower it by {100 * loss:.0f} % (Ergun): take fluid.darcy_law = 'ergun'",
+        )
 
 
 # ------------------------------------------------------------------------------------------------
@@ -252,9 +232,7 @@ def impact_stokes(relaxation_time: float, velocity: float, radius: float) -> flo
     return relaxation_time * velocity / radius
 
 
-def drive_of(
-    case: InvasionCase, velocity: float, relaxation_time: float, *, free: float | None = None
-) -> Drive:
+def drive_of(case: InvasionCase, velocity: float, relaxation_time: float, free: float) -> Drive:
     """The velocity that the case asks for, or the fluid's own.
 
     "auto" never drives slower than the fluid moves.
@@ -264,49 +242,42 @@ def drive_of(
         velocity: of the fluid in the pores, m/s.
         relaxation_time: of the largest fine, s.
         free: velocity of a free fine in this fluid, m/s: faster where a pressure gradient pushes
-            it; the fluid's own if not given.
+            it.
 
     Raises:
         CaseError: a driven case whose impact Stokes number is above `STOKES_LIMIT`, as simulated
             or at the fluid's own velocity.
     """
-    radius, asked = case.fines.radius_range_m[1], case.drag.drive_velocity_m_s
-    own = impact_stokes(relaxation_time, velocity if free is None else free, radius)
-    driven = velocity
+    asked, driven = case.drag.drive_velocity_m_s, velocity
+    own = impact_stokes(relaxation_time, free, case.fines.radius_range_m[1])
     if asked == "auto":
         driven = velocity * max(1.0, AUTO_STOKES / own)
     elif asked is not None:
         driven = asked
-    factor = driven / velocity
-    drive = Drive(velocity=driven, factor=factor, impact_stokes=own * factor)
-    if asked is not None:
-        _refuse_inertia(drive, own)
-    return drive
-
-
-def _refuse_inertia(drive: Drive, own_stokes: float) -> None:
-    if own_stokes > STOKES_LIMIT * _ROUNDING:
+    stokes = own * (driven / velocity)
+    if asked is not None and own > STOKES_LIMIT * _ROUNDING:
         raise CaseError(
-            f"drag.drive_velocity_m_s: the impact Stokes number of the fines is {own_stokes:.2g} "
+            f"drag.drive_velocity_m_s: the impact Stokes number of the fines is {own:.2g} "
             f"in the fluid itself (limit {STOKES_LIMIT:g}), so their inertia matters and no other "
             "velocity gives the same result; leave the key out"
         )
-    if drive.impact_stokes > STOKES_LIMIT * _ROUNDING:
-        most = drive.velocity * STOKES_LIMIT / drive.impact_stokes
+    if asked is not None and stokes > STOKES_LIMIT * _ROUNDING:
         raise CaseError(
-            f"drag.drive_velocity_m_s: {drive.velocity:g} m/s makes the impact Stokes number "
-            f"{drive.impact_stokes:.2g} (limit {STOKES_LIMIT:g}): the fines' inertia would "
-            f"matter; expected at most {most:.2g} m/s"
+            f"drag.drive_velocity_m_s: {driven:g} m/s makes the impact Stokes number "
+            f"{stokes:.2g} (limit {STOKES_LIMIT:g}): the fines' inertia would "
+            f"matter; expected at most {driven * STOKES_LIMIT / stokes:.2g} m/s"
         )
+    return Drive(velocity=driven, factor=driven / velocity, impact_stokes=stokes)
 
 
-def drive_warnings(case: InvasionCase, drive: Drive) -> list[str]:
+def drive_warnings(case: InvasionCase, drive: Drive) -> list[Doubt]:
     """A driven case in which inertia may begin to matter; empty when it does not."""
     if case.drag.drive_velocity_m_s is None or drive.impact_stokes <= STOKES_WARNING * _ROUNDING:
         return []
     lower = drive.velocity * STOKES_WARNING / drive.impact_stokes
-    return [
+    text = (
         f"drag.drive_velocity_m_s: at {drive.velocity:.3g} m/s the impact Stokes number is "
         f"{drive.impact_stokes:.2g} (above {STOKES_WARNING:g}), so the fines' inertia may begin "
         f"to matter: lower it to {lower:.2g} m/s"
-    ]
+    )
+    return [Doubt("driven-inertia", text)]

@@ -1,6 +1,4 @@
-"""The pack: how dense it can be, its sizes, the grains.
-
-The densest random pack of rigid spheres of a range of sizes.
+"""The pack: how dense it can be, its sizes, the number of grains, how it is grown.
 
 Farr and Groot (J. Chem. Phys. 131 (2009) 244104) map spheres in space to rods on a line: the rods
 are the chords that a random line cuts out of the spheres, and neighbours keep a gap of at least
@@ -16,8 +14,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from fdnet.case.case import Case, InvasionCase
-from fdnet.case.spheres import Sizes, Spheres
-from fdnet.errors import CaseError
+from fdnet.case.spheres import Spheres
+from fdnet.errors import CaseError, Doubt
 from fdnet.scales.contacts import REFERENCE_OVERLAP, Contact, mass_range
 from fdnet.sizes import SURFACE, SizeCurve
 
@@ -72,8 +70,18 @@ def within_limit(rigid: float, porosity: float, overlap: float, limit: float) ->
 
 
 def close_packing(curve: SizeCurve) -> float:
-    """Share of space that spheres of these sizes fill at random close packing."""
-    rods = _rods(curve)
+    """Share of space that spheres of these sizes fill at random close packing.
+
+    The rods are chords, longest first: a line meets spheres by their cross-section, at a random
+    distance, and cuts one of diameter D in a chord above L with the probability 1 - (L / D)^2. The
+    diameters and the distances are taken evenly, in an order that mixes them (golden ratio).
+    """
+    even = (np.arange(RODS) + 0.5) / RODS
+    mixed = np.mod(even * RODS * (math.sqrt(5) - 1) / 2, 1.0)
+    diameter = np.full(RODS, curve.low)
+    if curve.low != curve.high:
+        diameter = np.exp(np.interp(even, curve.finer(SURFACE), np.log(curve.edges)))
+    rods = sorted((diameter * np.sqrt(1 - mixed)).tolist(), reverse=True)
     gaps, total_gap = [-GAP * rods[0]], GAP * rods[0]
     for rod in rods[1:]:
         least = GAP * rod
@@ -85,24 +93,8 @@ def close_packing(curve: SizeCurve) -> float:
     return math.fsum(rods) / (math.fsum(rods) + total_gap)
 
 
-def _rods(curve: SizeCurve) -> list[float]:
-    """Chords, longest first: a line meets spheres by their cross-section, at a random distance.
-
-    A sphere of diameter D is cut in a chord above L with the probability 1 - (L / D)^2. The
-    diameters and the distances are taken evenly, in an order that mixes them (golden ratio).
-    """
-    even = (np.arange(RODS) + 0.5) / RODS
-    mixed = np.mod(even * RODS * (math.sqrt(5) - 1) / 2, 1.0)
-    if curve.low == curve.high:
-        diameter = np.full(RODS, curve.low)
-    else:
-        diameter = np.exp(np.interp(even, curve.finer(SURFACE), np.log(curve.edges)))
-    chords = diameter * np.sqrt(1 - mixed)
-    return sorted(chords.tolist(), reverse=True)
-
-
 # ------------------------------------------------------------------------------------------------
-# The sizes of a case in closed form: diameters of its curves, and what they leave out.
+# The measured sizes of a case: diameters of its curves, and what these miss and leave out.
 
 
 SHARES = (0.1, 0.5, 0.9)
@@ -110,17 +102,13 @@ SHARES = (0.1, 0.5, 0.9)
 MOST_MISFIT = 0.05
 """Difference of a law to a given diameter, over it, above which a warning names it: a quarter of
 the step between two sieves of the series R 40/3 (ISO 565), 19 %."""
-_SOURCES = {
-    "log-normal": "Hatch & Choate 1929",
-    "rosin-rammler": "Rosin & Rammler 1933",
-    "measured": "as measured, straight over ln d",
-}
 
 
-def sized(case: Case) -> dict[str, Spheres]:
-    """Grains and fines by the names of their tables."""
+def curves_of(case: Case) -> dict[str, Spheres]:
+    """Grains and fines whose sizes are given by curves, by the names of their tables."""
     fines = {"fines": case.fines} if isinstance(case, InvasionCase) else {}
-    return {"grains": case.grains, **fines}
+    both: dict[str, Spheres] = {"grains": case.grains, **fines}
+    return {name: spheres for name, spheres in both.items() if spheres.measured}
 
 
 def diameter_at(curve: SizeCurve, share: float) -> float | None:
@@ -129,134 +117,52 @@ def diameter_at(curve: SizeCurve, share: float) -> float | None:
     return curve.size_at(inside) if 0 <= inside <= 1 else None
 
 
-def size_rows(case: Case) -> list[tuple[str, str, float, str, str, str]]:
-    """Rows of the table of scales: name, symbol, value, unit, formula, source.
-
-    They are the diameters of every measured curve next to those given, and its ends.
-    """
-    rows = []
-    for name, spheres in sized(case).items():
-        if spheres.measured:
-            rows += [*_curve_rows(name, spheres), *_end_rows(name, spheres.curve)]
-    return rows
-
-
-def _curve_rows(name: str, spheres: Spheres) -> Iterator[tuple[str, str, float, str, str, str]]:
-    law, asked = "measured", dict[float, float]()
-    if spheres.sizes is not None and spheres.sizes.fit is not None:
-        law, asked = spheres.sizes.fit.name, spheres.sizes.asked
-    for share in SHARES:
-        value = diameter_at(spheres.curve, share)
-        if value is None:
-            continue
-        given = asked.get(share)
-        compared = (
-            "" if given is None else f", given {given:.4g} m ({100 * (value / given - 1):+z.1f} %)"
-        )
-        yield (
-            f"{name}: {100 * share:.0f} % by volume finer than",
-            f"D{100 * share:.0f}",
-            value,
-            "m",
-            f"{law} curve{compared}",
-            _SOURCES[law],
-        )
-
-
-def _end_rows(name: str, curve: SizeCurve) -> list[tuple[str, str, float, str, str, str]]:
-    return [
-        (
-            f"{name}: smallest diameter placed",
-            "d_min",
-            curve.low,
-            "m",
-            _cut_text(curve.below, "finer"),
-            "cut",
-        ),
-        (
-            f"{name}: largest diameter placed",
-            "d_max",
-            curve.high,
-            "m",
-            _cut_text(curve.above, "coarser"),
-            "cut",
-        ),
-        (
-            f"{name}: number mean diameter",
-            "<d>",
-            curve.mean(1),
-            "m",
-            "moment of the curve",
-            "exact",
-        ),
-    ]
-
-
-def _cut_text(share: float, side: str) -> str:
-    return f"{100 * share:.3g} % of the solids are {side} and left out"
-
-
-def size_warnings(case: Case) -> list[str]:
-    """What curves miss and what they leave out, one sentence each."""
-    warnings = []
-    for name, spheres in sized(case).items():
-        if spheres.measured:
-            warnings += [*_misfit_warnings(name, spheres), *_cut_warnings(name, spheres.curve)]
+def size_warnings(case: Case) -> Iterator[Doubt]:
+    """What curves miss and what they leave out, and a sand denser than rigid spheres get."""
+    for name, spheres in curves_of(case).items():
+        given = [] if spheres.sizes is None else [(f"{name}.sizes", spheres.sizes)]
+        for number, one in enumerate(getattr(spheres, "materials", None) or ()):
+            given.append((f"{name}.materials.{number}.sizes", one.sizes))
+        for key, sizes in given:
+            if sizes.fit is not None and sizes.fit.worst > MOST_MISFIT:
+                missed = ", ".join(
+                    f"D{100 * share:.0f} by {100 * off:+z.0f} %"
+                    for share, off in sizes.fit.misfit.items()
+                )
+                yield Doubt(
+                    "curve-misses-its-points",
+                    f"{key}: the {sizes.fit.name} curve misses {missed}; give the measured curve "
+                    "(size and passing, or a file) if it matters",
+                )
+        curve = spheres.curve
+        ends = ((curve.below, "finer", curve.low), (curve.above, "coarser", curve.high))
+        parts = [
+            f"{100 * share:.3g} % of the solids ({side} than {1e6 * size:.3g} um)"
+            for share, side, size in ends
+            if share > 1e-9
+        ]
+        if parts:
+            more = " and fines.cut_um" if name == "fines" else ""
+            yield Doubt(
+                "sizes-left-out",
+                f"{name}: {' and '.join(parts)} are left out; see sizes.cut_percent{more}",
+            )
     if isinstance(case, InvasionCase) and case.fines.measured:
-        given, placed = case.fines.volume_fraction, case.fines.placed_fraction
-        if placed < given:
-            warnings.append(
+        whole, placed = case.fines.volume_fraction, case.fines.placed_fraction
+        if placed < whole:
+            yield Doubt(
+                "thinner-suspension",
                 f"fines: the suspension carries {100 * placed:.3g} % of fines by volume instead "
-                f"of {100 * given:.3g} %, because the sizes left out are not in it"
+                f"of {100 * whole:.3g} %, because the sizes left out are not in it",
             )
-    return warnings + _dense_warnings(case)
-
-
-def _dense_warnings(case: Case) -> list[str]:
-    """The sand is denser than rigid spheres of its sizes get."""
     porosity = case.grains.porosity
-    if not case.grains.measured or case.grains.count is not None or porosity is None:
-        return []
-    rigid = densest_porosity(case.grains)
-    if porosity >= rigid:
-        return []
-    return [f"grains.porosity: {reach_text(rigid)}; at {porosity:g} grains overlap"]
-
-
-def _curves(name: str, spheres: Spheres) -> Iterator[tuple[str, Sizes]]:
-    """The given curves by the key that gives them."""
-    if spheres.sizes is not None:
-        yield f"{name}.sizes", spheres.sizes
-    for number, one in enumerate(getattr(spheres, "materials", None) or ()):
-        yield f"{name}.materials.{number}.sizes", one.sizes
-
-
-def _misfit_warnings(name: str, spheres: Spheres) -> Iterator[str]:
-    for key, sizes in _curves(name, spheres):
-        fit = sizes.fit
-        if fit is not None and fit.worst > MOST_MISFIT:
-            missed = ", ".join(
-                f"D{100 * share:.0f} by {100 * off:+z.0f} %" for share, off in fit.misfit.items()
+    if case.grains.measured and case.grains.count is None and porosity is not None:
+        rigid = 1 - close_packing(case.grains.curve)
+        if porosity < rigid:
+            yield Doubt(
+                "denser-than-spheres",
+                f"grains.porosity: {reach_text(rigid)}; at {porosity:g} grains overlap",
             )
-            yield (
-                f"{key}: the {fit.name} curve misses {missed}; give the measured curve (size and "
-                "passing, or a file) if it matters"
-            )
-
-
-def _cut_warnings(name: str, curve: SizeCurve) -> Iterator[str]:
-    parts = [
-        f"{100 * share:.3g} % of the solids ({side} than {1e6 * size:.3g} um)"
-        for share, side, size in (
-            (curve.below, "finer", curve.low),
-            (curve.above, "coarser", curve.high),
-        )
-        if share > 1e-9
-    ]
-    if parts:
-        yield f"{name}: {' and '.join(parts)} are left out; see sizes.cut_percent" + (
-            " and fines.cut_um" if name == "fines" else ""
-        )
 
 
 # ------------------------------------------------------------------------------------------------

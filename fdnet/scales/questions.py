@@ -1,13 +1,13 @@
 """What `fdnet init` asks for."""
 
 import re
-from dataclasses import dataclass
+from contextlib import suppress
+from typing import NamedTuple
 
 from fdnet.case.units import converted, share_of
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Question:
+class Question(NamedTuple):
     """One thing to ask for.
 
     Attributes:
@@ -32,10 +32,17 @@ class Question:
         """As on the command line."""
         return f"--{self.key.replace('_', '-')}"
 
-    def problem(self, text: str) -> str:
-        """Why a text is no answer; empty for one that can be read."""
-        if text == self.default:
-            return ""
+    def read(self, text: str) -> tuple[str, str]:
+        """An answer as it is read, and why it is none; that is empty for one that can be read.
+
+        A share may be a number between 0 and 1, which becomes a percentage.
+        """
+        text = text.strip()
+        if "%" in self.unit:
+            with suppress(ValueError):
+                text = f"{100 * float(text):g} %" if 0 < float(text) < 1 else text
+        if text in ("", self.default):
+            return text, ""
         _, _, suffix = self.unit.rpartition("%")
         try:
             if "%" in self.unit and (not suffix or text.rstrip().endswith("%")):
@@ -43,52 +50,37 @@ class Question:
             else:
                 converted(text, suffix)
         except ValueError as error:
-            return f"{self.option}: {text!r}: {error}"
-        return ""
+            return text, f"{self.option}: {text!r}: {error}"
+        return text, ""
 
 
 QUESTIONS = (
-    Question(key="sand_d10", text="Sand, D10 (10 % are finer)", example="0.25 mm", group="sand"),
-    Question(key="sand_d50", text="Sand, D50 (the median)", example="0.40 mm", group="sand"),
-    Question(key="sand_d90", text="Sand, D90", example="0.60 mm", group="sand"),
-    Question(key="porosity", text="Porosity of the sand", example="38 %", unit="%"),
-    Question(key="mud_d50", text="Solids of the mud, D50", example="40 um", group="mud"),
+    Question("sand_d10", "Sand, D10 (10 % are finer)", "0.25 mm", group="sand"),
+    Question("sand_d50", "Sand, D50 (the median)", "0.40 mm", group="sand"),
+    Question("sand_d90", "Sand, D90", "0.60 mm", group="sand"),
+    Question("porosity", "Porosity of the sand", "38 %", "%"),
+    Question("mud_d50", "Solids of the mud, D50", "40 um", group="mud"),
+    Question("mud_d10", "Solids, D10", "20 um", default="half of D50", group="mud"),
+    Question("mud_d90", "Solids, D90", "80 um", default="twice D50", group="mud"),
+    Question("solids", "Solids in the mud, by volume or mass", "5 %", "%_kg_m3"),
     Question(
-        key="mud_d10", text="Solids, D10", example="20 um", default="half of D50", group="mud"
+        "solids_density",
+        "Density of the solids (CaCO3 2.71 g/cc, barite 4.2 g/cc)",
+        *("2.71 g/cc", "_kg_m3", "2.71 g/cc"),
     ),
-    Question(key="mud_d90", text="Solids, D90", example="80 um", default="twice D50", group="mud"),
+    Question("viscosity", "Viscosity of the liquid", "10 cP", "_cP"),
+    Question("liquid_density", "Density of the liquid", "1050 kg/m3", "_kg_m3", "1050 kg/m3"),
+    Question("overbalance", "Overbalance", "300 psi", "_MPa"),
     Question(
-        key="solids", text="Solids in the mud, by volume or mass", example="5 %", unit="%_kg_m3"
+        "well_radius",
+        "Radius of the well (8 1/2 inches across: 108 mm)",
+        *("108 mm", "_mm", "108 mm"),
     ),
+    Question("drainage_radius", "Drainage radius", "100 m", default="100 m"),
     Question(
-        key="solids_density",
-        text="Density of the solids (CaCO3 2.71 g/cc, barite 4.2 g/cc)",
-        example="2.71 g/cc",
-        unit="_kg_m3",
-        default="2.71 g/cc",
-    ),
-    Question(key="viscosity", text="Viscosity of the liquid", example="10 cP", unit="_cP"),
-    Question(
-        key="liquid_density",
-        text="Density of the liquid",
-        example="1050 kg/m3",
-        unit="_kg_m3",
-        default="1050 kg/m3",
-    ),
-    Question(key="overbalance", text="Overbalance", example="300 psi", unit="_MPa"),
-    Question(
-        key="well_radius",
-        text="Radius of the well (8 1/2 inches across: 108 mm)",
-        example="108 mm",
-        default="108 mm",
-    ),
-    Question(key="drainage_radius", text="Drainage radius", example="100 m", default="100 m"),
-    Question(
-        key="formation_permeability",
-        text="Permeability of the formation (nothing: that of the sand)",
-        example="500 mD",
-        unit="_mD",
-        default="",
+        "formation_permeability",
+        "Permeability of the formation (nothing: that of the sand)",
+        *("500 mD", "_mD", ""),
     ),
 )
 """In the order in which they are asked."""

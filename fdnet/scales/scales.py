@@ -1,12 +1,11 @@
 """The scales of a case in closed form; `scale_rows` has each formula and its source."""
 
 import math
-from dataclasses import dataclass, fields, replace
-from typing import overload
+from dataclasses import dataclass, fields
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.tables import CleanUp
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt
 from fdnet.scales.clock import (
     chunk_refreshes,
     densest_factor,
@@ -14,7 +13,6 @@ from fdnet.scales.clock import (
     drive_in,
     hold_steps,
     plug_warnings,
-    pressed_in,
     relaxation_times,
     slab_of,
     slab_warnings,
@@ -28,12 +26,13 @@ from fdnet.scales.contacts import (
     cohesion_warnings,
     contacts_of,
     overlap_warnings,
+    overlaps_of,
     sticking_of,
     sticking_warnings,
     stiffness_factor,
 )
 from fdnet.scales.drag import Push, push_of, reynolds_warnings, throat_warnings, throat_width
-from fdnet.scales.flow import Drive, Velocity, drive_warnings, velocity_of, velocity_warnings
+from fdnet.scales.flow import Velocity, drive_warnings, velocity_of, velocity_warnings
 from fdnet.scales.pack import pack_step, size_warnings, target_porosity
 
 MOST_STEPS = 2**31 - 1
@@ -66,7 +65,7 @@ class Scales:
     stiffness_factor: float
     contacts: dict[str, Contact]
     pack_step: float
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Doubt, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,10 +129,6 @@ class InvasionScales(Scales):
     sticking: Sticking
 
 
-@overload
-def scales_of(case: InvasionCase) -> InvasionScales: ...
-@overload
-def scales_of(case: Case) -> Scales: ...
 def scales_of(case: Case) -> Scales:
     """All scales of a case; InvasionScales when it has fines.
 
@@ -143,12 +138,22 @@ def scales_of(case: Case) -> Scales:
     """
     try:
         case = stiff_enough(case)
-        velocity = velocity_of(case, target_porosity(case))
-        shared = _shared(case, velocity)
-        if not isinstance(case, InvasionCase):
-            return shared
-        doubts = [*shared.warnings, *velocity_warnings(case, shared.porosity, velocity)]
-        return _invasion(case, velocity, replace(shared, warnings=tuple(doubts)))
+        porosity = target_porosity(case)
+        flow = velocity_of(case, porosity)
+        contacts = contacts_of(case, flow.interstitial)
+        shared = Scales(
+            porosity=porosity,
+            permeability=flow.permeability,
+            darcy_velocity=flow.darcy,
+            interstitial_velocity=flow.interstitial,
+            pressure_gradient=flow.pressure_gradient,
+            inertial_loss=flow.inertial_loss,
+            stiffness_factor=stiffness_factor(case),
+            contacts=contacts,
+            pack_step=pack_step(case, contacts),
+            warnings=tuple(size_warnings(case)),
+        )
+        return _invasion(case, flow, shared) if isinstance(case, InvasionCase) else shared
     except (OverflowError, ZeroDivisionError) as error:
         raise CaseError(
             f"case {case.name}: a formula leaves the range of numbers ({error}); check units and "
@@ -156,39 +161,44 @@ def scales_of(case: Case) -> Scales:
         ) from error
 
 
-def _shared(case: Case, velocity: Velocity) -> Scales:
-    contacts = contacts_of(case, velocity.interstitial)
-    return Scales(
-        porosity=target_porosity(case),
-        permeability=velocity.permeability,
-        darcy_velocity=velocity.darcy,
-        interstitial_velocity=velocity.interstitial,
-        pressure_gradient=velocity.pressure_gradient,
-        inertial_loss=velocity.inertial_loss,
-        stiffness_factor=stiffness_factor(case),
-        contacts=contacts,
-        pack_step=pack_step(case, contacts),
-        warnings=tuple(size_warnings(case)),
-    )
+def invasion_scales(case: InvasionCase) -> InvasionScales:
+    """`scales_of` a case that is known to have fines."""
+    scales = scales_of(case)
+    assert isinstance(scales, InvasionScales)
+    return scales
 
 
 def _invasion(case: InvasionCase, flow: Velocity, shared: Scales) -> InvasionScales:
+    fines, fluid, multiplier = case.fines, case.fluid, case.drag.multiplier
+    small, large = fines.radius_range_m
+    speed, viscosity = flow.interstitial, fluid.viscosity_Pa_s
     slab, relaxation = slab_of(case), relaxation_times(case)
-    reynolds, throat = _reynolds(case, shared.interstitial_velocity), _throat_ratio(case, shared)
     drive = drive_in(case, flow)
-    push = push_of(case, drive.velocity, shared.pressure_gradient, factor=drive.factor)
-    upstream = _upstream(case, shared, drive)
-    shortest = relaxation[0] * push.relaxation_share(case.fines.radius_range_m[0])
+    push = push_of(case, drive.velocity, flow.pressure_gradient, factor=drive.factor)
+    upstream = drive.velocity
+    if case.drag.upstream == "darcy":
+        upstream = flow.darcy * drive.factor
+    shortest = relaxation[0] * push.relaxation_share(small)
     step = time_step(case, shared.contacts, shortest)
     times = stop_times(case, slab, drive, upstream=upstream)
     hold = hold_steps(case, step, shortest / densest_factor(case), times.chunk)
     chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
     contact = shared.contacts["grain-fine"]
-    overlaps = pressed_in(case, flow, drive, contact)
+    overlaps = overlaps_of(case, contact, flow, drive, shared.porosity)
     sticking = sticking_of(case, contact, push, step)
-    _refuse_long_chunk(step, chunk_steps)
+    if chunk_steps > MOST_STEPS:
+        raise CaseError(
+            f"run.time_step_s: {step:.3g} s needs {chunk_steps:.3g} steps between checkpoints "
+            f"(limit {MOST_STEPS:.3g}); raise the step or shorten run.checkpoint_ms"
+        )
+    reynolds = fluid.density_kg_m3 * speed * 2 * large / viscosity
+    throat = 2 * large / throat_width(shared.porosity, flow.permeability)
+    displaced = fluid.density_kg_m3 * case.gravity.buoyancy
+    excess = max(abs(one.density - displaced) for one in fines.components)
+    weight = math.hypot(*case.gravity.acceleration_m_s2) * excess
     warnings = [
         *shared.warnings,
+        *velocity_warnings(case, shared.porosity, flow),
         *drive_warnings(case, drive),
         *reynolds_warnings(case, push, reynolds, throat_ratio=throat),
         *throat_warnings(case, throat),
@@ -216,64 +226,22 @@ def _invasion(case: InvasionCase, flow: Velocity, shared: Scales) -> InvasionSca
         reynolds=reynolds,
         stokes=relaxation[1] * drive.velocity / (2 * case.grains.mean_radius_m),
         impact_stokes=drive.impact_stokes,
-        gravity_over_drag=_gravity_over_drag(case, shared.interstitial_velocity),
-        gradient_over_drag=_gradient_over_drag(case, shared),
+        # 2 r^2 (rho - rho_fluid) g / (9 mu u M), of the material that weighs most in the fluid
+        gravity_over_drag=2 * large**2 * weight / (9 * viscosity * speed * multiplier),
+        # 2 r^2 (-grad p) / (9 mu u M), by Darcy's law (2/9) r^2 phi / (k M)
+        gradient_over_drag=2
+        / 9
+        * large**2
+        * flow.pressure_gradient
+        / (viscosity * speed * multiplier),
         push=push,
-        drift_velocity=drive.velocity + push.drift(case.fines.radius_range_m[1]),
+        drift_velocity=drive.velocity + push.drift(large),
         throat_ratio=throat,
         impact_overlap=overlaps.impact,
         drag_overlap=overlaps.drag,
         deposit_overlap=overlaps.deposit,
         sticking=sticking,
     )
-
-
-def _upstream(case: InvasionCase, shared: Scales, drive: Drive) -> float:
-    interstitial = case.drag.upstream == "interstitial"
-    return drive.velocity if interstitial else shared.darcy_velocity * drive.factor
-
-
-def _reynolds(case: InvasionCase, velocity: float) -> float:
-    """rho u 2 r / mu of the largest fine, with the fluid's density rho and viscosity mu."""
-    radius = case.fines.radius_range_m[1]
-    return case.fluid.density_kg_m3 * velocity * 2 * radius / case.fluid.viscosity_Pa_s
-
-
-def _gradient_over_drag(case: InvasionCase, shared: Scales) -> float:
-    """2 r^2 (-grad p) / (9 mu u M) of the largest fine, (2/9) r^2 phi / (k M) by Darcy's law.
-
-    It is the force V (-grad p) over Stokes's drag at rest, whether or not the case lets it act.
-    """
-    drag = case.fluid.viscosity_Pa_s * shared.interstitial_velocity * case.drag.multiplier
-    return 2 / 9 * case.fines.radius_range_m[1] ** 2 * shared.pressure_gradient / drag
-
-
-def _throat_ratio(case: InvasionCase, shared: Scales) -> float:
-    return 2 * case.fines.radius_range_m[1] / throat_width(shared.porosity, shared.permeability)
-
-
-def _gravity_over_drag(case: InvasionCase, velocity: float) -> float:
-    """2 r^2 (rho - rho_fluid) g / (9 mu u M), M the drag multiplier.
-
-    Of the largest fine and the material that weighs most in the fluid.
-    """
-    displaced = case.fluid.density_kg_m3 * case.gravity.buoyancy
-    excess = max(abs(one.density - displaced) for one in case.fines.components)
-    weight = math.hypot(*case.gravity.acceleration_m_s2) * excess
-    return (
-        2
-        * case.fines.radius_range_m[1] ** 2
-        * weight
-        / (9 * case.fluid.viscosity_Pa_s * velocity * case.drag.multiplier)
-    )
-
-
-def _refuse_long_chunk(step: float, chunk_steps: int) -> None:
-    if chunk_steps > MOST_STEPS:
-        raise CaseError(
-            f"run.time_step_s: {step:.3g} s needs {chunk_steps:.3g} steps between checkpoints "
-            f"(limit {MOST_STEPS:.3g}); raise the step or shorten run.checkpoint_ms"
-        )
 
 
 # ------------------------------------------------------------------------------------------------
@@ -321,7 +289,7 @@ def back_flow(case: InvasionCase) -> BackFlow:
         raise CaseError(f"case {case.name}: has no table [clean_up]; add it with drawdown_MPa")
     turned = _at_drawdown(case, choices)
     try:
-        scales = scales_of(turned)
+        scales = invasion_scales(turned)
     except CaseError as error:
         given = 1e-6 * choices.drawdown_Pa
         raise CaseError(f"clean_up.drawdown_MPa: {given:g}: {error}") from error
@@ -349,6 +317,6 @@ def _at_drawdown(case: InvasionCase, choices: CleanUp) -> InvasionCase:
     turned = case.model_copy(update={"fluid": fluid, "run": run, "drag": undriven})
     if case.drag.drive_velocity_m_s is None:
         return turned
-    driven = scales_of(turned).interstitial_velocity * scales_of(case).force_factor
+    driven = scales_of(turned).interstitial_velocity * invasion_scales(case).force_factor
     drag = case.drag.model_copy(update={"drive_velocity_m_s": driven})
     return turned.model_copy(update={"drag": drag})

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, frozen, one_line
 
 if TYPE_CHECKING:
@@ -114,9 +114,10 @@ def overlap_doubts(grains: float, fines: float = 0.0) -> Iterator[str]:
     """Warnings on the largest overlaps of grains and of fines, as shares of a diameter."""
     for name, what, share in (("grains", "pack", grains), ("fines", "deposit", fines)):
         if share > _OVERLAP_WARNING:
-            yield (
+            yield Doubt(
+                "grains-overlap",
                 f"{name} overlap by up to {100 * share:.1f} % of a diameter: the {what} is denser "
-                "than rigid spheres get"
+                "than rigid spheres get",
             )
 
 

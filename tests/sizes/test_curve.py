@@ -20,8 +20,6 @@ from fdnet.sizes import (
     blended,
     cut_curve,
     dealt,
-    fit_log_normal,
-    fit_rosin_rammler,
     volume_quantiles,
 )
 
@@ -171,12 +169,12 @@ def test_three_points_of_a_law_are_met_and_the_law_is_recognised():
 def test_the_misfit_of_three_points_is_that_of_the_line_of_least_squares():
     """The log-normal quantiles are symmetric, so the line passes through the mean of ln d."""
     points = {0.1: 0.25e-3, 0.5: 0.40e-3, 0.9: 0.60e-3}
-    fit = fit_log_normal(points)
+    fit = best_fit(points, "log-normal")
     assert fit.law.median == pytest.approx((0.25 * 0.40 * 0.60) ** (1 / 3) * 1e-3)
     assert fit.law.spread == pytest.approx(math.log(0.60 / 0.25) / (2 * Z10))
     assert fit.misfit[0.5] == pytest.approx((0.25 * 0.60 / 0.40**2) ** (1 / 3) - 1)
     assert best_fit(points).name == "log-normal"
-    assert fit_rosin_rammler(points).worst > fit.worst
+    assert best_fit(points, "rosin-rammler").worst > fit.worst
     assert best_fit(points, "rosin-rammler").name == "rosin-rammler"
 
 

@@ -24,8 +24,9 @@ from fdnet.dem.supply import (
 )
 from fdnet.errors import CaseError
 from fdnet.scales.contacts import mass_range
-from fdnet.scales.pack import diameter_at, size_rows
+from fdnet.scales.pack import diameter_at
 from fdnet.scales.scales import scales_of
+from fdnet.scales.table import scale_rows
 from fdnet.sizes import volume_quantiles
 from fdnet.spheres.snapshot import Kind, resting
 
@@ -84,7 +85,8 @@ def test_what_is_left_out_and_what_the_law_misses_is_said():
 
 
 def test_the_table_of_scales_shows_each_diameter_beside_the_given_one():
-    rows = {row[0]: row for row in size_rows(made(measured()))}
+    case = made(measured())
+    rows = {row[0]: row for row in scale_rows(case, scales_of(case))}
     row = rows["grains: 50 % by volume finer than"]
     assert row[2] == pytest.approx((0.25 * 0.40 * 0.60) ** (1 / 3) * 1e-3, rel=1e-6)
     assert "given 0.0004 m (-2.1 %)" in row[4]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, Doubt
 from fdnet.network.flow.flow import Flow, solve_flow
 from fdnet.network.network import Network
 from fdnet.network.nodes import nodes_of
@@ -312,10 +312,11 @@ def thin_slabs(sections: Sequence[Section], diameter: float) -> Iterator[str]:
         return
     count = int((sections[-1].x_hi - sections[0].x_lo) / least)
     cure = f"take fewer sections: analysis.sections = {count} or less"
-    yield (
+    yield Doubt(
+        "thin-sections",
         f"sections {thin} are thinner than the mean grain diameter ({1e3 * diameter:.3g} mm): the "
         "permeability of each is that of single throats; "
-        + (cure if count else "take a specimen that is longer along x")
+        + (cure if count else "take a specimen that is longer along x"),
     )
 
 

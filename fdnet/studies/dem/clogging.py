@@ -16,7 +16,7 @@ from fdnet.report.figures import draw
 from fdnet.report.tables import write_rows
 from fdnet.run.bridging import CLOGGED
 from fdnet.run.finished import open_run
-from fdnet.scales.scales import scales_of
+from fdnet.scales.scales import invasion_scales
 from fdnet.spheres.snapshot import Array, one_line
 from fdnet.studies.dem.arrivals import arrivals
 from fdnet.studies.engine.bands import wilson_interval
@@ -64,7 +64,7 @@ def met_throats(folder: Path) -> Met:
     states = [
         state
         for _, state in readable_states(
-            own, read_history(own), run.case, scales_of(run.case), grains
+            own, read_history(own), run.case, invasion_scales(run.case), grains
         )
     ]
     clean = table["conductance_initial_m3"].to_numpy()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from fdnet.case.case import InvasionCase
 from fdnet.scales.clock import HOLD_OVER_RELAXATION
-from fdnet.scales.scales import scales_of
+from fdnet.scales.scales import invasion_scales
 from fdnet.studies.dem.runs import (
     BINS,
     OBSERVED,
@@ -116,7 +116,7 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
 
 
 def _invasion_case(point: Point, form: Form) -> InvasionCase:
-    tau = scales_of(slab_case(point.seed, small=form.small)).relaxation_time[0]
+    tau = invasion_scales(slab_case(point.seed, small=form.small)).relaxation_time[0]
     return slab_case(
         point.seed,
         f"run.stiffness_N_m={form.stiffness!r}",

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import case_from, case_path, read_case, set_keys
-from fdnet.scales.scales import scales_of
+from fdnet.scales.scales import invasion_scales
 from fdnet.studies.dem.runs import invasion_run
 from fdnet.studies.engine.error_rows import against_reference
 from fdnet.studies.engine.study import Measured, Panel, Point, Row, Study
@@ -52,7 +52,7 @@ def case_of(point: Point) -> InvasionCase:
     for name in ("fluid", "drag"):
         del data[name]
     plain = with_fines(case_from(set_keys(data, [_WELL, f"seed={point.seed}"])))
-    velocity = float(point.value) * scales_of(plain).interstitial_velocity
+    velocity = float(point.value) * invasion_scales(plain).interstitial_velocity
     keys = (
         _WELL,
         f"seed={point.seed}",
@@ -69,7 +69,7 @@ def case_of(point: Point) -> InvasionCase:
 def measure(point: Point, work: Path) -> Mapping[str, float]:
     """One invasion, with the impact Stokes number and the physical duration."""
     case = case_of(point)
-    scales = scales_of(case)
+    scales = invasion_scales(case)
     run = invasion_run(case, work, point.slug)
     seconds = run["steps"] * scales.time_step * scales.force_factor
     return run | {"impact_stokes": scales.impact_stokes, "physical_time_s": seconds}

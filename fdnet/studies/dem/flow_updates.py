@@ -20,7 +20,7 @@ from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.run.fluid import STANDING, NetworkFluid
 from fdnet.run.network_flow import RENEWED
-from fdnet.scales.scales import scales_of
+from fdnet.scales.scales import invasion_scales
 from fdnet.studies.dem.coupling import FLUIDS
 from fdnet.studies.dem.runs import grains_of, the_binary
 from fdnet.studies.engine.error_rows import against_reference
@@ -102,7 +102,7 @@ def _heavier(plain: InvasionCase, point: Point) -> InvasionCase:
 def measure(point: Point, work: Path) -> Mapping[str, float]:
     """One invasion; its seconds are those of LIGGGHTS and of the updates together."""
     case = case_of(point)
-    scales, grains, folder = scales_of(case), grains_of(case, work), work / point.slug
+    scales, grains, folder = invasion_scales(case), grains_of(case, work), work / point.slug
     shutil.rmtree(folder, ignore_errors=True)
     fluid = NetworkFluid(
         case=case,

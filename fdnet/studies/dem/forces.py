@@ -17,7 +17,7 @@ from fdnet.dem.invade_deck import render_invade, write_invade_inputs
 from fdnet.dem.liggghts import SCREEN, Launch, run_deck
 from fdnet.files import write_text
 from fdnet.run.pipeline import run_case
-from fdnet.scales.scales import scales_of
+from fdnet.scales.scales import invasion_scales
 from fdnet.spheres.snapshot import Array, Snapshot
 from fdnet.studies.dem.runs import grains_of, slab_case, the_binary
 
@@ -52,7 +52,7 @@ def _effect(path: Path, seed: int, acts: bool, work: Path) -> dict[str, object]:
         "case": case.name,
         "seed": seed,
         "pressure_gradient": acts,
-        "gradient_over_drag": scales_of(case).gradient_over_drag,
+        "gradient_over_drag": invasion_scales(case).gradient_over_drag,
         "supplied": summary["supplied_count"],
         "invaded": summary["invaded_count"],
         "passed": summary["passed_count"],
@@ -99,7 +99,7 @@ def _turns(count: int, size: tuple[str, ...], turns: tuple[int, int], work: Path
     (folder / "post").mkdir(parents=True)
     cases = [_case(count, *size, *settings) for settings in FORCES.values()]
     grains = grains_of(cases[0], work)
-    write_invade_inputs(cases[0], scales_of(cases[0]), grains, folder)
+    write_invade_inputs(cases[0], invasion_scales(cases[0]), grains, folder)
     parts = [_deck(case, grains) for case in cases]
     lines = [parts[0][0], f"variable turn loop {rounds}", "label turn"]
     for _, block in parts:
@@ -118,7 +118,7 @@ def _case(count: int, *settings: str) -> InvasionCase:
 
 def _deck(case: InvasionCase, grains: Snapshot) -> tuple[str, str]:
     """The deck of one case up to the forces of the fluid, and these."""
-    deck = render_invade(case, scales_of(case), grains).text
+    deck = render_invade(case, invasion_scales(case), grains).text
     start, end = deck.index("# Stokes drag"), deck.index("region specimen")
     return f"{deck[:start]}thermo_modify lost error norm no", deck[start:end]
 

@@ -25,7 +25,7 @@ from fdnet.files import write_text
 from fdnet.names import SECTION_ARCHIE
 from fdnet.network.permeability import analyse
 from fdnet.scales.clock import relaxation_time
-from fdnet.scales.scales import scales_of
+from fdnet.scales.scales import invasion_scales, scales_of
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
 from fdnet.studies.engine.runner import child_core_seconds
@@ -134,7 +134,7 @@ def _fresh(
     One that an earlier session left unfinished starts anew, so that its costs are complete.
     """
     shutil.rmtree(folder, ignore_errors=True)
-    scales, before = scales_of(case), child_core_seconds()
+    scales, before = invasion_scales(case), child_core_seconds()
     launch = Launch(binary=the_binary(), ranks=math.prod(grid))
     runs = [_gridded(case, grains, folder, grid, launch)] if grid else []
     result = invade(case, scales, grains, folder, launch)
@@ -162,7 +162,7 @@ def edited_run(
     exactly one line of the deck has the pattern.
     """
     (folder / "post").mkdir(parents=True)
-    scales = scales_of(case)
+    scales = invasion_scales(case)
     deck = write_invade_inputs(case, scales, grains, folder, ranks=launch.ranks).text
     text, count = re.subn(f"(?m){edit[0]}", edit[1], deck)
     assert count == 1, f"{count} lines of the deck have the pattern {edit[0]}, expected 1"
@@ -267,7 +267,7 @@ def relaxation_run(
 
 
 def _relaxed(case: InvasionCase, folder: Path, *, terminal: float, tau: float) -> dict[str, float]:
-    scales, far = scales_of(case), np.array([[3.5e-3, 1.4e-3, 1.4e-3]])
+    scales, far = invasion_scales(case), np.array([[3.5e-3, 1.4e-3, 1.4e-3]])
     lonely = resting(far, 2.5e-4, specimen_box(case), Kind.GRAIN)
     result, costs = _fresh(case, lonely, folder)
     errors = []

@@ -13,7 +13,7 @@ from scipy.stats import binomtest
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import case_from
 from fdnet.scales.contacts import sphere_mass
-from fdnet.scales.scales import scales_of
+from fdnet.scales.scales import invasion_scales
 from fdnet.studies.dem.runs import window_run
 from fdnet.studies.engine.error_rows import sizes
 from fdnet.studies.engine.markdown import markdown_table
@@ -95,7 +95,7 @@ def case_of(point: Point) -> InvasionCase:
 def measure(point: Point, work: Path) -> Mapping[str, float]:
     """Share of the fines that are held, the scales of their sticking, and costs."""
     case = case_of(point)
-    sticking = scales_of(case).sticking
+    sticking = invasion_scales(case).sticking
     seen = window_run(case, work, point.slug)
     return {
         HELD: seen["invaded"] / FINES,

@@ -20,7 +20,7 @@ from fdnet.network.laws.section_archie import STEP as STEP_OF_ANALYSIS
 from fdnet.network.laws.section_archie import KeptSections, measured_sections
 from fdnet.run.fluid import NetworkFluid
 from fdnet.run.network_flow import Carried, changed_share
-from fdnet.scales.scales import scales_of
+from fdnet.scales.scales import invasion_scales
 from fdnet.spheres.snapshot import Snapshot, one_line
 
 THRESHOLDS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5)
@@ -126,7 +126,7 @@ def lag_rows(
 
     `k_finer_sections` is the same in all rows, see `WatchedFluid.finer_sections`.
     """
-    scales = scales_of(case)
+    scales = invasion_scales(case)
     fluid = WatchedFluid(NetworkFluid(case=case, scales=scales, grains=grains), THRESHOLDS)
     invade(case, scales, grains, folder, launch, fluid=fluid)
     finer = {"k_finer_sections": fluid.finer_sections()}

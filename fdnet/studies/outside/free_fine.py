@@ -18,7 +18,7 @@ from fdnet.case.file import case_from, set_keys
 from fdnet.dem.deck import specimen_box
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
-from fdnet.scales.scales import scales_of
+from fdnet.scales.scales import invasion_scales
 from fdnet.spheres.snapshot import Array, Kind, resting
 from fdnet.studies.dem.runs import the_binary
 from fdnet.studies.engine.error_rows import sizes
@@ -96,7 +96,7 @@ def expected(force: str, case: InvasionCase) -> Array:
         thin = VISCOSITY * _THIN
         fall = stokes_fall(_PULLS[force], thin)
         return np.asarray(fluid - [0, 0, slip_with_inertia(float(-fall[2]), thin)])
-    scales = scales_of(case)
+    scales = invasion_scales(case)
     share = 2 / 9 * RADIUS**2 * scales.porosity / scales.permeability
     return (1 + share) * fluid
 
@@ -118,7 +118,7 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
     force, folder = str(point.value), work / point.slug
     case = case_of(force)
     lonely = resting(np.array([[2.7e-3, 3e-4, 3e-4]]), 2.5e-4, specimen_box(case), Kind.GRAIN)
-    end = invade(case, scales_of(case), lonely, folder, Launch(binary=the_binary()))
+    end = invade(case, invasion_scales(case), lonely, folder, Launch(binary=the_binary()))
     seen, exact = end.damaged.fines().velocity[0], expected(force, case)
     slip = exact - [_SPEED, 0.0, 0.0]
     return {ERROR: float(math.dist(seen, exact) / np.linalg.norm(slip))}

@@ -17,7 +17,7 @@ from fdnet.case.file import case_from
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.scales.contacts import sphere_mass
-from fdnet.scales.scales import scales_of
+from fdnet.scales.scales import invasion_scales
 from fdnet.spheres.geometry import max_overlap
 from fdnet.studies.dem.runs import edited_run, grains_of, the_binary
 from fdnet.studies.engine.error_rows import sizes
@@ -97,7 +97,7 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
     shutil.rmtree(folder, ignore_errors=True)
     launch = Launch(binary=the_binary())
     edited_run(case, grains, folder, launch, _ALONE)
-    last = invade(case, scales_of(case), grains, folder, launch).history[-1]
+    last = invade(case, invasion_scales(case), grains, folder, launch).history[-1]
     return {
         HELD: float(last.invaded),
         SUPPLIED: float(last.upstream + last.invaded + last.passed),

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from fdnet.case.case import InvasionCase, with_fines
 from fdnet.case.file import QUICK, case_path, read_case
-from fdnet.scales.scales import scales_of
+from fdnet.scales.scales import invasion_scales
 
 SPECIMENS = tuple(f"specimen{number}" for number in range(1, 9))
 VARIANTS = ("specimen1-7to8", "specimen1-1410", "specimen5-5to6", "table3")
@@ -113,7 +113,7 @@ def _scans() -> Iterator[Planned]:
             )
     for name in (QUICK + "specimen5", QUICK + "specimen6"):
         case = with_fines(read_case(case_path(name)))
-        count = scales_of(case).supplied_count
+        count = invasion_scales(case).supplied_count
         for factor in SUPPLIES:
             setting = f"fines.count={round(factor * count)}"
             for seed in range(1, SCAN_SEEDS + 1):
@@ -132,7 +132,7 @@ def _longer(case: InvasionCase, factor: float) -> tuple[str, ...]:
     """The cap on the simulated time, moved by the longer arrival of a longer slab."""
     if case.run.cap_s is None:
         return ()
-    scales = scales_of(case)
+    scales = invasion_scales(case)
     arrival = scales.slab_length / scales.upstream_velocity
     return (f"run.cap_ms={1e3 * (case.run.cap_s + (factor - 1) * arrival):.4g}",)
 

@@ -24,7 +24,7 @@ from fdnet.errors import CaseError
 from fdnet.files import write_bytes
 from fdnet.run.folder import CASE, check_files, read_record
 from fdnet.run.records import PACK_DUMP
-from fdnet.scales.scales import scales_of
+from fdnet.scales.scales import invasion_scales
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 
@@ -82,7 +82,7 @@ def state_of_run(folder: Path) -> State:
         )
     check_files(folder / "pack", pack, RUN_ANEW)
     check_files(folder / "invade", invasion, RUN_ANEW)
-    scales, history = scales_of(case), read_history(folder / "invade")
+    scales, history = invasion_scales(case), read_history(folder / "invade")
     dump = folder / "pack" / PACK_DUMP
     grains = snapshot_of(read_frame(dump), case, time_s=0.0)
     check_radii(grains, case, dump)
