@@ -23,7 +23,8 @@ LAYERS = [
 """Rooms of the package from the bottom up; a room imports from lower lines only."""
 
 NETWORK_LAYERS = [
-    ["geometry", "compiled", "stokes"],
+    ["geometry", "compiled"],
+    ["stokes"],
     ["field"],
     ["tessellation"],
     ["network"],

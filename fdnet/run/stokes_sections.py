@@ -1,10 +1,15 @@
-"""Resolved Stokes flow through one slab of a run, on two grids that the run folder keeps."""
+"""Sections of a finished run by resolved Stokes flow, and what the network gives for them.
+
+Resolved flow needs no law of throats. It takes minutes where the network takes seconds, so it is
+computed for the sections that a user names, mostly the first. Each is solved on two grids, which
+the run folder keeps (docs/how-to/check_the_face.md).
+"""
 
 import html
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from math import ceil, isfinite
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +20,9 @@ from fdnet.case.case import Case
 from fdnet.errors import CaseError
 from fdnet.files import write_text
 from fdnet.network.states import cut_out
-from fdnet.network.stokes import Closed, Estimate, StokesFlow, estimate, solve_slab, stagger
-from fdnet.report.html import STOKES as NAME
-from fdnet.report.html import put_section
-from fdnet.report.html import stokes_html as section_html
+from fdnet.network.stokes import StokesFlow, Walled, divide, estimate, solve_slab
+from fdnet.report.html import STOKES, put_section, stokes_html
+from fdnet.report.tables import AboveZero, JsonObject, read_table, write_rows
 from fdnet.run.finished import FinishedRun, open_run
 from fdnet.run.folder import locked
 from fdnet.run.records import cores
@@ -28,18 +32,20 @@ ACROSS_A_GRAIN, ACROSS_A_FINE = 15.0, 3.5
 """Cells of the finer grid across the mean radius of the grains, and of the fines."""
 COARSER = 1.5
 """Edge of a cell of the coarser grid over that of the finer one."""
-TOLERANCE = 1e-3
+K_TOLERANCE = 1e-3
 """Of the solves, as of `solve_stokes`."""
 MOST_CELLS = 60_000_000
 BYTES = 200
 """Memory for each cell."""
-SECONDS = {"initial": 1.5e-5, "damaged": 4e-5}
+SECONDS = {"initial": 1.2e-5, "damaged": 2.5e-5}
 """For each cell, on one core of the machine of docs/stokes.md."""
+KEPT_IN, GRIDS, RESOLVED = "stokes", "grids.json", "sections.csv"
+"""Folder in the run folder, the file of the solved grids, the table of the sections."""
 Follow = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Slab:
+class ResolvedSlab:
     """Spheres between two planes.
 
     Attributes:
@@ -48,13 +54,15 @@ class Slab:
         closed: which sides are walls.
         state: "initial" or "damaged".
         digest: of the file of the spheres.
+        across: cells across the mean radius of a fine, on the finer of two grids.
     """
 
     spheres: Snapshot
     span: tuple[float, float]
-    closed: Closed
+    closed: Walled
     state: str
     digest: str
+    across: float
 
     __repr__ = one_line
 
@@ -69,90 +77,60 @@ class Slab:
         state = "after the invasion" if self.state == "damaged" else "before it"
         return f"{1e3 * self.span[0]:g} to {1e3 * self.span[1]:g} mm, {state}"
 
-    def cells(self, across: float) -> tuple[int, int]:
-        """Cells on the longest edge of the coarser and of the finer grid.
-
-        `across` is their number across the mean radius of a fine in the finer one.
-        """
-        grains, fines = self.spheres.grains(), self.spheres.fines()
-        wanted = [ACROSS_A_GRAIN / _mean(grains.radius)] if len(grains) else []
-        wanted += [across / _mean(fines.radius)] if len(fines) else []
+    @property
+    def cells(self) -> tuple[int, int]:
+        """Cells on the longest edge of the coarser and of the finer grid."""
+        wanted = [
+            cells * float(np.sum(r**2) / np.sum(r**3))  # over the Sauter mean radius
+            for cells, r in (
+                (ACROSS_A_GRAIN, self.spheres.grains().radius),
+                (self.across, self.spheres.fines().radius),
+            )
+            if len(r)
+        ]
         if not wanted:
             raise CaseError(f"{self.words}: no sphere reaches into it, expected grains")
         fine = ceil(float(self.edges.max()) * max(wanted))
         return ceil(fine / COARSER), fine
 
-    def cell(self, across: float) -> float:
-        """Edge of a cell of the finer grid, m."""
-        return float(self.edges.max()) / self.cells(across)[1]
-
     def size(self, cells: int) -> int:
         """Cells of the grid with `cells` on the longest edge."""
-        return int(np.prod(stagger(self.edges, cells, closed=self.closed)[0].shape))
+        return int(np.prod(divide(self.edges, cells)))
 
 
-def _mean(radius: Array) -> float:
-    """Sauter mean: sum of cubes over sum of squares."""
-    return float(np.sum(radius**3) / np.sum(radius**2))
+class KeptGrid(JsonObject):
+    """A solved grid in the file `GRIDS`: what was solved, and the fields of `StokesFlow`."""
+
+    state: str
+    x_lo_m: float
+    x_hi_m: float
+    cells: int
+    spheres: str
+    k: AboveZero
+    iterations: int
+    residual: float
+    seconds: float
+    unknowns: int
 
 
-class KeptGrids:
-    """The solved grids of a run in a file, which is whole after each of them."""
-
-    def __init__(self, path: Path) -> None:
-        """Reads what `path` holds. Raises CaseError where it cannot be understood."""
-        self.path = path
-        self.rows: list[dict[str, Any]] = []
-        if path.is_file():
-            names = {one.name for one in fields(StokesFlow)}
-            try:
-                rows = json.loads(path.read_text(encoding="utf-8"))
-                if not isinstance(rows, list):
-                    raise ValueError(f"{type(rows).__name__}, expected a list")
-                self.rows = [dict(row) for row in rows]
-                if not all(names <= row.keys() for row in self.rows):
-                    raise ValueError(f"a grid lacks one of {', '.join(sorted(names))}")
-                if not all(0.0 < float(row["k"]) < np.inf for row in self.rows):
-                    raise ValueError("a permeability k is not positive and finite")
-            except (ValueError, TypeError) as error:
-                raise CaseError(
-                    f"{path}: cannot be read as solved grids ({error}); remove it, and its grids "
-                    "are solved again"
-                ) from error
-
-    def find(self, key: dict[str, Any]) -> StokesFlow | None:
-        """The flow of a grid that was solved."""
-        names = [one.name for one in fields(StokesFlow)]
-        for row in self.rows:
-            if all(row.get(name) == value for name, value in key.items()):
-                return StokesFlow(**{name: row[name] for name in names})
-        return None
-
-    def add(self, key: dict[str, Any], flow: StokesFlow) -> None:
-        """Keeps a solved grid."""
-        self.rows.append(key | {one.name: getattr(flow, one.name) for one in fields(StokesFlow)})
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        write_text(self.path, json.dumps(self.rows, indent=1) + "\n")
-
-
-def refuse_large(slab: Slab, across: float) -> None:
-    """Raises CaseError where the finer grid would take more than `MOST_CELLS`."""
-    size = slab.size(slab.cells(across)[1])
-    if size > MOST_CELLS:
+def read_grids(path: Path) -> list[KeptGrid]:
+    """The solved grids of a run, none without the file. Raises CaseError for another content."""
+    if not path.is_file():
+        return []
+    try:
+        rows = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(rows, list):
+            raise ValueError(f"{type(rows).__name__}, expected a list")
+        return [KeptGrid.model_validate(row) for row in rows]
+    except (OSError, ValueError) as error:
         raise CaseError(
-            f"{slab.words}: {size / 1e6:.0f} million cells, expected at most "
-            f"{MOST_CELLS / 1e6:.0f} million; lower --across from {across:g}, or analyse the run "
-            "with thinner sections"
-        )
+            f"{path}: cannot be read as solved grids ({error}); remove it, and its grids are "
+            "solved again"
+        ) from error
 
 
-def permeability_of(slab: Slab, across: float, kept: KeptGrids, follow: Follow) -> Estimate:
-    """Permeability of the slab along x, m2, and its error."""
-    coarse, fine = (_flow(slab, cells, kept, follow) for cells in slab.cells(across))
-    return estimate(coarse, fine, with_fines=len(slab.spheres.fines()) > 0)
-
-
-def _flow(slab: Slab, cells: int, kept: KeptGrids, follow: Follow) -> StokesFlow:
+def flow_through(slab: ResolvedSlab, cells: int, path: Path, follow: Follow) -> StokesFlow:
+    """The flow on one grid, out of the file at `path` or solved and added to it."""
     key = {
         "state": slab.state,
         "x_lo_m": slab.span[0],
@@ -160,34 +138,25 @@ def _flow(slab: Slab, cells: int, kept: KeptGrids, follow: Follow) -> StokesFlow
         "cells": cells,
         "spheres": slab.digest,
     }
-    flow = kept.find(key)
-    if flow is None:
-        follow(_expected(slab, slab.size(cells)))
-        with fft.set_workers(cores()):
-            flow = solve_slab(
-                slab.spheres, slab.span, cells=cells, tolerance=TOLERANCE, closed=slab.closed
-            )
-        kept.add(key, flow)
-    return flow
-
-
-def _expected(slab: Slab, size: int) -> str:
+    kept, names = read_grids(path), [one.name for one in fields(StokesFlow)]
+    for one in kept:
+        row = one.model_dump()
+        if key.items() <= row.items():
+            return StokesFlow(**{name: row[name] for name in names})
+    size = slab.size(cells)
     seconds = max(1.0, SECONDS[slab.state] * size / cores() ** 0.5)
     took = f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
     memory = BYTES * size / 2**30
-    return f"{slab.words}: {size / 1e6:.1f} million cells, about {took} and {memory:.1f} GiB"
-
-
-# ------------------------------------------------------------------------------------------------
-# Sections of a finished run by resolved Stokes flow, and what the network gives for them.
-#
-# Resolved flow needs no law of throats. It takes minutes where the network takes seconds, so it is
-# computed for the sections that a user names, mostly the first.
-
-
-FOLDER, GRIDS, TABLE = "stokes", "grids.json", "sections.csv"
-"""Folder in the run folder, the file of the solved grids, the table of the sections."""
-INITIAL, DAMAGED = "initial", "damaged"
+    follow(f"{slab.words}: {size / 1e6:.1f} million cells, about {took} and {memory:.1f} GiB")
+    with fft.set_workers(cores()):
+        flow = solve_slab(
+            slab.spheres, slab.span, cells=cells, tolerance=K_TOLERANCE, closed=slab.closed
+        )
+    rows = [one.model_dump() for one in kept]
+    rows.append(key | {name: getattr(flow, name) for name in names})
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_text(path, json.dumps(rows, indent=1) + "\n")
+    return flow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -226,8 +195,8 @@ def stokes_sections(
 ) -> list[dict[str, Any]]:
     """Sections of a finished run by resolved Stokes flow and by the network, each cut out.
 
-    They are written to the folder `FOLDER` of the run and to its report. Every solved grid is kept
-    there, so a cut computation goes on behind the last of them.
+    They are written to the folder `KEPT_IN` of the run and to its report. Every solved grid is
+    kept there, so a cut computation goes on behind the last of them.
 
     Args:
         folder: of the run.
@@ -250,35 +219,82 @@ def stokes_sections(
             f"--across: {across:g}, expected 1 to 20 cells across the radius of a fine"
         )
     with locked(open_run(folder).path):
-        return _resolved(open_run(folder), numbers, across, follow)
+        run = open_run(folder)
+        slabs = _slabs(run, numbers, across)
+        grids, table = run.path / KEPT_IN / GRIDS, run.path / KEPT_IN / RESOLVED
+        read_sections(table)  # refuses a broken table before hours of solving
+        for before, *after in slabs:
+            row: dict[str, float] = {}
+            for slab in (before, *after) if after else (before, before):
+                name = "damaged" if row else "initial"
+                k = estimate(
+                    *(flow_through(slab, cells, grids, follow) for cells in slab.cells),
+                    with_fines=len(slab.spheres.fines()) > 0,
+                )
+                row |= {f"k_{name}_m2": k.k, f"k_{name}_error": k.error}
+                row[f"cell_{name}_m"] = float(slab.edges.max()) / slab.cells[1]
+            one = StokesSection(
+                x_lo_m=before.span[0],
+                x_hi_m=before.span[1],
+                k_reduction=1.0 - row["k_damaged_m2"] / row["k_initial_m2"],
+                **row,
+            )
+            others = [
+                other
+                for other in read_sections(table)
+                if (other.x_lo_m, other.x_hi_m) != before.span
+            ]
+            table.parent.mkdir(exist_ok=True)
+            write_rows(table, sorted(map(asdict, [*others, one]), key=lambda row: row["x_lo_m"]))
+        rows = with_network(read_sections(table), run.summary)
+        if (run.path / "report.html").is_file():
+            put_section(run.path / "report.html", STOKES, stokes_html(rows))
+        return [row for row in rows if row["section"] in numbers]
 
 
-def _resolved(
-    run: FinishedRun, numbers: Sequence[int], across: float, follow: Follow
-) -> list[dict[str, Any]]:
-    spheres = {INITIAL: run.spheres("initial"), DAMAGED: run.spheres("damaged")}
-    slabs = {number: _slabs(run, spheres, number) for number in numbers}
-    for pair in slabs.values():
+def _slabs(run: FinishedRun, numbers: Sequence[int], across: float) -> list[list[ResolvedSlab]]:
+    """Each section before and, where fines reach into it or grains moved, after the invasion."""
+    spheres = {state: run.spheres(state) for state in ("initial", "damaged")}
+    sections, (_, y, z), pairs = run.summary["sections"], run.case.periodic, []
+    for number in numbers:
+        if not 1 <= number <= len(sections):
+            raise CaseError(
+                f"--section: {number}, expected 1 to {len(sections)}, the sections of the run"
+            )
+        if _slips(run.case):
+            raise CaseError(
+                "analysis.walls: 'slip', but resolved flow knows only side walls that hold the "
+                "fluid; analyse the run with analysis.walls = 'no-slip' first"
+            )
+        span = (sections[number - 1]["x_lo_m"], sections[number - 1]["x_hi_m"])
+        pair = [
+            ResolvedSlab(
+                spheres=cut_out(one, span, run.case.periodic),
+                span=span,
+                closed=(False, not y, not z),
+                state=state,
+                digest=str(run.manifest.get("files", {}).get(f"spheres_{state}.csv", "")),
+                across=across,
+            )
+            for state, one in spheres.items()
+        ]
+        if not len(pair[1].spheres.fines()) and "k_moved_m2" not in run.summary:
+            pair.pop()
         for slab in pair:
-            refuse_large(slab, across)
-    kept = KeptGrids(run.path / FOLDER / GRIDS)
-    table = run.path / FOLDER / TABLE
-    read_sections(table)  # refuses a broken table before hours of solving
-    for pair in slabs.values():
-        by_state = {slab.state: permeability_of(slab, across, kept, follow) for slab in pair}
-        cells = {slab.state: slab.cell(across) for slab in pair}
-        row = StokesSection(
-            x_lo_m=pair[0].span[0],
-            x_hi_m=pair[0].span[1],
-            **_of(INITIAL, by_state[INITIAL], cells[INITIAL]),
-            **_of(DAMAGED, by_state[pair[-1].state], cells[pair[-1].state]),
-            k_reduction=1.0 - by_state[pair[-1].state].k / by_state[INITIAL].k,
-        )
-        _write(table, [one for one in read_sections(table) if not _same(one, row)] + [row])
-    rows = with_network(read_sections(table), run.summary)
-    if (run.path / "report.html").is_file():
-        put_section(run.path / "report.html", NAME, section_html(rows))
-    return [row for row in rows if row["section"] in slabs]
+            size = slab.size(slab.cells[1])
+            if size > MOST_CELLS:
+                raise CaseError(
+                    f"{slab.words}: {size / 1e6:.0f} million cells, expected at most "
+                    f"{MOST_CELLS / 1e6:.0f} million; lower --across from {across:g}, or analyse "
+                    "the run with thinner sections"
+                )
+        pairs.append(pair)
+    return pairs
+
+
+def _slips(case: Case) -> bool:
+    """Whether the network has side walls that let the fluid slip; resolved flow has none."""
+    return not all(case.periodic[1:]) and case.analysis.walls == "slip"
 
 
 def report_section(folder: Path, case: Case, summary: Mapping[str, Any]) -> str:
@@ -291,10 +307,10 @@ def report_section(folder: Path, case: Case, summary: Mapping[str, Any]) -> str:
     if _slips(case):
         return ""
     try:
-        rows = with_network(read_sections(folder / FOLDER / TABLE), summary)
+        rows = with_network(read_sections(folder / KEPT_IN / RESOLVED), summary)
     except CaseError as error:
         return f'<p class="note">{html.escape(str(error))}</p>'
-    return section_html(rows) if rows else ""
+    return stokes_html(rows) if rows else ""
 
 
 def with_network(
@@ -312,55 +328,6 @@ def with_network(
     return rows
 
 
-def _slabs(run: FinishedRun, spheres: Mapping[str, Snapshot], number: int) -> list[Slab]:
-    """The section before and, where fines reach into it or grains moved, after the invasion."""
-    sections = run.summary["sections"]
-    if not 1 <= number <= len(sections):
-        raise CaseError(
-            f"--section: {number}, expected 1 to {len(sections)}, the sections of the run"
-        )
-    if _slips(run.case):
-        raise CaseError(
-            "analysis.walls: 'slip', but resolved flow knows only side walls that hold the fluid; "
-            "analyse the run with analysis.walls = 'no-slip' first"
-        )
-    span = (sections[number - 1]["x_lo_m"], sections[number - 1]["x_hi_m"])
-    before, after = (_slab(run, state, one, span) for state, one in spheres.items())
-    changed = len(after.spheres.fines()) or "k_moved_m2" in run.summary
-    return [before, after] if changed else [before]
-
-
-def _slab(run: FinishedRun, state: str, spheres: Snapshot, span: tuple[float, float]) -> Slab:
-    _, y, z = run.case.periodic
-    return Slab(
-        spheres=cut_out(spheres, span, run.case.periodic),
-        span=span,
-        closed=(False, not y, not z),
-        state=state,
-        digest=str(run.manifest.get("files", {}).get(f"spheres_{state}.csv", "")),
-    )
-
-
-def _slips(case: Case) -> bool:
-    """Whether the network has side walls that let the fluid slip; resolved flow has none."""
-    return not all(case.periodic[1:]) and case.analysis.walls == "slip"
-
-
-def _of(state: str, flow: Estimate, cell: float) -> dict[str, float]:
-    return {f"k_{state}_m2": flow.k, f"k_{state}_error": flow.error, f"cell_{state}_m": cell}
-
-
-def _same(one: StokesSection, other: StokesSection) -> bool:
-    return (one.x_lo_m, one.x_hi_m) == (other.x_lo_m, other.x_hi_m)
-
-
-def _write(path: Path, rows: Sequence[StokesSection]) -> None:
-    names = [one.name for one in fields(StokesSection)]
-    ordered = sorted(rows, key=lambda row: row.x_lo_m)
-    lines = [",".join(repr(value) for value in asdict(row).values()) for row in ordered]
-    write_text(path, "\n".join([",".join(names), *lines]) + "\n")
-
-
 def read_sections(path: Path) -> list[StokesSection]:
     """The resolved sections in a table; none where it does not exist.
 
@@ -370,12 +337,14 @@ def read_sections(path: Path) -> list[StokesSection]:
         return []
     names = [one.name for one in fields(StokesSection)]
     try:
-        lines = [line.split(",") for line in path.read_text(encoding="utf-8").split()]
-        if lines[:1] != [names]:
-            raise ValueError(f"expected the columns {','.join(names)}")
-        rows = [dict(zip(names, map(float, line), strict=True)) for line in lines[1:]]
-        if not all(isfinite(value) for row in rows for value in row.values()):
-            raise ValueError("a number is not finite")
-    except (OSError, ValueError) as error:
-        raise CaseError(f"{path}: {error}; remove it and call fdnet stokes again") from error
-    return [StokesSection(**row) for row in rows]
+        table = read_table(path, names)[names]
+        if not np.isfinite(table.to_numpy(float)).all():
+            raise CaseError("a number is not finite")
+    except CaseError as error:
+        raise CaseError(
+            f"{path}: cannot be read, expected numbers below {', '.join(names)}; remove it and "
+            "call fdnet stokes again"
+        ) from error
+    return [
+        StokesSection(**dict(zip(names, row, strict=True))) for row in table.to_numpy().tolist()
+    ]

@@ -4,10 +4,14 @@ import numpy as np
 import pytest
 
 import fdnet
-from fdnet.network.field import field as of_pack
-from fdnet.network.field import solved as collective
-from fdnet.network.field.grid import differences, dot, find_walls
-from fdnet.network.field.solved import Problem
+from fdnet.network import stokes
+from fdnet.network.field.field import build_lattice, on_grid
+from fdnet.network.stokes import (
+    Problem,
+    find_walls,
+    neighbour_differences,
+    summed_product,
+)
 
 
 def _grains() -> fdnet.Snapshot:
@@ -22,9 +26,13 @@ def _grains() -> fdnet.Snapshot:
 
 def _problem(periodic: str) -> Problem:
     sides = ("x" in periodic, "y" in periodic, "z" in periodic)
-    skeleton = of_pack._skeleton(_grains(), sides, (8.0, 1e-3))
-    walls = [find_walls(one, skeleton.lattice, d) for d, one in enumerate(skeleton.marks)]
-    return Problem(walls, skeleton.response, 4.0)
+    grains, diameter = _grains(), 2.0 * float(_grains().radius.mean())
+    lattice = build_lattice(
+        grains.box, sides, spacing=diameter / 8.0, upstream=1e-3, downstream=0.5 * diameter
+    )
+    kept = grains.where(on_grid(lattice, grains.position, grains.radius))
+    walls = [find_walls(lattice, d, kept.position, kept.radius) for d in range(3)]
+    return Problem(walls, lattice.response, 4.0)
 
 
 def test_differences_are_those_with_the_six_neighbours_at_the_walls_alone() -> None:
@@ -33,7 +41,7 @@ def test_differences_are_those_with_the_six_neighbours_at_the_walls_alone() -> N
     value = numbers.standard_normal(weight.shape).astype("f") * (weight > 0)
     beside = sum(np.roll(value, step, axis) for axis in (1, 2, 3) for step in (1, -1))
     expected = np.where(weight > 0, value + 0.5 * (6.0 * value - beside), 0.0)
-    assert differences(value, weight, 0.5) == pytest.approx(expected, abs=1e-5)
+    assert neighbour_differences(value, weight, 0.5) == pytest.approx(expected, abs=1e-5)
 
 
 def test_the_greatest_eigenvalue_is_known_to_half_a_percent(
@@ -41,9 +49,9 @@ def test_the_greatest_eigenvalue_is_known_to_half_a_percent(
 ) -> None:
     """More steps of the process of Lanczos can only raise it."""
     slow = _problem("").collective
-    few = slow._greatest()
-    monkeypatch.setattr(collective, "PROBED", 60)
-    assert few == pytest.approx(slow._greatest(), rel=5e-3)
+    few = slow.greatest()
+    monkeypatch.setattr(stokes, "PROBED", 60)
+    assert few == pytest.approx(slow.greatest(), rel=5e-3)
 
 
 @pytest.mark.parametrize("periodic", ["yz", "z", ""])
@@ -55,18 +63,20 @@ def test_the_preconditioner_is_symmetric_and_positive_definite(periodic: str) ->
     across = (np.arange(walled.shape[2]) + 0.5) / walled.shape[2]
     slow[0] = problem.weight[0] * np.cos(2.0 * np.pi * across)[:, None]
     one, two = problem.project(one), problem.project(two)
-    assert dot(one, problem.smoothed(two)) == pytest.approx(
-        dot(two, problem.smoothed(one)), rel=1e-4
+    assert summed_product(one, problem.smoothed(two)) == pytest.approx(
+        summed_product(two, problem.smoothed(one)), rel=1e-4
     )
     for force in (one, two, slow):
-        assert dot(force, problem.smoothed(force)) > 0.0
-    assert dot(slow, problem.smoothed(slow)) < 0.7 * dot(slow, problem._differences(slow))
+        assert summed_product(force, problem.smoothed(force)) > 0.0
+    assert summed_product(slow, problem.smoothed(slow)) < 0.7 * summed_product(
+        slow, problem.differences(slow)
+    )
 
 
 def test_fewer_iterations_give_the_same_flow(monkeypatch: pytest.MonkeyPatch) -> None:
     fields = []
-    for share in (0.0, collective.SHARE):
-        monkeypatch.setattr(collective, "SHARE", share)
+    for share in (0.0, stokes.TAKEN_OUT):
+        monkeypatch.setattr(stokes, "TAKEN_OUT", share)
         fields.append(fdnet.velocity_field(_grains(), periodic="yz", cells=10.0, tolerance=0.01))
     without, taken = fields
     assert taken.solved.iterations < 0.7 * without.solved.iterations

@@ -9,9 +9,7 @@ from network.packs import random_pack
 
 import fdnet
 from fdnet.errors import CaseError, NetworkError
-from fdnet.network.field.field import VelocityField
-from fdnet.network.field.grid import build_lattice
-from fdnet.network.field.solved import build_skeleton, solve
+from fdnet.network.field.field import VelocityField, build_lattice, solved_field
 from fdnet.network.stokes import solve_stokes
 from fdnet.spheres.snapshot import Snapshot
 from fdnet.studies.engine.timing import least_time
@@ -46,16 +44,8 @@ def test_plane_walls_without_a_grain_give_the_parabola_of_poiseuille():
     """Mean 1 and pressure gradient 12 / H^2; this scheme's own error is 2 / n^2."""
     box = np.array([[0.0, 2.0], [0.0, 1.0], [0.0, 2.0]])
     lattice = build_lattice(box, (True, False, True), spacing=0.05, upstream=0.0, downstream=0.0)
-    skeleton = build_skeleton(lattice, (np.zeros((0, 3)), np.zeros(0)))
     none = (np.zeros((0, 3)), np.zeros(0))
-    flow = VelocityField(
-        skeleton=skeleton,
-        fines=none,
-        left_out=0,
-        tolerance=1e-5,
-        solved=solve(skeleton, none, 1e-5),
-        inside=np.zeros(0, bool),
-    )
+    flow = solved_field(lattice, none, none, 1e-5)
     y = np.linspace(0.002, 0.998, 100)
     u = flow.at(np.column_stack([np.full(100, 0.7), y, np.full(100, 1.1)]))
     assert u[:, 0] == pytest.approx(6.0 * y * (1.0 - y), abs=0.02)

@@ -11,12 +11,13 @@ from direct_stokes import direct_tensor
 from fdnet.errors import CaseError, FlowError
 from fdnet.network import stokes as forces
 from fdnet.network.stokes import (
-    Staggered,
-    build_green,
+    OPEN,
+    Lattice,
+    Response,
+    divide,
     extrapolate,
     find_walls,
     solve_stokes,
-    stagger,
 )
 from fdnet.spheres.snapshot import Array, Snapshot
 from fdnet.studies.truth.packs import DATA, OWN_TRUTH
@@ -45,8 +46,21 @@ def cell(
     )
 
 
-def lattice_radius(lattice: list, solid: float) -> float:
-    return float((solid / len(lattice) * 3 / 4 / np.pi) ** (1 / 3))
+def lattice(shape: tuple[int, int, int], edges: Array | None = None) -> Lattice:
+    """A periodic grid, of cells of edge 1 where no edges of the whole are given."""
+    size = np.array(shape, float) if edges is None else edges
+    return Lattice(
+        low=np.zeros(3),
+        spacing=size / shape,
+        shape=shape,
+        walled=OPEN,
+        specimen=(0.0, float(size[0])),
+        repeats=True,
+    )
+
+
+def lattice_radius(places: list, solid: float) -> float:
+    return float((solid / len(places) * 3 / 4 / np.pi) ** (1 / 3))
 
 
 def literature(solid: float, drag: float, radius: float) -> float:
@@ -58,7 +72,7 @@ def literature(solid: float, drag: float, radius: float) -> float:
 
 
 @pytest.mark.parametrize(
-    ("lattice", "solid", "drag", "cells", "bound"),
+    ("places", "solid", "drag", "cells", "bound"),
     [
         (SC, 0.064, 2.810, (24, 48), 0.002),
         (SC, 0.216, 7.442, (24, 48), 0.002),
@@ -69,8 +83,8 @@ def literature(solid: float, drag: float, radius: float) -> float:
         (FCC, np.pi * np.sqrt(2) / 6, 435.0, (48, 64), 0.015),
     ],
 )
-def test_zick_and_homsy(lattice, solid, drag, cells, bound):
-    pack = cell(lattice, lattice_radius(lattice, solid))
+def test_zick_and_homsy(places, solid, drag, cells, bound):
+    pack = cell(places, lattice_radius(places, solid))
     k = extrapolate(*(solve_stokes(pack, cells=n) for n in cells)).k
     assert k == pytest.approx(literature(solid, drag, pack.radius[0]), rel=bound)
 
@@ -96,9 +110,8 @@ def test_green_solves_the_discrete_stokes_equations():
     rng = np.random.default_rng(1)
     force = [rng.normal(size=(6, 8, 5)) for _ in range(3)]
     force = [part - part.mean() for part in force]
-    velocity = build_green(Staggered(shape=(6, 8, 5))).velocity(
-        [part.astype(np.float32) for part in force]
-    )
+    response = Response((6, 8, 5), OPEN, np.ones(3))
+    velocity = response.velocity([part.astype(np.float32) for part in force])
     divergence = sum(np.roll(v, -1, axis=d) - v for d, v in enumerate(velocity))
     assert np.abs(divergence).max() < 1e-5
     excess = [
@@ -115,10 +128,10 @@ def test_green_solves_the_discrete_stokes_equations():
 
 def tensor_of(pack: Snapshot, cells: int) -> Array:
     """K (3, 3), m2, by the direct solve."""
-    grid, spacing = stagger(np.diff(pack.box)[:, 0], cells)
-    centre, radius = (pack.position - pack.box[:, 0]) / spacing, pack.radius / spacing
-    walls = [find_walls(centre, radius, grid, component=d) for d in range(3)]
-    return direct_tensor(grid.shape, [(wall.node, wall.slack) for wall in walls]) * spacing**2
+    edges = np.diff(pack.box)[:, 0]
+    grid = lattice(divide(edges, cells), edges)
+    walls = [find_walls(grid, d, pack.position, pack.radius) for d in range(3)]
+    return direct_tensor(grid.shape, [(wall.node, wall.slack) for wall in walls]) * grid.unit**2
 
 
 def test_a_direct_solve_gives_the_same_tensor():
@@ -138,7 +151,7 @@ def test_a_direct_solve_gives_the_same_tensor():
 
 def test_walls_stand_where_the_sphere_is():
     point, r = np.array([3.7, 4.2, 5.1]), 2.3
-    walls = find_walls(point[None], np.array([r]), Staggered(shape=(9, 10, 11)), component=1)
+    walls = find_walls(lattice((9, 10, 11)), 1, point[None], np.array([r]))
     offset = np.array([0.5, 0.0, 0.5])
     for node, slack in zip(walls.node, walls.slack, strict=True):
         place = np.array(np.unravel_index(node, (9, 10, 11))) + offset
@@ -221,7 +234,7 @@ def test_refusals(monkeypatch):
     flow = solve_stokes(cell(SC, 0.3), cells=10)
     with pytest.raises(CaseError, match="finer"):
         extrapolate(flow, flow)
-    monkeypatch.setattr(forces, "ITERATIONS", 5)
+    monkeypatch.setattr(forces, "MOST_ITERATIONS", 5)
     with pytest.raises(FlowError, match="after 5 iterations"):
         solve_stokes(cell(SC, 0.4), cells=16)
 

@@ -1,6 +1,7 @@
 """The Stokes oracle between two planes: half of a mirrored cell against the whole, a direct solve,
 lattices, clipped spheres; the specimens of the slabs."""
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -9,8 +10,9 @@ from direct_stokes import direct_tensor
 
 from fdnet.errors import CaseError
 from fdnet.network.stokes import (
-    Staggered,
-    build_green,
+    OPEN,
+    Lattice,
+    Response,
     extrapolate,
     find_walls,
     solve_slab,
@@ -19,7 +21,15 @@ from fdnet.network.stokes import (
 from fdnet.spheres.snapshot import Array, Snapshot, resting
 
 EDGES = (7, 8, 9)
-HALF = Staggered(shape=EDGES, mirrored=True)
+HALF = Lattice(
+    low=np.zeros(3),
+    spacing=np.ones(3),
+    shape=EDGES,
+    walled=OPEN,
+    specimen=(0.0, float(EDGES[0])),
+    repeats=True,
+    planes=True,
+)
 CUT_PLACE = np.array(
     [
         [-1.3, 2, 2.5],
@@ -71,7 +81,7 @@ def first_hit(place: Array, way: Array) -> float:
 @pytest.mark.parametrize("component", range(3))
 def test_walls_of_cut_spheres(component):
     """Against rays through the mirrored solid, at every node."""
-    walls = find_walls(CUT_PLACE, CUT_RADIUS, HALF, component=component)
+    walls = find_walls(HALF, component, CUT_PLACE, CUT_RADIUS)
     nodes = (EDGES[0] + (component == 0), *EDGES[1:])
     offset = np.full(3, 0.5)
     offset[component] = 0.0
@@ -93,16 +103,23 @@ def test_walls_of_cut_spheres(component):
 def test_the_mirrored_response_is_that_of_the_doubled_grid():
     shape = (5, 6, 7)
     rng = np.random.default_rng(2)
-    half = build_green(Staggered(shape=shape, mirrored=True))
-    doubled = build_green(Staggered(shape=(10, 6, 7)))
-    parts = [rng.normal(size=s).astype(np.float32) for s in half.grid.shapes]
-    full = [np.zeros(doubled.grid.shape, np.float32) for _ in range(3)]
+    half = Response(shape, OPEN, np.ones(3), planes=True)
+    doubled = Response((10, 6, 7), OPEN, np.ones(3))
+    shapes = [(6, 6, 7), shape, shape]
+    parts = [rng.normal(size=s).astype(np.float32) for s in shapes]
+    full = [np.zeros(doubled.nodes, np.float32) for _ in range(3)]
     places = [whole(np.arange(part.size), shape, d) for d, part in enumerate(parts)]
     for d, (part, place) in enumerate(zip(parts, places, strict=True)):
         full[d].reshape(-1)[place[0]] = part.reshape(-1)
         full[d].reshape(-1)[place[1]] = (1.0 if d == 0 else -1.0) * part.reshape(-1)
     slow = doubled.velocity([part - part.mean() for part in full])
-    fast = half.velocity(parts)
+    given = [np.zeros(half.nodes, np.float32) for _ in range(3)]
+    for one, part in zip(given, parts, strict=True):
+        one[: len(part)] = part
+    given[0][[0, -1]] *= np.sqrt(0.5)  # a node on a plane stands for one node, the others for two
+    fast = half.velocity(given)
+    fast[0][[0, -1]] *= np.sqrt(2.0)
+    fast = [one[: len(part)] for one, part in zip(fast, parts, strict=True)]
     for d in range(3):
         got, expected = fast[d].reshape(-1), slow[d].reshape(-1)[places[d][0]]
         np.testing.assert_allclose(got - got.mean(), expected - expected.mean(), atol=3e-5)
@@ -118,13 +135,40 @@ def test_a_direct_solve_of_the_whole_mirrored_cell_gives_the_same():
     """One sparse LU on the doubled grid, with the walls of the half copied to their images."""
     walls = []
     for d in range(3):
-        half = find_walls(CUT_PLACE, CUT_RADIUS, HALF, component=d)
+        half = find_walls(HALF, d, CUT_PLACE, CUT_RADIUS)
         places = whole(half.node, EDGES, d)
         walls.append((places.ravel(), np.tile(half.slack, 2)))
     tensor = direct_tensor((2 * EDGES[0], *EDGES[1:]), walls)
     assert np.abs(tensor[0, 1:]).max() < 1e-9 * tensor[0, 0]
     k = solve_slab(cut_slab(), (0.0, EDGES[0]), cells=EDGES[2], tolerance=1e-6).k
     assert k == pytest.approx(tensor[0, 0], rel=1e-4)
+
+
+def test_a_direct_solve_with_a_solid_layer_for_the_walls_gives_the_same():
+    """The walls across y as a layer of nodes at rest on a grid that repeats, and one sparse LU.
+
+    There a node half a spacing from a wall has a neighbour at rest, which is a drag of 1 of the 2.
+    """
+    grid, (n0, n1, n2) = replace(HALF, walled=(False, True, False)), EDGES
+    walls = []
+    for d in range(3):
+        half = find_walls(grid, d, CUT_PLACE, CUT_RADIUS)
+        i, j, k = np.unravel_index(half.node, (n0 + (d == 0), n1, n2))
+        drag = np.divide(1.0, half.slack, out=np.zeros(len(j)), where=half.slack > 0.0)
+        drag -= 1.0 * (drag > 0.0) * (d != 1) * ((j == 0) | (j == n1 - 1))
+        slack = np.where(half.slack > 0.0, 1.0 / np.maximum(drag, 1e-12), 0.0)
+        layered = np.ravel_multi_index((i, j, k), (n0 + (d == 0), n1 + 1, n2))
+        rest = np.indices((2 * n0, 1, n2)).reshape(3, -1) + np.array([[0], [n1], [0]])
+        still = [np.ravel_multi_index(rest, (2 * n0, n1 + 1, n2))]
+        if d == 1:
+            still.append(np.ravel_multi_index(rest * [[1], [0], [1]], (2 * n0, n1 + 1, n2)))
+        nodes = [*whole(layered, (n0, n1 + 1, n2), d), *still]
+        walls.append(
+            (np.concatenate(nodes), np.concatenate([slack, slack, 0.0 * np.concatenate(still)]))
+        )
+    direct = direct_tensor((2 * n0, n1 + 1, n2), walls)[0, 0] * (n1 + 1) / n1
+    k = solve_slab(cut_slab(), (0.0, n0), cells=n2, tolerance=1e-6, closed=(False, True, False)).k
+    assert k == pytest.approx(direct, rel=1e-4)
 
 
 def test_a_sphere_that_both_planes_cut_is_no_pipe():
@@ -216,8 +260,8 @@ def test_walls_with_spheres_between_them_are_sheets_of_overlapping_spheres():
 def test_the_drag_of_a_wall_on_cells_of_unequal_edges():
     """Along each axis (1/t - 1) over the square of the edge, for a free share t of the step."""
     step, place, r = np.array([0.8, 1.25, 1.0]), np.array([4.1, 5.3, 4.4]), 2.2
-    grid = Staggered(shape=(11, 8, 9), step=step)
-    walls = find_walls(place[None], np.array([r]), grid, component=0)
+    grid = replace(HALF, shape=(11, 8, 9), spacing=step, planes=False)
+    walls = find_walls(grid, 0, place[None], np.array([r]))
     free, offset = walls.slack > 0.0, np.array([0.0, 0.5, 0.5])
     for node, slack in zip(walls.node[free], walls.slack[free], strict=True):
         number = np.array(np.unravel_index(node, grid.shape))
@@ -228,5 +272,5 @@ def test_the_drag_of_a_wall_on_cells_of_unequal_edges():
             inside = (ahead - step[axis]) ** 2 + aside <= r * r
             gap = ahead - np.sqrt(max(r * r - aside, 0.0))
             drag += (step[axis] / gap - 1.0) / step[axis] ** 2 if inside else 0.0
-        assert 1.0 / slack == pytest.approx(drag, rel=1e-4)
+        assert 1.0 / slack == pytest.approx(step[0] ** 2 * drag, rel=1e-4)
     assert free.sum() > 40

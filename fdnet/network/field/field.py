@@ -1,22 +1,28 @@
 """The velocity field of a pack, and its streamlines.
 
-The velocity of the fluid in the pores of a pack, with a deposit of fines or without.
-
-A coarse resolved Stokes flow on a staggered grid (`solved`), interpolated down to the walls
-(`sampled`). Formulas and checks: docs/velocity_field.md.
+The velocity of the fluid in the pores of a pack, with a deposit of fines or without: a coarse
+resolved Stokes flow (`fdnet.network.stokes`), interpolated down to the walls (`sampled`). Formulas
+and checks: docs/velocity_field.md.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
+from math import ceil
 from typing import Any
 
 import numpy as np
+from scipy import fft
 
-from fdnet.errors import CaseError
-from fdnet.network.field.grid import Lattice, build_lattice, find_nearby
-from fdnet.network.field.sampled import Gradient, Sampled, find_gradient, sample_velocity
-from fdnet.network.field.solved import Skeleton, Solved, Spheres, build_skeleton, solve
-from fdnet.spheres.snapshot import Array, Directions, Kind, Snapshot, frozen, sides_of
+from fdnet.errors import CaseError, NetworkError
+from fdnet.network.field.sampled import (
+    Gradient,
+    Sampled,
+    find_gradient,
+    find_nearby,
+    sample_velocity,
+)
+from fdnet.network.stokes import FEWEST_CELLS, GridFlow, Lattice, Walled, solve
+from fdnet.spheres.snapshot import Array, Directions, Snapshot, frozen, sides_of
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -25,7 +31,7 @@ class VelocityField:
     superficial velocity U along x.
 
     Attributes:
-        skeleton: the grains and their grid.
+        grains: centres (G, 3) m and radii (G,) m of the grains that hold the fluid.
         fines: centres (N, 3) m and radii (N,) m of the fines that hold the fluid.
         left_out: number of fines that were given but lie outside of the grid.
         tolerance: rms velocity over U that may be left at the walls.
@@ -33,32 +39,31 @@ class VelocityField:
         inside: (N,) which of the fines given are on the grid.
     """
 
-    skeleton: Skeleton
-    fines: Spheres
+    grains: tuple[Array, Array]
+    fines: tuple[Array, Array]
     left_out: int
     tolerance: float
-    solved: Solved
+    solved: GridFlow
     inside: Array
 
     def __repr__(self) -> str:
         shape = " x ".join(map(str, self.lattice.shape))
         return (
-            f"VelocityField({len(self.skeleton.grains[1])} grains, {len(self.fines[1])} fines, "
+            f"VelocityField({len(self.grains[1])} grains, {len(self.fines[1])} fines, "
             f"{shape} cells, k {self.k:.4g} m2)"
         )
 
     @property
     def lattice(self) -> Lattice:
         """The grid."""
-        return self.skeleton.lattice
+        return self.solved.lattice
 
     @cached_property
     def resistance(self) -> float:
         """Pressure drop over the specimen over mu U, 1/m; clear fluid around it adds nothing."""
-        lattice = self.lattice
-        along = float(lattice.spacing[0] * lattice.shape[0])
-        force = float(self.solved.sphere_force[:, 0].sum() + self.solved.wall_force[0])
-        return force / (lattice.volume / along)
+        edges = self.lattice.spacing * self.lattice.shape
+        force = float(self._forces[0][:, 0].sum() + self.wall_force[0])
+        return force / (float(np.prod(edges)) / float(edges[0]))
 
     @property
     def k(self) -> float:
@@ -68,7 +73,7 @@ class VelocityField:
     @property
     def grain_force(self) -> Array:
         """Force of the fluid on each grain over mu U, (G, 3) m, the pressure gradient included."""
-        return np.asarray(self.solved.sphere_force[: len(self.skeleton.grains[1])])
+        return self._forces[0][: len(self.grains[1])]
 
     @property
     def fine_force(self) -> Array:
@@ -77,13 +82,13 @@ class VelocityField:
         The forces on grains, fines and side walls add up to the pressure drop times the area.
         """
         force = np.zeros((len(self.inside), 3))
-        force[self.inside] = self.solved.sphere_force[len(self.skeleton.grains[1]) :]
+        force[self.inside] = self._forces[0][len(self.grains[1]) :]
         return force
 
     @property
     def wall_force(self) -> Array:
         """Force of the fluid on the side walls over mu U, (3,) m."""
-        return self.solved.wall_force
+        return self._forces[1]
 
     def at(self, points: Any) -> Array:
         """Fluid velocity over U, (N, 3), at points (N, 3) m.
@@ -107,50 +112,27 @@ class VelocityField:
         return self._gradient.at(_checked(points))
 
     @cached_property
+    def _forces(self) -> tuple[Array, Array]:
+        return self.solved.forces(len(self.grains[1]) + len(self.fines[1]))
+
+    @cached_property
     def _flow(self) -> list[Array]:
-        flow = self.skeleton.response.velocity(list(self.solved.force))
+        flow = self.lattice.response.velocity(list(self.solved.force))
         return [
             part + np.float32(drift) for part, drift in zip(flow, self.solved.drift, strict=True)
         ]
 
     @cached_property
     def _sampled(self) -> Sampled:
-        grains = self.skeleton.grains
-        nearby = find_nearby(
-            self.lattice,
-            np.concatenate([grains[0], self.fines[0]]),
-            np.concatenate([grains[1], self.fines[1]]),
+        position, radius = map(np.concatenate, zip(self.grains, self.fines, strict=True))
+        return sample_velocity(
+            self.lattice, find_nearby(self.lattice, position, radius), self._flow
         )
-        return sample_velocity(self.lattice, nearby, self._flow)
 
     @cached_property
     def _gradient(self) -> Gradient:
-        lattice = self.lattice
-        mean = -self.resistance / float(lattice.spacing[0] * lattice.shape[0])
-        return find_gradient(lattice, self.skeleton.response, self.solved, mean)
-
-
-def solved_field(skeleton: Skeleton, deposit: Spheres, tolerance: float) -> VelocityField:
-    """The field around grains and fines; `deposit` are centres (N, 3) m and radii (N,) m."""
-    place, radius = deposit
-    inside = on_grid(skeleton.lattice, place, radius)
-    fines = frozen(place[inside]), frozen(radius[inside])
-    return VelocityField(
-        skeleton=skeleton,
-        fines=fines,
-        left_out=int(np.sum(~inside)),
-        tolerance=tolerance,
-        solved=solve(skeleton, fines, tolerance),
-        inside=frozen(inside),
-    )
-
-
-def on_grid(lattice: Lattice, position: Array, radius: Array) -> Array:
-    """True (N,) for spheres that lie wholly between the ends of the grid along x."""
-    if lattice.repeats:
-        return np.ones(len(position), bool)
-    low, high = lattice.low[0], lattice.high[0]
-    return (position[:, 0] - radius >= low) & (position[:, 0] + radius <= high)
+        mean = -self.resistance / float(self.lattice.spacing[0] * self.lattice.shape[0])
+        return find_gradient(self.solved, self.lattice.response, mean)
 
 
 def _checked(points: Any) -> Array:
@@ -172,7 +154,7 @@ def _checked(points: Any) -> Array:
 COARSEST, FINEST, AFFORDED = 10.0, 18.0, 1_000_000
 """Cells across a mean grain where none is given: as many between the first two as keep the grid
 below the third number of cells (`fdnet study velocity-field`)."""
-TOLERANCE = 0.05
+SLIP_LEFT = 0.05
 """Rms velocity left at the walls over the superficial velocity."""
 UPSTREAM, DOWNSTREAM = 1.0, 0.5
 """Clear fluid before and beyond a specimen that is not periodic along x, in grain diameters."""
@@ -185,7 +167,7 @@ def velocity_field(
     fines: Snapshot | None = None,
     cells: float | None = None,
     upstream: float | None = None,
-    tolerance: float = TOLERANCE,
+    tolerance: float = SLIP_LEFT,
 ) -> VelocityField:
     """The velocity of a slow fluid in the pores of a pack, over the superficial one along x.
 
@@ -217,57 +199,110 @@ def velocity_field(
         >>> print(f"{field.at([[1e-3, 1e-3, 1e-3]])[0, 0]:.0f}")
         4
     """
-    if not len(grains.grains()):
+    skeleton, deposit = grains.grains(), grains.fines()
+    if not len(skeleton):
         raise CaseError("velocity field: no grain among the spheres, expected at least one")
     if not ((cells is None or 1.0 <= cells < np.inf) and 0.0 < tolerance < 1.0):
         raise CaseError(
             f"velocity field: {cells!r} cells across a grain and a tolerance of {tolerance!r}, "
             "expected at least 1 cell and a tolerance between 0 and 1"
         )
-    deposit = _deposit(grains if fines is None else fines, fines is not None)
-    skeleton = _skeleton(
-        grains, sides_of(grains, periodic), (cells, _upstream(grains, deposit, upstream))
-    )
-    return solved_field(skeleton, (deposit.position, deposit.radius), tolerance)
-
-
-def _upstream(grains: Snapshot, deposit: Snapshot, wanted: float | None) -> float:
-    """Metres of grid before the specimen."""
-    if wanted is not None:
-        return wanted
-    reach = grains.box[0, 0] - (deposit.position[:, 0] - deposit.radius)
-    clear = UPSTREAM * 2.0 * float(grains.grains().radius.mean())
-    return clear + float(max(0.0, reach.max(initial=0.0)))
-
-
-def _skeleton(
-    spheres: Snapshot, sides: tuple[bool, bool, bool], grid: tuple[float | None, float]
-) -> Skeleton:
-    """The grains on a grid of so many cells across a grain and so many metres upstream."""
-    grains, (cells, upstream) = spheres.grains(), grid
-    diameter = 2.0 * float(grains.radius.mean())
+    if fines is not None:
+        # all of them where none is of kind fine
+        deposit = fines.fines() if len(fines.fines()) else fines
+    diameter, sides = 2.0 * float(skeleton.radius.mean()), sides_of(grains, periodic)
+    if upstream is None:
+        reach = grains.box[0, 0] - (deposit.position[:, 0] - deposit.radius)
+        upstream = UPSTREAM * diameter + float(max(0.0, reach.max(initial=0.0)))
     if cells is None:
-        edges = np.ptp(spheres.box, axis=1)
+        edges = np.ptp(grains.box, axis=1)
         edges[0] += 0.0 if sides[0] else upstream + DOWNSTREAM * diameter
         affordable = diameter * (AFFORDED / np.prod(edges)) ** (1.0 / 3.0)
         cells = float(np.clip(affordable, COARSEST, FINEST))
     lattice = build_lattice(
-        spheres.box,
+        grains.box,
         sides,
         spacing=diameter / cells,
         upstream=upstream,
         downstream=DOWNSTREAM * diameter,
     )
-    kept = grains.where(on_grid(lattice, grains.position, grains.radius))
-    return build_skeleton(lattice, (kept.position, kept.radius))
+    kept = skeleton.where(on_grid(lattice, skeleton.position, skeleton.radius))
+    return solved_field(
+        lattice, (kept.position, kept.radius), (deposit.position, deposit.radius), tolerance
+    )
 
 
-def _deposit(spheres: Snapshot, given: bool) -> Snapshot:
-    """The spheres of kind fine; all of them where they were given as fines and none is."""
-    fines = spheres.fines()
-    if given and not len(fines):
-        return replace(spheres, kind=np.full(len(spheres), Kind.FINE))
-    return fines
+def build_lattice(
+    box: Array, periodic: Walled, *, spacing: float, upstream: float, downstream: float
+) -> Lattice:
+    """The grid of a specimen, which always wraps along x.
+
+    A specimen that is not periodic along x lies in a gap of clear fluid that is wide enough for
+    the flow to become even again.
+
+    Args:
+        box: (3, 2) m, bounds of the specimen.
+        periodic: whether its sides x, y, z are periodic.
+        spacing: m, the largest edge of a cell.
+        upstream: m of clear fluid before the specimen; without meaning where x is periodic.
+        downstream: m of clear fluid, at least, beyond the specimen; likewise.
+
+    Raises:
+        NetworkError: the box has no extent, or the spacing is not positive.
+    """
+    edges = box[:, 1] - box[:, 0]
+    if not (np.all(edges > 0.0) and 0.0 < spacing < np.inf):
+        raise NetworkError(
+            f"velocity field: cells of {spacing:g} m in a box of edges {edges.tolist()} m, "
+            "expected positive numbers; give the spheres a box"
+        )
+
+    def fast(length: float) -> int:
+        """The least number of cells whose Fourier transform is fast."""
+        return int(fft.next_fast_len(max(FEWEST_CELLS, ceil(length / spacing * (1.0 - 1e-9)))))
+
+    low, shape = box[:, 0].copy(), [fast(edge) for edge in edges]
+    steps = edges / shape
+    if not periodic[0]:
+        steps[0] = spacing
+        low[0] -= upstream
+        shape[0] = fast(edges[0] + upstream + downstream)
+    return Lattice(
+        low=frozen(low),
+        spacing=frozen(steps),
+        shape=(shape[0], shape[1], shape[2]),
+        walled=(False, not periodic[1], not periodic[2]),
+        specimen=(float(box[0, 0]), float(box[0, 1])),
+        repeats=periodic[0],
+    )
+
+
+def on_grid(lattice: Lattice, position: Array, radius: Array) -> Array:
+    """True (N,) for spheres that lie wholly between the ends of the grid along x."""
+    low, high = lattice.low[0], lattice.high[0]
+    inside = (position[:, 0] - radius >= low) & (position[:, 0] + radius <= high)
+    return np.asarray(lattice.repeats | inside)
+
+
+def solved_field(
+    lattice: Lattice,
+    grains: tuple[Array, Array],
+    deposit: tuple[Array, Array],
+    tolerance: float,
+) -> VelocityField:
+    """The field around grains on the grid and a deposit: centres (N, 3) m and radii (N,) m."""
+    inside = on_grid(lattice, *deposit)
+    fines = frozen(deposit[0][inside]), frozen(deposit[1][inside])
+    position, radius = map(np.concatenate, zip(grains, fines, strict=True))
+    grain = float(grains[1].mean()) if len(grains[1]) else FEWEST_CELLS * lattice.unit
+    return VelocityField(
+        grains=grains,
+        fines=fines,
+        left_out=int(np.sum(~inside)),
+        tolerance=tolerance,
+        solved=solve(lattice, position, radius, grain=grain, slip=tolerance),
+        inside=frozen(inside),
+    )
 
 
 # ------------------------------------------------------------------------------------------------
@@ -281,7 +316,7 @@ SHORTER = (1.0, 0.25, 0.0625)
 
 
 def streamlines(
-    field: "VelocityField", start: Array, *, step: float, until: float, longest: float = 10.0
+    field: VelocityField, start: Array, *, step: float, until: float, longest: float = 10.0
 ) -> list[Array]:
     """The streamlines of a field from given points on.
 
@@ -324,7 +359,7 @@ def streamlines(
     return [way_points[use[:, line], line] for line in range(len(place))]
 
 
-def _stepped(field: "VelocityField", place: Array, step: float) -> tuple[Array, Array]:
+def _stepped(field: VelocityField, place: Array, step: float) -> tuple[Array, Array]:
     """Points (N, 3) one step on, a shorter one near walls, and where (N,) there is no way on."""
     result, held = place.copy(), np.ones(len(place), bool)
     for share in SHORTER:
@@ -339,7 +374,7 @@ def _stepped(field: "VelocityField", place: Array, step: float) -> tuple[Array, 
     return result, held
 
 
-def _directions(field: "VelocityField", points: Array) -> tuple[Array, Array]:
+def _directions(field: VelocityField, points: Array) -> tuple[Array, Array]:
     """Unit vectors (N, 3) of the velocity at the points, and where (N,) there is none."""
     velocity = field.at(points)
     speed = np.linalg.norm(velocity, axis=1)

@@ -1,39 +1,150 @@
-"""The velocity field at points, and its pressures.
+"""The velocity and the pressure gradient between the nodes of a staggered grid.
 
-The velocity at a point between the nodes of a staggered grid, by the laws that hold at a wall.
-
-Fluid that cannot slip and keeps its volume approaches a wall like the square of the distance d.
-Nearer than PROBE to a sphere, velocity / phi is therefore taken at the distance PROBE on the same
-normal; between two spheres nearer than that the probe stays on this side of the middle. The part
-of the velocity across the wall is replaced by what keeps the volume of the part along it,
-
-    - (divergence along the sphere) (integral of phi from 0 to d) / phi(d),
-
-which is d (R - d / 3) / (2 R - d) times the divergence for the profile phi = d (2 R - d) / R^2 of
-one wall. The divergence is that of the velocity along the sphere at the distance d, by central
-differences. Any share of the velocity across as sampled would make sources and sinks here, which
-gather what the fluid carries at the walls.
+The nodes carry velocity / phi, with the profile phi that the walls allow; it is interpolated
+linearly and multiplied by phi at the point. Nearer than PROBED_AT to a sphere it is taken at that
+distance on the same normal, and the part across the wall follows from the divergence of the part
+along it (docs/velocity_field.md). Nodes in the solid, or of a phi below LEAST_PROFILE, take the
+mean of their neighbours; in the solid, without its part across the wall. Lengths are in the
+spacing along x, from the lower corner of the grid.
 """
 
 from dataclasses import dataclass
-from math import cos, floor, sin, sqrt
+from math import ceil, cos, floor, sin, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from fdnet.network.compiled import compiled
-from fdnet.network.field.grid import REACH, Lattice, Nearby, Place, Response, wall_profile
-from fdnet.network.field.solved import Solved
+from fdnet.network.stokes import GridFlow, Lattice, Response
 from fdnet.spheres.snapshot import Array, one_line
 
-PROBE = 0.8
+WALL_REACH = 2.0
+"""R, distance from which a wall no longer shapes the profile, in spacings."""
+PROBED_AT = 0.8
 """Distance from a sphere, in spacings, within which the flow follows the laws at a wall."""
-STEP = 0.5
+ALONG = 0.5
 """Length, in spacings, over which the velocity along a sphere is differentiated."""
+LEAST_PROFILE = 0.02
+"""Least phi of a node whose own velocity is used."""
 
-Near = tuple[float, float, float, int]
-Frame = tuple[Array, Array, Array]
-Walls = tuple[Array, Array, Array]
+Place = tuple[float, float, float]
 Parts = tuple[Array, Array, Array]
+
+
+class CellFrame(NamedTuple):
+    """Cells (3,) of a grid, their edges (3,), and whether (3,) it repeats along each axis."""
+
+    shape: Array
+    step: Array
+    wraps: Array
+
+
+class Nearby(NamedTuple):
+    """Walls near each cell of a grid.
+
+    Attributes:
+        first: (cells + 1,) row where the spheres of each cell begin.
+        place: (K, 4) centre and radius of a sphere, shifted by periods to where it stands next to
+            the cell.
+        sides: (6,) lower and upper x between which the side walls hold the fluid; places of the
+            lower and upper walls across y, then z, infinitely far away where there is none.
+    """
+
+    first: Array
+    place: Array
+    sides: Array
+
+
+class Near(NamedTuple):
+    """phi at a point, least and second least distance to a sphere, row of the nearest sphere.
+
+    Distances are WALL_REACH, and the row -1, where no sphere is nearer. In a solid phi is 0.
+    """
+
+    profile: float
+    least: float
+    second: float
+    row: int
+
+
+def find_nearby(lattice: Lattice, position: Array, radius: Array) -> Nearby:
+    """Spheres within WALL_REACH of some point of each cell; centres (N, 3) m, radii (N,) m."""
+    step = lattice.spacing / lattice.unit
+    frame = CellFrame(np.array(lattice.shape), step, ~np.array(lattice.walled))
+    centre, size = (position - lattice.low) / lattice.unit, radius / lattice.unit
+    count = np.zeros(lattice.cells, np.int64)
+    _visit(centre, size, frame, count, np.zeros((0, 4), np.float32))
+    first = np.concatenate([[0], np.cumsum(count)])
+    place = np.zeros((int(first[-1]), 4), np.float32)
+    if len(place):
+        _visit(centre, size, frame, first[:-1].copy(), place)
+    sides = np.tile([-np.inf, np.inf], 3)
+    if not lattice.repeats:
+        sides[:2] = (np.array(lattice.specimen) - lattice.low[0]) / lattice.unit
+    for axis in np.flatnonzero(lattice.walled):
+        sides[2 * axis : 2 * axis + 2] = 0.0, lattice.shape[axis] * step[axis]
+    return Nearby(first, place, sides)
+
+
+@compiled
+def _visit(centre: Array, radius: Array, grid: CellFrame, count: Array, place: Array) -> None:
+    """Counts the spheres near each cell; writes them from `count` on where `place` has room."""
+    shape, step, wraps = grid
+    half = 0.5 * sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
+    low, high = np.zeros(3, np.int64), np.zeros(3, np.int64)
+    for s in range(len(radius)):
+        reach = radius[s] + WALL_REACH
+        for axis in range(3):
+            low[axis] = floor((centre[s, axis] - reach) / step[axis])
+            high[axis] = ceil((centre[s, axis] + reach) / step[axis])
+            if not wraps[axis]:
+                low[axis], high[axis] = max(low[axis], 0), min(high[axis], shape[axis] - 1)
+        for i in range(low[0], high[0] + 1):
+            x = (i + 0.5) * step[0] - centre[s, 0]
+            for j in range(low[1], high[1] + 1):
+                y = (j + 0.5) * step[1] - centre[s, 1]
+                for k in range(low[2], high[2] + 1):
+                    z = (k + 0.5) * step[2] - centre[s, 2]
+                    if x * x + y * y + z * z > (reach + half) ** 2:
+                        continue
+                    a, b, c = i % shape[0], j % shape[1], k % shape[2]
+                    cell = (a * shape[1] + b) * shape[2] + c
+                    if len(place):
+                        row = count[cell]
+                        place[row, 0] = centre[s, 0] + (a - i) * step[0]
+                        place[row, 1] = centre[s, 1] + (b - j) * step[1]
+                        place[row, 2] = centre[s, 2] + (c - k) * step[2]
+                        place[row, 3] = radius[s]
+                    count[cell] += 1
+
+
+@compiled
+def wall_profile(point: Place, cell: int, nearby: Nearby) -> Near:
+    """phi at a point in a `cell`, and the spheres that are nearest."""
+    x, y, z = point
+    place, sides = nearby.place, nearby.sides
+    profile, least, second, nearest = 1.0, WALL_REACH, WALL_REACH, -1
+    for row in range(nearby.first[cell], nearby.first[cell + 1]):
+        dx, dy, dz = x - place[row, 0], y - place[row, 1], z - place[row, 2]
+        away = sqrt(dx * dx + dy * dy + dz * dz) - place[row, 3]
+        if away <= 0.0:
+            return Near(0.0, away, away, row)
+        if away < WALL_REACH:
+            profile *= away * (2.0 * WALL_REACH - away) / WALL_REACH**2
+            if away < least:
+                least, second, nearest = away, least, row
+            elif away < second:
+                second = away
+    if sides[0] <= x <= sides[1]:
+        for side in range(4):
+            away = y if side < 2 else z
+            away = away - sides[2 + side] if side % 2 == 0 else sides[2 + side] - away
+            if away <= 0.0:
+                return Near(0.0, away, away, -1)
+            if away < WALL_REACH:
+                profile *= away * (2.0 * WALL_REACH - away) / WALL_REACH**2
+                second = min(second, away)
+    return Near(profile, least, second, nearest)
 
 
 @compiled
@@ -52,22 +163,43 @@ def linear(part: Array, x: float, y: float, z: float) -> float:
 
 
 @compiled
-def _off_the_wall(point: Place, near: Near, place: Array) -> tuple[Place, Place, float]:
-    """Where to sample, the normal of the nearest sphere, and d / probe (1 away from spheres)."""
-    x, y, z = point
-    _, least, second, row = near
-    probe = min(PROBE, 0.5 * (least + second))
-    if row < 0 or least >= probe:
-        return point, (0.0, 0.0, 0.0), 1.0
-    p, q, r = x - place[row, 0], y - place[row, 1], z - place[row, 2]
-    length = sqrt(p * p + q * q + r * r)
-    p, q, r = p / length, q / length, r / length
-    more = probe - least
-    return (x + more * p, y + more * q, z + more * r), (p, q, r), least / probe
+def _interpolated(smooth: Parts, x: float, y: float, z: float) -> Place:
+    """Velocity / phi at (x, y, z), in cells."""
+    return (
+        linear(smooth[0], x + 2.0, y + 1.5, z + 1.5),
+        linear(smooth[1], x + 1.5, y + 2.0, z + 1.5),
+        linear(smooth[2], x + 1.5, y + 1.5, z + 2.0),
+    )
 
 
 @compiled
-def _place_on(point: Place, grid: Frame) -> tuple[Place, int]:
+def _unbalanced(
+    point: Place, cell: int, grid: CellFrame, nearby: Nearby, smooth: Parts
+) -> tuple[Place, Place, float, Near]:
+    """Velocity with its part across a near wall as sampled; normal, d / probe and walls near.
+
+    Away from spheres the normal is 0 and d / probe is 1.
+    """
+    x, y, z = point
+    normal, share = (0.0, 0.0, 0.0), 1.0
+    near = wall_profile(point, cell, nearby)
+    if near.profile <= 0.0:
+        return (0.0, 0.0, 0.0), normal, share, near
+    probe = min(PROBED_AT, 0.5 * (near.least + near.second))
+    if near.row >= 0 and near.least < probe:
+        sphere = nearby.place[near.row]
+        p, q, r = x - sphere[0], y - sphere[1], z - sphere[2]
+        length = sqrt(p * p + q * q + r * r)
+        p, q, r = p / length, q / length, r / length
+        more, normal, share = probe - near.least, (p, q, r), near.least / probe
+        x, y, z = x + more * p, y + more * q, z + more * r
+    step = grid.step
+    u, v, w = _interpolated(smooth, x / step[0], y / step[1], z / step[2])
+    return (near.profile * u, near.profile * v, near.profile * w), normal, share, near
+
+
+@compiled
+def _place_on(point: Place, grid: CellFrame) -> tuple[Place, int]:
     """The point within the grid, and its cell; -1 - axis for a point outside along an axis."""
     shape, step, wraps = grid
     number, out = 0, 0
@@ -90,26 +222,12 @@ def _place_on(point: Place, grid: Frame) -> tuple[Place, int]:
 
 
 @compiled
-def _unbalanced(
-    point: Place, cell: int, grid: Frame, nearby: Walls, smooth: Parts
-) -> tuple[Place, Place, float, Near]:
-    """Velocity with its part across a near wall as sampled; normal, d / probe and walls near."""
-    step = grid[1]
-    first, place, sides = nearby
-    near = wall_profile(point, (first[cell], first[cell + 1]), place, sides)
-    if near[0] <= 0.0:
-        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0, near
-    there, normal, share = _off_the_wall(point, near, place)
-    x, y, z = there[0] / step[0], there[1] / step[1], there[2] / step[2]
-    u = near[0] * linear(smooth[0], x + 2.0, y + 1.5, z + 1.5)
-    v = near[0] * linear(smooth[1], x + 1.5, y + 2.0, z + 1.5)
-    w = near[0] * linear(smooth[2], x + 1.5, y + 1.5, z + 2.0)
-    return (u, v, w), normal, share, near
-
-
-@compiled
 def _spreading(
-    point: Place, around: tuple[Place, float, float], grid: Frame, nearby: Walls, smooth: Parts
+    point: Place,
+    around: tuple[Place, float, float],
+    grid: CellFrame,
+    nearby: Nearby,
+    smooth: Parts,
 ) -> float:
     """Divergence along a sphere of the velocity along it, at one distance from it.
 
@@ -154,9 +272,10 @@ def _spreading(
 
 
 @compiled
-def sample_points(point: Array, grid: Frame, nearby: Walls, smooth: Parts, result: Array) -> None:
+def sample_points(
+    point: Array, grid: CellFrame, nearby: Nearby, smooth: Parts, result: Array
+) -> None:
     """Writes the velocity at each `point` (N, 3), in spacings, to `result`."""
-    place = nearby[1]
     for s in range(len(point)):
         inside, cell = _place_on((point[s, 0], point[s, 1], point[s, 2]), grid)
         if cell < 0:
@@ -166,28 +285,12 @@ def sample_points(point: Array, grid: Frame, nearby: Walls, smooth: Parts, resul
         if share < 1.0:
             p, q, r = normal
             sampled = u * p + v * q + w * r
-            radius = near[1] + place[near[3], 3]
-            spread = _spreading(inside, (normal, radius, STEP), grid, nearby, smooth)
-            depth = near[1] * (REACH - near[1] / 3.0) / (2.0 * REACH - near[1])
+            radius = near.least + nearby.place[near.row, 3]
+            spread = _spreading(inside, (normal, radius, ALONG), grid, nearby, smooth)
+            depth = near.least * (WALL_REACH - near.least / 3.0) / (2.0 * WALL_REACH - near.least)
             across = -depth * spread - sampled
             u, v, w = u + across * p, v + across * q, w + across * r
         result[s, 0], result[s, 1], result[s, 2] = u, v, w
-
-
-# ------------------------------------------------------------------------------------------------
-# The velocity between the nodes of a staggered grid, down to the walls.
-#
-# Linear interpolation from node to node knows nothing of a wall between them. So the nodes carry
-# velocity / phi, with the profile phi that the walls allow (`nearby`), which is smooth up to the
-# walls; it is interpolated linearly and multiplied by phi at the point. Nodes in the solid, or of
-# a phi below LEAST_PROFILE, take the mean of their neighbours; in the solid, without its part
-# across the wall.
-#
-# What happens at the walls is in `wall_laws`.
-
-
-LEAST_PROFILE = 0.02
-"""Least phi of a node whose own velocity is used."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -203,7 +306,7 @@ class Sampled:
 
     lattice: Lattice
     nearby: Nearby
-    smooth: tuple[Array, Array, Array]
+    smooth: Parts
 
     __repr__ = one_line
 
@@ -214,29 +317,26 @@ class Sampled:
         x where that does not repeat.
         """
         lattice = self.lattice
-        step = lattice.spacing / lattice.unit
-        shape = np.array(lattice.shape)
-        nearby = (self.nearby.first, self.nearby.place, self.nearby.sides)
         wraps = np.array([lattice.repeats, not lattice.walled[1], not lattice.walled[2]])
+        frame = CellFrame(np.array(lattice.shape), lattice.spacing / lattice.unit, wraps)
         result = np.zeros(points.shape)
         place = np.ascontiguousarray((points - lattice.low) / lattice.unit)
-        sample_points(place, (shape, step, wraps), nearby, self.smooth, result)
+        sample_points(place, frame, self.nearby, self.smooth, result)
         return result
 
 
 def sample_velocity(lattice: Lattice, nearby: Nearby, flow: list[Array]) -> Sampled:
     """Prepares the interpolation of a velocity, three arrays of the grid's shape."""
     step = lattice.spacing / lattice.unit
-    walls = (nearby.first, nearby.place, nearby.sides)
     smooth = []
     for d, part in enumerate(flow):
-        phi = _profile_at_nodes(np.array(lattice.shape), step, d, walls)
+        phi = np.zeros(lattice.shape, np.float32)
+        _set_profile(d, step, nearby, phi)
         smooth.append(_filled(_padded(part, lattice, d), _padded(phi, lattice, d)))
-    mean = (smooth[0], smooth[1], smooth[2])
-    bounded = []
+    mean, bounded = (smooth[0], smooth[1], smooth[2]), []
     for d, part in enumerate(mean):
         inner = part[2:-2, 2:-2, 2:-2].copy()
-        _turn_along_walls(d, step, walls, mean, inner)
+        _turn_along_walls(d, step, nearby, mean, inner)
         bounded.append(_padded(inner, lattice, d))
         if lattice.walled[d]:
             # no flow through the walls: their own nodes carry nothing
@@ -257,20 +357,17 @@ def _padded(part: Array, lattice: Lattice, component: int) -> Array:
 
 
 @compiled
-def _profile_at_nodes(
-    shape: Array, step: Array, component: int, walls: tuple[Array, Array, Array]
-) -> Array:
-    first, place, sides = walls
-    phi = np.zeros((shape[0], shape[1], shape[2]), np.float32)
+def _set_profile(component: int, step: Array, nearby: Nearby, phi: Array) -> None:
+    """Sets `phi` at the nodes of a component."""
+    shape = phi.shape
     away = np.full(3, 0.5)
     away[component] = 0.0
     for i in range(shape[0]):
         for j in range(shape[1]):
             for k in range(shape[2]):
-                cell = (i * shape[1] + j) * shape[2] + k
                 node = ((i + away[0]) * step[0], (j + away[1]) * step[1], (k + away[2]) * step[2])
-                phi[i, j, k] = wall_profile(node, (first[cell], first[cell + 1]), place, sides)[0]
-    return phi
+                cell = (i * shape[1] + j) * shape[2] + k
+                phi[i, j, k] = wall_profile(node, cell, nearby).profile
 
 
 @compiled
@@ -299,14 +396,13 @@ def _filled(flow: Array, phi: Array) -> Array:
 
 @compiled
 def _turn_along_walls(
-    component: int, step: Array, walls: Walls, smooth: Parts, part: Array
+    component: int, step: Array, nearby: Nearby, smooth: Parts, part: Array
 ) -> None:
     """Takes the part across its sphere from velocity / phi at nodes in the solid.
 
     Across a wall velocity / phi is 0 at the wall, where along it it is not. `part` holds the nodes
     of this component of `smooth` without those added around, and is changed.
     """
-    first, place, sides = walls
     shape = part.shape
     away = np.full(3, 0.5)
     away[component] = 0.0
@@ -317,22 +413,14 @@ def _turn_along_walls(
                     continue
                 x, y, z = i + away[0], j + away[1], k + away[2]
                 node = (x * step[0], y * step[1], z * step[2])
-                cell = (i * shape[1] + j) * shape[2] + k
-                near = wall_profile(node, (first[cell], first[cell + 1]), place, sides)
-                row = near[3]
-                if near[0] > 0.0 or row < 0:
+                near = wall_profile(node, (i * shape[1] + j) * shape[2] + k, nearby)
+                if near.profile > 0.0 or near.row < 0:
                     continue
-                p, q, r = node[0] - place[row, 0], node[1] - place[row, 1], node[2] - place[row, 2]
-                square = p * p + q * q + r * r
-                u = linear(smooth[0], x + 2.0, y + 1.5, z + 1.5)
-                v = linear(smooth[1], x + 1.5, y + 2.0, z + 1.5)
-                w = linear(smooth[2], x + 1.5, y + 1.5, z + 2.0)
+                sphere = nearby.place[near.row]
+                p, q, r = node[0] - sphere[0], node[1] - sphere[1], node[2] - sphere[2]
+                u, v, w = _interpolated(smooth, x, y, z)
                 own = p if component == 0 else (q if component == 1 else r)
-                part[i, j, k] -= own * (u * p + v * q + w * r) / square
-
-
-# ------------------------------------------------------------------------------------------------
-# The pressure gradient between the nodes of a staggered grid.
+                part[i, j, k] -= own * (u * p + v * q + w * r) / (p * p + q * q + r * r)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -347,7 +435,7 @@ class Gradient:
     """
 
     lattice: Lattice
-    parts: tuple[Array, Array, Array]
+    parts: Parts
 
     __repr__ = one_line
 
@@ -367,11 +455,9 @@ class Gradient:
         return result
 
 
-def find_gradient(
-    lattice: Lattice, response: Response, solved: Solved, gradient: float
-) -> Gradient:
+def find_gradient(flow: GridFlow, response: Response, gradient: float) -> Gradient:
     """The pressure gradient of a flow whose mean is `gradient` 1/m2 along x."""
-    pressure = response.pressure(list(solved.force))
+    lattice, pressure = flow.lattice, response.pressure(list(flow.force))
     parts = []
     for axis in range(3):
         step = pressure - np.roll(pressure, 1, axis=axis)
@@ -380,17 +466,11 @@ def find_gradient(
         part = step / (lattice.spacing[axis] * lattice.unit)
         if axis == 0:
             part += gradient
-        parts.append(_inwards(part.astype(np.float32), ~solved.solid[axis]))
+        part, known = part.astype(np.float32), ~flow.walls[axis].solid
+        while _fill_layer(part, known):
+            pass
+        parts.append(part)
     return Gradient(lattice=lattice, parts=(parts[0], parts[1], parts[2]))
-
-
-def _inwards(part: Array, known: Array) -> Array:
-    """Fills nodes that are not `known` with the mean of those next to them, layer by layer."""
-    known = known.copy()
-    while True:
-        count = _fill_layer(part, known)
-        if count == 0:
-            return part
 
 
 @compiled

@@ -116,7 +116,7 @@ def tabulated(rows: list[dict[str, str]]) -> list[dict[str, str]]:
             **{name: grids[0][name] for name in ("case", "file", "edge_mm", "axis")},
             "k_mm2": f"{end.k:.6g}",
             "k_over_k0": f"{end.k / float(intact['k_mm2']):.4f}" if intact else "",
-            "relative_error": f"{100 * end.relative_error:.2g}%",
+            "relative_error": f"{100 * end.error:.2g}%",
             "source": "own Stokes extrapolated (2nd order) from N="
             + "+".join(row["cells"] for row in grids),
         }
