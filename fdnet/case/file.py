@@ -15,8 +15,7 @@ from typing import Any, NamedTuple, get_args
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from fdnet.case.case import Case, InvasionCase, case_type
-from fdnet.case.rules import cross_problems
+from fdnet.case.case import Case, InvasionCase, case_type, cross_problems
 from fdnet.case.spheres import Sizes
 from fdnet.case.tables import Part
 from fdnet.case.units import SUFFIXES, converted, length_factor, share_of, stem_of, suffix_of

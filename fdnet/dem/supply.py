@@ -17,8 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fdnet.case.case import InvasionCase
-from fdnet.case.rules import concentration_text
+from fdnet.case.case import InvasionCase, concentration_text
 from fdnet.errors import CaseError
 from fdnet.scales.scales import InvasionScales
 from fdnet.sizes import dealt

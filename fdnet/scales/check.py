@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.case.case import Case, InvasionCase
-from fdnet.case.rules import WIDEST_THROAT
+from fdnet.case.case import WIDEST_THROAT, Case, InvasionCase
 from fdnet.errors import PAGE, catalogue, explained
 from fdnet.scales.clock import TAKEN_SOLIDS, spoken_memory, spoken_time, supplied_solids
 from fdnet.scales.cost import Cost, cost_of, peak_memory

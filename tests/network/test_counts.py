@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from fdnet.network.network import build_network
-from fdnet.network.tessellation.facets import STEPS
 from fdnet.spheres.geometry import measure_porosity
 from fdnet.spheres.readers import read_spheres
 from tests.network.packs import body_centred, face_centred, random_pack, simple_cubic, snapshot
@@ -18,35 +17,6 @@ def truth_pack(root, name):
     spheres = read_spheres(path, units="mm")
     position, radius = spheres.position, spheres.radius
     return snapshot(position * 1e3, radius * 1e3, [[0, edge]] * 3)
-
-
-def pierced_by_all(network, pack):
-    """Open facets with a grid point inside any grain but their own three, image by image."""
-    steps = (
-        np.stack(np.meshgrid(*[[-2, -1, 0, 1, 2]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-        * pack.box[:, 1]
-    )
-    images, radius = (pack.position[:, None] + steps).reshape(-1, 3), np.repeat(pack.radius, 125)
-    pierced = 0
-    for corner, own, gap in zip(
-        network.throat_corner, network.throat_corner_radius, network.throat_radius, strict=True
-    ):
-        point = STEPS @ corner
-        near = np.linalg.norm(images - corner.mean(axis=0), axis=1) < 6.0
-        near &= np.min(np.linalg.norm(images[:, None] - corner, axis=2), axis=1) > 1e-9
-        free = np.all(np.linalg.norm(point[:, None] - corner, axis=2) > own, axis=1)
-        covered = np.any(
-            np.linalg.norm(point[:, None] - images[near], axis=2) < radius[near], axis=1
-        )
-        pierced += bool(gap > 0 and np.any(free & covered))
-    return pierced
-
-
-@pytest.mark.parametrize("spread", [0.0, 0.9])
-def test_pierced_facets_are_those_a_search_of_all_grains_finds(spread):
-    pack = random_pack(60, 0.3, spread=spread)  # a dense one has none
-    network = build_network(pack, periodic=ALL)
-    assert network.counts["throats_pierced"] == pierced_by_all(network, pack) > 0
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,11 @@ from scipy.sparse.csgraph import connected_components
 
 from fdnet.errors import NetworkError
 from fdnet.network import geometry
-from fdnet.network.compiled import compiled, compiled_in_place
+from fdnet.network.compiled import compiled
 from fdnet.network.tessellation.delaunay import (
     SAME_CENTRE,
     PlacedGrains,
     Tetrahedra,
-    Vector,
     along,
     less,
     make_tetrahedra,
@@ -477,135 +476,3 @@ def _walls(tessellation: Tessellation, centre: Array, group: Array) -> Array:
             groups[group[wall[:, axis] == side]] = True
             wall[groups[group], axis] = side
     return wall
-
-
-# ------------------------------------------------------------------------------------------------
-# Open sections that a fourth grain reaches into.
-
-
-GRID = 12
-STEPS = (
-    np.array([(i, j, GRID - i - j) for i in range(GRID + 1) for j in range(GRID + 1 - i)]) / GRID
-)
-"""(91, 3) barycentric coordinates of the points at which a section is examined."""
-
-
-def pierced_facets(tessellation: Tessellation, facets: Facets, open_facet: Array) -> Array:
-    """True (T,) where a grain near the facet covers part of its open section.
-
-    `open_facet` (T,) is true where the section is open. The grains that are examined are the
-    apexes of the two tetrahedra of the facet and of those across their other facets. The section
-    is examined on a triangular grid of 91 points.
-    """
-    points, vertex = tessellation.tetrahedra.points, tessellation.tetrahedra.vertex
-    # the point opposite each facet of a tetrahedron on its other side, -1 beyond a wall
-    beyond, turn = np.full(vertex.shape, -1, np.int32), np.zeros((*vertex.shape, 3), np.int8)
-    (one, two), (first, second) = facets.pore.T, facets.opposite.T
-    beyond[one, first] = vertex[two, second]
-    beyond[two, second] = vertex[one, first]
-    across = np.flatnonzero(np.any(facets.shift != 0, axis=1))
-    turn[one[across], first[across]] = facets.shift[across]
-    turn[two[across], second[across]] = -facets.shift[across]
-    pierced = np.zeros(len(open_facet), np.bool_)
-    _set_pierced(
-        pierced,
-        points.position,
-        points.radius,
-        vertex,
-        beyond,
-        turn,
-        facets.vertex,
-        facets.pore,
-        facets.opposite,
-        facets.shift,
-        open_facet,
-        np.asarray(tessellation.size, float),
-    )
-    return pierced
-
-
-@compiled_in_place
-def _set_pierced(
-    pierced: Array,
-    points: Array,
-    grain: Array,
-    vertex: Array,
-    beyond: Array,
-    turn: Array,
-    corner: Array,
-    pore: Array,
-    opposite: Array,
-    shift: Array,
-    open_facet: Array,
-    size: Array,
-) -> None:
-    """Sets which open facets (T,) a grain of their two tetrahedra or of a neighbour pierces."""
-    for t in range(len(corner)):
-        if not open_facet[t]:
-            continue
-        for side in range(2):
-            own, apex = pore[t, side], opposite[t, side]
-            for k in range(5):
-                # the apex of the tetrahedron first, then those across its other facets
-                if k == apex + 1:
-                    continue
-                other = vertex[own, apex] if k == 0 else beyond[own, k - 1]
-                if other < 0 or pierced[t]:
-                    continue
-                x, y, z = side * shift[t, 0], side * shift[t, 1], side * shift[t, 2]
-                if k > 0:
-                    x, y, z = (
-                        x + turn[own, k - 1, 0],
-                        y + turn[own, k - 1, 1],
-                        z + turn[own, k - 1, 2],
-                    )
-                moved = (x * size[0], y * size[1], z * size[2])
-                pierced[t] = _pierces(points, grain, corner[t], other, moved)
-
-
-@compiled_in_place
-def _pierces(points: Array, grain: Array, corner: Array, other: int, moved: Vector) -> bool:
-    """Whether the grain `other`, `moved` by a vector m, covers part of an open section."""
-    a, b, c = corner[0], corner[1], corner[2]
-    one, two = less(points, b, a), less(points, c, a)
-    normal = times(one, two)
-    apart = less(points, other, a)
-    place = (apart[0] + moved[0], apart[1] + moved[1], apart[2] + moved[2])
-    square, radius = along(normal, normal), grain[other]
-    away = along(place, normal)
-    if not away * away < radius * radius * square:
-        return False
-    disc = np.sqrt(radius * radius - away * away / square)
-    size = np.sqrt(square)
-    third = (two[0] - one[0], two[1] - one[1], two[2] - one[2])
-    last = (place[0] - one[0], place[1] - one[1], place[2] - one[2])
-    if not (
-        _outside(one, normal, place, size) < disc
-        and _outside(third, normal, last, size) < disc
-        and -_outside(two, normal, place, size) < disc
-    ):
-        return False
-    # whether the ball covers a grid point of the triangle outside its three grains
-    for step in STEPS:
-        x = step[1] * one[0] + step[2] * two[0]
-        y = step[1] * one[1] + step[2] * two[1]
-        z = step[1] * one[2] + step[2] * two[2]
-        if (
-            _square(x, y, z, place) < radius**2
-            and x * x + y * y + z * z > grain[a] ** 2
-            and _square(x, y, z, one) > grain[b] ** 2
-            and _square(x, y, z, two) > grain[c] ** 2
-        ):
-            return True
-    return False
-
-
-@compiled_in_place
-def _outside(side: Vector, normal: Vector, place: Vector, size: float) -> float:
-    """How far m `place` lies to the right of a side of a triangle; `size` m2 is that of normal."""
-    return along(place, times(side, normal)) / (size * np.sqrt(along(side, side)))
-
-
-@compiled
-def _square(x: float, y: float, z: float, place: Vector) -> float:
-    return (x - place[0]) ** 2 + (y - place[1]) ** 2 + (z - place[2]) ** 2

@@ -9,7 +9,6 @@ from fdnet.network.tessellation.delaunay import solids, touching_spheres
 from fdnet.network.tessellation.facets import (
     Polyhedra,
     Tessellation,
-    pierced_facets,
     sections,
 )
 from fdnet.spheres.snapshot import Array
@@ -143,7 +142,6 @@ def measure_throats(
     closed = ~(inscribed > 0)
     radius = np.where(closed, 0.0, inscribed)
     area = np.where(closed, 0.0, np.maximum(opened, 0.0))
-    pierced = pierced_facets(tessellation, facets, radius > 0)
     throats = {
         "throat_pores": facets.pore,
         "throat_shift": shift,
@@ -161,7 +159,6 @@ def measure_throats(
         "throats_closed": int(np.sum(closed)),
         "throats_overlapping": int(np.sum(overlapping & ~closed)),
         "throat_area_negative": int(np.sum(opened[~closed] < 0)),
-        "throats_pierced": int(np.sum(pierced)),
         "throats_short": int(np.sum(length < floor)),
         "throats_in_polyhedra": int(np.sum(polyhedra.group[one] == polyhedra.group[two])),
         "throats_in_end_faces_dropped": int(np.sum(~kept)),
