@@ -26,7 +26,7 @@ the stiffness at `REFERENCE_OVERLAP`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Moduli:
+class PairModuli:
     """Elastic constants of a pair of materials, as they are used.
 
     Attributes:
@@ -38,10 +38,10 @@ class Moduli:
     shear: float
 
 
-def elastic(first: tuple[float, float], second: tuple[float, float]) -> Moduli:
+def elastic(first: tuple[float, float], second: tuple[float, float]) -> PairModuli:
     """Of two materials, each with Young's modulus in Pa and Poisson's ratio."""
     (e1, nu1), (e2, nu2) = first, second
-    return Moduli(
+    return PairModuli(
         modulus=1 / ((1 - nu1**2) / e1 + (1 - nu2**2) / e2),
         shear=1 / (2 * (2 - nu1) * (1 + nu1) / e1 + 2 * (2 - nu2) * (1 + nu2) / e2),
     )
@@ -190,7 +190,7 @@ class Contact:
     damping_rate: float
     contact_time: float
     step_limit: float
-    elastic: Moduli | None = None
+    elastic: PairModuli | None = None
     stokes: float | None = None
 
     @property
@@ -333,7 +333,7 @@ def material_of(case: Case, name: str, factor: float) -> tuple[float, float]:
     return factor * spheres.youngs_modulus_Pa, spheres.poissons_ratio
 
 
-def pair_elastic(case: Case, pair: tuple[str, str], factor: float) -> Moduli:
+def pair_elastic(case: Case, pair: tuple[str, str], factor: float) -> PairModuli:
     """Elastic constants of a pair of materials, softened by `factor`."""
     return elastic(material_of(case, pair[0], factor), material_of(case, pair[1], factor))
 
