@@ -1,11 +1,15 @@
-"""Imports point down, and each outside library has one door."""
+"""Imports point down, each outside library has one door, each public name one place."""
 
 import ast
+import sys
 from pathlib import Path
 
 import pytest
 
 from fdnet.case.file import known_keys
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
+import count  # noqa: E402
 
 LAYERS = [
     ["errors", "names"],
@@ -189,3 +193,14 @@ def test_the_units_of_a_case_file_stay_inside_the_case(root):
                 raise AssertionError(
                     f"{name}:{node.lineno} reads {node.attr}; take its SI property"
                 )
+
+
+def test_a_public_name_stands_in_one_place(root):
+    assert count.names_twice(root) == []
+
+
+def test_a_step_takes_few_files(root):
+    """So many that a reader can hold them: the limits are those of docs/architecture.md."""
+    most = dict(zip(count.STEPS, (5, 5, 6, 5, 10, 16), strict=True))
+    taken = {name: len(count.files_of(root, start)) for name, start in count.STEPS.items()}
+    assert all(taken[name] <= most[name] for name in most), taken
