@@ -9,7 +9,7 @@ import pytest
 from fdnet.case.file import known_keys
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
-import count  # noqa: E402
+import count
 
 LAYERS = [
     ["errors", "names"],
