@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -252,7 +253,10 @@ def _run(options: argparse.Namespace) -> int:
     def tell(summary: Mapping[str, Any]) -> None:
         """The answer, as soon as it is known: the pictures may take longer than it did."""
         if summary and not options.json:
-            print("\n".join(summary_lines(summary)), flush=True)
+            try:
+                print("\n".join(summary_lines(summary)), flush=True)
+            except BrokenPipeError:  # the reader has gone; the run goes on to its end
+                os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
             printed.append(summary)
 
     chosen = RunOptions(

@@ -35,7 +35,7 @@ from fdnet.dem.invade_deck import (
 )
 from fdnet.dem.invasion import ChunkedStage, EndedStage
 from fdnet.dem.liggghts import Launch
-from fdnet.errors import CaseError, LiggghtsError
+from fdnet.errors import CaseError, Doubt, LiggghtsError
 from fdnet.files import write_text
 from fdnet.scales.scales import BackFlow
 from fdnet.spheres.snapshot import Array, Snapshot
@@ -141,7 +141,11 @@ class CleanUpStage(ChunkedStage):
             before = Checkpoints(folder=start.invasion, digest=case.digest("invade"))
             path = before.path(self.first_step, "restart")
             record = before.record(self.first_step)
-            if record is None or not path.is_file() or file_digest(path) != record.restart:
+            try:
+                same = record is not None and file_digest(path) == record.restart
+            except OSError:
+                same = False
+            if not same:
                 raise CaseError(
                     f"{path}: the clean-up begins with this file, and it is missing or is not the "
                     "one that the invasion wrote; put it back, or run the invasion again with "
@@ -173,7 +177,11 @@ class CleanUpStage(ChunkedStage):
         if last.quiet >= self.flow.quiet_chunks:
             return "quiet", []
         return "cap", [
-            "the clean-up stopped at its cap while fines still came out: raise clean_up.cap_ms",
+            Doubt(
+                "clean-up-at-its-cap",
+                "the clean-up stopped at its cap while fines still came out: raise "
+                "clean_up.cap_ms",
+            )
         ]
 
 
@@ -194,8 +202,8 @@ def clean_up(
     """Turn the flow back; continues from the last whole checkpoint when `folder` holds one.
 
     A coupled case needs the `fluid` that answers for its fines. The `stop_reason` is also "quiet"
-    (nothing came out any more) or "empty". Raises LiggghtsError when a run
-    fails or fines are lost, CaseError when the restart of the invasion is not there.
+    (nothing came out any more) or "empty". Raises LiggghtsError when a run fails or fines are
+    lost, CaseError when the restart of the invasion is not there.
     """
     stage = CleanUpStage(
         case=flow.case,

@@ -142,15 +142,17 @@ class ChunkedStage(ABC):
                 if self.over(last):
                     return deck, ()
             launch = replace(self.launch, follow=self.keeper())
+            screen = self.folder / SCREEN
+            screen.unlink(missing_ok=True)
             try:
                 play = None if self.fluid is None else partial(self._play, name, last)
                 return deck, (run_deck(self.folder, name, launch, play),)
             except LiggghtsError:
-                if last is None:
+                if last is None or not screen.exists():
                     raise
-                with (self.folder / SCREEN).open("rb") as file:
-                    screen = file.read(_START_OF_SCREEN)
-                if b"FDNET restoring" not in screen or b"FDNET restored" in screen:
+                with screen.open("rb") as file:
+                    said = file.read(_START_OF_SCREEN)
+                if b"FDNET restoring" not in said or b"FDNET restored" in said:
                     raise
                 restart = self.points.path(last.step, "restart")
                 restart.rename(restart.with_suffix(".unreadable"))
@@ -185,7 +187,7 @@ class ChunkedStage(ABC):
         overlaps = watch.upto(step)
         for row in rows:
             self.points.keep(row, ranks=self.launch.ranks, overlaps=overlaps)
-        if not rows and self.case.run.on_overlap == "stop":
+        if not rows and self.points.stage == "invade" and self.case.run.on_overlap == "stop":
             raise LiggghtsError(
                 f"{self.folder / HISTORY}: no row for the checkpoint at step {step}; continue "
                 "with --resume"
@@ -384,10 +386,10 @@ class InvadeStage(ChunkedStage):
                 velocity = float(updates.last["velocity_m_s"])
                 moved = float(updates.last["filtrate_m3"]) / area + velocity * since
             ahead = velocity * scales.checkpoint_steps * scales.time_step
+            density = densities(case, batches.counts)
             for which in range(entered, batches.entered_after(moved + ahead)):
                 spheres = self.spheres(self.shown(feed), time)
                 fines = later_batch(case, scales, spheres, which, moved)
-                density = densities(case, batches.counts)
                 inputs = case, scales, self.grains, self.folder
                 feed(f"include {write_batch(*inputs, which, fines, velocity, density)}")
         if is_watched(case):

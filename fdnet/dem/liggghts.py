@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from fdnet.errors import CaseError, LiggghtsError
+from fdnet.errors import CaseError, LiggghtsError, cure_of
 from fdnet.files import disk_is_full
 
 _ALWAYS = dict.fromkeys(
@@ -425,10 +425,11 @@ class Feed:
                 self.waited = time.monotonic() - began - self.busy
                 self._write(f'print "{END_MARK}"\n')
                 assert self.process.stdin is not None
-                self.process.stdin.close()
+                with contextlib.suppress(BrokenPipeError):
+                    self.process.stdin.close()
             while True:
                 self._lines()
-        except (_EndedError, BrokenPipeError):
+        except _EndedError:
             while self.process.poll() is None:  # it may close its output before
                 self._refuse()
                 time.sleep(0.02)
@@ -454,7 +455,14 @@ class Feed:
             if self.process.poll() is not None:  # a daemon of MPI may keep the pipe open
                 raise _EndedError
         part = os.read(pipe, _PART)
-        self.screen.write(part)
+        try:
+            self.screen.write(part)
+        except OSError as error:
+            raise LiggghtsError(
+                f"{self.folder / SCREEN}: what LIGGGHTS prints cannot be written "
+                f"({error.strerror}), so it was stopped; {cure_of(error)} and continue with "
+                "--resume"
+            ) from error
         *parts, self._rest = (self._rest + part).split(b"\n")
         if not part and self._rest:
             parts, self._rest = [*parts, self._rest], b""

@@ -227,10 +227,6 @@ class Batches:
         needed = int(np.searchsorted(totals, fines)) + 1
         return min(len(totals), max(needed, self.entered_at(1)))
 
-    def distance_of(self, number: int) -> float:
-        """Distance m by which undisturbed mud has moved when batch `number` (from 0) enters."""
-        return max(0, number + 1 - AT_ONCE) * self.travel
-
     def supplied(self, entered: int) -> int:
         """Fines in the first batches, `entered` of them."""
         return sum(self.counts[:entered])

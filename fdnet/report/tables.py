@@ -342,6 +342,7 @@ class JsonObject(BaseModel):
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Number = Annotated[int, Field(ge=0)]
 AboveZero = Annotated[float, Field(ge=0.0)]
+Positive = Annotated[float, Field(gt=0.0)]
 Lost = Annotated[float, Field(le=1.0)] | None
 
 

@@ -9,6 +9,7 @@ from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import HISTORY, UPDATES, Cleaned, overlap_in, read_history, state_at
 from fdnet.dem.clean_up import CleanUpStage, Start, clean_up, fines_inside
 from fdnet.dem.invade_deck import DrivingFluid
+from fdnet.errors import explained
 from fdnet.run.dem_stages import invaded, is_done, packed_grains
 from fdnet.run.fluid import Mirrored, UniformCrowd, fluid_of, mirrored
 from fdnet.run.folder import RECORD_FORMAT, START_OVER, check_files, digests_of
@@ -39,7 +40,7 @@ def clean_up_stage(session: Session, case: InvasionCase) -> None:
         launch, fluid = session.launch(progress), fluid_turned_back(flow, grains)
         result = clean_up(flow, start, folder, launch, fluid=fluid)
     known, last = set(session.scales.warnings), result.history[-1]
-    doubts = [f"clean-up: {text}" for text in flow.scales.warnings if text not in known]
+    doubts = [f"clean-up: {explained(text)}" for text in flow.scales.warnings if text not in known]
     dumps = (f"post/clean_{row.step}.dump" for row in result.history)
     steps = last.chunk * flow.scales.checkpoint_steps
     record = {
@@ -52,7 +53,7 @@ def clean_up_stage(session: Session, case: InvasionCase) -> None:
         "steps": last.step,
         "dt_s": flow.step,
         "physical_time_s": steps * flow.step * flow.scales.force_factor,
-        "warnings": [*doubts, *result.warnings],
+        "warnings": [*doubts, *map(explained, result.warnings)],
         "ranks": result.ranks,
         "files": digests_of(folder, [CleanUpStage.deck, HISTORY, UPDATES, *dumps]),
         "runs": [run_record(run) for run in result.runs],

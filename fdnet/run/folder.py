@@ -164,7 +164,7 @@ class StageRecord(JsonObject):
     steps: int
     dt_s: float
     ranks: int
-    files: Mapping[str, str]
+    files: Annotated[Mapping[str, str], Field(min_length=1)]
     runs: list[_Execution]
     left_out: list[str]
 
@@ -234,7 +234,7 @@ def read_manifest(folder: Path) -> dict[str, Any] | None:
     path = folder / MANIFEST
     if not path.exists():
         return None
-    manifest = read_json(path, Manifest, noun="manifest of a run", advice=ANEW)
+    manifest = read_json(path, Manifest, noun="manifest of a run", advice=ANALYSE_AGAIN)
     for stage in STAGES[:4]:
         if stage not in manifest["stages"] or (stage == "invade" and manifest["invade"] is None):
             continue

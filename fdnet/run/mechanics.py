@@ -10,7 +10,7 @@ from typing import Any
 from fdnet.case.case import Case
 from fdnet.case.file import case_from, read_case, recorded_case, set_keys
 from fdnet.dem.deck import snapshot_of
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, explained
 from fdnet.files import write_text
 from fdnet.mechanics.of_case import (
     elastic_moduli,
@@ -100,7 +100,7 @@ def measure_elastic(packed: Packed, pressure_Pa: float | None) -> dict[str, Any]
         "seed": case.seed,
         **elastic_numbers(result),
         "springs": springs | {f"bonds.{key}": one for key, one in data.get("bonds", {}).items()},
-        "warnings": warnings_of(result, case),
+        "warnings": [explained(one) for one in warnings_of(result, case)],
         "seconds": time.monotonic() - start,
     }
 
@@ -117,7 +117,8 @@ def measure_triaxial(
     start, case = time.monotonic(), packed.case
     material = pack_material(case, packed.grains, test.confining)
     result = triaxial(packed.grains, material, test, periodic=case.periodic, follow=follow)
-    numbers = {**triaxial_numbers(result), "warnings": triaxial_warnings(result)}
+    numbers = triaxial_numbers(result)
+    numbers["warnings"] = [explained(one) for one in triaxial_warnings(result)]
     numbers["seconds"] = time.monotonic() - start
     folder = packed.folder / FOLDER
     folder.mkdir(parents=True, exist_ok=True)

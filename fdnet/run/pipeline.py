@@ -14,7 +14,7 @@ from fdnet.case.tables import AnalysisChoices
 from fdnet.dem.checkpoint import read_rows
 from fdnet.dem.liggghts import find_binary
 from fdnet.dem.supply import refuse_crowded_supply
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, explained
 from fdnet.files import expanded
 from fdnet.names import AUTO, DEFAULT_LAW, LIGGGHTS_STAGES, STAGES, off_by_factors
 from fdnet.report import html, tables
@@ -47,7 +47,7 @@ from fdnet.run.outputs import (
 from fdnet.run.records import RunOptions, Session, record_warnings, stage_seconds, versions
 from fdnet.run.stokes_sections import report_section
 from fdnet.run.summary import summarise
-from fdnet.scales.check import every_finding, explained
+from fdnet.scales.check import every_finding
 from fdnet.scales.cost import over_limit
 from fdnet.scales.pack import grain_count, refuse_unreachable
 from fdnet.scales.scales import InvasionScales, Scales, back_flow, scales_of

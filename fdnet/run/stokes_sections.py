@@ -22,7 +22,7 @@ from fdnet.files import write_text
 from fdnet.network.states import cut_out
 from fdnet.network.stokes import StokesFlow, Walled, divide, estimate, solve_slab
 from fdnet.report.html import STOKES, put_section, stokes_html
-from fdnet.report.tables import AboveZero, JsonObject, read_table, write_rows
+from fdnet.report.tables import JsonObject, Positive, read_table, write_rows
 from fdnet.run.finished import FinishedRun, open_run
 from fdnet.run.folder import locked
 from fdnet.run.records import cores
@@ -106,7 +106,7 @@ class KeptGrid(JsonObject):
     x_hi_m: float
     cells: int
     spheres: str
-    k: AboveZero
+    k: Positive
     iterations: int
     residual: float
     seconds: float
@@ -341,9 +341,10 @@ def read_sections(path: Path) -> list[StokesSection]:
         if not np.isfinite(table.to_numpy(float)).all():
             raise CaseError("a number is not finite")
     except CaseError as error:
+        why = str(error).partition("; ")[0].removeprefix(f"{path}: ")
         raise CaseError(
-            f"{path}: cannot be read, expected numbers below {', '.join(names)}; remove it and "
-            "call fdnet stokes again"
+            f"{path}: cannot be read ({why}), expected numbers below {', '.join(names)}; remove "
+            "it and call fdnet stokes again"
         ) from error
     return [
         StokesSection(**dict(zip(names, row, strict=True))) for row in table.to_numpy().tolist()

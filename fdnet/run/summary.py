@@ -6,8 +6,8 @@ import numpy as np
 
 from fdnet.case.case import Case
 from fdnet.dem.checkpoint import Checkpoint
+from fdnet.errors import explained
 from fdnet.report.tables import section_rows
-from fdnet.scales.check import explained
 
 if TYPE_CHECKING:
     from fdnet.network.permeability import Analysis

@@ -54,13 +54,13 @@ A, R = 0.5, 0.25
 TUBE = (1 / sqrt(2) - 0.5) * A
 WIDE, THIN = 0.1, 0.02
 # x, y, z, radius in mm; all lie midway between two cells, some on the axis of the face's throats;
-# the three wide ones are so little apart that none lies inside another, which would leave it out
+# the three wide ones are a little apart, so that none lies inside others, which would leave it out
 APART = 2e-4
 FINES = [
     [0.6, 0.0, 0.25, 0.05],
     [0.6, 0.5 + 0.5, 0.25 + 0.08, THIN],
     [0.6 + 0.11, 0.5, 0.75, THIN],
-    *([0.6, 0.5 + shift, 1.25, WIDE] for shift in (-APART, 0.0, APART)),
+    *([0.6, 0.5 + y, 1.25 + z, WIDE] for y, z in ((-APART, 0.0), (APART, 0.0), (0.0, APART))),
     [1.6, 1.0, 1.25, 0.05],
     [-0.3, 0.5, 0.5, 0.05],
 ]
