@@ -148,5 +148,7 @@ def test_stored_truth_of_a_slab_lies_below_a_coarse_grid():
         assert end.k_mm2 == pytest.approx(float(k), rel=0.02)
 
 
-def test_the_page_lists_the_slabs(root):
-    assert slab_table(SLAB_FOLDER) in (root / "docs/stokes.md").read_text(encoding="utf-8")
+def test_the_list_of_slabs_has_a_row_for_each():
+    assert [row.split(" | ")[0] for row in slab_table(SLAB_FOLDER).splitlines()[2:]] == [
+        f"| {name}" for name in SLABS
+    ]
