@@ -2,6 +2,8 @@
 
 import json
 import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -159,3 +161,17 @@ def test_a_run_that_was_cut_after_its_pack_goes_on_with_its_ranks(copied):
     with pytest.raises(CaseError, match=r"begun with --np 1, .* continue with --np 1"):
         run_stages(CASE, options(copied, resume=True, ranks=2))
     assert run_stages(CASE, options(copied, resume=True))["ranks"] == {"pack": 1, "invade": 1}
+
+
+def test_a_run_ends_well_though_the_reader_of_its_answer_has_gone(copied):
+    """`fdnet run ... | less`, closed with q: figures, report and manifest are still written."""
+    stages = "--stages analyse,report --force --quiet"
+    line = (
+        f"'{sys.executable}' -m fdnet.cli run {copied}/case.toml --out {copied} {stages} | true; "
+    )
+    ended = ["bash", "-c", line + 'echo "${PIPESTATUS[0]}"']
+    done = subprocess.run(ended, capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "0", done.stderr
+    assert not (copied / ".unfinished").exists()
+    assert (copied / "manifest.json").exists()
+    assert (copied / "report.html").exists()
