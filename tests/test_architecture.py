@@ -176,8 +176,6 @@ def test_the_network_half_never_imports_the_dem_half(root):
 
 
 FIELD_UNITS = ("_GPa", "_mm", "_cP", "_MPa", "_ms", "_mD")
-NO_KEYS = {"fdnet/studies/dem/economies.py": {"duration_ms"}}
-"""Attributes, by file, that share the name of a case's key but mean something else."""
 
 
 def test_the_units_of_a_case_file_stay_inside_the_case(root):
@@ -189,7 +187,7 @@ def test_the_units_of_a_case_file_stay_inside_the_case(root):
         if name.startswith("fdnet/case/"):
             continue
         for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Attribute) and node.attr in keys - NO_KEYS.get(name, set()):
+            if isinstance(node, ast.Attribute) and node.attr in keys:
                 raise AssertionError(
                     f"{name}:{node.lineno} reads {node.attr}; take its SI property"
                 )

@@ -4,6 +4,7 @@ import errno
 import json
 import re
 import shutil
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from builders import tiny
 
 import fdnet
+from fdnet.case.file import case_from
 from fdnet.errors import CaseError
 from fdnet.report.text import facts
 from fdnet.run.finished import FinishedRun
@@ -352,3 +354,16 @@ def test_stages_that_end_without_a_result_are_refused(tmp_path, stages):
 def test_an_unknown_state_is_refused(run):
     with pytest.raises(CaseError, match="expected 'initial'"):
         run.spheres("final")
+
+
+def test_a_finished_run_is_read_and_one_of_another_case_refused(finished):
+    again = partial(
+        fdnet.run_case, stages=("pack", "invade", "analyse"), resume=True, progress=False
+    )
+    before = sorted(path.stat().st_mtime_ns for path in finished.path.rglob("*"))
+    assert again(finished.case, finished.path).summary == finished.summary
+    data = finished.case.data()
+    data["seed"] += 1
+    with pytest.raises(CaseError, match="holds a run of another case"):
+        again(case_from(data), finished.path)
+    assert sorted(path.stat().st_mtime_ns for path in finished.path.rglob("*")) == before

@@ -79,10 +79,10 @@ STAGNANT = 1e-2
 """A pore that carries less than this share of the mean flux of a pore, clean, keeps ratio 1."""
 RENEWED = 0.2
 """Share of the deposit by volume that may change before the network is solved anew
-(`scripts/solve_lag.py`, docs/validation/flow-updates.md)."""
+(docs/validation/solve_lag.csv, docs/validation/flow-updates.md)."""
 STEP = 1.0 / 3.0
 """Greatest step between two sections of a throat, in radii of its smallest fine. The analysis
-takes an eighth (`scripts/solve_lag.py`)."""
+takes an eighth (docs/validation/solve_lag.csv)."""
 MOVED = 0.01
 """Way in radii within which a fine that moves is taken to be at one place (`placed`)."""
 LEAK = 1e-6

@@ -17,15 +17,10 @@ STUDIES: Mapping[str, str] = {
     "time-step": "time step over sqrt(m/k) and over the drag relaxation time",
     "size-ratio": "fines of 1/5 to 1/30 held in a pack, by stiffness, step and shear stiffness",
     "drag": "drag at every step, held, implicit, viscous",
-    "speed": "mobile grains, neighbour skin and bins, MPI ranks",
-    "throat-occupancy": "volume of a fine in a throat: the thesis's two planes or quadrature",
     "linear-solver": "method and tolerance of the network's solve, by size and conductances",
     "laws": "conductance and damage laws, and coarse resolved flow, against Stokes truth",
     "velocity-field": "cells across a grain for the velocity between the grains",
     "specimen-size": "number of grains and seed: how large a specimen must be",
-    "economies": "settings that make full-scale invasions affordable: error and speed-up of each",
-    "defaults": "sides, walls, upstream, step and supply: what each default changes",
-    "drive-velocity": "fines at a well, driven 1 to 18 times as fast as the fluid",
     "mechanics": "moduli by size and sides, triaxial tests by load steps and against LIGGGHTS",
     "compaction": "porosity and permeability of sand under stress, bonded grains in the flow",
     "flow-updates": "how often a flow that follows its deposit is computed anew",
@@ -33,7 +28,7 @@ STUDIES: Mapping[str, str] = {
 }
 """Name of each study and its question; the module has the same name with underscores."""
 
-OF_NETWORK = ("throat-occupancy", "linear-solver", "laws", "velocity-field", "specimen-size")
+OF_NETWORK = ("linear-solver", "laws", "velocity-field", "specimen-size")
 """The studies of the network half; the others are of the invasion."""
 
 OUTSIDE = "outside-numbers"

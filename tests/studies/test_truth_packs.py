@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fdnet.spheres.geometry import measure_porosity
+from fdnet.studies.truth import packs
 from fdnet.studies.truth.grids import make, tabulated
 from fdnet.studies.truth.made_packs import touching_three
 from fdnet.studies.truth.packs import DATA, read_pack
@@ -62,3 +63,9 @@ def test_the_table_takes_the_two_finest_grids():
     assert float(table["packH_40_eps40"]["k_mm2"]) == pytest.approx(2.0, rel=1e-5)
     assert float(table["packH_r5_d13"]["k_over_k0"]) == pytest.approx(0.25, rel=1e-3)
     assert table["packH_r5_d13"]["source"].endswith("N=96+144")
+
+
+def test_packs_that_are_not_there_are_missed_by_name(monkeypatch, tmp_path):
+    monkeypatch.setattr(packs, "DATA", tmp_path / "data")
+    with pytest.raises(packs.CaseError, match=r"data is not there.*install fdnet again"):
+        packs.truth_folder()

@@ -63,7 +63,7 @@ def exact_volume(pairs: Pairs, *, points: int = GAUSS_POINTS) -> Array:
     Discs of the sphere, cut by the tube, are integrated along the axis: in closed form where the
     disc lies within the tube or covers it; where they cross, by a Gauss-Legendre rule of `points`
     points in the angle phi with place = middle + half sin(phi), which smooths the ends. The error
-    is below 1e-6 of the sphere (study throat-occupancy).
+    is below 1e-6 of the sphere (docs/validation/throat-occupancy.csv).
     """
     volume = np.zeros(len(pairs.sphere))
     node, weights = np.polynomial.legendre.leggauss(points)

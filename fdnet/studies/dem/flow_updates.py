@@ -21,7 +21,6 @@ from fdnet.dem.liggghts import Launch
 from fdnet.run.fluid import STANDING, NetworkFluid
 from fdnet.run.network_flow import RENEWED
 from fdnet.scales.scales import invasion_scales
-from fdnet.studies.dem.coupling import FLUIDS
 from fdnet.studies.dem.runs import grains_of, the_binary
 from fdnet.studies.engine.error_rows import against_reference
 from fdnet.studies.engine.runner import child_core_seconds
@@ -44,6 +43,17 @@ REFERENCE: Mapping[str, float] = {
     FIFTH: 1.0,
     TENTH: 1.0,
 }
+NETWORK = (
+    "fines.supply=slab",
+    "drag.upstream=darcy",
+    "fluid.velocity_m_s=5.4",
+    "run.duration_ms=2.0",
+    "drag.scheme=implicit",
+    "drag.crowd=beetstra",
+    "drag.field=network",
+    "drag.pressure_gradient=true",
+)
+"""The flow of the network, at the pressure that drives the Darcy velocity over the specimen."""
 OBSERVED = ("filtrate", "rate", "invaded", "mean_depth")
 _WORDS: Mapping[str, str] = {
     "filtrate": "filtrate",
@@ -78,7 +88,7 @@ def case_of(point: Point) -> InvasionCase:
     """The quick specimen 5 in the flow of the network, with half its fines for half its time."""
     travel = point.value if point.series == TRAVEL else 0.5
     keys = [
-        *FLUIDS["network"],
+        *NETWORK,
         *_SIZES[str(point.settings["size"])],
         f"seed={point.seed}",
         f"drag.update_travel={travel}",

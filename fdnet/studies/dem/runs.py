@@ -112,14 +112,9 @@ def invasion_run(case: InvasionCase, work: Path, slug: str) -> dict[str, float]:
     return invasion_observed(case, grains, result) | costs
 
 
-def window_run(
-    case: InvasionCase, work: Path, slug: str, *, grid: tuple[int, ...] = ()
-) -> dict[str, float]:
-    """One invasion without its permeability: count and mean depth (m) of the fines, and costs.
-
-    `grid` runs it on as many MPI ranks, cut in x, y and z as it says.
-    """
-    result, costs = _fresh(case, grains_of(case, work), work / slug, grid)
+def window_run(case: InvasionCase, work: Path, slug: str) -> dict[str, float]:
+    """One invasion without its permeability: count and mean depth (m) of the fines, and costs."""
+    result, costs = _fresh(case, grains_of(case, work), work / slug)
     return {
         "invaded": float(result.history[-1].invaded),
         "mean_depth": _mean(_depths(case, result)),
@@ -127,7 +122,7 @@ def window_run(
 
 
 def _fresh(
-    case: InvasionCase, grains: Snapshot, folder: Path, grid: tuple[int, ...] = ()
+    case: InvasionCase, grains: Snapshot, folder: Path
 ) -> tuple[Invasion, dict[str, float]]:
     """An invasion and its costs.
 
@@ -135,22 +130,12 @@ def _fresh(
     """
     shutil.rmtree(folder, ignore_errors=True)
     scales, before = invasion_scales(case), child_core_seconds()
-    launch = Launch(binary=the_binary(), ranks=math.prod(grid))
-    runs = [_gridded(case, grains, folder, grid, launch)] if grid else []
-    result = invade(case, scales, grains, folder, launch)
+    result = invade(case, scales, grains, folder, Launch(binary=the_binary()))
     return result, {
         "steps": float(result.history[-1].step),
         "core_s": child_core_seconds() - before,
-        "wall_s": sum(run.seconds for run in [*runs, *result.runs]),
+        "wall_s": sum(run.seconds for run in result.runs),
     }
-
-
-def _gridded(
-    case: InvasionCase, grains: Snapshot, folder: Path, grid: tuple[int, ...], launch: Launch
-) -> Execution:
-    """The whole invasion under another processor grid than fdnet's; `invade` then reads it."""
-    line = "processors " + " ".join(map(str, grid))
-    return edited_run(case, grains, folder, launch, (r"^processors .*$", line))
 
 
 def edited_run(

@@ -3,7 +3,7 @@
 import csv
 import io
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -56,20 +56,6 @@ def write_named(
     writer.writerow(names)
     writer.writerows([_named_cell(row.get(name), digits) for name in names] for row in rows)
     return write_text(path, text.getvalue())
-
-
-def write_as_they_come(
-    path: Path, rows: Iterable[Mapping[str, object]], *, digits: int = 6
-) -> Iterator[Mapping[str, object]]:
-    """Writes each row as soon as it is computed, for tables that take hours; yields it again."""
-    with path.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        for number, row in enumerate(rows):
-            if number == 0:
-                writer.writerow(row)
-            writer.writerow([_named_cell(value, digits) for value in row.values()])
-            file.flush()
-            yield row
 
 
 def read_csv(path: Path, columns: Sequence[str]) -> list[list[str]]:

@@ -4,15 +4,12 @@ import math
 from collections.abc import Iterable
 from pathlib import Path
 
-import numpy as np
-
-from fdnet.studies.dem import drag, economies, size_ratio, speed, stiffness, time_step
+from fdnet.studies.dem import drag, size_ratio, stiffness, time_step
 from fdnet.studies.dem.runs import OBSERVED
 from fdnet.studies.engine.levels import Level, order
 from fdnet.studies.network import specimen_size
 from fdnet.studies.pages.lookup import (
     Lookup,
-    between,
     exponent,
     lookup,
     percent,
@@ -30,9 +27,7 @@ def invasion_numbers(validation: Path) -> dict[str, str]:
         **_stiffness(lookup(validation, "stiffness")),
         **_time_step(lookup(validation, "time-step")),
         **_drag(lookup(validation, "drag")),
-        **_speed(lookup(validation, "speed")),
         **_specimen_size(lookup(validation, "specimen-size")),
-        **_economies(lookup(validation, "economies")),
         **_size_ratio(lookup(validation, "size-ratio")),
     }
 
@@ -130,47 +125,6 @@ def _drag(table: Lookup) -> dict[str, str]:
     }
 
 
-def _speed(table: Lookup) -> dict[str, str]:
-    sizes = (speed.FEW, speed.MANY)
-    few = [
-        level.error
-        for setting in (speed.SKIN, speed.BIN, speed.RANKS)
-        for name in ("invaded", "mean_depth")
-        for level in table.levels(speed.window_of(setting, speed.FEW), name)
-    ]
-    skins = [speed.window_of(speed.SKIN, fines) for fines in sizes]
-    extreme = [
-        table.cost(series, "invaded", value) / table.cost(series, "invaded", speed.OWN_SKIN)
-        for series in skins
-        for value in (0.1, 4.0)
-    ]
-    ranks = {
-        fines: {
-            level.value: level.cost
-            for level in table.levels(
-                speed.window_of(speed.RANKS, fines), "invaded", cost="wall_s"
-            )
-        }
-        for fines in sizes
-    }
-    across = [
-        ranks[fines][grid] / ranks[fines][speed.ONE_RANK]
-        for fines in sizes
-        for grid in ("1 x 2 x 1", "1 x 1 x 2")
-    ]
-    along = ranks[speed.FEW]["2 x 1 x 1"] / ranks[speed.FEW][speed.ONE_RANK]
-    return {
-        "search_errors": percent(max(map(abs, few)), 1),
-        "skin_extremes": between(extreme),
-        "mobile_invaded": with_band(table.level(speed.MOTION, "invaded", speed.MOBILE)),
-        "grain_shift": percent(table.error(speed.MOTION, "grain_shift", speed.MOBILE), 1),
-        "grain_drift": percent(table.error(speed.STILL, "grain_shift", speed.MOBILE), 1),
-        "two_ranks_gain": between(1 / share for share in across),
-        "two_ranks_save": percents(1 - share for share in across),
-        "ranks_along": f"{along:.2f}",
-    }
-
-
 def _specimen_size(table: Lookup) -> dict[str, str]:
     intact = f"{specimen_size.INTACT}, {specimen_size.PERIODIC}"
     invaded = f"{specimen_size.INVADED}, {specimen_size.PERIODIC}"
@@ -196,37 +150,6 @@ def _specimen_size(table: Lookup) -> dict[str, str]:
         "bulk_scatter": percent(table.scatter(invaded, "k_ratio_first", float(largest.value))),
         "quick_k": percent(table.error(quick, "k_initial", grains[quick])),
         "five_k": percent(table.error(five, "k_initial", grains[five])),
-    }
-
-
-def _economies(table: Lookup) -> dict[str, str]:
-    equal, long, unequal = economies.SERIES
-    gains = {
-        (series, value): float(np.mean(ratios))
-        for series in economies.SERIES
-        for value, ratios in economies.speed_ups(table.rows, series).items()
-    }
-    plain = {row.seed: row.observed for row in table.runs(equal, "invaded", economies.PLAIN)}
-
-    def more(value: str) -> str:
-        rows = table.runs(equal, "invaded", value)
-        return percents(row.observed / plain[row.seed] - 1 for row in rows)
-
-    return {
-        "plain_band": percent(table.level(equal, "invaded", economies.PLAIN).half_width),
-        "batches_gain": f"{100 * (gains[equal, economies.BATCHES] - 1):.0f}",
-        "batches_long": f"{gains[long, economies.BATCHES]:.1f}",
-        "step_gain": f"{gains[equal, economies.STEP]:.1f}",
-        "soft_more": percent(table.error(equal, "invaded", economies.SOFT)),
-        "softer_more": percent(table.error(equal, "invaded", economies.SOFTER)),
-        "soft_band": percent(table.level(equal, "invaded", economies.SOFT).half_width),
-        "soft_same_pack": more(economies.SOFT),
-        "softer_same_pack": more(economies.SOFTER),
-        "viscous_gain": f"{gains[equal, economies.VISCOUS]:.1f}",
-        "held_gain": f"{gains[unequal, economies.HELD]:.1f}",
-        "implicit_gain": f"{gains[unequal, economies.IMPLICIT]:.1f}",
-        "all_gain": between((gains[equal, economies.ALL], gains[unequal, economies.ALL])),
-        "all_long": f"{gains[long, economies.ALL]:.0f}",
     }
 
 

@@ -49,10 +49,6 @@ class Lookup:
             and (value is None or row.value == value)
         ]
 
-    def observed(self, series: str, quantity: str, value: Value) -> float:
-        """Mean of what was observed."""
-        return float(np.mean([row.observed for row in self.runs(series, quantity, value)]))
-
     def scatter(self, series: str, quantity: str, value: Value) -> float:
         """Standard deviation of the errors over the seeds."""
         return float(np.std([row.error for row in self.runs(series, quantity, value)], ddof=1))

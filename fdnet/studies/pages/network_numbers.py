@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from fdnet.names import DEFAULT_LAW
-from fdnet.studies.accuracy import ARCHIE, FINEST, PACKS, PAIRS
-from fdnet.studies.engine.csv_rows import read_named
+from fdnet.studies.accuracy import ARCHIE, FINEST, PAIRS
 from fdnet.studies.engine.study import DONE
-from fdnet.studies.network import laws, linear_solver, solver_peers, throat_occupancy
+from fdnet.studies.network import laws, linear_solver, solver_peers
 from fdnet.studies.pages.lookup import (
     Lookup,
     between,
@@ -24,8 +23,6 @@ from fdnet.studies.pages.lookup import (
 )
 from fdnet.studies.truth.cases import LOOSE
 
-TUBES = tuple(f"a/r = {ratio:g}" for ratio in throat_occupancy.RATIOS)
-WHERE = ("inside", "ends")
 FEW_PORES = linear_solver.SMALL
 OWN_SERIES = re.compile(rf"{solver_peers.FDNET}, \d")
 
@@ -33,67 +30,12 @@ OWN_SERIES = re.compile(rf"{solver_peers.FDNET}, \d")
 def network_numbers(validation: Path) -> dict[str, str]:
     """Every number by its name in docs/validation.md.in."""
     return {
-        **_throat_occupancy(lookup(validation, "throat-occupancy"), validation),
-        **_laws(lookup(validation, "laws"), validation),
+        **_laws(lookup(validation, "laws")),
         **_linear_solver(lookup(validation, "linear-solver")),
     }
 
 
-def _throat_occupancy(table: Lookup, validation: Path) -> dict[str, str]:
-    planes, own = throat_occupancy.TWO_PLANE, 10.0
-    (fifth, tenth, clogging), files = throat_occupancy.PACKS, [*throat_occupancy.PACKS.values()]
-    worst = {
-        n: [table.error(tube, f"largest, {where}", n) for tube in TUBES for where in WHERE]
-        for n in (4.0, 8.0, 10.0, 16.0)
-    }
-    doubling = [
-        few / many
-        for low, high in ((4.0, 8.0), (8.0, 16.0))
-        for few, many in zip(worst[low], worst[high], strict=True)
-    ]
-    volumes = [
-        table.cost(tube, "largest, inside", own) / table.cost(planes, "largest, inside", ratio)
-        for tube, ratio in zip(TUBES, throat_occupancy.RATIOS, strict=True)
-    ]
-    k = {name: table.levels(name, "k/k0, thesis") for name in throat_occupancy.PACKS}
-    cost = {name: {level.value: level.cost for level in k[name]} for name in k}
-    two_planes = table.levels(planes, "largest, inside")
-    thesis = {row["case"]: float(row[PAIRS[0]]) for row in read_named(validation / PACKS)}
-    exact = _exact_of(table, clogging)
-    return {
-        "doubling": f"{math.floor(min(doubling) / 100) * 100:.0f}",
-        "ten_points": significant(max(worst[own])),
-        "ten_points_k": significant(
-            max(table.level(name, "k/k0, thesis", own).size for name in k), 1
-        ),
-        "six_points_k": significant(
-            max(table.level(name, "k/k0, thesis", 6.0).size for name in k), 1
-        ),
-        "six_points_save": percents(1 - cost[name][6.0] / cost[name][own] for name in cost),
-        "planes_worst": between((100 * level.size for level in two_planes), 2),
-        "planes_low": f"{100 * table.level(planes, 'bias of the sum, inside', 0.05).size:.2f}",
-        "planes_low_large": percent(table.error(planes, "bias of the sum, inside", 1.0)),
-        "planes_gain": between(volumes),
-        "planes_save": percents(1 - cost[name][planes] / cost[name][own] for name in cost),
-        "planes_k": percents(table.error(name, "k/k0, thesis", planes) for name in (fifth, tenth)),
-        "thesis_k": between(thesis[file.removeprefix("pack")] for file in files[:2]),
-        "planes_clogged": f"{table.observed(clogging, 'throats below 0.40', planes):.0f}",
-        "exact_clogged": f"{exact['throats below 0.40']:.0f}",
-        "planes_clogged_k": f"{table.observed(clogging, 'k/k0, thesis', planes):.3f}",
-        "exact_clogged_k": f"{exact['k/k0, thesis']:.3f}",
-    }
-
-
-def _exact_of(table: Lookup, pack: str) -> dict[str, float]:
-    """What exact volumes give in a pack, from what ten points give and their error."""
-    values = {}
-    for name in ("throats below 0.40", "k/k0, thesis"):
-        (row,) = table.runs(pack, name, 10.0)
-        values[name] = row.observed / (1.0 + row.error)
-    return values
-
-
-def _laws(table: Lookup, validation: Path) -> dict[str, str]:
+def _laws(table: Lookup) -> dict[str, str]:
     intact, damaged = (f"{pack}: networks" for pack in (laws.INTACT, laws.DAMAGED))
     one, two = laws.GRID, laws.TWO_GRIDS
     times = [level.cost for level in table.levels(intact, "k")]

@@ -9,9 +9,9 @@ from fdnet.files import write_text
 from fdnet.studies.command import STUDIES, study_named
 from fdnet.studies.engine.csv_rows import read_named
 from fdnet.studies.engine.draw import draw_study
-from fdnet.studies.engine.markdown import bullets, markdown_table, wrapped
+from fdnet.studies.engine.markdown import markdown_table, wrapped
 from fdnet.studies.engine.study import Row, Study
-from fdnet.studies.engine.table import knee_lines, missing_lines, read_rows, study_text
+from fdnet.studies.engine.table import read_rows, study_text
 from fdnet.studies.pages.invasion_numbers import invasion_numbers
 from fdnet.studies.pages.network_numbers import network_numbers
 
@@ -36,19 +36,14 @@ def document(docs: Path) -> str:
 
 
 def study_part(study: Study, rows: Sequence[Row]) -> str:
-    """Summary or knees of one study, what was not done, and what it cost, as Markdown."""
-    parts = [study.summary(rows)] if study.summary else []
-    if knees := knee_lines(study, rows):
-        parts.append(bullets(knees))
-    if missing := missing_lines(rows):
-        parts.append(f"Not done:\n\n{bullets(missing)}")
+    """What a study cost, and where its numbers stand, as Markdown."""
     seconds = {row.run: row.wall_s for row in rows}
-    parts.append(
-        f"{len(seconds)} runs, {sum(seconds.values()) / 3600:.2g} h. "
-        f"Tables: [{study.name}.md](validation/{study.name}.md), "
+    hours = sum(seconds.values()) / 3600
+    return (
+        f"`fdnet study {study.name}`: {len(seconds)} runs, {hours:.2g} h. "
+        f"All numbers: [{study.name}.md](validation/{study.name}.md), "
         f"rows: `validation/{study.name}.csv`."
     )
-    return "\n\n".join(parts)
 
 
 def stability_table(path: Path) -> str:

@@ -16,7 +16,7 @@ from fdnet.studies.thesis.page import csv_tables, run_tables
 
 PAGE, SOURCE, TABLES = "thesis.md", "thesis.md.in", "thesis"
 FOLLOWED, FOLLOWED_TRENDS = "followed.csv", "followed_trends.csv"
-"""The tables of scripts/followed.py and scripts/followed_trends.py."""
+"""The tables of the specimens and of the quick forms in the flow that follows, made once."""
 
 
 def write_page(docs: Path) -> Path:
