@@ -37,6 +37,7 @@ NETWORK_LAYERS = [
     ["laws", "specimen"],
     ["states"],
     ["permeability"],
+    ["warm_up"],
 ]
 STUDIES_LAYERS = [
     ["engine", "fuzz", "chaos"],
@@ -74,6 +75,7 @@ DOORS = {
         "campaign/engine/local",
         "campaign/engine/snakemake",
         "dem/liggghts",
+        "network/warm_up",
         "report/picture",
         "spheres/vtk_file",
         "studies/benchmark",

@@ -81,7 +81,22 @@ if not config.CACHE_DIR:  # type: ignore[attr-defined]
     _SHARED = cache_folder(_PACKAGE, _writable_root())
     config.CACHE_DIR = str(_SHARED)  # type: ignore[attr-defined]
 
+_COLD = _SHARED is not None and not any(_SHARED.rglob("*.nbi"))
+
+
 _said: set[str] = set()
+
+
+def is_cold() -> bool:
+    """Whether this version had compiled nothing when the process began."""
+    return _COLD
+
+
+def say_compiling() -> None:
+    """Say once why the first analysis of a version takes longer."""
+    if _COLD and "compiling" not in _said:
+        _said.add("compiling")
+        print("fdnet: compiling, once for this version, about 40 s", file=sys.stderr, flush=True)
 
 
 def _say_once(folder: str, what: str, error: Exception) -> None:
@@ -104,6 +119,7 @@ class _CheckedFile(IndexDataCacheFile):
         try:
             kept = super().load(key)
             if kept is None:
+                say_compiling()
                 return None
             own, data = kept
             if own != key:  # two processes took one name for the codes of two signatures

@@ -17,6 +17,7 @@ from fdnet.dem.supply import refuse_crowded_supply
 from fdnet.errors import CaseError, explained
 from fdnet.files import expanded
 from fdnet.names import AUTO, DEFAULT_LAW, LIGGGHTS_STAGES, STAGES, off_by_factors
+from fdnet.network.warm_up import compiling
 from fdnet.report import html, tables
 from fdnet.report.text import case_words, thesis_law_warning
 from fdnet.report.vtk import view_of
@@ -44,7 +45,14 @@ from fdnet.run.outputs import (
     write_paraview,
     write_tables,
 )
-from fdnet.run.records import RunOptions, Session, record_warnings, stage_seconds, versions
+from fdnet.run.records import (
+    RunOptions,
+    Session,
+    cores,
+    record_warnings,
+    stage_seconds,
+    versions,
+)
 from fdnet.run.stokes_sections import report_section
 from fdnet.run.summary import summarise
 from fdnet.scales.check import every_finding
@@ -220,13 +228,18 @@ def _carry_out(session: Session) -> dict[str, Any]:
     stages = session.options.stages
     if session.folder.manifest() is not None:
         session.folder.clear(tuple(stage for stage in ("analyse", "report") if stage in stages))
-    if session.wants("pack"):
-        pack_stage(session)
-    if isinstance(session.case, InvasionCase) and session.wants("invade"):
-        invade_stage(session, session.case)
-    if isinstance(session.case, InvasionCase) and session.wants("clean_up"):
-        clean_up_stage(session, session.case)
-    if not {"analyse", "report"} & set(stages):
+    analysed = bool({"analyse", "report"} & set(stages))
+    sides = "".join(axis for axis, yes in zip("xyz", session.case.periodic, strict=True) if yes)
+    free = cores() > session.options.ranks
+    with compiling(sides, wanted=analysed and free and session.wants("pack")) as wait:
+        if session.wants("pack"):
+            pack_stage(session)
+        if isinstance(session.case, InvasionCase) and session.wants("invade"):
+            invade_stage(session, session.case)
+        if isinstance(session.case, InvasionCase) and session.wants("clean_up"):
+            clean_up_stage(session, session.case)
+        wait()
+    if not analysed:
         session.folder.complete(None)
         return {}
     record = session.folder.record("pack")

@@ -223,3 +223,29 @@ def test_no_function_in_place_returns_an_array(root):
                 marks = {getattr(mark, "id", "") for mark in node.decorator_list}
                 if marks & {"compiled_in_place", "loops_in_place"}:
                     assert "Array" not in ast.unparse(node.returns), f"{path.name}: {node.name}"
+
+
+def test_a_run_compiles_next_to_liggghts(tmp_path):
+    """In an empty cache it says so and leaves code behind; then there is nothing to do."""
+    code = (
+        "import sys, time\n"
+        "from pathlib import Path\n"
+        "from fdnet.network.warm_up import compiling\n"
+        "with compiling('yz', wanted=True):\n"
+        "    for _ in range(600):\n"
+        "        if any(Path(sys.argv[1]).rglob('*.nbi')):\n"
+        "            break\n"
+        "        time.sleep(0.1)\n"
+    )
+    inherited = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    cache = {**inherited, "XDG_CACHE_HOME": str(tmp_path)}
+    for said in (True, False):
+        done = subprocess.run(
+            [sys.executable, "-c", code, str(tmp_path)],
+            capture_output=True,
+            text=True,
+            check=True,
+            env=cache,
+        )
+        assert ("compiling, once for this version" in done.stderr) == said
+        assert list(tmp_path.rglob("*.nbi"))
