@@ -124,7 +124,7 @@ def test_records_of_another_shape_are_named(tmp_path, stage, key, value):
     )
     assert read() is not None
     path.write_text(json.dumps(good | numbers | texts | {key: value}))
-    with pytest.raises(CaseError, match=rf"{key}.*start over with --force"):
+    with pytest.raises(CaseError, match=rf"{key}.*--force"):
         read()
 
 

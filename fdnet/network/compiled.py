@@ -119,7 +119,6 @@ class _CheckedFile(IndexDataCacheFile):
         try:
             kept = super().load(key)
             if kept is None:
-                say_compiling()
                 return None
             own, data = kept
             if own != key:  # two processes took one name for the codes of two signatures
