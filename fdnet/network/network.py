@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from fdnet.errors import NetworkError
+from fdnet.network.compiled import say_compiling
 from fdnet.network.tessellation.delaunay import place_grains
 from fdnet.network.tessellation.facets import join_polyhedra, tessellate
 from fdnet.network.tessellation.pores import LENGTH_FLOOR, measure_pores, measure_throats
@@ -193,6 +194,7 @@ def build_network(
     sides = sides_of(grains, periodic)
     placed = place_grains(grains, periodic=sides)
     tessellation = tessellate(placed)
+    say_compiling()  # only now, so that a pack that is refused has one line
     polyhedra = join_polyhedra(tessellation)
     pores, pore_counts = measure_pores(tessellation, polyhedra)
     throats, throat_counts = measure_throats(tessellation, polyhedra, pores)

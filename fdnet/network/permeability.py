@@ -10,7 +10,6 @@ import numpy as np
 from fdnet.case.tables import AnalysisChoices, AnalysisKeys, with_visible_choices
 from fdnet.errors import Doubt
 from fdnet.names import ALL_SPHERES, AUTO, SECTION_ARCHIE, law_pairs
-from fdnet.network.compiled import say_compiling
 from fdnet.network.fines.occupancy import Occupancy
 from fdnet.network.flow.flow import Flow
 from fdnet.network.flow.sections import (
@@ -260,7 +259,6 @@ def compare(
         lubrication: 2.5e-09 m2
     """
     require_snapshots(spheres, damaged)
-    say_compiling()
     base, around = _chosen(options, choices), sides_of(spheres, periodic)
     if damaged is None and len(spheres.fines()):
         damaged = spheres

@@ -30,7 +30,7 @@ def compiling(sides: str, *, wanted: bool) -> Iterator[Callable[[], None]]:
     with subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet) as process:
 
         def wait() -> None:
-            """What it could not compile, the analysis compiles itself."""
+            """Wait for its end; the analysis compiles what is left."""
             process.wait()
 
         try:

@@ -6,7 +6,6 @@ Which spheres touch, by how much they overlap, and which lie inside others.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -14,9 +13,6 @@ from scipy.spatial.distance import cdist
 
 from fdnet.errors import CaseError, Doubt
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, frozen, one_line
-
-if TYPE_CHECKING:
-    from scipy.spatial import cKDTree
 
 _ROUNDING = 1e-6
 """Gap over the smaller diameter below which two spheres may touch, to LIGGGHTS's rounding."""
@@ -34,8 +30,6 @@ def touching_pairs(
     Two spheres touch when they are nearer than `gap` times the smaller diameter. Spheres are
     searched in two classes of size, so that a few large ones do not widen the search of all.
     """
-    from scipy.spatial import cKDTree
-
     radius = spheres.radius
     if len(radius) == 0:
         return np.empty((0, 2), int), np.empty(0)
@@ -58,7 +52,7 @@ def touching_pairs(
 
 
 def _pairs(
-    trees: "tuple[cKDTree, cKDTree]", groups: tuple[Array, Array], radius: Array, gap: float
+    trees: tuple[cKDTree, cKDTree], groups: tuple[Array, Array], radius: Array, gap: float
 ) -> tuple[Array, Array]:
     first, second = groups
     reach = radius[first].max() + radius[second].max()
