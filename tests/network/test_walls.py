@@ -3,6 +3,8 @@
 The specimen is a part of the periodic pack that its images make up.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -37,7 +39,13 @@ def doubled(pack, axes):
 
 
 def permeabilities(pack, periodic):
+    """By each law for rigid grains.
+
+    A grain that a wall cuts near its centre is a clump with its mirror image in the doubled pack
+    alone, and clumps have a law of their own (up to 2.5 % apart here), so no grain is marked.
+    """
     network = build_network(pack, periodic=periodic, walls="slip")
+    network = replace(network, image_fine=np.zeros_like(network.image_fine))
     length = np.ptp(pack.box[0])
     return np.array(
         [solve_flow(network, law(network)).inflow * length / network.area for law in LAWS.values()]
