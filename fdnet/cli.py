@@ -1,4 +1,4 @@
-"""The `fdnet` command: runs, ensembles and sweeps of cases, permeability, mechanics, studies.
+"""The `fdnet` command: runs, ensembles and sweeps of cases, permeability, mechanics.
 
 It reads the arguments, calls the package and prints. Exit codes: 0 done, 2 bad input (nothing
 written), 3 LIGGGHTS missing or failed, 4 degenerate geometry or an unconverged solve, 5 some
@@ -15,7 +15,7 @@ import threading
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from fdnet.commands import campaign, finished, init, mechanics, permeability, run, study
+from fdnet.commands import campaign, finished, init, mechanics, permeability, run
 from fdnet.commands.permeability import joined_box
 from fdnet.errors import FdnetError, words_of
 
@@ -23,7 +23,7 @@ COMMANDS = (
     *(init.add_init, run.add_cases, run.add_check, run.add_run),
     *(campaign.add_ensemble, campaign.add_sweep, campaign.add_compare, campaign.add_design),
     *(run.add_render, permeability.add_permeability, finished.add_stokes),
-    *(mechanics.add_mechanics, finished.add_movie, study.add_study),
+    *(mechanics.add_mechanics, finished.add_movie),
 )
 """What adds each command to the parser, in the order that `fdnet --help` shows."""
 

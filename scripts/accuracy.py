@@ -17,7 +17,7 @@ import argparse
 from pathlib import Path
 
 from fdnet.files import path_option
-from fdnet.studies.accuracy import write_accuracy, write_full_size
+from validation.accuracy import write_accuracy, write_full_size
 
 VALIDATION = Path(__file__).resolve().parents[1] / "docs" / "validation"
 parser = argparse.ArgumentParser(

@@ -10,7 +10,7 @@ import argparse
 from pathlib import Path
 
 from fdnet.files import path_option
-from fdnet.studies.benchmark.whole_runs import measure, show, write_table
+from validation.benchmark.whole_runs import measure, show, write_table
 
 parser = argparse.ArgumentParser(
     description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter

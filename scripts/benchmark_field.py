@@ -7,7 +7,7 @@
 import argparse
 
 from fdnet.files import path_option
-from fdnet.studies.benchmark.field import measure_field
+from validation.benchmark.field import measure_field
 
 parser = argparse.ArgumentParser(
     description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter

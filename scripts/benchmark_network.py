@@ -10,8 +10,8 @@ A tool that is not installed is named and left out.
 import argparse
 
 from fdnet.files import path_option
-from fdnet.studies.benchmark.network import Options, measure, show_growth, write_table
-from fdnet.studies.truth.packs import DATA
+from validation.benchmark.network import Options, measure, show_growth, write_table
+from validation.truth.packs import DATA
 
 LIMIT = (
     "CPU seconds for a process of a peer (600); fdnet has 5 times, its largest size 10 times that"

@@ -7,8 +7,8 @@
 import argparse
 
 from fdnet.files import path_option
-from fdnet.studies.benchmark.network import show_growth, write_table
-from fdnet.studies.benchmark.walled import measure_walled
+from validation.benchmark.network import show_growth, write_table
+from validation.benchmark.walled import measure_walled
 
 parser = argparse.ArgumentParser(
     description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter

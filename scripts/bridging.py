@@ -7,7 +7,7 @@
 import argparse
 
 from fdnet.files import path_option
-from fdnet.studies.dem.bridging import pooled_runs
+from validation.dem.bridging import pooled_runs
 
 parser = argparse.ArgumentParser(
     description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter

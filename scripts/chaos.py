@@ -19,8 +19,8 @@ from typing import Any
 
 from fdnet.cli import main
 from fdnet.files import path_option
-from fdnet.studies.chaos.chaos import chaos, prepared_runs
-from fdnet.studies.chaos.soak import soak
+from validation.chaos.chaos import chaos, prepared_runs
+from validation.chaos.soak import soak
 
 parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
 parser.add_argument("--attacks", type=int, default=24)

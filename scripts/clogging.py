@@ -7,7 +7,7 @@
 import argparse
 
 from fdnet.files import path_option
-from fdnet.studies.dem.clogging import clogging_of_runs
+from validation.dem.clogging import clogging_of_runs
 
 parser = argparse.ArgumentParser(
     description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter

@@ -20,9 +20,9 @@ from pathlib import Path
 
 import fdnet
 from fdnet.network.permeability import Analysis
-from fdnet.studies.engine.csv_rows import read_named
-from fdnet.studies.truth.packs import read_pack, truth_folder
-from fdnet.studies.truth.slabs import SLAB_FOLDER, SLAB_TRUTH, read_specimen
+from validation.engine.csv_rows import read_named
+from validation.truth.packs import read_pack, truth_folder
+from validation.truth.slabs import SLAB_FOLDER, SLAB_TRUTH, read_specimen
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "tests/data/frozen.json"

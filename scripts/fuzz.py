@@ -14,7 +14,7 @@ from pathlib import Path
 
 from fdnet.cli import main
 from fdnet.files import path_option
-from fdnet.studies.fuzz.fuzz import fuzz
+from validation.fuzz.fuzz import fuzz
 
 MEMORY_BYTES = 6 << 30
 ROOT = Path(__file__).resolve().parents[1]

@@ -11,7 +11,7 @@ import argparse
 import fdnet
 from fdnet.files import path_option
 from fdnet.run.stokes_sections import ACROSS_A_FINE, stokes_sections
-from fdnet.studies.engine.csv_rows import write_named
+from validation.engine.csv_rows import write_named
 
 parser = argparse.ArgumentParser(
     description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter

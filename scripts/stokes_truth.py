@@ -23,14 +23,14 @@ import sys
 from pathlib import Path
 
 from fdnet.files import path_option
-from fdnet.studies.truth.grids import Solve, make, solve
-from fdnet.studies.truth.made_packs import PACKS
-from fdnet.studies.truth.made_slabs import SLABS, make_specimens
-from fdnet.studies.truth.packs import DATA, OWN_GRIDS, OWN_TRUTH
-from fdnet.studies.truth.slab_grids import slab_table, solve_slabs
-from fdnet.studies.truth.slabs import SLAB_FOLDER
-from fdnet.studies.truth.specimens import SPECIMENS
-from fdnet.studies.truth.two_grids import two_grids_table
+from validation.truth.grids import Solve, make, solve
+from validation.truth.made_packs import PACKS
+from validation.truth.made_slabs import SLABS, make_specimens
+from validation.truth.packs import DATA, OWN_GRIDS, OWN_TRUTH
+from validation.truth.slab_grids import slab_table, solve_slabs
+from validation.truth.slabs import SLAB_FOLDER
+from validation.truth.specimens import SPECIMENS
+from validation.truth.two_grids import two_grids_table
 
 parser = argparse.ArgumentParser(
     description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter

@@ -6,7 +6,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 bash scripts/setup.sh --dev
 # The first analysis of a version compiles for a minute; the linters run at the same time.
-.venv/bin/fdnet permeability fdnet/studies/truth/data/packH_r5_d13.csv --units mm \
+.venv/bin/fdnet permeability scripts/validation/truth/data/packH_r5_d13.csv --units mm \
     --periodic yz --box 0,3.268,0,3.268,0,3.268 --compare-laws \
     >/dev/null &
 warming=$!

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Write docs/thesis.md from docs/thesis.md.in and the tables of `fdnet study thesis`.
+"""Write docs/thesis.md from docs/thesis.md.in and the tables of the study `thesis`.
 
     .venv/bin/python scripts/thesis.py [--docs docs]
 
@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 from fdnet.files import path_option
-from fdnet.studies.thesis.page.document import write_page
+from validation.thesis.page.document import write_page
 
 ROOT = Path(__file__).resolve().parents[1]
 

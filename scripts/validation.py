@@ -1,27 +1,43 @@
 #!/usr/bin/env python3
-"""docs/validation.md from docs/validation.md.in and the committed tables in docs/validation.
+"""The evidence for fdnet: error against run time of its choices, and comparisons from outside.
 
-    .venv/bin/python scripts/validation.py [--docs docs] [--redraw]
+    .venv/bin/python scripts/validation.py NAME [--quick] [--out DIR]
+    .venv/bin/python scripts/validation.py list
+    .venv/bin/python scripts/validation.py page [--redraw]
 
-It runs no study, so it takes a second. `fdnet study NAME --out DIR` makes NAME.csv, .png and .md,
-which are then copied to docs/validation; --redraw makes the last two anew from the first.
+NAME runs a study, or goes on with it. `page` runs nothing: it writes docs/validation.md from the
+committed tables in docs/validation, with `--redraw` also the figure and text of each study.
 """
 
 import argparse
+import sys
 from pathlib import Path
 
-from fdnet.files import path_option
-from fdnet.studies.pages.validation import redraw, write_page
+from fdnet.errors import FdnetError
+from validation.command import add_arguments, run
+from validation.pages.validation import redraw, write_page
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-parser = argparse.ArgumentParser(
-    description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-)
-parser.add_argument("--docs", type=path_option, default=DOCS, help="where to read and write")
-parser.add_argument("--redraw", action="store_true", help="figures and texts of the studies too")
+
+
+def main() -> int:
+    """Parse the arguments and run; returns the exit code."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    add_arguments(parser)
+    given = parser.parse_args()
+    if given.name == "page":
+        if given.redraw:
+            redraw(DOCS / "validation")
+        print(write_page(DOCS))
+        return 0
+    try:
+        return run(given)
+    except FdnetError as error:
+        print(f"validation.py: {error}", file=sys.stderr)
+        return error.exit_code
+
 
 if __name__ == "__main__":
-    given = parser.parse_args()
-    if given.redraw:
-        redraw(given.docs / "validation")
-    print(write_page(given.docs))
+    sys.exit(main())

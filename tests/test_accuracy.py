@@ -10,7 +10,7 @@ import pytest
 from fdnet.network.laws.named import LAWS
 from fdnet.network.permeability import analyse
 from fdnet.spheres.snapshot import Kind
-from fdnet.studies.accuracy import (
+from validation.accuracy import (
     ARCHIE,
     FINEST,
     SLABS,
@@ -24,10 +24,10 @@ from fdnet.studies.accuracy import (
     slab_table,
     summary,
 )
-from fdnet.studies.engine.csv_rows import read_named, write_named
-from fdnet.studies.truth.cases import EQUAL, LATTICE, LOOSE_SOLIDS, read_cases
-from fdnet.studies.truth.packs import DATA, MM, read_pack, snapshot
-from fdnet.studies.truth.slabs import LATER, SLAB_FOLDER, SLAB_TRUTH
+from validation.engine.csv_rows import read_named, write_named
+from validation.truth.cases import EQUAL, LATTICE, LOOSE_SOLIDS, read_cases
+from validation.truth.packs import DATA, MM, read_pack, snapshot
+from validation.truth.slabs import LATER, SLAB_FOLDER, SLAB_TRUTH
 
 TRUTH = DATA / "truth.csv"
 

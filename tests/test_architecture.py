@@ -20,7 +20,7 @@ LAYERS = [
     ["mechanics"],
     ["dem", "report"],
     ["run"],
-    ["studies", "campaign"],
+    ["campaign"],
     ["commands"],
     ["cli"],
 ]
@@ -39,21 +39,6 @@ NETWORK_LAYERS = [
     ["permeability"],
     ["warm_up"],
 ]
-STUDIES_LAYERS = [
-    ["engine", "fuzz", "chaos"],
-    ["truth"],
-    ["accuracy", "benchmark", "dem", "thesis"],
-    ["network", "outside"],
-    ["command"],
-    ["pages"],
-]
-THESIS_LAYERS = [
-    ["runs"],
-    ["numbers"],
-    ["collection", "compare", "figures"],
-    ["outputs"],
-    ["command", "page"],
-]
 CAMPAIGN_LAYERS = [
     ["plan"],
     ["engine"],
@@ -66,11 +51,9 @@ ROOMS = {
     "fdnet": LAYERS,
     "fdnet.campaign": CAMPAIGN_LAYERS,
     "fdnet.network": NETWORK_LAYERS,
-    "fdnet.studies": STUDIES_LAYERS,
-    "fdnet.studies.thesis": THESIS_LAYERS,
 }
 DOORS = {
-    "jinja2": {"dem/deck", "report/html", "campaign/engine", "campaign/page", "studies/dem"},
+    "jinja2": {"dem/deck", "report/html", "campaign/engine", "campaign/page"},
     "subprocess": {
         "campaign/engine/local",
         "campaign/engine/snakemake",
@@ -78,30 +61,23 @@ DOORS = {
         "network/warm_up",
         "report/picture",
         "spheres/vtk_file",
-        "studies/benchmark",
-        "studies/chaos",
     },
     "pandas": {"spheres/dump", "spheres/readers", "report/tables"},
     "pyvista": {"report/vtk", "report/picture"},
     "vtkmodules": {"report/vtk", "spheres/vtk_file"},
     "imageio_ffmpeg": {"report/picture"},
-    "openpnm": {"report/tables", "studies/benchmark"},
+    "openpnm": {"report/tables"},
     "pyarrow": {"campaign/result/table"},
     "matplotlib": {
         "campaign/page/figures",
         "report/figures",
-        "studies/accuracy",
-        "studies/dem/mechanics_figure",
-        "studies/engine/draw",
-        "studies/outside/figure",
-        "studies/thesis/figures/canvas",
     },
-    "PIL": {"report/picture", "studies/thesis/figures/canvas"},
+    "PIL": {"report/picture"},
     "numba": {"network/compiled"},
     "pymetis": {"network/flow/solver"},
-    "pyamg": {"network/flow/solver", "studies/network/solver_peers"},
+    "pyamg": {"network/flow/solver"},
     "pydantic": {"case", "report/tables", "run/folder", "campaign/plan/folder"},
-    "tomli_w": {"case/case", "studies/fuzz/mutations"},
+    "tomli_w": {"case/case"},
     "rich": {"run/progress"},
 }
 

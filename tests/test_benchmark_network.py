@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from fdnet.studies.benchmark import network, steps
+from validation.benchmark import network, steps
 
 
 def test_packs_are_tiles_with_fines_on_the_grains():

@@ -20,8 +20,8 @@ from fdnet.case.case import (
 from fdnet.case.file import case_from, known_keys, read_case, set_keys
 from fdnet.errors import CaseError
 from fdnet.scales.scales import InvasionScales, Scales, scales_of
-from fdnet.studies.thesis.runs.carry_out import find_state, state_path
-from fdnet.studies.thesis.runs.plan import SPECIMENS, VARIANTS, planned
+from validation.thesis.runs.carry_out import find_state, state_path
+from validation.thesis.runs.plan import SPECIMENS, VARIANTS, planned
 
 
 def problems(data: dict) -> str:

@@ -132,7 +132,7 @@ def test_decks_are_not_written_into_a_run_folder(tmp_path, case, capsys):
 
 def test_the_growth_of_the_thesis_is_not_written_over_a_folder_of_somebody_else(tmp_path):
     from fdnet.errors import CaseError
-    from fdnet.studies.thesis.command import keep_growth
+    from validation.thesis.command import keep_growth
 
     (tmp_path / "growth").mkdir()
     (tmp_path / "growth" / "plants.csv").write_text("mine")

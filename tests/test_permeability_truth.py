@@ -16,7 +16,7 @@ from fdnet.names import (
     SECTION_ARCHIE,
 )
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
-from fdnet.studies.truth.packs import DATA, truth_tables
+from validation.truth.packs import DATA, truth_tables
 
 ROWS = [row for path in truth_tables() for row in csv.DictReader(path.open()) if row["file"]]
 TRUTH = {f"{row['case']}-{row['axis']}": row for row in ROWS if (DATA / row["file"]).exists()}

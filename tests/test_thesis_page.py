@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from fdnet.errors import CaseError
-from fdnet.studies.thesis.collection import RESULTS
-from fdnet.studies.thesis.compare.trends import compare_trends
-from fdnet.studies.thesis.numbers.examine import THESIS_PAIR, examine
-from fdnet.studies.thesis.numbers.results import read_results, result_rows
-from fdnet.studies.thesis.numbers.values import thesis_of
-from fdnet.studies.thesis.outputs import CAPTIONS, DEPOSITION, TETRAHEDRA
-from fdnet.studies.thesis.page.document import document
-from fdnet.studies.thesis.runs.carry_out import state_path
-from fdnet.studies.thesis.runs.plan import (
+from validation.thesis.collection import RESULTS
+from validation.thesis.compare.trends import compare_trends
+from validation.thesis.numbers.examine import THESIS_PAIR, examine
+from validation.thesis.numbers.results import read_results, result_rows
+from validation.thesis.numbers.values import thesis_of
+from validation.thesis.outputs import CAPTIONS, DEPOSITION, TETRAHEDRA
+from validation.thesis.page.document import document
+from validation.thesis.runs.carry_out import state_path
+from validation.thesis.runs.plan import (
     CHEAP,
     SCAN_SEEDS,
     SEEDS,
@@ -24,7 +24,7 @@ from fdnet.studies.thesis.runs.plan import (
     Planned,
     planned,
 )
-from fdnet.studies.thesis.runs.state import read_state
+from validation.thesis.runs.state import read_state
 
 
 @pytest.fixture(scope="module")

@@ -2,9 +2,9 @@
 
 import pytest
 
-from fdnet.studies.command import STUDIES, study_named
-from fdnet.studies.engine.table import read_rows, study_text
-from fdnet.studies.pages.validation import document, evidence
+from validation.command import STUDIES, study_named
+from validation.engine.table import read_rows, study_text
+from validation.pages.validation import document, evidence
 
 
 def test_the_page_is_written_from_the_committed_tables(root):

@@ -16,9 +16,9 @@ from fdnet.scales.contacts import collision_time, overlap_of_impact, pair_elasti
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.geometry import max_overlap, touching_pairs
 from fdnet.spheres.snapshot import Kind, resting
-from fdnet.studies.dem import size_ratio
-from fdnet.studies.dem.closed import Watch, closed_run, kinetic_energy, restitution_of
-from fdnet.studies.dem.runs import window_run
+from validation.dem import size_ratio
+from validation.dem.closed import Watch, closed_run, kinetic_energy, restitution_of
+from validation.dem.runs import window_run
 
 pytestmark = pytest.mark.liggghts
 HERTZ = "contact.model=hertz"

@@ -15,8 +15,8 @@ from fdnet.scales.contacts import pull_off
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.dump import read_dump
 from fdnet.spheres.snapshot import Kind, resting
-from fdnet.studies.dem.closed import Watch, closed_run
-from fdnet.studies.dem.runs import the_binary
+from validation.dem.closed import Watch, closed_run
+from validation.dem.runs import the_binary
 
 pytestmark = pytest.mark.liggghts
 WET, HERTZ = "contact.restitution=liquid", "contact.model=hertz"

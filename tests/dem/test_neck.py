@@ -6,7 +6,7 @@ import pytest
 
 from fdnet.case.spheres import SHEAR_RATIO
 from fdnet.scales.contacts import MOST_FALSE_FORCE
-from fdnet.studies.dem.neck import LEAVES_AFTER, Neck, factor_step, leaving_time
+from validation.dem.neck import LEAVES_AFTER, Neck, factor_step, leaving_time
 
 pytestmark = pytest.mark.liggghts
 LAMMPS_SHEAR = 0.8235

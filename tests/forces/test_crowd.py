@@ -9,7 +9,7 @@ from fdnet.errors import CaseError
 from fdnet.scales.drag import MOST_CROWD_REYNOLDS as MOST_REYNOLDS
 from fdnet.scales.drag import Crowd, bed_factor, size_factor
 from fdnet.scales.drag import crowd_drag_factor as drag_factor
-from fdnet.studies.outside.ergun import (
+from validation.outside.ergun import (
     Bed,
     ergun_gradient,
     ergun_velocity,

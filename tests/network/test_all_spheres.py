@@ -23,9 +23,9 @@ from fdnet.network.network import build_network
 from fdnet.network.permeability import analyse
 from fdnet.network.states import Log, Sides, at_most_the_grains, measure_all_spheres
 from fdnet.spheres.snapshot import Kind, Snapshot
-from fdnet.studies.truth.packs import read_pack, truth_folder
 from tests.network.one_section import from_python
 from tests.network.packs import random_pack, with_fines
+from validation.truth.packs import read_pack, truth_folder
 
 SIDES = "yz"
 BASE = np.array([[0.0, 0.0], [1.0, 0.0], [0.3, 0.9]])

@@ -10,7 +10,7 @@ from packs import simple_cubic
 from fdnet.network.network import build_network
 from fdnet.run.bridging import OpenThroats, classes_of, open_throats, width_rows, wilsons_band
 from fdnet.spheres.snapshot import Snapshot
-from fdnet.studies.dem.bridging import pooled_classes
+from validation.dem.bridging import pooled_classes
 
 
 def throats(ratio, clogged):

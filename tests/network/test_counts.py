@@ -12,7 +12,7 @@ ALL = (True,) * 3
 
 
 def truth_pack(root, name):
-    path = root / "fdnet/studies/truth/data" / f"{name}.csv"
+    path = root / "scripts/validation/truth/data" / f"{name}.csv"
     edge = float(path.read_text().split("edge ")[1].split()[0])
     spheres = read_spheres(path, units="mm")
     position, radius = spheres.position, spheres.radius

@@ -9,11 +9,11 @@ from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.reaching_grains import cut_corners, ray_room, share_of_cut
 from fdnet.network.laws.wedges import ratio_table
 from fdnet.network.states import cut_out
-from fdnet.studies.engine.csv_rows import read_named
-from fdnet.studies.truth.packs import MM
-from fdnet.studies.truth.slabs import SLAB_FOLDER, SLAB_TRUTH, read_specimen
 from tests.network.one_section import from_python, uneven_flux
 from tests.network.section_flux import resolved_flux
+from validation.engine.csv_rows import read_named
+from validation.truth.packs import MM
+from validation.truth.slabs import SLAB_FOLDER, SLAB_TRUTH, read_specimen
 
 ROOM = np.empty((2, 3, 3)), ray_room(0), ratio_table()
 BASE = np.array([[0.0, 0.0], [1.0, 0.0], [0.45, 0.85]])

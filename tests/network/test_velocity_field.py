@@ -12,9 +12,9 @@ from fdnet.errors import CaseError, NetworkError
 from fdnet.network.field.field import VelocityField, build_lattice, solved_field
 from fdnet.network.stokes import solve_stokes
 from fdnet.spheres.snapshot import Snapshot
-from fdnet.studies.engine.timing import least_time
-from fdnet.studies.network.interception import happel, intercepted
-from fdnet.studies.network.velocity_field import throat_fluxes
+from validation.engine.timing import least_time
+from validation.network.interception import happel, intercepted
+from validation.network.velocity_field import throat_fluxes
 
 
 @cache

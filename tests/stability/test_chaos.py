@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 
 from fdnet.cli import main
-from fdnet.studies.chaos import chaos as suite
-from fdnet.studies.chaos import commands
-from fdnet.studies.chaos.attacks import ATTACKS, ORDER, SELDOM
-from fdnet.studies.chaos.chaos import chaos, one_attack, prepared_runs
-from fdnet.studies.chaos.commands import Ended, FaultError
-from fdnet.studies.chaos.judge import check_report, differs, judge
-from fdnet.studies.chaos.soak import soak
+from validation.chaos import chaos as suite
+from validation.chaos import commands
+from validation.chaos.attacks import ATTACKS, ORDER, SELDOM
+from validation.chaos.chaos import chaos, one_attack, prepared_runs
+from validation.chaos.commands import Ended, FaultError
+from validation.chaos.judge import check_report, differs, judge
+from validation.chaos.soak import soak
 
 pytestmark = pytest.mark.liggghts
 

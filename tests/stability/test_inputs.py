@@ -13,8 +13,8 @@ from fdnet.errors import CaseError, DumpError
 from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.network import build_network
 from fdnet.spheres.dump import parse_dump
-from fdnet.studies.fuzz import fuzz, targets
 from tests.network.packs import random_pack, simple_cubic, snapshot
+from validation.fuzz import fuzz, targets
 
 HOSTILE = ["nan", "NaN", "inf", "-inf", "1e400", "-1e999", "", "1,5", "0x10", "1_0", "none"]
 

@@ -23,7 +23,7 @@ from fdnet.scales.scales import scales_of
 from fdnet.spheres.dump import Frame, read_dump
 from fdnet.spheres.geometry import touching_pairs
 from fdnet.spheres.snapshot import Kind, Snapshot, resting
-from fdnet.studies.dem.collisions import energy_run
+from validation.dem.collisions import energy_run
 
 pytestmark = pytest.mark.liggghts
 RADIUS = 0.05e-3

@@ -9,8 +9,8 @@ from network.packs import random_pack
 from fdnet.network.network import build_network
 from fdnet.spheres.geometry import wrapped
 from fdnet.spheres.snapshot import Kind, Snapshot
-from fdnet.studies.dem.arrivals import arrivals
-from fdnet.studies.dem.clogging import Met, clogging_rows
+from validation.dem.arrivals import arrivals
+from validation.dem.clogging import Met, clogging_rows
 
 RADIUS = 0.05
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from fdnet.studies.engine.children import end_children, start_child
+from validation.engine.children import end_children, start_child
 
 
 def _slow_to_leave(send: Callable[[Any], None]) -> None:

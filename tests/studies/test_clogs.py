@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fdnet.studies.outside.clogs import (
+from validation.outside.clogs import (
     Clogging,
     after_first,
     clogging,

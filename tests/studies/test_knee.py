@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from fdnet.errors import CaseError
-from fdnet.studies.engine.error_rows import against_reference, profile_distance
-from fdnet.studies.engine.knee import knee, knee_sentence
-from fdnet.studies.engine.levels import Level, levels, order
-from fdnet.studies.engine.study import DONE, Measured, Point
+from validation.engine.error_rows import against_reference, profile_distance
+from validation.engine.knee import knee, knee_sentence
+from validation.engine.levels import Level, levels, order
+from validation.engine.study import DONE, Measured, Point
 
 NAN = float("nan")
 

@@ -7,12 +7,12 @@ import pytest
 from fdnet.cli import main
 from fdnet.names import DEFAULT_LAW
 from fdnet.network.laws.named import LAWS
-from fdnet.studies.accuracy import ALL_PAIRS, ARCHIE, FINEST, PACKS
-from fdnet.studies.command import run_study
-from fdnet.studies.engine.table import read_rows
-from fdnet.studies.network import laws
-from fdnet.studies.truth import packs
-from fdnet.studies.truth.cases import EQUAL, LATTICE
+from validation.accuracy import ALL_PAIRS, ARCHIE, FINEST, PACKS
+from validation.command import run_study
+from validation.engine.table import read_rows
+from validation.network import laws
+from validation.truth import packs
+from validation.truth.cases import EQUAL, LATTICE
 
 FIFTH = "fines of 1/5"
 

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from fdnet.errors import FlowError
-from fdnet.studies.command import run_study
-from fdnet.studies.engine.study import DONE
-from fdnet.studies.engine.table import read_rows
-from fdnet.studies.network.circuit import Circuit, circuit_of, exact_fluxes
-from fdnet.studies.network.linear_solver import OWN, STUDY, suffix
-from fdnet.studies.network.solver_peers import (
+from tests.network.exact import exact_balance, random_links
+from validation.command import run_study
+from validation.engine.study import DONE
+from validation.engine.table import read_rows
+from validation.network.circuit import Circuit, circuit_of, exact_fluxes
+from validation.network.linear_solver import OWN, STUDY, suffix
+from validation.network.solver_peers import (
     AGGREGATION,
     DIRECT,
     FDNET,
@@ -23,7 +24,6 @@ from fdnet.studies.network.solver_peers import (
     UNIT_DIAGONAL,
     solve_by,
 )
-from tests.network.exact import exact_balance, random_links
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,6 @@
 """Markdown of the pages: wrapped lines mean what the long ones meant."""
 
-from fdnet.studies.engine.markdown import bullets, wrapped
+from validation.engine.markdown import bullets, wrapped
 
 
 def test_paragraphs_and_items_are_wrapped_and_keep_their_indent():

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from fdnet.studies.command import run_study
-from fdnet.studies.dem.neck import LEAVES_AFTER
-from fdnet.studies.engine.table import read_rows, study_text
-from fdnet.studies.outside import (
+from validation.command import run_study
+from validation.dem.neck import LEAVES_AFTER
+from validation.engine.table import read_rows, study_text
+from validation.outside import (
     constriction,
     ergun,
     free_fine,
@@ -18,8 +18,8 @@ from fdnet.studies.outside import (
     three_spheres,
     throat,
 )
-from fdnet.studies.outside.orifice import FINE, start_of, wall_spheres
-from fdnet.studies.outside.outside_numbers import CASES, STUDY
+from validation.outside.orifice import FINE, start_of, wall_spheres
+from validation.outside.outside_numbers import CASES, STUDY
 
 
 @pytest.fixture(scope="module")

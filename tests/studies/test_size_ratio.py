@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from fdnet.studies.command import run_study
-from fdnet.studies.dem.size_ratio import (
+from validation.command import run_study
+from validation.dem.size_ratio import (
     DEFAULT,
     FINES,
     HELD,
@@ -18,7 +18,7 @@ from fdnet.studies.dem.size_ratio import (
     held_band,
     held_of,
 )
-from fdnet.studies.engine.table import read_rows
+from validation.engine.table import read_rows
 
 
 @pytest.mark.liggghts

@@ -2,10 +2,10 @@
 
 import pytest
 
-from fdnet.studies.command import run_study
-from fdnet.studies.engine.levels import levels
-from fdnet.studies.engine.table import read_rows
-from fdnet.studies.network.specimen_size import INTACT, INVADED, NAMED, PERIODIC, STUDY
+from validation.command import run_study
+from validation.engine.levels import levels
+from validation.engine.table import read_rows
+from validation.network.specimen_size import INTACT, INVADED, NAMED, PERIODIC, STUDY
 
 pytestmark = pytest.mark.liggghts
 

@@ -6,13 +6,13 @@ import pytest
 
 from fdnet.scales.contacts import sphere_mass
 from fdnet.scales.scales import scales_of
-from fdnet.studies.command import run_study
-from fdnet.studies.dem.closed import deepest_overlap_of, restitution_of
-from fdnet.studies.dem.collisions import SPEED
-from fdnet.studies.dem.runs import slab_case
-from fdnet.studies.dem.stiffness import COLLISION, LONG, NOMINAL, STUDY
-from fdnet.studies.engine.levels import levels
-from fdnet.studies.engine.table import read_rows
+from validation.command import run_study
+from validation.dem.closed import deepest_overlap_of, restitution_of
+from validation.dem.collisions import SPEED
+from validation.dem.runs import slab_case
+from validation.dem.stiffness import COLLISION, LONG, NOMINAL, STUDY
+from validation.engine.levels import levels
+from validation.engine.table import read_rows
 
 pytestmark = pytest.mark.liggghts
 

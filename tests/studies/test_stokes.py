@@ -20,7 +20,7 @@ from fdnet.network.stokes import (
     solve_stokes,
 )
 from fdnet.spheres.snapshot import Array, Snapshot
-from fdnet.studies.truth.packs import DATA, OWN_TRUTH
+from validation.truth.packs import DATA, OWN_TRUTH
 
 SC = [[0.31, 0.17, 0.43]]
 BCC = [[0.1, 0.2, 0.3], [0.6, 0.7, 0.8]]

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from fdnet.studies.command import run_study
-from fdnet.studies.dem.drag import EVERY, HELD, HOLDING, IMPLICIT, OTHER, STUDY, VISCOUS
-from fdnet.studies.engine.levels import levels
-from fdnet.studies.engine.table import read_rows
+from validation.command import run_study
+from validation.dem.drag import EVERY, HELD, HOLDING, IMPLICIT, OTHER, STUDY, VISCOUS
+from validation.engine.levels import levels
+from validation.engine.table import read_rows
 
 pytestmark = pytest.mark.liggghts
 

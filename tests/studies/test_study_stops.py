@@ -11,9 +11,9 @@ from uuid import uuid4
 
 import pytest
 
-from fdnet.studies.thesis.runs import carry_out as runs
-from fdnet.studies.thesis.runs.plan import Planned
-from fdnet.studies.thesis.runs.state import read_state
+from validation.thesis.runs import carry_out as runs
+from validation.thesis.runs.plan import Planned
+from validation.thesis.runs.state import read_state
 
 pytestmark = pytest.mark.liggghts
 MARK = "FDNET_TEST_MARK"
@@ -97,8 +97,8 @@ def test_a_stopped_study_goes_on_where_it_was(tmp_path):
     whole, cut = tmp_path / "whole", tmp_path / "cut"
     driver = (
         "from pathlib import Path\n"
-        "from fdnet.studies.thesis.runs.carry_out import carry_out\n"
-        "from fdnet.studies.thesis.runs.plan import Planned\n"
+        "from validation.thesis.runs.carry_out import carry_out\n"
+        "from validation.thesis.runs.plan import Planned\n"
         f"plan = [Planned(case='quick-specimen5', group='quick', seed=s, settings={SMALL})"
         " for s in (1, 2)]\n"
         "if __name__ == '__main__':\n"
@@ -128,7 +128,7 @@ def test_a_stopped_study_of_a_choice_leaves_no_process(root, tmp_path, sign):
         f"sys.path[:0] = [{str(root / 'tests')!r}, {str(root)!r}]\n"
         "from pathlib import Path\n"
         "import toy_points\n"
-        "from fdnet.studies.engine.runner import run_points\n"
+        "from validation.engine.runner import run_points\n"
         "if __name__ == '__main__':\n"
         "    run_points(toy_points.endless(), Path('out'), quick=False)\n"
     )

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from fdnet.studies.command import run_study
-from fdnet.studies.dem.time_step import COLLISION, DRAG, ENERGY, INVASION, STUDY
-from fdnet.studies.engine.levels import levels, order
-from fdnet.studies.engine.table import read_rows
+from validation.command import run_study
+from validation.dem.time_step import COLLISION, DRAG, ENERGY, INVASION, STUDY
+from validation.engine.levels import levels, order
+from validation.engine.table import read_rows
 
 pytestmark = pytest.mark.liggghts
 

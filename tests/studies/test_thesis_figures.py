@@ -13,28 +13,28 @@ from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 
 from fdnet.spheres.snapshot import Kind, resting
-from fdnet.studies.thesis.figures.canvas import few_colours
-from fdnet.studies.thesis.figures.deposition import distances, tetrahedra
-from fdnet.studies.thesis.figures.depth import (
+from validation.thesis.figures.canvas import few_colours
+from validation.thesis.figures.deposition import distances, tetrahedra
+from validation.thesis.figures.depth import (
     compared_fraction,
     invaded_fraction,
     porosity_reduction,
     total_reduction,
 )
-from fdnet.studies.thesis.figures.draw_all import draw_all, filled_in
-from fdnet.studies.thesis.figures.drawings import FIGURES
-from fdnet.studies.thesis.figures.packs import fines_by_size, growth, middle_slab, pack
-from fdnet.studies.thesis.figures.permeability import compared_permeability, permeability, ratios
-from fdnet.studies.thesis.figures.pores_and_throats import (
+from validation.thesis.figures.draw_all import draw_all, filled_in
+from validation.thesis.figures.drawings import FIGURES
+from validation.thesis.figures.packs import fines_by_size, growth, middle_slab, pack
+from validation.thesis.figures.permeability import compared_permeability, permeability, ratios
+from validation.thesis.figures.pores_and_throats import (
     contents,
     density,
     sizes,
     throat_porosity,
     throats_by_depth,
 )
-from fdnet.studies.thesis.figures.scans import invasion_depth, over_seeds
-from fdnet.studies.thesis.figures.sources import NO_NUMBERS, Sources
-from fdnet.studies.thesis.figures.tables import (
+from validation.thesis.figures.scans import invasion_depth, over_seeds
+from validation.thesis.figures.sources import NO_NUMBERS, Sources
+from validation.thesis.figures.tables import (
     POROSITY_CLASSES,
     FigureTables,
     ScanRow,
@@ -42,18 +42,18 @@ from fdnet.studies.thesis.figures.tables import (
     scan_row,
     tetrahedra_counted,
 )
-from fdnet.studies.thesis.numbers.examine import examine
-from fdnet.studies.thesis.numbers.first_millimetre import first_millimetre
-from fdnet.studies.thesis.numbers.results import result_rows
-from fdnet.studies.thesis.numbers.values import (
+from validation.thesis.numbers.examine import examine
+from validation.thesis.numbers.first_millimetre import first_millimetre
+from validation.thesis.numbers.results import result_rows
+from validation.thesis.numbers.values import (
     DepositionClaim,
     Statistic,
     ThesisSpecimen,
     percent,
     thesis_values,
 )
-from fdnet.studies.thesis.numbers.whole_pores import share_within, whole_pores
-from fdnet.studies.thesis.runs.state import ENDING, State
+from validation.thesis.numbers.whole_pores import share_within, whole_pores
+from validation.thesis.runs.state import ENDING, State
 
 FINE = 0.04e-3
 DEPTHS = {1: [0.5] * 3 + [1.0], 2: [0.5] * 2 + [1.0, 1.5]}

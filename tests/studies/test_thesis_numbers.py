@@ -18,19 +18,19 @@ from scipy.spatial import Delaunay
 from fdnet.dem.deck import specimen_box
 from fdnet.errors import CaseError
 from fdnet.spheres.snapshot import Kind, resting
-from fdnet.studies.engine.bands import wilson_interval
-from fdnet.studies.thesis.numbers.deposition import deposition, write_deposition
-from fdnet.studies.thesis.numbers.examine import DEFAULT_PAIR, THESIS_PAIR, Examined, examine
-from fdnet.studies.thesis.numbers.first_millimetre import first_millimetre
-from fdnet.studies.thesis.numbers.grains_alone import sizes_of_grains_alone
-from fdnet.studies.thesis.numbers.invasion import deep_near_wall, porosity_loss
-from fdnet.studies.thesis.numbers.results import (
+from validation.engine.bands import wilson_interval
+from validation.thesis.numbers.deposition import deposition, write_deposition
+from validation.thesis.numbers.examine import DEFAULT_PAIR, THESIS_PAIR, Examined, examine
+from validation.thesis.numbers.first_millimetre import first_millimetre
+from validation.thesis.numbers.grains_alone import sizes_of_grains_alone
+from validation.thesis.numbers.invasion import deep_near_wall, porosity_loss
+from validation.thesis.numbers.results import (
     COLUMNS,
     read_results,
     result_rows,
     write_results,
 )
-from fdnet.studies.thesis.numbers.statistics import (
+from validation.thesis.numbers.statistics import (
     POROSITY,
     SINGLES,
     SIZES,
@@ -40,14 +40,14 @@ from fdnet.studies.thesis.numbers.statistics import (
     within,
     write_statistics,
 )
-from fdnet.studies.thesis.numbers.tetrahedra import count_tetrahedra, tetrahedra, write_tetrahedra
-from fdnet.studies.thesis.numbers.values import (
+from validation.thesis.numbers.tetrahedra import count_tetrahedra, tetrahedra, write_tetrahedra
+from validation.thesis.numbers.values import (
     ThesisSpecimen,
     specimen_number,
     thesis_of,
     thesis_values,
 )
-from fdnet.studies.thesis.runs.state import State
+from validation.thesis.runs.state import State
 
 MM = 1e-3
 A, R = 0.5, 0.25

@@ -13,13 +13,13 @@ import pytest
 from fdnet.cli import main
 from fdnet.dem.liggghts import Launch
 from fdnet.errors import CaseError
-from fdnet.studies.thesis import command as command_module
-from fdnet.studies.thesis.numbers.examine import DEFAULT_PAIR, THESIS_PAIR, examine
-from fdnet.studies.thesis.numbers.results import read_results
-from fdnet.studies.thesis.runs import carry_out as runs
-from fdnet.studies.thesis.runs import plan as plans
-from fdnet.studies.thesis.runs.growth import grow, read_growth, write_growth
-from fdnet.studies.thesis.runs.plan import (
+from validation.thesis import command as command_module
+from validation.thesis.numbers.examine import DEFAULT_PAIR, THESIS_PAIR, examine
+from validation.thesis.numbers.results import read_results
+from validation.thesis.runs import carry_out as runs
+from validation.thesis.runs import plan as plans
+from validation.thesis.runs.growth import grow, read_growth, write_growth
+from validation.thesis.runs.plan import (
     CHEAP,
     QUICK_SEEDS,
     SCAN_SEEDS,
@@ -28,7 +28,7 @@ from fdnet.studies.thesis.runs.plan import (
     Planned,
     planned,
 )
-from fdnet.studies.thesis.runs.state import read_state, state_of_run, write_state
+from validation.thesis.runs.state import read_state, state_of_run, write_state
 
 LONGEST = (
     *("specimen2", "specimen3", "specimen6", "specimen7", "specimen8"),

@@ -11,10 +11,10 @@ from math import nan, sqrt
 import pytest
 
 from fdnet.statistics.bands import Band
-from fdnet.studies.engine.bands import Sample, band, difference
-from fdnet.studies.engine.markdown import as_told, figure, markdown_table, with_band
-from fdnet.studies.thesis.compare.tables import TABLES, table_of, thesis_tables
-from fdnet.studies.thesis.compare.trend_claims import (
+from validation.engine.bands import Sample, band, difference
+from validation.engine.markdown import as_told, figure, markdown_table, with_band
+from validation.thesis.compare.tables import TABLES, table_of, thesis_tables
+from validation.thesis.compare.trend_claims import (
     ABOVE,
     ALIKE,
     MORE,
@@ -22,7 +22,7 @@ from fdnet.studies.thesis.compare.trend_claims import (
     claims,
     share_at_the_face,
 )
-from fdnet.studies.thesis.compare.trend_quantities import (
+from validation.thesis.compare.trend_quantities import (
     QUANTITIES,
     beyond_the_others,
     first_share,
@@ -31,13 +31,13 @@ from fdnet.studies.thesis.compare.trend_quantities import (
     sample_of,
     slope_per_decade,
 )
-from fdnet.studies.thesis.compare.trend_table import (
+from validation.thesis.compare.trend_table import (
     caveats,
     flows_table,
     trends_table,
     verdict_of,
 )
-from fdnet.studies.thesis.compare.trends import (
+from validation.thesis.compare.trends import (
     FAILS,
     FULL_SCALE,
     HOLDS,
@@ -48,8 +48,8 @@ from fdnet.studies.thesis.compare.trends import (
     verdict,
     write_trends,
 )
-from fdnet.studies.thesis.numbers.examine import DEFAULT_PAIR, THESIS_PAIR
-from fdnet.studies.thesis.numbers.results import ResultRow
+from validation.thesis.numbers.examine import DEFAULT_PAIR, THESIS_PAIR
+from validation.thesis.numbers.results import ResultRow
 
 T2, T4, T8 = 4.3027, 2.7764, 2.3060
 SCATTER = (-1.0, 0.0, 1.0)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from fdnet.spheres.geometry import measure_porosity
-from fdnet.studies.truth import packs
-from fdnet.studies.truth.grids import make, tabulated
-from fdnet.studies.truth.made_packs import touching_three
-from fdnet.studies.truth.packs import DATA, read_pack
+from validation.truth import packs
+from validation.truth.grids import make, tabulated
+from validation.truth.made_packs import touching_three
+from validation.truth.packs import DATA, read_pack
 
 STATED = {
     "packE_80_eps30": 0.30,

@@ -6,9 +6,9 @@ import pytest
 from fdnet.errors import CaseError
 from fdnet.network.stokes import StokesFlow, solve_slab
 from fdnet.spheres.snapshot import Kind, resting
-from fdnet.studies.engine.csv_rows import read_named
-from fdnet.studies.truth.made_slabs import SLABS
-from fdnet.studies.truth.slab_grids import (
+from validation.engine.csv_rows import read_named
+from validation.truth.made_slabs import SLABS
+from validation.truth.slab_grids import (
     DEPOSIT,
     GRAINS,
     TOLERANCE,
@@ -16,7 +16,7 @@ from fdnet.studies.truth.slab_grids import (
     slab_table,
     tabulated,
 )
-from fdnet.studies.truth.slabs import (
+from validation.truth.slabs import (
     SLAB_FOLDER,
     SLAB_GRIDS,
     SLAB_TRUTH,
@@ -24,7 +24,7 @@ from fdnet.studies.truth.slabs import (
     read_specimen,
     write_specimen,
 )
-from fdnet.studies.truth.specimens import SPECIMENS
+from validation.truth.specimens import SPECIMENS
 
 
 def flow(cells: int, k: float) -> StokesFlow:

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from fdnet.studies.command import run_study
-from fdnet.studies.engine.table import read_rows
-from fdnet.studies.network.velocity_field import FLUXES, STUDY, VELOCITY, pore_points
-from fdnet.studies.truth.cases import simple_cubic
+from validation.command import run_study
+from validation.engine.table import read_rows
+from validation.network.velocity_field import FLUXES, STUDY, VELOCITY, pore_points
+from validation.truth.cases import simple_cubic
 
 
 def test_errors_fall_with_the_cells(tmp_path):

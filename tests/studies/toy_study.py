@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from fdnet.errors import FlowError
-from fdnet.studies.engine.error_rows import against_exact
-from fdnet.studies.engine.study import Panel, Point, Study
+from validation.engine.error_rows import against_exact
+from validation.engine.study import Panel, Point, Study
 
 
 def points(quick: bool) -> list[Point]:
