@@ -3,41 +3,36 @@
 
     .venv/bin/python scripts/validation.py NAME [--quick] [--out DIR]
     .venv/bin/python scripts/validation.py list
-    .venv/bin/python scripts/validation.py page [--redraw]
 
-NAME runs a study, or goes on with it. `page` runs nothing: it writes docs/validation.md from the
-committed tables in docs/validation, with `--redraw` also the figure and text of each study.
+NAME runs a study, or goes on with it; `NAME --help` says what else it takes.
 """
 
-import argparse
 import sys
-from pathlib import Path
+from collections.abc import Sequence
+from importlib import import_module
 
 from fdnet.errors import FdnetError
-from validation.command import add_arguments, run
-from validation.pages.validation import redraw, write_page
 
-DOCS = Path(__file__).resolve().parents[1] / "docs"
+CHAPTERS: dict[str, str] = {}
+"""Name and module of the comparisons with a command of their own, `main(arguments) -> int`.
+
+All other names are studies of error against run time.
+"""
+STUDIES = "validation.command"
 
 
-def main() -> int:
-    """Parse the arguments and run; returns the exit code."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    add_arguments(parser)
-    given = parser.parse_args()
-    if given.name == "page":
-        if given.redraw:
-            redraw(DOCS / "validation")
-        print(write_page(DOCS))
-        return 0
+def main(arguments: Sequence[str]) -> int:
+    """Runs what `arguments` name; returns the exit code."""
+    name, *rest = arguments or ["--help"]
+    module = CHAPTERS.get(name)
     try:
-        return run(given)
+        if module:
+            return int(import_module(module).main(rest))
+        return int(import_module(STUDIES).main([name, *rest]))
     except FdnetError as error:
         print(f"validation.py: {error}", file=sys.stderr)
         return error.exit_code
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))

@@ -68,7 +68,7 @@ def test_intact_packs_and_lattices_within_2_percent_and_3_in_the_mean_square(cap
     "names",
     [
         pytest.param([name for name in FILLED if name not in LONG], id="without the two longest"),
-        pytest.param(FILLED, id="all", marks=pytest.mark.slow),
+        pytest.param(FILLED, id="all", marks=pytest.mark.nightly),
     ],
 )
 def test_loss_by_fines_within_10_percent_and_5_in_the_mean_square(capsys, names):

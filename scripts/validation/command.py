@@ -67,6 +67,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def main(arguments: list[str]) -> int:
+    """Runs the study that `arguments` name; returns the exit code."""
+    parser = argparse.ArgumentParser(prog="validation.py", description=__doc__)
+    add_arguments(parser)
+    options = parser.parse_args(arguments)
+    if options.name == "page":
+        from validation.pages.validation import redraw, write_page
+
+        docs = Path(__file__).resolve().parents[2] / "docs"
+        if options.redraw:
+            redraw(docs / "validation")
+        print(write_page(docs))
+        return 0
+    return run(options)
+
+
 def run(options: argparse.Namespace) -> int:
     """Runs one study and returns the exit code.
 

@@ -141,7 +141,7 @@ class StopError(Exception):
     [
         ("held", 1),
         *(
-            pytest.param(scheme, ranks, marks=pytest.mark.slow)
+            pytest.param(scheme, ranks, marks=pytest.mark.nightly)
             for scheme in ("held", "viscous", "implicit")
             for ranks in (1, 2)
             if (scheme, ranks) != ("held", 1)
@@ -180,8 +180,8 @@ def test_a_clean_up_cut_at_every_checkpoint_goes_on_bit_for_bit(
     "place",
     [
         "write_tables",
-        pytest.param("clean_up_stage", marks=pytest.mark.slow),
-        pytest.param("draw_figures", marks=pytest.mark.slow),
+        pytest.param("clean_up_stage", marks=pytest.mark.nightly),
+        pytest.param("draw_figures", marks=pytest.mark.nightly),
     ],
 )
 def test_a_run_cut_in_a_later_stage_gives_the_summary_of_the_uncut_one(

@@ -84,7 +84,7 @@ def test_a_continued_coupled_invasion_is_the_uncut_one(binary, grains, tmp_path,
     assert differences(small(scheme), grains, tmp_path, binary) == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("motion", ["fixed", "mobile"])
 @pytest.mark.parametrize("scheme", ["implicit", "held"])

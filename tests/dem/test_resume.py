@@ -53,7 +53,7 @@ def test_a_continued_invasion_is_the_uncut_one(binary, packed, tmp_path, cell):
     assert not list(tmp_path.glob("*/post/*contacts*")), "the scratch file stays"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("cell", MATRIX, ids="-".join)
 def test_a_continued_invasion_is_the_uncut_one_everywhere(binary, packed, tmp_path, cell, ranks):

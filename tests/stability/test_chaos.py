@@ -36,7 +36,7 @@ def test_some_attacks_end_well_or_in_one_refusal(runs, tmp_path):
     assert again == record
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_attacks_on_reports_and_on_two_ranks_end_well(binary, tmp_path):
     with prepared_runs(tmp_path) as runs:
         record = chaos(runs, seed=3, indices=range(4), kinds=SELDOM)

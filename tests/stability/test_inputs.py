@@ -151,7 +151,7 @@ def test_no_fines_are_no_fault_of_occupancy():
     assert occupancy.pore_solid_volume.sum() == 0
 
 
-@pytest.mark.parametrize("seed", [11, pytest.param(12, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", [11, pytest.param(12, marks=pytest.mark.nightly)])
 def test_some_hundred_mutated_inputs_make_no_fault(root, seed):
     """The quick form of scripts/fuzz.py, whose long record is docs/validation/fuzz.json."""
     record = fuzz.fuzz(root, main, seed=seed, indices=range(300), limit=20.0)

@@ -219,7 +219,7 @@ def test_the_plan_names_every_run_once_with_its_seeds():
             tuple(f"quick-{name}" for name in LONGEST),
             id="without the seven longest",
         ),
-        pytest.param((), id="all", marks=pytest.mark.slow),
+        pytest.param((), id="all", marks=pytest.mark.nightly),
     ],
 )
 def test_the_quick_study_runs_every_form_to_its_end(
