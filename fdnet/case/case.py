@@ -154,8 +154,8 @@ class Case(Part):
     def digest(self, stage: str = "analyse") -> str:
         """Hash of what `stage` depends on.
 
-        "pack" ignores fines, fluid and analysis, unless the stiffness follows from them
-        (`run.stiffness_N_m` = "auto"); "invade" ignores the analysis and the clean-up,
+        "pack" ignores fluid, run and analysis, and of the fines all but what decides the ratio
+        of stiffnesses; "invade" ignores the analysis and the clean-up,
         "clean_up" the analysis, but for side walls that let a fluid slip which is made with them
         (`walls_of_the_fluid`). No result depends on `POLICIES` or on the bonds, which mechanics
         alone reads, so no digest does.
@@ -164,16 +164,20 @@ class Case(Part):
         data.pop("given", None)
         data.pop("bonds", None)
         data["run"] = {key: value for key, value in data["run"].items() if key not in POLICIES}
+        packing = data["grains"]["packing_stiffness_N_m"]
+        if stage != "pack" and packing == self.run.stiffness_N_m:
+            data["grains"].pop("packing_stiffness_N_m")
         if stage in LIGGGHTS_STAGES:
             data |= walls_of_the_fluid(stage, data)
             data.pop("analysis")
             data.pop("name")
         if stage == "invade":
             data.pop("clean_up", None)
-        if stage == "pack" and self.run.stiffness_N_m != "auto":
+        if stage == "pack":
             data["grains"].pop("motion")
             fines = data.get("fines", {}).get("normal_stiffness_N_m")
-            scaling = {"stiffness": self.run.stiffness_N_m, "fines_stiffness": fines}
+            stiffness = data["grains"].pop("packing_stiffness_N_m")
+            scaling = {"stiffness": stiffness, "fines_stiffness": fines}
             elastic = self._elastic_of_the_pack(data)
             data = {key: data[key] for key in ("seed", "box", "grains")} | scaling | elastic
         return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]

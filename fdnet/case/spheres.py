@@ -391,6 +391,10 @@ class Grains(Spheres):
     max_overlap: Fraction = 0.15
     """Largest accepted overlap of two grains in the pack, over the smaller diameter. A denser pack
     is refused."""
+    packing_stiffness_N_m: Positive = 1.0e4
+    """Stiffness of the stiffest contact while the pack is made. The same seed gives the same pack
+    whatever `run.stiffness_N_m` is. With another value here its numbers are rounded otherwise,
+    which makes another pack of the same kind."""
 
 
 class Fines(Spheres):

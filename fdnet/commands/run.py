@@ -49,8 +49,8 @@ def add_ranks(parser: argparse.ArgumentParser) -> None:
         type=_ranks,
         default=1,
         metavar="N",
-        help="MPI ranks for LIGGGHTS (default 1); another number of ranks gives another pack from "
-        "the same seed, and a cut run is continued with the number it was begun with",
+        help="MPI ranks of LIGGGHTS for invasion and clean-up (default 1); packing takes one, and "
+        "a cut invasion is continued with the number it was begun with",
     )
 
 

@@ -425,7 +425,8 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
 
     Raises CaseError when a file that would be written is there already.
     """
-    scales, out = scales_of(case), expanded(out)
+    out = expanded(out)
+    scales_of(case)  # refuses what no deck can be written for
     refuse_folder_name(out)
     decks = {
         stage: out / stage / f"in.{stage}" for stage in case.stages if stage in LIGGGHTS_STAGES
@@ -445,7 +446,7 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
     for path in decks.values():
         path.parent.mkdir(parents=True, exist_ok=True)
     folder = decks["pack"].parent
-    write_pack_inputs(case, scales, folder, count=grain_count(case), ranks=ranks)
+    write_pack_inputs(case, folder, count=grain_count(case))
     for path, text in texts.items():
         path.write_text(text, encoding="utf-8")
     return list(decks.values())

@@ -37,10 +37,12 @@ from fdnet.scales.pack import (
     PACK_STEP,
     densest_porosity,
     grain_count,
+    pack_step,
     reach_text,
+    target_porosity,
     within_limit,
 )
-from fdnet.scales.scales import Scales
+from fdnet.scales.scales import packing_scales
 from fdnet.spheres.dump import COLUMNS, FORMAT, read_frame
 from fdnet.spheres.geometry import max_overlap, measure_porosity
 from fdnet.spheres.snapshot import Array, Snapshot, resting
@@ -56,21 +58,14 @@ REST_RUNS = 4 * PACK_RELAX_STEPS // RELAX_RUN_STEPS
 
 
 def write_pack_inputs(
-    case: Case,
-    scales: Scales,
-    folder: Path,
-    *,
-    count: int,
-    ranks: int = 1,
-    shown: tuple[int, ...] = (),
-    places: int = 0,
+    case: Case, folder: Path, *, count: int, shown: tuple[int, ...] = (), places: int = 0
 ) -> Deck:
     """Write in.pack and pack.data, `count` small spheres at random, into `folder`.
 
     `places` numbers the sets of random places that the same grains may start from. For `shown` see
     `render_pack`.
     """
-    deck = render_pack(case, scales, count=count, ranks=ranks, shown=shown)
+    deck = render_pack(case, count=count, shown=shown)
     (folder / "in.pack").write_text(deck.text)
     radii, box = draw_radii(case, count), specimen_box(case)
     rng = np.random.default_rng([case.seed, count, *([places] if places else [])])
@@ -115,24 +110,23 @@ def check_radii(grains: Snapshot, case: Case, path: Path) -> None:
         )
 
 
-def render_pack(
-    case: Case, scales: Scales, *, count: int, ranks: int = 1, shown: tuple[int, ...] = ()
-) -> Deck:
+def render_pack(case: Case, *, count: int, shown: tuple[int, ...] = ()) -> Deck:
     """The packing deck: soft springs without friction, viscous damping, growth, test for rest.
 
     After the stages of growth in `shown` (1 to `PACK_STAGES`) it also dumps to
     post/grown_STAGE.dump.
     """
-    stiffness = scales.contacts["grain-grain"].normal_stiffness
+    scales = packing_scales(case)
+    contact = scales.contacts["grain-grain"]
+    stiffness = contact.normal_stiffness
     low, high = case.grains.radius_range_m
     mass = sphere_mass(low, case.grains.density_kg_m3)
     left_out = [
         LeftOut("friction and tangential history", "grains are packed frictionless"),
         LeftOut("gravity", "only the geometry of the pack is wanted"),
         LeftOut("fines and fluid", "the pack is made before the invasion"),
+        LeftOut("MPI processor grid", "one rank"),
     ]
-    if ranks == 1:
-        left_out.append(LeftOut("MPI processor grid", "one rank"))
     contacts = contact_variables(case, scales, "pack", friction=False)
     damping = ("damping", 0.8 * math.sqrt(stiffness / mass))
     if case.contact.model == "hertz":
@@ -140,12 +134,12 @@ def render_pack(
     contacts[damping[0]] = " ".join([number(damping[1])] * contacts["size"] ** 2)
     text = render_text(
         "pack.in.j2",
-        header_variables(case, "pack", left_out, ranks)
+        header_variables(case, "pack", left_out, 1)
         | {
             "skin": number(0.4 * low),
             "contacts": contacts,
             "walls": wall_variables(case, "pack", friction=False),
-            "time_step": number(scales.pack_step),
+            "time_step": number(pack_step(case, contact)),
             "viscous": number(0.03 * math.sqrt(stiffness * mass)),
             "thermo_steps": RELAX_RUN_STEPS,
             "density": number(case.grains.density_kg_m3),
@@ -218,18 +212,21 @@ class RestlessError(LiggghtsError):
     """The grains never came to rest."""
 
 
-def make_pack(case: Case, scales: Scales, folder: Path, launch: Launch) -> Pack:
+def make_pack(case: Case, folder: Path, launch: Launch) -> Pack:
     """Pack with different numbers of grains until the porosity is within 0.003 of the target.
+
+    LIGGGHTS runs on one rank: on others the sums are taken in another order, which makes another
+    sand of the same seed.
 
     Raises CaseError when the porosity cannot be reached, LiggghtsError when a run fails or does
     not come to rest.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    count, target = grain_count(case), scales.porosity
+    count, target, launch = grain_count(case), target_porosity(case), replace(launch, ranks=1)
     tried: list[dict[str, Any]] = []
     while True:
         attempt = folder / f"attempt_{len(tried) + 1}"
-        pack = _at_rest(case, scales, attempt, launch, count=count)
+        pack = _at_rest(case, attempt, launch, count=count)
         tried.append(
             {
                 "grains": len(pack.grains),
@@ -299,26 +296,25 @@ def _next_count(case: Case, target: float, tried: list[dict[str, Any]]) -> int:
     return around[0]
 
 
-def _at_rest(case: Case, scales: Scales, folder: Path, launch: Launch, *, count: int) -> Pack:
+def _at_rest(case: Case, folder: Path, launch: Launch, *, count: int) -> Pack:
     """A pack of `count` grains, from the next random places where it does not come to rest.
 
     Raises RestlessError when it does not after `PLACES` of them.
     """
     for places in range(PLACES):
         try:
-            return _attempt(case, scales, folder, launch, count=count, places=places)
+            return _attempt(case, folder, launch, count=count, places=places)
         except RestlessError as error:
             last = error
     raise RestlessError(f"{last} (tried {PLACES} times from other places)") from last
 
 
-def _attempt(
-    case: Case, scales: Scales, folder: Path, launch: Launch, *, count: int, places: int
-) -> Pack:
+def _attempt(case: Case, folder: Path, launch: Launch, *, count: int, places: int) -> Pack:
     if folder.exists():
         shutil.rmtree(folder)
     (folder / "post").mkdir(parents=True)
-    deck = write_pack_inputs(case, scales, folder, count=count, ranks=launch.ranks, places=places)
+    deck = write_pack_inputs(case, folder, count=count, places=places)
+    step = pack_step(case, packing_scales(case).contacts["grain-grain"])
     try:
         run = run_deck(folder, "in.pack", launch)
     except LiggghtsError as error:
@@ -333,7 +329,7 @@ def _attempt(
     frame = read_frame(dump)
     grains = snapshot_of(frame, case, time_s=0.0)
     restless = "FDNET restless" in (folder / SCREEN).read_text("utf-8", errors="replace")
-    creep = _creep(case, scales, folder, grains) if restless else 0.0
+    creep = _creep(case, step, folder, grains) if restless else 0.0
     if len(grains) != count:
         raise LiggghtsError(f"{dump}: {len(grains)} grains, expected {count}: some were lost")
     check_radii(grains, case, dump)
@@ -345,7 +341,7 @@ def _attempt(
         porosity_sum=porosity.sum,
         max_overlap=max_overlap(grains, case.periodic),
         steps=frame.step,
-        step_s=scales.pack_step,
+        step_s=step,
         attempts=(),
         left_out=deck.left_out,
         run=run,
@@ -354,14 +350,14 @@ def _attempt(
     )
 
 
-def _creep(case: Case, scales: Scales, folder: Path, grains: Snapshot) -> float:
+def _creep(case: Case, step: float, folder: Path, grains: Snapshot) -> float:
     """Root-mean-square speed, m/s, of grains that never came to rest.
 
     A pack that is barely jammed has such soft modes. Raises RestlessError above `MOST_CREEP` grain
     diameters per sqrt(m/k).
     """
     speed = float(np.sqrt(np.mean(np.sum(grains.velocity**2, axis=1))))
-    natural = 2 * case.grains.mean_radius_m * PACK_STEP / scales.pack_step
+    natural = 2 * case.grains.mean_radius_m * PACK_STEP / step
     if speed > MOST_CREEP * natural:
         raise RestlessError(
             f"{folder}: the pack did not come to rest in {REST_RUNS * RELAX_RUN_STEPS} steps, its "

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 
 from fdnet.case.case import InvasionCase
-from fdnet.dem.checkpoint import Checkpoints, read_history, read_updates, state_at
+from fdnet.dem.checkpoint import read_history, read_updates, state_at
 from fdnet.dem.deck import snapshot_of
 from fdnet.dem.invasion import invade
 from fdnet.dem.packing import check_radii, make_pack
@@ -35,32 +35,22 @@ def pack_stage(session: Session) -> None:
     if session.options.pack_from is not None:
         take_pack(session, session.options.pack_from)
         return
-    case, scales, folder = session.case, session.scales, session.path / "pack"
+    case, folder = session.case, session.path / "pack"
     expected = PACK_STAGES * PACK_STAGE_STEPS + PACK_RELAX_STEPS // 2
     progress = Progress("pack", Forecast(expected=expected), show=session.options.show_progress)
     with session.timed("pack"), progress:
-        pack = make_pack(case, scales, folder, session.launch(progress))
-    seconds, assumed = session.seconds["pack"], scales.porosity
+        pack = make_pack(case, folder, session.launch(progress))
+    seconds, assumed = session.seconds["pack"], session.scales.porosity
     session.folder.finish(
         "pack", pack_record(case, pack, folder, assumed=assumed, seconds=seconds)
     )
 
 
 def invade_stage(session: Session, case: InvasionCase) -> None:
-    """Drive the fines in, unless that is done. Raises what `invade` raises.
-
-    A run that was cut between pack and invasion goes on with the ranks that it began with.
-    """
+    """Drive the fines in, unless that is done. Raises what `invade` raises."""
     if is_done(session, "invade"):
         return
     scales, grains, folder = invasion_scales(case), packed_grains(session), session.path / "invade"
-    ranks, made = session.options.ranks, (session.folder.record("pack") or {}).get("ranks")
-    begun = Checkpoints(folder=folder, digest="").files()
-    if session.options.resume and not begun and made not in (None, ranks):
-        raise CaseError(
-            f"{session.path}: this run was begun with --np {made}, and --np {ranks} would give "
-            f"another result; continue with --np {made}, or start over with --force"
-        )
     step = scales.time_step
     arrivals = scales.supplied_count * scales.upstream_velocity / scales.slab_length
     forecast = Forecast(

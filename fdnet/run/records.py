@@ -350,8 +350,8 @@ def take_pack(session: Session, source: Path) -> None:
 
     Its record counts no seconds of LIGGGHTS, which belong to the run that made the pack.
 
-    Raises CaseError when `source` holds no finished pack, or one of another case, seed or number
-    of ranks, or when its files are not those that the stage made.
+    Raises CaseError when `source` holds no finished pack, or one of another case or seed, or
+    when its files are not those that the stage made.
     """
     record = read_record(source, "pack")
     if record is None:
@@ -363,11 +363,6 @@ def take_pack(session: Session, source: Path) -> None:
         raise CaseError(
             f"--pack-from {source}: its pack is that of another case or seed (digest "
             f"{record['digest']}, this case {session.case.digest('pack')}); leave the option out"
-        )
-    if record["ranks"] != session.options.ranks:
-        raise CaseError(
-            f"--pack-from {source}: its pack was made with --np {record['ranks']}, this run has "
-            f"--np {session.options.ranks}, which would give another pack; use the same number"
         )
     check_files(source / "pack", record, START_OVER)
     with session.timed("pack"):

@@ -191,12 +191,12 @@ def grain_count(case: Case) -> int:
     )
 
 
-def pack_step(case: Case, contacts: dict[str, Contact]) -> float:
+def pack_step(case: Case, contact: Contact) -> float:
     """Time step of packing, s: `PACK_STEP` of sqrt(m/k) of the lightest grain.
 
-    The stiffness of Hertz contacts is that of its tangent at `grains.max_overlap`.
+    `contact` is that of two grains. Its stiffness by Hertz is that of its tangent at
+    `grains.max_overlap`.
     """
-    contact = contacts["grain-grain"]
     stiffness = contact.normal_stiffness
     if contact.elastic:
         size = case.grains.radius_range_m[0] / case.grains.mean_radius_m

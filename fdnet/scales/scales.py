@@ -33,7 +33,7 @@ from fdnet.scales.contacts import (
 )
 from fdnet.scales.drag import Push, push_of, reynolds_warnings, throat_warnings, throat_width
 from fdnet.scales.flow import Velocity, drive_warnings, velocity_of, velocity_warnings
-from fdnet.scales.pack import pack_step, size_warnings, target_porosity
+from fdnet.scales.pack import size_warnings, target_porosity
 
 MOST_STEPS = 2**31 - 1
 """LIGGGHTS counts the steps of a run in 32 bits."""
@@ -52,7 +52,6 @@ class Scales:
         inertial_loss: share by which Ergun's inertial term lowers the velocity of Darcy's law.
         stiffness_factor: factor from the materials' stiffness, or moduli, to those used.
         contacts: contact of each pair of materials, such as "grain-fine".
-        pack_step: s, time step of packing.
         warnings: doubts about the case, one sentence each.
     """
 
@@ -64,7 +63,6 @@ class Scales:
     inertial_loss: float
     stiffness_factor: float
     contacts: dict[str, Contact]
-    pack_step: float
     warnings: tuple[Doubt, ...] = ()
 
 
@@ -140,25 +138,34 @@ def scales_of(case: Case) -> Scales:
         case = stiff_enough(case)
         porosity = target_porosity(case)
         flow = velocity_of(case, porosity)
-        contacts = contacts_of(case, flow.interstitial)
-        shared = Scales(
-            porosity=porosity,
-            permeability=flow.permeability,
-            darcy_velocity=flow.darcy,
-            interstitial_velocity=flow.interstitial,
-            pressure_gradient=flow.pressure_gradient,
-            inertial_loss=flow.inertial_loss,
-            stiffness_factor=stiffness_factor(case),
-            contacts=contacts,
-            pack_step=pack_step(case, contacts),
-            warnings=tuple(size_warnings(case)),
-        )
+        shared = _shared(case, porosity, flow)
         return _invasion(case, flow, shared) if isinstance(case, InvasionCase) else shared
     except (OverflowError, ZeroDivisionError) as error:
         raise CaseError(
             f"case {case.name}: a formula leaves the range of numbers ({error}); check units and "
             "magnitudes of fluid, fines and run"
         ) from error
+
+
+def packing_scales(case: Case) -> Scales:
+    """The scales of packing, at a stiffness of its own whatever the invasion needs."""
+    run = case.run.model_copy(update={"stiffness_N_m": case.grains.packing_stiffness_N_m})
+    case, porosity = case.model_copy(update={"run": run}), target_porosity(case)
+    return _shared(case, porosity, velocity_of(case, porosity))
+
+
+def _shared(case: Case, porosity: float, flow: Velocity) -> Scales:
+    return Scales(
+        porosity=porosity,
+        permeability=flow.permeability,
+        darcy_velocity=flow.darcy,
+        interstitial_velocity=flow.interstitial,
+        pressure_gradient=flow.pressure_gradient,
+        inertial_loss=flow.inertial_loss,
+        stiffness_factor=stiffness_factor(case),
+        contacts=contacts_of(case, flow.interstitial),
+        warnings=tuple(size_warnings(case)),
+    )
 
 
 def invasion_scales(case: InvasionCase) -> InvasionScales:

@@ -174,7 +174,7 @@ def test_a_batched_invasion_accounts_for_every_fine_and_resumes(binary, tmp_path
     settings = (f"drag.scheme={scheme}", "run.cap_ms=0.1", "fines.friction=0.2")
     case = tiny(*BATCHED, *settings, *forces)
     scales = scales_of(case)
-    grains = make_pack(case, scales, tmp_path / "pack", Launch(binary=binary)).grains
+    grains = make_pack(case, tmp_path / "pack", Launch(binary=binary)).grains
     whole = invade(case, scales, grains, tmp_path / "whole", Launch(binary=binary))
     last, batches = whole.history[-1], batches_of(case, scales)
     assert len(batches.counts) > 5

@@ -156,7 +156,7 @@ def test_what_is_not_asked_for_is_left_out_and_named():
     smooth = invade_text(*keys)
     assert has(smooth, "^fix wy0 fines wall/gran model hertz cohesion sjkr primitive")
     case = tiny(*keys)
-    assert not has(render_pack(case, scales_of(case), count=66).text, words)
+    assert not has(render_pack(case, count=66).text, words)
 
 
 def test_options_are_another_invasion_of_the_same_pack():

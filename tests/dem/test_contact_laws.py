@@ -82,7 +82,7 @@ def test_a_damped_collision_has_the_overlap_and_restitution_of_the_ratio(binary,
 def test_a_hertz_specimen_is_packed_invaded_and_continued(binary, tmp_path, cell):
     """Walls with friction, mobile grains: a continued invasion is the uncut one, bit for bit."""
     case = cell_case(*cell, HERTZ, "box.wall_friction=0.3")
-    pack = make_pack(case, scales_of(case), tmp_path / "pack", Launch(binary=binary))
+    pack = make_pack(case, tmp_path / "pack", Launch(binary=binary))
     assert len(pack.grains) == 15
     assert differences(case, pack.grains, tmp_path, binary) == []
 
@@ -91,7 +91,7 @@ def test_a_dense_hertz_pack_meets_its_porosity_at_rest(binary, tmp_path):
     keys = ("box.size_mm=[5.0,3.0,3.0]", "grains={radius_mm=0.25, porosity=0.36}")
     case = tiny(HERTZ, *keys)
     scales = scales_of(case)
-    pack = make_pack(case, scales, tmp_path, Launch(binary=binary))
+    pack = make_pack(case, tmp_path, Launch(binary=binary))
     assert abs(pack.porosity - 0.36) <= 0.003
     mass = 2650 * 4 / 3 * math.pi * GRAIN**3
     natural = math.sqrt(scales.contacts["grain-grain"].normal_stiffness / mass)
@@ -117,7 +117,7 @@ def test_an_undamped_dense_pack_keeps_its_energy_at_the_largest_step(binary, tmp
         "box.size_mm=[2.0,2.0,2.1]",
     )
     scales = scales_of(case)
-    grains = make_pack(case, scales, tmp_path / "pack", Launch(binary=binary)).grains
+    grains = make_pack(case, tmp_path / "pack", Launch(binary=binary)).grains
     assert max_overlap(grains, (False, False, False)) > 0.1
     step = 0.2 * min(scales.contacts[f"grain-{other}"].step_limit for other in ("grain", "wall"))
     thrown_at = np.random.default_rng(3).normal(0.0, 0.002 * GRAIN / step, (len(grains), 3))

@@ -173,5 +173,5 @@ def test_rolling_and_cohesive_contacts_continue_bit_for_bit(binary, tmp_path):
         "contact.rolling_friction=0.2",
         "contact.cohesion_J_m3=1e6",
     )
-    pack = make_pack(case, scales_of(case), tmp_path / "pack", Launch(binary=binary))
+    pack = make_pack(case, tmp_path / "pack", Launch(binary=binary))
     assert differences(case, pack.grains, tmp_path, binary) == []

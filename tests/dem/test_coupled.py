@@ -64,7 +64,7 @@ def small(scheme="implicit", *more):
 @pytest.fixture(scope="module")
 def grains(binary, tmp_path_factory):
     case, folder = small(), tmp_path_factory.mktemp("pack")
-    return make_pack(case, scales_of(case), folder, Launch(binary=binary)).grains
+    return make_pack(case, folder, Launch(binary=binary)).grains
 
 
 @pytest.fixture(scope="module")
@@ -296,7 +296,7 @@ def bed_of_fines(binary, folder) -> Snapshot:
         "grains": {"radius_mm": 0.25, "porosity": 0.39},
     }
     case = case_from(data)
-    return make_pack(case, scales_of(case), folder, Launch(binary=binary)).grains
+    return make_pack(case, folder, Launch(binary=binary)).grains
 
 
 def share_within(bed: Snapshot, low: float, high: float) -> np.ndarray:

@@ -176,7 +176,7 @@ def test_the_neighbour_search_is_the_cases_or_the_measured_best():
 
 def test_lost_atoms_are_errors_and_the_end_is_marked():
     case = tiny()
-    for text in (invade_text(), render_pack(case, scales_of(case), count=66).text):
+    for text in (invade_text(), render_pack(case, count=66).text):
         assert has(text, "thermo_modify lost error")
         assert commands(text)[-1] == 'print "DECK_DONE"'
         assert has(text, r"^timestep ")
@@ -185,7 +185,7 @@ def test_lost_atoms_are_errors_and_the_end_is_marked():
 
 def test_the_set_command_never_meets_its_unset_number():
     case = tiny()
-    text = render_pack(case, scales_of(case), count=66).text
+    text = render_pack(case, count=66).text
     assert has(text, r"^set group all density 2650.0 diameter v_d")
     assert not has(text, r"^set group all diameter v_")
 
@@ -233,7 +233,7 @@ def test_pairs_and_walls_have_the_contact_model_of_the_case(model, law):
     smooth = invade_text(f"contact.model={model}")
     assert has(smooth, rf"^fix wy0 fines wall/gran model {law} primitive type 3 yplane")
     case = tiny(f"contact.model={model}")
-    pack = render_pack(case, scales_of(case), count=66).text
+    pack = render_pack(case, count=66).text
     assert has(pack, rf"^pair_style gran model {law} limitForce on")
     assert has(pack, rf"^fix wx0 all wall/gran model {law} primitive type 2 xplane")
 

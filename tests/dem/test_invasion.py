@@ -53,7 +53,7 @@ def packed(binary, tmp_path_factory):
     for sides in ("walls", "periodic"):
         case = tiny(f"box.sides={sides}")
         grains[sides] = make_pack(
-            case, scales_of(case), tmp_path_factory.mktemp(sides), Launch(binary=binary)
+            case, tmp_path_factory.mktemp(sides), Launch(binary=binary)
         ).grains
     return grains
 

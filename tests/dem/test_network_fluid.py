@@ -43,7 +43,7 @@ FIRST = Moment(step=0, time=0.0, before=None, first=None, fresh=True)
 @pytest.fixture(scope="module")
 def fluid(binary, tmp_path_factory) -> NetworkFluid:
     case, folder = followed(), tmp_path_factory.mktemp("pack")
-    grains = make_pack(case, scales_of(case), folder, Launch(binary=binary)).grains
+    grains = make_pack(case, folder, Launch(binary=binary)).grains
     made = fluid_of(case, scales_of(case), grains)
     assert isinstance(made, NetworkFluid)
     return made

@@ -33,9 +33,7 @@ FAST = ("run.cap_ms=0.3", f"run.max_overlap={LIMIT}")
 @pytest.fixture(scope="module")
 def grains(binary, tmp_path_factory):
     case = tiny()
-    return make_pack(
-        case, scales_of(case), tmp_path_factory.mktemp("pack"), Launch(binary=binary)
-    ).grains
+    return make_pack(case, tmp_path_factory.mktemp("pack"), Launch(binary=binary)).grains
 
 
 def deck_of(*assignments: str):

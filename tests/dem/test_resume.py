@@ -40,7 +40,7 @@ def packed(binary, tmp_path_factory):
         box = (case.box.sides, case.size_m)
         if box not in made:
             folder = tmp_path_factory.mktemp(case.box.sides)
-            made[box] = make_pack(case, scales_of(case), folder, Launch(binary=binary)).grains
+            made[box] = make_pack(case, folder, Launch(binary=binary)).grains
         return made[box]
 
     return grains

@@ -83,7 +83,7 @@ def test_updates_at_every_diameter_carry_fines_as_far_as_sixteen_times_as_many(b
     """Fines of 1/20 of a grain cross a pack; the fluid at their place alone holds them back."""
     case = followed(FINE)
     scales = scales_of(case)
-    grains = make_pack(case, scales, tmp_path, Launch(binary=binary)).grains
+    grains = make_pack(case, tmp_path, Launch(binary=binary)).grains
     fluid = NetworkFluid(case=case, scales=scales, grains=grains, standing=0.0)
     seldom, often = gone(fluid, 1.0), gone(fluid, 0.0625)
     assert seldom == pytest.approx(often, rel=0.05)

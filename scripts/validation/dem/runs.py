@@ -25,7 +25,7 @@ from fdnet.files import write_text
 from fdnet.names import SECTION_ARCHIE
 from fdnet.network.permeability import analyse
 from fdnet.scales.clock import relaxation_time
-from fdnet.scales.scales import invasion_scales, scales_of
+from fdnet.scales.scales import invasion_scales
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
 from validation.engine.runner import child_core_seconds
@@ -101,7 +101,7 @@ def grains_of(case: Case, work: Path) -> Snapshot:
     plain = case.model_copy(update={"run": type(case.run)()})
     folder = work / f"pack-{plain.digest('pack')}"
     if not (folder / "attempts.json").exists():
-        make_pack(plain, scales_of(plain), folder, Launch(binary=the_binary()))
+        make_pack(plain, folder, Launch(binary=the_binary()))
     return snapshot_of(read_frame(folder / "post" / "pack.dump"), plain, time_s=0.0)
 
 

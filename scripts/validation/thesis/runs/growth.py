@@ -14,7 +14,6 @@ from fdnet.dem.packing import write_pack_inputs
 from fdnet.errors import CaseError
 from fdnet.files import write_bytes
 from fdnet.scales.pack import PACK_STAGES
-from fdnet.scales.scales import scales_of
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Kind, Snapshot
 from validation.thesis.runs.state import BROKEN, packed_bytes
@@ -33,7 +32,7 @@ def grow(case: Case, folder: Path, launch: Launch, *, count: int) -> tuple[Snaps
     Raises LiggghtsError when the run fails.
     """
     (folder / "post").mkdir(parents=True, exist_ok=True)
-    write_pack_inputs(case, scales_of(case), folder, count=count, shown=SHOWN)
+    write_pack_inputs(case, folder, count=count, shown=SHOWN)
     run_deck(folder, "in.pack", launch)
     names = [*(f"grown_{stage}.dump" for stage in SHOWN), "pack.dump"]
     return tuple(
