@@ -147,8 +147,8 @@ class Well(Part):
     drainage_radius_m: Positive
     """Radius at which the pressure is that of the undisturbed formation."""
     formation_permeability_mD: Positive | None = None
-    """Permeability of the formation around the well. When absent it is that of the pack by Carman
-    and Kozeny."""
+    """Permeability of the formation around the well. When absent it is that of the pack: by Carman
+    and Kozeny, and by the network where the flow follows the deposit."""
 
     radius_m: ClassVar = InSI[float]("radius_mm", 1e-3)
     """Radius of the well, m."""

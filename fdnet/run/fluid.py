@@ -33,7 +33,7 @@ from fdnet.run.network_flow import (
     placed,
 )
 from fdnet.scales.drag import Crowd, crowd_drag_factor
-from fdnet.scales.flow import path_of
+from fdnet.scales.flow import darcy_through, path_of
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array, Snapshot, unmoved
 
@@ -334,10 +334,17 @@ class NetworkFluid:
     def _intact(self) -> IntactFlow:
         return IntactFlow()
 
-    @property
+    @cached_property
     def first_velocity(self) -> float:
-        """Superficial velocity at the start, m/s as simulated."""
-        return self.scales.darcy_velocity * self.scales.force_factor
+        """Superficial velocity at the start, m/s as simulated.
+
+        Where the overbalance drives it, the pack has its own permeability, by the network.
+        """
+        case, scales = self.case, self.scales
+        darcy = scales.darcy_velocity
+        if case.fluid.velocity_m_s is None:
+            darcy = darcy_through(case, scales.porosity, self.pack.permeability)
+        return darcy * scales.force_factor
 
     @cached_property
     def rest(self) -> float:
@@ -345,11 +352,11 @@ class NetworkFluid:
 
         A velocity that is given says nothing of the way: the specimen is all of it.
         """
-        case, length = self.case, self.pack.length
+        case, pack, length = self.case, self.pack, self.pack.length
         if case.fluid.velocity_m_s is not None:
             return 0.0
         given = None if case.well is None else case.well.formation_permeability_m2
-        ratio = 1.0 if given is None else self.scales.permeability / given
+        ratio = 1.0 if given is None else pack.permeability / given
         return max(0.0, path_of(case).viscous - length) / length * ratio
 
     def forces(self, spheres: Snapshot, moment: Moment) -> FluidForces:

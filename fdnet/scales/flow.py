@@ -134,6 +134,29 @@ def velocity_of(case: Case, porosity: float) -> Velocity:
     )
 
 
+def darcy_through(case: Case, porosity: float, permeability: float) -> float:
+    """Darcy velocity at the face, m/s, that the overbalance drives through a specimen.
+
+    `permeability` m2 is that of the specimen itself, and of the rest of the way too unless the
+    case gives that of the formation.
+    """
+    given = None if case.well is None else case.well.formation_permeability_m2
+    path = path_of(case)
+    own, around = (
+        _by_law(case, _losses(case, porosity, one))
+        for one in (permeability, given or permeability)
+    )
+    near = Path(
+        viscous=min(case.size_m[0], path.viscous), inertial=min(case.size_m[0], path.inertial)
+    )
+    viscous, inertial = near.viscous / path.viscous, near.inertial / path.inertial
+    mean = Losses(
+        viscous=own.viscous * viscous + around.viscous * (1 - viscous),
+        inertial=own.inertial * inertial + around.inertial * (1 - inertial),
+    )
+    return mean.velocity(case.fluid.overbalance_Pa, path)
+
+
 def driving_pressure(case: Case, gradient: float) -> float:
     """Pressure, Pa, that drives the fluid: over its whole way, or over the specimen alone.
 

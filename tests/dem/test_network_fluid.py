@@ -251,6 +251,29 @@ def test_the_rate_follows_the_resistances_in_series(fluid, done):
     assert steady._velocity(carried, intact) == steady.first_velocity
 
 
+def test_the_overbalance_is_the_first_drop_of_pressure(fluid):
+    """Over the pack's own permeability and the rest of the way, with inertia where it counts."""
+    viscosity, permeability = fluid._viscosity, fluid.pack.permeability
+    for way, length in (
+        ("fluid.darcy_length_mm=1.6", 1.6e-3),
+        ("fluid.darcy_length_mm=4.8", 4.8e-3),
+    ):
+        other = with_case(fluid, way=way)
+        pressure = viscosity * other.first_velocity * length / permeability
+        assert pressure == pytest.approx(other.case.fluid.overbalance_Pa, rel=1e-9)
+    around = ("well.radius_mm=108.0", "well.drainage_radius_m=100.0")
+    tight = with_case(
+        fluid, *around, "well.formation_permeability_mD=50.0", way="fluid.overbalance_MPa=2.0"
+    )
+    path = 0.108 * np.log(100.0 / 0.108)
+    resistance = 1.6e-3 / permeability + (path - 1.6e-3) / (50.0 * 9.869233e-16)
+    assert viscosity * tight.first_velocity * resistance == pytest.approx(2e6, rel=1e-9)
+    assert tight.rest == pytest.approx(resistance * permeability / 1.6e-3 - 1.0, rel=1e-9)
+    fast = with_case(fluid, "fluid.darcy_law=ergun", way="fluid.darcy_length_mm=1.6")
+    darcy = fluid.case.fluid.overbalance_Pa * permeability / viscosity / 1.6e-3
+    assert 0.1 * darcy < fast.first_velocity < 0.99 * darcy
+
+
 def test_a_standing_cake_takes_the_pressure_of_carman_and_kozeny(fluid):
     """Five layers of a cubic bed upstream, 0.1 mm apart, at rest."""
     spacing, radius = 1e-4, 4.9e-5
