@@ -1,6 +1,7 @@
 """What a run writes next to its summary: tables, figures, ParaView files."""
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import accumulate
@@ -125,12 +126,17 @@ def write_paraview(results: Results) -> None:
 
 
 def draw_figures(results: Results) -> tuple[list[tuple[Path, str]], list[str]]:
-    """All figures with their captions, and why the 3-D picture is missing if it is."""
-    folder = results.path / "figures"
-    rows = results.history_rows or None
-    drawn = figures.draw_all(folder, results.analysis, results.shown, rows, results.sizes)
-    picture = folder / "spheres_3d.png"
-    reason = render_spheres_png(picture, results.path / "spheres_damaged.vtp", results.shown.box)
+    """All figures with their captions, and why the 3-D picture is missing if it is.
+
+    The 3-D picture is drawn by a process of its own at the same time as the others.
+    """
+    folder, spheres = results.path / "figures", results.path / "spheres_damaged.vtp"
+    rows, picture = results.history_rows or None, folder / "spheres_3d.png"
+    folder.mkdir(exist_ok=True)
+    with ThreadPoolExecutor(1) as aside:
+        waiting = aside.submit(render_spheres_png, picture, spheres, results.shown.box)
+        drawn = figures.draw_all(folder, results.analysis, results.shown, rows, results.sizes)
+        reason = waiting.result()
     captioned = [
         (file, figures.CAPTIONS[file.stem]) for file in ([] if reason else [picture]) + drawn
     ]
