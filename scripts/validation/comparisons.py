@@ -72,7 +72,8 @@ class Comparison:
         full: values of the knob, each with its number of seeds.
         quick: those of the reduced form.
         measure: observations by name of one trial.
-        judge: findings from the rows of this comparison that were done.
+        judge: findings from the rows that were done.
+        of: names of the comparisons whose rows it takes.
     """
 
     name: str
@@ -80,6 +81,7 @@ class Comparison:
     quick: Mapping[Value, int]
     measure: Callable[[Trial], Mapping[str, float]]
     judge: Judge
+    of: tuple[str, ...]
 
 
 class Chapter(NamedTuple):
@@ -111,6 +113,7 @@ def comparisons_of(
             quick={_value(name): seeds for name, seeds in part["quick"].items()},
             measure=measures[part["measure"]],
             judge=judges[part["judge"]] if "judge" in part else _by_lines(part["line"], exact),
+            of=tuple(part.get("of", [part["name"]])),
         )
         for part in parts
     )
@@ -187,7 +190,7 @@ def _core_seconds() -> float:
 
 def findings(comparisons: Sequence[Comparison], rows: pd.DataFrame) -> list[Finding]:
     """The lines of all comparisons of which there are rows that were done."""
-    return [line for one in comparisons for line in one.judge(rows[rows.comparison == one.name])]
+    return [line for one in comparisons for line in one.judge(rows[rows.comparison.isin(one.of)])]
 
 
 def table(lines: Sequence[Finding]) -> str:
