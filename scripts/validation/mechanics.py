@@ -192,7 +192,7 @@ def _test(trial: Trial, liggghts: bool) -> dict[str, float]:
 
 
 def _stress(trial: Trial, stiffness: float) -> dict[str, float]:
-    case = case_of(trial.seed, 2.4, "walls", stiffness)
+    case = case_of(trial.seed, 2.4, "periodic", stiffness)
     grains = packed(case, trial.folder.parent)
     if trial.value:
         material = replace(pack_material(case, grains), glued=False)
@@ -227,10 +227,11 @@ def displacement_under_flow(
 
 def _bonds(trial: Trial, normal: float, shear: float) -> dict[str, float]:
     """The largest displacement by the thesis's fall of pressure, 3.5 MPa over 8 mm."""
-    case = case_of(trial.seed, 2.4, "walls", QUARTZ, trial.value)
+    case = case_of(trial.seed, 2.4, "periodic", QUARTZ, trial.value)
     grains = packed(case, trial.folder.parent)
     cement = Cement(radius_ratio=1.0, normal=normal, shear=shear)
-    material = replace(pack_material(case, grains), cement=cement)
+    springs = pack_material(case, grains)
+    material = PackMaterial(normal=springs.normal, shear=springs.shear, cement=cement)
     moved = displacement_under_flow(grains, material, 3.5e6 / 8e-3, periodic=case.periodic)
     return {"moved": float(moved[:, 0].max())}
 
