@@ -227,13 +227,13 @@ def _held(trial: Trial) -> Seen:
 
 def _judge_held(rows: pd.DataFrame) -> list[Finding]:
     lines = []
-    for ratio, expected in ((7.0, "at most 1 %"), (5.0, "most: the count can fail")):
+    for ratio, expected in ((7.0, "at most 1 %"), (5.0, "most of them")):
         sums = rows[rows.value == ratio].groupby("quantity")["observed"].sum()
         if len(sums):
             held, fines = round(sums["held"]), round(sums["supplied"])
             band = binomtest(held, fines).proportion_ci(0.95)
             over = band.high / 0.01 if ratio == 7.0 else (1 - band.low) / 0.5
-            what = f"single fines of 1/{ratio:g} that a pack without overlap holds"
+            what = f"single fines of 1/{ratio:g} held by a pack"
             seen = f"{held} of {fines:,}, {100 * band.low:.2g} to {100 * band.high:.2g} % (95 %)"
             lines.append(Finding(what, expected, "arXiv 2605.19845", seen, over))
     return lines
@@ -379,15 +379,13 @@ def _judge_low(rows: pd.DataFrame) -> list[Finding]:
     stopped, free = int((below.quantity == CLOGGED).sum()), holes.get(2.75)
     lines = []
     if free:
-        seen = f"{stopped} of {len(below)} runs; at R 2.75 none in {sum(free.counts):,} fines"
-        what = "runs that clog at a hole R below 3 fine diameters, friction 0.1"
-        lines.append(Finding(what, "all", source, seen, math.nan, "in part: rare from R 2.4 on"))
+        seen = f"{stopped} of {len(below)}; none of {sum(free.counts):,} fines at 2.75"
+        what = "runs that clog, R below 3, friction 0.1"
+        lines.append(Finding(what, "all", source, seen, math.nan, "in part"))
     if above:
         clogs, flow = (sum(one.clogs + one.early for one in above.values()), above.values())
         seen = f"{clogs} in {sum(sum(one.counts) for one in flow):,} fines"
-        lines.append(
-            Finding("clogs at R from 3 on, friction 0.1", "0", source, seen, float(clogs))
-        )
+        lines.append(Finding("clogs, R from 3 on, friction 0.1", "0", source, seen, float(clogs)))
     return lines + _judge_laws(holes, "0.1")
 
 
@@ -395,7 +393,7 @@ def _judge_high(rows: pd.DataFrame) -> list[Finding]:
     holes = holes_of(rows)
     wide = [one for r, one in holes.items() if r >= 3.03]
     seen = f"{sum(one.clogs for one in wide)} clogs in {sum(sum(o.counts) for o in wide):,} fines"
-    what, note = "flow at R 3.03 to 5.26, friction 0.5", "open: a steady push breaks no arch"
+    what, note = "flow, R 3.03 to 5.26, friction 0.5", "open"
     turns = Finding(what, "flows and stops by turns", "Souzy and Marin 2022", seen, math.nan, note)
     return [*([turns] if wide else []), *_judge_laws(holes, "0.5")]
 
@@ -420,15 +418,15 @@ def _judge_laws(holes: Mapping[float, Clogging], friction: str) -> list[Finding]
     every = [one.counts for one in holes.values() if 5 <= len(one.counts) == one.clogs]
     if every:
         least = min(map(geometric_chance, every))
-        what = f"fines that escape before a clog, friction {friction}"
-        seen = f"chance of the sample {least:.2g}, least of {len(every)} holes"
+        what = f"fines before a clog, friction {friction}"
+        seen = f"chance {least:.2g}, least of {len(every)} holes"
         lines.append(Finding(what, "geometric law", source, seen, 0.05 / len(every) / least))
     if line:
-        what = f"ln P of a clog over R² − 1, friction {friction}"
+        what = f"ln P of a clog, friction {friction}"
         over = max(0.05 / line.chance, (1 - line.explained) / 0.1)
         seen = f"slope −{-line.slope:.2f} ± {line.band:.2f}, explains {100 * line.explained:.0f} %"
-        seen += f"; chance scatters more in {100 * line.chance:.2g} % of cases"
-        lines.append(Finding(what, "linear", source, seen, over))
+        seen += f", chance {line.chance:.2g}"
+        lines.append(Finding(what, "linear in R²", source, seen, over))
     return lines
 
 

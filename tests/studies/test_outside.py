@@ -1,4 +1,4 @@
-"""Comparisons with numbers from outside: statistics, set-ups, quick forms, and the committed rows."""
+"""Comparisons with numbers from outside: statistics, set-ups, quick forms, committed rows."""
 
 import math
 
@@ -10,10 +10,10 @@ from validation.comparisons import findings, read_rows, table
 from validation.outside import Clogging, clogging, fitted_line, geometric_chance
 
 OPEN = {
-    "ln P of a clog over R² − 1, friction 0.1",
-    "time to leave the neck of two grains, LAMMPS's contacts, s",
-    "Young's moduli, walls at the sides, 1.9 mm, over periodic 3 mm",
-    "permeability of a sand of quartz at 35 MPa over none",
+    "ln P of a clog, friction 0.1",
+    "the same with LAMMPS's contacts",
+    "moduli, walls at the sides: Young's, 1.9 mm over 3 mm",
+    "k of sand of quartz, 35 MPa over 0",
 }
 """What disagrees, and is said to."""
 
@@ -149,5 +149,5 @@ def test_the_page_has_the_table_of_the_committed_rows(root):
     for chapter, own in ((outside, "outside"), (mechanics, "mechanics")):
         rows = read_rows(root / "docs" / "validation" / f"{own}.csv")
         lines += findings(chapter.CHAPTER.comparisons, rows)
-    assert table(lines) in page
+    assert table([line for line in lines if line.source != mechanics.ITSELF]) in page
     assert {line.what for line in lines if line.verdict == "**disagrees**"} == OPEN
