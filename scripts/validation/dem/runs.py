@@ -4,9 +4,7 @@ They use fdnet's own decks and the real LIGGGHTS.
 """
 
 import math
-import re
 import shutil
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,13 +13,11 @@ import numpy as np
 
 from fdnet.case.case import Case, InvasionCase, with_fines
 from fdnet.case.file import case_from, set_keys
-from fdnet.dem.checkpoint import Checkpoints, state_at
+from fdnet.dem.checkpoint import state_at
 from fdnet.dem.deck import snapshot_of, specimen_box
-from fdnet.dem.invade_deck import write_invade_inputs
-from fdnet.dem.invasion import InvadeStage, Invasion, invade
-from fdnet.dem.liggghts import Binary, Execution, Launch, find_binary, run_deck
+from fdnet.dem.invasion import Invasion, invade
+from fdnet.dem.liggghts import Binary, Launch, find_binary
 from fdnet.dem.packing import make_pack
-from fdnet.files import write_text
 from fdnet.names import SECTION_ARCHIE
 from fdnet.network.permeability import analyse
 from fdnet.scales.clock import relaxation_time
@@ -136,26 +132,6 @@ def _fresh(
         "core_s": child_core_seconds() - before,
         "wall_s": sum(run.seconds for run in result.runs),
     }
-
-
-def edited_run(
-    case: InvasionCase, grains: Snapshot, folder: Path, launch: Launch, edit: tuple[str, str]
-) -> Execution:
-    """The whole invasion with one line of its deck replaced; `invade` then reads the folder.
-
-    `edit` is the pattern of the line and what takes its place. Raises AssertionError when not
-    exactly one line of the deck has the pattern.
-    """
-    (folder / "post").mkdir(parents=True)
-    scales = invasion_scales(case)
-    deck = write_invade_inputs(case, scales, grains, folder, ranks=launch.ranks).text
-    text, count = re.subn(f"(?m){edit[0]}", edit[1], deck)
-    assert count == 1, f"{count} lines of the deck have the pattern {edit[0]}, expected 1"
-    write_text(folder / "in.invade", text)
-    points = Checkpoints(folder=folder, digest=case.digest("invade"))
-    points.cut(None)
-    stage = InvadeStage(case=case, scales=scales, grains=grains, points=points, launch=launch)
-    return run_deck(folder, "in.invade", replace(launch, follow=stage.keeper()))
 
 
 def invasion_observed(case: InvasionCase, grains: Snapshot, result: Invasion) -> dict[str, float]:
