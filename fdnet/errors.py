@@ -234,27 +234,20 @@ def page() -> str:
     """The page of all warnings."""
     import textwrap
 
-    def filled(text: str, indent: str = "  ") -> list[str]:
-        return textwrap.wrap(text, 97, subsequent_indent=indent, break_on_hyphens=False)
+    def filled(text: str, indent: str = "") -> list[str]:
+        width = {"width": 99, "break_on_hyphens": False, "break_long_words": False}
+        return textwrap.wrap(text, **width, initial_indent=indent, subsequent_indent=indent)
 
-    lines = [
-        "# Warnings",
-        "",
-        "This page lists every warning of fdnet: what follows from it, and what to do. A warning",
-        "names something that is valid but doubtful, and the run goes on. … stands for what",
-        "differs from case to case. What `fdnet check` finds odd about the sizes, the speed and",
-        "the supply of a case comes first in the summary; it says all this itself.",
-    ]
+    opening = (
+        "A warning names something that is valid but doubtful, and the run goes on. Here stands, "
+        "under the beginning of its text, what follows from it and what to do. What `fdnet check` "
+        "finds odd about sizes, speed and supply says all this itself."
+    )
+    lines = ["# Warnings", "", *filled(opening)]
     for key, entry in catalogue().items():
-        lines += [
-            "",
-            f"({key})=",
-            f"## {key.replace('-', ' ').capitalize()}",
-            "",
-            *filled(f"> {entry.text}", "> "),
-            "",
-            *filled(f"- **What follows:** {entry.follows}."),
-            *filled(f"- **What to do:** {entry.do}."),
-            f"- **Read:** [{entry.read}](../{entry.read})",
-        ]
+        title, *said = (
+            one[0].upper() + one[1:] for one in (key.replace("-", " "), entry.follows, entry.do)
+        )
+        lines += ["", f"## {title}", "", *filled(entry.text, "> "), ""]
+        lines += filled(f"{'. '.join(said)}. [More](../{entry.read})")
     return "\n".join(lines) + "\n"
