@@ -1,4 +1,7 @@
-"""Every warning that the package raises has an entry that says what follows and what to do."""
+"""Every warning that the package raises has an entry that says what follows and what to do.
+
+That the page of warnings is that of the entries, and its links lead somewhere, is in test_docs.py.
+"""
 
 import ast
 import copy
@@ -6,7 +9,7 @@ import pickle
 from collections.abc import Iterator
 from pathlib import Path
 
-from fdnet.errors import GAP, PAGE, Doubt, catalogue, explained, page
+from fdnet.errors import GAP, PAGE, Doubt, catalogue, explained
 
 
 def raised(root: Path) -> Iterator[tuple[str, str]]:
@@ -55,18 +58,6 @@ def test_every_text_begins_as_its_entry_has_it(root):
         first, *_ = catalogue()[kind].text.removeprefix(GAP).split(GAP)
         known = first.strip() in text or first.startswith(text.split(GAP)[0])
         assert known, f"{kind}: {text}"
-
-
-def test_every_entry_leads_to_a_page(root):
-    for entry in catalogue().values():
-        assert (root / "docs" / entry.read).exists(), entry.key
-        assert entry.follows
-        assert entry.do
-
-
-def test_the_page_is_that_of_the_catalogue(root):
-    """After a change: `python docs/_ext/reference_tables.py --write`."""
-    assert (root / PAGE).read_text(encoding="utf-8") == page()
 
 
 def test_a_warning_is_explained_once_with_what_it_does_not_say_itself():
