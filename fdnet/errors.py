@@ -165,7 +165,6 @@ def words_of(error: Exception) -> str:
 
 
 PAGE = "docs/reference/warnings.md"
-GAP = "…"
 
 
 class Doubt(str):
@@ -188,7 +187,6 @@ class Entry:
 
     Attributes:
         key: its place on the page.
-        text: what it says, with `GAP` for what differs from case to case.
         follows: what follows.
         do: what to do.
         read: page of the documentation.
@@ -196,7 +194,6 @@ class Entry:
     """
 
     key: str
-    text: str
     follows: str
     do: str
     read: str
@@ -234,20 +231,18 @@ def page() -> str:
     """The page of all warnings."""
     import textwrap
 
-    def filled(text: str, indent: str = "") -> list[str]:
-        width = {"width": 99, "break_on_hyphens": False, "break_long_words": False}
-        return textwrap.wrap(text, **width, initial_indent=indent, subsequent_indent=indent)
+    def filled(text: str) -> list[str]:
+        return textwrap.wrap(text, 99, break_on_hyphens=False, break_long_words=False)
 
     opening = (
-        "A warning names something that is valid but doubtful, and the run goes on. Here stands, "
-        "under the beginning of its text, what follows from it and what to do. What `fdnet check` "
-        "finds odd about sizes, speed and supply says all this itself."
+        "A warning names something that is valid but doubtful, and the run goes on. It ends with "
+        "its place on this page, which says what follows from it and what to do. What `fdnet "
+        "check` finds odd about sizes, speed and supply says all this itself."
     )
     lines = ["# Warnings", "", *filled(opening)]
     for key, entry in catalogue().items():
         title, *said = (
             one[0].upper() + one[1:] for one in (key.replace("-", " "), entry.follows, entry.do)
         )
-        lines += ["", f"## {title}", "", *filled(entry.text, "> "), ""]
-        lines += filled(f"{'. '.join(said)}. [More](../{entry.read})")
+        lines += ["", f"## {title}", "", *filled(f"{'. '.join(said)}. [More](../{entry.read})")]
     return "\n".join(lines) + "\n"
