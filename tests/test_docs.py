@@ -20,7 +20,7 @@ import reference_tables  # noqa: E402
 from case_keys import meaning_of, part_model  # noqa: E402
 
 LONGEST_LINE = 99
-RUN_PAGE = ROOT / "docs" / "reference" / "run_folder.md"
+RUN_PAGES = [ROOT / "docs" / "reference" / name for name in ("run_folder.md", "summary.md")]
 WORKPLACE = re.compile(
     r"(?<![\w.$}])/(?:work|home|root|mnt|srv|Users)/|https?://(?:[\d.:]+|\w+|[\w.-]+\.(?:local|lan|corp|internal))/"
 )
@@ -227,8 +227,9 @@ def test_broken_links_of_a_site_are_named(tmp_path):
 
 
 def explained(heading: str, *, table: int = 0) -> list[str]:
-    """First cells of a table of the run-folder page, counted from its heading."""
-    section = RUN_PAGE.read_text().split(f"\n## {heading}\n")[1].split("\n## ")[0]
+    """First cells of a table of the pages on the run folder, counted from its heading."""
+    text = "\n## ".join(page.read_text() for page in RUN_PAGES)
+    section = text.split(f"\n## {heading}\n")[1].split("\n## ")[0]
     block = re.findall(r"^\|.*?(?=\n\n|\Z)", section, re.M | re.S)[table]
     cells = [row.split(" | ")[0] for row in block.splitlines()[2:]]
     return [name for cell in cells if "(" not in cell for name in re.findall(r"`(.*?)`", cell)]
@@ -248,8 +249,8 @@ def test_everything_in_a_run_folder_is_explained(finished):
         == 1
     )
     summary = json.loads((run / "summary.json").read_text())
-    assert set(summary) | NOW_AND_THEN == set(explained("summary.json"))
-    assert set(summary["network_counts"]) <= set(explained("summary.json", table=1))
+    assert set(summary) | NOW_AND_THEN == set(explained("Keys"))
+    assert set(summary["network_counts"]) <= set(explained("Counts of the network"))
     patterns = explained("Files")
     files = [path.relative_to(run) for path in run.rglob("*") if path.is_file()]
     left = [one for one in files if not any(one.match(name) for name in (*patterns, ".lock"))]
