@@ -165,7 +165,6 @@ def words_of(error: Exception) -> str:
 
 
 PAGE = "docs/reference/warnings.md"
-GAP = "…"
 
 
 class Doubt(str):
@@ -188,7 +187,6 @@ class Entry:
 
     Attributes:
         key: its place on the page.
-        text: what it says, with `GAP` for what differs from case to case.
         follows: what follows.
         do: what to do.
         read: page of the documentation.
@@ -196,7 +194,6 @@ class Entry:
     """
 
     key: str
-    text: str
     follows: str
     do: str
     read: str
@@ -234,27 +231,18 @@ def page() -> str:
     """The page of all warnings."""
     import textwrap
 
-    def filled(text: str, indent: str = "  ") -> list[str]:
-        return textwrap.wrap(text, 97, subsequent_indent=indent, break_on_hyphens=False)
+    def filled(text: str) -> list[str]:
+        return textwrap.wrap(text, 99, break_on_hyphens=False, break_long_words=False)
 
-    lines = [
-        "# Warnings",
-        "",
-        "This page lists every warning of fdnet: what follows from it, and what to do. A warning",
-        "names something that is valid but doubtful, and the run goes on. … stands for what",
-        "differs from case to case. What `fdnet check` finds odd about the sizes, the speed and",
-        "the supply of a case comes first in the summary; it says all this itself.",
-    ]
+    opening = (
+        "A warning names something that is valid but doubtful, and the run goes on. It ends with "
+        "its place on this page, which says what follows from it and what to do. What `fdnet "
+        "check` finds odd about sizes, speed and supply says all this itself."
+    )
+    lines = ["# Warnings", "", *filled(opening)]
     for key, entry in catalogue().items():
-        lines += [
-            "",
-            f"({key})=",
-            f"## {key.replace('-', ' ').capitalize()}",
-            "",
-            *filled(f"> {entry.text}", "> "),
-            "",
-            *filled(f"- **What follows:** {entry.follows}."),
-            *filled(f"- **What to do:** {entry.do}."),
-            f"- **Read:** [{entry.read}](../{entry.read})",
-        ]
+        title, *said = (
+            one[0].upper() + one[1:] for one in (key.replace("-", " "), entry.follows, entry.do)
+        )
+        lines += ["", f"## {title}", "", *filled(f"{'. '.join(said)}. [More](../{entry.read})")]
     return "\n".join(lines) + "\n"

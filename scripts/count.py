@@ -68,15 +68,21 @@ def lines(paths: list[Path]) -> int:
 
 def main() -> None:
     """Print the counts as a table."""
-    package, tests = [sorted((ROOT / name).rglob("*.py")) for name in ("fdnet", "tests")]
+    folders = {
+        "campaign": "fdnet/campaign",
+        "evidence": "scripts/validation",
+        "tests": "tests",
+    }
     pages = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "docs").rglob("*.md.in")]
     pages = [page for page in pages if page.name != "CHANGELOG.md" and "_build" not in page.parts]
     words = sum(len(page.read_text("utf-8").split()) for page in pages)
     files = [path for path in core(ROOT) if path.name != "__init__.py"]
     rows = [
         ("core", f"{lines(core(ROOT)):,} lines in {len(files)} files"),
-        ("package", f"{lines(package):,} lines"),
-        ("tests", f"{lines(tests):,} lines"),
+        *(
+            (name, f"{lines(sorted((ROOT / folder).rglob('*.py'))):,} lines")
+            for name, folder in folders.items()
+        ),
         ("public names of the core defined twice", f"{len(names_twice(ROOT))}"),
         ("words of pages", f"{words:,}"),
     ]

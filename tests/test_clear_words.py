@@ -55,8 +55,8 @@ def test_a_second_line_of_an_assignment_is_not_dropped(tmp_path, case, capsys):
         assert "is not one value" in err
 
 
-@pytest.mark.parametrize("number", ["9" * 400, "9" * 5000])
-def test_long_numbers_in_files_of_spheres_are_refused(tmp_path, capsys, number):
+def test_long_numbers_in_files_of_spheres_are_refused(tmp_path, capsys):
+    number = "9" * 5000
     table = tmp_path / "s.csv"
     table.write_text(
         CUBE.replace("radius_m\n", "radius_m,id\n").replace(",0.5\n", f",0.5,{number}\n")
@@ -77,34 +77,20 @@ def test_long_numbers_in_files_of_spheres_are_refused(tmp_path, capsys, number):
     assert "too large" in refusal(capsys, "permeability", dump)
 
 
-@pytest.mark.parametrize(("column", "value"), [("type", 3.0), ("radius", 0.0)])
-def test_a_dump_of_a_run_with_a_sphere_of_no_kind_or_size_is_named(column, value):
+def test_a_dump_of_a_run_with_a_sphere_of_no_kind_or_size_is_named():
     from fdnet.dem.deck import snapshot_of
     from fdnet.spheres.dump import COLUMNS, Frame
 
     columns = tuple(COLUMNS.split())
-    rows = np.array([[7, 1, 1e-4, 1e-4, 1e-4, 0, 0, 0, 2e-4]])
-    rows[0, columns.index(column)] = value
-    frame = Frame(step=5, box=np.array([[0, 1.0]] * 3), columns=columns, rows=rows)
-    with pytest.raises(DumpError, match=f"id 7 has {column} {value:g}"):
-        snapshot_of(frame, tiny(), time_s=0.0)
+    for column, value in (("type", 3.0), ("radius", 0.0)):
+        rows = np.array([[7, 1, 1e-4, 1e-4, 1e-4, 0, 0, 0, 2e-4]])
+        rows[0, columns.index(column)] = value
+        frame = Frame(step=5, box=np.array([[0, 1.0]] * 3), columns=columns, rows=rows)
+        with pytest.raises(DumpError, match=f"id 7 has {column} {value:g}"):
+            snapshot_of(frame, tiny(), time_s=0.0)
 
 
-@pytest.mark.parametrize(
-    ("stage", "key", "value"),
-    [
-        ("pack", "runs", []),
-        ("pack", "runs", ["x"]),
-        ("pack", "seconds", "long"),
-        ("pack", "attempts", {}),
-        ("invade", "warnings", [1]),
-        ("invade", "digest", None),
-        ("manifest", "stages", {"pack": 1}),
-        ("manifest", "invade", [1]),
-        ("manifest", "stages", None),
-    ],
-)
-def test_records_of_another_shape_are_named(tmp_path, stage, key, value):
+def test_records_of_another_shape_are_named(tmp_path):
     from fdnet.run.folder import read_manifest, read_record
 
     row = {"version": "3.8.0", "seconds": 1.0, "liggghts_s": 1.0}
@@ -114,42 +100,39 @@ def test_records_of_another_shape_are_named(tmp_path, stage, key, value):
     )
     texts = {"digest": "x", "stop_reason": "x", "left_out": [], "warnings": []}
     good = {"format": 1, "stages": [], "invade": None, "runs": [row], "attempts": [row], **files}
-    path = tmp_path / ("manifest.json" if stage == "manifest" else f"{stage}/stage.json")
-    path.parent.mkdir(exist_ok=True)
-    path.write_text(json.dumps(good | numbers | texts))
-    read = (
-        (lambda: read_manifest(tmp_path))
-        if stage == "manifest"
-        else (lambda: read_record(tmp_path, stage))
-    )
-    assert read() is not None
-    path.write_text(json.dumps(good | numbers | texts | {key: value}))
-    with pytest.raises(CaseError, match=rf"{key}.*--force"):
-        read()
+    for stage, key, value in (
+        ("pack", "runs", []),
+        ("pack", "runs", ["x"]),
+        ("pack", "seconds", "long"),
+        ("pack", "attempts", {}),
+        ("invade", "warnings", [1]),
+        ("invade", "digest", None),
+        ("manifest", "stages", {"pack": 1}),
+        ("manifest", "invade", [1]),
+        ("manifest", "stages", None),
+    ):
+        path = tmp_path / ("manifest.json" if stage == "manifest" else f"{stage}/stage.json")
+        path.parent.mkdir(exist_ok=True)
+
+        def read(stage: str = stage) -> object:
+            return read_manifest(tmp_path) if stage == "manifest" else read_record(tmp_path, stage)
+
+        path.write_text(json.dumps(good | numbers | texts))
+        assert read() is not None
+        path.write_text(json.dumps(good | numbers | texts | {key: value}))
+        with pytest.raises(CaseError, match=rf"{key}.*--force"):
+            read()
 
 
-def test_an_empty_summary_of_a_finished_run_is_named(tmp_path, monkeypatch):
-    from fdnet.run import pipeline
-
-    (tmp_path / "summary.json").write_text("")
-
-    class Folder:
-        path = tmp_path
-
-    with pytest.raises(CaseError, match=r"summary.json: cannot be read as JSON"):
-        pipeline._read_summary(Folder())
-
-
-@pytest.mark.parametrize("value", ["nan", "inf", "0", "-1"])
-def test_a_time_limit_is_a_number_of_seconds(tmp_path, case, capsys, value):
-    err = refusal(capsys, "run", case, "--out", tmp_path / "run", f"--timeout={value}")
-    assert "timeout" in err
+def test_limits_of_time_ranks_and_grains_are_refused_before_anything_runs(tmp_path, case, capsys):
+    run = ["run", case, "--out", tmp_path / "run", "--set", "fluid.velocity_m_s=0.1"]
+    for option, word in (
+        *((f"--timeout={value}", "timeout") for value in ("nan", "inf", "0", "-1")),
+        *((f"--set=grains.count={count}", "expected at least 4") for count in (1, 2, 3)),
+        ("--np=1000000", "ranks: 1000000"),
+    ):
+        assert word in refusal(capsys, *run, option)
     assert not (tmp_path / "run").exists()
-
-
-def test_ranks_have_a_bound_that_fits_the_machine(tmp_path, case, capsys):
-    err = refusal(capsys, "run", case, "--out", tmp_path / "run", "--np", "1000000")
-    assert "ranks: 1000000" in err
 
 
 def test_more_ranks_than_cores_are_warned_of_at_once(tmp_path, case, capsys, monkeypatch):
@@ -161,13 +144,6 @@ def test_more_ranks_than_cores_are_warned_of_at_once(tmp_path, case, capsys, mon
     code, err = answer(capsys, "run", case, "--out", tmp_path / "run", "--np", "64")
     assert code == 0
     assert "--np 64: this machine has 2 cores" in err
-
-
-@pytest.mark.parametrize("count", [1, 2, 3])
-def test_too_few_grains_are_refused_before_anything_runs(tmp_path, case, capsys, count):
-    command = ["run", case, "--out", tmp_path / "run", "--set", f"grains.count={count}"]
-    assert "expected at least 4" in refusal(capsys, *command, "--set", "fluid.velocity_m_s=0.1")
-    assert not (tmp_path / "run").exists()
 
 
 def test_a_picture_that_could_not_be_drawn_is_said_on_standard_error(
@@ -256,23 +232,21 @@ def test_a_reader_that_has_gone_does_not_fail_the_command(tmp_path):
 
 
 def test_a_library_that_cannot_be_loaded_is_named(tmp_path, capsys, monkeypatch):
-    """As under a limit of memory, where the linker cannot map a library."""
+    """As under a limit of memory: the linker cannot map a library, or Python itself fails."""
+    from fdnet.commands import permeability as permeability_command
+
     table = tmp_path / "s.csv"
     table.write_text(CUBE)
-    monkeypatch.setitem(sys.modules, "fdnet.spheres.readers", None)
-    arguments = ("permeability", table, "--units", "mm", "--box", "0,1,0,1,0,1")
-    assert "fdnet: a library cannot be loaded (" in refusal(capsys, *arguments)
-
-
-def test_a_failure_of_python_itself_for_want_of_memory_is_named(capsys, monkeypatch, tmp_path):
-    """Attack 939 of seed 1: an import under a limit of 300 MiB ended with a SystemError."""
-    from fdnet.commands import permeability as permeability_command
+    with monkeypatch.context() as patch:
+        patch.setitem(sys.modules, "fdnet.spheres.readers", None)
+        arguments = ("permeability", table, "--units", "mm", "--box", "0,1,0,1,0,1")
+        assert "fdnet: a library cannot be loaded (" in refusal(capsys, *arguments)
 
     def importing(_):
         raise SystemError("_find_and_load returned NULL without setting an exception")
 
     monkeypatch.setattr(permeability_command, "run", importing)
-    assert "give fdnet more memory" in refusal(capsys, "permeability", tmp_path / "s.csv")
+    assert "give fdnet more memory" in refusal(capsys, "permeability", table)
 
 
 def test_a_stop_that_a_library_turns_into_its_own_error_is_a_stop(capsys, monkeypatch, tmp_path):
@@ -303,16 +277,13 @@ def pack(fine: list[float] | None = None, radius: float = 0.1, *, side: float = 
     return Snapshot.from_arrays(places, radii, kind=kinds, box=[0, side] * 3)
 
 
-@pytest.mark.parametrize(
-    ("radius", "limit"),
-    [
+def test_a_fine_larger_than_any_grain_or_wider_than_the_box_is_refused():
+    for radius, limit in (
         (60.0, "more than half the shortest side of the box"),
         (0.6, "the smallest grain one of 0.5 m"),
-    ],
-)
-def test_a_fine_larger_than_any_grain_or_wider_than_the_box_is_refused(radius, limit):
-    with pytest.raises(NetworkError, match=rf"id 28 has a radius of {radius:g} m, {limit}"):
-        analyse(pack([1.0, 1.0, 1.0], radius))
+    ):
+        with pytest.raises(NetworkError, match=rf"id 28 has a radius of {radius:g} m, {limit}"):
+            analyse(pack([1.0, 1.0, 1.0], radius))
 
 
 def test_fines_beyond_the_side_walls_are_counted():

@@ -31,13 +31,15 @@ UNITS = {
     "_m": "m",
 }
 """End of a key and the unit it stands for; the longer ends first."""
+SIGNS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 SPACE = "\N{NO-BREAK SPACE}"
 
 
-def key_rows(part: str) -> Iterator[tuple[str, ...]]:
-    """Key, unit, default, range and meaning, in Markdown, of every key of the table `part`.
+def key_rows(part: str) -> Iterator[tuple[str, str, str]]:
+    """Key, default and meaning, in Markdown, of every key of the table `part`.
 
-    A dotted `part` is a table inside another, such as grains.sizes.
+    A dotted `part` is a table inside another, such as grains.sizes. The unit stands with the
+    default; choices that the meaning does not name, and bounds other than "above 0", follow it.
     """
     from fdnet.case.case import InvasionCase
 
@@ -48,14 +50,7 @@ def key_rows(part: str) -> Iterator[tuple[str, ...]]:
         model = inner
     for name, field in model.model_fields.items():
         if part or part_model(field.annotation) is None:
-            key = f"{part}.{name}" if part else name
-            yield (
-                f"`{key}`",
-                unit_of(name),
-                _default(field),
-                _range(field),
-                meaning_of(model, name),
-            )
+            yield f"`{name}`", _default(name, field), _meaning(model, name)
 
 
 def meaning_of(model: type[BaseModel], name: str) -> str:
@@ -91,15 +86,14 @@ def part_model(annotation: Any) -> type[BaseModel] | None:
     return None
 
 
-def unit_of(key: str) -> str:
-    """The unit in a key's name, a dash without one."""
-    return next((unit for end, unit in UNITS.items() if key.endswith(end)), "–")
-
-
-def _default(field: FieldInfo) -> str:
+def _default(name: str, field: FieldInfo) -> str:
     if field.is_required():
         return "**required**"
-    return "–" if field.default is None else f"`{_toml(field.default)}`"
+    if field.default in (None, {}):
+        return ""
+    unit = next((unit for end, unit in UNITS.items() if name.endswith(end)), "")
+    text = " ".join(filter(None, (f"`{_toml(field.default)}`", unit)))
+    return text.replace(" ", SPACE) if unit else text
 
 
 def _toml(value: Any) -> str:
@@ -112,55 +106,33 @@ def _toml(value: Any) -> str:
     return f'"{value}"' if isinstance(value, str) else str(value)
 
 
-def _range(field: FieldInfo) -> str:
-    parts = list(_ranges(field.annotation, [*field.metadata]))
-    return " or ".join(dict.fromkeys(parts))
+def _meaning(model: type[BaseModel], name: str) -> str:
+    text, field = meaning_of(model, name), model.model_fields[name]
+    limits = [one for one in _limits(field.annotation, [*field.metadata]) if one not in text]
+    return f"{text} ({', '.join(dict.fromkeys(limits))})" if limits else text
 
 
-def _ranges(annotation: Any, metadata: list[Any]) -> Iterator[str]:
-    """What values a type takes; `metadata` are its bounds."""
-    arguments = get_args(annotation)
-    if part_model(annotation) is not None and get_origin(annotation) is None:
-        yield "table"
-    elif arguments and part_model(arguments[0]) is not None and ... in arguments:
-        yield "list of tables"
-    elif get_origin(annotation) is tuple and ... in arguments:
-        yield f"list, each {next(_ranges(arguments[0], []))}"
-    elif get_origin(annotation) is Literal:
-        yield ", ".join(f"`{_toml(value)}`" for value in arguments)
-    elif get_origin(annotation) is tuple:
-        each = next(_ranges(arguments[0], metadata))
-        yield f"list of {len(arguments)}, each {each}"
+def _limits(annotation: Any, metadata: list[Any]) -> Iterator[str]:
+    """Choices and bounds of a type; `metadata` are its bounds."""
+    if get_origin(annotation) is Literal:
+        yield from (_toml(value) for value in get_args(annotation) if value is not None)
     elif hasattr(annotation, "__metadata__"):
-        yield from _ranges(annotation.__origin__, [*metadata, *annotation.__metadata__])
-    elif arguments:
-        for kind in arguments:
-            if kind is not type(None):
-                yield from _ranges(kind, metadata)
-    elif annotation is bool:
-        yield "`true`, `false`"
-    elif annotation is str:
-        yield "text"
-    else:
-        yield _bounds(metadata) or ("whole number" if annotation is int else "number")
+        yield from _limits(annotation.__origin__, [*metadata, *annotation.__metadata__])
+    elif part_model(annotation) is None and annotation is not str:
+        yield from _bounds(metadata)
+        for kind in get_args(annotation):
+            yield from _limits(kind, [])
 
 
-def _bounds(metadata: list[Any]) -> str:
-    """Bounds as signs; the range 1e-18 to 1e15, which stands for any positive number, is "> 0".
-
-    The sign is escaped, as a Markdown text that starts with it is a quotation.
-    """
+def _bounds(metadata: list[Any]) -> Iterator[str]:
+    """Upper bounds as signs; a range far beyond use has none."""
     bounds: dict[str, Any] = {}
     for item in metadata:
         for part in getattr(item, "metadata", [item]):
-            for name in ("gt", "ge", "lt", "le"):
+            for name in SIGNS:
                 if getattr(part, name, None) is not None:
                     bounds[name] = getattr(part, name)
-    if (bounds.get("ge"), bounds.get("le")) == (1e-18, 1e15):
-        bounds = {"gt": 0}
-    signs = {"gt": "\\>", "ge": "≥", "lt": "<", "le": "≤"}
-    return ", ".join(f"{signs[name]}{SPACE}{_plain(value)}" for name, value in bounds.items())
-
-
-def _plain(value: float) -> str:
-    return "2³¹" if value == 2**31 else f"{value:g}"
+    if (bounds.get("ge"), bounds.get("le")) != (1e-18, 1e15):
+        for name, value in bounds.items():
+            if name in ("lt", "le"):
+                yield f"{SIGNS[name]}{SPACE}{'2³¹' if value == 2**31 else f'{value:g}'}"

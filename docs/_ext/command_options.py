@@ -1,8 +1,12 @@
-"""Usage and options of each command of fdnet as rows of a table, from its own parser."""
+"""Options of each command of fdnet as rows of a table, from its own parser."""
 
 import argparse
 import re
+from collections import Counter
 from collections.abc import Iterator
+
+SHARED = 3
+"""An option that means the same to so many commands is explained once."""
 
 
 def commands() -> dict[str, argparse.ArgumentParser]:
@@ -15,14 +19,22 @@ def commands() -> dict[str, argparse.ArgumentParser]:
     raise LookupError("the parser of fdnet has no commands")
 
 
-def usage_of(parser: argparse.ArgumentParser) -> str:
-    """The usage of a command, wrapped to the width of the page."""
-    parser.formatter_class = lambda prog: argparse.HelpFormatter(prog, width=78)
-    return parser.format_usage().removeprefix("usage: ").replace("[-h] ", "").strip()
+def shared_rows() -> list[tuple[str, str]]:
+    """Name and meaning of the arguments that `SHARED` or more commands take, in Markdown."""
+    rows = Counter(row for parser in commands().values() for row in _rows(parser))
+    return sorted(row for row, count in rows.items() if count >= SHARED)
 
 
-def option_rows(parser: argparse.ArgumentParser) -> Iterator[tuple[str, str]]:
-    """Name and meaning of every argument, in Markdown; raises LookupError for one without help."""
+def own_rows(name: str) -> list[tuple[str, str]]:
+    """Name and meaning of the other arguments of a command, and a row that names the shared."""
+    shared, rows = shared_rows(), list(_rows(commands()[name]))
+    names = ", ".join(f"`{row[0].strip('`').split()[0]}`" for row in rows if row in shared)
+    also = [("Also", f"{names}.")] if names else []
+    return [row for row in rows if row not in shared] + also
+
+
+def _rows(parser: argparse.ArgumentParser) -> Iterator[tuple[str, str]]:
+    """Every argument; raises LookupError for one without help."""
     for action in parser._actions:
         if isinstance(action, argparse._HelpAction):
             continue

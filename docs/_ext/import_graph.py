@@ -3,15 +3,13 @@
     python docs/_ext/import_graph.py
 
 writes `docs/import_graph.csv`, one row for each edge (who imports whom), and the picture
-`docs/import_graph.svg`, and puts their counts into `docs/architecture.md`. One node is a folder
-of `fdnet`, or a module directly in it, or all scripts, or the deck templates, which `fdnet.dem`
-reads as package data.
+`docs/import_graph.svg`. One node is a folder of `fdnet`, or a module directly in it, or all
+scripts, or the deck templates, which `fdnet.dem` reads as package data.
 """
 
 import ast
 import csv
 import hashlib
-import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -118,14 +116,6 @@ def counts_of(nodes: set[str], edges: set[Edge]) -> str:
     return f"{len(nodes)} nodes, {layers} layers, {len(edges)} edges"
 
 
-def write_counts(page: Path, nodes: set[str], edges: set[Edge]) -> None:
-    """Put how many nodes, layers and edges there are into the row "now" of the page's table."""
-    layers = 1 + max(layers_of(nodes, edges).values())
-    row = f"| now | {len(nodes)} | {layers} | {len(edges)} |"
-    text = page.read_text("utf-8")
-    page.write_text(re.sub(r"(?m)^\| now \|.*$", row, text, count=1), "utf-8")
-
-
 def draw_svg(path: Path, nodes: set[str], edges: set[Edge]) -> None:
     """Nodes by layer from the bottom up; an edge that others imply is thin."""
     import matplotlib
@@ -209,7 +199,6 @@ def main() -> int:
     nodes, edges = nodes_of(ROOT), edges_of(ROOT)
     write_csv(ROOT / "docs" / "import_graph.csv", edges)
     draw_svg(ROOT / "docs" / "import_graph.svg", nodes, edges)
-    write_counts(ROOT / "docs" / "architecture.md", nodes, edges)
     print(f"docs/import_graph.csv, docs/import_graph.svg: {counts_of(nodes, edges)}")
     return 0
 

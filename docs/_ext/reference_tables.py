@@ -2,8 +2,8 @@
 
     python docs/_ext/reference_tables.py --write    # after a change of a key or an option
 
-Each table stands between two comments, `<!-- case-keys grains -->` (or `command-options run`) and
-`<!-- end -->`. The pages are therefore whole where they are read as plain Markdown, too.
+Each table stands between two comments, `<!-- case-keys grains -->` (or `command-options run`, or
+`shared-options`) and `<!-- end -->`, so the pages are whole as plain Markdown, too.
 """
 
 import re
@@ -12,32 +12,32 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from case_keys import key_rows
-from command_options import commands, option_rows, usage_of
+from command_options import own_rows, shared_rows
 
 from fdnet.errors import PAGE, page
 
 PAGES = ("docs/reference/case.md", "docs/reference/commands.md")
 BLOCK = re.compile(
-    r"(<!-- (case-keys|command-options)(?: ([\w.]+))? -->\n).*?(<!-- end -->)", re.S
+    r"(<!-- (case-keys|command-options|shared-options)(?: ([\w.]+))? -->\n).*?(<!-- end -->)",
+    re.S,
 )
 
 
 def filled(page: str) -> str:
     """The text of a page with the tables of the models and parsers between its comments."""
-    return BLOCK.sub(lambda block: f"{block[1]}\n{_content(block[2], block[3])}\n{block[4]}", page)
+    return BLOCK.sub(lambda block: f"{block[1]}\n{_table(block[2], block[3])}\n{block[4]}", page)
 
 
-def _content(kind: str, name: str | None) -> str:
+def _table(kind: str, name: str | None) -> str:
     if kind == "case-keys":
-        return _table(("Key", "Unit", "Default", "Range", "Meaning"), list(key_rows(name or "")))
-    parser = commands()[str(name)]
-    rows = _table(("Argument", "Meaning"), list(option_rows(parser)))
-    return f"```text\n{usage_of(parser)}\n```\n\n{rows}"
+        return _lines(("Key", "Default", "Meaning"), list(key_rows(name or "")))
+    rows = shared_rows() if kind == "shared-options" else own_rows(str(name))
+    return _lines(("Argument", "Meaning"), rows)
 
 
-def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def _lines(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = [header, ["---"] * len(header), *rows]
-    cells = [[" ".join(cell.split()).replace("|", r"\|") for cell in line] for line in lines]
+    cells = [[" ".join(cell.split(" ")).replace("|", r"\|") for cell in line] for line in lines]
     return "".join(f"| {' | '.join(line)} |\n" for line in cells)
 
 

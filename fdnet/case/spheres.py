@@ -65,8 +65,8 @@ class Sizes(Part):
     D90_mm: Positive | None = None
     """Diameter that 90 % are finer than."""
     shape: Literal["log-normal", "rosin-rammler"] | None = None
-    """Law through D10, D50 and D90. When absent: the one of the two that misses them least, for
-    two given diameters the log-normal one."""
+    """Law through the diameters. When absent: the one that misses them least, "log-normal" for
+    two."""
     size_mm: Lengths | None = None
     """Diameters of a measured curve, rising; it is straight over ln d."""
     passing_percent: Percents | None = None
@@ -74,8 +74,7 @@ class Sizes(Part):
     by: Literal["mass", "volume", "surface", "number"] = "mass"
     """What the percentages count. Mass and volume are the same for one material."""
     cut_percent: Cut = (1.0, 99.0)
-    """Ends of the curve, by volume: finer and coarser sizes are left out, and the summary says
-    what share of the solids they are."""
+    """Ends of the curve, by volume: finer and coarser sizes are left out."""
 
     @model_validator(mode="after")
     def _is_a_curve(self) -> Self:
@@ -202,14 +201,13 @@ class Material(Part):
     name: str = Field(min_length=1, max_length=60)
     """Name of the material."""
     share: Positive
-    """Its share of the solids by mass; the shares are relative to their sum."""
+    """Its share of the solids by mass, relative to the sum of shares."""
     sizes: Sizes
     """Its curve of diameters, as `fines.sizes`."""
     density_kg_m3: Positive | None = None
     """Density of the material. When absent: `fines.density_kg_m3`."""
     friction: NonNegative | None = None
-    """Coefficient of sliding friction; for now it must be that of all fines, `fines.friction`,
-    which is also the default."""
+    """Must be `fines.friction`, which is the default."""
 
 
 SHEAR_RATIO = 0.04
@@ -221,10 +219,9 @@ class Spheres(Part):
     """What grains and fines share: sizes, density and the parameters of their contacts."""
 
     radius_mm: Radius | None = None
-    """Radius of a sphere. A list of two values, [smallest, largest], gives radii that are uniform
-    by number between them. Give this or `sizes`."""
+    """Radius. A list [smallest, largest] gives radii uniform by number. Give this or `sizes`."""
     sizes: Sizes | None = None
-    """A measured curve of diameters instead of `radius_mm`; its keys are below."""
+    """A measured curve of diameters instead; its keys are below."""
     density_kg_m3: Positive
     """Density of the solid."""
     normal_stiffness_N_m: Positive
@@ -239,10 +236,9 @@ class Spheres(Part):
     poissons_ratio: Annotated[float, Field(ge=0, le=0.5)]
     """Poisson's ratio of the material, for contact.model = "hertz"."""
     friction: NonNegative = 0.55
-    """Coefficient of sliding friction. A contact takes the smaller value of its two materials."""
+    """Sliding friction. A contact takes the smaller value of its two materials."""
     damping_ratio: Annotated[float, Field(ge=0, lt=1)] = 0.2
-    """Damping of a contact over its critical damping. A contact takes the mean of its two
-    materials."""
+    """Damping over critical damping. A contact takes the mean of its two materials."""
 
     @property
     def tangential_stiffness(self) -> float:
@@ -366,35 +362,32 @@ class Grains(Spheres):
     """
 
     porosity: Fraction | None = None
-    """Porosity of the finished pack, with overlaps of grains counted once. The number of grains is
-    adjusted until it is met within 0.003."""
+    """Porosity of the pack, overlaps counted once. The number of grains is adjusted until it is
+    met within 0.003."""
     count: Annotated[int, Field(ge=1)] | None = None
     """Number of grains. It overrides `porosity`."""
     density_kg_m3: Positive = 2650.0
     """Density of the grains."""
     normal_stiffness_N_m: Positive = 94.3e9
-    """Normal contact stiffness of the grains' material, and of the walls. `run.stiffness_N_m`
-    scales all contact stiffnesses by one factor."""
+    """Normal contact stiffness of grains and walls. `run.stiffness_N_m` scales all by one
+    factor."""
     shear_stiffness_N_m: Positive | None = None
-    """Tangential contact stiffness of the grains' material, and of the walls. When absent: 0.04 of
-    the normal one, so that friction lets go of fines that roll around the neck of two grains. The
-    thesis has 34e9."""
+    """Tangential one. When absent: 0.04 of the normal one, so that fines do not lock between
+    grains. The thesis has 34e9."""
     youngs_modulus_GPa: Positive = 94.3
-    """Young's modulus of the grains' material, and of the walls, for contact.model = "hertz". The
-    default is the thesis's (quartz). `run.stiffness_N_m` scales all moduli by one factor."""
+    """Young's modulus of grains and walls, for "hertz" (quartz). `run.stiffness_N_m` scales all by
+    one factor."""
     poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = 0.387
-    """Poisson's ratio of the grains' material, and of the walls, for contact.model = "hertz". The
-    default is E / 2G - 1 of the thesis's 94.3 and 34 GPa."""
+    """Poisson's ratio of grains and walls, for "hertz"."""
     motion: Literal["fixed", "mobile"] = "fixed"
-    """Motion of the grains during the invasion: "fixed" keeps them in place, "mobile" lets the
-    fines push them. The fluid itself does not push grains."""
+    """"fixed" grains stay in place during the invasion, "mobile" ones are pushed by fines, not by
+    the fluid."""
     max_overlap: Fraction = 0.15
-    """Largest accepted overlap of two grains in the pack, over the smaller diameter. A denser pack
-    is refused."""
+    """Largest accepted overlap of two grains, over the smaller diameter; a denser pack is
+    refused."""
     packing_stiffness_N_m: Positive = 1.0e4
-    """Stiffness of the stiffest contact while the pack is made. The same seed gives the same pack
-    whatever `run.stiffness_N_m` is. With another value here its numbers are rounded otherwise,
-    which makes another pack of the same kind."""
+    """Stiffness of the stiffest contact while the pack is made, whatever `run.stiffness_N_m` is.
+    With another value the same seed gives another pack of the same kind."""
 
 
 class Fines(Spheres):
@@ -408,31 +401,26 @@ class Fines(Spheres):
     density_kg_m3: Positive = 2146.0
     """Density of the fines."""
     normal_stiffness_N_m: Positive = 63.0e9
-    """Normal contact stiffness of the fines' material."""
+    """Normal contact stiffness."""
     shear_stiffness_N_m: Positive | None = None
-    """Tangential contact stiffness of the fines' material. When absent: 0.04 of the normal one.
-    The thesis has 26e9."""
+    """Tangential one. When absent: 0.04 of the normal one. The thesis has 26e9."""
     youngs_modulus_GPa: Positive = 63.0
-    """Young's modulus of the fines' material, for contact.model = "hertz". The default is the
-    thesis's."""
+    """Young's modulus, for "hertz"."""
     poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = 0.212
-    """Poisson's ratio of the fines' material, for contact.model = "hertz". The default is E / 2G -
-    1 of the thesis's 63 and 26 GPa."""
+    """Poisson's ratio, for "hertz"."""
     materials: Materials | None = None
-    """Several materials, each a table with its own sizes, instead of `radius_mm` or `sizes`; their
-    keys are below."""
+    """Several materials instead; their keys are below."""
     cut_um: Positive | None = None
-    """Diameter below which solids of measured sizes are left out. Their share is said in the
-    warnings of the summary, and the suspension is thinner by it."""
+    """Diameter below which solids of measured sizes are left out. The mud is thinner by their
+    share, which a warning names."""
     concentration: Annotated[float, Field(gt=0, le=MAX_CONCENTRATION)] | None = 0.10
-    """Volume of solids over the volume of suspension in the slab upstream. It has no default where
-    `solids_kg_m3` is given."""
+    """Volume of solids over that of the mud."""
     solids_kg_m3: Positive | None = None
     """Mass of solids in a volume of mud, instead of `concentration`."""
     count: Annotated[int, Field(ge=1)] | None = None
-    """Number of fines supplied. The length of the slab follows from it."""
+    """Number of fines supplied."""
     slab_mm: Positive | None = None
-    """Length of the slab of suspension along the flow. The number of fines follows from it."""
+    """Length of the slab of mud, instead of `count`."""
     supply: Literal["slab", "batches"] = "batches"
     """How the fines enter: "batches" puts each part of the slab in when it is about to arrive,
     "slab" puts all of them in at the start. The suspension is the same; batches are much faster

@@ -109,18 +109,16 @@ class Fluid(Part):
     density_kg_m3: Positive = 1095.0
     """Density; it decides buoyancy and the particle Reynolds number."""
     overbalance_MPa: Positive = 3.5
-    """Pressure of the mud above that of the formation. Darcy's law turns it into the fluid's
-    velocity."""
+    """Pressure of the mud above that of the formation; it drives the fluid by Darcy's law."""
     velocity_m_s: Positive | None = None
-    """Interstitial velocity of the fluid along x. When absent it follows from `overbalance_MPa`
-    and either the table `[well]` or `darcy_length_mm`."""
+    """Interstitial velocity along x. When absent it follows from the overbalance and `[well]` or
+    `darcy_length_mm`."""
     darcy_length_mm: Positive | None = None
-    """Length of a plug over which the whole overbalance is lost. Without it and without the table
-    `[well]` it is the length of the box, which warns: around a well the gradient is about a
-    hundred times less."""
+    """Length of a plug over which the whole overbalance is lost. When absent, without a well: the
+    length of the box, which warns."""
     darcy_law: Literal["darcy", "ergun"] = "darcy"
-    """How the overbalance becomes a velocity: "darcy" takes the viscous loss alone, "ergun" adds
-    the loss by inertia. Where this loss lowers the velocity by 5 % or more, "darcy" warns."""
+    """The overbalance makes the velocity by the viscous loss alone ("darcy"), or with the loss by
+    inertia ("ergun"). "darcy" warns where inertia takes 5 % or more."""
 
     viscosity_Pa_s: ClassVar = InSI[float]("viscosity_cP", 1e-3)
     """Dynamic viscosity, Pa s."""
@@ -147,8 +145,8 @@ class Well(Part):
     drainage_radius_m: Positive
     """Radius at which the pressure is that of the undisturbed formation."""
     formation_permeability_mD: Positive | None = None
-    """Permeability of the formation around the well. When absent it is that of the pack: by Carman
-    and Kozeny, and by the network where the flow follows the deposit."""
+    """Permeability of the formation. When absent: that of the pack by Carman and Kozeny, by the
+    network where the flow follows the deposit."""
 
     radius_m: ClassVar = InSI[float]("radius_mm", 1e-3)
     """Radius of the well, m."""
@@ -171,19 +169,17 @@ class ContactLaw(Part):
     """[contact], the law of all contacts; what is not asked for is left out of the deck."""
 
     model: Literal["hooke", "hertz"] = "hooke"
-    """Contact law: "hooke", linear springs of `normal_stiffness_N_m` and `shear_stiffness_N_m`, or
-    "hertz", Hertz-Mindlin contacts of `youngs_modulus_GPa` and `poissons_ratio`."""
+    """"hooke": linear springs. "hertz": Hertz-Mindlin contacts of the moduli."""
 
     restitution: Literal["dry", "liquid"] = "dry"
-    """Rebound of fines: "dry" takes `damping_ratio` as it is, "liquid" lowers the restitution of
-    every contact of a fine by exp(-35 / St), St being the impact Stokes number at the velocity of
-    the fluid. Below a St of 10 nothing rebounds."""
+    """Rebound of fines: "dry" takes `damping_ratio` as it is, "liquid" lowers the restitution by
+    exp(-35 / St), St being the impact Stokes number."""
     rolling_friction: Positive | None = None
-    """Coefficient of rolling friction of all contacts with friction: the largest rolling torque
-    over normal force and effective radius. When absent nothing resists rolling."""
+    """Largest rolling torque of a contact over normal force and effective radius. When absent
+    nothing resists rolling."""
     cohesion_J_m3: Positive | None = None
-    """Cohesion of every contact of a fine: attraction over the area of contact (LIGGGHTS's SJKR).
-    It needs contact.model = "hertz". When absent nothing attracts."""
+    """Attraction of a fine's contact over its area (LIGGGHTS's SJKR). It needs "hertz". When
+    absent nothing attracts."""
 
     @property
     def other_keys(self) -> frozenset[str]:
@@ -232,12 +228,12 @@ class Box(Part):
     """
 
     size_mm: Triple
-    """Three side lengths of the box. The mud flows along the first side."""
+    """Three side lengths; the mud flows along the first."""
     sides: Literal["walls", "periodic"] = "periodic"
-    """What bounds the box in y and z: periodic images of itself, or solid walls."""
+    """What bounds the box in y and z: "periodic" images of itself, or solid "walls"."""
     wall_friction: NonNegative | None = None
-    """Coefficient of sliding friction of the side walls, if there are any. When absent it is that
-    of the grains. A contact takes the smaller value of the wall and the sphere."""
+    """Sliding friction of side walls. When absent: that of the grains. A contact takes the smaller
+    value of wall and sphere."""
 
     @property
     def size_m(self) -> tuple[float, float, float]:
@@ -259,38 +255,32 @@ class Drag(Part):
     """
 
     field: Literal["uniform", "network"] = "uniform"
-    """Velocity field of the fluid: "uniform" is the same velocity everywhere. "network" follows
-    the pores of the pack and the deposit in them: fdnet solves it anew while LIGGGHTS waits."""
+    """"uniform": one velocity everywhere. "network": the fluid follows the pores and the deposit
+    in them."""
     multiplier: Positive = 1.0
     """Factor on the Stokes drag."""
     scheme: Literal["held", "implicit", "viscous"] = "held"
-    """How the force is integrated: "held" keeps it for `refresh_steps` steps, "viscous" splits it
-    into a constant force and viscous damping (fines of one size only), "implicit" solves it for
-    the new velocity and is stable at any step."""
+    """"held" keeps the force for `refresh_steps` steps, "viscous" takes viscous damping (fines of
+    one size), "implicit" is stable at any step."""
     refresh_steps: Annotated[int, Field(ge=1)] | None = None
-    """Steps for which scheme "held" keeps the force. When absent the force is kept for at most
-    0.05 of the drag relaxation time."""
+    """Steps for which "held" keeps the force. When absent: at most 0.05 of the relaxation time."""
     drive_velocity_m_s: Positive | Literal["auto"] | None = None
-    """Velocity of the fluid in the pores of the simulation, to shorten a run with a weak push:
-    every force is scaled by the same factor, and the physical clock runs faster by it. Allowed
-    where the fines' inertia does not matter, up to an impact Stokes number of 1. "auto" drives to
-    0.1, or as fast as the fluid itself."""
+    """Velocity in the pores of the simulation, to shorten a run with a weak push. All forces are
+    scaled by the same factor. Allowed up to an impact Stokes number of 1; "auto" drives to 0.1."""
     upstream: Literal["interstitial", "darcy"] = "darcy"
-    """Velocity of the fluid upstream of the formation face: the Darcy velocity of the mud, or the
-    interstitial one of the pack, which brings the mud faster than it flows in."""
+    """Velocity upstream of the face: "darcy", or "interstitial" as in the pack, which brings the
+    mud too fast."""
     pressure_gradient: bool = True
-    """Whether the pressure gradient of the pack acts on every fine inside it, with the volume of
-    the fine times the fall of pressure with x. The thesis's cases leave it out."""
+    """Whether the pressure gradient pushes the fines inside the pack. The thesis's cases leave it
+    out."""
     inertia: Literal["none", "schiller-naumann"] = "none"
-    """Drag at finite Reynolds numbers: "none" is Stokes's at any speed, "schiller-naumann"
-    multiplies it by 1 + 0.15 Re^0.687 (Re up to 800; scheme "held")."""
+    """"none": Stokes drag at any speed. "schiller-naumann": times 1 + 0.15 Re^0.687 (Re up to 800;
+    scheme "held")."""
     crowd: Literal["none", "beetstra"] = "none"
-    """How other fines nearby change the drag on a fine: "none" leaves it that of a lone sphere,
-    "beetstra" takes the law of Beetstra, van der Hoef and Kuipers (2007) with the porosity around
-    each fine, which fdnet computes while LIGGGHTS waits."""
+    """"none": the drag of a lone sphere. "beetstra": the law of Beetstra and others (2007) with
+    the porosity around each fine."""
     drive: Literal["pressure", "rate"] | None = None
-    """What stays constant where the field is "network": the pressure over pack, cake and the rest
-    of the way on which the overbalance is lost, or the rate. When absent: "pressure"."""
+    """What stays constant with the field "network": "pressure" (when absent) or "rate"."""
     update_travel: Annotated[float, Field(gt=0, le=MOST_TRAVEL)] | None = Field(
         None,
         description="How far the fluid carries a fine, in diameters of the smallest fine, before "
@@ -324,13 +314,11 @@ class Gravity(Part):
     """[gravity], weight and buoyancy of the moving spheres."""
 
     mode: Literal["auto", "on", "off"] = "auto"
-    """"auto" leaves gravity out where weight over drag is below `negligible_below`; the run
-    summary then says so."""
+    """"auto" leaves gravity out where weight over drag is below `negligible_below`."""
     acceleration_m_s2: Vector = (0.0, 0.0, -9.81)
     """Gravity vector (x, y, z), in any direction."""
     buoyancy: bool = True
-    """Whether the fluid's buoyancy acts: gravity times 1 - fluid over sphere density, for fines
-    and for mobile grains."""
+    """Whether the fluid's buoyancy acts on fines and mobile grains."""
     negligible_below: NonNegative = 1e-3
     """Ratio of weight to drag below which mode "auto" leaves gravity out."""
 
@@ -348,49 +336,40 @@ class Run(Part):
     """
 
     stiffness_N_m: Positive | Literal["nominal", "auto"] = DEFAULT_STIFFNESS
-    """Stiffness of the stiffest contact; all others keep their ratio to it. With contact.model =
-    "hertz": force over overlap of the stiffest contact of a fine, at an overlap of 1 % of its
-    diameter. "nominal" keeps the materials' own stiffness, which needs a far smaller time step.
-    "auto" takes the least that keeps the predicted overlaps of a fine at 3 % of its diameter, and
-    at least the default."""
+    """Stiffness of the stiffest contact; all others keep their ratio to it. With "hertz": force
+    over overlap of a fine's stiffest contact at 1 % of its diameter. "nominal" keeps the real
+    stiffness. "auto" takes the least that keeps predicted overlaps at 3 %, and at least the
+    default."""
     max_hours: Positive = 24.0
     """A case that is expected to run longer is refused before it starts."""
     max_overlap: Fraction = 0.03
-    """Overlap of a fine with another sphere, over the smaller diameter, above which `on_overlap`
-    applies."""
+    """Overlap of a fine, over the smaller diameter, above which `on_overlap` applies."""
     on_overlap: Literal["warn", "stop"] = "warn"
-    """What follows when `max_overlap` is exceeded: a warning in the summary, or the run stops with
-    its state kept."""
+    """What follows then: a warning ("warn"), or the run stops with its state kept ("stop")."""
     time_step_factor: Annotated[float, Field(gt=0, le=CONTACT_STEP_LIMIT)] = 0.2
-    """Time step over sqrt(m/k) of the lightest sphere and stiffest contact. Linear contacts
-    without rolling friction are stable up to 0.3 where damping ratios are at most 0.48, and up to
-    somewhat less with more damping; all others take at most 0.2."""
+    """Time step over sqrt(m/k) of the lightest sphere and stiffest contact. Up to 0.3 is stable
+    for linear contacts without rolling friction and with damping ratios up to 0.48; all others
+    take at most 0.2."""
     time_step_s: Positive | None = None
-    """Time step of the invasion. When absent it follows from `time_step_factor`, and explicit drag
-    keeps it below 0.1 of the drag relaxation time."""
+    """Time step of the invasion, instead of `time_step_factor`."""
     duration_ms: Positive | None = None
     """Length of the invasion. It replaces the stop rule and excludes `cap_ms`."""
     plug_time_ms: Positive | None = None
-    """The face counts as plugged when no fine has crossed it for this time. When absent: the
-    longer of the time in which the fluid passes four grain diameters and the time in which ten
-    fines arrive."""
+    """The face counts as plugged when no fine crossed it for this time. When absent: until the
+    fluid has passed four grain diameters and ten fines have arrived."""
     plug_rate: Annotated[float, Field(ge=0, lt=1)] = 0.0
     """Share of the undisturbed supply that may still cross the face while it counts as plugged."""
     stop_rate: Fraction | None = None
-    """Share of the first rate below which the invasion counts as plugged, where drag.field is
-    "network" at constant pressure."""
+    """Share of the first rate below which the invasion ends as plugged (field "network")."""
     stop_pore_volumes: Positive | None = None
-    """The invasion ends when so much fluid has passed the specimen, in volumes of its intact
-    pores, where drag.field is "network"."""
+    """The invasion ends when so many volumes of its intact pores have passed (field "network")."""
     cap_ms: Positive | None = None
-    """The invasion ends at this time at the latest. When absent it is derived from the length of
-    the slab, the plug time and the passage of the fluid."""
+    """The invasion ends at this time at the latest. When absent it follows from slab, plug time
+    and velocity."""
     checkpoint_ms: Positive | None = None
-    """Time between checkpoints (dump and restart). When absent: the time in which the fluid passes
-    about one grain diameter."""
+    """Time between checkpoints. When absent: the fluid passes about one grain diameter."""
     skin_mm: Positive | None = None
-    """Skin of LIGGGHTS's neighbour search. When absent: the radius of the smallest fine. It
-    changes run time and the order of sums, not the physics."""
+    """Skin of LIGGGHTS's neighbour search. When absent: the radius of the smallest fine."""
     neighbour_bin_mm: Positive | None = None
     """Bin width of LIGGGHTS's neighbour search. When absent LIGGGHTS chooses it."""
 
@@ -417,8 +396,8 @@ class CleanUp(Part):
     """
 
     drawdown_MPa: Positive
-    """Pressure of the formation above that of the well. It is lost on the same way as the
-    overbalance was, and makes the fluid's velocity by the same law."""
+    """Pressure of the formation above that of the well, lost on the same way as the
+    overbalance."""
     duration_ms: Positive | None = None
     """Length of the clean-up. It replaces the stop rule and excludes `cap_ms`."""
     quiet_ms: Positive | None = None
