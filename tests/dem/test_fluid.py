@@ -728,12 +728,12 @@ def test_a_fine_that_stays_where_the_fluid_is_even_meets_it_there():
     assert np.all(everywhere[1:, 0] > 1.0)
 
 
-def test_updates_at_every_diameter_carry_fines_as_far_as_sixteen_times_as_many(grains_of):
+def test_updates_at_every_diameter_carry_fines_as_far_as_eight_times_as_many(grains_of):
     """Fines of 1/20 of a grain cross a pack; the fluid at their place alone holds them back."""
     case = followed(FINE)
     scales, grains = scales_of(case), grains_of(case)
     fluid = NetworkFluid(case=case, scales=scales, grains=grains, standing=0.0)
-    assert gone(fluid, 1.0) == pytest.approx(gone(fluid, 0.0625), rel=0.05)
+    assert gone(fluid, 1.0) == pytest.approx(gone(fluid, 0.125), rel=0.05)
 
 
 def gone(fluid: NetworkFluid, travel: float) -> float:
