@@ -425,7 +425,7 @@ def test_every_command_explains_itself(capsys):
         assert ended.value.code == 0
         return capsys.readouterr().out
 
-    commands = re.findall(r"(?m)^    ([a-z]+) ", screen())
+    commands = re.findall(r"(?m)^    ([a-z]+)(?: |$)", screen())
     assert {"run", "check", "permeability", "movie"} <= set(commands)
     for command in commands:
         shown = screen(command)
