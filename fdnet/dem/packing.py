@@ -329,7 +329,7 @@ def _attempt(case: Case, folder: Path, launch: Launch, *, count: int, places: in
     frame = read_frame(dump)
     grains = snapshot_of(frame, case, time_s=0.0)
     restless = "FDNET restless" in (folder / SCREEN).read_text("utf-8", errors="replace")
-    creep = _creep(case, step, folder, grains) if restless else 0.0
+    creep = creep_of(case, step, folder, grains) if restless else 0.0
     if len(grains) != count:
         raise LiggghtsError(f"{dump}: {len(grains)} grains, expected {count}: some were lost")
     check_radii(grains, case, dump)
@@ -350,7 +350,7 @@ def _attempt(case: Case, folder: Path, launch: Launch, *, count: int, places: in
     )
 
 
-def _creep(case: Case, step: float, folder: Path, grains: Snapshot) -> float:
+def creep_of(case: Case, step: float, folder: Path, grains: Snapshot) -> float:
     """Root-mean-square speed, m/s, of grains that never came to rest.
 
     A pack that is barely jammed has such soft modes. Raises RestlessError above `MOST_CREEP` grain

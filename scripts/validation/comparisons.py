@@ -261,5 +261,5 @@ def packed(case: Case, folder: Path) -> Snapshot:
     plain = case.model_copy(update={"run": type(case.run)()})
     own = folder / f"pack-{plain.digest('pack')}"
     if not (own / "attempts.json").exists():
-        make_pack(plain, scales_of(plain), own, Launch(binary=the_binary()))
+        make_pack(plain, own, Launch(binary=the_binary()))
     return snapshot_of(read_frame(own / "post" / "pack.dump"), plain, time_s=0.0)
