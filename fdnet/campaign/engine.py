@@ -238,7 +238,10 @@ def _stop(processes: Iterable[subprocess.Popen], number: int, *, whole_group: bo
 
 SNAKEFILE = str(resources.files("fdnet.campaign").joinpath("Snakefile"))
 _SNAKEMAKE_LOG, _CONFIG = "logs/snakemake.txt", "logs/snakemake.json"
-_REASON = re.compile(r"^(?!.*\(check log file).*(?:error:|Exception|failed|locked).*$", re.MULTILINE)
+_REASON = re.compile(
+    r"^(?!.*(?:check log file|Error in rule|Look above)).*(?:[Ee]rror|Exception|failed|locked).*$",
+    re.MULTILINE,
+)
 
 
 def has_snakemake() -> bool:
